@@ -1,4 +1,8 @@
-//! What the whole program promises, one module a subject.
+//! Behaviour and reference tests, a module for each floor.
+#![expect(clippy::unwrap_used, reason = "a test that cannot read its data should fail")]
+#![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
-// The lenses that come with the program.
+/// Exact answers for single rays in hard cases.
+mod hard_cases;
+/// The lenses that come with the program.
 mod library;
