@@ -140,6 +140,11 @@ fn fallback(line: &GlassLine) -> Result<Found, Malformed> {
     Ok((medium, Outcome::Approximated, note))
 }
 
+/// Whether the glass is no maker's own: crystals, fused silica, plastics.
+pub(super) fn is_general(glass: &Glass) -> bool {
+    matches!(glass.maker.as_str(), "CRYSTAL" | "PLASTIC" | "FUSED_SILICA")
+}
+
 /// `517642` and `517.642`: nd 1.517, vd 64.2.
 fn code(name: &str) -> Option<(f64, f64)> {
     let digits: String = name.chars().filter(|c| *c != '.').collect();

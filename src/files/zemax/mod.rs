@@ -10,6 +10,9 @@ mod glass;
 mod line;
 mod parse;
 mod shape;
+mod write;
+
+pub use write::write;
 
 use super::error::{FileError, Malformed};
 use super::report::Report;
