@@ -254,136 +254,86 @@ impl<R: Real> Tracer<R> {
     #[inline(always)]
     fn homeward(
         &self,
-        mut block: Block<R>,
+        block: Block<R>,
         distances: &[[R; BLOCK]],
         count: usize,
         seed: impl Fn(usize) -> Seed<R>,
         harvest: &mut impl Harvest<R>,
     ) {
-        let mut adjoint = self.sow(&block, count, &seed, harvest);
+        let mut way = Homeward::new(block);
+        self.sow(&mut way, count, &seed, harvest);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
-            let before = i.checked_sub(1);
-            let mut lanes = Derivatives::zero();
+            way.s = *distance;
             match interface.form {
-                Form::Plane | Form::Sphere => {
-                    adjoint.retrace(interface, &mut block, distance, &mut lanes, sphere_normal);
-                }
-                Form::Conic => {
-                    adjoint.retrace(interface, &mut block, distance, &mut lanes, conic_normal);
-                }
-                Form::Asphere => {
-                    adjoint.retrace_asphere(interface, &mut block, distance, &mut lanes);
-                }
+                Form::Plane | Form::Sphere => way.retrace(interface, sphere_normal),
+                Form::Conic => way.retrace(interface, conic_normal),
+                Form::Asphere => way.retrace_asphere(interface),
             }
-            lanes.forget_lost(&block);
-            harvest.take(Some(i), Slot::Curvature, &lanes.curvature);
-            if matches!(interface.form, Form::Conic | Form::Asphere) {
-                harvest.take(Some(i), Slot::Conic, &lanes.conic);
-            }
-            if interface.form == Form::Asphere {
-                for (term, column) in lanes.terms.iter().enumerate() {
-                    harvest.take(Some(i), Slot::Term(term), column);
-                }
-            }
-            if before.is_some() {
-                harvest.take(before, Slot::Thickness, &lanes.gap);
-            }
-            harvest.take(interface.medium, Slot::Index, &lanes.index_before);
-            let behind = if interface.mirror { interface.medium } else { Some(i) };
-            harvest.take(behind, Slot::Index, &lanes.index_behind);
+            way.harvest(interface, i, harvest);
         }
-        self.launch_index(&block, &adjoint, harvest);
+        self.launch_index(&way, harvest);
     }
 
     /// The adjoint of the landing; the direction cosines are `k / n'`.
     #[inline(always)]
     fn sow(
         &self,
-        block: &Block<R>,
+        way: &mut Homeward<R>,
         count: usize,
         seed: &impl Fn(usize) -> Seed<R>,
         harvest: &mut impl Harvest<R>,
-    ) -> Adjoint<R> {
-        let mut adjoint = Adjoint::zero();
+    ) {
         let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
         let inverse = R::ONE / index;
         let mut by_index = [R::ZERO; BLOCK];
-        for j in 0..count {
-            if block.code[j] > R::ZERO {
+        for (j, by_index) in by_index.iter_mut().enumerate().take(count) {
+            if way.block.code[j] > R::ZERO {
                 continue;
             }
             let seed = seed(j);
-            let k = Vec3::new(block.kx[j], block.ky[j], block.kz[j]);
-            (adjoint.x[j], adjoint.y[j], adjoint.z[j]) = (seed.point.x, seed.point.y, seed.point.z);
+            let (_, k) = way.block.state(j);
             let direction = seed.direction * inverse;
-            (adjoint.kx[j], adjoint.ky[j], adjoint.kz[j]) = (direction.x, direction.y, direction.z);
-            adjoint.opl[j] = seed.opl;
-            by_index[j] = -(direction.dot(k) * inverse);
+            way.set(j, seed.point, direction);
+            way.by_opl[j] = seed.opl;
+            *by_index = -(direction.dot(k) * inverse);
         }
         let behind = self.interfaces.iter().rposition(|interface| !interface.mirror);
         harvest.take(behind, Slot::Index, &by_index);
-        adjoint
     }
 
     /// The first optical direction is the index times the direction.
     #[inline(always)]
-    fn launch_index(&self, block: &Block<R>, adjoint: &Adjoint<R>, harvest: &mut impl Harvest<R>) {
+    fn launch_index(&self, way: &Homeward<R>, harvest: &mut impl Harvest<R>) {
         let inverse = R::ONE / self.index_before;
-        let mut lanes = [R::ZERO; BLOCK];
-        for j in 0..BLOCK {
-            let k = Vec3::new(block.kx[j], block.ky[j], block.kz[j]);
-            let by_k = Vec3::new(adjoint.kx[j], adjoint.ky[j], adjoint.kz[j]);
-            lanes[j] = R::select(block.code[j] > R::ZERO, R::ZERO, by_k.dot(k) * inverse);
-        }
+        let lanes = std::array::from_fn(|j| {
+            let (_, k) = way.block.state(j);
+            let by_index = way.by_k(j).dot(k) * inverse;
+            R::select(way.block.code[j] > R::ZERO, R::ZERO, by_index)
+        });
         harvest.take(None, Slot::Index, &lanes);
     }
 }
 
-/// The derivatives by the state of a block of rays.
-struct Adjoint<R> {
-    x: [R; BLOCK],
-    y: [R; BLOCK],
-    z: [R; BLOCK],
-    kx: [R; BLOCK],
-    ky: [R; BLOCK],
-    kz: [R; BLOCK],
-    opl: [R; BLOCK],
-}
-
-/// The derivatives of a block by the numbers of one surface.
-struct Derivatives<R> {
-    curvature: [R; BLOCK],
-    conic: [R; BLOCK],
-    terms: [[R; BLOCK]; ASPHERE_TERMS],
-    gap: [R; BLOCK],
-    index_before: [R; BLOCK],
-    index_behind: [R; BLOCK],
-}
-
-impl<R: Real> Derivatives<R> {
-    #[inline(always)]
-    fn zero() -> Self {
-        let zero = [R::ZERO; BLOCK];
-        Self {
-            curvature: zero,
-            conic: zero,
-            terms: [zero; ASPHERE_TERMS],
-            gap: zero,
-            index_before: zero,
-            index_behind: zero,
-        }
-    }
-
-    /// A lost ray counts nothing, whatever its numbers have become.
-    #[inline(always)]
-    fn forget_lost(&mut self, block: &Block<R>) {
-        let Self { curvature, conic, terms, gap, index_before, index_behind } = self;
-        for lanes in [curvature, conic, gap, index_before, index_behind].into_iter().chain(terms) {
-            for (lane, code) in lanes.iter_mut().zip(&block.code) {
-                *lane = R::select(*code > R::ZERO, R::ZERO, *lane);
-            }
-        }
-    }
+/// A block of rays on its way back: where it is, the derivatives by its state, and those by the
+/// numbers of the surface it has just passed. One value, so that the compiler sees that no column
+/// overlaps another.
+struct Homeward<R> {
+    block: Block<R>,
+    /// The distance to the surface.
+    s: [R; BLOCK],
+    by_x: [R; BLOCK],
+    by_y: [R; BLOCK],
+    by_z: [R; BLOCK],
+    by_kx: [R; BLOCK],
+    by_ky: [R; BLOCK],
+    by_kz: [R; BLOCK],
+    by_opl: [R; BLOCK],
+    by_curvature: [R; BLOCK],
+    by_conic: [R; BLOCK],
+    by_gap: [R; BLOCK],
+    by_index_before: [R; BLOCK],
+    by_index_behind: [R; BLOCK],
+    by_terms: [[R; BLOCK]; ASPHERE_TERMS],
 }
 
 /// The normal of a surface and everything about it that the adjoint needs.
@@ -455,21 +405,43 @@ fn unrefract<R: Real>(
     Refracted { k, a, by_k: by_behind + vector * by_a, by_normal, by_dn2 }
 }
 
-impl<R: Real> Adjoint<R> {
+impl<R: Real> Homeward<R> {
     #[inline(always)]
-    fn zero() -> Self {
+    fn new(block: Block<R>) -> Self {
         let zero = [R::ZERO; BLOCK];
-        Self { x: zero, y: zero, z: zero, kx: zero, ky: zero, kz: zero, opl: zero }
+        Self {
+            block,
+            s: zero,
+            by_x: zero,
+            by_y: zero,
+            by_z: zero,
+            by_kx: zero,
+            by_ky: zero,
+            by_kz: zero,
+            by_opl: zero,
+            by_curvature: zero,
+            by_conic: zero,
+            by_gap: zero,
+            by_index_before: zero,
+            by_index_behind: zero,
+            by_terms: [zero; ASPHERE_TERMS],
+        }
     }
 
     #[inline(always)]
     fn by_point(&self, j: usize) -> Vec3<R> {
-        Vec3::new(self.x[j], self.y[j], self.z[j])
+        Vec3::new(self.by_x[j], self.by_y[j], self.by_z[j])
     }
 
     #[inline(always)]
     fn by_k(&self, j: usize) -> Vec3<R> {
-        Vec3::new(self.kx[j], self.ky[j], self.kz[j])
+        Vec3::new(self.by_kx[j], self.by_ky[j], self.by_kz[j])
+    }
+
+    #[inline(always)]
+    fn set(&mut self, j: usize, by_point: Vec3<R>, by_k: Vec3<R>) {
+        (self.by_x[j], self.by_y[j], self.by_z[j]) = (by_point.x, by_point.y, by_point.z);
+        (self.by_kx[j], self.by_ky[j], self.by_kz[j]) = (by_k.x, by_k.y, by_k.z);
     }
 
     /// Goes back through a conic (a plane, a sphere) to the surface before.
@@ -477,46 +449,33 @@ impl<R: Real> Adjoint<R> {
     fn retrace(
         &mut self,
         surface: &Interface<R>,
-        block: &mut Block<R>,
-        distance: &[R; BLOCK],
-        lanes: &mut Derivatives<R>,
         normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
     ) {
         let surface = *surface;
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
         let half = R::from_f64(0.5);
         for j in 0..BLOCK {
-            let (p, behind) = block.state(j);
+            let (p, behind) = self.block.state(j);
             let normal = normal(&surface, p);
             let back = unrefract(&surface, normal, behind, self.by_k(j));
             let n = back.by_normal;
             let by_point = self.by_point(j) - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
-            let lambda = (by_point.dot(back.k) + self.opl[j] * surface.n2) / back.a;
+            let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             let bulge = p.x * p.x + p.y * p.y + k1 * p.z * p.z;
-            lanes.curvature[j] = lambda * bulge * half - (p.x * n.x + p.y * n.y + k1 * p.z * n.z);
+            self.by_curvature[j] = lambda * bulge * half - (p.x * n.x + p.y * n.y + k1 * p.z * n.z);
             if !normal.unit {
-                lanes.conic[j] = c * p.z * (lambda * p.z * half - n.z);
+                self.by_conic[j] = c * p.z * (lambda * p.z * half - n.z);
             }
-            let step = Step { p, by_point, lambda, s: distance[j], normal: normal.vector };
-            self.step_back(&surface, j, block, lanes, (back, step));
+            self.step_back(&surface, j, p, &back, by_point - normal.vector * lambda);
         }
     }
 
     /// Goes back through an asphere to the surface before.
     #[inline(always)]
-    fn retrace_asphere(
-        &mut self,
-        surface: &Interface<R>,
-        block: &mut Block<R>,
-        distance: &[R; BLOCK],
-        lanes: &mut Derivatives<R>,
-    ) {
+    fn retrace_asphere(&mut self, surface: &Interface<R>) {
         let surface = *surface;
         for j in 0..BLOCK {
-            if block.code[j] > R::ZERO {
-                continue;
-            }
-            let (p, behind) = block.state(j);
+            let (p, behind) = self.block.state(j);
             let sag = Sag::new(&surface, p.x * p.x + p.y * p.y);
             let slope = -(sag.slope + sag.slope);
             let vector = Vec3::new(p.x * slope, p.y * slope, R::ONE);
@@ -528,46 +487,58 @@ impl<R: Real> Adjoint<R> {
             let radial = by_slope * sag.bend * R::TWO;
             let by_point = self.by_point(j)
                 + Vec3::new(p.x * radial + n.x * slope, p.y * radial + n.y * slope, R::ZERO);
-            let lambda = (by_point.dot(back.k) + self.opl[j] * surface.n2) / back.a;
-            sag.harvest(lambda, by_slope, j, lanes);
-            let step = Step { p, by_point, lambda, s: distance[j], normal: vector };
-            self.step_back(&surface, j, block, lanes, (back, step));
+            let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
+            (self.by_curvature[j], self.by_conic[j]) = sag.by_conic(lambda, by_slope);
+            let terms = sag.by_terms(lambda, by_slope);
+            self.by_terms.iter_mut().zip(terms).for_each(|(column, by_term)| column[j] = by_term);
+            self.step_back(&surface, j, p, &back, by_point - vector * lambda);
         }
     }
 
-    /// From the surface to the one before: the adjoint of the intersection and of the gap.
+    /// From the surface to the one before: the adjoint of the way between and of the gap.
     #[inline(always)]
     fn step_back(
         &mut self,
         surface: &Interface<R>,
         j: usize,
-        block: &mut Block<R>,
-        lanes: &mut Derivatives<R>,
-        (back, step): (Refracted<R>, Step<R>),
+        p: Vec3<R>,
+        back: &Refracted<R>,
+        by_start: Vec3<R>,
     ) {
-        let Step { p, by_point, lambda, s, normal } = step;
-        let by_start = by_point - normal * lambda;
-        let by_k = back.by_k + by_start * s;
+        let s = self.s[j];
         let start = p - back.k * s;
-        lanes.gap[j] = -by_start.z;
+        self.by_gap[j] = -by_start.z;
         // dn2 = n'² − n², and the optical path is s n².
-        lanes.index_behind[j] = back.by_dn2 * surface.index_behind * R::TWO;
-        let path = self.opl[j] * s;
-        lanes.index_before[j] = (path - back.by_dn2) * surface.index_before * R::TWO;
-        (self.x[j], self.y[j], self.z[j]) = (by_start.x, by_start.y, by_start.z);
-        (self.kx[j], self.ky[j], self.kz[j]) = (by_k.x, by_k.y, by_k.z);
-        (block.x[j], block.y[j], block.z[j]) = (start.x, start.y, start.z + surface.gap);
-        (block.kx[j], block.ky[j], block.kz[j]) = (back.k.x, back.k.y, back.k.z);
+        self.by_index_behind[j] = back.by_dn2 * surface.index_behind * R::TWO;
+        let path = self.by_opl[j] * s;
+        self.by_index_before[j] = (path - back.by_dn2) * surface.index_before * R::TWO;
+        self.set(j, by_start, back.by_k + by_start * s);
+        self.block.set(j, Vec3::new(start.x, start.y, start.z + surface.gap), back.k);
     }
-}
 
-/// What the adjoint of the intersection needs.
-struct Step<R> {
-    p: Vec3<R>,
-    by_point: Vec3<R>,
-    lambda: R,
-    s: R,
-    normal: Vec3<R>,
+    /// Hands over the derivatives by the numbers of a surface. A lost ray counts nothing, whatever
+    /// its numbers have become.
+    #[inline(always)]
+    fn harvest(&self, surface: &Interface<R>, i: usize, harvest: &mut impl Harvest<R>) {
+        let arrived = |lanes: &[R; BLOCK]| -> [R; BLOCK] {
+            std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
+        };
+        harvest.take(Some(i), Slot::Curvature, &arrived(&self.by_curvature));
+        if matches!(surface.form, Form::Conic | Form::Asphere) {
+            harvest.take(Some(i), Slot::Conic, &arrived(&self.by_conic));
+        }
+        if surface.form == Form::Asphere {
+            for (term, lanes) in self.by_terms.iter().enumerate() {
+                harvest.take(Some(i), Slot::Term(term), &arrived(lanes));
+            }
+        }
+        if let Some(before) = i.checked_sub(1) {
+            harvest.take(Some(before), Slot::Thickness, &arrived(&self.by_gap));
+        }
+        harvest.take(surface.medium, Slot::Index, &arrived(&self.by_index_before));
+        let behind = if surface.mirror { surface.medium } else { Some(i) };
+        harvest.take(behind, Slot::Index, &arrived(&self.by_index_behind));
+    }
 }
 
 /// An asphere at a distance from the axis: `w = dz/dr²` and every derivative of z and w.
@@ -603,20 +574,26 @@ impl<R: Real> Sag<R> {
         }
     }
 
-    /// Derivatives by curvature, conic constant and coefficients, from those by z and by w.
+    /// Derivatives by curvature and conic constant, from those by z and by w.
     #[inline(always)]
-    fn harvest(&self, by_z: R, by_w: R, j: usize, lanes: &mut Derivatives<R>) {
+    fn by_conic(&self, by_z: R, by_w: R) -> (R, R) {
         let (c, q, r2) = (self.curvature, self.root, self.r2);
-        let one_q = R::ONE + q;
-        let cube = q * q * q;
-        lanes.curvature[j] = by_z * r2 / (q * one_q) + by_w / (cube + cube);
+        let (one_q, cube) = (R::ONE + q, q * q * q);
+        let by_curvature = by_z * r2 / (q * one_q) + by_w / (cube + cube);
         let c3 = c * c * c * r2;
-        lanes.conic[j] =
+        let by_conic =
             by_z * c3 * r2 / (R::TWO * q * one_q * one_q) + by_w * c3 / (R::from_f64(4.0) * cube);
-        let mut power = r2;
-        for (term, column) in lanes.terms.iter_mut().enumerate() {
-            column[j] = power * (by_z * r2 + by_w * R::from_f64(term as f64 + 2.0));
-            power = power * r2;
-        }
+        (by_curvature, by_conic)
+    }
+
+    /// Derivatives by the coefficients, from those by z and by w.
+    #[inline(always)]
+    fn by_terms(&self, by_z: R, by_w: R) -> [R; ASPHERE_TERMS] {
+        let mut power = self.r2;
+        std::array::from_fn(|term| {
+            let by_term = power * (by_z * self.r2 + by_w * R::from_f64(term as f64 + 2.0));
+            power = power * self.r2;
+            by_term
+        })
     }
 }

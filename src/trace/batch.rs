@@ -353,6 +353,12 @@ impl<R: Real> Block<R> {
     }
 
     #[inline(always)]
+    pub(super) fn set(&mut self, j: usize, p: Vec3<R>, k: Vec3<R>) {
+        (self.x[j], self.y[j], self.z[j]) = (p.x, p.y, p.z);
+        (self.kx[j], self.ky[j], self.kz[j]) = (k.x, k.y, k.z);
+    }
+
+    #[inline(always)]
     fn cross<S: Sink<R>>(&mut self, interface: &Interface<R>, number: u32) {
         if S::PATH {
             let mut opl = self.opl;
@@ -400,9 +406,7 @@ impl<R: Real> Block<R> {
             let (p, k) = self.state(j);
             let p = Vec3::new(p.x, p.y, p.z - interface.gap);
             let crossing = interface.go_on(meet(&interface, p, k), k);
-            let (p, k) = (crossing.point, crossing.k);
-            (self.x[j], self.y[j], self.z[j]) = (p.x, p.y, p.z);
-            (self.kx[j], self.ky[j], self.kz[j]) = (k.x, k.y, k.z);
+            self.set(j, crossing.point, crossing.k);
             keep(j, crossing.s);
             let code = code(&crossing, missed, clipped, reflected);
             self.code[j] = R::select(self.code[j] > R::ZERO, self.code[j], code);
