@@ -1,1 +1,5 @@
-//! studio
+//! The window: panels read a view and push commands.
+//!
+//! **A panel changes nothing**: it gets a view of the design and writes down wishes.
+
+pub mod draw;

@@ -1,0 +1,6 @@
+//! What the window shows: every shader is valid, and the graphics card draws what the processor
+//! draws.
+#![expect(clippy::unwrap_used, reason = "a test that cannot prepare its case should fail")]
+
+mod drawing;
+mod shaders;
