@@ -1,29 +1,59 @@
-//! Aplanat designs lenses by computation.
+//! Aplanat designs lenses by computation: exact rays, exact derivatives, and a studio around them.
+//!
+//! This file is the map. The modules below are the floors of the house, from the ground up, and
+//! **a module uses only modules declared above it**; `tests/architecture.rs` keeps that true.
+//!
+//! What is deliberately absent:
+//! - *tracing looks nothing up*: a [`lens::Lens`] is what a person wrote, a [`lens::System`] holds
+//!   only numbers;
+//! - *no ray is dropped silently*: every ray ends with a [`trace::Fate`];
+//! - *the engine reads no clock*: only `measure` and `session` do;
+//! - *no result depends on the number of threads*: sums run over fixed chunks, in order;
+//! - *a panel changes nothing*: it reads a view and pushes commands.
+//!
+//! Units and signs: lengths in millimetres, angles in radians inside and in degrees in files and
+//! windows, wavelengths in micrometres. Light travels towards +z, and a positive curvature has
+//! its centre to the right of the surface. Thickness and glass of a row belong to the gap after it.
+
+// Numbers without optics: the number types, vectors, roots, quadrature, samplers.
 pub mod math;
 
+// The prescription that a designer writes, and the system of plain numbers it resolves to.
 pub mod lens;
 
+// First-order optics: cardinal points, pupils, Seidel sums, the focus solve.
 pub mod paraxial;
 
+// Real rays through a system: every ray ends with a fate; derivatives forwards and backwards.
 pub mod trace;
 
+// Reading and writing lenses: the native JSON, Zemax; an export proves itself.
 pub mod files;
 
+// The set of rays that get through: where they start, their boundary, quadrature over them.
 pub mod pupil;
 
+// What a designer reads, each number with its error estimate.
 pub mod analysis;
 
+// What "better" means: weighted terms with gradients.
 pub mod merit;
 
+// Which physical effects a scene calls for, each decision with the number it rests on.
 pub mod effects;
 
+// Local search: Adam and damped least squares, one step at a time.
 pub mod optimize;
 
+// Accuracy against time, throughput, memory.
 pub mod measure;
 
+// One open design: commands, undo, background worker, events. Knows no widgets.
 pub mod session;
 
+// The window: panels read a view and push commands. The only module that knows egui.
 #[cfg(feature = "studio")]
 pub mod studio;
 
+// The headless command line.
 pub mod cli;

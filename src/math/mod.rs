@@ -1,1 +1,13 @@
-//! math
+//! Numbers without optics.
+//!
+//! The physics is written once over the trait [`Real`]: `f64` gives a ray, `f32` a fast preview,
+//! a [`Dual`] a derivative, a dual of duals a second derivative.
+
+mod dual;
+pub mod quadrature;
+mod real;
+mod vec3;
+
+pub use dual::Dual;
+pub use real::Real;
+pub use vec3::Vec3;

@@ -1,0 +1,166 @@
+//! Glass: index against wavelength, by catalogue name or from nd and vd.
+//!
+//! The catalogue is `assets/glasses.json`, a subset of the refractiveindex.info database (CC0).
+//! Indices are relative to air at about 20 °C, as in the makers' catalogues.
+
+use serde::Deserialize;
+use std::sync::OnceLock;
+
+/// Wavelengths of the spectral lines that index and Abbe number refer to, in micrometres.
+pub mod line {
+    /// Blue mercury.
+    pub const G: f64 = 0.4358343;
+    /// Blue hydrogen.
+    pub const F: f64 = 0.4861327;
+    /// Yellow helium.
+    pub const D: f64 = 0.5875618;
+    /// Red hydrogen.
+    pub const C: f64 = 0.6562725;
+}
+
+/// The formula of a catalogue glass, over the wavelength in micrometres.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Formula {
+    /// `n² = 1 + c₀ + Σ Bᵢ λ²/(λ² − Cᵢ)`.
+    SellmeierSq,
+    /// `n² = 1 + c₀ + Σ Bᵢ λ²/(λ² − Cᵢ²)`.
+    SellmeierLin,
+    /// `n² = c₀ + Σ cᵢ λ^pᵢ`.
+    Poly,
+}
+
+/// One glass of the catalogue.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Glass {
+    /// Its name with the maker.
+    pub name: String,
+    /// The maker: SCHOTT, OHARA, HOYA, ...
+    pub maker: String,
+    /// Index at the d line.
+    pub nd: f64,
+    /// Abbe number.
+    pub vd: f64,
+    /// The dispersion formula.
+    pub formula: Formula,
+    /// Its coefficients.
+    pub coefficients: Vec<f64>,
+    /// Where the formula holds, in micrometres.
+    pub range_um: [f64; 2],
+}
+
+impl Glass {
+    /// The index at a wavelength in micrometres; `None` where the formula does not hold.
+    pub fn index(&self, um: f64) -> Option<f64> {
+        let [low, high] = self.range_um;
+        if !(low..=high).contains(&um) {
+            return None;
+        }
+        let (first, rest) = self.coefficients.split_first()?;
+        let l2 = um * um;
+        let term = |pair: &[f64]| match self.formula {
+            Formula::SellmeierSq => pair[0] * l2 / (l2 - pair[1]),
+            Formula::SellmeierLin => pair[0] * l2 / (l2 - pair[1] * pair[1]),
+            Formula::Poly => pair[0] * um.powf(pair[1]),
+        };
+        let sum: f64 = rest.chunks_exact(2).map(term).sum();
+        let one = if self.formula == Formula::Poly { 0.0 } else { 1.0 };
+        let n2 = one + first + sum;
+        (n2 > 0.0).then(|| n2.sqrt())
+    }
+
+    /// Maker and name, as lens files write it.
+    pub fn full_name(&self) -> String {
+        format!("{} {}", self.maker, self.name)
+    }
+}
+
+#[derive(Deserialize)]
+struct Catalogue {
+    glasses: Vec<Glass>,
+}
+
+/// Every glass that comes with the program.
+pub fn catalogue() -> &'static [Glass] {
+    static CATALOGUE: OnceLock<Vec<Glass>> = OnceLock::new();
+    CATALOGUE.get_or_init(|| {
+        let text = include_str!("../../assets/glasses.json");
+        let parsed: Result<Catalogue, _> = serde_json::from_str(text);
+        parsed.map(|c| c.glasses).unwrap_or_default()
+    })
+}
+
+/// The glass with this name, `SCHOTT N-BK7` or, where only one maker has it, `N-BK7`; blanks and
+/// case do not matter.
+pub fn find(name: &str) -> Option<&'static Glass> {
+    let wanted = plain(name);
+    let full = catalogue().iter().find(|glass| plain(&glass.full_name()) == wanted);
+    full.or_else(|| {
+        let mut same = catalogue().iter().filter(|glass| plain(&glass.name) == wanted);
+        let only = same.next();
+        if same.next().is_some() { None } else { only }
+    })
+}
+
+/// Upper case without blanks.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_uppercase).collect()
+}
+
+/// The names nearest to one that was not found, for an error message.
+pub fn similar(name: &str) -> Vec<String> {
+    let letters = |text: &str| -> String {
+        plain(text).chars().filter(char::is_ascii_alphanumeric).collect()
+    };
+    let wanted = letters(name);
+    let near = |glass: &&Glass| {
+        let short = letters(&glass.name);
+        wanted.ends_with(&short) || short.contains(&wanted)
+    };
+    catalogue().iter().filter(near).take(3).map(Glass::full_name).collect()
+}
+
+/// The index of a model glass at a wavelength in micrometres, from index and Abbe number at the d
+/// line. Conrady's form `n = A + B/λ + C/λ^3.5` through nd, the difference nF − nC, and the
+/// partial dispersion of the normal line `PgF = 0.6438 − 0.001682 vd`; constant for `vd = 0`.
+pub fn model_index(nd: f64, vd: f64, um: f64) -> f64 {
+    if vd == 0.0 {
+        return nd;
+    }
+    let p = |l: f64| 1.0 / l;
+    let q = |l: f64| l.powf(-3.5);
+    let spread = (nd - 1.0) / vd;
+    let partial = (0.6438 - 0.001682 * vd) * spread;
+    // B and C from nF − nC and ng − nF.
+    let (a11, a12) = (p(line::F) - p(line::C), q(line::F) - q(line::C));
+    let (a21, a22) = (p(line::G) - p(line::F), q(line::G) - q(line::F));
+    let determinant = a11 * a22 - a12 * a21;
+    let b = (spread * a22 - partial * a12) / determinant;
+    let c = (a11 * partial - a21 * spread) / determinant;
+    nd + b * (p(um) - p(line::D)) + c * (q(um) - q(line::D))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_catalogue_agrees_with_its_own_nd_and_vd() {
+        assert!(catalogue().len() > 300);
+        for glass in catalogue() {
+            let n = |um| glass.index(um).unwrap();
+            let vd = (n(line::D) - 1.0) / (n(line::F) - n(line::C));
+            assert!((n(line::D) - glass.nd).abs() < 2e-6, "{}", glass.full_name());
+            assert!((vd - glass.vd).abs() < 2e-3 * vd, "{}", glass.full_name());
+        }
+    }
+
+    #[test]
+    fn a_model_glass_has_its_index_and_abbe_number() {
+        let n = |um| model_index(1.62004, 36.37, um);
+        assert!((n(line::D) - 1.62004).abs() < 1e-15);
+        assert!(((n(line::D) - 1.0) / (n(line::F) - n(line::C)) - 36.37).abs() < 1e-9);
+        let real = find("SCHOTT F2").unwrap();
+        assert!((n(line::G) - real.index(line::G).unwrap()).abs() < 1e-4);
+    }
+}

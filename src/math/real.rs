@@ -1,0 +1,119 @@
+//! The number type that the physics is written over.
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// A real number, or something that behaves like one and carries derivatives along.
+///
+/// Comparisons look at the value alone, so a [`Dual`](super::Dual) takes the path of the plain
+/// number.
+pub trait Real:
+    Copy
+    + Debug
+    + Default
+    + PartialEq
+    + PartialOrd
+    + Add<Output = Self>
+    + AddAssign
+    + Sub<Output = Self>
+    + SubAssign
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + Send
+    + Sync
+    + 'static
+{
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+    /// Two.
+    const TWO: Self;
+    /// The distance from one to the next larger number.
+    const EPSILON: f64;
+
+    /// The number nearest to `value`, with no derivative.
+    fn from_f64(value: f64) -> Self;
+
+    /// The value alone, without derivatives.
+    fn value(self) -> f64;
+
+    /// The square root; not a number for a negative argument.
+    #[must_use]
+    fn sqrt(self) -> Self;
+
+    /// The absolute value.
+    #[inline(always)]
+    #[must_use]
+    fn abs(self) -> Self {
+        Self::select(self < Self::ZERO, -self, self)
+    }
+
+    /// `yes` where the condition holds, else `no`: a choice that a vector of rays can make too.
+    #[inline(always)]
+    #[must_use]
+    fn select(condition: bool, yes: Self, no: Self) -> Self {
+        if condition { yes } else { no }
+    }
+
+    /// Whether the value and every derivative are finite.
+    fn is_finite(self) -> bool;
+}
+
+impl Real for f64 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+    const TWO: Self = 2.0;
+    const EPSILON: f64 = 2.220446049250313e-16;
+
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn value(self) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        self.is_finite()
+    }
+}
+
+impl Real for f32 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+    const TWO: Self = 2.0;
+    const EPSILON: f64 = 1.1920928955078125e-7;
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what is asked")]
+    fn from_f64(value: f64) -> Self {
+        value as Self
+    }
+    #[inline(always)]
+    fn value(self) -> f64 {
+        f64::from(self)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        self.is_finite()
+    }
+}
