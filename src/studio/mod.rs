@@ -3,3 +3,7 @@
 //! **A panel changes nothing**: it gets a view of the design and writes down wishes.
 
 pub mod draw;
+pub mod number;
+pub mod palette;
+pub mod section;
+pub mod shell;
