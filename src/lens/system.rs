@@ -48,6 +48,19 @@ impl<R: Real> Shape<R> {
         }
     }
 
+    /// The simplest form with these numbers, coefficients of r⁴, r⁶, ... as far as there are any.
+    ///
+    /// # Errors
+    /// More coefficients than the model has.
+    pub fn new(curvature: R, conic: R, terms: &[R], surface: usize) -> Result<Self, Invalid> {
+        if terms.len() > ASPHERE_TERMS {
+            return Err(Invalid::TooManyTerms { surface, found: terms.len() });
+        }
+        let mut all = [R::ZERO; ASPHERE_TERMS];
+        all[..terms.len()].copy_from_slice(terms);
+        Ok(Self::simplest(curvature, conic, all))
+    }
+
     /// Curvature at the vertex, conic constant and polynomial, zero where the form has none.
     pub fn numbers(&self) -> (R, R, [R; ASPHERE_TERMS]) {
         match *self {

@@ -127,6 +127,7 @@ impl<R: Real, const N: usize> Real for Dual<R, N> {
     const ONE: Self = Self { value: R::ONE, slope: [R::ZERO; N] };
     const TWO: Self = Self { value: R::TWO, slope: [R::ZERO; N] };
     const EPSILON: f64 = R::EPSILON;
+    const ORDER: usize = R::ORDER + 1;
 
     #[inline(always)]
     fn from_f64(value: f64) -> Self {

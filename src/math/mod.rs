@@ -3,11 +3,13 @@
 //! The physics is written once over the trait [`Real`]: `f64` gives a ray, `f32` a fast preview,
 //! a [`Dual`] a derivative, a dual of duals a second derivative.
 
+mod double;
 mod dual;
 pub mod quadrature;
 mod real;
 mod vec3;
 
+pub use double::Double;
 pub use dual::Dual;
 pub use real::Real;
 pub use vec3::Vec3;

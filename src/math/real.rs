@@ -33,6 +33,9 @@ pub trait Real:
     /// The distance from one to the next larger number.
     const EPSILON: f64;
 
+    /// How many derivatives it carries along: 0 for a plain number.
+    const ORDER: usize;
+
     /// The number nearest to `value`, with no derivative.
     fn from_f64(value: f64) -> Self;
 
@@ -61,10 +64,12 @@ pub trait Real:
     fn is_finite(self) -> bool;
 }
 
+#[expect(clippy::use_self, reason = "the constant is an f64 for every number type")]
 impl Real for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const TWO: Self = 2.0;
+    const ORDER: usize = 0;
     const EPSILON: f64 = 2.220446049250313e-16;
 
     #[inline(always)]
@@ -93,6 +98,7 @@ impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const TWO: Self = 2.0;
+    const ORDER: usize = 0;
     const EPSILON: f64 = 1.1920928955078125e-7;
 
     #[inline(always)]

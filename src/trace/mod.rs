@@ -1,1 +1,49 @@
-//! trace
+//! Real rays through a resolved lens: move to the surface, meet it, refract.
+//!
+//! After Spencer and Murty, "General Ray-Tracing Procedure", JOSA 52 (1962), with the optical
+//! direction `k = n (L, M, N)` in place of the direction cosines (Feder, JOSA 41, 1951): Snell's
+//! law becomes `k' = k + Γ N`, and no index ratio is needed. A ray that does not arrive ends with
+//! a [`Fate`] that names the surface and the cause.
+//!
+//! Which crossing of a surface counts is decided by the sense of travel σ, which starts at +1 and
+//! turns at every mirror: the one with `σ k·N > 0`. It is not the sign of `N`: light that comes
+//! from behind the front lens of a fisheye still travels forwards.
+
+mod asphere;
+mod batch;
+mod fate;
+mod interface;
+mod single;
+
+pub use batch::{Hits, Points, Rays, Sink, Width};
+pub use fate::{Fate, Fates};
+pub use single::{Landing, Path, Ray};
+
+use crate::lens::Invalid;
+use crate::lens::System;
+use crate::math::Real;
+use interface::Interface;
+
+/// A system made ready for tracing: checked, with every constant of a surface worked out once.
+#[derive(Debug, Clone)]
+pub struct Tracer<R> {
+    interfaces: Vec<Interface<R>>,
+    index_before: R,
+}
+
+impl<R: Real> Tracer<R> {
+    /// Prepares a system.
+    ///
+    /// # Errors
+    /// Numbers that no ray can be traced with: see [`System::check`].
+    pub fn new(system: &System<R>) -> Result<Self, Invalid> {
+        system.check()?;
+        let interfaces = interface::interfaces(system);
+        Ok(Self { interfaces, index_before: system.index_before })
+    }
+
+    /// How many surfaces a ray crosses, the image plane included.
+    pub fn surfaces(&self) -> usize {
+        self.interfaces.len()
+    }
+}

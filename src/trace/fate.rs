@@ -1,0 +1,87 @@
+//! How a ray ends.
+
+use serde::Serialize;
+
+/// How a ray ends, and at which surface (counted from 0).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Fate {
+    /// It reaches the last surface.
+    Imaged,
+    /// It does not meet the surface.
+    Missed(u32),
+    /// It meets the surface outside the semi-diameter.
+    Clipped(u32),
+    /// It is totally reflected.
+    TotalReflection(u32),
+}
+
+impl Fate {
+    /// What this kind of end is called in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Imaged => "imaged",
+            Self::Missed(_) => "missed",
+            Self::Clipped(_) => "clipped",
+            Self::TotalReflection(_) => "total_reflection",
+        }
+    }
+
+    /// The surface at which the ray was lost; `None` for one that arrived.
+    pub fn surface(self) -> Option<usize> {
+        match self {
+            Self::Imaged => None,
+            Self::Missed(i) | Self::Clipped(i) | Self::TotalReflection(i) => Some(i as usize),
+        }
+    }
+
+    /// Whether the ray arrived.
+    pub fn is_imaged(self) -> bool {
+        self == Self::Imaged
+    }
+
+    /// The number that stands for a cause at a surface inside the kernels: 0 for a ray on its way,
+    /// else `4 surface + cause`.
+    pub(super) fn from_code(code: u32) -> Self {
+        let surface = code / 4;
+        match code % 4 {
+            MISSED => Self::Missed(surface),
+            CLIPPED => Self::Clipped(surface),
+            TOTAL_REFLECTION => Self::TotalReflection(surface),
+            _ => Self::Imaged,
+        }
+    }
+}
+
+pub(super) const MISSED: u32 = 1;
+pub(super) const CLIPPED: u32 = 2;
+pub(super) const TOTAL_REFLECTION: u32 = 3;
+
+/// How many rays ended how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Fates {
+    /// Arrived.
+    pub imaged: usize,
+    /// Missed a surface.
+    pub missed: usize,
+    /// Clipped by a semi-diameter.
+    pub clipped: usize,
+    /// Totally reflected.
+    pub total_reflection: usize,
+}
+
+impl Fates {
+    /// Counts one more.
+    pub fn count(&mut self, fate: Fate) {
+        match fate {
+            Fate::Imaged => self.imaged += 1,
+            Fate::Missed(_) => self.missed += 1,
+            Fate::Clipped(_) => self.clipped += 1,
+            Fate::TotalReflection(_) => self.total_reflection += 1,
+        }
+    }
+
+    /// How many rays there are.
+    pub fn total(self) -> usize {
+        self.imaged + self.missed + self.clipped + self.total_reflection
+    }
+}

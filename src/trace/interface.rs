@@ -1,0 +1,296 @@
+//! One surface as a ray meets it: where, under which angle, and how it goes on.
+//!
+//! The formulas are free of branches on the ray, so that the same text traces one ray, a vector
+//! of rays and a dual number. With `p` the start of the ray in the frame of the surface, `k` its
+//! optical direction, `c` the curvature and `κ` the conic constant (Welford, *Aberrations of
+//! Optical Systems*, 1986, section 4.4):
+//!
+//! ```text
+//! A = c (n² + κ kz²)   B = kz − c (p·k + κ z kz)   F = c (p² + κ z²) − 2 z
+//! k·N = σ √(B² − A F)  s = F / (B + k·N), or (B − k·N) / A where B and σ disagree
+//! ```
+
+use super::asphere;
+use crate::lens::{ASPHERE_TERMS, Shape, System};
+use crate::math::Real;
+use crate::math::Vec3;
+
+/// The form of a surface, as far as it decides what has to be computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    Plane,
+    Sphere,
+    Conic,
+    Asphere,
+}
+
+/// A surface with every constant that does not depend on the ray.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Interface<R> {
+    pub(super) form: Form,
+    pub(super) mirror: bool,
+    /// Whether rays come from so far away that they are first moved to their point of closest
+    /// approach: `B² − A F` would cancel otherwise.
+    pub(super) far: bool,
+    /// The sense of travel σ in front of the surface, +1 or −1.
+    pub(super) sense: R,
+    /// The distance from the vertex before.
+    pub(super) gap: R,
+    pub(super) curvature: R,
+    pub(super) conic: R,
+    pub(super) terms: [R; ASPHERE_TERMS],
+    /// The square of the index in front.
+    pub(super) n2: R,
+    /// The index behind.
+    pub(super) index_behind: R,
+    /// `n'² − n²`, computed as a product so that nearly equal indices keep their difference.
+    pub(super) dn2: R,
+    /// The square of the semi-diameter.
+    pub(super) rim2: R,
+    /// `1 − (1+κ) c z` may not fall below this: 0 on the sag sheet, anything where the far half
+    /// of an ellipsoid counts too.
+    pub(super) sheet: R,
+    /// The largest slope of an asphere inside its semi-diameter; infinite where there is no bound.
+    pub(super) steepest: f64,
+}
+
+/// Where a ray meets a surface, before anything happens to it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Meeting<R> {
+    /// The point in the frame of the surface.
+    pub(super) point: Vec3<R>,
+    /// How far along `k` it lies.
+    pub(super) s: R,
+    /// The normal `N`, of length `√m`.
+    pub(super) normal: Vec3<R>,
+    /// `k·N`.
+    pub(super) a: R,
+    /// `N·N`.
+    pub(super) m: R,
+    pub(super) missed: bool,
+}
+
+/// A ray just behind a surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing<R> {
+    pub(super) point: Vec3<R>,
+    pub(super) k: Vec3<R>,
+    pub(super) s: R,
+    pub(super) missed: bool,
+    pub(super) clipped: bool,
+    pub(super) reflected: bool,
+}
+
+/// Rays that travel farther than this many radii of curvature are moved close first.
+const FAR: f64 = 0.5;
+
+/// The surfaces of a system, prepared.
+pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
+    let (mut n, mut gap, mut sense) = (system.index_before, R::ZERO, R::ONE);
+    let prepare = |(i, surface): (usize, &crate::lens::Surface<R>)| {
+        let (curvature, conic, terms) = surface.shape.numbers();
+        let behind = if surface.mirror { n } else { surface.index };
+        let rim2 = surface.semi_diameter * surface.semi_diameter;
+        let whole = surface.hyper && conic.value() > -1.0;
+        let interface = Interface {
+            form: form(&surface.shape),
+            mirror: surface.mirror,
+            far: i == 0 || (curvature.value() * gap.value()).abs() > FAR,
+            sense,
+            gap,
+            curvature,
+            conic,
+            terms,
+            n2: n * n,
+            index_behind: behind,
+            dn2: (behind - n) * (behind + n),
+            rim2,
+            sheet: R::from_f64(if whole { f64::NEG_INFINITY } else { 0.0 }),
+            steepest: asphere::steepest(&surface.shape, surface.semi_diameter.value()),
+        };
+        (n, gap) = (behind, surface.thickness);
+        sense = if surface.mirror { -sense } else { sense };
+        interface
+    };
+    system.surfaces.iter().enumerate().map(prepare).collect()
+}
+
+fn form<R>(shape: &Shape<R>) -> Form {
+    match shape {
+        Shape::Plane => Form::Plane,
+        Shape::Sphere { .. } => Form::Sphere,
+        Shape::Conic { .. } => Form::Conic,
+        Shape::Asphere { .. } => Form::Asphere,
+    }
+}
+
+impl<R: Real> Interface<R> {
+    /// Meets the surface and goes on behind it; `p` is in the frame of the vertex before.
+    #[inline(always)]
+    pub(super) fn cross(&self, p: Vec3<R>, k: Vec3<R>) -> Crossing<R> {
+        let start = Vec3::new(p.x, p.y, p.z - self.gap);
+        let met = match self.form {
+            Form::Plane => self.meet_plane(start, k),
+            Form::Sphere => self.meet_sphere(start, k),
+            Form::Conic => self.meet_conic(start, k),
+            Form::Asphere => self.meet_asphere(start, k),
+        };
+        self.go_on(met, k)
+    }
+
+    /// Clips, then refracts or reflects.
+    #[inline(always)]
+    pub(super) fn go_on(&self, met: Meeting<R>, k: Vec3<R>) -> Crossing<R> {
+        let p = met.point;
+        let clipped = !(p.x * p.x + p.y * p.y <= self.rim2);
+        let (gamma, reflected) =
+            if self.mirror { (-(met.a + met.a) / met.m, false) } else { self.refraction(&met) };
+        let k = k + met.normal * gamma;
+        Crossing { point: p, k, s: met.s, missed: met.missed, clipped, reflected }
+    }
+
+    /// `Γ` of Snell's law `k' = k + Γ N`, and whether the ray is totally reflected instead.
+    #[inline(always)]
+    fn refraction(&self, met: &Meeting<R>) -> (R, bool) {
+        let behind2 = met.a * met.a + self.dn2 * met.m;
+        let behind = self.sense * behind2.sqrt();
+        let gamma = (behind - met.a) / met.m;
+        (gamma, !(behind2 >= R::ZERO))
+    }
+
+    #[inline(always)]
+    pub(super) fn meet_plane(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+        let s = -p.z / k.z;
+        Meeting {
+            point: Vec3::new(p.x + k.x * s, p.y + k.y * s, R::ZERO),
+            s,
+            normal: Vec3::new(R::ZERO, R::ZERO, R::ONE),
+            a: k.z,
+            m: R::ONE,
+            missed: !(self.sense * k.z > R::ZERO),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn meet_sphere(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+        let c = self.curvature;
+        let (p, before) = self.closest(p, k);
+        let b = k.z - c * p.dot(k);
+        let f = c * p.dot(p) - (p.z + p.z);
+        let (s, a, missed) = self.root(c * self.n2, b, f);
+        let point = p + k * s;
+        let normal = Vec3::new(-(c * point.x), -(c * point.y), R::ONE - c * point.z);
+        let missed = missed | !(normal.z >= self.sheet);
+        Meeting { point, s: before + s, normal, a, m: R::ONE, missed }
+    }
+
+    #[inline(always)]
+    pub(super) fn meet_conic(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+        let c = self.curvature;
+        let (p, before) = self.closest(p, k);
+        let axial = self.conic * p.z;
+        let b = k.z - c * (p.dot(k) + axial * k.z);
+        let f = c * (p.dot(p) + axial * p.z) - (p.z + p.z);
+        let (s, a, missed) = self.root(c * (self.n2 + self.conic * k.z * k.z), b, f);
+        let point = p + k * s;
+        let normal_z = R::ONE - c * (point.z + self.conic * point.z);
+        let normal = Vec3::new(-(c * point.x), -(c * point.y), normal_z);
+        let missed = missed | !(normal_z >= self.sheet);
+        Meeting { point, s: before + s, normal, a, m: normal.dot(normal), missed }
+    }
+
+    /// The root of `A s² − 2 B s + F` where `k·N` has the sense of travel, with `k·N`, and whether
+    /// there is none. The form without cancellation is chosen by the sign of `B`.
+    #[inline(always)]
+    fn root(&self, a: R, b: R, f: R) -> (R, R, bool) {
+        let square = b * b - a * f;
+        let normal = self.sense * square.sqrt();
+        let along = self.sense * b >= R::ZERO;
+        let above = R::select(along, f, b - normal);
+        let below = R::select(along, b + normal, a);
+        (above / below, normal, !(square > R::ZERO))
+    }
+
+    /// The point of closest approach to the vertex, and how far along `k` it lies; the start
+    /// itself where nothing would cancel.
+    #[inline(always)]
+    fn closest(&self, p: Vec3<R>, k: Vec3<R>) -> (Vec3<R>, R) {
+        if self.far {
+            let s = -p.dot(k) / self.n2;
+            (p + k * s, s)
+        } else {
+            (p, R::ZERO)
+        }
+    }
+
+    pub(super) fn meet_asphere(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+        let (start, before) = self.closest(p, k);
+        let Some(s) = asphere::crossing(self.value(), start.value(), k.value(), -before.value())
+        else {
+            return self.no_meeting(p);
+        };
+        let mut s = R::from_f64(s);
+        for _ in 0..R::ORDER {
+            let (f, slope) = self.height_above(start + k * s, k);
+            s -= f / slope;
+        }
+        let point = start + k * s;
+        let normal = self.normal(point);
+        let a = k.dot(normal);
+        let missed = !(self.sense * a > R::ZERO);
+        Meeting { point, s: before + s, normal, a, m: normal.dot(normal), missed }
+    }
+
+    /// The same surface without derivatives.
+    fn value(&self) -> Interface<f64> {
+        Interface {
+            form: self.form,
+            mirror: self.mirror,
+            far: self.far,
+            sense: self.sense.value(),
+            gap: self.gap.value(),
+            curvature: self.curvature.value(),
+            conic: self.conic.value(),
+            terms: self.terms.map(Real::value),
+            n2: self.n2.value(),
+            index_behind: self.index_behind.value(),
+            dn2: self.dn2.value(),
+            rim2: self.rim2.value(),
+            sheet: self.sheet.value(),
+            steepest: self.steepest,
+        }
+    }
+
+    fn no_meeting(&self, point: Vec3<R>) -> Meeting<R> {
+        let normal = Vec3::new(R::ZERO, R::ZERO, R::ONE);
+        Meeting { point, s: R::ZERO, normal, a: self.sense, m: R::ONE, missed: true }
+    }
+
+    /// `z(r) − z` at a point and its slope along `k`.
+    fn height_above(&self, point: Vec3<R>, k: Vec3<R>) -> (R, R) {
+        let (z, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
+        let along = (point.x * k.x + point.y * k.y) * dz_dr2;
+        (z - point.z, along + along - k.z)
+    }
+
+    /// `(−∂z/∂x, −∂z/∂y, 1)`.
+    fn normal(&self, point: Vec3<R>) -> Vec3<R> {
+        let (_, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
+        let slope = -(dz_dr2 + dz_dr2);
+        Vec3::new(point.x * slope, point.y * slope, R::ONE)
+    }
+
+    /// Sag and its derivative by r²; at the edge of the conic beyond it.
+    pub(super) fn sag(&self, r2: R) -> (R, R) {
+        let c = self.curvature;
+        let radicand = R::ONE - (R::ONE + self.conic) * c * c * r2;
+        let root = R::select(radicand > R::ZERO, radicand, R::ZERO).sqrt();
+        let (mut sum, mut slope) = (R::ZERO, R::ZERO);
+        for a in self.terms.into_iter().rev() {
+            slope = slope * r2 + sum;
+            sum = sum * r2 + a;
+        }
+        let polynomial_slope = (slope * r2 + sum + sum) * r2;
+        (c * r2 / (R::ONE + root) + sum * r2 * r2, c / (root + root) + polynomial_slope)
+    }
+}

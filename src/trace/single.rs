@@ -1,0 +1,141 @@
+//! One ray at a time, over any number type, with everything about its way.
+
+use super::Tracer;
+use super::fate::{CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
+use crate::lens::Invalid;
+use crate::math::Real;
+use crate::math::Vec3;
+
+/// A straight ray.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Ray<R> {
+    /// A point on it, in mm.
+    pub point: Vec3<R>,
+    /// Its direction cosines.
+    pub direction: Vec3<R>,
+}
+
+impl Ray<f64> {
+    /// Refuses a ray that is not finite or whose direction is not of length 1 within 1e-9; `number`
+    /// is how the error calls it.
+    pub fn check(&self, number: usize) -> Result<(), Invalid> {
+        let refuse = |found: String| Err(Invalid::Ray { ray: number, found });
+        let (p, d) = (self.point, self.direction);
+        let sizes = [p.x, p.y, p.z].map(f64::abs);
+        if !(p.is_finite() && d.is_finite()) || sizes.iter().any(|v| *v > 1e100) {
+            return refuse(format!("start {p:?}, direction {d:?}"));
+        }
+        let length = d.dot(d).sqrt();
+        if (length - 1.0).abs() > 1e-9 {
+            return refuse(format!("a direction of length {length}"));
+        }
+        Ok(())
+    }
+}
+
+/// Where and how a ray ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Landing<R> {
+    /// How.
+    pub fate: Fate,
+    /// Point and direction in the frame of the surface where it ended: behind the last surface for
+    /// a ray that arrived, where it was clipped or reflected, or where it was before the surface
+    /// that it missed (in the frame of that surface).
+    pub ray: Ray<R>,
+    /// The optical path from the start to that point, in mm.
+    pub opl: R,
+    /// The first surface that was reached by going backwards.
+    pub backwards: Option<usize>,
+}
+
+/// The corners of a ray's way and how it ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// The start and every point of incidence, in the frame of the first vertex.
+    pub points: Vec<Vec3<f64>>,
+    /// How it ended.
+    pub fate: Fate,
+}
+
+impl<R: Real> Tracer<R> {
+    /// Traces one ray that starts in the frame of the first vertex. Its direction is normalised.
+    pub fn trace(&self, ray: Ray<R>) -> Landing<R> {
+        self.follow(ray, self.interfaces.len(), |_, _| {})
+    }
+
+    /// Traces one ray and calls `visit` with each surface and the point of incidence in its frame.
+    pub fn visit(&self, ray: Ray<R>, visit: impl FnMut(usize, Vec3<R>)) -> Landing<R> {
+        self.follow(ray, self.interfaces.len(), visit)
+    }
+
+    /// Traces one ray through the first surfaces, up to and with `surface`.
+    pub fn trace_to(&self, ray: Ray<R>, surface: usize) -> Landing<R> {
+        self.follow(ray, (surface + 1).min(self.interfaces.len()), |_, _| {})
+    }
+
+    fn follow(
+        &self,
+        ray: Ray<R>,
+        surfaces: usize,
+        mut visit: impl FnMut(usize, Vec3<R>),
+    ) -> Landing<R> {
+        let mut k = launch(ray.direction, self.index_before);
+        let mut landing = Landing { fate: Fate::Imaged, ray, opl: R::ZERO, backwards: None };
+        let mut index = self.index_before;
+        for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
+            let p = landing.ray.point;
+            let crossing = interface.cross(p, k);
+            let code = i as u32 * 4;
+            if crossing.missed {
+                landing.ray.point.z = p.z - interface.gap;
+                landing.fate = Fate::from_code(code + MISSED);
+                break;
+            }
+            landing.ray.point = crossing.point;
+            landing.opl += crossing.s * interface.n2;
+            if crossing.s < R::ZERO && landing.backwards.is_none() {
+                landing.backwards = Some(i);
+            }
+            visit(i, crossing.point);
+            if crossing.clipped || crossing.reflected {
+                let cause = if crossing.clipped { CLIPPED } else { TOTAL_REFLECTION };
+                landing.fate = Fate::from_code(code + cause);
+                break;
+            }
+            k = crossing.k;
+            index = interface.index_behind;
+        }
+        landing.ray.direction = k * (R::ONE / index);
+        landing
+    }
+}
+
+impl Tracer<f64> {
+    /// The corners of a ray's way, for drawing. A ray that misses a surface is drawn on to the
+    /// vertex plane of that surface, if it is going there.
+    pub fn path(&self, ray: Ray<f64>) -> Path {
+        let mut points = vec![ray.point];
+        let mut vertices = Vec::with_capacity(self.interfaces.len());
+        let mut z = 0.0;
+        for interface in &self.interfaces {
+            z += interface.gap;
+            vertices.push(z);
+        }
+        let landing = self.visit(ray, |i, p| points.push(Vec3::new(p.x, p.y, p.z + vertices[i])));
+        if let Fate::Missed(surface) = landing.fate {
+            let (p, d) = (landing.ray.point, landing.ray.direction);
+            let s = -p.z / d.z;
+            if s.is_finite() && s > 0.0 {
+                let end = p + d * s;
+                points.push(Vec3::new(end.x, end.y, vertices[surface as usize]));
+            }
+        }
+        Path { points, fate: landing.fate }
+    }
+}
+
+/// The optical direction `n d / |d|`.
+#[inline(always)]
+pub(super) fn launch<R: Real>(direction: Vec3<R>, index: R) -> Vec3<R> {
+    direction * (index / direction.dot(direction).sqrt())
+}

@@ -1,0 +1,6 @@
+//! Behaviour and reference tests, a module for each floor.
+#![expect(clippy::unwrap_used, reason = "a test that cannot read its data should fail")]
+#![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
+
+/// Exact answers for single rays in hard cases.
+mod hard_cases;
