@@ -59,7 +59,7 @@ pub fn open(
     start: impl Fn(&CreationContext<'_>, Backing) -> Box<dyn App>,
 ) -> Result<(), StudioError> {
     let wgpu = match open_with(Renderer::Wgpu, memory, &start) {
-        Err(eframe::Error::Wgpu(error)) => error.to_string(),
+        Err(eframe::Error::Wgpu(error)) => plain(&error.to_string()),
         Err(error) => return Err(error.into()),
         Ok(()) => return Ok(()),
     };
@@ -75,10 +75,16 @@ pub fn open(
 impl From<eframe::Error> for StudioError {
     fn from(error: eframe::Error) -> Self {
         match error {
-            eframe::Error::WinitEventLoop(reason) => Self::NoDisplay(reason.to_string()),
+            eframe::Error::WinitEventLoop(reason) => Self::NoDisplay(plain(&reason.to_string())),
             other => Self::Window(other.to_string()),
         }
     }
+}
+
+/// A library's message without the place in its source and without what it left unfilled.
+fn plain(message: &str) -> String {
+    let after_place = message.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+    after_place.map_or(message, |(_, rest)| rest).trim_end_matches(": {}").to_owned()
 }
 
 fn open_with(
@@ -148,6 +154,14 @@ fn dress(context: &egui::Context) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn messages_of_libraries_lose_their_source_places() {
+        let winit = "os error at /x/linux/mod.rs:765: DISPLAY is not set";
+        assert_eq!(plain(winit), "DISPLAY is not set");
+        assert_eq!(plain("Failed to create surface: {}"), "Failed to create surface");
+        assert_eq!(plain("glutin error: [a7] GLXBadFBConfig"), "glutin error: [a7] GLXBadFBConfig");
+    }
 
     #[test]
     fn an_error_names_packages_and_what_works_without_a_window() {

@@ -56,11 +56,14 @@ impl Scene {
         }
     }
 
-    /// Lines from point to point.
+    /// Lines from point to point; points in line with their neighbours need no joint.
     pub fn polyline(&mut self, points: &[DVec2], width: f32, colour: Colour) {
-        for ends in points.windows(2) {
-            if ends[0] != ends[1] {
-                self.line(ends[0], ends[1], width, colour);
+        let Some(&(mut start)) = points.first() else { return };
+        for (i, &end) in points.iter().enumerate().skip(1) {
+            let goes_on = points.get(i + 1).is_some_and(|&next| in_line(start, end, next));
+            if !goes_on && start != end {
+                self.line(start, end, width, colour);
+                start = end;
             }
         }
     }
@@ -101,6 +104,13 @@ impl Scene {
     }
 }
 
+/// Whether the way from `a` to `c` passes straight through `b`.
+fn in_line(a: DVec2, b: DVec2, c: DVec2) -> bool {
+    let (first, second) = (b - a, c - b);
+    let size = first.length() * second.length();
+    first.perp_dot(second).abs() <= 1e-12 * size && first.dot(second) >= 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,6 +133,16 @@ mod tests {
         scene.outline(&[DVec2::ZERO, DVec2::X, DVec2::ONE], 1.0, BLUE);
         assert_eq!(scene.segments.len(), 3);
         assert_eq!(scene.segments[2].to, scene.segments[0].from);
+    }
+
+    #[test]
+    fn points_in_line_need_no_joint() {
+        let mut scene = Scene::default();
+        let points = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (3.0, 0.0), (3.0, 1.0), (3.0, 0.0)];
+        scene.polyline(&points.map(|(x, y)| DVec2::new(x, y)), 1.0, BLUE);
+        let ends: Vec<_> = scene.segments.iter().map(|s| (s.from, s.to)).collect();
+        let [a, b, c] = [Vec2::ZERO, Vec2::new(3.0, 0.0), Vec2::new(3.0, 1.0)];
+        assert_eq!(ends, [(a, b), (b, c), (c, b)]);
     }
 
     #[test]

@@ -120,7 +120,7 @@ fn scale_bar(ui: &Ui, rect: Rect, scale: f64) {
     let color = ui.visuals().strong_text_color();
     let bar = Rect::from_min_size(left - egui::vec2(0.0, 3.0), egui::vec2(width, 3.0));
     ui.painter().rect(bar, CornerRadius::ZERO, color, Stroke::NONE, egui::StrokeKind::Inside);
-    let font = egui::TextStyle::Small.resolve(ui.style());
+    let font = egui::TextStyle::Body.resolve(ui.style());
     let above = bar.left_top() - egui::vec2(0.0, 2.0);
     ui.painter().text(above, Align2::LEFT_BOTTOM, length_text(length), font, color);
 }
