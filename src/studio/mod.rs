@@ -2,6 +2,7 @@
 //!
 //! **A panel changes nothing**: it gets a view of the design and writes down wishes.
 
+pub mod chooser;
 pub mod draw;
 pub mod number;
 pub mod palette;

@@ -39,7 +39,7 @@ fn rays(scene: &mut Scene) {
         let field = f64::from(ray % 3) - 1.0;
         let points: Vec<DVec2> = [-15.0, 2.0, 9.0, 15.0, 21.0, 62.0]
             .into_iter()
-            .map(|z| DVec2::new(z, height * (1.0 - z / 60.0) + 0.1 * field * z))
+            .map(|z| DVec2::new(z, height * (1.0 - z / 60.0) + 0.1 * field * z + 1e-3 * z * z))
             .collect();
         scene.polyline(&points, 1.0, colours[ray as usize % 3]);
     }
