@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its data should fail")]
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
-/// Exact answers for single rays in hard cases.
 mod hard_cases;
-/// The lenses that come with the program.
 mod library;
+mod paraxial;
+mod reference;

@@ -1,0 +1,71 @@
+//! A ray close to the axis: refraction `n'u' = nu − y (n' − n) c`, transfer `y⁺ = y + t u'`
+//! (Welford 1986, equations 3.11 and 3.12).
+
+use crate::lens::System;
+use crate::math::Real;
+
+/// The heights of a paraxial ray at every surface, and its slopes behind every surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParaxialRay<R> {
+    /// The slope in front of the first surface, `dy/dz`.
+    pub start_slope: R,
+    /// The distance from the axis at each surface, in mm.
+    pub heights: Vec<R>,
+    /// The slope `dy/dz` behind each surface.
+    pub slopes: Vec<R>,
+}
+
+/// The index of every gap, the space in front of the first surface first; negative after an odd
+/// number of mirrors.
+pub fn signed_indices<R: Real>(system: &System<R>) -> Vec<R> {
+    let mut sense = R::ONE;
+    let mut indices = Vec::with_capacity(system.surfaces.len() + 1);
+    indices.push(system.index_before);
+    for surface in &system.surfaces {
+        if surface.mirror {
+            sense = -sense;
+        }
+        indices.push(sense * surface.index);
+    }
+    indices
+}
+
+/// The paraxial ray that meets the vertex plane of the first surface at `height` with `slope`.
+pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> ParaxialRay<R> {
+    let indices = signed_indices(system);
+    let count = system.surfaces.len();
+    let (mut heights, mut slopes) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let (mut y, mut nu) = (height, indices[0] * slope);
+    for (i, surface) in system.surfaces.iter().enumerate() {
+        heights.push(y);
+        nu -= y * (indices[i + 1] - indices[i]) * surface.shape.curvature();
+        let u = nu / indices[i + 1];
+        slopes.push(u);
+        y += surface.thickness * u;
+    }
+    ParaxialRay { start_slope: slope, heights, slopes }
+}
+
+impl<R: Real> ParaxialRay<R> {
+    /// The same ray with every height and slope multiplied.
+    #[must_use]
+    pub fn scaled(&self, factor: R) -> Self {
+        Self {
+            start_slope: self.start_slope * factor,
+            heights: self.heights.iter().map(|y| *y * factor).collect(),
+            slopes: self.slopes.iter().map(|u| *u * factor).collect(),
+        }
+    }
+
+    /// The slope in front of a surface.
+    pub fn slope_before(&self, surface: usize) -> R {
+        if surface == 0 { self.start_slope } else { self.slopes[surface - 1] }
+    }
+
+    /// Where the ray behind a surface crosses the axis, from that surface's vertex in mm; `None`
+    /// where it runs parallel to the axis.
+    pub fn crossing(&self, surface: usize) -> Option<R> {
+        let (y, u) = (self.heights[surface], self.slopes[surface]);
+        (u.value() != 0.0).then(|| -(y / u))
+    }
+}
