@@ -13,10 +13,12 @@ mod asphere;
 mod batch;
 mod fate;
 mod interface;
+mod margin;
 mod single;
 
 pub use batch::{Hits, Points, Rays, Sink, Width};
 pub use fate::{Fate, Fates};
+pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};
 
 use crate::lens::Invalid;
