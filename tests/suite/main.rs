@@ -4,6 +4,7 @@
 
 mod analysis;
 mod hard_cases;
+mod library;
 mod paraxial;
 mod pupil;
 mod reference;
