@@ -140,8 +140,7 @@ pub(super) fn distortion(scene: &Scene<'_>, sum: &mut Sum) -> Result<(), MeritEr
     let system = &scene.systems.systems[primary];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
     let scale = image_scale(system, scene.zoom.object);
-    let scale_slope =
-        slopes(scene, sum.detail, |system| image_scale(system, scene.zoom.object));
+    let scale_slope = slopes(scene, sum.detail, |system| image_scale(system, scene.zoom.object));
     let moving = scene.zoom.moving(primary);
     let chief = &scene.sampling.chief;
     let (hits, rows) = tracer.jacobian(chief, &moving);
