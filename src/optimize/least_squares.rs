@@ -97,9 +97,9 @@ impl LeastSquares {
                 self.sum = sum;
                 let gain = (before - self.state.value) / promised.max(f64::MIN_POSITIVE);
                 if accepted < 1.0 {
-                    self.tighten()
+                    self.tighten();
                 } else {
-                    self.relax(gain.min(1.0))
+                    self.relax(gain.min(1.0));
                 }
                 return if asked > 0.0 { accepted * length / asked } else { 1.0 };
             }

@@ -10,3 +10,4 @@ mod optimize;
 mod paraxial;
 mod pupil;
 mod reference;
+mod trace;

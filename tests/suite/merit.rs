@@ -90,9 +90,11 @@ fn check(lens: &Lens, term: Term, steps: impl Fn(Quantity) -> f64) {
 fn step(quantity: Quantity) -> f64 {
     match quantity {
         Quantity::Curvature => 2e-5,
-        Quantity::Conic => 1e-2,
         Quantity::Asphere(term) => 1e-6 * 0.03_f64.powi(2 * term as i32),
-        Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 1e-2,
+        Quantity::Conic
+        | Quantity::Thickness
+        | Quantity::ZoomThickness(_)
+        | Quantity::SemiDiameter => 1e-2,
         Quantity::Index => 1e-4,
     }
 }
