@@ -3,5 +3,7 @@
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
 mod hard_cases;
+/// The lenses that come with the program.
+mod library;
 mod paraxial;
 mod reference;
