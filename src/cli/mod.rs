@@ -11,6 +11,7 @@ mod convert;
 mod failure;
 mod info;
 mod input;
+mod measure;
 mod output;
 mod trace;
 mod window;
@@ -47,6 +48,7 @@ enum Command {
     Info(info::Info),
     Trace(trace::Trace),
     Convert(convert::Convert),
+    Measure(measure::Measure),
 }
 
 impl Command {
@@ -55,6 +57,7 @@ impl Command {
             Self::Info(info) => info.run(output),
             Self::Trace(trace) => trace.run(output),
             Self::Convert(convert) => convert.run(output),
+            Self::Measure(measure) => measure.run(output),
         }
     }
 }

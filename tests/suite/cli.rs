@@ -88,8 +88,10 @@ impl Drop for Scratch {
 
 #[test]
 fn every_subcommand_has_long_help_with_its_json() {
-    for name in ["info", "trace"] {
-        let help = done(&[name, "--help"], "");
+    let names = ["info", "trace", "measure trace"];
+    for name in names {
+        let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
+        let help = done(&arguments, "");
         assert!(help.contains("JSON out (--json)"), "{name}: {help}");
     }
     assert!(done(&["--help"], "").contains("Exit status"));
@@ -212,6 +214,20 @@ fn trace_refuses_what_cannot_be_traced() {
     };
     file("{\"rays\": [], \"zoom\": 7}", &["zoom position 7"]);
     file("{\"rays\": [], \"wavelength_um\": 90}", &["90 um"]);
+}
+
+#[test]
+fn measure_trace_has_a_rate_for_every_way() {
+    let measured = done_json(&["measure", "trace", "--turns", "1"], "");
+    has_keys(&measured["machine"], &["processor", "cores", "lane_bits", "optimised"]);
+    let rows = measured["rows"].as_array().unwrap();
+    for name in ["f64_batch_1_thread", "f64_batch_2_threads", "f32_batch_1_thread", "f64_single"] {
+        let row = rows.iter().find(|row| row["name"] == name).unwrap();
+        assert!(row["million_ray_surfaces_per_s"].as_f64().unwrap() > 0.0, "{name}");
+    }
+    let rounding = |name: &str| measured[name]["point_rms_mm"].as_f64().unwrap();
+    assert!(rounding("rounding_f64") < 1e-12 && rounding("rounding_f32") < 1e-4);
+    assert_eq!(measured["rounding_f64"]["other_fates"], 0);
 }
 
 #[cfg(unix)]
