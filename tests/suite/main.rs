@@ -2,10 +2,10 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its data should fail")]
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
-/// The program, from outside.
+mod analysis;
 mod cli;
 mod hard_cases;
-/// The lenses that come with the program.
 mod library;
 mod paraxial;
+mod pupil;
 mod reference;
