@@ -3,5 +3,6 @@
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
 mod hard_cases;
+mod library;
 mod paraxial;
 mod reference;

@@ -1,0 +1,523 @@
+//! The native lens file: JSON with a version, one surface a line.
+//!
+//! A key that is not known is refused by name, with line and column; numbers are written with the
+//! fewest digits that read back to the same bits; what has its default value is left out.
+//!
+//! ```json
+//! { "aplanat": 1, "name": "Achromat", "object": "infinity",
+//!   "aperture": {"entrance_pupil_diameter": 16.0},
+//!   "fields": {"kind": "angle", "values": [{"y": 0.0, "weight": 1.0}]},
+//!   "wavelengths": [{"um": 0.5875618, "primary": true}],
+//!   "surfaces": [
+//!     {"curvature": 0.0195, "thickness": 5.5, "glass": "SCHOTT N-BAK4", "stop": true},
+//!     {"radius": -166.7, "conic": -1.0, "asphere": [1e-7], "thickness": 76.5} ] }
+//! ```
+
+mod layout;
+
+use super::error::{FileError, Malformed};
+use crate::lens::{
+    Aperture, Fields, Lens, Medium, Object, Pickup, Row, Variable, Wavelength, ZoomPosition,
+};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error as _, IgnoredAny, MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+
+/// The version of the format that is written.
+pub const VERSION: u64 = 1;
+
+/// Reads a lens from the text of a native file; `file` is only for the message.
+pub fn read(text: &str, file: &str) -> Result<Lens, FileError> {
+    let malformed = |error: &serde_json::Error| explain(error, text).of(file);
+    let probe: Probe = serde_json::from_str(text).map_err(|e| malformed(&e))?;
+    probe.check(text).map_err(|wrong| wrong.of(file))?;
+    let lens: Lens = serde_json::from_str(text).map_err(|e| malformed(&e))?;
+    lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
+    Ok(lens)
+}
+
+/// The text of the native file of a lens.
+pub fn write(lens: &Lens) -> String {
+    layout::pretty(lens)
+}
+
+/// The version alone, so that a newer file is refused for its version and not for its keys.
+#[derive(Deserialize)]
+struct Probe {
+    #[serde(default)]
+    aplanat: Option<serde_json::Value>,
+    #[serde(flatten)]
+    _rest: IgnoredAny,
+}
+
+impl Probe {
+    fn check(&self, text: &str) -> Result<(), Malformed> {
+        let expected = format!("`\"aplanat\": {VERSION}`, the version that this program reads");
+        match &self.aplanat {
+            Some(version) if version.as_u64() == Some(VERSION) => Ok(()),
+            Some(version) => {
+                let line = text.lines().position(|l| l.contains("\"aplanat\"")).unwrap_or(0);
+                let place = format!("line {}", line + 1);
+                Err(Malformed { place, found: format!("`\"aplanat\": {version}`"), expected })
+            }
+            None => {
+                let found = "no key `aplanat`".to_owned();
+                Err(Malformed { place: "line 1".to_owned(), found, expected })
+            }
+        }
+    }
+}
+
+/// Splits the parser's message into place, found and expected.
+fn explain(error: &serde_json::Error, text: &str) -> Malformed {
+    let place = format!("line {}, column {}", error.line(), error.column());
+    let whole = error.to_string();
+    let position = format!(" at line {} column {}", error.line(), error.column());
+    let message = whole.strip_suffix(&position).unwrap_or(&whole);
+    if error.is_eof() {
+        let found = "the end of the file".to_owned();
+        return Malformed { place, found, expected: "the rest of it; is it truncated?".to_owned() };
+    }
+    if error.is_syntax() {
+        let found = word_at(text, error.line(), error.column());
+        return Malformed { place, found, expected: format!("JSON ({message})") };
+    }
+    let plain = message.replace("expected f64", "expected a number");
+    let plain = plain.strip_prefix("invalid type: ").unwrap_or(&plain);
+    let (found, expected) = plain.split_once(", expected ").unwrap_or((plain, "it"));
+    let found = match found.strip_prefix("missing field ") {
+        Some(key) => format!("no key {key}"),
+        None => found.replace("unknown field", "the unknown key"),
+    };
+    Malformed { place, found, expected: expected.to_owned() }
+}
+
+/// The word around a place, in quotes, for a message.
+fn word_at(text: &str, line: usize, column: usize) -> String {
+    let Some(line) = text.lines().nth(line.saturating_sub(1)) else {
+        return "the end of the file".to_owned();
+    };
+    let bytes = line.as_bytes();
+    let inside = |b: u8| b.is_ascii_alphanumeric() || b"+-._".contains(&b) || b >= 0x80;
+    let at = column.saturating_sub(1).min(bytes.len());
+    let start = bytes[..at].iter().rposition(|b| !inside(*b)).map_or(0, |i| i + 1);
+    let end = bytes[at..].iter().position(|b| !inside(*b)).map_or(bytes.len(), |i| i + at);
+    let end = end.max((start + 1).min(bytes.len())).min(start + 40);
+    match String::from_utf8_lossy(&bytes[start.min(end)..end]) {
+        word if word.is_empty() => "the end of the line".to_owned(),
+        word => format!("`{word}`"),
+    }
+}
+
+/// The keys of a lens.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LensKeys {
+    aplanat: u64,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    name: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    source: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    notes: String,
+    object: Object,
+    #[serde(default, skip_serializing_if = "is_air")]
+    object_glass: Medium,
+    aperture: Aperture,
+    fields: Fields,
+    wavelengths: Vec<Wavelength>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    focus: Option<f64>,
+    surfaces: Vec<Row>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    zoom: Vec<ZoomPosition>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    variables: Vec<Variable>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pickups: Vec<Pickup>,
+}
+
+fn is_air(medium: &Medium) -> bool {
+    *medium == Medium::Air
+}
+
+impl Serialize for Lens {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let Self { object, aperture, focus, .. } = *self;
+        LensKeys {
+            aplanat: VERSION,
+            name: self.name.clone(),
+            source: self.source.clone(),
+            notes: self.notes.clone(),
+            object,
+            object_glass: self.object_medium.clone(),
+            aperture,
+            fields: self.fields.clone(),
+            wavelengths: self.wavelengths.clone(),
+            focus,
+            surfaces: self.surfaces.clone(),
+            zoom: self.zoom.clone(),
+            variables: self.variables.clone(),
+            pickups: self.pickups.clone(),
+        }
+        .serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Lens {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let keys = LensKeys::deserialize(from)?;
+        Ok(Self {
+            name: keys.name,
+            source: keys.source,
+            notes: keys.notes,
+            object: keys.object,
+            object_medium: keys.object_glass,
+            aperture: keys.aperture,
+            fields: keys.fields,
+            wavelengths: keys.wavelengths,
+            surfaces: keys.surfaces,
+            zoom: keys.zoom,
+            variables: keys.variables,
+            pickups: keys.pickups,
+            focus: keys.focus,
+        })
+    }
+}
+
+/// The keys of a surface. A `radius` is read but never written.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RowKeys {
+    #[serde(default, skip_serializing)]
+    radius: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    curvature: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_plain_zero")]
+    conic: f64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    asphere: Vec<f64>,
+    thickness: f64,
+    #[serde(default, skip_serializing_if = "is_air")]
+    glass: Medium,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    semi_diameter: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_false")]
+    stop: bool,
+    #[serde(default, skip_serializing_if = "is_false")]
+    hyper: bool,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    comment: String,
+}
+
+/// A zero without sign, so that −0 is written and comes back with its sign.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+fn is_plain_zero(value: &f64) -> bool {
+    value.to_bits() == 0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+fn is_false(value: &bool) -> bool {
+    !*value
+}
+
+impl RowKeys {
+    /// One over the radius, whichever of the two is given.
+    fn curvature(&self) -> Result<f64, &'static str> {
+        match (self.curvature, self.radius) {
+            (Some(_), Some(_)) => Err("both `curvature` and `radius`, expected one of them"),
+            (None, Some(0.0)) => {
+                Err("a `radius` of 0, expected another number, or none for a plane")
+            }
+            (None, Some(radius)) => Ok(1.0 / radius),
+            (curvature, None) => Ok(curvature.unwrap_or(0.0)),
+        }
+    }
+}
+
+impl Serialize for Row {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        RowKeys {
+            radius: None,
+            curvature: (!is_plain_zero(&self.curvature)).then_some(self.curvature),
+            conic: self.conic,
+            asphere: self.asphere.clone(),
+            thickness: self.thickness,
+            glass: self.medium.clone(),
+            semi_diameter: self.semi_diameter,
+            stop: self.stop,
+            hyper: self.hyper,
+            comment: self.comment.clone(),
+        }
+        .serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Row {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_map(RowText)
+    }
+}
+
+struct RowText;
+
+impl<'de> Visitor<'de> for RowText {
+    type Value = Row;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a surface, {\"curvature\", \"thickness\", ...}")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Row, A::Error> {
+        let keys = RowKeys::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(Row {
+            curvature: keys.curvature().map_err(A::Error::custom)?,
+            conic: keys.conic,
+            asphere: keys.asphere,
+            thickness: keys.thickness,
+            medium: keys.glass,
+            semi_diameter: keys.semi_diameter,
+            stop: keys.stop,
+            hyper: keys.hyper,
+            comment: keys.comment,
+        })
+    }
+}
+
+/// The keys of an object that is not at infinity.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectKeys {
+    distance: f64,
+}
+
+impl Serialize for Object {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Infinity => to.serialize_str("infinity"),
+            Self::Finite(distance) => entries(to, &[("distance", *distance)]),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Object {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_any(ObjectText)
+    }
+}
+
+struct ObjectText;
+
+impl<'de> Visitor<'de> for ObjectText {
+    type Value = Object;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"infinity\" or {\"distance\": mm}")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Object, E> {
+        if text == "infinity" {
+            Ok(Object::Infinity)
+        } else {
+            Err(E::invalid_value(serde::de::Unexpected::Str(text), &self))
+        }
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Object, A::Error> {
+        let keys = ObjectKeys::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(Object::Finite(keys.distance))
+    }
+}
+
+/// The keys of a medium that is not a name.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MediumKeys {
+    nd: Option<f64>,
+    vd: Option<f64>,
+    index: Option<f64>,
+}
+
+impl Serialize for Medium {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Air => to.serialize_none(),
+            Self::Mirror => to.serialize_str("mirror"),
+            Self::Glass(name) => to.serialize_str(name),
+            Self::Model { nd, vd } => entries(to, &[("nd", *nd), ("vd", *vd)]),
+            Self::Index(index) => entries(to, &[("index", *index)]),
+        }
+    }
+}
+
+/// An object of numbers.
+fn entries<S: Serializer>(to: S, numbers: &[(&str, f64)]) -> Result<S::Ok, S::Error> {
+    let mut map = to.serialize_map(Some(numbers.len()))?;
+    numbers.iter().try_for_each(|(key, value)| map.serialize_entry(key, value))?;
+    map.end()
+}
+
+impl<'de> Deserialize<'de> for Medium {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_any(MediumText)
+    }
+}
+
+struct MediumText;
+
+impl<'de> Visitor<'de> for MediumText {
+    type Value = Medium;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a catalogue name, {\"nd\", \"vd\"}, {\"index\"} or \"mirror\"")
+    }
+
+    fn visit_unit<E>(self) -> Result<Medium, E> {
+        Ok(Medium::Air)
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Medium, E> {
+        Ok(match text {
+            "mirror" => Medium::Mirror,
+            name => Medium::Glass(name.to_owned()),
+        })
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Medium, A::Error> {
+        let keys = MediumKeys::deserialize(MapAccessDeserializer::new(map))?;
+        match (keys.nd, keys.vd, keys.index) {
+            (Some(nd), Some(vd), None) => Ok(Medium::Model { nd, vd }),
+            (None, None, Some(index)) => Ok(Medium::Index(index)),
+            _ => Err(A::Error::custom(
+                "a glass with other keys, expected {\"nd\", \"vd\"} or {\"index\"}",
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Parameter, Quantity, ZoomThickness};
+
+    const ACHROMAT: &str = r#"{ "aplanat": 1, "name": "Achromat", "source": "", "notes": "",
+  "object": "infinity",
+  "aperture": {"entrance_pupil_diameter": 16.0},
+  "fields": {"kind": "angle", "values": [{"y": 0.0, "weight": 1.0}, {"y": 5.0}]},
+  "wavelengths": [{"um": 0.5875618, "weight": 1.0, "primary": true}],
+  "surfaces": [
+    {"curvature": 0.0195, "thickness": 5.5, "glass": "SCHOTT N-BAK4", "semi_diameter": 9.0},
+    {"radius": -40, "thickness": 2.0, "glass": {"nd": 1.62004, "vd": 36.4}, "stop": true},
+    {"curvature": -0.006, "conic": 0.0, "asphere": [1e-7], "thickness": 76.5}
+  ] }"#;
+
+    fn message(text: &str) -> String {
+        read(text, "a.json").unwrap_err().to_string()
+    }
+
+    fn changed(from: &str, to: &str) -> String {
+        assert!(ACHROMAT.contains(from), "{from}");
+        message(&ACHROMAT.replacen(from, to, 1))
+    }
+
+    #[test]
+    fn the_example_of_the_format_is_read() {
+        let lens = read(ACHROMAT, "a.json").unwrap();
+        assert_eq!(lens.surfaces[1].curvature, -0.025);
+        assert_eq!(lens.surfaces[1].medium, Medium::Model { nd: 1.62004, vd: 36.4 });
+        assert_eq!(lens.surfaces[2].asphere, [1e-7]);
+        assert_eq!(lens.stop(), Some(1));
+        assert_eq!(lens.fields.values[1].weight, 1.0);
+    }
+
+    #[test]
+    fn whatever_is_written_reads_back_to_the_same_bits() {
+        let mut lens = read(ACHROMAT, "a.json").unwrap();
+        lens.name = "quotes \" and\nlines".to_owned();
+        lens.object = Object::Finite(1.0 / 3.0);
+        lens.object_medium = Medium::Index(1.33);
+        lens.surfaces[0].conic = -0.0;
+        lens.surfaces[0].curvature = 5e-324;
+        lens.surfaces[0].hyper = true;
+        lens.surfaces[2].asphere = vec![0.1 + 0.2, -1.2345678901234567e-19];
+        lens.focus = Some(0.0);
+        let gap = ZoomThickness { surface: 0, thickness: 1e23 };
+        let aperture = Some(Aperture::FNumber(2.0));
+        lens.zoom = vec![ZoomPosition {
+            name: "wide".into(),
+            thicknesses: vec![gap],
+            aperture,
+            fields: None,
+        }];
+        let thickness = Parameter::new(0, Quantity::ZoomThickness(0));
+        lens.variables = vec![Variable { parameter: thickness, min: Some(0.1), max: None }];
+        lens.pickups = vec![Pickup {
+            parameter: Parameter::new(2, Quantity::Asphere(1)),
+            source: Parameter::new(0, Quantity::Conic),
+            scale: -1.0,
+            offset: 0.0,
+        }];
+        let text = write(&lens);
+        let back = read(&text, "a.json").unwrap();
+        assert_eq!(back, lens);
+        assert!(back.surfaces[0].conic.is_sign_negative());
+        assert_eq!(write(&back), text);
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_place() {
+        let text = changed("\"asphere\"", "\"aspheric\"");
+        assert!(text.starts_with("a.json, line 9, column 50: found"), "{text}");
+        assert!(text.contains("the unknown key `aspheric`; expected one of `radius`"), "{text}");
+        let text = changed("\"object\"", "\"objekt\"");
+        assert!(text.contains("line 2") && text.contains("`objekt`"), "{text}");
+        let text = changed("\"vd\": 36.4", "\"vd\": 36.4, \"ve\": 1");
+        assert!(text.contains("line 8") && text.contains("`ve`"), "{text}");
+    }
+
+    #[test]
+    fn another_version_is_refused_for_its_version() {
+        let text = changed("\"aplanat\": 1", "\"aplanat\": 2, \"future\": 0");
+        assert!(
+            text.contains("line 1: found `\"aplanat\": 2`; expected `\"aplanat\": 1`"),
+            "{text}"
+        );
+        let text = changed("\"aplanat\": 1", "\"aplanet\": 1");
+        assert!(text.contains("found no key `aplanat`"), "{text}");
+    }
+
+    #[test]
+    fn truncated_files_and_words_that_are_no_numbers_are_refused() {
+        let half = &ACHROMAT[..ACHROMAT.len() / 2];
+        assert!(message(half).contains("found the end of the file"), "{}", message(half));
+        assert!(message("").contains("line 1, column 0: found the end of the file"));
+        for word in ["NaN", "Infinity", "-Infinity", "nan"] {
+            let text = changed("5.5", word);
+            assert!(text.contains("line 7, column"), "{text}");
+            assert!(text.contains(&format!("found `{word}`")), "{text}");
+        }
+        assert!(changed("5.5", "1e999").contains("line 7"), "{}", changed("5.5", "1e999"));
+        assert!(changed("5.5", "\"NaN\"").contains("string \"NaN\"; expected a number"));
+    }
+
+    #[test]
+    fn contradictions_are_refused() {
+        let text = changed("\"radius\": -40", "\"radius\": -40, \"curvature\": -0.025");
+        assert!(
+            text.contains("line 8") && text.contains("both `curvature` and `radius`"),
+            "{text}"
+        );
+        assert!(changed("\"radius\": -40", "\"radius\": 0").contains("a `radius` of 0"));
+        assert!(changed("\"vd\": 36.4", "\"index\": 1.5").contains("line 8"));
+        assert!(changed("\"infinity\"", "\"far\"").contains("\"far\"; expected \"infinity\" or"));
+        assert!(changed(", \"stop\": true", "").contains("no surface is the stop"));
+        let text = changed("\"semi_diameter\": 9.0", "\"stop\": true");
+        assert!(text.contains("surfaces 0 and 1 are both the stop"), "{text}");
+        let text = changed("9.0", "-9.0");
+        assert!(text.contains("semi-diameter of surface 0 is -9; expected zero or more"), "{text}");
+        let text = changed("N-BAK4", "N-BAK99");
+        assert!(text.contains("unknown glass `SCHOTT N-BAK99`"), "{text}");
+    }
+}

@@ -1,0 +1,101 @@
+//! From bytes to text: what encoding it is, and whether it is text at all.
+
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+
+/// What a file is that starts with these bytes, if it is surely no text.
+const SIGNATURES: &[(&[u8], &str)] = &[
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xFF\xD8\xFF", "a JPEG picture"),
+    (b"GIF8", "a GIF picture"),
+    (b"BM", "a BMP picture"),
+    (b"II*\0", "a TIFF picture"),
+    (b"MM\0*", "a TIFF picture"),
+    (b"RIFF", "a RIFF file (WebP, WAV or AVI)"),
+    (b"%PDF", "a PDF document"),
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"\x1F\x8B", "a gzip archive"),
+    (b"\x7FELF", "a program"),
+    (b"MZ", "a program"),
+];
+
+/// Why bytes are no text.
+pub(super) fn not_text(bytes: &[u8]) -> Option<String> {
+    let known = SIGNATURES.iter().find(|(signature, _)| bytes.starts_with(signature));
+    // Some signatures are letters: only a file with control characters is what they say.
+    let binary = share_of_controls(bytes) > 0.02;
+    match known {
+        Some((_, what)) if binary => Some((*what).to_owned()),
+        None if binary && encoding(bytes).1 == WINDOWS_1252 => Some("binary data".to_owned()),
+        _ if bytes.is_empty() => Some("an empty file".to_owned()),
+        _ => None,
+    }
+}
+
+fn share_of_controls(bytes: &[u8]) -> f64 {
+    let start = &bytes[..bytes.len().min(4096)];
+    let control = |b: &&u8| **b < 9 || (14..32).contains(*b) || **b == 127;
+    start.iter().filter(control).count() as f64 / start.len().max(1) as f64
+}
+
+/// The text of a file in UTF-16 or UTF-8, with or without byte order mark, or in an 8-bit code.
+pub(super) fn decode(bytes: &[u8]) -> String {
+    let (mark, encoding) = encoding(bytes);
+    let (text, _) = encoding.decode_without_bom_handling(&bytes[mark..]);
+    text.into_owned()
+}
+
+/// How long the byte order mark is, and the encoding.
+fn encoding(bytes: &[u8]) -> (usize, &'static Encoding) {
+    if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
+        return (mark, encoding);
+    }
+    if zeros(bytes, 1) > 0.3 {
+        (0, UTF_16LE)
+    } else if zeros(bytes, 0) > 0.3 {
+        (0, UTF_16BE)
+    } else if std::str::from_utf8(bytes).is_ok() {
+        (0, UTF_8)
+    } else {
+        (0, WINDOWS_1252)
+    }
+}
+
+/// The share of zeros among every other byte at the start; Latin letters in UTF-16 have them.
+fn zeros(bytes: &[u8], first: usize) -> f64 {
+    let start = &bytes[..bytes.len().min(400)];
+    let half = || start.iter().skip(first).step_by(2);
+    half().filter(|byte| **byte == 0).count() as f64 / half().count().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn utf16(text: &str, mark: bool, bytes: fn(u16) -> [u8; 2]) -> Vec<u8> {
+        let start = mark.then_some(0xFEFF);
+        start.into_iter().chain(text.encode_utf16()).flat_map(bytes).collect()
+    }
+
+    #[test]
+    fn every_encoding_gives_the_same_text() {
+        let text = "NAME Tessär 50 mm\r\nSURF 0\r\n";
+        for mark in [false, true] {
+            assert_eq!(decode(&utf16(text, mark, u16::to_le_bytes)), text);
+            assert_eq!(decode(&utf16(text, mark, u16::to_be_bytes)), text);
+        }
+        assert_eq!(decode(text.as_bytes()), text);
+        assert_eq!(decode(&[b"\xEF\xBB\xBF", text.as_bytes()].concat()), text);
+        let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        assert_eq!(decode(&latin), text);
+    }
+
+    #[test]
+    fn pictures_are_no_text_and_letters_are() {
+        let picture = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\x02";
+        assert_eq!(not_text(picture).unwrap(), "a PNG picture");
+        assert_eq!(not_text(b"\0\x01\x02\x03\x04\x05\xF0\xF1").unwrap(), "binary data");
+        assert_eq!(not_text(b"").unwrap(), "an empty file");
+        assert_eq!(not_text(b"BMW and MZ are letters"), None);
+        assert_eq!(not_text(&utf16("SURF 0\r\n  STOP\r\n", false, u16::to_le_bytes)), None);
+    }
+}

@@ -1,0 +1,113 @@
+//! Every lens that comes with the program opens, has the focal length that its source states,
+//! and survives being written and read.
+#![expect(clippy::unwrap_used, reason = "a test that cannot read its data should fail")]
+
+use aplanat::files::{self, Bundled, native};
+use aplanat::lens::{Lens, System};
+use serde::Deserialize;
+use std::collections::BTreeSet;
+
+/// The reference prints six or seven digits, and takes catalogue indices rounded to five.
+const DIGITS: f64 = 1e-5;
+
+/// `tests/reference/library.json`.
+#[derive(Deserialize)]
+struct Table {
+    lenses: Vec<Stated>,
+}
+
+#[derive(Deserialize)]
+struct Stated {
+    lens: String,
+    efl: Vec<FocalLength>,
+    bfl_computed_mm: f64,
+}
+
+#[derive(Deserialize)]
+struct FocalLength {
+    zoom: usize,
+    stated_mm: f64,
+    computed_mm: f64,
+    error_percent: f64,
+}
+
+fn table() -> Vec<Stated> {
+    let text = std::fs::read_to_string("tests/reference/library.json").unwrap();
+    serde_json::from_str::<Table>(&text).unwrap().lenses
+}
+
+fn opened(bundled: &Bundled) -> Lens {
+    let name = format!("lenses/{}.json", bundled.name);
+    files::open(&name).unwrap_or_else(|error| panic!("{error}")).lens
+}
+
+/// Focal length and back focal length of a paraxial ray from infinity.
+fn focal_lengths(system: &System<f64>) -> (f64, f64) {
+    let (mut n, mut y, mut nu, mut sense) = (system.index_before, 1.0, 0.0, 1.0);
+    let (_image, surfaces) = system.surfaces.split_last().unwrap();
+    let mut last_height = y;
+    for surface in surfaces {
+        if surface.mirror {
+            sense = -sense;
+        }
+        let behind = sense * surface.index;
+        nu -= y * (behind - n) * surface.shape.curvature();
+        n = behind;
+        last_height = y;
+        y += surface.thickness * nu / n;
+    }
+    (-sense / nu, -last_height * n / nu)
+}
+
+fn at_primary(lens: &Lens, zoom: usize) -> System<f64> {
+    lens.system(zoom, lens.wavelengths[lens.primary()].um).unwrap()
+}
+
+#[test]
+fn the_embedded_lenses_are_those_of_the_folder() {
+    let embedded: BTreeSet<String> =
+        files::library().iter().map(|b| format!("{}.json", b.name)).collect();
+    let folder: BTreeSet<String> = std::fs::read_dir("lenses")
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert_eq!(embedded, folder);
+    assert_eq!(embedded.len(), files::library().len());
+    for bundled in files::library() {
+        let text = std::fs::read_to_string(format!("lenses/{}.json", bundled.name)).unwrap();
+        assert_eq!(bundled.text, text, "{}: build again", bundled.name);
+    }
+}
+
+#[test]
+fn every_lens_has_its_stated_focal_length() {
+    let table = table();
+    assert_eq!(table.len(), files::library().len());
+    for bundled in files::library() {
+        let lens = opened(bundled);
+        let stated = table.iter().find(|stated| stated.lens == bundled.name).unwrap();
+        for position in &stated.efl {
+            let (efl, bfl) = focal_lengths(&at_primary(&lens, position.zoom));
+            let relative = efl / position.computed_mm - 1.0;
+            assert!(relative.abs() < DIGITS, "{}: {efl} mm, {relative:e}", bundled.name);
+            let percent = 100.0 * (efl / position.stated_mm - 1.0);
+            let off = (percent - position.error_percent).abs();
+            assert!(off < 6e-3, "{}: {percent} % from the stated value", bundled.name);
+            if position.zoom == 0 {
+                let off = (bfl - stated.bfl_computed_mm).abs() / efl.abs();
+                assert!(off < DIGITS, "{}: back focus {bfl} mm, off by {off:e}", bundled.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_lens_is_the_same_after_writing_and_reading() {
+    for bundled in files::library() {
+        let lens = opened(bundled);
+        let text = native::write(&lens);
+        assert_eq!(text, bundled.text, "{}: not in the form in which it is written", bundled.name);
+        assert_eq!(native::read(&text, bundled.name).unwrap(), lens, "{}", bundled.name);
+        assert!(!lens.source.is_empty(), "{}: no source", bundled.name);
+    }
+}
