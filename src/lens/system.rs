@@ -71,6 +71,26 @@ impl<R: Real> Shape<R> {
         }
     }
 
+    /// The same surface written as a conic, so that its derivative by the conic constant exists;
+    /// an asphere stays one.
+    #[must_use]
+    pub fn as_conic(self) -> Self {
+        match self {
+            Self::Plane | Self::Sphere { .. } | Self::Conic { .. } => {
+                let (curvature, conic, _) = self.numbers();
+                Self::Conic { curvature, conic }
+            }
+            Self::Asphere { .. } => self,
+        }
+    }
+
+    /// The same surface written as an asphere, so that its derivatives by the coefficients exist.
+    #[must_use]
+    pub fn as_asphere(self) -> Self {
+        let (curvature, conic, terms) = self.numbers();
+        Self::Asphere { curvature, conic, terms }
+    }
+
     /// The curvature at the vertex.
     pub fn curvature(&self) -> R {
         self.numbers().0

@@ -8,6 +8,7 @@
 
 use super::fate::{CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
 use super::interface::{Crossing, Form, Interface, Meeting};
+use super::lanes::{Width, widest};
 use super::single::{Ray, launch};
 use super::{Fates, Tracer};
 use crate::lens::Invalid;
@@ -16,9 +17,9 @@ use crate::math::Vec3;
 use rayon::prelude::*;
 
 /// Rays in a block.
-const BLOCK: usize = 64;
+pub(super) const BLOCK: usize = 64;
 /// Rays that one task traces when all cores work.
-const CHUNK: usize = 64 * BLOCK;
+pub(super) const CHUNK: usize = 64 * BLOCK;
 
 /// Rays as columns, each starting in the frame of the first vertex.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -75,7 +76,7 @@ impl<R: Real> Rays<R> {
         }
     }
 
-    fn slice(&self, from: usize, to: usize) -> Columns<'_, R> {
+    pub(super) fn slice(&self, from: usize, to: usize) -> Columns<'_, R> {
         Columns {
             x: &self.x[from..to],
             y: &self.y[from..to],
@@ -105,7 +106,7 @@ impl<R: Real> FromIterator<Ray<R>> for Rays<R> {
 
 /// A part of some rays.
 #[derive(Clone, Copy)]
-struct Columns<'a, R> {
+pub(super) struct Columns<'a, R> {
     x: &'a [R],
     y: &'a [R],
     z: &'a [R],
@@ -236,37 +237,6 @@ impl<R: Real> Sink<R> for Points<R> {
     }
 }
 
-/// How many lanes the vector instructions have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Width {
-    /// What every processor of the target has.
-    Baseline,
-    /// AVX2: 256 bits.
-    Bits256,
-    /// AVX-512: 512 bits.
-    Bits512,
-}
-
-impl Width {
-    /// The widest that this processor has.
-    pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512bw")
-            {
-                return Self::Bits512;
-            }
-            if is_x86_feature_detected!("avx2") {
-                return Self::Bits256;
-            }
-        }
-        Self::Baseline
-    }
-}
-
 impl<R: Real> Tracer<R> {
     /// Traces rays on the calling thread.
     ///
@@ -283,11 +253,8 @@ impl<R: Real> Tracer<R> {
     /// If the columns of `rays` differ in length.
     pub fn batch_with<S: Sink<R>>(&self, width: Width, rays: &Rays<R>, sink: &mut S) {
         sink.resize(rays.len());
-        let width = narrower(width, Width::detect());
-        for (i, mut part) in sink.parts(CHUNK).into_iter().enumerate() {
-            let from = i * CHUNK;
-            let columns = rays.slice(from, from + part.codes.len());
-            self.dispatch::<S>(width, columns, &mut part);
+        for (i, part) in sink.parts(CHUNK).into_iter().enumerate() {
+            self.chunk::<S>(width, rays, i * CHUNK, part);
         }
     }
 
@@ -298,40 +265,23 @@ impl<R: Real> Tracer<R> {
     pub fn batch_parallel<S: Sink<R>>(&self, rays: &Rays<R>, sink: &mut S) {
         sink.resize(rays.len());
         let width = Width::detect();
-        sink.parts(CHUNK).into_par_iter().enumerate().for_each(|(i, mut part)| {
-            let from = i * CHUNK;
-            let columns = rays.slice(from, from + part.codes.len());
-            self.dispatch::<S>(width, columns, &mut part);
-        });
+        let parts = sink.parts(CHUNK).into_par_iter().enumerate();
+        parts.for_each(|(i, part)| self.chunk::<S>(width, rays, i * CHUNK, part));
     }
 
-    #[expect(
-        unsafe_code,
-        reason = "three times the speed of the baseline lanes; a detected width has the instructions"
-    )]
-    fn dispatch<S: Sink<R>>(&self, width: Width, rays: Columns<'_, R>, part: &mut SinkPart<'_, R>) {
-        #[cfg(target_arch = "x86_64")]
-        match width {
-            Width::Baseline => self.blocks::<S>(rays, part),
-            // SAFETY: `batch_with` and `batch_parallel` pass at most the detected width.
-            Width::Bits256 => unsafe { self.blocks_avx2::<S>(rays, part) },
-            // SAFETY: as above.
-            Width::Bits512 => unsafe { self.blocks_avx512::<S>(rays, part) },
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        self.blocks::<S>(rays, part);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn blocks_avx2<S: Sink<R>>(&self, rays: Columns<'_, R>, part: &mut SinkPart<'_, R>) {
-        self.blocks::<S>(rays, part);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
-    fn blocks_avx512<S: Sink<R>>(&self, rays: Columns<'_, R>, part: &mut SinkPart<'_, R>) {
-        self.blocks::<S>(rays, part);
+    fn chunk<S: Sink<R>>(
+        &self,
+        width: Width,
+        rays: &Rays<R>,
+        from: usize,
+        mut part: SinkPart<'_, R>,
+    ) {
+        let columns = rays.slice(from, from + part.codes.len());
+        widest(
+            width,
+            #[inline(always)]
+            || self.blocks::<S>(columns, &mut part),
+        );
     }
 
     #[inline(always)]
@@ -351,38 +301,31 @@ impl<R: Real> Tracer<R> {
     }
 }
 
-fn narrower(asked: Width, detected: Width) -> Width {
-    match (asked, detected) {
-        (Width::Bits512, Width::Bits512) => Width::Bits512,
-        (Width::Baseline, _) | (_, Width::Baseline) => Width::Baseline,
-        _ => Width::Bits256,
-    }
-}
-
 /// Rays on their way, as columns.
-struct Block<R> {
-    x: [R; BLOCK],
-    y: [R; BLOCK],
-    z: [R; BLOCK],
-    kx: [R; BLOCK],
-    ky: [R; BLOCK],
-    kz: [R; BLOCK],
+#[derive(Clone)]
+pub(super) struct Block<R> {
+    pub(super) x: [R; BLOCK],
+    pub(super) y: [R; BLOCK],
+    pub(super) z: [R; BLOCK],
+    pub(super) kx: [R; BLOCK],
+    pub(super) ky: [R; BLOCK],
+    pub(super) kz: [R; BLOCK],
     opl: [R; BLOCK],
     /// 0 for a ray on its way, else where and why it was lost; a number of the same width as the
     /// others, so that the lanes need no conversion.
-    code: [R; BLOCK],
+    pub(super) code: [R; BLOCK],
 }
 
 impl<R: Real> Block<R> {
     #[inline(always)]
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let zero = [R::ZERO; BLOCK];
         Self { x: zero, y: zero, z: zero, kx: zero, ky: zero, kz: zero, opl: zero, code: zero }
     }
 
     /// Takes rays from the columns; a block that is not full is filled up with its first ray.
     #[inline(always)]
-    fn load(&mut self, rays: Columns<'_, R>, from: usize, count: usize, index: R) {
+    pub(super) fn load(&mut self, rays: Columns<'_, R>, from: usize, count: usize, index: R) {
         for (to, column) in [
             (&mut self.x, rays.x),
             (&mut self.y, rays.y),
@@ -402,37 +345,69 @@ impl<R: Real> Block<R> {
         }
     }
 
+    /// Point and optical direction of a ray.
+    #[inline(always)]
+    pub(super) fn state(&self, j: usize) -> (Vec3<R>, Vec3<R>) {
+        let p = Vec3::new(self.x[j], self.y[j], self.z[j]);
+        (p, Vec3::new(self.kx[j], self.ky[j], self.kz[j]))
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, j: usize, p: Vec3<R>, k: Vec3<R>) {
+        (self.x[j], self.y[j], self.z[j]) = (p.x, p.y, p.z);
+        (self.kx[j], self.ky[j], self.kz[j]) = (k.x, k.y, k.z);
+    }
+
     #[inline(always)]
     fn cross<S: Sink<R>>(&mut self, interface: &Interface<R>, number: u32) {
+        if S::PATH {
+            let mut opl = self.opl;
+            self.meet(interface, number, |j, s| opl[j] += s * interface.n2);
+            self.opl = opl;
+        } else {
+            self.meet(interface, number, |_, _| {});
+        }
+    }
+
+    /// Crosses a surface and keeps the distance to it.
+    #[inline(always)]
+    pub(super) fn cross_keeping(
+        &mut self,
+        interface: &Interface<R>,
+        number: u32,
+        distance: &mut [R; BLOCK],
+    ) {
+        self.meet(interface, number, |j, s| distance[j] = s);
+    }
+
+    #[inline(always)]
+    fn meet(&mut self, interface: &Interface<R>, number: u32, keep: impl FnMut(usize, R)) {
         match interface.form {
-            Form::Plane => self.sweep::<S>(interface, number, Interface::meet_plane),
-            Form::Sphere => self.sweep::<S>(interface, number, Interface::meet_sphere),
-            Form::Conic => self.sweep::<S>(interface, number, Interface::meet_conic),
-            Form::Asphere => self.sweep::<S>(interface, number, Interface::meet_asphere),
+            Form::Plane => self.sweep(interface, number, Interface::meet_plane, keep),
+            Form::Sphere => self.sweep(interface, number, Interface::meet_sphere, keep),
+            Form::Conic => self.sweep(interface, number, Interface::meet_conic, keep),
+            Form::Asphere => self.sweep(interface, number, Interface::meet_asphere, keep),
         }
     }
 
     #[inline(always)]
-    fn sweep<S: Sink<R>>(
+    fn sweep(
         &mut self,
         interface: &Interface<R>,
         number: u32,
         meet: impl Fn(&Interface<R>, Vec3<R>, Vec3<R>) -> Meeting<R>,
+        mut keep: impl FnMut(usize, R),
     ) {
         let interface = *interface;
         let lost = |cause: u32| R::from_f64(f64::from(4 * number + cause));
         let (missed, clipped) = (lost(MISSED), lost(CLIPPED));
         let reflected = lost(TOTAL_REFLECTION);
         for j in 0..BLOCK {
-            let p = Vec3::new(self.x[j], self.y[j], self.z[j] - interface.gap);
-            let k = Vec3::new(self.kx[j], self.ky[j], self.kz[j]);
+            let (p, k) = self.state(j);
+            let p = Vec3::new(p.x, p.y, p.z - interface.gap);
             let crossing = interface.go_on(meet(&interface, p, k), k);
-            (self.x[j], self.y[j], self.z[j]) =
-                (crossing.point.x, crossing.point.y, crossing.point.z);
-            (self.kx[j], self.ky[j], self.kz[j]) = (crossing.k.x, crossing.k.y, crossing.k.z);
-            if S::PATH {
-                self.opl[j] += crossing.s * interface.n2;
-            }
+            self.set(j, crossing.point, crossing.k);
+            keep(j, crossing.s);
             let code = code(&crossing, missed, clipped, reflected);
             self.code[j] = R::select(self.code[j] > R::ZERO, self.code[j], code);
         }

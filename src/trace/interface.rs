@@ -39,7 +39,12 @@ pub(super) struct Interface<R> {
     pub(super) curvature: R,
     pub(super) conic: R,
     pub(super) terms: [R; ASPHERE_TERMS],
-    /// The square of the index in front.
+    /// The surface whose index the light is in when it arrives; `None` for the index in front of
+    /// the first one. A mirror sets no index.
+    pub(super) medium: Option<usize>,
+    /// The index in front.
+    pub(super) index_before: R,
+    /// Its square.
     pub(super) n2: R,
     /// The index behind.
     pub(super) index_behind: R,
@@ -87,6 +92,7 @@ const FAR: f64 = 0.5;
 /// The surfaces of a system, prepared.
 pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
     let (mut n, mut gap, mut sense) = (system.index_before, R::ZERO, R::ONE);
+    let mut medium = None;
     let prepare = |(i, surface): (usize, &crate::lens::Surface<R>)| {
         let (curvature, conic, terms) = surface.shape.numbers();
         let behind = if surface.mirror { n } else { surface.index };
@@ -101,6 +107,8 @@ pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
             curvature,
             conic,
             terms,
+            medium,
+            index_before: n,
             n2: n * n,
             index_behind: behind,
             dn2: (behind - n) * (behind + n),
@@ -109,6 +117,7 @@ pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
             steepest: asphere::steepest(&surface.shape, surface.semi_diameter.value()),
         };
         (n, gap) = (behind, surface.thickness);
+        medium = if surface.mirror { medium } else { Some(i) };
         sense = if surface.mirror { -sense } else { sense };
         interface
     };
@@ -252,6 +261,8 @@ impl<R: Real> Interface<R> {
             curvature: self.curvature.value(),
             conic: self.conic.value(),
             terms: self.terms.map(Real::value),
+            medium: self.medium,
+            index_before: self.index_before.value(),
             n2: self.n2.value(),
             index_behind: self.index_behind.value(),
             dn2: self.dn2.value(),

@@ -10,13 +10,17 @@
 //! from behind the front lens of a fisheye still travels forwards.
 
 mod asphere;
+mod backward;
 mod batch;
 mod fate;
 mod interface;
+mod lanes;
 mod single;
 
-pub use batch::{Hits, Points, Rays, Sink, Width};
+pub use backward::{Gradient, Seed, Slot, SurfaceGradient};
+pub use batch::{Hits, Points, Rays, Sink};
 pub use fate::{Fate, Fates};
+pub use lanes::Width;
 pub use single::{Landing, Path, Ray};
 
 use crate::lens::Invalid;

@@ -7,7 +7,7 @@
 
 use aplanat::lens::{ASPHERE_TERMS, Invalid, Shape, Surface, System};
 use aplanat::math::{Double, Dual, Real, Vec3};
-use aplanat::trace::{Fate, Hits, Landing, Ray, Rays, Sink, Tracer, Width};
+use aplanat::trace::{Fate, Gradient, Hits, Landing, Ray, Rays, Seed, Sink, Tracer, Width};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -331,4 +331,78 @@ fn reference_hard_cases_in_batches_give_the_same_bits() {
             }
         }
     }
+}
+
+/// One output of a landing as the seed of the backward pass.
+fn seed(output: usize) -> Seed<f64> {
+    let mut v = [0.0; 7];
+    v[output] = 1.0;
+    let [x, y, z, l, m, n, opl] = v;
+    Seed { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n), opl }
+}
+
+fn parameter(gradient: &Gradient<f64>, name: &str) -> Option<f64> {
+    if name == "n0" {
+        return Some(gradient.index_before);
+    }
+    let (surface, what) = name.strip_prefix('s')?.split_once('.')?;
+    let surface = &gradient.surfaces[surface.parse::<usize>().unwrap()];
+    Some(match what {
+        "c" => surface.curvature,
+        "k" => surface.conic,
+        "t" => surface.thickness,
+        "n" => surface.index,
+        term => surface.terms[term.strip_prefix('a')?.parse::<usize>().unwrap() / 2 - 2],
+    })
+}
+
+/// The backward pass against forward duals of the same case, every output and every number.
+#[test]
+fn reference_hard_cases_backwards() {
+    let cases = read("hard_cases.json");
+    let mut worst: BTreeMap<&str, f64> = BTreeMap::new();
+    for case in cases["cases"].as_array().unwrap() {
+        let expect = &case["expect"];
+        let Some(derivatives) = expect.get("derivatives").and_then(Value::as_object) else {
+            continue;
+        };
+        let family = case["family"].as_str().unwrap();
+        let start = PLAIN.ray(&case["input"]["ray"]);
+        // Every number is asked for, so a surface is written in the form that has it.
+        let mut system = PLAIN.system(&case["input"]).unwrap();
+        for (surface, input) in
+            system.surfaces.iter_mut().zip(case["input"]["surfaces"].as_array().unwrap())
+        {
+            let asphere = input.get("a").is_some();
+            surface.shape =
+                if asphere { surface.shape.as_asphere() } else { surface.shape.as_conic() };
+        }
+        let Ok(tracer) = Tracer::new(&system) else { continue };
+        let rays: Rays<f64> = std::iter::once(start).collect();
+        let (unit, size) = (units(expect), expected(expect));
+        let relative_unit =
+            (0..7).map(|i| unit[i] / size[i].abs().max(1.0)).fold(HALF_ULP, f64::max);
+        let rounding = 64.0 * relative_unit * relative_unit / HALF_ULP;
+        for output in 0..7 {
+            let gradient = tracer.gradient(&rays, |_| seed(output));
+            let exact = |row: &Value| number(&row[output]);
+            let largest = derivatives.values().fold(0.0, |m: f64, row| m.max(exact(row).abs()));
+            for (name, row) in derivatives {
+                let Some(got) = parameter(&gradient, name) else { continue };
+                let error = (got - exact(row)).abs();
+                if error <= 1e-12 || family == "extreme" {
+                    continue;
+                }
+                let relative = error / largest;
+                let entry = worst.entry(family).or_default();
+                *entry = entry.max(relative);
+                let what = format!(
+                    "{}: d{}/d{name} = {got:e}, {}",
+                    case["id"], OUTPUTS[output], row[output]
+                );
+                assert!(relative <= rounding.max(1e-9), "{what}: off by {relative:e}");
+            }
+        }
+    }
+    println!("backward pass, worst relative error by family: {worst:?}");
 }

@@ -1,0 +1,311 @@
+//! The scene drawn on the graphics card, through `scene.wgsl`: one instanced quad a segment, the
+//! ramp at its rim in the shader.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec2;
+use thiserror::Error;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu::vertex_attr_array as attributes;
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingType, BlendState, Buffer, BufferAsyncError, BufferBindingType,
+    BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, Color, ColorTargetState,
+    ColorWrites, CommandEncoder, CommandEncoderDescriptor, Device, DeviceDescriptor, Extent3d,
+    FragmentState, Instance, InstanceDescriptor, LoadOp, MapMode, MapRangeError, MultisampleState,
+    Operations, PipelineCompilationOptions, PipelineLayoutDescriptor, PollError, PollType,
+    PrimitiveState, PrimitiveTopology, Queue, RenderPass, RenderPassColorAttachment,
+    RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, RequestAdapterError,
+    RequestAdapterOptions, RequestDeviceError, ShaderModule, ShaderStages, StoreOp,
+    TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor, TextureDimension,
+    TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, VertexBufferLayout,
+    VertexState, VertexStepMode, include_wgsl,
+};
+
+use super::{Camera, Colour, Corner, Picture, Scene, Segment};
+
+/// Drawings keep colours as a person picks them: blending happens on the stored values.
+pub const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
+
+/// Why a drawing could not be fetched from the graphics card.
+#[derive(Debug, Error)]
+pub enum Error {
+    /// No graphics card and no software in its place.
+    #[error("no graphics adapter: {0}")]
+    Adapter(#[from] RequestAdapterError),
+    /// The card refused to work.
+    #[error("the graphics adapter gives no device: {0}")]
+    Device(#[from] RequestDeviceError),
+    /// The card was lost while it worked.
+    #[error("waiting for the graphics card failed: {0}")]
+    Poll(#[from] PollError),
+    /// Its memory could not be read.
+    #[error("memory of the graphics card cannot be read: {0}")]
+    Map(#[from] BufferAsyncError),
+    /// Its memory could not be read.
+    #[error("memory of the graphics card cannot be read: {0}")]
+    Range(#[from] MapRangeError),
+    /// The card never answered.
+    #[error("the graphics card never reported that a drawing is done")]
+    Silent,
+}
+
+/// What the shader knows of the camera.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct View {
+    centre: Vec2,
+    size: Vec2,
+    scale: f32,
+    // The size of a uniform is a multiple of eight bytes.
+    padding: f32,
+}
+
+impl View {
+    fn new(camera: Camera, size: [u32; 2]) -> Self {
+        let (centre, scale) = camera.to_f32();
+        let [width, height] = size.map(|n| n as f32);
+        Self { centre, size: Vec2::new(width, height), scale, padding: 0.0 }
+    }
+}
+
+/// The two programs that draw a scene.
+#[derive(Debug)]
+pub struct Renderer {
+    triangles: RenderPipeline,
+    segments: RenderPipeline,
+    views: BindGroupLayout,
+}
+
+impl Renderer {
+    /// Compiles the programs.
+    pub fn new(device: &Device) -> Self {
+        let module = device.create_shader_module(include_wgsl!("scene.wgsl"));
+        let views = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+            label: Some("scene view"),
+            entries: &[BindGroupLayoutEntry {
+                binding: 0,
+                visibility: ShaderStages::VERTEX,
+                ty: BindingType::Buffer {
+                    ty: BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            }],
+        });
+        let pipeline = |shape: &Shape<'_>| pipeline(device, &module, &views, shape);
+        Self { triangles: pipeline(&TRIANGLES), segments: pipeline(&SEGMENTS), views }
+    }
+
+    /// Draws a scene into a new texture of `size` pixels.
+    pub fn draw(
+        &self,
+        device: &Device,
+        encoder: &mut CommandEncoder,
+        scene: &Scene,
+        camera: Camera,
+        size: [u32; 2],
+    ) -> Texture {
+        let texture = target(device, size);
+        let view = texture.create_view(&TextureViewDescriptor::default());
+        let group = self.bind(device, View::new(camera, size));
+        let corners = vertices(device, &scene.corners);
+        let segments = vertices(device, &scene.segments);
+        let mut pass = begin(encoder, &view, scene.background);
+        pass.set_bind_group(0, &group, &[]);
+        if let Some((buffer, count)) = corners {
+            pass.set_pipeline(&self.triangles);
+            pass.set_vertex_buffer(0, buffer.slice(..));
+            pass.draw(0..count, 0..1);
+        }
+        if let Some((buffer, count)) = segments {
+            pass.set_pipeline(&self.segments);
+            pass.set_vertex_buffer(0, buffer.slice(..));
+            pass.draw(0..4, 0..count);
+        }
+        drop(pass);
+        texture
+    }
+
+    fn bind(&self, device: &Device, view: View) -> BindGroup {
+        let buffer = device.create_buffer_init(&BufferInitDescriptor {
+            label: Some("scene view"),
+            contents: bytemuck::bytes_of(&view),
+            usage: BufferUsages::UNIFORM,
+        });
+        device.create_bind_group(&BindGroupDescriptor {
+            label: Some("scene view"),
+            layout: &self.views,
+            entries: &[BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
+        })
+    }
+}
+
+/// How one kind of shape reaches its program.
+struct Shape<'a> {
+    vertex: &'a str,
+    fragment: &'a str,
+    topology: PrimitiveTopology,
+    buffer: VertexBufferLayout<'a>,
+}
+
+const TRIANGLES: Shape<'_> = Shape {
+    vertex: "corner",
+    fragment: "triangle",
+    topology: PrimitiveTopology::TriangleList,
+    buffer: VertexBufferLayout {
+        array_stride: size_of::<Corner>() as u64,
+        step_mode: VertexStepMode::Vertex,
+        attributes: &attributes![0 => Float32x2, 1 => Unorm8x4],
+    },
+};
+
+const SEGMENTS: Shape<'_> = Shape {
+    vertex: "quad",
+    fragment: "segment",
+    topology: PrimitiveTopology::TriangleStrip,
+    buffer: VertexBufferLayout {
+        array_stride: size_of::<Segment>() as u64,
+        step_mode: VertexStepMode::Instance,
+        attributes: &attributes![0 => Float32x2, 1 => Float32x2, 2 => Float32, 3 => Unorm8x4],
+    },
+};
+
+fn pipeline(
+    device: &Device,
+    module: &ShaderModule,
+    views: &BindGroupLayout,
+    shape: &Shape<'_>,
+) -> RenderPipeline {
+    let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+        label: Some(shape.fragment),
+        bind_group_layouts: &[Some(views)],
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&RenderPipelineDescriptor {
+        label: Some(shape.fragment),
+        layout: Some(&layout),
+        vertex: VertexState {
+            module,
+            entry_point: Some(shape.vertex),
+            buffers: &[Some(shape.buffer.clone())],
+            compilation_options: PipelineCompilationOptions::default(),
+        },
+        primitive: PrimitiveState { topology: shape.topology, ..PrimitiveState::default() },
+        depth_stencil: None,
+        multisample: MultisampleState::default(),
+        fragment: Some(FragmentState {
+            module,
+            entry_point: Some(shape.fragment),
+            targets: &[Some(ColorTargetState {
+                format: FORMAT,
+                blend: Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                write_mask: ColorWrites::ALL,
+            })],
+            compilation_options: PipelineCompilationOptions::default(),
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+fn target(device: &Device, [width, height]: [u32; 2]) -> Texture {
+    device.create_texture(&TextureDescriptor {
+        label: Some("scene"),
+        size: Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: TextureDimension::D2,
+        format: FORMAT,
+        usage: TextureUsages::RENDER_ATTACHMENT
+            | TextureUsages::TEXTURE_BINDING
+            | TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+/// A buffer with some shapes and their number; none where there are none.
+fn vertices<T: Pod>(device: &Device, shapes: &[T]) -> Option<(Buffer, u32)> {
+    let count = u32::try_from(shapes.len()).ok().filter(|&count| count > 0)?;
+    let buffer = device.create_buffer_init(&BufferInitDescriptor {
+        label: Some("scene shapes"),
+        contents: bytemuck::cast_slice(shapes),
+        usage: BufferUsages::VERTEX,
+    });
+    Some((buffer, count))
+}
+
+fn begin<'a>(
+    encoder: &'a mut CommandEncoder,
+    view: &TextureView,
+    background: Colour,
+) -> RenderPass<'a> {
+    let [r, g, b, a] = background.map(|byte| f64::from(byte) / 255.0);
+    encoder.begin_render_pass(&RenderPassDescriptor {
+        label: Some("scene"),
+        color_attachments: &[Some(RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: Operations {
+                load: LoadOp::Clear(Color { r: r * a, g: g * a, b: b * a, a }),
+                store: StoreOp::Store,
+            },
+        })],
+        ..RenderPassDescriptor::default()
+    })
+}
+
+/// A device without a window, with all that its adapter can do.
+///
+/// A software adapter serves as well as a graphics card.
+pub async fn headless() -> Result<(Device, Queue), Error> {
+    let instance = Instance::new(InstanceDescriptor::new_without_display_handle());
+    let adapter = instance.request_adapter(&RequestAdapterOptions::default()).await?;
+    let descriptor =
+        DeviceDescriptor { required_limits: adapter.limits(), ..DeviceDescriptor::default() };
+    Ok(adapter.request_device(&descriptor).await?)
+}
+
+/// Draws a scene without a window and fetches the picture.
+pub fn picture(
+    (device, queue): &(Device, Queue),
+    scene: &Scene,
+    camera: Camera,
+    size: [u32; 2],
+) -> Result<Picture, Error> {
+    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+    let texture = Renderer::new(device).draw(device, &mut encoder, scene, camera, size);
+    let stride = (4 * size[0]).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = device.create_buffer(&BufferDescriptor {
+        label: Some("picture"),
+        size: u64::from(stride) * u64::from(size[1]),
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let layout =
+        TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(stride), rows_per_image: None };
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        TexelCopyBufferInfo { buffer: &buffer, layout },
+        texture.size(),
+    );
+    queue.submit([encoder.finish()]);
+    let bytes = read(device, &buffer)?;
+    let rows = bytes.chunks_exact(stride as usize);
+    let rgba = rows.flat_map(|row| &row[..4 * size[0] as usize]).copied().collect();
+    Ok(Picture { size, rgba })
+}
+
+fn read(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, Error> {
+    let (done, mapped) = std::sync::mpsc::channel();
+    buffer.map_async(MapMode::Read, .., move |result| {
+        // Nobody listens only if waiting failed, which is then the error.
+        drop(done.send(result));
+    });
+    device.poll(PollType::wait_indefinitely())?;
+    mapped.try_recv().map_err(|_unanswered| Error::Silent)??;
+    let bytes = buffer.get_mapped_range(..)?.to_vec();
+    buffer.unmap();
+    Ok(bytes)
+}

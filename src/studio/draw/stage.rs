@@ -1,0 +1,164 @@
+//! A scene to look around in: drag to move, wheel to zoom, double click or *Fit* to see it all,
+//! and a scale bar.
+
+use std::sync::Arc;
+
+use eframe::egui::{
+    self, Align2, Color32, CornerRadius, Event, MouseWheelUnit, Rect, Response, Sense, Stroke, Ui,
+    WidgetInfo,
+};
+use glam::DVec2;
+
+use super::{Backing, Bounds, Camera, Canvas, Scene, round_length};
+
+/// Free room around a fitted scene.
+const MARGIN: f64 = 24.0; // points
+/// The scale bar is at most this share of the width, and at most so long.
+const BAR: (f32, f32) = (0.25, 160.0); // share, points
+/// How much nearer one notch of the wheel brings.
+const NOTCH: f64 = 1.2;
+
+/// A part of a panel that shows a scene; it remembers where one looks.
+#[derive(Debug)]
+pub struct Stage {
+    canvas: Canvas,
+    /// Where a person has moved to; none while the whole scene is shown.
+    moved: Option<Camera>,
+}
+
+impl Stage {
+    /// A stage; no two of one window share a name.
+    pub const fn new(name: &'static str) -> Self {
+        Self { canvas: Canvas::new(name), moved: None }
+    }
+
+    /// Shows the whole scene again.
+    pub const fn fit(&mut self) {
+        self.moved = None;
+    }
+
+    /// Shows a scene in all the room that is left. `whole` is what *fit* shows.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        backing: Backing,
+        scene: &Arc<Scene>,
+        whole: Bounds,
+        label: &str,
+    ) -> Response {
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, label));
+        let per_point = f64::from(ui.ctx().pixels_per_point());
+        let size = per_point * DVec2::new(rect.width().into(), rect.height().into());
+        let fitted = Camera::fit(whole, size, MARGIN * per_point);
+        let camera = self.look_around(ui, &response, fitted, size, per_point);
+        self.canvas.show(ui, rect, backing, scene, camera);
+        scale_bar(ui, rect, camera.scale * per_point);
+        response
+    }
+
+    fn look_around(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        fitted: Camera,
+        size: DVec2,
+        per_point: f64,
+    ) -> Camera {
+        if response.double_clicked() {
+            self.fit();
+        }
+        let mut camera = self.moved.unwrap_or(fitted);
+        if response.dragged() {
+            camera = camera.dragged(per_point * points(response.drag_delta()));
+        }
+        if let Some(pointer) = response.hover_pos() {
+            let factor = zoom(ui);
+            if factor != 1.0 {
+                let px = per_point * points(pointer - response.rect.min);
+                camera = camera.zoomed(factor, px, size);
+            }
+        }
+        if camera != self.moved.unwrap_or(fitted) {
+            self.moved = Some(camera);
+        }
+        camera
+    }
+}
+
+fn points(v: egui::Vec2) -> DVec2 {
+    DVec2::new(v.x.into(), v.y.into())
+}
+
+/// By how much the wheel or two fingers bring the scene nearer.
+///
+/// The events themselves are read: the smoothed ones would draw the scene ten times for a notch.
+fn zoom(ui: &Ui) -> f64 {
+    ui.input(|input| {
+        input.events.iter().fold(1.0, |factor, event| match event {
+            Event::Zoom(nearer) => factor * f64::from(*nearer),
+            Event::MouseWheel { unit, delta, .. } => {
+                let notches = match unit {
+                    MouseWheelUnit::Point => delta.y / 50.0,
+                    MouseWheelUnit::Line => delta.y,
+                    MouseWheelUnit::Page => 4.0 * delta.y,
+                };
+                factor * NOTCH.powf(notches.into())
+            }
+            _ => factor,
+        })
+    })
+}
+
+/// Draws a bar of a round length and says how long it is. `scale` is in points per mm.
+fn scale_bar(ui: &Ui, rect: Rect, scale: f64) {
+    let room = (BAR.0 * rect.width()).min(BAR.1);
+    let length = round_length(f64::from(room) / scale);
+    #[expect(clippy::cast_possible_truncation, reason = "at most 160 points")]
+    let width = (length * scale) as f32;
+    let left = rect.left_bottom() + egui::vec2(10.0, -10.0);
+    let color = ui.visuals().strong_text_color();
+    let bar = Rect::from_min_size(left - egui::vec2(0.0, 3.0), egui::vec2(width, 3.0));
+    ui.painter().rect(bar, CornerRadius::ZERO, color, Stroke::NONE, egui::StrokeKind::Inside);
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let above = bar.left_top() - egui::vec2(0.0, 2.0);
+    ui.painter().text(above, Align2::LEFT_BOTTOM, length_text(length), font, color);
+}
+
+/// A round length in the unit in which it is easiest to read.
+pub fn length_text(mm: f64) -> String {
+    if mm >= 1000.0 {
+        format!("{} m", mm / 1000.0)
+    } else if mm >= 1.0 {
+        format!("{mm} mm")
+    } else {
+        // A round length below a millimetre is a whole or tenth number of micrometres.
+        format!("{} µm", (mm * 1e5).round() / 100.0)
+    }
+}
+
+/// A small button in the upper right corner of a stage.
+pub fn corner_button(ui: &mut Ui, rect: Rect, text: &str) -> Response {
+    let size = egui::vec2(36.0, 20.0);
+    let place = Rect::from_min_size(rect.right_top() + egui::vec2(-size.x - 6.0, 6.0), size);
+    ui.put(place, egui::Button::new(text).fill(Color32::TRANSPARENT))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_in_readable_units() {
+        let cases = [
+            (0.00002, "0.02 µm"),
+            (0.05, "50 µm"),
+            (2.0, "2 mm"),
+            (500.0, "500 mm"),
+            (2000.0, "2 m"),
+        ];
+        for (mm, text) in cases {
+            assert_eq!(length_text(mm), text);
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The colours of drawings: legible on dark and on light, and told apart by colour-blind eyes.
+
+use eframe::egui::{self, Color32};
+
+use super::draw::Colour;
+
+/// Colours of fields in their order: blue, green, red, then what is left of the set of Okabe and
+/// Ito (2008), which people with every kind of colour blindness can tell apart.
+const FIELDS_DARK: [[u8; 3]; 7] = [
+    [86, 180, 233],
+    [0, 190, 130],
+    [240, 110, 60],
+    [240, 200, 60],
+    [225, 140, 190],
+    [150, 150, 240],
+    [170, 170, 170],
+];
+const FIELDS_LIGHT: [[u8; 3]; 7] = [
+    [0, 90, 180],
+    [0, 130, 90],
+    [200, 70, 0],
+    [180, 130, 0],
+    [180, 80, 140],
+    [90, 70, 190],
+    [90, 90, 90],
+];
+
+/// What a drawing is coloured with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Palette {
+    dark: bool,
+    /// Behind everything.
+    pub background: Colour,
+    /// Inside a lens; a denser glass is drawn less transparent.
+    pub glass: Colour,
+    /// The rim of a lens.
+    pub outline: Colour,
+    /// A mirror.
+    pub mirror: Colour,
+    /// The stop and the image plane.
+    pub strong: Colour,
+    /// The axis, and surfaces between equal media.
+    pub faint: Colour,
+    /// Where a ray has died.
+    pub lost: Colour,
+}
+
+impl Palette {
+    /// The colours that go with the window's theme.
+    pub fn of(visuals: &egui::Visuals) -> Self {
+        if visuals.dark_mode { Self::DARK } else { Self::LIGHT }
+    }
+
+    /// Light on dark.
+    pub const DARK: Self = Self {
+        dark: true,
+        background: [22, 24, 28, 255],
+        glass: [110, 165, 225, 70],
+        outline: [160, 190, 220, 255],
+        mirror: [120, 210, 140, 255],
+        strong: [235, 235, 235, 255],
+        faint: [120, 125, 135, 130],
+        lost: [255, 90, 90, 255],
+    };
+
+    /// Dark on light.
+    pub const LIGHT: Self = Self {
+        dark: false,
+        background: [252, 252, 252, 255],
+        glass: [90, 150, 215, 60],
+        outline: [60, 95, 135, 255],
+        mirror: [30, 130, 60, 255],
+        strong: [25, 25, 25, 255],
+        faint: [110, 115, 125, 130],
+        lost: [205, 20, 20, 255],
+    };
+
+    /// The colour of a field by its place in the list.
+    pub fn field(&self, index: usize) -> Colour {
+        let set = if self.dark { FIELDS_DARK } else { FIELDS_LIGHT };
+        let [r, g, b] = set[index % set.len()];
+        [r, g, b, 255]
+    }
+
+    /// About the hue that a wavelength has to the eye, violet below 0.4 µm and red above 0.7 µm.
+    pub fn wavelength(&self, um: f64) -> Colour {
+        const HUES: [(f64, [f64; 3]); 7] = [
+            (0.40, [150.0, 60.0, 255.0]),
+            (0.45, [70.0, 90.0, 255.0]),
+            (0.49, [0.0, 190.0, 230.0]),
+            (0.53, [0.0, 200.0, 60.0]),
+            (0.58, [220.0, 200.0, 0.0]),
+            (0.62, [255.0, 120.0, 0.0]),
+            (0.70, [235.0, 40.0, 40.0]),
+        ];
+        let um = um.clamp(HUES[0].0, HUES[6].0);
+        let above = HUES.iter().position(|(at, _)| um <= *at).unwrap_or(6).max(1);
+        let ((low, a), (high, b)) = (HUES[above - 1], HUES[above]);
+        let t = (um - low) / (high - low);
+        let shade = if self.dark { 1.0 } else { 0.75 };
+        let mix = |i: usize| to_byte(shade * (a[i] + t * (b[i] - a[i])));
+        [mix(0), mix(1), mix(2), 255]
+    }
+}
+
+/// The nearest of the 256 steps of a colour.
+pub fn to_byte(value: f64) -> u8 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let byte = value.round() as u8;
+    byte
+}
+
+/// A colour as the widgets want it.
+pub fn color32([r, g, b, a]: Colour) -> Color32 {
+    Color32::from_rgba_unmultiplied(r, g, b, a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_waves_are_blue_and_long_ones_red() {
+        for palette in [Palette::DARK, Palette::LIGHT] {
+            let [violet, red] = [0.35, 1.1].map(|um| palette.wavelength(um));
+            assert!(violet[2] > violet[0] && red[0] > red[2]);
+            let green = palette.wavelength(0.53);
+            assert!(green[1] > green[0] && green[1] > green[2]);
+        }
+    }
+
+    #[test]
+    fn fields_beyond_the_set_start_again() {
+        assert_eq!(Palette::DARK.field(0), Palette::DARK.field(7));
+        assert_ne!(Palette::DARK.field(0), Palette::DARK.field(1));
+    }
+}

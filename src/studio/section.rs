@@ -1,0 +1,217 @@
+//! The section of a lens in the y-z plane: glass with joined edges, the stop as ticks, mirrors,
+//! the image plane.
+//!
+//! An element reaches to the larger of its two semi-diameters; the smaller surface goes on flat,
+//! as lenses are ground. A surface without a semi-diameter is drawn as far as its rays go.
+
+use glam::DVec2;
+
+use super::draw::{Bounds, Scene};
+use super::palette::{Palette, to_byte};
+use crate::lens::{Shape, System};
+
+/// How many straight pieces a surface is drawn with: the sag of a hemisphere of 200 px is then
+/// off by a fiftieth of a pixel.
+const PIECES: i32 = 96;
+
+/// The section of a system, ready to be drawn.
+#[derive(Clone, Debug)]
+pub struct Section<'a> {
+    system: &'a System<f64>,
+    vertices: Vec<f64>,
+    heights: Vec<f64>,
+}
+
+impl<'a> Section<'a> {
+    /// The section of a system. `reached` says how far from the axis rays meet each surface.
+    pub fn new(system: &'a System<f64>, reached: &[f64]) -> Self {
+        Self { system, vertices: vertices(system), heights: heights(system, reached) }
+    }
+
+    /// What a picture of the whole lens shows: all surfaces and the image plane.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let corners = self.vertices.iter().zip(&self.heights);
+        Bounds::around(corners.flat_map(|(&z, &h)| [DVec2::new(z, h), DVec2::new(z, -h)]))
+    }
+
+    /// Draws glass, to lie below the rays.
+    pub fn draw_glass(&self, scene: &mut Scene, palette: &Palette) {
+        for (left, medium) in self.elements() {
+            let height = self.heights[left].max(self.heights[left + 1]);
+            let mut colour = palette.glass;
+            colour[3] = glass_alpha(colour[3], medium);
+            scene.strip(&self.curve(left, height), &self.curve(left + 1, height), colour);
+        }
+    }
+
+    /// Draws what lies above the rays: rims, mirrors, stop, image plane and axis.
+    pub fn draw_outlines(&self, scene: &mut Scene, palette: &Palette) {
+        self.draw_axis(scene, palette);
+        for (left, _) in self.elements() {
+            let height = self.heights[left].max(self.heights[left + 1]);
+            let mut rim = self.curve(left, height);
+            rim.extend(self.curve(left + 1, height).into_iter().rev());
+            scene.outline(&rim, 1.5, palette.outline);
+        }
+        let last = self.system.surfaces.len().saturating_sub(1);
+        for (i, surface) in self.system.surfaces.iter().enumerate() {
+            let curve = || self.curve(i, self.heights[i]);
+            if surface.mirror {
+                scene.polyline(&curve(), 2.5, palette.mirror);
+            } else if i == last {
+                scene.polyline(&curve(), 1.5, palette.strong);
+            } else if !self.is_refracting(i) && self.system.stop != Some(i) {
+                scene.polyline(&curve(), 1.0, palette.faint);
+            }
+        }
+        self.draw_stop(scene, palette);
+    }
+
+    fn draw_axis(&self, scene: &mut Scene, palette: &Palette) {
+        let first = self.vertices.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = self.vertices.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let beyond = 0.05 * (last - first);
+        let ends = [first - beyond, last + beyond].map(|z| DVec2::new(z, 0.0));
+        scene.line(ends[0], ends[1], 1.0, palette.faint);
+    }
+
+    fn draw_stop(&self, scene: &mut Scene, palette: &Palette) {
+        let Some(stop) = self.system.stop.filter(|&stop| stop < self.heights.len()) else {
+            return;
+        };
+        let height = self.heights[stop];
+        let highest = self.heights.iter().copied().fold(0.0, f64::max);
+        let z = self.at(stop, height).x;
+        for side in [-1.0, 1.0] {
+            let rim = DVec2::new(z, side * height);
+            scene.line(rim, rim + DVec2::new(0.0, side * 0.25 * highest), 3.0, palette.strong);
+        }
+    }
+
+    /// The gaps filled with something other than air: the surface in front and the index.
+    fn elements(&self) -> impl Iterator<Item = (usize, f64)> {
+        let gaps = self.system.surfaces.len().saturating_sub(1);
+        let filled = self.system.surfaces.iter().take(gaps).enumerate();
+        filled.filter(|(_, s)| !s.mirror && s.index != 1.0).map(|(i, s)| (i, s.index))
+    }
+
+    fn is_refracting(&self, i: usize) -> bool {
+        self.system.index_before(i) != self.system.surfaces[i].index
+    }
+
+    /// A surface from below to above, flat beyond its own semi-diameter.
+    fn curve(&self, i: usize, height: f64) -> Vec<DVec2> {
+        let step = |j: i32| f64::from(j) / f64::from(PIECES);
+        (-PIECES..=PIECES).step_by(2).map(|j| self.at(i, height * step(j))).collect()
+    }
+
+    /// The point of a surface at a height, flat beyond its own semi-diameter.
+    fn at(&self, i: usize, height: f64) -> DVec2 {
+        let ground = height.abs().min(self.heights[i]);
+        DVec2::new(self.vertices[i] + sag(&self.system.surfaces[i].shape, ground), height)
+    }
+}
+
+/// Where each vertex lies on the axis; the first at 0.
+pub fn vertices(system: &System<f64>) -> Vec<f64> {
+    let gaps = system.surfaces.iter().map(|surface| surface.thickness);
+    let ends = gaps.scan(0.0, |z, gap| {
+        let vertex = *z;
+        *z += gap;
+        Some(vertex)
+    });
+    ends.collect()
+}
+
+fn heights(system: &System<f64>, reached: &[f64]) -> Vec<f64> {
+    let known = |i: usize| Some(system.surfaces[i].semi_diameter).filter(|h| h.is_finite());
+    let reached = |i: usize| reached.get(i).copied().filter(|h| *h > 0.0 && h.is_finite());
+    let own: Vec<Option<f64>> =
+        (0..system.surfaces.len()).map(|i| known(i).or_else(|| reached(i))).collect();
+    let highest = own.iter().flatten().copied().fold(0.0, f64::max);
+    let usual = if highest > 0.0 { highest } else { 1.0 };
+    own.into_iter().map(|height| height.unwrap_or(usual)).collect()
+}
+
+/// The sag at a height, or at the edge of the surface where it ends before.
+fn sag(shape: &Shape<f64>, height: f64) -> f64 {
+    let at = |height: f64| shape.sag(height * height).map(|(z, _)| z).filter(|z| z.is_finite());
+    if let Some(z) = at(height) {
+        return z;
+    }
+    let (mut inside, mut outside) = (0.0, height);
+    for _ in 0..40 {
+        let middle = 0.5 * (inside + outside);
+        *(if at(middle).is_some() { &mut inside } else { &mut outside }) = middle;
+    }
+    at(inside).unwrap_or(0.0)
+}
+
+/// Denser glass is less transparent: 1.45 half as much as 1.9.
+fn glass_alpha(usual: u8, index: f64) -> u8 {
+    let share = ((index - 1.0) / 0.65).clamp(0.4, 2.0);
+    to_byte(f64::from(usual) * share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::Surface;
+
+    fn surface(curvature: f64, thickness: f64, index: f64, semi_diameter: f64) -> Surface<f64> {
+        let shape = Shape::Sphere { curvature };
+        Surface { shape, thickness, index, semi_diameter, mirror: false, hyper: false }
+    }
+
+    fn singlet() -> System<f64> {
+        let mut surfaces = vec![
+            surface(0.02, 5.0, 1.5, 10.0),
+            surface(-0.02, 95.0, 1.0, 8.0),
+            surface(0.0, 0.0, 1.0, f64::INFINITY),
+        ];
+        surfaces[2].shape = Shape::Plane;
+        System { index_before: 1.0, surfaces, stop: Some(1) }
+    }
+
+    #[test]
+    fn an_element_reaches_to_its_larger_semi_diameter() {
+        let system = singlet();
+        let section = Section::new(&system, &[]);
+        let back = section.curve(1, 10.0);
+        let rim = back.last().copied().unwrap_or_default();
+        assert_eq!(rim.y, 10.0);
+        assert!((rim.x - (5.0 - 0.02 * 64.0 / (1.0 + (1.0_f64 - 0.0256).sqrt()))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_surface_without_semi_diameter_reaches_as_far_as_its_rays() {
+        let system = singlet();
+        assert_eq!(Section::new(&system, &[9.0, 9.0, 3.0]).heights, [10.0, 8.0, 3.0]);
+        assert_eq!(Section::new(&system, &[]).heights, [10.0, 8.0, 10.0]);
+    }
+
+    #[test]
+    fn a_surface_that_ends_early_is_drawn_to_its_edge() {
+        let ball = Shape::Sphere { curvature: 0.1 };
+        assert!((sag(&ball, 30.0) - 10.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn only_glass_is_filled() {
+        let system = singlet();
+        let mut scene = Scene::default();
+        Section::new(&system, &[]).draw_glass(&mut scene, &Palette::DARK);
+        let behind = scene.corners.iter().map(|corner| corner.at.x).fold(0.0, f32::max);
+        assert!(behind <= 5.01, "nothing is filled behind the singlet");
+    }
+
+    #[test]
+    fn a_lens_without_surfaces_draws_nothing() {
+        let system = System { index_before: 1.0, surfaces: Vec::new(), stop: Some(3) };
+        let section = Section::new(&system, &[]);
+        let mut scene = Scene::default();
+        section.draw_glass(&mut scene, &Palette::DARK);
+        section.draw_outlines(&mut scene, &Palette::DARK);
+        assert_eq!((scene.bounds(), section.bounds()), (None, None));
+    }
+}

@@ -1,0 +1,599 @@
+//! Derivatives for every number of a lens at once: the ray is retraced backwards.
+//!
+//! A block of rays is traced forwards once more, keeping one number a surface: the distance `s` to
+//! it. Then it goes back. From the point on a surface and the direction behind it, Snell's law
+//! read backwards gives the direction in front and `s` the point before: no path is stored, no
+//! tape. At each surface the adjoint passes refraction,
+//!
+//! ```text
+//! k' = k + Γ N   Γ = (a' − a)/m   a = k·N   a'² = a² + (n'² − n²) m   m = N·N
+//! ∂Γ/∂a = −Γ/a'   ∂Γ/∂m = ((n'² − n²)/2a' − Γ)/m   ∂Γ/∂(n'² − n²) = 1/2a'
+//! ```
+//!
+//! and the intersection by the implicit function theorem, with `G` the equation of the surface and
+//! `∇G = −N`: `a ds = ∂G/∂q dq − N·(dp + s dk)`. The forward formulas are those of the interface;
+//! the cost does not depend on the number of parameters.
+
+use super::Tracer;
+use super::batch::{BLOCK, Block, CHUNK, Hits, Rays};
+use super::interface::{Form, Interface};
+use super::lanes::{Width, widest};
+use crate::lens::ASPHERE_TERMS;
+use crate::math::Real;
+use crate::math::Vec3;
+use rayon::prelude::*;
+
+/// The derivative of something by where and how a ray lands.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seed<R> {
+    /// By the point, in the frame of the last surface.
+    pub point: Vec3<R>,
+    /// By the direction cosines behind the last surface.
+    pub direction: Vec3<R>,
+    /// By the optical path.
+    pub opl: R,
+}
+
+/// Derivatives by the numbers of one surface.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SurfaceGradient<R> {
+    /// By the curvature.
+    pub curvature: R,
+    /// By the conic constant; only where the form of the surface has one.
+    pub conic: R,
+    /// By the coefficients of r⁴ to r¹⁶; only where the form of the surface has them.
+    pub terms: [R; ASPHERE_TERMS],
+    /// By the thickness of the gap behind it.
+    pub thickness: R,
+    /// By the index behind it.
+    pub index: R,
+}
+
+/// Derivatives by every number of a system.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Gradient<R> {
+    /// By the index in front of the first surface.
+    pub index_before: R,
+    /// By the numbers of each surface.
+    pub surfaces: Vec<SurfaceGradient<R>>,
+}
+
+impl<R: Real> Gradient<R> {
+    /// Zero for a system of this many surfaces.
+    pub fn zero(surfaces: usize) -> Self {
+        Self { index_before: R::ZERO, surfaces: vec![SurfaceGradient::default(); surfaces] }
+    }
+
+    /// Adds another one, `factor` times.
+    pub fn add(&mut self, other: &Self, factor: R) {
+        self.index_before += other.index_before * factor;
+        for (to, from) in self.surfaces.iter_mut().zip(&other.surfaces) {
+            to.curvature += from.curvature * factor;
+            to.conic += from.conic * factor;
+            to.thickness += from.thickness * factor;
+            to.index += from.index * factor;
+            to.terms.iter_mut().zip(from.terms).for_each(|(t, f)| *t += f * factor);
+        }
+    }
+}
+
+/// A number of a surface that a ray depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slot {
+    /// The curvature.
+    Curvature,
+    /// The conic constant.
+    Conic,
+    /// An asphere coefficient.
+    Term(usize),
+    /// The gap behind the surface.
+    Thickness,
+    /// The index behind the surface; `None` of the surfaces for the one in front of all.
+    Index,
+}
+
+/// Who takes the derivatives of a block of rays as they come.
+trait Harvest<R> {
+    /// The derivatives of a block by a number of a surface, to be added to what came before.
+    /// `surface` is `None` for the index in front of the first surface.
+    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]);
+}
+
+impl<R: Real> Harvest<R> for Gradient<R> {
+    #[inline(always)]
+    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]) {
+        let sum = lane_sum(lanes);
+        let Some(surface) = surface else {
+            self.index_before += sum;
+            return;
+        };
+        let surface = &mut self.surfaces[surface];
+        match slot {
+            Slot::Curvature => surface.curvature += sum,
+            Slot::Conic => surface.conic += sum,
+            Slot::Term(term) => surface.terms[term] += sum,
+            Slot::Thickness => surface.thickness += sum,
+            Slot::Index => surface.index += sum,
+        }
+    }
+}
+
+/// The sum over a block in an order that lanes can keep.
+#[inline(always)]
+fn lane_sum<R: Real>(lanes: &[R; BLOCK]) -> R {
+    let mut parts = [R::ZERO; 8];
+    for eight in lanes.chunks_exact(8) {
+        for (part, lane) in parts.iter_mut().zip(eight) {
+            *part += *lane;
+        }
+    }
+    let [a, b, c, d, e, f, g, h] = parts;
+    ((a + b) + (c + d)) + ((e + f) + (g + h))
+}
+
+/// The derivative of each ray by some numbers of the system.
+#[derive(Debug)]
+struct Rows<'a, R> {
+    wanted: &'a [(Option<usize>, Slot)],
+    /// A column for each wanted number.
+    columns: &'a mut [[R; BLOCK]],
+}
+
+impl<R: Real> Harvest<R> for Rows<'_, R> {
+    #[inline(always)]
+    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]) {
+        let asked = self.wanted.iter().position(|w| *w == (surface, slot));
+        if let Some(column) = asked.map(|i| &mut self.columns[i]) {
+            column.iter_mut().zip(lanes).for_each(|(to, from)| *to += *from);
+        }
+    }
+}
+
+impl<R: Real> Tracer<R> {
+    /// The derivative of a sum over rays by every number of the system, on the calling thread;
+    /// `seed` gives the derivative of the sum by the landing of ray `i`. Rays that are lost count
+    /// nothing.
+    pub fn gradient(&self, rays: &Rays<R>, seed: impl Fn(usize) -> Seed<R> + Sync) -> Gradient<R> {
+        let mut total = Gradient::zero(self.surfaces());
+        for from in (0..rays.len()).step_by(CHUNK) {
+            total.add(&self.chunk_gradient(rays, from, &seed), R::ONE);
+        }
+        total
+    }
+
+    /// The same on all cores, to the same bits.
+    pub fn gradient_parallel(
+        &self,
+        rays: &Rays<R>,
+        seed: impl Fn(usize) -> Seed<R> + Sync,
+    ) -> Gradient<R> {
+        let starts: Vec<usize> = (0..rays.len()).step_by(CHUNK).collect();
+        let parts: Vec<_> =
+            starts.par_iter().map(|from| self.chunk_gradient(rays, *from, &seed)).collect();
+        let mut total = Gradient::zero(self.surfaces());
+        parts.iter().for_each(|part| total.add(part, R::ONE));
+        total
+    }
+
+    fn chunk_gradient(
+        &self,
+        rays: &Rays<R>,
+        start: usize,
+        seed: &(impl Fn(usize) -> Seed<R> + Sync),
+    ) -> Gradient<R> {
+        let mut gradient = Gradient::zero(self.surfaces());
+        let mut distances = vec![[R::ZERO; BLOCK]; self.surfaces()];
+        let end = rays.len().min(start + CHUNK);
+        widest(
+            Width::detect(),
+            #[inline(always)]
+            || {
+                for from in (start..end).step_by(BLOCK) {
+                    let count = BLOCK.min(end - from);
+                    let block = self.outward(rays, from, count, &mut distances);
+                    self.homeward(block, &distances, count, |j| seed(from + j), &mut gradient);
+                }
+            },
+        );
+        gradient
+    }
+
+    /// Where rays land and the derivatives of their points across the axis by some numbers of the
+    /// system: for each ray `2 wanted` numbers, first those of x, then those of y; zeros for a ray
+    /// that is lost. `surface` is `None` for the index in front of the first one.
+    pub fn jacobian(&self, rays: &Rays<R>, wanted: &[(Option<usize>, Slot)]) -> (Hits<R>, Vec<R>) {
+        let mut hits = Hits::default();
+        self.batch(rays, &mut hits);
+        let row = 2 * wanted.len();
+        let mut matrix = vec![R::ZERO; row * rays.len()];
+        let mut distances = vec![[R::ZERO; BLOCK]; self.surfaces()];
+        let mut columns = vec![[R::ZERO; BLOCK]; row];
+        let x = Seed { point: Vec3::new(R::ONE, R::ZERO, R::ZERO), ..Seed::default() };
+        let y = Seed { point: Vec3::new(R::ZERO, R::ONE, R::ZERO), ..Seed::default() };
+        widest(
+            Width::detect(),
+            #[inline(always)]
+            || {
+                for from in (0..rays.len()).step_by(BLOCK) {
+                    let count = BLOCK.min(rays.len() - from);
+                    let block = self.outward(rays, from, count, &mut distances);
+                    columns.fill([R::ZERO; BLOCK]);
+                    let (of_x, of_y) = columns.split_at_mut(wanted.len());
+                    let mut rows = Rows { wanted, columns: of_x };
+                    self.homeward(block.clone(), &distances, count, |_| x, &mut rows);
+                    let mut rows = Rows { wanted, columns: of_y };
+                    self.homeward(block, &distances, count, |_| y, &mut rows);
+                    for j in 0..count {
+                        let to = &mut matrix[(from + j) * row..(from + j + 1) * row];
+                        to.iter_mut().zip(&columns).for_each(|(to, column)| *to = column[j]);
+                    }
+                }
+            },
+        );
+        (hits, matrix)
+    }
+
+    /// Traces a block and keeps the distance to each surface.
+    #[inline(always)]
+    fn outward(
+        &self,
+        rays: &Rays<R>,
+        from: usize,
+        count: usize,
+        distances: &mut [[R; BLOCK]],
+    ) -> Block<R> {
+        let mut block = Block::new();
+        block.load(rays.slice(from, from + count), 0, count, self.index_before);
+        for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate() {
+            block.cross_keeping(interface, i as u32, distance);
+        }
+        block
+    }
+
+    /// Retraces a block from the last surface to its start and passes on the derivatives.
+    #[inline(always)]
+    fn homeward(
+        &self,
+        block: Block<R>,
+        distances: &[[R; BLOCK]],
+        count: usize,
+        seed: impl Fn(usize) -> Seed<R>,
+        harvest: &mut impl Harvest<R>,
+    ) {
+        let mut way = Homeward::new(block);
+        self.sow(&mut way, count, &seed, harvest);
+        for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
+            way.s = *distance;
+            match interface.form {
+                Form::Plane | Form::Sphere => way.retrace(interface, sphere_normal),
+                Form::Conic => way.retrace(interface, conic_normal),
+                Form::Asphere => way.retrace_asphere(interface),
+            }
+            way.harvest(interface, i, harvest);
+        }
+        self.launch_index(&way, harvest);
+    }
+
+    /// The adjoint of the landing; the direction cosines are `k / n'`.
+    #[inline(always)]
+    fn sow(
+        &self,
+        way: &mut Homeward<R>,
+        count: usize,
+        seed: &impl Fn(usize) -> Seed<R>,
+        harvest: &mut impl Harvest<R>,
+    ) {
+        let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
+        let inverse = R::ONE / index;
+        let mut by_index = [R::ZERO; BLOCK];
+        for (j, by_index) in by_index.iter_mut().enumerate().take(count) {
+            if way.block.code[j] > R::ZERO {
+                continue;
+            }
+            let seed = seed(j);
+            let (_, k) = way.block.state(j);
+            let direction = seed.direction * inverse;
+            way.set(j, seed.point, direction);
+            way.by_opl[j] = seed.opl;
+            *by_index = -(direction.dot(k) * inverse);
+        }
+        let behind = self.interfaces.iter().rposition(|interface| !interface.mirror);
+        harvest.take(behind, Slot::Index, &by_index);
+    }
+
+    /// The first optical direction is the index times the direction.
+    #[inline(always)]
+    fn launch_index(&self, way: &Homeward<R>, harvest: &mut impl Harvest<R>) {
+        let inverse = R::ONE / self.index_before;
+        let lanes = std::array::from_fn(|j| {
+            let (_, k) = way.block.state(j);
+            let by_index = way.by_k(j).dot(k) * inverse;
+            R::select(way.block.code[j] > R::ZERO, R::ZERO, by_index)
+        });
+        harvest.take(None, Slot::Index, &lanes);
+    }
+}
+
+/// A block of rays on its way back: where it is, the derivatives by its state, and those by the
+/// numbers of the surface it has just passed. One value, so that the compiler sees that no column
+/// overlaps another.
+struct Homeward<R> {
+    block: Block<R>,
+    /// The distance to the surface.
+    s: [R; BLOCK],
+    by_x: [R; BLOCK],
+    by_y: [R; BLOCK],
+    by_z: [R; BLOCK],
+    by_kx: [R; BLOCK],
+    by_ky: [R; BLOCK],
+    by_kz: [R; BLOCK],
+    by_opl: [R; BLOCK],
+    by_curvature: [R; BLOCK],
+    by_conic: [R; BLOCK],
+    by_gap: [R; BLOCK],
+    by_index_before: [R; BLOCK],
+    by_index_behind: [R; BLOCK],
+    by_terms: [[R; BLOCK]; ASPHERE_TERMS],
+}
+
+/// The normal of a surface and everything about it that the adjoint needs.
+#[derive(Clone, Copy)]
+struct Normal<R> {
+    vector: Vec3<R>,
+    /// `N·N`.
+    m: R,
+    /// Whether `m` is one wherever a ray meets the surface.
+    unit: bool,
+}
+
+#[inline(always)]
+fn sphere_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
+    let c = surface.curvature;
+    let vector = Vec3::new(-(c * p.x), -(c * p.y), R::ONE - c * p.z);
+    Normal { vector, m: R::ONE, unit: true }
+}
+
+#[inline(always)]
+fn conic_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
+    let c = surface.curvature;
+    let vector = Vec3::new(-(c * p.x), -(c * p.y), R::ONE - c * (p.z + surface.conic * p.z));
+    Normal { vector, m: vector.dot(vector), unit: false }
+}
+
+/// What refraction read backwards gives.
+struct Refracted<R> {
+    /// The direction in front.
+    k: Vec3<R>,
+    /// `k·N`.
+    a: R,
+    by_k: Vec3<R>,
+    by_normal: Vec3<R>,
+    by_dn2: R,
+}
+
+#[inline(always)]
+fn unrefract<R: Real>(
+    surface: &Interface<R>,
+    normal: Normal<R>,
+    behind: Vec3<R>,
+    by_behind: Vec3<R>,
+) -> Refracted<R> {
+    let Normal { vector, m, unit } = normal;
+    let a_behind = behind.dot(vector);
+    let by_gamma = by_behind.dot(vector);
+    let inverse_m = if unit { R::ONE } else { R::ONE / m };
+    let (a, gamma, by_a, by_m, by_dn2);
+    if surface.mirror {
+        a = -a_behind;
+        gamma = -((a + a) * inverse_m);
+        by_a = -((by_gamma + by_gamma) * inverse_m);
+        by_m = -(gamma * by_gamma * inverse_m);
+        by_dn2 = R::ZERO;
+    } else {
+        a = surface.sense * (a_behind * a_behind - surface.dn2 * m).sqrt();
+        gamma = (a_behind - a) * inverse_m;
+        let scaled = by_gamma / a_behind;
+        by_a = -(scaled * gamma);
+        by_dn2 = scaled * R::from_f64(0.5);
+        by_m = (by_dn2 * surface.dn2 - by_gamma * gamma) * inverse_m;
+    }
+    let k = behind - vector * gamma;
+    let mut by_normal = by_behind * gamma + k * by_a;
+    if !unit {
+        by_normal = by_normal + vector * (by_m + by_m);
+    }
+    Refracted { k, a, by_k: by_behind + vector * by_a, by_normal, by_dn2 }
+}
+
+impl<R: Real> Homeward<R> {
+    #[inline(always)]
+    fn new(block: Block<R>) -> Self {
+        let zero = [R::ZERO; BLOCK];
+        Self {
+            block,
+            s: zero,
+            by_x: zero,
+            by_y: zero,
+            by_z: zero,
+            by_kx: zero,
+            by_ky: zero,
+            by_kz: zero,
+            by_opl: zero,
+            by_curvature: zero,
+            by_conic: zero,
+            by_gap: zero,
+            by_index_before: zero,
+            by_index_behind: zero,
+            by_terms: [zero; ASPHERE_TERMS],
+        }
+    }
+
+    #[inline(always)]
+    fn by_point(&self, j: usize) -> Vec3<R> {
+        Vec3::new(self.by_x[j], self.by_y[j], self.by_z[j])
+    }
+
+    #[inline(always)]
+    fn by_k(&self, j: usize) -> Vec3<R> {
+        Vec3::new(self.by_kx[j], self.by_ky[j], self.by_kz[j])
+    }
+
+    #[inline(always)]
+    fn set(&mut self, j: usize, by_point: Vec3<R>, by_k: Vec3<R>) {
+        (self.by_x[j], self.by_y[j], self.by_z[j]) = (by_point.x, by_point.y, by_point.z);
+        (self.by_kx[j], self.by_ky[j], self.by_kz[j]) = (by_k.x, by_k.y, by_k.z);
+    }
+
+    /// Goes back through a conic (a plane, a sphere) to the surface before.
+    #[inline(always)]
+    fn retrace(
+        &mut self,
+        surface: &Interface<R>,
+        normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
+    ) {
+        let surface = *surface;
+        let (c, k1) = (surface.curvature, R::ONE + surface.conic);
+        let half = R::from_f64(0.5);
+        for j in 0..BLOCK {
+            let (p, behind) = self.block.state(j);
+            let normal = normal(&surface, p);
+            let back = unrefract(&surface, normal, behind, self.by_k(j));
+            let n = back.by_normal;
+            let by_point = self.by_point(j) - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
+            let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
+            let bulge = p.x * p.x + p.y * p.y + k1 * p.z * p.z;
+            self.by_curvature[j] = lambda * bulge * half - (p.x * n.x + p.y * n.y + k1 * p.z * n.z);
+            if !normal.unit {
+                self.by_conic[j] = c * p.z * (lambda * p.z * half - n.z);
+            }
+            self.step_back(&surface, j, p, &back, by_point - normal.vector * lambda);
+        }
+    }
+
+    /// Goes back through an asphere to the surface before.
+    #[inline(always)]
+    fn retrace_asphere(&mut self, surface: &Interface<R>) {
+        let surface = *surface;
+        for j in 0..BLOCK {
+            let (p, behind) = self.block.state(j);
+            let sag = Sag::new(&surface, p.x * p.x + p.y * p.y);
+            let slope = -(sag.slope + sag.slope);
+            let vector = Vec3::new(p.x * slope, p.y * slope, R::ONE);
+            let normal = Normal { vector, m: vector.dot(vector), unit: false };
+            let back = unrefract(&surface, normal, behind, self.by_k(j));
+            // N = (−2 x w, −2 y w, 1) with w = dz/dr².
+            let n = back.by_normal;
+            let by_slope = -(p.x * n.x + p.y * n.y) * R::TWO;
+            let radial = by_slope * sag.bend * R::TWO;
+            let by_point = self.by_point(j)
+                + Vec3::new(p.x * radial + n.x * slope, p.y * radial + n.y * slope, R::ZERO);
+            let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
+            (self.by_curvature[j], self.by_conic[j]) = sag.by_conic(lambda, by_slope);
+            let terms = sag.by_terms(lambda, by_slope);
+            self.by_terms.iter_mut().zip(terms).for_each(|(column, by_term)| column[j] = by_term);
+            self.step_back(&surface, j, p, &back, by_point - vector * lambda);
+        }
+    }
+
+    /// From the surface to the one before: the adjoint of the way between and of the gap.
+    #[inline(always)]
+    fn step_back(
+        &mut self,
+        surface: &Interface<R>,
+        j: usize,
+        p: Vec3<R>,
+        back: &Refracted<R>,
+        by_start: Vec3<R>,
+    ) {
+        let s = self.s[j];
+        let start = p - back.k * s;
+        self.by_gap[j] = -by_start.z;
+        // dn2 = n'² − n², and the optical path is s n².
+        self.by_index_behind[j] = back.by_dn2 * surface.index_behind * R::TWO;
+        let path = self.by_opl[j] * s;
+        self.by_index_before[j] = (path - back.by_dn2) * surface.index_before * R::TWO;
+        self.set(j, by_start, back.by_k + by_start * s);
+        self.block.set(j, Vec3::new(start.x, start.y, start.z + surface.gap), back.k);
+    }
+
+    /// Hands over the derivatives by the numbers of a surface. A lost ray counts nothing, whatever
+    /// its numbers have become.
+    #[inline(always)]
+    fn harvest(&self, surface: &Interface<R>, i: usize, harvest: &mut impl Harvest<R>) {
+        let arrived = |lanes: &[R; BLOCK]| -> [R; BLOCK] {
+            std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
+        };
+        harvest.take(Some(i), Slot::Curvature, &arrived(&self.by_curvature));
+        if matches!(surface.form, Form::Conic | Form::Asphere) {
+            harvest.take(Some(i), Slot::Conic, &arrived(&self.by_conic));
+        }
+        if surface.form == Form::Asphere {
+            for (term, lanes) in self.by_terms.iter().enumerate() {
+                harvest.take(Some(i), Slot::Term(term), &arrived(lanes));
+            }
+        }
+        if let Some(before) = i.checked_sub(1) {
+            harvest.take(Some(before), Slot::Thickness, &arrived(&self.by_gap));
+        }
+        harvest.take(surface.medium, Slot::Index, &arrived(&self.by_index_before));
+        let behind = if surface.mirror { surface.medium } else { Some(i) };
+        harvest.take(behind, Slot::Index, &arrived(&self.by_index_behind));
+    }
+}
+
+/// An asphere at a distance from the axis: `w = dz/dr²` and every derivative of z and w.
+struct Sag<R> {
+    r2: R,
+    curvature: R,
+    /// `√(1 − (1+κ) c² r²)`.
+    root: R,
+    /// `w`.
+    slope: R,
+    /// `dw/dr²`.
+    bend: R,
+}
+
+impl<R: Real> Sag<R> {
+    #[inline(always)]
+    fn new(surface: &Interface<R>, r2: R) -> Self {
+        let c = surface.curvature;
+        let square = (R::ONE + surface.conic) * c * c;
+        let root = (R::ONE - square * r2).sqrt();
+        let (mut slope, mut bend) = (R::ZERO, R::ZERO);
+        for (j, a) in surface.terms.into_iter().enumerate().rev() {
+            let degree = R::from_f64(j as f64 + 2.0);
+            bend = bend * r2 + a * degree * (degree - R::ONE);
+            slope = slope * r2 + a * degree;
+        }
+        Self {
+            r2,
+            curvature: c,
+            root,
+            slope: c / (root + root) + slope * r2,
+            bend: c * square / (R::from_f64(4.0) * root * root * root) + bend,
+        }
+    }
+
+    /// Derivatives by curvature and conic constant, from those by z and by w.
+    #[inline(always)]
+    fn by_conic(&self, by_z: R, by_w: R) -> (R, R) {
+        let (c, q, r2) = (self.curvature, self.root, self.r2);
+        let (one_q, cube) = (R::ONE + q, q * q * q);
+        let by_curvature = by_z * r2 / (q * one_q) + by_w / (cube + cube);
+        let c3 = c * c * c * r2;
+        let by_conic =
+            by_z * c3 * r2 / (R::TWO * q * one_q * one_q) + by_w * c3 / (R::from_f64(4.0) * cube);
+        (by_curvature, by_conic)
+    }
+
+    /// Derivatives by the coefficients, from those by z and by w.
+    #[inline(always)]
+    fn by_terms(&self, by_z: R, by_w: R) -> [R; ASPHERE_TERMS] {
+        let mut power = self.r2;
+        std::array::from_fn(|term| {
+            let by_term = power * (by_z * self.r2 + by_w * R::from_f64(term as f64 + 2.0));
+            power = power * self.r2;
+            by_term
+        })
+    }
+}
