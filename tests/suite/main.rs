@@ -2,8 +2,14 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its data should fail")]
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
+mod analysis;
+mod cli;
 mod files;
 mod hard_cases;
 mod library;
+mod merit;
+mod optimize;
 mod paraxial;
+mod pupil;
 mod reference;
+mod trace;
