@@ -247,7 +247,7 @@ impl<'a> Search<'a> {
     /// a bracketed secant on the distance between the two; `None` where a third one is in the way.
     fn corner(&mut self, a: (f64, Edge), b: (f64, Edge)) -> Option<f64> {
         let (mut low, mut high) = (a.0, b.0);
-        let mut gap = |search: &mut Self, azimuth: f64| {
+        let gap = |search: &mut Self, azimuth: f64| {
             let share = (azimuth - a.0) / (b.0 - a.0);
             let guess = a.1.radius + share * (b.1.radius - a.1.radius);
             let ends = [a.1.limit, b.1.limit].map(|limit| search.zero(limit, azimuth, guess));
