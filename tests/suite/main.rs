@@ -8,3 +8,4 @@ mod library;
 mod paraxial;
 mod pupil;
 mod reference;
+mod session;
