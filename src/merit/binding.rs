@@ -100,9 +100,8 @@ impl Zoom {
     fn solve_focus(&self, found: &mut Systems, offset: f64) {
         let primary = &found.systems[self.primary];
         let gap = focus_gap(primary, self.object) + offset;
-        let slope = |variable| {
-            focus_gap(&self.along_unfocused(primary, variable), self.object).slope[0]
-        };
+        let slope =
+            |variable| focus_gap(&self.along_unfocused(primary, variable), self.object).slope[0];
         found.focus = Some(DVector::from_iterator(self.variables, (0..self.variables).map(slope)));
         for system in &mut found.systems {
             let last = system.surfaces.len() - 2;
@@ -244,7 +243,8 @@ fn index_growth(lens: &Lens, surface: usize, um: f64) -> f64 {
 fn followers_of_index(lens: &Lens, surface: usize, slot: Slot) -> Vec<usize> {
     let mut all = vec![surface];
     if slot == Slot::Index {
-        let mirrors = lens.surfaces[surface + 1..].iter().take_while(|r| r.medium == Medium::Mirror);
+        let mirrors =
+            lens.surfaces[surface + 1..].iter().take_while(|r| r.medium == Medium::Mirror);
         all.extend((1..=mirrors.count()).map(|i| surface + i));
         if all.last() == Some(&(lens.surfaces.len() - 1)) {
             all.push(lens.surfaces.len());
@@ -273,7 +273,9 @@ fn number_mut<R: Real>(system: &mut System<R>, surface: usize, slot: Slot) -> &m
         (Slot::Thickness, _) => &mut surface.thickness,
         (
             Slot::Curvature,
-            Shape::Sphere { curvature } | Shape::Conic { curvature, .. } | Shape::Asphere { curvature, .. },
+            Shape::Sphere { curvature }
+            | Shape::Conic { curvature, .. }
+            | Shape::Asphere { curvature, .. },
         ) => curvature,
         (Slot::Conic, Shape::Conic { conic, .. } | Shape::Asphere { conic, .. }) => conic,
         (Slot::Term(term), Shape::Asphere { terms, .. }) => &mut terms[term],

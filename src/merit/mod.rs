@@ -12,8 +12,8 @@
 
 mod binding;
 mod first_order;
-mod goal;
 mod gaps;
+mod goal;
 mod sampling;
 mod spot;
 mod sum;
@@ -235,7 +235,11 @@ impl Merit {
                 Term::Spot => spot::spot(&scene, &mut sum)?,
                 Term::Distortion => spot::distortion(&scene, &mut sum)?,
                 Term::FocalLength(target) => {
-                    first_order::focal_length(&scene, self.goal.target(zoom.number, target), &mut sum);
+                    first_order::focal_length(
+                        &scene,
+                        self.goal.target(zoom.number, target),
+                        &mut sum,
+                    );
                 }
                 _ => gaps::gaps(&scene, term, &mut sum),
             }

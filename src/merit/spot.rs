@@ -108,23 +108,22 @@ fn normal(scene: &Scene<'_>, landed: &[Landed], centroids: &[Centroid], sum: &mu
         let mut weighted = DMatrix::zeros(count, 2 * color.rays.len());
         let mut slope = vec![0.0; count];
         for (field, centroid) in centroids.iter().enumerate() {
-            for i in color.range(field) {
+            let axes = color.range(field).flat_map(|i| [(i, 0), (i, 1)]);
+            for (i, axis) in axes {
                 let w = color.weights[i];
-                let at = [landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y];
-                for axis in 0..2 {
-                    let from = (2 * i + axis) * moving.len();
-                    let row = &rows[from..from + moving.len()];
-                    scene.zoom.collect_row(scene.systems, wavelength, &moving, row, &mut slope);
-                    let column = DVector::from_column_slice(&slope);
-                    sum.gradient.axpy(2.0 * w * at[axis], &column, 1.0);
-                    if axis == 1 || !color.mirrored[field] {
-                        means[field][axis].axpy(w, &column, 1.0);
-                    }
-                    weighted.set_column(2 * i + axis, &(column * w.sqrt()));
+                let at = [landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y][axis];
+                let from = (2 * i + axis) * moving.len();
+                let row = &rows[from..from + moving.len()];
+                scene.zoom.collect_row(scene.systems, wavelength, &moving, row, &mut slope);
+                let column = DVector::from_column_slice(&slope);
+                sum.gradient.axpy(2.0 * w * at, &column, 1.0);
+                if axis == 1 || !color.mirrored[field] {
+                    means[field][axis].axpy(w, &column, 1.0);
                 }
+                weighted.set_column(2 * i + axis, &(column * w.sqrt()));
             }
         }
-        sum.normal.gemm_tr(1.0, &weighted.transpose(), &weighted.transpose(), 1.0);
+        sum.normal.gemm(1.0, &weighted, &weighted.transpose(), 1.0);
     }
     for (mean, centroid) in means.iter().zip(centroids).filter(|(_, c)| c.share > 0.0) {
         for slope in mean {
@@ -140,8 +139,7 @@ pub(super) fn distortion(scene: &Scene<'_>, sum: &mut Sum) -> Result<(), MeritEr
     let system = &scene.systems.systems[primary];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
     let scale = image_scale(system, scene.zoom.object);
-    let scale_slope =
-        slopes(scene, sum.detail, |system| image_scale(system, scene.zoom.object));
+    let scale_slope = slopes(scene, sum.detail, |system| image_scale(system, scene.zoom.object));
     let moving = scene.zoom.moving(primary);
     let chief = &scene.sampling.chief;
     let (hits, rows) = tracer.jacobian(chief, &moving);
