@@ -148,10 +148,10 @@ pub(super) fn quick<R: Real, const W: usize>(
     let mut s = [R::ZERO; W];
     let mut moving = [R::ONE; W];
     let tolerance = R::from_f64(R::EPSILON.powf(2.0 / 3.0));
-    for j in 0..W {
+    for (j, s) in s.iter_mut().enumerate() {
         let (p, k) = rays.get(j);
         let conic = near.meet_conic(p, k);
-        s[j] = R::select(conic.missed, -(p.z / k.z), conic.s);
+        *s = R::select(conic.missed, -(p.z / k.z), conic.s);
     }
     for _ in 0..STEPS {
         for j in 0..W {
