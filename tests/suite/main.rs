@@ -12,4 +12,5 @@ mod optimize;
 mod paraxial;
 mod pupil;
 mod reference;
+mod session;
 mod trace;
