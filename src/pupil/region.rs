@@ -4,8 +4,10 @@
 //! where light is, in how many pieces, and whether one point sees all of it; then the edge is
 //! followed from there.
 
-use super::boundary::{Boundary, Search};
+use super::boundary::{Boundary, Edge, Frame, NEAR, Search};
 use super::launch::Launch;
+use super::quadrature::Nodes;
+use super::sample::{Pattern, pattern};
 use crate::trace::{Points, Rays, Sink};
 use std::f64::consts::{PI, TAU};
 
@@ -83,6 +85,30 @@ impl<'a> Region<'a> {
             }
         }
         Self { launch, kind, rays }
+    }
+
+    /// The points of a pattern over a disc, or a stretched one, that holds all of the light: a
+    /// sum over those that arrive is what clipped patterns give in other programs.
+    pub fn sampled(&self, chosen: Pattern) -> Nodes {
+        let frame = match &self.kind {
+            Kind::Clear => Frame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
+            Kind::Split(_) | Kind::Ragged { .. } if self.launch.bench.ends_at_disc() => {
+                Frame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] }
+            }
+            Kind::Split(boundary) => boundary.cover(),
+            Kind::Ragged { square: (center, half), .. } => {
+                let reach = half * std::f64::consts::SQRT_2;
+                Frame { center: *center, axes: [[reach, 0.0], [0.0, reach]] }
+            }
+            Kind::Dark | Kind::Endless => return Nodes::default(),
+        };
+        let place = |p: &[f64; 2]| {
+            let [a, b] = frame.axes;
+            [0, 1].map(|i| frame.center[i] + p[0] * a[i] + p[1] * b[i])
+        };
+        let points: Vec<_> = pattern(chosen).iter().map(place).collect();
+        let weight = PI * frame.area() / points.len() as f64;
+        Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
     }
 
     /// Whether no light gets through.
@@ -201,27 +227,49 @@ impl Grid {
         if pieces != 1 {
             return ragged;
         }
-        let center = self.center(launch);
+        let frame = self.frame(launch);
         let end = if launch.is_symmetric() { PI } else { TAU };
         let azimuths = if launch.is_symmetric() { AZIMUTHS } else { 2 * AZIMUTHS };
-        match Search::new(launch, center).boundary(end, azimuths) {
-            Some(boundary) if self.agrees(&boundary) => Kind::Split(boundary),
+        match Search::new(launch, frame).boundary(end, azimuths) {
+            Some(boundary) if self.agrees(launch, &boundary) => Kind::Split(boundary),
             Some(_) | None => ragged,
         }
     }
 
-    /// The centroid of the light, or the lit point nearest to it.
-    fn center(&self, launch: &Launch<'_>) -> [f64; 2] {
+    /// The frame in which the light looks round about its centroid, or about the lit point nearest
+    /// to that.
+    fn frame(&self, launch: &Launch<'_>) -> Frame {
         let count = self.count() as f64;
         let points = || self.lit_cells().map(|i| self.point(i));
         let sum = points().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
-        let x = if launch.is_symmetric() { 0.0 } else { sum[0] / count };
-        let center = [x, sum[1] / count];
-        if launch.is_lit(center) {
-            return center;
+        let middle = [sum[0] / count, sum[1] / count];
+        let mut center = if launch.is_symmetric() { [0.0, middle[1]] } else { middle };
+        if !launch.is_lit(center) {
+            let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
+            let nearest = points().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            center = nearest.unwrap_or(center);
         }
-        let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
-        points().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(center)
+        Frame { center, axes: self.axes(middle, launch.is_symmetric()) }
+    }
+
+    /// The axes of an ellipse with the second moments of the light: those of a uniform one are a
+    /// quarter of the squares of its semi-axes.
+    fn axes(&self, middle: [f64; 2], symmetric: bool) -> [[f64; 2]; 2] {
+        let cell = 2.0 * self.reach / self.cells as f64;
+        let own = cell * cell / 12.0;
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for p in self.lit_cells().map(|i| self.point(i)) {
+            let (x, y) = (p[0] - middle[0], p[1] - middle[1]);
+            (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+        }
+        let count = self.count() as f64;
+        let (xx, yy) = (xx / count + own, yy / count + own);
+        let xy = if symmetric { 0.0 } else { xy / count };
+        // Cholesky: the frame's y stays y.
+        let y = yy.sqrt();
+        let slant = xy / y;
+        let x = (xx - slant * slant).max(0.01 * xx).sqrt();
+        [[2.0 * x, 0.0], [2.0 * slant, 2.0 * y]]
     }
 
     /// A square around the light.
@@ -270,22 +318,22 @@ impl Grid {
         near(row).flat_map(move |r| near(column).map(move |c| r * cells + c))
     }
 
-    /// Whether light and dark lie on their sides of the edge, but for the width of a cell.
-    fn agrees(&self, boundary: &Boundary) -> bool {
-        let cell = 2.0 * self.reach / self.cells as f64;
-        let [x, y] = boundary.center;
+    /// Whether light and dark lie on their sides of the edge; where a grid point is close to it,
+    /// the edge is looked for at its azimuth.
+    fn agrees(&self, launch: &Launch<'_>, boundary: &Boundary) -> bool {
         let end = boundary.samples.last().map_or(TAU, |s| s.0);
+        let mut search = Search::new(launch, boundary.frame);
         (0..self.lit.len()).all(|i| {
-            let p = self.point(i);
-            let (dx, dy) = (p[0] - x, p[1] - y);
-            let mut azimuth = dx.atan2(dy).rem_euclid(TAU);
+            let (mut azimuth, r) = boundary.frame.polar(self.point(i));
             if azimuth > end {
                 azimuth = TAU - azimuth;
             }
-            let radius = boundary.near(azimuth);
-            let slack = 1.5 * cell + 0.03 * radius;
-            let r = dx.hypot(dy);
-            if self.lit[i] { r <= radius + slack } else { r >= radius - slack }
+            let near = boundary.near(azimuth);
+            let fits = |radius: f64, slack: f64| {
+                if self.lit[i] { r <= radius + slack } else { r >= radius - slack }
+            };
+            let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
+            fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
         })
     }
 }
