@@ -4,6 +4,7 @@
 
 mod analysis;
 mod cli;
+mod files;
 mod hard_cases;
 mod library;
 mod merit;
@@ -11,4 +12,5 @@ mod optimize;
 mod paraxial;
 mod pupil;
 mod reference;
+mod session;
 mod trace;
