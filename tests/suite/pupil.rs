@@ -202,6 +202,24 @@ fn a_stop_of_size_zero_is_dark() {
 }
 
 #[test]
+fn a_sliver_that_a_rim_cuts_off_is_seen() {
+    // The rim's shadow cuts off at most 0.2 % of the radius, and no ray of the first look is in it.
+    for cut in [0.01, 0.002, 0.0005] {
+        let rows = [(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, 60.0)];
+        let edge = ((55.0 + 5.0 * cut) / 100.0f64).atan().to_degrees();
+        let aperture = Aperture::EntrancePupilDiameter(10.0);
+        let bench = bench(system(&rows, 0), aperture, edge, Aiming::Paraxial);
+        for turn in [0.0f64, 0.2, 0.11] {
+            let field = Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 };
+            let region = Region::new(bench.launch(field, 0).unwrap());
+            let exact = overlap(1.0, 12.0, 11.0 + cut);
+            assert!(matches!(region.kind, Kind::Split(_)), "{cut} {turn} {:?}", region.kind);
+            assert!((area(&region) - exact).abs() < 1e-10, "{cut} {turn}");
+        }
+    }
+}
+
+#[test]
 fn a_rim_of_size_zero_is_dark() {
     for edge in [0.0, 3.0] {
         let rows = [(0.01, 5.0, 1.5, 20.0), (-0.01, 90.0, 1.0, 0.0)];
