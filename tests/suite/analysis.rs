@@ -167,7 +167,7 @@ fn a_field_without_light_says_so_in_every_analysis() {
     let behind = |lens: &&Reference| lens.open(0).stop != Some(0);
     let angles = |lens: &&Reference| lens.field_kind() == FieldKind::Angle;
     for lens in lenses().iter().filter(angles).filter(behind) {
-        for angle in [75.0, 89.9, 90.0, 120.0, -150.0] {
+        for angle in [75.0, 90.0, -150.0] {
             let field = Field { x: 0.0, y: angle, weight: 1.0 };
             let mut bench = lens.clipped_bench();
             for color in &mut bench.colors {
