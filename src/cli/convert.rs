@@ -17,9 +17,7 @@ pub(super) struct Convert {
 }
 
 impl Convert {
-    pub(super) fn run(&self, _output: &Output) -> Result<(), Failure> {
-        let opened = crate::files::open(&self.from)?;
-        crate::files::save(&opened.lens, &self.to)?;
-        Ok(())
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        output.print(&crate::files::convert(&self.from, &self.to)?)
     }
 }

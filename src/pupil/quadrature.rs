@@ -5,7 +5,7 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
 //! is integrated over one half.
 
-use super::boundary::{Boundary, Search};
+use super::boundary::{Boundary, NEAR, Search};
 use super::region::{Kind, Region};
 use super::rules::{legendre, radial};
 use crate::trace::{Rays, Sink};
@@ -98,22 +98,19 @@ impl Region<'_> {
 
     /// Gauss nodes between the centre and the edge of every arc.
     fn split(&self, boundary: &Boundary, (azimuths, radii): (usize, usize)) -> Nodes {
-        let mut search = Search::new(&self.launch, boundary.center);
+        let mut search = Search::new(&self.launch, boundary.frame);
         let mirrored = self.launch.is_symmetric();
-        let factor = if mirrored { 2.0 } else { 1.0 };
+        let factor = boundary.frame.area() * if mirrored { 2.0 } else { 1.0 };
         let mut nodes = Nodes { mirrored, ..Nodes::default() };
         for arc in &boundary.arcs {
             let length = arc.to - arc.from;
             for (t, share) in legendre(azimuths) {
                 let azimuth = arc.from + t * length;
-                let guess = 1.001 * boundary.near(azimuth);
-                let Some(edge) = search.edge(azimuth, guess) else { continue };
-                let (sin, cos) = azimuth.sin_cos();
+                let guess = boundary.near(azimuth);
+                let Some(edge) = search.edge(azimuth, guess, NEAR) else { continue };
                 let sector = factor * share * length * edge.radius * edge.radius;
                 for (r, weight) in radial(radii) {
-                    let r = r * edge.radius;
-                    let [x, y] = boundary.center;
-                    nodes.points.push([x + r * sin, y + r * cos]);
+                    nodes.points.push(boundary.frame.point(azimuth, r * edge.radius));
                     nodes.weights.push(sector * weight);
                 }
             }

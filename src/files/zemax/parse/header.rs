@@ -8,7 +8,6 @@ use crate::files::zemax::line::Line;
 /// Reads a line of the header; `None` where it is none.
 pub(super) fn read(draft: &mut Draft, line: &Line<'_>) -> Result<Option<Verdict>, Malformed> {
     let verdict = match line.keyword {
-        "VERS" => preserved(),
         "MODE" => mode(line)?,
         "UNIT" => unit(draft, line)?,
         "NAME" => text(&mut draft.name, line.rest),
@@ -29,8 +28,8 @@ pub(super) fn read(draft: &mut Draft, line: &Line<'_>) -> Result<Option<Verdict>
         "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDXF" | "VDYF" | "VCXF" | "VCYF" => {
             vignetting(line)
         }
-        "GFAC" | "RAIM" | "PUSH" | "SDMA" | "ROPD" | "PICB" | "POLS" | "GLRS" | "GSTD" | "NSCD"
-        | "COFN" | "PFIL" | "LANG" | "TOL" => preserved(),
+        "VERS" | "GFAC" | "RAIM" | "PUSH" | "SDMA" | "ROPD" | "PICB" | "POLS" | "GLRS" | "GSTD"
+        | "NSCD" | "COFN" | "PFIL" | "LANG" | "TOL" => preserved(),
         _ => return Ok(None),
     };
     Ok(Some(verdict))
@@ -131,7 +130,8 @@ fn waves(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
     let waves = &mut draft.waves;
     match line.keyword {
         "WAVM" => {
-            waves.numbered.push((line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?));
+            let (um, weight) = (line.number(1)?, line.number_or(2, 1.0)?);
+            waves.numbered.push((line.count(0)?, um, weight, line.number));
         }
         "WAVL" | "WAVN" => waves.list.extend(line.numbers()?),
         _ => waves.weights.extend(line.numbers()?),
