@@ -1,1 +1,75 @@
-//! analysis
+//! What a designer reads, each number with its error estimate and what it cost.
+//!
+//! Integrals over the pupil are asked for with a tolerance, never with a number of rays: the order
+//! of the quadrature is raised until two agree (see [`crate::pupil`]). Fields and wavelengths are
+//! worked on in parallel, and their results stand in the order of the lens, whatever the number of
+//! threads. A field without light is a [`Dark`], by name and reason, and never a number that is
+//! none.
+
+mod distortion;
+mod fan;
+mod illumination;
+mod mtf;
+mod spot;
+
+pub use distortion::{Curvature, Distortion, distortion, field_curvature};
+pub use fan::{Fan, FanPoint, fan};
+pub use illumination::{Illumination, illumination};
+pub use mtf::{Contrast, contrast};
+pub use spot::{ColorSpot, Spot, airy_radius, spot, spots};
+
+use crate::lens::Field;
+use crate::pupil::{Bench, Kind, LaunchError, Region};
+use serde::Serialize;
+
+/// A number with its error, and what it cost.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// An estimate of its error, in the same unit.
+    pub error: f64,
+    /// Rays traced for it, those that only looked for the edge of the pupil included.
+    pub rays: usize,
+    /// What it took; the engine reads no clock, so whoever does fills this in.
+    pub milliseconds: Option<f64>,
+}
+
+impl Estimate {
+    /// A number whose time nobody took.
+    pub const fn new(value: f64, error: f64, rays: usize) -> Self {
+        Self { value, error, rays, milliseconds: None }
+    }
+}
+
+/// Why a field has no result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize)]
+pub enum Dark {
+    /// No ray of the field gets through the lens.
+    #[error("no light: no ray of this field gets through the lens")]
+    NoLight,
+    /// No ray of the field could be started.
+    #[error("no rays: {0}")]
+    NoRays(#[serde(serialize_with = "as_text")] LaunchError),
+    /// Nothing limits the beam.
+    #[error("no beam: no surface limits it; give the stop a semi-diameter")]
+    Endless,
+    /// The chief ray does not reach the image, so that nothing can be measured from it.
+    #[error("no chief ray: the ray through the middle of the pupil does not reach the image")]
+    NoChief,
+}
+
+fn as_text<S: serde::Serializer>(error: &LaunchError, to: S) -> Result<S::Ok, S::Error> {
+    to.collect_str(error)
+}
+
+/// The rays of a field that get through, if any do.
+pub fn region(bench: &Bench, field: Field, wavelength: usize) -> Result<Region<'_>, Dark> {
+    let launch = bench.launch(field, wavelength).map_err(Dark::NoRays)?;
+    let region = Region::new(launch);
+    match region.kind {
+        Kind::Dark => Err(Dark::NoLight),
+        Kind::Endless => Err(Dark::Endless),
+        Kind::Clear | Kind::Split(_) | Kind::Ragged { .. } => Ok(region),
+    }
+}

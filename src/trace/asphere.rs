@@ -69,7 +69,9 @@ pub(super) fn crossing(
     let edge = problem.edge();
     let inside = rim.min(edge);
     if let Some(s) = problem.newton() {
-        let unique = problem.surface.steepest * problem.across < k.z.abs();
+        // A ray along the axis crosses a graph once, however steep that may be elsewhere.
+        let unique =
+            problem.across == 0.0 || problem.surface.steepest * problem.across < k.z.abs();
         if unique && problem.r2(s) <= inside * inside {
             return Some(s);
         }

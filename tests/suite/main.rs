@@ -2,7 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its data should fail")]
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
+mod analysis;
 mod hard_cases;
 mod library;
 mod paraxial;
+mod pupil;
 mod reference;

@@ -1,7 +1,8 @@
 //! Reading the reference cases: `tests/reference/`, or the folder that `APLANAT_REFERENCE` names.
 
-use aplanat::lens::{ASPHERE_TERMS, Aperture, FieldKind, Object, Shape, Surface, System};
+use aplanat::lens::{ASPHERE_TERMS, Aperture, Field, FieldKind, Object, Shape, Surface, System};
 use aplanat::paraxial::Beam;
+use aplanat::pupil::{Aiming, Bench};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -92,6 +93,38 @@ impl Reference {
             field: self.field_kind(),
             edge: *self.fields().last().unwrap(),
         }
+    }
+
+    /// The lens ready for rays over the whole unit disc of the pupil, clipped by nothing.
+    pub(crate) fn open_bench(&self) -> Bench {
+        let systems = self.systems(|w| self.open(w));
+        let (aiming, mut beam) = (self.aiming(), self.beam());
+        if aiming == Aiming::Stop {
+            beam.aperture = Aperture::StopSemiDiameter(number(&self.data["stop_radius"]));
+        }
+        self.with_fields(Bench::new(systems, self.primary(), beam, aiming).unwrap())
+    }
+
+    /// The lens ready for rays, limited by its stop and clipped by its semi-diameters.
+    pub(crate) fn clipped_bench(&self) -> Bench {
+        let systems = self.systems(|w| self.clipped(w));
+        let mut beam = self.beam();
+        beam.aperture = Aperture::StopSemiDiameter(number(&self.data["stop_radius"]));
+        self.with_fields(Bench::new(systems, self.primary(), beam, self.aiming()).unwrap())
+    }
+
+    fn systems(&self, system: impl Fn(usize) -> System<f64>) -> Vec<(f64, f64, System<f64>)> {
+        let waves = self.wavelengths();
+        waves.iter().enumerate().map(|(w, um)| (*um, 1.0, system(w))).collect()
+    }
+
+    fn aiming(&self) -> Aiming {
+        if self.aimed_at_stop() { Aiming::Stop } else { Aiming::Paraxial }
+    }
+
+    fn with_fields(&self, bench: Bench) -> Bench {
+        let field = |y: f64| Field { x: 0.0, y, weight: 1.0 };
+        Bench { fields: self.fields().into_iter().map(field).collect(), ..bench }
     }
 
     /// The lens at a wavelength, clipped by nothing.

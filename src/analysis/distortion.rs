@@ -1,0 +1,100 @@
+//! Distortion and field curvature: what the chief ray and its closest neighbours say.
+
+use super::Dark;
+use crate::lens::{Field, FieldKind, Object};
+use crate::math::Vec3;
+use crate::pupil::Bench;
+
+/// Where a chief ray lands against where it should.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distortion {
+    /// The field.
+    pub field: Field,
+    /// Where the real chief ray lands, along the field's direction, in mm.
+    pub height: f64,
+    /// Where it should land: `f tan θ`, or the magnified object height, in mm.
+    pub ideal: f64,
+    /// `height / ideal − 1`; `None` on the axis.
+    pub distortion: Option<f64>,
+    /// The same against `f θ`; `None` on the axis and for an object at a finite distance.
+    pub f_theta: Option<f64>,
+}
+
+/// The foci of a narrow beam about a chief ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Curvature {
+    /// The field.
+    pub field: Field,
+    /// How far behind the image plane rays in the plane of the field meet, in mm; `None` where
+    /// they are parallel.
+    pub tangential: Option<f64>,
+    /// How far behind the image plane rays perpendicular to it meet, in mm.
+    pub sagittal: Option<f64>,
+}
+
+impl Bench {
+    /// Where the chief ray of a field lands, clipped by nothing, in mm.
+    pub(super) fn chief_point(&self, field: Field, wavelength: usize) -> Result<[f64; 2], Dark> {
+        let launch = self.launch(field, wavelength).map_err(Dark::NoRays)?;
+        let landing = launch.open_landing([0.0, 0.0]).ok_or(Dark::NoChief)?;
+        Ok([landing.ray.point.x.value, landing.ray.point.y.value])
+    }
+
+    /// Where the chief ray of a field should land, along the field's direction, in mm.
+    fn ideal_height(&self, field: Field) -> Option<f64> {
+        let size = field.x.hypot(field.y);
+        match (self.beam.field, self.beam.object) {
+            (FieldKind::ImageHeight, _) => Some(size),
+            (FieldKind::ObjectHeight, _) => Some(self.first.magnification? * size),
+            (FieldKind::Angle, Object::Infinity) => {
+                let index = self.colors[self.primary].system.index_before;
+                Some(self.first.efl? * index * size.to_radians().tan())
+            }
+            (FieldKind::Angle, Object::Finite(distance)) => {
+                let reach = distance + self.first.entrance_pupil.position?;
+                Some(-self.first.magnification? * reach * size.to_radians().tan())
+            }
+        }
+    }
+}
+
+/// The distortion of a field at a wavelength.
+///
+/// # Errors
+/// Where the chief ray does not reach the image, or the lens has no focal length to compare with.
+pub fn distortion(bench: &Bench, field: Field, wavelength: usize) -> Result<Distortion, Dark> {
+    let [x, y] = bench.chief_point(field, wavelength)?;
+    let ideal = bench.ideal_height(field).filter(|h| h.is_finite()).ok_or(Dark::NoChief)?;
+    let size = field.x.hypot(field.y);
+    let height = if size == 0.0 { y } else { (x * field.x + y * field.y) / size };
+    let against = |ideal: f64| (ideal != 0.0).then(|| height / ideal - 1.0);
+    let collimated = bench.beam.object == Object::Infinity && bench.beam.field == FieldKind::Angle;
+    let efl = bench.first.efl.filter(|_| collimated);
+    let f_theta = efl.and_then(|f| against(f * size.to_radians()));
+    Ok(Distortion { field, height, ideal, distortion: against(ideal), f_theta })
+}
+
+/// The tangential and sagittal focus of a field at a wavelength, from the derivatives of the chief
+/// ray: the same numbers as Coddington's equations give.
+///
+/// # Errors
+/// Where the chief ray does not reach the image.
+pub fn field_curvature(bench: &Bench, field: Field, wavelength: usize) -> Result<Curvature, Dark> {
+    let launch = bench.launch(field, wavelength).map_err(Dark::NoRays)?;
+    let landing = launch.open_landing([0.0, 0.0]).ok_or(Dark::NoChief)?;
+    let Vec3 { x, y, .. } = landing.ray.point;
+    let d = landing.ray.direction;
+    let slopes = [d.x / d.z, d.y / d.z];
+    let size = field.x.hypot(field.y);
+    let [tx, ty] = if size == 0.0 { [0.0, 1.0] } else { [field.x / size, field.y / size] };
+    let focus = |ex: f64, ey: f64| {
+        // Along (ex, ey) in the pupil and in the image.
+        let along = |v: [crate::math::Dual<f64, 2>; 2]| {
+            let by = |s: [f64; 2]| s[0] * ex + s[1] * ey;
+            ex * by(v[0].slope) + ey * by(v[1].slope)
+        };
+        let turn = along(slopes);
+        (turn != 0.0).then(|| -along([x, y]) / turn)
+    };
+    Ok(Curvature { field, tangential: focus(tx, ty), sagittal: focus(-ty, tx) })
+}

@@ -1,0 +1,54 @@
+//! Transverse ray fans: how far from the chief ray's image point the rays of a pupil section land.
+
+use super::Dark;
+use crate::lens::Field;
+use crate::pupil::Bench;
+use crate::trace::Fate;
+
+/// A ray of a fan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FanPoint {
+    /// Its coordinate along the section, −1 to 1 between the rims of the pupil.
+    pub pupil: f64,
+    /// How far from the chief ray it lands, in mm; `None` where it is lost.
+    pub error: Option<[f64; 2]>,
+    /// How it ended; `None` where it could not be started.
+    pub fate: Option<Fate>,
+}
+
+/// The two fans of a field in one colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fan {
+    /// Which wavelength.
+    pub wavelength: usize,
+    /// Along y of the pupil.
+    pub tangential: Vec<FanPoint>,
+    /// Along x of the pupil.
+    pub sagittal: Vec<FanPoint>,
+}
+
+/// The fans of a field, one for each wavelength, measured from the chief ray of the primary one;
+/// `count` rays each.
+pub fn fan(bench: &Bench, field: Field, count: usize) -> Result<Vec<Fan>, Dark> {
+    let chief = bench.chief_point(field, bench.primary)?;
+    let one = |wavelength: usize| {
+        let launch = bench.launch(field, wavelength).map_err(Dark::NoRays)?;
+        let point = |pupil: f64, p: [f64; 2]| {
+            let landing = launch.ray(p).map(|ray| launch.color().tracer.trace(ray));
+            let arrived = landing.filter(|landing| landing.fate.is_imaged());
+            let error = |at: crate::math::Vec3<f64>| [at.x - chief[0], at.y - chief[1]];
+            FanPoint {
+                pupil,
+                error: arrived.map(|landing| error(landing.ray.point)),
+                fate: landing.map(|landing| landing.fate),
+            }
+        };
+        let at = |i: usize| 2.0 * i as f64 / count.saturating_sub(1).max(1) as f64 - 1.0;
+        Ok(Fan {
+            wavelength,
+            tangential: (0..count).map(|i| point(at(i), [0.0, at(i)])).collect(),
+            sagittal: (0..count).map(|i| point(at(i), [at(i), 0.0])).collect(),
+        })
+    };
+    (0..bench.colors.len()).map(one).collect()
+}

@@ -1,0 +1,62 @@
+//! The geometric modulation transfer: the contrast of a grating imaged by rays alone,
+//! `|mean exp(−2πi ν y)|` (Hopkins and Yzuel, Optica Acta 17, 1970).
+
+use super::{Dark, Estimate, region};
+use crate::lens::Field;
+use crate::pupil::{Accuracy, Bench, Nodes, Region, converged};
+use crate::trace::Points;
+use std::f64::consts::TAU;
+
+/// The contrast at one spatial frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contrast {
+    /// Line pairs per mm.
+    pub frequency: f64,
+    /// Of lines perpendicular to y: rays are spread along y.
+    pub tangential: Estimate,
+    /// Of lines perpendicular to x.
+    pub sagittal: Estimate,
+}
+
+/// The contrast of a field in one colour at some frequencies in line pairs per mm; errors are
+/// absolute.
+///
+/// # Errors
+/// Where the field is dark.
+pub fn contrast(
+    bench: &Bench,
+    field: Field,
+    wavelength: usize,
+    frequencies: &[f64],
+    accuracy: Accuracy,
+) -> Result<Vec<Contrast>, Dark> {
+    let region = region(bench, field, wavelength)?;
+    let at = |frequency: &f64| {
+        let numbers = |nodes: &Nodes| modulation(&region, nodes, *frequency);
+        let found = converged(&region, accuracy, numbers, |_| [1.0; 2]).ok_or(Dark::NoLight)?;
+        let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
+        Ok(Contrast { frequency: *frequency, tangential: estimate(0), sagittal: estimate(1) })
+    };
+    frequencies.iter().map(at).collect()
+}
+
+fn modulation(region: &Region<'_>, nodes: &Nodes, frequency: f64) -> Option<[f64; 2]> {
+    let landed = region.trace::<Points<f64>>(nodes);
+    let points = &landed.sink;
+    let area: f64 = landed.arrived().map(|(_, w)| w).sum();
+    let first = landed.arrived().next()?.0;
+    let (x0, y0) = (points.x[first], points.y[first]);
+    let mut sums = [0.0; 4];
+    for (i, w) in landed.arrived() {
+        let (sin, cos) = (TAU * frequency * (points.y[i] - y0)).sin_cos();
+        sums[0] += w * cos;
+        sums[1] += w * sin;
+        // The mirror image of a half pupil cancels the sine.
+        let from = if nodes.mirrored { 0.0 } else { x0 };
+        let (sin, cos) = (TAU * frequency * (points.x[i] - from)).sin_cos();
+        sums[2] += w * cos;
+        sums[3] += if nodes.mirrored { 0.0 } else { w * sin };
+    }
+    let [a, b, c, d] = sums.map(|sum| sum / area);
+    Some([a.hypot(b), c.hypot(d)])
+}

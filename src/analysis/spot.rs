@@ -1,0 +1,252 @@
+//! The spot: where the rays of a field land.
+
+use super::{Dark, Estimate, region};
+use crate::lens::Field;
+use crate::pupil::{Accuracy, Bench, Kind, Nodes, Region, converged};
+use crate::trace::{Hits, Points, Rays, Sink};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+/// The spot of a field in one colour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColorSpot {
+    /// RMS distance from its own centroid, in mm.
+    pub rms: Estimate,
+    /// The centroid, in mm.
+    pub centroid: [Estimate; 2],
+    /// The area of the pupil that is lit, in pupil coordinates: π where nothing is clipped.
+    pub area: Estimate,
+    /// The mean square of the slope about its mean, and its covariance with the place, in mm: what
+    /// the spot does out of focus.
+    slope: [f64; 2],
+    /// Whether the tolerance was met.
+    pub reached: bool,
+}
+
+/// The spot of a field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spot {
+    /// The field.
+    pub field: Field,
+    /// One entry a wavelength; a colour may be dark by itself.
+    pub colors: Vec<Result<ColorSpot, Dark>>,
+    /// RMS distance from the common centroid of all colours, in mm.
+    pub rms: Estimate,
+    /// The common centroid, in mm.
+    pub centroid: [Estimate; 2],
+    /// The largest distance of any ray from the common centroid, in mm.
+    pub radius: Estimate,
+}
+
+/// The radius of the first dark ring of a perfect lens with this aperture, in mm.
+pub fn airy_radius(bench: &Bench) -> Option<f64> {
+    let um = bench.colors[bench.primary].um;
+    bench.first.working_f_number.map(|f| 1.22 * um * 1e-3 * f)
+}
+
+/// The spots of all fields, in order.
+pub fn spots(bench: &Bench, accuracy: Accuracy) -> Vec<Result<Spot, Dark>> {
+    bench.fields.par_iter().map(|field| spot(bench, *field, accuracy)).collect()
+}
+
+/// The spot of a field in all colours; errors are relative to the RMS radius.
+///
+/// # Errors
+/// Where no colour of the field gets through: see [`Dark`].
+pub fn spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, Dark> {
+    let pairs: Vec<_> = (0..bench.colors.len())
+        .into_par_iter()
+        .map(|w| {
+            let region = region(bench, field, w)?;
+            let spot = color_spot(&region, accuracy).ok_or(Dark::NoLight)?;
+            Ok((region, spot))
+        })
+        .collect();
+    let lit: Vec<_> = pairs.iter().filter_map(|pair| pair.as_ref().ok()).collect();
+    let Some(shares) = shares(bench, &lit) else {
+        let reason = pairs.iter().find_map(|pair| pair.as_ref().err().copied());
+        return Err(reason.unwrap_or(Dark::NoLight));
+    };
+    let pooled = pooled(&lit, &shares);
+    let center = pooled.centroid.map(|e| e.value);
+    Ok(Spot {
+        field,
+        rms: pooled.rms,
+        centroid: pooled.centroid,
+        radius: geometric_radius(&lit, center, pooled.rms.error),
+        colors: pairs.iter().map(|pair| pair.as_ref().map(|p| p.1).map_err(|e| *e)).collect(),
+    })
+}
+
+/// The share of each lit colour in the light: its weight times the area of its pupil.
+fn shares(bench: &Bench, lit: &[&(Region<'_>, ColorSpot)]) -> Option<Vec<f64>> {
+    let light = |(region, spot): &(Region<'_>, ColorSpot)| {
+        bench.colors[region.launch.wavelength].weight * spot.area.value
+    };
+    let sum: f64 = lit.iter().map(|pair| light(pair)).sum();
+    (sum > 0.0).then(|| lit.iter().map(|pair| light(pair) / sum).collect())
+}
+
+struct Pooled {
+    rms: Estimate,
+    centroid: [Estimate; 2],
+}
+
+/// All colours together: `rms² = Σ share (rms_λ² + |c_λ − c|²)`.
+fn pooled(lit: &[&(Region<'_>, ColorSpot)], shares: &[f64]) -> Pooled {
+    let rays = lit.iter().map(|(_, spot)| spot.rms.rays).sum();
+    let colors = || lit.iter().map(|pair| &pair.1).zip(shares);
+    let center = [0, 1].map(|i| colors().map(|(c, share)| share * c.centroid[i].value).sum());
+    let center_error = [0, 1].map(|i| colors().map(|(c, share)| share * c.centroid[i].error).sum());
+    let (mut square, mut error) = (0.0, 0.0);
+    for (color, share) in colors() {
+        let off: [f64; 2] = [0, 1].map(|i| color.centroid[i].value - center[i]);
+        square += share * (color.rms.value.powi(2) + off[0] * off[0] + off[1] * off[1]);
+        error += share * color.rms.value * color.rms.error;
+        error += share * (0..2).map(|i| off[i].abs() * color.centroid[i].error).sum::<f64>();
+    }
+    let rms = square.sqrt();
+    let error = if rms > 0.0 { error / rms } else { 0.0 };
+    Pooled {
+        rms: Estimate::new(rms, error, rays),
+        centroid: [0, 1].map(|i| Estimate::new(center[i], center_error[i], rays)),
+    }
+}
+
+/// A spot smaller than this against the size of the lens is rounding.
+const SHARPEST: f64 = 1e-13;
+
+fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
+    let first = &region.launch.bench.first;
+    let size = first.efl.unwrap_or(0.0).abs() + first.marginal.heights[0].abs();
+    let found = converged(
+        region,
+        accuracy,
+        |nodes| Moments::of(region, nodes).map(|m| m.numbers()),
+        |[rms, x, y, area, ..]| {
+            let floor = SHARPEST * (size + x.abs() + y.abs());
+            let rms = rms.max(floor / accuracy.tolerance);
+            [rms, rms, rms, *area, f64::INFINITY, f64::INFINITY]
+        },
+    )?;
+    let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
+    Some(ColorSpot {
+        rms: estimate(0),
+        centroid: [estimate(1), estimate(2)],
+        area: estimate(3),
+        slope: [found.values[4], found.values[5]],
+        reached: found.reached,
+    })
+}
+
+impl ColorSpot {
+    /// The RMS radius with the image plane moved by `defocus` mm along the light.
+    pub fn rms_at(&self, defocus: f64) -> f64 {
+        let [slope, covariance] = self.slope;
+        let square = self.rms.value.powi(2) + defocus * (2.0 * covariance + defocus * slope);
+        square.max(0.0).sqrt()
+    }
+
+    /// By how much to move the image plane for the smallest RMS radius, in mm; `None` where all
+    /// rays are parallel.
+    pub fn best_focus(&self) -> Option<f64> {
+        let [slope, covariance] = self.slope;
+        (slope > 0.0).then(|| -covariance / slope)
+    }
+}
+
+/// Weighted sums over the rays that arrive.
+#[derive(Debug, Clone, Copy, Default)]
+struct Moments {
+    area: f64,
+    x: f64,
+    y: f64,
+    square: f64,
+    slope_square: f64,
+    covariance: f64,
+}
+
+impl Moments {
+    /// The means and central second moments over some nodes; `None` where no ray arrives.
+    fn of(region: &Region<'_>, nodes: &Nodes) -> Option<Self> {
+        let landed = region.trace::<Hits<f64>>(nodes);
+        let hits = &landed.sink;
+        let area: f64 = landed.arrived().map(|(_, w)| w).sum();
+        if !(area > 0.0) {
+            return None;
+        }
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            // About the first ray, so that a small spot far from the axis keeps its digits.
+            let first = landed.arrived().next().map_or(0.0, |(i, _)| of(i));
+            first + landed.arrived().map(|(i, w)| w * (of(i) - first)).sum::<f64>() / area
+        };
+        let slope_x = |i: usize| hits.l[i] / hits.n[i];
+        let slope_y = |i: usize| hits.m[i] / hits.n[i];
+        let across = |of: &dyn Fn(usize) -> f64| if nodes.mirrored { 0.0 } else { mean(of) };
+        let (x, y) = (across(&|i| hits.x[i]), mean(&|i| hits.y[i]));
+        let (u, v) = (across(&slope_x), mean(&slope_y));
+        let mut moments = Self { area, x, y, ..Self::default() };
+        for (i, w) in landed.arrived() {
+            let (dx, dy) = (hits.x[i] - x, hits.y[i] - y);
+            let (du, dv) = (slope_x(i) - u, slope_y(i) - v);
+            moments.square += w * (dx * dx + dy * dy) / area;
+            moments.slope_square += w * (du * du + dv * dv) / area;
+            moments.covariance += w * (dx * du + dy * dv) / area;
+        }
+        Some(moments)
+    }
+
+    fn numbers(&self) -> [f64; 6] {
+        [self.square.sqrt(), self.x, self.y, self.area, self.slope_square, self.covariance]
+    }
+}
+
+/// Rays around the edge at which the largest distance is looked for.
+const EDGE_RAYS: usize = 128;
+
+/// The largest distance of a ray from a point: the rays at the edge, and those of a quadrature
+/// inside it. The error is what half of the edge rays would have missed.
+fn geometric_radius(
+    lit: &[&(Region<'_>, ColorSpot)],
+    center: [f64; 2],
+    rms_error: f64,
+) -> Estimate {
+    let (mut all, mut half, mut rays) = (0.0f64, 0.0f64, 0);
+    for (region, spot) in lit {
+        let inside = region.nodes(2.min(region.orders() - 1));
+        let edge = edge_points(region);
+        rays += spot.rms.rays + inside.points.len() + edge.len();
+        let far = farthest(region, &inside.points, center);
+        let (even, odd): (Vec<_>, Vec<_>) =
+            edge.iter().copied().enumerate().partition(|(i, _)| i % 2 == 0);
+        let strip = |list: Vec<(usize, [f64; 2])>| list.into_iter().map(|(_, p)| p).collect();
+        let (even, odd): (Vec<[f64; 2]>, Vec<[f64; 2]>) = (strip(even), strip(odd));
+        let far_even = far.max(farthest(region, &even, center));
+        all = all.max(far_even).max(farthest(region, &odd, center));
+        half = half.max(far_even);
+    }
+    Estimate::new(all, (all - half).max(rms_error), rays)
+}
+
+/// Points just inside the edge of a pupil.
+fn edge_points(region: &Region<'_>) -> Vec<[f64; 2]> {
+    let turn = if region.launch.is_symmetric() { PI } else { TAU };
+    let at = |i: usize| turn * i as f64 / EDGE_RAYS as f64;
+    let inside = 1.0 - 1e-9;
+    match &region.kind {
+        Kind::Clear => (0..=EDGE_RAYS)
+            .map(|i| at(i).sin_cos())
+            .map(|(s, c)| [inside * s, inside * c])
+            .collect(),
+        Kind::Split(boundary) => boundary.points(&region.launch, EDGE_RAYS, inside),
+        Kind::Dark | Kind::Endless | Kind::Ragged { .. } => Vec::new(),
+    }
+}
+
+fn farthest(region: &Region<'_>, points: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+    let rays: Rays<f64> = points.iter().filter_map(|p| region.launch.ray(*p)).collect();
+    let mut landed = Points::default();
+    region.launch.color().tracer.batch(&rays, &mut landed);
+    let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
+    arrived.map(|i| (landed.x[i] - x).hypot(landed.y[i] - y)).fold(0.0, f64::max)
+}

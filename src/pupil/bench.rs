@@ -1,0 +1,163 @@
+//! A lens with its beam, ready for rays.
+
+use crate::lens::{Aperture, Field, Invalid, Lens, LensError, System};
+use crate::math::Dual;
+use crate::paraxial::{Beam, FirstOrder, Undefined, first_order};
+use crate::trace::Tracer;
+
+use super::launch::Launch;
+
+/// A number with its derivatives by the two coordinates of a pupil.
+pub type Dual2 = Dual<f64, 2>;
+
+/// How pupil coordinates become rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aiming {
+    /// Through that point of the paraxial entrance pupil at the primary wavelength. Exact on the
+    /// axis, right for narrow fields.
+    Paraxial,
+    /// As `Paraxial`, but shifted and stretched so that the chief ray and its neighbours cross the
+    /// stop where they should: what wide fields need, at the price of one search per field.
+    Chief,
+    /// Through that point of the real stop, searched for every ray and wavelength by itself.
+    Stop,
+}
+
+/// Beyond this miss of the stop's centre by the paraxial chief ray, in stop radii, the pupil of a
+/// wide field is looked for where it is: paraxial coordinates would waste half of the beam.
+const MISS: f64 = 0.25;
+
+/// Why a lens cannot be set up.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BenchError {
+    /// The prescription.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// Its numbers.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    /// Its aperture.
+    #[error(transparent)]
+    Undefined(#[from] Undefined),
+}
+
+/// A lens at one wavelength.
+#[derive(Debug, Clone)]
+pub struct Color {
+    /// The wavelength in micrometres.
+    pub um: f64,
+    /// Its share in polychromatic results.
+    pub weight: f64,
+    /// The lens, with the stop as large as the aperture says.
+    pub system: System<f64>,
+    /// The same made ready for tracing.
+    pub tracer: Tracer<f64>,
+    /// The same clipped by nothing, with derivatives by two pupil coordinates.
+    pub(super) open: Tracer<Dual2>,
+}
+
+/// A lens with its beam at one zoom position, ready for rays at every wavelength.
+#[derive(Debug, Clone)]
+pub struct Bench {
+    /// How it is used.
+    pub beam: Beam,
+    /// The field points, in the unit of the beam's field kind.
+    pub fields: Vec<Field>,
+    /// One entry a wavelength.
+    pub colors: Vec<Color>,
+    /// Which of them is the primary one.
+    pub primary: usize,
+    /// First-order data at the primary wavelength.
+    pub first: FirstOrder<f64>,
+    /// How pupil coordinates become rays.
+    pub aiming: Aiming,
+}
+
+impl Bench {
+    /// A lens at a zoom position. Rays are aimed paraxially unless the chief ray of the farthest
+    /// field then misses the centre of the stop by more than a quarter of its radius.
+    pub fn of(lens: &Lens, zoom: usize) -> Result<Self, BenchError> {
+        let mut bench = Self::with_aiming(lens, zoom, Aiming::Paraxial)?;
+        if bench.stop_miss().is_none_or(|miss| miss > MISS) {
+            bench.aiming = Aiming::Chief;
+        }
+        Ok(bench)
+    }
+
+    /// A lens at a zoom position, aimed as said.
+    pub fn with_aiming(lens: &Lens, zoom: usize, aiming: Aiming) -> Result<Self, BenchError> {
+        let system = |w: &crate::lens::Wavelength| Ok((w.um, w.weight, lens.system(zoom, w.um)?));
+        let systems: Result<Vec<_>, LensError> = lens.wavelengths.iter().map(system).collect();
+        let mut bench = Self::new(systems?, lens.primary(), Beam::of(lens, zoom), aiming)?;
+        bench.fields.clone_from(&lens.fields_at(zoom).values);
+        Ok(bench)
+    }
+
+    /// Systems at several wavelengths in micrometres, each with its weight.
+    ///
+    /// # Errors
+    /// Numbers that cannot be traced, or an aperture without meaning for the lens.
+    pub fn new(
+        systems: Vec<(f64, f64, System<f64>)>,
+        primary: usize,
+        beam: Beam,
+        aiming: Aiming,
+    ) -> Result<Self, BenchError> {
+        let first = first_order(&systems[primary].2, &beam)?;
+        let rim = match (beam.aperture, aiming) {
+            (Aperture::StopSemiDiameter(_), Aiming::Stop) => Some(f64::INFINITY),
+            (Aperture::StopSemiDiameter(radius), Aiming::Paraxial | Aiming::Chief) => Some(radius),
+            _ => None,
+        };
+        let color = |(um, weight, mut system): (f64, f64, System<f64>)| {
+            let stop = system.stop.unwrap_or(0);
+            rim.into_iter().for_each(|radius| system.surfaces[stop].semi_diameter = radius);
+            let tracer = Tracer::new(&system)?;
+            let mut open = system.lift::<Dual2>();
+            let unlimited = Dual2::constant(f64::INFINITY);
+            open.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = unlimited);
+            Ok(Color { um, weight, system, tracer, open: Tracer::new(&open)? })
+        };
+        let colors: Result<Vec<_>, Invalid> = systems.into_iter().map(color).collect();
+        Ok(Self { beam, fields: Vec::new(), colors: colors?, primary, first, aiming })
+    }
+
+    /// The rays of a field at a wavelength.
+    pub fn launch(
+        &self,
+        field: Field,
+        wavelength: usize,
+    ) -> Result<Launch<'_>, super::LaunchError> {
+        Launch::new(self, field, wavelength)
+    }
+
+    /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces
+    /// limit it, the stop among them.
+    pub fn ends_at_disc(&self) -> bool {
+        self.aiming == Aiming::Stop || !matches!(self.beam.aperture, Aperture::StopSemiDiameter(_))
+    }
+
+    /// The radius of the stop in mm: as given, or the height of the paraxial marginal ray there.
+    pub fn stop_radius(&self) -> f64 {
+        match self.beam.aperture {
+            Aperture::StopSemiDiameter(radius) => radius,
+            _ => self.first.stop_semi_diameter,
+        }
+    }
+
+    /// The surface that is the stop.
+    pub fn stop(&self) -> usize {
+        self.colors[self.primary].system.stop.unwrap_or(0)
+    }
+
+    /// By how many stop radii the paraxial chief ray of the farthest field misses the centre of
+    /// the stop; `None` where that ray does not get there.
+    pub fn stop_miss(&self) -> Option<f64> {
+        let paraxial = Self { aiming: Aiming::Paraxial, ..self.clone() };
+        let edge = Field { x: 0.0, y: self.beam.edge, weight: 1.0 };
+        let launch = paraxial.launch(edge, self.primary).ok()?;
+        let [x, y] = launch.at_stop([0.0, 0.0])?;
+        let miss = x.hypot(y) / self.stop_radius();
+        miss.is_finite().then_some(miss)
+    }
+}

@@ -1,0 +1,287 @@
+//! Where the pupil ends: the rims that clip, found to rounding, split where one takes over from
+//! another.
+//!
+//! From a point inside, the pupil's edge is a function `R(ψ)` of azimuth. It is the zero of one
+//! margin of the ray (see [`Hurdle`]) along the radius, found by a bracketed secant; where the
+//! margin that ends it changes, `R` has a corner, and there the azimuths are split into arcs.
+
+use super::launch::Launch;
+use crate::trace::Hurdle;
+use std::f64::consts::PI;
+
+/// What ends the pupil somewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Limit {
+    /// The disc of the entrance pupil, or of the stop that rays are aimed at.
+    Disc,
+    /// A surface that clips, misses or totally reflects.
+    Surface(usize, Hurdle),
+    /// No ray is found that crosses the stop there.
+    Unaimed,
+}
+
+/// The edge of the pupil along one radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge {
+    /// Its distance from the centre, in pupil coordinates.
+    pub radius: f64,
+    /// What ends the pupil there.
+    pub limit: Limit,
+}
+
+/// A stretch of the edge that one limit makes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arc {
+    /// Azimuth where it begins, in radians from +y towards +x.
+    pub from: f64,
+    /// Azimuth where it ends.
+    pub to: f64,
+    /// What ends the pupil along it.
+    pub limit: Limit,
+}
+
+/// The edge of a pupil that is star-shaped about a point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Boundary {
+    /// The point, in pupil coordinates.
+    pub center: [f64; 2],
+    /// The arcs in order of azimuth: over a half turn where the pupil is its own mirror image.
+    pub arcs: Vec<Arc>,
+    /// The edge at the azimuths that were looked at.
+    pub(super) samples: Vec<(f64, Edge)>,
+    /// Rays traced to find it.
+    pub rays: usize,
+}
+
+/// How a ray fares against the limits.
+pub(super) struct Probe {
+    /// The first limit that it fails, with the margin.
+    pub(super) failed: Option<(Limit, f64)>,
+    /// Its margin at the limit that was asked for.
+    wanted: f64,
+}
+
+/// A ray so close to the rim of the disc, relatively, counts as one at the rim: where the rim of
+/// the stop is the rim of the pupil as well, rounding must not decide ray by ray between them.
+const AT_DISC: f64 = 1e-10;
+/// A corner is located to this azimuth; its square is what the quadrature sees of it.
+const CORNER: f64 = 1e-9;
+/// More arcs than this are no pupil but noise.
+pub(super) const MOST_ARCS: usize = 24;
+/// A pupil that reaches this far, in pupil coordinates, is limited by nothing.
+const ENDLESS: f64 = 1e4;
+
+impl Launch<'_> {
+    /// Whether the ray at `p` gets through, and its margin at one limit.
+    pub(super) fn probe(&self, p: [f64; 2], wanted: Limit) -> Probe {
+        let Some(ray) = self.ray(p) else {
+            return Probe { failed: Some((Limit::Unaimed, -1.0)), wanted: -1.0 };
+        };
+        let mut probe = Probe { failed: None, wanted: 1.0 };
+        self.color().tracer.margins(ray, |surface, hurdle, margin| {
+            let limit = Limit::Surface(surface, hurdle);
+            if limit == wanted {
+                probe.wanted = margin;
+            }
+            if probe.failed.is_none() && !(margin >= 0.0) {
+                probe.failed = Some((limit, if margin < 0.0 { margin } else { -1.0 }));
+            }
+        });
+        probe
+    }
+
+    /// Whether the ray at `p` gets through the surfaces.
+    pub(super) fn is_lit(&self, p: [f64; 2]) -> bool {
+        self.probe(p, Limit::Disc).failed.is_none()
+    }
+}
+
+/// A search for the edge from one point.
+pub(super) struct Search<'a> {
+    pub(super) launch: &'a Launch<'a>,
+    pub(super) center: [f64; 2],
+    pub(super) rays: usize,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(launch: &'a Launch<'a>, center: [f64; 2]) -> Self {
+        Self { launch, center, rays: 0 }
+    }
+
+    fn point(&self, azimuth: f64, r: f64) -> [f64; 2] {
+        let (sin, cos) = azimuth.sin_cos();
+        [self.center[0] + r * sin, self.center[1] + r * cos]
+    }
+
+    fn probe(&mut self, azimuth: f64, r: f64, wanted: Limit) -> Probe {
+        self.rays += 1;
+        self.launch.probe(self.point(azimuth, r), wanted)
+    }
+
+    /// Where the radius leaves the unit disc; infinite where the disc is no limit.
+    fn disc(&self, azimuth: f64) -> f64 {
+        if !self.launch.bench.ends_at_disc() {
+            return f64::INFINITY;
+        }
+        let [x, y] = self.center;
+        let (sin, cos) = azimuth.sin_cos();
+        let along = x * sin + y * cos;
+        (along * along + 1.0 - x * x - y * y).max(0.0).sqrt() - along
+    }
+
+    /// The edge at an azimuth, searched from a guess of its radius; `None` where nothing limits
+    /// the pupil.
+    pub(super) fn edge(&mut self, azimuth: f64, guess: f64) -> Option<Edge> {
+        let disc = self.disc(azimuth);
+        let mut low = 0.0;
+        let mut high = guess.min(disc * (1.0 - AT_DISC));
+        loop {
+            let probe = self.probe(azimuth, high, Limit::Disc);
+            if let Some(failed) = probe.failed {
+                return Some(self.bracketed(azimuth, low, high, failed));
+            }
+            if high >= disc * (1.0 - AT_DISC) {
+                return Some(Edge { radius: disc, limit: Limit::Disc });
+            }
+            if high > ENDLESS {
+                return None;
+            }
+            low = high;
+            high = (1.25 * high).min(disc * (1.0 - AT_DISC));
+        }
+    }
+
+    /// The zero of the margin that ends the pupil between a ray that passes and one that fails:
+    /// the method of Anderson and Björck (BIT 13, 1973), halving where it is slow.
+    fn bracketed(
+        &mut self,
+        azimuth: f64,
+        mut low: f64,
+        mut high: f64,
+        (mut limit, mut at_high): (Limit, f64),
+    ) -> Edge {
+        let mut at_low = self.probe(azimuth, low, limit).wanted;
+        let (mut last, mut slow) = (f64::INFINITY, 0);
+        for _ in 0..100 {
+            let width = high - low;
+            let secant = high - at_high * width / (at_high - at_low);
+            let inside = secant > low && secant < high && slow < 3;
+            let r = if inside { secant } else { low + 0.5 * width };
+            if (r - last).abs() <= 4.0 * f64::EPSILON * high || r <= low || r >= high {
+                return Edge { radius: r, limit };
+            }
+            last = r;
+            let probe = self.probe(azimuth, r, limit);
+            match probe.failed {
+                None => {
+                    at_high *= damping(probe.wanted, at_low);
+                    (low, at_low) = (r, probe.wanted);
+                }
+                Some((same, margin)) if same == limit => {
+                    at_low *= damping(margin, at_high);
+                    (high, at_high) = (r, margin);
+                }
+                Some((other, margin)) if width > 1e-10 * high => {
+                    (high, at_high, limit) = (r, margin, other);
+                    at_low = self.probe(azimuth, low, limit).wanted;
+                }
+                Some(_) => return Edge { radius: r, limit },
+            }
+            slow = if high - low > 0.5 * width { slow + 1 } else { 0 };
+        }
+        Edge { radius: low, limit }
+    }
+
+    /// The edge all around, from the azimuths 0 to `end`; `None` where nothing limits the pupil
+    /// or where its edge is too ragged to be split.
+    pub(super) fn boundary(mut self, end: f64, azimuths: usize) -> Option<Boundary> {
+        let mut samples = Vec::with_capacity(azimuths + 1);
+        let mut guess = 0.5;
+        for i in 0..=azimuths {
+            let azimuth = end * i as f64 / azimuths as f64;
+            let edge = self.edge(azimuth, guess)?;
+            guess = 1.02 * edge.radius;
+            samples.push((azimuth, edge));
+        }
+        let mut arcs = vec![Arc { from: 0.0, to: end, limit: samples[0].1.limit }];
+        for pair in samples.windows(2) {
+            self.corners(pair[0], pair[1], &mut arcs)?;
+        }
+        arcs.retain(|arc| arc.to > arc.from);
+        if end > 1.5 * PI {
+            joined(&mut arcs, end);
+        }
+        Some(Boundary { center: self.center, arcs, samples, rays: self.rays })
+    }
+
+    /// Halves the azimuths between two edges of different limits down to the corner; an arc in
+    /// between is found on the way.
+    fn corners(&mut self, a: (f64, Edge), b: (f64, Edge), arcs: &mut Vec<Arc>) -> Option<()> {
+        if a.1.limit == b.1.limit {
+            return Some(());
+        }
+        let middle = 0.5 * (a.0 + b.0);
+        if b.0 - a.0 <= CORNER {
+            if arcs.len() >= MOST_ARCS {
+                return None;
+            }
+            let end = arcs.last().map_or(0.0, |arc| arc.to);
+            arcs.last_mut()?.to = middle;
+            arcs.push(Arc { from: middle, to: end, limit: b.1.limit });
+            return Some(());
+        }
+        let guess = 0.5 * (a.1.radius + b.1.radius) * (1.0 + 0.1 * (b.0 - a.0).min(0.2));
+        let between = (middle, self.edge(middle, guess)?);
+        self.corners(a, between, arcs)?;
+        self.corners(between, b, arcs)
+    }
+}
+
+/// What the value at the kept end of a bracket is multiplied with.
+fn damping(new: f64, replaced: f64) -> f64 {
+    let factor = 1.0 - new / replaced;
+    if factor > 0.0 { factor } else { 0.5 }
+}
+
+/// The first and the last arc of a full turn are one where the same limit makes them.
+fn joined(arcs: &mut Vec<Arc>, turn: f64) {
+    if let (Some(first), Some(last)) = (arcs.first().copied(), arcs.last().copied())
+        && arcs.len() > 1
+        && first.limit == last.limit
+    {
+        arcs.remove(0);
+        if let Some(last) = arcs.last_mut() {
+            last.to = turn + first.to;
+        }
+    }
+}
+
+impl Boundary {
+    /// Points of the edge, or, for an `inside` below 1, just inside it, at some azimuths.
+    pub fn points(&self, launch: &Launch<'_>, count: usize, inside: f64) -> Vec<[f64; 2]> {
+        let mut search = Search::new(launch, self.center);
+        let mut points = Vec::with_capacity(count + self.arcs.len());
+        let end = self.samples.last().map_or(0.0, |s| s.0);
+        let steps = (0..=count).map(|i| end * i as f64 / count as f64);
+        let corners = self.arcs.iter().map(|arc| arc.to);
+        let mut azimuths: Vec<f64> = steps.chain(corners).collect();
+        azimuths.sort_by(f64::total_cmp);
+        for azimuth in azimuths {
+            if let Some(edge) = search.edge(azimuth, 1.001 * self.near(azimuth)) {
+                points.push(search.point(azimuth, inside * edge.radius));
+            }
+        }
+        points
+    }
+
+    /// A guess of the radius at an azimuth, from the nearest ones known.
+    pub(super) fn near(&self, azimuth: f64) -> f64 {
+        let end = self.samples.last().map_or(1.0, |s| s.0);
+        let azimuth = if azimuth > end { azimuth - end } else { azimuth };
+        let after = self.samples.partition_point(|(a, _)| *a < azimuth);
+        let known = |i: usize| self.samples[i.min(self.samples.len() - 1)];
+        let ((a, low), (b, high)) = (known(after.saturating_sub(1)), known(after));
+        let share = if b > a { (azimuth - a) / (b - a) } else { 0.0 };
+        low.radius + share * (high.radius - low.radius)
+    }
+}

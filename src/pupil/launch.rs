@@ -1,0 +1,341 @@
+//! Where a ray starts.
+//!
+//! Every ray of a field is named by its point `q` in a plane: for a collimated beam the plane
+//! across the beam through the first vertex, so that 90 degrees and more are nothing special; for
+//! an object point the plane of the entrance pupil; in a telecentric beam `q` is the slope. A chart
+//! leads from pupil coordinates to that plane.
+
+use super::aim::{Aimed, aimed};
+use super::bench::{Aiming, Bench, Color, Dual2};
+use crate::lens::{Field, FieldKind, Object};
+use crate::math::Real;
+use crate::math::Vec3;
+use crate::trace::{Landing, Ray};
+
+/// Why a field has no rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LaunchError {
+    /// Nothing defines the field point.
+    #[error("the field has no object point: the lens gives the field's unit no meaning")]
+    NoObjectPoint,
+    /// No ray of the field through the centre of the stop was found.
+    #[error("no ray of this field was found that crosses the centre of the stop")]
+    NotAimed,
+    /// There is no such wavelength.
+    #[error("there is no such wavelength")]
+    NoWavelength,
+}
+
+/// What all rays of a field have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Source {
+    /// A direction; `across` spans the plane perpendicular to it, `ahead` is how far in front of
+    /// that plane a ray starts that does not start at the first vertex plane.
+    Collimated { direction: Vec3<f64>, across: [Vec3<f64>; 2], ahead: f64 },
+    /// A point, and the plane `z = through` in which rays are named.
+    Point { from: Vec3<f64>, through: f64 },
+    /// A point whose rays are named by their slopes.
+    Slopes { from: Vec3<f64> },
+}
+
+/// Below this direction cosine a collimated ray starts in front of the lens instead of at the
+/// vertex plane, which it may meet far behind the lens or never.
+const GRAZING: f64 = 0.05;
+
+impl Source {
+    pub(super) fn ray<R: Real>(&self, q: [R; 2]) -> Ray<R> {
+        match *self {
+            Self::Collimated { direction, across, ahead } => {
+                let along = Vec3::from_f64(direction);
+                let [e, f] = across.map(Vec3::from_f64);
+                let point = e * q[0] + f * q[1];
+                let slide =
+                    if direction.z > GRAZING { -(point.z / along.z) } else { R::from_f64(-ahead) };
+                Ray { point: point + along * slide, direction: along }
+            }
+            Self::Point { from, through } => {
+                let forwards = if through > from.z { R::ONE } else { -R::ONE };
+                let from = Vec3::from_f64(from);
+                let target = Vec3::new(q[0], q[1], R::from_f64(through));
+                from_point(from, (target - from) * forwards)
+            }
+            Self::Slopes { from } => {
+                from_point(Vec3::from_f64(from), Vec3::new(q[0], q[1], R::ONE))
+            }
+        }
+    }
+}
+
+/// A ray from a point, or from the first vertex plane towards a point behind it.
+fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
+    let direction = along * (R::ONE / along.dot(along).sqrt());
+    let point = if from.z > R::ZERO { from - direction * (from.z / direction.z) } else { from };
+    Ray { point, direction }
+}
+
+/// An affine map from pupil coordinates to the plane in which rays are named.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Chart {
+    pub(super) origin: [f64; 2],
+    pub(super) columns: [[f64; 2]; 2],
+}
+
+impl Chart {
+    pub(super) fn map<R: Real>(&self, p: [R; 2]) -> [R; 2] {
+        let [a, b] = self.columns;
+        let row = |i: usize| {
+            R::from_f64(self.origin[i]) + R::from_f64(a[i]) * p[0] + R::from_f64(b[i]) * p[1]
+        };
+        [row(0), row(1)]
+    }
+}
+
+/// The rays of one field at one wavelength.
+#[derive(Debug, Clone)]
+pub struct Launch<'a> {
+    /// The lens.
+    pub bench: &'a Bench,
+    /// The field.
+    pub field: Field,
+    /// Which wavelength.
+    pub wavelength: usize,
+    pub(super) source: Source,
+    chart: Chart,
+}
+
+impl<'a> Launch<'a> {
+    pub(super) fn new(
+        bench: &'a Bench,
+        field: Field,
+        wavelength: usize,
+    ) -> Result<Self, LaunchError> {
+        if wavelength >= bench.colors.len() {
+            return Err(LaunchError::NoWavelength);
+        }
+        let source = source(bench, field).ok_or(LaunchError::NoObjectPoint)?;
+        let chart = paraxial_chart(bench, &source);
+        let mut launch = Self { bench, field, wavelength, source, chart };
+        match bench.aiming {
+            Aiming::Paraxial => {}
+            Aiming::Chief | Aiming::Stop => {
+                let chief = launch.chief().ok_or(LaunchError::NotAimed)?;
+                launch.chart = chief.chart(bench.stop_radius()).ok_or(LaunchError::NotAimed)?;
+            }
+        }
+        Ok(launch)
+    }
+
+    /// The lens at this wavelength.
+    pub fn color(&self) -> &'a Color {
+        &self.bench.colors[self.wavelength]
+    }
+
+    /// Whether the rays at `(−px, py)` mirror those at `(px, py)`.
+    pub fn is_symmetric(&self) -> bool {
+        self.field.x == 0.0
+    }
+
+    /// The ray at these pupil coordinates; `None` where none was found that crosses the stop
+    /// there.
+    pub fn ray(&self, p: [f64; 2]) -> Option<Ray<f64>> {
+        Some(self.source.ray(self.place(p)?))
+    }
+
+    /// The same ray with its derivatives by the two pupil coordinates.
+    pub fn dual_ray(&self, p: [f64; 2]) -> Option<Ray<Dual2>> {
+        let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
+        if self.bench.aiming != Aiming::Stop {
+            return Some(self.source.ray(self.chart.map(variables)));
+        }
+        let found = self.aim(p)?;
+        let chart = found.chart(self.bench.stop_radius())?;
+        let q = |i: usize| Dual2 {
+            value: found.q[i],
+            slope: [chart.columns[0][i], chart.columns[1][i]],
+        };
+        Some(self.source.ray([q(0), q(1)]))
+    }
+
+    /// Where the ray at these pupil coordinates crosses the stop, clipped by nothing.
+    pub fn at_stop(&self, p: [f64; 2]) -> Option<[f64; 2]> {
+        let ray = self.source.ray(self.place(p)?.map(Dual2::constant));
+        let landing = self.color().open.trace_to(ray, self.bench.stop());
+        let point = landing.ray.point.value();
+        landing.fate.is_imaged().then_some([point.x, point.y])
+    }
+
+    /// The ray at these pupil coordinates at the image, clipped by nothing, with its derivatives;
+    /// `None` where it does not get there.
+    pub fn open_landing(&self, p: [f64; 2]) -> Option<Landing<Dual2>> {
+        let landing = self.color().open.trace(self.dual_ray(p)?);
+        landing.fate.is_imaged().then_some(landing)
+    }
+
+    /// The derivatives by the pupil coordinates of the direction cosines `L'` and `M'` with which
+    /// a ray arrives; `None` for a ray that is lost.
+    pub fn slopes_of_directions(&self, p: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+        let ray = self.ray(p)?;
+        if !self.color().tracer.trace(ray).fate.is_imaged() {
+            return None;
+        }
+        let direction = self.open_landing(p)?.ray.direction;
+        Some([direction.x.slope, direction.y.slope])
+    }
+
+    fn place(&self, p: [f64; 2]) -> Option<[f64; 2]> {
+        match self.bench.aiming {
+            Aiming::Paraxial | Aiming::Chief => Some(self.chart.map(p)),
+            Aiming::Stop => self.aim(p).map(|found| found.q),
+        }
+    }
+
+    fn aim(&self, p: [f64; 2]) -> Option<Aimed> {
+        let radius = self.bench.stop_radius();
+        aimed(self.bench, self.wavelength, &self.source, self.chart.map(p), p.map(|v| v * radius))
+    }
+
+    /// The real ray through the centre of the stop, followed from the axis to the field.
+    fn chief(&self) -> Option<Aimed> {
+        let mut walk = Walk { done: 0.0, shift: [0.0; 2], slope: [0.0; 2] };
+        let mut step: f64 = if self.is_wide() { 0.125 } else { 1.0 };
+        let mut found = self.chief_at(&walk, 0.0)?;
+        while walk.done < 1.0 {
+            let next = (walk.done + step).min(1.0);
+            if let Some(there) = self.chief_at(&walk, next) {
+                walk.advance(next, there.shift);
+                found = there;
+            } else {
+                step *= 0.5;
+                if step < SMALLEST_STEP {
+                    return None;
+                }
+            }
+        }
+        Some(found)
+    }
+
+    fn is_wide(&self) -> bool {
+        match self.source {
+            Source::Collimated { direction, .. } => direction.z < 0.9,
+            Source::Point { .. } | Source::Slopes { .. } => false,
+        }
+    }
+
+    /// The chief ray at a fraction of the field, from where the walk so far predicts it.
+    fn chief_at(&self, walk: &Walk, fraction: f64) -> Option<Aimed> {
+        let field = Field { x: self.field.x * fraction, y: self.field.y * fraction, ..self.field };
+        let source = source(self.bench, field)?;
+        let paraxial = paraxial_chart(self.bench, &source);
+        let shift = walk.predict(fraction);
+        let guess = [paraxial.origin[0] + shift[0], paraxial.origin[1] + shift[1]];
+        let mut found = aimed(self.bench, self.wavelength, &source, guess, [0.0; 2])?;
+        found.shift = [found.q[0] - paraxial.origin[0], found.q[1] - paraxial.origin[1]];
+        Some(found)
+    }
+}
+
+/// A field that cannot be reached in steps this small, as a fraction of it, is not reached.
+const SMALLEST_STEP: f64 = 1e-3;
+
+/// The way from the axis to a field: how far the chief ray's place is from its paraxial one.
+struct Walk {
+    done: f64,
+    shift: [f64; 2],
+    slope: [f64; 2],
+}
+
+impl Walk {
+    fn predict(&self, fraction: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.shift[i] + (fraction - self.done) * self.slope[i])
+    }
+
+    fn advance(&mut self, fraction: f64, shift: [f64; 2]) {
+        self.slope = [0, 1].map(|i| (shift[i] - self.shift[i]) / (fraction - self.done));
+        (self.done, self.shift) = (fraction, shift);
+    }
+}
+
+fn source(bench: &Bench, field: Field) -> Option<Source> {
+    match (bench.beam.field, bench.beam.object) {
+        (FieldKind::Angle, Object::Infinity) => {
+            let angle = field.x.hypot(field.y).to_radians();
+            collimated(bench, field, angle)
+        }
+        (FieldKind::ImageHeight, Object::Infinity) => {
+            let index = bench.colors[bench.primary].system.index_before;
+            let slope = field.x.hypot(field.y) * bench.first.power / index;
+            let turned =
+                Field { x: field.x * slope.signum(), y: field.y * slope.signum(), ..field };
+            (slope != 0.0 || field.x.hypot(field.y) == 0.0)
+                .then(|| collimated(bench, turned, slope.abs().atan()))?
+        }
+        (FieldKind::ObjectHeight, Object::Finite(distance)) => {
+            Some(point(bench, field.x, field.y, distance))
+        }
+        (FieldKind::ImageHeight, Object::Finite(distance)) => {
+            let scale = bench.first.magnification?;
+            Some(point(bench, field.x / scale, field.y / scale, distance))
+        }
+        (FieldKind::Angle, Object::Finite(distance)) => {
+            let reach = distance + bench.first.entrance_pupil.position?;
+            let angle = field.x.hypot(field.y);
+            let height = -reach * angle.to_radians().tan();
+            let [x, y] = toward(field, angle).map(|part| part * height);
+            (angle < 90.0).then(|| point(bench, x, y, distance))
+        }
+        (FieldKind::ObjectHeight, Object::Infinity) => None,
+    }
+}
+
+/// The unit vector in the direction of a field, `length` of it given.
+fn toward(field: Field, length: f64) -> [f64; 2] {
+    if length == 0.0 { [0.0, 1.0] } else { [field.x / length, field.y / length] }
+}
+
+fn collimated(bench: &Bench, field: Field, angle: f64) -> Option<Source> {
+    let (sin, cos) = angle.sin_cos();
+    let [tx, ty] = toward(field, field.x.hypot(field.y));
+    let direction = Vec3::new(sin * tx, sin * ty, cos);
+    // Perpendicular to the beam, turned out of the x-y plane by the field angle about the axis
+    // that is perpendicular to both: the projections of x and y for small angles.
+    let turn = 1.0 - cos;
+    let e = Vec3::new(1.0 - turn * tx * tx, -turn * tx * ty, -sin * tx);
+    let f = Vec3::new(-turn * tx * ty, 1.0 - turn * ty * ty, -sin * ty);
+    let system = &bench.colors[bench.primary].system;
+    let first = &system.surfaces[0];
+    let sizes = [first.semi_diameter, 1.0 / first.shape.curvature().abs()];
+    let size = sizes.into_iter().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let pupil = bench.first.entrance_pupil.position.unwrap_or(0.0).abs();
+    let ahead = 4.0 * (size + pupil + bench.first.marginal.heights[0].abs());
+    angle.is_finite().then_some(Source::Collimated { direction, across: [e, f], ahead })
+}
+
+fn point(bench: &Bench, x: f64, y: f64, distance: f64) -> Source {
+    let from = Vec3::new(x, y, -distance);
+    match bench.first.entrance_pupil.position {
+        Some(through) => Source::Point { from, through },
+        None => Source::Slopes { from },
+    }
+}
+
+/// The chart of the paraxial entrance pupil.
+fn paraxial_chart(bench: &Bench, source: &Source) -> Chart {
+    let pupil = bench.first.entrance_pupil;
+    let marginal = &bench.first.marginal;
+    let radius = pupil.diameter.map_or(marginal.heights[0].abs(), |d| 0.5 * d);
+    match source {
+        Source::Collimated { across: [e, f], .. } => {
+            let z = pupil.position.unwrap_or(0.0);
+            Chart {
+                origin: [e.z * z, f.z * z],
+                columns: [[e.x * radius, f.x * radius], [e.y * radius, f.y * radius]],
+            }
+        }
+        Source::Point { .. } => straight(radius),
+        Source::Slopes { .. } => straight(marginal.start_slope.abs()),
+    }
+}
+
+fn straight(scale: f64) -> Chart {
+    Chart { origin: [0.0; 2], columns: [[scale, 0.0], [0.0, scale]] }
+}

@@ -1,0 +1,228 @@
+//! Integrals over the rays that get through, by orders that are raised until two agree.
+//!
+//! The clear disc has Gauss nodes in `ρ²` and equal steps of azimuth: odd powers of `ρ` cancel
+//! there, and the rule converges spectrally (Forbes 1988). A clipped pupil has Gauss nodes in
+//! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
+//! is integrated over one half.
+
+use super::boundary::{Boundary, Search};
+use super::region::{Kind, Region};
+use super::rules::{legendre, radial};
+use crate::trace::{Rays, Sink};
+use std::f64::consts::PI;
+
+/// Points of the pupil with their weights.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Nodes {
+    /// Pupil coordinates.
+    pub points: Vec<[f64; 2]>,
+    /// The share of the pupil that each stands for, in pupil coordinates: π for the whole disc.
+    pub weights: Vec<f64>,
+    /// Whether every point stands for its mirror image `(−px, py)` as well; the weights then count
+    /// both.
+    pub mirrored: bool,
+    /// Rays traced to find them.
+    pub rays: usize,
+}
+
+/// What is asked of a result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// The error allowed, relative to what the analysis names as its scale.
+    pub tolerance: f64,
+    /// No more rays than this for one field and wavelength.
+    pub most_rays: usize,
+}
+
+impl Default for Accuracy {
+    fn default() -> Self {
+        Self { tolerance: 1e-3, most_rays: 100_000 }
+    }
+}
+
+/// Numbers with their errors, and what they cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converged<const K: usize> {
+    /// The numbers at the highest order.
+    pub values: [f64; K],
+    /// How much the last raising of the order changed each.
+    pub errors: [f64; K],
+    /// Rays traced.
+    pub rays: usize,
+    /// Whether the errors are what was asked for; else the rays ran out.
+    pub reached: bool,
+}
+
+/// Nodes along the radius and along half a turn, of the clear disc.
+const CLEAR: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
+/// Nodes along an arc and along the radius, of a piece.
+const SPLIT: [(usize, usize); 12] = [
+    (4, 3),
+    (6, 4),
+    (8, 5),
+    (10, 6),
+    (12, 8),
+    (16, 10),
+    (20, 12),
+    (28, 16),
+    (40, 20),
+    (56, 28),
+    (72, 40),
+    (96, 56),
+];
+/// Points of the lowest order where nothing better is known than a clipped low-discrepancy set.
+const RAGGED: usize = 1024;
+const RAGGED_ORDERS: usize = 8;
+
+impl Region<'_> {
+    /// How many orders of quadrature there are.
+    pub fn orders(&self) -> usize {
+        match self.kind {
+            Kind::Dark | Kind::Endless => 0,
+            Kind::Clear => CLEAR.len(),
+            Kind::Split(_) => SPLIT.len(),
+            Kind::Ragged { .. } => RAGGED_ORDERS,
+        }
+    }
+
+    /// The nodes of an order, counted from 0; none where there is no light.
+    pub fn nodes(&self, order: usize) -> Nodes {
+        let mirrored = self.launch.is_symmetric();
+        match &self.kind {
+            Kind::Dark | Kind::Endless => Nodes::default(),
+            Kind::Clear => clear(CLEAR[order.min(CLEAR.len() - 1)], mirrored),
+            Kind::Split(boundary) => self.split(boundary, SPLIT[order.min(SPLIT.len() - 1)]),
+            Kind::Ragged { square, .. } => ragged(*square, RAGGED << (2 * order)),
+        }
+    }
+
+    /// Gauss nodes between the centre and the edge of every arc.
+    fn split(&self, boundary: &Boundary, (azimuths, radii): (usize, usize)) -> Nodes {
+        let mut search = Search::new(&self.launch, boundary.center);
+        let mirrored = self.launch.is_symmetric();
+        let factor = if mirrored { 2.0 } else { 1.0 };
+        let mut nodes = Nodes { mirrored, ..Nodes::default() };
+        for arc in &boundary.arcs {
+            let length = arc.to - arc.from;
+            for (t, share) in legendre(azimuths) {
+                let azimuth = arc.from + t * length;
+                let guess = 1.001 * boundary.near(azimuth);
+                let Some(edge) = search.edge(azimuth, guess) else { continue };
+                let (sin, cos) = azimuth.sin_cos();
+                let sector = factor * share * length * edge.radius * edge.radius;
+                for (r, weight) in radial(radii) {
+                    let r = r * edge.radius;
+                    let [x, y] = boundary.center;
+                    nodes.points.push([x + r * sin, y + r * cos]);
+                    nodes.weights.push(sector * weight);
+                }
+            }
+        }
+        nodes.rays = search.rays;
+        nodes
+    }
+
+    /// Traces nodes; `visit` gets the weight and the number of each ray that arrives in `sink`.
+    pub fn trace<S: Sink<f64> + Default>(&self, nodes: &Nodes) -> Landed<S> {
+        let mut landed = Landed { sink: S::default(), weights: Vec::new(), lost: 0 };
+        let mut rays = Rays::with_capacity(nodes.points.len());
+        for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
+            match self.launch.ray(*p) {
+                Some(ray) => {
+                    rays.push(ray);
+                    landed.weights.push(*weight);
+                }
+                None => landed.lost += 1,
+            }
+        }
+        self.launch.color().tracer.batch(&rays, &mut landed.sink);
+        landed
+    }
+}
+
+/// Rays of a quadrature where they landed.
+#[derive(Debug, Clone)]
+pub struct Landed<S> {
+    /// Where.
+    pub sink: S,
+    /// The weight of each.
+    pub weights: Vec<f64>,
+    /// How many did not even start.
+    pub lost: usize,
+}
+
+impl<S: Sink<f64>> Landed<S> {
+    /// The number and weight of every ray that arrived.
+    pub fn arrived(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let all = self.weights.iter().copied().enumerate();
+        all.filter(|(i, _)| self.sink.fate(*i).is_imaged())
+    }
+}
+
+fn clear(order: usize, mirrored: bool) -> Nodes {
+    let azimuths = if mirrored { order } else { 2 * order };
+    let turn = if mirrored { PI } else { 2.0 * PI };
+    let step = turn / azimuths as f64;
+    let mut nodes = Nodes { mirrored, ..Nodes::default() };
+    for (square, share) in legendre(order) {
+        for j in 0..azimuths {
+            let (sin, cos) = (step * (j as f64 + 0.5)).sin_cos();
+            let r = square.sqrt();
+            nodes.points.push([r * sin, r * cos]);
+            nodes.weights.push(PI * share / azimuths as f64);
+        }
+    }
+    nodes
+}
+
+/// Roberts's additive sequence over a square: points that fill it evenly for any count.
+fn ragged((center, half): ([f64; 2], f64), count: usize) -> Nodes {
+    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+    let point = |i: usize| {
+        [0, 1].map(|k| center[k] + half * (2.0 * (0.5 + STEP[k] * i as f64).fract() - 1.0))
+    };
+    let weight = 4.0 * half * half / count as f64;
+    Nodes {
+        points: (0..count).map(point).collect(),
+        weights: vec![weight; count],
+        mirrored: false,
+        rays: 0,
+    }
+}
+
+/// Raises the order until each of some numbers changes by less than the tolerance times its scale;
+/// `None` where no light gets through. `numbers` computes them from nodes, `scales` says against
+/// what each is measured.
+pub fn converged<const K: usize>(
+    region: &Region<'_>,
+    accuracy: Accuracy,
+    mut numbers: impl FnMut(&Nodes) -> Option<[f64; K]>,
+    scales: impl Fn(&[f64; K]) -> [f64; K],
+) -> Option<Converged<K>> {
+    let mut rays = region.rays;
+    let mut before: Option<Converged<K>> = None;
+    for order in 0..region.orders() {
+        let nodes = region.nodes(order);
+        let cost = nodes.points.len() + nodes.rays;
+        let has_error = before.is_some_and(|b| b.errors.iter().all(|e| e.is_finite()));
+        if has_error && rays + cost > accuracy.most_rays {
+            break;
+        }
+        rays += cost;
+        let Some(values) = numbers(&nodes) else { continue };
+        let mut now = Converged { values, errors: [f64::INFINITY; K], rays, reached: false };
+        if let Some(before) = before {
+            let scales = scales(&values);
+            now.errors = std::array::from_fn(|k| (values[k] - before.values[k]).abs());
+            now.reached = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
+            if matches!(region.kind, Kind::Ragged { .. }) {
+                now.errors = now.errors.map(|e| 2.0 * e);
+            }
+        }
+        if now.reached {
+            return Some(now);
+        }
+        before = Some(now);
+    }
+    before
+}

@@ -1,0 +1,92 @@
+//! How narrowly a ray passes each surface.
+//!
+//! The set of rays that get through a lens ends where one of these margins is zero. They are
+//! smooth along a family of rays on both sides of that place, so that it can be found to the last
+//! digit by a root finder, which yes or no could not.
+
+use super::Tracer;
+use super::interface::{Form, Interface, Meeting};
+use super::single::{Ray, launch};
+use crate::math::Real;
+use crate::math::Vec3;
+
+/// What may end a ray at a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Hurdle {
+    /// The surface is not met: the ray passes by it.
+    Miss,
+    /// The ray meets it outside the semi-diameter.
+    Rim,
+    /// The ray is totally reflected.
+    Reflection,
+}
+
+impl<R: Real> Tracer<R> {
+    /// Follows a ray and calls `visit` with every hurdle on its way and the margin by which it is
+    /// taken: positive for a ray that passes, negative for one that does not. A ray goes on behind
+    /// a rim that clips it, but not behind a surface that it misses or that reflects it totally.
+    ///
+    /// The margin is `sd² − r²` in mm² at a rim, the square of the optical direction's component
+    /// along the normal at a miss and at a total reflection, and −1 at an asphere that is missed.
+    pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, Hurdle, R)) {
+        let mut k = launch(ray.direction, self.index_before);
+        let mut point = ray.point;
+        for (i, interface) in self.interfaces.iter().enumerate() {
+            let start = Vec3::new(point.x, point.y, point.z - interface.gap);
+            let met = interface.meeting(start, k);
+            visit(i, Hurdle::Miss, interface.miss_margin(&met, start, k));
+            if met.missed {
+                return;
+            }
+            let p = met.point;
+            if interface.rim2.value() < f64::INFINITY {
+                visit(i, Hurdle::Rim, interface.rim2 - (p.x * p.x + p.y * p.y));
+            }
+            if !interface.mirror {
+                let behind2 = met.a * met.a + interface.dn2 * met.m;
+                visit(i, Hurdle::Reflection, behind2);
+                if !(behind2 >= R::ZERO) {
+                    return;
+                }
+            }
+            k = interface.go_on(met, k).k;
+            point = p;
+        }
+    }
+}
+
+impl<R: Real> Interface<R> {
+    fn meeting(&self, start: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+        match self.form {
+            Form::Plane => self.meet_plane(start, k),
+            Form::Sphere => self.meet_sphere(start, k),
+            Form::Conic => self.meet_conic(start, k),
+            Form::Asphere => self.meet_asphere(start, k),
+        }
+    }
+
+    /// `(k·N)²`, negative where no point of the ray lies on the surface, or what the sheet of the
+    /// surface leaves where that is less.
+    fn miss_margin(&self, met: &Meeting<R>, p: Vec3<R>, k: Vec3<R>) -> R {
+        let square = match self.form {
+            Form::Plane => return self.sense * k.z,
+            Form::Asphere if met.missed => return -R::ONE,
+            Form::Asphere => return met.a * met.a,
+            Form::Sphere | Form::Conic => self.discriminant(p, k),
+        };
+        let sheet = met.normal.z - self.sheet;
+        let sheet_decides = square > R::ZERO && sheet < square;
+        let margin = R::select(sheet_decides, sheet, square);
+        // Rounding may tell the two computations of the discriminant apart: the ray decides.
+        let agrees = met.missed != (margin > R::ZERO);
+        R::select(agrees, margin, R::ZERO - R::from_f64(f64::from(u8::from(met.missed))))
+    }
+
+    fn discriminant(&self, p: Vec3<R>, k: Vec3<R>) -> R {
+        let c = self.curvature;
+        let axial = self.conic * p.z;
+        let b = k.z - c * (p.dot(k) + axial * k.z);
+        let f = c * (p.dot(p) + axial * p.z) - (p.z + p.z);
+        b * b - c * (self.n2 + self.conic * k.z * k.z) * f
+    }
+}
