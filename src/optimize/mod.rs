@@ -1,7 +1,7 @@
 //! Local search, one step at a time: the caller owns the loop.
 
 use crate::lens::Lens;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A search that can be stepped, watched and stopped by its caller.
 pub trait Optimizer: Send + std::fmt::Debug {
@@ -31,7 +31,7 @@ pub struct Progress {
 }
 
 /// Which method searches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Method {
     /// First order, with moments (Kingma and Ba 2015).
     Adam,

@@ -1,0 +1,77 @@
+//! Undo and redo: whole lenses, shared and never copied.
+
+use super::command::Cell;
+use crate::lens::Lens;
+use std::sync::Arc;
+
+/// How many steps can be taken back.
+const DEEPEST: usize = 1000;
+
+/// The lenses before and after the present one.
+#[derive(Debug, Default)]
+pub(super) struct History {
+    past: Vec<Step>,
+    future: Vec<Step>,
+    /// The cell that is being typed into.
+    typing: Option<Cell>,
+}
+
+/// A lens on the other side of an edit.
+#[derive(Debug)]
+struct Step {
+    lens: Arc<Lens>,
+    title: String,
+}
+
+impl History {
+    /// The lens before the typing into this cell began, if that is what the last step was.
+    pub(super) fn before_typing(&self, cell: Option<Cell>) -> Option<&Arc<Lens>> {
+        let same = cell.is_some() && self.typing == cell;
+        self.past.last().filter(|_| same).map(|step| &step.lens)
+    }
+
+    /// Notes that `lens` was changed by an edit; more typing into one cell is no new step.
+    pub(super) fn note(&mut self, lens: Arc<Lens>, title: String, cell: Option<Cell>) {
+        let merges = self.before_typing(cell).is_some();
+        self.future.clear();
+        self.typing = cell;
+        if merges {
+            return;
+        }
+        self.past.push(Step { lens, title });
+        if self.past.len() > DEEPEST {
+            self.past.remove(0);
+        }
+    }
+
+    /// Ends the typing into a cell.
+    pub(super) fn settle(&mut self) {
+        self.typing = None;
+    }
+
+    /// Exchanges the present lens for the one before the last edit.
+    pub(super) fn undo(&mut self, present: &Arc<Lens>) -> Option<Arc<Lens>> {
+        self.typing = None;
+        let step = self.past.pop()?;
+        self.future.push(Step { lens: Arc::clone(present), title: step.title });
+        Some(step.lens)
+    }
+
+    /// Exchanges the present lens for the one after the edit that was taken back last.
+    pub(super) fn redo(&mut self, present: &Arc<Lens>) -> Option<Arc<Lens>> {
+        self.typing = None;
+        let step = self.future.pop()?;
+        self.past.push(Step { lens: Arc::clone(present), title: step.title });
+        Some(step.lens)
+    }
+
+    /// What undo would take back.
+    pub(super) fn undo_title(&self) -> Option<&str> {
+        self.past.last().map(|step| step.title.as_str())
+    }
+
+    /// What redo would do again.
+    pub(super) fn redo_title(&self) -> Option<&str> {
+        self.future.last().map(|step| step.title.as_str())
+    }
+}

@@ -1,0 +1,74 @@
+//! Every length of a lens, multiplied.
+
+use super::edit::EditError;
+use crate::lens::{Aperture, FieldKind, Fields, Lens, Object, Parameter, Quantity};
+
+/// The power of a length that a number is measured in: mm⁻¹ for a curvature, mm⁻³ for r⁴.
+fn power(parameter: Parameter) -> i32 {
+    match parameter.quantity {
+        Quantity::Curvature => -1,
+        Quantity::Conic | Quantity::Index => 0,
+        Quantity::Asphere(term) => -(2 * term as i32 + 3),
+        Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 1,
+    }
+}
+
+/// Multiplies every length; angles, f-numbers and apertures by number stay.
+pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
+    if !(factor > 0.0 && factor.is_finite()) {
+        return Err(EditError::Scale(factor));
+    }
+    for row in &mut lens.surfaces {
+        row.curvature *= factor.powi(-1);
+        row.thickness *= factor;
+        row.semi_diameter = row.semi_diameter.map(|sd| sd * factor);
+        for (term, a) in row.asphere.iter_mut().enumerate() {
+            *a *= factor.powi(-(2 * term as i32 + 3));
+        }
+    }
+    if let Object::Finite(distance) = &mut lens.object {
+        *distance *= factor;
+    }
+    lens.focus = lens.focus.map(|offset| offset * factor);
+    scale_aperture(&mut lens.aperture, factor);
+    scale_fields(&mut lens.fields, factor);
+    for position in &mut lens.zoom {
+        position.thicknesses.iter_mut().for_each(|gap| gap.thickness *= factor);
+        position.aperture.iter_mut().for_each(|aperture| scale_aperture(aperture, factor));
+        position.fields.iter_mut().for_each(|fields| scale_fields(fields, factor));
+    }
+    scale_rules(lens, factor);
+    Ok(())
+}
+
+fn scale_aperture(aperture: &mut Aperture, factor: f64) {
+    match aperture {
+        Aperture::EntrancePupilDiameter(length) | Aperture::StopSemiDiameter(length) => {
+            *length *= factor;
+        }
+        Aperture::FNumber(_) | Aperture::ObjectNa(_) => {}
+    }
+}
+
+fn scale_fields(fields: &mut Fields, factor: f64) {
+    if fields.kind != FieldKind::Angle {
+        for field in &mut fields.values {
+            field.x *= factor;
+            field.y *= factor;
+        }
+    }
+}
+
+/// Bounds and pickups.
+fn scale_rules(lens: &mut Lens, factor: f64) {
+    for variable in &mut lens.variables {
+        let by = factor.powi(power(variable.parameter));
+        variable.min = variable.min.map(|min| min * by);
+        variable.max = variable.max.map(|max| max * by);
+    }
+    for pickup in &mut lens.pickups {
+        let by = factor.powi(power(pickup.parameter));
+        pickup.offset *= by;
+        pickup.scale *= by / factor.powi(power(pickup.source));
+    }
+}

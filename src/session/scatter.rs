@@ -1,0 +1,45 @@
+//! Where the rays of each field land: the dots of a spot diagram.
+
+use crate::pupil::{Bench, Launch, Pattern, pattern};
+use crate::trace::{Fates, Points, Rays, Sink};
+
+/// The dots of one field at one wavelength.
+#[derive(Debug, Clone, Default)]
+pub struct Scatter {
+    /// The field.
+    pub field: usize,
+    /// The wavelength.
+    pub wavelength: usize,
+    /// Where rays land in the image plane, in mm from the axis.
+    pub points: Vec<[f64; 2]>,
+    /// How the rays ended.
+    pub fates: Fates,
+}
+
+/// Rings of the pattern: 127 rays a field and wavelength.
+const RINGS: usize = 6;
+
+/// The dots of every field and wavelength; a field without rays has none.
+pub fn scatter(bench: &Bench) -> Vec<Scatter> {
+    let points = pattern(Pattern::Hexapolar(RINGS));
+    let mut all = Vec::new();
+    for (field, point) in bench.fields.iter().enumerate() {
+        for wavelength in 0..bench.colors.len() {
+            let dots = bench.launch(*point, wavelength).ok().map(|launch| dots(&launch, &points));
+            all.push(Scatter { field, wavelength, ..dots.unwrap_or_default() });
+        }
+    }
+    all
+}
+
+fn dots(launch: &Launch<'_>, points: &[[f64; 2]]) -> Scatter {
+    let rays: Rays<f64> = points.iter().filter_map(|p| launch.ray(*p)).collect();
+    let mut landed = Points::default();
+    launch.color().tracer.batch(&rays, &mut landed);
+    let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
+    Scatter {
+        points: arrived.map(|i| [landed.x[i], landed.y[i]]).collect(),
+        fates: landed.fates(),
+        ..Scatter::default()
+    }
+}

@@ -1,0 +1,93 @@
+//! Places where threads leave things for each other, so that neither waits for the other.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// A place for the newest value; neither side waits for the other to finish anything.
+#[derive(Debug)]
+pub struct Slot<T>(Arc<Mutex<Option<Arc<T>>>>);
+
+impl<T> Clone for Slot<T> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<T> Default for Slot<T> {
+    fn default() -> Self {
+        Self(Arc::default())
+    }
+}
+
+impl<T> Slot<T> {
+    /// Puts a value in the place of the one before.
+    pub fn set(&self, value: T) {
+        *locked(&self.0) = Some(Arc::new(value));
+    }
+
+    /// Empties the slot.
+    pub fn clear(&self) {
+        *locked(&self.0) = None;
+    }
+
+    /// The newest value.
+    pub fn latest(&self) -> Option<Arc<T>> {
+        locked(&self.0).clone()
+    }
+}
+
+/// A thread that died while it held the lock left a whole value: only whole values are stored.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A letter box that holds one letter: a newer one replaces one that was not read yet.
+#[derive(Debug)]
+pub(super) struct Mailbox<T> {
+    state: Mutex<State<T>>,
+    arrived: Condvar,
+}
+
+#[derive(Debug)]
+struct State<T> {
+    letter: Option<T>,
+    closed: bool,
+}
+
+impl<T> Mailbox<T> {
+    pub(super) fn new() -> Self {
+        let state = State { letter: None, closed: false };
+        Self { state: Mutex::new(state), arrived: Condvar::new() }
+    }
+
+    /// Leaves a letter.
+    pub(super) fn put(&self, letter: T) {
+        locked(&self.state).letter = Some(letter);
+        self.arrived.notify_one();
+    }
+
+    /// Says that no more letters come.
+    pub(super) fn close(&self) {
+        locked(&self.state).closed = true;
+        self.arrived.notify_all();
+    }
+
+    /// Whether a reader should leave what it is at.
+    pub(super) fn interrupts(&self) -> bool {
+        let state = locked(&self.state);
+        state.closed || state.letter.is_some()
+    }
+
+    /// Waits for a letter; `None` when the box is closed.
+    pub(super) fn take(&self) -> Option<T> {
+        let mut state = locked(&self.state);
+        loop {
+            if state.closed {
+                return None;
+            }
+            if let Some(letter) = state.letter.take() {
+                return Some(letter);
+            }
+            state = self.arrived.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! What a panel reads: a snapshot of the session that nothing changes.
+
+use super::analyst::Results;
+use super::worker::Search;
+use crate::effects::{Choice, Effect};
+use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A snapshot of one open design and everything that is known about it.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// The design.
+    pub lens: Arc<Lens>,
+    /// Counts every change of the design and of the settings.
+    pub version: u64,
+    /// The newest numbers there are, maybe of an older version.
+    pub results: Option<Arc<Results>>,
+    /// The search in the background, or the last one whose result was neither taken nor thrown
+    /// away.
+    pub search: Option<Arc<Search>>,
+    /// What was said, newest last.
+    pub messages: Vec<Message>,
+    /// What undo would take back; `None` where there is nothing.
+    pub undo: Option<String>,
+    /// What redo would do again; `None` where there is nothing.
+    pub redo: Option<String>,
+    /// The file of the design; `None` where it was never saved.
+    pub path: Option<PathBuf>,
+    /// Whether the design differs from its file.
+    pub dirty: bool,
+    /// What is shown and how exactly.
+    pub settings: Settings,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self {
+            lens: Arc::new(blank()),
+            version: 0,
+            results: None,
+            search: None,
+            messages: Vec::new(),
+            undo: None,
+            redo: None,
+            path: None,
+            dirty: false,
+            settings: Settings::default(),
+        }
+    }
+}
+
+impl View {
+    /// Whether the numbers belong to the design as it is now.
+    pub fn is_current(&self) -> bool {
+        self.results.as_ref().is_some_and(|results| results.version == self.version)
+    }
+
+    /// Whether there is a step to take back.
+    pub fn can_undo(&self) -> bool {
+        self.undo.is_some()
+    }
+
+    /// Whether there is a step to do again.
+    pub fn can_redo(&self) -> bool {
+        self.redo.is_some()
+    }
+}
+
+/// What is shown and how exactly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// The relative error that the shown numbers may have.
+    pub tolerance: f64,
+    /// The zoom position that is shown.
+    pub zoom: usize,
+    /// How many rays of each field the layout shows.
+    pub rays: usize,
+    /// Effects that are not left to the plan.
+    pub choices: Vec<(Effect, Choice)>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { tolerance: 1e-3, zoom: 0, rays: 15, choices: Vec::new() }
+    }
+}
+
+impl Settings {
+    /// Whether an effect is computed.
+    pub fn choice(&self, effect: Effect) -> Choice {
+        let chosen = self.choices.iter().find(|(other, _)| *other == effect);
+        chosen.map_or(Choice::Auto, |(_, choice)| *choice)
+    }
+
+    pub(super) fn choose(&mut self, effect: Effect, choice: Choice) {
+        self.choices.retain(|(other, _)| *other != effect);
+        if choice != Choice::Auto {
+            self.choices.push((effect, choice));
+            self.choices.sort_unstable_by_key(|(effect, _)| *effect);
+        }
+    }
+}
+
+/// How much a message matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Something was done.
+    Note,
+    /// A wish was not fulfilled, or not wholly.
+    Warning,
+    /// Something failed.
+    Error,
+}
+
+/// Something that was said to the person.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Message {
+    /// How much it matters.
+    pub severity: Severity,
+    /// The words.
+    pub text: String,
+}
+
+/// A lens to start from: one plane-parallel plate behind the stop.
+pub fn blank() -> Lens {
+    let row = |thickness: f64, medium: Medium, stop: bool| Row {
+        thickness,
+        medium,
+        stop,
+        semi_diameter: Some(10.0),
+        ..Row::default()
+    };
+    Lens {
+        name: "New lens".to_owned(),
+        source: String::new(),
+        notes: String::new(),
+        object: Object::Infinity,
+        object_medium: Medium::Air,
+        aperture: Aperture::EntrancePupilDiameter(10.0),
+        fields: Fields {
+            kind: FieldKind::Angle,
+            values: vec![Field { x: 0.0, y: 0.0, weight: 1.0 }],
+        },
+        wavelengths: vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }],
+        surfaces: vec![
+            row(5.0, Medium::Glass("SCHOTT N-BK7".to_owned()), true),
+            row(50.0, Medium::Air, false),
+        ],
+        zoom: Vec::new(),
+        variables: Vec::new(),
+        pickups: Vec::new(),
+        focus: None,
+    }
+}

@@ -1,0 +1,338 @@
+//! A search in the background: orders in, news out, and dropping the handle ends the thread.
+//!
+//! The search works on its own copy of the lens. How far it is sits in a newest-value slot, so a
+//! slow window never holds it up; small news travels as events. The window is woken at most
+//! thirty times a second, and at once where something ends.
+
+use super::clock::Pace;
+use super::slot::Slot;
+use crate::lens::Lens;
+use crate::merit::Goal;
+use crate::optimize::{Method, Optimizer, Progress};
+use std::any::Any;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+/// The time between two looks of the window, at least.
+const BETWEEN: Duration = Duration::from_millis(33);
+/// How many points of the merit history are kept; beyond that every second one goes.
+const HISTORY: usize = 2000;
+
+/// Begins a search: a method, the lens it starts from, and what it aims at.
+pub type Starter = dyn Fn(Method, &Lens, &Goal) -> Result<Box<dyn Optimizer>, String> + Send;
+
+/// How a search stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// It takes steps.
+    Running,
+    /// It is held and can go on.
+    Paused,
+    /// It was ended.
+    Stopped,
+    /// Further steps would change nothing.
+    Finished,
+}
+
+/// How far a search is.
+#[derive(Debug, Clone)]
+pub struct Search {
+    /// Which search of the session it is, counted from 1.
+    pub number: u64,
+    /// How it stands.
+    pub standing: Standing,
+    /// How it searches.
+    pub method: Method,
+    /// What its last step did; `None` before the first.
+    pub progress: Option<Progress>,
+    /// The lens it started from.
+    pub start: Arc<Lens>,
+    /// The best lens so far.
+    pub best: Arc<Lens>,
+    /// The lens at the current step.
+    pub current: Arc<Lens>,
+    /// The merit against the step, at most a few thousand points of the whole way.
+    pub history: Vec<Merit>,
+}
+
+/// A point of the merit history.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Merit {
+    /// Steps so far.
+    pub step: usize,
+    /// Merit of the current lens.
+    pub current: f64,
+    /// Merit of the best lens so far.
+    pub best: f64,
+}
+
+/// What happened to a search; each carries its number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum News {
+    Started(u64),
+    Paused(u64),
+    Resumed(u64),
+    Stopped(u64),
+    Finished(u64),
+    Failed(u64, String),
+}
+
+/// What a search is told.
+enum Order {
+    Start { number: u64, method: Method, lens: Arc<Lens>, goal: Goal },
+    Pause,
+    Resume,
+    Step,
+    Stop,
+}
+
+/// The handle of the thread that searches.
+#[derive(Debug)]
+pub(super) struct Worker {
+    orders: Option<Sender<Order>>,
+    news: Receiver<News>,
+    search: Slot<Search>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Worker {
+    /// Starts the thread. `wake` is called from it when there is something new to look at.
+    pub(super) fn spawn(
+        start: Box<Starter>,
+        wake: impl Fn() + Send + 'static,
+    ) -> io::Result<Self> {
+        let (orders, inbox) = mpsc::channel();
+        let (outbox, news) = mpsc::channel();
+        let search = Slot::default();
+        let desk = Desk {
+            inbox,
+            outbox,
+            search: search.clone(),
+            start,
+            wake: Box::new(wake),
+            pace: Pace::new(BETWEEN),
+        };
+        let thread = thread::Builder::new().name("optimizer".into()).spawn(move || desk.serve())?;
+        Ok(Self { orders: Some(orders), news, search, thread: Some(thread) })
+    }
+
+    pub(super) fn start(&self, number: u64, method: Method, lens: Arc<Lens>, goal: Goal) {
+        self.tell(Order::Start { number, method, lens, goal });
+    }
+
+    pub(super) fn pause(&self) {
+        self.tell(Order::Pause);
+    }
+
+    pub(super) fn resume(&self) {
+        self.tell(Order::Resume);
+    }
+
+    pub(super) fn step(&self) {
+        self.tell(Order::Step);
+    }
+
+    pub(super) fn stop(&self) {
+        self.tell(Order::Stop);
+    }
+
+    /// Forgets the last search.
+    pub(super) fn clear(&self) {
+        self.search.clear();
+    }
+
+    /// How far the search is.
+    pub(super) fn search(&self) -> Option<Arc<Search>> {
+        self.search.latest()
+    }
+
+    /// What happened since the last look.
+    pub(super) fn news(&self) -> Vec<News> {
+        self.news.try_iter().collect()
+    }
+
+    /// The thread outlives every panic of a search, so it hears every order.
+    fn tell(&self, order: Order) {
+        if let Some(orders) = &self.orders {
+            orders.send(order).unwrap_or_default();
+        }
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.orders = None;
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap_or_default();
+        }
+    }
+}
+
+/// What the thread works with.
+struct Desk {
+    inbox: Receiver<Order>,
+    outbox: Sender<News>,
+    search: Slot<Search>,
+    start: Box<Starter>,
+    wake: Box<dyn Fn() + Send>,
+    pace: Pace,
+}
+
+/// A search under way.
+struct Run {
+    optimizer: Box<dyn Optimizer>,
+    state: Search,
+    stride: usize,
+}
+
+impl Desk {
+    /// Works until the handle is dropped.
+    fn serve(mut self) {
+        let mut run: Option<Run> = None;
+        loop {
+            let running = run.as_ref().is_some_and(|r| r.state.standing == Standing::Running);
+            let order = if running {
+                match self.inbox.try_recv() {
+                    Ok(order) => Some(order),
+                    Err(TryRecvError::Empty) => None,
+                    Err(TryRecvError::Disconnected) => return,
+                }
+            } else {
+                match self.inbox.recv() {
+                    Ok(order) => Some(order),
+                    Err(_) => return,
+                }
+            };
+            run = match (order, run) {
+                (Some(Order::Start { number, method, lens, goal }), _) => {
+                    self.begin(number, method, lens, &goal)
+                }
+                (Some(order), Some(run)) => self.obey(&order, run),
+                (None, Some(run)) => self.advance(run),
+                (_, None) => None,
+            };
+        }
+    }
+
+    fn begin(&mut self, number: u64, method: Method, lens: Arc<Lens>, goal: &Goal) -> Option<Run> {
+        let start = AssertUnwindSafe(|| (self.start)(method, &lens, goal));
+        match catch_unwind(start).unwrap_or_else(|panic| Err(said(panic.as_ref()))) {
+            Ok(optimizer) => {
+                let state = Search {
+                    number,
+                    standing: Standing::Running,
+                    method,
+                    progress: None,
+                    best: Arc::clone(&lens),
+                    current: Arc::clone(&lens),
+                    start: lens,
+                    history: Vec::new(),
+                };
+                let run = Run { optimizer, state, stride: 1 };
+                self.tell(&run, News::Started(number));
+                Some(run)
+            }
+            Err(why) => {
+                self.emit(News::Failed(number, why));
+                None
+            }
+        }
+    }
+
+    fn obey(&mut self, order: &Order, mut run: Run) -> Option<Run> {
+        let number = run.state.number;
+        match (order, run.state.standing) {
+            (Order::Pause, Standing::Running) => {
+                run.state.standing = Standing::Paused;
+                self.tell(&run, News::Paused(number));
+            }
+            (Order::Resume, Standing::Paused) => {
+                run.state.standing = Standing::Running;
+                self.tell(&run, News::Resumed(number));
+            }
+            (Order::Step, Standing::Paused) => {
+                run = self.advance(run)?;
+                self.publish(&run);
+            }
+            (Order::Stop, Standing::Running | Standing::Paused) => {
+                run.state.standing = Standing::Stopped;
+                self.tell(&run, News::Stopped(number));
+                return None;
+            }
+            _ => {}
+        }
+        Some(run)
+    }
+
+    /// Takes one step; `None` where the search is over.
+    fn advance(&mut self, mut run: Run) -> Option<Run> {
+        let number = run.state.number;
+        let stepped = catch_unwind(AssertUnwindSafe(|| run.step()));
+        if let Err(panic) = stepped {
+            run.state.standing = Standing::Stopped;
+            self.tell(&run, News::Failed(number, said(panic.as_ref())));
+            return None;
+        }
+        if run.state.progress.as_ref().is_some_and(|progress| progress.finished) {
+            run.state.standing = Standing::Finished;
+            self.tell(&run, News::Finished(number));
+            return None;
+        }
+        if self.pace.is_due() {
+            self.publish(&run);
+        }
+        Some(run)
+    }
+
+    /// Shows how far the search is, then says what happened.
+    fn tell(&self, run: &Run, news: News) {
+        self.search.set(run.snapshot());
+        self.emit(news);
+    }
+
+    fn publish(&self, run: &Run) {
+        self.search.set(run.snapshot());
+        (self.wake)();
+    }
+
+    /// Nobody listens any more when the handle is being dropped; the next look at the inbox ends
+    /// the thread then.
+    fn emit(&self, news: News) {
+        self.outbox.send(news).unwrap_or_default();
+        (self.wake)();
+    }
+}
+
+impl Run {
+    fn step(&mut self) {
+        let progress = self.optimizer.step();
+        if progress.step % self.stride == 0 || progress.finished {
+            let Progress { step, merit: current, best, .. } = progress;
+            self.state.history.push(Merit { step, current, best });
+        }
+        if self.state.history.len() > HISTORY {
+            self.stride *= 2;
+            self.state.history.retain(|merit| merit.step % self.stride == 0);
+        }
+        self.state.progress = Some(progress);
+    }
+
+    fn snapshot(&self) -> Search {
+        Search {
+            best: Arc::new(self.optimizer.best().clone()),
+            current: Arc::new(self.optimizer.current().clone()),
+            ..self.state.clone()
+        }
+    }
+}
+
+/// The words of a panic.
+fn said(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
+    format!("the search failed: {}", text.unwrap_or_else(|| "for an unknown reason".to_owned()))
+}
