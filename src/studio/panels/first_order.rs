@@ -1,0 +1,26 @@
+//! First order.
+
+use eframe::egui::Ui;
+
+use super::Panel;
+use crate::session::{Command, View};
+use crate::studio::draw::Backing;
+
+/// The panel.
+#[derive(Debug, Default)]
+pub struct FirstOrderData;
+
+impl FirstOrderData {
+    /// x
+    pub const fn new(_backing: Backing) -> Self { Self }
+}
+
+impl Panel for FirstOrderData {
+    fn title(&self) -> &'static str {
+        "First order"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &View, _wishes: &mut Vec<Command>) {
+        ui.weak(&view.lens.name);
+    }
+}

@@ -1,0 +1,26 @@
+//! Spot diagram.
+
+use eframe::egui::Ui;
+
+use super::Panel;
+use crate::session::{Command, View};
+use crate::studio::draw::Backing;
+
+/// The panel.
+#[derive(Debug, Default)]
+pub struct SpotDiagram;
+
+impl SpotDiagram {
+    /// x
+    pub const fn new(_backing: Backing) -> Self { Self }
+}
+
+impl Panel for SpotDiagram {
+    fn title(&self) -> &'static str {
+        "Spot diagram"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &View, _wishes: &mut Vec<Command>) {
+        ui.weak(&view.lens.name);
+    }
+}
