@@ -1,3 +1,5 @@
 //! The program: a window without arguments, a command line with them.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    aplanat::cli::run()
+}

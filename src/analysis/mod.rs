@@ -44,23 +44,20 @@ impl Estimate {
 
 /// Why a field has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Dark {
     /// No ray of the field gets through the lens.
     #[error("no light: no ray of this field gets through the lens")]
     NoLight,
     /// No ray of the field could be started.
     #[error("no rays: {0}")]
-    NoRays(#[serde(serialize_with = "as_text")] LaunchError),
+    NoRays(LaunchError),
     /// Nothing limits the beam.
     #[error("no beam: no surface limits it; give the stop a semi-diameter")]
     Endless,
     /// The chief ray does not reach the image, so that nothing can be measured from it.
     #[error("no chief ray: the ray through the middle of the pupil does not reach the image")]
     NoChief,
-}
-
-fn as_text<S: serde::Serializer>(error: &LaunchError, to: S) -> Result<S::Ok, S::Error> {
-    to.collect_str(error)
 }
 
 /// The rays of a field that get through, if any do.

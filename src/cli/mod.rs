@@ -1,1 +1,98 @@
-//! cli
+//! The headless command line: the same work as in the window, results as text or JSON.
+//!
+//! Results go to standard output; progress and errors go to standard error. The exit status is 0
+//! when the work is done, 1 when it failed, 2 when the input is wrong. An error names the file, the
+//! place in it, what was found and what was expected.
+//!
+//! A subcommand is a file of this folder, a line in [`Command`] and a line in its `run`. The JSON
+//! that it reads and writes stands in `help/`, which is its `--help` and a part of the README.
+
+mod convert;
+mod failure;
+mod info;
+mod input;
+mod measure;
+mod output;
+mod trace;
+mod window;
+
+use clap::{Parser, Subcommand};
+use failure::Failure;
+use output::Output;
+use std::io::{Write as _, stderr};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Designs lenses by computation. Without arguments, or with just a lens, it opens the studio;
+/// with a subcommand it works without a window or a display.
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXIT)]
+struct Arguments {
+    /// The lens that the studio opens: .json or .zmx
+    lens: Option<PathBuf>,
+
+    /// Prints the result as JSON
+    #[arg(long, global = true)]
+    json: bool,
+
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+const EXIT: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong.\n\
+    Lengths in mm, angles in degrees, wavelengths in um; surfaces count from 0.";
+
+/// Every subcommand.
+#[derive(Debug, Subcommand)]
+enum Command {
+    Info(info::Info),
+    Trace(trace::Trace),
+    Convert(convert::Convert),
+    Measure(measure::Measure),
+}
+
+impl Command {
+    fn run(&self, output: &Output) -> Result<(), Failure> {
+        match self {
+            Self::Info(info) => info.run(output),
+            Self::Trace(trace) => trace.run(output),
+            Self::Convert(convert) => convert.run(output),
+            Self::Measure(measure) => measure.run(output),
+        }
+    }
+}
+
+/// Does what the arguments of the process ask for.
+pub fn run() -> ExitCode {
+    env_logger::init();
+    match Arguments::try_parse() {
+        Ok(arguments) => finish(arguments.run()),
+        Err(usage) => {
+            // Help that nobody reads to its end is no failure.
+            drop(usage.print());
+            ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2))
+        }
+    }
+}
+
+impl Arguments {
+    fn run(&self) -> Result<(), Failure> {
+        let output = Output::new(self.json);
+        match &self.command {
+            Some(_) if self.lens.is_some() => Err(Failure::Input(
+                "a lens in front of a subcommand; expected it behind: `aplanat info LENS`".into(),
+            )),
+            Some(command) => command.run(&output),
+            None => window::open(self.lens.as_deref()),
+        }
+    }
+}
+
+fn finish(result: Result<(), Failure>) -> ExitCode {
+    let Err(failure) = result else { return ExitCode::SUCCESS };
+    if !failure.is_closed_pipe() {
+        // Nothing is left to tell it to if standard error is closed too.
+        drop(writeln!(stderr(), "error: {failure}"));
+    }
+    ExitCode::from(failure.status())
+}

@@ -7,11 +7,14 @@
 mod error;
 mod library;
 pub mod native;
+mod report;
 mod save;
 mod text;
+pub mod zemax;
 
 pub use error::FileError;
 pub use library::{Bundled, library};
+pub use report::{Outcome, Report, ReportRow};
 
 use crate::lens::Lens;
 use std::path::Path;

@@ -1,16 +1,27 @@
 //! Local search, one step at a time: the caller owns the loop.
+//!
+//! An [`Optimizer`] knows nothing of threads, clocks or files. It keeps its own copy of the lens,
+//! never lets it become invalid, and always has a best one to give.
+
+mod adam;
+mod least_squares;
+mod state;
 
 use crate::lens::Lens;
+use crate::merit::{Goal, Merit, MeritError, TermValue};
 use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
 
 /// A search that can be stepped, watched and stopped by its caller.
-pub trait Optimizer: Send + std::fmt::Debug {
+pub trait Optimizer: Send + Debug {
     /// Takes one step; a step that would make the lens invalid is refused and shortened.
     fn step(&mut self) -> Progress;
     /// The best lens so far.
     fn best(&self) -> &Lens;
     /// The lens at the current step.
     fn current(&self) -> &Lens;
+    /// Every term of the merit function for the best lens so far.
+    fn terms(&self) -> Result<Vec<TermValue>, MeritError>;
 }
 
 /// What a step did.
@@ -31,10 +42,39 @@ pub struct Progress {
 }
 
 /// Which method searches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// First order, with moments (Kingma and Ba 2015).
+    /// First order, with moments (Kingma and Ba, ICLR 2015).
     Adam,
-    /// Damped least squares (Levenberg 1944).
+    /// Damped least squares (Levenberg 1944; Marquardt 1963).
+    #[default]
     DampedLeastSquares,
+}
+
+impl Method {
+    /// What it is called in menus.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Adam => "Adam",
+            Self::DampedLeastSquares => "Damped least squares",
+        }
+    }
+}
+
+/// Begins a search of a lens; spots are good to `tolerance` of their radius.
+///
+/// # Errors
+/// A lens without variables, or one without merit: see [`MeritError`].
+pub fn start(
+    method: Method,
+    lens: &Lens,
+    goal: &Goal,
+    tolerance: f64,
+) -> Result<Box<dyn Optimizer>, MeritError> {
+    let merit = Merit::new(lens, goal, tolerance)?;
+    Ok(match method {
+        Method::Adam => Box::new(adam::Adam::new(merit, lens)?),
+        Method::DampedLeastSquares => Box::new(least_squares::LeastSquares::new(merit, lens)?),
+    })
 }

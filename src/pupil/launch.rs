@@ -11,9 +11,11 @@ use crate::lens::{Field, FieldKind, Object};
 use crate::math::Real;
 use crate::math::Vec3;
 use crate::trace::{Landing, Ray};
+use serde::Serialize;
 
 /// Why a field has no rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LaunchError {
     /// Nothing defines the field point.
     #[error("the field has no object point: the lens gives the field's unit no meaning")]

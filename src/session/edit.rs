@@ -76,12 +76,16 @@ pub enum EditError {
 /// What follows another number has its value written into the lens, so that a table of the lens
 /// shows it.
 pub fn edited(lens: &Lens, edit: &Edit) -> Result<Lens, EditError> {
-    let mut lens = lens.clone();
-    lens.edit(edit)?;
-    lens.check()?;
-    let lens = lens.with_pickups()?;
-    lens.check_resolved()?;
-    Ok(lens)
+    let mut changed = lens.clone();
+    changed.edit(edit)?;
+    changed.check()?;
+    let changed = changed.with_pickups()?;
+    changed.check()?;
+    match changed.check_resolved() {
+        // What could not be traced before may be put right one number at a time.
+        Err(why) if lens.check_resolved().is_ok() => Err(why.into()),
+        _ => Ok(changed),
+    }
 }
 
 impl Lens {
@@ -177,15 +181,13 @@ impl Lens {
 
     fn limit(&mut self, surface: usize, value: Option<f64>) -> Result<(), EditError> {
         let parameter = Parameter::new(surface, Quantity::SemiDiameter);
-        match value {
-            Some(value) => self.write(parameter, value),
-            None => {
-                self.may_be_written(parameter)?;
-                self.forget(parameter);
-                self.surfaces[surface].semi_diameter = None;
-                Ok(())
-            }
+        if let Some(value) = value {
+            return self.write(parameter, value);
         }
+        self.may_be_written(parameter)?;
+        self.forget(parameter);
+        self.row(surface)?.semi_diameter = None;
+        Ok(())
     }
 
     /// A glass with a fixed index has none that could vary or be followed.
@@ -299,16 +301,16 @@ impl Lens {
 
     fn map_zooms(&mut self, map: impl Fn(usize) -> Option<usize>) {
         self.map_parameters(|parameter| match parameter.quantity {
-            Quantity::ZoomThickness(zoom) => {
-                map(zoom).map(|zoom| Parameter { quantity: Quantity::ZoomThickness(zoom), ..parameter })
-            }
+            Quantity::ZoomThickness(zoom) => map(zoom)
+                .map(|zoom| Parameter { quantity: Quantity::ZoomThickness(zoom), ..parameter }),
             _ => Some(parameter),
         });
     }
 
     /// Renames every parameter that a variable or pickup mentions; what has no name any more goes.
     pub(super) fn map_parameters(&mut self, map: impl Fn(Parameter) -> Option<Parameter>) {
-        let variable = |v: &Variable| map(v.parameter).map(|parameter| Variable { parameter, ..*v });
+        let variable =
+            |v: &Variable| map(v.parameter).map(|parameter| Variable { parameter, ..*v });
         let pickup = |p: &Pickup| {
             let (parameter, source) = (map(p.parameter)?, map(p.source)?);
             Some(Pickup { parameter, source, ..*p })

@@ -37,15 +37,18 @@ const LEAD: f64 = 0.15;
 
 /// A fan of rays of each field in the meridional plane, at the primary wavelength.
 pub fn layout(bench: &Bench, count: usize) -> Layout {
-    let mut layout =
-        Layout { reached: vec![0.0; bench.colors[bench.primary].tracer.surfaces()], ..Layout::default() };
+    let mut layout = Layout {
+        reached: vec![0.0; bench.colors[bench.primary].tracer.surfaces()],
+        ..Layout::default()
+    };
     for (field, point) in bench.fields.iter().enumerate() {
         match bench.launch(*point, bench.primary) {
             Ok(launch) => {
                 for pupil in across(count) {
                     if let Some(ray) = launch.ray([0.0, pupil]) {
                         let path = launch.color().tracer.path(ray);
-                        layout.add(bench, DrawnRay { field, wavelength: bench.primary, pupil, path });
+                        layout
+                            .add(bench, DrawnRay { field, wavelength: bench.primary, pupil, path });
                     }
                 }
             }

@@ -1,1 +1,38 @@
-//! session
+//! One open design: the document, commands and undo, a search and an analyst in the background.
+//!
+//! A [`Session`] is told what a person wants as [`Command`]s and shows what there is as a
+//! [`View`]. It knows no widgets: the window, a test and a script use it alike.
+//!
+//! - *The document changes only by a command*, and an edit that would leave a lens that cannot be
+//!   used is refused: the document is then what it was.
+//! - *A search works on its own copy*: its result becomes the document when it is taken, as one
+//!   undo step.
+//! - *Nothing here waits*: numbers and searches are in newest-value slots, and `wake` is called when
+//!   something new is in one.
+
+mod analyst;
+mod clock;
+mod command;
+mod desk;
+mod edit;
+mod history;
+mod layout;
+mod rows;
+mod scale;
+mod scatter;
+mod slot;
+mod typed;
+mod view;
+mod worker;
+
+pub use analyst::{Numbers, Results, compute};
+pub use clock::Timed;
+pub use command::{Command, Edit};
+pub use desk::{Event, Session};
+pub use edit::{EditError, edited};
+pub use layout::{DrawnRay, Layout, layout};
+pub use scatter::{Scatter, scatter};
+pub use slot::Slot;
+pub use typed::{NoNumber, evaluate};
+pub use view::{Message, Settings, Severity, View, blank};
+pub use worker::{Merit, Search, Standing, Starter};

@@ -53,7 +53,8 @@ pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), 
 fn renumber(lens: &mut Lens, map: impl Fn(usize) -> Option<usize>) {
     lens.map_parameters(|p| map(p.surface).map(|surface| Parameter { surface, ..p }));
     for position in &mut lens.zoom {
-        let gap = |gap: &ZoomThickness| map(gap.surface).map(|surface| ZoomThickness { surface, ..*gap });
+        let gap =
+            |gap: &ZoomThickness| map(gap.surface).map(|surface| ZoomThickness { surface, ..*gap });
         position.thicknesses = position.thicknesses.iter().filter_map(gap).collect();
     }
 }
@@ -132,8 +133,7 @@ impl Turn {
 
     fn bounds(self, variable: &mut Variable) {
         if self.turns(variable.parameter) {
-            (variable.min, variable.max) =
-                (variable.max.map(negative), variable.min.map(negative));
+            (variable.min, variable.max) = (variable.max.map(negative), variable.min.map(negative));
         }
     }
 

@@ -101,10 +101,7 @@ pub(super) struct Worker {
 
 impl Worker {
     /// Starts the thread. `wake` is called from it when there is something new to look at.
-    pub(super) fn spawn(
-        start: Box<Starter>,
-        wake: impl Fn() + Send + 'static,
-    ) -> io::Result<Self> {
+    pub(super) fn spawn(start: Box<Starter>, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         let (orders, inbox) = mpsc::channel();
         let (outbox, news) = mpsc::channel();
         let search = Slot::default();
@@ -138,11 +135,6 @@ impl Worker {
 
     pub(super) fn stop(&self) {
         self.tell(Order::Stop);
-    }
-
-    /// Forgets the last search.
-    pub(super) fn clear(&self) {
-        self.search.clear();
     }
 
     /// How far the search is.
@@ -218,7 +210,7 @@ impl Desk {
         }
     }
 
-    fn begin(&mut self, number: u64, method: Method, lens: Arc<Lens>, goal: &Goal) -> Option<Run> {
+    fn begin(&self, number: u64, method: Method, lens: Arc<Lens>, goal: &Goal) -> Option<Run> {
         let start = AssertUnwindSafe(|| (self.start)(method, &lens, goal));
         match catch_unwind(start).unwrap_or_else(|panic| Err(said(panic.as_ref()))) {
             Ok(optimizer) => {
@@ -310,13 +302,13 @@ impl Desk {
 impl Run {
     fn step(&mut self) {
         let progress = self.optimizer.step();
-        if progress.step % self.stride == 0 || progress.finished {
+        if progress.step.is_multiple_of(self.stride) || progress.finished {
             let Progress { step, merit: current, best, .. } = progress;
             self.state.history.push(Merit { step, current, best });
         }
         if self.state.history.len() > HISTORY {
             self.stride *= 2;
-            self.state.history.retain(|merit| merit.step % self.stride == 0);
+            self.state.history.retain(|merit| merit.step.is_multiple_of(self.stride));
         }
         self.state.progress = Some(progress);
     }

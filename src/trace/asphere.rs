@@ -70,8 +70,7 @@ pub(super) fn crossing(
     let inside = rim.min(edge);
     if let Some(s) = problem.newton() {
         // A ray along the axis crosses a graph once, however steep that may be elsewhere.
-        let unique =
-            problem.across == 0.0 || problem.surface.steepest * problem.across < k.z.abs();
+        let unique = problem.across == 0.0 || problem.surface.steepest * problem.across < k.z.abs();
         if unique && problem.r2(s) <= inside * inside {
             return Some(s);
         }

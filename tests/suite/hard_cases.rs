@@ -341,7 +341,7 @@ fn seed(output: usize) -> Seed<f64> {
     Seed { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n), opl }
 }
 
-fn parameter(gradient: &Gradient<f64>, name: &str) -> Option<f64> {
+pub(crate) fn parameter(gradient: &Gradient<f64>, name: &str) -> Option<f64> {
     if name == "n0" {
         return Some(gradient.index_before);
     }

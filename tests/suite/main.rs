@@ -3,8 +3,13 @@
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
 mod analysis;
+mod cli;
 mod hard_cases;
 mod library;
+mod merit;
+mod optimize;
 mod paraxial;
 mod pupil;
 mod reference;
+mod session;
+mod trace;

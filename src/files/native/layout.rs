@@ -5,7 +5,7 @@ use serde_json::ser::Formatter;
 use std::io::{Result, Write};
 
 /// The text of a value; what is two levels down starts a line, what is deeper shares it.
-pub(super) fn pretty(value: &impl Serialize) -> String {
+pub fn pretty(value: &impl Serialize) -> String {
     let mut bytes = Vec::new();
     let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, Lines { depth: 0 });
     // Writing to memory fails for no lens; an empty text would be refused on reading.

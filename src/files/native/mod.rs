@@ -15,12 +15,14 @@
 
 mod layout;
 
+pub use layout::pretty;
+
 use super::error::{FileError, Malformed};
 use crate::lens::{
     Aperture, Fields, Lens, Medium, Object, Pickup, Row, Variable, Wavelength, ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error as _, IgnoredAny, MapAccess, Visitor};
+use serde::de::{DeserializeOwned, Error as _, IgnoredAny, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
@@ -38,9 +40,14 @@ pub fn read(text: &str, file: &str) -> Result<Lens, FileError> {
     Ok(lens)
 }
 
+/// Reads any other JSON, with errors that name place, found and expected as those of a lens do.
+pub fn read_json<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, FileError> {
+    serde_json::from_str(text).map_err(|error| explain(&error, text).of(file))
+}
+
 /// The text of the native file of a lens.
 pub fn write(lens: &Lens) -> String {
-    layout::pretty(lens)
+    pretty(lens)
 }
 
 /// The version alone, so that a newer file is refused for its version and not for its keys.
@@ -72,10 +79,10 @@ impl Probe {
 
 /// Splits the parser's message into place, found and expected.
 fn explain(error: &serde_json::Error, text: &str) -> Malformed {
-    let place = format!("line {}, column {}", error.line(), error.column());
-    let whole = error.to_string();
     let position = format!(" at line {} column {}", error.line(), error.column());
-    let message = whole.strip_suffix(&position).unwrap_or(&whole);
+    let whole = error.to_string();
+    let (element, message) = element(whole.strip_suffix(&position).unwrap_or(&whole));
+    let place = format!("line {}, column {}{element}", error.line(), error.column());
     if error.is_eof() {
         let found = "the end of the file".to_owned();
         return Malformed { place, found, expected: "the rest of it; is it truncated?".to_owned() };
@@ -92,6 +99,16 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
         None => found.replace("unknown field", "the unknown key"),
     };
     Malformed { place, found, expected: expected.to_owned() }
+}
+
+/// Splits off the number that a list has put in front of the message about one of its elements:
+/// `ray 3: ` becomes `, ray 3`.
+fn element(message: &str) -> (String, &str) {
+    let Some((name, rest)) = message.split_once(": ") else { return (String::new(), message) };
+    match name.split_once(' ') {
+        Some((_, number)) if number.parse::<usize>().is_ok() => (format!(", {name}"), rest),
+        _ => (String::new(), message),
+    }
 }
 
 /// The word around a place, in quotes, for a message.

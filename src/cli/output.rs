@@ -1,0 +1,116 @@
+//! Printing a result: text for people, JSON for programs.
+
+use super::failure::Failure;
+use crate::files::native;
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::io::{Write as _, stdout};
+
+/// Where results go, and in which form.
+#[derive(Debug)]
+pub(super) struct Output {
+    json: bool,
+}
+
+impl Output {
+    pub(super) fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// Prints a result.
+    pub(super) fn print(&self, result: &(impl Serialize + Display)) -> Result<(), Failure> {
+        let text = if self.json { native::pretty(result) } else { result.to_string() };
+        let mut out = stdout().lock();
+        out.write_all(text.as_bytes())?;
+        Ok(out.flush()?)
+    }
+}
+
+/// A number with seven significant digits, and no more zeros than it needs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Number(pub(super) f64);
+
+impl Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.0;
+        let size = value.abs();
+        if size == 0.0 || !value.is_finite() {
+            return f.pad(&value.to_string());
+        }
+        if !(1e-4..1e9).contains(&size) {
+            return f.pad(&format!("{value:.4e}"));
+        }
+        let decimals = (6 - size.log10().floor() as i32).max(0) as usize;
+        let text = format!("{value:.decimals$}");
+        let shorter = if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.')
+        } else {
+            &text
+        };
+        f.pad(shorter)
+    }
+}
+
+/// A number that may not exist.
+pub(super) fn optional(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |value| Number(value).to_string())
+}
+
+/// Rows of text in columns that line up: the first to the left, the others to the right.
+#[derive(Debug, Default)]
+pub(super) struct Table {
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub(super) fn new(head: &[&str]) -> Self {
+        Self { rows: vec![head.iter().map(|cell| (*cell).to_owned()).collect()] }
+    }
+
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    fn widths(&self) -> Vec<usize> {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let width = |row: &Vec<String>, i: usize| row.get(i).map_or(0, |cell| cell.chars().count());
+        (0..columns).map(|i| self.rows.iter().map(|row| width(row, i)).max().unwrap_or(0)).collect()
+    }
+}
+
+impl Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let widths = self.widths();
+        for row in &self.rows {
+            let cells = row.iter().zip(&widths).enumerate().map(|(i, (cell, width))| match i {
+                0 => format!("{cell:<width$}"),
+                _ => format!("{cell:>width$}"),
+            });
+            writeln!(f, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_seven_digits_and_no_idle_zeros() {
+        let shown = |value: f64| Number(value).to_string();
+        assert_eq!(shown(50.0), "50");
+        assert_eq!(shown(-99.499_874_37), "-99.49987");
+        assert_eq!(shown(0.036_437_850_765), "0.03643785");
+        assert_eq!(shown(1e-9), "1.0000e-9");
+        assert_eq!(shown(0.0), "0");
+        assert_eq!(shown(123_456_789.1), "123456789");
+    }
+
+    #[test]
+    fn columns_line_up() {
+        let mut table = Table::new(&["row", "x"]);
+        table.row(["a longer one".into(), "-1".into()]);
+        assert_eq!(table.to_string(), "row            x\na longer one  -1\n");
+    }
+}

@@ -1,0 +1,181 @@
+//! Tracing rays that are given as JSON.
+
+use super::failure::Failure;
+use super::input::{self, LensFile};
+use super::output::{Number, Output, Table};
+use crate::math::Vec3;
+use crate::trace::{Fates, Landing, Ray, Tracer};
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+/// Traces rays given as JSON: how each one ends, where, and its optical path
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("help/trace.txt"))]
+pub(super) struct Trace {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// The rays as JSON, `-` for standard input
+    #[arg(long, value_name = "FILE")]
+    rays: PathBuf,
+}
+
+impl Trace {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let opened = self.lens.open()?;
+        let request: Request = input::read_json(&self.rays)?;
+        let wavelength_um = request.wavelength_um.unwrap_or_else(|| opened.primary_um());
+        let zoom = request.zoom.unwrap_or(0);
+        let system = opened.system(zoom, Some(wavelength_um))?;
+        let refuse = |source| Failure::Rays { file: input::name(&self.rays), source };
+        let tracer = Tracer::new(&system).map_err(refuse)?;
+        let rays = request.rays.checked().map_err(refuse)?;
+        let last = tracer.surfaces() - 1;
+        let landings = rays.iter().map(|ray| tracer.trace(*ray));
+        let mut fates = Fates::default();
+        let landings = landings.inspect(|landing| fates.count(landing.fate));
+        let rays = landings.map(|landing| Line::new(&landing, last)).collect();
+        output.print(&Traced { wavelength_um, zoom, fates, rays })
+    }
+}
+
+/// What is read.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Request {
+    wavelength_um: Option<f64>,
+    zoom: Option<usize>,
+    rays: RayList,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RayKeys {
+    x: f64,
+    y: f64,
+    z: f64,
+    #[serde(rename = "L")]
+    l: f64,
+    #[serde(rename = "M")]
+    m: f64,
+    #[serde(rename = "N")]
+    n: f64,
+}
+
+/// Rays, whose errors say which one is wrong.
+struct RayList(Vec<Ray<f64>>);
+
+impl RayList {
+    /// The rays, if every one of them can be traced.
+    fn checked(self) -> Result<Vec<Ray<f64>>, crate::lens::Invalid> {
+        self.0.iter().enumerate().try_for_each(|(i, ray)| ray.check(i))?;
+        Ok(self.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for RayList {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_seq(RayListText)
+    }
+}
+
+struct RayListText;
+
+impl<'de> Visitor<'de> for RayListText {
+    type Value = RayList;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("rays, [{\"x\", \"y\", \"z\", \"L\", \"M\", \"N\"}, ...]")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<RayList, A::Error> {
+        let mut rays = Vec::with_capacity(list.size_hint().unwrap_or(0));
+        loop {
+            let next = list.next_element::<RayKeys>();
+            let next = next.map_err(|error| numbered(error, rays.len()))?;
+            let Some(RayKeys { x, y, z, l, m, n }) = next else { return Ok(RayList(rays)) };
+            rays.push(Ray { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n) });
+        }
+    }
+}
+
+/// Puts the number of the ray in front of what is wrong with it; a text that is no JSON is wrong as
+/// a whole.
+fn numbered<E: serde::de::Error>(error: E, ray: usize) -> E {
+    let message = error.to_string();
+    let about_a_ray = ["invalid", "unknown", "missing", "duplicate"];
+    if about_a_ray.iter().any(|word| message.starts_with(word)) {
+        E::custom(format!("ray {ray}: {message}"))
+    } else {
+        error
+    }
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Traced {
+    wavelength_um: f64,
+    zoom: usize,
+    fates: Fates,
+    rays: Vec<Line>,
+}
+
+#[derive(Serialize)]
+struct Line {
+    fate: &'static str,
+    surface: usize,
+    x: f64,
+    y: f64,
+    z: f64,
+    #[serde(rename = "L")]
+    l: f64,
+    #[serde(rename = "M")]
+    m: f64,
+    #[serde(rename = "N")]
+    n: f64,
+    opl: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    backwards: Option<usize>,
+}
+
+impl Line {
+    fn new(landing: &Landing<f64>, last: usize) -> Self {
+        let (p, d) = (landing.ray.point, landing.ray.direction);
+        Self {
+            fate: landing.fate.name(),
+            surface: landing.fate.surface().unwrap_or(last),
+            x: p.x,
+            y: p.y,
+            z: p.z,
+            l: d.x,
+            m: d.y,
+            n: d.z,
+            opl: landing.opl,
+            backwards: landing.backwards,
+        }
+    }
+}
+
+impl Display for Traced {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let head = ["ray", "fate", "surface", "x", "y", "z", "L", "M", "N", "opl", ""];
+        let mut table = Table::new(&head);
+        for (i, ray) in self.rays.iter().enumerate() {
+            let numbers = [ray.x, ray.y, ray.z, ray.l, ray.m, ray.n, ray.opl];
+            let remark = ray.backwards.map(|i| format!("backwards to surface {i}"));
+            let start = [i.to_string(), ray.fate.to_owned(), ray.surface.to_string()];
+            let numbers = numbers.iter().map(|value| Number(*value).to_string());
+            table.row(start.into_iter().chain(numbers).chain([remark.unwrap_or_default()]));
+        }
+        let Fates { imaged, missed, clipped, total_reflection } = self.fates;
+        write!(f, "{table}")?;
+        writeln!(
+            f,
+            "{} um, zoom position {}: {imaged} imaged, {clipped} clipped, {missed} missed, \
+             {total_reflection} totally reflected",
+            self.wavelength_um, self.zoom
+        )
+    }
+}

@@ -1,0 +1,131 @@
+//! What became of each part of a lens on its way between two formats.
+
+use serde::Serialize;
+use std::fmt;
+
+/// What became of one line or one number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It means something that the other side cannot say; it is lost.
+    Dropped,
+    /// It is there, but not quite as it was; the note says with what.
+    Approximated,
+    /// It changes no ray; it is kept in this report.
+    Preserved,
+    /// It is there exactly.
+    Used,
+}
+
+impl Outcome {
+    /// All of them, the one that matters most first.
+    pub const ALL: [Self; 4] = [Self::Dropped, Self::Approximated, Self::Preserved, Self::Used];
+
+    /// How reports call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dropped => "dropped",
+            Self::Approximated => "approximated",
+            Self::Preserved => "preserved",
+            Self::Used => "used",
+        }
+    }
+}
+
+/// One line of the source, or one number of the lens, and what became of it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ReportRow {
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Its line in the foreign file, counted from 1; `None` for what has none there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
+    /// Its first word.
+    pub keyword: String,
+    /// All of it.
+    pub text: String,
+    /// With what it was approximated, or why it was dropped.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub note: String,
+}
+
+/// What an import or export used, approximated, preserved and dropped.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Report {
+    /// A row for each line of an import; on export one for whatever is not exact.
+    pub rows: Vec<ReportRow>,
+}
+
+impl Report {
+    /// How many rows ended so.
+    pub fn count(&self, outcome: Outcome) -> usize {
+        self.with(outcome).count()
+    }
+
+    /// The rows that ended so.
+    pub fn with(&self, outcome: Outcome) -> impl Iterator<Item = &ReportRow> {
+        self.rows.iter().filter(move |row| row.outcome == outcome)
+    }
+
+    /// Adds a row that has no line in a file.
+    pub(super) fn add(&mut self, outcome: Outcome, what: &str, note: impl Into<String>) {
+        self.rows.push(ReportRow {
+            outcome,
+            line: None,
+            keyword: what.split_whitespace().next().unwrap_or_default().to_owned(),
+            text: what.to_owned(),
+            note: note.into(),
+        });
+    }
+
+    /// Changes what became of a line that was read before.
+    pub(super) fn amend(&mut self, line: usize, outcome: Outcome, note: impl Into<String>) {
+        // Lines are added in order.
+        if let Ok(found) = self.rows.binary_search_by_key(&Some(line), |row| row.line) {
+            self.rows[found].outcome = outcome;
+            self.rows[found].note = note.into();
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, outcome) in Outcome::ALL.into_iter().enumerate() {
+            let gap = if i == 0 { "" } else { ", " };
+            write!(f, "{gap}{} {}", self.count(outcome), outcome.name())?;
+        }
+        writeln!(f)?;
+        for row in Outcome::ALL.into_iter().flat_map(|outcome| self.with(outcome)) {
+            let line = row.line.map(|line| line.to_string()).unwrap_or_default();
+            let text: String = row.text.chars().take(60).collect();
+            write!(f, "{:<12} {line:>5}  {text:<40}", row.outcome.name())?;
+            writeln!(f, "{}{}", if row.note.is_empty() { "" } else { "  " }, row.note)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_shows_what_was_lost_first() {
+        let mut report = Report::default();
+        report.rows.push(ReportRow {
+            outcome: Outcome::Used,
+            line: Some(7),
+            keyword: "ENPD".to_owned(),
+            text: "ENPD 16".to_owned(),
+            note: String::new(),
+        });
+        report.add(Outcome::Dropped, "hyper of surface 3", "no such thing there");
+        let table = report.to_string();
+        let lines: Vec<&str> = table.lines().collect();
+        assert_eq!(lines[0], "1 dropped, 0 approximated, 0 preserved, 1 used");
+        assert!(lines[1].starts_with("dropped") && lines[1].ends_with("no such thing there"));
+        assert!(lines[2].contains("    7  ENPD 16"), "{}", lines[2]);
+        report.amend(7, Outcome::Approximated, "as 15");
+        assert_eq!(report.count(Outcome::Approximated), 1);
+    }
+}

@@ -1,0 +1,112 @@
+//! Aperture, fields and wavelengths.
+
+use crate::files::error::Malformed;
+use crate::files::report::{Outcome, Report};
+use crate::files::zemax::draft::{ApertureLine, Draft};
+use crate::lens::glass;
+use crate::lens::{Aperture, Field, FieldKind, Fields, Medium, Object, Wavelength};
+
+/// The aperture of the whole lens.
+pub(super) fn aperture(
+    draft: &Draft,
+    stop: usize,
+    object: Object,
+    object_medium: &Medium,
+) -> Result<Aperture, Malformed> {
+    let wrong = |line: usize, found: String, expected: &str| {
+        Err(Malformed { place: format!("line {line}"), found, expected: expected.to_owned() })
+    };
+    let Some((aperture, line)) = draft.aperture else {
+        let line = draft.surfaces[0].line;
+        return wrong(line, "no aperture before it".to_owned(), "ENPD, FNUM, OBNA or FLOA");
+    };
+    match aperture {
+        ApertureLine::Diameter(v) if v > 0.0 => Ok(Aperture::EntrancePupilDiameter(v * draft.unit)),
+        ApertureLine::FNumber { value, working } if value > 0.0 => {
+            if object != Object::Infinity && !working {
+                let expected = "a working f-number (FNUM v 1), ENPD or OBNA for a finite object";
+                return wrong(line, "an f-number for infinite conjugates".to_owned(), expected);
+            }
+            Ok(Aperture::FNumber(value))
+        }
+        ApertureLine::ObjectNa(v) if v > 0.0 => Ok(Aperture::ObjectNa(v)),
+        ApertureLine::ObjectConeDegrees(v) if v > 0.0 && v < 90.0 => {
+            Ok(Aperture::ObjectNa(index(object_medium) * v.to_radians().sin()))
+        }
+        ApertureLine::FloatByStop => match draft.surfaces[stop].semi_diameter {
+            Some(given) => Ok(Aperture::StopSemiDiameter(given.value * draft.unit)),
+            None => wrong(line, "FLOA and no DIAM on the stop".to_owned(), "a DIAM there"),
+        },
+        other => wrong(line, format!("{other:?}"), "a number above 0, a cone below 90 degrees"),
+    }
+}
+
+fn index(medium: &Medium) -> f64 {
+    match medium {
+        Medium::Air | Medium::Mirror => 1.0,
+        Medium::Index(n) | Medium::Model { nd: n, .. } => *n,
+        Medium::Glass(name) => glass::find(name).map_or(1.0, |glass| glass.nd),
+    }
+}
+
+/// The field points: as many as the file counts, or in older files up to the last that is not 0.
+pub(super) fn fields(draft: &Draft) -> Result<Fields, Malformed> {
+    let lines = &draft.fields;
+    let (kind, line) = lines.kind.unwrap_or((0, 0));
+    let given = lines.x.len().max(lines.y.len()).max(1);
+    let last = |values: &[f64]| values.iter().rposition(|v| *v != 0.0).map_or(1, |i| i + 1);
+    let count = lines.count.unwrap_or(last(&lines.x).max(last(&lines.y))).min(given);
+    let at = |values: &[f64], i: usize, default: f64| values.get(i).copied().unwrap_or(default);
+    let scale = if matches!(kind, 0 | 4) { 1.0 } else { draft.unit };
+    let values: Vec<Field> = (0..count)
+        .map(|i| Field {
+            x: at(&lines.x, i, 0.0) * scale,
+            y: at(&lines.y, i, 0.0) * scale,
+            weight: at(&lines.weights, i, 1.0),
+        })
+        .collect();
+    if kind == 4 && values.iter().any(|field| field.x != 0.0) {
+        let found = "theodolite angles with fields in x".to_owned();
+        let expected = "field angles (FTYP 0)".to_owned();
+        return Err(Malformed { place: format!("line {line}"), found, expected });
+    }
+    let kind = match kind {
+        1 => FieldKind::ObjectHeight,
+        2 | 3 => FieldKind::ImageHeight,
+        _ => FieldKind::Angle,
+    };
+    Ok(Fields { kind, values })
+}
+
+/// What fills the lines of wavelengths that are not used.
+const PADDING: (f64, f64) = (0.55, 1.0);
+
+/// The wavelengths: as many as the file counts, or all in front of the padding.
+pub(super) fn wavelengths(
+    draft: &Draft,
+    report: &mut Report,
+) -> Result<Vec<Wavelength>, Malformed> {
+    let lines = &draft.waves;
+    let mut numbered = lines.numbered.clone();
+    numbered.sort_by_key(|(index, ..)| *index);
+    let mut all: Vec<(f64, f64)> = numbered.iter().map(|(_, um, weight)| (*um, *weight)).collect();
+    if all.is_empty() {
+        let weight = |i| lines.weights.get(i).copied().unwrap_or(1.0);
+        all = lines.list.iter().enumerate().map(|(i, um)| (*um, weight(i))).collect();
+    }
+    let padding = all.iter().rev().take_while(|wave| **wave == PADDING).count();
+    let unpadded = (all.len() - padding).max(1);
+    all.truncate(lines.count.unwrap_or(unpadded));
+    if all.is_empty() {
+        let place = format!("line {}", draft.surfaces[0].line);
+        let found = "no wavelengths before it".to_owned();
+        return Err(Malformed { place, found, expected: "WAVM lines".to_owned() });
+    }
+    let primary = lines.primary.filter(|(index, _)| (1..=all.len()).contains(index));
+    if let (None, Some((_, line))) = (primary, lines.primary) {
+        report.amend(line, Outcome::Approximated, "no such wavelength: the middle one is primary");
+    }
+    let marked = |i| primary.is_some_and(|(index, _)| index == i + 1);
+    let waves = all.into_iter().enumerate();
+    Ok(waves.map(|(i, (um, weight))| Wavelength { um, weight, primary: marked(i) }).collect())
+}

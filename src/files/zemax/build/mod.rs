@@ -1,0 +1,175 @@
+//! From a draft to a lens.
+//!
+//! Surface 0 of the file is the object and the last one the image; surface k between them is row
+//! k − 1 here. Lengths become millimetres.
+
+mod beam;
+mod row;
+mod solve;
+mod zoom;
+
+use super::draft::Draft;
+use super::{breaks, glass};
+use crate::files::error::Malformed;
+use crate::files::report::{Outcome, Report};
+use crate::lens::{Lens, Medium, Object, Row};
+
+/// Makes a lens of the draft and says in the report what could not be kept.
+pub(super) fn build(draft: &Draft, report: &mut Report) -> Result<Lens, Malformed> {
+    complete(draft)?;
+    breaks::check(&draft.surfaces)?;
+    let stop = stop(draft)?;
+    let object = object(draft)?;
+    let object_medium = object_medium(draft, report)?;
+    let surfaces = rows(draft, stop, report)?;
+    let aperture = beam::aperture(draft, stop, object, &object_medium)?;
+    let (name, source, notes, zoom_names) = texts(draft);
+    let mut lens = Lens {
+        name,
+        source,
+        notes,
+        object,
+        object_medium,
+        aperture,
+        fields: beam::fields(draft)?,
+        wavelengths: beam::wavelengths(draft, report)?,
+        surfaces,
+        zoom: Vec::new(),
+        variables: Vec::new(),
+        pickups: Vec::new(),
+        focus: None,
+    };
+    image(draft, report);
+    zoom::positions(draft, &mut lens, &zoom_names, report);
+    solve::solves(draft, &mut lens, report);
+    Ok(lens)
+}
+
+/// Refuses a file that ends too early.
+fn complete(draft: &Draft) -> Result<(), Malformed> {
+    let surfaces = &draft.surfaces;
+    let last = surfaces.len().saturating_sub(1);
+    let wrong = |line, found: String, expected: &str| {
+        Err(Malformed { place: format!("line {line}"), found, expected: expected.to_owned() })
+    };
+    for (number, surface) in surfaces.iter().enumerate() {
+        let curvature = surface.curvature.is_some() || number == 0;
+        let thickness = surface.thickness.is_some() || number == last;
+        for (there, keyword) in [(curvature, "CURV"), (thickness, "DISZ")] {
+            if !there {
+                let found = format!("surface {number} without {keyword}");
+                return wrong(surface.line, found, "all its lines; is the file truncated?");
+            }
+        }
+    }
+    if surfaces.len() < 3 {
+        let found = format!("{} surfaces", surfaces.len());
+        let line = surfaces.last().map_or(1, |surface| surface.line);
+        return wrong(line, found, "an object, at least one surface, and an image");
+    }
+    Ok(())
+}
+
+/// The surface of the file that is the stop.
+fn stop(draft: &Draft) -> Result<usize, Malformed> {
+    let surfaces = &draft.surfaces;
+    let numbered = surfaces.iter().enumerate();
+    let mut stops = numbered.filter_map(|(number, surface)| Some((number, surface.stop?)));
+    let wrong = |place: String, found: String| {
+        Err(Malformed {
+            place,
+            found,
+            expected: "exactly one STOP, between object and image".to_owned(),
+        })
+    };
+    let Some((stop, line)) = stops.next() else {
+        let [first, last] = [0, surfaces.len() - 1].map(|number| surfaces[number].line);
+        return wrong(format!("lines {first} to {last}"), "no STOP".to_owned());
+    };
+    if let Some((_, second)) = stops.next() {
+        return wrong(format!("line {second}"), format!("a second STOP after that of line {line}"));
+    }
+    if stop == 0 || stop + 1 == surfaces.len() {
+        return wrong(format!("line {line}"), format!("STOP on surface {stop}"));
+    }
+    Ok(stop)
+}
+
+/// A thickness on the object from which on it counts as infinite.
+const FAR: f64 = 1e10;
+
+fn object(draft: &Draft) -> Result<Object, Malformed> {
+    let (distance, line) = draft.surfaces[0].thickness.unwrap_or((f64::INFINITY, 0));
+    if distance.abs() >= FAR {
+        return Ok(Object::Infinity);
+    }
+    if distance == 0.0 {
+        let expected = "a distance other than 0, or INFINITY".to_owned();
+        let found = "an object at the first surface".to_owned();
+        return Err(Malformed { place: format!("line {line}"), found, expected });
+    }
+    Ok(Object::Finite(distance * draft.unit))
+}
+
+fn object_medium(draft: &Draft, report: &mut Report) -> Result<Medium, Malformed> {
+    let (medium, outcome, note) = glass::medium(&draft.surfaces, 0, &draft.catalogues)?;
+    if let Some(glass) = &draft.surfaces[0].glass {
+        if medium == Medium::Mirror {
+            report.amend(glass.line, Outcome::Dropped, "the object is no mirror here");
+            return Ok(Medium::Air);
+        }
+        report.amend(glass.line, outcome, note);
+    }
+    Ok(medium)
+}
+
+fn rows(draft: &Draft, stop: usize, report: &mut Report) -> Result<Vec<Row>, Malformed> {
+    // What fills the present gap; a coordinate break has the same on both sides.
+    let mut gap = Medium::Air;
+    let mut rows = Vec::with_capacity(draft.surfaces.len() - 2);
+    for number in 1..draft.surfaces.len() - 1 {
+        let (medium, outcome, note) = glass::medium(&draft.surfaces, number, &draft.catalogues)?;
+        if let Some(glass) = &draft.surfaces[number].glass {
+            report.amend(glass.line, outcome, note);
+        }
+        let medium = if breaks::is_break(&draft.surfaces[number]) { gap.clone() } else { medium };
+        if medium != Medium::Mirror {
+            gap = medium.clone();
+        }
+        rows.push(row::row(draft, number, stop, medium, report)?);
+    }
+    Ok(rows)
+}
+
+/// The image is a plane without a row: says what else the file makes of it.
+fn image(draft: &Draft, report: &mut Report) {
+    for surface in [draft.surfaces.first(), draft.surfaces.last()].into_iter().flatten() {
+        if let Some((curvature, line)) = surface.curvature
+            && curvature != 0.0
+        {
+            report.amend(line, Outcome::Dropped, "object and image are planes here");
+        }
+        let terms = surface.parameters.iter().chain(&surface.extra);
+        for (_, _, line) in terms.filter(|(_, value, _)| *value != 0.0) {
+            report.amend(*line, Outcome::Dropped, "object and image are planes here");
+        }
+    }
+    if let Some(glass) = draft.surfaces.last().and_then(|surface| surface.glass.as_ref()) {
+        report.amend(glass.line, Outcome::Dropped, "nothing lies behind the image here");
+    }
+}
+
+/// Name, source, notes, and the names of the zoom positions, as our own exports write them.
+fn texts(draft: &Draft) -> (String, String, String, Vec<String>) {
+    let mut source = String::new();
+    let mut zoom = Vec::new();
+    let mut notes: Vec<&str> = Vec::new();
+    for note in &draft.notes {
+        match (note.strip_prefix(super::SOURCE), note.strip_prefix(super::ZOOM_NAME)) {
+            (Some(text), _) if source.is_empty() => text.clone_into(&mut source),
+            (_, Some(text)) if draft.configurations > 1 => zoom.push(text.to_owned()),
+            _ => notes.push(note),
+        }
+    }
+    (draft.name.clone(), source, notes.join("\n").trim().to_owned(), zoom)
+}

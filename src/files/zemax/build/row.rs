@@ -1,0 +1,78 @@
+//! One surface between object and image.
+
+use crate::files::error::Malformed;
+use crate::files::report::{Outcome, Report};
+use crate::files::zemax::breaks;
+use crate::files::zemax::draft::{ApertureLine, Draft, Surface};
+use crate::files::zemax::shape::{self, Form};
+use crate::lens::{Medium, Row};
+
+/// A gap from which on it counts as infinite, which only that behind the object may be.
+const INFINITE: f64 = 1e18;
+
+/// The row of surface `number`.
+pub(super) fn row(
+    draft: &Draft,
+    number: usize,
+    stop: usize,
+    medium: Medium,
+    report: &mut Report,
+) -> Result<Row, Malformed> {
+    let surface = &draft.surfaces[number];
+    let form = if breaks::is_break(surface) {
+        let note = "this run of coordinate breaks changes nothing; read as planes";
+        report.amend(surface.kind.1, Outcome::Approximated, note);
+        Form::default()
+    } else {
+        shape::form(surface, number)?
+    };
+    if let Some((line, note)) = form.note {
+        report.amend(line, Outcome::Used, note);
+    }
+    let unit = draft.unit;
+    let scaled =
+        form.asphere.iter().zip((4..).step_by(2)).map(|(a, power)| a * unit.powi(1 - power));
+    Ok(Row {
+        curvature: form.curvature / unit,
+        conic: form.conic,
+        asphere: scaled.collect(),
+        thickness: thickness(surface, number)? * unit,
+        medium,
+        semi_diameter: semi_diameter(draft, number, stop, report).map(|radius| radius * unit),
+        stop: number == stop,
+        hyper: false,
+        comment: surface.comment.clone(),
+    })
+}
+
+fn thickness(surface: &Surface, number: usize) -> Result<f64, Malformed> {
+    let (thickness, line) = surface.thickness.unwrap_or((0.0, surface.line));
+    if thickness.abs() < INFINITE {
+        return Ok(thickness);
+    }
+    let found = format!("an infinite thickness after surface {number}");
+    let expected = "INFINITY only behind the object".to_owned();
+    Err(Malformed { place: format!("line {line}"), found, expected })
+}
+
+/// What clips there: a circular aperture. A fixed semi-diameter is only drawn there and clips here,
+/// an automatic one is wide enough for every ray.
+fn semi_diameter(draft: &Draft, number: usize, stop: usize, report: &mut Report) -> Option<f64> {
+    let surface = &draft.surfaces[number];
+    if surface.clip.is_some() {
+        return surface.clip;
+    }
+    let given = surface.semi_diameter?;
+    let floating = matches!(draft.aperture, Some((ApertureLine::FloatByStop, _)));
+    if floating && number == stop {
+        return None; // it is the aperture of the whole lens
+    }
+    if given.fixed && given.value > 0.0 {
+        let note = "clips here; in the file it is only drawn";
+        report.amend(given.line, Outcome::Approximated, note);
+        return Some(given.value);
+    }
+    let note = "found automatically there; nothing is clipped here";
+    report.amend(given.line, Outcome::Preserved, note);
+    None
+}

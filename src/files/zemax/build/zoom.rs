@@ -1,0 +1,94 @@
+//! The multi-configuration table: one zoom position a configuration.
+
+use crate::files::report::{Outcome, Report};
+use crate::files::zemax::draft::{Draft, Operand};
+use crate::lens::{
+    Aperture, FieldKind, Lens, Parameter, Quantity, Variable, ZoomPosition, ZoomThickness,
+};
+
+/// Gives the lens its zoom positions, if the file has more than one configuration.
+pub(super) fn positions(draft: &Draft, lens: &mut Lens, names: &[String], report: &mut Report) {
+    if draft.configurations < 2 {
+        return;
+    }
+    let name = |i: usize| names.get(i).cloned().unwrap_or_default();
+    lens.zoom = (0..draft.configurations)
+        .map(|i| ZoomPosition { name: name(i), ..ZoomPosition::default() })
+        .collect();
+    for operand in &draft.operands {
+        if let Err(why) = apply(draft.unit, lens, operand) {
+            report.amend(operand.line, Outcome::Dropped, why);
+        }
+    }
+}
+
+/// Writes one value into its position, or says why it cannot.
+fn apply(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+    let zoom = operand.configuration - 1;
+    match operand.name.as_str() {
+        "THIC" => thickness(unit, lens, operand),
+        "APER" => aperture(unit, lens, operand),
+        "SDIA" => {
+            let stop = lens.stop().map(|stop| stop + 1) == Some(operand.target);
+            if !(stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_))) {
+                return Err("only the stop's size changes with the zoom position here");
+            }
+            lens.zoom[zoom].aperture = Some(Aperture::StopSemiDiameter(operand.value * unit));
+            Ok(())
+        }
+        _ => field(unit, lens, operand),
+    }
+}
+
+fn thickness(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+    let surface = match operand.target.checked_sub(1) {
+        None => return Err("the object does not move with the zoom position here"),
+        Some(surface) if surface < lens.surfaces.len() => surface,
+        Some(_) => return Err("there is no such gap"),
+    };
+    if operand.value.abs() >= 1e10 {
+        return Err("an infinite gap");
+    }
+    let zoom = operand.configuration - 1;
+    let parameter = Parameter::new(surface, Quantity::ZoomThickness(zoom));
+    let gaps = &mut lens.zoom[zoom].thicknesses;
+    if gaps.iter().any(|gap| gap.surface == surface) {
+        return Err("a second value for this gap; the first one counts");
+    }
+    gaps.push(ZoomThickness { surface, thickness: operand.value * unit });
+    if operand.variable {
+        lens.variables.push(Variable { parameter, min: None, max: None });
+    }
+    Ok(())
+}
+
+/// The value means whatever the aperture of the lens is given by.
+fn aperture(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+    let value = operand.value;
+    if value <= 0.0 {
+        return Err("an aperture of 0");
+    }
+    let aperture = match lens.aperture {
+        Aperture::EntrancePupilDiameter(_) => Aperture::EntrancePupilDiameter(value * unit),
+        Aperture::FNumber(_) => Aperture::FNumber(value),
+        Aperture::ObjectNa(_) => Aperture::ObjectNa(value),
+        Aperture::StopSemiDiameter(_) => return Err("the stop's size is the aperture"),
+    };
+    lens.zoom[operand.configuration - 1].aperture = Some(aperture);
+    Ok(())
+}
+
+fn field(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+    let position = &mut lens.zoom[operand.configuration - 1];
+    let fields = position.fields.get_or_insert_with(|| lens.fields.clone());
+    let scale = if fields.kind == FieldKind::Angle { 1.0 } else { unit };
+    let number = operand.target.checked_sub(1);
+    let field = number.and_then(|i| fields.values.get_mut(i)).ok_or("there is no such field")?;
+    let value = operand.value * scale;
+    if operand.name == "XFIE" {
+        field.x = value
+    } else {
+        field.y = value
+    }
+    Ok(())
+}

@@ -1,0 +1,158 @@
+//! What a `.zmx` file says, before anything is made of it. Lengths are in its own unit.
+
+/// Everything in a file that a lens can be made of.
+#[derive(Debug)]
+pub(super) struct Draft {
+    /// Millimetres per unit.
+    pub(super) unit: f64,
+    pub(super) name: String,
+    pub(super) notes: Vec<String>,
+    pub(super) aperture: Option<(ApertureLine, usize)>,
+    pub(super) fields: FieldLines,
+    pub(super) waves: WaveLines,
+    /// Names of glass catalogues, in the order in which they are searched.
+    pub(super) catalogues: Vec<String>,
+    pub(super) surfaces: Vec<Surface>,
+    /// How many configurations there are.
+    pub(super) configurations: usize,
+    pub(super) operands: Vec<Operand>,
+}
+
+impl Default for Draft {
+    fn default() -> Self {
+        Self {
+            unit: 1.0,
+            name: String::new(),
+            notes: Vec::new(),
+            aperture: None,
+            fields: FieldLines::default(),
+            waves: WaveLines::default(),
+            catalogues: Vec::new(),
+            surfaces: Vec::new(),
+            configurations: 1,
+            operands: Vec::new(),
+        }
+    }
+}
+
+/// How the width of the beam is given.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum ApertureLine {
+    Diameter(f64),
+    FNumber { value: f64, working: bool },
+    ObjectNa(f64),
+    ObjectConeDegrees(f64),
+    FloatByStop,
+}
+
+/// The lines that give the field points.
+#[derive(Debug, Default)]
+pub(super) struct FieldLines {
+    /// 0 angle, 1 object height, 2 paraxial image height, 3 real image height, 4 theodolite; with
+    /// its line.
+    pub(super) kind: Option<(usize, usize)>,
+    pub(super) count: Option<usize>,
+    pub(super) x: Vec<f64>,
+    pub(super) y: Vec<f64>,
+    pub(super) weights: Vec<f64>,
+}
+
+/// The lines that give the wavelengths.
+#[derive(Debug, Default)]
+pub(super) struct WaveLines {
+    pub(super) count: Option<usize>,
+    /// Index from 1, micrometres, weight.
+    pub(super) numbered: Vec<(usize, f64, f64)>,
+    /// Micrometres, in the older spelling.
+    pub(super) list: Vec<f64>,
+    pub(super) weights: Vec<f64>,
+    /// Index from 1 of the primary wavelength, and its line.
+    pub(super) primary: Option<(usize, usize)>,
+}
+
+/// One surface block.
+#[derive(Debug, Default)]
+pub(super) struct Surface {
+    /// The line of its `SURF`.
+    pub(super) line: usize,
+    pub(super) stop: Option<usize>,
+    /// Its type, empty for none, and the line.
+    pub(super) kind: (String, usize),
+    pub(super) comment: String,
+    pub(super) curvature: Option<(f64, usize)>,
+    pub(super) curvature_solve: CurvatureSolve,
+    pub(super) conic: f64,
+    /// Parameter and extra-data numbers with their index and line.
+    pub(super) parameters: Vec<(usize, f64, usize)>,
+    pub(super) extra: Vec<(usize, f64, usize)>,
+    /// Infinite for the word, and the line.
+    pub(super) thickness: Option<(f64, usize)>,
+    pub(super) glass: Option<GlassLine>,
+    pub(super) semi_diameter: Option<SemiDiameter>,
+    /// The radius outside which a circular aperture cuts.
+    pub(super) clip: Option<f64>,
+    pub(super) variable_thickness: Option<(f64, f64, usize)>,
+    pub(super) thickness_pickup: Option<PickupLine>,
+    /// Height, zone and line of a marginal ray height solve.
+    pub(super) marginal_height: Option<(f64, f64, usize)>,
+    pub(super) variable_conic: Option<usize>,
+    /// Parameter numbers that are variable, with their line.
+    pub(super) variable_parameters: Vec<(usize, usize)>,
+}
+
+/// What the curvature follows.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) enum CurvatureSolve {
+    #[default]
+    Fixed,
+    Variable,
+    Pickup(PickupLine),
+}
+
+/// A number that follows that of another surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PickupLine {
+    pub(super) surface: usize,
+    pub(super) scale: f64,
+    pub(super) offset: f64,
+    pub(super) line: usize,
+}
+
+/// A semi-diameter and how it came about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SemiDiameter {
+    pub(super) value: f64,
+    /// Whether a person fixed it; else the program computed it.
+    pub(super) fixed: bool,
+    pub(super) line: usize,
+}
+
+/// The medium behind a surface.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct GlassLine {
+    pub(super) name: String,
+    /// 0 catalogue, 1 model, 2 pickup, 3 substitute, 4 offset.
+    pub(super) code: usize,
+    /// The surface whose glass is picked up.
+    pub(super) source: Option<usize>,
+    pub(super) nd: f64,
+    pub(super) vd: f64,
+    pub(super) partial: f64,
+    pub(super) variable_index: bool,
+    /// What is added to nd and vd for code 4.
+    pub(super) offsets: (f64, f64),
+    pub(super) line: usize,
+}
+
+/// One value of the multi-configuration table.
+#[derive(Debug, Clone)]
+pub(super) struct Operand {
+    pub(super) name: String,
+    /// Surface or field.
+    pub(super) target: usize,
+    /// From 1.
+    pub(super) configuration: usize,
+    pub(super) value: f64,
+    pub(super) variable: bool,
+    pub(super) line: usize,
+}

@@ -1,0 +1,247 @@
+//! From a `GLAS` line to a medium.
+//!
+//! The line names a glass but not its maker: the catalogues of `GCAT` are searched in their order.
+//! Index and Abbe number on the line may be placeholders and count only where no catalogue has
+//! the name.
+
+use super::draft::{GlassLine, Surface};
+use crate::files::error::Malformed;
+use crate::files::report::Outcome;
+use crate::lens::Medium;
+use crate::lens::glass::{self, Glass};
+
+/// A medium, how faithful it is, and why.
+pub(super) type Found = (Medium, Outcome, String);
+
+/// The medium behind surface `number`.
+pub(super) fn medium(
+    surfaces: &[Surface],
+    number: usize,
+    catalogues: &[String],
+) -> Result<Found, Malformed> {
+    let mut at = number;
+    // A glass may be picked up from a surface that picks it up itself.
+    for _ in 0..=surfaces.len() {
+        let line = surfaces.get(at).and_then(|surface| surface.glass.as_ref());
+        match line {
+            None => return Ok((Medium::Air, Outcome::Used, String::new())),
+            Some(line) if line.code == 2 => at = line.source.unwrap_or(usize::MAX),
+            Some(line) => return named(line, catalogues),
+        }
+    }
+    let line = surfaces[number].glass.as_ref().map_or(0, |glass| glass.line);
+    let found = format!("surface {number}, whose glass is picked up in a circle");
+    Err(wrong(line, found, "a pickup that ends at a glass"))
+}
+
+fn wrong(line: usize, found: String, expected: &str) -> Malformed {
+    Malformed { place: format!("line {line}"), found, expected: expected.to_owned() }
+}
+
+fn named(line: &GlassLine, catalogues: &[String]) -> Result<Found, Malformed> {
+    let name = line.name.to_ascii_uppercase();
+    match (name.as_str(), line.code) {
+        ("MIRROR", _) => return Ok((Medium::Mirror, Outcome::Used, String::new())),
+        ("AIR" | "", _) => return Ok((Medium::Air, Outcome::Used, String::new())),
+        (_, 1) => return Ok(model(line)),
+        _ if name.starts_with("___BLANK") => return Ok(model(line)),
+        _ => {}
+    }
+    let exact = in_catalogues(&name, catalogues);
+    let found = exact.map(|glass| (glass, true)).or_else(|| similar(line, catalogues));
+    match found {
+        Some((glass, exact)) => Ok(offset(line, glass, exact)),
+        None => fallback(line),
+    }
+}
+
+/// The glass of that name, in the first of the catalogues that has it, or in the only one.
+fn in_catalogues(name: &str, catalogues: &[String]) -> Option<&'static Glass> {
+    let listed = catalogues.iter().find_map(|catalogue| {
+        // `OHARA_2021-04` is a state of the catalogue `OHARA`.
+        let maker = catalogue.split(['_', '-']).next().unwrap_or_default();
+        glass::find(&format!("{maker} {name}"))
+    });
+    listed.or_else(|| glass::find(name))
+}
+
+/// What makers put in front of the names of glasses that replaced older ones.
+const PREFIXES: [&str; 5] = ["N-", "S-", "H-", "E-", "J-"];
+
+/// A glass of nearly that name, if the line's own index, where it has one, agrees.
+fn similar(line: &GlassLine, catalogues: &[String]) -> Option<(&'static Glass, bool)> {
+    let name = line.name.to_ascii_uppercase();
+    let with = |prefix: &&str| in_catalogues(&format!("{prefix}{name}"), catalogues);
+    let letters = |name: &str| -> String {
+        name.chars().filter(char::is_ascii_alphanumeric).flat_map(char::to_uppercase).collect()
+    };
+    let spelled = || glass::catalogue().iter().find(|g| letters(&g.name) == letters(&name));
+    let found = PREFIXES.iter().find_map(with).or_else(spelled)?;
+    let agrees = placeholder(line) || (found.nd - line.nd).abs() < 1e-3;
+    agrees.then_some((found, false))
+}
+
+/// Whether index and Abbe number on the line say nothing.
+fn placeholder(line: &GlassLine) -> bool {
+    line.nd <= 1.0 || (line.nd, line.vd) == (1.5, 40.0)
+}
+
+fn model(line: &GlassLine) -> Found {
+    let medium = if line.vd == 0.0 {
+        Medium::Index(line.nd)
+    } else {
+        Medium::Model { nd: line.nd, vd: line.vd }
+    };
+    if line.partial == 0.0 {
+        (medium, Outcome::Used, String::new())
+    } else {
+        let note = "the deviation of the partial dispersion is taken as 0";
+        (medium, Outcome::Approximated, note.to_owned())
+    }
+}
+
+/// The catalogue glass; for code 4 a model glass with what is added to its nd and vd.
+fn offset(line: &GlassLine, glass: &Glass, exact: bool) -> Found {
+    let full = glass.full_name();
+    if line.code == 4 && line.offsets != (0.0, 0.0) {
+        let (nd, vd) = (glass.nd + line.offsets.0, glass.vd + line.offsets.1);
+        let note = format!("{full} with its offsets as the model glass nd {nd}, vd {vd}");
+        return (Medium::Model { nd, vd }, Outcome::Approximated, note);
+    }
+    let medium = Medium::Glass(full.clone());
+    if !exact {
+        let note = format!("{full} in place of {}", line.name);
+        return (medium, Outcome::Approximated, note);
+    }
+    let far = !placeholder(line) && (glass.nd - line.nd).abs() > 5e-4;
+    if far {
+        let note = format!("{full} has nd {}, the file says {}", glass.nd, line.nd);
+        return (medium, Outcome::Approximated, note);
+    }
+    (medium, Outcome::Used, full)
+}
+
+/// A glass that no catalogue has: its index on the line, or the one in its name.
+fn fallback(line: &GlassLine) -> Result<Found, Malformed> {
+    let numbers = if placeholder(line) { code(&line.name) } else { Some((line.nd, line.vd)) };
+    let Some((nd, vd)) = numbers else {
+        let similar = glass::similar(&line.name);
+        let hint = if similar.is_empty() {
+            String::new()
+        } else {
+            format!("; similar names: {}", similar.join(", "))
+        };
+        let found = format!("the unknown glass `{}` without an index on its line", line.name);
+        let expected = format!("a catalogue glass, or one with nd and vd{hint}");
+        return Err(wrong(line.line, found, &expected));
+    };
+    let medium = if vd == 0.0 { Medium::Index(nd) } else { Medium::Model { nd, vd } };
+    let note = format!("no catalogue has {}: the model glass nd {nd}, vd {vd}", line.name);
+    Ok((medium, Outcome::Approximated, note))
+}
+
+/// Whether the glass is no maker's own: crystals, fused silica, plastics.
+pub(super) fn is_general(glass: &Glass) -> bool {
+    matches!(glass.maker.as_str(), "CRYSTAL" | "PLASTIC" | "FUSED_SILICA")
+}
+
+/// `517642` and `517.642`: nd 1.517, vd 64.2.
+fn code(name: &str) -> Option<(f64, f64)> {
+    let digits: String = name.chars().filter(|c| *c != '.').collect();
+    if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let (nd, vd): (f64, f64) = (digits[..3].parse().ok()?, digits[3..].parse().ok()?);
+    // From their decimal text, so that 1.517 is the f64 next to 1.517.
+    let nd = format!("1.{:03}", nd).parse().ok()?;
+    Some((nd, vd / 10.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(name: &str, code: usize, nd: f64, vd: f64) -> GlassLine {
+        GlassLine {
+            name: name.to_owned(),
+            code,
+            source: None,
+            nd,
+            vd,
+            partial: 0.0,
+            variable_index: false,
+            offsets: (0.0, 0.0),
+            line: 9,
+        }
+    }
+
+    fn found(line: GlassLine) -> Result<Found, Malformed> {
+        let surface = Surface { glass: Some(line), ..Surface::default() };
+        medium(&[surface], 0, &["OHARA".to_owned(), "SCHOTT".to_owned()])
+    }
+
+    fn glass(name: &str) -> Medium {
+        Medium::Glass(name.to_owned())
+    }
+
+    #[test]
+    fn names_are_found_in_the_catalogues() {
+        let (medium, outcome, _) = found(line("N-BK7", 0, 1.5, 40.0)).unwrap();
+        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), Outcome::Used));
+        let (medium, outcome, note) = found(line("BK7", 0, 1.5168, 64.17)).unwrap();
+        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), Outcome::Approximated));
+        assert_eq!(note, "SCHOTT N-BK7 in place of BK7");
+        let (medium, ..) = found(line("n-bk7", 3, 0.0, 0.0)).unwrap();
+        assert_eq!(medium, glass("SCHOTT N-BK7"));
+        // An old name whose index is not that of the new glass is a glass of its own.
+        let (medium, ..) = found(line("BK7", 0, 1.6, 60.0)).unwrap();
+        assert_eq!(medium, Medium::Model { nd: 1.6, vd: 60.0 });
+    }
+
+    #[test]
+    fn models_mirrors_and_codes_are_what_they_say() {
+        assert_eq!(
+            found(line("___BLANK", 1, 1.6, 36.0)).unwrap().0,
+            Medium::Model { nd: 1.6, vd: 36.0 }
+        );
+        assert_eq!(found(line("___BLANK", 1, 1.33, 0.0)).unwrap().0, Medium::Index(1.33));
+        assert_eq!(found(line("MIRROR", 0, 1.5, 40.0)).unwrap().0, Medium::Mirror);
+        for name in ["517642", "517.642"] {
+            assert_eq!(
+                found(line(name, 0, 0.0, 0.0)).unwrap().0,
+                Medium::Model { nd: 1.517, vd: 64.2 }
+            );
+        }
+        let mut shifted = line("N-BK7", 4, 0.0, 0.0);
+        shifted.offsets = (0.001, 0.2);
+        let (medium, outcome, _) = found(shifted).unwrap();
+        let bk7 = glass::find("N-BK7").unwrap();
+        assert_eq!(medium, Medium::Model { nd: bk7.nd + 0.001, vd: bk7.vd + 0.2 });
+        assert_eq!(outcome, Outcome::Approximated);
+    }
+
+    #[test]
+    fn an_unknown_glass_needs_an_index() {
+        let (medium, outcome, note) = found(line("XYZ-9", 0, 1.7, 30.0)).unwrap();
+        assert_eq!((medium, outcome), (Medium::Model { nd: 1.7, vd: 30.0 }, Outcome::Approximated));
+        assert!(note.contains("no catalogue has XYZ-9"));
+        for (nd, vd) in [(1.5, 40.0), (0.0, 0.0)] {
+            let error = found(line("XYZ-9", 0, nd, vd)).unwrap_err();
+            assert_eq!(error.place, "line 9");
+            assert!(error.found.contains("`XYZ-9`"));
+        }
+    }
+
+    #[test]
+    fn picked_up_glasses_are_followed_and_circles_refused() {
+        let pickup = |source| {
+            let glass = GlassLine { source: Some(source), ..line("X", 2, 0.0, 0.0) };
+            Surface { glass: Some(glass), ..Surface::default() }
+        };
+        let end = Surface { glass: Some(line("N-BK7", 0, 0.0, 0.0)), ..Surface::default() };
+        let surfaces = [pickup(1), pickup(2), end];
+        assert_eq!(medium(&surfaces, 0, &[]).unwrap().0, glass("SCHOTT N-BK7"));
+        let circle = [pickup(1), pickup(0)];
+        assert!(medium(&circle, 0, &[]).unwrap_err().found.contains("in a circle"));
+    }
+}

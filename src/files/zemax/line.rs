@@ -1,0 +1,167 @@
+//! A line of a `.zmx` file: a keyword and fields separated by blanks.
+
+use crate::files::error::Malformed;
+
+/// Beyond this no ray can be traced.
+const LARGEST: f64 = 1e100;
+
+/// One line that is not blank.
+#[derive(Debug, Clone)]
+pub(super) struct Line<'a> {
+    /// Its number, counted from 1.
+    pub(super) number: usize,
+    /// Its first word.
+    pub(super) keyword: &'a str,
+    /// Everything behind the keyword.
+    pub(super) rest: &'a str,
+    /// What stands behind the keyword, word by word; a quoted text is one word.
+    pub(super) fields: Vec<&'a str>,
+    /// Whether numbers are written with a comma in place of the point.
+    pub(super) comma: bool,
+}
+
+/// The lines of a text that are not blank.
+pub(super) fn lines(text: &str) -> Vec<Line<'_>> {
+    let mut lines: Vec<Line<'_>> = text.lines().zip(1..).filter_map(line).collect();
+    if decimal_commas(&lines) {
+        lines.iter_mut().for_each(|line| line.comma = true);
+    }
+    lines
+}
+
+fn line((text, number): (&str, usize)) -> Option<Line<'_>> {
+    let text = text.trim();
+    let keyword = text.split_whitespace().next()?;
+    let rest = text[keyword.len()..].trim_start();
+    Some(Line { number, keyword, rest, fields: fields(rest), comma: false })
+}
+
+/// Commas are decimal where curvatures or thicknesses have commas and no points.
+fn decimal_commas(lines: &[Line<'_>]) -> bool {
+    let lengths = || {
+        let geometry = lines.iter().filter(|line| matches!(line.keyword, "CURV" | "DISZ"));
+        geometry.filter_map(|line| line.fields.first())
+    };
+    lengths().any(|field| field.contains(',')) && !lengths().any(|field| field.contains('.'))
+}
+
+fn fields(rest: &str) -> Vec<&str> {
+    let mut fields = Vec::new();
+    let mut rest = rest.trim_start();
+    while !rest.is_empty() {
+        let (field, behind) = match rest.strip_prefix('"') {
+            Some(quoted) => quoted.split_once('"').unwrap_or((quoted, "")),
+            None => rest.split_once(char::is_whitespace).unwrap_or((rest, "")),
+        };
+        fields.push(field);
+        rest = behind.trim_start();
+    }
+    fields
+}
+
+impl Line<'_> {
+    /// All of it.
+    pub(super) fn text(&self) -> String {
+        format!("{} {}", self.keyword, self.rest).trim_end().to_owned()
+    }
+
+    /// Its place, for a message.
+    pub(super) fn place(&self) -> String {
+        format!("line {}", self.number)
+    }
+
+    /// What is wrong with it.
+    pub(super) fn wrong(&self, found: impl Into<String>, expected: &str) -> Malformed {
+        Malformed { place: self.place(), found: found.into(), expected: expected.to_owned() }
+    }
+
+    /// The number in a field.
+    pub(super) fn number(&self, field: usize) -> Result<f64, Malformed> {
+        let Some(text) = self.fields.get(field) else {
+            let found = format!("`{}` with {} fields", self.text(), self.fields.len());
+            return Err(self.wrong(found, &format!("a number in field {}", field + 1)));
+        };
+        self.parse(text).ok_or_else(|| {
+            let found = format!("`{text}` in `{}`", self.text());
+            self.wrong(found, "a finite number below 1e100")
+        })
+    }
+
+    /// The number in a field, or `default` where the line is shorter.
+    pub(super) fn number_or(&self, field: usize, default: f64) -> Result<f64, Malformed> {
+        if field < self.fields.len() { self.number(field) } else { Ok(default) }
+    }
+
+    /// Every field as a number.
+    pub(super) fn numbers(&self) -> Result<Vec<f64>, Malformed> {
+        (0..self.fields.len()).map(|field| self.number(field)).collect()
+    }
+
+    /// The number in a field that counts something; some writers append `.0`.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a whole number in range"
+    )]
+    pub(super) fn count(&self, field: usize) -> Result<usize, Malformed> {
+        let number = self.number(field)?;
+        if number >= 0.0 && number.fract() == 0.0 && number <= f64::from(u32::MAX) {
+            return Ok(number as usize);
+        }
+        Err(self.wrong(format!("`{number}` in `{}`", self.text()), "a whole number, 0 or more"))
+    }
+
+    /// The number that counts something, if the field is there and holds one.
+    pub(super) fn count_if_any(&self, field: usize) -> Option<usize> {
+        self.count(field).ok()
+    }
+
+    /// The text of a field.
+    pub(super) fn word(&self, field: usize) -> Result<&str, Malformed> {
+        self.fields.get(field).copied().ok_or_else(|| {
+            let found = format!("`{}` with {} fields", self.text(), self.fields.len());
+            self.wrong(found, &format!("a word in field {}", field + 1))
+        })
+    }
+
+    fn parse(&self, text: &str) -> Option<f64> {
+        let number: f64 =
+            if self.comma { text.replace(',', ".").parse() } else { text.parse() }.ok()?;
+        // The words `inf` and `nan` parse as numbers too.
+        (number.abs() <= LARGEST).then_some(number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_in_every_spelling() {
+        let text = "PARM 1.2E-003 5.E-1 -1. .5 1.797e2 +3 0.019500000000000000001";
+        let expected = [1.2e-3, 0.5, -1.0, 0.5, 179.7, 3.0, 0.0195];
+        assert_eq!(lines(text)[0].numbers().unwrap(), expected);
+        for wrong in ["nan", "NaN", "inf", "INFINITY", "1e999", "1e308", "1,5", "0x1", "--1"] {
+            let text = format!("\n  CURV {wrong} 0");
+            let error = lines(&text)[0].number(0).unwrap_err();
+            assert_eq!(error.place, "line 2");
+            assert!(error.found.contains(wrong), "{}", error.found);
+        }
+        assert!(lines("CURV")[0].number(0).unwrap_err().found.contains("with 0 fields"));
+        assert!(lines("PWAV 1.5")[0].count(0).is_err() && lines("PWAV -1")[0].count(0).is_err());
+    }
+
+    #[test]
+    fn commas_are_decimal_only_in_files_without_points() {
+        let read = |text| lines(text)[0].number(0).ok();
+        assert_eq!(read("CURV 0,02\nDISZ 5"), Some(0.02));
+        assert_eq!(read("CURV 0,02\nDISZ 5.0"), None);
+    }
+
+    #[test]
+    fn a_quoted_text_is_one_field() {
+        let line = &lines("  CURV 0.5 0 \"two words\" 3 \"")[0];
+        assert_eq!(line.fields, ["0.5", "0", "two words", "3", ""]);
+        assert_eq!(line.rest, "0.5 0 \"two words\" 3 \"");
+    }
+}

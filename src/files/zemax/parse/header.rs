@@ -1,0 +1,148 @@
+//! The header: title, unit, aperture, fields, wavelengths, glass catalogues.
+
+use super::{Verdict, dropped, preserved, used};
+use crate::files::error::Malformed;
+use crate::files::zemax::draft::{ApertureLine, Draft};
+use crate::files::zemax::line::Line;
+
+/// Reads a line of the header; `None` where it is none.
+pub(super) fn read(draft: &mut Draft, line: &Line<'_>) -> Result<Option<Verdict>, Malformed> {
+    let verdict = match line.keyword {
+        "VERS" => preserved(),
+        "MODE" => mode(line)?,
+        "UNIT" => unit(draft, line)?,
+        "NAME" => text(&mut draft.name, line.rest),
+        "NOTE" => note(draft, line),
+        "ENPD" | "FNUM" | "OBNA" | "FLOA" => aperture(draft, line)?,
+        "GCAT" => {
+            draft.catalogues = line.fields.iter().map(|&name| name.to_owned()).collect();
+            used()
+        }
+        "ENVD" => environment(line)?,
+        "FTYP" => field_type(draft, line)?,
+        "XFLN" | "YFLN" | "FWGN" | "XFLD" | "YFLD" | "FWGT" => field_values(draft, line)?,
+        "WAVM" | "WAVL" | "WAVN" | "WWGT" | "WWGN" => waves(draft, line)?,
+        "PWAV" => {
+            draft.waves.primary = Some((line.count(0)?, line.number));
+            used()
+        }
+        "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDXF" | "VDYF" | "VCXF" | "VCYF" => {
+            vignetting(line)
+        }
+        "GFAC" | "RAIM" | "PUSH" | "SDMA" | "ROPD" | "PICB" | "POLS" | "GLRS" | "GSTD" | "NSCD"
+        | "COFN" | "PFIL" | "LANG" | "TOL" => preserved(),
+        _ => return Ok(None),
+    };
+    Ok(Some(verdict))
+}
+
+fn text(to: &mut String, rest: &str) -> Verdict {
+    rest.clone_into(to);
+    used()
+}
+
+/// `NOTE 0 text`; the number is the kind of note.
+fn note(draft: &mut Draft, line: &Line<'_>) -> Verdict {
+    let (kind, text) = line.rest.split_once(char::is_whitespace).unwrap_or((line.rest, ""));
+    let numbered = kind.parse::<u32>().is_ok();
+    draft.notes.push(if numbered { text.trim().to_owned() } else { line.rest.to_owned() });
+    used()
+}
+
+fn mode(line: &Line<'_>) -> Result<Verdict, Malformed> {
+    if line.word(0)?.eq_ignore_ascii_case("SEQ") {
+        return Ok(used());
+    }
+    let expected = "MODE SEQ: only sequential lenses can be traced here, in which light meets the \
+                    surfaces in their order";
+    Err(line.wrong(format!("`{}`", line.text()), expected))
+}
+
+fn unit(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    draft.unit = match line.word(0)?.to_ascii_uppercase().as_str() {
+        "MM" => 1.0,
+        "CM" => 10.0,
+        "IN" | "INCH" => 25.4,
+        "FT" => 304.8,
+        "M" | "METER" | "METERS" => 1000.0,
+        other => return Err(line.wrong(format!("unit `{other}`"), "MM, CM, IN, FT or M")),
+    };
+    Ok(used())
+}
+
+fn aperture(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    if draft.aperture.is_some() {
+        return Ok(dropped("a second aperture; the first one counts"));
+    }
+    let kind = line.number_or(1, 0.0)?;
+    let aperture = match line.keyword {
+        "ENPD" => ApertureLine::Diameter(line.number(0)?),
+        "FNUM" => ApertureLine::FNumber { value: line.number(0)?, working: kind == 1.0 },
+        "OBNA" if kind == 1.0 => ApertureLine::ObjectConeDegrees(line.number(0)?),
+        "OBNA" => ApertureLine::ObjectNa(line.number(0)?),
+        _ => ApertureLine::FloatByStop,
+    };
+    draft.aperture = Some((aperture, line.number));
+    Ok(used())
+}
+
+/// Temperature in °C, pressure in atmospheres, and whether indices are adjusted to them.
+fn environment(line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let standard = line.number_or(0, 20.0)? == 20.0 && line.number_or(1, 1.0)? == 1.0;
+    let adjusted = line.number_or(2, 0.0)? != 0.0;
+    Ok(if adjusted && !standard {
+        super::approximated("indices are those at 20 °C and 1 atm")
+    } else {
+        preserved()
+    })
+}
+
+fn field_type(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let kind = line.count(0)?;
+    if kind > 4 {
+        return Err(line.wrong(format!("field type {kind}"), "0 to 4"));
+    }
+    draft.fields.kind = Some((kind, line.number));
+    // Older files have one or two fields; a count of 0 says nothing.
+    draft.fields.count = line.count_if_any(2).filter(|count| *count > 0);
+    draft.waves.count = line.count_if_any(3).filter(|count| *count > 0);
+    Ok(match (kind, line.number_or(1, 0.0)? != 0.0) {
+        (_, true) => dropped("telecentric object space: chief rays go through the stop here"),
+        (3, _) => super::approximated("real image heights are taken as paraxial ones"),
+        _ => used(),
+    })
+}
+
+fn field_values(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let fields = &mut draft.fields;
+    let values = line.numbers()?;
+    match line.keyword {
+        "XFLN" => fields.x = values,
+        "YFLN" => fields.y = values,
+        "FWGN" => fields.weights = values,
+        "XFLD" => fields.x.extend(values),
+        "YFLD" => fields.y.extend(values),
+        _ => fields.weights.extend(values),
+    }
+    Ok(used())
+}
+
+fn waves(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let waves = &mut draft.waves;
+    match line.keyword {
+        "WAVM" => {
+            waves.numbered.push((line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?));
+        }
+        "WAVL" | "WAVN" => waves.list.extend(line.numbers()?),
+        _ => waves.weights.extend(line.numbers()?),
+    }
+    Ok(used())
+}
+
+fn vignetting(line: &Line<'_>) -> Verdict {
+    if (0..line.fields.len()).all(|field| line.number(field).is_ok_and(|value| value == 0.0)) {
+        preserved()
+    } else {
+        dropped("vignetting factors: rays are clipped by the semi-diameters here")
+    }
+}

@@ -1,0 +1,165 @@
+//! The lines of a surface.
+
+use super::{Verdict, approximated, dropped, preserved, used};
+use crate::files::error::Malformed;
+use crate::files::zemax::draft::{
+    CurvatureSolve, Draft, GlassLine, PickupLine, SemiDiameter, Surface,
+};
+use crate::files::zemax::line::Line;
+
+/// The keywords that make no sense outside a surface.
+pub(super) const KEYWORDS: &[&str] =
+    &["STOP", "TYPE", "CURV", "DISZ", "CONI", "PARM", "XDAT", "GLAS", "DIAM", "CLAP", "FLAP"];
+
+/// `SURF k`: surfaces come in order, from 0.
+pub(super) fn begin(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let expected = draft.surfaces.len();
+    if line.count(0)? != expected {
+        return Err(line.wrong(format!("`{}`", line.text()), &format!("SURF {expected}")));
+    }
+    draft.surfaces.push(Surface { line: line.number, ..Surface::default() });
+    Ok(used())
+}
+
+/// Reads one line of a surface.
+pub(super) fn read(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    match line.keyword {
+        "STOP" => surface.stop = Some(line.number),
+        "TYPE" => surface.kind = (line.word(0)?.to_ascii_uppercase(), line.number),
+        "COMM" => line.rest.clone_into(&mut surface.comment),
+        "CURV" => return curvature(surface, line),
+        "CONI" => surface.conic = line.number(0)?,
+        "PARM" => surface.parameters.push((line.count(0)?, line.number(1)?, line.number)),
+        "XDAT" => surface.extra.push((line.count(0)?, line.number(1)?, line.number)),
+        "DISZ" => surface.thickness = Some((thickness(line)?, line.number)),
+        "GLAS" => surface.glass = Some(glass(line)?),
+        "DIAM" => surface.semi_diameter = Some(semi_diameter(line)?),
+        "CLAP" | "FLAP" => return clip(surface, line),
+        "VCON" => surface.variable_conic = Some(line.number),
+        "VPAR" => surface.variable_parameters.push((line.count(0)?, line.number)),
+        "VDSZ" => {
+            let (low, high) = (line.number_or(0, 0.0)?, line.number_or(1, 0.0)?);
+            surface.variable_thickness = Some((low, high, line.number));
+        }
+        "MAZH" => {
+            let (height, zone) = (line.number_or(0, 0.0)?, line.number_or(1, 0.0)?);
+            surface.marginal_height = Some((height, zone, line.number));
+        }
+        "PZUP" => return thickness_pickup(surface, line),
+        _ => return rare(line),
+    }
+    Ok(used())
+}
+
+/// What changes rays and has no place in a lens here, and whatever else there is.
+fn rare(line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let zeros = |from| (from..line.fields.len()).all(|field| line.number(field) == Ok(0.0));
+    Ok(match line.keyword {
+        "OBSC" | "SQAP" | "ELAP" | "OBDC" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
+            dropped("only round, centred, clear apertures clip here")
+        }
+        "PPAR" | "CHZH" | "TOLE" | "TCOM" | "EDGE" | "PMVA" | "PUPZ" | "CENT" => {
+            approximated("the value that is solved for is kept as it is")
+        }
+        "SCBD" if !zeros(1) => {
+            let found = format!("a tilted or decentred surface (`{}`)", line.text());
+            return Err(line.wrong(found, "surfaces that are centred on the axis"));
+        }
+        _ => preserved(),
+    })
+}
+
+/// The words of the solve codes, from 2 on.
+const SOLVES: [&str; 11] = [
+    "marginal ray angle",
+    "chief ray angle",
+    "pickup",
+    "marginal ray normal",
+    "chief ray normal",
+    "aplanatic",
+    "element power",
+    "concentric with a surface",
+    "concentric with a radius",
+    "f-number",
+    "macro",
+];
+
+fn curvature(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    surface.curvature = Some((line.number(0)?, line.number));
+    surface.curvature_solve = CurvatureSolve::Fixed;
+    match line.count_if_any(1).unwrap_or(0) {
+        0 => {}
+        1 => surface.curvature_solve = CurvatureSolve::Variable,
+        4 => {
+            surface.curvature_solve = CurvatureSolve::Pickup(PickupLine {
+                surface: line.count(2)?,
+                scale: line.number_or(3, 1.0)?,
+                offset: line.number_or(4, 0.0)?,
+                line: line.number,
+            });
+        }
+        code => {
+            let solve = SOLVES.get(code - 2).copied().unwrap_or("unknown");
+            return Ok(approximated(format!("the {solve} solve is kept at its present value")));
+        }
+    }
+    Ok(used())
+}
+
+fn thickness(line: &Line<'_>) -> Result<f64, Malformed> {
+    let word = line.word(0)?;
+    let infinite = ["INFINITY", "INF"].iter().any(|name| word.eq_ignore_ascii_case(name));
+    if infinite { Ok(f64::INFINITY) } else { line.number(0) }
+}
+
+/// `GLAS name code pickup nd vd dPgF v_nd v_vd v_dPgF p1 p2`.
+fn glass(line: &Line<'_>) -> Result<GlassLine, Malformed> {
+    let number = |field| line.number_or(field, 0.0);
+    Ok(GlassLine {
+        name: line.word(0)?.to_owned(),
+        code: line.count_if_any(1).unwrap_or(0),
+        source: line.count_if_any(2),
+        nd: number(3)?,
+        vd: number(4)?,
+        partial: number(5)?,
+        variable_index: number(6)? == 1.0,
+        offsets: (number(9)?, number(10)?),
+        line: line.number,
+    })
+}
+
+fn semi_diameter(line: &Line<'_>) -> Result<SemiDiameter, Malformed> {
+    let value = line.number(0)?;
+    if value < 0.0 {
+        return Err(line.wrong(format!("a semi-diameter of {value}"), "zero or more"));
+    }
+    Ok(SemiDiameter { value, fixed: line.number_or(1, 0.0)? == 1.0, line: line.number })
+}
+
+/// `CLAP rmin rmax`, `FLAP rmin rmax`: what lies outside is cut.
+fn clip(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let (inner, outer) = (line.number(0)?, line.number(1)?);
+    if inner < 0.0 || outer < 0.0 {
+        let found = format!("an aperture from {inner} to {outer}");
+        return Err(line.wrong(found, "radii of zero or more"));
+    }
+    surface.clip = Some(surface.clip.map_or(outer, |other| other.min(outer)));
+    if inner > 0.0 {
+        return Ok(approximated(format!("the hole inside {inner} is open here")));
+    }
+    Ok(used())
+}
+
+/// `PZUP surface scale offset column`.
+fn thickness_pickup(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    if line.number_or(3, 0.0)? != 0.0 {
+        return Ok(approximated("a pickup from another column is kept at its present value"));
+    }
+    surface.thickness_pickup = Some(PickupLine {
+        surface: line.count(0)?,
+        scale: line.number_or(1, 1.0)?,
+        offset: line.number_or(2, 0.0)?,
+        line: line.number,
+    });
+    Ok(used())
+}

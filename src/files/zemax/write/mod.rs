@@ -1,0 +1,143 @@
+//! From a lens to the text of a `.zmx` file.
+//!
+//! Curvatures, not radii; the fewest digits that read back to the same bits; a semi-diameter that
+//! clips is a fixed one with a circular aperture, since a semi-diameter alone cuts no ray there.
+
+mod header;
+mod surface;
+mod table;
+
+use crate::files::report::{Outcome, Report};
+use crate::lens::{Lens, LensError, Quantity, ZoomThickness};
+
+/// The text of the file and what could not be said in it.
+pub fn write(lens: &Lens) -> Result<(String, Report), LensError> {
+    lens.check()?;
+    let mut export =
+        Export { lens: lens.with_pickups()?, text: String::new(), report: Report::default() };
+    export.settle_focus();
+    export.header();
+    export.surfaces();
+    export.table();
+    export.losses();
+    Ok((export.text, export.report))
+}
+
+/// A file on its way.
+struct Export {
+    /// The lens, with every pickup and the focus worked out.
+    lens: Lens,
+    text: String,
+    report: Report,
+}
+
+/// A number in the fewest digits that read back to the same bits.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-5..1e15).contains(&value.abs()) {
+        format!("{value:?}")
+    } else {
+        format!("{value:E}")
+    }
+}
+
+/// Numbers with blanks between them.
+fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    values.into_iter().map(number).collect::<Vec<_>>().join(" ")
+}
+
+/// A text on one line.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+impl Export {
+    fn line(&mut self, text: impl AsRef<str>) {
+        self.text.push_str(text.as_ref().trim_end());
+        self.text.push_str("\r\n");
+    }
+
+    /// A line of a surface.
+    fn inner(&mut self, text: impl AsRef<str>) {
+        self.text.push_str("  ");
+        self.line(text);
+    }
+
+    fn lose(&mut self, outcome: Outcome, what: impl AsRef<str>, note: impl Into<String>) {
+        self.report.add(outcome, what.as_ref(), note);
+    }
+
+    /// Whether the last gap is solved for the focus there too.
+    fn has_focus_solve(&self) -> bool {
+        self.lens.focus == Some(0.0)
+    }
+
+    /// Writes the solved last gap into the lens, at every zoom position where it is not solved
+    /// there too.
+    fn settle_focus(&mut self) {
+        let Some(offset) = self.lens.focus else { return };
+        let primary = self.lens.wavelengths[self.lens.primary()].um;
+        let last = self.lens.surfaces.len() - 1;
+        let solved = |lens: &Lens, zoom| {
+            lens.system(zoom, primary).ok().map(|system| system.surfaces[last].thickness)
+        };
+        let gaps: Vec<Option<f64>> =
+            (0..self.lens.zoom_positions()).map(|zoom| solved(&self.lens, zoom)).collect();
+        if let Some(gap) = gaps[0] {
+            self.lens.surfaces[last].thickness = gap;
+        }
+        for (zoom, gap) in gaps.into_iter().enumerate().take(self.lens.zoom.len()) {
+            self.lens.zoom[zoom].thicknesses.retain(|other| other.surface != last);
+            if let Some(thickness) = gap.filter(|_| offset != 0.0) {
+                let gap = ZoomThickness { surface: last, thickness };
+                self.lens.zoom[zoom].thicknesses.push(gap);
+            }
+        }
+        if offset != 0.0 {
+            let note = "no solve there displaces the focus: the last gap is what it is now";
+            self.lose(Outcome::Approximated, format!("focus solve displaced by {offset} mm"), note);
+        }
+    }
+
+    /// What has no place in the file.
+    fn losses(&mut self) {
+        let lens = self.lens.clone();
+        for variable in &lens.variables {
+            let what = format!("variable: {}", variable.parameter);
+            let bounded = variable.min.is_some() || variable.max.is_some();
+            let both = variable.min.is_some() && variable.max.is_some();
+            match variable.parameter.quantity {
+                Quantity::SemiDiameter => {
+                    self.lose(Outcome::Dropped, what, "semi-diameters do not vary there");
+                }
+                Quantity::Thickness if both => {}
+                _ if bounded => self.lose(Outcome::Dropped, what, "its bounds; it stays variable"),
+                _ => {}
+            }
+        }
+        for pickup in &lens.pickups {
+            let like = pickup.parameter.quantity == pickup.source.quantity;
+            let there =
+                matches!(pickup.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
+            if !(like && there) {
+                let what = format!("pickup: {} from the {}", pickup.parameter, pickup.source);
+                self.lose(Outcome::Approximated, what, "its present value, without the pickup");
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_to_the_same_bits() {
+        let values = [0.0, -0.0, 1.0, 0.1 + 0.2, 5e-324, -1e99, 2.0491803278688523e-2, 1e15, 1e-5];
+        for value in values {
+            let back: f64 = number(value).parse().unwrap();
+            assert_eq!(back.to_bits(), value.to_bits(), "{}", number(value));
+        }
+        assert_eq!(number(5.5), "5.5");
+        assert_eq!(number(1e-7), "1E-7");
+    }
+}

@@ -1,0 +1,164 @@
+//! The surfaces, with the object in front and the image behind.
+
+use super::{Export, number, numbers, one_line};
+use crate::files::report::Outcome;
+use crate::files::zemax::glass as there;
+use crate::lens::glass;
+use crate::lens::{Aperture, Medium, Object, Parameter, Pickup, Quantity, Row};
+
+impl Export {
+    pub(super) fn surfaces(&mut self) {
+        self.object();
+        for i in 0..self.lens.surfaces.len() {
+            self.row(i);
+        }
+        self.line(format!("SURF {}", self.lens.surfaces.len() + 1));
+        self.plane("0.0");
+    }
+
+    fn object(&mut self) {
+        self.line("SURF 0");
+        let distance = match self.lens.object {
+            Object::Infinity => "INFINITY".to_owned(),
+            Object::Finite(distance) => number(distance),
+        };
+        self.plane(&distance);
+        let medium = self.lens.object_medium.clone();
+        self.glass(&medium, "before surface 0", false);
+    }
+
+    /// Object or image.
+    fn plane(&mut self, thickness: &str) {
+        self.inner("TYPE STANDARD");
+        self.inner("CURV 0.0 0 0 0 0 \"\"");
+        self.inner(format!("DISZ {thickness}"));
+        self.inner("DIAM 0 0 0 0 1 \"\"");
+    }
+
+    fn row(&mut self, i: usize) {
+        let row = self.lens.surfaces[i].clone();
+        self.line(format!("SURF {}", i + 1));
+        if row.stop {
+            self.inner("STOP");
+        }
+        let aspheric = row.asphere.iter().any(|a| *a != 0.0);
+        self.inner(if aspheric { "TYPE EVENASPH" } else { "TYPE STANDARD" });
+        if !row.comment.is_empty() {
+            self.inner(format!("COMM {}", one_line(&row.comment)));
+        }
+        self.curvature(i, row.curvature);
+        if row.conic != 0.0 {
+            self.inner(format!("CONI {}", number(row.conic)));
+        }
+        if self.is_variable(i, Quantity::Conic) {
+            self.inner("VCON");
+        }
+        if aspheric {
+            self.terms(i, &row.asphere);
+        }
+        self.thickness(i, row.thickness);
+        let variable = self.is_variable(i, Quantity::Index);
+        self.glass(&row.medium, &format!("after surface {i}"), variable);
+        self.semi_diameter(&row);
+        if row.hyper {
+            let note = "the far half of the surface counts there or not, as the program decides";
+            self.lose(Outcome::Dropped, format!("hyper of surface {i}"), note);
+        }
+    }
+
+    fn is_variable(&self, surface: usize, quantity: Quantity) -> bool {
+        self.lens.variable(Parameter::new(surface, quantity)).is_some()
+    }
+
+    /// The pickup of a number from the same number of another surface.
+    fn pickup(&self, surface: usize, quantity: Quantity) -> Option<Pickup> {
+        let parameter = Parameter::new(surface, quantity);
+        let mut pickups = self.lens.pickups.iter();
+        pickups.find(|p| p.parameter == parameter && p.source.quantity == quantity).copied()
+    }
+
+    fn curvature(&mut self, i: usize, curvature: f64) {
+        let solve = match self.pickup(i, Quantity::Curvature) {
+            Some(pickup) => {
+                let (surface, scale) = (pickup.source.surface + 1, number(pickup.scale));
+                format!("4 {surface} {scale} {}", number(pickup.offset))
+            }
+            None if self.is_variable(i, Quantity::Curvature) => "1 0 0 0".to_owned(),
+            None => "0 0 0 0".to_owned(),
+        };
+        self.inner(format!("CURV {} {solve} \"\"", number(curvature)));
+    }
+
+    /// Parameter 1 belongs to r², which a conic has already.
+    fn terms(&mut self, i: usize, asphere: &[f64]) {
+        self.inner("PARM 1 0.0");
+        for (term, a) in asphere.iter().enumerate() {
+            self.inner(format!("PARM {} {}", term + 2, number(*a)));
+        }
+        for term in 0..crate::lens::ASPHERE_TERMS {
+            if self.is_variable(i, Quantity::Asphere(term)) {
+                self.inner(format!("VPAR {}", term + 2));
+            }
+        }
+    }
+
+    fn thickness(&mut self, i: usize, thickness: f64) {
+        self.inner(format!("DISZ {}", number(thickness)));
+        let parameter = Parameter::new(i, Quantity::Thickness);
+        if self.has_focus_solve() && i + 1 == self.lens.surfaces.len() {
+            self.inner("MAZH 0 0");
+        } else if let Some(pickup) = self.pickup(i, Quantity::Thickness) {
+            let surface = pickup.source.surface + 1;
+            let line = format!("PZUP {surface} {} 0", numbers([pickup.scale, pickup.offset]));
+            self.inner(line);
+        } else if let Some(variable) = self.lens.variable(parameter).copied() {
+            let bounds = variable.min.zip(variable.max).filter(|(low, high)| low < high);
+            let (low, high) = bounds.unwrap_or((0.0, 0.0));
+            self.inner(format!("VDSZ {}", numbers([low, high])));
+        }
+    }
+
+    fn glass(&mut self, medium: &Medium, place: &str, variable: bool) {
+        let vary = i32::from(variable);
+        match medium {
+            Medium::Air => {}
+            Medium::Mirror => self.inner("GLAS MIRROR 0 0 1.5 40 0 0 0 0 0 0"),
+            Medium::Index(n) => {
+                self.inner(format!("GLAS ___BLANK 1 0 {} 0 {vary} 0 0 0 0", numbers([*n, 0.0])));
+            }
+            Medium::Model { nd, vd } => {
+                let line = format!("GLAS ___BLANK 1 0 {} 0 {vary} 0 0 0 0", numbers([*nd, *vd]));
+                self.inner(line);
+                let note = "each program has its own dispersion formula for nd and vd";
+                self.lose(Outcome::Approximated, format!("model glass {place}"), note);
+            }
+            Medium::Glass(name) => self.catalogue_glass(name, place),
+        }
+    }
+
+    fn catalogue_glass(&mut self, name: &str, place: &str) {
+        let Some(glass) = glass::find(name) else { return };
+        let bare: String = glass.name.split_whitespace().collect();
+        let values = numbers([glass.nd, glass.vd]);
+        self.inner(format!("GLAS {bare} 0 0 {values} 0 0 0 0 0 0"));
+        if there::is_general(glass) {
+            let note = "not a maker's own: its data in the other program may differ";
+            self.lose(Outcome::Approximated, format!("glass {place}: {name}"), note);
+        }
+    }
+
+    /// The semi-diameter, and the aperture that makes it clip.
+    fn semi_diameter(&mut self, row: &Row) {
+        let aperture = match self.lens.aperture {
+            Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
+            _ => row.semi_diameter,
+        };
+        match aperture {
+            Some(radius) => self.inner(format!("DIAM {} 1 0 0 1 \"\"", number(radius))),
+            None => self.inner("DIAM 0 0 0 0 1 \"\""),
+        }
+        if let Some(radius) = row.semi_diameter {
+            self.inner(format!("CLAP 0 {} 0", number(radius)));
+        }
+    }
+}

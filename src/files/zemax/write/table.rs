@@ -1,0 +1,112 @@
+//! The multi-configuration table: all positions of one operand, then the next.
+
+use super::{Export, number};
+use crate::files::report::Outcome;
+use crate::lens::{Aperture, Fields, Parameter, Quantity};
+use std::mem::discriminant;
+
+impl Export {
+    pub(super) fn table(&mut self) {
+        let positions = self.lens.zoom.len();
+        if positions == 0 {
+            return;
+        }
+        if positions == 1 {
+            let note = "one position is written as a lens that does not zoom";
+            self.lose(Outcome::Approximated, "zoom positions: 1", note);
+        }
+        self.line(format!("MNUM {positions} 1"));
+        self.thicknesses();
+        self.apertures();
+        self.zoom_fields();
+    }
+
+    /// One operand over all positions.
+    fn operand(&mut self, name: &str, target: usize, values: &[(f64, bool)]) {
+        for (i, (value, variable)) in values.iter().enumerate() {
+            let (configuration, status) = (i + 1, i32::from(*variable));
+            let value = number(*value);
+            self.line(format!(
+                "{name} {target} {configuration} {value} {status} 0 0 1 1 1 0 0 \"\" 0"
+            ));
+        }
+    }
+
+    fn thicknesses(&mut self) {
+        for surface in 0..self.lens.surfaces.len() {
+            let positions = &self.lens.zoom;
+            let moves = |p: &crate::lens::ZoomPosition| {
+                p.thicknesses.iter().any(|gap| gap.surface == surface)
+            };
+            if !positions.iter().any(moves) {
+                continue;
+            }
+            let value = |zoom| {
+                let parameter = Parameter::new(surface, Quantity::ZoomThickness(zoom));
+                let gap = self.lens.thickness_at(surface, zoom).unwrap_or(0.0);
+                (gap, self.lens.variable(parameter).is_some())
+            };
+            let values: Vec<(f64, bool)> = (0..positions.len()).map(value).collect();
+            self.operand("THIC", surface + 1, &values);
+        }
+    }
+
+    fn apertures(&mut self) {
+        let base = self.lens.aperture;
+        let all: Vec<Aperture> =
+            (0..self.lens.zoom.len()).map(|zoom| self.lens.aperture_at(zoom)).collect();
+        if self.lens.zoom.iter().all(|position| position.aperture.is_none()) {
+            return;
+        }
+        if all.iter().any(|aperture| discriminant(aperture) != discriminant(&base)) {
+            let note = "apertures of different kinds: that of the lens holds at every position";
+            self.lose(Outcome::Dropped, "apertures of the zoom positions", note);
+            return;
+        }
+        let values: Vec<(f64, bool)> = all.into_iter().map(|a| (size(a), false)).collect();
+        match (base, self.lens.stop()) {
+            (Aperture::StopSemiDiameter(_), Some(stop)) => self.operand("SDIA", stop + 1, &values),
+            _ => self.operand("APER", 0, &values),
+        }
+    }
+
+    fn zoom_fields(&mut self) {
+        if self.lens.zoom.iter().all(|position| position.fields.is_none()) {
+            return;
+        }
+        let base = self.lens.fields.clone();
+        let all: Vec<Fields> =
+            (0..self.lens.zoom.len()).map(|zoom| self.lens.fields_at(zoom).clone()).collect();
+        if !all.iter().all(|fields| alike(fields, &base)) {
+            let note =
+                "fields of another kind, number or weight: those of the lens hold everywhere";
+            self.lose(Outcome::Dropped, "fields of the zoom positions", note);
+            return;
+        }
+        let any_x = all.iter().flat_map(|fields| &fields.values).any(|field| field.x != 0.0);
+        for i in 0..base.values.len() {
+            let column = |f: fn(&crate::lens::Field) -> f64| -> Vec<(f64, bool)> {
+                all.iter().map(|fields| (f(&fields.values[i]), false)).collect()
+            };
+            if any_x {
+                self.operand("XFIE", i + 1, &column(|field| field.x));
+            }
+            self.operand("YFIE", i + 1, &column(|field| field.y));
+        }
+    }
+}
+
+fn size(aperture: Aperture) -> f64 {
+    match aperture {
+        Aperture::EntrancePupilDiameter(v)
+        | Aperture::FNumber(v)
+        | Aperture::ObjectNa(v)
+        | Aperture::StopSemiDiameter(v) => v,
+    }
+}
+
+/// Whether only the coordinates differ.
+fn alike(fields: &Fields, base: &Fields) -> bool {
+    let weights = |fields: &Fields| fields.values.iter().map(|f| f.weight).collect::<Vec<_>>();
+    fields.kind == base.kind && weights(fields) == weights(base)
+}

@@ -1,0 +1,48 @@
+//! What a measurement was made on.
+
+use crate::trace::Width;
+use serde::Serialize;
+use std::fmt;
+
+/// A machine, as far as numbers depend on it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Machine {
+    /// The processor, as the system calls it.
+    pub processor: String,
+    /// How many cores this process may use.
+    pub cores: usize,
+    /// Bits of the vector instructions that batches are traced with.
+    pub lane_bits: usize,
+    /// Whether the program was compiled with optimisation.
+    pub optimised: bool,
+}
+
+impl Machine {
+    /// The one that the program runs on.
+    pub fn here() -> Self {
+        Self {
+            processor: processor().unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            lane_bits: match Width::detect() {
+                Width::Baseline => 128,
+                Width::Bits256 => 256,
+                Width::Bits512 => 512,
+            },
+            optimised: !cfg!(debug_assertions),
+        }
+    }
+}
+
+fn processor() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+impl fmt::Display for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { processor, cores, lane_bits, optimised } = self;
+        let build = if *optimised { "" } else { "; NOT OPTIMISED, build with --release" };
+        write!(f, "{processor}, {cores} cores, lanes of {lane_bits} bits{build}")
+    }
+}

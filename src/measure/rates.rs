@@ -1,0 +1,58 @@
+//! Timing several methods turn by turn.
+
+use super::clock::Stopwatch;
+use serde::Serialize;
+
+/// How fast something is done: the median of many turns, the slowest and the fastest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Rate {
+    /// Half of the turns were faster.
+    pub median: f64,
+    /// The slowest turn.
+    pub min: f64,
+    /// The fastest turn.
+    pub max: f64,
+}
+
+impl Rate {
+    fn of(mut turns: Vec<f64>) -> Self {
+        turns.sort_by(f64::total_cmp);
+        let at = |i: usize| turns.get(i).copied().unwrap_or(f64::NAN);
+        Self { median: at(turns.len() / 2), min: at(0), max: at(turns.len().saturating_sub(1)) }
+    }
+
+    /// The same in another unit.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        Self { median: self.median * factor, min: self.min * factor, max: self.max * factor }
+    }
+}
+
+/// One thing that is timed: a turn of it, and how many units of work that is.
+pub(super) struct Contestant<'a> {
+    pub(super) work: f64,
+    pub(super) turn: Box<dyn FnMut() + 'a>,
+}
+
+/// Lets every contestant have `turns` turns of at least `seconds`, one after the other; how many
+/// units of work a second each did.
+pub(super) fn compete(contestants: &mut [Contestant<'_>], turns: usize, seconds: f64) -> Vec<Rate> {
+    let repeats: Vec<u32> = contestants.iter_mut().map(|c| repeats(&mut c.turn, seconds)).collect();
+    let mut rates = vec![Vec::with_capacity(turns); contestants.len()];
+    for _ in 0..turns {
+        for ((contestant, repeats), rates) in contestants.iter_mut().zip(&repeats).zip(&mut rates) {
+            let watch = Stopwatch::start();
+            (0..*repeats).for_each(|_| (contestant.turn)());
+            rates.push(f64::from(*repeats) * contestant.work / watch.seconds());
+        }
+    }
+    rates.into_iter().map(Rate::of).collect()
+}
+
+/// How often something has to be done to take `seconds`; the first time warms it up.
+fn repeats(turn: &mut dyn FnMut(), seconds: f64) -> u32 {
+    turn();
+    let watch = Stopwatch::start();
+    turn();
+    (seconds / watch.seconds().max(1e-9)).ceil().clamp(1.0, 1e9) as u32
+}

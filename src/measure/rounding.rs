@@ -1,0 +1,61 @@
+//! What rounding costs: the same rays in another number type and in twice the precision.
+
+use super::double_gauss::bundle;
+use crate::lens::{Invalid, System};
+use crate::math::{Double, Real, Vec3};
+use crate::trace::{Ray, Tracer};
+use serde::Serialize;
+
+/// How far off rounding puts the rays that reach the image, against twice the precision.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Rounding {
+    /// Root of the mean square distance of the image points, in mm.
+    pub point_rms_mm: f64,
+    /// The largest distance, in mm.
+    pub point_max_mm: f64,
+    /// Root of the mean square difference of the optical paths, in mm.
+    pub path_rms_mm: f64,
+    /// Rays that end otherwise; a rim may cut a ray on one side of rounding and not on the other.
+    pub other_fates: usize,
+    /// How many rays were compared.
+    pub rays: usize,
+}
+
+/// The rounding error of the number type `R` over a bundle through the measured lens.
+pub fn rounding<R: Real>(system: &System<f64>, rays: usize) -> Result<Rounding, Invalid> {
+    let fast = Tracer::new(&system.lift::<R>())?;
+    let exact = Tracer::new(&system.lift::<Double>())?;
+    let bundle = bundle(rays);
+    let mut sum = Rounding { rays, ..Rounding::default() };
+    let mut compared = 0;
+    for i in 0..rays {
+        let ray = bundle.get(i);
+        let got = fast.trace(lift(ray));
+        // Starting where the fast ray starts leaves the error of the tracing alone.
+        let want = exact.trace(lift(Ray::<f64> {
+            point: lift::<R>(ray).point.value(),
+            direction: lift::<R>(ray).direction.value(),
+        }));
+        if got.fate != want.fate {
+            sum.other_fates += 1;
+        } else if got.fate.is_imaged() {
+            let (p, q) = (got.ray.point, want.ray.point);
+            let distance = off(p.x, q.x).hypot(off(p.y, q.y));
+            sum.point_rms_mm += distance * distance;
+            sum.point_max_mm = sum.point_max_mm.max(distance);
+            sum.path_rms_mm += off(got.opl, want.opl).powi(2);
+            compared += 1;
+        }
+    }
+    let mean = |square: f64| (square / f64::from(compared.max(1))).sqrt();
+    Ok(Rounding { point_rms_mm: mean(sum.point_rms_mm), path_rms_mm: mean(sum.path_rms_mm), ..sum })
+}
+
+fn lift<R: Real>(ray: Ray<f64>) -> Ray<R> {
+    Ray { point: Vec3::from_f64(ray.point), direction: Vec3::from_f64(ray.direction) }
+}
+
+/// The difference of two numbers, without rounding the exact one first.
+fn off<R: Real>(got: R, exact: Double) -> f64 {
+    (Double::from_f64(got.value()) - exact).value()
+}

@@ -1,0 +1,199 @@
+//! How many ray-surfaces a second, and what rounding costs at that speed.
+
+use super::double_gauss::{bundle, double_gauss};
+use super::memory::{Memory, peak_megabytes};
+use super::rates::{Contestant, Rate, compete};
+use super::rounding::{Rounding, rounding};
+use crate::lens::{Invalid, LensError, Shape, System, glass::line};
+use crate::math::Real;
+use crate::trace::{Points, Ray, Rays, Tracer, Width};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::Serialize;
+use std::hint::black_box;
+
+/// Rays of a turn: 24 tasks for two threads, and still in the second-level cache.
+const RAYS: usize = 24 * 4096;
+/// Rays that are traced one at a time in a turn.
+const SINGLE_RAYS: usize = 4096;
+/// Rays on which rounding is measured.
+const ROUNDED_RAYS: usize = 4096;
+/// Rays for which memory is measured.
+const MANY_RAYS: usize = 1_000_000;
+const TURN: f64 = 4e-3; // seconds: shorter than what a busy system grants at once
+
+/// What tracing costs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Throughput {
+    /// Surfaces of the lens, the image plane included.
+    pub surfaces: usize,
+    /// A way of tracing each.
+    pub rows: Vec<TraceRow>,
+    /// Rounding in `f64` against twice the precision.
+    pub rounding_f64: Rounding,
+    /// Rounding in `f32` against twice the precision.
+    pub rounding_f32: Rounding,
+    /// Tracing a million rays, the rays themselves included.
+    pub memory_trace: Option<Memory>,
+}
+
+/// One way of tracing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TraceRow {
+    /// What it is called.
+    pub name: &'static str,
+    /// The median of all turns.
+    pub million_ray_surfaces_per_s: f64,
+    /// The slowest turn.
+    pub min: f64,
+    /// The fastest turn.
+    pub max: f64,
+}
+
+impl TraceRow {
+    fn new(name: &'static str, rate: Rate) -> Self {
+        let Rate { median, min, max } = rate.times(1e-6);
+        Self { name, million_ray_surfaces_per_s: median, min, max }
+    }
+}
+
+/// Why nothing could be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum Unmeasured {
+    /// The lens of the measurement.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// The numbers of the lens.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    /// No threads.
+    #[error("no threads to measure with: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+/// The forms of the lens that are raced.
+struct Tracers {
+    plain: Tracer<f64>,
+    single_precision: Tracer<f32>,
+    spheres: Tracer<f64>,
+    conics: Tracer<f64>,
+    aspheres: Tracer<f64>,
+}
+
+impl Tracers {
+    fn new(system: &System<f64>) -> Result<Self, Invalid> {
+        let reshaped = |f: fn(usize, Shape<f64>) -> Shape<f64>| {
+            let mut system = system.clone();
+            for (i, surface) in system.surfaces.iter_mut().enumerate() {
+                surface.shape = f(i, surface.shape);
+            }
+            Tracer::new(&system)
+        };
+        Ok(Self {
+            plain: Tracer::new(system)?,
+            single_precision: Tracer::new(&system.lift())?,
+            spheres: reshaped(|_, shape| Shape::Sphere { curvature: shape.curvature() })?,
+            conics: reshaped(|_, shape| Shape::Conic { curvature: shape.curvature(), conic: 0.0 })?,
+            aspheres: reshaped(figured)?,
+        })
+    }
+}
+
+/// The first and the last glass surface as aspheres, the rest as it is.
+fn figured(i: usize, shape: Shape<f64>) -> Shape<f64> {
+    if i != 0 && i != 10 {
+        return shape;
+    }
+    let mut terms = [0.0; crate::lens::ASPHERE_TERMS];
+    (terms[0], terms[1]) = (1e-9, 1e-13);
+    Shape::Asphere { curvature: shape.curvature(), conic: 0.0, terms }
+}
+
+/// Races every way of tracing, `turns` turns each.
+pub fn throughput(turns: usize) -> Result<Throughput, Unmeasured> {
+    let system = double_gauss().system(0, line::D)?;
+    let tracers = Tracers::new(&system)?;
+    let pool = ThreadPoolBuilder::new().num_threads(2).build()?;
+    let memory_trace = peak_megabytes(|| trace_many(&tracers.plain));
+    let (names, mut contestants): (Vec<_>, Vec<_>) =
+        contestants(&tracers, &pool).into_iter().unzip();
+    let rates = compete(&mut contestants, turns, TURN);
+    Ok(Throughput {
+        surfaces: tracers.plain.surfaces(),
+        rows: names.into_iter().zip(rates).map(|(name, rate)| TraceRow::new(name, rate)).collect(),
+        rounding_f64: rounding::<f64>(&system, ROUNDED_RAYS)?,
+        rounding_f32: rounding::<f32>(&system, ROUNDED_RAYS)?,
+        memory_trace,
+    })
+}
+
+fn contestants<'a>(
+    tracers: &'a Tracers,
+    pool: &'a ThreadPool,
+) -> Vec<(&'static str, Contestant<'a>)> {
+    let Tracers { plain, single_precision, spheres, conics, aspheres } = tracers;
+    vec![
+        ("f64_batch_1_thread", batch(plain, Width::Bits512)),
+        ("f64_batch_2_threads", on_two_threads(plain, pool)),
+        ("f64_batch_1_thread_spheres", batch(spheres, Width::Bits512)),
+        ("f64_batch_1_thread_conics", batch(conics, Width::Bits512)),
+        ("f64_batch_1_thread_2_aspheres", batch(aspheres, Width::Bits512)),
+        ("f64_batch_avx2", batch(plain, Width::Bits256)),
+        ("f64_batch_baseline", batch(plain, Width::Baseline)),
+        ("f64_single", one_by_one(plain)),
+        ("f32_batch_1_thread", batch(single_precision, Width::Bits512)),
+    ]
+}
+
+fn work<R: Real>(tracer: &Tracer<R>, rays: usize) -> f64 {
+    (tracer.surfaces() * rays) as f64
+}
+
+fn batch<R: Real>(tracer: &Tracer<R>, width: Width) -> Contestant<'_> {
+    let (rays, mut points) = (lifted(&bundle(RAYS)), Points::<R>::default());
+    let turn = Box::new(move || {
+        tracer.batch_with(width, &rays, &mut points);
+        black_box(&points);
+    });
+    Contestant { work: work(tracer, RAYS), turn }
+}
+
+fn on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> Contestant<'a> {
+    let (rays, mut points) = (bundle(RAYS), Points::default());
+    let turn = Box::new(move || {
+        pool.install(|| tracer.batch_parallel(&rays, &mut points));
+        black_box(&points);
+    });
+    Contestant { work: work(tracer, RAYS), turn }
+}
+
+fn one_by_one(tracer: &Tracer<f64>) -> Contestant<'_> {
+    let rays: Vec<Ray<f64>> = {
+        let bundle = bundle(SINGLE_RAYS);
+        (0..SINGLE_RAYS).map(|i| bundle.get(i)).collect()
+    };
+    let turn = Box::new(move || {
+        for ray in &rays {
+            black_box(tracer.trace(*ray));
+        }
+    });
+    Contestant { work: work(tracer, SINGLE_RAYS), turn }
+}
+
+/// The same rays as another number type.
+fn lifted<R: Real>(rays: &Rays<f64>) -> Rays<R> {
+    let column = |from: &[f64]| from.iter().map(|v| R::from_f64(*v)).collect();
+    Rays {
+        x: column(&rays.x),
+        y: column(&rays.y),
+        z: column(&rays.z),
+        l: column(&rays.l),
+        m: column(&rays.m),
+        n: column(&rays.n),
+    }
+}
+
+fn trace_many(tracer: &Tracer<f64>) {
+    let (rays, mut points) = (bundle(MANY_RAYS), Points::default());
+    tracer.batch(&rays, &mut points);
+    black_box(&points);
+}

@@ -1,0 +1,285 @@
+//! From variables to the numbers of resolved systems, without looking anything up again.
+//!
+//! Every number that moves is a straight line in one variable: a curvature is the variable, a
+//! pickup a multiple of it, the index of a model glass grows in proportion with nd.
+
+use super::{Along, MeritError};
+use crate::lens::glass::model_index;
+use crate::lens::{FieldKind, Lens, Medium, Object, Quantity, System, focus_gap};
+use crate::math::Real;
+use crate::trace::{Gradient, Slot};
+use nalgebra::DVector;
+
+/// A number of a system that follows a variable: `offset + factor × variable`.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    variable: usize,
+    surface: usize,
+    slot: Slot,
+    factor: f64,
+    offset: f64,
+}
+
+/// A lens at one zoom position: its systems, and which of their numbers follow the variables.
+#[derive(Debug, Clone)]
+pub(super) struct Zoom {
+    pub(super) number: usize,
+    pub(super) primary: usize,
+    pub(super) object: Object,
+    pub(super) field: FieldKind,
+    /// Which gaps are glass.
+    pub(super) glass: Vec<bool>,
+    /// One for each wavelength, clipped by nothing.
+    systems: Vec<System<f64>>,
+    /// What clips them.
+    pub(super) rims: Vec<Option<f64>>,
+    lines: Vec<Vec<Line>>,
+    /// The distance of the image plane from the paraxial focus, where the last gap is solved.
+    focus: Option<f64>,
+    variables: usize,
+}
+
+/// The systems of a zoom position at some values of the variables.
+#[derive(Debug, Clone)]
+pub(super) struct Systems {
+    /// One for each wavelength.
+    pub(super) systems: Vec<System<f64>>,
+    /// The derivative of the last gap by the variables where it is solved.
+    focus: Option<DVector<f64>>,
+}
+
+impl Zoom {
+    pub(super) fn new(lens: &Lens, number: usize) -> Result<Self, MeritError> {
+        let mut systems = Vec::new();
+        let mut lines = Vec::new();
+        for wavelength in &lens.wavelengths {
+            let mut system = lens.system(number, wavelength.um)?;
+            system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = f64::INFINITY);
+            let found = lines_of(lens, number, wavelength.um, &mut system);
+            lines.push(found);
+            systems.push(system);
+        }
+        let glass = |i: usize| {
+            let row = &lens.surfaces[i];
+            match row.medium {
+                Medium::Mirror => systems[0].surfaces[i].index != 1.0,
+                Medium::Air => false,
+                Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) => true,
+            }
+        };
+        Ok(Self {
+            number,
+            primary: lens.primary(),
+            object: lens.object,
+            field: lens.fields_at(number).kind,
+            glass: (0..lens.surfaces.len()).map(glass).collect(),
+            rims: lens.surfaces.iter().map(|row| row.semi_diameter).collect(),
+            focus: lens.focus,
+            variables: lens.variables.len(),
+            lines,
+            systems,
+        })
+    }
+
+    /// The systems at some values of the variables.
+    pub(super) fn at(&self, values: &[f64]) -> Systems {
+        let mut systems = self.systems.clone();
+        for (system, lines) in systems.iter_mut().zip(&self.lines) {
+            for line in lines {
+                let number = line.offset + line.factor * values[line.variable];
+                *number_mut(system, line.surface, line.slot) = number;
+            }
+        }
+        let mut found = Systems { systems, focus: None };
+        if let Some(offset) = self.focus {
+            self.solve_focus(&mut found, offset);
+        }
+        found
+    }
+
+    fn solve_focus(&self, found: &mut Systems, offset: f64) {
+        let primary = &found.systems[self.primary];
+        let gap = focus_gap(primary, self.object) + offset;
+        let slope =
+            |variable| focus_gap(&self.along_unfocused(primary, variable), self.object).slope[0];
+        found.focus = Some(DVector::from_iterator(self.variables, (0..self.variables).map(slope)));
+        for system in &mut found.systems {
+            let last = system.surfaces.len() - 2;
+            system.surfaces[last].thickness = gap;
+        }
+    }
+
+    fn along_unfocused(&self, primary: &System<f64>, variable: usize) -> System<Along> {
+        let mut system: System<Along> = primary.lift();
+        for line in self.lines[self.primary].iter().filter(|line| line.variable == variable) {
+            number_mut(&mut system, line.surface, line.slot).slope[0] = line.factor;
+        }
+        system
+    }
+
+    /// The system at the primary wavelength with its derivative along one variable.
+    pub(super) fn along(&self, found: &Systems, variable: usize) -> System<Along> {
+        let mut system = self.along_unfocused(&found.systems[self.primary], variable);
+        if let Some(focus) = &found.focus {
+            let last = system.surfaces.len() - 2;
+            system.surfaces[last].thickness.slope[0] = focus[variable];
+        }
+        system
+    }
+
+    /// The derivatives by the variables from those by the numbers of a system.
+    pub(super) fn collect(
+        &self,
+        found: &Systems,
+        wavelength: usize,
+        gradient: &Gradient<f64>,
+    ) -> DVector<f64> {
+        let mut by_variable = DVector::zeros(self.variables);
+        for line in &self.lines[wavelength] {
+            let surface = &gradient.surfaces[line.surface];
+            let by_number = match line.slot {
+                Slot::Curvature => surface.curvature,
+                Slot::Conic => surface.conic,
+                Slot::Term(term) => surface.terms[term],
+                Slot::Thickness => surface.thickness,
+                Slot::Index => surface.index,
+            };
+            by_variable[line.variable] += line.factor * by_number;
+        }
+        if let Some(focus) = &found.focus {
+            let last = gradient.surfaces.len() - 2;
+            by_variable.axpy(gradient.surfaces[last].thickness, focus, 1.0);
+        }
+        by_variable
+    }
+
+    /// The numbers of a system that some variable moves.
+    pub(super) fn moving(&self, wavelength: usize) -> Vec<(Option<usize>, Slot)> {
+        let mut moving = Vec::new();
+        for line in &self.lines[wavelength] {
+            let number = (Some(line.surface), line.slot);
+            if !moving.contains(&number) {
+                moving.push(number);
+            }
+        }
+        let last = (Some(self.systems[wavelength].surfaces.len() - 2), Slot::Thickness);
+        if self.focus.is_some() && !moving.contains(&last) {
+            moving.push(last);
+        }
+        moving
+    }
+
+    /// The derivatives by the variables from those by the moving numbers.
+    pub(super) fn collect_row(
+        &self,
+        found: &Systems,
+        wavelength: usize,
+        moving: &[(Option<usize>, Slot)],
+        row: &[f64],
+        by_variable: &mut [f64],
+    ) {
+        by_variable.fill(0.0);
+        let by = |surface: usize, slot: Slot| {
+            moving.iter().position(|m| *m == (Some(surface), slot)).map_or(0.0, |i| row[i])
+        };
+        for line in &self.lines[wavelength] {
+            by_variable[line.variable] += line.factor * by(line.surface, line.slot);
+        }
+        if let Some(focus) = &found.focus {
+            let last = self.systems[wavelength].surfaces.len() - 2;
+            let by_gap = by(last, Slot::Thickness);
+            by_variable.iter_mut().zip(focus.iter()).for_each(|(to, f)| *to += by_gap * f);
+        }
+    }
+}
+
+/// What follows the variables at a wavelength; the system is written in forms that have all these
+/// numbers.
+fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<Line> {
+    let mut lines = Vec::new();
+    for (variable, free) in lens.variables.iter().enumerate() {
+        let start = lens.get(free.parameter).unwrap_or(0.0);
+        for (parameter, factor) in lens.followers(free.parameter) {
+            let surface = parameter.surface;
+            let own_gap = has_own_gap(lens, zoom, surface);
+            let slot = match parameter.quantity {
+                Quantity::Curvature => Slot::Curvature,
+                Quantity::Conic => Slot::Conic,
+                Quantity::Asphere(term) => Slot::Term(term),
+                Quantity::Thickness if !own_gap => Slot::Thickness,
+                Quantity::ZoomThickness(z) if z == zoom => Slot::Thickness,
+                Quantity::Index => Slot::Index,
+                Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => {
+                    continue;
+                }
+            };
+            let growth = if slot == Slot::Index { index_growth(lens, surface, um) } else { 1.0 };
+            let factor = factor * growth;
+            for surface in followers_of_index(lens, surface, slot) {
+                widen(system, surface, slot);
+                let now = *number_mut(system, surface, slot);
+                let offset = if factor == 1.0 && now == start { 0.0 } else { now - factor * start };
+                lines.push(Line { variable, surface, slot, factor, offset });
+            }
+        }
+    }
+    lines
+}
+
+fn has_own_gap(lens: &Lens, zoom: usize, surface: usize) -> bool {
+    let position = lens.zoom.get(zoom);
+    position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == surface))
+}
+
+/// How fast the index of a gap grows with its nd.
+fn index_growth(lens: &Lens, surface: usize, um: f64) -> f64 {
+    match lens.surfaces[surface].medium {
+        Medium::Model { vd, .. } => model_index(2.0, vd, um) - model_index(1.0, vd, um),
+        Medium::Air | Medium::Glass(_) | Medium::Index(_) | Medium::Mirror => 1.0,
+    }
+}
+
+/// The surface itself, and for an index the mirrors behind it, and the image plane, which keep it.
+fn followers_of_index(lens: &Lens, surface: usize, slot: Slot) -> Vec<usize> {
+    let mut all = vec![surface];
+    if slot == Slot::Index {
+        let mirrors =
+            lens.surfaces[surface + 1..].iter().take_while(|r| r.medium == Medium::Mirror);
+        all.extend((1..=mirrors.count()).map(|i| surface + i));
+        if all.last() == Some(&(lens.surfaces.len() - 1)) {
+            all.push(lens.surfaces.len());
+        }
+    }
+    all
+}
+
+/// Writes a surface in a form that has a number, even where it is zero.
+fn widen(system: &mut System<f64>, surface: usize, slot: Slot) {
+    use crate::lens::Shape;
+    let shape = &mut system.surfaces[surface].shape;
+    *shape = match (slot, *shape) {
+        (Slot::Curvature, Shape::Plane) => Shape::Sphere { curvature: 0.0 },
+        (Slot::Conic, shape) => shape.as_conic(),
+        (Slot::Term(_), shape) => shape.as_asphere(),
+        (_, shape) => shape,
+    };
+}
+
+/// A number of a system.
+fn number_mut<R: Real>(system: &mut System<R>, surface: usize, slot: Slot) -> &mut R {
+    use crate::lens::Shape;
+    let surface = &mut system.surfaces[surface];
+    match (slot, &mut surface.shape) {
+        (Slot::Thickness, _) => &mut surface.thickness,
+        (
+            Slot::Curvature,
+            Shape::Sphere { curvature }
+            | Shape::Conic { curvature, .. }
+            | Shape::Asphere { curvature, .. },
+        ) => curvature,
+        (Slot::Conic, Shape::Conic { conic, .. } | Shape::Asphere { conic, .. }) => conic,
+        (Slot::Term(term), Shape::Asphere { terms, .. }) => &mut terms[term],
+        // `widen` has written the form that has the number; an index is always there.
+        _ => &mut surface.index,
+    }
+}

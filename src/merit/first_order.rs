@@ -1,0 +1,50 @@
+//! Terms of first-order optics, differentiated by dual numbers.
+
+use super::Scene;
+use super::sum::{Detail, Sum};
+use crate::lens::System;
+use crate::math::Real;
+use crate::paraxial::{paraxial_ray, signed_indices};
+use nalgebra::DVector;
+
+/// The square of the deviation of the focal length from a target.
+pub(super) fn focal_length(scene: &Scene<'_>, target: f64, sum: &mut Sum) {
+    let focal = efl(&scene.systems.systems[scene.zoom.primary]);
+    sum.residual(1.0, focal - target, &slopes(scene, sum.detail, efl));
+}
+
+/// The derivatives of a first-order number by the variables; zeros where none are asked for.
+pub(super) fn slopes(
+    scene: &Scene<'_>,
+    detail: Detail,
+    number: impl Fn(&System<super::Along>) -> super::Along,
+) -> DVector<f64> {
+    let count = scene.values.len();
+    if detail == Detail::Value {
+        return DVector::zeros(count);
+    }
+    let slope = |variable| number(&scene.zoom.along(scene.systems, variable)).slope[0];
+    DVector::from_iterator(count, (0..count).map(slope))
+}
+
+/// The focal length `−n₁ y₁ / (n' u')` of the ray that arrives parallel to the axis; infinite for
+/// an afocal system.
+pub(super) fn efl<R: Real>(system: &System<R>) -> R {
+    let ray = paraxial_ray(system, R::ONE, R::ZERO);
+    let last = system.surfaces.len() - 1;
+    let index = signed_indices(system)[last + 1];
+    -(R::ONE / (index * ray.slopes[last]))
+}
+
+/// The paraxial image height per unit of `tan θ`, or of object height for a finite object.
+pub(super) fn image_scale<R: Real>(system: &System<R>, object: crate::lens::Object) -> R {
+    match object {
+        crate::lens::Object::Infinity => efl(system) * system.index_before,
+        crate::lens::Object::Finite(distance) => {
+            let ray = paraxial_ray(system, R::from_f64(distance), R::ONE);
+            let last = system.surfaces.len() - 1;
+            let index = signed_indices(system)[last + 1];
+            system.index_before / (index * ray.slopes[last])
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What a lens is asked for.
+
+use super::MeritError;
+use crate::lens::{Lens, Object};
+use crate::paraxial::{Beam, first_order};
+use serde::{Deserialize, Serialize};
+
+/// What an optimization aims at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Goal {
+    /// The terms that are summed.
+    pub terms: Vec<Weighted>,
+    /// The focal length at each zoom position relative to the first; a single lens needs none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zoom_ratios: Vec<f64>,
+}
+
+/// A term and its weight.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Weighted {
+    /// The term.
+    pub term: Term,
+    /// Its factor in the sum.
+    pub weight: f64,
+}
+
+/// One thing that a lens is asked for. Every term is a sum of squares, and the mean over the zoom
+/// positions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Term {
+    /// The mean square radius of the spots about their centroids, over fields, wavelengths and
+    /// zoom positions by weight, in mm².
+    Spot,
+    /// The square of the deviation of the focal length from this, in mm².
+    FocalLength(f64),
+    /// The mean square of the distance of the chief rays' image points from the paraxial image
+    /// (`f tan θ` for an object at infinity), in mm².
+    Distortion,
+    /// Glass thinner or thicker than this on the axis, in mm².
+    GlassCenter {
+        /// Not thinner than this.
+        min: f64,
+        /// Not thicker than this.
+        max: f64,
+    },
+    /// Glass thinner than this at the rim, in mm².
+    GlassEdge(f64),
+    /// Air thinner or thicker than this on the axis, in mm².
+    AirCenter {
+        /// Not thinner than this.
+        min: f64,
+        /// Not thicker than this.
+        max: f64,
+    },
+    /// Air thinner than this at the rim, in mm².
+    AirEdge(f64),
+    /// From the first vertex to the image longer than this, in mm².
+    TotalTrack(f64),
+    /// From the last vertex to the image shorter than this, in mm².
+    BackFocus(f64),
+}
+
+impl Term {
+    /// What it is called in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spot => "spot",
+            Self::FocalLength(_) => "focal_length",
+            Self::Distortion => "distortion",
+            Self::GlassCenter { .. } => "glass_center",
+            Self::GlassEdge(_) => "glass_edge",
+            Self::AirCenter { .. } => "air_center",
+            Self::AirEdge(_) => "air_edge",
+            Self::TotalTrack(_) => "total_track",
+            Self::BackFocus(_) => "back_focus",
+        }
+    }
+
+    fn numbers(self) -> Vec<f64> {
+        match self {
+            Self::Spot | Self::Distortion => Vec::new(),
+            Self::GlassCenter { min, max } | Self::AirCenter { min, max } => vec![min, max],
+            Self::FocalLength(v)
+            | Self::GlassEdge(v)
+            | Self::AirEdge(v)
+            | Self::TotalTrack(v)
+            | Self::BackFocus(v) => vec![v],
+        }
+    }
+}
+
+impl Goal {
+    /// What a designer would ask of a lens first: sharp spots at the focal length it has, glass
+    /// and air that can be made, nothing longer than it is by more than a fifth.
+    pub fn sensible(lens: &Lens) -> Result<Self, MeritError> {
+        let focal_lengths = focal_lengths(lens)?;
+        let first = focal_lengths[0];
+        let size = first.map_or_else(|| track(lens), f64::abs);
+        let mut terms = vec![Weighted { term: Term::Spot, weight: 1.0 }];
+        if let Some(first) = first {
+            terms.push(Weighted { term: Term::FocalLength(first), weight: 1e-2 });
+        }
+        let thin = 0.012 * size;
+        for term in [
+            Term::GlassCenter { min: thin, max: 0.5 * size },
+            Term::GlassEdge(0.8 * thin),
+            Term::AirCenter { min: 0.002 * size, max: 3.0 * track(lens) },
+            Term::AirEdge(0.001 * size),
+            Term::TotalTrack(1.2 * track(lens)),
+        ] {
+            terms.push(Weighted { term, weight: 1.0 });
+        }
+        let zoom_ratios = match first {
+            Some(first) if lens.zoom.len() > 1 => {
+                focal_lengths.iter().map(|f| f.unwrap_or(first) / first).collect()
+            }
+            _ => Vec::new(),
+        };
+        Ok(Self { terms, zoom_ratios })
+    }
+
+    /// Refuses what a lens cannot be asked for.
+    pub fn check(&self, lens: &Lens) -> Result<(), MeritError> {
+        for Weighted { term, weight } in &self.terms {
+            let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
+            if !(weight.is_finite() && *weight >= 0.0) {
+                return refuse("its weight is not a number of zero or more");
+            }
+            if !term.numbers().iter().all(|v| v.is_finite()) {
+                return refuse("its target is not finite");
+            }
+            if matches!(term, Term::FocalLength(_)) && focal_lengths(lens)?.contains(&None) {
+                return refuse("the lens is afocal");
+            }
+        }
+        Ok(())
+    }
+
+    /// The focal length wanted at a zoom position.
+    pub(super) fn target(&self, zoom: usize, first: f64) -> f64 {
+        first * self.zoom_ratios.get(zoom).copied().unwrap_or(1.0)
+    }
+}
+
+/// The focal length at every zoom position; `None` for an afocal lens.
+fn focal_lengths(lens: &Lens) -> Result<Vec<Option<f64>>, MeritError> {
+    let um = lens.wavelengths[lens.primary()].um;
+    let focal_length = |zoom| {
+        let system = lens.system(zoom, um)?;
+        let first = first_order(&system, &Beam::of(lens, zoom));
+        let first = first.map_err(crate::pupil::BenchError::from)?;
+        Ok(first.efl)
+    };
+    (0..lens.zoom_positions()).map(focal_length).collect()
+}
+
+/// From the first vertex to the image, as the sum of all gaps without sign.
+fn track(lens: &Lens) -> f64 {
+    let object = if lens.object == Object::Infinity { 0.0 } else { f64::EPSILON };
+    lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>() + object
+}

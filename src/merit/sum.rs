@@ -1,0 +1,70 @@
+//! A sum of squares with its derivatives.
+
+use nalgebra::{DMatrix, DVector};
+
+/// How much of a sum is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Detail {
+    /// The value alone.
+    Value,
+    /// The value and its derivatives.
+    Gradient,
+    /// Those and the Gauss-Newton matrix.
+    Normal,
+}
+
+/// `Σ w r²` with its derivatives by the variables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sum {
+    /// How much of it is computed.
+    pub detail: Detail,
+    /// The sum.
+    pub value: f64,
+    /// `2 Σ w r ∂r`.
+    pub gradient: DVector<f64>,
+    /// `Σ w ∂r ∂rᵀ`; empty where it was not asked for.
+    pub normal: DMatrix<f64>,
+}
+
+impl Sum {
+    /// Zero for this many variables.
+    pub fn zero(variables: usize, detail: Detail) -> Self {
+        let rows = if detail == Detail::Normal { variables } else { 0 };
+        let gradient = DVector::zeros(variables);
+        Self { detail, value: 0.0, gradient, normal: DMatrix::zeros(rows, rows) }
+    }
+
+    /// Adds `weight` times another one.
+    pub fn add(&mut self, other: &Self, weight: f64) {
+        self.value += weight * other.value;
+        self.gradient.axpy(weight, &other.gradient, 1.0);
+        if self.detail == Detail::Normal {
+            self.normal += &other.normal * weight;
+        }
+    }
+
+    /// Multiplies everything.
+    pub fn scale(&mut self, factor: f64) {
+        self.value *= factor;
+        self.gradient *= factor;
+        self.normal *= factor;
+    }
+
+    /// Adds `weight r²` with `slope = ∂r`.
+    pub fn residual(&mut self, weight: f64, r: f64, slope: &DVector<f64>) {
+        self.value += weight * r * r;
+        if self.detail > Detail::Value {
+            self.gradient.axpy(2.0 * weight * r, slope, 1.0);
+        }
+        if self.detail == Detail::Normal {
+            self.normal.ger(weight, slope, slope, 1.0);
+        }
+    }
+
+    /// Whether every number in it is finite.
+    pub fn is_finite(&self) -> bool {
+        self.value.is_finite()
+            && self.gradient.iter().all(|v| v.is_finite())
+            && self.normal.iter().all(|v| v.is_finite())
+    }
+}

@@ -1,0 +1,121 @@
+//! Adam: first-order descent with running means of the gradient and of its square (Kingma and Ba,
+//! "Adam: A Method for Stochastic Optimization", ICLR 2015, algorithm 1).
+//!
+//! The merit may rise for a while; the best lens is kept. When it has not improved for long, the
+//! rate is halved and the search goes back to the best lens.
+
+use super::state::State;
+use super::{Optimizer, Progress};
+use crate::lens::Lens;
+use crate::merit::{Detail, Merit, MeritError, TermValue};
+
+/// Decay of the mean gradient and of the mean square.
+const DECAY: [f64; 2] = [0.9, 0.999];
+/// The first rate, in scaled variables.
+const RATE: f64 = 1e-2;
+/// Below this the search has ended.
+const SMALLEST_RATE: f64 = 1e-7;
+/// Steps without improvement before the rate is halved.
+const PATIENCE: usize = 40;
+/// A step may not multiply the merit by more than this.
+const WORST: f64 = 2.0;
+
+#[derive(Debug)]
+pub(super) struct Adam {
+    state: State,
+    gradient: Vec<f64>,
+    mean: Vec<f64>,
+    square: Vec<f64>,
+    rate: f64,
+    /// Steps since the moments were reset.
+    age: i32,
+    since_better: usize,
+}
+
+impl Adam {
+    pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
+        let state = State::new(merit, lens)?;
+        let count = state.values.len();
+        let gradient = state.merit.sum(&state.values, Detail::Gradient)?.gradient;
+        Ok(Self {
+            gradient: gradient.iter().copied().collect(),
+            mean: vec![0.0; count],
+            square: vec![0.0; count],
+            rate: RATE,
+            age: 0,
+            since_better: 0,
+            state,
+        })
+    }
+
+    /// The step in scaled variables.
+    fn direction(&mut self) -> Vec<f64> {
+        self.age += 1;
+        let [b1, b2] = DECAY;
+        let (c1, c2) = (1.0 - b1.powi(self.age), 1.0 - b2.powi(self.age));
+        let held = self.state.held(&self.gradient);
+        let step = |i: usize| {
+            let g = self.gradient[i] * self.state.scales[i];
+            self.mean[i] = b1 * self.mean[i] + (1.0 - b1) * g;
+            self.square[i] = b2 * self.square[i] + (1.0 - b2) * g * g;
+            let size = (self.square[i] / c2).sqrt();
+            if held[i] || size == 0.0 { 0.0 } else { -self.rate * (self.mean[i] / c1) / size }
+        };
+        (0..self.gradient.len()).map(step).collect()
+    }
+
+    /// Back to the best lens with half of the rate and fresh moments.
+    fn slow_down(&mut self) {
+        self.rate *= 0.5;
+        self.since_better = 0;
+        self.age = 0;
+        self.mean.fill(0.0);
+        self.square.fill(0.0);
+        self.state.values = self.state.merit.values(&self.state.best);
+        self.state.current = self.state.best.clone();
+        self.state.value = self.state.best_value;
+        self.differentiate();
+    }
+
+    fn differentiate(&mut self) {
+        if let Ok(sum) = self.state.merit.sum(&self.state.values, Detail::Gradient) {
+            self.gradient = sum.gradient.iter().copied().collect();
+        }
+    }
+}
+
+impl Optimizer for Adam {
+    fn step(&mut self) -> Progress {
+        if self.rate < SMALLEST_RATE {
+            return self.state.progress(0.0, true);
+        }
+        let step = self.direction();
+        let (before, limit) = (self.state.best_value, WORST * self.state.value);
+        let (accepted, sum) = self.state.advance(&step, Detail::Gradient, |value| value <= limit);
+        match sum {
+            Some(sum) => self.gradient = sum.gradient.iter().copied().collect(),
+            None => self.slow_down(),
+        }
+        self.since_better = if self.state.best_value < before { 0 } else { self.since_better + 1 };
+        if self.since_better >= PATIENCE {
+            self.slow_down();
+        }
+        let progress = self.state.progress(accepted, false);
+        if self.state.resample_if_due() {
+            self.differentiate();
+        }
+        progress
+    }
+
+    fn best(&self) -> &Lens {
+        &self.state.best
+    }
+
+    fn current(&self) -> &Lens {
+        &self.state.current
+    }
+
+    fn terms(&self) -> Result<Vec<TermValue>, MeritError> {
+        self.state.terms()
+    }
+}

@@ -1,0 +1,197 @@
+//! What every local search shares: scaled variables with bounds, the best lens, and the rule that
+//! no step may make the lens invalid.
+
+use super::Progress;
+use crate::lens::{ASPHERE_TERMS, Lens, Quantity, Variable};
+use crate::merit::{Detail, Merit, MeritError, Sum, TermValue};
+
+/// How often a step is halved before it is given up.
+const HALVINGS: usize = 12;
+/// Steps between two searches for the rays of the spots.
+const RESAMPLE: usize = 25;
+
+/// A lens on its way.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    pub(super) merit: Merit,
+    /// The variables at the current step.
+    pub(super) values: Vec<f64>,
+    /// What a change of one means for each variable.
+    pub(super) scales: Vec<f64>,
+    pub(super) current: Lens,
+    pub(super) best: Lens,
+    pub(super) value: f64,
+    pub(super) best_value: f64,
+    pub(super) steps: usize,
+    pub(super) refused: Option<String>,
+}
+
+impl State {
+    pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
+        if merit.variables().is_empty() {
+            return Err(MeritError::NoVariables);
+        }
+        let values = merit.values(lens);
+        let value = merit.value(&values)?;
+        let scales = merit.variables().iter().map(|v| scale(lens, v)).collect();
+        Ok(Self {
+            merit,
+            values,
+            scales,
+            current: lens.clone(),
+            best: lens.clone(),
+            value,
+            best_value: value,
+            steps: 0,
+            refused: None,
+        })
+    }
+
+    /// Moves by a step in scaled variables, halved until the lens is valid; returns how much of the
+    /// step was taken, nothing where `accept` does not like the merit.
+    pub(super) fn advance(
+        &mut self,
+        step: &[f64],
+        detail: Detail,
+        accept: impl Fn(f64) -> bool,
+    ) -> (f64, Option<Sum>) {
+        let mut fraction = 1.0;
+        for _ in 0..HALVINGS {
+            let proposal = self.proposal(step, fraction);
+            match self.evaluate(&proposal, detail) {
+                Ok(sum) if accept(sum.value) => {
+                    self.take(proposal, sum.value);
+                    return (fraction, Some(sum));
+                }
+                Ok(_) => return (0.0, None),
+                Err(cause) => self.refuse(step, &cause),
+            }
+            fraction *= 0.5;
+        }
+        (0.0, None)
+    }
+
+    /// The variables after a fraction of a step, inside their bounds.
+    fn proposal(&self, step: &[f64], fraction: f64) -> Vec<f64> {
+        let moved = |i: usize| {
+            let value = self.values[i] + fraction * step[i] * self.scales[i];
+            clamp(&self.merit.variables()[i], value)
+        };
+        (0..self.values.len()).map(moved).collect()
+    }
+
+    /// The merit at some values, which must be those of a lens that passes its own check.
+    fn evaluate(&self, values: &[f64], detail: Detail) -> Result<Sum, MeritError> {
+        if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+            let parameter = self.merit.variables()[i].parameter;
+            let found = values[i];
+            let what = parameter.to_string();
+            let expected = "a finite number";
+            return Err(crate::lens::LensError::Number { what, found, expected }.into());
+        }
+        self.merit.sum(values, detail)
+    }
+
+    fn take(&mut self, values: Vec<f64>, value: f64) {
+        self.values = values;
+        self.value = value;
+        self.current = self.merit.lens(&self.values);
+        if value < self.best_value {
+            self.best_value = value;
+            self.best.clone_from(&self.current);
+        }
+    }
+
+    /// Notes why a step was refused and which variable it moved most.
+    fn refuse(&mut self, step: &[f64], cause: &MeritError) {
+        let most = (0..step.len()).max_by(|a, b| step[*a].abs().total_cmp(&step[*b].abs()));
+        let parameter = most.map(|i| self.merit.variables()[i].parameter.to_string());
+        let parameter = parameter.unwrap_or_default();
+        self.refused = Some(format!("{cause}; the step moved the {parameter} most"));
+    }
+
+    /// Every so often the rays of the spots are found anew, because the pupil has moved. The best
+    /// merit is then that of the best lens by the new rays. A lens that has lost its light goes
+    /// back to the best one.
+    ///
+    /// Returns whether the merit function has changed.
+    pub(super) fn resample_if_due(&mut self) -> bool {
+        if self.steps == 0 || !self.steps.is_multiple_of(RESAMPLE) {
+            return false;
+        }
+        let mut merit = self.merit.clone();
+        let current = self.current.clone();
+        match merit.resample(&current) {
+            Ok(()) => {
+                let best = merit.value(&merit.values(&self.best));
+                let value = merit.value(&self.values);
+                if let (Ok(best), Ok(value)) = (best, value) {
+                    (self.merit, self.best_value, self.value) = (merit, best, value);
+                    if value < best {
+                        self.best = current;
+                        self.best_value = value;
+                    }
+                }
+            }
+            Err(cause) => {
+                self.refused = Some(cause.to_string());
+                self.current = self.best.clone();
+                self.values = self.merit.values(&self.best);
+                self.value = self.best_value;
+            }
+        }
+        true
+    }
+
+    pub(super) fn progress(&mut self, accepted: f64, finished: bool) -> Progress {
+        self.steps += 1;
+        Progress {
+            step: self.steps,
+            merit: self.value,
+            best: self.best_value,
+            accepted,
+            refused: self.refused.take(),
+            finished,
+        }
+    }
+
+    /// Which variables stand at a bound that a descent would push them through.
+    pub(super) fn held(&self, gradient: &[f64]) -> Vec<bool> {
+        let held = |i: usize| {
+            let variable = &self.merit.variables()[i];
+            let value = self.values[i];
+            let down = gradient[i] > 0.0 && variable.min.is_some_and(|min| value <= min);
+            let up = gradient[i] < 0.0 && variable.max.is_some_and(|max| value >= max);
+            down || up
+        };
+        (0..self.values.len()).map(held).collect()
+    }
+
+    pub(super) fn terms(&self) -> Result<Vec<TermValue>, MeritError> {
+        self.merit.terms(&self.merit.values(&self.best))
+    }
+}
+
+fn clamp(variable: &Variable, value: f64) -> f64 {
+    let low = variable.min.map_or(value, |min| value.max(min));
+    variable.max.map_or(low, |max| low.min(max))
+}
+
+/// A change of a variable that bends rays about as much as that of any other: what one step of a
+/// first-order method should be measured in.
+fn scale(lens: &Lens, variable: &Variable) -> f64 {
+    let size = lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>().max(1e-6);
+    let rim = lens.surfaces[variable.parameter.surface].semi_diameter.unwrap_or(0.1 * size);
+    let rim = rim.clamp(1e-3 * size, size);
+    match variable.parameter.quantity {
+        Quantity::Curvature => 0.1 / rim.max(0.05 * size),
+        Quantity::Conic => 1.0,
+        // As much sag at the rim as a change of the curvature has.
+        Quantity::Asphere(term) => {
+            let power = 2 * term.min(ASPHERE_TERMS) as i32 + 4;
+            0.05 / rim.powi(power - 1)
+        }
+        Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.1 * rim,
+        Quantity::Index => 0.1,
+    }
+}

@@ -1,0 +1,380 @@
+//! The session itself: what each command does.
+
+use super::analyst::{Analyst, Request, Results};
+use super::command::{Command, Edit};
+use super::edit::edited;
+use super::history::History;
+use super::view::{Message, Settings, Severity, View};
+use super::worker::{News, Search, Standing, Starter, Worker};
+use crate::files;
+use crate::lens::Lens;
+use crate::merit::Goal;
+use crate::optimize::Method;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What happened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Event {
+    /// The design or a setting is another; the view has this version.
+    Changed(u64),
+    /// A lens was read from this file.
+    Opened(PathBuf),
+    /// The lens was written to this file.
+    Saved(PathBuf),
+    /// A search began.
+    SearchStarted,
+    /// It is held.
+    SearchPaused,
+    /// It goes on.
+    SearchResumed,
+    /// It was ended; its result can be taken.
+    SearchStopped,
+    /// It ended by itself; its result can be taken.
+    SearchFinished,
+    /// Something to tell the person.
+    Said(Message),
+}
+
+/// How many messages are kept.
+const MESSAGES: usize = 200;
+
+/// One open design.
+#[derive(Debug)]
+pub struct Session {
+    lens: Arc<Lens>,
+    version: u64,
+    history: History,
+    path: Option<PathBuf>,
+    /// The lens as its file has it.
+    saved: Arc<Lens>,
+    settings: Settings,
+    messages: Vec<Message>,
+    analyst: Analyst,
+    worker: Worker,
+    /// How many searches were begun.
+    searches: u64,
+    /// The last search, if its result is neither taken nor thrown away.
+    search: Option<u64>,
+    events: Vec<Event>,
+}
+
+impl Session {
+    /// Opens a design; `start` begins searches and `wake` is called from other threads when there
+    /// is something new to look at.
+    ///
+    /// # Errors
+    /// A lens that cannot be used, or a system that can start no thread.
+    pub fn new(
+        lens: Lens,
+        start: Box<Starter>,
+        wake: impl Fn() + Send + Clone + 'static,
+    ) -> io::Result<Self> {
+        lens.check().map_err(io::Error::other)?;
+        let lens = Arc::new(lens);
+        let session = Self {
+            saved: Arc::clone(&lens),
+            lens,
+            version: 1,
+            history: History::default(),
+            path: None,
+            settings: Settings::default(),
+            messages: Vec::new(),
+            analyst: Analyst::spawn(wake.clone())?,
+            worker: Worker::spawn(start, wake)?,
+            searches: 0,
+            search: None,
+            events: Vec::new(),
+        };
+        session.ask();
+        Ok(session)
+    }
+
+    /// Does what a command says and tells what happened.
+    pub fn apply(&mut self, command: Command) -> Vec<Event> {
+        match command {
+            Command::Edit(edit) => self.edit(&edit),
+            Command::Settle => self.history.settle(),
+            Command::Undo => self.undo(),
+            Command::Redo => self.redo(),
+            Command::New(lens) => self.start_with(*lens, None),
+            Command::Open(path) => self.open(&path),
+            Command::Save(path) => self.save(path),
+            Command::Export(path) => self.export(&path),
+            Command::Optimize { method, goal } => self.optimize(method, goal),
+            Command::Pause => self.worker.pause(),
+            Command::Resume => self.worker.resume(),
+            Command::Step => self.worker.step(),
+            Command::Stop => self.worker.stop(),
+            Command::Take => self.take(),
+            Command::Discard => self.discard(),
+            Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
+            Command::ShowZoom(zoom) => self.show_zoom(zoom),
+            Command::ShowRays(rays) => self.set_up(|settings| settings.rays = rays.min(MOST_RAYS)),
+            Command::Choose(effect, choice) => self.set_up(|s| s.choose(effect, choice)),
+            Command::ClearMessages => self.messages.clear(),
+        }
+        self.poll()
+    }
+
+    /// What happened since the last call, in the background too.
+    pub fn poll(&mut self) -> Vec<Event> {
+        for news in self.worker.news() {
+            self.hear(news);
+        }
+        std::mem::take(&mut self.events)
+    }
+
+    /// A snapshot for panels.
+    pub fn view(&self) -> View {
+        View {
+            lens: Arc::clone(&self.lens),
+            version: self.version,
+            results: self.analyst.results(),
+            search: self.search(),
+            messages: self.messages.clone(),
+            undo: self.history.undo_title().map(str::to_owned),
+            redo: self.history.redo_title().map(str::to_owned),
+            path: self.path.clone(),
+            dirty: self.is_dirty(),
+            settings: self.settings.clone(),
+        }
+    }
+
+    /// The design.
+    pub fn lens(&self) -> &Arc<Lens> {
+        &self.lens
+    }
+
+    /// The newest numbers, maybe of an older version.
+    pub fn results(&self) -> Option<Arc<Results>> {
+        self.analyst.results()
+    }
+
+    /// Whether the design differs from its file.
+    pub fn is_dirty(&self) -> bool {
+        !Arc::ptr_eq(&self.lens, &self.saved) && self.lens != self.saved
+    }
+
+    fn search(&self) -> Option<Arc<Search>> {
+        self.worker.search().filter(|search| Some(search.number) == self.search)
+    }
+
+    fn edit(&mut self, edit: &Edit) {
+        let cell = edit.cell();
+        let base = self.history.before_typing(cell).unwrap_or(&self.lens);
+        match edited(base, edit) {
+            Ok(lens) if lens == *self.lens => {}
+            Ok(lens) => {
+                self.history.note(Arc::clone(&self.lens), edit.title(), cell);
+                self.show(Arc::new(lens));
+            }
+            Err(why) => self.say(Severity::Warning, why.to_string()),
+        }
+    }
+
+    fn undo(&mut self) {
+        if let Some(lens) = self.history.undo(&self.lens) {
+            self.show(lens);
+        }
+    }
+
+    fn redo(&mut self) {
+        if let Some(lens) = self.history.redo(&self.lens) {
+            self.show(lens);
+        }
+    }
+
+    /// Makes another lens the design.
+    fn show(&mut self, lens: Arc<Lens>) {
+        self.settings.zoom = self.settings.zoom.min(lens.zoom_positions() - 1);
+        self.lens = lens;
+        self.renew();
+    }
+
+    /// Makes everything that was computed so far old.
+    fn renew(&mut self) {
+        self.version += 1;
+        self.ask();
+        self.events.push(Event::Changed(self.version));
+    }
+
+    fn ask(&self) {
+        self.analyst.ask(Request {
+            version: self.version,
+            lens: Arc::clone(&self.lens),
+            settings: self.settings.clone(),
+        });
+    }
+
+    fn say(&mut self, severity: Severity, text: String) {
+        let message = Message { severity, text };
+        if self.messages.len() >= MESSAGES {
+            self.messages.remove(0);
+        }
+        self.messages.push(message.clone());
+        self.events.push(Event::Said(message));
+    }
+
+    /// Replaces the design by another one with a history of its own.
+    fn start_with(&mut self, lens: Lens, path: Option<PathBuf>) {
+        if let Err(why) = lens.check() {
+            return self.say(Severity::Error, why.to_string());
+        }
+        self.discard();
+        let lens = Arc::new(lens);
+        self.history = History::default();
+        self.saved = Arc::clone(&lens);
+        self.path = path;
+        self.settings.zoom = 0;
+        self.show(lens);
+    }
+
+    fn open(&mut self, path: &Path) {
+        match files::open(path) {
+            Ok(opened) => {
+                // A foreign file is not written to under its own name without asking.
+                let own = (opened.format == files::Format::Native).then(|| path.to_owned());
+                self.start_with(opened.lens, own);
+                self.events.push(Event::Opened(path.to_owned()));
+            }
+            Err(why) => self.say(Severity::Error, why.to_string()),
+        }
+    }
+
+    fn save(&mut self, path: Option<PathBuf>) {
+        let Some(path) = path.or_else(|| self.path.clone()) else {
+            let text = "the lens has no file yet; choose where to save it";
+            return self.say(Severity::Warning, text.to_owned());
+        };
+        match files::save(&self.lens, &path) {
+            Ok(_) => {
+                self.saved = Arc::clone(&self.lens);
+                self.path = Some(path.clone());
+                self.events.push(Event::Saved(path));
+            }
+            Err(why) => self.say(Severity::Error, why.to_string()),
+        }
+    }
+
+    fn export(&mut self, path: &Path) {
+        match files::save(&self.lens, path) {
+            Ok(_) => {
+                self.say(Severity::Note, format!("exported to {}", path.display()));
+                self.events.push(Event::Saved(path.to_owned()));
+            }
+            Err(why) => self.say(Severity::Error, why.to_string()),
+        }
+    }
+
+    fn optimize(&mut self, method: Method, goal: Goal) {
+        self.discard();
+        self.searches += 1;
+        self.search = Some(self.searches);
+        self.worker.start(self.searches, method, Arc::clone(&self.lens), goal);
+    }
+
+    /// Makes the best lens of the search the design, as one step.
+    fn take(&mut self) {
+        let Some(search) = self.search() else {
+            return self
+                .say(Severity::Warning, "there is no search whose result to take".to_owned());
+        };
+        match carried(&search, &self.lens) {
+            Ok(lens) => {
+                self.history.note(
+                    Arc::clone(&self.lens),
+                    "take the search's lens".to_owned(),
+                    None,
+                );
+                self.discard();
+                self.show(Arc::new(lens));
+            }
+            Err(why) => self.say(Severity::Warning, why),
+        }
+    }
+
+    fn discard(&mut self) {
+        self.worker.stop();
+        self.search = None;
+    }
+
+    fn hear(&mut self, news: News) {
+        let (number, event) = match news {
+            News::Started(number) => (number, Event::SearchStarted),
+            News::Paused(number) => (number, Event::SearchPaused),
+            News::Resumed(number) => (number, Event::SearchResumed),
+            News::Stopped(number) => (number, Event::SearchStopped),
+            News::Finished(number) => (number, Event::SearchFinished),
+            News::Failed(number, why) => {
+                if Some(number) == self.search {
+                    self.say(Severity::Error, why);
+                }
+                (number, Event::SearchStopped)
+            }
+        };
+        if Some(number) == self.search {
+            self.events.push(event);
+        }
+    }
+
+    fn set_tolerance(&mut self, tolerance: f64) {
+        if tolerance > 0.0 && tolerance < 1.0 {
+            self.set_up(|settings| settings.tolerance = tolerance);
+        } else {
+            let text = format!("the tolerance is {tolerance}; expected a number between 0 and 1");
+            self.say(Severity::Warning, text);
+        }
+    }
+
+    fn show_zoom(&mut self, zoom: usize) {
+        let count = self.lens.zoom_positions();
+        if zoom < count {
+            self.set_up(|settings| settings.zoom = zoom);
+        } else {
+            self.say(Severity::Warning, format!("there is no zoom position {zoom} of {count}"));
+        }
+    }
+
+    /// Changes a setting; the same setting again changes nothing.
+    fn set_up(&mut self, change: impl FnOnce(&mut Settings)) {
+        let before = self.settings.clone();
+        change(&mut self.settings);
+        if self.settings != before {
+            self.renew();
+        }
+    }
+}
+
+/// More rays of a field than this are a solid area.
+const MOST_RAYS: usize = 2000;
+
+/// The best lens of a search; where the design was edited meanwhile, the design with the numbers
+/// that the search changed.
+fn carried(search: &Search, design: &Arc<Lens>) -> Result<Lens, String> {
+    let best = &search.best;
+    if Arc::ptr_eq(&search.start, design) {
+        return Ok(Lens::clone(best));
+    }
+    let same_rows =
+        best.surfaces.len() == design.surfaces.len() && best.zoom.len() == design.zoom.len();
+    if !same_rows {
+        return Err("the design has other surfaces now than when the search began".to_owned());
+    }
+    let mut lens = Lens::clone(design);
+    for variable in &search.start.variables {
+        if let Some(value) = best.get(variable.parameter) {
+            lens.set(variable.parameter, value);
+        }
+    }
+    let lens = edited(&lens, &Edit::SetName(design.name.clone()));
+    lens.map_err(|why| format!("the result does not fit the design as it is now: {why}"))
+}
+
+impl Search {
+    /// Whether it takes steps or can go on.
+    pub fn is_under_way(&self) -> bool {
+        matches!(self.standing, Standing::Running | Standing::Paused)
+    }
+}

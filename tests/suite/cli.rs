@@ -1,0 +1,242 @@
+//! The program as other programs see it: every subcommand with right and wrong input, its exit
+//! status, the keys of its JSON, the words of its errors.
+
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+const LENS: &str = "lenses/double_gauss_rudolph_50.json";
+const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
+
+/// Runs the program without a display.
+fn aplanat(arguments: &[&str], input: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+    command.args(arguments).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let written = child.stdin.take().unwrap().write_all(input.as_bytes());
+    // A program that refuses its arguments does not read its input.
+    drop(written);
+    child.wait_with_output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// What it prints when it does its work.
+fn done(arguments: &[&str], input: &str) -> String {
+    let output = aplanat(arguments, input);
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {errors}");
+    text(&output.stdout)
+}
+
+fn done_json(arguments: &[&str], input: &str) -> Value {
+    let out = done(&[arguments, &["--json"]].concat(), input);
+    serde_json::from_str(&out).unwrap_or_else(|e| panic!("{arguments:?}: {e} in {out}"))
+}
+
+/// What it says when it ends with this status, which must contain these words.
+fn refused(status: i32, arguments: &[&str], input: &str, words: &[&str]) {
+    let output = aplanat(arguments, input);
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(status), "{arguments:?}: {errors}");
+    assert!(output.stdout.is_empty(), "{arguments:?} prints {}", text(&output.stdout));
+    for word in words {
+        assert!(errors.contains(word), "{arguments:?}: `{errors}` does not say `{word}`");
+    }
+    assert!(!errors.contains("panicked"), "{errors}");
+}
+
+fn has_keys(value: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(value.get(key).is_some(), "no key `{key}` in {value}");
+    }
+}
+
+/// A path in the temporary folder that no other test has.
+fn temporary(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("aplanat-{}-{name}", std::process::id()))
+}
+
+/// A file that is gone when the test ends.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(name: &str) -> Self {
+        Self(temporary(name))
+    }
+
+    fn with(name: &str, text: &str) -> Self {
+        let scratch = Self::new(name);
+        std::fs::write(&scratch.0, text).unwrap();
+        scratch
+    }
+
+    fn path(&self) -> &str {
+        self.0.to_str().unwrap()
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        drop(std::fs::remove_file(&self.0));
+    }
+}
+
+#[test]
+fn every_subcommand_has_long_help_with_its_json() {
+    let names = ["info", "trace", "measure trace"];
+    for name in names {
+        let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
+        let help = done(&arguments, "");
+        assert!(help.contains("JSON out (--json)"), "{name}: {help}");
+    }
+    assert!(done(&["--help"], "").contains("Exit status"));
+    assert!(done(&["--version"], "").starts_with("aplanat "));
+}
+
+#[test]
+fn wrong_usage_is_wrong_input() {
+    refused(2, &["info"], "", &["LENS"]);
+    refused(2, &["tarce"], "", &["tarce", "subcommand"]);
+    refused(2, &["info", LENS, "--zoom", "one"], "", &["one"]);
+    refused(2, &[LENS, "info", LENS], "", &["in front of a subcommand"]);
+    refused(2, &["nowhere.json"], "", &["nowhere.json"]);
+}
+
+#[test]
+fn wrong_lenses_are_named() {
+    refused(2, &["info", "nowhere.json"], "", &["nowhere.json", "cannot be read"]);
+    let whole = std::fs::read_to_string(LENS).unwrap();
+    let wrong = [
+        ("truncated.json", whole[..400].to_owned(), "truncated"),
+        ("version.json", whole.replace("\"aplanat\": 1", "\"aplanat\": 9"), "9"),
+        ("glass.json", whole.replace("SCHOTT N-BAK1", "SCHOTT N-BAK99"), "N-BAK99"),
+        ("key.json", whole.replace("\"notes\"", "\"nots\""), "nots"),
+        ("sd.json", whole.replace("6.3", "-6.3"), "-6.3"),
+    ];
+    for (name, text, word) in wrong {
+        let scratch = Scratch::with(name, &text);
+        refused(2, &["info", scratch.path()], "", &[scratch.path(), word]);
+    }
+}
+
+#[test]
+fn info_gives_first_order_data() {
+    let info = done_json(&["info", LENS], "");
+    let keys = [
+        "efl",
+        "bfl",
+        "ffl",
+        "f_number",
+        "entrance_pupil",
+        "exit_pupil",
+        "petzval_sum",
+        "seidel",
+        "semi_diameters",
+    ];
+    has_keys(&info, &keys);
+    has_keys(&info["entrance_pupil"], &["position", "diameter"]);
+    assert!((info["efl"].as_f64().unwrap() - 49.389).abs() < 1e-3);
+    assert_eq!(info["seidel"]["surfaces"].as_array().unwrap().len(), 11);
+    assert!(done(&["info", LENS], "").contains("focal length"));
+}
+
+#[test]
+fn info_gives_every_zoom_position() {
+    let info = done_json(&["info", ZOOM], "");
+    let positions = info["positions"].as_array().unwrap();
+    assert_eq!(positions.len(), 3);
+    assert_eq!(positions[0]["efl"], info["efl"]);
+    let one = done_json(&["info", ZOOM, "--zoom", "2"], "");
+    assert_eq!(one["efl"], positions[2]["efl"]);
+    refused(2, &["info", ZOOM, "--zoom", "3"], "", &[ZOOM, "no zoom position 3", "0 to 2"]);
+}
+
+/// A ray of a request.
+fn ray(y: f64, m: f64, n: f64) -> Value {
+    json!({"x": 0.0, "y": y, "z": 0.0, "L": 0.0, "M": m, "N": n})
+}
+
+fn trace(rays: &Value) -> Value {
+    done_json(&["trace", LENS, "--rays", "-"], &rays.to_string())
+}
+
+#[test]
+fn trace_gives_every_ray_its_fate() {
+    let rays = json!({"rays": [ray(2.0, 0.0, 1.0), ray(60.0, 0.0, 1.0), ray(6.2, 0.0, 1.0)]});
+    let traced = trace(&rays);
+    let rays = traced["rays"].as_array().unwrap();
+    let keys = ["fate", "surface", "x", "y", "z", "L", "M", "N", "opl"];
+    rays.iter().for_each(|ray| has_keys(ray, &keys));
+    let fate = |i: usize| (rays[i]["fate"].as_str().unwrap(), rays[i]["surface"].as_u64().unwrap());
+    assert_eq!(fate(0), ("imaged", 11));
+    assert_eq!(fate(1), ("missed", 0));
+    assert_eq!(fate(2).0, "clipped");
+    assert_eq!(traced["fates"]["imaged"], 1);
+    assert_eq!(rays[0]["z"], 0.0);
+    assert!(rays[0].get("backwards").is_none());
+}
+
+#[test]
+fn trace_flags_a_ray_that_goes_backwards() {
+    let rays = json!({"rays": [{"x": 0, "y": 1, "z": 5, "L": 0, "M": 0, "N": 1}]});
+    assert_eq!(trace(&rays)["rays"][0]["backwards"], 0);
+}
+
+#[test]
+fn trace_reads_a_file_and_prints_a_table() {
+    let rays = json!({"wavelength_um": 0.55, "zoom": 1, "rays": [ray(1.0, 0.0, 1.0)]});
+    let scratch = Scratch::with("rays.json", &rays.to_string());
+    let out = done(&["trace", ZOOM, "--rays", scratch.path()], "");
+    assert!(out.contains("imaged") && out.contains("0.55 um, zoom position 1"), "{out}");
+}
+
+#[test]
+fn trace_refuses_what_cannot_be_traced() {
+    let refuse = |input: &str, words: &[&str]| {
+        refused(2, &["trace", LENS, "--rays", "-"], input, &[&["standard input"], words].concat());
+    };
+    let rays = |last: Value| json!({"rays": [ray(0.0, 0.0, 1.0), last]}).to_string();
+    refuse(&rays(ray(0.0, 0.5, 1.0)), &["ray 1", "length"]);
+    refuse(&rays(json!({"x": 0, "y": 0, "z": 0, "L": 0, "M": 0})), &["ray 1", "`N`"]);
+    refuse(&rays(ray(1e200, 0.0, 1.0)), &["ray 1", "finite"]);
+    refuse(&rays(json!({"x": "NaN"})), &["ray 1", "NaN"]);
+    refuse(&rays(ray(0.0, 0.0, 1.0)).replace("\"L\"", "\"U\""), &["ray 0", "`U`", "column"]);
+    refuse("{\"rays\": [], \"colour\": 1}", &["`colour`", "wavelength_um"]);
+    refuse("{\"rays\": [{\"x\": 1e999}]}", &["range"]);
+    refuse("{\"rays\": [", &["end of the file"]);
+    let file = |input: &str, words: &[&str]| {
+        refused(2, &["trace", LENS, "--rays", "-"], input, &[&[LENS], words].concat());
+    };
+    file("{\"rays\": [], \"zoom\": 7}", &["zoom position 7"]);
+    file("{\"rays\": [], \"wavelength_um\": 90}", &["90 um"]);
+}
+
+#[test]
+fn measure_trace_has_a_rate_for_every_way() {
+    let measured = done_json(&["measure", "trace", "--turns", "1"], "");
+    has_keys(&measured["machine"], &["processor", "cores", "lane_bits", "optimised"]);
+    let rows = measured["rows"].as_array().unwrap();
+    for name in ["f64_batch_1_thread", "f64_batch_2_threads", "f32_batch_1_thread", "f64_single"] {
+        let row = rows.iter().find(|row| row["name"] == name).unwrap();
+        assert!(row["million_ray_surfaces_per_s"].as_f64().unwrap() > 0.0, "{name}");
+    }
+    let rounding = |name: &str| measured[name]["point_rms_mm"].as_f64().unwrap();
+    assert!(rounding("rounding_f64") < 1e-12 && rounding("rounding_f32") < 1e-4);
+    assert_eq!(measured["rounding_f64"]["other_fates"], 0);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+    command.args(["info", LENS]).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
+}

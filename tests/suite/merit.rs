@@ -1,0 +1,138 @@
+//! Derivatives of every term by every kind of variable, against central differences.
+
+use aplanat::files;
+use aplanat::lens::{Lens, Medium, Parameter, Pickup, Quantity, Variable};
+use aplanat::merit::{Detail, Goal, Merit, Term, Weighted};
+
+pub(crate) fn bundled(name: &str) -> Lens {
+    files::open(format!("lenses/{name}.json")).unwrap().lens
+}
+
+pub(crate) fn vary(lens: &mut Lens, surface: usize, quantity: Quantity) {
+    let parameter = Parameter::new(surface, quantity);
+    lens.variables.push(Variable { parameter, min: None, max: None });
+}
+
+/// A double Gauss in which every kind of number varies: an asphere, a conic, a model glass, a
+/// pickup, a solved last gap.
+fn everything() -> Lens {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.variables.clear();
+    lens.surfaces[2].conic = -0.3;
+    lens.surfaces[9].asphere = vec![1e-6, -2e-9];
+    lens.surfaces[0].medium = Medium::Model { nd: 1.5725, vd: 57.5 };
+    lens.focus = Some(0.1);
+    for surface in [0, 1, 4, 6] {
+        vary(&mut lens, surface, Quantity::Curvature);
+    }
+    vary(&mut lens, 2, Quantity::Conic);
+    vary(&mut lens, 7, Quantity::Conic);
+    vary(&mut lens, 9, Quantity::Asphere(0));
+    vary(&mut lens, 9, Quantity::Asphere(3));
+    vary(&mut lens, 0, Quantity::Index);
+    for surface in [0, 4, 5] {
+        vary(&mut lens, surface, Quantity::Thickness);
+    }
+    lens.pickups.push(Pickup {
+        parameter: Parameter::new(10, Quantity::Curvature),
+        source: Parameter::new(0, Quantity::Curvature),
+        scale: -1.0,
+        offset: 0.0,
+    });
+    lens
+}
+
+fn terms() -> Vec<Term> {
+    vec![
+        Term::Spot,
+        Term::FocalLength(60.0),
+        Term::Distortion,
+        Term::GlassCenter { min: 3.0, max: 1.0 },
+        Term::GlassEdge(3.0),
+        Term::AirCenter { min: 3.0, max: 0.05 },
+        Term::AirEdge(4.0),
+        Term::TotalTrack(20.0),
+        Term::BackFocus(90.0),
+    ]
+}
+
+fn check(lens: &Lens, term: Term, steps: impl Fn(Quantity) -> f64) {
+    let goal = Goal { terms: vec![Weighted { term, weight: 1.0 }], zoom_ratios: Vec::new() };
+    let merit = Merit::new(lens, &goal, 1e-4).unwrap();
+    let values = merit.values(lens);
+    let sum = merit.sum(&values, Detail::Gradient).unwrap();
+    let normal = merit.sum(&values, Detail::Normal).unwrap();
+    let mut worst: f64 = 0.0;
+    for (i, variable) in merit.variables().iter().enumerate() {
+        let step = steps(variable.parameter.quantity);
+        let at = |offset: f64| {
+            let mut moved = values.clone();
+            moved[i] += offset * step;
+            merit.value(&moved).unwrap()
+        };
+        let difference = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step);
+        let scale = sum.gradient.amax() * 1e-9 + 1e-9 * sum.value / step;
+        let error = (sum.gradient[i] - difference).abs();
+        let relative = error / (difference.abs() + scale);
+        worst = worst.max(relative);
+        let name = variable.parameter.to_string();
+        assert!(relative < 2e-6, "{} by {name}: {} and {difference}", term.name(), sum.gradient[i]);
+        let same = (sum.gradient[i] - normal.gradient[i]).abs();
+        assert!(
+            same <= 1e-9 * sum.gradient.amax(),
+            "{} by {name}: backwards and by rows",
+            term.name()
+        );
+    }
+    println!("{}: gradient against differences, worst {worst:.1e}", term.name());
+}
+
+fn step(quantity: Quantity) -> f64 {
+    match quantity {
+        Quantity::Curvature => 2e-5,
+        Quantity::Asphere(term) => 1e-6 * 0.03_f64.powi(2 * term as i32),
+        Quantity::Conic
+        | Quantity::Thickness
+        | Quantity::ZoomThickness(_)
+        | Quantity::SemiDiameter => 1e-2,
+        Quantity::Index => 1e-4,
+    }
+}
+
+#[test]
+fn every_term_has_the_derivative_of_its_value() {
+    let lens = everything();
+    terms().into_iter().for_each(|term| check(&lens, term, step));
+}
+
+#[test]
+fn a_zoom_lens_has_derivatives_by_its_moving_gaps() {
+    let mut lens = bundled("zoom_nikkor_28_80");
+    lens.variables.clear();
+    for gap in lens.zoom[0].thicknesses.clone() {
+        for zoom in 0..lens.zoom.len() {
+            vary(&mut lens, gap.surface, Quantity::ZoomThickness(zoom));
+        }
+    }
+    vary(&mut lens, 3, Quantity::Curvature);
+    for term in [Term::Spot, Term::FocalLength(29.0), Term::TotalTrack(10.0)] {
+        check(&lens, term, step);
+    }
+}
+
+#[test]
+fn the_gauss_newton_matrix_is_that_of_the_residuals() {
+    // Near a solution the Hessian of a sum of squares is twice the Gauss-Newton matrix; a linear
+    // residual is near one everywhere.
+    let mut lens = bundled("achromat_ac254_100");
+    lens.variables.clear();
+    vary(&mut lens, 2, Quantity::Thickness);
+    let goal =
+        Goal { terms: vec![Weighted { term: Term::Spot, weight: 1.0 }], zoom_ratios: vec![] };
+    let merit = Merit::new(&lens, &goal, 1e-4).unwrap();
+    let values = merit.values(&lens);
+    let at = |t: f64| merit.sum(&[values[0] + t], Detail::Gradient).unwrap().gradient[0];
+    let second = (at(0.01) - at(-0.01)) / 0.02;
+    let normal = merit.sum(&values, Detail::Normal).unwrap().normal[(0, 0)];
+    assert!((second / (2.0 * normal) - 1.0).abs() < 1e-6, "{second} and {normal}");
+}

@@ -1,0 +1,61 @@
+//! Local search on real lenses.
+
+use super::merit::{bundled, vary};
+use aplanat::lens::Quantity;
+use aplanat::merit::{Goal, MeritError};
+use aplanat::optimize::{Method, start};
+
+fn improve(method: Method, steps: usize) -> (f64, f64) {
+    let lens = bundled("double_gauss_rudolph_50");
+    let goal = Goal::sensible(&lens).unwrap();
+    let mut optimizer = start(method, &lens, &goal, 1e-3).unwrap();
+    let before = optimizer.terms().unwrap()[0].value.sqrt();
+    for _ in 0..steps {
+        let progress = optimizer.step();
+        assert!(progress.merit.is_finite() && progress.best <= progress.merit * (1.0 + 1e-12));
+        optimizer.current().check().unwrap();
+        if progress.finished {
+            break;
+        }
+    }
+    let best = optimizer.best();
+    best.check().unwrap();
+    let terms = optimizer.terms().unwrap();
+    println!("{method:?}: {terms:?}");
+    (before, terms[0].value.sqrt())
+}
+
+#[test]
+fn least_squares_sharpens_the_double_gauss() {
+    let (before, after) = improve(Method::DampedLeastSquares, 60);
+    println!("RMS radius {before:.5} mm to {after:.5} mm");
+    assert!(after < 0.4 * before);
+}
+
+#[test]
+fn adam_sharpens_the_double_gauss() {
+    let (before, after) = improve(Method::Adam, 200);
+    println!("RMS radius {before:.5} mm to {after:.5} mm");
+    assert!(after < 0.6 * before);
+}
+
+#[test]
+fn bounds_hold_and_a_lens_without_variables_is_refused() {
+    let mut lens = bundled("achromat_ac254_100");
+    lens.variables.clear();
+    let goal = Goal::sensible(&lens).unwrap();
+    assert_eq!(start(Method::Adam, &lens, &goal, 1e-3).unwrap_err(), MeritError::NoVariables);
+    vary(&mut lens, 2, Quantity::Thickness);
+    vary(&mut lens, 0, Quantity::Curvature);
+    let thickness = lens.surfaces[2].thickness;
+    lens.variables[0].min = Some(thickness + 0.0);
+    lens.variables[0].max = Some(thickness + 0.001);
+    for method in [Method::Adam, Method::DampedLeastSquares] {
+        let mut optimizer = start(method, &lens, &goal, 1e-3).unwrap();
+        for _ in 0..30 {
+            optimizer.step();
+            let t = optimizer.current().surfaces[2].thickness;
+            assert!((thickness..=thickness + 0.001).contains(&t), "{method:?}: {t}");
+        }
+    }
+}

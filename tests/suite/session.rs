@@ -1,0 +1,681 @@
+//! A session keeps the design sound, whatever it is told, and its threads keep their word.
+
+use aplanat::effects::{Choice, Effect};
+use aplanat::files;
+use aplanat::lens::{
+    Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
+    Variable, ZoomPosition, ZoomThickness,
+};
+use aplanat::merit::Goal;
+use aplanat::optimize::{Method, Optimizer, Progress};
+use aplanat::session::{Command, Edit, Event, Session, Severity, Standing, Starter, View};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+/// A lens of the library.
+fn lens(name: &str) -> Lens {
+    let bundled = files::library().iter().find(|lens| lens.name == name).unwrap();
+    files::native::read(bundled.text, name).unwrap()
+}
+
+fn double_gauss() -> Lens {
+    lens("double_gauss_rudolph_50")
+}
+
+/// Bends the first surface a little with every step, and gets better with each.
+#[derive(Debug)]
+struct Toy {
+    lens: Lens,
+    step: usize,
+    last: usize,
+    breaks: usize,
+    steps: Arc<AtomicUsize>,
+}
+
+impl Optimizer for Toy {
+    fn step(&mut self) -> Progress {
+        assert_ne!(self.step, self.breaks, "the toy breaks");
+        self.step += 1;
+        self.steps.fetch_add(1, Ordering::SeqCst);
+        self.lens.surfaces[0].curvature *= 1.0 + 1e-6;
+        let merit = 1.0 / self.step as f64;
+        let finished = self.step == self.last;
+        Progress { step: self.step, merit, best: merit, accepted: 1.0, refused: None, finished }
+    }
+
+    fn best(&self) -> &Lens {
+        &self.lens
+    }
+
+    fn current(&self) -> &Lens {
+        &self.lens
+    }
+}
+
+/// A toy that ends after its `last` step, and breaks if it is the name of the lens that says so.
+fn toy(last: usize, steps: &Arc<AtomicUsize>) -> Box<Starter> {
+    let steps = Arc::clone(steps);
+    Box::new(move |_, lens, _| {
+        if lens.surfaces[0].curvature == 0.0 {
+            return Err("the toy needs a curved surface".to_owned());
+        }
+        let breaks = if lens.name == "breaks" { 7 } else { usize::MAX };
+        let (lens, steps) = (lens.clone(), Arc::clone(&steps));
+        Ok(Box::new(Toy { lens, step: 0, last, breaks, steps }))
+    })
+}
+
+fn session(lens: Lens) -> Session {
+    Session::new(lens, toy(1_000_000, &Arc::default()), || {}).unwrap()
+}
+
+const OPTIMIZE: Command =
+    Command::Optimize { method: Method::Adam, goal: Goal { terms: Vec::new() } };
+
+/// Waits until something has happened in the background.
+fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
+    let mut events = Vec::new();
+    for _ in 0..2000 {
+        events.extend(session.poll());
+        if happened(&session.view(), &events) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    panic!("{what} never happened");
+}
+
+fn step_of(view: &View) -> usize {
+    let progress = view.search.as_ref().and_then(|search| search.progress.as_ref());
+    progress.map_or(0, |progress| progress.step)
+}
+
+const CURVATURE: Parameter = Parameter::new(0, Quantity::Curvature);
+const GAP: Parameter = Parameter::new(1, Quantity::Thickness);
+
+/// One edit of every kind, each of which changes the lens.
+fn every_edit(lens: &Lens) -> Vec<Edit> {
+    let last = lens.surfaces.len() - 1;
+    let stop = lens.stop().unwrap();
+    let angles = vec![Field { x: 0.0, y: 3.0, weight: 2.0 }];
+    let position = ZoomPosition {
+        name: "near".into(),
+        thicknesses: vec![ZoomThickness { surface: 1, thickness: 0.7 }],
+        ..ZoomPosition::default()
+    };
+    let thickness = lens.surfaces[last].thickness;
+    let row = Row { curvature: 0.01, thickness, ..Row::default() };
+    vec![
+        Edit::Set { parameter: GAP, value: 0.2 },
+        Edit::Type { parameter: GAP, text: "*2".into() },
+        Edit::TypeRadius { surface: 0, text: "15+1".into() },
+        Edit::SetSemiDiameter { surface: 0, value: None },
+        Edit::SetAsphere { surface: 0, terms: vec![1e-7, 2e-10] },
+        Edit::SetMedium { surface: 0, medium: Medium::Model { nd: 1.6, vd: 50.0 } },
+        Edit::SetObjectMedium(Medium::Index(1.33)),
+        Edit::SetStop(usize::from(stop == 0)),
+        Edit::SetHyper { surface: 0, hyper: true },
+        Edit::SetComment { surface: 0, text: "front".into() },
+        Edit::SetRow { surface: last, row: Row { stop: last == stop, ..row.clone() } },
+        Edit::InsertRow { at: 1, row: row.clone() },
+        Edit::RemoveRow(1),
+        Edit::FlipRows { first: 0, last: 1 },
+        Edit::Scale(2.0),
+        Edit::SetName("Other".into()),
+        Edit::SetSource("elsewhere".into()),
+        Edit::SetNotes("a note".into()),
+        Edit::SetObject(Object::Finite(1000.0)),
+        Edit::SetAperture(Aperture::EntrancePupilDiameter(1.25)),
+        Edit::SetFields(Fields { kind: FieldKind::Angle, values: angles }),
+        Edit::SetWavelengths(vec![aplanat::lens::Wavelength {
+            um: 0.55,
+            weight: 1.0,
+            primary: true,
+        }]),
+        Edit::SetFocus(Some(0.1)),
+        Edit::Free(Variable { parameter: CURVATURE, min: None, max: None }),
+        Edit::Fix(CURVATURE),
+        Edit::SetPickup(Pickup { parameter: GAP, source: CURVATURE, scale: 1.0, offset: 3.0 }),
+        Edit::RemovePickup(GAP),
+        Edit::InsertZoom { at: 0, position: position.clone() },
+        Edit::SetZoom { at: 0, position: ZoomPosition { name: "far".into(), ..position } },
+        Edit::RemoveZoom(0),
+        Edit::Replace(Box::new(aplanat::session::blank())),
+    ]
+}
+
+/// The number of an edit's kind; the compiler asks for every new one.
+fn kind(edit: &Edit) -> usize {
+    match edit {
+        Edit::Set { .. } => 0,
+        Edit::Type { .. } => 1,
+        Edit::TypeRadius { .. } => 2,
+        Edit::SetSemiDiameter { .. } => 3,
+        Edit::SetAsphere { .. } => 4,
+        Edit::SetMedium { .. } => 5,
+        Edit::SetObjectMedium(_) => 6,
+        Edit::SetStop(_) => 7,
+        Edit::SetHyper { .. } => 8,
+        Edit::SetComment { .. } => 9,
+        Edit::SetRow { .. } => 10,
+        Edit::InsertRow { .. } => 11,
+        Edit::RemoveRow(_) => 12,
+        Edit::FlipRows { .. } => 13,
+        Edit::Scale(_) => 14,
+        Edit::SetName(_) => 15,
+        Edit::SetSource(_) => 16,
+        Edit::SetNotes(_) => 17,
+        Edit::SetObject(_) => 18,
+        Edit::SetAperture(_) => 19,
+        Edit::SetFields(_) => 20,
+        Edit::SetWavelengths(_) => 21,
+        Edit::SetFocus(_) => 22,
+        Edit::Free(_) => 23,
+        Edit::Fix(_) => 24,
+        Edit::SetPickup(_) => 25,
+        Edit::RemovePickup(_) => 26,
+        Edit::InsertZoom { .. } => 27,
+        Edit::SetZoom { .. } => 28,
+        Edit::RemoveZoom(_) => 29,
+        Edit::Replace(_) => 30,
+    }
+}
+
+#[test]
+fn every_kind_of_edit_is_undone_and_redone_exactly() {
+    let mut session = session(double_gauss());
+    let edits = every_edit(session.lens());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..31).collect::<Vec<_>>());
+    let mut lenses = vec![Arc::clone(session.lens())];
+    for edit in edits {
+        let events = session.apply(edit.clone().into());
+        let refused = matches!(events.last(), Some(Event::Said(_)));
+        assert!(!refused && session.lens() != lenses.last().unwrap(), "{edit:?}: {events:?}");
+        let text = serde_json::to_string(&Command::from(edit.clone())).unwrap();
+        assert_eq!(serde_json::from_str::<Command>(&text).unwrap(), Command::Edit(edit), "{text}");
+        lenses.push(Arc::clone(session.lens()));
+        session.apply(Command::Settle);
+    }
+    for before in lenses.iter().rev().skip(1) {
+        session.apply(Command::Undo);
+        assert_eq!(session.lens(), before);
+    }
+    assert!(!session.view().can_undo() && !session.is_dirty());
+    for after in &lenses[1..] {
+        session.apply(Command::Redo);
+        assert_eq!(session.lens(), after);
+    }
+    assert!(!session.view().can_redo() && session.is_dirty());
+}
+
+#[test]
+fn typing_into_one_cell_is_one_step_from_the_value_that_was_there() {
+    let mut session = session(double_gauss());
+    let before = session.lens().surfaces[1].thickness;
+    for text in ["*", "*1", "*10", "*10.", "*10.5"] {
+        session.apply(Edit::Type { parameter: GAP, text: text.into() }.into());
+    }
+    assert_eq!(session.lens().surfaces[1].thickness, before * 10.5);
+    session.apply(Command::Settle);
+    session.apply(Edit::Type { parameter: GAP, text: "+1".into() }.into());
+    assert_eq!(session.lens().surfaces[1].thickness, before * 10.5 + 1.0);
+    session.apply(Command::Undo);
+    session.apply(Command::Undo);
+    assert_eq!(session.lens().surfaces[1].thickness, before);
+    assert!(!session.view().can_undo());
+}
+
+#[test]
+fn refused_edits_leave_the_design_and_say_why() {
+    let cases = [
+        (Edit::Set { parameter: GAP, value: f64::NAN }, "thickness after surface 1 is NaN"),
+        (Edit::Set { parameter: Parameter::new(99, Quantity::Conic), value: 0.0 }, "no surface 99"),
+        (Edit::TypeRadius { surface: 0, text: "ten".into() }, "`ten` is no number"),
+        (Edit::SetSemiDiameter { surface: 0, value: Some(-1.0) }, "expected zero or more"),
+        (Edit::SetMedium { surface: 0, medium: Medium::Glass("N-BK77".into()) }, "unknown glass"),
+        (Edit::RemoveRow(usize::MAX), "there is no surface"),
+        (Edit::FlipRows { first: 2, last: 1 }, "no group"),
+        (Edit::SetWavelengths(Vec::new()), "no wavelengths"),
+        (Edit::RemoveZoom(0), "the lens has 0"),
+        (Edit::Scale(0.0), "the scale is 0"),
+        (Edit::SetAperture(Aperture::FNumber(0.0)), "f-number is 0"),
+    ];
+    let mut session = session(double_gauss());
+    let before = session.view();
+    for (edit, words) in cases {
+        let events = session.apply(edit.into());
+        let [Event::Said(message)] = events.as_slice() else { panic!("{events:?}") };
+        assert!(message.text.contains(words), "{} has no `{words}`", message.text);
+        assert_eq!(message.severity, Severity::Warning);
+    }
+    let stop = session.lens().stop().unwrap();
+    session.apply(Edit::RemoveRow(stop).into());
+    assert!(session.view().messages.last().unwrap().text.contains("is the stop"));
+    assert_eq!((session.lens(), session.view().version), (&before.lens, before.version));
+}
+
+/// A zoom lens with variables and pickups on both sides of its rows 3 to 5.
+fn wired() -> Lens {
+    let mut lens = lens("zoom_nikkor_28_80");
+    let number = Parameter::new;
+    lens.variables = vec![
+        Variable { parameter: number(2, Quantity::Curvature), min: None, max: Some(0.5) },
+        Variable { parameter: number(7, Quantity::ZoomThickness(1)), min: Some(1.0), max: None },
+    ];
+    lens.pickups = vec![Pickup {
+        parameter: number(16, Quantity::SemiDiameter),
+        source: number(15, Quantity::SemiDiameter),
+        scale: 1.0,
+        offset: 0.0,
+    }];
+    lens
+}
+
+#[test]
+fn what_names_a_row_follows_it_when_rows_come_and_go() {
+    let mut session = session(wired());
+    let before = Arc::clone(session.lens());
+    session.apply(Edit::InsertRow { at: 3, row: Row::default() }.into());
+    let lens = Arc::clone(session.lens());
+    assert_eq!(lens.variables[0].parameter.surface, 2);
+    assert_eq!(lens.variables[1].parameter.surface, 8);
+    assert_eq!((lens.pickups[0].parameter.surface, lens.pickups[0].source.surface), (17, 16));
+    assert_eq!(lens.zoom[2].thicknesses.iter().map(|g| g.surface).collect::<Vec<_>>(), [8, 17]);
+    session.apply(Edit::RemoveRow(3).into());
+    assert_eq!(*session.lens(), before);
+    session.apply(Edit::RemoveRow(2).into());
+    assert_eq!(session.lens().variables.len(), 1);
+    session.apply(Edit::RemoveRow(6).into());
+    assert_eq!(session.lens().variables.len(), 0, "its gap is gone at every zoom position");
+    assert_eq!(session.lens().zoom[0].thicknesses.len(), 1);
+}
+
+#[test]
+fn a_row_that_changes_nothing_changes_no_focal_length_wherever_it_is_put() {
+    let mut base = double_gauss();
+    base.focus = Some(0.0);
+    let um = base.wavelengths[base.primary()].um;
+    let efl = |lens: &Lens| {
+        let system = lens.system(0, um).unwrap();
+        let length: f64 = system.surfaces.iter().map(|s| s.thickness).sum();
+        let beam = aplanat::paraxial::Beam::of(lens, 0);
+        (aplanat::paraxial::first_order(&system, &beam).unwrap().efl.unwrap(), length)
+    };
+    let (f, length) = efl(&base);
+    for at in 0..=base.surfaces.len() {
+        let medium = if at == 0 { Medium::Air } else { base.surfaces[at - 1].medium.clone() };
+        let row = Row { medium, ..Row::default() };
+        let lens = aplanat::session::edited(&base, &Edit::InsertRow { at, row }).unwrap();
+        let (other, other_length) = efl(&lens);
+        assert!((other - f).abs() < 1e-12 * f, "row {at}: {other}");
+        assert!((other_length - length).abs() < 1e-9, "row {at}: {other_length}");
+    }
+}
+
+#[test]
+fn a_group_turned_twice_is_what_it_was() {
+    let mut lens = wired();
+    let asphere = Parameter::new(4, Quantity::Asphere(1));
+    lens.surfaces[4].asphere = vec![1e-6, -2e-9];
+    lens.variables.push(Variable { parameter: asphere, min: Some(-1e-8), max: Some(0.0) });
+    lens.pickups.push(Pickup {
+        parameter: Parameter::new(5, Quantity::Curvature),
+        source: asphere,
+        scale: 3.0,
+        offset: 0.02,
+    });
+    let lens = lens.with_pickups().unwrap();
+    for (first, last) in [(0, 16), (2, 5), (4, 4), (4, 7), (6, 9)] {
+        let flip = Edit::FlipRows { first, last };
+        let turned = aplanat::session::edited(&lens, &flip).unwrap();
+        assert_ne!(turned, lens);
+        assert_eq!(aplanat::session::edited(&turned, &flip).unwrap(), lens, "{first} to {last}");
+    }
+    let turned = aplanat::session::edited(&lens, &Edit::FlipRows { first: 4, last: 5 }).unwrap();
+    let (bound, law) = (turned.variables[2], turned.pickups[1]);
+    assert_eq!((bound.parameter.surface, bound.min, bound.max), (5, Some(0.0), Some(1e-8)));
+    assert_eq!((law.parameter.surface, law.scale, law.offset), (4, 3.0, -0.02));
+}
+
+#[test]
+fn a_scaled_lens_has_the_scaled_focal_length_and_goes_back() {
+    for bundled in files::library() {
+        let lens = lens(bundled.name);
+        let um = lens.wavelengths[lens.primary()].um;
+        let power = |lens: &Lens| {
+            let beam = aplanat::paraxial::Beam::of(lens, 0);
+            aplanat::paraxial::first_order(&lens.system(0, um).unwrap(), &beam).unwrap().power
+        };
+        let twice = aplanat::session::edited(&lens, &Edit::Scale(2.0)).unwrap();
+        assert!((2.0 * power(&twice) - power(&lens)).abs() < 1e-12, "{}", bundled.name);
+        let back = aplanat::session::edited(&twice, &Edit::Scale(0.5)).unwrap();
+        assert_eq!(back, lens, "{}", bundled.name);
+    }
+}
+
+#[test]
+fn the_image_plane_stays_where_it_was_when_the_solve_goes() {
+    let mut lens = wired();
+    lens.focus = Some(0.25);
+    let um = lens.wavelengths[lens.primary()].um;
+    let fixed = aplanat::session::edited(&lens, &Edit::SetFocus(None)).unwrap();
+    for zoom in 0..3 {
+        assert_eq!(fixed.system(zoom, um).unwrap(), lens.system(zoom, um).unwrap());
+    }
+    let last = Parameter::new(16, Quantity::Thickness);
+    let edit = Edit::Set { parameter: last, value: 30.0 };
+    assert!(aplanat::session::edited(&lens, &edit).is_err(), "a solved gap is not typed");
+}
+
+#[test]
+fn a_search_runs_beside_the_design_and_its_result_is_one_step() {
+    let mut session = session(double_gauss());
+    let before = Arc::clone(session.lens());
+    session.apply(OPTIMIZE);
+    wait(&mut session, "a step", |view, _| step_of(view) > 0);
+    session.apply(Command::Stop);
+    wait(&mut session, "the stop", |view, _| !view.search.as_ref().unwrap().is_under_way());
+    assert_eq!(*session.lens(), before, "the search has its own copy");
+    let best = Arc::clone(&session.view().search.unwrap().best);
+    session.apply(Command::Take);
+    assert_eq!(*session.lens(), best);
+    assert!(session.view().search.is_none());
+    session.apply(Command::Undo);
+    assert_eq!(*session.lens(), before);
+    assert!(!session.view().can_undo());
+}
+
+#[test]
+fn a_discarded_search_leaves_the_design_alone() {
+    let mut session = session(double_gauss());
+    let before = session.view();
+    session.apply(OPTIMIZE);
+    wait(&mut session, "a step", |view, _| step_of(view) > 0);
+    session.apply(Command::Discard);
+    let after = session.view();
+    assert!(after.search.is_none());
+    assert_eq!((after.version, &after.lens), (before.version, &before.lens));
+    let events = session.apply(Command::Take);
+    assert!(matches!(events.last(), Some(Event::Said(_))), "there is nothing to take: {events:?}");
+}
+
+#[test]
+fn a_result_taken_after_an_edit_keeps_the_edit() {
+    let mut start = double_gauss();
+    start.variables = vec![Variable { parameter: CURVATURE, min: None, max: None }];
+    let mut session = session(start);
+    session.apply(OPTIMIZE);
+    wait(&mut session, "a step", |view, _| step_of(view) > 0);
+    session.apply(Command::Pause);
+    session.apply(Edit::Set { parameter: GAP, value: 0.5 }.into());
+    wait(&mut session, "the pause", |view, _| {
+        view.search.as_ref().is_some_and(|search| search.standing == Standing::Paused)
+    });
+    let best = Arc::clone(&session.view().search.unwrap().best);
+    session.apply(Command::Take);
+    assert_eq!(session.lens().surfaces[0].curvature, best.surfaces[0].curvature);
+    assert_eq!(session.lens().surfaces[1].thickness, 0.5);
+}
+
+#[test]
+fn pause_holds_and_step_advances_by_one() {
+    let steps = Arc::new(AtomicUsize::new(0));
+    let mut session = Session::new(double_gauss(), toy(600, &steps), || {}).unwrap();
+    session.apply(OPTIMIZE);
+    session.apply(Command::Pause);
+    wait(&mut session, "the pause", |view, _| {
+        view.search.as_ref().is_some_and(|search| search.standing == Standing::Paused)
+    });
+    let held = steps.load(Ordering::SeqCst);
+    std::thread::sleep(Duration::from_millis(60));
+    assert_eq!(steps.load(Ordering::SeqCst), held, "nothing moves while the search is held");
+    for more in 1..=3 {
+        session.apply(Command::Step);
+        wait(&mut session, "one step", |view, _| step_of(view) == held + more);
+        assert_eq!(steps.load(Ordering::SeqCst), held + more);
+    }
+    session.apply(Command::Resume);
+    wait(&mut session, "the end", |view, _| {
+        view.search.as_ref().is_some_and(|search| search.standing == Standing::Finished)
+    });
+    let search = session.view().search.unwrap();
+    assert_eq!((search.standing, search.history.len()), (Standing::Finished, 600));
+}
+
+#[test]
+fn a_search_that_breaks_says_so_and_the_next_one_works() {
+    let mut session = session(Lens { name: "breaks".into(), ..double_gauss() });
+    session.apply(OPTIMIZE);
+    wait(&mut session, "the failure", |view, _| {
+        view.messages.iter().any(|m| m.text.contains("the toy breaks"))
+    });
+    session.apply(Command::Undo);
+    session.apply(Edit::SetName("works".into()).into());
+    session.apply(OPTIMIZE);
+    wait(&mut session, "another step", |view, _| step_of(view) > 0);
+    session.apply(Edit::Set { parameter: CURVATURE, value: 0.0 }.into());
+    session.apply(OPTIMIZE);
+    wait(&mut session, "the refusal", |view, _| {
+        view.messages.iter().any(|m| m.text.contains("needs a curved surface"))
+    });
+    assert!(session.view().search.is_none());
+}
+
+#[test]
+fn the_threads_end_when_the_session_is_dropped() {
+    let alive = Arc::new(());
+    let steps = Arc::new(AtomicUsize::new(0));
+    let held = Arc::clone(&alive);
+    let wake = move || assert!(Arc::strong_count(&held) > 0);
+    let mut session = Session::new(double_gauss(), toy(usize::MAX, &steps), wake).unwrap();
+    session.apply(OPTIMIZE);
+    wait(&mut session, "a step", |view, _| step_of(view) > 0);
+    drop(session);
+    assert_eq!(Arc::strong_count(&alive), 1, "no thread holds the way to wake the window");
+    let last = steps.load(Ordering::SeqCst);
+    std::thread::sleep(Duration::from_millis(30));
+    assert_eq!(steps.load(Ordering::SeqCst), last);
+}
+
+#[test]
+fn a_slow_window_holds_nothing_up_and_is_not_woken_too_often() {
+    let steps = Arc::new(AtomicUsize::new(0));
+    let woken = Arc::new(AtomicUsize::new(0));
+    let count = Arc::clone(&woken);
+    let wake = move || {
+        count.fetch_add(1, Ordering::SeqCst);
+    };
+    let mut session = Session::new(double_gauss(), toy(500_000, &steps), wake).unwrap();
+    session.apply(OPTIMIZE);
+    std::thread::sleep(Duration::from_millis(300));
+    let (taken, looks) = (steps.load(Ordering::SeqCst), woken.load(Ordering::SeqCst));
+    assert!(taken >= 1000, "nobody looked, and yet there were {taken} steps");
+    assert!(looks <= 20, "{looks} looks in 0.3 s");
+}
+
+#[test]
+fn the_numbers_of_the_newest_design_arrive() {
+    let mut session = session(double_gauss());
+    for thickness in 1..50 {
+        session.apply(Edit::Set { parameter: GAP, value: 0.01 * f64::from(thickness) }.into());
+    }
+    wait(&mut session, "the numbers", |view, _| view.is_current());
+    let results = session.results().unwrap();
+    assert_eq!(results.lens.surfaces[1].thickness, 0.49);
+    let numbers = results.numbers.as_ref().unwrap();
+    assert!((numbers.first().efl.unwrap() - 49.4).abs() < 1.0);
+    println!(
+        "numbers of the double Gauss: {:.2} ms (bench {:.2}, seidel {:.3}, layout {:.2}, dots {:.2})",
+        results.ms, numbers.bench.ms, numbers.seidel.ms, numbers.layout.ms, numbers.scatter.ms
+    );
+}
+
+#[test]
+fn a_design_is_saved_and_opened() {
+    let folder = std::env::temp_dir().join(format!("aplanat-session-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("lens.json");
+    let mut session = session(double_gauss());
+    let events = session.apply(Command::Save(None));
+    assert!(matches!(events.last(), Some(Event::Said(_))), "it has no file yet");
+    session.apply(Edit::SetName("Mine".into()).into());
+    let events = session.apply(Command::Save(Some(path.clone())));
+    assert!(events.contains(&Event::Saved(path.clone())), "{events:?}");
+    assert!(!session.view().dirty);
+    session.apply(Edit::SetName("Other".into()).into());
+    assert!(session.view().dirty);
+    session.apply(Command::Open(path.clone()));
+    assert_eq!((session.lens().name.as_str(), session.view().can_undo()), ("Mine", false));
+    assert_eq!(session.view().path, Some(path));
+    let before = Arc::clone(session.lens());
+    let events = session.apply(Command::Open(folder.join("missing.json")));
+    assert!(matches!(&events[0], Event::Said(m) if m.text.contains("missing.json")), "{events:?}");
+    assert_eq!(*session.lens(), before);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// Steele, Lea and Flood's generator.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        usize::try_from(self.next() % end as u64).unwrap()
+    }
+
+    fn number(&mut self) -> f64 {
+        let odd = [0.0, -0.0, f64::NAN, f64::INFINITY, -1.0, 1e300, 1e-300, 5e-324];
+        match self.below(4) {
+            0 => odd[self.below(odd.len())],
+            1 => self.below(20) as f64 - 5.0,
+            _ => (self.below(2000) as f64 - 1000.0) * 1e-4,
+        }
+    }
+
+    fn parameter(&mut self) -> Parameter {
+        let quantity = match self.below(7) {
+            0 => Quantity::Curvature,
+            1 => Quantity::Conic,
+            2 => Quantity::Asphere(self.below(9)),
+            3 => Quantity::Thickness,
+            4 => Quantity::ZoomThickness(self.below(4)),
+            5 => Quantity::Index,
+            _ => Quantity::SemiDiameter,
+        };
+        Parameter::new(self.below(20), quantity)
+    }
+
+    fn medium(&mut self) -> Medium {
+        match self.below(6) {
+            0 => Medium::Air,
+            1 => Medium::Glass("SCHOTT N-BK7".into()),
+            2 => Medium::Glass("nonsense".into()),
+            3 => Medium::Model { nd: 1.0 + self.number(), vd: 50.0 * self.number() },
+            4 => Medium::Index(self.number()),
+            _ => Medium::Mirror,
+        }
+    }
+
+    fn position(&mut self) -> ZoomPosition {
+        let gap = ZoomThickness { surface: self.below(20), thickness: self.number() };
+        ZoomPosition { thicknesses: vec![gap], ..ZoomPosition::default() }
+    }
+
+    fn row(&mut self) -> Row {
+        Row {
+            curvature: self.number(),
+            thickness: self.number(),
+            medium: self.medium(),
+            stop: self.below(10) == 0,
+            ..Row::default()
+        }
+    }
+
+    fn edit(&mut self) -> Edit {
+        let (parameter, value, surface) = (self.parameter(), self.number(), self.below(20));
+        let limit = (self.below(3) > 0).then_some(value);
+        let angles = vec![Field { x: self.number(), y: value, weight: 1.0 }; self.below(3)];
+        let texts = ["*2", "/0", "-1", "inf", "", "(", "1e400", "+0.1"];
+        let text = texts[self.below(texts.len())].to_owned();
+        match self.below(26) {
+            0 | 1 => Edit::Set { parameter, value },
+            2 | 3 => Edit::Type { parameter, text },
+            4 => Edit::TypeRadius { surface, text },
+            5 => Edit::SetSemiDiameter { surface, value: limit },
+            6 => Edit::SetAsphere { surface, terms: vec![value * 1e-5; self.below(9)] },
+            7 => Edit::SetMedium { surface, medium: self.medium() },
+            8 => Edit::SetStop(surface),
+            9 => Edit::SetRow { surface, row: self.row() },
+            10 | 11 => Edit::InsertRow { at: surface, row: self.row() },
+            12 | 13 => Edit::RemoveRow(surface),
+            14 => Edit::FlipRows { first: surface, last: self.below(20) },
+            15 => Edit::Scale(value.abs() + 0.9),
+            16 => Edit::SetObject(Object::Finite(100.0 * value)),
+            17 => Edit::SetAperture(Aperture::StopSemiDiameter(value)),
+            18 => Edit::SetFields(Fields { kind: FieldKind::Angle, values: angles }),
+            19 => Edit::SetFocus(limit),
+            20 => Edit::Free(Variable { parameter, min: limit, max: None }),
+            21 => Edit::SetPickup(Pickup {
+                parameter,
+                source: self.parameter(),
+                scale: self.number(),
+                offset: value,
+            }),
+            22 => Edit::InsertZoom { at: self.below(4), position: self.position() },
+            23 => Edit::RemoveZoom(self.below(4)),
+            24 => Edit::SetZoom { at: self.below(4), position: self.position() },
+            _ => Edit::SetObject(Object::Infinity),
+        }
+    }
+
+    fn command(&mut self) -> Command {
+        match self.below(30) {
+            0 | 1 => Command::Undo,
+            2 => Command::Redo,
+            3 => Command::Settle,
+            4 => OPTIMIZE,
+            5 => Command::Pause,
+            6 => Command::Step,
+            7 => Command::Take,
+            8 => Command::Discard,
+            9 => Command::ShowZoom(self.below(5)),
+            10 => Command::SetTolerance(self.number()),
+            11 => Command::Choose(Effect::Clipping, Choice::Off),
+            12 => Command::ShowRays(self.below(40)),
+            _ => Command::Edit(self.edit()),
+        }
+    }
+}
+
+#[test]
+fn a_thousand_random_commands_leave_a_sound_design() {
+    let starts = ["double_gauss_rudolph_50", "zoom_nikkor_28_80", "phone_us7558005_1"];
+    let (mut accepted, mut refused) = (0, 0);
+    for (seed, name) in starts.iter().enumerate() {
+        let mut random = Random(seed as u64);
+        let mut session = session(lens(name));
+        for _ in 0..400 {
+            let command = random.command();
+            let before = Arc::clone(session.lens());
+            let events = session.apply(command.clone());
+            session.lens().check().unwrap_or_else(|why| panic!("{command:?}: {why}"));
+            let changed = *session.lens() != before;
+            accepted += usize::from(changed);
+            if matches!((&command, events.last()), (Command::Edit(_), Some(Event::Said(_)))) {
+                refused += 1;
+                assert!(!changed, "refused and yet changed: {command:?}");
+            }
+        }
+        wait(&mut session, "the numbers", |view, _| view.is_current());
+    }
+    println!("{accepted} commands changed the design, {refused} were refused");
+    assert!(accepted > 100 && refused > 100);
+}

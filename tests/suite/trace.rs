@@ -1,0 +1,326 @@
+//! What must hold for any ray, and the real rays of `lenses.json`.
+
+use super::merit::bundled;
+use super::reference::{self, Reference, number, numbers};
+use aplanat::lens::{Shape, Surface, System};
+use aplanat::math::{Dual, Real, Vec3};
+use aplanat::trace::{Fate, Hits, Points, Ray, Rays, Seed, Sink, Tracer, Width};
+use serde_json::Value;
+
+const EPSILON: f64 = f64::EPSILON;
+
+/// A ray of a reference lens as it is launched.
+fn launched(row: &Value) -> Ray<f64> {
+    let (p, d) = (numbers(&row["start"]), numbers(&row["dir0"]));
+    Ray { point: Vec3::new(p[0], p[1], p[2]), direction: Vec3::new(d[0], d[1], d[2]) }
+}
+
+fn rows(lens: &Reference) -> Vec<Value> {
+    lens.data["rays"].as_array().unwrap().clone()
+}
+
+#[test]
+fn reference_lens_rays_land_where_they_must() {
+    for lens in reference::lenses() {
+        let mut worst: f64 = 0.0;
+        for row in rows(&lens) {
+            let wavelength = reference::count(&row["w"]);
+            let landing = Tracer::new(&lens.open(wavelength)).unwrap().trace(launched(&row));
+            assert_eq!(row["status"] == "ok", landing.fate.is_imaged(), "{}: {row}", lens.id());
+            let (Some(unit), true) = (row.get("unit"), landing.fate.is_imaged()) else { continue };
+            let point = (&row["point"], &unit["point"], landing.ray.point);
+            let direction = (&row["dir"], &unit["dir"], landing.ray.direction);
+            let size = numbers(&row["point"]).iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            let mut check = |got: f64, exact: f64, unit: f64, size: f64| {
+                let allowed = 16.0 * unit + 2.0 * EPSILON * size;
+                let error = (got - exact).abs() / allowed.max(f64::MIN_POSITIVE);
+                worst = worst.max(error);
+                assert!(error <= 1.0, "{}: {got:e} instead of {exact:e} in {row}", lens.id());
+            };
+            for ((exact, unit, got), size) in [(point, size.max(1.0)), (direction, 1.0)] {
+                let (exact, unit) = (numbers(exact), numbers(unit));
+                [got.x, got.y, got.z]
+                    .iter()
+                    .enumerate()
+                    .for_each(|(i, v)| check(*v, exact[i], unit[i], size));
+            }
+            let opl = number(&row["opl"]);
+            check(landing.opl, opl, number(&unit["opl"]), opl.abs());
+        }
+        println!("{}: worst ray {worst:.2} of 16 units", lens.id());
+    }
+}
+
+/// Every derivative `[dx, dy, dOPL]` of the reference rays, by the backward pass.
+#[test]
+fn reference_lens_rays_have_the_right_derivatives() {
+    for lens in reference::lenses() {
+        let mut worst: f64 = 0.0;
+        for row in rows(&lens) {
+            let Some(derivatives) = row.get("derivatives").and_then(Value::as_object) else {
+                continue;
+            };
+            let mut system = lens.open(reference::count(&row["w"]));
+            system.surfaces.iter_mut().for_each(|s| s.shape = s.shape.as_conic());
+            let tracer = Tracer::new(&system).unwrap();
+            let rays: Rays<f64> = std::iter::once(launched(&row)).collect();
+            let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::default()];
+            for (output, point) in axes.into_iter().enumerate() {
+                let opl = if output == 2 { 1.0 } else { 0.0 };
+                let gradient = tracer.gradient(&rays, |_| Seed { point, opl, ..Seed::default() });
+                let exact: Vec<f64> = derivatives.values().map(|v| number(&v[output])).collect();
+                let largest = exact.iter().fold(1e-9, |m: f64, v| m.max(v.abs()));
+                for (name, exact) in derivatives.keys().zip(exact) {
+                    let Some(got) = super::hard_cases::parameter(&gradient, name) else { continue };
+                    let error = (got - exact).abs() / largest;
+                    worst = worst.max(error);
+                    assert!(error < 1e-9, "{} {name}: {got:e} instead of {exact:e}", lens.id());
+                }
+            }
+        }
+        println!("{}: worst derivative {worst:.1e}", lens.id());
+    }
+}
+
+/// Rays over the pupil of a library lens at half of its field.
+fn some_rays(count: usize) -> Rays<f64> {
+    let angle: f64 = 0.2;
+    (0..count)
+        .map(|i| {
+            let r = 5.0 * ((i as f64 + 0.5) / count as f64).sqrt();
+            let (sin, cos) = (2.4 * i as f64).sin_cos();
+            let point = Vec3::new(r * cos, r * sin - 1.0, -3.0);
+            Ray { point, direction: Vec3::new(0.0, angle.sin(), angle.cos()) }
+        })
+        .collect()
+}
+
+fn system() -> System<f64> {
+    bundled("double_gauss_rudolph_50").system(0, 0.5875618).unwrap()
+}
+
+#[test]
+fn one_thread_two_threads_and_single_rays_give_the_same_bits() {
+    let tracer = Tracer::new(&system()).unwrap();
+    let rays = some_rays(10_000);
+    let mut one = Hits::default();
+    tracer.batch(&rays, &mut one);
+    for threads in [1, 2, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut many = Hits::default();
+        pool.install(|| tracer.batch_parallel(&rays, &mut many));
+        assert_eq!(one, many, "{threads} threads");
+        let seed = |i: usize| Seed { point: Vec3::new(one.x[i], one.y[i], 0.0), ..Seed::default() };
+        let gradient = pool.install(|| tracer.gradient_parallel(&rays, seed));
+        assert_eq!(gradient, tracer.gradient(&rays, seed), "{threads} threads");
+    }
+    let mut points = Points::default();
+    for width in [Width::Baseline, Width::Bits256, Width::Bits512] {
+        tracer.batch_with(width, &rays, &mut points);
+        assert_eq!((&points.x, &points.y), (&one.x, &one.y), "{width:?}");
+    }
+    for i in (0..rays.len()).step_by(97) {
+        let landing = tracer.trace(rays.get(i));
+        assert_eq!(landing.fate, one.fate(i));
+        if landing.fate.is_imaged() {
+            assert_eq!(landing.ray.point, Vec3::new(one.x[i], one.y[i], one.z[i]));
+        }
+    }
+}
+
+#[test]
+fn a_ray_turned_about_the_axis_lands_turned() {
+    let tracer = Tracer::new(&system()).unwrap();
+    let rays = some_rays(50);
+    let (sin, cos) = 0.7_f64.sin_cos();
+    let turn = |v: Vec3<f64>| Vec3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
+    for i in 0..rays.len() {
+        let ray = rays.get(i);
+        let turned = Ray { point: turn(ray.point), direction: turn(ray.direction) };
+        let (one, other) = (tracer.trace(ray), tracer.trace(turned));
+        assert_eq!(one.fate, other.fate);
+        let difference = turn(one.ray.point) - other.ray.point;
+        assert!(!one.fate.is_imaged() || difference.dot(difference).sqrt() < 1e-12);
+    }
+}
+
+/// A power of two scales every number without rounding.
+#[test]
+fn a_lens_scaled_by_a_power_of_two_gives_the_scaled_bits() {
+    let mut lens = bundled("phone_us7558005_1");
+    lens.surfaces[2].hyper = true;
+    let system = lens.system(0, 0.5875618).unwrap();
+    let factor = 1024.0;
+    let scaled = System {
+        surfaces: system.surfaces.iter().map(|s| scale(s, factor)).collect(),
+        ..system.clone()
+    };
+    let (small, large) = (Tracer::new(&system).unwrap(), Tracer::new(&scaled).unwrap());
+    let mut imaged = 0;
+    for i in 0..200 {
+        let y = -0.7 + 0.007 * f64::from(i);
+        let direction = Vec3::new(0.0, 0.2, (1.0_f64 - 0.04).sqrt());
+        let ray = |f: f64| Ray { point: Vec3::new(0.1 * f, y * f, -0.5 * f), direction };
+        let (one, other) = (small.trace(ray(1.0)), large.trace(ray(factor)));
+        assert_eq!(one.fate, other.fate);
+        assert_eq!(one.ray.point * factor, other.ray.point);
+        assert_eq!(one.ray.direction, other.ray.direction);
+        assert_eq!(one.opl * factor, other.opl);
+        imaged += usize::from(one.fate.is_imaged());
+    }
+    assert!(imaged > 100);
+}
+
+fn scale(surface: &Surface<f64>, factor: f64) -> Surface<f64> {
+    let (c, k, mut terms) = surface.shape.numbers();
+    let mut power = factor.powi(3);
+    for a in &mut terms {
+        *a /= power;
+        power *= factor * factor;
+    }
+    Surface {
+        shape: Shape::simplest(c / factor, k, terms),
+        thickness: surface.thickness * factor,
+        semi_diameter: surface.semi_diameter * factor,
+        ..*surface
+    }
+}
+
+/// Light that goes back the way it came arrives where it started.
+#[test]
+fn a_reversed_ray_returns_to_its_start() {
+    for name in ["double_gauss_rudolph_50", "zoom_tamron_28_75_f28", "phone_us7558005_1"] {
+        let system = bundled(name).system(0, 0.5875618).unwrap();
+        let (forth, back) =
+            (Tracer::new(&system).unwrap(), Tracer::new(&reversed(&system)).unwrap());
+        let scale = 0.1 * system.surfaces[0].semi_diameter;
+        for i in 0..20 {
+            let direction = Vec3::new(0.0, 0.1, 0.99_f64.sqrt());
+            let start = Vec3::new(0.3 * scale, scale * (0.2 * f64::from(i) - 2.0), 0.0);
+            let landing = forth.trace(Ray { point: start, direction });
+            if !landing.fate.is_imaged() {
+                continue;
+            }
+            let (p, d) = (landing.ray.point, landing.ray.direction);
+            let turned = Ray { point: p, direction: Vec3::new(-d.x, -d.y, d.z) };
+            let home = back.trace(turned);
+            assert!(home.fate.is_imaged(), "{name}: {home:?}");
+            let miss = home.ray.point - start;
+            assert!(miss.dot(miss).sqrt() < 1e-10, "{name}: {miss:?}");
+        }
+    }
+}
+
+/// The same lens as light from the image sees it; its last surface is the plane of the first
+/// vertex.
+fn reversed(system: &System<f64>) -> System<f64> {
+    let count = system.surfaces.len();
+    let plane = |thickness: f64, index: f64| Surface {
+        shape: Shape::Plane,
+        thickness,
+        index,
+        semi_diameter: f64::INFINITY,
+        mirror: false,
+        hyper: false,
+    };
+    let image_index = system.surfaces[count - 1].index;
+    let mut surfaces = vec![plane(system.surfaces[count - 2].thickness, image_index)];
+    for i in (0..count - 1).rev() {
+        let (c, k, terms) = system.surfaces[i].shape.numbers();
+        let thickness = i.checked_sub(1).map_or(0.0, |before| system.surfaces[before].thickness);
+        surfaces.push(Surface {
+            shape: Shape::simplest(-c, k, terms.map(|a| -a)),
+            thickness,
+            index: system.index_before(i),
+            ..system.surfaces[i]
+        });
+    }
+    surfaces.push(plane(0.0, system.index_before));
+    System { index_before: image_index, surfaces, stop: None }
+}
+
+#[test]
+fn a_plane_between_equal_media_changes_nothing() {
+    let system = system();
+    let mut longer = system.clone();
+    let gap = longer.surfaces[3];
+    longer.surfaces[3].thickness *= 0.25;
+    let thickness = gap.thickness - longer.surfaces[3].thickness;
+    let plane = Surface { shape: Shape::Plane, thickness, semi_diameter: f64::INFINITY, ..gap };
+    longer.surfaces.insert(4, plane);
+    let (one, other) = (Tracer::new(&system).unwrap(), Tracer::new(&longer).unwrap());
+    let rays = some_rays(50);
+    for i in 0..rays.len() {
+        let (a, b) = (one.trace(rays.get(i)), other.trace(rays.get(i)));
+        let miss = a.ray.point - b.ray.point;
+        assert!(!a.fate.is_imaged() || miss.dot(miss).sqrt() < 1e-12);
+    }
+}
+
+#[test]
+fn a_curvature_that_vanishes_joins_the_plane() {
+    let trace = |curvature: f64| {
+        let mut system = system();
+        system.surfaces[2].shape = Shape::Conic { curvature, conic: 0.5 };
+        Tracer::new(&system).unwrap().trace(some_rays(40).get(7))
+    };
+    let plane = {
+        let mut system = system();
+        system.surfaces[2].shape = Shape::Plane;
+        Tracer::new(&system).unwrap().trace(some_rays(40).get(7))
+    };
+    for curvature in [1e-17, -1e-17, 1e-300, -1e-300, 0.0] {
+        let landing = trace(curvature);
+        assert_eq!(landing.fate, plane.fate);
+        let miss = landing.ray.point - plane.ray.point;
+        assert!(miss.dot(miss).sqrt() < 1e-13, "{curvature:e}: {miss:?}");
+    }
+}
+
+/// Forward duals against differences, and the second derivative by nested duals against both.
+#[test]
+fn jets_are_the_derivatives_of_rays() {
+    type Jet = Dual<Dual<f64, 1>, 1>;
+    let at = |c: f64| {
+        let mut system = system();
+        system.surfaces[4].shape = Shape::Sphere { curvature: c };
+        Tracer::new(&system).unwrap().trace(some_rays(40).get(9)).ray.point.y
+    };
+    let c = system().surfaces[4].shape.curvature();
+    let mut lifted: System<Jet> = system().lift();
+    lifted.surfaces[4].shape = Shape::Sphere { curvature: Jet::variable(Dual::variable(c, 0), 0) };
+    let ray = some_rays(40).get(9);
+    let ray = Ray { point: Vec3::from_f64(ray.point), direction: Vec3::from_f64(ray.direction) };
+    let y = Tracer::new(&lifted).unwrap().trace(ray).ray.point.y;
+    let h = 1e-5;
+    let first = (8.0 * (at(c + h) - at(c - h)) - at(c + 2.0 * h) + at(c - 2.0 * h)) / (12.0 * h);
+    let h = 3e-5;
+    let second = (at(c + h) - 2.0 * at(c) + at(c - h)) / (h * h);
+    assert_eq!(y.value(), at(c));
+    assert!((y.slope[0].value / first - 1.0).abs() < 1e-8, "{y:?} {first}");
+    assert!((y.slope[0].slope[0] / second - 1.0).abs() < 1e-4, "{y:?} {second}");
+}
+
+#[test]
+fn lost_rays_end_with_a_surface_and_finite_numbers() {
+    let tracer = Tracer::new(&system()).unwrap();
+    let mut fates = std::collections::BTreeSet::new();
+    let mut rays = Rays::default();
+    for i in 0..4000 {
+        let (a, b) = (0.37 * f64::from(i), 0.0007 * f64::from(i));
+        let direction = Vec3::new(b.sin() * a.cos(), b.sin() * a.sin(), b.cos());
+        rays.push(Ray { point: Vec3::new(0.0, 0.004 * f64::from(i) - 8.0, -2.0), direction });
+    }
+    let mut hits = Hits::default();
+    tracer.batch(&rays, &mut hits);
+    for i in 0..rays.len() {
+        let landing = tracer.trace(rays.get(i));
+        assert_eq!(landing.fate, hits.fate(i), "ray {i}");
+        assert!(landing.ray.point.is_finite() && landing.ray.direction.is_finite());
+        assert!([hits.x[i], hits.y[i], hits.opl[i]].iter().all(|v| v.is_finite()));
+        fates.insert(landing.fate.name());
+    }
+    assert_eq!(hits.fates().total(), rays.len());
+    assert!(fates.len() >= 3, "{fates:?}");
+    assert!(matches!(tracer.trace(rays.get(0)).fate, Fate::Clipped(_) | Fate::Imaged));
+}
