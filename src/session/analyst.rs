@@ -8,9 +8,10 @@ use super::layout::{Layout, layout};
 use super::scatter::{Scatter, scatter};
 use super::slot::{Mailbox, Slot};
 use super::view::Settings;
+use crate::analysis::{Dark, Spot, spot};
 use crate::lens::Lens;
 use crate::paraxial::{FirstOrder, Seidel, seidel};
-use crate::pupil::Bench;
+use crate::pupil::{Accuracy, Bench};
 use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
@@ -41,6 +42,8 @@ pub struct Numbers {
     pub layout: Timed<Layout>,
     /// Where the rays of each field land.
     pub scatter: Timed<Vec<Scatter>>,
+    /// The spot of each field, or why it has none.
+    pub spots: Vec<Timed<Result<Spot, Dark>>>,
 }
 
 impl Numbers {
@@ -138,7 +141,13 @@ fn numbers(
     let layout = timed(|| layout(&bench.value, settings.rays));
     go_on()?;
     let scatter = timed(|| scatter(&bench.value));
-    Some(Ok(Numbers { bench, seidel, layout, scatter }))
+    let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
+    let mut spots = Vec::new();
+    for field in &bench.value.fields {
+        go_on()?;
+        spots.push(timed(|| spot(&bench.value, *field, accuracy)));
+    }
+    Some(Ok(Numbers { bench, seidel, layout, scatter, spots }))
 }
 
 fn third_order(bench: &Bench) -> Option<Seidel<f64>> {
