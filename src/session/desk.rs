@@ -5,10 +5,11 @@ use super::command::{Command, Edit};
 use super::edit::edited;
 use super::history::History;
 use super::view::{Message, Settings, Severity, View};
-use super::worker::{News, Search, Standing, Starter, Worker};
+use super::worker::{News, Search, Standing, Starter, Task, Worker};
 use crate::files;
 use crate::lens::Lens;
 use crate::merit::Goal;
+use crate::optimize;
 use crate::optimize::Method;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -61,12 +62,23 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens a design; `start` begins searches and `wake` is called from other threads when there
-    /// is something new to look at.
+    /// Opens a design; `wake` is called from other threads when there is something new to look at.
     ///
     /// # Errors
     /// A lens that cannot be used, or a system that can start no thread.
-    pub fn new(
+    pub fn new(lens: Lens, wake: impl Fn() + Send + Clone + 'static) -> io::Result<Self> {
+        let start = |task: &Task| {
+            let started = optimize::start(task.method, &task.lens, &task.goal, task.tolerance);
+            started.map_err(|why| why.to_string())
+        };
+        Self::with_starter(lens, Box::new(start), wake)
+    }
+
+    /// The same with another way to begin searches.
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn with_starter(
         lens: Lens,
         start: Box<Starter>,
         wake: impl Fn() + Send + Clone + 'static,
@@ -272,7 +284,8 @@ impl Session {
         self.discard();
         self.searches += 1;
         self.search = Some(self.searches);
-        self.worker.start(self.searches, method, Arc::clone(&self.lens), goal);
+        let (lens, tolerance) = (Arc::clone(&self.lens), self.settings.tolerance);
+        self.worker.start(self.searches, Task { method, lens, goal, tolerance });
     }
 
     /// Makes the best lens of the search the design, as one step.
@@ -354,7 +367,7 @@ const MOST_RAYS: usize = 2000;
 /// that the search changed.
 fn carried(search: &Search, design: &Arc<Lens>) -> Result<Lens, String> {
     let best = &search.best;
-    if Arc::ptr_eq(&search.start, design) {
+    if Arc::ptr_eq(&search.task.lens, design) {
         return Ok(Lens::clone(best));
     }
     let same_rows =
@@ -363,7 +376,7 @@ fn carried(search: &Search, design: &Arc<Lens>) -> Result<Lens, String> {
         return Err("the design has other surfaces now than when the search began".to_owned());
     }
     let mut lens = Lens::clone(design);
-    for variable in &search.start.variables {
+    for variable in &search.task.lens.variables {
         if let Some(value) = best.get(variable.parameter) {
             lens.set(variable.parameter, value);
         }

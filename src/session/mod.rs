@@ -35,4 +35,4 @@ pub use scatter::{Scatter, scatter};
 pub use slot::Slot;
 pub use typed::{NoNumber, evaluate};
 pub use view::{Message, Settings, Severity, View, blank};
-pub use worker::{Merit, Search, Standing, Starter};
+pub use worker::{HistoryPoint, Search, Standing, Starter, Task};

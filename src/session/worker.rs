@@ -7,7 +7,7 @@
 use super::clock::Pace;
 use super::slot::Slot;
 use crate::lens::Lens;
-use crate::merit::Goal;
+use crate::merit::{Goal, TermValue};
 use crate::optimize::{Method, Optimizer, Progress};
 use std::any::Any;
 use std::io;
@@ -22,8 +22,21 @@ const BETWEEN: Duration = Duration::from_millis(33);
 /// How many points of the merit history are kept; beyond that every second one goes.
 const HISTORY: usize = 2000;
 
-/// Begins a search: a method, the lens it starts from, and what it aims at.
-pub type Starter = dyn Fn(Method, &Lens, &Goal) -> Result<Box<dyn Optimizer>, String> + Send;
+/// What a search is to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Task {
+    /// How to search.
+    pub method: Method,
+    /// From where.
+    pub lens: Arc<Lens>,
+    /// What for.
+    pub goal: Goal,
+    /// How exact the merit has to be, relative to the size of the spots.
+    pub tolerance: f64,
+}
+
+/// Begins a search.
+pub type Starter = dyn Fn(&Task) -> Result<Box<dyn Optimizer>, String> + Send;
 
 /// How a search stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,23 +58,23 @@ pub struct Search {
     pub number: u64,
     /// How it stands.
     pub standing: Standing,
-    /// How it searches.
-    pub method: Method,
+    /// What it was told to do, with the lens it started from.
+    pub task: Arc<Task>,
     /// What its last step did; `None` before the first.
     pub progress: Option<Progress>,
-    /// The lens it started from.
-    pub start: Arc<Lens>,
     /// The best lens so far.
     pub best: Arc<Lens>,
     /// The lens at the current step.
     pub current: Arc<Lens>,
+    /// Every term of the merit for the best lens so far.
+    pub terms: Vec<TermValue>,
     /// The merit against the step, at most a few thousand points of the whole way.
-    pub history: Vec<Merit>,
+    pub history: Vec<HistoryPoint>,
 }
 
 /// A point of the merit history.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Merit {
+pub struct HistoryPoint {
     /// Steps so far.
     pub step: usize,
     /// Merit of the current lens.
@@ -83,7 +96,7 @@ pub(super) enum News {
 
 /// What a search is told.
 enum Order {
-    Start { number: u64, method: Method, lens: Arc<Lens>, goal: Goal },
+    Start { number: u64, task: Task },
     Pause,
     Resume,
     Step,
@@ -117,8 +130,8 @@ impl Worker {
         Ok(Self { orders: Some(orders), news, search, thread: Some(thread) })
     }
 
-    pub(super) fn start(&self, number: u64, method: Method, lens: Arc<Lens>, goal: Goal) {
-        self.tell(Order::Start { number, method, lens, goal });
+    pub(super) fn start(&self, number: u64, task: Task) {
+        self.tell(Order::Start { number, task });
     }
 
     pub(super) fn pause(&self) {
@@ -200,9 +213,7 @@ impl Desk {
                 }
             };
             run = match (order, run) {
-                (Some(Order::Start { number, method, lens, goal }), _) => {
-                    self.begin(number, method, lens, &goal)
-                }
+                (Some(Order::Start { number, task }), _) => self.begin(number, task),
                 (Some(order), Some(run)) => self.obey(&order, run),
                 (None, Some(run)) => self.advance(run),
                 (_, None) => None,
@@ -210,18 +221,18 @@ impl Desk {
         }
     }
 
-    fn begin(&self, number: u64, method: Method, lens: Arc<Lens>, goal: &Goal) -> Option<Run> {
-        let start = AssertUnwindSafe(|| (self.start)(method, &lens, goal));
+    fn begin(&self, number: u64, task: Task) -> Option<Run> {
+        let start = AssertUnwindSafe(|| (self.start)(&task));
         match catch_unwind(start).unwrap_or_else(|panic| Err(said(panic.as_ref()))) {
             Ok(optimizer) => {
                 let state = Search {
                     number,
                     standing: Standing::Running,
-                    method,
                     progress: None,
-                    best: Arc::clone(&lens),
-                    current: Arc::clone(&lens),
-                    start: lens,
+                    best: Arc::clone(&task.lens),
+                    current: Arc::clone(&task.lens),
+                    task: Arc::new(task),
+                    terms: Vec::new(),
                     history: Vec::new(),
                 };
                 let run = Run { optimizer, state, stride: 1 };
@@ -304,7 +315,7 @@ impl Run {
         let progress = self.optimizer.step();
         if progress.step.is_multiple_of(self.stride) || progress.finished {
             let Progress { step, merit: current, best, .. } = progress;
-            self.state.history.push(Merit { step, current, best });
+            self.state.history.push(HistoryPoint { step, current, best });
         }
         if self.state.history.len() > HISTORY {
             self.stride *= 2;
@@ -317,6 +328,7 @@ impl Run {
         Search {
             best: Arc::new(self.optimizer.best().clone()),
             current: Arc::new(self.optimizer.current().clone()),
+            terms: self.optimizer.terms().unwrap_or_default(),
             ..self.state.clone()
         }
     }

@@ -6,7 +6,7 @@ use aplanat::lens::{
     Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
     Variable, ZoomPosition, ZoomThickness,
 };
-use aplanat::merit::Goal;
+use aplanat::merit::{Goal, MeritError, TermValue};
 use aplanat::optimize::{Method, Optimizer, Progress};
 use aplanat::session::{Command, Edit, Event, Session, Severity, Standing, Starter, View};
 use std::sync::Arc;
@@ -51,27 +51,34 @@ impl Optimizer for Toy {
     fn current(&self) -> &Lens {
         &self.lens
     }
+
+    fn terms(&self) -> Result<Vec<TermValue>, MeritError> {
+        Ok(Vec::new())
+    }
 }
 
 /// A toy that ends after its `last` step, and breaks if it is the name of the lens that says so.
 fn toy(last: usize, steps: &Arc<AtomicUsize>) -> Box<Starter> {
     let steps = Arc::clone(steps);
-    Box::new(move |_, lens, _| {
+    Box::new(move |task| {
+        let lens = &task.lens;
         if lens.surfaces[0].curvature == 0.0 {
             return Err("the toy needs a curved surface".to_owned());
         }
         let breaks = if lens.name == "breaks" { 7 } else { usize::MAX };
-        let (lens, steps) = (lens.clone(), Arc::clone(&steps));
+        let (lens, steps) = (Lens::clone(lens), Arc::clone(&steps));
         Ok(Box::new(Toy { lens, step: 0, last, breaks, steps }))
     })
 }
 
 fn session(lens: Lens) -> Session {
-    Session::new(lens, toy(1_000_000, &Arc::default()), || {}).unwrap()
+    Session::with_starter(lens, toy(1_000_000, &Arc::default()), || {}).unwrap()
 }
 
-const OPTIMIZE: Command =
-    Command::Optimize { method: Method::Adam, goal: Goal { terms: Vec::new() } };
+const OPTIMIZE: Command = Command::Optimize {
+    method: Method::Adam,
+    goal: Goal { terms: Vec::new(), zoom_ratios: Vec::new() },
+};
 
 /// Waits until something has happened in the background.
 fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
@@ -387,6 +394,25 @@ fn a_search_runs_beside_the_design_and_its_result_is_one_step() {
 }
 
 #[test]
+fn the_double_gauss_gets_better_in_the_background() {
+    let lens = double_gauss();
+    let goal = Goal::sensible(&lens).unwrap();
+    let mut session = Session::new(lens, || {}).unwrap();
+    session.apply(Command::Optimize { method: Method::DampedLeastSquares, goal });
+    wait(&mut session, "ten steps", |view, _| {
+        let over = view.search.as_ref().is_some_and(|search| !search.is_under_way());
+        step_of(view) >= 10 || over
+    });
+    let search = session.view().search.unwrap();
+    let (first, last) = (search.history[0], search.history[search.history.len() - 1]);
+    assert!(last.best < first.best, "{first:?} {last:?}");
+    assert!(!search.terms.is_empty());
+    session.apply(Command::Take);
+    assert_eq!(*session.lens(), session.view().lens);
+    assert!(session.view().can_undo());
+}
+
+#[test]
 fn a_discarded_search_leaves_the_design_alone() {
     let mut session = session(double_gauss());
     let before = session.view();
@@ -421,7 +447,7 @@ fn a_result_taken_after_an_edit_keeps_the_edit() {
 #[test]
 fn pause_holds_and_step_advances_by_one() {
     let steps = Arc::new(AtomicUsize::new(0));
-    let mut session = Session::new(double_gauss(), toy(600, &steps), || {}).unwrap();
+    let mut session = Session::with_starter(double_gauss(), toy(600, &steps), || {}).unwrap();
     session.apply(OPTIMIZE);
     session.apply(Command::Pause);
     wait(&mut session, "the pause", |view, _| {
@@ -468,7 +494,7 @@ fn the_threads_end_when_the_session_is_dropped() {
     let steps = Arc::new(AtomicUsize::new(0));
     let held = Arc::clone(&alive);
     let wake = move || assert!(Arc::strong_count(&held) > 0);
-    let mut session = Session::new(double_gauss(), toy(usize::MAX, &steps), wake).unwrap();
+    let mut session = Session::with_starter(double_gauss(), toy(usize::MAX, &steps), wake).unwrap();
     session.apply(OPTIMIZE);
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
     drop(session);
@@ -486,7 +512,7 @@ fn a_slow_window_holds_nothing_up_and_is_not_woken_too_often() {
     let wake = move || {
         count.fetch_add(1, Ordering::SeqCst);
     };
-    let mut session = Session::new(double_gauss(), toy(500_000, &steps), wake).unwrap();
+    let mut session = Session::with_starter(double_gauss(), toy(500_000, &steps), wake).unwrap();
     session.apply(OPTIMIZE);
     std::thread::sleep(Duration::from_millis(300));
     let (taken, looks) = (steps.load(Ordering::SeqCst), woken.load(Ordering::SeqCst));
