@@ -34,7 +34,7 @@ use crate::session::{Command, Session, blank};
 pub fn run(path: Option<PathBuf>) -> Result<(), StudioError> {
     shell::open(Memory::Kept, |context, backing| {
         let wake = context.egui_ctx.clone();
-        let session = Session::new(first_lens(), Box::new(|m, l, g| crate::optimize::start(m, l, g, 1e-3).map_err(|w| w.to_string())), move || wake.request_repaint())?;
+        let session = Session::new(first_lens(), move || wake.request_repaint())?;
         let mut studio = Studio::new(session, backing, Memory::Kept, context.storage);
         if let Some(path) = &path {
             studio.apply(&context.egui_ctx, Command::Open(path.clone()));

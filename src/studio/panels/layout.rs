@@ -7,11 +7,10 @@ use std::sync::Arc;
 use eframe::egui::{Align, ComboBox, DragValue, Layout as Arrange, RichText, Stroke, Ui};
 use glam::DVec2;
 
-use super::{Panel, field_name, no_numbers, numbers, swatch};
-use crate::lens::{Lens, System};
+use super::{Panel, field_name, no_numbers, shown, swatch};
+use crate::lens::System;
 use crate::math::Vec3;
-use crate::pupil::Bench;
-use crate::session::{Command, DrawnRay, Layout, Results, View, layout};
+use crate::session::{Command, DrawnRay, Layout, Numbers, Results, View};
 use crate::studio::draw::{Backing, Bounds, Colour, Scene, Shown, Stage};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -45,25 +44,22 @@ struct Drawing {
 /// All on which a drawing depends.
 #[derive(Debug, Clone)]
 struct Source {
-    results: Arc<Results>,
-    /// The lens of a search, which is shown instead of the design.
-    searched: Option<Arc<Lens>>,
-    rays: usize,
+    /// What is drawn.
+    shown: Arc<Results>,
+    /// The design, drawn faintly below the lens of a search.
+    ghost: Option<Arc<Results>>,
     palette: Palette,
 }
 
 impl PartialEq for Source {
-    /// Shared values are compared by address, which cannot be another's while one is held.
+    /// Results are compared by address, which cannot be another's while they are held.
     fn eq(&self, other: &Self) -> bool {
-        let searched = match (&self.searched, &other.searched) {
+        let ghost = match (&self.ghost, &other.ghost) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
             (None, None) => true,
             _ => false,
         };
-        searched
-            && Arc::ptr_eq(&self.results, &other.results)
-            && self.rays == other.rays
-            && self.palette == other.palette
+        ghost && Arc::ptr_eq(&self.shown, &other.shown) && self.palette == other.palette
     }
 }
 
@@ -181,54 +177,30 @@ fn zoom_position(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
 
 impl Source {
     fn of(ui: &Ui, view: &View) -> Option<Self> {
-        let results = Arc::clone(view.results.as_ref()?);
-        numbers(view)?;
-        let searched = view.search.as_ref().map(|search| {
-            Arc::clone(if search.is_under_way() { &search.current } else { &search.best })
-        });
-        let (rays, palette) = (view.settings.rays, Palette::of(ui.visuals()));
-        Some(Self { results, searched, rays, palette })
+        let shown = Arc::clone(shown(view)?.0);
+        let ghost = view.results.clone().filter(|design| !Arc::ptr_eq(design, &shown));
+        Some(Self { shown, ghost, palette: Palette::of(ui.visuals()) })
     }
 }
 
 impl Drawing {
     fn new(source: Source) -> Option<Self> {
-        let numbers = source.results.numbers.as_ref().ok()?;
-        let (design, drawn) = (&numbers.bench.value, &numbers.layout.value);
-        let zoom = source.results.settings.zoom;
-        let Some(lens) = &source.searched else {
-            return Self::of(source.clone(), design, drawn, None);
-        };
-        // A search never shows a lens that cannot be traced; if one comes up, the design stays.
-        let Ok(bench) = Bench::of(lens, zoom) else {
-            return Self::of(source.clone(), design, drawn, None);
-        };
-        let rays = layout(&bench, source.rays);
-        Self::of(source.clone(), &bench, &rays, Some((design, drawn)))
-    }
-
-    fn of(
-        source: Source,
-        bench: &Bench,
-        layout: &Layout,
-        ghost: Option<(&Bench, &Layout)>,
-    ) -> Option<Self> {
+        let numbers = source.shown.numbers.as_ref().ok()?;
+        let (bench, layout) = (&numbers.bench.value, &numbers.layout.value);
         let palette = source.palette;
         let system = bench.colors[bench.primary].system.clone();
         let section = Section::new(&system, &layout.reached);
         let mut scene = Scene::on(palette.background);
-        if let Some((bench, layout)) = ghost {
-            let system = &bench.colors[bench.primary].system;
-            Section::new(system, &layout.reached).draw_ghost(&mut scene, palette.faint);
+        if let Some(Ok(design)) = source.ghost.as_ref().map(|ghost| &ghost.numbers) {
+            draw_ghost(&mut scene, design, &palette);
         }
         section.draw_glass(&mut scene, &palette);
         layout.rays.iter().for_each(|ray| draw_ray(&mut scene, ray, &palette));
         section.draw_outlines(&mut scene, &palette);
         draw_image(&mut scene, &section, layout, &palette);
-        let whole = whole(&section, layout)?;
         Some(Self {
             scene: Arc::new(scene),
-            whole,
+            whole: whole(&section, layout)?,
             reached: layout.reached.clone(),
             fates: layout.fates,
             dark: layout.dark.clone(),
@@ -266,6 +238,13 @@ impl Drawing {
     }
 }
 
+/// The outlines of the design, to compare with.
+fn draw_ghost(scene: &mut Scene, design: &Numbers, palette: &Palette) {
+    let bench = &design.bench.value;
+    let system = &bench.colors[bench.primary].system;
+    Section::new(system, &design.layout.value.reached).draw_ghost(scene, palette.faint);
+}
+
 /// The lowest and the highest place of the image plane that rays reach, with some room.
 fn image(layout: &Layout) -> Option<(f64, f64)> {
     let arrived = layout.rays.iter().filter(|ray| ray.path.fate.is_imaged());
@@ -288,8 +267,9 @@ fn whole(section: &Section<'_>, layout: &Layout) -> Option<Bounds> {
     let lens = section.bounds()?;
     let z = section.image();
     let ends = image(layout).map(|(low, high)| [DVec2::new(z, low), DVec2::new(z, high)]);
+    let high = 1.4 * section.highest();
     let starts = layout.rays.iter().filter_map(|ray| ray.path.points.first());
-    let starts = starts.map(|start| DVec2::new(start.z, 0.0));
+    let starts = starts.map(|start| DVec2::new(start.z, start.y.clamp(-high, high)));
     Bounds::around([lens.min, lens.max].into_iter().chain(ends.into_iter().flatten()).chain(starts))
 }
 

@@ -14,6 +14,8 @@ pub use optimizer::Optimizer;
 pub use prescription::Prescription;
 pub use spot::SpotDiagram;
 
+use std::sync::Arc;
+
 use eframe::egui::{Color32, Sense, Ui, vec2};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +23,7 @@ use super::draw::Backing;
 use super::number;
 use super::wording::{capital, counted_from_one};
 use crate::lens::{Field, FieldKind};
-use crate::session::{Command, Numbers, View};
+use crate::session::{Command, Numbers, Results, View};
 
 /// A part of the window. It shows a view and writes down wishes; it changes nothing.
 pub trait Panel {
@@ -82,6 +84,12 @@ impl Kind {
 /// The newest numbers, if the lens has any.
 fn numbers(view: &View) -> Option<&Numbers> {
     view.results.as_ref()?.numbers.as_ref().ok()
+}
+
+/// The results that drawings show: those of the search where there are any, else the design's.
+fn shown(view: &View) -> Option<(&Arc<Results>, &Numbers)> {
+    let results = view.preview.as_ref().or(view.results.as_ref())?;
+    Some((results, results.numbers.as_ref().ok()?))
 }
 
 /// A small square in the colour of what stands behind it.
