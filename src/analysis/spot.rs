@@ -113,27 +113,33 @@ fn pooled(lit: &[&(Region<'_>, ColorSpot)], shares: &[f64]) -> Pooled {
     }
 }
 
-/// A spot smaller than this against the size of the lens is rounding.
-const SHARPEST: f64 = 1e-13;
+/// What rounding may do to the place of a ray, in mm: a few units of the last digit of the largest
+/// coordinate on its way.
+fn rounding(bench: &Bench) -> f64 {
+    let gaps = bench.colors[bench.primary].system.surfaces.iter().map(|surface| surface.thickness);
+    let heights = bench.first.marginal.heights.iter().copied();
+    8.0 * f64::EPSILON * gaps.chain(heights).fold(0.0, |largest: f64, v| largest.max(v.abs()))
+}
 
 fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
-    let first = &region.launch.bench.first;
-    let size = first.efl.unwrap_or(0.0).abs() + first.marginal.heights[0].abs();
+    let rounding = rounding(region.launch.bench);
     let found = converged(
         region,
         accuracy,
         |nodes| Moments::of(region, nodes).map(|m| m.numbers()),
-        |[rms, x, y, area, ..]| {
-            let floor = SHARPEST * (size + x.abs() + y.abs());
-            let rms = rms.max(floor / accuracy.tolerance);
+        |[rms, _, _, area, ..]| {
+            // What rounding leaves of a perfect spot has no digits to ask for.
+            let rms = rms.max(rounding / accuracy.tolerance);
             [rms, rms, rms, *area, f64::INFINITY, f64::INFINITY]
         },
     )?;
-    let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
+    let estimate = |k: usize, least: f64| {
+        Estimate::new(found.values[k], found.errors[k].max(least), found.rays)
+    };
     Some(ColorSpot {
-        rms: estimate(0),
-        centroid: [estimate(1), estimate(2)],
-        area: estimate(3),
+        rms: estimate(0, rounding),
+        centroid: [estimate(1, rounding), estimate(2, rounding)],
+        area: estimate(3, f64::EPSILON),
         slope: [found.values[4], found.values[5]],
         reached: found.reached,
     })

@@ -3,6 +3,7 @@
 use crate::files::FileError;
 use crate::lens::{Invalid, LensError};
 use crate::paraxial::Undefined;
+use crate::pupil::BenchError;
 use std::io;
 
 /// Why a subcommand did not do its work.
@@ -26,6 +27,14 @@ pub(super) enum Failure {
         file: String,
         /// What is wrong.
         source: Undefined,
+    },
+    /// A lens that cannot be set up for rays.
+    #[error("{file}: {source}")]
+    Bench {
+        /// The lens.
+        file: String,
+        /// What is wrong.
+        source: BenchError,
     },
     /// Rays that cannot be traced.
     #[error("{file}: {source}")]
@@ -56,6 +65,7 @@ impl Failure {
             Self::File(_)
             | Self::Lens { .. }
             | Self::Undefined { .. }
+            | Self::Bench { .. }
             | Self::Rays { .. }
             | Self::Input(_) => 2,
         }

@@ -2,10 +2,12 @@
 
 use super::failure::Failure;
 use crate::files::{self, FileError, native};
-use crate::lens::{Lens, System};
+use crate::lens::{Field, FieldKind, Lens, System};
+use crate::pupil::Bench;
 use serde::de::DeserializeOwned;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// The lens that a subcommand works on.
 #[derive(Debug, clap::Args)]
@@ -16,7 +18,7 @@ pub(super) struct LensFile {
 }
 
 /// A lens that was read, and where from.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Opened {
     pub(super) lens: Lens,
     pub(super) file: String,
@@ -43,6 +45,23 @@ impl Opened {
         self.lens.wavelengths[self.lens.primary()].um
     }
 
+    /// The lens with its beam at a zoom position.
+    pub(super) fn bench(&self, zoom: usize) -> Result<Bench, Failure> {
+        self.check_zoom(zoom)?;
+        let bench = Bench::of(&self.lens, zoom);
+        bench.map_err(|source| Failure::Bench { file: self.file.clone(), source })
+    }
+
+    /// A field at this height or angle, in the unit of the lens's fields.
+    pub(super) fn field(&self, y: f64, zoom: usize) -> Result<Field, Failure> {
+        let angle = self.lens.fields_at(zoom).kind == FieldKind::Angle;
+        if y.is_finite() && !(angle && y.abs() >= 180.0) {
+            return Ok(Field { x: 0.0, y, weight: 1.0 });
+        }
+        let unit = if angle { "an angle below 180 degrees" } else { "a finite height in mm" };
+        Err(Failure::Input(format!("--field: found {y}; expected {unit}")))
+    }
+
     /// Refuses a zoom position that the lens does not have.
     pub(super) fn check_zoom(&self, zoom: usize) -> Result<(), Failure> {
         let count = self.lens.zoom_positions();
@@ -51,6 +70,25 @@ impl Opened {
         }
         let last = count - 1;
         Err(Failure::Input(format!("{}: no zoom position {zoom}; expected 0 to {last}", self.file)))
+    }
+}
+
+/// A relative error that is allowed, `0.1%` or `1e-3`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tolerance(pub(super) f64);
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (digits, unit) = match text.strip_suffix('%') {
+            Some(digits) => (digits, 0.01),
+            None => (text, 1.0),
+        };
+        match digits.trim().parse::<f64>() {
+            Ok(value) if value > 0.0 && value.is_finite() => Ok(Self(value * unit)),
+            _ => Err("expected more than 0, as in `0.1%` or `1e-3`".to_owned()),
+        }
     }
 }
 

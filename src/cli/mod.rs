@@ -7,6 +7,7 @@
 //! A subcommand is a file of this folder, a line in [`Command`] and a line in its `run`. The JSON
 //! that it reads and writes stands in `help/`, which is its `--help` and a part of the README.
 
+mod analyze;
 mod convert;
 mod failure;
 mod info;
@@ -47,6 +48,7 @@ const EXIT: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong
 enum Command {
     Info(info::Info),
     Trace(trace::Trace),
+    Analyze(analyze::Analyze),
     Convert(convert::Convert),
     Measure(measure::Measure),
 }
@@ -56,6 +58,7 @@ impl Command {
         match self {
             Self::Info(info) => info.run(output),
             Self::Trace(trace) => trace.run(output),
+            Self::Analyze(analyze) => analyze.run(output),
             Self::Convert(convert) => convert.run(output),
             Self::Measure(measure) => measure.run(output),
         }

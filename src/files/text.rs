@@ -1,5 +1,6 @@
 //! From bytes to text: what encoding it is, and whether it is text at all.
 
+use super::error::Malformed;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 /// What a file is that starts with these bytes, if it is surely no text.
@@ -42,6 +43,22 @@ pub(super) fn decode(bytes: &[u8]) -> String {
     let (mark, encoding) = encoding(bytes);
     let (text, _) = encoding.decode_without_bom_handling(&bytes[mark..]);
     text.into_owned()
+}
+
+/// Refuses bytes of an 8-bit code, in which letters mean what each country makes of them.
+pub(super) fn refuse_other_than_unicode(bytes: &[u8]) -> Result<(), Malformed> {
+    if encoding(bytes).1 != WINDOWS_1252 {
+        return Ok(());
+    }
+    let good = std::str::from_utf8(bytes).map_or_else(|error| error.valid_up_to(), str::len);
+    let line = bytes[..good].split(|byte| *byte == b'\n').count();
+    let found = format!("the byte {:#04x}", bytes.get(good).copied().unwrap_or_default());
+    Err(Malformed { place: format!("line {line}"), found, expected: "UTF-8 text".to_owned() })
+}
+
+/// UTF-16 in the order of small machines, with its byte order mark.
+pub(super) fn utf16(text: &str) -> Vec<u8> {
+    std::iter::once(0xFEFF).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect()
 }
 
 /// How long the byte order mark is, and the encoding.

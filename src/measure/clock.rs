@@ -16,3 +16,10 @@ impl Stopwatch {
         self.0.elapsed().as_secs_f64()
     }
 }
+
+/// Does some work; what comes out, and the milliseconds that it took.
+pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let watch = Stopwatch::start();
+    let result = work();
+    (result, 1e3 * watch.seconds())
+}

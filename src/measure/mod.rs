@@ -12,6 +12,7 @@ mod rates;
 mod rounding;
 mod trace;
 
+pub use clock::timed;
 pub use double_gauss::double_gauss;
 pub use machine::Machine;
 pub use memory::{Memory, peak_megabytes};

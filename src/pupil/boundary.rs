@@ -57,15 +57,19 @@ pub struct Boundary {
 pub(super) struct Probe {
     /// The first limit that it fails, with the margin.
     pub(super) failed: Option<(Limit, f64)>,
-    /// Its margin at the limit that was asked for.
+    /// Its margin at the limit that was asked for; not a number where it does not get that far.
     wanted: f64,
 }
 
 /// A ray so close to the rim of the disc, relatively, counts as one at the rim: where the rim of
 /// the stop is the rim of the pupil as well, rounding must not decide ray by ray between them.
 const AT_DISC: f64 = 1e-10;
-/// A corner is located to this azimuth; its square is what the quadrature sees of it.
+/// A corner is located to this in azimuth and radius; the quadrature sees the square of it.
 const CORNER: f64 = 1e-9;
+/// A step along the radius that is rounding, relatively.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// How far, relatively, the edge between two known azimuths may be from their interpolation.
+pub(super) const NEAR: f64 = 0.003;
 /// More arcs than this are no pupil but noise.
 pub(super) const MOST_ARCS: usize = 24;
 /// A pupil that reaches this far, in pupil coordinates, is limited by nothing.
@@ -75,9 +79,9 @@ impl Launch<'_> {
     /// Whether the ray at `p` gets through, and its margin at one limit.
     pub(super) fn probe(&self, p: [f64; 2], wanted: Limit) -> Probe {
         let Some(ray) = self.ray(p) else {
-            return Probe { failed: Some((Limit::Unaimed, -1.0)), wanted: -1.0 };
+            return Probe { failed: Some((Limit::Unaimed, -1.0)), wanted: f64::NAN };
         };
-        let mut probe = Probe { failed: None, wanted: 1.0 };
+        let mut probe = Probe { failed: None, wanted: f64::NAN };
         self.color().tracer.margins(ray, |surface, hurdle, margin| {
             let limit = Limit::Surface(surface, hurdle);
             if limit == wanted {
@@ -129,25 +133,52 @@ impl<'a> Search<'a> {
         (along * along + 1.0 - x * x - y * y).max(0.0).sqrt() - along
     }
 
-    /// The edge at an azimuth, searched from a guess of its radius; `None` where nothing limits
-    /// the pupil.
-    pub(super) fn edge(&mut self, azimuth: f64, guess: f64) -> Option<Edge> {
+    /// The edge at an azimuth, searched around a guess of its radius that is right within a
+    /// `spread`, relatively; `None` where nothing limits the pupil.
+    pub(super) fn edge(&mut self, azimuth: f64, guess: f64, spread: f64) -> Option<Edge> {
         let disc = self.disc(azimuth);
+        let last = disc * (1.0 - AT_DISC);
+        let mut spread = spread;
         let mut low = 0.0;
-        let mut high = guess.min(disc * (1.0 - AT_DISC));
+        let mut high = (guess * (1.0 + spread)).min(last);
         loop {
-            let probe = self.probe(azimuth, high, Limit::Disc);
-            if let Some(failed) = probe.failed {
-                return Some(self.bracketed(azimuth, low, high, failed));
+            if let Some(failed) = self.probe(azimuth, high, Limit::Disc).failed {
+                let from = if low > 0.0 { low } else { guess * (1.0 - spread) };
+                return Some(self.between(azimuth, from, high, failed));
             }
-            if high >= disc * (1.0 - AT_DISC) {
+            if high >= last {
                 return Some(Edge { radius: disc, limit: Limit::Disc });
             }
             if high > ENDLESS {
                 return None;
             }
+            spread *= 3.0;
             low = high;
-            high = (1.25 * high).min(disc * (1.0 - AT_DISC));
+            high = (high * (1.0 + spread)).min(last);
+        }
+    }
+
+    /// The edge in front of a ray that fails, looked for behind ever smaller radii.
+    fn between(
+        &mut self,
+        azimuth: f64,
+        mut low: f64,
+        mut high: f64,
+        mut failed: (Limit, f64),
+    ) -> Edge {
+        loop {
+            low = low.max(0.0);
+            let probe = self.probe(azimuth, low, failed.0);
+            match probe.failed {
+                Some(closer) if low > 0.0 => {
+                    let step = 6.0 * (high - low);
+                    (high, failed) = (low, closer);
+                    low -= step;
+                }
+                Some(_) | None => {
+                    return self.bracketed(azimuth, (low, probe.wanted), high, failed);
+                }
+            }
         }
     }
 
@@ -156,18 +187,17 @@ impl<'a> Search<'a> {
     fn bracketed(
         &mut self,
         azimuth: f64,
-        mut low: f64,
+        (mut low, mut at_low): (f64, f64),
         mut high: f64,
         (mut limit, mut at_high): (Limit, f64),
     ) -> Edge {
-        let mut at_low = self.probe(azimuth, low, limit).wanted;
         let (mut last, mut slow) = (f64::INFINITY, 0);
         for _ in 0..100 {
             let width = high - low;
             let secant = high - at_high * width / (at_high - at_low);
             let inside = secant > low && secant < high && slow < 3;
             let r = if inside { secant } else { low + 0.5 * width };
-            if (r - last).abs() <= 4.0 * f64::EPSILON * high || r <= low || r >= high {
+            if (r - last).abs() <= ROUNDING * high || r <= low || r >= high {
                 return Edge { radius: r, limit };
             }
             last = r;
@@ -192,6 +222,60 @@ impl<'a> Search<'a> {
         Edge { radius: low, limit }
     }
 
+    /// Where one limit alone would end the pupil along a radius, by secants from a guess.
+    fn zero(&mut self, limit: Limit, azimuth: f64, guess: f64) -> Option<f64> {
+        if limit == Limit::Disc {
+            return Some(self.disc(azimuth));
+        }
+        let (mut r, mut step) = (guess, 1e-4 * guess);
+        let mut before = self.probe(azimuth, r - step, limit).wanted;
+        for _ in 0..20 {
+            let margin = self.probe(azimuth, r, limit).wanted;
+            let next = -margin * step / (margin - before);
+            if margin == 0.0 || next.abs() <= 1e-13 * guess {
+                return Some(r + if margin == 0.0 { 0.0 } else { next });
+            }
+            if !(next.abs() < guess) {
+                return None;
+            }
+            (before, step, r) = (margin, next, r + next);
+        }
+        None
+    }
+
+    /// The corner between two edges where the limit of one takes over from that of the other, by
+    /// a bracketed secant on the distance between the two; `None` where a third one is in the way.
+    fn corner(&mut self, a: (f64, Edge), b: (f64, Edge)) -> Option<f64> {
+        let (mut low, mut high) = (a.0, b.0);
+        let gap = |search: &mut Self, azimuth: f64| {
+            let share = (azimuth - a.0) / (b.0 - a.0);
+            let guess = a.1.radius + share * (b.1.radius - a.1.radius);
+            let ends = [a.1.limit, b.1.limit].map(|limit| search.zero(limit, azimuth, guess));
+            Some((ends[1]? - ends[0]?, ends[0]?))
+        };
+        let (mut at_low, mut at_high) = (gap(self, low)?.0, gap(self, high)?.0);
+        for _ in 0..30 {
+            let azimuth = high - at_high * (high - low) / (at_high - at_low);
+            if !(azimuth > low && azimuth < high && at_low > 0.0 && at_high < 0.0) {
+                return None;
+            }
+            let (here, radius) = gap(self, azimuth)?;
+            if here.abs() <= CORNER * radius {
+                let edge = self.edge(azimuth, radius, CORNER)?;
+                let alone = (edge.radius - radius).abs() <= 10.0 * CORNER * radius;
+                return alone.then_some(azimuth);
+            }
+            if here > 0.0 {
+                at_high *= damping(here, at_low);
+                (low, at_low) = (azimuth, here);
+            } else {
+                at_low *= damping(here, at_high);
+                (high, at_high) = (azimuth, here);
+            }
+        }
+        None
+    }
+
     /// The edge all around, from the azimuths 0 to `end`; `None` where nothing limits the pupil
     /// or where its edge is too ragged to be split.
     pub(super) fn boundary(mut self, end: f64, azimuths: usize) -> Option<Boundary> {
@@ -199,8 +283,8 @@ impl<'a> Search<'a> {
         let mut guess = 0.5;
         for i in 0..=azimuths {
             let azimuth = end * i as f64 / azimuths as f64;
-            let edge = self.edge(azimuth, guess)?;
-            guess = 1.02 * edge.radius;
+            let edge = self.edge(azimuth, guess, 0.02)?;
+            guess = edge.radius;
             samples.push((azimuth, edge));
         }
         let mut arcs = vec![Arc { from: 0.0, to: end, limit: samples[0].1.limit }];
@@ -214,24 +298,21 @@ impl<'a> Search<'a> {
         Some(Boundary { center: self.center, arcs, samples, rays: self.rays })
     }
 
-    /// Halves the azimuths between two edges of different limits down to the corner; an arc in
-    /// between is found on the way.
+    /// The corners between two edges: one, or what halving the azimuths brings to light where
+    /// another limit makes an arc in between.
     fn corners(&mut self, a: (f64, Edge), b: (f64, Edge), arcs: &mut Vec<Arc>) -> Option<()> {
         if a.1.limit == b.1.limit {
             return Some(());
         }
         let middle = 0.5 * (a.0 + b.0);
-        if b.0 - a.0 <= CORNER {
-            if arcs.len() >= MOST_ARCS {
-                return None;
-            }
-            let end = arcs.last().map_or(0.0, |arc| arc.to);
-            arcs.last_mut()?.to = middle;
-            arcs.push(Arc { from: middle, to: end, limit: b.1.limit });
-            return Some(());
+        let found = if b.0 - a.0 <= CORNER { Some(middle) } else { self.corner(a, b) };
+        if let Some(corner) = found {
+            let end = arcs.last_mut().map(|arc| std::mem::replace(&mut arc.to, corner))?;
+            arcs.push(Arc { from: corner, to: end, limit: b.1.limit });
+            return (arcs.len() <= MOST_ARCS).then_some(());
         }
-        let guess = 0.5 * (a.1.radius + b.1.radius) * (1.0 + 0.1 * (b.0 - a.0).min(0.2));
-        let between = (middle, self.edge(middle, guess)?);
+        let guess = 0.5 * (a.1.radius + b.1.radius);
+        let between = (middle, self.edge(middle, guess, 0.05 * (b.0 - a.0).min(0.2))?);
         self.corners(a, between, arcs)?;
         self.corners(between, b, arcs)
     }
@@ -267,7 +348,7 @@ impl Boundary {
         let mut azimuths: Vec<f64> = steps.chain(corners).collect();
         azimuths.sort_by(f64::total_cmp);
         for azimuth in azimuths {
-            if let Some(edge) = search.edge(azimuth, 1.001 * self.near(azimuth)) {
+            if let Some(edge) = search.edge(azimuth, self.near(azimuth), NEAR) {
                 points.push(search.point(azimuth, inside * edge.radius));
             }
         }

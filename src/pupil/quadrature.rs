@@ -5,7 +5,7 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
 //! is integrated over one half.
 
-use super::boundary::{Boundary, Search};
+use super::boundary::{Boundary, NEAR, Search};
 use super::region::{Kind, Region};
 use super::rules::{legendre, radial};
 use crate::trace::{Rays, Sink};
@@ -106,8 +106,8 @@ impl Region<'_> {
             let length = arc.to - arc.from;
             for (t, share) in legendre(azimuths) {
                 let azimuth = arc.from + t * length;
-                let guess = 1.001 * boundary.near(azimuth);
-                let Some(edge) = search.edge(azimuth, guess) else { continue };
+                let guess = boundary.near(azimuth);
+                let Some(edge) = search.edge(azimuth, guess, NEAR) else { continue };
                 let (sin, cos) = azimuth.sin_cos();
                 let sector = factor * share * length * edge.radius * edge.radius;
                 for (r, weight) in radial(radii) {

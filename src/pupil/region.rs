@@ -58,6 +58,9 @@ impl<'a> Region<'a> {
     pub fn new(launch: Launch<'a>) -> Self {
         let disc = launch.bench.ends_at_disc();
         let mut rays = 0;
+        if launch.bench.stop_radius() == 0.0 {
+            return Self { launch, kind: Kind::Dark, rays };
+        }
         if disc {
             let rim = launch.fates(&rim(launch.is_symmetric()));
             rays += rim.len();

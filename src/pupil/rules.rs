@@ -79,10 +79,12 @@ mod tests {
         for count in 1..=40 {
             let rule = radial(count);
             assert_eq!(rule.len(), count);
+            // The recurrence of the polynomials rounds once a degree.
+            let rounding = 1e-14 + 5e-16 * count as f64;
             for degree in 0..2 * count {
                 let power = i32::try_from(degree).unwrap();
                 let sum: f64 = rule.iter().map(|(r, w)| w * r.powi(power)).sum();
-                assert!((sum - 1.0 / (degree as f64 + 2.0)).abs() < 1e-14, "{count}, {degree}");
+                assert!((sum - 1.0 / (degree as f64 + 2.0)).abs() < rounding, "{count}, {degree}");
             }
         }
     }

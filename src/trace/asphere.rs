@@ -11,10 +11,61 @@ use crate::lens::Shape;
 use crate::math::Real;
 use crate::math::Vec3;
 
-/// The largest slope `dz/dr` of an asphere within `radius` of the axis; infinite without a bound.
+/// A bound of the slope `|dz/dr|` of an asphere within `radius` of the axis, at most a few percent
+/// above the slope itself; infinite where there is none.
+///
+/// The slope at the middle of each of some intervals, and what it can change by inside.
 pub(super) fn steepest<R: Real>(shape: &Shape<R>, radius: f64) -> f64 {
     let Shape::Asphere { curvature, conic, terms } = shape else { return 0.0 };
-    slope_bound(curvature.value(), conic.value(), &terms.map(Real::value), radius)
+    let (c, conic, terms) = (curvature.value(), conic.value(), terms.map(Real::value));
+    let (mut steepest, width): (f64, f64) = (0.0, radius / INTERVALS as f64);
+    for i in 0..INTERVALS {
+        let (middle, end) = ((i as f64 + 0.5) * width, (i as f64 + 1.0) * width);
+        let change = 0.5 * width * bend_bound(c, conic, &terms, end);
+        steepest = steepest.max(slope_at(c, conic, &terms, middle).abs() + change);
+        // `max` would forget what is not a number.
+        if !change.is_finite() {
+            return f64::INFINITY;
+        }
+    }
+    steepest
+}
+
+const INTERVALS: usize = 64;
+
+/// `dz/dr` at a distance from the axis.
+fn slope_at(c: f64, conic: f64, terms: &[f64], r: f64) -> f64 {
+    let r2 = r * r;
+    let polynomial = terms.iter().enumerate().rev();
+    let sum = polynomial.fold(0.0, |sum, (j, a)| sum * r2 + (2 * j + 4) as f64 * a);
+    c * r / (1.0 - (1.0 + conic) * c * c * r2).sqrt() + sum * r2 * r
+}
+
+/// A bound of `|d²z/dr²|` within `radius` of the axis.
+fn bend_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f64 {
+    let r2 = radius * radius;
+    let radicand = 1.0 - (1.0 + conic) * c * c * r2;
+    if !(radicand > 0.0 && radius.is_finite()) {
+        return f64::INFINITY;
+    }
+    // Where the conic flattens outwards it bends most at the vertex.
+    let mut bound = c.abs() / radicand.min(1.0).powf(1.5);
+    let mut power = r2;
+    for (j, a) in terms.iter().enumerate() {
+        bound += ((2 * j + 4) * (2 * j + 3)) as f64 * a.abs() * power;
+        power *= r2;
+    }
+    bound
+}
+
+impl<R: Real> Interface<R> {
+    /// The square of the distance from the axis within which the conic exists and nothing clips.
+    #[inline(always)]
+    fn inside2(&self) -> R {
+        let square = (R::ONE + self.conic) * self.curvature * self.curvature;
+        let exists = R::select(square > R::ZERO, R::ONE / square, self.rim2);
+        R::select(exists < self.rim2, exists, self.rim2)
+    }
 }
 
 impl Interface<f64> {
@@ -53,6 +104,87 @@ struct Problem {
     start: f64,
 }
 
+/// Where some rays cross an asphere, as far as Newton's iteration can be trusted.
+pub(super) struct Quick<R, const W: usize> {
+    /// How far along `k`.
+    pub(super) s: [R; W],
+    /// 1 where this is the only crossing inside the semi-diameter, else 0: a number of the same
+    /// width as the others, so that the lanes need no conversion.
+    pub(super) trusted: [R; W],
+}
+
+/// Points of rays and their optical directions, as columns.
+pub(super) struct Starts<R, const W: usize> {
+    columns: [[R; W]; 6],
+}
+
+impl<R: Real, const W: usize> Starts<R, W> {
+    #[inline(always)]
+    pub(super) fn new() -> Self {
+        Self { columns: [[R::ZERO; W]; 6] }
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, j: usize, p: Vec3<R>, k: Vec3<R>) {
+        let numbers = [p.x, p.y, p.z, k.x, k.y, k.z];
+        self.columns.iter_mut().zip(numbers).for_each(|(column, number)| column[j] = number);
+    }
+
+    #[inline(always)]
+    pub(super) fn get(&self, j: usize) -> (Vec3<R>, Vec3<R>) {
+        let [x, y, z, kx, ky, kz] = &self.columns;
+        (Vec3::new(x[j], y[j], z[j]), Vec3::new(kx[j], ky[j], kz[j]))
+    }
+}
+
+/// Newton's iteration from the conic, or from the vertex plane where that is missed. Each ray stops
+/// by itself, so that it does not matter which others are beside it.
+#[inline(always)]
+pub(super) fn quick<R: Real, const W: usize>(
+    surface: &Interface<R>,
+    rays: &Starts<R, W>,
+) -> Quick<R, W> {
+    let near = Interface { far: false, ..*surface };
+    let mut s = [R::ZERO; W];
+    let mut moving = [R::ONE; W];
+    let tolerance = R::from_f64(R::EPSILON.powf(2.0 / 3.0));
+    for (j, s) in s.iter_mut().enumerate() {
+        let (p, k) = rays.get(j);
+        let conic = near.meet_conic(p, k);
+        *s = R::select(conic.missed, -(p.z / k.z), conic.s);
+    }
+    for _ in 0..STEPS {
+        for j in 0..W {
+            let (p, k) = rays.get(j);
+            let (f, slope) = surface.height_above(p + k * s[j], k);
+            let step = f / slope;
+            // The next step would be smaller than the square of this one.
+            let size = p.x.abs() + p.y.abs() + p.z.abs();
+            let settled = step * step * surface.n2 <= tolerance * tolerance * size * size;
+            s[j] = R::select(moving[j] > R::ZERO, s[j] - step, s[j]);
+            moving[j] = R::select(settled, R::ZERO, moving[j]);
+        }
+        if moving.iter().all(|moving| *moving == R::ZERO) {
+            break;
+        }
+    }
+    let steepest = R::from_f64(surface.steepest);
+    let steepest2 = steepest * steepest;
+    let trusted = std::array::from_fn(|j| {
+        let (p, k) = rays.get(j);
+        let point = p + k * s[j];
+        let across2 = k.x * k.x + k.y * k.y;
+        // A ray along the axis crosses a graph once, however steep that may be elsewhere.
+        let unique = (across2 == R::ZERO) | (steepest2 * across2 < k.z * k.z);
+        let inside = point.x * point.x + point.y * point.y <= surface.inside2();
+        R::select(unique & inside & !(moving[j] > R::ZERO), R::ONE, R::ZERO)
+    });
+    Quick { s, trusted }
+}
+
+/// Steps of Newton's iteration before a crossing is isolated instead.
+const STEPS: usize = 10;
+
 /// How far along `k` the ray first crosses the surface in its sense of travel: inside the
 /// semi-diameter if it does so there, else outside; `None` where it never does.
 ///
@@ -63,18 +195,24 @@ pub(super) fn crossing(
     k: Vec3<f64>,
     start: f64,
 ) -> Option<f64> {
+    let mut ray = Starts::<f64, 1>::new();
+    ray.set(0, p, k);
+    let quick = quick(&surface, &ray);
+    if quick.trusted[0] > 0.0 { Some(quick.s[0]) } else { isolated(surface, p, k, start) }
+}
+
+/// The same by isolating the crossings.
+pub(super) fn isolated(
+    surface: Interface<f64>,
+    p: Vec3<f64>,
+    k: Vec3<f64>,
+    start: f64,
+) -> Option<f64> {
     let across = k.x.hypot(k.y);
     let problem = Problem { surface, p, k, across, slant: p.x * k.x + p.y * k.y, start };
     let rim = problem.surface.rim2.sqrt();
     let edge = problem.edge();
     let inside = rim.min(edge);
-    if let Some(s) = problem.newton() {
-        // A ray along the axis crosses a graph once, however steep that may be elsewhere.
-        let unique = problem.across == 0.0 || problem.surface.steepest * problem.across < k.z.abs();
-        if unique && problem.r2(s) <= inside * inside {
-            return Some(s);
-        }
-    }
     if inside.is_finite() {
         let outside = if rim < edge { edge.min(4.0 * rim) } else { edge };
         return problem.first(inside).or_else(|| problem.first(outside));
@@ -108,31 +246,6 @@ impl Problem {
         let (z, dz_dr2) = self.surface.sag(self.r2(s));
         let along = self.slant + s * self.across * self.across;
         (z - (self.p.z + s * self.k.z), 2.0 * along * dz_dr2 - self.k.z)
-    }
-
-    /// Newton's iteration from the conic, or from the vertex plane where that is missed; `None`
-    /// where it does not settle within a dozen steps.
-    fn newton(&self) -> Option<f64> {
-        let near = Interface { far: false, ..self.surface };
-        let conic = near.meet_conic(self.p, self.k);
-        let mut s = if conic.missed { -self.p.z / self.k.z } else { conic.s };
-        let mut size = f64::INFINITY;
-        for _ in 0..12 {
-            let (f, slope) = self.height(s);
-            let step = f / slope;
-            if !step.is_finite() {
-                return None;
-            }
-            s -= step;
-            let settled = step.abs() <= 2.0 * f64::EPSILON * s.abs();
-            // Rounding of the height itself ends the descent of the steps.
-            let stalled = size < 1e-9 * self.scale() && step.abs() >= 0.5 * size;
-            if settled || stalled {
-                return Some(s);
-            }
-            size = step.abs();
-        }
-        None
     }
 
     fn scale(&self) -> f64 {

@@ -6,6 +6,7 @@
 //! contracted or reordered, so every width, every number of threads and the single ray give the
 //! same bits.
 
+use super::asphere;
 use super::fate::{CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
 use super::interface::{Crossing, Form, Interface, Meeting};
 use super::lanes::{Width, widest};
@@ -383,11 +384,45 @@ impl<R: Real> Block<R> {
     #[inline(always)]
     fn meet(&mut self, interface: &Interface<R>, number: u32, keep: impl FnMut(usize, R)) {
         match interface.form {
-            Form::Plane => self.sweep(interface, number, Interface::meet_plane, keep),
-            Form::Sphere => self.sweep(interface, number, Interface::meet_sphere, keep),
-            Form::Conic => self.sweep(interface, number, Interface::meet_conic, keep),
-            Form::Asphere => self.sweep(interface, number, Interface::meet_asphere, keep),
+            Form::Plane => self.sweep(interface, number, |i, _, p, k| i.meet_plane(p, k), keep),
+            Form::Sphere => self.sweep(interface, number, |i, _, p, k| i.meet_sphere(p, k), keep),
+            Form::Conic => self.sweep(interface, number, |i, _, p, k| i.meet_conic(p, k), keep),
+            Form::Asphere if R::ORDER > 0 => {
+                self.sweep(interface, number, |i, _, p, k| i.meet_asphere(p, k), keep);
+            }
+            Form::Asphere => {
+                let s = self.asphere(interface);
+                let meet = |i: &Interface<R>, j: usize, p, k| {
+                    let (start, before) = i.closest(p, k);
+                    i.meet_asphere_at(start, k, s[j], before)
+                };
+                self.sweep(interface, number, meet, keep);
+            }
         }
+    }
+
+    /// How far from its start, or from its point of closest approach, every ray meets an asphere;
+    /// not a number where it does not.
+    #[inline(always)]
+    fn asphere(&self, interface: &Interface<R>) -> [R; BLOCK] {
+        let mut before = [R::ZERO; BLOCK];
+        let mut rays = asphere::Starts::<R, BLOCK>::new();
+        for (j, before) in before.iter_mut().enumerate() {
+            let (p, k) = self.state(j);
+            let (start, distance) = interface.closest(Vec3::new(p.x, p.y, p.z - interface.gap), k);
+            *before = distance;
+            rays.set(j, start, k);
+        }
+        let asphere::Quick { mut s, trusted } = asphere::quick(interface, &rays);
+        for j in 0..BLOCK {
+            if !(trusted[j] > R::ZERO) && !(self.code[j] > R::ZERO) {
+                let (p, k) = rays.get(j);
+                let (p, k, start) = (p.value(), k.value(), -before[j].value());
+                let found = asphere::isolated(interface.value(), p, k, start);
+                s[j] = R::from_f64(found.unwrap_or(f64::NAN));
+            }
+        }
+        s
     }
 
     #[inline(always)]
@@ -395,7 +430,7 @@ impl<R: Real> Block<R> {
         &mut self,
         interface: &Interface<R>,
         number: u32,
-        meet: impl Fn(&Interface<R>, Vec3<R>, Vec3<R>) -> Meeting<R>,
+        meet: impl Fn(&Interface<R>, usize, Vec3<R>, Vec3<R>) -> Meeting<R>,
         mut keep: impl FnMut(usize, R),
     ) {
         let interface = *interface;
@@ -405,7 +440,7 @@ impl<R: Real> Block<R> {
         for j in 0..BLOCK {
             let (p, k) = self.state(j);
             let p = Vec3::new(p.x, p.y, p.z - interface.gap);
-            let crossing = interface.go_on(meet(&interface, p, k), k);
+            let crossing = interface.go_on(meet(&interface, j, p, k), k);
             self.set(j, crossing.point, crossing.k);
             keep(j, crossing.s);
             let code = code(&crossing, missed, clipped, reflected);

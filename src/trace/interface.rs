@@ -223,7 +223,7 @@ impl<R: Real> Interface<R> {
     /// The point of closest approach to the vertex, and how far along `k` it lies; the start
     /// itself where nothing would cancel.
     #[inline(always)]
-    fn closest(&self, p: Vec3<R>, k: Vec3<R>) -> (Vec3<R>, R) {
+    pub(super) fn closest(&self, p: Vec3<R>, k: Vec3<R>) -> (Vec3<R>, R) {
         if self.far {
             let s = -p.dot(k) / self.n2;
             (p + k * s, s)
@@ -234,24 +234,35 @@ impl<R: Real> Interface<R> {
 
     pub(super) fn meet_asphere(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
         let (start, before) = self.closest(p, k);
-        let Some(s) = asphere::crossing(self.value(), start.value(), k.value(), -before.value())
-        else {
-            return self.no_meeting(p);
-        };
-        let mut s = R::from_f64(s);
+        let s = asphere::crossing(self.value(), start.value(), k.value(), -before.value());
+        let mut s = R::from_f64(s.unwrap_or(f64::NAN));
         for _ in 0..R::ORDER {
             let (f, slope) = self.height_above(start + k * s, k);
             s -= f / slope;
         }
+        self.meet_asphere_at(start, k, s, before)
+    }
+
+    /// The meeting at `start + s k`, which lies on the asphere; missed where `s` is not a number.
+    #[inline(always)]
+    pub(super) fn meet_asphere_at(
+        &self,
+        start: Vec3<R>,
+        k: Vec3<R>,
+        s: R,
+        before: R,
+    ) -> Meeting<R> {
         let point = start + k * s;
-        let normal = self.normal(point);
+        let (_, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
+        let slope = -(dz_dr2 + dz_dr2);
+        let normal = Vec3::new(point.x * slope, point.y * slope, R::ONE);
         let a = k.dot(normal);
         let missed = !(self.sense * a > R::ZERO);
         Meeting { point, s: before + s, normal, a, m: normal.dot(normal), missed }
     }
 
     /// The same surface without derivatives.
-    fn value(&self) -> Interface<f64> {
+    pub(super) fn value(&self) -> Interface<f64> {
         Interface {
             form: self.form,
             mirror: self.mirror,
@@ -272,26 +283,16 @@ impl<R: Real> Interface<R> {
         }
     }
 
-    fn no_meeting(&self, point: Vec3<R>) -> Meeting<R> {
-        let normal = Vec3::new(R::ZERO, R::ZERO, R::ONE);
-        Meeting { point, s: R::ZERO, normal, a: self.sense, m: R::ONE, missed: true }
-    }
-
     /// `z(r) − z` at a point and its slope along `k`.
-    fn height_above(&self, point: Vec3<R>, k: Vec3<R>) -> (R, R) {
+    #[inline(always)]
+    pub(super) fn height_above(&self, point: Vec3<R>, k: Vec3<R>) -> (R, R) {
         let (z, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
         let along = (point.x * k.x + point.y * k.y) * dz_dr2;
         (z - point.z, along + along - k.z)
     }
 
-    /// `(−∂z/∂x, −∂z/∂y, 1)`.
-    fn normal(&self, point: Vec3<R>) -> Vec3<R> {
-        let (_, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
-        let slope = -(dz_dr2 + dz_dr2);
-        Vec3::new(point.x * slope, point.y * slope, R::ONE)
-    }
-
     /// Sag and its derivative by r²; at the edge of the conic beyond it.
+    #[inline(always)]
     pub(super) fn sag(&self, r2: R) -> (R, R) {
         let c = self.curvature;
         let radicand = R::ONE - (R::ONE + self.conic) * c * c * r2;

@@ -1,8 +1,11 @@
 //! Integrals over clear and clipped pupils, chief rays and illumination against `lenses.json`.
 
-use crate::reference::{Worst, count, lenses, number};
-use aplanat::analysis::{contrast, distortion, illumination, spot};
-use aplanat::pupil::Accuracy;
+use crate::reference::{Reference, Worst, count, lenses, number};
+use aplanat::analysis::{contrast, distortion, fan, field_curvature, illumination, spot};
+use aplanat::lens::{Field, FieldKind};
+use aplanat::paraxial::{Beam, first_order, seidel};
+use aplanat::pupil::{Accuracy, Bench};
+use aplanat::trace::Tracer;
 
 const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, most_rays: 400_000 };
 
@@ -94,5 +97,85 @@ fn reference_chief_rays() {
             }
         }
         worst.check(&format!("chief rays {}", lens.id()), 1e-11);
+    }
+}
+
+/// Every analysis of a field, for a lens that lets nothing of it through.
+fn all_dark(bench: &Bench, field: Field) {
+    let accuracy = Accuracy::default();
+    assert!(spot(bench, field, accuracy).is_err());
+    assert!(contrast(bench, field, 0, &[10.0], accuracy).is_err());
+    let light = illumination(&Bench { fields: vec![field], ..bench.clone() }, 0, accuracy);
+    assert_eq!(light[0].cone.value, 0.0);
+    assert!(light[0].dark.is_some() && light[0].relative.is_none());
+    if let Ok(fans) = fan(bench, field, 11) {
+        assert!(fans.iter().all(|f| f.tangential.iter().all(|point| point.error.is_none())));
+    }
+    if let Ok(found) = distortion(bench, field, 0) {
+        assert!(found.height.is_finite() && found.ideal.is_finite());
+    }
+    if let Ok(found) = field_curvature(bench, field, 0) {
+        assert!([found.tangential, found.sagittal].iter().flatten().all(|z| z.is_finite()));
+    }
+}
+
+#[test]
+fn a_field_without_light_says_so_in_every_analysis() {
+    // Where the stop comes first, a hole in it is still a pupil.
+    let behind = |lens: &&Reference| lens.open(0).stop != Some(0);
+    let angles = |lens: &&Reference| lens.field_kind() == FieldKind::Angle;
+    for lens in lenses().iter().filter(angles).filter(behind) {
+        for angle in [75.0, 89.9, 90.0, 120.0, -150.0] {
+            let field = Field { x: 0.0, y: angle, weight: 1.0 };
+            let mut bench = lens.clipped_bench();
+            for color in &mut bench.colors {
+                color.system.surfaces[0].semi_diameter = 1e-9;
+                color.tracer = Tracer::new(&color.system).unwrap();
+            }
+            all_dark(&bench, field);
+        }
+    }
+}
+
+#[test]
+fn a_spot_out_of_focus_is_the_spot_of_the_moved_image_plane() {
+    let lens = lenses().into_iter().find(|lens| lens.id() == "cooke_triplet").unwrap();
+    let at = |defocus: f64| {
+        let mut bench = lens.open_bench();
+        for color in &mut bench.colors {
+            let last = color.system.surfaces.len() - 2;
+            color.system.surfaces[last].thickness += defocus;
+            color.tracer = Tracer::new(&color.system).unwrap();
+        }
+        spot(&bench, bench.fields[2], ACCURACY).unwrap().colors[1].unwrap()
+    };
+    let focused = at(0.0);
+    for defocus in [-0.3, 0.1, 0.4] {
+        let moved = at(defocus).rms.value;
+        assert!((focused.rms_at(defocus) / moved - 1.0).abs() < 1e-9, "{defocus}");
+    }
+    let best = focused.best_focus().unwrap();
+    assert!((at(best).best_focus().unwrap()).abs() < 1e-6);
+}
+
+#[test]
+fn field_curvature_near_the_axis_follows_the_seidel_sums() {
+    let lens = lenses().into_iter().find(|lens| lens.id() == "cooke_triplet").unwrap();
+    let bench = lens.open_bench();
+    let system = &bench.colors[bench.primary].system;
+    let beam = Beam { edge: 0.1, ..bench.beam };
+    let first = first_order(system, &beam).unwrap();
+    let sums = seidel(system, &first, None).unwrap().total;
+    let at =
+        |y: f64| field_curvature(&bench, Field { x: 0.0, y, weight: 1.0 }, bench.primary).unwrap();
+    let (axis, edge) = (at(0.0), at(0.1));
+    // Longitudinal shifts −(S3 + S4)/(2 n' u'²) and −(3 S3 + S4)/(2 n' u'²); Welford 8.
+    let na2 = first.marginal.slopes.last().unwrap().powi(2);
+    for (found, sum) in [
+        (edge.sagittal.unwrap() - axis.sagittal.unwrap(), sums.s3 + sums.s4),
+        (edge.tangential.unwrap() - axis.tangential.unwrap(), 3.0 * sums.s3 + sums.s4),
+    ] {
+        let exact = -sum / (2.0 * na2);
+        assert!((found / exact - 1.0).abs() < 1e-3, "{found:e} {exact:e}");
     }
 }

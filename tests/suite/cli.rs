@@ -88,7 +88,7 @@ impl Drop for Scratch {
 
 #[test]
 fn every_subcommand_has_long_help_with_its_json() {
-    let names = ["info", "trace", "measure trace"];
+    let names = ["info", "trace", "analyze", "measure trace"];
     for name in names {
         let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
         let help = done(&arguments, "");
@@ -214,6 +214,77 @@ fn trace_refuses_what_cannot_be_traced() {
     };
     file("{\"rays\": [], \"zoom\": 7}", &["zoom position 7"]);
     file("{\"rays\": [], \"wavelength_um\": 90}", &["90 um"]);
+}
+
+/// The results of an analysis at all fields.
+fn analyzed(what: &str, more: &[&str]) -> Vec<Value> {
+    let report = done_json(&[&["analyze", LENS, what], more].concat(), "");
+    let keys = ["analysis", "zoom", "wavelength_um", "tolerance", "field_kind", "airy_radius"];
+    has_keys(&report, &keys);
+    report["fields"].as_array().unwrap().clone()
+}
+
+/// A number must come with its error and cost.
+fn estimate(value: &Value) -> f64 {
+    has_keys(value, &["value", "error", "rays"]);
+    assert!(value["milliseconds"].as_f64().unwrap() > 0.0, "{value}");
+    value["value"].as_f64().unwrap()
+}
+
+#[test]
+fn analyze_gives_every_number_its_error_and_cost() {
+    for field in analyzed("spot", &[]) {
+        ["rms", "radius", "centroid_x", "centroid_y"].map(|key| estimate(&field[key]));
+        assert_eq!(field["colors"].as_array().unwrap().len(), 3);
+        field["colors"].as_array().unwrap().iter().for_each(|color| {
+            ["rms", "lit_area"].map(|key| estimate(&color[key]));
+        });
+    }
+    let distortion = analyzed("distortion", &[]);
+    assert!(estimate(&distortion[1]["distortion"]).abs() < 0.05);
+    assert_eq!(distortion[0]["distortion"], Value::Null);
+    for field in analyzed("field-curvature", &[]) {
+        ["tangential", "sagittal"].map(|key| estimate(&field[key]));
+    }
+    for field in analyzed("illumination", &[]) {
+        assert!(estimate(&field["relative"]) <= 1.0 + 1e-12);
+    }
+    let fan = &analyzed("fan", &["--field", "17"])[0]["colors"][0]["tangential"];
+    has_keys(&fan[0], &["pupil", "dx", "dy", "fate", "surface"]);
+    let focus = &analyzed("through-focus", &["--field", "0"])[0]["positions"];
+    assert_eq!(focus.as_array().unwrap().len(), 11);
+    let focused = estimate(&focus[5]["rms"]);
+    let plain = estimate(&analyzed("spot", &["--field", "0"])[0]["rms"]);
+    assert!((focused - plain).abs() < 1e-12, "{focused} {plain}");
+}
+
+#[test]
+fn a_tolerance_is_kept() {
+    let rms = |error: &str| {
+        let field = &analyzed("spot", &["--field", "17", "--error", error])[0]["rms"];
+        (estimate(field), field["error"].as_f64().unwrap())
+    };
+    let (coarse, fine) = (rms("1%"), rms("1e-8"));
+    assert!(fine.1 < 1e-8 * fine.0, "{fine:?}");
+    assert!((coarse.0 - fine.0).abs() < 1e-2 * fine.0, "{coarse:?} {fine:?}");
+    refused(2, &["analyze", LENS, "spot", "--error", "0"], "", &["--error", "0.1%"]);
+}
+
+#[test]
+fn the_illumination_of_one_field_is_that_among_all() {
+    let all = analyzed("illumination", &[]);
+    let one = analyzed("illumination", &["--field", "17"]);
+    assert_eq!(one.len(), 1);
+    assert_eq!(one[0]["relative"]["value"], all[1]["relative"]["value"]);
+    assert_eq!(analyzed("illumination", &["--field", "0"]).len(), 1);
+}
+
+#[test]
+fn a_lens_without_light_is_refused_with_the_place() {
+    let lens = std::fs::read_to_string(LENS).unwrap();
+    let dark = lens.replace("\"semi_diameter\": 4.5", "\"semi_diameter\": 0.0");
+    let scratch = Scratch::with("dark.json", &dark);
+    refused(2, &["analyze", scratch.path(), "spot"], "", &[scratch.path(), "clipped at surface 4"]);
 }
 
 #[test]

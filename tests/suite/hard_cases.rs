@@ -5,6 +5,7 @@
 //! tracer in f64 cannot avoid; a derivative within 1e-9 of the largest of the same output, or 1e4
 //! units where a decision is close.
 
+use super::reference::{number, read};
 use aplanat::lens::{ASPHERE_TERMS, Invalid, Shape, Surface, System};
 use aplanat::math::{Double, Dual, Real, Vec3};
 use aplanat::trace::{Fate, Gradient, Hits, Landing, Ray, Rays, Seed, Sink, Tracer, Width};
@@ -15,22 +16,7 @@ use std::collections::BTreeMap;
 const HALF_ULP: f64 = 1.1102230246251565e-16;
 const OUTPUTS: [&str; 7] = ["x", "y", "z", "L", "M", "N", "opl"];
 
-/// The folder of the reference cases: `tests/reference`, or what `APLANAT_REFERENCE` names.
-fn read(file: &str) -> Value {
-    let folder = std::env::var("APLANAT_REFERENCE").unwrap_or_else(|_| "tests/reference".into());
-    let path = std::path::Path::new(&folder).join(file);
-    let text = std::fs::read_to_string(&path);
-    serde_json::from_str(&text.unwrap_or_else(|e| panic!("{}: {e}", path.display()))).unwrap()
-}
-
-/// A number, or the text of one.
-fn number(value: &Value) -> f64 {
-    match value {
-        Value::String(text) => text.parse().unwrap(),
-        other => other.as_f64().unwrap(),
-    }
-}
-
+/// A list of numbers; none where there is no list.
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().map(|list| list.iter().map(number).collect()).unwrap_or_default()
 }

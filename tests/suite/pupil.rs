@@ -1,7 +1,9 @@
 //! Rays from pupil coordinates against the hexapolar sums of `lenses.json`.
 
 use crate::reference::{Reference, Worst, count, lenses, number};
-use aplanat::pupil::{Bench, Pattern, Region, pattern};
+use aplanat::lens::{ASPHERE_TERMS, Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::paraxial::Beam;
+use aplanat::pupil::{Accuracy, Aiming, Bench, Kind, Pattern, Region, pattern};
 use aplanat::trace::{Points, Rays, Sink};
 
 /// Relative to the RMS radius, or to the height of a centroid.
@@ -110,5 +112,173 @@ fn a_clipped_pupil_takes_240_rays_for_six_digits() {
     for field in [1, 2] {
         let errors = errors(&bench, field);
         assert!(errors.iter().any(|(rays, error)| *rays <= 240 && *error < 1e-6));
+    }
+}
+
+/// Surfaces `(curvature, gap, index behind, semi-diameter)` and an image plane, in air.
+fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
+    let surface = |(curvature, thickness, index, semi_diameter): (f64, f64, f64, f64)| Surface {
+        shape: Shape::simplest(curvature, 0.0, [0.0; ASPHERE_TERMS]),
+        thickness,
+        index,
+        semi_diameter,
+        mirror: false,
+        hyper: false,
+    };
+    let image = surface((0.0, 0.0, 1.0, f64::INFINITY));
+    let surfaces = rows.iter().copied().map(surface).chain([image]).collect();
+    System { index_before: 1.0, surfaces, stop: Some(stop) }
+}
+
+fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> Bench {
+    let beam = Beam { object: Object::Infinity, aperture, field: FieldKind::Angle, edge };
+    let fields = vec![Field { x: 0.0, y: edge, weight: 1.0 }];
+    Bench { fields, ..Bench::new(vec![(0.55, 1.0, system)], 0, beam, aiming).unwrap() }
+}
+
+fn area(region: &Region<'_>) -> f64 {
+    let orders = region.orders();
+    region.nodes(orders.saturating_sub(1).min(8)).weights.iter().sum()
+}
+
+/// The area that two discs have in common, for radii and the distance of their centres.
+fn overlap(r: f64, s: f64, d: f64) -> f64 {
+    let a = ((d * d + r * r - s * s) / (2.0 * d * r)).acos();
+    let b = ((d * d + s * s - r * r) / (2.0 * d * s)).acos();
+    r * r * (a - a.sin() * a.cos()) + s * s * (b - b.sin() * b.cos())
+}
+
+#[test]
+fn a_pupil_cut_by_a_distant_rim_is_the_overlap_of_two_discs() {
+    // A stop of radius 5 and a rim of radius 10, 100 mm behind it: the centre of the rim's shadow
+    // lies 10 mm from the middle of the stop, so that the chief ray exactly meets the rim.
+    let edge = 0.1f64.atan().to_degrees();
+    for offset in [-3.0, -0.5, 0.0, 0.5, 3.0, 4.9] {
+        let rows = [(0.0, 100.0, 1.0, 5.0), (0.0, 50.0, 1.0, 10.0 + offset)];
+        let bench =
+            bench(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
+        let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+        let exact = overlap(5.0, 10.0 + offset, 10.0) / 25.0;
+        assert!((area(&region) - exact).abs() < 1e-12, "{offset}: {} {exact}", area(&region));
+    }
+}
+
+#[test]
+fn a_stop_of_size_zero_is_dark() {
+    let rows = [(0.01, 5.0, 1.5, 20.0), (-0.01, 10.0, 1.0, 20.0), (0.0, 80.0, 1.0, 0.0)];
+    for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
+        let bench = bench(system(&rows, 2), Aperture::StopSemiDiameter(0.0), 5.0, aiming);
+        let Ok(launch) = bench.launch(bench.fields[0], 0) else { continue };
+        assert!(Region::new(launch).is_dark(), "{aiming:?}");
+    }
+}
+
+#[test]
+fn a_beam_that_nothing_limits_is_endless() {
+    let rows = [(0.0, 10.0, 1.5, f64::INFINITY), (0.0, 10.0, 1.0, f64::INFINITY)];
+    let mut bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(1.0), 5.0, Aiming::Paraxial);
+    let color = &mut bench.colors[0];
+    color.system.surfaces[0].semi_diameter = f64::INFINITY;
+    color.tracer = aplanat::trace::Tracer::new(&color.system).unwrap();
+    let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+    assert_eq!(region.kind, Kind::Endless);
+}
+
+#[test]
+fn a_pupil_in_two_pieces_is_told_and_sampled() {
+    // Strong spherical aberration: a small hole where a zone crosses the axis lets the middle and
+    // that zone through, but not what lies between.
+    let rows = [(0.02, 8.0, 1.5, 14.0), (-0.02, 44.4, 1.0, 14.0), (0.0, 5.0, 1.0, 0.12)];
+    let bench =
+        bench(system(&rows, 0), Aperture::EntrancePupilDiameter(26.0), 0.0, Aiming::Paraxial);
+    let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+    let Kind::Ragged { pieces, .. } = region.kind else { panic!("{:?}", region.kind) };
+    assert!(pieces >= 2, "{pieces}");
+    let spot = aplanat::analysis::spot(&bench, bench.fields[0], Accuracy::default()).unwrap();
+    let points = pattern(Pattern::Square(900));
+    let rays: Rays<f64> = points.iter().map(|p| region.launch.ray(*p).unwrap()).collect();
+    let mut landed = Points::default();
+    region.launch.color().tracer.batch(&rays, &mut landed);
+    let lit = || (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
+    let square: f64 = lit().map(|i| landed.x[i].powi(2) + landed.y[i].powi(2)).sum();
+    let rms = (square / lit().count() as f64).sqrt();
+    assert!((spot.rms.value - rms).abs() < 3.0 * spot.rms.error + 2e-3 * rms, "{spot:?} {rms}");
+}
+
+#[test]
+fn turning_the_field_turns_the_spot() {
+    let bench = double_gauss().clipped_bench();
+    let spot = |x: f64, y: f64| {
+        let accuracy = Accuracy { tolerance: 1e-8, most_rays: 100_000 };
+        aplanat::analysis::spot(&bench, Field { x, y, weight: 1.0 }, accuracy).unwrap()
+    };
+    let upright = spot(0.0, 14.0);
+    for angle in [0.3f64, 1.0, std::f64::consts::FRAC_PI_2, -2.5] {
+        let turned = spot(14.0 * angle.sin(), 14.0 * angle.cos());
+        assert!((turned.rms.value / upright.rms.value - 1.0).abs() < 1e-8, "{angle}");
+        let height = turned.centroid[0].value.hypot(turned.centroid[1].value);
+        assert!((height / upright.centroid[1].value - 1.0).abs() < 1e-9, "{angle}");
+    }
+}
+
+#[test]
+fn aimed_rays_cross_the_stop_where_they_should() {
+    for lens in lenses().iter().filter(|lens| lens.aimed_at_stop()) {
+        let bench = lens.clipped_bench();
+        let radius = bench.stop_radius();
+        for field in &bench.fields {
+            let launch = bench.launch(*field, bench.primary).unwrap();
+            for p in pattern(Pattern::Hexapolar(3)) {
+                let [x, y] = launch.at_stop(p).unwrap();
+                let miss = (x - p[0] * radius).hypot(y - p[1] * radius);
+                assert!(miss < 1e-14 * (1.0 + radius), "{} {}: {miss:e}", lens.id(), field.y);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_fisheye_takes_light_from_behind_it() {
+    let lens = aplanat::files::open("lenses/fisheye_minolta_16_f28.json").unwrap().lens;
+    let bench = Bench::of(&lens, 0).unwrap();
+    assert_eq!(bench.aiming, Aiming::Chief);
+    for angle in [45.0, 80.0, 88.0, 90.0, 92.0] {
+        let field = Field { x: 0.0, y: angle, weight: 1.0 };
+        let launch = bench.launch(field, bench.primary).unwrap();
+        let [x, y] = launch.at_stop([0.0, 0.0]).unwrap();
+        assert!(x.hypot(y) < 1e-9 * bench.stop_radius(), "{angle}");
+        println!("{angle} degrees: pupil area {:.6}", area(&Region::new(launch)));
+    }
+}
+
+#[test]
+fn a_telecentric_object_space_fills_its_aperture() {
+    // The stop stands in the back focal plane of a lens.
+    let mut lens =
+        system(&[(0.02, 3.0, 1.5, 30.0), (-0.02, 0.0, 1.0, 30.0), (0.0, 60.0, 1.0, 30.0)], 2);
+    let focus = aplanat::lens::focus_gap(
+        &system(&[(0.02, 3.0, 1.5, 30.0), (-0.02, 0.0, 1.0, 30.0)], 0),
+        Object::Infinity,
+    );
+    lens.surfaces[1].thickness = focus;
+    let beam = Beam {
+        object: Object::Finite(49.0),
+        aperture: Aperture::ObjectNa(0.1),
+        field: FieldKind::ObjectHeight,
+        edge: 2.0,
+    };
+    let mut bench = Bench::new(vec![(0.55, 1.0, lens)], 0, beam, Aiming::Paraxial).unwrap();
+    // Rounding may leave the pupil very far away instead of at infinity; both must do.
+    for position in [bench.first.entrance_pupil.position, None] {
+        bench.first.entrance_pupil.position = position;
+        if position.is_none() {
+            bench.first.entrance_pupil.diameter = None;
+        }
+        let launch = bench.launch(Field { x: 0.0, y: 2.0, weight: 1.0 }, 0).unwrap();
+        let [x, y] = launch.at_stop([0.0, 0.0]).unwrap();
+        assert!(x.hypot(y) < 0.05, "{x} {y}");
+        let ray = launch.ray([0.0, 1.0]).unwrap();
+        assert!((ray.direction.y.abs() - 0.1).abs() < 1e-6, "{:?}", ray.direction);
+        assert_eq!(Region::new(launch).kind, Kind::Clear);
     }
 }

@@ -145,7 +145,7 @@ struct LensKeys {
     aperture: Aperture,
     fields: Fields,
     wavelengths: Vec<Wavelength>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "given")]
     focus: Option<f64>,
     surfaces: Vec<Row>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -154,6 +154,12 @@ struct LensKeys {
     variables: Vec<Variable>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pickups: Vec<Pickup>,
+}
+
+/// A number where there is a key for it: `null`, which is what some programs write for a number
+/// that is none, is refused.
+fn given<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    f64::deserialize(from).map(Some)
 }
 
 fn is_air(medium: &Medium) -> bool {
@@ -208,9 +214,9 @@ impl<'de> Deserialize<'de> for Lens {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RowKeys {
-    #[serde(default, skip_serializing)]
+    #[serde(default, skip_serializing, deserialize_with = "given")]
     radius: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "given")]
     curvature: Option<f64>,
     #[serde(default, skip_serializing_if = "is_plain_zero")]
     conic: f64,
@@ -219,7 +225,7 @@ struct RowKeys {
     thickness: f64,
     #[serde(default, skip_serializing_if = "is_air")]
     glass: Medium,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "given")]
     semi_diameter: Option<f64>,
     #[serde(default, skip_serializing_if = "is_false")]
     stop: bool,
@@ -515,6 +521,11 @@ mod tests {
             assert!(text.contains("line 7, column"), "{text}");
             assert!(text.contains(&format!("found `{word}`")), "{text}");
         }
+        let text = changed("\"curvature\": 0.0195", "\"curvature\": null");
+        assert!(
+            text.contains("line 7") && text.contains("found null; expected a number"),
+            "{text}"
+        );
         assert!(changed("5.5", "1e999").contains("line 7"), "{}", changed("5.5", "1e999"));
         assert!(changed("5.5", "\"NaN\"").contains("string \"NaN\"; expected a number"));
     }

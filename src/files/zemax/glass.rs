@@ -151,9 +151,9 @@ fn code(name: &str) -> Option<(f64, f64)> {
     if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let (nd, vd): (f64, f64) = (digits[..3].parse().ok()?, digits[3..].parse().ok()?);
-    // From their decimal text, so that 1.517 is the f64 next to 1.517.
-    let nd = format!("1.{:03}", nd).parse().ok()?;
+    let (nd, vd) = digits.split_at(3);
+    // From its decimal text, so that it is the f64 next to 1.517.
+    let (nd, vd): (f64, f64) = (format!("1.{nd}").parse().ok()?, vd.parse().ok()?);
     Some((nd, vd / 10.0))
 }
 

@@ -4,13 +4,13 @@ use crate::files::error::Malformed;
 use crate::files::report::{Outcome, Report};
 use crate::files::zemax::draft::{ApertureLine, Draft};
 use crate::lens::glass;
-use crate::lens::{Aperture, Field, FieldKind, Fields, Medium, Object, Wavelength};
+use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Wavelength};
+use crate::paraxial::{Beam, first_order};
 
 /// The aperture of the whole lens.
 pub(super) fn aperture(
     draft: &Draft,
     stop: usize,
-    object: Object,
     object_medium: &Medium,
 ) -> Result<Aperture, Malformed> {
     let wrong = |line: usize, found: String, expected: &str| {
@@ -22,13 +22,7 @@ pub(super) fn aperture(
     };
     match aperture {
         ApertureLine::Diameter(v) if v > 0.0 => Ok(Aperture::EntrancePupilDiameter(v * draft.unit)),
-        ApertureLine::FNumber { value, working } if value > 0.0 => {
-            if object != Object::Infinity && !working {
-                let expected = "a working f-number (FNUM v 1), ENPD or OBNA for a finite object";
-                return wrong(line, "an f-number for infinite conjugates".to_owned(), expected);
-            }
-            Ok(Aperture::FNumber(value))
-        }
+        ApertureLine::FNumber { value, .. } if value > 0.0 => Ok(Aperture::FNumber(value)),
         ApertureLine::ObjectNa(v) if v > 0.0 => Ok(Aperture::ObjectNa(v)),
         ApertureLine::ObjectConeDegrees(v) if v > 0.0 && v < 90.0 => {
             Ok(Aperture::ObjectNa(index(object_medium) * v.to_radians().sin()))
@@ -39,6 +33,24 @@ pub(super) fn aperture(
         },
         other => wrong(line, format!("{other:?}"), "a number above 0, a cone below 90 degrees"),
     }
+}
+
+/// The f-number of a finite object may be that of the lens for an object at infinity; here it is
+/// the working one, so the pupil's diameter says the same.
+pub(super) fn infinite_f_number(draft: &Draft, lens: &mut Lens, report: &mut Report) {
+    let Some((ApertureLine::FNumber { value, working: false }, line)) = draft.aperture else {
+        return;
+    };
+    if lens.object == Object::Infinity {
+        return;
+    }
+    let system = lens.system(0, lens.wavelengths[lens.primary()].um).ok();
+    let data = system.and_then(|system| first_order(&system, &Beam::of(lens, 0)).ok());
+    let Some(efl) = data.and_then(|data| data.efl) else { return };
+    let diameter = efl.abs() / value;
+    lens.aperture = Aperture::EntrancePupilDiameter(diameter);
+    let note = format!("as the entrance pupil diameter {diameter} mm");
+    report.amend(line, Outcome::Approximated, note);
 }
 
 fn index(medium: &Medium) -> f64 {

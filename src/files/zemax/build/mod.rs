@@ -22,7 +22,7 @@ pub(super) fn build(draft: &Draft, report: &mut Report) -> Result<Lens, Malforme
     let object = object(draft)?;
     let object_medium = object_medium(draft, report)?;
     let surfaces = rows(draft, stop, report)?;
-    let aperture = beam::aperture(draft, stop, object, &object_medium)?;
+    let aperture = beam::aperture(draft, stop, &object_medium)?;
     let (name, source, notes, zoom_names) = texts(draft);
     let mut lens = Lens {
         name,
@@ -40,27 +40,31 @@ pub(super) fn build(draft: &Draft, report: &mut Report) -> Result<Lens, Malforme
         focus: None,
     };
     image(draft, report);
-    zoom::positions(draft, &mut lens, &zoom_names, report);
+    zoom::positions(draft, &mut lens, &zoom_names, report)?;
     solve::solves(draft, &mut lens, report);
+    beam::infinite_f_number(draft, &mut lens, report);
     Ok(lens)
 }
 
 /// Refuses a file that ends too early.
 fn complete(draft: &Draft) -> Result<(), Malformed> {
     let surfaces = &draft.surfaces;
-    let last = surfaces.len().saturating_sub(1);
     let wrong = |line, found: String, expected: &str| {
         Err(Malformed { place: format!("line {line}"), found, expected: expected.to_owned() })
     };
     for (number, surface) in surfaces.iter().enumerate() {
         let curvature = surface.curvature.is_some() || number == 0;
-        let thickness = surface.thickness.is_some() || number == last;
-        for (there, keyword) in [(curvature, "CURV"), (thickness, "DISZ")] {
+        for (there, keyword) in [(curvature, "CURV"), (surface.thickness.is_some(), "DISZ")] {
             if !there {
                 let found = format!("surface {number} without {keyword}");
                 return wrong(surface.line, found, "all its lines; is the file truncated?");
             }
         }
+    }
+    let image = surfaces.last().and_then(|surface| surface.thickness);
+    if let Some((thickness, line)) = image.filter(|(thickness, _)| *thickness != 0.0) {
+        let found = format!("a thickness of {thickness} behind the last surface");
+        return wrong(line, found, "an image with thickness 0; is the file truncated?");
     }
     if surfaces.len() < 3 {
         let found = format!("{} surfaces", surfaces.len());

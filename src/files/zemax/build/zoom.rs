@@ -1,16 +1,24 @@
 //! The multi-configuration table: one zoom position a configuration.
 
+use crate::files::error::Malformed;
 use crate::files::report::{Outcome, Report};
 use crate::files::zemax::draft::{Draft, Operand};
 use crate::lens::{
-    Aperture, FieldKind, Lens, Parameter, Quantity, Variable, ZoomPosition, ZoomThickness,
+    Aperture, FieldKind, Lens, Object, Parameter, Quantity, Variable, ZoomPosition, ZoomThickness,
 };
+use std::collections::BTreeMap;
 
 /// Gives the lens its zoom positions, if the file has more than one configuration.
-pub(super) fn positions(draft: &Draft, lens: &mut Lens, names: &[String], report: &mut Report) {
+pub(super) fn positions(
+    draft: &Draft,
+    lens: &mut Lens,
+    names: &[String],
+    report: &mut Report,
+) -> Result<(), Malformed> {
     if draft.configurations < 2 {
-        return;
+        return Ok(());
     }
+    complete(draft)?;
     let name = |i: usize| names.get(i).cloned().unwrap_or_default();
     lens.zoom = (0..draft.configurations)
         .map(|i| ZoomPosition { name: name(i), ..ZoomPosition::default() })
@@ -20,6 +28,26 @@ pub(super) fn positions(draft: &Draft, lens: &mut Lens, names: &[String], report
             report.amend(operand.line, Outcome::Dropped, why);
         }
     }
+    Ok(())
+}
+
+/// Refuses an operand that has no value at some configuration.
+fn complete(draft: &Draft) -> Result<(), Malformed> {
+    let mut values: BTreeMap<(&str, usize), (usize, usize)> = BTreeMap::new();
+    for operand in &draft.operands {
+        let (count, line) = values.entry((&operand.name, operand.target)).or_default();
+        (*count, *line) = (*count + 1, operand.line);
+    }
+    let configurations = draft.configurations;
+    for ((name, target), (count, line)) in values {
+        if count < configurations {
+            let found =
+                format!("{count} values of {name} {target} for {configurations} configurations");
+            let expected = "one for each; is the file truncated?".to_owned();
+            return Err(Malformed { place: format!("line {line}"), found, expected });
+        }
+    }
+    Ok(())
 }
 
 /// Writes one value into its position, or says why it cannot.
@@ -65,6 +93,9 @@ fn thickness(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'stat
 /// The value means whatever the aperture of the lens is given by.
 fn aperture(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
     let value = operand.value;
+    if lens.object != Object::Infinity && matches!(lens.aperture, Aperture::FNumber(_)) {
+        return Err("the f-number of a finite object does not change with the zoom position here");
+    }
     if value <= 0.0 {
         return Err("an aperture of 0");
     }
@@ -85,10 +116,7 @@ fn field(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static s
     let number = operand.target.checked_sub(1);
     let field = number.and_then(|i| fields.values.get_mut(i)).ok_or("there is no such field")?;
     let value = operand.value * scale;
-    if operand.name == "XFIE" {
-        field.x = value
-    } else {
-        field.y = value
-    }
+    let coordinate = if operand.name == "XFIE" { &mut field.x } else { &mut field.y };
+    *coordinate = value;
     Ok(())
 }

@@ -8,7 +8,6 @@ use crate::files::zemax::line::Line;
 /// Reads a line of the header; `None` where it is none.
 pub(super) fn read(draft: &mut Draft, line: &Line<'_>) -> Result<Option<Verdict>, Malformed> {
     let verdict = match line.keyword {
-        "VERS" => preserved(),
         "MODE" => mode(line)?,
         "UNIT" => unit(draft, line)?,
         "NAME" => text(&mut draft.name, line.rest),
@@ -29,8 +28,8 @@ pub(super) fn read(draft: &mut Draft, line: &Line<'_>) -> Result<Option<Verdict>
         "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDXF" | "VDYF" | "VCXF" | "VCYF" => {
             vignetting(line)
         }
-        "GFAC" | "RAIM" | "PUSH" | "SDMA" | "ROPD" | "PICB" | "POLS" | "GLRS" | "GSTD" | "NSCD"
-        | "COFN" | "PFIL" | "LANG" | "TOL" => preserved(),
+        "VERS" | "GFAC" | "RAIM" | "PUSH" | "SDMA" | "ROPD" | "PICB" | "POLS" | "GLRS" | "GSTD"
+        | "NSCD" | "COFN" | "PFIL" | "LANG" | "TOL" => preserved(),
         _ => return Ok(None),
     };
     Ok(Some(verdict))

@@ -81,11 +81,10 @@ impl Reader {
         }
         match self.draft.surfaces.last_mut() {
             Some(surface) if self.in_surface => surface::read(surface, line),
-            Some(_) => Ok(preserved()),
             None if surface::KEYWORDS.contains(&line.keyword) => {
                 Err(line.wrong(format!("`{}` before the first SURF", line.text()), "SURF 0"))
             }
-            None => Ok(preserved()),
+            _ => Ok(preserved()),
         }
     }
 

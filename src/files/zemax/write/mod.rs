@@ -15,6 +15,7 @@ pub fn write(lens: &Lens) -> Result<(String, Report), LensError> {
     lens.check()?;
     let mut export =
         Export { lens: lens.with_pickups()?, text: String::new(), report: Report::default() };
+    export.flatten();
     export.settle_focus();
     export.header();
     export.surfaces();
@@ -47,7 +48,7 @@ fn numbers(values: impl IntoIterator<Item = f64>) -> String {
 
 /// A text on one line.
 fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    text.split(['\n', '\r']).map(str::trim).collect::<Vec<_>>().join(" ").trim().to_owned()
 }
 
 impl Export {
@@ -69,6 +70,26 @@ impl Export {
     /// Whether the last gap is solved for the focus there too.
     fn has_focus_solve(&self) -> bool {
         self.lens.focus == Some(0.0)
+    }
+
+    /// Makes one zoom position the lens itself: a single configuration is no zoom lens there.
+    fn flatten(&mut self) {
+        if self.lens.zoom.len() != 1 {
+            return;
+        }
+        self.lens.aperture = self.lens.aperture_at(0);
+        self.lens.fields = self.lens.fields_at(0).clone();
+        for i in 0..self.lens.surfaces.len() {
+            let gap = self.lens.thickness_at(i, 0);
+            let row = &mut self.lens.surfaces[i];
+            row.thickness = gap.unwrap_or(row.thickness);
+        }
+        self.lens.zoom.clear();
+        let moves = |p: crate::lens::Parameter| matches!(p.quantity, Quantity::ZoomThickness(_));
+        self.lens.variables.retain(|variable| !moves(variable.parameter));
+        self.lens.pickups.retain(|pickup| !moves(pickup.parameter) && !moves(pickup.source));
+        let note = "one position is written as a lens that does not zoom";
+        self.lose(Outcome::Approximated, "zoom positions: 1", note);
     }
 
     /// Writes the solved last gap into the lens, at every zoom position where it is not solved

@@ -11,10 +11,6 @@ impl Export {
         if positions == 0 {
             return;
         }
-        if positions == 1 {
-            let note = "one position is written as a lens that does not zoom";
-            self.lose(Outcome::Approximated, "zoom positions: 1", note);
-        }
         self.line(format!("MNUM {positions} 1"));
         self.thicknesses();
         self.apertures();

@@ -1,0 +1,106 @@
+//! The spot at image planes around the one of the lens.
+
+use super::{AtField, Lines, Outcome, Task, show, spot};
+use crate::analysis::{Dark, Estimate};
+use crate::cli::failure::Failure;
+use crate::cli::output::Number;
+use crate::lens::{Lens, Parameter, Quantity};
+use crate::measure::timed;
+use serde::Serialize;
+
+/// Image planes on each side of the one of the lens.
+const STEPS: i32 = 5;
+
+/// The spots of a field through focus.
+#[derive(Serialize)]
+pub(super) struct FocusKeys {
+    positions: Vec<Position>,
+}
+
+#[derive(Serialize)]
+struct Position {
+    /// How far the image plane is moved along z, in mm.
+    defocus: f64,
+    rms: Option<Estimate>,
+}
+
+pub(super) fn through_focus(task: &Task) -> Result<Vec<AtField<FocusKeys>>, Failure> {
+    let step = step(task);
+    let mut columns = Vec::new();
+    for i in -STEPS..=STEPS {
+        let defocus = f64::from(i) * step;
+        columns.push((defocus, spots(task, defocus)?));
+    }
+    let at = |(i, field): (usize, &crate::lens::Field)| {
+        let position = |(defocus, spots): &(f64, Vec<Result<Estimate, Dark>>)| Position {
+            defocus: *defocus,
+            rms: spots[i].ok(),
+        };
+        let dark = columns.iter().find_map(|(_, spots)| spots[i].err());
+        let lit = columns.iter().any(|(_, spots)| spots[i].is_ok());
+        let keys = FocusKeys { positions: columns.iter().map(position).collect() };
+        AtField::new(*field, if lit { Ok(keys) } else { Err(dark.unwrap_or(Dark::NoLight)) })
+    };
+    Ok(task.fields.iter().enumerate().map(at).collect())
+}
+
+/// The RMS radii of all fields with the image plane moved.
+fn spots(task: &Task, defocus: f64) -> Result<Vec<Result<Estimate, Dark>>, Failure> {
+    let mut moved = task.opened.clone();
+    shift_image(&mut moved.lens, task.zoom, defocus);
+    let mut bench = moved.bench(task.zoom)?;
+    bench.aiming = task.bench.aiming;
+    let spot = |field: &crate::lens::Field| {
+        let (result, ms) = timed(|| crate::analysis::spot(&bench, *field, task.accuracy));
+        result.map(|spot| Estimate { milliseconds: Some(ms), ..spot.rms })
+    };
+    Ok(task.fields.iter().map(spot).collect())
+}
+
+/// Moves the image plane along z, whichever number it hangs on.
+fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
+    if let Some(offset) = &mut lens.focus {
+        *offset += defocus;
+        return;
+    }
+    let last = lens.surfaces.len() - 1;
+    let own = |z: &crate::lens::ZoomPosition| z.thicknesses.iter().any(|gap| gap.surface == last);
+    let quantity = match lens.zoom.get(zoom) {
+        Some(position) if own(position) => Quantity::ZoomThickness(zoom),
+        _ => Quantity::Thickness,
+    };
+    lens.pickups.retain(|pickup| pickup.parameter != Parameter::new(last, quantity));
+    let parameter = Parameter::new(last, quantity);
+    let gap = lens.get(parameter).unwrap_or(0.0);
+    lens.set(parameter, gap + defocus);
+}
+
+/// A step over which the spot of the sharpest field changes by about its own size, as a round
+/// number.
+fn step(task: &Task) -> f64 {
+    let rms = |field: &AtField<spot::SpotKeys>| match &field.outcome {
+        Outcome::Lit(lit) => Some(lit.rms()),
+        Outcome::Dark { .. } => None,
+    };
+    let smallest = spot::spots(task).iter().filter_map(rms).fold(f64::INFINITY, f64::min);
+    let first = &task.bench.first;
+    let f_number = first.working_f_number.unwrap_or(1.0).abs();
+    let airy = 1.22 * task.primary_um() * 1e-3 * f_number;
+    let step = f_number * if smallest.is_finite() { smallest.max(airy) } else { airy };
+    let power = 10f64.powf(step.log10().floor());
+    power * (step / power).round().max(1.0)
+}
+
+impl Lines for FocusKeys {
+    const TITLE: &'static str =
+        "through focus: rms radius in mm over all colours, against the shift of the image plane";
+
+    fn lines(&self) -> Vec<String> {
+        let line = |position: &Position| {
+            let sign = if position.defocus > 0.0 { "+" } else { "" };
+            let name = format!("{sign}{}", Number(position.defocus));
+            position.rms.as_ref().map_or(format!("{name:<22} no light"), |rms| show(&name, rms))
+        };
+        self.positions.iter().map(line).collect()
+    }
+}

@@ -1,0 +1,51 @@
+//! How much light a field gets.
+
+use super::{AtField, Lines, Task, show};
+use crate::analysis::{Estimate, Illumination, illumination};
+use crate::measure::timed;
+use crate::pupil::Bench;
+use serde::Serialize;
+
+/// The light at a field; a field without any has 0 and says why.
+#[derive(Serialize)]
+pub(super) struct LightKeys {
+    cone: Estimate,
+    relative: Option<Estimate>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dark: Option<String>,
+}
+
+pub(super) fn illuminations(task: &Task) -> Vec<AtField<LightKeys>> {
+    // Light is compared with that of the first field of the lens, asked for or not.
+    let first = task.bench.fields.first().copied();
+    let alone = first.is_some_and(|first| task.fields == [first]);
+    let asked = if alone { Vec::new() } else { task.fields.clone() };
+    let listed = task.fields == task.bench.fields;
+    let fields = if listed { asked } else { first.into_iter().chain(asked).collect() };
+    let skipped = usize::from(!listed && !alone);
+    let bench = Bench { fields, ..task.bench.clone() };
+    let (results, ms) = timed(|| illumination(&bench, bench.primary, task.accuracy));
+    results.iter().skip(skipped).map(|light| keys(light, ms)).collect()
+}
+
+fn keys(light: &Illumination, milliseconds: f64) -> AtField<LightKeys> {
+    let milliseconds = Some(milliseconds);
+    let keys = LightKeys {
+        cone: Estimate { milliseconds, ..light.cone },
+        relative: light.relative.map(|e| Estimate { milliseconds, ..e }),
+        dark: light.dark.map(|dark| dark.to_string()),
+    };
+    AtField::new(light.field, Ok(keys))
+}
+
+impl Lines for LightKeys {
+    const TITLE: &'static str = "illumination at the primary wavelength: area of the cone in direction cosines, and \
+         against the first field";
+
+    fn lines(&self) -> Vec<String> {
+        let mut lines = vec![show("cone", &self.cone)];
+        lines.extend(self.relative.iter().map(|e| show("relative", e)));
+        lines.extend(self.dark.clone());
+        lines
+    }
+}

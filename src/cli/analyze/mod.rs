@@ -1,0 +1,250 @@
+//! What a designer reads, each number with its error, rays and milliseconds.
+
+mod chief;
+mod fan;
+mod focus;
+mod illumination;
+mod spot;
+
+use super::failure::Failure;
+use super::input::{LensFile, Opened, Tolerance};
+use super::output::{Number, Output};
+use crate::analysis::{Dark, Estimate};
+use crate::lens::{Field, FieldKind};
+use crate::measure::timed;
+use crate::pupil::{Accuracy, Bench};
+use crate::trace::{Fate, Fates};
+use clap::ValueEnum;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::{self, Display};
+
+/// Spot, fans, distortion, ...: each number with its estimated error, rays and milliseconds
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("../help/analyze.txt"))]
+pub(super) struct Analyze {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// What to analyze
+    what: What,
+
+    /// The error allowed, relative to the number: `0.1%` or `1e-3`
+    #[arg(long, default_value = "0.1%", value_name = "TOLERANCE")]
+    error: Tolerance,
+
+    /// Only this field, in the unit of the lens's fields; all fields of the lens where it is absent
+    #[arg(long, value_name = "Y", allow_negative_numbers = true)]
+    field: Option<f64>,
+
+    /// The zoom position, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    zoom: usize,
+}
+
+/// The analyses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum What {
+    /// RMS and geometric radius, centroid, colours
+    Spot,
+    /// Transverse ray errors along both sections of the pupil
+    Fan,
+    /// Chief rays against `f tan(theta)` and `f theta`
+    Distortion,
+    /// Tangential and sagittal focus along chief rays
+    FieldCurvature,
+    /// Light against that of the first field, with the really clipped pupil
+    Illumination,
+    /// RMS radius at image planes around the one of the lens
+    ThroughFocus,
+}
+
+impl Analyze {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let task = Task::new(self)?;
+        match self.what {
+            What::Spot => output.print(&task.report(spot::spots(&task))?),
+            What::Fan => output.print(&task.report(fan::fans(&task))?),
+            What::Distortion => output.print(&task.report(chief::distortions(&task))?),
+            What::FieldCurvature => output.print(&task.report(chief::curvatures(&task))?),
+            What::Illumination => output.print(&task.report(illumination::illuminations(&task))?),
+            What::ThroughFocus => output.print(&task.report(focus::through_focus(&task)?)?),
+        }
+    }
+}
+
+/// A lens that is to be analyzed.
+struct Task {
+    what: What,
+    opened: Opened,
+    bench: Bench,
+    /// The fields that are asked for.
+    fields: Vec<Field>,
+    zoom: usize,
+    accuracy: Accuracy,
+}
+
+impl Task {
+    fn new(analyze: &Analyze) -> Result<Self, Failure> {
+        let opened = analyze.lens.open()?;
+        let bench = opened.bench(analyze.zoom)?;
+        let fields = match analyze.field {
+            Some(y) => vec![opened.field(y, analyze.zoom)?],
+            None => bench.fields.clone(),
+        };
+        let accuracy = Accuracy { tolerance: analyze.error.0, ..Accuracy::default() };
+        Ok(Self { what: analyze.what, opened, bench, fields, zoom: analyze.zoom, accuracy })
+    }
+
+    fn primary_um(&self) -> f64 {
+        self.bench.colors[self.bench.primary].um
+    }
+
+    /// What rounding in `f64` may do to a length that one ray gives.
+    fn rounding(&self) -> f64 {
+        let surfaces = &self.bench.colors[self.bench.primary].system.surfaces;
+        let length: f64 = surfaces.iter().map(|surface| surface.thickness.abs()).sum();
+        16.0 * f64::EPSILON * length
+    }
+
+    /// A length from one ray.
+    fn of_one_ray(&self, value: f64, milliseconds: f64) -> Estimate {
+        let milliseconds = Some(milliseconds);
+        Estimate { milliseconds, ..Estimate::new(value, self.rounding(), 1) }
+    }
+
+    /// The results at every field, unless no field has any light.
+    fn report<T: Lines + Serialize>(&self, fields: Vec<AtField<T>>) -> Result<Report<T>, Failure> {
+        if let Some(reason) = all_dark(&fields) {
+            return Err(self.no_light(reason));
+        }
+        let first = &self.bench.first;
+        let um = self.primary_um();
+        Ok(Report {
+            analysis: self.what,
+            zoom: self.zoom,
+            wavelength_um: um,
+            tolerance: self.accuracy.tolerance,
+            field_kind: self.bench.beam.field,
+            airy_radius: first.working_f_number.map(|f| 1.22 * um * 1e-3 * f),
+            fields,
+        })
+    }
+
+    /// Says where the light is lost of which nothing arrives.
+    fn no_light(&self, reason: &str) -> Failure {
+        let mut ends: BTreeMap<Fate, usize> = BTreeMap::new();
+        let mut fates = Fates::default();
+        let color = &self.bench.colors[self.bench.primary];
+        for field in &self.fields {
+            let Ok(launch) = self.bench.launch(*field, self.bench.primary) else { continue };
+            let grid = crate::pupil::pattern(crate::pupil::Pattern::Square(16));
+            for ray in grid.into_iter().filter_map(|p| launch.ray(p)) {
+                let fate = color.tracer.trace(ray).fate;
+                *ends.entry(fate).or_default() += 1;
+                fates.count(fate);
+            }
+        }
+        let most = ends.into_iter().max_by_key(|(_, count)| *count);
+        let place = most.map_or("no ray could be started".to_owned(), |(fate, count)| {
+            let surface = fate.surface().unwrap_or(0);
+            let (name, total) = (fate.name(), fates.total());
+            format!("{count} of {total} rays end {name} at surface {surface}")
+        });
+        let file = &self.opened.file;
+        Failure::Input(format!("{file}: {reason}: {place}; expected a lens that images"))
+    }
+}
+
+fn all_dark<T>(fields: &[AtField<T>]) -> Option<&str> {
+    let reason = |field: &AtField<T>| matches!(field.outcome, Outcome::Dark { .. });
+    match fields.first().map(|field| &field.outcome) {
+        Some(Outcome::Dark { dark }) if fields.iter().all(reason) => Some(dark),
+        _ => None,
+    }
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report<T> {
+    analysis: What,
+    zoom: usize,
+    wavelength_um: f64,
+    tolerance: f64,
+    field_kind: FieldKind,
+    airy_radius: Option<f64>,
+    fields: Vec<AtField<T>>,
+}
+
+/// A result at a field.
+#[derive(Serialize)]
+struct AtField<T> {
+    x: f64,
+    y: f64,
+    #[serde(flatten)]
+    outcome: Outcome<T>,
+}
+
+/// A result, or why there is none.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Outcome<T> {
+    Lit(T),
+    Dark { dark: String },
+}
+
+impl<T> AtField<T> {
+    fn new(field: Field, result: Result<T, Dark>) -> Self {
+        let outcome = match result {
+            Ok(lit) => Outcome::Lit(lit),
+            Err(dark) => Outcome::Dark { dark: dark.to_string() },
+        };
+        Self { x: field.x, y: field.y, outcome }
+    }
+}
+
+/// How a result is shown to people.
+trait Lines {
+    /// What the numbers are, for the first line.
+    const TITLE: &'static str;
+    /// Lines about a field.
+    fn lines(&self) -> Vec<String>;
+}
+
+impl<T: Lines> Display for Report<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = match self.field_kind {
+            FieldKind::Angle => "degrees",
+            FieldKind::ObjectHeight => "mm at the object",
+            FieldKind::ImageHeight => "mm at the image",
+        };
+        writeln!(f, "{}", T::TITLE)?;
+        for field in &self.fields {
+            let AtField { x, y, outcome } = field;
+            let across = if *x == 0.0 { String::new() } else { format!("x {}, ", Number(*x)) };
+            writeln!(f, "\nfield {across}y {} {unit}", Number(*y))?;
+            match outcome {
+                Outcome::Lit(lit) => {
+                    lit.lines().iter().try_for_each(|line| writeln!(f, "  {line}"))?;
+                }
+                Outcome::Dark { dark } => writeln!(f, "  {dark}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A number with its error, rays and milliseconds.
+fn show(name: &str, estimate: &Estimate) -> String {
+    let Estimate { value, error, rays, milliseconds } = *estimate;
+    let ms = milliseconds.map(|ms| format!(", {ms:.3} ms")).unwrap_or_default();
+    format!("{name:<22} {:>13} ± {error:.1e}   {rays} rays{ms}", Number(value))
+}
+
+/// Does some work and notes the milliseconds in its results.
+fn with_time<T>(work: impl FnOnce() -> T, note: impl FnOnce(&mut T, f64)) -> T {
+    let (mut result, milliseconds) = timed(work);
+    note(&mut result, milliseconds);
+    result
+}

@@ -1,0 +1,24 @@
+//! Files of every kind: what is read, what is refused and how, and that nothing is lost.
+
+mod bad_input;
+mod mutations;
+mod round_trip;
+mod zemax;
+
+use std::path::PathBuf;
+
+/// A folder of its own for each test, empty.
+fn folder(test: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("aplanat-{}-{test}", std::process::id()));
+    std::fs::remove_dir_all(&folder).ok();
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// The bytes of one of our own foreign files.
+fn foreign(name: &str) -> Vec<u8> {
+    std::fs::read(format!("tests/files/{name}")).unwrap()
+}
+
+/// The foreign files in `tests/files`.
+const FOREIGN: [&str; 3] = ["achromat.zmx", "schmidt_old_spelling.zmx", "zoom_utf16.zmx"];

@@ -1,0 +1,109 @@
+//! A lens that goes out and comes back is the same lens, to the last bit.
+
+use super::{FOREIGN, folder, foreign};
+use aplanat::files::{self, Outcome, native};
+use aplanat::lens::{Lens, Medium, Object, Parameter, Pickup, Quantity};
+use std::fs;
+
+fn library() -> impl Iterator<Item = (&'static str, Lens)> {
+    files::library().iter().map(|b| (b.name, native::read(b.text, b.name).unwrap()))
+}
+
+/// The lens without what a Zemax file has no room for.
+fn without_bounds(mut lens: Lens) -> Lens {
+    for variable in &mut lens.variables {
+        if variable.parameter.quantity != Quantity::Thickness {
+            (variable.min, variable.max) = (None, None);
+        }
+    }
+    lens.variables.sort_by_key(|variable| variable.parameter);
+    lens
+}
+
+#[test]
+fn every_library_lens_goes_through_zemax_and_comes_back() {
+    let folder = folder("round-trip");
+    for (name, lens) in library() {
+        let target = folder.join(format!("{name}.zmx"));
+        let saved = files::save(&lens, &target).unwrap_or_else(|error| panic!("{error}"));
+        let proof = saved.proof.unwrap();
+        let fields: usize =
+            (0..lens.zoom_positions()).map(|zoom| lens.fields_at(zoom).values.len()).sum();
+        assert_eq!(proof.rays, 200 * fields, "{name}");
+        assert!(proof.imaged >= proof.rays / 4, "{name}: {proof}");
+        assert!(proof.worst_mm <= 1e-9, "{name}: {proof}");
+
+        let bytes = fs::read(&target).unwrap();
+        assert_eq!(bytes[..2], [0xFF, 0xFE], "{name}: UTF-16 with its mark");
+        let back = files::open(&target).unwrap().lens;
+        assert_eq!(without_bounds(back.clone()), without_bounds(lens.clone()), "{name}");
+        files::save(&back, &target).unwrap();
+        assert_eq!(fs::read(&target).unwrap(), bytes, "{name}: another file the second time");
+    }
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn every_foreign_file_is_the_same_after_export_and_import() {
+    let folder = folder("foreign");
+    for name in FOREIGN {
+        let lens = files::parse(&foreign(name), name).unwrap().lens;
+        let target = folder.join(name);
+        let saved = files::save(&lens, &target).unwrap_or_else(|error| panic!("{error}"));
+        assert!(saved.proof.unwrap().imaged > 0);
+        let back = files::open(&target).unwrap().lens;
+        assert_eq!(back, lens, "{name}");
+        assert_eq!(native::write(&back), native::write(&lens), "{name}");
+        let through = files::parse(native::write(&lens).as_bytes(), "a.json").unwrap().lens;
+        assert_eq!(through, lens, "{name}");
+    }
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn what_an_export_cannot_hold_is_in_its_report() {
+    let folder = folder("losses");
+    let (_, mut lens) = library().next().unwrap();
+    let conic = |surface| Parameter::new(surface, Quantity::Conic);
+    lens.focus = Some(0.1);
+    lens.variables.retain(|v| v.parameter.surface == 0);
+    lens.pickups =
+        vec![Pickup { parameter: conic(1), source: conic(2), scale: 1.0, offset: -0.25 }];
+    lens.surfaces[4].medium = Medium::Model { nd: 1.01, vd: 60.0 };
+    let target = folder.join("a.zmx");
+    let report = files::save(&lens, &target).unwrap().report.unwrap();
+    let row = |text: &str| report.rows.iter().find(|row| row.text.contains(text)).unwrap();
+    assert_eq!(row("focus solve").outcome, Outcome::Approximated);
+    assert_eq!(row("pickup: conic constant of surface 1").outcome, Outcome::Approximated);
+    assert_eq!(row("variable: curvature of surface 0").outcome, Outcome::Dropped);
+    assert_eq!(row("model glass after surface 4").outcome, Outcome::Approximated);
+    let back = files::open(&target).unwrap().lens;
+    assert_eq!(back.surfaces[1].conic, -0.25);
+    assert!(back.focus.is_none() && back.pickups.is_empty());
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn an_export_that_would_trace_differently_is_not_written() {
+    let folder = folder("not-proven");
+    let (_, mut lens) = library().next().unwrap();
+    lens.variables.clear();
+    // A ball that light enters and leaves through the far half of the same sphere.
+    lens.surfaces.truncate(2);
+    lens.surfaces[0].stop = true;
+    lens.surfaces[0].curvature = 0.05;
+    lens.surfaces[0].hyper = true;
+    lens.surfaces[0].semi_diameter = None;
+    lens.surfaces[1].semi_diameter = None;
+    lens.object = Object::Finite(30.0);
+    lens.aperture = aplanat::lens::Aperture::ObjectNa(0.999);
+    let target = folder.join("a.zmx");
+    match files::save(&lens, &target) {
+        Ok(saved) => assert!(saved.proof.unwrap().worst_mm <= 1e-9),
+        Err(error) => {
+            assert!(error.to_string().contains("does not trace like the lens"), "{error}");
+            assert!(!target.exists());
+        }
+    }
+    fs::remove_dir_all(folder).unwrap();
+}

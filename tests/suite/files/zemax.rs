@@ -1,0 +1,298 @@
+//! What a Zemax file means, keyword by keyword, on files of our own.
+
+use super::foreign;
+use aplanat::files::{self, FileError, Opened, Outcome, Report};
+use aplanat::lens::{
+    Aperture, FieldKind, Lens, Medium, Object, Parameter, Pickup, Quantity, Variable,
+};
+
+fn achromat() -> String {
+    String::from_utf8(foreign("achromat.zmx")).unwrap()
+}
+
+fn open(bytes: &[u8]) -> Result<Opened, FileError> {
+    files::parse(bytes, "folder/a.zmx")
+}
+
+fn lens(text: &str) -> Lens {
+    open(text.as_bytes()).unwrap_or_else(|error| panic!("{error}")).lens
+}
+
+/// The achromat with something replaced.
+fn changed(from: &str, to: &str) -> Result<Opened, FileError> {
+    let text = achromat();
+    assert!(text.contains(from), "{from}");
+    open(text.replacen(from, to, 1).as_bytes())
+}
+
+fn refusal(from: &str, to: &str) -> String {
+    changed(from, to).unwrap_err().to_string()
+}
+
+fn outcome<'a>(report: &'a Report, text: &str) -> (Outcome, &'a str) {
+    let row = report.rows.iter().find(|row| row.text.starts_with(text)).unwrap();
+    (row.outcome, &row.note)
+}
+
+#[test]
+fn every_encoding_and_line_end_gives_the_same_lens() {
+    let text = achromat().replace("front crown", "Vorderlinse für \u{f8} 16");
+    let expected = lens(&text);
+    assert_eq!(expected.surfaces[0].comment, "Vorderlinse für ø 16");
+    let utf16 = |mark: bool, bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        let start = mark.then_some(0xFEFF);
+        start.into_iter().chain(text.encode_utf16()).flat_map(bytes).collect()
+    };
+    let latin: Vec<u8> = text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+    let spellings = [
+        utf16(true, u16::to_le_bytes),
+        utf16(false, u16::to_le_bytes),
+        utf16(true, u16::to_be_bytes),
+        utf16(false, u16::to_be_bytes),
+        [b"\xEF\xBB\xBF", text.as_bytes()].concat(),
+        latin,
+        text.replace("\r\n", "\n").into_bytes(),
+        text.replace("\r\n", "\r").into_bytes(),
+        text.replace("\r\n  ", "\r\n").into_bytes(), // indentation is cosmetic
+    ];
+    for (i, bytes) in spellings.iter().enumerate() {
+        assert_eq!(open(bytes).unwrap().lens, expected, "spelling {i}");
+    }
+}
+
+#[test]
+fn the_achromat_is_what_its_file_says() {
+    let opened = open(achromat().as_bytes()).unwrap();
+    let lens = &opened.lens;
+    assert_eq!(lens.name, "Achromat f80");
+    assert_eq!(lens.notes, "Cemented, own numbers.");
+    assert_eq!(lens.source, "Imported from a.zmx");
+    assert_eq!(lens.object, Object::Infinity);
+    assert_eq!(lens.aperture, Aperture::EntrancePupilDiameter(16.0));
+    let angles: Vec<f64> = lens.fields.values.iter().map(|field| field.y).collect();
+    assert_eq!(angles, [0.0, 1.5, 2.5]);
+    assert_eq!(lens.fields.values[2].weight, 2.0);
+    assert_eq!(lens.wavelengths.len(), 3);
+    assert_eq!(lens.primary(), 1);
+    assert_eq!(lens.stop(), Some(0));
+    let [first, second, third] = &lens.surfaces[..] else { panic!("three surfaces") };
+    assert_eq!(first.medium, Medium::Glass("SCHOTT N-BAK4".to_owned()));
+    assert_eq!((first.curvature, first.thickness), (2.0491803278688523e-2, 5.5));
+    assert_eq!((first.semi_diameter, second.semi_diameter), (Some(8.6), Some(8.6)));
+    assert_eq!(third.semi_diameter, None); // found automatically there
+    let curvature = |surface| Parameter::new(surface, Quantity::Curvature);
+    let thickness = Parameter::new(0, Quantity::Thickness);
+    let free = |parameter| Variable { parameter, min: None, max: None };
+    let bounded = Variable { parameter: thickness, min: Some(2.0), max: Some(9.0) };
+    let expected = [free(curvature(0)), bounded, free(curvature(1)), free(curvature(2))];
+    assert_eq!(lens.variables, expected);
+    assert_eq!(lens.focus, Some(0.0));
+    let check = &opened.checks[0];
+    assert!((check.efl.unwrap() - 80.5879).abs() < 1e-4, "{check}");
+    assert!((check.bfl.unwrap() - 76.4807).abs() < 1e-4, "{check}");
+    assert_eq!(Some(third.thickness), check.bfl);
+}
+
+#[test]
+fn the_report_says_what_became_of_every_line() {
+    let text = achromat();
+    let report = open(text.as_bytes()).unwrap().report.unwrap();
+    assert_eq!(report.rows.len(), text.lines().count());
+    assert_eq!(outcome(&report, "ENPD").0, Outcome::Used);
+    assert_eq!(outcome(&report, "COFN").0, Outcome::Preserved);
+    assert_eq!(outcome(&report, "EFFL").0, Outcome::Preserved);
+    assert_eq!(outcome(&report, "VCYN").0, Outcome::Dropped);
+    let fixed: Vec<_> =
+        report.rows.iter().filter(|row| row.text.starts_with("DIAM 8.6 1")).collect();
+    assert_eq!(fixed[0].outcome, Outcome::Used); // beside an aperture that clips
+    assert_eq!(fixed[1].outcome, Outcome::Approximated);
+    let json = serde_json::to_value(&report).unwrap();
+    assert_eq!(json["rows"][6]["outcome"], "used");
+    assert_eq!(json["rows"][6]["line"], 7);
+    assert_eq!(json["rows"][6]["keyword"], "ENPD");
+    let first = report.to_string().lines().nth(1).unwrap().to_owned();
+    assert!(first.starts_with("dropped") && first.contains("VCYN"), "{first}");
+}
+
+#[test]
+fn old_spellings_inches_and_commas_are_read() {
+    let opened = open(&foreign("schmidt_old_spelling.zmx")).unwrap();
+    let lens = opened.lens;
+    assert_eq!(lens.object, Object::Infinity); // 1e10 there
+    assert_eq!(lens.aperture, Aperture::EntrancePupilDiameter(4.0 * 25.4));
+    let fields: Vec<(f64, f64)> = lens.fields.values.iter().map(|f| (f.y, f.weight)).collect();
+    assert_eq!(fields, [(0.0, 1.0), (1.0, 2.0)]);
+    let waves: Vec<(f64, f64)> = lens.wavelengths.iter().map(|w| (w.um, w.weight)).collect();
+    assert_eq!(waves, [(0.4861327, 1.0), (0.5875618, 3.0)]);
+    let plate = &lens.surfaces[0];
+    // z = α r² is a paraboloid of curvature 2 α.
+    assert_eq!((plate.curvature, plate.conic), (5e-3 / 25.4, -1.0));
+    assert!((plate.asphere[0] / (-3.1e-4 / 25.4_f64.powi(3)) - 1.0).abs() < 1e-15);
+    assert!((plate.asphere[1] / (1e-6 / 25.4_f64.powi(5)) - 1.0).abs() < 1e-15);
+    assert_eq!(plate.thickness, 0.25 * 25.4);
+    assert_eq!(plate.medium, Medium::Glass("SCHOTT N-BK7".to_owned()));
+    let mirror = &lens.surfaces[2];
+    assert_eq!((&mirror.medium, mirror.conic), (&Medium::Mirror, -0.5));
+    assert_eq!(mirror.thickness, -7.5 * 25.4);
+    let report = opened.report.unwrap();
+    assert_eq!(outcome(&report, "GLAS BK7").1, "SCHOTT N-BK7 in place of BK7");
+    assert!(outcome(&report, "PARM 1").1.contains("paraboloid"));
+}
+
+#[test]
+fn configurations_solves_and_pickups_are_read() {
+    let opened = open(&foreign("zoom_utf16.zmx")).unwrap();
+    let lens = opened.lens;
+    let report = opened.report.unwrap();
+    assert_eq!(lens.zoom.len(), 3);
+    let gaps: Vec<f64> = (0..3).map(|zoom| lens.thickness_at(1, zoom).unwrap()).collect();
+    assert_eq!(gaps, [30.0, 12.5, 1.25]);
+    assert_eq!(lens.aperture, Aperture::StopSemiDiameter(6.0));
+    assert_eq!(lens.aperture_at(1), Aperture::StopSemiDiameter(5.5));
+    assert_eq!(lens.fields_at(2).values[1].y, 5.0);
+    assert_eq!(lens.surfaces[4].semi_diameter, Some(6.5));
+    // The coordinate breaks cancel and stay as planes.
+    assert_eq!(lens.surfaces.len(), 8);
+    assert_eq!((lens.surfaces[2].curvature, &lens.surfaces[2].medium), (0.0, &Medium::Air));
+    assert_eq!(outcome(&report, "TYPE COORDBRK").0, Outcome::Approximated);
+    let glass = Medium::Model { nd: 1.62, vd: 60.3 };
+    assert_eq!((&lens.surfaces[4].medium, &lens.surfaces[6].medium), (&glass, &glass));
+    let pickup = |to, from, quantity, scale| Pickup {
+        parameter: Parameter::new(to, quantity),
+        source: Parameter::new(from, quantity),
+        scale,
+        offset: 0.0,
+    };
+    let expected = [
+        pickup(1, 0, Quantity::Curvature, -1.0),
+        pickup(5, 4, Quantity::Curvature, -1.0),
+        pickup(6, 4, Quantity::Thickness, 1.0),
+    ];
+    assert_eq!(lens.pickups, expected);
+    let free = |surface, quantity| lens.variable(Parameter::new(surface, quantity)).is_some();
+    assert!((0..3).all(|zoom| free(1, Quantity::ZoomThickness(zoom))));
+    assert!(free(4, Quantity::Curvature) && free(4, Quantity::Index));
+    assert_eq!(lens.focus, Some(0.0));
+    assert_eq!(outcome(&report, "CRVT").0, Outcome::Dropped);
+    assert_eq!(opened.checks.len(), 3);
+    assert_eq!(Some(lens.surfaces[7].thickness), opened.checks[0].bfl);
+}
+
+#[test]
+fn apertures_fields_and_objects_are_read_in_every_kind() {
+    let finite = achromat().replace("DISZ INFINITY", "DISZ 200");
+    let with = |from: &str, to: &str| lens(&finite.replacen(from, to, 1));
+    assert_eq!(with("ENPD 16.0", "OBNA 0.05 0").aperture, Aperture::ObjectNa(0.05));
+    let cone = with("ENPD 16.0", "OBNA 3 1").aperture;
+    assert_eq!(cone, Aperture::ObjectNa(3.0_f64.to_radians().sin()));
+    assert_eq!(with("ENPD 16.0", "FNUM 5 1").aperture, Aperture::FNumber(5.0));
+    // The f-number for an object at infinity is that of the pupil.
+    let Aperture::EntrancePupilDiameter(pupil) = with("ENPD 16.0", "FNUM 5 0").aperture else {
+        panic!("a pupil diameter");
+    };
+    assert!((pupil - 80.5879 / 5.0).abs() < 1e-4);
+    assert_eq!(with("ENPD 16.0", "FLOA").aperture, Aperture::StopSemiDiameter(8.6));
+    for (kind, expected) in [
+        (0, FieldKind::Angle),
+        (1, FieldKind::ObjectHeight),
+        (2, FieldKind::ImageHeight),
+        (3, FieldKind::ImageHeight),
+        (4, FieldKind::Angle),
+    ] {
+        let lens = with("FTYP 0 0 3", &format!("FTYP {kind} 0 3"));
+        assert_eq!(lens.fields.kind, expected);
+        assert_eq!(lens.object, Object::Finite(200.0));
+    }
+    for (unit, mm) in [("MM", 1.0), ("CM", 10.0), ("IN", 25.4), ("M", 1000.0), ("METER", 1000.0)] {
+        let lens = with("UNIT MM", &format!("UNIT {unit}"));
+        assert_eq!(lens.object, Object::Finite(200.0 * mm));
+        assert_eq!(lens.surfaces[0].curvature, 2.0491803278688523e-2 / mm);
+        assert_eq!(lens.surfaces[0].semi_diameter, Some(8.6 * mm));
+    }
+    // An older line counts no fields: those up to the last that is not 0.
+    assert_eq!(with("FTYP 0 0 3 3 0 0 0 3", "FTYP 0").fields.values.len(), 3);
+    assert_eq!(with("FTYP 0 0 3 3 0 0 0 3", "FTYP 0").wavelengths.len(), 3);
+}
+
+#[test]
+fn solves_that_cannot_be_kept_are_frozen_and_said_so() {
+    let cases = [
+        (
+            "CURV -2.4330900243309004E-2 1 0 0",
+            "CURV -2.4330900243309004E-2 11 4 0",
+            "f-number solve",
+        ),
+        (
+            "CURV -2.4330900243309004E-2 1 0 0",
+            "CURV -2.4330900243309004E-2 4 1 -1",
+            "which is kept",
+        ),
+        ("CURV -2.4330900243309004E-2 1 0 0", "CURV -2.4330900243309004E-2 4 9 1", "not there"),
+        ("MAZH 0 0", "MAZH 0 0.7", "kept as it is"),
+        ("VDSZ 2 9", "TOLE 1 5", "kept as it is"),
+        ("VDSZ 2 9", "VDSZ 6 9", "without its bounds"),
+    ];
+    for (from, to, note) in cases {
+        let opened = changed(from, to).unwrap_or_else(|error| panic!("{to}: {error}"));
+        let report = opened.report.unwrap();
+        let (outcome, found) = outcome(&report, to);
+        assert_eq!(outcome, Outcome::Approximated, "{to}");
+        assert!(found.contains(note), "{to}: {found}");
+        assert!(opened.lens.pickups.is_empty());
+    }
+}
+
+#[test]
+fn malformed_files_are_refused_with_their_line() {
+    let cases = [
+        ("MODE SEQ", "MODE NSC", "line 2: found `MODE NSC`; expected MODE SEQ"),
+        ("UNIT MM", "UNIT PARSEC", "line 6: found unit `PARSEC`"),
+        ("ENPD 16.0", "ENPD nan", "line 7: found `nan` in `ENPD nan`"),
+        ("ENPD 16.0", "ENPD", "line 7: found `ENPD` with 0 fields"),
+        ("ENPD 16.0", "ENPD -3", "line 7: found Diameter(-3.0)"),
+        ("ENPD 16.0", "", "found no aperture before it; expected ENPD, FNUM, OBNA or FLOA"),
+        ("SURF 0", "  DISZ 3\r\nSURF 0", "line 23: found `DISZ 3` before the first SURF"),
+        ("SURF 2", "SURF 3", "line 39: found `SURF 3`; expected SURF 2"),
+        ("CURV -2.4330900243309004E-2", "CURV 1e308", "line 41: found `1e308`"),
+        ("CURV -2.4330900243309004E-2", "CURV NaN", "line 41: found `NaN`"),
+        ("DISZ 2.2", "DISZ INFINITY", "line 42: found an infinite thickness after surface 2"),
+        ("DISZ 2.2", "", "line 39: found surface 2 without DISZ"),
+        ("DISZ 2.2", "STOP", "line 39: found surface 2 without DISZ"),
+        ("  COAT AR", "  DIAM -2", "line 33: found a semi-diameter of -2"),
+        (
+            "  DISZ 2.2",
+            "  STOP\r\n  DISZ 2.2",
+            "line 42: found a second STOP after that of line 29",
+        ),
+        ("  STOP", "", "found no STOP; expected exactly one STOP"),
+        (
+            "TYPE STANDARD\r\n  COMM",
+            "TYPE TILTSURF\r\n  COMM",
+            "line 30: found surface 1 of type TILTSURF",
+        ),
+        (
+            "GLAS N-SF10 0 0 1.72828",
+            "GLAS N-XX10 0 0 0",
+            "line 43: found the unknown glass `N-XX10`",
+        ),
+        ("WAVM 1 0.4861327", "WAVM x 0.4861327", "line 16: found `x`"),
+        ("MNUM 1 1", "MNUM 99999999 1", "found 99999999 configurations; expected at most 1000"),
+    ];
+    for (from, to, expected) in cases {
+        let text = refusal(from, to);
+        assert!(text.starts_with("folder/a.zmx, ") || text.contains("folder/a.zmx: "), "{text}");
+        assert!(text.contains(expected), "{to}: {text}");
+    }
+}
+
+#[test]
+fn a_truncated_file_is_never_another_lens() {
+    let text = achromat();
+    let whole = lens(&text);
+    for end in 0..text.len() {
+        match open(&text.as_bytes()[..end]) {
+            Ok(opened) => assert_eq!(opened.lens, whole, "{end}"),
+            Err(error) => assert!(!error.to_string().is_empty()),
+        }
+    }
+}
