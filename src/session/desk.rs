@@ -282,6 +282,9 @@ impl Session {
                 // A foreign file is not written to under its own name without asking.
                 let own = (opened.format == files::Format::Native).then(|| path.to_owned());
                 self.start_with(opened.lens, own);
+                if let Some(report) = opened.report {
+                    self.say(Severity::Note, format!("imported {}\n{report}", path.display()));
+                }
                 self.events.push(Event::Opened(path.to_owned()));
             }
             Err(why) => self.say(Severity::Error, why.to_string()),
@@ -305,8 +308,12 @@ impl Session {
 
     fn export(&mut self, path: &Path) {
         match files::save(&self.lens, path) {
-            Ok(_) => {
-                self.say(Severity::Note, format!("exported to {}", path.display()));
+            Ok(saved) => {
+                let mut text = format!("exported to {}", path.display());
+                for part in [saved.proof.map(|p| p.to_string()), saved.report.map(|r| r.to_string())] {
+                    text += &part.map(|part| format!("\n{part}")).unwrap_or_default();
+                }
+                self.say(Severity::Note, text);
                 self.events.push(Event::Saved(path.to_owned()));
             }
             Err(why) => self.say(Severity::Error, why.to_string()),
