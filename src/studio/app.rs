@@ -199,10 +199,15 @@ impl Studio {
         let Some(text) = &self.report else { return };
         let mut read = false;
         let modal = Modal::new(Id::unique("report")).show(context, |ui| {
-            ui.set_max_width(560.0);
-            ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
-                ui.add(Label::new(capital(text)).selectable(true));
-            });
+            let (words, table) = text.split_once('\n').unwrap_or((text, ""));
+            ui.set_max_width(if table.is_empty() { 460.0 } else { 820.0 });
+            ui.label(capital(&counted_from_one(words)));
+            if !table.is_empty() {
+                ScrollArea::both().max_height(440.0).show(ui, |ui| {
+                    let table = RichText::new(table).monospace();
+                    ui.add(Label::new(table).extend().selectable(true));
+                });
+            }
             ui.add_space(8.0);
             read = ui.button("OK").clicked();
         });

@@ -75,7 +75,7 @@ impl Dock {
     }
 }
 
-/// The layout above, the numbers below it.
+/// The layout with the numbers of the lens below it; beside them how good it is and the search.
 fn usual() -> Tree<Kind> {
     let mut tiles = Tiles::default();
     let mut pane = |kind: Kind| tiles.insert_pane(kind);
@@ -89,14 +89,19 @@ fn usual() -> Tree<Kind> {
     ]
     .map(&mut pane);
     let facts = tiles.insert_tab_tile(vec![first, effects]);
-    let above = row(&mut tiles, &[(layout, 0.66), (spot, 0.34)]);
-    let below = row(&mut tiles, &[(table, 0.49), (optimizer, 0.29), (facts, 0.22)]);
-    let root = line(&mut tiles, LinearDir::Vertical, &[(above, 0.51), (below, 0.49)]);
+    let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
+    let left = column(&mut tiles, &[(layout, 0.52), (table, 0.48)]);
+    let right = column(&mut tiles, &[(spot, 0.44), (optimizer, 0.56)]);
+    let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
     Tree::new(Id::unique("dock"), root, tiles)
 }
 
 fn row(tiles: &mut Tiles<Kind>, parts: &[(TileId, f32)]) -> TileId {
     line(tiles, LinearDir::Horizontal, parts)
+}
+
+fn column(tiles: &mut Tiles<Kind>, parts: &[(TileId, f32)]) -> TileId {
+    line(tiles, LinearDir::Vertical, parts)
 }
 
 fn line(tiles: &mut Tiles<Kind>, direction: LinearDir, parts: &[(TileId, f32)]) -> TileId {

@@ -1,6 +1,8 @@
 //! What a lens does to rays near its axis: lengths, pupils, and the third-order sums.
 
-use eframe::egui::{Align, Color32, Grid, Layout as Arrange, RichText, ScrollArea, Ui};
+use eframe::egui::{
+    Align, Color32, Frame, Grid, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui,
+};
 
 use super::{Panel, no_numbers, shown};
 use crate::lens::Lens;
@@ -19,13 +21,13 @@ impl Panel for FirstOrderData {
 
     fn ui(&mut self, ui: &mut Ui, view: &View, _wishes: &mut Vec<Command>) {
         let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
-        ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             data(ui, &results.lens, numbers.first());
-            ui.add_space(8.0);
-            match &numbers.seidel.value {
+            ui.add_space(6.0);
+            ScrollArea::horizontal().show(ui, |ui| match &numbers.seidel.value {
                 Some(seidel) => sums(ui, &results.lens, seidel),
                 None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
-            }
+            });
         });
     }
 }
@@ -34,15 +36,18 @@ impl Panel for FirstOrderData {
 struct Line(&'static str, String, &'static str);
 
 fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
-    Grid::new("first order").num_columns(2).spacing([10.0, 3.0]).striped(true).show(ui, |ui| {
-        for Line(name, value, meaning) in lines(lens, first) {
-            ui.label(name).on_hover_text(meaning);
-            ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
-                ui.label(RichText::new(value).strong());
+    ui.spacing_mut().item_spacing.y = 1.0;
+    for (i, Line(name, value, meaning)) in lines(lens, first).into_iter().enumerate() {
+        let striped = if i % 2 == 0 { ui.visuals().faint_bg_color } else { Color32::TRANSPARENT };
+        // The scroll bar floats over the right end.
+        let margin = Margin { left: 3, right: 10, top: 1, bottom: 1 };
+        Frame::new().fill(striped).inner_margin(margin).show(ui, |ui| {
+            ui.horizontal(|ui| {
+                ui.label(name).on_hover_text(meaning);
+                right(ui, |ui| drop(ui.add(Label::new(RichText::new(value).strong()).truncate())));
             });
-            ui.end_row();
-        }
-    });
+        });
+    }
 }
 
 fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<Line> {
@@ -59,9 +64,9 @@ fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<Line> {
             "One over twice the numerical aperture in the image space",
         ),
         pupil_place("Entrance pupil at", first.entrance_pupil, "From the first vertex"),
-        pupil_size("Entrance pupil", first.entrance_pupil),
+        pupil_size("Entrance pupil size", first.entrance_pupil),
         pupil_place("Exit pupil at", first.exit_pupil, "From the last vertex"),
-        pupil_size("Exit pupil", first.exit_pupil),
+        pupil_size("Exit pupil size", first.exit_pupil),
         Line(
             "Stop semi-diameter",
             mm(Some(first.stop_semi_diameter)),
@@ -81,7 +86,7 @@ fn pupil_place(name: &'static str, pupil: Pupil<f64>, from: &'static str) -> Lin
 }
 
 fn pupil_size(name: &'static str, pupil: Pupil<f64>) -> Line {
-    let size = pupil.diameter.map_or_else(|| "telecentric".to_owned(), |d| format!("⌀ {}", mm(Some(d))));
+    let size = pupil.diameter.map_or_else(|| "telecentric".to_owned(), |d| mm(Some(d)));
     Line(name, size, "Its diameter")
 }
 

@@ -1,16 +1,12 @@
 //! The merit against the steps.
 
-use eframe::egui::{Ui, WidgetInfo};
+use eframe::egui::{Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, Plot, PlotPoints};
 
 use crate::session::{HistoryPoint, Search};
 
-/// How high the plot is at least, in points.
-const LOWEST: f32 = 110.0;
-
 /// Plots the merit of the current and of the best lens, decades up and steps across.
 pub(super) fn plot(ui: &mut Ui, search: &Search) {
-    let height = ui.available_height().max(LOWEST);
     let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
     let curve = |merit: fn(&HistoryPoint) -> f64| -> PlotPoints<'static> {
         let points = search.history.iter().map(|point| [point.step as f64, decade(merit(point))]);
@@ -20,21 +16,22 @@ pub(super) fn plot(ui: &mut Ui, search: &Search) {
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.hyperlink_color);
     let plot = Plot::new("merit history")
-        .height(height)
+        .height(ui.available_height())
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
         .allow_boxed_zoom(false)
-        .y_axis_min_width(36.0)
-        .x_axis_label("step")
-        .y_axis_label("merit")
+        .y_axis_min_width(40.0)
+        .grid_color(visuals.widgets.noninteractive.bg_stroke.color)
+        .grid_spacing(18.0..=120.0)
+        .set_margin_fraction(vec2(0.01, 0.08))
         .y_axis_formatter(|mark, _| power_of_ten(mark.value));
     let shown = plot.show(ui, |plot| {
         plot.line(Line::new("current", current).color(weak).width(1.0));
         plot.line(Line::new("best", best).color(strong).width(2.0));
     });
     let text = "Merit against steps";
-    shown.response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, text));
+    shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));
 }
 
 fn power_of_ten(exponent: f64) -> String {

@@ -5,7 +5,7 @@
 mod goal;
 mod history;
 
-use eframe::egui::{Button, ComboBox, RichText, ScrollArea, Ui};
+use eframe::egui::{Button, ComboBox, Frame, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::Panel;
 use crate::optimize::Method;
@@ -14,6 +14,9 @@ use crate::studio::field::Drafts;
 use crate::studio::number;
 use crate::studio::wording::{capital, counted_from_one};
 use goal::Aims;
+
+/// How high the merit history is, in points; less where there is little room.
+const HISTORY: f32 = 130.0;
 
 /// The panel.
 #[derive(Debug, Default)]
@@ -31,14 +34,14 @@ impl Panel for Optimizer {
     fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
         self.aims.keep_up(view);
         self.controls(ui, view, wishes);
+        if let Some(search) = view.search.as_deref() {
+            progress(ui, view, search);
+            let plot = Side::bottom("merit history").frame(Frame::NONE).show_separator_line(false);
+            let room = (0.45 * ui.available_height()).min(HISTORY);
+            plot.exact_size(room).show(ui, |ui| history::plot(ui, search));
+        }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            if let Some(search) = view.search.as_deref() {
-                progress(ui, view, search);
-            }
             self.aims.ui(ui, view, &mut self.drafts);
-            if let Some(search) = view.search.as_deref() {
-                history::plot(ui, search);
-            }
         });
     }
 
@@ -128,14 +131,15 @@ fn progress(ui: &mut Ui, view: &View, search: &Search) {
         Standing::Finished => "Finished",
     };
     let step = search.progress.as_ref().map_or(0, |progress| progress.step);
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         ui.strong(standing);
         ui.label(format!("after step {step}"));
-        for text in changes(view, search) {
+        if let (Some(first), Some(last)) = (search.history.first(), search.progress.as_ref()) {
             ui.separator();
-            ui.label(text);
+            ui.label(format!("merit {:.3e} to {:.3e}", first.current, last.best));
         }
     });
+    ui.label(changes(view).join(", "));
     let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
     if let Some(why) = refused {
         let text = RichText::new(capital(&counted_from_one(why))).small();
@@ -144,21 +148,18 @@ fn progress(ui: &mut Ui, view: &View, search: &Search) {
     }
 }
 
-/// Merit, spots and focal length of the design and of the lens that the search shows.
-fn changes(view: &View, search: &Search) -> Vec<String> {
+/// Spots and focal length of the design and of the lens that the search shows.
+fn changes(view: &View) -> Vec<String> {
     let short = |value: f64| number::show_digits(value, 4);
     let mut texts = Vec::new();
-    if let (Some(first), Some(last)) = (search.history.first(), search.progress.as_ref()) {
-        texts.push(format!("merit {:.3e} → {:.3e}", first.current, last.best));
-    }
     let before = view.results.as_ref().and_then(|results| results.numbers.as_ref().ok());
     let after = view.preview.as_ref().and_then(|results| results.numbers.as_ref().ok());
     let (Some(before), Some(after)) = (before, after) else { return texts };
     if let (Some(old), Some(new)) = (mean_spot(before), mean_spot(after)) {
-        texts.push(format!("mean RMS {} → {} µm", short(1e3 * old), short(1e3 * new)));
+        texts.push(format!("mean RMS {} to {} µm", short(1e3 * old), short(1e3 * new)));
     }
     if let (Some(old), Some(new)) = (before.first().efl, after.first().efl) {
-        texts.push(format!("focal length {} → {} mm", short(old), short(new)));
+        texts.push(format!("focal length {} to {} mm", short(old), short(new)));
     }
     texts
 }
