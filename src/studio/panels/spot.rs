@@ -13,7 +13,7 @@ use eframe::egui::{
 use glam::DVec2;
 
 use super::{Panel, field_name, no_numbers, shown, swatch};
-use crate::analysis::{Estimate, Spot, airy_radius};
+use crate::analysis::{Estimate, Spot};
 use crate::lens::Lens;
 use crate::session::{Command, Numbers, Results, View};
 use crate::studio::draw::{Backing, Camera, Canvas, Scene, length_text, round_length};
@@ -70,7 +70,7 @@ impl Panel for SpotDiagram {
         let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, "Spots"));
-        let cells = cells(rect, numbers.spots.len());
+        let cells = cells(rect, numbers.spots.value.len());
         self.draw(ui, rect, Arc::clone(results), numbers, &cells);
         for (i, cell) in cells.iter().enumerate() {
             words(ui, *cell, &results.lens, numbers, i);
@@ -161,9 +161,9 @@ fn picture(cell: Rect) -> Rect {
 
 /// Half of what the side of every picture shows, in mm.
 fn half_width(numbers: &Numbers) -> f64 {
-    let lit = numbers.spots.iter().filter_map(|spot| spot.value.as_ref().ok());
+    let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let widest = lit.map(|spot| spot.radius.value).fold(0.0, f64::max);
-    let airy = airy_radius(&numbers.bench.value).unwrap_or(0.0);
+    let airy = numbers.airy.unwrap_or(0.0);
     1.12 * if widest > 0.0 { widest.max(1.1 * airy) } else { airy.max(1e-3) }
 }
 
@@ -177,10 +177,10 @@ fn scene(ui: &Ui, source: &Source, numbers: &Numbers) -> Scene {
         let scale = 0.5 * f64::from(cell.width()) / half;
         let frame = Frame { centre, half: 0.5 * f64::from(cell.width()), palette, scale };
         frame.draw(&mut scene);
-        if let Some(airy) = airy_radius(&numbers.bench.value) {
+        if let Some(airy) = numbers.airy {
             frame.draw_airy(&mut scene, airy, source.per_point);
         }
-        if let Ok(spot) = &numbers.spots[field].value {
+        if let Ok(spot) = &numbers.spots.value[field] {
             frame.draw_dots(&mut scene, numbers, spot, field, source.per_point);
         }
     }
@@ -257,19 +257,19 @@ fn words(ui: &mut Ui, cell: Rect, lens: &Lens, numbers: &Numbers, field: usize) 
         pos2(cell.left() + 3.0, picture.bottom() + 2.0),
         pos2(cell.right(), picture.bottom() + WORDS.1),
     );
-    let spot = &numbers.spots[field];
+    let spot = &numbers.spots.value[field];
     within(ui, above, |ui| {
         ui.horizontal(|ui| {
             name(ui, lens, field);
-            if let Ok(spot) = &spot.value {
+            if let Ok(spot) = spot {
                 lit(ui, spot);
             }
         });
     });
     within(ui, below, |ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
-        match &spot.value {
-            Ok(found) => radii(ui, found, spot.ms),
+        match spot {
+            Ok(spot) => radii(ui, spot),
             Err(why) => {
                 let text = RichText::new(why.to_string()).small();
                 ui.label(text.color(ui.visuals().warn_fg_color));
@@ -307,13 +307,14 @@ fn lit(ui: &mut Ui, spot: &Spot) {
     }
 }
 
-fn radii(ui: &mut Ui, spot: &Spot, ms: f64) {
+fn radii(ui: &mut Ui, spot: &Spot) {
     let line = |ui: &mut Ui, text: String| -> Response { ui.label(RichText::new(text).small()) };
     line(ui, format!("RMS {}", in_um(spot.rms)))
         .on_hover_text("Root mean square distance from the centroid of all colours");
     line(ui, format!("GEO {}", in_um(spot.radius)))
         .on_hover_text("Largest distance from the centroid of all colours");
-    let rays = RichText::new(format!("{} rays, {ms:.2} ms", spot.radius.rays)).small();
+    let time = spot.rms.milliseconds.map(|ms| format!(", {ms:.2} ms")).unwrap_or_default();
+    let rays = RichText::new(format!("{} rays{time}", spot.radius.rays)).small();
     ui.label(rays.weak()).on_hover_text("Rays traced for these numbers, and the time it took");
 }
 

@@ -166,7 +166,7 @@ fn changes(view: &View) -> Vec<String> {
 
 /// The mean RMS radius of the fields with light, in mm.
 fn mean_spot(numbers: &Numbers) -> Option<f64> {
-    let lit = numbers.spots.iter().filter_map(|spot| spot.value.as_ref().ok());
+    let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
     (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)
 }
