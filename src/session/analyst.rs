@@ -184,7 +184,7 @@ impl Numbers {
         go_on()?;
         let scatter = timed(|| scatter(&b));
         go_on()?;
-        let spots = timed(|| analysis::spots(&b, accuracy));
+        let spots = timed(|| each(&b, |field| timed_spot(&b, field, accuracy)));
         go_on()?;
         let fans = timed(|| each(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
         go_on()?;
@@ -204,6 +204,16 @@ impl Numbers {
             illumination,
         })
     }
+}
+
+/// The spot of a field, with the time that its numbers took.
+fn timed_spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, Dark> {
+    let Timed { value, ms } = timed(|| analysis::spot(bench, field, accuracy));
+    let mut spot = value?;
+    for number in [&mut spot.rms, &mut spot.radius] {
+        number.milliseconds = Some(ms);
+    }
+    Ok(spot)
 }
 
 /// A result for each field, in order.
