@@ -48,7 +48,12 @@ enum Waiting {
 
 impl Studio {
     /// A studio on a session. `left` is where the last window has left the panels.
-    pub fn new(session: Session, backing: Backing, memory: Memory, left: Option<&dyn Storage>) -> Self {
+    pub fn new(
+        session: Session,
+        backing: Backing,
+        memory: Memory,
+        left: Option<&dyn Storage>,
+    ) -> Self {
         let tree = left.and_then(|storage| eframe::get_value(storage, DOCK));
         Self {
             session,
@@ -132,7 +137,9 @@ impl Studio {
         match purpose {
             Purpose::Open => self.replace(context, Command::Open(path)),
             Purpose::Save => self.apply(context, Command::Save(Some(path))),
-            Purpose::ExportZemax | Purpose::ExportJson => self.apply(context, Command::Export(path)),
+            Purpose::ExportZemax | Purpose::ExportJson => {
+                self.apply(context, Command::Export(path))
+            }
         }
     }
 
@@ -232,9 +239,8 @@ impl Studio {
         ui.horizontal(|ui| {
             messages(ui, &view.messages, wishes);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.weak(freshness(view)).on_hover_text(
-                    "How long all numbers of all panels took after the last change",
-                );
+                ui.weak(freshness(view))
+                    .on_hover_text("How long all numbers of all panels took after the last change");
                 if view.dirty {
                     ui.separator();
                     ui.weak("unsaved changes");

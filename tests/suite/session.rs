@@ -539,6 +539,23 @@ fn the_numbers_of_the_newest_design_arrive() {
 }
 
 #[test]
+fn when_there_is_time_the_cost_of_each_effect_is_measured() {
+    let mut session = session(double_gauss());
+    wait(&mut session, "the measured plan", |view, _| {
+        let numbers = view.results.as_ref().and_then(|results| results.numbers.as_ref().ok());
+        numbers.is_some_and(|n| n.plan.value.decisions.iter().all(|d| d.saved_ms.is_some()))
+    });
+    let results = session.results().unwrap();
+    let plan = &results.numbers.as_ref().unwrap().plan.value;
+    for decision in &plan.decisions {
+        println!("{}: {:.2} ms", decision.effect.name(), decision.saved_ms.unwrap());
+    }
+    assert!(plan.of(Effect::Dispersion).unwrap().saved_ms.unwrap() > 0.0);
+    assert_eq!(plan.of(Effect::Asphere).unwrap().saved_ms, Some(0.0));
+    assert!(session.view().is_current());
+}
+
+#[test]
 fn every_number_of_every_library_lens_is_there_in_time() {
     for bundled in files::library() {
         let lens = lens(bundled.name);

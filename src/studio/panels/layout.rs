@@ -275,7 +275,8 @@ fn whole(section: &Section<'_>, layout: &Layout) -> Option<Bounds> {
 
 /// A ray in the colour of its field; a lost one in red to the dot where it ends.
 fn draw_ray(scene: &mut Scene, ray: &DrawnRay, palette: &Palette) {
-    let points: Vec<DVec2> = ray.path.points.iter().map(|p: &Vec3<f64>| DVec2::new(p.z, p.y)).collect();
+    let points: Vec<DVec2> =
+        ray.path.points.iter().map(|p: &Vec3<f64>| DVec2::new(p.z, p.y)).collect();
     if ray.path.fate.is_imaged() {
         return scene.polyline(&points, 1.0, with_alpha(palette.field(ray.field), 190));
     }

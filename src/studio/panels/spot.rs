@@ -252,7 +252,8 @@ impl Frame {
 /// The words of a cell: its field above the picture, its numbers below.
 fn words(ui: &mut Ui, cell: Rect, lens: &Lens, numbers: &Numbers, field: usize) {
     let picture = picture(cell);
-    let above = Rect::from_min_max(pos2(picture.left(), picture.top() - WORDS.0), picture.right_top());
+    let above =
+        Rect::from_min_max(pos2(picture.left(), picture.top() - WORDS.0), picture.right_top());
     let below = Rect::from_min_max(
         pos2(cell.left() + 3.0, picture.bottom() + 2.0),
         pos2(cell.right(), picture.bottom() + WORDS.1),

@@ -192,7 +192,8 @@ impl Menu<'_> {
             Quantity::Conic | Quantity::Asphere(_) | Quantity::Index => "number",
         };
         ui.weak(format!("Bounds ({unit}); empty for none"));
-        let limit = |text: &str| if text.trim().is_empty() { Some(None) } else { value(text).map(Some) };
+        let limit =
+            |text: &str| if text.trim().is_empty() { Some(None) } else { value(text).map(Some) };
         if let Some(min) = self.line(ui, "Minimum", variable.min, drafts, limit) {
             wishes.push(Edit::Free(Variable { min, ..variable }).into());
         }

@@ -34,7 +34,9 @@ pub(super) fn parse(text: &str) -> Medium {
     match numbers.as_slice() {
         [Some(index)] => Medium::Index(*index),
         [Some(nd), Some(vd)] => Medium::Model { nd: *nd, vd: *vd },
-        _ => Medium::Glass(glass::find(text).map_or_else(|| text.to_owned(), glass::Glass::full_name)),
+        _ => Medium::Glass(
+            glass::find(text).map_or_else(|| text.to_owned(), glass::Glass::full_name),
+        ),
     }
 }
 

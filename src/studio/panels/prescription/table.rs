@@ -1,8 +1,8 @@
 //! The table of the prescription.
 
 use eframe::egui::{
-    Align, Button, Color32, Id, Key, Layout, Modifiers, Popup, PopupCloseBehavior, Response, RichText,
-    ScrollArea, Ui, vec2,
+    Align, Button, Color32, Id, Key, Layout, Modifiers, Popup, PopupCloseBehavior, Response,
+    RichText, ScrollArea, Ui, vec2,
 };
 use egui_extras::{Column as Width, TableBuilder, TableRow};
 
@@ -12,8 +12,8 @@ use crate::lens::{Lens, Medium, Object, Parameter, Quantity};
 use crate::session::{Command, Edit, View, edited, evaluate};
 use crate::studio::field::{Drafts, Field as Cell};
 use crate::studio::number;
-use crate::studio::panels::numbers;
 use crate::studio::palette::{Palette, color32};
+use crate::studio::panels::numbers;
 use crate::studio::wording::{capital, counted_from_one};
 
 /// How high a row is, in points.
@@ -180,7 +180,9 @@ impl Table<'_> {
         for column in columns {
             row.col(|ui| match column {
                 Column::Radius => still(ui, "Infinity", badge::WIDTH),
-                Column::SemiDiameter => still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0),
+                Column::SemiDiameter => {
+                    still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0)
+                }
                 _ => {}
             });
         }
@@ -419,13 +421,8 @@ fn typed(parameter: Parameter, text: &str) -> Edit {
 
 /// The columns of a lens: those of aspheres only where there are some.
 fn columns(lens: &Lens) -> Vec<Column> {
-    let mut columns = vec![
-        Column::Radius,
-        Column::Thickness,
-        Column::Glass,
-        Column::SemiDiameter,
-        Column::Conic,
-    ];
+    let mut columns =
+        vec![Column::Radius, Column::Thickness, Column::Glass, Column::SemiDiameter, Column::Conic];
     let terms = lens.surfaces.iter().map(|row| row.asphere.len()).max().unwrap_or(0);
     columns.extend((0..terms).map(Column::Asphere));
     columns.push(Column::Comment);
