@@ -5,15 +5,22 @@
 
 use super::clock::{Timed, now, timed};
 use super::layout::{Layout, layout};
+use super::saving::timed_plan;
 use super::scatter::{Scatter, scatter};
 use super::slot::{Mailbox, Slot};
 use super::view::Settings;
-use crate::lens::Lens;
+use crate::analysis;
+use crate::analysis::{Curvature, Dark, Distortion, Fan, Illumination, Spot};
+use crate::effects;
+use crate::effects::{Plan, Task};
+use crate::lens::{Field, Lens};
 use crate::paraxial::{FirstOrder, Seidel, seidel};
-use crate::pupil::Bench;
+use crate::pupil::{Accuracy, Bench, BenchError};
+use rayon::prelude::*;
 use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 /// The numbers of one version of the design.
 #[derive(Debug, Clone)]
@@ -37,10 +44,24 @@ pub struct Numbers {
     pub bench: Timed<Arc<Bench>>,
     /// Third-order sums; `None` where there is no chief ray.
     pub seidel: Timed<Option<Seidel<f64>>>,
+    /// Which effects are computed and why.
+    pub plan: Timed<Plan>,
     /// The rays of the layout.
     pub layout: Timed<Layout>,
-    /// Where the rays of each field land.
+    /// Where the rays of each field land, in the order of fields and then wavelengths.
     pub scatter: Timed<Vec<Scatter>>,
+    /// The spot of each field.
+    pub spots: Timed<Vec<Result<Spot, Dark>>>,
+    /// The radius of the first dark ring of a perfect lens, in mm.
+    pub airy: Option<f64>,
+    /// The ray fans of each field.
+    pub fans: Timed<Vec<Result<Vec<Fan>, Dark>>>,
+    /// Distortion at each field.
+    pub distortion: Timed<Vec<Result<Distortion, Dark>>>,
+    /// Field curvature at each field.
+    pub curvature: Timed<Vec<Result<Curvature, Dark>>>,
+    /// The light of each field.
+    pub illumination: Timed<Vec<Illumination>>,
 }
 
 impl Numbers {
@@ -58,6 +79,13 @@ pub(super) struct Request {
     pub(super) settings: Settings,
 }
 
+/// Whether the time that each effect takes is measured when there is time for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Savings {
+    Measured,
+    Left,
+}
+
 /// The handle of the thread that computes numbers.
 #[derive(Debug)]
 pub(super) struct Analyst {
@@ -68,19 +96,12 @@ pub(super) struct Analyst {
 
 impl Analyst {
     /// Starts the thread. `wake` is called from it when new results are there.
-    pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+    pub(super) fn spawn(savings: Savings, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         let requests = Arc::new(Mailbox::new());
         let results = Slot::default();
-        let (inbox, shown) = (Arc::clone(&requests), results.clone());
-        let serve = move || {
-            while let Some(request) = inbox.take() {
-                if let Some(found) = answer(request, || inbox.interrupts()) {
-                    shown.set(found);
-                    wake();
-                }
-            }
-        };
-        let thread = thread::Builder::new().name("analyst".into()).spawn(serve)?;
+        let inbox = Arc::clone(&requests);
+        let desk = Desk { inbox, shown: results.clone(), wake, savings, published: None };
+        let thread = thread::Builder::new().name("analyst".into()).spawn(move || desk.serve())?;
         Ok(Self { requests, results, thread: Some(thread) })
     }
 
@@ -104,13 +125,66 @@ impl Drop for Analyst {
     }
 }
 
-/// The results of a request; `None` where `interrupted` says that they are no longer wanted.
-fn answer(request: Request, interrupted: impl Fn() -> bool) -> Option<Results> {
-    let start = now();
-    let Request { version, lens, settings } = request;
-    let numbers = numbers(&lens, &settings, interrupted)?;
-    let ms = start.elapsed().as_secs_f64() * 1e3;
-    Some(Results { version, lens, settings, numbers, ms })
+/// A newer request stops one that was begun so long ago, unless nothing was shown for longer than
+/// the second time: numbers follow a value that is being dragged.
+const BEGUN: Duration = Duration::from_millis(50);
+const SHOWN: Duration = Duration::from_millis(200);
+/// Times are measured when nothing was asked for so long.
+const QUIET: Duration = Duration::from_millis(300);
+
+/// What the thread works with.
+struct Desk<W> {
+    inbox: Arc<Mailbox<Request>>,
+    shown: Slot<Results>,
+    wake: W,
+    savings: Savings,
+    /// When results were shown last.
+    published: Option<Instant>,
+}
+
+impl<W: Fn()> Desk<W> {
+    /// Works until the handle is dropped.
+    fn serve(mut self) {
+        while let Some(request) = self.inbox.take() {
+            let found = self.answer(request);
+            if let (Some(results), Savings::Measured) = (found, self.savings) {
+                self.measure(results);
+            }
+        }
+    }
+
+    /// Shows the results of a request, and gives them back if they are shown.
+    fn answer(&mut self, request: Request) -> Option<Results> {
+        let start = now();
+        let fresh = self.published.is_some_and(|shown| start.duration_since(shown) < SHOWN);
+        let overtaken = || fresh && start.elapsed() > BEGUN && self.inbox.interrupts();
+        let interrupted = || self.inbox.is_closed() || overtaken();
+        let Request { version, lens, settings } = request;
+        let numbers = numbers(&lens, &settings, interrupted)?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let results = Results { version, lens, settings, numbers, ms };
+        self.published = Some(now());
+        self.publish(results.clone());
+        Some(results)
+    }
+
+    /// Shows the same results once more with the time that each effect takes, if there is time.
+    fn measure(&self, mut results: Results) {
+        let Ok(numbers) = &mut results.numbers else { return };
+        if !self.inbox.is_quiet_for(QUIET) {
+            return;
+        }
+        let interrupted = || self.inbox.interrupts();
+        if let Some(Ok(plan)) = timed_plan(&results.lens, &results.settings, interrupted) {
+            numbers.plan.value = plan;
+            self.publish(results);
+        }
+    }
+
+    fn publish(&self, results: Results) {
+        self.shown.set(results);
+        (self.wake)();
+    }
 }
 
 /// The numbers of a lens.
@@ -127,18 +201,79 @@ fn numbers(
     settings: &Settings,
     interrupted: impl Fn() -> bool,
 ) -> Option<Result<Numbers, String>> {
-    let bench = timed(|| Bench::of(lens, settings.zoom));
-    let bench = match bench.value {
-        Ok(value) => Timed { value: Arc::new(value), ms: bench.ms },
+    let plan = timed(|| planned(lens, settings));
+    let plan = match plan.value {
+        Ok(value) => Timed { value, ms: plan.ms },
         Err(error) => return Some(Err(error.to_string())),
     };
-    let seidel = timed(|| third_order(&bench.value));
-    let go_on = || (!interrupted()).then_some(());
-    go_on()?;
-    let layout = timed(|| layout(&bench.value, settings.rays));
-    go_on()?;
-    let scatter = timed(|| scatter(&bench.value));
-    Some(Ok(Numbers { bench, seidel, layout, scatter }))
+    let bench = timed(|| effects::bench(lens, settings.zoom, &plan.value));
+    match bench.value {
+        Ok(value) => {
+            let bench = Timed { value: Arc::new(value), ms: bench.ms };
+            Numbers::of(bench, plan, settings, interrupted).map(Ok)
+        }
+        Err(error) => Some(Err(error.to_string())),
+    }
+}
+
+fn planned(lens: &Lens, settings: &Settings) -> Result<Plan, BenchError> {
+    let facts = effects::survey(lens, settings.zoom)?;
+    Ok(effects::plan(&facts, Task::Spot(settings.tolerance), &settings.choices))
+}
+
+/// How many points a ray fan has.
+const FAN_POINTS: usize = 65;
+
+impl Numbers {
+    /// All numbers, what is looked at first in front; `None` where they are no longer wanted.
+    fn of(
+        bench: Timed<Arc<Bench>>,
+        plan: Timed<Plan>,
+        settings: &Settings,
+        interrupted: impl Fn() -> bool,
+    ) -> Option<Self> {
+        let go_on = || (!interrupted()).then_some(());
+        let b = Arc::clone(&bench.value);
+        let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
+        let layout = timed(|| layout(&b, settings.rays));
+        go_on()?;
+        let scatter = timed(|| scatter(&b));
+        go_on()?;
+        let spots = timed(|| each(&b, |field| timed_spot(&b, field, accuracy)));
+        go_on()?;
+        let fans = timed(|| each(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
+        go_on()?;
+        let illumination = timed(|| analysis::illumination(&b, b.primary, accuracy));
+        go_on()?;
+        Some(Self {
+            seidel: timed(|| third_order(&b)),
+            airy: analysis::airy_radius(&b),
+            distortion: timed(|| each(&b, |field| analysis::distortion(&b, field, b.primary))),
+            curvature: timed(|| each(&b, |field| analysis::field_curvature(&b, field, b.primary))),
+            bench,
+            plan,
+            layout,
+            scatter,
+            spots,
+            fans,
+            illumination,
+        })
+    }
+}
+
+/// The spot of a field, with the time that its numbers took.
+fn timed_spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, Dark> {
+    let Timed { value, ms } = timed(|| analysis::spot(bench, field, accuracy));
+    let mut spot = value?;
+    for number in [&mut spot.rms, &mut spot.radius] {
+        number.milliseconds = Some(ms);
+    }
+    Ok(spot)
+}
+
+/// A result for each field, in order.
+fn each<T: Send>(bench: &Bench, of: impl Fn(Field) -> T + Sync) -> Vec<T> {
+    bench.fields.par_iter().map(|field| of(*field)).collect()
 }
 
 fn third_order(bench: &Bench) -> Option<Seidel<f64>> {

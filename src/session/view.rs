@@ -2,7 +2,7 @@
 
 use super::analyst::Results;
 use super::worker::Search;
-use crate::effects::{Choice, Effect};
+use crate::effects::Choices;
 use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -20,6 +20,8 @@ pub struct View {
     /// The search in the background, or the last one whose result was neither taken nor thrown
     /// away.
     pub search: Option<Arc<Search>>,
+    /// The numbers of the lens that the search shows, maybe of a step before.
+    pub preview: Option<Arc<Results>>,
     /// What was said, newest last.
     pub messages: Vec<Message>,
     /// What undo would take back; `None` where there is nothing.
@@ -41,6 +43,7 @@ impl Default for View {
             version: 0,
             results: None,
             search: None,
+            preview: None,
             messages: Vec::new(),
             undo: None,
             redo: None,
@@ -78,28 +81,12 @@ pub struct Settings {
     /// How many rays of each field the layout shows.
     pub rays: usize,
     /// Effects that are not left to the plan.
-    pub choices: Vec<(Effect, Choice)>,
+    pub choices: Choices,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance: 1e-3, zoom: 0, rays: 15, choices: Vec::new() }
-    }
-}
-
-impl Settings {
-    /// Whether an effect is computed.
-    pub fn choice(&self, effect: Effect) -> Choice {
-        let chosen = self.choices.iter().find(|(other, _)| *other == effect);
-        chosen.map_or(Choice::Auto, |(_, choice)| *choice)
-    }
-
-    pub(super) fn choose(&mut self, effect: Effect, choice: Choice) {
-        self.choices.retain(|(other, _)| *other != effect);
-        if choice != Choice::Auto {
-            self.choices.push((effect, choice));
-            self.choices.sort_unstable_by_key(|(effect, _)| *effect);
-        }
+        Self { tolerance: 1e-3, zoom: 0, rays: 15, choices: Choices::default() }
     }
 }
 
