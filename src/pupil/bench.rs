@@ -2,7 +2,7 @@
 
 use crate::lens::{Aperture, Field, Invalid, Lens, LensError, System};
 use crate::math::Dual;
-use crate::paraxial::{Beam, FirstOrder, Undefined, first_order};
+use crate::paraxial::{Beam, FirstOrder, Seidel, Undefined, first_order, seidel};
 use crate::trace::Tracer;
 
 use super::launch::Launch;
@@ -129,6 +129,16 @@ impl Bench {
         wavelength: usize,
     ) -> Result<Launch<'_>, super::LaunchError> {
         Launch::new(self, field, wavelength)
+    }
+
+    /// The third-order sums, chromatic ones between the shortest and the longest wavelength; `None`
+    /// where there is no chief ray.
+    pub fn seidel(&self) -> Option<Seidel<f64>> {
+        let by_length = |a: &&Color, b: &&Color| a.um.total_cmp(&b.um);
+        let short = self.colors.iter().min_by(by_length)?;
+        let long = self.colors.iter().max_by(by_length)?;
+        let system = &self.colors[self.primary].system;
+        seidel(system, &self.first, Some((&short.system, &long.system)))
     }
 
     /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces

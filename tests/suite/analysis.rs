@@ -147,15 +147,19 @@ fn a_spot_out_of_focus_is_the_spot_of_the_moved_image_plane() {
             color.system.surfaces[last].thickness += defocus;
             color.tracer = Tracer::new(&color.system).unwrap();
         }
-        spot(&bench, bench.fields[2], ACCURACY).unwrap().colors[1].unwrap()
+        spot(&bench, bench.fields[2], ACCURACY).unwrap()
     };
     let focused = at(0.0);
     for defocus in [-0.3, 0.1, 0.4] {
-        let moved = at(defocus).rms.value;
-        assert!((focused.rms_at(defocus) / moved - 1.0).abs() < 1e-9, "{defocus}");
+        let moved = at(defocus);
+        assert!((focused.rms_at(defocus) / moved.rms.value - 1.0).abs() < 1e-9, "{defocus}");
+        let (color, moved) = (focused.colors[1].unwrap(), moved.colors[1].unwrap());
+        assert!((color.rms_at(defocus) / moved.rms.value - 1.0).abs() < 1e-9, "{defocus}");
     }
     let best = focused.best_focus().unwrap();
-    assert!((at(best).best_focus().unwrap()).abs() < 1e-6);
+    assert!(at(best).best_focus().unwrap().abs() < 1e-6);
+    let best = focused.colors[1].unwrap().best_focus().unwrap();
+    assert!(at(best).colors[1].unwrap().best_focus().unwrap().abs() < 1e-6);
 }
 
 #[test]

@@ -414,11 +414,11 @@ fn ctrl_c_saves_the_best_so_far() {
 fn convert_goes_both_ways_and_says_what_was_lost() {
     let (zemax, native) = (Scratch::new("convert.zmx"), Scratch::new("convert.json"));
     let there = done_json(&["convert", LENS, zemax.path()], "");
-    has_keys(&there["to"], &["file", "format", "report", "proof"]);
-    assert_eq!(there["to"]["format"], "zemax");
-    assert!(there["to"]["proof"]["worst_mm"].as_f64().unwrap() < 1e-9);
+    has_keys(&there["export"], &["format", "report", "proof"]);
+    assert_eq!(there["export"]["format"], "zemax");
+    assert!(there["export"]["proof"]["worst_mm"].as_f64().unwrap() < 1e-9);
     let back = done_json(&["convert", zemax.path(), native.path()], "");
-    assert!(back["from"]["report"]["rows"].as_array().unwrap().len() > 10);
+    assert!(back["import"]["rows"].as_array().unwrap().len() > 10);
     has_keys(&back["checks"][0], &["zoom", "efl", "bfl", "f_number"]);
     let efl = |path: &str| done_json(&["info", path], "")["efl"].as_f64().unwrap();
     assert!((efl(native.path()) - efl(LENS)).abs() < 1e-9);

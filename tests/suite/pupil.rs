@@ -107,11 +107,11 @@ fn a_clear_pupil_takes_25_rays_for_nine_digits() {
 }
 
 #[test]
-fn a_clipped_pupil_takes_240_rays_for_six_digits() {
+fn a_clipped_pupil_takes_72_rays_for_six_digits() {
     let bench = double_gauss().clipped_bench();
     for field in [1, 2] {
         let errors = errors(&bench, field);
-        assert!(errors.iter().any(|(rays, error)| *rays <= 240 && *error < 1e-6));
+        assert!(errors.iter().any(|(rays, error)| *rays <= 72 && *error < 1e-6));
     }
 }
 
