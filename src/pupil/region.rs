@@ -20,6 +20,9 @@ const SCANS: [(usize, f64); 3] = [(25, 120.0), (101, 13.0), (301, 1.7)];
 /// around that light, this often at most.
 const FEW: usize = 12;
 const ZOOMS: usize = 14;
+/// Light through a hole narrower than this, in pupil coordinates, is a single ray: a rim of size
+/// zero lets it through on the axis.
+const NARROWEST: f64 = 1e-9;
 /// Azimuths at which the edge is looked at first, over a half turn.
 const AZIMUTHS: usize = 24;
 /// How far from the axis light is looked for first where no disc limits the pupil.
@@ -174,7 +177,7 @@ impl Grid {
             }
             grid = closer;
         }
-        Some(grid)
+        (grid.half > NARROWEST).then_some(grid)
     }
 
     /// Ever larger grids about the axis until one holds light, and all of it.

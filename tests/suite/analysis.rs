@@ -183,3 +183,28 @@ fn field_curvature_near_the_axis_follows_the_seidel_sums() {
         assert!((found / exact - 1.0).abs() < 1e-3, "{found:e} {exact:e}");
     }
 }
+
+#[test]
+fn an_error_estimate_covers_the_error() {
+    let (mut worst, mut count) = (0.0f64, 0);
+    for lens in lenses() {
+        for bench in [lens.open_bench(), lens.clipped_bench()] {
+            for field in &bench.fields {
+                let Ok(exact) = spot(&bench, *field, ACCURACY) else { continue };
+                for tolerance in [1e-1, 1e-2, 1e-3, 1e-5] {
+                    let accuracy = Accuracy { tolerance, ..ACCURACY };
+                    let rough = spot(&bench, *field, accuracy).unwrap();
+                    let error = (rough.rms.value - exact.rms.value).abs();
+                    let ratio = error / (rough.rms.error + exact.rms.error);
+                    if ratio > 1.0 {
+                        println!("{} {} {tolerance}: {error:e} {:?}", lens.id(), field.y, rough.rms);
+                    }
+                    worst = worst.max(ratio);
+                    count += 1;
+                }
+            }
+        }
+    }
+    println!("largest error over its estimate: {worst:.2} in {count} spots");
+    assert!(worst < 1.0);
+}

@@ -174,6 +174,18 @@ fn a_stop_of_size_zero_is_dark() {
 }
 
 #[test]
+fn a_rim_of_size_zero_is_dark() {
+    for edge in [0.0, 3.0] {
+        let rows = [(0.01, 5.0, 1.5, 20.0), (-0.01, 90.0, 1.0, 0.0)];
+        for aperture in [Aperture::StopSemiDiameter(5.0), Aperture::EntrancePupilDiameter(10.0)] {
+            let bench = bench(system(&rows, 0), aperture, edge, Aiming::Paraxial);
+            let launch = bench.launch(bench.fields[0], 0).unwrap();
+            assert!(Region::new(launch).is_dark(), "{aperture:?} {edge}");
+        }
+    }
+}
+
+#[test]
 fn a_beam_that_nothing_limits_is_endless() {
     let rows = [(0.0, 10.0, 1.5, f64::INFINITY), (0.0, 10.0, 1.0, f64::INFINITY)];
     let mut bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(1.0), 5.0, Aiming::Paraxial);
