@@ -8,9 +8,14 @@ use super::layout::{Layout, layout};
 use super::scatter::{Scatter, scatter};
 use super::slot::{Mailbox, Slot};
 use super::view::Settings;
-use crate::lens::Lens;
+use crate::analysis;
+use crate::analysis::{Curvature, Dark, Distortion, Fan, Illumination, Spot};
+use crate::effects;
+use crate::effects::{Plan, Task};
+use crate::lens::{Field, Lens};
 use crate::paraxial::{FirstOrder, Seidel, seidel};
-use crate::pupil::Bench;
+use crate::pupil::{Accuracy, Bench, BenchError};
+use rayon::prelude::*;
 use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
@@ -37,10 +42,24 @@ pub struct Numbers {
     pub bench: Timed<Arc<Bench>>,
     /// Third-order sums; `None` where there is no chief ray.
     pub seidel: Timed<Option<Seidel<f64>>>,
+    /// Which effects are computed and why.
+    pub plan: Timed<Plan>,
     /// The rays of the layout.
     pub layout: Timed<Layout>,
-    /// Where the rays of each field land.
+    /// Where the rays of each field land, in the order of fields and then wavelengths.
     pub scatter: Timed<Vec<Scatter>>,
+    /// The spot of each field.
+    pub spots: Timed<Vec<Result<Spot, Dark>>>,
+    /// The radius of the first dark ring of a perfect lens, in mm.
+    pub airy: Option<f64>,
+    /// The ray fans of each field.
+    pub fans: Timed<Vec<Result<Vec<Fan>, Dark>>>,
+    /// Distortion at each field.
+    pub distortion: Timed<Vec<Result<Distortion, Dark>>>,
+    /// Field curvature at each field.
+    pub curvature: Timed<Vec<Result<Curvature, Dark>>>,
+    /// The light of each field.
+    pub illumination: Timed<Vec<Illumination>>,
 }
 
 impl Numbers {
@@ -127,18 +146,69 @@ fn numbers(
     settings: &Settings,
     interrupted: impl Fn() -> bool,
 ) -> Option<Result<Numbers, String>> {
-    let bench = timed(|| Bench::of(lens, settings.zoom));
-    let bench = match bench.value {
-        Ok(value) => Timed { value: Arc::new(value), ms: bench.ms },
+    let plan = timed(|| planned(lens, settings));
+    let plan = match plan.value {
+        Ok(value) => Timed { value, ms: plan.ms },
         Err(error) => return Some(Err(error.to_string())),
     };
-    let seidel = timed(|| third_order(&bench.value));
-    let go_on = || (!interrupted()).then_some(());
-    go_on()?;
-    let layout = timed(|| layout(&bench.value, settings.rays));
-    go_on()?;
-    let scatter = timed(|| scatter(&bench.value));
-    Some(Ok(Numbers { bench, seidel, layout, scatter }))
+    let bench = timed(|| effects::bench(lens, settings.zoom, &plan.value));
+    match bench.value {
+        Ok(value) => {
+            let bench = Timed { value: Arc::new(value), ms: bench.ms };
+            Numbers::of(bench, plan, settings, interrupted).map(Ok)
+        }
+        Err(error) => Some(Err(error.to_string())),
+    }
+}
+
+fn planned(lens: &Lens, settings: &Settings) -> Result<Plan, BenchError> {
+    let facts = effects::survey(lens, settings.zoom)?;
+    Ok(effects::plan(&facts, Task::Spot(settings.tolerance), &settings.choices))
+}
+
+/// How many points a ray fan has.
+const FAN_POINTS: usize = 65;
+
+impl Numbers {
+    /// All numbers, what is looked at first in front; `None` where they are no longer wanted.
+    fn of(
+        bench: Timed<Arc<Bench>>,
+        plan: Timed<Plan>,
+        settings: &Settings,
+        interrupted: impl Fn() -> bool,
+    ) -> Option<Self> {
+        let go_on = || (!interrupted()).then_some(());
+        let b = Arc::clone(&bench.value);
+        let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
+        let layout = timed(|| layout(&b, settings.rays));
+        go_on()?;
+        let scatter = timed(|| scatter(&b));
+        go_on()?;
+        let spots = timed(|| analysis::spots(&b, accuracy));
+        go_on()?;
+        let fans = timed(|| each(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
+        go_on()?;
+        let illumination = timed(|| analysis::illumination(&b, b.primary, accuracy));
+        go_on()?;
+        Some(Self {
+            seidel: timed(|| third_order(&b)),
+            airy: analysis::airy_radius(&b),
+            distortion: timed(|| each(&b, |field| analysis::distortion(&b, field, b.primary))),
+            curvature: timed(|| each(&b, |field| analysis::field_curvature(&b, field, b.primary))),
+            bench,
+            plan,
+            layout,
+            scatter,
+            spots,
+            fans,
+            illumination,
+        })
+    }
+}
+
+/// A result for each field, in order.
+fn each<T: Send>(bench: &Bench, of: impl Fn(Field) -> T + Sync) -> Vec<T> {
+    bench.fields.par_iter().map(|field| of(*field)).collect()
 }
 
 fn third_order(bench: &Bench) -> Option<Seidel<f64>> {

@@ -124,7 +124,7 @@ impl Session {
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
             Command::ShowZoom(zoom) => self.show_zoom(zoom),
             Command::ShowRays(rays) => self.set_up(|settings| settings.rays = rays.min(MOST_RAYS)),
-            Command::Choose(effect, choice) => self.set_up(|s| s.choose(effect, choice)),
+            Command::Choose(effect, choice) => self.set_up(|s| s.choices.choose(effect, choice)),
             Command::ClearMessages => self.messages.clear(),
         }
         self.poll()

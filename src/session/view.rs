@@ -2,7 +2,7 @@
 
 use super::analyst::Results;
 use super::worker::Search;
-use crate::effects::{Choice, Effect};
+use crate::effects::Choices;
 use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -78,28 +78,12 @@ pub struct Settings {
     /// How many rays of each field the layout shows.
     pub rays: usize,
     /// Effects that are not left to the plan.
-    pub choices: Vec<(Effect, Choice)>,
+    pub choices: Choices,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance: 1e-3, zoom: 0, rays: 15, choices: Vec::new() }
-    }
-}
-
-impl Settings {
-    /// Whether an effect is computed.
-    pub fn choice(&self, effect: Effect) -> Choice {
-        let chosen = self.choices.iter().find(|(other, _)| *other == effect);
-        chosen.map_or(Choice::Auto, |(_, choice)| *choice)
-    }
-
-    pub(super) fn choose(&mut self, effect: Effect, choice: Choice) {
-        self.choices.retain(|(other, _)| *other != effect);
-        if choice != Choice::Auto {
-            self.choices.push((effect, choice));
-            self.choices.sort_unstable_by_key(|(effect, _)| *effect);
-        }
+        Self { tolerance: 1e-3, zoom: 0, rays: 15, choices: Choices::default() }
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod analysis;
 mod cli;
+mod effects;
 mod files;
 mod hard_cases;
 mod library;

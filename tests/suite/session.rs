@@ -8,7 +8,9 @@ use aplanat::lens::{
 };
 use aplanat::merit::{Goal, MeritError, TermValue};
 use aplanat::optimize::{Method, Optimizer, Progress};
-use aplanat::session::{Command, Edit, Event, Session, Severity, Standing, Starter, View};
+use aplanat::session::{
+    Command, Edit, Event, Session, Settings, Severity, Standing, Starter, View, compute,
+};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
@@ -531,10 +533,37 @@ fn the_numbers_of_the_newest_design_arrive() {
     assert_eq!(results.lens.surfaces[1].thickness, 0.49);
     let numbers = results.numbers.as_ref().unwrap();
     assert!((numbers.first().efl.unwrap() - 49.4).abs() < 1.0);
-    println!(
-        "numbers of the double Gauss: {:.2} ms (bench {:.2}, seidel {:.3}, layout {:.2}, dots {:.2})",
-        results.ms, numbers.bench.ms, numbers.seidel.ms, numbers.layout.ms, numbers.scatter.ms
-    );
+    let rms: Vec<f64> =
+        numbers.spots.value.iter().map(|spot| spot.as_ref().unwrap().rms.value).collect();
+    assert!(rms.len() == 3 && rms.iter().all(|rms| *rms > 0.0), "{rms:?}");
+}
+
+#[test]
+fn every_number_of_every_library_lens_is_there_in_time() {
+    for bundled in files::library() {
+        let lens = lens(bundled.name);
+        let settings = Settings::default();
+        let start = std::time::Instant::now();
+        let numbers = compute(&lens, &settings).unwrap();
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        println!(
+            "{:32} {ms:6.2} ms: plan {:.2}, bench {:.2}, layout {:.2}, dots {:.2}, spots {:.2}, \
+             fans {:.2}, illumination {:.2}, distortion {:.2}, curvature {:.2}",
+            bundled.name,
+            numbers.plan.ms,
+            numbers.bench.ms,
+            numbers.layout.ms,
+            numbers.scatter.ms,
+            numbers.spots.ms,
+            numbers.fans.ms,
+            numbers.illumination.ms,
+            numbers.distortion.ms,
+            numbers.curvature.ms
+        );
+        assert!(numbers.first().efl.is_some());
+        assert_eq!(numbers.spots.value.len(), lens.fields_at(0).values.len());
+        assert!(numbers.layout.value.rays.len() > 10, "{}", bundled.name);
+    }
 }
 
 #[test]

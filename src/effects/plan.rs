@@ -1,0 +1,278 @@
+//! The decisions: a pure function of what was measured.
+
+use super::apply::decided;
+use super::survey::Facts;
+use super::{Choice, Choices, Effect};
+use serde::{Deserialize, Serialize};
+
+/// Rays are aimed at the real stop where the paraxial chief ray misses its centre by more than so
+/// many stop radii: paraxial coordinates would waste much of the beam.
+pub const AIMING: f64 = 0.25;
+
+/// A rim that no ray comes nearer than this, in semi-diameters, clips nothing.
+const NEAR_RIM: f64 = 0.98;
+/// A surface that no ray leaves within two degrees of grazing reflects nothing totally; the sine
+/// of the angle of refraction there.
+const NEAR_GRAZING: f64 = 0.9994;
+/// What a drawing of a lens shows: a thousandth of its length.
+const DRAWN: f64 = 1e-3;
+/// What a traced ray is exact to, in mm.
+const EXACT: f64 = 1e-9;
+
+/// What a lens is resolved for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Task {
+    /// Rays as such: nothing that moves one of them may be left out.
+    Trace,
+    /// Spots, good to this share of the smallest one.
+    Spot(f64),
+    /// A drawing.
+    Layout,
+    /// Searching, with spots good to this share of the smallest one.
+    Optimize(f64),
+}
+
+impl Task {
+    /// By how much rays may move, in mm.
+    fn allows(self, facts: &Facts) -> f64 {
+        match self {
+            Self::Trace => EXACT,
+            Self::Spot(share) | Self::Optimize(share) if facts.spot.is_finite() => {
+                share * facts.spot
+            }
+            Self::Spot(_) | Self::Optimize(_) => 0.0,
+            Self::Layout => DRAWN * facts.length,
+        }
+    }
+}
+
+/// What was decided about one effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Decision {
+    /// Which effect.
+    pub effect: Effect,
+    /// What the person said.
+    pub choice: Choice,
+    /// Whether the lens calls for it.
+    pub needed: bool,
+    /// Whether it is computed.
+    pub computed: bool,
+    /// The surfaces at which it is computed, where it belongs to surfaces.
+    pub surfaces: Vec<usize>,
+    /// The number that the decision rests on: what changes if the effect is left out.
+    pub error: f64,
+    /// The effect is needed where the number is above this.
+    pub limit: f64,
+    /// What really is left out, in the same unit: 0 where nothing is.
+    pub left: f64,
+    /// What these numbers are measured in.
+    pub unit: &'static str,
+    /// Why, in a sentence.
+    pub reason: String,
+    /// The share of the work of tracing that leaving it out saves or would save, by count of
+    /// ray-surfaces.
+    pub saves: f64,
+    /// The same in milliseconds for the task; the engine reads no clock, so whoever does fills
+    /// this in.
+    pub saved_ms: Option<f64>,
+}
+
+/// All decisions for a lens.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plan {
+    /// One decision an effect, in the order of [`Effect::ALL`].
+    pub decisions: Vec<Decision>,
+    /// Figured surfaces whose figuring is left out.
+    pub plain: Vec<usize>,
+    /// Surfaces whose rim is left out.
+    pub open: Vec<usize>,
+}
+
+impl Plan {
+    /// What was decided about an effect.
+    pub fn of(&self, effect: Effect) -> Option<&Decision> {
+        self.decisions.iter().find(|decision| decision.effect == effect)
+    }
+
+    /// Whether an effect is computed.
+    pub fn computes(&self, effect: Effect) -> bool {
+        self.of(effect).is_none_or(|decision| decision.computed)
+    }
+}
+
+/// What to compute for a task, from what was measured and what a person chose.
+pub fn plan(facts: &Facts, task: Task, choices: &Choices) -> Plan {
+    let allowed = task.allows(facts);
+    let (asphere, plain) = asphere(facts, allowed, choices.of(Effect::Asphere));
+    let (clipping, open) = clipping(facts, choices.of(Effect::Clipping));
+    let decisions = vec![
+        dispersion(facts, allowed, choices.of(Effect::Dispersion)),
+        asphere,
+        clipping,
+        reflection(facts, choices.of(Effect::TotalReflection)),
+        aiming(facts, choices.of(Effect::Aiming)),
+        object(facts, allowed, choices.of(Effect::FiniteObject)),
+    ];
+    Plan { decisions, plain, open }
+}
+
+/// A decision that rests on one number and belongs to the lens as a whole.
+fn whole(effect: Effect, choice: Choice, error: f64, limit: f64, unit: &'static str) -> Decision {
+    let needed = !(error <= limit);
+    let computed = decided(choice, needed);
+    Decision {
+        effect,
+        choice,
+        needed,
+        computed,
+        surfaces: Vec::new(),
+        error,
+        limit,
+        left: if computed { 0.0 } else { error },
+        unit,
+        reason: String::new(),
+        saves: 0.0,
+        saved_ms: None,
+    }
+}
+
+fn dispersion(facts: &Facts, allowed: f64, choice: Choice) -> Decision {
+    let decision = whole(Effect::Dispersion, choice, facts.dispersion, allowed, "mm");
+    let reason = match facts.colors {
+        1 => "there is one wavelength".to_owned(),
+        colors if facts.dispersion == 0.0 => {
+            format!("all {colors} wavelengths take the same way")
+        }
+        colors => format!(
+            "the {colors} wavelengths land {:.3} um apart; {:.3} um may be neglected",
+            1e3 * facts.dispersion,
+            1e3 * allowed
+        ),
+    };
+    Decision { reason, saves: 1.0 - 1.0 / facts.colors as f64, ..decision }
+}
+
+/// Keeps the figuring of as few surfaces as are needed: the weakest ones go first, as long as
+/// together they may be neglected.
+fn asphere(facts: &Facts, allowed: f64, choice: Choice) -> (Decision, Vec<usize>) {
+    let total = facts.aspheres.iter().fold(0.0, |sum, (_, moved)| sum + moved);
+    let decision = whole(Effect::Asphere, choice, total, allowed, "mm");
+    let mut weakest = facts.aspheres.clone();
+    weakest.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let (mut plain, mut left) = (Vec::new(), 0.0);
+    for (surface, moved) in weakest {
+        let goes = match choice {
+            Choice::Auto => left + moved <= allowed,
+            Choice::On => false,
+            Choice::Off => true,
+        };
+        if goes {
+            left += moved;
+            plain.push(surface);
+        }
+    }
+    plain.sort_unstable();
+    let kept = facts.aspheres.iter().map(|(surface, _)| *surface).filter(|i| !plain.contains(i));
+    let surfaces: Vec<usize> = kept.collect();
+    let reason = match (facts.aspheres.len(), surfaces.len()) {
+        (0, _) => "no surface is figured".to_owned(),
+        (all, _) => format!(
+            "without the figuring of {all} surfaces rays would land {:.3} um away; {:.3} um may \
+             be neglected",
+            1e3 * total,
+            1e3 * allowed
+        ),
+    };
+    let figured = facts.aspheres.len() as f64;
+    let work = facts.surfaces as f64 + figured * (ITERATION - 1.0);
+    let saves = figured * (ITERATION - 1.0) / work;
+    let computed = !surfaces.is_empty();
+    (Decision { computed, surfaces, left, reason, saves, ..decision }, plain)
+}
+
+/// What a crossing of a figured surface costs, in crossings of a sphere.
+const ITERATION: f64 = 15.0;
+
+/// Keeps the rims that a ray may reach, and those that tell an iteration where to look.
+fn clipping(facts: &Facts, choice: Choice) -> (Decision, Vec<usize>) {
+    let ratio = |rim: &super::Rim| {
+        if rim.reached == 0.0 { 0.0 } else { rim.reached / rim.semi_diameter }
+    };
+    let nearest = facts.rims.iter().map(ratio).fold(0.0, f64::max);
+    let decision = whole(Effect::Clipping, choice, nearest, NEAR_RIM, "of the semi-diameter");
+    let goes = |rim: &&super::Rim| match choice {
+        Choice::Auto => !rim.figured && ratio(rim) <= NEAR_RIM,
+        Choice::On => false,
+        Choice::Off => true,
+    };
+    let open: Vec<usize> = facts.rims.iter().filter(goes).map(|rim| rim.surface).collect();
+    let left = facts.rims.iter().filter(goes).map(ratio).fold(0.0, f64::max);
+    let kept = facts.rims.iter().map(|rim| rim.surface).filter(|i| !open.contains(i));
+    let surfaces: Vec<usize> = kept.collect();
+    let reason = if facts.rims.is_empty() {
+        "no surface has a semi-diameter".to_owned()
+    } else {
+        let (clipped, rays) = (facts.fates.clipped, facts.fates.total());
+        let limiting = facts.rims.iter().filter(|rim| ratio(rim) > NEAR_RIM).count();
+        format!(
+            "rays come to {:.0} % of a semi-diameter, and near the rim at {limiting} surfaces; \
+             {clipped} of {rays} are lost there",
+            100.0 * nearest
+        )
+    };
+    let computed = !surfaces.is_empty();
+    (Decision { computed, surfaces, left, reason, ..decision }, open)
+}
+
+/// The test is the sign of the number whose root refraction takes anyway: it cannot be left out
+/// and would save nothing.
+fn reflection(facts: &Facts, choice: Choice) -> Decision {
+    let nearest = facts.critical.map_or(0.0, |angle| angle.to_radians().cos());
+    let decision =
+        whole(Effect::TotalReflection, choice, nearest, NEAR_GRAZING, "of the critical sine");
+    let reason = match facts.critical {
+        None => "the index falls at no surface that rays leave".to_owned(),
+        Some(_) if facts.fates.total_reflection > 0 => {
+            let Facts { fates, .. } = facts;
+            format!("{} of {} rays are totally reflected", fates.total_reflection, fates.total())
+        }
+        Some(angle) => format!("no ray leaves a surface at less than {angle:.1} degrees to it"),
+    };
+    let computed = !facts.falls.is_empty();
+    Decision { computed, left: 0.0, surfaces: facts.falls.clone(), reason, ..decision }
+}
+
+/// What a search for the chief ray costs, in rays of a spot: some steps with derivatives.
+const CHIEF_RAYS: f64 = 20.0;
+/// The rays of a spot.
+const SPOT_RAYS: f64 = 100.0;
+
+fn aiming(facts: &Facts, choice: Choice) -> Decision {
+    let miss = facts.miss.unwrap_or(f64::INFINITY);
+    let decision = whole(Effect::Aiming, choice, miss, AIMING, "stop radii");
+    let reason = match facts.miss {
+        Some(miss) => format!(
+            "the paraxial chief ray of the farthest field misses the centre of the stop by \
+             {:.0} % of its radius",
+            100.0 * miss
+        ),
+        None => "the paraxial chief ray of the farthest field does not reach the stop".to_owned(),
+    };
+    let saves = CHIEF_RAYS / (CHIEF_RAYS + SPOT_RAYS);
+    Decision { reason, saves, ..decision }
+}
+
+fn object(facts: &Facts, allowed: f64, choice: Choice) -> Decision {
+    let moved = facts.object.map_or(0.0, |(_, moved)| moved);
+    let decision = whole(Effect::FiniteObject, choice, moved, allowed, "mm");
+    let reason = match facts.object {
+        None => "the object is at infinity".to_owned(),
+        Some((distance, moved)) => format!(
+            "from infinity rays would land {:.3} um away from where they land from {distance} mm",
+            1e3 * moved
+        ),
+    };
+    let computed = decision.computed && facts.object.is_some();
+    Decision { computed, reason, ..decision }
+}

@@ -1,0 +1,337 @@
+//! What each effect does to the rays of a lens, measured.
+//!
+//! A few dozen rays of every field and wavelength are enough: what is measured is how far rays
+//! move and how near they come to a rim, both smooth over the pupil. The root mean square of a
+//! displacement bounds what it does to the RMS radius of a spot, by the triangle inequality.
+
+use super::apply::{collimated, drop_terms};
+use crate::lens::{Field, Lens, Object, Shape, System};
+use crate::math::Vec3;
+use crate::paraxial::Beam;
+use crate::pupil::{Aiming, Bench, BenchError, Launch, Pattern, pattern};
+use crate::trace::{Fates, Ray, Tracer};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// What was measured of a lens at one zoom position.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facts {
+    /// How many wavelengths it has.
+    pub colors: usize,
+    /// How many surfaces a ray crosses.
+    pub surfaces: usize,
+    /// From the first vertex to the image, in mm.
+    pub length: f64,
+    /// The smallest RMS radius of any field that has light, in mm.
+    pub spot: f64,
+    /// How far the colours lie from the primary one, root mean square over rays, in mm: of the
+    /// field where that is most.
+    pub dispersion: f64,
+    /// The figured surfaces, and how far rays move without the figuring of each, in mm.
+    pub aspheres: Vec<(usize, f64)>,
+    /// Every rim that is written, and how near rays come to it.
+    pub rims: Vec<Rim>,
+    /// How the surveyed rays ended.
+    pub fates: Fates,
+    /// Surfaces at which the index falls, where alone total reflection is possible.
+    pub falls: Vec<usize>,
+    /// The smallest distance of any ray from total reflection, in degrees of the refracted ray
+    /// from grazing; `None` where no index falls.
+    pub critical: Option<f64>,
+    /// By how many stop radii the paraxial chief ray of the farthest field misses the centre of the
+    /// stop; `None` where it does not get there.
+    pub miss: Option<f64>,
+    /// The distance of a finite object, and how far rays move if it is taken to be at infinity, in
+    /// mm.
+    pub object: Option<(f64, f64)>,
+}
+
+/// How near rays come to a rim.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rim {
+    /// The surface.
+    pub surface: usize,
+    /// Its semi-diameter, in mm.
+    pub semi_diameter: f64,
+    /// How far from the axis rays meet it that nothing else stops, in mm.
+    pub reached: f64,
+    /// Whether the surface is figured: its iteration needs the rim to know where to look.
+    pub figured: bool,
+}
+
+/// Rays inside the pupil in rings that stand for equal areas, and rays on its rim.
+const RINGS: usize = 3;
+const ON_RIM: usize = 24;
+/// Where no disc limits the beam, rays up to so many times the paraxial pupil are tried.
+const BEYOND: f64 = 1.6;
+
+/// Measures a lens at a zoom position.
+///
+/// # Errors
+/// A lens or aperture through which nothing can be traced.
+pub fn survey(lens: &Lens, zoom: usize) -> Result<Facts, BenchError> {
+    let mut bench = Bench::with_aiming(lens, zoom, Aiming::Paraxial)?;
+    let miss = bench.stop_miss();
+    if miss.is_none_or(|miss| miss > super::AIMING) {
+        bench.aiming = Aiming::Chief;
+    }
+    let system = &bench.colors[bench.primary].system;
+    let sights: Vec<Sight> =
+        bench.fields.par_iter().flat_map_iter(|field| Sight::of_field(&bench, *field)).collect();
+    let mut fates = Fates::default();
+    sights.iter().flat_map(|sight| &sight.fates).for_each(|fate| fates.count(*fate));
+    Ok(Facts {
+        colors: bench.colors.len(),
+        surfaces: system.surfaces.len(),
+        length: length(system),
+        spot: smallest_spot(&bench, &sights),
+        dispersion: dispersion(&bench, &sights),
+        aspheres: aspheres(&bench, &sights)?,
+        rims: rims(&bench)?,
+        fates,
+        falls: falls(system),
+        critical: critical(&bench, &sights),
+        miss,
+        object: object(lens, zoom, &bench, &sights)?,
+    })
+}
+
+fn length(system: &System<f64>) -> f64 {
+    let gaps = system.surfaces.iter().take(system.surfaces.len() - 1);
+    gaps.map(|surface| surface.thickness.abs()).sum()
+}
+
+/// The points of the pupil that are looked at; those inside come first.
+fn places(bench: &Bench) -> Vec<[f64; 2]> {
+    let reach = if bench.ends_at_disc() { 1.0 } else { BEYOND };
+    let rim = (0..ON_RIM).map(|i| (TAU * i as f64 / ON_RIM as f64).sin_cos().into());
+    let inside = pattern(Pattern::HexapolarInside(RINGS)).into_iter();
+    inside.map(|p| p.map(|v| v * reach)).chain(rim).collect()
+}
+
+/// The surveyed rays of one field at one wavelength.
+struct Sight {
+    field: Field,
+    wavelength: usize,
+    rays: Vec<Option<Ray<f64>>>,
+    /// Where they land; `None` for a ray that is lost.
+    landed: Vec<Option<Vec3<f64>>>,
+    fates: Vec<crate::trace::Fate>,
+}
+
+impl Sight {
+    /// The rays of a field at all wavelengths; a field without rays is dark and has none.
+    fn of_field(bench: &Bench, field: Field) -> Vec<Self> {
+        let places = places(bench);
+        let launches = (0..bench.colors.len()).filter_map(|w| bench.launch(field, w).ok());
+        launches.map(|launch| Self::new(&launch, &places)).collect()
+    }
+
+    fn new(launch: &Launch<'_>, places: &[[f64; 2]]) -> Self {
+        let rays: Vec<_> = places.iter().map(|p| launch.ray(*p)).collect();
+        let landings: Vec<_> =
+            rays.iter().map(|ray| ray.map(|ray| launch.color().tracer.trace(ray))).collect();
+        Self {
+            field: launch.field,
+            wavelength: launch.wavelength,
+            landed: landings
+                .iter()
+                .map(|l| l.filter(|l| l.fate.is_imaged()).map(|l| l.ray.point))
+                .collect(),
+            fates: landings.iter().flatten().map(|landing| landing.fate).collect(),
+            rays,
+        }
+    }
+
+    /// Where the rays inside the pupil land.
+    fn inside(&self) -> impl Iterator<Item = &Vec3<f64>> {
+        self.landed[..self.landed.len() - ON_RIM].iter().flatten()
+    }
+
+    /// The root mean square distance of the rays from where they land otherwise, both from the
+    /// axis; infinite where a ray gets lost.
+    fn moved(&self, otherwise: impl Fn(usize, Ray<f64>) -> Option<Vec3<f64>>) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for (i, (ray, landed)) in self.rays.iter().zip(&self.landed).enumerate() {
+            let (Some(ray), Some(here)) = (ray, landed) else { continue };
+            let there = otherwise(i, *ray);
+            sum += there.map_or(f64::INFINITY, |t| (t.x - here.x).powi(2) + (t.y - here.y).powi(2));
+            count += 1;
+        }
+        if count == 0 { 0.0 } else { (sum / f64::from(count)).sqrt() }
+    }
+}
+
+/// Fewer rays than this say nothing about the size of a spot.
+const FEW: usize = 8;
+
+/// The smallest RMS radius of a field, all colours together.
+fn smallest_spot(bench: &Bench, sights: &[Sight]) -> f64 {
+    let spot = |field: &Field| {
+        let of_field = || sights.iter().filter(|sight| sight.field == *field);
+        let points: Vec<_> = of_field().flat_map(Sight::inside).collect();
+        let share = 1.0 / points.len() as f64;
+        let mean = points.iter().fold(Vec3::default(), |sum, p| sum + **p) * share;
+        let off = |p: &&Vec3<f64>| (p.x - mean.x).powi(2) + (p.y - mean.y).powi(2);
+        let square = points.iter().map(off).sum::<f64>() * share;
+        (points.len() >= FEW).then(|| square.sqrt())
+    };
+    bench.fields.iter().filter_map(spot).fold(f64::INFINITY, f64::min)
+}
+
+/// `√(Σ share |p_λ − p|²)` over the rays that arrive in both colours, of the worst field.
+fn dispersion(bench: &Bench, sights: &[Sight]) -> f64 {
+    let weights: f64 = bench.colors.iter().map(|color| color.weight).sum();
+    let worst = |field: &Field| -> f64 {
+        let of_field = |sight: &&Sight| sight.field == *field;
+        let primary = sights.iter().filter(of_field).find(|s| s.wavelength == bench.primary);
+        let square = |sight: &Sight| {
+            let share = bench.colors[sight.wavelength].weight / weights;
+            let there = |i: usize, _| primary.and_then(|p| p.landed[i]).or(sight.landed[i]);
+            share * sight.moved(there).powi(2)
+        };
+        sights.iter().filter(of_field).map(square).sum::<f64>().sqrt()
+    };
+    bench.fields.iter().map(worst).fold(0.0, f64::max)
+}
+
+/// The largest way that rays at the primary wavelength move in another system.
+fn moves(bench: &Bench, sights: &[Sight], other: &System<f64>) -> Result<f64, BenchError> {
+    let tracer = Tracer::new(other)?;
+    let land = |_, ray| {
+        let landing = tracer.trace(ray);
+        landing.fate.is_imaged().then_some(landing.ray.point)
+    };
+    let primary = sights.iter().filter(|sight| sight.wavelength == bench.primary);
+    Ok(primary.map(|sight| sight.moved(land)).fold(0.0, f64::max))
+}
+
+fn aspheres(bench: &Bench, sights: &[Sight]) -> Result<Vec<(usize, f64)>, BenchError> {
+    let system = &bench.colors[bench.primary].system;
+    let figured = (0..system.surfaces.len()).filter(|i| is_figured(system, *i));
+    let moved = |i: usize| {
+        let mut plain = without_rims(bench);
+        drop_terms(&mut plain.surfaces[i]);
+        Ok((i, moves(bench, sights, &plain)?))
+    };
+    figured.map(moved).collect()
+}
+
+fn is_figured(system: &System<f64>, surface: usize) -> bool {
+    matches!(system.surfaces[surface].shape, Shape::Asphere { .. })
+}
+
+/// The lens at the primary wavelength with the rims of its figured surfaces alone, and that of the
+/// stop where it limits the beam.
+fn without_rims(bench: &Bench) -> System<f64> {
+    let mut system = bench.colors[bench.primary].system.clone();
+    for i in 0..system.surfaces.len() {
+        let limits = !bench.ends_at_disc() && i == bench.stop();
+        if !(is_figured(&system, i) || limits) {
+            system.surfaces[i].semi_diameter = f64::INFINITY;
+        }
+    }
+    system
+}
+
+/// How far from the axis rays meet each surface that arrive where only those rims clip that have
+/// to.
+fn rims(bench: &Bench) -> Result<Vec<Rim>, BenchError> {
+    let tracer = Tracer::new(&without_rims(bench))?;
+    let count = tracer.surfaces();
+    let reached = |field: &Field| -> Vec<f64> {
+        let mut reached = vec![0.0; count];
+        for launch in (0..bench.colors.len()).filter_map(|w| bench.launch(*field, w).ok()) {
+            for ray in places(bench).into_iter().filter_map(|p| launch.ray(p)) {
+                let mut heights = vec![0.0; count];
+                let landing = tracer.visit(ray, |i, p| heights[i] = p.x.hypot(p.y));
+                if landing.fate.is_imaged() {
+                    reached.iter_mut().zip(heights).for_each(|(r, h)| *r = h.max(*r));
+                }
+            }
+        }
+        reached
+    };
+    let all: Vec<_> = bench.fields.par_iter().map(reached).collect();
+    let system = &bench.colors[bench.primary].system;
+    let rim = |surface: usize| Rim {
+        surface,
+        semi_diameter: system.surfaces[surface].semi_diameter,
+        reached: all.iter().map(|field| field[surface]).fold(0.0, f64::max),
+        figured: is_figured(system, surface),
+    };
+    Ok((0..count).map(rim).filter(|rim| rim.semi_diameter.is_finite()).collect())
+}
+
+fn falls(system: &System<f64>) -> Vec<usize> {
+    let falls = |i: &usize| {
+        let surface = &system.surfaces[*i];
+        !surface.mirror && surface.index < system.index_before(*i)
+    };
+    (0..system.surfaces.len()).filter(falls).collect()
+}
+
+/// The angle by which the ray nearest to total reflection leaves its surface, from the margin
+/// `n'² cos² I'`.
+fn critical(bench: &Bench, sights: &[Sight]) -> Option<f64> {
+    let mut least: Option<f64> = None;
+    for sight in sights {
+        let color = &bench.colors[sight.wavelength];
+        let falls = falls(&color.system);
+        for ray in sight.rays.iter().flatten() {
+            let mut points = Vec::with_capacity(color.system.surfaces.len());
+            let landing = color.tracer.visit(*ray, |i, p| points.push((i, p)));
+            if let crate::trace::Fate::TotalReflection(_) = landing.fate {
+                return Some(0.0);
+            }
+            let angles = leaving(&color.system, &points);
+            for (_, angle) in angles.filter(|(i, _)| falls.contains(i)) {
+                least = Some(least.map_or(angle, |least: f64| least.min(angle)));
+            }
+        }
+    }
+    least
+}
+
+/// The angle between a ray and each surface that it leaves, in degrees.
+fn leaving<'a>(
+    system: &'a System<f64>,
+    points: &'a [(usize, Vec3<f64>)],
+) -> impl Iterator<Item = (usize, f64)> + 'a {
+    points.windows(2).filter_map(move |pair| {
+        let [(i, here), (_, next)] = pair else { return None };
+        let surface = &system.surfaces[*i];
+        let along =
+            Vec3::new(next.x - here.x, next.y - here.y, next.z + surface.thickness - here.z);
+        let (_, slope) = surface.shape.sag(here.x * here.x + here.y * here.y)?;
+        let normal = Vec3::new(-2.0 * slope * here.x, -2.0 * slope * here.y, 1.0);
+        let sine = along.dot(normal).abs() / (along.dot(along) * normal.dot(normal)).sqrt();
+        Some((*i, sine.min(1.0).asin().to_degrees()))
+    })
+}
+
+fn object(
+    lens: &Lens,
+    zoom: usize,
+    bench: &Bench,
+    sights: &[Sight],
+) -> Result<Option<(f64, f64)>, BenchError> {
+    let Object::Finite(distance) = lens.object else { return Ok(None) };
+    let Some((beam, fields)) = collimated(bench, &Beam::of(lens, zoom)) else {
+        return Ok(Some((distance, f64::INFINITY)));
+    };
+    let systems =
+        bench.colors.iter().map(|color| (color.um, color.weight, color.system.clone())).collect();
+    let far = Bench::new(systems, bench.primary, beam, bench.aiming)?;
+    let places = places(bench);
+    let mut most: f64 = 0.0;
+    for (field, parallel) in bench.fields.iter().zip(fields) {
+        let mut here = sights.iter().filter(|s| s.field == *field && s.wavelength == bench.primary);
+        let there = far.launch(parallel, bench.primary).ok();
+        if let (Some(here), Some(there)) = (here.next(), there) {
+            let there = Sight::new(&there, &places);
+            most = most.max(here.moved(|i, _| there.landed[i]));
+        }
+    }
+    Ok(Some((distance, most)))
+}
