@@ -10,9 +10,21 @@ pub(super) fn open(lens: Option<&Path>) -> Result<(), Failure> {
         refuse_typing_error(path)?;
         files::open(path)?;
     }
+    show(lens)
+}
+
+#[cfg(feature = "studio")]
+fn show(lens: Option<&Path>) -> Result<(), Failure> {
+    let studio = crate::studio::run(lens.map(Path::to_owned));
+    studio.map_err(|why| Failure::Failed(why.to_string()))
+}
+
+#[cfg(not(feature = "studio"))]
+fn show(_lens: Option<&Path>) -> Result<(), Failure> {
     Err(Failure::Failed(WITHOUT.to_owned()))
 }
 
+#[cfg(not(feature = "studio"))]
 const WITHOUT: &str = "this program was built without its window (cargo feature `studio`)\n\
     with it: `cargo run --release`\n\
     the same work without a window: `aplanat info LENS`, `aplanat analyze LENS spot`, \

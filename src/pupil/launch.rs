@@ -145,7 +145,18 @@ impl<'a> Launch<'a> {
         Some(self.source.ray(self.place(p)?))
     }
 
-    /// The same ray with its derivatives by the two pupil coordinates.
+    /// The optical path from the object point to the start of a ray of this field, or from the
+    /// plane wave through the first vertex, in mm.
+    pub fn path_to(&self, ray: Ray<f64>) -> f64 {
+        let index = self.color().system.index_before;
+        let away = match self.source {
+            Source::Collimated { .. } => ray.point,
+            Source::Point { from, .. } | Source::Slopes { from } => ray.point - from,
+        };
+        index * away.dot(ray.direction)
+    }
+
+    /// The ray at these pupil coordinates with its derivatives by the two pupil coordinates.
     pub fn dual_ray(&self, p: [f64; 2]) -> Option<Ray<Dual2>> {
         let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
         if self.aiming != Aiming::Stop {

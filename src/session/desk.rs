@@ -1,6 +1,6 @@
 //! The session itself: what each command does.
 
-use super::analyst::{Analyst, Request, Results};
+use super::analyst::{Analyst, Request, Results, Savings};
 use super::command::{Command, Edit};
 use super::edit::edited;
 use super::history::History;
@@ -54,6 +54,10 @@ pub struct Session {
     messages: Vec<Message>,
     analyst: Analyst,
     worker: Worker,
+    /// Computes the numbers of the lens that the search shows.
+    follower: Analyst,
+    /// That lens, and what the numbers were asked for with.
+    followed: Option<(Arc<Lens>, Settings)>,
     /// How many searches were begun.
     searches: u64,
     /// The last search, if its result is neither taken nor thrown away.
@@ -93,7 +97,9 @@ impl Session {
             path: None,
             settings: Settings::default(),
             messages: Vec::new(),
-            analyst: Analyst::spawn(wake.clone())?,
+            analyst: Analyst::spawn(Savings::Measured, wake.clone())?,
+            follower: Analyst::spawn(Savings::Left, wake.clone())?,
+            followed: None,
             worker: Worker::spawn(start, wake)?,
             searches: 0,
             search: None,
@@ -135,6 +141,7 @@ impl Session {
         for news in self.worker.news() {
             self.hear(news);
         }
+        self.follow();
         std::mem::take(&mut self.events)
     }
 
@@ -145,6 +152,7 @@ impl Session {
             version: self.version,
             results: self.analyst.results(),
             search: self.search(),
+            preview: self.preview(),
             messages: self.messages.clone(),
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),
@@ -171,6 +179,31 @@ impl Session {
 
     fn search(&self) -> Option<Arc<Search>> {
         self.worker.search().filter(|search| Some(search.number) == self.search)
+    }
+
+    /// Asks for the numbers of the lens that the search shows, if it is another one by now.
+    fn follow(&mut self) {
+        let Some(search) = self.search() else {
+            self.followed = None;
+            return;
+        };
+        let (lens, settings) = (search.shown(), &self.settings);
+        let known = self.followed.as_ref();
+        if known.is_some_and(|(old, with)| Arc::ptr_eq(old, lens) && with == settings) {
+            return;
+        }
+        self.followed = Some((Arc::clone(lens), settings.clone()));
+        self.follower.ask(Request {
+            version: search.number,
+            lens: Arc::clone(lens),
+            settings: settings.clone(),
+        });
+    }
+
+    /// The numbers of the search that is shown, if there are any yet.
+    fn preview(&self) -> Option<Arc<Results>> {
+        let number = self.search().map(|search| search.number)?;
+        self.follower.results().filter(|results| results.version == number)
     }
 
     fn edit(&mut self, edit: &Edit) {
@@ -249,6 +282,9 @@ impl Session {
                 // A foreign file is not written to under its own name without asking.
                 let own = (opened.format == files::Format::Native).then(|| path.to_owned());
                 self.start_with(opened.lens, own);
+                if let Some(report) = opened.report {
+                    self.say(Severity::Note, format!("imported {}\n{report}", path.display()));
+                }
                 self.events.push(Event::Opened(path.to_owned()));
             }
             Err(why) => self.say(Severity::Error, why.to_string()),
@@ -272,8 +308,14 @@ impl Session {
 
     fn export(&mut self, path: &Path) {
         match files::save(&self.lens, path) {
-            Ok(_) => {
-                self.say(Severity::Note, format!("exported to {}", path.display()));
+            Ok(saved) => {
+                let mut text = format!("exported to {}", path.display());
+                for part in
+                    [saved.proof.map(|p| p.to_string()), saved.report.map(|r| r.to_string())]
+                {
+                    text += &part.map(|part| format!("\n{part}")).unwrap_or_default();
+                }
+                self.say(Severity::Note, text);
                 self.events.push(Event::Saved(path.to_owned()));
             }
             Err(why) => self.say(Severity::Error, why.to_string()),
@@ -386,6 +428,11 @@ fn carried(search: &Search, design: &Arc<Lens>) -> Result<Lens, String> {
 }
 
 impl Search {
+    /// The lens to look at: the current one while it searches, the best one afterwards.
+    pub fn shown(&self) -> &Arc<Lens> {
+        if self.is_under_way() { &self.current } else { &self.best }
+    }
+
     /// Whether it takes steps or can go on.
     pub fn is_under_way(&self) -> bool {
         matches!(self.standing, Standing::Running | Standing::Paused)

@@ -20,6 +20,8 @@ pub struct View {
     /// The search in the background, or the last one whose result was neither taken nor thrown
     /// away.
     pub search: Option<Arc<Search>>,
+    /// The numbers of the lens that the search shows, maybe of a step before.
+    pub preview: Option<Arc<Results>>,
     /// What was said, newest last.
     pub messages: Vec<Message>,
     /// What undo would take back; `None` where there is nothing.
@@ -41,6 +43,7 @@ impl Default for View {
             version: 0,
             results: None,
             search: None,
+            preview: None,
             messages: Vec::new(),
             undo: None,
             redo: None,

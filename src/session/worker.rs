@@ -66,6 +66,8 @@ pub struct Search {
     pub best: Arc<Lens>,
     /// The lens at the current step.
     pub current: Arc<Lens>,
+    /// Every term of the merit for the lens it started from.
+    pub before: Vec<TermValue>,
     /// Every term of the merit for the best lens so far.
     pub terms: Vec<TermValue>,
     /// The merit against the step, at most a few thousand points of the whole way.
@@ -232,6 +234,7 @@ impl Desk {
                     best: Arc::clone(&task.lens),
                     current: Arc::clone(&task.lens),
                     task: Arc::new(task),
+                    before: optimizer.terms().unwrap_or_default(),
                     terms: Vec::new(),
                     history: Vec::new(),
                 };

@@ -16,6 +16,8 @@ pub enum Purpose {
     Save,
     /// To write the lens as Zemax reads it.
     ExportZemax,
+    /// To write a copy of the lens in our own form.
+    ExportJson,
 }
 
 impl Purpose {
@@ -24,13 +26,14 @@ impl Purpose {
             Self::Open => "Open a lens",
             Self::Save => "Save the lens",
             Self::ExportZemax => "Export the lens for Zemax",
+            Self::ExportJson => "Export a copy of the lens",
         }
     }
 
     const fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Open => &["json", "zmx", "ZMX"],
-            Self::Save => &["json"],
+            Self::Save | Self::ExportJson => &["json"],
             Self::ExportZemax => &["zmx"],
         }
     }
@@ -65,6 +68,11 @@ impl Chooser {
             }
             None => self.ask_for_path(purpose, near),
         }
+    }
+
+    /// Whether a question waits for its answer.
+    pub const fn is_open(&self) -> bool {
+        self.asked.is_some() || self.typed.is_some()
     }
 
     /// Asks with a line to type a path into.

@@ -2,9 +2,50 @@
 //!
 //! **A panel changes nothing**: it gets a view of the design and writes down wishes.
 
+mod app;
 pub mod chooser;
+pub mod dock;
 pub mod draw;
+pub mod field;
+mod menu;
 pub mod number;
 pub mod palette;
+pub mod panels;
 pub mod section;
 pub mod shell;
+pub mod theme;
+pub mod wording;
+
+pub use app::Studio;
+
+use std::path::PathBuf;
+
+use shell::{Memory, StudioError};
+
+use crate::files;
+use crate::lens::Lens;
+use crate::session::{Command, Session, blank};
+
+/// Opens the studio on a file, or on the first lens that comes with the program, and stays until
+/// the window is closed.
+///
+/// # Errors
+/// Where no window can open: see [`StudioError`]. A file that cannot be read is said in the window.
+pub fn run(path: Option<PathBuf>) -> Result<(), StudioError> {
+    shell::open(Memory::Kept, |context, backing| {
+        let wake = context.egui_ctx.clone();
+        let session = Session::new(first_lens(), move || wake.request_repaint())?;
+        let mut studio = Studio::new(session, backing, Memory::Kept, context.storage);
+        if let Some(path) = &path {
+            studio.apply(&context.egui_ctx, Command::Open(path.clone()));
+        }
+        Ok(Box::new(studio))
+    })
+}
+
+/// The lens that the studio opens with.
+fn first_lens() -> Lens {
+    let first = files::library().first();
+    let read = first.and_then(|lens| files::parse(lens.text.as_bytes(), lens.name).ok());
+    read.map_or_else(blank, |opened| opened.lens)
+}

@@ -1,12 +1,12 @@
 //! The section of a lens in the y-z plane: glass with joined edges, the stop as ticks, mirrors,
-//! the image plane.
+//! axis.
 //!
 //! An element reaches to the larger of its two semi-diameters; the smaller surface goes on flat,
 //! as lenses are ground. A surface without a semi-diameter is drawn as far as its rays go.
 
 use glam::DVec2;
 
-use super::draw::{Bounds, Scene};
+use super::draw::{Bounds, Colour, Scene};
 use super::palette::{Palette, to_byte};
 use crate::lens::{Shape, System};
 
@@ -28,10 +28,12 @@ impl<'a> Section<'a> {
         Self { system, vertices: vertices(system), heights: heights(system, reached) }
     }
 
-    /// What a picture of the whole lens shows: all surfaces and the image plane.
+    /// What a picture of the whole lens shows: all surfaces and the place of the image.
     pub fn bounds(&self) -> Option<Bounds> {
-        let corners = self.vertices.iter().zip(&self.heights);
-        Bounds::around(corners.flat_map(|(&z, &h)| [DVec2::new(z, h), DVec2::new(z, -h)]))
+        let heights = self.heights.iter().enumerate();
+        let heights = heights.map(|(i, h)| if i == self.last() { 0.0 } else { *h });
+        let corners = self.vertices.iter().zip(heights);
+        Bounds::around(corners.flat_map(|(&z, h)| [DVec2::new(z, h), DVec2::new(z, -h)]))
     }
 
     /// Draws glass, to lie below the rays.
@@ -44,27 +46,65 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Draws what lies above the rays: rims, mirrors, stop, image plane and axis.
+    /// Draws what lies above the rays: rims, mirrors, stop and axis.
     pub fn draw_outlines(&self, scene: &mut Scene, palette: &Palette) {
         self.draw_axis(scene, palette);
         for (left, _) in self.elements() {
-            let height = self.heights[left].max(self.heights[left + 1]);
-            let mut rim = self.curve(left, height);
-            rim.extend(self.curve(left + 1, height).into_iter().rev());
-            scene.outline(&rim, 1.5, palette.outline);
+            scene.outline(&self.rim(left), 1.5, palette.outline);
         }
-        let last = self.system.surfaces.len().saturating_sub(1);
         for (i, surface) in self.system.surfaces.iter().enumerate() {
             let curve = || self.curve(i, self.heights[i]);
             if surface.mirror {
                 scene.polyline(&curve(), 2.5, palette.mirror);
-            } else if i == last {
-                scene.polyline(&curve(), 1.5, palette.strong);
-            } else if !self.is_refracting(i) && self.system.stop != Some(i) {
+            } else if i != self.last() && !self.is_refracting(i) && self.system.stop != Some(i) {
                 scene.polyline(&curve(), 1.0, palette.faint);
             }
         }
         self.draw_stop(scene, palette);
+    }
+
+    /// Where the image plane is.
+    pub fn image(&self) -> f64 {
+        self.vertices.last().copied().unwrap_or(0.0)
+    }
+
+    /// How far the lens reaches from the axis.
+    pub fn highest(&self) -> f64 {
+        self.heights.iter().take(self.last()).copied().fold(0.0, f64::max)
+    }
+
+    /// The number of the image plane.
+    fn last(&self) -> usize {
+        self.heights.len().saturating_sub(1)
+    }
+
+    /// Draws the rims alone, in one colour: a lens to compare with.
+    pub fn draw_ghost(&self, scene: &mut Scene, colour: Colour) {
+        for (left, _) in self.elements() {
+            scene.outline(&self.rim(left), 1.0, colour);
+        }
+    }
+
+    /// The surface that passes nearest to a point, no farther than `within` mm along the axis.
+    pub fn surface_near(&self, point: DVec2, within: f64) -> Option<usize> {
+        let distance = |i: &usize| (self.at(*i, point.y).x - point.x).abs();
+        let reaches = |i: &usize| point.y.abs() <= self.heights[*i] + within;
+        (0..self.heights.len())
+            .filter(reaches)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .filter(|i| distance(i) <= within)
+    }
+
+    /// A surface from its lower rim to its upper one.
+    pub fn outline_of(&self, i: usize) -> Vec<DVec2> {
+        self.curve(i, self.heights[i])
+    }
+
+    fn rim(&self, left: usize) -> Vec<DVec2> {
+        let height = self.heights[left].max(self.heights[left + 1]);
+        let mut rim = self.curve(left, height);
+        rim.extend(self.curve(left + 1, height).into_iter().rev());
+        rim
     }
 
     fn draw_axis(&self, scene: &mut Scene, palette: &Palette) {

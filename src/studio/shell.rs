@@ -8,6 +8,7 @@ use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCrea
 use eframe::{App, CreationContext, NativeOptions, Renderer};
 
 use super::draw::{Backing, install};
+use super::theme;
 
 /// Why the studio cannot open.
 #[derive(Debug, thiserror::Error)]
@@ -52,11 +53,14 @@ pub enum Memory {
     None,
 }
 
+/// What a window shows, or why there is nothing to show.
+pub type Started = Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>;
+
 /// Opens a window and stays until it is closed. `start` makes what the window shows; it may be
 /// called a second time when the first renderer fails.
 pub fn open(
     memory: Memory,
-    start: impl Fn(&CreationContext<'_>, Backing) -> Box<dyn App>,
+    start: impl Fn(&CreationContext<'_>, Backing) -> Started,
 ) -> Result<(), StudioError> {
     let wgpu = match open_with(Renderer::Wgpu, memory, &start) {
         Err(eframe::Error::Wgpu(error)) => plain(&error.to_string()),
@@ -90,7 +94,7 @@ fn plain(message: &str) -> String {
 fn open_with(
     renderer: Renderer,
     memory: Memory,
-    start: &impl Fn(&CreationContext<'_>, Backing) -> Box<dyn App>,
+    start: &impl Fn(&CreationContext<'_>, Backing) -> Started,
 ) -> eframe::Result {
     let create = |context: &CreationContext<'_>| {
         let backing = match &context.wgpu_render_state {
@@ -101,8 +105,8 @@ fn open_with(
             }
             None => Backing::Software,
         };
-        dress(&context.egui_ctx);
-        Ok(start(context, backing))
+        theme::dress(&context.egui_ctx);
+        start(context, backing)
     };
     eframe::run_native("Aplanat", options(renderer, memory), Box::new(create))
 }
@@ -139,15 +143,6 @@ fn report_errors(state: &RenderState) {
     state.device.on_uncaptured_error(Arc::new(|error| log::error!("graphics card: {error}")));
     state.device.set_device_lost_callback(|reason, message| {
         log::error!("graphics card lost ({reason:?}): {message}");
-    });
-}
-
-/// A text cursor that blinks repaints the window twice a second for ever, and animations many
-/// times after each click.
-fn dress(context: &egui::Context) {
-    context.all_styles_mut(|style| {
-        style.visuals.text_cursor.blink = false;
-        style.animation_time = 0.0;
     });
 }
 

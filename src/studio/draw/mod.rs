@@ -18,7 +18,7 @@ mod stage;
 pub use camera::{Bounds, Camera, round_length};
 pub use canvas::{Backing, Canvas, install};
 pub use scene::{Colour, Corner, Scene, Segment};
-pub use stage::{Stage, corner_button, length_text};
+pub use stage::{Shown, Stage, length_text};
 
 /// A drawn scene: rows from the top, four bytes a pixel, colour multiplied by alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    self, Align2, Color32, CornerRadius, Event, MouseWheelUnit, Rect, Response, Sense, Stroke, Ui,
+    self, Align2, CornerRadius, Event, MouseWheelUnit, Rect, Response, Sense, Stroke, Ui,
     WidgetInfo,
 };
 use glam::DVec2;
@@ -45,7 +45,7 @@ impl Stage {
         scene: &Arc<Scene>,
         whole: Bounds,
         label: &str,
-    ) -> Response {
+    ) -> Shown {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, label));
         let per_point = f64::from(ui.ctx().pixels_per_point());
@@ -53,8 +53,9 @@ impl Stage {
         let fitted = Camera::fit(whole, size, MARGIN * per_point);
         let camera = self.look_around(ui, &response, fitted, size, per_point);
         self.canvas.show(ui, rect, backing, scene, camera);
-        scale_bar(ui, rect, camera.scale * per_point);
-        response
+        // The camera counts real pixels, the bar points.
+        scale_bar(ui, rect, camera.scale / per_point);
+        Shown { response, camera, per_point }
     }
 
     fn look_around(
@@ -83,6 +84,36 @@ impl Stage {
             self.moved = Some(camera);
         }
         camera
+    }
+}
+
+/// A scene as it is shown.
+#[derive(Debug)]
+pub struct Shown {
+    /// Where it is.
+    pub response: Response,
+    camera: Camera,
+    per_point: f64,
+}
+
+impl Shown {
+    fn size(&self) -> DVec2 {
+        self.per_point * points(self.response.rect.size())
+    }
+
+    /// The point of the plane under the pointer, and how long a point of the screen is there.
+    pub fn pointer(&self) -> Option<(DVec2, f64)> {
+        let at = self.response.hover_pos()?;
+        let px = self.per_point * points(at - self.response.rect.min);
+        Some((self.camera.to_mm(px, self.size()), self.per_point / self.camera.scale))
+    }
+
+    /// Where a point of the plane is on the screen.
+    pub fn on_screen(&self, mm: DVec2) -> egui::Pos2 {
+        let px = self.camera.to_px(mm, self.size()) / self.per_point;
+        #[expect(clippy::cast_possible_truncation, reason = "a place on the screen")]
+        let offset = egui::vec2(px.x as f32, px.y as f32);
+        self.response.rect.min + offset
     }
 }
 
@@ -135,13 +166,6 @@ pub fn length_text(mm: f64) -> String {
         // A round length below a millimetre is a whole or tenth number of micrometres.
         format!("{} µm", (mm * 1e5).round() / 100.0)
     }
-}
-
-/// A small button in the upper right corner of a stage.
-pub fn corner_button(ui: &mut Ui, rect: Rect, text: &str) -> Response {
-    let size = egui::vec2(36.0, 20.0);
-    let place = Rect::from_min_size(rect.right_top() + egui::vec2(-size.x - 6.0, 6.0), size);
-    ui.put(place, egui::Button::new(text).fill(Color32::TRANSPARENT))
 }
 
 #[cfg(test)]

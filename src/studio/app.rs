@@ -1,0 +1,338 @@
+//! The studio: one session, the panels that show it, the menu, and the questions before something
+//! would be lost.
+
+use std::path::PathBuf;
+
+use eframe::egui::{
+    Align, CentralPanel, Context, Frame, Id, Label, Layout, Margin, Modal, Panel as Side, Response,
+    RichText, ScrollArea, Ui, ViewportCommand,
+};
+use eframe::{App, Storage};
+
+use super::chooser::{Chooser, Purpose};
+use super::dock::Dock;
+use super::draw::Backing;
+use super::menu::{self, Wish};
+use super::shell::Memory;
+use super::wording::{capital, counted_from_one};
+use crate::files;
+use crate::session::{Command, Event, Message, Session, Severity, View};
+
+/// Under which name the arrangement of the panels is remembered.
+const DOCK: &str = "dock";
+
+/// All of the window.
+#[derive(Debug)]
+pub struct Studio {
+    session: Session,
+    dock: Dock,
+    chooser: Chooser,
+    memory: Memory,
+    /// What waits for the answer to whether changes may be lost.
+    waiting: Option<Waiting>,
+    /// A message too long for the line at the bottom.
+    report: Option<String>,
+    title: String,
+    /// The window closes although changes are lost.
+    leaving: bool,
+}
+
+/// What a person wants to do although changes would be lost.
+#[derive(Debug)]
+enum Waiting {
+    Do(Command),
+    Quit,
+    /// The same once the lens is saved.
+    Saving(Box<Self>),
+}
+
+impl Studio {
+    /// A studio on a session. `left` is where the last window has left the panels.
+    pub fn new(
+        session: Session,
+        backing: Backing,
+        memory: Memory,
+        left: Option<&dyn Storage>,
+    ) -> Self {
+        let tree = left.and_then(|storage| eframe::get_value(storage, DOCK));
+        Self {
+            session,
+            dock: Dock::new(backing, tree),
+            chooser: Chooser::default(),
+            memory,
+            waiting: None,
+            report: None,
+            title: String::new(),
+            leaving: false,
+        }
+    }
+
+    /// What the studio works on.
+    pub const fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// Does what a command says, as a panel would ask for it.
+    pub fn apply(&mut self, context: &Context, command: Command) {
+        let events = self.session.apply(command);
+        self.hear(events);
+        context.request_repaint();
+    }
+
+    /// Shows the whole window and does what is wished in it.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        let events = self.session.poll();
+        self.hear(events);
+        let view = self.session.view();
+        self.name_window(ui.ctx(), &view);
+        let mut wishes = menu::keys(ui, &view, self.dock.is_typing());
+        bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut wishes));
+        bar_frame(ui, Side::bottom("status"), |ui| self.status(ui, &view, &mut wishes));
+        let mut commands = Vec::new();
+        CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut commands));
+        wishes.extend(commands.into_iter().map(Wish::Do));
+        let context = ui.ctx().clone();
+        self.dialogs(&context, &view);
+        for wish in wishes {
+            self.fulfil(&context, &view, wish);
+        }
+    }
+
+    fn fulfil(&mut self, context: &Context, view: &View, wish: Wish) {
+        match wish {
+            Wish::Choose(purpose) => self.chooser.ask(context, purpose, view.path.as_deref()),
+            Wish::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name) {
+                Ok(opened) => self.replace(context, Command::New(Box::new(opened.lens))),
+                Err(why) => self.report = Some(why.to_string()),
+            },
+            Wish::Do(command @ Command::New(_)) => self.replace(context, command),
+            Wish::Do(command) => self.apply(context, command),
+        }
+    }
+
+    /// Does what would throw the lens away, at once or after a question.
+    fn replace(&mut self, context: &Context, command: Command) {
+        if self.session.is_dirty() {
+            self.waiting = Some(Waiting::Do(command));
+            context.request_repaint();
+        } else {
+            self.apply(context, command);
+        }
+    }
+
+    fn dialogs(&mut self, context: &Context, view: &View) {
+        if let Some((purpose, path)) = self.chooser.ui(context) {
+            self.chosen(context, purpose, path);
+        }
+        let closing = context.input(|input| input.viewport().close_requested());
+        if closing && self.session.is_dirty() && !self.leaving {
+            context.send_viewport_cmd(ViewportCommand::CancelClose);
+            self.waiting = Some(Waiting::Quit);
+        }
+        self.question(context, view);
+        self.show_report(context);
+    }
+
+    fn chosen(&mut self, context: &Context, purpose: Purpose, path: PathBuf) {
+        match purpose {
+            Purpose::Open => self.replace(context, Command::Open(path)),
+            Purpose::Save => self.apply(context, Command::Save(Some(path))),
+            Purpose::ExportZemax | Purpose::ExportJson => {
+                self.apply(context, Command::Export(path))
+            }
+        }
+    }
+
+    /// Asks before changes are lost.
+    fn question(&mut self, context: &Context, view: &View) {
+        match self.waiting.take() {
+            None => {}
+            Some(Waiting::Saving(then)) => self.go_on_when_saved(context, *then),
+            Some(waiting) => match ask(context, &view.lens.name) {
+                None => self.waiting = Some(waiting),
+                Some(answer) => self.answered(context, view, waiting, answer),
+            },
+        }
+    }
+
+    fn answered(&mut self, context: &Context, view: &View, waiting: Waiting, answer: Answer) {
+        context.request_repaint();
+        match answer {
+            Answer::Stay => {}
+            Answer::Lose => self.go_on(context, waiting),
+            Answer::Save => {
+                self.waiting = Some(Waiting::Saving(Box::new(waiting)));
+                match &view.path {
+                    Some(_) => self.apply(context, Command::Save(None)),
+                    None => self.chooser.ask(context, Purpose::Save, None),
+                }
+            }
+        }
+    }
+
+    /// Goes on once the lens is saved; gives up where no file was chosen or it could not be saved.
+    fn go_on_when_saved(&mut self, context: &Context, then: Waiting) {
+        if !self.session.is_dirty() {
+            self.go_on(context, then);
+        } else if self.chooser.is_open() {
+            self.waiting = Some(Waiting::Saving(Box::new(then)));
+        }
+    }
+
+    fn go_on(&mut self, context: &Context, waiting: Waiting) {
+        match waiting {
+            Waiting::Do(command) => self.apply(context, command),
+            Waiting::Saving(then) => self.go_on(context, *then),
+            Waiting::Quit => {
+                self.leaving = true;
+                context.send_viewport_cmd(ViewportCommand::Close);
+            }
+        }
+    }
+
+    /// Notes what is too much for the line at the bottom.
+    fn hear(&mut self, events: Vec<Event>) {
+        for event in events {
+            if let Event::Said(message) = event
+                && (message.text.lines().count() > 1 || message.severity == Severity::Error)
+            {
+                self.report = Some(message.text);
+            }
+        }
+    }
+
+    /// Shows a report or an error until it is closed.
+    fn show_report(&mut self, context: &Context) {
+        let Some(text) = &self.report else { return };
+        let mut read = false;
+        let modal = Modal::new(Id::unique("report")).show(context, |ui| {
+            let (words, table) = text.split_once('\n').unwrap_or((text, ""));
+            ui.set_max_width(if table.is_empty() { 460.0 } else { 820.0 });
+            ui.label(capital(&counted_from_one(words)));
+            if !table.is_empty() {
+                ScrollArea::both().max_height(440.0).show(ui, |ui| {
+                    let table = RichText::new(table).monospace();
+                    ui.add(Label::new(table).extend().selectable(true));
+                });
+            }
+            ui.add_space(8.0);
+            read = ui.button("OK").clicked();
+        });
+        if read || modal.should_close() {
+            self.report = None;
+        }
+    }
+
+    fn name_window(&mut self, context: &Context, view: &View) {
+        let mark = if view.dirty { "• " } else { "" };
+        let file = view.path.as_ref().and_then(|path| path.file_name());
+        let file = file.map(|name| format!(" ({})", name.to_string_lossy())).unwrap_or_default();
+        let title = format!("{mark}{}{file} - Aplanat", view.lens.name);
+        if title != self.title {
+            context.send_viewport_cmd(ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
+    }
+
+    /// The line at the bottom: the last message, and how old the numbers are.
+    fn status(&self, ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
+        ui.horizontal(|ui| {
+            messages(ui, &view.messages, wishes);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.weak(freshness(view))
+                    .on_hover_text("How long all numbers of all panels took after the last change");
+                if view.dirty {
+                    ui.separator();
+                    ui.weak("unsaved changes");
+                }
+            });
+        });
+    }
+}
+
+impl App for Studio {
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        Self::ui(self, ui);
+    }
+
+    fn save(&mut self, storage: &mut dyn Storage) {
+        if self.memory == Memory::Kept {
+            eframe::set_value(storage, DOCK, self.dock.tree());
+        }
+    }
+
+    fn persist_egui_memory(&self) -> bool {
+        self.memory == Memory::Kept
+    }
+}
+
+/// What a person answers to whether changes may be lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Answer {
+    Save,
+    Lose,
+    Stay,
+}
+
+fn ask(context: &Context, name: &str) -> Option<Answer> {
+    let mut answer = None;
+    let modal = Modal::new(Id::unique("unsaved")).show(context, |ui| {
+        ui.set_width(340.0);
+        ui.heading("Save the changes first?");
+        ui.label(format!("{name} has changes that are in no file yet."));
+        ui.add_space(8.0);
+        let answers =
+            [("Save", Answer::Save), ("Don't save", Answer::Lose), ("Cancel", Answer::Stay)];
+        ui.horizontal(|ui| {
+            for (text, chosen) in answers {
+                if ui.button(text).clicked() {
+                    answer = Some(chosen);
+                }
+            }
+        });
+    });
+    answer.or_else(|| modal.should_close().then_some(Answer::Stay))
+}
+
+fn bar_frame(ui: &mut Ui, side: Side, show: impl FnOnce(&mut Ui)) {
+    let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::symmetric(6, 3));
+    side.frame(frame).show_separator_line(false).show(ui, show);
+}
+
+/// The last message, and a button for those before it.
+fn messages(ui: &mut Ui, messages: &[Message], wishes: &mut Vec<Wish>) {
+    let Some(last) = messages.last() else {
+        ui.weak("Ready");
+        return;
+    };
+    ui.menu_button(format!("Messages ({})", messages.len()), |ui| {
+        ui.set_min_width(420.0);
+        ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
+            messages.iter().rev().for_each(|message| drop(said(ui, message)));
+        });
+        if ui.button("Forget all").clicked() {
+            wishes.push(Wish::Do(Command::ClearMessages));
+            ui.close();
+        }
+    });
+    said(ui, last);
+}
+
+fn said(ui: &mut Ui, message: &Message) -> Response {
+    let visuals = ui.visuals();
+    let color = match message.severity {
+        Severity::Note => visuals.text_color(),
+        Severity::Warning => visuals.warn_fg_color,
+        Severity::Error => visuals.error_fg_color,
+    };
+    let line = message.text.lines().next().unwrap_or_default();
+    let text = RichText::new(capital(&counted_from_one(line))).color(color);
+    ui.add(Label::new(text).truncate()).on_hover_text(capital(&counted_from_one(&message.text)))
+}
+
+fn freshness(view: &View) -> String {
+    match &view.results {
+        Some(results) if view.is_current() => format!("all numbers in {:.1} ms", results.ms),
+        _ => "computing…".to_owned(),
+    }
+}

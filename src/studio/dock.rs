@@ -1,0 +1,184 @@
+//! The arrangement of the panels: tabs that can be dragged side by side, on top of each other, or
+//! closed and opened again from the menu.
+
+use eframe::egui::{Color32, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText};
+use egui_tiles::{
+    Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles,
+    Tree, UiResponse,
+};
+
+use super::draw::Backing;
+use super::panels::{Kind, Panel};
+use crate::session::{Command, View};
+
+/// The arranged panels.
+pub struct Dock {
+    tree: Tree<Kind>,
+    panels: Vec<(Kind, Box<dyn Panel>)>,
+}
+
+impl std::fmt::Debug for Dock {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Dock").field("tree", &self.tree).finish_non_exhaustive()
+    }
+}
+
+impl Dock {
+    /// All panels, arranged as they were left or as usual.
+    pub fn new(backing: Backing, left: Option<Tree<Kind>>) -> Self {
+        let whole =
+            |tree: &Tree<Kind>| Kind::ALL.iter().all(|kind| tree.tiles.find_pane(kind).is_some());
+        let tree = left.filter(whole).unwrap_or_else(usual);
+        Self { tree, panels: Kind::ALL.map(|kind| (kind, kind.panel(backing))).into() }
+    }
+
+    /// How the panels are arranged.
+    pub const fn tree(&self) -> &Tree<Kind> {
+        &self.tree
+    }
+
+    /// Arranges all panels as usual.
+    pub fn reset(&mut self) {
+        self.tree = usual();
+    }
+
+    /// Whether a panel is shown.
+    pub fn is_open(&self, kind: Kind) -> bool {
+        self.tree.tiles.find_pane(&kind).is_some_and(|tile| self.tree.tiles.is_visible(tile))
+    }
+
+    /// Shows or hides a panel.
+    pub fn toggle(&mut self, kind: Kind) {
+        let open = !self.is_open(kind);
+        if let Some(tile) = self.tree.tiles.find_pane(&kind) {
+            self.tree.set_visible(tile, open);
+            self.tree.make_active(|id, _| id == tile);
+        }
+    }
+
+    /// What a panel's tab says.
+    pub fn title(&self, kind: Kind) -> &'static str {
+        let panel = self.panels.iter().find(|(other, _)| *other == kind);
+        panel.map_or("", |(_, panel)| panel.title())
+    }
+
+    /// Whether something is typed into a panel that is not accepted yet.
+    pub fn is_typing(&self) -> bool {
+        self.panels.iter().any(|(_, panel)| panel.is_typing())
+    }
+
+    /// Shows all panels.
+    pub fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        let Self { tree, panels } = self;
+        tree.ui(&mut Shown { panels, view, wishes }, ui);
+    }
+}
+
+/// The layout with the numbers of the lens below it; beside them how good it is and the search.
+fn usual() -> Tree<Kind> {
+    let mut tiles = Tiles::default();
+    let mut pane = |kind: Kind| tiles.insert_pane(kind);
+    let [layout, spot, table, optimizer, first, effects] = [
+        Kind::Layout,
+        Kind::Spot,
+        Kind::Prescription,
+        Kind::Optimizer,
+        Kind::FirstOrder,
+        Kind::Effects,
+    ]
+    .map(&mut pane);
+    let facts = tiles.insert_tab_tile(vec![first, effects]);
+    let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
+    let left = column(&mut tiles, &[(layout, 0.52), (table, 0.48)]);
+    let right = column(&mut tiles, &[(spot, 0.44), (optimizer, 0.56)]);
+    let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
+    Tree::new(Id::unique("dock"), root, tiles)
+}
+
+fn row(tiles: &mut Tiles<Kind>, parts: &[(TileId, f32)]) -> TileId {
+    line(tiles, LinearDir::Horizontal, parts)
+}
+
+fn column(tiles: &mut Tiles<Kind>, parts: &[(TileId, f32)]) -> TileId {
+    line(tiles, LinearDir::Vertical, parts)
+}
+
+fn line(tiles: &mut Tiles<Kind>, direction: LinearDir, parts: &[(TileId, f32)]) -> TileId {
+    let mut linear = Linear::new(direction, parts.iter().map(|(tile, _)| *tile).collect());
+    for (tile, share) in parts {
+        linear.shares.set_share(*tile, *share);
+    }
+    tiles.insert_new(Tile::Container(Container::Linear(linear)))
+}
+
+/// The panels in one frame.
+struct Shown<'a> {
+    panels: &'a mut Vec<(Kind, Box<dyn Panel>)>,
+    view: &'a View,
+    wishes: &'a mut Vec<Command>,
+}
+
+impl Behavior<Kind> for Shown<'_> {
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, kind: &mut Kind) -> UiResponse {
+        let panel = self.panels.iter_mut().find(|(other, _)| other == kind);
+        if let Some((_, panel)) = panel {
+            let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::same(5));
+            frame.show(ui, |ui| {
+                ui.set_min_size(ui.available_size());
+                panel.ui(ui, self.view, self.wishes);
+            });
+        }
+        UiResponse::None
+    }
+
+    fn tab_title_for_pane(&mut self, kind: &Kind) -> WidgetText {
+        let panel = self.panels.iter().find(|(other, _)| other == kind);
+        panel.map_or("", |(_, panel)| panel.title()).into()
+    }
+
+    fn is_tab_closable(&self, _tiles: &Tiles<Kind>, _tile: TileId) -> bool {
+        true
+    }
+
+    /// A closed panel is hidden, so that the menu can bring it back to its place.
+    fn on_tab_close(&mut self, tiles: &mut Tiles<Kind>, tile: TileId) -> bool {
+        tiles.set_visible(tile, false);
+        false
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
+    }
+
+    fn tab_bar_height(&self, _style: &Style) -> f32 {
+        24.0
+    }
+
+    fn gap_width(&self, _style: &Style) -> f32 {
+        3.0
+    }
+
+    fn tab_bar_color(&self, visuals: &Visuals) -> Color32 {
+        if visuals.dark_mode { visuals.extreme_bg_color } else { visuals.widgets.inactive.bg_fill }
+    }
+
+    fn tab_outline_stroke(
+        &self,
+        _visuals: &Visuals,
+        _tiles: &Tiles<Kind>,
+        _tile: TileId,
+        _state: &TabState,
+    ) -> Stroke {
+        Stroke::NONE
+    }
+
+    fn tab_text_color(
+        &self,
+        visuals: &Visuals,
+        _tiles: &Tiles<Kind>,
+        _tile: TileId,
+        state: &TabState,
+    ) -> Color32 {
+        if state.active { visuals.strong_text_color() } else { visuals.weak_text_color() }
+    }
+}

@@ -1,0 +1,181 @@
+//! What a lens does to rays near its axis: lengths, pupils, and the third-order sums.
+
+use eframe::egui::{
+    Align, Color32, Frame, Grid, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui,
+};
+
+use super::{Panel, no_numbers, shown};
+use crate::lens::Lens;
+use crate::paraxial::{FirstOrder, Pupil, Seidel, SeidelSums};
+use crate::session::{Command, View};
+use crate::studio::number;
+
+/// The panel.
+#[derive(Debug)]
+pub struct FirstOrderData;
+
+impl Panel for FirstOrderData {
+    fn title(&self) -> &'static str {
+        "First order"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &View, _wishes: &mut Vec<Command>) {
+        let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            data(ui, &results.lens, numbers.first());
+            ui.add_space(6.0);
+            ScrollArea::horizontal().show(ui, |ui| match &numbers.seidel.value {
+                Some(seidel) => sums(ui, &results.lens, seidel),
+                None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
+            });
+        });
+    }
+}
+
+/// A name, a value with its unit, and what it means.
+struct Line(&'static str, String, &'static str);
+
+fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
+    ui.spacing_mut().item_spacing.y = 1.0;
+    for (i, Line(name, value, meaning)) in lines(lens, first).into_iter().enumerate() {
+        let striped = if i % 2 == 0 { ui.visuals().faint_bg_color } else { Color32::TRANSPARENT };
+        // The scroll bar floats over the right end.
+        let margin = Margin { left: 3, right: 10, top: 1, bottom: 1 };
+        Frame::new().fill(striped).inner_margin(margin).show(ui, |ui| {
+            ui.horizontal(|ui| {
+                ui.label(name).on_hover_text(meaning);
+                right(ui, |ui| drop(ui.add(Label::new(RichText::new(value).strong()).truncate())));
+            });
+        });
+    }
+}
+
+fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<Line> {
+    let track: f64 = lens.surfaces.iter().map(|row| row.thickness).sum();
+    let petzval = (first.petzval_sum != 0.0).then(|| -1.0 / first.petzval_sum);
+    vec![
+        Line("Focal length", mm(first.efl), "Equivalent focal length, one over the power"),
+        Line("Back focal length", mm(first.bfl), "From the last vertex to the back focal point"),
+        Line("Front focal length", mm(first.ffl), "From the first vertex to the front focal point"),
+        Line("F-number", plain(first.f_number), "Focal length over entrance pupil diameter"),
+        Line(
+            "Working f-number",
+            plain(first.working_f_number),
+            "One over twice the numerical aperture in the image space",
+        ),
+        pupil_place("Entrance pupil at", first.entrance_pupil, "From the first vertex"),
+        pupil_size("Entrance pupil size", first.entrance_pupil),
+        pupil_place("Exit pupil at", first.exit_pupil, "From the last vertex"),
+        pupil_size("Exit pupil size", first.exit_pupil),
+        Line(
+            "Stop semi-diameter",
+            mm(Some(first.stop_semi_diameter)),
+            "Height of the marginal ray at the stop",
+        ),
+        Line("Image behind focus", mm(first.image_defocus), "Image plane from the paraxial image"),
+        Line("Magnification", plain(first.magnification), "None for an object at infinity"),
+        Line("Lagrange invariant", mm(first.lagrange), "n (ū y − u ȳ), the same everywhere"),
+        Line("Petzval radius", mm(petzval), "Radius of the image surface without astigmatism"),
+        Line("Total track", mm(Some(track)), "From the first vertex to the image, as written"),
+    ]
+}
+
+fn pupil_place(name: &'static str, pupil: Pupil<f64>, from: &'static str) -> Line {
+    let place = pupil.position.map_or_else(|| "Infinity".to_owned(), |z| mm(Some(z)));
+    Line(name, place, from)
+}
+
+fn pupil_size(name: &'static str, pupil: Pupil<f64>) -> Line {
+    let size = pupil.diameter.map_or_else(|| "telecentric".to_owned(), |d| mm(Some(d)));
+    Line(name, size, "Its diameter")
+}
+
+fn plain(value: Option<f64>) -> String {
+    value.map_or_else(|| "none".to_owned(), |value| number::show_digits(value, 6))
+}
+
+fn mm(value: Option<f64>) -> String {
+    value.map_or_else(|| "none".to_owned(), |value| format!("{} mm", number::show_digits(value, 7)))
+}
+
+/// The columns of the sums and what they stand for.
+const SUMS: [(&str, &str); 7] = [
+    ("S1", "Spherical aberration"),
+    ("S2", "Coma"),
+    ("S3", "Astigmatism"),
+    ("S4", "Petzval curvature"),
+    ("S5", "Distortion"),
+    ("C1", "Axial colour between the outer wavelengths"),
+    ("C2", "Lateral colour between the outer wavelengths"),
+];
+
+const fn row_of(sums: &SeidelSums<f64>) -> [f64; 7] {
+    [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
+}
+
+fn sums(ui: &mut Ui, lens: &Lens, seidel: &Seidel<f64>) {
+    ui.label(RichText::new("Seidel sums, µm").strong()).on_hover_text(
+        "Third-order wave aberrations at the edge of pupil and field, surface by surface \
+         (Welford's S1 to S5, C1, C2); the tint shows where they come from",
+    );
+    Grid::new("seidel").num_columns(8).spacing([4.0, 2.0]).show(ui, |ui| {
+        ui.weak("Surf");
+        for (name, meaning) in SUMS {
+            right(ui, |ui| drop(ui.weak(name).on_hover_text(meaning)));
+        }
+        ui.end_row();
+        for (i, sums) in seidel.surfaces.iter().enumerate() {
+            let stop = lens.surfaces.get(i).is_some_and(|row| row.stop);
+            ui.label(if stop { format!("{} STO", i + 1) } else { (i + 1).to_string() });
+            numbers(ui, sums, &largest(seidel));
+        }
+        ui.strong("Sum");
+        numbers(ui, &seidel.total, &[f64::INFINITY; 7]);
+    });
+}
+
+/// The largest contribution to each sum.
+fn largest(seidel: &Seidel<f64>) -> [f64; 7] {
+    let mut most = [0.0_f64; 7];
+    for sums in &seidel.surfaces {
+        for (most, value) in most.iter_mut().zip(row_of(sums)) {
+            *most = most.max(value.abs());
+        }
+    }
+    most
+}
+
+fn numbers(ui: &mut Ui, sums: &SeidelSums<f64>, largest: &[f64; 7]) {
+    for (value, largest) in row_of(sums).into_iter().zip(largest) {
+        let share = if *largest > 0.0 { value / largest } else { 0.0 };
+        right(ui, |ui| {
+            let text = RichText::new(fixed(1e3 * value)).small();
+            let tint = tint(ui, share);
+            ui.label(text.background_color(tint));
+        });
+    }
+    ui.end_row();
+}
+
+/// At most five signs after the sign, so that columns stay narrow.
+fn fixed(value: f64) -> String {
+    let size = value.abs();
+    if size >= 1e5 || (size < 1e-3 && size > 0.0) {
+        format!("{value:.1e}")
+    } else if size >= 100.0 {
+        format!("{value:.1}")
+    } else {
+        format!("{value:.3}")
+    }
+}
+
+/// Red for what adds, blue for what takes away.
+fn tint(ui: &Ui, share: f64) -> Color32 {
+    let color =
+        if share > 0.0 { ui.visuals().error_fg_color } else { ui.visuals().hyperlink_color };
+    color.gamma_multiply((0.4 * share.abs()) as f32)
+}
+
+fn right(ui: &mut Ui, show: impl FnOnce(&mut Ui)) {
+    ui.with_layout(Arrange::right_to_left(Align::Center), show);
+}

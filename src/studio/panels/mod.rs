@@ -1,0 +1,118 @@
+//! What the window is made of: one panel a question that a designer asks.
+
+mod effects;
+mod first_order;
+mod layout;
+mod optimizer;
+mod prescription;
+mod spot;
+
+pub use effects::Effects;
+pub use first_order::FirstOrderData;
+pub use layout::LensLayout;
+pub use optimizer::Optimizer;
+pub use prescription::Prescription;
+pub use spot::SpotDiagram;
+
+use std::sync::Arc;
+
+use eframe::egui::{Color32, Sense, Ui, vec2};
+use serde::{Deserialize, Serialize};
+
+use super::draw::Backing;
+use super::number;
+use super::wording::{capital, counted_from_one};
+use crate::lens::{Field, FieldKind};
+use crate::session::{Command, Numbers, Results, View};
+
+/// A part of the window. It shows a view and writes down wishes; it changes nothing.
+pub trait Panel {
+    /// What its tab says.
+    fn title(&self) -> &'static str;
+
+    /// Shows it.
+    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>);
+
+    /// Whether something is typed into it that is not accepted yet.
+    fn is_typing(&self) -> bool {
+        false
+    }
+}
+
+/// Which panel; what a saved arrangement of the window remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The lens in section, with its rays.
+    Layout,
+    /// The table of surfaces.
+    Prescription,
+    /// Where the rays of each field land.
+    Spot,
+    /// The search for a better lens.
+    Optimizer,
+    /// Focal lengths, pupils, third-order sums.
+    FirstOrder,
+    /// Which physics is computed, and why.
+    Effects,
+}
+
+impl Kind {
+    /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
+    pub const ALL: [Self; 6] = [
+        Self::Layout,
+        Self::Prescription,
+        Self::Spot,
+        Self::Optimizer,
+        Self::FirstOrder,
+        Self::Effects,
+    ];
+
+    /// A new panel of this kind.
+    pub fn panel(self, backing: Backing) -> Box<dyn Panel> {
+        match self {
+            Self::Layout => Box::new(LensLayout::new(backing)),
+            Self::Prescription => Box::new(Prescription::default()),
+            Self::Spot => Box::new(SpotDiagram::new(backing)),
+            Self::Optimizer => Box::new(Optimizer::default()),
+            Self::FirstOrder => Box::new(FirstOrderData),
+            Self::Effects => Box::new(Effects),
+        }
+    }
+}
+
+/// The newest numbers, if the lens has any.
+fn numbers(view: &View) -> Option<&Numbers> {
+    view.results.as_ref()?.numbers.as_ref().ok()
+}
+
+/// The results that drawings show: those of the search where there are any, else the design's.
+fn shown(view: &View) -> Option<(&Arc<Results>, &Numbers)> {
+    let results = view.preview.as_ref().or(view.results.as_ref())?;
+    Some((results, results.numbers.as_ref().ok()?))
+}
+
+/// A small square in the colour of what stands behind it.
+fn swatch(ui: &mut Ui, color: Color32) {
+    let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
+    ui.painter().rect_filled(rect, 1.0, color);
+}
+
+/// Says why there are no numbers, where there are none.
+fn no_numbers(ui: &mut Ui, view: &View) {
+    let why = match view.results.as_deref().map(|results| &results.numbers) {
+        Some(Err(why)) => capital(&counted_from_one(why)),
+        _ => "Computing…".to_owned(),
+    };
+    ui.weak(why);
+}
+
+/// A field point as it is read: `14°`, `20 mm`, with both coordinates where it has two.
+fn field_name(kind: FieldKind, field: Field) -> String {
+    let unit = if kind == FieldKind::Angle { "°" } else { " mm" };
+    let y = number::show_digits(field.y, 4);
+    if field.x == 0.0 {
+        return format!("{y}{unit}");
+    }
+    format!("({}, {y}){unit}", number::show_digits(field.x, 4))
+}

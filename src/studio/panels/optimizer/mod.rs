@@ -1,0 +1,172 @@
+//! The search for a better lens: what it aims at, how it goes, and what becomes of its result.
+//!
+//! The search works on its own copy. The design changes only when its result is taken.
+
+mod goal;
+mod history;
+
+use eframe::egui::{Button, ComboBox, Frame, Panel as Side, RichText, ScrollArea, Ui};
+
+use super::Panel;
+use crate::optimize::Method;
+use crate::session::{Command, Numbers, Search, Standing, View};
+use crate::studio::field::Drafts;
+use crate::studio::number;
+use crate::studio::wording::{capital, counted_from_one};
+use goal::Aims;
+
+/// How high the merit history is, in points; less where there is little room.
+const HISTORY: f32 = 130.0;
+
+/// The panel.
+#[derive(Debug, Default)]
+pub struct Optimizer {
+    method: Method,
+    aims: Aims,
+    drafts: Drafts,
+}
+
+impl Panel for Optimizer {
+    fn title(&self) -> &'static str {
+        "Optimizer"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        self.aims.keep_up(view);
+        self.controls(ui, view, wishes);
+        if let Some(search) = view.search.as_deref() {
+            progress(ui, view, search);
+            let plot = Side::bottom("merit history").frame(Frame::NONE).show_separator_line(false);
+            let room = (0.45 * ui.available_height()).min(HISTORY);
+            plot.exact_size(room).show(ui, |ui| history::plot(ui, search));
+        }
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            self.aims.ui(ui, view, &mut self.drafts);
+        });
+    }
+
+    fn is_typing(&self) -> bool {
+        !self.drafts.is_empty()
+    }
+}
+
+impl Optimizer {
+    fn controls(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        let standing = view.search.as_ref().map(|search| search.standing);
+        let paused = standing == Some(Standing::Paused);
+        let under_way = paused || standing == Some(Standing::Running);
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            self.begin(ui, view, under_way, wishes);
+            let hold = if paused {
+                ("Resume", Command::Resume, "Let the search go on")
+            } else {
+                ("Pause", Command::Pause, "Hold the search after its current step")
+            };
+            let buttons = [
+                (hold.0, under_way, hold.1, hold.2),
+                ("Step", paused, Command::Step, "Take one step of the search that is held"),
+                ("Stop", under_way, Command::Stop, "End the search and keep its result to look at"),
+                (
+                    "Take",
+                    standing.is_some(),
+                    Command::Take,
+                    "Make the best lens of the search the design, as one undo step",
+                ),
+                (
+                    "Discard",
+                    standing.is_some(),
+                    Command::Discard,
+                    "End the search and throw its result away",
+                ),
+            ];
+            for (text, enabled, command, hint) in buttons {
+                if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
+                    wishes.push(command);
+                }
+            }
+        });
+        self.method(ui, under_way);
+    }
+
+    fn begin(&self, ui: &mut Ui, view: &View, under_way: bool, wishes: &mut Vec<Command>) {
+        let ready = !under_way && !view.lens.variables.is_empty();
+        let fill = ui.visuals().selection.bg_fill;
+        let text = RichText::new("Optimize").strong();
+        let button = ui.add_enabled(ready, Button::new(text).fill(fill));
+        let button = button.on_hover_text("Search for a better lens in the background, on a copy");
+        let why = if under_way {
+            "A search is under way"
+        } else {
+            "No number is variable: press the badge beside one in the prescription"
+        };
+        if button.on_disabled_hover_text(why).clicked() {
+            let goal = self.aims.goal();
+            wishes.push(Command::Optimize { method: self.method, goal });
+        }
+    }
+
+    fn method(&mut self, ui: &mut Ui, under_way: bool) {
+        ui.horizontal(|ui| {
+            ui.weak("Method");
+            ui.add_enabled_ui(!under_way, |ui| {
+                let combo = ComboBox::from_id_salt("method").selected_text(self.method.name());
+                let combo = combo.width(160.0).show_ui(ui, |ui| {
+                    for method in [Method::DampedLeastSquares, Method::Adam] {
+                        ui.selectable_value(&mut self.method, method, method.name());
+                    }
+                });
+                combo.response.accessible_name("Method");
+            });
+        });
+    }
+}
+
+/// How the search stands, and the numbers a designer reads first, before and after.
+fn progress(ui: &mut Ui, view: &View, search: &Search) {
+    let standing = match search.standing {
+        Standing::Running => "Running",
+        Standing::Paused => "Paused",
+        Standing::Stopped => "Stopped",
+        Standing::Finished => "Finished",
+    };
+    let step = search.progress.as_ref().map_or(0, |progress| progress.step);
+    ui.horizontal(|ui| {
+        ui.strong(standing);
+        ui.label(format!("after step {step}"));
+        if let (Some(first), Some(last)) = (search.history.first(), search.progress.as_ref()) {
+            ui.separator();
+            ui.label(format!("merit {:.3e} to {:.3e}", first.current, last.best));
+        }
+    });
+    ui.label(changes(view).join(", "));
+    let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
+    if let Some(why) = refused {
+        let text = RichText::new(capital(&counted_from_one(why))).small();
+        ui.label(text.color(ui.visuals().warn_fg_color))
+            .on_hover_text("Steps that would make the lens invalid are refused and shortened");
+    }
+}
+
+/// Spots and focal length of the design and of the lens that the search shows.
+fn changes(view: &View) -> Vec<String> {
+    let short = |value: f64| number::show_digits(value, 4);
+    let mut texts = Vec::new();
+    let before = view.results.as_ref().and_then(|results| results.numbers.as_ref().ok());
+    let after = view.preview.as_ref().and_then(|results| results.numbers.as_ref().ok());
+    let (Some(before), Some(after)) = (before, after) else { return texts };
+    if let (Some(old), Some(new)) = (mean_spot(before), mean_spot(after)) {
+        texts.push(format!("mean RMS {} to {} µm", short(1e3 * old), short(1e3 * new)));
+    }
+    if let (Some(old), Some(new)) = (before.first().efl, after.first().efl) {
+        texts.push(format!("focal length {} to {} mm", short(old), short(new)));
+    }
+    texts
+}
+
+/// The mean RMS radius of the fields with light, in mm.
+fn mean_spot(numbers: &Numbers) -> Option<f64> {
+    let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
+    let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
+    (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)
+}

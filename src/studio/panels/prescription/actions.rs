@@ -1,0 +1,113 @@
+//! What can be done with a row: insert, delete, turn around, make it the stop.
+
+use crate::lens::{Lens, Medium, Row};
+use crate::session::Edit;
+
+/// Something to do with a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Action {
+    InsertBefore,
+    InsertAfter,
+    Remove,
+    Flip,
+    Stop,
+}
+
+/// Everything that can be done, in the order in which it is shown.
+pub(super) const ALL: [Action; 5] =
+    [Action::InsertBefore, Action::InsertAfter, Action::Remove, Action::Flip, Action::Stop];
+
+impl Action {
+    /// What a button says.
+    pub(super) const fn title(self) -> &'static str {
+        match self {
+            Self::InsertBefore => "Insert before",
+            Self::InsertAfter => "Insert after",
+            Self::Remove => "Delete",
+            Self::Flip => "Flip element",
+            Self::Stop => "Make stop",
+        }
+    }
+
+    /// What it does, in more words.
+    pub(super) const fn hint(self) -> &'static str {
+        match self {
+            Self::InsertBefore => "Puts a plane surface in front of the selected one (Insert)",
+            Self::InsertAfter => "Puts a plane surface behind the selected one",
+            Self::Remove => "Takes the selected surface and the gap behind it out (Delete)",
+            Self::Flip => "Turns the glass element or group of the selected surface around",
+            Self::Stop => "Makes the selected surface the aperture stop",
+        }
+    }
+
+    /// The edit that does it; `None` where it makes no sense.
+    pub(super) fn edit(self, lens: &Lens, row: usize) -> Option<Edit> {
+        match self {
+            Self::InsertBefore => Some(insert(lens, row)),
+            Self::InsertAfter => Some(insert(lens, row + 1)),
+            Self::Remove => Some(Edit::RemoveRow(row)),
+            Self::Flip => {
+                let (first, last) = element(lens, row)?;
+                Some(Edit::FlipRows { first, last })
+            }
+            Self::Stop => (!lens.surfaces.get(row)?.stop).then_some(Edit::SetStop(row)),
+        }
+    }
+}
+
+/// A plane surface that divides the gap in front of row `at` and leaves the light as it is.
+fn insert(lens: &Lens, at: usize) -> Edit {
+    let before = at.checked_sub(1).and_then(|i| lens.surfaces.get(i));
+    let medium = before.map_or(&lens.object_medium, |row| &row.medium);
+    let medium = if *medium == Medium::Mirror { Medium::Air } else { medium.clone() };
+    let near = lens.surfaces.get(at).or(before);
+    let semi_diameter = near.and_then(|row| row.semi_diameter);
+    Edit::InsertRow { at, row: Row { medium, semi_diameter, ..Row::default() } }
+}
+
+/// The first and the last surface of the glass to which a surface belongs, cemented ones together.
+fn element(lens: &Lens, row: usize) -> Option<(usize, usize)> {
+    let filled = |gap: usize| {
+        lens.surfaces.get(gap).is_some_and(|r| !matches!(r.medium, Medium::Air | Medium::Mirror))
+    };
+    let first = (0..row).rev().take_while(|gap| filled(*gap)).last().unwrap_or(row);
+    let last = (row..lens.surfaces.len()).take_while(|gap| filled(*gap)).last();
+    let last = last.map_or(row, |gap| gap + 1);
+    (first < last && last < lens.surfaces.len()).then_some((first, last))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files;
+
+    fn double_gauss() -> Lens {
+        let bundled = &files::library()[0];
+        files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens
+    }
+
+    #[test]
+    fn an_element_is_found_from_each_of_its_surfaces() {
+        let lens = double_gauss();
+        let glass = |row: &Row| !matches!(row.medium, Medium::Air);
+        let first = lens.surfaces.iter().position(glass).unwrap();
+        let (start, end) = element(&lens, first).unwrap();
+        assert!((start..=end).all(|row| element(&lens, row) == Some((start, end))));
+    }
+
+    #[test]
+    fn a_surface_in_air_has_nothing_to_flip() {
+        let lens = double_gauss();
+        let stop = lens.stop().unwrap();
+        let alone = element(&lens, stop).is_none();
+        assert_eq!(Action::Flip.edit(&lens, stop).is_none(), alone);
+    }
+
+    #[test]
+    fn an_inserted_surface_leaves_the_light_as_it_is() {
+        let lens = double_gauss();
+        let Edit::InsertRow { at: 1, row } = insert(&lens, 1) else { unreachable!() };
+        assert_eq!(row.medium, lens.surfaces[0].medium);
+        assert_eq!((row.curvature, row.thickness), (0.0, 0.0));
+    }
+}

@@ -1,0 +1,99 @@
+//! A medium as text: a catalogue name, `nd vd`, an index, `mirror`, or nothing for air.
+
+use crate::lens::{Medium, glass};
+use crate::studio::number;
+
+/// How many glasses are proposed while one types.
+const PROPOSALS: usize = 8;
+
+/// What a cell shows.
+pub(super) fn show(medium: &Medium) -> String {
+    match medium {
+        Medium::Air => String::new(),
+        Medium::Glass(name) => name.clone(),
+        Medium::Model { nd, vd } => format!("{} {}", number::show(*nd), number::show(*vd)),
+        Medium::Index(n) => number::show(*n),
+        Medium::Mirror => "MIRROR".to_owned(),
+    }
+}
+
+/// What a cell means. A name that is in no catalogue is kept, so that the lens can say so.
+pub(super) fn parse(text: &str) -> Medium {
+    let text = text.trim();
+    if text.is_empty() || text.eq_ignore_ascii_case("air") {
+        return Medium::Air;
+    }
+    if text.eq_ignore_ascii_case("mirror") {
+        return Medium::Mirror;
+    }
+    let numbers: Vec<Option<f64>> = text
+        .split([' ', '/', ':', ';'])
+        .filter(|part| !part.is_empty())
+        .map(|part| part.parse().ok())
+        .collect();
+    match numbers.as_slice() {
+        [Some(index)] => Medium::Index(*index),
+        [Some(nd), Some(vd)] => Medium::Model { nd: *nd, vd: *vd },
+        _ => Medium::Glass(
+            glass::find(text).map_or_else(|| text.to_owned(), glass::Glass::full_name),
+        ),
+    }
+}
+
+/// Glasses whose names go on like what was typed, then those that contain it.
+pub(super) fn proposals(text: &str) -> Vec<String> {
+    let wanted = text.trim().to_uppercase();
+    if wanted.is_empty() || wanted.starts_with(|c: char| c == '.' || c == '1') {
+        return Vec::new();
+    }
+    let all = || glass::catalogue().iter().map(|glass| (glass, glass.full_name().to_uppercase()));
+    let begins = |(g, full): &(&glass::Glass, String)| {
+        g.name.to_uppercase().starts_with(&wanted) || full.starts_with(&wanted)
+    };
+    let first = all().filter(&begins);
+    let then = all().filter(|glass| !begins(glass) && glass.1.contains(&wanted));
+    first.chain(then).take(PROPOSALS).map(|(glass, _)| glass.full_name()).collect()
+}
+
+/// The index and Abbe number of a glass, for a tooltip.
+pub(super) fn describe(medium: &Medium) -> String {
+    match medium {
+        Medium::Air => "Air, index 1. Type a catalogue name such as N-BK7, index and Abbe number \
+                        such as 1.62 36.4, an index, or mirror."
+            .to_owned(),
+        Medium::Glass(name) => glass::find(name).map_or_else(
+            || format!("{name} is in no catalogue"),
+            |g| format!("{}: nd {:.5}, vd {:.2}", g.full_name(), g.nd, g.vd),
+        ),
+        Medium::Model { nd, vd } => format!("Model glass: nd {nd}, vd {vd}"),
+        Medium::Index(n) => format!("Index {n} at every wavelength"),
+        Medium::Mirror => "A mirror: the gap behind it is filled like the one before it".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_medium_is_read_as_it_is_shown() {
+        let media = [
+            Medium::Air,
+            Medium::Mirror,
+            Medium::Index(1.5),
+            Medium::Model { nd: 1.62, vd: 36.4 },
+            Medium::Glass("SCHOTT N-BK7".into()),
+        ];
+        for medium in media {
+            assert_eq!(parse(&show(&medium)), medium);
+        }
+    }
+
+    #[test]
+    fn a_glass_is_found_without_its_maker_and_proposed_while_typing() {
+        assert_eq!(parse("n-bk7"), Medium::Glass("SCHOTT N-BK7".into()));
+        assert_eq!(parse("n-bk99"), Medium::Glass("n-bk99".into()));
+        assert!(proposals("n-bk").contains(&"SCHOTT N-BK7".to_owned()));
+        assert!(proposals("").is_empty() && proposals("1.5").is_empty());
+    }
+}

@@ -1,0 +1,91 @@
+//! The prescription: a row a surface, a cell a number, and a badge that says what decides it.
+//!
+//! Rows are counted as designers do: the object is row 0, the first surface row 1, the image the
+//! last one. What is typed is tried on the lens at once; what the lens cannot be stays in its cell
+//! with the reason, and the lens is what it was.
+
+mod actions;
+mod badge;
+mod glass;
+mod table;
+
+use eframe::egui::{Button, Frame, Key, Margin, Panel as SidePanel, RichText, Ui};
+
+use super::Panel;
+use crate::session::{Command, View};
+use crate::studio::field::{Drafts, error_color};
+use crate::studio::wording::{capital, counted_from_one};
+use actions::Action;
+use table::Table;
+
+/// The panel.
+#[derive(Debug, Default)]
+pub struct Prescription {
+    drafts: Drafts,
+    /// The surface whose row is selected, counted from 0.
+    selected: Option<usize>,
+}
+
+impl Panel for Prescription {
+    fn title(&self) -> &'static str {
+        "Prescription"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        self.selected = self.selected.filter(|row| *row < view.lens.surfaces.len());
+        self.keys(ui, view, wishes);
+        self.toolbar(ui, view, wishes);
+        self.complaint(ui);
+        let Self { drafts, selected } = self;
+        Table { view, drafts, selected, wishes }.show(ui);
+    }
+
+    fn is_typing(&self) -> bool {
+        !self.drafts.is_empty()
+    }
+}
+
+impl Prescription {
+    /// Insert and Delete work on the selected row while no text is being edited.
+    fn keys(&self, ui: &Ui, view: &View, wishes: &mut Vec<Command>) {
+        let Some(row) = self.selected.filter(|_| !ui.ctx().egui_wants_keyboard_input()) else {
+            return;
+        };
+        for (key, action) in [(Key::Delete, Action::Remove), (Key::Insert, Action::InsertBefore)] {
+            if ui.input(|input| input.key_pressed(key)) {
+                wishes.extend(action.edit(&view.lens, row).map(Command::Edit));
+            }
+        }
+    }
+
+    fn toolbar(&self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        let lens = &view.lens;
+        ui.horizontal(|ui| {
+            for action in actions::ALL {
+                let edit = self.selected.and_then(|row| action.edit(lens, row));
+                let button = ui.add_enabled(edit.is_some(), Button::new(action.title()).small());
+                let button = button.on_hover_text(action.hint());
+                let button = button.on_disabled_hover_text("Select a row by its number first.");
+                if let Some(edit) = edit.filter(|_| button.clicked()) {
+                    wishes.push(edit.into());
+                }
+            }
+            let free = lens.variables.len();
+            let text = if free == 1 { "1 variable".into() } else { format!("{free} variables") };
+            ui.weak(text).on_hover_text(
+                "Numbers with the badge V are what the optimizer may change. \
+                 Press the badge beside a number to free or fix it.",
+            );
+        });
+    }
+
+    /// The last text that was refused, where it can be read in full.
+    fn complaint(&self, ui: &mut Ui) {
+        let Some(why) = self.drafts.complaint() else { return };
+        let text = capital(&counted_from_one(why));
+        let frame = Frame::new().inner_margin(Margin::symmetric(4, 2));
+        SidePanel::bottom("complaint").frame(frame).show_separator_line(false).show(ui, |ui| {
+            ui.label(RichText::new(text).color(error_color(ui)));
+        });
+    }
+}

@@ -1,0 +1,481 @@
+//! The table of the prescription.
+
+use eframe::egui::{
+    Align, Button, Color32, Id, Key, Layout, Modifiers, Popup, PopupCloseBehavior, Response,
+    RichText, ScrollArea, Ui, vec2,
+};
+use egui_extras::{Column as Width, TableBuilder, TableRow};
+
+use super::badge::{self, Decides};
+use super::{actions, glass};
+use crate::lens::{Lens, Medium, Object, Parameter, Quantity};
+use crate::session::{Command, Edit, View, edited, evaluate};
+use crate::studio::field::{Drafts, Field as Cell};
+use crate::studio::number;
+use crate::studio::palette::{Palette, color32};
+use crate::studio::panels::numbers;
+use crate::studio::wording::{capital, counted_from_one};
+
+/// How high a row is, in points.
+const ROW: f32 = 21.0;
+
+/// What a cell holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Column {
+    Radius,
+    Thickness,
+    Glass,
+    SemiDiameter,
+    Conic,
+    Asphere(usize),
+    Comment,
+}
+
+impl Column {
+    const fn title(self) -> &'static str {
+        match self {
+            Self::Radius => "Radius",
+            Self::Thickness => "Thickness",
+            Self::Glass => "Glass",
+            Self::SemiDiameter => "Semi-diameter",
+            Self::Conic => "Conic",
+            Self::Asphere(0) => "r⁴",
+            Self::Asphere(1) => "r⁶",
+            Self::Asphere(2) => "r⁸",
+            Self::Asphere(3) => "r¹⁰",
+            Self::Asphere(4) => "r¹²",
+            Self::Asphere(5) => "r¹⁴",
+            Self::Asphere(_) => "r¹⁶",
+            Self::Comment => "Remark",
+        }
+    }
+
+    const fn hint(self) -> &'static str {
+        match self {
+            Self::Radius => {
+                "Radius of curvature in mm, positive where the centre lies to the right; \
+                 Infinity for a plane. The optimizer works on the curvature 1/R. \
+                 Arithmetic goes on from the old value: *2, /2, +5, - 3."
+            }
+            Self::Thickness => "Distance along the axis to the next surface, in mm",
+            Self::Glass => "What fills the gap behind the surface; empty for air",
+            Self::SemiDiameter => {
+                "Rays that meet the surface farther from the axis than this are clipped here, \
+                 in mm; empty where nothing is clipped. Most programs do not clip at a \
+                 semi-diameter: an export says so."
+            }
+            Self::Conic => "Conic constant: 0 a sphere, -1 a paraboloid",
+            Self::Asphere(_) => "Coefficient of the even asphere, in powers of mm",
+            Self::Comment => "A remark on the surface",
+        }
+    }
+
+    fn width(self) -> Width {
+        match self {
+            Self::Radius | Self::Thickness => Width::initial(104.0).at_least(70.0),
+            Self::Glass => Width::initial(122.0).at_least(70.0),
+            Self::SemiDiameter => Width::initial(92.0).at_least(60.0),
+            Self::Conic => Width::initial(86.0).at_least(60.0),
+            Self::Asphere(_) => Width::initial(112.0).at_least(60.0),
+            Self::Comment => Width::remainder().at_least(90.0).clip(true),
+        }
+    }
+
+    const fn has_badge(self) -> bool {
+        matches!(self, Self::Radius | Self::Thickness | Self::Conic | Self::Asphere(_))
+    }
+
+    /// The number in a row of this column; none where it holds text.
+    fn parameter(self, view: &View, surface: usize) -> Option<Parameter> {
+        let quantity = match self {
+            Self::Radius => Quantity::Curvature,
+            Self::Thickness => thickness_at(&view.lens, surface, view.settings.zoom),
+            Self::SemiDiameter => Quantity::SemiDiameter,
+            Self::Conic => Quantity::Conic,
+            Self::Asphere(term) => Quantity::Asphere(term),
+            Self::Glass | Self::Comment => return None,
+        };
+        Some(Parameter::new(surface, quantity))
+    }
+}
+
+/// The gap as it is at a zoom position: its own number where it has one there.
+fn thickness_at(lens: &Lens, surface: usize, zoom: usize) -> Quantity {
+    let own = lens.zoom.get(zoom).is_some_and(|position| {
+        position.thicknesses.iter().any(|thickness| thickness.surface == surface)
+    });
+    if own { Quantity::ZoomThickness(zoom) } else { Quantity::Thickness }
+}
+
+/// What a number is called in the window, where surfaces are counted from 1.
+pub(super) fn name_of(parameter: Parameter) -> String {
+    let what = match parameter.quantity {
+        Quantity::Curvature => "Radius",
+        Quantity::Thickness | Quantity::ZoomThickness(_) => "Thickness",
+        Quantity::SemiDiameter => "Semi-diameter",
+        Quantity::Conic => "Conic",
+        Quantity::Index => "Index",
+        Quantity::Asphere(term) => Column::Asphere(term).title(),
+    };
+    format!("{what} of surface {}", parameter.surface + 1)
+}
+
+/// The table for one frame.
+pub(super) struct Table<'a> {
+    pub(super) view: &'a View,
+    pub(super) drafts: &'a mut Drafts,
+    pub(super) selected: &'a mut Option<usize>,
+    pub(super) wishes: &'a mut Vec<Command>,
+}
+
+impl Table<'_> {
+    pub(super) fn show(mut self, ui: &mut Ui) {
+        let columns = columns(&self.view.lens);
+        ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
+        ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
+            let mut table = TableBuilder::new(ui)
+                .id_salt(columns.len())
+                .resizable(true)
+                .auto_shrink([false, false])
+                .cell_layout(Layout::left_to_right(Align::Center))
+                .column(Width::exact(54.0));
+            for column in &columns {
+                table = table.column(column.width());
+            }
+            let rows = self.view.lens.surfaces.len() + 2;
+            table.header(ROW, |row| header(row, &columns)).body(|body| {
+                body.rows(ROW, rows, |row| self.row(row, &columns));
+            });
+        });
+    }
+
+    fn row(&mut self, mut row: TableRow<'_, '_>, columns: &[Column]) {
+        let index = row.index();
+        if index == 0 {
+            self.object_row(&mut row, columns);
+        } else if index > self.view.lens.surfaces.len() {
+            self.image_row(&mut row, columns);
+        } else {
+            self.surface_row(&mut row, index - 1, columns);
+        }
+    }
+
+    fn object_row(&mut self, row: &mut TableRow<'_, '_>, columns: &[Column]) {
+        row.col(|ui| {
+            row_name(ui, "OBJ").on_hover_text("The object: row 0");
+        });
+        for column in columns {
+            row.col(|ui| match column {
+                Column::Thickness => self.object_distance(ui),
+                Column::Glass => self.object_medium(ui),
+                _ => {}
+            });
+        }
+    }
+
+    fn image_row(&self, row: &mut TableRow<'_, '_>, columns: &[Column]) {
+        row.col(|ui| {
+            row_name(ui, "IMA").on_hover_text("The image plane: no surface of the lens");
+        });
+        for column in columns {
+            row.col(|ui| match column {
+                Column::Radius => still(ui, "Infinity", badge::WIDTH),
+                Column::SemiDiameter => {
+                    still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0)
+                }
+                _ => {}
+            });
+        }
+    }
+
+    fn surface_row(&mut self, row: &mut TableRow<'_, '_>, surface: usize, columns: &[Column]) {
+        row.set_selected(*self.selected == Some(surface));
+        row.col(|ui| self.surface_name(ui, surface));
+        for column in columns {
+            row.col(|ui| {
+                if let Some(tint) = tint(ui, &self.view.lens.surfaces[surface].medium) {
+                    ui.painter().rect_filled(ui.max_rect(), 0.0, tint);
+                }
+                self.cell(ui, *column, surface);
+            });
+        }
+    }
+
+    fn cell(&mut self, ui: &mut Ui, column: Column, surface: usize) {
+        match column {
+            Column::Glass => self.glass(ui, surface),
+            Column::Comment => self.comment(ui, surface),
+            _ => self.number(ui, column, surface),
+        }
+    }
+
+    fn surface_name(&mut self, ui: &mut Ui, surface: usize) {
+        let stop = self.view.lens.surfaces[surface].stop;
+        let text = if stop { format!("{} STO", surface + 1) } else { (surface + 1).to_string() };
+        let text = if stop { RichText::new(text).strong() } else { RichText::new(text) };
+        let chosen = *self.selected == Some(surface);
+        let label = ui.selectable_label(chosen, text).accessible_name(row_label(surface));
+        if label.clicked() || label.secondary_clicked() {
+            *self.selected = Some(surface);
+        }
+        label.context_menu(|ui| self.row_menu(ui, surface));
+        label.on_hover_text(format!(
+            "Surface {} of the window, which counts from 1; files count from 0: {surface} there. \
+             Press the right button for what can be done with it.",
+            surface + 1
+        ));
+    }
+
+    fn row_menu(&mut self, ui: &mut Ui, surface: usize) {
+        for action in actions::ALL {
+            let edit = action.edit(&self.view.lens, surface);
+            let button = Button::new(action.title());
+            if ui.add_enabled(edit.is_some(), button).on_hover_text(action.hint()).clicked() {
+                self.wishes.extend(edit.map(Command::Edit));
+                ui.close();
+            }
+        }
+        ui.separator();
+        let hyper = self.view.lens.surfaces[surface].hyper;
+        if ui.selectable_label(hyper, "Hyper-hemisphere").clicked() {
+            self.wishes.push(Edit::SetHyper { surface, hyper: !hyper }.into());
+            ui.close();
+        }
+    }
+
+    fn number(&mut self, ui: &mut Ui, column: Column, surface: usize) {
+        let Some(parameter) = column.parameter(self.view, surface) else { return };
+        let limit = column == Column::SemiDiameter;
+        let (name, shown) = (name_of(parameter), self.shown(parameter));
+        let hint = if limit { self.reached(surface) } else { String::new() };
+        let cell = Cell { name: &name, shown: &shown, hint: &hint, align: Align::Max };
+        let place = (column, surface);
+        let response = self.field(ui, place, cell, |text| Ok(typed(parameter, text)));
+        if !limit {
+            badge::show(ui, &self.view.lens, parameter, self.drafts, self.wishes);
+            self.toggle_by_key(ui, &response, parameter);
+        } else {
+            response.on_hover_text(column.hint());
+        }
+    }
+
+    /// What a number cell shows: radius for curvature, the solved gap where it is solved.
+    fn shown(&self, parameter: Parameter) -> String {
+        let value = self.view.lens.get(parameter);
+        match parameter.quantity {
+            Quantity::Curvature => number::show(number::radius(value.unwrap_or(0.0))),
+            Quantity::SemiDiameter => value.map(number::show).unwrap_or_default(),
+            _ => {
+                let solved = matches!(Decides::of(&self.view.lens, parameter), Decides::Focus(_));
+                let gap = solved.then(|| self.traced_gap(parameter.surface)).flatten();
+                number::show(gap.or(value).unwrap_or(0.0))
+            }
+        }
+    }
+
+    /// The gap behind a surface as it was traced.
+    fn traced_gap(&self, surface: usize) -> Option<f64> {
+        let bench = &numbers(self.view)?.bench.value;
+        bench.colors[bench.primary].system.surfaces.get(surface).map(|s| s.thickness)
+    }
+
+    /// How far from the axis the drawn rays meet a surface.
+    fn reached(&self, surface: usize) -> String {
+        let numbers = numbers(self.view).filter(|_| self.view.is_current());
+        let reached = numbers.and_then(|n| n.layout.value.reached.get(surface).copied());
+        reached.map(|height| format!("{height:.3}")).unwrap_or_default()
+    }
+
+    fn toggle_by_key(&mut self, ui: &Ui, field: &Response, parameter: Parameter) {
+        let keys = Modifiers::COMMAND | Modifiers::SHIFT;
+        if field.has_focus() && ui.input_mut(|input| input.consume_key(keys, Key::V)) {
+            let decides = Decides::of(&self.view.lens, parameter);
+            self.wishes.push(badge::toggled(decides, parameter).into());
+        }
+    }
+
+    fn glass(&mut self, ui: &mut Ui, surface: usize) {
+        let medium = &self.view.lens.surfaces[surface].medium;
+        let (name, shown) = (format!("Glass of surface {}", surface + 1), glass::show(medium));
+        let cell = Cell { name: &name, shown: &shown, hint: "", align: Align::Min };
+        let edit = move |text: &str| Edit::SetMedium { surface, medium: glass::parse(text) };
+        let field = self.field(ui, (Column::Glass, surface), cell, |text| Ok(edit(text)));
+        self.propose(&field, edit);
+        field.on_hover_text(glass::describe(medium));
+    }
+
+    /// Proposes glasses below a cell into which a name is typed.
+    fn propose(&mut self, field: &Response, edit: impl Fn(&str) -> Edit) {
+        let typing = self.drafts.text(field.id).filter(|_| field.has_focus());
+        let proposals = typing.map(glass::proposals).unwrap_or_default();
+        if proposals.is_empty() {
+            return;
+        }
+        let popup = Popup::from_response(field).close_behavior(PopupCloseBehavior::IgnoreClicks);
+        popup.show(|ui| {
+            for name in proposals {
+                // Taken as the button goes down: its release comes after the typing has ended.
+                if ui.selectable_label(false, &name).is_pointer_button_down_on() {
+                    self.drafts.accept(field.id);
+                    self.wishes.push(edit(&name).into());
+                }
+            }
+        });
+    }
+
+    fn comment(&mut self, ui: &mut Ui, surface: usize) {
+        let shown = self.view.lens.surfaces[surface].comment.clone();
+        let name = format!("Remark on surface {}", surface + 1);
+        let cell = Cell { name: &name, shown: &shown, hint: "", align: Align::Min };
+        let edit = |text: &str| Ok(Edit::SetComment { surface, text: text.to_owned() });
+        self.field(ui, (Column::Comment, surface), cell, edit);
+    }
+
+    fn object_distance(&mut self, ui: &mut Ui) {
+        let old = match self.view.lens.object {
+            Object::Infinity => f64::INFINITY,
+            Object::Finite(distance) => distance,
+        };
+        let shown = number::show(old);
+        let cell = Cell { name: "Object distance", shown: &shown, hint: "", align: Align::Max };
+        let object = |distance: f64| {
+            if distance.is_infinite() { Object::Infinity } else { Object::Finite(distance) }
+        };
+        let edit = |text: &str| {
+            let distance = evaluate(text, old).map_err(|why| why.to_string())?;
+            Ok(Edit::SetObject(object(distance)))
+        };
+        self.field(ui, (Column::Thickness, OBJECT), cell, edit);
+    }
+
+    fn object_medium(&mut self, ui: &mut Ui) {
+        let shown = glass::show(&self.view.lens.object_medium);
+        let cell =
+            Cell { name: "Medium of the object", shown: &shown, hint: "", align: Align::Min };
+        let edit = |text: &str| Ok(Edit::SetObjectMedium(glass::parse(text)));
+        self.field(ui, (Column::Glass, OBJECT), cell, edit);
+    }
+
+    /// A cell: what is typed becomes an edit, if the lens can be that.
+    fn field(
+        &mut self,
+        ui: &mut Ui,
+        (column, row): (Column, usize),
+        cell: Cell<'_>,
+        edit: impl Fn(&str) -> Result<Edit, String>,
+    ) -> Response {
+        let id = cell_id(column, row);
+        let room = if column.has_badge() { badge::WIDTH } else { 0.0 };
+        let size = vec2(ui.available_width() - room, ui.available_height());
+        let layout = Layout::left_to_right(Align::Center);
+        let entry = ui.allocate_ui_with_layout(size, layout, |ui| self.drafts.show(ui, id, cell));
+        let entry = entry.inner;
+        let enter = ui.input(|input| input.key_pressed(Key::Enter));
+        let fits = match entry.typed {
+            Some(text) => self.take(id, edit(&text)),
+            None => true,
+        };
+        if entry.response.lost_focus() && enter {
+            let below = if row == OBJECT { 0 } else { row + 1 };
+            let next = if fits { cell_id(column, below) } else { id };
+            ui.memory_mut(|memory| memory.request_focus(next));
+        }
+        entry.response
+    }
+
+    /// Wishes for an edit, if the lens can be that; otherwise the cell says why not.
+    fn take(&mut self, id: Id, edit: Result<Edit, String>) -> bool {
+        let tried = edit.and_then(|edit| {
+            let lens = edited(&self.view.lens, &edit);
+            lens.map(|_| edit).map_err(|why| why.to_string())
+        });
+        match tried {
+            Ok(edit) => {
+                self.drafts.accept(id);
+                self.wishes.extend([Command::Edit(edit), Command::Settle]);
+                true
+            }
+            Err(why) => {
+                self.drafts.refuse(id, capital(&counted_from_one(&why)));
+                false
+            }
+        }
+    }
+}
+
+/// Stands for the row of the object where a surface is named.
+const OBJECT: usize = usize::MAX;
+
+fn cell_id(column: Column, row: usize) -> Id {
+    Id::unique(("prescription cell", column, row))
+}
+
+/// What is typed into the cell of a number; a curvature is typed as its radius.
+fn typed(parameter: Parameter, text: &str) -> Edit {
+    let text = text.to_owned();
+    match parameter {
+        Parameter { surface, quantity: Quantity::Curvature } => Edit::TypeRadius { surface, text },
+        _ => Edit::Type { parameter, text },
+    }
+}
+
+/// The columns of a lens: those of aspheres only where there are some.
+fn columns(lens: &Lens) -> Vec<Column> {
+    let mut columns =
+        vec![Column::Radius, Column::Thickness, Column::Glass, Column::SemiDiameter, Column::Conic];
+    let terms = lens.surfaces.iter().map(|row| row.asphere.len()).max().unwrap_or(0);
+    columns.extend((0..terms).map(Column::Asphere));
+    columns.push(Column::Comment);
+    columns
+}
+
+fn header(mut row: TableRow<'_, '_>, columns: &[Column]) {
+    row.col(|ui| {
+        ui.add_space(6.0);
+        ui.weak("Surf").on_hover_text("Counted from 1, as designers do; files count from 0");
+    });
+    for column in columns {
+        row.col(|ui| {
+            let room = if column.has_badge() { badge::WIDTH } else { 0.0 };
+            let left = matches!(column, Column::Glass | Column::Comment);
+            let layout = if left {
+                Layout::left_to_right(Align::Center)
+            } else {
+                Layout::right_to_left(Align::Center)
+            };
+            ui.with_layout(layout, |ui| {
+                ui.add_space(room + 5.0);
+                ui.weak(column.title()).on_hover_text(column.hint());
+            });
+        });
+    }
+}
+
+fn row_name(ui: &mut Ui, text: &str) -> Response {
+    ui.add_space(6.0);
+    ui.weak(text)
+}
+
+/// What a screen reader calls the number of a row.
+fn row_label(surface: usize) -> String {
+    format!("Row of surface {}", surface + 1)
+}
+
+/// A value that nobody can type.
+fn still(ui: &mut Ui, text: &str, room: f32) {
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        ui.add_space(room + 5.0);
+        ui.weak(text);
+    });
+}
+
+/// The tint of a row: blue for glass, green for a mirror.
+fn tint(ui: &Ui, medium: &Medium) -> Option<Color32> {
+    let palette = Palette::of(ui.visuals());
+    let [r, g, b, _] = match medium {
+        Medium::Air => return None,
+        Medium::Mirror => palette.mirror,
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) => palette.glass,
+    };
+    Some(color32([r, g, b, 30]))
+}

@@ -1,0 +1,350 @@
+//! Where the rays of each field land, all cells to one scale.
+//!
+//! The dots are for the eye; the radii come from integrals over the pupil, each with its error, its
+//! rays and its time. Both are measured from the centroid of all colours.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use eframe::egui::{
+    Align, ComboBox, Layout as Arrange, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2,
+    WidgetInfo, pos2, vec2,
+};
+use glam::DVec2;
+
+use super::{Panel, field_name, no_numbers, shown, swatch};
+use crate::analysis::{Estimate, Spot};
+use crate::lens::Lens;
+use crate::session::{Command, Numbers, Results, View};
+use crate::studio::draw::{Backing, Camera, Canvas, Scene, length_text, round_length};
+use crate::studio::number;
+use crate::studio::palette::{Palette, color32};
+
+/// The errors that can be asked for, and what they are called.
+const TOLERANCES: [(f64, &str); 3] = [(1e-2, "1 %"), (1e-3, "0.1 %"), (1e-6, "1e-6")];
+
+/// The height of the words of a cell, in points: its field above, three lines of numbers below.
+const WORDS: (f32, f32) = (20.0, 47.0);
+
+/// The panel.
+#[derive(Debug)]
+pub struct SpotDiagram {
+    backing: Backing,
+    canvas: Canvas,
+    drawing: Option<(Source, Arc<Scene>)>,
+}
+
+/// All on which the drawn dots depend.
+#[derive(Debug)]
+struct Source {
+    results: Arc<Results>,
+    cells: Vec<Rect>,
+    palette: Palette,
+    per_point: f32,
+}
+
+impl PartialEq for Source {
+    /// Results are compared by address, which cannot be another's while they are held.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.results, &other.results)
+            && self.cells == other.cells
+            && self.palette == other.palette
+            && self.per_point == other.per_point
+    }
+}
+
+impl SpotDiagram {
+    /// An empty panel.
+    pub const fn new(backing: Backing) -> Self {
+        Self { backing, canvas: Canvas::new("spots"), drawing: None }
+    }
+}
+
+impl Panel for SpotDiagram {
+    fn title(&self) -> &'static str {
+        "Spot diagram"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        header(ui, view, wishes);
+        let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, "Spots"));
+        let cells = cells(rect, numbers.spots.value.len());
+        self.draw(ui, rect, Arc::clone(results), numbers, &cells);
+        for (i, cell) in cells.iter().enumerate() {
+            words(ui, *cell, &results.lens, numbers, i);
+        }
+        bar(ui, &cells, half_width(numbers));
+    }
+}
+
+impl SpotDiagram {
+    fn draw(
+        &mut self,
+        ui: &Ui,
+        rect: Rect,
+        results: Arc<Results>,
+        numbers: &Numbers,
+        cells: &[Rect],
+    ) {
+        let per_point = ui.ctx().pixels_per_point();
+        let palette = Palette::of(ui.visuals());
+        let relative = |cell: &Rect| picture(*cell).translate(-rect.min.to_vec2());
+        let cells = cells.iter().map(relative).collect();
+        let source = Source { results: Arc::clone(&results), cells, palette, per_point };
+        if self.drawing.as_ref().is_none_or(|(drawn, _)| *drawn != source) {
+            let scene = Arc::new(scene(ui, &source, numbers));
+            self.drawing = Some((source, scene));
+        }
+        let Some((_, scene)) = &self.drawing else { return };
+        // The scene is in points from the upper left corner, y up.
+        let centre = DVec2::new(f64::from(rect.width()), -f64::from(rect.height())) / 2.0;
+        let camera = Camera { centre, scale: per_point.into() };
+        self.canvas.show(ui, rect, self.backing, scene, camera);
+    }
+}
+
+fn header(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        let palette = Palette::of(ui.visuals());
+        for wavelength in &view.lens.wavelengths {
+            swatch(ui, color32(palette.wavelength(wavelength.um)));
+            ui.label(format!("{:.0} nm", 1e3 * wavelength.um));
+        }
+        ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
+            tolerance(ui, view, wishes);
+        });
+    });
+}
+
+fn tolerance(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    let mut chosen = view.settings.tolerance;
+    let known = TOLERANCES.iter().find(|(error, _)| *error == chosen);
+    let text = known.map_or_else(|| format!("{chosen:e}"), |(_, name)| (*name).to_owned());
+    let combo = ComboBox::from_id_salt("tolerance").width(64.0).selected_text(text);
+    let shown = combo.show_ui(ui, |ui| {
+        for (error, name) in TOLERANCES {
+            ui.selectable_value(&mut chosen, error, name);
+        }
+    });
+    shown.response.accessible_name("Allowed error").on_hover_text(
+        "The error that the numbers may have. As many rays are traced as that takes, no more.",
+    );
+    ui.weak("error below");
+    if chosen != view.settings.tolerance {
+        wishes.push(Command::SetTolerance(chosen));
+    }
+}
+
+/// Cells of one size that fill a part of the window, as large as can be.
+fn cells(rect: Rect, count: usize) -> Vec<Rect> {
+    let size = |columns: usize| {
+        let rows = count.div_ceil(columns);
+        vec2(rect.width() / columns as f32, rect.height() / rows as f32)
+    };
+    let side = |columns: &usize| picture(Rect::from_min_size(rect.min, size(*columns))).width();
+    let columns = (1..=count).max_by(|a, b| side(a).total_cmp(&side(b)));
+    let Some(columns) = columns else { return Vec::new() };
+    let size = size(columns);
+    let place = |i: usize| vec2((i % columns) as f32 * size.x, (i / columns) as f32 * size.y);
+    (0..count).map(|i| Rect::from_min_size(rect.min + place(i), size)).collect()
+}
+
+/// The square of a cell in which its dots are.
+fn picture(cell: Rect) -> Rect {
+    let room = cell.size() - vec2(6.0, WORDS.0 + WORDS.1);
+    let side = room.min_elem().max(1.0);
+    let middle = pos2(cell.center().x, cell.top() + WORDS.0 + 0.5 * room.y.max(side));
+    Rect::from_center_size(middle, Vec2::splat(side))
+}
+
+/// Half of what the side of every picture shows, in mm.
+fn half_width(numbers: &Numbers) -> f64 {
+    let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
+    let widest = lit.map(|spot| spot.radius.value).fold(0.0, f64::max);
+    let airy = numbers.airy.unwrap_or(0.0);
+    1.12 * if widest > 0.0 { widest.max(1.1 * airy) } else { airy.max(1e-3) }
+}
+
+fn scene(ui: &Ui, source: &Source, numbers: &Numbers) -> Scene {
+    let palette = source.palette;
+    let background = ui.visuals().panel_fill.to_srgba_unmultiplied();
+    let mut scene = Scene::on(background);
+    let half = half_width(numbers);
+    for (field, cell) in source.cells.iter().enumerate() {
+        let centre = DVec2::new(cell.center().x.into(), -f64::from(cell.center().y));
+        let scale = 0.5 * f64::from(cell.width()) / half;
+        let frame = Frame { centre, half: 0.5 * f64::from(cell.width()), palette, scale };
+        frame.draw(&mut scene);
+        if let Some(airy) = numbers.airy {
+            frame.draw_airy(&mut scene, airy, source.per_point);
+        }
+        if let Ok(spot) = &numbers.spots.value[field] {
+            frame.draw_dots(&mut scene, numbers, spot, field, source.per_point);
+        }
+    }
+    scene
+}
+
+/// The square of one field.
+struct Frame {
+    centre: DVec2,
+    half: f64,
+    palette: Palette,
+    /// Points per mm.
+    scale: f64,
+}
+
+impl Frame {
+    fn draw(&self, scene: &mut Scene) {
+        let corner = |x: f64, y: f64| self.centre + self.half * DVec2::new(x, y);
+        let background = self.palette.background;
+        let left = [corner(-1.0, -1.0), corner(-1.0, 1.0)];
+        scene.strip(&left, &[corner(1.0, -1.0), corner(1.0, 1.0)], background);
+        let faint = self.palette.faint;
+        scene.line(corner(-1.0, 0.0), corner(1.0, 0.0), 1.0, faint);
+        scene.line(corner(0.0, -1.0), corner(0.0, 1.0), 1.0, faint);
+    }
+
+    /// The first dark ring of a perfect lens, dashed.
+    fn draw_airy(&self, scene: &mut Scene, radius: f64, per_point: f32) {
+        let radius = radius * self.scale;
+        let dashes = ((TAU * radius / 7.0) as usize).clamp(8, 90);
+        let at = |turn: f64| self.centre + radius * DVec2::from_angle(TAU * turn);
+        if radius > 1.4 * self.half {
+            return;
+        }
+        for dash in 0..dashes {
+            let (from, to) = (dash as f64 / dashes as f64, (dash as f64 + 0.55) / dashes as f64);
+            let middle = at(0.5 * (from + to));
+            scene.polyline(&[at(from), middle, at(to)], 1.2 * per_point, self.palette.strong);
+        }
+    }
+
+    /// The dots, short waves over long ones.
+    fn draw_dots(
+        &self,
+        scene: &mut Scene,
+        numbers: &Numbers,
+        spot: &Spot,
+        field: usize,
+        per_point: f32,
+    ) {
+        let colors = &numbers.bench.value.colors;
+        let mut scatters: Vec<_> =
+            numbers.scatter.value.iter().filter(|scatter| scatter.field == field).collect();
+        let um = |wavelength: usize| colors[wavelength].um;
+        scatters.sort_by(|a, b| um(b.wavelength).total_cmp(&um(a.wavelength)));
+        let centroid = DVec2::new(spot.centroid[0].value, spot.centroid[1].value);
+        for scatter in scatters {
+            let [r, g, b, _] = self.palette.wavelength(um(scatter.wavelength));
+            for point in &scatter.points {
+                let from = self.scale * (DVec2::from(*point) - centroid);
+                if from.abs().max_element() <= self.half {
+                    scene.dot(self.centre + from, 2.4 * per_point, [r, g, b, 205]);
+                }
+            }
+        }
+    }
+}
+
+/// The words of a cell: its field above the picture, its numbers below.
+fn words(ui: &mut Ui, cell: Rect, lens: &Lens, numbers: &Numbers, field: usize) {
+    let picture = picture(cell);
+    let above =
+        Rect::from_min_max(pos2(picture.left(), picture.top() - WORDS.0), picture.right_top());
+    let below = Rect::from_min_max(
+        pos2(cell.left() + 3.0, picture.bottom() + 2.0),
+        pos2(cell.right(), picture.bottom() + WORDS.1),
+    );
+    let spot = &numbers.spots.value[field];
+    within(ui, above, |ui| {
+        ui.horizontal(|ui| {
+            name(ui, lens, field);
+            if let Ok(spot) = spot {
+                lit(ui, spot);
+            }
+        });
+    });
+    within(ui, below, |ui| {
+        ui.spacing_mut().item_spacing.y = 1.0;
+        match spot {
+            Ok(spot) => radii(ui, spot),
+            Err(why) => {
+                let text = RichText::new(why.to_string()).small();
+                ui.label(text.color(ui.visuals().warn_fg_color));
+            }
+        }
+    });
+}
+
+fn within(ui: &mut Ui, rect: Rect, show: impl FnOnce(&mut Ui)) {
+    let builder = UiBuilder::new().max_rect(rect).layout(Arrange::top_down(Align::Min));
+    ui.scope_builder(builder, |ui| {
+        ui.set_clip_rect(rect.expand(2.0).intersect(ui.clip_rect()));
+        show(ui);
+    });
+}
+
+fn name(ui: &mut Ui, lens: &Lens, field: usize) {
+    let palette = Palette::of(ui.visuals());
+    let fields = &lens.fields;
+    let Some(point) = fields.values.get(field) else { return };
+    let color = color32(palette.field(field));
+    swatch(ui, color);
+    ui.label(RichText::new(field_name(fields.kind, *point)).color(color));
+}
+
+/// How much of the pupil is lit, where it is clipped.
+fn lit(ui: &mut Ui, spot: &Spot) {
+    let lit = spot.colors.iter().filter_map(|color| color.as_ref().ok());
+    let area = lit.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI;
+    if area < 1.0 - 1e-6 {
+        let text = RichText::new(format!("{:.0} % of pupil", 100.0 * area)).small();
+        ui.label(text.weak()).on_hover_text(
+            "Surfaces clip the rest. The integral follows the edge of what gets through.",
+        );
+    }
+}
+
+fn radii(ui: &mut Ui, spot: &Spot) {
+    let line = |ui: &mut Ui, text: String| -> Response { ui.label(RichText::new(text).small()) };
+    line(ui, format!("RMS {}", in_um(spot.rms)))
+        .on_hover_text("Root mean square distance from the centroid of all colours");
+    line(ui, format!("GEO {}", in_um(spot.radius)))
+        .on_hover_text("Largest distance from the centroid of all colours");
+    let time = spot.rms.milliseconds.map(|ms| format!(", {ms:.2} ms")).unwrap_or_default();
+    let rays = RichText::new(format!("{} rays{time}", spot.radius.rays)).small();
+    ui.label(rays.weak()).on_hover_text("Rays traced for these numbers, and the time it took");
+}
+
+/// A length with its relative error.
+fn in_um(estimate: Estimate) -> String {
+    let value = number::show_digits(1e3 * estimate.value, 4);
+    let share = (estimate.error / estimate.value).abs();
+    let error = if !share.is_finite() {
+        String::new()
+    } else if share >= 5e-5 {
+        format!(" ± {} %", number::show_digits(100.0 * share, 2))
+    } else {
+        format!(" ± {share:.0e}")
+    };
+    format!("{value} µm{error}")
+}
+
+/// The scale of all cells, in the first one.
+fn bar(ui: &Ui, cells: &[Rect], half: f64) {
+    let Some(first) = cells.first().map(|cell| picture(*cell)) else { return };
+    let scale = 0.5 * f64::from(first.width()) / half;
+    let length = round_length(0.4 * f64::from(first.width()) / scale);
+    let width = (length * scale) as f32;
+    let color = ui.visuals().strong_text_color();
+    let corner = first.left_bottom() + vec2(6.0, -6.0);
+    let rect = Rect::from_min_size(corner - vec2(0.0, 2.0), vec2(width, 2.0));
+    ui.painter().rect_filled(rect, 0.0, color);
+    let font = eframe::egui::TextStyle::Small.resolve(ui.style());
+    let at = rect.left_top() - vec2(0.0, 1.0);
+    let painter = ui.painter();
+    painter.text(at, eframe::egui::Align2::LEFT_BOTTOM, length_text(length), font, color);
+}
