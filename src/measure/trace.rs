@@ -12,15 +12,17 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
 
-/// Rays of a turn: 24 tasks for two threads, and still in the second-level cache.
-const RAYS: usize = 24 * 4096;
+/// Rays of a turn on one thread.
+const RAYS: usize = 2 * 4096;
+/// Rays of a turn on two threads: 24 tasks.
+const SHARED_RAYS: usize = 24 * 4096;
 /// Rays that are traced one at a time in a turn.
 const SINGLE_RAYS: usize = 4096;
 /// Rays on which rounding is measured.
 const ROUNDED_RAYS: usize = 4096;
 /// Rays for which memory is measured.
 const MANY_RAYS: usize = 1_000_000;
-const TURN: f64 = 4e-3; // seconds: shorter than what a busy system grants at once
+const TURN: f64 = 5e-4; // seconds: much shorter than what a busy system grants at once
 
 const FORWARD: &str = "f64_batch_1_thread";
 const GRADIENT: &str = "gradient";
@@ -182,12 +184,12 @@ fn batch<R: Real>(tracer: &Tracer<R>, width: Width) -> Contestant<'_> {
 }
 
 fn on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> Contestant<'a> {
-    let (rays, mut points) = (bundle(RAYS), Points::default());
+    let (rays, mut points) = (bundle(SHARED_RAYS), Points::default());
     let turn = Box::new(move || {
         pool.install(|| tracer.batch_parallel(&rays, &mut points));
         black_box(&points);
     });
-    Contestant { work: work(tracer, RAYS), turn }
+    Contestant { work: work(tracer, SHARED_RAYS), turn }
 }
 
 fn one_by_one(tracer: &Tracer<f64>) -> Contestant<'_> {
@@ -218,11 +220,11 @@ fn gradient(tracer: &Tracer<f64>) -> Contestant<'_> {
 }
 
 fn gradient_on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> Contestant<'a> {
-    let rays = bundle(RAYS);
+    let rays = bundle(SHARED_RAYS);
     let turn = Box::new(move || {
         black_box(pool.install(|| tracer.gradient_parallel(&rays, seed)));
     });
-    Contestant { work: work(tracer, RAYS), turn }
+    Contestant { work: work(tracer, SHARED_RAYS), turn }
 }
 
 /// The same rays as another number type.

@@ -88,7 +88,10 @@ impl Drop for Scratch {
 
 #[test]
 fn every_subcommand_has_long_help_with_its_json() {
-    let names = ["info", "trace", "analyze", "gradient", "optimize", "convert", "measure trace"];
+    let names = [
+        "info", "trace", "analyze", "gradient", "optimize", "convert", "measure trace",
+        "measure spot", "measure optimize",
+    ];
     for name in names {
         let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
         let help = done(&arguments, "");
@@ -137,8 +140,15 @@ fn info_gives_first_order_data() {
         "petzval_sum",
         "seidel",
         "semi_diameters",
+        "checks",
+        "effects",
     ];
     has_keys(&info, &keys);
+    let effects = info["effects"].as_array().unwrap();
+    assert_eq!(effects.len(), 6);
+    for effect in effects {
+        has_keys(effect, &["effect", "needed", "computed", "error", "reason", "saves", "saved_ms"]);
+    }
     has_keys(&info["entrance_pupil"], &["position", "diameter"]);
     assert!((info["efl"].as_f64().unwrap() - 49.389).abs() < 1e-3);
     assert_eq!(info["seidel"]["surfaces"].as_array().unwrap().len(), 11);
@@ -309,7 +319,8 @@ fn a_gradient_is_what_a_changed_file_shows() {
     // Nothing but the disc of the pupil limits the light, and on the axis it does not matter where
     // that disc is: here the biased kind is exact.
     let lens = std::fs::read_to_string(LENS).unwrap();
-    let open = lens.replace("\"stop_semi_diameter\": 4.215", "\"entrance_pupil_diameter\": 6.0");
+    let open = lens
+        .replace("\"stop_semi_diameter\": 4.215", "\"entrance_pupil_diameter\": 6.0");
     let changed = |name: &str, step: f64| {
         let curvature = 0.07061398863114783 + step;
         let text = open.replacen("0.07061398863114783", &curvature.to_string(), 1);
@@ -318,7 +329,8 @@ fn a_gradient_is_what_a_changed_file_shows() {
     };
     let step = 1e-6;
     let (_, slopes) = changed("open.json", 0.0);
-    let difference = (changed("plus.json", step).0 - changed("minus.json", -step).0) / (2.0 * step);
+    let difference =
+        (changed("plus.json", step).0 - changed("minus.json", -step).0) / (2.0 * step);
     assert!((slopes[0] - difference).abs() < 1e-6 * difference.abs(), "{slopes:?} {difference}");
 }
 
@@ -335,20 +347,8 @@ fn optimize_makes_the_lens_better_and_saves_it() {
     let (out, history) = (Scratch::new("better.json"), Scratch::new("history.json"));
     for method in ["dls", "adam"] {
         let arguments = [
-            "optimize",
-            LENS,
-            "--out",
-            out.path(),
-            "--history",
-            history.path(),
-            "--steps",
-            "8",
-            "--vary",
-            "curvatures,thicknesses",
-            "--error",
-            "0.1%",
-            "--method",
-            method,
+            "optimize", LENS, "--out", out.path(), "--history", history.path(), "--steps", "8",
+            "--vary", "curvatures,thicknesses", "--error", "0.1%", "--method", method,
         ];
         let report = done_json(&arguments, "");
         let number = |key: &str| report[key].as_f64().unwrap();
@@ -368,8 +368,7 @@ fn optimize_makes_the_lens_better_and_saves_it() {
 #[test]
 fn optimize_aims_at_a_goal() {
     let goal = json!({"terms": [{"term": {"focal_length": 52.0}, "weight": 1.0}]});
-    let (goal, out) =
-        (Scratch::with("goal.json", &goal.to_string()), Scratch::new("goal-out.json"));
+    let (goal, out) = (Scratch::with("goal.json", &goal.to_string()), Scratch::new("goal-out.json"));
     let arguments = ["optimize", LENS, "--out", out.path(), "--goal", goal.path()];
     done(&[&arguments[..], &["--vary", "curvatures"]].concat(), "");
     let efl = done_json(&["info", out.path()], "")["efl"].as_f64().unwrap();
@@ -458,6 +457,51 @@ fn measure_trace_has_a_rate_for_every_way() {
     let rounding = |name: &str| measured[name]["point_rms_mm"].as_f64().unwrap();
     assert!(rounding("rounding_f64") < 1e-12 && rounding("rounding_f32") < 1e-4);
     assert_eq!(measured["rounding_f64"]["other_fates"], 0);
+}
+
+#[test]
+fn measure_trace_tells_what_derivatives_cost() {
+    let measured = done_json(&["measure", "trace", "--turns", "1"], "");
+    assert!(measured["gradient_over_forward"].as_f64().unwrap() > 0.0);
+    if cfg!(target_os = "linux") {
+        for memory in ["memory_trace", "memory_gradient"] {
+            let peak = measured[memory]["peak_mb"].as_f64().unwrap();
+            assert!(peak < 150.0, "{memory} {peak}");
+        }
+    }
+}
+
+#[test]
+fn measure_spot_draws_error_against_time() {
+    let plot = Scratch::new("curves.png");
+    let singlet = "lenses/singlet_la1131.json";
+    let arguments = ["measure", "spot", singlet, "--field", "1", "--plot", plot.path()];
+    let curves = done_json(&arguments, "");
+    has_keys(&curves, &["machine", "lens", "y", "rms_clear", "rms_clipped", "lit", "rows"]);
+    let rows = curves["rows"].as_array().unwrap();
+    for key in ["pupil", "method", "precision", "rays", "error", "ms"] {
+        assert!(rows.iter().all(|row| row.get(key).is_some()), "{key}");
+    }
+    let best = |method: &str| {
+        let mine = rows.iter().filter(|row| {
+            row["method"] == method && row["precision"] == "f64" && row["pupil"] == "clear"
+        });
+        mine.map(|row| row["error"].as_f64().unwrap()).fold(f64::INFINITY, f64::min)
+    };
+    assert!(best("gauss") < 1e-10 && best("square_grid") > 1e-6);
+    assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
+    refused(2, &["measure", "spot", singlet, "--plot", "curves.gif"], "", &["`gif`", "`.png`"]);
+}
+
+#[test]
+fn measure_optimize_has_a_cost_for_every_search() {
+    let measured = done_json(&["measure", "optimize", "--steps", "2"], "");
+    has_keys(&measured, &["machine", "steps", "variables", "fields", "tolerance", "rows"]);
+    for row in measured["rows"].as_array().unwrap() {
+        let keys = ["name", "ms_per_iteration", "mean", "min", "max", "rays", "error"];
+        has_keys(row, &keys);
+        assert!(row["error"].as_f64().unwrap() < 1e-5, "{row}");
+    }
 }
 
 #[cfg(unix)]

@@ -11,7 +11,7 @@ use std::fmt::{self, Display};
 #[command(after_long_help = include_str!("../help/measure_trace.txt"))]
 pub(super) struct Trace {
     /// How many times each way of tracing is timed
-    #[arg(long, value_name = "N", default_value_t = 41)]
+    #[arg(long, value_name = "N", default_value_t = 201)]
     turns: usize,
 }
 
