@@ -19,6 +19,7 @@ pub use error::FileError;
 pub use library::{Bundled, library};
 pub use probe::{Proof, SelfCheck};
 pub use report::{Outcome, Report, ReportRow};
+pub use save::replace;
 
 use crate::lens::Lens;
 use serde::Serialize;
@@ -128,7 +129,7 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
             (bytes, Some(report), Some(proof))
         }
     };
-    save::replace(path, &bytes)?;
+    replace(path, &bytes)?;
     Ok(SaveReport { format, report, proof })
 }
 

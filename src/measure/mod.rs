@@ -8,14 +8,18 @@ mod clock;
 mod double_gauss;
 mod machine;
 mod memory;
+mod optimize;
 mod rates;
 mod rounding;
+mod spot;
 mod trace;
 
 pub use clock::timed;
 pub use double_gauss::double_gauss;
 pub use machine::Machine;
 pub use memory::{Memory, peak_megabytes};
+pub use optimize::{StepCosts, StepRow, step_costs};
 pub use rates::Rate;
 pub use rounding::{Rounding, rounding};
+pub use spot::{NoCurves, Precision, Pupil, Sampling, SpotCurves, SpotRow, spot_curves};
 pub use trace::{Throughput, TraceRow, Unmeasured, throughput};

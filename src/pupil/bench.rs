@@ -128,7 +128,7 @@ impl Bench {
         field: Field,
         wavelength: usize,
     ) -> Result<Launch<'_>, super::LaunchError> {
-        Launch::new(self, field, wavelength)
+        Launch::new(self, field, wavelength, self.aiming)
     }
 
     /// The third-order sums, chromatic ones between the shortest and the longest wavelength; `None`
@@ -163,9 +163,8 @@ impl Bench {
     /// By how many stop radii the paraxial chief ray of the farthest field misses the centre of
     /// the stop; `None` where that ray does not get there.
     pub fn stop_miss(&self) -> Option<f64> {
-        let paraxial = Self { aiming: Aiming::Paraxial, ..self.clone() };
         let edge = Field { x: 0.0, y: self.beam.edge, weight: 1.0 };
-        let launch = paraxial.launch(edge, self.primary).ok()?;
+        let launch = Launch::new(self, edge, self.primary, Aiming::Paraxial).ok()?;
         let [x, y] = launch.at_stop([0.0, 0.0])?;
         let miss = x.hypot(y) / self.stop_radius();
         miss.is_finite().then_some(miss)

@@ -109,6 +109,10 @@ const CORNER: f64 = 1e-9;
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.
 pub(super) const NEAR: f64 = 0.003;
+/// How far inside the edge, relatively, margins are looked at.
+const INSIDE: f64 = 1e-9;
+/// A margin this small against its neighbours is one that ends the pupil.
+const ENDING: f64 = 1e-6;
 /// What is added to the largest radius seen so that none is larger.
 const COVER: f64 = 1.02;
 /// More arcs than this are no pupil but noise.
@@ -133,6 +137,14 @@ impl Launch<'_> {
             }
         });
         probe
+    }
+
+    /// The margins of a ray at every hurdle; `None` where it does not get through.
+    pub(super) fn margins_of_passing(&self, p: [f64; 2]) -> Option<Vec<f64>> {
+        let ray = self.ray(p)?;
+        let mut margins = Vec::with_capacity(3 * self.color().tracer.surfaces());
+        self.color().tracer.margins(ray, |_, _, margin| margins.push(margin));
+        margins.iter().all(|margin| *margin >= 0.0).then_some(margins)
     }
 
     /// Whether the ray at `p` gets through the surfaces.
@@ -317,14 +329,7 @@ impl<'a> Search<'a> {
     /// The edge all around, from the azimuths 0 to `end`; `None` where nothing limits the pupil
     /// or where its edge is too ragged to be split.
     pub(super) fn boundary(mut self, end: f64, azimuths: usize) -> Option<Boundary> {
-        let mut samples = Vec::with_capacity(azimuths + 1);
-        let mut guess = 1.0;
-        for i in 0..=azimuths {
-            let azimuth = end * i as f64 / azimuths as f64;
-            let edge = self.edge(azimuth, guess, 0.02)?;
-            guess = edge.radius;
-            samples.push((azimuth, edge));
-        }
+        let samples = self.samples(end, azimuths)?;
         let mut arcs = vec![Arc { from: 0.0, to: end, limit: samples[0].1.limit }];
         for pair in samples.windows(2) {
             self.corners(pair[0], pair[1], &mut arcs)?;
@@ -334,6 +339,35 @@ impl<'a> Search<'a> {
             joined(&mut arcs, end);
         }
         Some(Boundary { frame: self.frame, arcs, samples, rays: self.rays })
+    }
+
+    /// Edges at equal steps of azimuth, and where another limit comes close in between.
+    fn samples(&mut self, end: f64, azimuths: usize) -> Option<Vec<(f64, Edge)>> {
+        let step = end / azimuths as f64;
+        let mut samples = Vec::with_capacity(azimuths + 1);
+        let mut margins = Vec::with_capacity(azimuths + 1);
+        let mut guess = 1.0;
+        for i in 0..=azimuths {
+            let azimuth = step * i as f64;
+            let edge = self.edge(azimuth, guess, 0.02)?;
+            guess = edge.radius;
+            samples.push((azimuth, edge));
+            self.rays += 1;
+            let inside = self.frame.point(azimuth, edge.radius * (1.0 - INSIDE));
+            margins.push(self.launch.margins_of_passing(inside).unwrap_or_default());
+        }
+        let half = end < 1.5 * PI;
+        margins.truncate(if half { azimuths + 1 } else { azimuths });
+        for dip in dips(&margins, half) {
+            let azimuth =
+                if half { (step * dip).clamp(0.0, end) } else { (step * dip).rem_euclid(end) };
+            let distance = |sample: &&(f64, Edge)| (sample.0 - azimuth).abs();
+            let near = samples.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            samples.push((azimuth, self.edge(azimuth, near.1.radius, 0.02)?));
+        }
+        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        samples.dedup_by(|a, b| a.0 == b.0);
+        Some(samples)
     }
 
     /// The corners between two edges: one, or what halving the azimuths brings to light where
@@ -354,6 +388,36 @@ impl<'a> Search<'a> {
         self.corners(a, between, arcs)?;
         self.corners(between, b, arcs)
     }
+}
+
+/// Where margins dip between rays at equal steps of azimuth, in steps from the first of them: the
+/// bottoms of the parabolas through a least margin and its neighbours, if they are much lower than
+/// that. Over half a turn the rays beyond its ends are mirror images.
+pub(super) fn dips(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
+    let count = margins.len();
+    let mut dips = Vec::new();
+    for i in 0..count {
+        let (before, after) = match (half, i) {
+            (true, 0) => (1, 1),
+            (true, _) if i == count - 1 => (i - 1, i - 1),
+            _ => ((i + count - 1) % count, (i + 1) % count),
+        };
+        let neighbours = margins[before].iter().zip(&margins[i]).zip(&margins[after]);
+        for ((left, here), right) in neighbours {
+            let (left, here, right) = (*left, *here, *right);
+            let bend = left - 2.0 * here + right;
+            // A margin that ends the pupil here is zero but for rounding, and no dip.
+            let open = here > ENDING * left.max(right);
+            if open && here <= left && here <= right && bend > 0.0 {
+                let place = 0.5 * (left - right) / bend;
+                let bottom = here - 0.25 * (left - right) * place;
+                if bottom < 0.5 * here {
+                    dips.push(i as f64 + place);
+                }
+            }
+        }
+    }
+    dips
 }
 
 /// What the value at the kept end of a bracket is multiplied with.

@@ -4,7 +4,7 @@
 //! where light is, in how many pieces, and whether one point sees all of it; then the edge is
 //! followed from there.
 
-use super::boundary::{Boundary, Edge, Frame, NEAR, Search};
+use super::boundary::{Boundary, Edge, Frame, NEAR, Search, dips};
 use super::launch::Launch;
 use super::quadrature::Nodes;
 use super::sample::{Pattern, pattern};
@@ -20,6 +20,9 @@ const SCANS: [(usize, f64); 3] = [(25, 120.0), (101, 13.0), (301, 1.7)];
 /// around that light, this often at most.
 const FEW: usize = 12;
 const ZOOMS: usize = 14;
+/// Light through a hole narrower than this, in pupil coordinates, is a single ray: a rim of size
+/// zero lets it through on the axis.
+const NARROWEST: f64 = 1e-9;
 /// Azimuths at which the edge is looked at first, over a half turn.
 const AZIMUTHS: usize = 24;
 /// How far from the axis light is looked for first where no disc limits the pupil.
@@ -64,12 +67,8 @@ impl<'a> Region<'a> {
         if launch.bench.stop_radius() == 0.0 {
             return Self { launch, kind: Kind::Dark, rays };
         }
-        if disc {
-            let rim = launch.fates(&rim(launch.is_symmetric()));
-            rays += rim.len();
-            if rim.iter().all(|lit| *lit) {
-                return Self { launch, kind: Kind::Clear, rays };
-            }
+        if disc && launch.is_clear(&mut rays) {
+            return Self { launch, kind: Kind::Clear, rays };
         }
         let Some(grid) = Grid::on_light(&launch, &mut rays) else {
             return Self { launch, kind: Kind::Dark, rays };
@@ -111,15 +110,30 @@ impl<'a> Region<'a> {
     }
 }
 
-/// Points at the rim of the disc and its centre; a half turn of them where the pupil is its own
-/// mirror image.
-fn rim(symmetric: bool) -> Vec<[f64; 2]> {
-    let turn = if symmetric { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
-    let at = |i: usize| (turn * i as f64).sin_cos().into();
-    (0..RIM_RAYS).map(at).chain([[0.0, 0.0]]).collect()
+/// The ray at an azimuth of the rim.
+fn rim(azimuth: f64) -> [f64; 2] {
+    azimuth.sin_cos().into()
 }
 
 impl Launch<'_> {
+    /// Whether the whole disc gets through, told by the margins of rays at its rim and by where
+    /// they are least in between.
+    fn is_clear(&self, rays: &mut usize) -> bool {
+        let half = self.is_symmetric();
+        let step = if half { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
+        let mut margins = Vec::with_capacity(RIM_RAYS);
+        for i in 0..RIM_RAYS {
+            *rays += 1;
+            let Some(found) = self.margins_of_passing(rim(step * i as f64)) else { return false };
+            margins.push(found);
+        }
+        *rays += 1;
+        let dips = dips(&margins, half);
+        *rays += dips.len();
+        let passes = |p: [f64; 2]| self.margins_of_passing(p).is_some();
+        passes([0.0, 0.0]) && dips.into_iter().all(|dip| passes(rim(step * dip)))
+    }
+
     /// Which of these pupil points get through the surfaces.
     pub(super) fn fates(&self, points: &[[f64; 2]]) -> Vec<bool> {
         let mut lit = vec![false; points.len()];
@@ -174,7 +188,7 @@ impl Grid {
             }
             grid = closer;
         }
-        Some(grid)
+        (grid.half > NARROWEST).then_some(grid)
     }
 
     /// Ever larger grids about the axis until one holds light, and all of it.

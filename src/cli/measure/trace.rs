@@ -44,7 +44,10 @@ impl Display for Report {
         writeln!(f, "{table}")?;
         write_rounding(f, "f64", &measured.rounding_f64)?;
         write_rounding(f, "f32", &measured.rounding_f32)?;
-        write_memory(f, "tracing a million rays", measured.memory_trace)
+        let ratio = measured.gradient_over_forward;
+        writeln!(f, "derivatives by all numbers: {ratio:.2} times the trace of the same rays")?;
+        write_memory(f, "tracing a million rays", measured.memory_trace)?;
+        write_memory(f, "differentiating a million rays", measured.memory_gradient)
     }
 }
 
