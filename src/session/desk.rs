@@ -310,7 +310,9 @@ impl Session {
         match files::save(&self.lens, path) {
             Ok(saved) => {
                 let mut text = format!("exported to {}", path.display());
-                for part in [saved.proof.map(|p| p.to_string()), saved.report.map(|r| r.to_string())] {
+                for part in
+                    [saved.proof.map(|p| p.to_string()), saved.report.map(|r| r.to_string())]
+                {
                     text += &part.map(|part| format!("\n{part}")).unwrap_or_default();
                 }
                 self.say(Severity::Note, text);

@@ -48,7 +48,12 @@ enum Waiting {
 
 impl Studio {
     /// A studio on a session. `left` is where the last window has left the panels.
-    pub fn new(session: Session, backing: Backing, memory: Memory, left: Option<&dyn Storage>) -> Self {
+    pub fn new(
+        session: Session,
+        backing: Backing,
+        memory: Memory,
+        left: Option<&dyn Storage>,
+    ) -> Self {
         let tree = left.and_then(|storage| eframe::get_value(storage, DOCK));
         Self {
             session,
@@ -82,7 +87,7 @@ impl Studio {
         self.name_window(ui.ctx(), &view);
         let mut wishes = menu::keys(ui, &view, self.dock.is_typing());
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut wishes));
-        bar_frame(ui, Side::bottom("status"), |ui| self.status(ui, &view, &mut wishes));
+        bar_frame(ui, Side::bottom("status"), |ui| Self::status(ui, &view, &mut wishes));
         let mut commands = Vec::new();
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut commands));
         wishes.extend(commands.into_iter().map(Wish::Do));
@@ -132,7 +137,9 @@ impl Studio {
         match purpose {
             Purpose::Open => self.replace(context, Command::Open(path)),
             Purpose::Save => self.apply(context, Command::Save(Some(path))),
-            Purpose::ExportZemax | Purpose::ExportJson => self.apply(context, Command::Export(path)),
+            Purpose::ExportZemax | Purpose::ExportJson => {
+                self.apply(context, Command::Export(path));
+            }
         }
     }
 
@@ -228,13 +235,12 @@ impl Studio {
     }
 
     /// The line at the bottom: the last message, and how old the numbers are.
-    fn status(&self, ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
+    fn status(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
         ui.horizontal(|ui| {
             messages(ui, &view.messages, wishes);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.weak(freshness(view)).on_hover_text(
-                    "How long all numbers of all panels took after the last change",
-                );
+                ui.weak(freshness(view))
+                    .on_hover_text("How long all numbers of all panels took after the last change");
                 if view.dirty {
                     ui.separator();
                     ui.weak("unsaved changes");

@@ -1,9 +1,7 @@
 //! The arrangement of the panels: tabs that can be dragged side by side, on top of each other, or
 //! closed and opened again from the menu.
 
-use eframe::egui::{
-    Color32, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText,
-};
+use eframe::egui::{Color32, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles,
     Tree, UiResponse,
@@ -28,7 +26,8 @@ impl std::fmt::Debug for Dock {
 impl Dock {
     /// All panels, arranged as they were left or as usual.
     pub fn new(backing: Backing, left: Option<Tree<Kind>>) -> Self {
-        let whole = |tree: &Tree<Kind>| Kind::ALL.iter().all(|kind| tree.tiles.find_pane(kind).is_some());
+        let whole =
+            |tree: &Tree<Kind>| Kind::ALL.iter().all(|kind| tree.tiles.find_pane(kind).is_some());
         let tree = left.filter(whole).unwrap_or_else(usual);
         Self { tree, panels: Kind::ALL.map(|kind| (kind, kind.panel(backing))).into() }
     }

@@ -136,7 +136,8 @@ fn file(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
 
 fn edit(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
     ui.set_min_width(260.0);
-    let steps = [("Undo", &view.undo, UNDO, Command::Undo), ("Redo", &view.redo, REDO, Command::Redo)];
+    let steps =
+        [("Undo", &view.undo, UNDO, Command::Undo), ("Redo", &view.redo, REDO, Command::Redo)];
     for (name, title, key, command) in steps {
         let text = title.as_ref().map_or_else(
             || name.to_owned(),
@@ -172,10 +173,7 @@ fn panels(ui: &mut Ui, dock: &mut Dock) {
 }
 
 fn history_buttons(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
-    let steps = [
-        ("Undo", &view.undo, Command::Undo),
-        ("Redo", &view.redo, Command::Redo),
-    ];
+    let steps = [("Undo", &view.undo, Command::Undo), ("Redo", &view.redo, Command::Redo)];
     for (name, title, command) in steps {
         let button = ui.add_enabled(title.is_some(), Button::new(name));
         let hint = title.as_ref().map_or_else(

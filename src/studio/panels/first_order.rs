@@ -171,7 +171,8 @@ fn fixed(value: f64) -> String {
 
 /// Red for what adds, blue for what takes away.
 fn tint(ui: &Ui, share: f64) -> Color32 {
-    let color = if share > 0.0 { ui.visuals().error_fg_color } else { ui.visuals().hyperlink_color };
+    let color =
+        if share > 0.0 { ui.visuals().error_fg_color } else { ui.visuals().hyperlink_color };
     color.gamma_multiply((0.4 * share.abs()) as f32)
 }
 

@@ -73,7 +73,8 @@ impl Aims {
 
     /// A menu of the terms that are not there yet.
     fn add(&mut self, ui: &mut Ui, view: &View) {
-        let there = |term: Term| self.terms.iter().any(|aim| aim.weighted.term.name() == term.name());
+        let there =
+            |term: Term| self.terms.iter().any(|aim| aim.weighted.term.name() == term.name());
         let missing: Vec<Term> = every(view).into_iter().filter(|term| !there(*term)).collect();
         if missing.is_empty() {
             return;

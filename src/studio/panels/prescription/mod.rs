@@ -14,7 +14,6 @@ use eframe::egui::{Button, Frame, Key, Margin, Panel as SidePanel, RichText, Ui}
 use super::Panel;
 use crate::session::{Command, View};
 use crate::studio::field::{Drafts, error_color};
-use crate::studio::wording::{capital, counted_from_one};
 use actions::Action;
 use table::Table;
 
@@ -82,10 +81,9 @@ impl Prescription {
     /// The last text that was refused, where it can be read in full.
     fn complaint(&self, ui: &mut Ui) {
         let Some(why) = self.drafts.complaint() else { return };
-        let text = capital(&counted_from_one(why));
         let frame = Frame::new().inner_margin(Margin::symmetric(4, 2));
         SidePanel::bottom("complaint").frame(frame).show_separator_line(false).show(ui, |ui| {
-            ui.label(RichText::new(text).color(error_color(ui)));
+            ui.label(RichText::new(why).color(error_color(ui)));
         });
     }
 }

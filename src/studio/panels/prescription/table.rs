@@ -1,8 +1,8 @@
 //! The table of the prescription.
 
 use eframe::egui::{
-    Align, Button, Color32, Id, Key, Layout, Modifiers, Popup, PopupCloseBehavior, Response, RichText,
-    ScrollArea, Ui, vec2,
+    Align, Button, Color32, Id, Key, Layout, Modifiers, Popup, PopupCloseBehavior, Response,
+    RichText, ScrollArea, Ui, vec2,
 };
 use egui_extras::{Column as Width, TableBuilder, TableRow};
 
@@ -12,8 +12,8 @@ use crate::lens::{Lens, Medium, Object, Parameter, Quantity};
 use crate::session::{Command, Edit, View, edited, evaluate};
 use crate::studio::field::{Drafts, Field as Cell};
 use crate::studio::number;
-use crate::studio::panels::numbers;
 use crate::studio::palette::{Palette, color32};
+use crate::studio::panels::numbers;
 use crate::studio::wording::{capital, counted_from_one};
 
 /// How high a row is, in points.
@@ -180,7 +180,9 @@ impl Table<'_> {
         for column in columns {
             row.col(|ui| match column {
                 Column::Radius => still(ui, "Infinity", badge::WIDTH),
-                Column::SemiDiameter => still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0),
+                Column::SemiDiameter => {
+                    still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0);
+                }
                 _ => {}
             });
         }
@@ -249,11 +251,11 @@ impl Table<'_> {
         let cell = Cell { name: &name, shown: &shown, hint: &hint, align: Align::Max };
         let place = (column, surface);
         let response = self.field(ui, place, cell, |text| Ok(typed(parameter, text)));
-        if !limit {
+        if limit {
+            response.on_hover_text(column.hint());
+        } else {
             badge::show(ui, &self.view.lens, parameter, self.drafts, self.wishes);
             self.toggle_by_key(ui, &response, parameter);
-        } else {
-            response.on_hover_text(column.hint());
         }
     }
 
@@ -368,12 +370,14 @@ impl Table<'_> {
         let layout = Layout::left_to_right(Align::Center);
         let entry = ui.allocate_ui_with_layout(size, layout, |ui| self.drafts.show(ui, id, cell));
         let entry = entry.inner;
-        let enter = ui.input(|input| input.key_pressed(Key::Enter));
+        // Consumed, so that the next cell does not end its typing by the same key.
+        let left = entry.response.lost_focus();
+        let enter = left && ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Enter));
         let fits = match entry.typed {
             Some(text) => self.take(id, edit(&text)),
             None => true,
         };
-        if entry.response.lost_focus() && enter {
+        if enter {
             let below = if row == OBJECT { 0 } else { row + 1 };
             let next = if fits { cell_id(column, below) } else { id };
             ui.memory_mut(|memory| memory.request_focus(next));
@@ -419,13 +423,8 @@ fn typed(parameter: Parameter, text: &str) -> Edit {
 
 /// The columns of a lens: those of aspheres only where there are some.
 fn columns(lens: &Lens) -> Vec<Column> {
-    let mut columns = vec![
-        Column::Radius,
-        Column::Thickness,
-        Column::Glass,
-        Column::SemiDiameter,
-        Column::Conic,
-    ];
+    let mut columns =
+        vec![Column::Radius, Column::Thickness, Column::Glass, Column::SemiDiameter, Column::Conic];
     let terms = lens.surfaces.iter().map(|row| row.asphere.len()).max().unwrap_or(0);
     columns.extend((0..terms).map(Column::Asphere));
     columns.push(Column::Comment);
