@@ -72,6 +72,11 @@ impl Studio {
         &self.session
     }
 
+    /// The same, to be told commands directly.
+    pub const fn session_mut(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
     /// Does what a command says, as a panel would ask for it.
     pub fn apply(&mut self, context: &Context, command: Command) {
         let events = self.session.apply(command);

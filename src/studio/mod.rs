@@ -7,6 +7,7 @@ pub mod chooser;
 pub mod dock;
 pub mod draw;
 pub mod field;
+mod gauge;
 mod menu;
 pub mod number;
 pub mod palette;
@@ -17,6 +18,7 @@ pub mod theme;
 pub mod wording;
 
 pub use app::Studio;
+pub use gauge::{Figures, measure};
 
 use std::path::Path;
 

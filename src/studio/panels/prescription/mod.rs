@@ -9,7 +9,7 @@ mod badge;
 mod glass;
 mod table;
 
-use eframe::egui::{Button, Frame, Key, Margin, Panel as SidePanel, RichText, Ui};
+use eframe::egui::{Button, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
 use super::Panel;
 use crate::session::{Command, View};
@@ -42,6 +42,11 @@ impl Panel for Prescription {
     fn is_typing(&self) -> bool {
         !self.drafts.is_empty()
     }
+}
+
+/// The field of the first radius.
+pub(in crate::studio) fn first_field() -> Id {
+    table::first_field()
 }
 
 impl Prescription {

@@ -408,6 +408,11 @@ impl Table<'_> {
 /// Stands for the row of the object where a surface is named.
 const OBJECT: usize = usize::MAX;
 
+/// The field of the first radius.
+pub(super) fn first_field() -> Id {
+    cell_id(Column::Radius, 0)
+}
+
 fn cell_id(column: Column, row: usize) -> Id {
     Id::unique(("prescription cell", column, row))
 }
