@@ -11,12 +11,14 @@ mod fan;
 mod illumination;
 mod mtf;
 mod spot;
+mod wavefront;
 
 pub use distortion::{Curvature, Distortion, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, illumination};
 pub use mtf::{Contrast, contrast};
-pub use spot::{ColorSpot, Spot, airy_radius, spot, spots};
+pub use spot::{ColorSpot, Spot, airy_radius, rounding, spot, spots};
+pub use wavefront::{Wavefront, path_differences, wavefront};
 
 use crate::lens::Field;
 use crate::pupil::{Bench, Kind, LaunchError, Region};

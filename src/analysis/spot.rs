@@ -16,11 +16,21 @@ pub struct ColorSpot {
     pub centroid: [Estimate; 2],
     /// The area of the pupil that is lit, in pupil coordinates: π where nothing is clipped.
     pub area: Estimate,
-    /// The mean square of the slope about its mean, and its covariance with the place, in mm: what
-    /// the spot does out of focus.
-    slope: [f64; 2],
+    /// What the spot does out of focus.
+    blur: Blur,
     /// Whether the tolerance was met.
     pub reached: bool,
+}
+
+/// The slopes with which the rays of a spot arrive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Blur {
+    /// The mean slope.
+    drift: [f64; 2],
+    /// The mean square of the slope about its mean.
+    square: f64,
+    /// Its covariance with the place, in mm.
+    covariance: f64,
 }
 
 /// The spot of a field.
@@ -36,6 +46,33 @@ pub struct Spot {
     pub centroid: [Estimate; 2],
     /// The largest distance of any ray from the common centroid, in mm.
     pub radius: Estimate,
+    /// The lit colours with their shares in the light.
+    shares: Vec<(ColorSpot, f64)>,
+}
+
+impl Spot {
+    /// The RMS radius with the image plane moved by `defocus` mm along the light.
+    pub fn rms_at(&self, defocus: f64) -> f64 {
+        let place =
+            |color: &ColorSpot, i: usize| color.centroid[i].value + defocus * color.blur.drift[i];
+        let colors = || self.shares.iter();
+        let center: [f64; 2] = [0, 1].map(|i| colors().map(|(c, s)| s * place(c, i)).sum());
+        let square = |color: &ColorSpot| {
+            let off = [0, 1].map(|i| place(color, i) - center[i]);
+            color.rms_at(defocus).powi(2) + off[0] * off[0] + off[1] * off[1]
+        };
+        colors().map(|(color, share)| share * square(color)).sum::<f64>().sqrt()
+    }
+
+    /// By how much to move the image plane for the smallest RMS radius, in mm; `None` where all
+    /// rays are parallel.
+    pub fn best_focus(&self) -> Option<f64> {
+        // The mean square is a parabola: three of its points tell where its bottom is.
+        let at = |defocus: f64| self.rms_at(defocus).powi(2);
+        let (left, middle, right) = (at(-1.0), at(0.0), at(1.0));
+        let curvature = left - 2.0 * middle + right;
+        (curvature > 0.0).then(|| 0.5 * (left - right) / curvature)
+    }
 }
 
 /// The radius of the first dark ring of a perfect lens with this aperture, in mm.
@@ -74,6 +111,7 @@ pub fn spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, Dar
         rms: pooled.rms,
         centroid: pooled.centroid,
         radius: geometric_radius(&lit, center, pooled.rms.error),
+        shares: lit.iter().map(|pair| pair.1).zip(shares).collect(),
         colors: pairs.iter().map(|pair| pair.as_ref().map(|p| p.1).map_err(|e| *e)).collect(),
     })
 }
@@ -114,8 +152,8 @@ fn pooled(lit: &[&(Region<'_>, ColorSpot)], shares: &[f64]) -> Pooled {
 }
 
 /// What rounding may do to the place of a ray, in mm: a few units of the last digit of the largest
-/// coordinate on its way.
-fn rounding(bench: &Bench) -> f64 {
+/// coordinate on its way. It is the error of whatever a single ray says.
+pub fn rounding(bench: &Bench) -> f64 {
     let gaps = bench.colors[bench.primary].system.surfaces.iter().map(|surface| surface.thickness);
     let heights = bench.first.marginal.heights.iter().copied();
     8.0 * f64::EPSILON * gaps.chain(heights).fold(0.0, |largest: f64, v| largest.max(v.abs()))
@@ -130,7 +168,8 @@ fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
         |[rms, _, _, area, ..]| {
             // What rounding leaves of a perfect spot has no digits to ask for.
             let rms = rms.max(rounding / accuracy.tolerance);
-            [rms, rms, rms, *area, f64::INFINITY, f64::INFINITY]
+            let any = f64::INFINITY;
+            [rms, rms, rms, *area, any, any, any, any]
         },
     )?;
     let estimate = |k: usize, least: f64| {
@@ -140,7 +179,11 @@ fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
         rms: estimate(0, rounding),
         centroid: [estimate(1, rounding), estimate(2, rounding)],
         area: estimate(3, f64::EPSILON),
-        slope: [found.values[4], found.values[5]],
+        blur: Blur {
+            square: found.values[4],
+            covariance: found.values[5],
+            drift: [found.values[6], found.values[7]],
+        },
         reached: found.reached,
     })
 }
@@ -148,16 +191,16 @@ fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
 impl ColorSpot {
     /// The RMS radius with the image plane moved by `defocus` mm along the light.
     pub fn rms_at(&self, defocus: f64) -> f64 {
-        let [slope, covariance] = self.slope;
-        let square = self.rms.value.powi(2) + defocus * (2.0 * covariance + defocus * slope);
-        square.max(0.0).sqrt()
+        let Blur { square, covariance, .. } = self.blur;
+        let mean = self.rms.value.powi(2) + defocus * (2.0 * covariance + defocus * square);
+        mean.max(0.0).sqrt()
     }
 
     /// By how much to move the image plane for the smallest RMS radius, in mm; `None` where all
     /// rays are parallel.
     pub fn best_focus(&self) -> Option<f64> {
-        let [slope, covariance] = self.slope;
-        (slope > 0.0).then(|| -covariance / slope)
+        let Blur { square, covariance, .. } = self.blur;
+        (square > 0.0).then(|| -covariance / square)
     }
 }
 
@@ -170,6 +213,7 @@ struct Moments {
     square: f64,
     slope_square: f64,
     covariance: f64,
+    drift: [f64; 2],
 }
 
 impl Moments {
@@ -191,7 +235,7 @@ impl Moments {
         let across = |of: &dyn Fn(usize) -> f64| if nodes.mirrored { 0.0 } else { mean(of) };
         let (x, y) = (across(&|i| hits.x[i]), mean(&|i| hits.y[i]));
         let (u, v) = (across(&slope_x), mean(&slope_y));
-        let mut moments = Self { area, x, y, ..Self::default() };
+        let mut moments = Self { area, x, y, drift: [u, v], ..Self::default() };
         for (i, w) in landed.arrived() {
             let (dx, dy) = (hits.x[i] - x, hits.y[i] - y);
             let (du, dv) = (slope_x(i) - u, slope_y(i) - v);
@@ -202,8 +246,9 @@ impl Moments {
         Some(moments)
     }
 
-    fn numbers(&self) -> [f64; 6] {
-        [self.square.sqrt(), self.x, self.y, self.area, self.slope_square, self.covariance]
+    fn numbers(&self) -> [f64; 8] {
+        let Self { area, x, y, square, slope_square, covariance, drift: [u, v] } = *self;
+        [square.sqrt(), x, y, area, slope_square, covariance, u, v]
     }
 }
 

@@ -1,11 +1,14 @@
-//! From one file format to another.
+//! From one file format to another, with all that was lost on the way.
 
 use super::failure::Failure;
+use super::input::check_target;
 use super::output::Output;
+use crate::files;
 use std::path::PathBuf;
 
-/// Converts a lens between formats and reports what was lost
+/// Converts a lens between formats; reports what was used, approximated, preserved and dropped
 #[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("help/convert.txt"))]
 pub(super) struct Convert {
     /// The lens that is read: .json or .zmx
     #[arg(value_name = "IN")]
@@ -17,9 +20,8 @@ pub(super) struct Convert {
 }
 
 impl Convert {
-    pub(super) fn run(&self, _output: &Output) -> Result<(), Failure> {
-        let opened = crate::files::open(&self.from)?;
-        crate::files::save(&opened.lens, &self.to)?;
-        Ok(())
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        check_target(&self.to, &["json", "zmx"])?;
+        output.print(&files::convert(&self.from, &self.to)?)
     }
 }

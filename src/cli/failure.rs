@@ -2,6 +2,7 @@
 
 use crate::files::FileError;
 use crate::lens::{Invalid, LensError};
+use crate::merit::MeritError;
 use crate::paraxial::Undefined;
 use crate::pupil::BenchError;
 use std::io;
@@ -36,6 +37,14 @@ pub(super) enum Failure {
         /// What is wrong.
         source: BenchError,
     },
+    /// A lens without the merit that is asked for.
+    #[error("{file}: {source}")]
+    Merit {
+        /// The lens.
+        file: String,
+        /// What is wrong.
+        source: MeritError,
+    },
     /// Rays that cannot be traced.
     #[error("{file}: {source}")]
     Rays {
@@ -66,6 +75,7 @@ impl Failure {
             | Self::Lens { .. }
             | Self::Undefined { .. }
             | Self::Bench { .. }
+            | Self::Merit { .. }
             | Self::Rays { .. }
             | Self::Input(_) => 2,
         }

@@ -1,7 +1,8 @@
 //! Reading what a subcommand works on.
 
 use super::failure::Failure;
-use crate::files::{self, FileError, native};
+use super::output::remark;
+use crate::files::{self, FileError, Outcome, native};
 use crate::lens::{Field, FieldKind, Lens, System};
 use crate::pupil::Bench;
 use serde::de::DeserializeOwned;
@@ -25,10 +26,18 @@ pub(super) struct Opened {
 }
 
 impl LensFile {
-    /// Reads the lens.
+    /// Reads the lens; what a foreign file says that we cannot is remarked on.
     pub(super) fn open(&self) -> Result<Opened, Failure> {
         let file = self.path.display().to_string();
-        Ok(Opened { lens: files::open(&self.path)?.lens, file })
+        let opened = files::open(&self.path)?;
+        let report = opened.report.unwrap_or_default();
+        let [dropped, changed] =
+            [Outcome::Dropped, Outcome::Approximated].map(|outcome| report.count(outcome));
+        if dropped + changed > 0 {
+            let text = format!("{dropped} lines dropped, {changed} approximated");
+            remark(format!("note: {file}: {text}; `aplanat convert` lists them"));
+        }
+        Ok(Opened { lens: opened.lens, file })
     }
 }
 
@@ -104,6 +113,25 @@ pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> 
         std::fs::read_to_string(path).map_err(unreadable)?
     };
     Ok(native::read_json(&text, &file)?)
+}
+
+/// Refuses a target that surely cannot be written, before the work and not after it.
+pub(super) fn check_target(path: &Path, extensions: &[&str]) -> Result<(), Failure> {
+    let file = path.display();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if !extensions.contains(&extension.to_ascii_lowercase().as_str()) {
+        let expected = extensions.join("` or `.");
+        let text = format!("{file}: found the extension `{extension}`; expected `.{expected}`");
+        return Err(Failure::Input(text));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    if path.is_dir() || !folder.is_dir() {
+        let found = if path.is_dir() { "a folder of that name" } else { "no such folder" };
+        let text = format!("{file}: found {found}; expected a file in a folder that exists");
+        return Err(Failure::Input(text));
+    }
+    Ok(())
 }
 
 /// What a message calls a file.

@@ -10,17 +10,19 @@
 mod analyze;
 mod convert;
 mod failure;
+mod gradient;
 mod info;
 mod input;
 mod measure;
+mod optimize;
 mod output;
 mod trace;
+mod vary;
 mod window;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
-use output::Output;
-use std::io::{Write as _, stderr};
+use output::{Output, remark};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -49,6 +51,8 @@ enum Command {
     Info(info::Info),
     Trace(trace::Trace),
     Analyze(analyze::Analyze),
+    Gradient(gradient::Gradient),
+    Optimize(optimize::Optimize),
     Convert(convert::Convert),
     Measure(measure::Measure),
 }
@@ -59,6 +63,8 @@ impl Command {
             Self::Info(info) => info.run(output),
             Self::Trace(trace) => trace.run(output),
             Self::Analyze(analyze) => analyze.run(output),
+            Self::Gradient(gradient) => gradient.run(output),
+            Self::Optimize(optimize) => optimize.run(output),
             Self::Convert(convert) => convert.run(output),
             Self::Measure(measure) => measure.run(output),
         }
@@ -94,8 +100,7 @@ impl Arguments {
 fn finish(result: Result<(), Failure>) -> ExitCode {
     let Err(failure) = result else { return ExitCode::SUCCESS };
     if !failure.is_closed_pipe() {
-        // Nothing is left to tell it to if standard error is closed too.
-        drop(writeln!(stderr(), "error: {failure}"));
+        remark(format!("error: {failure}"));
     }
     ExitCode::from(failure.status())
 }

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use crate::files::native;
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::io::{Write as _, stdout};
+use std::io::{Write as _, stderr, stdout};
 
 /// Where results go, and in which form.
 #[derive(Debug)]
@@ -24,6 +24,12 @@ impl Output {
         out.write_all(text.as_bytes())?;
         Ok(out.flush()?)
     }
+}
+
+/// Tells the person something that is not the result.
+pub(super) fn remark(text: impl Display) {
+    // A remark that nobody can read is not worth failing for.
+    drop(writeln!(stderr(), "{text}"));
 }
 
 /// A number with seven significant digits, and no more zeros than it needs.

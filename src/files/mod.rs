@@ -4,6 +4,7 @@
 //! approximated, preserved and dropped; an export is read back and traced before it counts as
 //! written; a file is written beside its target and renamed, so that nothing is lost on the way.
 
+mod convert;
 mod error;
 mod library;
 pub mod native;
@@ -13,10 +14,12 @@ mod save;
 mod text;
 pub mod zemax;
 
+pub use convert::{Conversion, convert};
 pub use error::FileError;
 pub use library::{Bundled, library};
 pub use probe::{Proof, SelfCheck};
 pub use report::{Outcome, Report, ReportRow};
+pub use save::replace;
 
 use crate::lens::Lens;
 use serde::Serialize;
@@ -52,8 +55,10 @@ pub struct SaveReport {
     /// What was written.
     pub format: Format,
     /// What a foreign file could not hold exactly.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<Report>,
     /// That a foreign file traces like the lens.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<Proof>,
 }
 
@@ -124,7 +129,7 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
             (bytes, Some(report), Some(proof))
         }
     };
-    save::replace(path, &bytes)?;
+    replace(path, &bytes)?;
     Ok(SaveReport { format, report, proof })
 }
 

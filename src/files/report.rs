@@ -98,8 +98,8 @@ impl fmt::Display for Report {
         for row in Outcome::ALL.into_iter().flat_map(|outcome| self.with(outcome)) {
             let line = row.line.map(|line| line.to_string()).unwrap_or_default();
             let text: String = row.text.chars().take(60).collect();
-            write!(f, "{:<12} {line:>5}  {text:<40}", row.outcome.name())?;
-            writeln!(f, "{}{}", if row.note.is_empty() { "" } else { "  " }, row.note)?;
+            let row = format!("{:<12} {line:>5}  {text:<40}  {}", row.outcome.name(), row.note);
+            writeln!(f, "{}", row.trim_end())?;
         }
         Ok(())
     }

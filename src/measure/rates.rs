@@ -15,7 +15,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    fn of(mut turns: Vec<f64>) -> Self {
+    pub(super) fn of(mut turns: Vec<f64>) -> Self {
         turns.sort_by(f64::total_cmp);
         let at = |i: usize| turns.get(i).copied().unwrap_or(f64::NAN);
         Self { median: at(turns.len() / 2), min: at(0), max: at(turns.len().saturating_sub(1)) }

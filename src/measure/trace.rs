@@ -5,21 +5,27 @@ use super::memory::{Memory, peak_megabytes};
 use super::rates::{Contestant, Rate, compete};
 use super::rounding::{Rounding, rounding};
 use crate::lens::{Invalid, LensError, Shape, System, glass::line};
-use crate::math::Real;
-use crate::trace::{Points, Ray, Rays, Tracer, Width};
+use crate::math::{Real, Vec3};
+use crate::merit::MeritError;
+use crate::trace::{Points, Ray, Rays, Seed, Tracer, Width};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
 
-/// Rays of a turn: 24 tasks for two threads, and still in the second-level cache.
-const RAYS: usize = 24 * 4096;
+/// Rays of a turn on one thread.
+const RAYS: usize = 2 * 4096;
+/// Rays of a turn on two threads: 24 tasks.
+const SHARED_RAYS: usize = 24 * 4096;
 /// Rays that are traced one at a time in a turn.
 const SINGLE_RAYS: usize = 4096;
 /// Rays on which rounding is measured.
 const ROUNDED_RAYS: usize = 4096;
 /// Rays for which memory is measured.
 const MANY_RAYS: usize = 1_000_000;
-const TURN: f64 = 4e-3; // seconds: shorter than what a busy system grants at once
+const TURN: f64 = 5e-4; // seconds: much shorter than what a busy system grants at once
+
+const FORWARD: &str = "f64_batch_1_thread";
+const GRADIENT: &str = "gradient";
 
 /// What tracing costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,8 +38,13 @@ pub struct Throughput {
     pub rounding_f64: Rounding,
     /// Rounding in `f32` against twice the precision.
     pub rounding_f32: Rounding,
+    /// How many times longer the derivatives by all numbers take than the trace of the same rays,
+    /// tracing them included.
+    pub gradient_over_forward: f64,
     /// Tracing a million rays, the rays themselves included.
     pub memory_trace: Option<Memory>,
+    /// The derivatives of a million rays by all numbers, the rays themselves included.
+    pub memory_gradient: Option<Memory>,
 }
 
 /// One way of tracing.
@@ -65,6 +76,9 @@ pub enum Unmeasured {
     /// The numbers of the lens.
     #[error(transparent)]
     Invalid(#[from] Invalid),
+    /// The merit of the lens.
+    #[error(transparent)]
+    Merit(#[from] MeritError),
     /// No threads.
     #[error("no threads to measure with: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -114,15 +128,24 @@ pub fn throughput(turns: usize) -> Result<Throughput, Unmeasured> {
     let tracers = Tracers::new(&system)?;
     let pool = ThreadPoolBuilder::new().num_threads(2).build()?;
     let memory_trace = peak_megabytes(|| trace_many(&tracers.plain));
+    let memory_gradient = peak_megabytes(|| differentiate_many(&tracers.plain));
     let (names, mut contestants): (Vec<_>, Vec<_>) =
         contestants(&tracers, &pool).into_iter().unzip();
     let rates = compete(&mut contestants, turns, TURN);
+    let rows: Vec<TraceRow> =
+        names.into_iter().zip(rates).map(|(name, rate)| TraceRow::new(name, rate)).collect();
+    let rate = |name| {
+        let row = rows.iter().find(|row| row.name == name);
+        row.map_or(f64::NAN, |row| row.million_ray_surfaces_per_s)
+    };
     Ok(Throughput {
         surfaces: tracers.plain.surfaces(),
-        rows: names.into_iter().zip(rates).map(|(name, rate)| TraceRow::new(name, rate)).collect(),
+        gradient_over_forward: rate(FORWARD) / rate(GRADIENT),
+        rows,
         rounding_f64: rounding::<f64>(&system, ROUNDED_RAYS)?,
         rounding_f32: rounding::<f32>(&system, ROUNDED_RAYS)?,
         memory_trace,
+        memory_gradient,
     })
 }
 
@@ -132,7 +155,7 @@ fn contestants<'a>(
 ) -> Vec<(&'static str, Contestant<'a>)> {
     let Tracers { plain, single_precision, spheres, conics, aspheres } = tracers;
     vec![
-        ("f64_batch_1_thread", batch(plain, Width::Bits512)),
+        (FORWARD, batch(plain, Width::Bits512)),
         ("f64_batch_2_threads", on_two_threads(plain, pool)),
         ("f64_batch_1_thread_spheres", batch(spheres, Width::Bits512)),
         ("f64_batch_1_thread_conics", batch(conics, Width::Bits512)),
@@ -141,6 +164,9 @@ fn contestants<'a>(
         ("f64_batch_baseline", batch(plain, Width::Baseline)),
         ("f64_single", one_by_one(plain)),
         ("f32_batch_1_thread", batch(single_precision, Width::Bits512)),
+        (GRADIENT, gradient(plain)),
+        ("gradient_2_aspheres", gradient(aspheres)),
+        ("gradient_2_threads", gradient_on_two_threads(plain, pool)),
     ]
 }
 
@@ -158,12 +184,12 @@ fn batch<R: Real>(tracer: &Tracer<R>, width: Width) -> Contestant<'_> {
 }
 
 fn on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> Contestant<'a> {
-    let (rays, mut points) = (bundle(RAYS), Points::default());
+    let (rays, mut points) = (bundle(SHARED_RAYS), Points::default());
     let turn = Box::new(move || {
         pool.install(|| tracer.batch_parallel(&rays, &mut points));
         black_box(&points);
     });
-    Contestant { work: work(tracer, RAYS), turn }
+    Contestant { work: work(tracer, SHARED_RAYS), turn }
 }
 
 fn one_by_one(tracer: &Tracer<f64>) -> Contestant<'_> {
@@ -177,6 +203,28 @@ fn one_by_one(tracer: &Tracer<f64>) -> Contestant<'_> {
         }
     });
     Contestant { work: work(tracer, SINGLE_RAYS), turn }
+}
+
+/// The derivative of a sum of squares over the image, by where each ray lands.
+fn seed(ray: usize) -> Seed<f64> {
+    let (x, y) = ((ray % 7) as f64 * 1e-3, (ray % 5) as f64 * 1e-3);
+    Seed { point: Vec3::new(x, y, 0.0), ..Seed::default() }
+}
+
+fn gradient(tracer: &Tracer<f64>) -> Contestant<'_> {
+    let rays = bundle(RAYS);
+    let turn = Box::new(move || {
+        black_box(tracer.gradient(&rays, seed));
+    });
+    Contestant { work: work(tracer, RAYS), turn }
+}
+
+fn gradient_on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> Contestant<'a> {
+    let rays = bundle(SHARED_RAYS);
+    let turn = Box::new(move || {
+        black_box(pool.install(|| tracer.gradient_parallel(&rays, seed)));
+    });
+    Contestant { work: work(tracer, SHARED_RAYS), turn }
 }
 
 /// The same rays as another number type.
@@ -196,4 +244,9 @@ fn trace_many(tracer: &Tracer<f64>) {
     let (rays, mut points) = (bundle(MANY_RAYS), Points::default());
     tracer.batch(&rays, &mut points);
     black_box(&points);
+}
+
+fn differentiate_many(tracer: &Tracer<f64>) {
+    let rays = bundle(MANY_RAYS);
+    black_box(tracer.gradient(&rays, seed));
 }

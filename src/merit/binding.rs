@@ -5,7 +5,7 @@
 
 use super::{Along, MeritError};
 use crate::lens::glass::model_index;
-use crate::lens::{FieldKind, Lens, Medium, Object, Quantity, System, focus_gap};
+use crate::lens::{FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System, focus_gap};
 use crate::math::Real;
 use crate::trace::{Gradient, Slot};
 use nalgebra::DVector;
@@ -29,7 +29,7 @@ pub(super) struct Zoom {
     pub(super) field: FieldKind,
     /// Which gaps are glass.
     pub(super) glass: Vec<bool>,
-    /// One for each wavelength, clipped by nothing.
+    /// One for each wavelength, opened so that rims do not clip.
     systems: Vec<System<f64>>,
     /// What clips them.
     pub(super) rims: Vec<Option<f64>>,
@@ -54,7 +54,7 @@ impl Zoom {
         let mut lines = Vec::new();
         for wavelength in &lens.wavelengths {
             let mut system = lens.system(number, wavelength.um)?;
-            system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = f64::INFINITY);
+            system.surfaces.iter_mut().for_each(open_up);
             let found = lines_of(lens, number, wavelength.um, &mut system);
             lines.push(found);
             systems.push(system);
@@ -193,6 +193,18 @@ impl Zoom {
     }
 }
 
+/// Rays may pass a rim by any amount while the lens moves, but an asphere ends not far behind its
+/// own: outside, its polynomial means nothing, and rays may cross it several times.
+fn open_up(surface: &mut Surface<f64>) {
+    surface.semi_diameter = match surface.shape {
+        Shape::Asphere { .. } => BEYOND * surface.semi_diameter,
+        Shape::Plane | Shape::Sphere { .. } | Shape::Conic { .. } => f64::INFINITY,
+    };
+}
+
+/// How far an asphere goes on behind its rim.
+const BEYOND: f64 = 1.05;
+
 /// What follows the variables at a wavelength; the system is written in forms that have all these
 /// numbers.
 fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<Line> {
@@ -255,7 +267,6 @@ fn followers_of_index(lens: &Lens, surface: usize, slot: Slot) -> Vec<usize> {
 
 /// Writes a surface in a form that has a number, even where it is zero.
 fn widen(system: &mut System<f64>, surface: usize, slot: Slot) {
-    use crate::lens::Shape;
     let shape = &mut system.surfaces[surface].shape;
     *shape = match (slot, *shape) {
         (Slot::Curvature, Shape::Plane) => Shape::Sphere { curvature: 0.0 },
@@ -267,7 +278,6 @@ fn widen(system: &mut System<f64>, surface: usize, slot: Slot) {
 
 /// A number of a system.
 fn number_mut<R: Real>(system: &mut System<R>, surface: usize, slot: Slot) -> &mut R {
-    use crate::lens::Shape;
     let surface = &mut system.surfaces[surface];
     match (slot, &mut surface.shape) {
         (Slot::Thickness, _) => &mut surface.thickness,

@@ -2,10 +2,11 @@
 //! length of the lens, room behind it. Each is the square of what is missing, zero where nothing
 //! is.
 
+use super::binding::Zoom;
 use super::first_order::slopes;
 use super::sum::Sum;
-use super::{Along, Scene, Term};
-use crate::lens::System;
+use super::{Along, MeritError, Scene, Term};
+use crate::lens::{Lens, System};
 use crate::math::Real;
 
 /// Adds one of the terms about gaps.
@@ -29,7 +30,7 @@ pub(super) fn gaps(scene: &Scene<'_>, term: Term, sum: &mut Sum) {
 }
 
 fn centers(scene: &Scene<'_>, glass: bool, (min, max): (f64, f64), sum: &mut Sum) {
-    for gap in inner_gaps(scene, glass) {
+    for gap in scene.zoom.inner_gaps(glass) {
         let number = Number { of: Of::Center(gap), scene };
         number.at_least(min, sum);
         number.at_most(max, sum);
@@ -37,18 +38,59 @@ fn centers(scene: &Scene<'_>, glass: bool, (min, max): (f64, f64), sum: &mut Sum
 }
 
 fn edges(scene: &Scene<'_>, glass: bool, min: f64, sum: &mut Sum) {
-    for gap in inner_gaps(scene, glass) {
-        let rims = &scene.zoom.rims;
-        let sizes = [rims[gap], rims.get(gap + 1).copied().flatten()];
-        let Some(height) = sizes.into_iter().flatten().reduce(f64::max) else { continue };
+    for gap in scene.zoom.inner_gaps(glass) {
+        let Some(height) = scene.zoom.rim(gap) else { continue };
         Number { of: Of::Edge(gap, height), scene }.at_least(min, sum);
     }
 }
 
-/// The gaps of a kind, without the last one, which leads to the image.
-fn inner_gaps(scene: &Scene<'_>, glass: bool) -> Vec<usize> {
-    let count = scene.zoom.glass.len() - 1;
-    (0..count).filter(|gap| scene.zoom.glass[*gap] == glass).collect()
+impl Zoom {
+    /// The gaps of a kind, without the last one, which leads to the image.
+    fn inner_gaps(&self, glass: bool) -> impl Iterator<Item = usize> + '_ {
+        (0..self.glass.len() - 1).filter(move |gap| self.glass[*gap] == glass)
+    }
+
+    /// The larger semi-diameter of the two surfaces of a gap.
+    fn rim(&self, gap: usize) -> Option<f64> {
+        let sizes = [self.rims[gap], self.rims.get(gap + 1).copied().flatten()];
+        sizes.into_iter().flatten().reduce(f64::max)
+    }
+}
+
+/// The smallest thicknesses that a lens has at any zoom position, in mm; infinite where it has no
+/// such gap.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slimmest {
+    pub(super) glass_center: f64,
+    pub(super) glass_edge: f64,
+    pub(super) air_center: f64,
+    pub(super) air_edge: f64,
+}
+
+impl Slimmest {
+    pub(super) fn of(lens: &Lens) -> Result<Self, MeritError> {
+        let none = f64::INFINITY;
+        let mut found =
+            Self { glass_center: none, glass_edge: none, air_center: none, air_edge: none };
+        for number in 0..lens.zoom_positions() {
+            let zoom = Zoom::new(lens, number)?;
+            let values: Vec<f64> =
+                lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
+            let system = &zoom.at(&values).systems[zoom.primary];
+            for gap in 0..zoom.glass.len() - 1 {
+                let center = Of::Center(gap).length(system);
+                let edge = zoom.rim(gap).map_or(none, |h| Of::Edge(gap, h).length(system));
+                let (to_center, to_edge) = if zoom.glass[gap] {
+                    (&mut found.glass_center, &mut found.glass_edge)
+                } else {
+                    (&mut found.air_center, &mut found.air_edge)
+                };
+                *to_center = to_center.min(center);
+                *to_edge = to_edge.min(edge);
+            }
+        }
+        Ok(found)
+    }
 }
 
 /// A length that a term is about.

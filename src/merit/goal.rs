@@ -1,7 +1,8 @@
 //! What a lens is asked for.
 
 use super::MeritError;
-use crate::lens::{Lens, Object};
+use super::gaps::Slimmest;
+use crate::lens::Lens;
 use crate::paraxial::{Beam, first_order};
 use serde::{Deserialize, Serialize};
 
@@ -94,7 +95,8 @@ impl Term {
 
 impl Goal {
     /// What a designer would ask of a lens first: sharp spots at the focal length it has, glass
-    /// and air that can be made, nothing longer than it is by more than a fifth.
+    /// and air that can be made or are no thinner than they are, nothing longer than it is by more
+    /// than a fifth.
     pub fn sensible(lens: &Lens) -> Result<Self, MeritError> {
         let focal_lengths = focal_lengths(lens)?;
         let first = focal_lengths[0];
@@ -103,12 +105,13 @@ impl Goal {
         if let Some(first) = first {
             terms.push(Weighted { term: Term::FocalLength(first), weight: 1e-2 });
         }
-        let thin = 0.012 * size;
+        let now = Slimmest::of(lens)?;
+        let (glass, air) = (0.012 * size, 0.002 * size);
         for term in [
-            Term::GlassCenter { min: thin, max: 0.5 * size },
-            Term::GlassEdge(0.8 * thin),
-            Term::AirCenter { min: 0.002 * size, max: 3.0 * track(lens) },
-            Term::AirEdge(0.001 * size),
+            Term::GlassCenter { min: now.glass_center.clamp(0.0, glass), max: 0.5 * size },
+            Term::GlassEdge(now.glass_edge.clamp(0.0, 0.8 * glass)),
+            Term::AirCenter { min: now.air_center.clamp(0.0, air), max: 3.0 * track(lens) },
+            Term::AirEdge(now.air_edge.clamp(0.0, 0.5 * air)),
             Term::TotalTrack(1.2 * track(lens)),
         ] {
             terms.push(Weighted { term, weight: 1.0 });
@@ -159,6 +162,5 @@ fn focal_lengths(lens: &Lens) -> Result<Vec<Option<f64>>, MeritError> {
 
 /// From the first vertex to the image, as the sum of all gaps without sign.
 fn track(lens: &Lens) -> f64 {
-    let object = if lens.object == Object::Infinity { 0.0 } else { f64::EPSILON };
-    lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>() + object
+    lens.surfaces.iter().map(|row| row.thickness.abs()).sum()
 }

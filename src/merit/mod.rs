@@ -182,7 +182,8 @@ impl Merit {
         lens
     }
 
-    /// How the spots are sampled, by zoom position, field and wavelength.
+    /// How the spots are sampled, by zoom position, field and wavelength; a spot without rays has no
+    /// light and counts nothing.
     pub fn sampled(&self) -> Vec<Sampled> {
         self.samplings.iter().flat_map(Sampling::sampled).collect()
     }

@@ -15,7 +15,8 @@ pub struct Sampled {
     pub field: usize,
     /// The wavelength in micrometres.
     pub um: f64,
-    /// Rays traced for each value of the merit function.
+    /// Rays traced for each value of the merit function; none where no light gets through, and the
+    /// spot then counts nothing.
     pub rays: usize,
     /// The estimated relative error of the spot's radius.
     pub error: f64,
@@ -79,21 +80,38 @@ impl Sampling {
                 if wavelength == bench.primary {
                     sampling.chief.push(chief(&launch).ok_or_else(|| dark(&place))?);
                 }
+                found.mirrored.push(launch.is_symmetric());
                 if share > 0.0 {
-                    let sampled = found.add(launch, share, tolerance, place)?;
-                    sampling.sampled.push(sampled);
-                } else {
-                    found.mirrored.push(false);
+                    sampling.sampled.push(found.add(launch, share, tolerance, place));
                 }
                 found.ends.push(found.weights.len());
             }
             sampling.colors.push(found);
         }
-        Ok(sampling)
+        sampling.share_of_light();
+        match sampling.sampled.first() {
+            Some(first) if sampling.sampled.iter().all(|s| s.rays == 0) => Err(dark(first)),
+            _ => Ok(sampling),
+        }
+    }
+
+    /// Spots without light leave their share to the others.
+    fn share_of_light(&mut self) {
+        let weights = || self.colors.iter().flat_map(|color| &color.weights);
+        let lit: f64 = weights().sum();
+        if lit > 0.0 {
+            let all = self.colors.iter_mut().flat_map(|color| &mut color.weights);
+            all.for_each(|weight| *weight /= lit);
+        }
     }
 
     pub(super) fn sampled(&self) -> Vec<Sampled> {
         self.sampled.clone()
+    }
+
+    /// Whether no light of a field gets through at any wavelength.
+    pub(super) fn is_dark(&self, field: usize) -> bool {
+        self.colors.iter().all(|color| color.range(field).is_empty())
     }
 
     pub(super) fn chiefs(&self) -> usize {
@@ -111,14 +129,8 @@ fn chief(launch: &Launch<'_>) -> Option<Ray<f64>> {
 }
 
 impl Color {
-    /// Adds the rays of one field with a share of the whole.
-    fn add(
-        &mut self,
-        launch: Launch<'_>,
-        share: f64,
-        tolerance: f64,
-        place: Sampled,
-    ) -> Result<Sampled, MeritError> {
+    /// Adds the rays of one field with a share of the whole; none where no light gets through.
+    fn add(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: Sampled) -> Sampled {
         let region = Region::new(launch);
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let mut kept = Nodes::default();
@@ -126,8 +138,9 @@ impl Color {
             kept.clone_from(nodes);
             mean_square(&region, nodes).map(|square| [square.sqrt()])
         };
-        let found = converged(&region, accuracy, spot, |values| *values);
-        let found = found.ok_or_else(|| dark(&place))?;
+        let Some(found) = converged(&region, accuracy, spot, |values| *values) else {
+            return place;
+        };
         let before = self.weights.len();
         let landed = region.trace::<Points<f64>>(&kept);
         let arrived: Vec<_> = landed.arrived().collect();
@@ -138,10 +151,9 @@ impl Color {
             self.rays.push(rays[i]);
             self.weights.push(share * weight / lit);
         }
-        self.mirrored.push(kept.mirrored);
         let radius = found.values[0].max(f64::MIN_POSITIVE);
         let error = found.errors[0] / radius;
-        Ok(Sampled { rays: self.weights.len() - before, error, ..place })
+        Sampled { rays: self.weights.len() - before, error, ..place }
     }
 }
 

@@ -146,6 +146,9 @@ pub(super) fn distortion(scene: &Scene<'_>, sum: &mut Sum) -> Result<(), MeritEr
     let total: f64 = scene.sampling.fields.iter().map(|f| f.weight).sum();
     let mut slope = vec![0.0; sum.gradient.len()];
     for (field, height) in heights.iter().enumerate() {
+        if scene.sampling.is_dark(field) {
+            continue;
+        }
         if !hits.fate(field).is_imaged() {
             return Err(lost_chief(scene, field, hits.fate(field)));
         }

@@ -12,7 +12,7 @@ use crate::merit::{Detail, Merit, MeritError, TermValue};
 /// Decay of the mean gradient and of the mean square.
 const DECAY: [f64; 2] = [0.9, 0.999];
 /// The first rate, in scaled variables.
-const RATE: f64 = 1e-2;
+const RATE: f64 = 0.1;
 /// Below this the search has ended.
 const SMALLEST_RATE: f64 = 1e-7;
 /// Steps without improvement before the rate is halved.
@@ -34,11 +34,12 @@ pub(super) struct Adam {
 
 impl Adam {
     pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
-        let state = State::new(merit, lens)?;
+        let mut state = State::new(merit, lens)?;
         let count = state.values.len();
-        let gradient = state.merit.sum(&state.values, Detail::Gradient)?.gradient;
+        let sum = state.merit.sum(&state.values, Detail::Normal)?;
+        state.rescale(&sum);
         Ok(Self {
-            gradient: gradient.iter().copied().collect(),
+            gradient: sum.gradient.iter().copied().collect(),
             mean: vec![0.0; count],
             square: vec![0.0; count],
             rate: RATE,
@@ -78,7 +79,8 @@ impl Adam {
     }
 
     fn differentiate(&mut self) {
-        if let Ok(sum) = self.state.merit.sum(&self.state.values, Detail::Gradient) {
+        if let Ok(sum) = self.state.merit.sum(&self.state.values, Detail::Normal) {
+            self.state.rescale(&sum);
             self.gradient = sum.gradient.iter().copied().collect();
         }
     }

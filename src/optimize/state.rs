@@ -18,6 +18,8 @@ pub(super) struct State {
     pub(super) values: Vec<f64>,
     /// What a change of one means for each variable.
     pub(super) scales: Vec<f64>,
+    /// The most that it may mean.
+    widest: Vec<f64>,
     pub(super) current: Lens,
     pub(super) best: Lens,
     pub(super) value: f64,
@@ -33,10 +35,11 @@ impl State {
         }
         let values = merit.values(lens);
         let value = merit.value(&values)?;
-        let scales = merit.variables().iter().map(|v| scale(lens, v)).collect();
+        let scales: Vec<f64> = merit.variables().iter().map(|v| scale(lens, v)).collect();
         Ok(Self {
             merit,
             values,
+            widest: scales.clone(),
             scales,
             current: lens.clone(),
             best: lens.clone(),
@@ -69,6 +72,17 @@ impl State {
             fraction *= 0.5;
         }
         (0.0, None)
+    }
+
+    /// Measures every variable by what it does: a change of one alters the residuals by as much as
+    /// they are.
+    pub(super) fn rescale(&mut self, sum: &Sum) {
+        for (i, scale) in self.scales.iter_mut().enumerate() {
+            let measured = (sum.value / sum.normal[(i, i)]).sqrt();
+            if measured.is_finite() && measured > 0.0 {
+                *scale = measured.min(self.widest[i]);
+            }
+        }
     }
 
     /// The variables after a fraction of a step, inside their bounds.

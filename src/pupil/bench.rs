@@ -2,7 +2,7 @@
 
 use crate::lens::{Aperture, Field, Invalid, Lens, LensError, System};
 use crate::math::Dual;
-use crate::paraxial::{Beam, FirstOrder, Undefined, first_order};
+use crate::paraxial::{Beam, FirstOrder, Seidel, Undefined, first_order, seidel};
 use crate::trace::Tracer;
 
 use super::launch::Launch;
@@ -128,7 +128,17 @@ impl Bench {
         field: Field,
         wavelength: usize,
     ) -> Result<Launch<'_>, super::LaunchError> {
-        Launch::new(self, field, wavelength)
+        Launch::new(self, field, wavelength, self.aiming)
+    }
+
+    /// The third-order sums, chromatic ones between the shortest and the longest wavelength; `None`
+    /// where there is no chief ray.
+    pub fn seidel(&self) -> Option<Seidel<f64>> {
+        let by_length = |a: &&Color, b: &&Color| a.um.total_cmp(&b.um);
+        let short = self.colors.iter().min_by(by_length)?;
+        let long = self.colors.iter().max_by(by_length)?;
+        let system = &self.colors[self.primary].system;
+        seidel(system, &self.first, Some((&short.system, &long.system)))
     }
 
     /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces
@@ -153,9 +163,8 @@ impl Bench {
     /// By how many stop radii the paraxial chief ray of the farthest field misses the centre of
     /// the stop; `None` where that ray does not get there.
     pub fn stop_miss(&self) -> Option<f64> {
-        let paraxial = Self { aiming: Aiming::Paraxial, ..self.clone() };
         let edge = Field { x: 0.0, y: self.beam.edge, weight: 1.0 };
-        let launch = paraxial.launch(edge, self.primary).ok()?;
+        let launch = Launch::new(self, edge, self.primary, Aiming::Paraxial).ok()?;
         let [x, y] = launch.at_stop([0.0, 0.0])?;
         let miss = x.hypot(y) / self.stop_radius();
         miss.is_finite().then_some(miss)

@@ -1,7 +1,8 @@
 //! Where the pupil ends: the rims that clip, found to rounding, split where one takes over from
 //! another.
 //!
-//! From a point inside, the pupil's edge is a function `R(ψ)` of azimuth. It is the zero of one
+//! From a point inside, the pupil's edge is a function `R(ψ)` of azimuth, both in a frame that is
+//! stretched with the pupil so that a narrow sliver looks round. It is the zero of one
 //! margin of the ray (see [`Hurdle`]) along the radius, found by a bracketed secant; where the
 //! margin that ends it changes, `R` has a corner, and there the azimuths are split into arcs.
 
@@ -20,10 +21,48 @@ pub enum Limit {
     Unaimed,
 }
 
+/// Polar coordinates about a point of the pupil, stretched with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// The point, in pupil coordinates.
+    pub center: [f64; 2],
+    /// Where the frame's unit vectors along x and y lie.
+    pub axes: [[f64; 2]; 2],
+}
+
+impl Frame {
+    /// Along which pupil coordinates change with the radius at an azimuth from +y towards +x.
+    pub fn direction(&self, azimuth: f64) -> [f64; 2] {
+        let (sin, cos) = azimuth.sin_cos();
+        [0, 1].map(|i| sin * self.axes[0][i] + cos * self.axes[1][i])
+    }
+
+    /// The pupil point at an azimuth and a radius.
+    pub fn point(&self, azimuth: f64, radius: f64) -> [f64; 2] {
+        let direction = self.direction(azimuth);
+        [0, 1].map(|i| self.center[i] + radius * direction[i])
+    }
+
+    /// By how much an area is larger in pupil coordinates.
+    pub fn area(&self) -> f64 {
+        let [[a, b], [c, d]] = self.axes;
+        (a * d - b * c).abs()
+    }
+
+    /// Azimuth from 0 to 2π and radius of a pupil point.
+    pub(super) fn polar(&self, p: [f64; 2]) -> (f64, f64) {
+        let [[a, b], [c, d]] = self.axes;
+        let (x, y) = (p[0] - self.center[0], p[1] - self.center[1]);
+        let determinant = a * d - b * c;
+        let (u, v) = ((d * x - c * y) / determinant, (a * y - b * x) / determinant);
+        (u.atan2(v).rem_euclid(2.0 * PI), u.hypot(v))
+    }
+}
+
 /// The edge of the pupil along one radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge {
-    /// Its distance from the centre, in pupil coordinates.
+    /// Its distance from the centre, in the frame.
     pub radius: f64,
     /// What ends the pupil there.
     pub limit: Limit,
@@ -32,7 +71,7 @@ pub struct Edge {
 /// A stretch of the edge that one limit makes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
-    /// Azimuth where it begins, in radians from +y towards +x.
+    /// Azimuth where it begins, in radians from the frame's +y towards its +x.
     pub from: f64,
     /// Azimuth where it ends.
     pub to: f64,
@@ -43,8 +82,8 @@ pub struct Arc {
 /// The edge of a pupil that is star-shaped about a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
-    /// The point, in pupil coordinates.
-    pub center: [f64; 2],
+    /// In what it is measured.
+    pub frame: Frame,
     /// The arcs in order of azimuth: over a half turn where the pupil is its own mirror image.
     pub arcs: Vec<Arc>,
     /// The edge at the azimuths that were looked at.
@@ -70,9 +109,15 @@ const CORNER: f64 = 1e-9;
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.
 pub(super) const NEAR: f64 = 0.003;
+/// How far inside the edge, relatively, margins are looked at.
+const INSIDE: f64 = 1e-9;
+/// A margin this small against its neighbours is one that ends the pupil.
+const ENDING: f64 = 1e-6;
+/// What is added to the largest radius seen so that none is larger.
+const COVER: f64 = 1.02;
 /// More arcs than this are no pupil but noise.
 pub(super) const MOST_ARCS: usize = 24;
-/// A pupil that reaches this far, in pupil coordinates, is limited by nothing.
+/// A pupil that reaches this far, in its frame, is limited by nothing.
 const ENDLESS: f64 = 1e4;
 
 impl Launch<'_> {
@@ -94,6 +139,14 @@ impl Launch<'_> {
         probe
     }
 
+    /// The margins of a ray at every hurdle; `None` where it does not get through.
+    pub(super) fn margins_of_passing(&self, p: [f64; 2]) -> Option<Vec<f64>> {
+        let ray = self.ray(p)?;
+        let mut margins = Vec::with_capacity(3 * self.color().tracer.surfaces());
+        self.color().tracer.margins(ray, |_, _, margin| margins.push(margin));
+        margins.iter().all(|margin| *margin >= 0.0).then_some(margins)
+    }
+
     /// Whether the ray at `p` gets through the surfaces.
     pub(super) fn is_lit(&self, p: [f64; 2]) -> bool {
         self.probe(p, Limit::Disc).failed.is_none()
@@ -103,23 +156,18 @@ impl Launch<'_> {
 /// A search for the edge from one point.
 pub(super) struct Search<'a> {
     pub(super) launch: &'a Launch<'a>,
-    pub(super) center: [f64; 2],
+    pub(super) frame: Frame,
     pub(super) rays: usize,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(launch: &'a Launch<'a>, center: [f64; 2]) -> Self {
-        Self { launch, center, rays: 0 }
-    }
-
-    fn point(&self, azimuth: f64, r: f64) -> [f64; 2] {
-        let (sin, cos) = azimuth.sin_cos();
-        [self.center[0] + r * sin, self.center[1] + r * cos]
+    pub(super) fn new(launch: &'a Launch<'a>, frame: Frame) -> Self {
+        Self { launch, frame, rays: 0 }
     }
 
     fn probe(&mut self, azimuth: f64, r: f64, wanted: Limit) -> Probe {
         self.rays += 1;
-        self.launch.probe(self.point(azimuth, r), wanted)
+        self.launch.probe(self.frame.point(azimuth, r), wanted)
     }
 
     /// Where the radius leaves the unit disc; infinite where the disc is no limit.
@@ -127,10 +175,12 @@ impl<'a> Search<'a> {
         if !self.launch.bench.ends_at_disc() {
             return f64::INFINITY;
         }
-        let [x, y] = self.center;
-        let (sin, cos) = azimuth.sin_cos();
-        let along = x * sin + y * cos;
-        (along * along + 1.0 - x * x - y * y).max(0.0).sqrt() - along
+        let [x, y] = self.frame.center;
+        let [dx, dy] = self.frame.direction(azimuth);
+        let along = x * dx + y * dy;
+        let square = dx * dx + dy * dy;
+        let inside = 1.0 - x * x - y * y;
+        ((along * along + square * inside).max(0.0).sqrt() - along) / square
     }
 
     /// The edge at an azimuth, searched around a guess of its radius that is right within a
@@ -279,14 +329,7 @@ impl<'a> Search<'a> {
     /// The edge all around, from the azimuths 0 to `end`; `None` where nothing limits the pupil
     /// or where its edge is too ragged to be split.
     pub(super) fn boundary(mut self, end: f64, azimuths: usize) -> Option<Boundary> {
-        let mut samples = Vec::with_capacity(azimuths + 1);
-        let mut guess = 0.5;
-        for i in 0..=azimuths {
-            let azimuth = end * i as f64 / azimuths as f64;
-            let edge = self.edge(azimuth, guess, 0.02)?;
-            guess = edge.radius;
-            samples.push((azimuth, edge));
-        }
+        let samples = self.samples(end, azimuths)?;
         let mut arcs = vec![Arc { from: 0.0, to: end, limit: samples[0].1.limit }];
         for pair in samples.windows(2) {
             self.corners(pair[0], pair[1], &mut arcs)?;
@@ -295,7 +338,36 @@ impl<'a> Search<'a> {
         if end > 1.5 * PI {
             joined(&mut arcs, end);
         }
-        Some(Boundary { center: self.center, arcs, samples, rays: self.rays })
+        Some(Boundary { frame: self.frame, arcs, samples, rays: self.rays })
+    }
+
+    /// Edges at equal steps of azimuth, and where another limit comes close in between.
+    fn samples(&mut self, end: f64, azimuths: usize) -> Option<Vec<(f64, Edge)>> {
+        let step = end / azimuths as f64;
+        let mut samples = Vec::with_capacity(azimuths + 1);
+        let mut margins = Vec::with_capacity(azimuths + 1);
+        let mut guess = 1.0;
+        for i in 0..=azimuths {
+            let azimuth = step * i as f64;
+            let edge = self.edge(azimuth, guess, 0.02)?;
+            guess = edge.radius;
+            samples.push((azimuth, edge));
+            self.rays += 1;
+            let inside = self.frame.point(azimuth, edge.radius * (1.0 - INSIDE));
+            margins.push(self.launch.margins_of_passing(inside).unwrap_or_default());
+        }
+        let half = end < 1.5 * PI;
+        margins.truncate(if half { azimuths + 1 } else { azimuths });
+        for dip in dips(&margins, half) {
+            let azimuth =
+                if half { (step * dip).clamp(0.0, end) } else { (step * dip).rem_euclid(end) };
+            let distance = |sample: &&(f64, Edge)| (sample.0 - azimuth).abs();
+            let near = samples.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            samples.push((azimuth, self.edge(azimuth, near.1.radius, 0.02)?));
+        }
+        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        samples.dedup_by(|a, b| a.0 == b.0);
+        Some(samples)
     }
 
     /// The corners between two edges: one, or what halving the azimuths brings to light where
@@ -316,6 +388,36 @@ impl<'a> Search<'a> {
         self.corners(a, between, arcs)?;
         self.corners(between, b, arcs)
     }
+}
+
+/// Where margins dip between rays at equal steps of azimuth, in steps from the first of them: the
+/// bottoms of the parabolas through a least margin and its neighbours, if they are much lower than
+/// that. Over half a turn the rays beyond its ends are mirror images.
+pub(super) fn dips(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
+    let count = margins.len();
+    let mut dips = Vec::new();
+    for i in 0..count {
+        let (before, after) = match (half, i) {
+            (true, 0) => (1, 1),
+            (true, _) if i == count - 1 => (i - 1, i - 1),
+            _ => ((i + count - 1) % count, (i + 1) % count),
+        };
+        let neighbours = margins[before].iter().zip(&margins[i]).zip(&margins[after]);
+        for ((left, here), right) in neighbours {
+            let (left, here, right) = (*left, *here, *right);
+            let bend = left - 2.0 * here + right;
+            // A margin that ends the pupil here is zero but for rounding, and no dip.
+            let open = here > ENDING * left.max(right);
+            if open && here <= left && here <= right && bend > 0.0 {
+                let place = 0.5 * (left - right) / bend;
+                let bottom = here - 0.25 * (left - right) * place;
+                if bottom < 0.5 * here {
+                    dips.push(i as f64 + place);
+                }
+            }
+        }
+    }
+    dips
 }
 
 /// What the value at the kept end of a bracket is multiplied with.
@@ -340,7 +442,7 @@ fn joined(arcs: &mut Vec<Arc>, turn: f64) {
 impl Boundary {
     /// Points of the edge, or, for an `inside` below 1, just inside it, at some azimuths.
     pub fn points(&self, launch: &Launch<'_>, count: usize, inside: f64) -> Vec<[f64; 2]> {
-        let mut search = Search::new(launch, self.center);
+        let mut search = Search::new(launch, self.frame);
         let mut points = Vec::with_capacity(count + self.arcs.len());
         let end = self.samples.last().map_or(0.0, |s| s.0);
         let steps = (0..=count).map(|i| end * i as f64 / count as f64);
@@ -349,10 +451,17 @@ impl Boundary {
         azimuths.sort_by(f64::total_cmp);
         for azimuth in azimuths {
             if let Some(edge) = search.edge(azimuth, self.near(azimuth), NEAR) {
-                points.push(search.point(azimuth, inside * edge.radius));
+                points.push(self.frame.point(azimuth, inside * edge.radius));
             }
         }
         points
+    }
+
+    /// The frame grown until its unit disc holds all of the pupil.
+    pub(super) fn cover(&self) -> Frame {
+        let reach = self.samples.iter().map(|(_, edge)| edge.radius).fold(0.0, f64::max);
+        let grown = COVER * reach;
+        Frame { axes: self.frame.axes.map(|axis| axis.map(|v| v * grown)), ..self.frame }
     }
 
     /// A guess of the radius at an azimuth, from the nearest ones known.

@@ -101,7 +101,8 @@ pub struct Launch<'a> {
     pub field: Field,
     /// Which wavelength.
     pub wavelength: usize,
-    pub(super) source: Source,
+    aiming: Aiming,
+    source: Source,
     chart: Chart,
 }
 
@@ -110,14 +111,15 @@ impl<'a> Launch<'a> {
         bench: &'a Bench,
         field: Field,
         wavelength: usize,
+        aiming: Aiming,
     ) -> Result<Self, LaunchError> {
         if wavelength >= bench.colors.len() {
             return Err(LaunchError::NoWavelength);
         }
         let source = source(bench, field).ok_or(LaunchError::NoObjectPoint)?;
         let chart = paraxial_chart(bench, &source);
-        let mut launch = Self { bench, field, wavelength, source, chart };
-        match bench.aiming {
+        let mut launch = Self { bench, field, wavelength, aiming, source, chart };
+        match aiming {
             Aiming::Paraxial => {}
             Aiming::Chief | Aiming::Stop => {
                 let chief = launch.chief().ok_or(LaunchError::NotAimed)?;
@@ -143,10 +145,21 @@ impl<'a> Launch<'a> {
         Some(self.source.ray(self.place(p)?))
     }
 
-    /// The same ray with its derivatives by the two pupil coordinates.
+    /// The optical path from the object point to the start of a ray of this field, or from the
+    /// plane wave through the first vertex, in mm.
+    pub fn path_to(&self, ray: Ray<f64>) -> f64 {
+        let index = self.color().system.index_before;
+        let away = match self.source {
+            Source::Collimated { .. } => ray.point,
+            Source::Point { from, .. } | Source::Slopes { from } => ray.point - from,
+        };
+        index * away.dot(ray.direction)
+    }
+
+    /// The ray at these pupil coordinates with its derivatives by the two pupil coordinates.
     pub fn dual_ray(&self, p: [f64; 2]) -> Option<Ray<Dual2>> {
         let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
-        if self.bench.aiming != Aiming::Stop {
+        if self.aiming != Aiming::Stop {
             return Some(self.source.ray(self.chart.map(variables)));
         }
         let found = self.aim(p)?;
@@ -185,7 +198,7 @@ impl<'a> Launch<'a> {
     }
 
     fn place(&self, p: [f64; 2]) -> Option<[f64; 2]> {
-        match self.bench.aiming {
+        match self.aiming {
             Aiming::Paraxial | Aiming::Chief => Some(self.chart.map(p)),
             Aiming::Stop => self.aim(p).map(|found| found.q),
         }

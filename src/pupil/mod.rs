@@ -22,7 +22,7 @@ mod rules;
 mod sample;
 
 pub use bench::{Aiming, Bench, BenchError, Color, Dual2};
-pub use boundary::{Arc, Boundary, Edge, Limit};
+pub use boundary::{Arc, Boundary, Edge, Frame, Limit};
 pub use launch::{Launch, LaunchError};
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};

@@ -98,9 +98,9 @@ impl Region<'_> {
 
     /// Gauss nodes between the centre and the edge of every arc.
     fn split(&self, boundary: &Boundary, (azimuths, radii): (usize, usize)) -> Nodes {
-        let mut search = Search::new(&self.launch, boundary.center);
+        let mut search = Search::new(&self.launch, boundary.frame);
         let mirrored = self.launch.is_symmetric();
-        let factor = if mirrored { 2.0 } else { 1.0 };
+        let factor = boundary.frame.area() * if mirrored { 2.0 } else { 1.0 };
         let mut nodes = Nodes { mirrored, ..Nodes::default() };
         for arc in &boundary.arcs {
             let length = arc.to - arc.from;
@@ -108,12 +108,9 @@ impl Region<'_> {
                 let azimuth = arc.from + t * length;
                 let guess = boundary.near(azimuth);
                 let Some(edge) = search.edge(azimuth, guess, NEAR) else { continue };
-                let (sin, cos) = azimuth.sin_cos();
                 let sector = factor * share * length * edge.radius * edge.radius;
                 for (r, weight) in radial(radii) {
-                    let r = r * edge.radius;
-                    let [x, y] = boundary.center;
-                    nodes.points.push([x + r * sin, y + r * cos]);
+                    nodes.points.push(boundary.frame.point(azimuth, r * edge.radius));
                     nodes.weights.push(sector * weight);
                 }
             }

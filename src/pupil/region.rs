@@ -4,23 +4,29 @@
 //! where light is, in how many pieces, and whether one point sees all of it; then the edge is
 //! followed from there.
 
-use super::boundary::{Boundary, Search};
+use super::boundary::{Boundary, Edge, Frame, NEAR, Search, dips};
 use super::launch::Launch;
+use super::quadrature::Nodes;
+use super::sample::{Pattern, pattern};
 use crate::trace::{Points, Rays, Sink};
 use std::f64::consts::{PI, TAU};
 
 /// Rays at the rim that tell whether a pupil is clear.
 const RIM_RAYS: usize = 16;
-/// Cells of the grid along a side, at first and where little light was found.
-const GRIDS: [usize; 3] = [25, 101, 301];
-/// A grid with fewer rays than this in the light is too coarse for a verdict.
+/// Grids that look for light where no disc limits the pupil: cells along a side, and how far from
+/// the axis that fine a grid is worth its rays.
+const SCANS: [(usize, f64); 3] = [(25, 120.0), (101, 13.0), (301, 1.7)];
+/// A grid with fewer rays than this in the light is too coarse for a verdict: another one is laid
+/// around that light, this often at most.
 const FEW: usize = 12;
+const ZOOMS: usize = 14;
+/// Light through a hole narrower than this, in pupil coordinates, is a single ray: a rim of size
+/// zero lets it through on the axis.
+const NARROWEST: f64 = 1e-9;
 /// Azimuths at which the edge is looked at first, over a half turn.
 const AZIMUTHS: usize = 24;
-/// How far from the axis light is looked for where no disc limits the pupil: this, doubled until
-/// the light ends inside.
+/// How far from the axis light is looked for first where no disc limits the pupil.
 const REACH: f64 = 1.6;
-const WIDEST: f64 = 120.0;
 
 /// The form of a pupil.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,28 +67,41 @@ impl<'a> Region<'a> {
         if launch.bench.stop_radius() == 0.0 {
             return Self { launch, kind: Kind::Dark, rays };
         }
-        if disc {
-            let rim = launch.fates(&rim(launch.is_symmetric()));
-            rays += rim.len();
-            if rim.iter().all(|lit| *lit) {
-                return Self { launch, kind: Kind::Clear, rays };
-            }
+        if disc && launch.is_clear(&mut rays) {
+            return Self { launch, kind: Kind::Clear, rays };
         }
-        let mut reach = if disc { 1.0 } else { REACH };
-        let mut kind = Kind::Dark;
-        for cells in GRIDS {
-            let grid = Grid::new(&launch, cells, &mut reach);
-            rays += grid.rays;
-            if grid.count() >= FEW || (grid.count() > 0 && cells == GRIDS[GRIDS.len() - 1]) {
-                let found = grid.kind(&launch);
-                if let Kind::Split(boundary) = &found {
-                    rays += boundary.rays;
-                }
-                kind = found;
-                break;
-            }
+        let Some(grid) = Grid::on_light(&launch, &mut rays) else {
+            return Self { launch, kind: Kind::Dark, rays };
+        };
+        let kind = grid.kind(&launch);
+        if let Kind::Split(boundary) = &kind {
+            rays += boundary.rays;
         }
         Self { launch, kind, rays }
+    }
+
+    /// The points of a pattern over a disc, or a stretched one, that holds all of the light: a
+    /// sum over those that arrive is what clipped patterns give in other programs.
+    pub fn sampled(&self, chosen: Pattern) -> Nodes {
+        let frame = match &self.kind {
+            Kind::Clear => Frame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
+            Kind::Split(_) | Kind::Ragged { .. } if self.launch.bench.ends_at_disc() => {
+                Frame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] }
+            }
+            Kind::Split(boundary) => boundary.cover(),
+            Kind::Ragged { square: (center, half), .. } => {
+                let reach = half * std::f64::consts::SQRT_2;
+                Frame { center: *center, axes: [[reach, 0.0], [0.0, reach]] }
+            }
+            Kind::Dark | Kind::Endless => return Nodes::default(),
+        };
+        let place = |p: &[f64; 2]| {
+            let [a, b] = frame.axes;
+            [0, 1].map(|i| frame.center[i] + p[0] * a[i] + p[1] * b[i])
+        };
+        let points: Vec<_> = pattern(chosen).iter().map(place).collect();
+        let weight = PI * frame.area() / points.len() as f64;
+        Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
     }
 
     /// Whether no light gets through.
@@ -91,15 +110,30 @@ impl<'a> Region<'a> {
     }
 }
 
-/// Points at the rim of the disc and its centre; a half turn of them where the pupil is its own
-/// mirror image.
-fn rim(symmetric: bool) -> Vec<[f64; 2]> {
-    let turn = if symmetric { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
-    let at = |i: usize| (turn * i as f64).sin_cos().into();
-    (0..RIM_RAYS).map(at).chain([[0.0, 0.0]]).collect()
+/// The ray at an azimuth of the rim.
+fn rim(azimuth: f64) -> [f64; 2] {
+    azimuth.sin_cos().into()
 }
 
 impl Launch<'_> {
+    /// Whether the whole disc gets through, told by the margins of rays at its rim and by where
+    /// they are least in between.
+    fn is_clear(&self, rays: &mut usize) -> bool {
+        let half = self.is_symmetric();
+        let step = if half { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
+        let mut margins = Vec::with_capacity(RIM_RAYS);
+        for i in 0..RIM_RAYS {
+            *rays += 1;
+            let Some(found) = self.margins_of_passing(rim(step * i as f64)) else { return false };
+            margins.push(found);
+        }
+        *rays += 1;
+        let dips = dips(&margins, half);
+        *rays += dips.len();
+        let passes = |p: [f64; 2]| self.margins_of_passing(p).is_some();
+        passes([0.0, 0.0]) && dips.into_iter().all(|dip| passes(rim(step * dip)))
+    }
+
     /// Which of these pupil points get through the surfaces.
     pub(super) fn fates(&self, points: &[[f64; 2]]) -> Vec<bool> {
         let mut lit = vec![false; points.len()];
@@ -128,42 +162,65 @@ impl<T, I: Iterator<Item = (T, crate::trace::Ray<f64>)>> UnzipRays<T> for I {
     }
 }
 
-/// A coarse picture of the light in the pupil plane.
+/// A coarse picture of the light in a square of the pupil plane.
 struct Grid {
     cells: usize,
-    reach: f64,
+    center: [f64; 2],
+    half: f64,
     lit: Vec<bool>,
     rays: usize,
 }
 
 impl Grid {
-    /// Rays over a square that holds all of the light; `reach` grows until it does.
-    fn new(launch: &Launch<'_>, cells: usize, reach: &mut f64) -> Self {
-        let mut rays = 0;
-        loop {
-            let grid = Self::of(launch, cells, *reach);
-            rays += grid.rays;
-            let limited = launch.bench.ends_at_disc() || *reach >= WIDEST;
-            if limited || (grid.count() > 0 && !grid.touches_its_edge()) {
-                return Self { rays, ..grid };
+    /// A grid that holds all of the light and enough of it; `None` where there is none.
+    fn on_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
+        let mut grid =
+            SCANS.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays))?;
+        for _ in 0..ZOOMS {
+            let (center, half) = grid.square();
+            if grid.count() >= FEW || half > 0.9 * grid.half {
+                break;
             }
-            *reach *= 2.0;
+            let closer = Self::of(launch, SCANS[0].0, center, half);
+            *rays += closer.rays;
+            if closer.count() == 0 {
+                break;
+            }
+            grid = closer;
+        }
+        (grid.half > NARROWEST).then_some(grid)
+    }
+
+    /// Ever larger grids about the axis until one holds light, and all of it.
+    fn scan(launch: &Launch<'_>, cells: usize, widest: f64, rays: &mut usize) -> Option<Self> {
+        let disc = launch.bench.ends_at_disc();
+        let mut half = if disc { 1.0 } else { REACH };
+        loop {
+            let grid = Self::of(launch, cells, [0.0; 2], half);
+            *rays += grid.rays;
+            let largest = disc || 2.0 * half > widest;
+            let holds = grid.count() > 0 && !grid.touches_its_edge();
+            if holds || largest {
+                return (grid.count() > 0).then_some(grid);
+            }
+            half *= 2.0;
         }
     }
 
-    fn of(launch: &Launch<'_>, cells: usize, reach: f64) -> Self {
-        let mut grid = Self { cells, reach, lit: vec![false; cells * cells], rays: 0 };
+    fn of(launch: &Launch<'_>, cells: usize, center: [f64; 2], half: f64) -> Self {
+        let lit = vec![false; cells * cells];
+        let mut grid = Self { cells, center, half, lit, rays: 0 };
         let disc = launch.bench.ends_at_disc();
         let wanted = |p: [f64; 2]| !disc || p[0].hypot(p[1]) <= 1.0;
-        let half = launch.is_symmetric();
+        let mirrored = launch.is_symmetric();
         let chosen: Vec<usize> = (0..cells * cells)
-            .filter(|i| wanted(grid.point(*i)) && (!half || i % cells >= cells / 2))
+            .filter(|i| wanted(grid.point(*i)) && (!mirrored || i % cells >= cells / 2))
             .collect();
         let points: Vec<_> = chosen.iter().map(|i| grid.point(*i)).collect();
         grid.rays = points.len();
         for (i, lit) in chosen.iter().zip(launch.fates(&points)) {
             grid.lit[*i] = lit;
-            if half {
+            if mirrored {
                 let (row, column) = (i / cells, i % cells);
                 grid.lit[row * cells + (cells - 1 - column)] = lit;
             }
@@ -173,9 +230,9 @@ impl Grid {
 
     /// The middle of a cell.
     fn point(&self, cell: usize) -> [f64; 2] {
-        let at =
-            |i: usize| self.reach * (2.0 * i as f64 - (self.cells - 1) as f64) / self.cells as f64;
-        [at(cell % self.cells), at(cell / self.cells)]
+        let step = 2.0 * self.half / self.cells as f64;
+        let at = |i: usize| step * (i as f64 - 0.5 * (self.cells - 1) as f64);
+        [self.center[0] + at(cell % self.cells), self.center[1] + at(cell / self.cells)]
     }
 
     fn count(&self) -> usize {
@@ -201,32 +258,54 @@ impl Grid {
         if pieces != 1 {
             return ragged;
         }
-        let center = self.center(launch);
+        let frame = self.frame(launch);
         let end = if launch.is_symmetric() { PI } else { TAU };
         let azimuths = if launch.is_symmetric() { AZIMUTHS } else { 2 * AZIMUTHS };
-        match Search::new(launch, center).boundary(end, azimuths) {
-            Some(boundary) if self.agrees(&boundary) => Kind::Split(boundary),
+        match Search::new(launch, frame).boundary(end, azimuths) {
+            Some(boundary) if self.agrees(launch, &boundary) => Kind::Split(boundary),
             Some(_) | None => ragged,
         }
     }
 
-    /// The centroid of the light, or the lit point nearest to it.
-    fn center(&self, launch: &Launch<'_>) -> [f64; 2] {
+    /// The frame in which the light looks round about its centroid, or about the lit point nearest
+    /// to that.
+    fn frame(&self, launch: &Launch<'_>) -> Frame {
         let count = self.count() as f64;
         let points = || self.lit_cells().map(|i| self.point(i));
         let sum = points().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
-        let x = if launch.is_symmetric() { 0.0 } else { sum[0] / count };
-        let center = [x, sum[1] / count];
-        if launch.is_lit(center) {
-            return center;
+        let middle = [sum[0] / count, sum[1] / count];
+        let mut center = if launch.is_symmetric() { [0.0, middle[1]] } else { middle };
+        if !launch.is_lit(center) {
+            let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
+            let nearest = points().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            center = nearest.unwrap_or(center);
         }
-        let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
-        points().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(center)
+        Frame { center, axes: self.axes(middle, launch.is_symmetric()) }
+    }
+
+    /// The axes of an ellipse with the second moments of the light: those of a uniform one are a
+    /// quarter of the squares of its semi-axes.
+    fn axes(&self, middle: [f64; 2], symmetric: bool) -> [[f64; 2]; 2] {
+        let cell = 2.0 * self.half / self.cells as f64;
+        let own = cell * cell / 12.0;
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for p in self.lit_cells().map(|i| self.point(i)) {
+            let (x, y) = (p[0] - middle[0], p[1] - middle[1]);
+            (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+        }
+        let count = self.count() as f64;
+        let (xx, yy) = (xx / count + own, yy / count + own);
+        let xy = if symmetric { 0.0 } else { xy / count };
+        // Cholesky: the frame's y stays y.
+        let y = yy.sqrt();
+        let slant = xy / y;
+        let x = (xx - slant * slant).max(0.01 * xx).sqrt();
+        [[2.0 * x, 0.0], [2.0 * slant, 2.0 * y]]
     }
 
     /// A square around the light.
     fn square(&self) -> ([f64; 2], f64) {
-        let cell = 2.0 * self.reach / self.cells as f64;
+        let cell = 2.0 * self.half / self.cells as f64;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in self.lit_cells().map(|i| self.point(i)) {
             low = [low[0].min(p[0]), low[1].min(p[1])];
@@ -270,22 +349,22 @@ impl Grid {
         near(row).flat_map(move |r| near(column).map(move |c| r * cells + c))
     }
 
-    /// Whether light and dark lie on their sides of the edge, but for the width of a cell.
-    fn agrees(&self, boundary: &Boundary) -> bool {
-        let cell = 2.0 * self.reach / self.cells as f64;
-        let [x, y] = boundary.center;
+    /// Whether light and dark lie on their sides of the edge; where a grid point is close to it,
+    /// the edge is looked for at its azimuth.
+    fn agrees(&self, launch: &Launch<'_>, boundary: &Boundary) -> bool {
         let end = boundary.samples.last().map_or(TAU, |s| s.0);
+        let mut search = Search::new(launch, boundary.frame);
         (0..self.lit.len()).all(|i| {
-            let p = self.point(i);
-            let (dx, dy) = (p[0] - x, p[1] - y);
-            let mut azimuth = dx.atan2(dy).rem_euclid(TAU);
+            let (mut azimuth, r) = boundary.frame.polar(self.point(i));
             if azimuth > end {
                 azimuth = TAU - azimuth;
             }
-            let radius = boundary.near(azimuth);
-            let slack = 1.5 * cell + 0.03 * radius;
-            let r = dx.hypot(dy);
-            if self.lit[i] { r <= radius + slack } else { r >= radius - slack }
+            let near = boundary.near(azimuth);
+            let fits = |radius: f64, slack: f64| {
+                if self.lit[i] { r <= radius + slack } else { r >= radius - slack }
+            };
+            let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
+            fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
         })
     }
 }

@@ -5,6 +5,7 @@
 
 use super::clock::{Timed, now, timed};
 use super::layout::{Layout, layout};
+use super::saving::timed_plan;
 use super::scatter::{Scatter, scatter};
 use super::slot::{Mailbox, Slot};
 use super::view::Settings;
@@ -19,6 +20,7 @@ use rayon::prelude::*;
 use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 /// The numbers of one version of the design.
 #[derive(Debug, Clone)]
@@ -77,6 +79,13 @@ pub(super) struct Request {
     pub(super) settings: Settings,
 }
 
+/// Whether the time that each effect takes is measured when there is time for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Savings {
+    Measured,
+    Left,
+}
+
 /// The handle of the thread that computes numbers.
 #[derive(Debug)]
 pub(super) struct Analyst {
@@ -87,19 +96,12 @@ pub(super) struct Analyst {
 
 impl Analyst {
     /// Starts the thread. `wake` is called from it when new results are there.
-    pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+    pub(super) fn spawn(savings: Savings, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         let requests = Arc::new(Mailbox::new());
         let results = Slot::default();
-        let (inbox, shown) = (Arc::clone(&requests), results.clone());
-        let serve = move || {
-            while let Some(request) = inbox.take() {
-                if let Some(found) = answer(request, || inbox.interrupts()) {
-                    shown.set(found);
-                    wake();
-                }
-            }
-        };
-        let thread = thread::Builder::new().name("analyst".into()).spawn(serve)?;
+        let inbox = Arc::clone(&requests);
+        let desk = Desk { inbox, shown: results.clone(), wake, savings, published: None };
+        let thread = thread::Builder::new().name("analyst".into()).spawn(move || desk.serve())?;
         Ok(Self { requests, results, thread: Some(thread) })
     }
 
@@ -123,13 +125,66 @@ impl Drop for Analyst {
     }
 }
 
-/// The results of a request; `None` where `interrupted` says that they are no longer wanted.
-fn answer(request: Request, interrupted: impl Fn() -> bool) -> Option<Results> {
-    let start = now();
-    let Request { version, lens, settings } = request;
-    let numbers = numbers(&lens, &settings, interrupted)?;
-    let ms = start.elapsed().as_secs_f64() * 1e3;
-    Some(Results { version, lens, settings, numbers, ms })
+/// A newer request stops one that was begun so long ago, unless nothing was shown for longer than
+/// the second time: numbers follow a value that is being dragged.
+const BEGUN: Duration = Duration::from_millis(50);
+const SHOWN: Duration = Duration::from_millis(200);
+/// Times are measured when nothing was asked for so long.
+const QUIET: Duration = Duration::from_millis(300);
+
+/// What the thread works with.
+struct Desk<W> {
+    inbox: Arc<Mailbox<Request>>,
+    shown: Slot<Results>,
+    wake: W,
+    savings: Savings,
+    /// When results were shown last.
+    published: Option<Instant>,
+}
+
+impl<W: Fn()> Desk<W> {
+    /// Works until the handle is dropped.
+    fn serve(mut self) {
+        while let Some(request) = self.inbox.take() {
+            let found = self.answer(request);
+            if let (Some(results), Savings::Measured) = (found, self.savings) {
+                self.measure(results);
+            }
+        }
+    }
+
+    /// Shows the results of a request, and gives them back if they are shown.
+    fn answer(&mut self, request: Request) -> Option<Results> {
+        let start = now();
+        let fresh = self.published.is_some_and(|shown| start.duration_since(shown) < SHOWN);
+        let overtaken = || fresh && start.elapsed() > BEGUN && self.inbox.interrupts();
+        let interrupted = || self.inbox.is_closed() || overtaken();
+        let Request { version, lens, settings } = request;
+        let numbers = numbers(&lens, &settings, interrupted)?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let results = Results { version, lens, settings, numbers, ms };
+        self.published = Some(now());
+        self.publish(results.clone());
+        Some(results)
+    }
+
+    /// Shows the same results once more with the time that each effect takes, if there is time.
+    fn measure(&self, mut results: Results) {
+        let Ok(numbers) = &mut results.numbers else { return };
+        if !self.inbox.is_quiet_for(QUIET) {
+            return;
+        }
+        let interrupted = || self.inbox.interrupts();
+        if let Some(Ok(plan)) = timed_plan(&results.lens, &results.settings, interrupted) {
+            numbers.plan.value = plan;
+            self.publish(results);
+        }
+    }
+
+    fn publish(&self, results: Results) {
+        self.shown.set(results);
+        (self.wake)();
+    }
 }
 
 /// The numbers of a lens.

@@ -1,6 +1,6 @@
 //! The session itself: what each command does.
 
-use super::analyst::{Analyst, Request, Results};
+use super::analyst::{Analyst, Request, Results, Savings};
 use super::command::{Command, Edit};
 use super::edit::edited;
 use super::history::History;
@@ -97,8 +97,8 @@ impl Session {
             path: None,
             settings: Settings::default(),
             messages: Vec::new(),
-            analyst: Analyst::spawn(wake.clone())?,
-            follower: Analyst::spawn(wake.clone())?,
+            analyst: Analyst::spawn(Savings::Measured, wake.clone())?,
+            follower: Analyst::spawn(Savings::Left, wake.clone())?,
             followed: None,
             worker: Worker::spawn(start, wake)?,
             searches: 0,

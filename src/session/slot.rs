@@ -1,6 +1,7 @@
 //! Places where threads leave things for each other, so that neither waits for the other.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// A place for the newest value; neither side waits for the other to finish anything.
 #[derive(Debug)]
@@ -79,15 +80,21 @@ impl<T> Mailbox<T> {
 
     /// Waits for a letter; `None` when the box is closed.
     pub(super) fn take(&self) -> Option<T> {
-        let mut state = locked(&self.state);
-        loop {
-            if state.closed {
-                return None;
-            }
-            if let Some(letter) = state.letter.take() {
-                return Some(letter);
-            }
-            state = self.arrived.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
+        let waiting = |state: &mut State<T>| !state.closed && state.letter.is_none();
+        let state = self.arrived.wait_while(locked(&self.state), waiting);
+        let mut state = state.unwrap_or_else(PoisonError::into_inner);
+        if state.closed { None } else { state.letter.take() }
+    }
+
+    /// Whether nothing arrives for a while.
+    pub(super) fn is_quiet_for(&self, time: Duration) -> bool {
+        let waiting = |state: &mut State<T>| !state.closed && state.letter.is_none();
+        let waited = self.arrived.wait_timeout_while(locked(&self.state), time, waiting);
+        waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
+    }
+
+    /// Whether no more letters come.
+    pub(super) fn is_closed(&self) -> bool {
+        locked(&self.state).closed
     }
 }

@@ -17,21 +17,29 @@ use crate::math::Vec3;
 /// The slope at the middle of each of some intervals, and what it can change by inside.
 pub(super) fn steepest<R: Real>(shape: &Shape<R>, radius: f64) -> f64 {
     let Shape::Asphere { curvature, conic, terms } = shape else { return 0.0 };
-    let (c, conic, terms) = (curvature.value(), conic.value(), terms.map(Real::value));
-    let (mut steepest, width): (f64, f64) = (0.0, radius / INTERVALS as f64);
-    for i in 0..INTERVALS {
-        let (middle, end) = ((i as f64 + 0.5) * width, (i as f64 + 1.0) * width);
-        let change = 0.5 * width * bend_bound(c, conic, &terms, end);
-        steepest = steepest.max(slope_at(c, conic, &terms, middle).abs() + change);
+    steepest_between(curvature.value(), conic.value(), &terms.map(Real::value), (0.0, radius), 64)
+}
+
+/// The same between two distances from the axis, from some intervals of them.
+fn steepest_between(
+    c: f64,
+    conic: f64,
+    terms: &[f64],
+    (from, to): (f64, f64),
+    intervals: u32,
+) -> f64 {
+    let (mut steepest, width): (f64, f64) = (0.0, (to - from) / f64::from(intervals));
+    for i in 0..intervals {
+        let start = from + f64::from(i) * width;
+        let change = 0.5 * width * bend_bound(c, conic, terms, start + width);
         // `max` would forget what is not a number.
         if !change.is_finite() {
             return f64::INFINITY;
         }
+        steepest = steepest.max(slope_at(c, conic, terms, start + 0.5 * width).abs() + change);
     }
     steepest
 }
-
-const INTERVALS: usize = 64;
 
 /// `dz/dr` at a distance from the axis.
 fn slope_at(c: f64, conic: f64, terms: &[f64], r: f64) -> f64 {
@@ -66,29 +74,6 @@ impl<R: Real> Interface<R> {
         let exists = R::select(square > R::ZERO, R::ONE / square, self.rim2);
         R::select(exists < self.rim2, exists, self.rim2)
     }
-}
-
-impl Interface<f64> {
-    fn slope_bound(&self, radius: f64) -> f64 {
-        slope_bound(self.curvature, self.conic, &self.terms, radius)
-    }
-}
-
-/// A bound of `|dz/dr|` within `radius` of the axis.
-fn slope_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f64 {
-    let radicand = 1.0 - (1.0 + conic) * c * c * radius * radius;
-    if !(radicand > 0.0 && radius.is_finite()) {
-        return f64::INFINITY;
-    }
-    // For 1 + κ < 0 the slope of the conic alone is largest at the rim as well.
-    let r2 = radius * radius;
-    let mut power = radius * r2;
-    let mut bound = (c * radius).abs() / radicand.sqrt();
-    for (j, a) in terms.iter().enumerate() {
-        bound += (2 * j + 4) as f64 * a.abs() * power;
-        power *= r2;
-    }
-    bound
 }
 
 /// A ray against one asphere, in plain numbers.
@@ -241,6 +226,16 @@ impl Problem {
         x * x + y * y
     }
 
+    /// A bound of the slope of the surface along a part of the ray, which is within `radius`.
+    fn steepest(&self, from: f64, to: f64, radius: f64) -> f64 {
+        let nearest = (-self.slant / (self.across * self.across)).max(from).min(to);
+        let low = if nearest.is_finite() { self.r2(nearest).sqrt() } else { 0.0 };
+        let high = self.r2(from).max(self.r2(to)).sqrt().min(radius);
+        let surface = &self.surface;
+        let range = (low.min(high), high);
+        steepest_between(surface.curvature, surface.conic, &surface.terms, range, 2)
+    }
+
     /// Height of the surface above the ray, and its slope along the ray.
     fn height(&self, s: f64) -> (f64, f64) {
         let (z, dz_dr2) = self.surface.sag(self.r2(s));
@@ -257,7 +252,7 @@ impl Problem {
     /// last one in front of it.
     fn first(&self, radius: f64) -> Option<f64> {
         let (from, to) = self.within(radius)?;
-        let start = self.start.clamp(from, to);
+        let start = self.start.max(from).min(to);
         let behind = self.search(start, to, radius, Order::First);
         behind.or_else(|| self.search(from, start, radius, Order::Last))
     }
@@ -330,8 +325,7 @@ impl Search<'_> {
         self.budget = self.budget.checked_sub(1)?;
         let problem = self.problem;
         let width = to.s - from.s;
-        let r = problem.r2(from.s).max(problem.r2(to.s)).sqrt().min(self.radius);
-        let steep = problem.surface.slope_bound(r) * problem.across;
+        let steep = problem.steepest(from.s, to.s, self.radius) * problem.across;
         let monotone = steep < problem.k.z.abs();
         let same_side = (from.height > 0.0) == (to.height > 0.0);
         let reach = (problem.k.z.abs() + steep) * width;

@@ -88,7 +88,8 @@ impl Drop for Scratch {
 
 #[test]
 fn every_subcommand_has_long_help_with_its_json() {
-    let names = ["info", "trace", "analyze", "measure trace"];
+    let names =
+        ["info", "trace", "analyze", "gradient", "optimize", "convert", "measure trace"];
     for name in names {
         let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
         let help = done(&arguments, "");
@@ -233,18 +234,21 @@ fn estimate(value: &Value) -> f64 {
 
 #[test]
 fn analyze_gives_every_number_its_error_and_cost() {
+    let check = |value: &Value, keys: &[&str]| {
+        keys.iter().for_each(|key| assert!(estimate(&value[key]).is_finite()));
+    };
     for field in analyzed("spot", &[]) {
-        ["rms", "radius", "centroid_x", "centroid_y"].map(|key| estimate(&field[key]));
+        check(&field, &["rms", "radius", "centroid_x", "centroid_y"]);
         assert_eq!(field["colors"].as_array().unwrap().len(), 3);
         field["colors"].as_array().unwrap().iter().for_each(|color| {
-            ["rms", "lit_area"].map(|key| estimate(&color[key]));
+            check(color, &["rms", "lit_area"]);
         });
     }
     let distortion = analyzed("distortion", &[]);
     assert!(estimate(&distortion[1]["distortion"]).abs() < 0.05);
     assert_eq!(distortion[0]["distortion"], Value::Null);
     for field in analyzed("field-curvature", &[]) {
-        ["tangential", "sagittal"].map(|key| estimate(&field[key]));
+        check(&field, &["tangential", "sagittal"]);
     }
     for field in analyzed("illumination", &[]) {
         assert!(estimate(&field["relative"]) <= 1.0 + 1e-12);
@@ -284,7 +288,152 @@ fn a_lens_without_light_is_refused_with_the_place() {
     let lens = std::fs::read_to_string(LENS).unwrap();
     let dark = lens.replace("\"semi_diameter\": 4.5", "\"semi_diameter\": 0.0");
     let scratch = Scratch::with("dark.json", &dark);
-    refused(2, &["analyze", scratch.path(), "spot"], "", &[scratch.path(), "clipped at surface 4"]);
+    let arguments = ["analyze", scratch.path(), "spot", "--field", "17"];
+    refused(2, &arguments, "", &[scratch.path(), "no light", "clipped at surface 4"]);
+}
+
+/// The derivatives of the spot on the axis by the curvatures, and its value.
+fn gradient(lens: &str) -> (f64, Vec<f64>) {
+    let report = done_json(&["gradient", lens, "--field", "0", "--error", "1e-9"], "");
+    has_keys(&report, &["term", "method", "value", "error", "rays", "ms", "d"]);
+    let d = &report["d"];
+    for key in ["curvature", "thickness", "semi_diameter", "conic", "index", "asphere"] {
+        assert_eq!(d[key].as_array().unwrap().len(), 11, "{key}");
+    }
+    assert_eq!(d["index"][0], Value::Null);
+    let slopes = d["curvature"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap());
+    (report["value"].as_f64().unwrap(), slopes.collect())
+}
+
+#[test]
+fn a_gradient_is_what_a_changed_file_shows() {
+    // Nothing but the disc of the pupil limits the light, and on the axis it does not matter where
+    // that disc is: here the biased kind is exact.
+    let lens = std::fs::read_to_string(LENS).unwrap();
+    let open = lens
+        .replace("\"stop_semi_diameter\": 4.215", "\"entrance_pupil_diameter\": 6.0");
+    let changed = |name: &str, step: f64| {
+        let curvature = 0.07061398863114783 + step;
+        let text = open.replacen("0.07061398863114783", &curvature.to_string(), 1);
+        let scratch = Scratch::with(name, &text);
+        gradient(scratch.path())
+    };
+    let step = 1e-6;
+    let (_, slopes) = changed("open.json", 0.0);
+    let difference =
+        (changed("plus.json", step).0 - changed("minus.json", -step).0) / (2.0 * step);
+    assert!((slopes[0] - difference).abs() < 1e-6 * difference.abs(), "{slopes:?} {difference}");
+}
+
+#[test]
+fn a_gradient_that_is_not_there_yet_is_refused_by_name() {
+    refused(2, &["gradient", LENS, "--method", "warp"], "", &["`warp`", "`biased`"]);
+    refused(2, &["gradient", LENS, "--term", "throughput"], "", &["`throughput`"]);
+    refused(2, &["gradient", LENS, "--method", "guess"], "", &["guess", "boundary"]);
+    refused(2, &["gradient", LENS, "--field", "200"], "", &["200", "180"]);
+}
+
+#[test]
+fn optimize_makes_the_lens_better_and_saves_it() {
+    let (out, history) = (Scratch::new("better.json"), Scratch::new("history.json"));
+    for method in ["dls", "adam"] {
+        let arguments = [
+            "optimize", LENS, "--out", out.path(), "--history", history.path(), "--steps", "8",
+            "--vary", "curvatures,thicknesses", "--error", "0.1%", "--method", method,
+        ];
+        let report = done_json(&arguments, "");
+        let number = |key: &str| report[key].as_f64().unwrap();
+        assert!(number("merit_after") < number("merit_before"), "{report}");
+        has_keys(&report["terms"][0], &["term", "weight", "before", "after"]);
+        has_keys(&report["terms"][0]["after"], &["value", "error", "rays"]);
+        has_keys(&report["variables"][0], &["parameter", "before", "after"]);
+        let steps: Value =
+            serde_json::from_str(&std::fs::read_to_string(&history.0).unwrap()).unwrap();
+        assert_eq!(steps["steps"].as_array().unwrap().len() as f64, number("steps"));
+        let better = done_json(&["info", out.path()], "");
+        assert!((better["efl"].as_f64().unwrap() - 49.389).abs() < 0.5, "{better}");
+    }
+    assert!(done(&["optimize", "--help"], "").contains("Ctrl-C"));
+}
+
+#[test]
+fn optimize_aims_at_a_goal() {
+    let goal = json!({"terms": [{"term": {"focal_length": 52.0}, "weight": 1.0}]});
+    let (goal, out) = (Scratch::with("goal.json", &goal.to_string()), Scratch::new("goal-out.json"));
+    let arguments = ["optimize", LENS, "--out", out.path(), "--goal", goal.path()];
+    done(&[&arguments[..], &["--vary", "curvatures"]].concat(), "");
+    let efl = done_json(&["info", out.path()], "")["efl"].as_f64().unwrap();
+    assert!((efl - 52.0).abs() < 1e-3, "{efl}");
+}
+
+#[test]
+fn optimize_refuses_before_it_works() {
+    let out = Scratch::new("never.json");
+    let mut lens: Value = serde_json::from_str(&std::fs::read_to_string(LENS).unwrap()).unwrap();
+    lens["variables"] = json!([]);
+    let rigid = Scratch::with("rigid.json", &lens.to_string());
+    let optimize = |more: &[&str], words: &[&str]| {
+        refused(2, &[&["optimize", rigid.path()], more].concat(), "", words);
+        assert!(!out.0.exists());
+    };
+    optimize(&["--out", out.path()], &[rigid.path(), "no variables", "--vary"]);
+    optimize(&["--out", "/nowhere/at/all.json"], &["/nowhere/at/all.json", "no such folder"]);
+    optimize(&["--out", "lens.txt"], &["lens.txt", "`txt`", "`.json`"]);
+    optimize(&["--out", out.path(), "--vary", "colours"], &["colours", "curvatures"]);
+    let wrong = [
+        (json!({"terms": [{"term": "spots", "weight": 1.0}]}), "spots"),
+        (json!({"terms": [], "weight": 1.0}), "`weight`"),
+        (json!({"terms": [{"term": "spot", "weight": -1.0}]}), "weight"),
+    ];
+    for (goal, word) in wrong {
+        let goal = Scratch::with("wrong-goal.json", &goal.to_string());
+        let more = ["--out", out.path(), "--vary", "curvatures", "--goal", goal.path()];
+        optimize(&more, &[word]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_saves_the_best_so_far() {
+    let out = Scratch::new("stopped.json");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+    command.args(["optimize", LENS, "--out", out.path(), "--vary", "curvatures", "--json"]);
+    command.args(["--method", "adam", "--steps", "100000000", "--error", "1e-9"]);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let id = child.id().to_string();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    Command::new("kill").args(["-INT", &id]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["ended"], "stopped");
+    has_keys(&done_json(&["info", out.path()], ""), &["efl"]);
+}
+
+#[test]
+fn convert_goes_both_ways_and_says_what_was_lost() {
+    let (zemax, native) = (Scratch::new("convert.zmx"), Scratch::new("convert.json"));
+    let there = done_json(&["convert", LENS, zemax.path()], "");
+    has_keys(&there["export"], &["format", "report", "proof"]);
+    assert_eq!(there["export"]["format"], "zemax");
+    assert!(there["export"]["proof"]["worst_mm"].as_f64().unwrap() < 1e-9);
+    let back = done_json(&["convert", zemax.path(), native.path()], "");
+    assert!(back["import"]["rows"].as_array().unwrap().len() > 10);
+    has_keys(&back["checks"][0], &["zoom", "efl", "bfl", "f_number"]);
+    let efl = |path: &str| done_json(&["info", path], "")["efl"].as_f64().unwrap();
+    assert!((efl(native.path()) - efl(LENS)).abs() < 1e-9);
+    assert!(done(&["convert", zemax.path(), native.path()], "").contains("used"));
+}
+
+#[test]
+fn convert_refuses_what_is_no_lens_and_where_it_cannot_write() {
+    let out = Scratch::new("refused.json");
+    let picture = Scratch::new("picture.zmx");
+    std::fs::write(&picture.0, b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01").unwrap();
+    refused(2, &["convert", picture.path(), out.path()], "", &[picture.path(), "PNG"]);
+    refused(2, &["convert", LENS, "lens.dat"], "", &["lens.dat", "`dat`"]);
+    refused(2, &["convert", LENS, "/nowhere/lens.zmx"], "", &["/nowhere/lens.zmx"]);
+    assert!(!out.0.exists());
 }
 
 #[test]

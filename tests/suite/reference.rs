@@ -105,9 +105,11 @@ impl Reference {
         self.with_fields(Bench::new(systems, self.primary(), beam, aiming).unwrap())
     }
 
-    /// The lens ready for rays, limited by its stop and clipped by its semi-diameters.
+    /// The lens ready for rays, limited by its stop and clipped by its semi-diameters; by its stop
+    /// alone where rays are aimed at that.
     pub(crate) fn clipped_bench(&self) -> Bench {
-        let systems = self.systems(|w| self.clipped(w));
+        let aimed = self.aimed_at_stop();
+        let systems = self.systems(|w| if aimed { self.open(w) } else { self.clipped(w) });
         let mut beam = self.beam();
         beam.aperture = Aperture::StopSemiDiameter(number(&self.data["stop_radius"]));
         self.with_fields(Bench::new(systems, self.primary(), beam, self.aiming()).unwrap())

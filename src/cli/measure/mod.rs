@@ -1,6 +1,10 @@
 //! Accuracy against time, throughput, memory.
 
+mod optimize;
+mod plot;
+mod spot;
 mod trace;
+mod window;
 
 use super::failure::Failure;
 use super::output::Output;
@@ -16,13 +20,20 @@ pub(super) struct Measure {
 /// Everything that is measured.
 #[derive(Debug, Subcommand)]
 enum What {
+    #[command(visible_alias = "gradient")]
     Trace(trace::Trace),
+    Spot(spot::Spot),
+    Optimize(optimize::Optimize),
+    Window(window::Window),
 }
 
 impl Measure {
     pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
         match &self.what {
             What::Trace(trace) => trace.run(output),
+            What::Spot(spot) => spot.run(output),
+            What::Optimize(optimize) => optimize.run(output),
+            What::Window(window) => window.run(output),
         }
     }
 }

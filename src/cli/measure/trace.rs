@@ -11,7 +11,7 @@ use std::fmt::{self, Display};
 #[command(after_long_help = include_str!("../help/measure_trace.txt"))]
 pub(super) struct Trace {
     /// How many times each way of tracing is timed
-    #[arg(long, value_name = "N", default_value_t = 41)]
+    #[arg(long, value_name = "N", default_value_t = 201)]
     turns: usize,
 }
 
@@ -44,7 +44,10 @@ impl Display for Report {
         writeln!(f, "{table}")?;
         write_rounding(f, "f64", &measured.rounding_f64)?;
         write_rounding(f, "f32", &measured.rounding_f32)?;
-        write_memory(f, "tracing a million rays", measured.memory_trace)
+        let ratio = measured.gradient_over_forward;
+        writeln!(f, "derivatives by all numbers: {ratio:.2} times the trace of the same rays")?;
+        write_memory(f, "tracing a million rays", measured.memory_trace)?;
+        write_memory(f, "differentiating a million rays", measured.memory_gradient)
     }
 }
 

@@ -192,6 +192,10 @@ impl Serialize for Lens {
 impl<'de> Deserialize<'de> for Lens {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let keys = LensKeys::deserialize(from)?;
+        if keys.aplanat != VERSION {
+            let found = format!("version {}, expected {VERSION}", keys.aplanat);
+            return Err(D::Error::custom(found));
+        }
         Ok(Self {
             name: keys.name,
             source: keys.source,

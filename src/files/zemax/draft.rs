@@ -61,8 +61,8 @@ pub(super) struct FieldLines {
 #[derive(Debug, Default)]
 pub(super) struct WaveLines {
     pub(super) count: Option<usize>,
-    /// Index from 1, micrometres, weight.
-    pub(super) numbered: Vec<(usize, f64, f64)>,
+    /// Index from 1, micrometres, weight, line.
+    pub(super) numbered: Vec<(usize, f64, f64, usize)>,
     /// Micrometres, in the older spelling.
     pub(super) list: Vec<f64>,
     pub(super) weights: Vec<f64>,

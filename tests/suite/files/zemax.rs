@@ -102,6 +102,8 @@ fn the_report_says_what_became_of_every_line() {
     assert_eq!(outcome(&report, "COFN").0, Outcome::Preserved);
     assert_eq!(outcome(&report, "EFFL").0, Outcome::Preserved);
     assert_eq!(outcome(&report, "VCYN").0, Outcome::Dropped);
+    assert_eq!(outcome(&report, "WAVM 3").0, Outcome::Used);
+    assert_eq!(outcome(&report, "WAVM 4").0, Outcome::Preserved); // padding
     let fixed: Vec<_> =
         report.rows.iter().filter(|row| row.text.starts_with("DIAM 8.6 1")).collect();
     assert_eq!(fixed[0].outcome, Outcome::Used); // beside an aperture that clips

@@ -101,7 +101,8 @@ pub(super) fn wavelengths(
     let lines = &draft.waves;
     let mut numbered = lines.numbered.clone();
     numbered.sort_by_key(|(index, ..)| *index);
-    let mut all: Vec<(f64, f64)> = numbered.iter().map(|(_, um, weight)| (*um, *weight)).collect();
+    let mut all: Vec<(f64, f64)> =
+        numbered.iter().map(|(_, um, weight, _)| (*um, *weight)).collect();
     if all.is_empty() {
         let weight = |i| lines.weights.get(i).copied().unwrap_or(1.0);
         all = lines.list.iter().enumerate().map(|(i, um)| (*um, weight(i))).collect();
@@ -109,6 +110,9 @@ pub(super) fn wavelengths(
     let padding = all.iter().rev().take_while(|wave| **wave == PADDING).count();
     let unpadded = (all.len() - padding).max(1);
     all.truncate(lines.count.unwrap_or(unpadded));
+    for (.., line) in numbered.iter().skip(all.len()) {
+        report.amend(*line, Outcome::Preserved, "beyond the wavelengths that count");
+    }
     if all.is_empty() {
         let place = format!("line {}", draft.surfaces[0].line);
         let found = "no wavelengths before it".to_owned();

@@ -153,6 +153,9 @@ fn image(draft: &Draft, report: &mut Report) {
         {
             report.amend(line, Outcome::Dropped, "object and image are planes here");
         }
+        if let Some(given) = surface.semi_diameter {
+            report.amend(given.line, Outcome::Preserved, "object and image clip nothing here");
+        }
         let terms = surface.parameters.iter().chain(&surface.extra);
         for (_, _, line) in terms.filter(|(_, value, _)| *value != 0.0) {
             report.amend(*line, Outcome::Dropped, "object and image are planes here");

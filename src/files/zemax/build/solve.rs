@@ -53,6 +53,11 @@ fn thickness(draft: &Draft, row: usize, lens: &mut Lens, report: &mut Report) {
     let surface = &draft.surfaces[row + 1];
     let solved = lens.focus.is_some() && row + 1 == lens.surfaces.len();
     if solved {
+        let pickup = surface.thickness_pickup.map(|pickup| pickup.line);
+        let variable = surface.variable_thickness.map(|(.., line)| line);
+        for line in pickup.into_iter().chain(variable) {
+            report.amend(line, Outcome::Dropped, "the gap is solved for the focus");
+        }
         return;
     }
     if let Some(line) = surface.thickness_pickup {

@@ -130,7 +130,8 @@ fn waves(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
     let waves = &mut draft.waves;
     match line.keyword {
         "WAVM" => {
-            waves.numbered.push((line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?));
+            let (um, weight) = (line.number(1)?, line.number_or(2, 1.0)?);
+            waves.numbered.push((line.count(0)?, um, weight, line.number));
         }
         "WAVL" | "WAVN" => waves.list.extend(line.numbers()?),
         _ => waves.weights.extend(line.numbers()?),

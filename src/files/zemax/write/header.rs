@@ -95,7 +95,7 @@ impl Export {
         }
         if count > FIELD_SLOTS {
             let note = format!("older versions of the program read {FIELD_SLOTS}");
-            self.lose(Outcome::Approximated, format!("fields: {count} points"), note);
+            self.note(Outcome::Approximated, format!("fields: {count} points"), note);
         }
     }
 

@@ -63,7 +63,7 @@ impl Export {
         self.line(text);
     }
 
-    fn lose(&mut self, outcome: Outcome, what: impl AsRef<str>, note: impl Into<String>) {
+    fn note(&mut self, outcome: Outcome, what: impl AsRef<str>, note: impl Into<String>) {
         self.report.add(outcome, what.as_ref(), note);
     }
 
@@ -89,7 +89,7 @@ impl Export {
         self.lens.variables.retain(|variable| !moves(variable.parameter));
         self.lens.pickups.retain(|pickup| !moves(pickup.parameter) && !moves(pickup.source));
         let note = "one position is written as a lens that does not zoom";
-        self.lose(Outcome::Approximated, "zoom positions: 1", note);
+        self.note(Outcome::Approximated, "zoom positions: 1", note);
     }
 
     /// Writes the solved last gap into the lens, at every zoom position where it is not solved
@@ -115,23 +115,28 @@ impl Export {
         }
         if offset != 0.0 {
             let note = "no solve there displaces the focus: the last gap is what it is now";
-            self.lose(Outcome::Approximated, format!("focus solve displaced by {offset} mm"), note);
+            self.note(Outcome::Approximated, format!("focus solve displaced by {offset} mm"), note);
         }
     }
 
-    /// What has no place in the file.
+    /// What has no place in the file, or another one.
     fn losses(&mut self) {
         let lens = self.lens.clone();
+        let clipping = lens.surfaces.iter().filter(|row| row.semi_diameter.is_some()).count();
+        if clipping > 0 {
+            let note = "semi-diameters alone clip nothing there: written with circular apertures";
+            self.note(Outcome::Used, format!("{clipping} semi-diameters that clip"), note);
+        }
         for variable in &lens.variables {
             let what = format!("variable: {}", variable.parameter);
             let bounded = variable.min.is_some() || variable.max.is_some();
             let both = variable.min.is_some() && variable.max.is_some();
             match variable.parameter.quantity {
                 Quantity::SemiDiameter => {
-                    self.lose(Outcome::Dropped, what, "semi-diameters do not vary there");
+                    self.note(Outcome::Dropped, what, "semi-diameters do not vary there");
                 }
                 Quantity::Thickness if both => {}
-                _ if bounded => self.lose(Outcome::Dropped, what, "its bounds; it stays variable"),
+                _ if bounded => self.note(Outcome::Dropped, what, "its bounds; it stays variable"),
                 _ => {}
             }
         }
@@ -141,7 +146,7 @@ impl Export {
                 matches!(pickup.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
             if !(like && there) {
                 let what = format!("pickup: {} from the {}", pickup.parameter, pickup.source);
-                self.lose(Outcome::Approximated, what, "its present value, without the pickup");
+                self.note(Outcome::Approximated, what, "its present value, without the pickup");
             }
         }
     }

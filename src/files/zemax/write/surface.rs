@@ -62,7 +62,7 @@ impl Export {
         self.semi_diameter(&row);
         if row.hyper {
             let note = "the far half of the surface counts there or not, as the program decides";
-            self.lose(Outcome::Dropped, format!("hyper of surface {i}"), note);
+            self.note(Outcome::Dropped, format!("hyper of surface {i}"), note);
         }
     }
 
@@ -130,7 +130,7 @@ impl Export {
                 let line = format!("GLAS ___BLANK 1 0 {} 0 {vary} 0 0 0 0", numbers([*nd, *vd]));
                 self.inner(line);
                 let note = "each program has its own dispersion formula for nd and vd";
-                self.lose(Outcome::Approximated, format!("model glass {place}"), note);
+                self.note(Outcome::Approximated, format!("model glass {place}"), note);
             }
             Medium::Glass(name) => self.catalogue_glass(name, place),
         }
@@ -143,7 +143,7 @@ impl Export {
         self.inner(format!("GLAS {bare} 0 0 {values} 0 0 0 0 0 0"));
         if there::is_general(glass) {
             let note = "not a maker's own: its data in the other program may differ";
-            self.lose(Outcome::Approximated, format!("glass {place}: {name}"), note);
+            self.note(Outcome::Approximated, format!("glass {place}: {name}"), note);
         }
     }
 

@@ -56,7 +56,7 @@ impl Export {
         }
         if all.iter().any(|aperture| discriminant(aperture) != discriminant(&base)) {
             let note = "apertures of different kinds: that of the lens holds at every position";
-            self.lose(Outcome::Dropped, "apertures of the zoom positions", note);
+            self.note(Outcome::Dropped, "apertures of the zoom positions", note);
             return;
         }
         let values: Vec<(f64, bool)> = all.into_iter().map(|a| (size(a), false)).collect();
@@ -76,7 +76,7 @@ impl Export {
         if !all.iter().all(|fields| alike(fields, &base)) {
             let note =
                 "fields of another kind, number or weight: those of the lens hold everywhere";
-            self.lose(Outcome::Dropped, "fields of the zoom positions", note);
+            self.note(Outcome::Dropped, "fields of the zoom positions", note);
             return;
         }
         let any_x = all.iter().flat_map(|fields| &fields.values).any(|field| field.x != 0.0);

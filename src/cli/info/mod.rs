@@ -1,16 +1,21 @@
 //! What a lens is: first-order data, third-order sums, sizes.
 
+mod checks;
+mod effects;
+
 use super::failure::Failure;
 use super::input::{LensFile, Opened};
 use super::output::{Number, Output, Table, optional};
+use crate::effects::Decision;
 use crate::lens::Lens;
 use crate::paraxial::{Beam, FirstOrder, Pupil, SeidelSums, first_order, seidel};
+use checks::{Check, checks};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
 /// First-order data, Seidel sums, semi-diameters, checks, and the effects chosen and why
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = include_str!("help/info.txt"))]
+#[command(after_long_help = include_str!("../help/info.txt"))]
 pub(super) struct Info {
     #[command(flatten)]
     lens: LensFile,
@@ -91,6 +96,8 @@ struct Position {
     lagrange: Option<f64>,
     petzval_sum: f64,
     seidel: Option<SeidelKeys>,
+    checks: Vec<Check>,
+    effects: Vec<Decision>,
 }
 
 #[derive(Serialize, Clone)]
@@ -141,6 +148,8 @@ impl Position {
         let undefined = |source| Failure::Undefined { file: opened.file.clone(), source };
         let data = first_order(&system, &Beam::of(lens, zoom)).map_err(undefined)?;
         let last = system.surfaces.len() - 1;
+        let media: Vec<_> = lens.surfaces.iter().map(|row| row.medium.clone()).collect();
+        let (facts, effects) = effects::decisions(opened, zoom)?;
         Ok(Self {
             zoom,
             zoom_name: lens.zoom.get(zoom).map(|z| z.name.clone()).unwrap_or_default(),
@@ -162,6 +171,8 @@ impl Position {
             lagrange: data.lagrange,
             petzval_sum: data.petzval_sum,
             seidel: seidel_keys(opened, zoom, &data)?,
+            checks: checks(&system, &media, facts.fates),
+            effects,
         })
     }
 }
@@ -189,6 +200,9 @@ impl Display for Report {
         write!(f, "{}", self.first_order())?;
         for position in self.positions() {
             write!(f, "\n{}", position.seidel_table())?;
+        }
+        for position in self.positions() {
+            write!(f, "\n{}", position.effects_and_checks())?;
         }
         let shown = |sd: &Option<f64>| sd.map_or("unlimited".into(), |sd| Number(sd).to_string());
         let list: Vec<String> = self.semi_diameters.iter().map(shown).collect();
@@ -235,6 +249,18 @@ impl Report {
 }
 
 impl Position {
+    fn effects_and_checks(&self) -> String {
+        let zoom = self.zoom;
+        let mut lines = vec![format!("effects on spots good to {}, zoom {zoom}", effects::SHARE)];
+        lines.extend(self.effects.iter().map(effects::line));
+        lines.push(format!("\nchecks, zoom {zoom}"));
+        lines.extend(self.checks.iter().map(Check::line));
+        if self.checks.is_empty() {
+            lines.push("  nothing to remark".to_owned());
+        }
+        lines.join("\n") + "\n"
+    }
+
     fn seidel_table(&self) -> Table {
         let title = format!("Seidel sums, zoom {}", self.zoom);
         let columns =

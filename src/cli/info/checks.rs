@@ -1,0 +1,65 @@
+//! What a maker would ask about a lens: gaps that are not there, rims that cannot be.
+
+use crate::lens::{Medium, System};
+use crate::trace::Fates;
+use serde::Serialize;
+
+/// Something about a lens that is worth a second look.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Check {
+    /// The surface that it is about, or the one in front of the gap.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<usize>,
+    /// What was found.
+    found: String,
+}
+
+impl Check {
+    pub(super) fn line(&self) -> String {
+        let place = self.surface.map(|i| format!("surface {i}: ")).unwrap_or_default();
+        format!("  {place}{}", self.found)
+    }
+}
+
+/// Looks at the gaps and rims of a lens, and at the rays that were tried.
+pub(super) fn checks(system: &System<f64>, media: &[Medium], fates: Fates) -> Vec<Check> {
+    let rows = media.len();
+    let mut checks: Vec<Check> = (0..rows).filter_map(|i| rim(system, i)).collect();
+    // Behind a mirror gaps are negative, and an edge means something else.
+    let straight = media.iter().position(|m| *m == Medium::Mirror).unwrap_or(rows);
+    checks.extend((0..straight.min(rows - 1)).filter_map(|i| gap(system, i)));
+    let lost = fates.total() - fates.imaged;
+    if fates.imaged == 0 && lost > 0 {
+        let found = format!("no light: none of {lost} rays gets through");
+        checks.push(Check { surface: None, found });
+    }
+    checks
+}
+
+/// A rim where the surface has ended already.
+fn rim(system: &System<f64>, i: usize) -> Option<Check> {
+    let surface = &system.surfaces[i];
+    let sd = surface.semi_diameter;
+    if !sd.is_finite() || surface.hyper || surface.shape.sag(sd * sd).is_some() {
+        return None;
+    }
+    let found = format!("the semi-diameter {sd} mm is beyond the edge of the surface");
+    Some(Check { surface: Some(i), found })
+}
+
+/// A gap without thickness on the axis or at the rims of its surfaces.
+fn gap(system: &System<f64>, i: usize) -> Option<Check> {
+    let [before, behind] = [&system.surfaces[i], &system.surfaces[i + 1]];
+    let check = |found| Some(Check { surface: Some(i), found });
+    if before.thickness < 0.0 {
+        return check(format!("the gap behind it is {} mm", before.thickness));
+    }
+    let rims = [before.semi_diameter, behind.semi_diameter];
+    let height = rims.into_iter().filter(|sd| sd.is_finite()).reduce(f64::min)?;
+    let sag = |surface: &crate::lens::Surface<f64>| Some(surface.shape.sag(height * height)?.0);
+    let edge = before.thickness + sag(behind)? - sag(before)?;
+    if edge >= 0.0 {
+        return None;
+    }
+    check(format!("the gap behind it is {edge:.4} mm at {height} mm from the axis"))
+}

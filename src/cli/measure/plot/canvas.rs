@@ -1,0 +1,120 @@
+//! Lines, markers and letters on a white picture.
+
+use super::font::glyph;
+use image::{ImageError, ImageFormat, Rgb, RgbImage};
+use std::io::Cursor;
+
+/// Red, green, blue.
+pub(super) type Color = [u8; 3];
+pub(super) const BLACK: Color = [0; 3];
+pub(super) const GRID: Color = [0xdd; 3];
+
+/// How large a dot of a letter is, in pixels.
+const DOT: i32 = 2;
+/// From one letter to the next, in dots.
+const ADVANCE: i32 = 6;
+/// How long a dash is and how far it is to the next one, in pixels.
+const DASH: f64 = 8.0;
+const PERIOD: f64 = 14.0;
+
+/// Where a text stands from its place.
+#[derive(Clone, Copy)]
+pub(super) enum Align {
+    Left,
+    Middle,
+    Right,
+}
+
+/// How a curve is drawn.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Stroke {
+    Solid,
+    Dashed,
+}
+
+/// A picture.
+pub(super) struct Canvas(RgbImage);
+
+impl Canvas {
+    pub(super) fn new([width, height]: [u32; 2]) -> Self {
+        Self(RgbImage::from_pixel(width, height, Rgb([0xff; 3])))
+    }
+
+    fn dot(&mut self, x: i32, y: i32, color: Color) {
+        let place = u32::try_from(x).ok().zip(u32::try_from(y).ok());
+        let inside = place.filter(|(x, y)| *x < self.0.width() && *y < self.0.height());
+        if let Some((x, y)) = inside {
+            self.0.put_pixel(x, y, Rgb(color));
+        }
+    }
+
+    /// A filled square around a place.
+    fn square(&mut self, [x, y]: [f64; 2], half: i32, color: Color) {
+        let (x, y) = (x.round() as i32, y.round() as i32);
+        for dy in -half..=half {
+            (-half..=half).for_each(|dx| self.dot(x + dx, y + dy, color));
+        }
+    }
+
+    /// A line one pixel wide.
+    pub(super) fn line(&mut self, from: [f64; 2], to: [f64; 2], color: Color) {
+        let place = |t: f64| [0, 1].map(|i| from[i] + t * (to[i] - from[i]));
+        let steps = length(from, to).ceil().max(1.0);
+        (0..=steps as i32).for_each(|i| self.square(place(f64::from(i) / steps), 0, color));
+    }
+
+    /// A broken line three pixels wide, with a marker at every point.
+    pub(super) fn curve(&mut self, points: &[[f64; 2]], color: Color, stroke: Stroke) {
+        let mut way = 0.0;
+        for pair in points.windows(2) {
+            let (from, to) = (pair[0], pair[1]);
+            let length = length(from, to);
+            let steps = length.ceil().max(1.0);
+            for i in 0..=steps as i32 {
+                let t = f64::from(i) / steps;
+                let drawn = stroke == Stroke::Solid || (way + t * length) % PERIOD < DASH;
+                if drawn {
+                    self.square([0, 1].map(|k| from[k] + t * (to[k] - from[k])), 1, color);
+                }
+            }
+            way += length;
+        }
+        points.iter().for_each(|point| self.square(*point, 3, color));
+    }
+
+    /// A line of text; the place is at its top.
+    pub(super) fn text(&mut self, [x, y]: [f64; 2], text: &str, color: Color, align: Align) {
+        let width = DOT * ADVANCE * text.chars().count() as i32;
+        let start = x.round() as i32
+            - match align {
+                Align::Left => 0,
+                Align::Middle => width / 2,
+                Align::Right => width,
+            };
+        for (i, letter) in text.chars().enumerate() {
+            self.letter([start + DOT * ADVANCE * i as i32, y.round() as i32], letter, color);
+        }
+    }
+
+    fn letter(&mut self, [x, y]: [i32; 2], letter: char, color: Color) {
+        for (column, bits) in glyph(letter).into_iter().enumerate() {
+            for row in (0..8).filter(|row| bits >> row & 1 == 1) {
+                let corner = [x + DOT * column as i32, y + DOT * row];
+                for i in 0..DOT * DOT {
+                    self.dot(corner[0] + i % DOT, corner[1] + i / DOT, color);
+                }
+            }
+        }
+    }
+
+    /// The picture as a file.
+    pub(super) fn png(&self) -> Result<Vec<u8>, ImageError> {
+        let mut bytes = Cursor::new(Vec::new());
+        self.0.write_to(&mut bytes, ImageFormat::Png)?;
+        Ok(bytes.into_inner())
+    }
+}
+
+fn length(from: [f64; 2], to: [f64; 2]) -> f64 {
+    (to[0] - from[0]).hypot(to[1] - from[1])
+}

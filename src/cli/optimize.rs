@@ -1,0 +1,311 @@
+//! Local optimization: the loop, its progress bar, and saving the best lens whatever ends it.
+
+use super::failure::Failure;
+use super::input::{self, LensFile, Opened, Tolerance};
+use super::output::{Number, Output, Table};
+use super::vary::{Kind, vary};
+use crate::files::{self, native};
+use crate::lens::Lens;
+use crate::measure::timed;
+use crate::merit::{Goal, MeritError, TermValue};
+use crate::optimize::{Method, Optimizer, Progress, start};
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Optimizes the variables of a lens; Ctrl-C ends it and saves the best lens so far
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("help/optimize.txt"))]
+pub(super) struct Optimize {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// Where the best lens is saved: .json or .zmx
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+
+    /// How to search
+    #[arg(long, value_enum, default_value_t = MethodName::Dls)]
+    method: MethodName,
+
+    /// No more steps than this; 100 for dls and 2000 for adam where it is absent
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+
+    /// The error allowed of the radius of each spot: `0.1%` or `1e-3`
+    #[arg(long, default_value = "1e-6", value_name = "TOLERANCE")]
+    error: Tolerance,
+
+    /// Kinds of numbers to vary besides the variables of the lens
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]
+    vary: Vec<Kind>,
+
+    /// What to aim at, as JSON; sharp spots at the focal length it has where it is absent
+    #[arg(long, value_name = "FILE")]
+    goal: Option<PathBuf>,
+
+    /// Where every step is written down, as JSON
+    #[arg(long, value_name = "FILE")]
+    history: Option<PathBuf>,
+}
+
+/// The methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum MethodName {
+    /// Damped least squares
+    Dls,
+    /// First order, with moments
+    Adam,
+}
+
+impl MethodName {
+    fn method(self) -> Method {
+        match self {
+            Self::Dls => Method::DampedLeastSquares,
+            Self::Adam => Method::Adam,
+        }
+    }
+
+    fn usual_steps(self) -> usize {
+        match self {
+            Self::Dls => 100,
+            Self::Adam => 2000,
+        }
+    }
+}
+
+impl Optimize {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let opened = self.lens.open()?;
+        input::check_target(&self.out, &["json", "zmx"])?;
+        self.history.iter().try_for_each(|path| input::check_target(path, &["json"]))?;
+        let mut lens = opened.lens.clone();
+        vary(&mut lens, &self.vary);
+        let refuse = |source| refused(&opened, source);
+        let goal = self.goal(&lens).map_err(|e| e.or_else(refuse))?;
+        let started = start(self.method.method(), &lens, &goal, self.error.0);
+        let mut optimizer = started.map_err(refuse)?;
+        let before = optimizer.terms().map_err(refuse)?;
+        let (search, ms) = timed(|| self.search(optimizer.as_mut()));
+        let after = optimizer.terms().map_err(refuse)?;
+        let best = Lens { variables: opened.lens.variables.clone(), ..optimizer.best().clone() };
+        files::save(&best, &self.out)?;
+        if let Some(path) = &self.history {
+            files::replace(path, native::pretty(&History { steps: &search.steps }).as_bytes())?;
+        }
+        let found = Found { search: &search, ms, before, after };
+        output.print(&Report::new(self, &lens, &best, found))
+    }
+
+    fn goal(&self, lens: &Lens) -> Result<Goal, Trouble> {
+        match &self.goal {
+            Some(path) => input::read_json(path).map_err(Trouble::Failure),
+            None => Goal::sensible(lens).map_err(Trouble::Merit),
+        }
+    }
+
+    /// Steps until nothing gets better, the steps are used up, or the person has had enough.
+    fn search(&self, optimizer: &mut dyn Optimizer) -> Search {
+        let most = self.steps.unwrap_or(self.method.usual_steps());
+        let stop = stop_flag();
+        let bar = progress_bar(most);
+        let mut search = Search { steps: Vec::new(), ended: Ended::Steps };
+        while search.steps.len() < most {
+            if stop.load(Ordering::Relaxed) {
+                search.ended = Ended::Stopped;
+                break;
+            }
+            let progress = optimizer.step();
+            bar.inc(1);
+            bar.set_message(format!("merit {}", Number(progress.best)));
+            let finished = progress.finished;
+            search.steps.push(progress);
+            if finished {
+                search.ended = Ended::Finished;
+                break;
+            }
+        }
+        bar.finish_and_clear();
+        search
+    }
+}
+
+/// What can go wrong while the goal is made.
+enum Trouble {
+    Failure(Failure),
+    Merit(MeritError),
+}
+
+impl Trouble {
+    fn or_else(self, refuse: impl FnOnce(MeritError) -> Failure) -> Failure {
+        match self {
+            Self::Failure(failure) => failure,
+            Self::Merit(source) => refuse(source),
+        }
+    }
+}
+
+fn refused(opened: &Opened, source: MeritError) -> Failure {
+    let file = opened.file.clone();
+    match source {
+        MeritError::NoVariables => Failure::Input(format!(
+            "{file}: found no variables; expected some in the file (`\"variables\"`), or kinds of \
+             numbers to vary: `--vary curvatures,thicknesses`"
+        )),
+        source => Failure::Merit { file, source },
+    }
+}
+
+/// A flag that Ctrl-C raises; a second Ctrl-C does no more than the first.
+fn stop_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
+        log::warn!("Ctrl-C will not save the best lens: {error}");
+    }
+    flag
+}
+
+/// A bar on standard error, where that is a terminal.
+fn progress_bar(steps: usize) -> ProgressBar {
+    let bar = ProgressBar::new(steps as u64);
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {eta}");
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// How a search went.
+struct Search {
+    steps: Vec<Progress>,
+    ended: Ended,
+}
+
+/// What ended a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Ended {
+    /// Nothing gets better.
+    Finished,
+    /// The steps are used up.
+    Steps,
+    /// The person stopped it.
+    Stopped,
+}
+
+#[derive(Serialize)]
+struct History<'a> {
+    steps: &'a [Progress],
+}
+
+/// A search with the terms around it.
+struct Found<'a> {
+    search: &'a Search,
+    ms: f64,
+    before: Vec<TermValue>,
+    after: Vec<TermValue>,
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report {
+    method: MethodName,
+    steps: usize,
+    ended: Ended,
+    ms: f64,
+    merit_before: f64,
+    merit_after: f64,
+    refused_steps: usize,
+    last_refusal: Option<String>,
+    terms: Vec<TermKeys>,
+    variables: Vec<VariableKeys>,
+    out: String,
+}
+
+#[derive(Serialize)]
+struct TermKeys {
+    term: &'static str,
+    weight: f64,
+    before: ValueKeys,
+    after: ValueKeys,
+}
+
+#[derive(Serialize)]
+struct ValueKeys {
+    value: f64,
+    error: f64,
+    rays: usize,
+}
+
+impl ValueKeys {
+    fn new(term: &TermValue) -> Self {
+        Self { value: term.value, error: term.error, rays: term.rays }
+    }
+}
+
+#[derive(Serialize)]
+struct VariableKeys {
+    parameter: String,
+    before: Option<f64>,
+    after: Option<f64>,
+}
+
+impl Report {
+    fn new(asked: &Optimize, lens: &Lens, best: &Lens, found: Found<'_>) -> Self {
+        let Found { search, ms, before, after } = found;
+        let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
+        let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
+        let variable = |v: &crate::lens::Variable| VariableKeys {
+            parameter: v.parameter.to_string(),
+            before: lens.get(v.parameter),
+            after: best.get(v.parameter),
+        };
+        let term = |(before, after): (&TermValue, &TermValue)| TermKeys {
+            term: before.term,
+            weight: before.weight,
+            before: ValueKeys::new(before),
+            after: ValueKeys::new(after),
+        };
+        Self {
+            method: asked.method,
+            steps: search.steps.len(),
+            ended: search.ended,
+            ms,
+            merit_before: merit(&before),
+            merit_after: merit(&after),
+            refused_steps: refusals().count(),
+            last_refusal: refusals().next_back().cloned(),
+            terms: before.iter().zip(&after).map(term).collect(),
+            variables: lens.variables.iter().map(variable).collect(),
+            out: asked.out.display().to_string(),
+        }
+    }
+}
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { steps, ms, merit_before, merit_after, out, .. } = self;
+        let ended = match self.ended {
+            Ended::Finished => "nothing gets better any more",
+            Ended::Steps => "the steps are used up",
+            Ended::Stopped => "stopped",
+        };
+        writeln!(f, "{steps} steps in {:.3} s: {ended}", 1e-3 * ms)?;
+        if let Some(refusal) = &self.last_refusal {
+            writeln!(f, "{} steps refused or shortened, the last: {refusal}", self.refused_steps)?;
+        }
+        writeln!(f, "merit {} -> {}\n", Number(*merit_before), Number(*merit_after))?;
+        let mut table = Table::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
+        for TermKeys { term, weight, before, after } in &self.terms {
+            let numbers = [*weight, before.value].map(|v| Number(v).to_string());
+            let start = std::iter::once((*term).to_owned()).chain(numbers);
+            let error = |value: &ValueKeys| format!("{:.1e}", value.error);
+            let rest = [error(before), Number(after.value).to_string(), error(after)];
+            table.row(start.chain(rest).chain([after.rays.to_string()]));
+        }
+        writeln!(f, "{table}\nsaved as {out}")
+    }
+}
