@@ -539,6 +539,25 @@ fn the_numbers_of_the_newest_design_arrive() {
 }
 
 #[test]
+fn an_effect_that_is_switched_off_is_not_computed() {
+    let mut session = session(double_gauss());
+    session.apply(Command::Choose(Effect::Dispersion, Choice::Off));
+    session.apply(Command::Choose(Effect::Clipping, Choice::Off));
+    wait(&mut session, "the numbers", |view, _| view.is_current());
+    let results = session.results().unwrap();
+    let numbers = results.numbers.as_ref().unwrap();
+    assert_eq!((numbers.bench.value.colors.len(), numbers.scatter.value.len()), (1, 3));
+    assert_eq!(numbers.layout.value.fates.clipped, 0);
+    assert!(!session.view().dirty && !session.view().can_undo(), "the design is what it was");
+    session.apply(Command::Choose(Effect::Clipping, Choice::Auto));
+    session.apply(Command::Choose(Effect::Dispersion, Choice::Auto));
+    wait(&mut session, "the numbers", |view, _| view.is_current());
+    let results = session.results().unwrap();
+    let numbers = results.numbers.as_ref().unwrap();
+    assert!(numbers.bench.value.colors.len() == 3 && numbers.layout.value.fates.clipped > 0);
+}
+
+#[test]
 fn when_there_is_time_the_cost_of_each_effect_is_measured() {
     let mut session = session(double_gauss());
     wait(&mut session, "the measured plan", |view, _| {
