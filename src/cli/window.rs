@@ -15,7 +15,7 @@ pub(super) fn open(lens: Option<&Path>) -> Result<(), Failure> {
 
 #[cfg(feature = "studio")]
 fn show(lens: Option<&Path>) -> Result<(), Failure> {
-    let studio = crate::studio::run(lens.map(Path::to_owned));
+    let studio = crate::studio::run(lens);
     studio.map_err(|why| Failure::Failed(why.to_string()))
 }
 

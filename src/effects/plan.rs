@@ -175,20 +175,25 @@ fn asphere(facts: &Facts, allowed: f64, choice: Choice) -> (Decision, Vec<usize>
     plain.sort_unstable();
     let kept = facts.aspheres.iter().map(|(surface, _)| *surface).filter(|i| !plain.contains(i));
     let surfaces: Vec<usize> = kept.collect();
-    let reason = match (facts.aspheres.len(), surfaces.len()) {
-        (0, _) => "no surface is figured".to_owned(),
-        (all, _) => format!(
-            "without the figuring of {all} surfaces rays would land {:.3} um away; {:.3} um may \
-             be neglected",
-            1e3 * total,
-            1e3 * allowed
-        ),
+    let reason = match facts.aspheres.len() {
+        0 => "no surface is figured".to_owned(),
+        1 => format!("without the figuring of a surface {}", way(total, allowed)),
+        all => format!("without the figuring of {all} surfaces {}", way(total, allowed)),
     };
     let figured = facts.aspheres.len() as f64;
     let work = facts.surfaces as f64 + figured * (ITERATION - 1.0);
     let saves = figured * (ITERATION - 1.0) / work;
     let computed = !surfaces.is_empty();
     (Decision { computed, surfaces, left, reason, saves, ..decision }, plain)
+}
+
+/// What rays would do, in words.
+fn way(moved: f64, allowed: f64) -> String {
+    if !moved.is_finite() {
+        return "rays would be lost".to_owned();
+    }
+    let [moved, allowed] = [moved, allowed].map(|mm| 1e3 * mm);
+    format!("rays would land {moved:.3} um away; {allowed:.3} um may be neglected")
 }
 
 /// What a crossing of a figured surface costs, in crossings of a sphere.
@@ -239,6 +244,9 @@ fn reflection(facts: &Facts, choice: Choice) -> Decision {
         }
         Some(angle) => format!("no ray leaves a surface at less than {angle:.1} degrees to it"),
     };
+    let kept =
+        if choice == Choice::Off { "; the test is part of refraction and stays" } else { "" };
+    let reason = reason + kept;
     let computed = !facts.falls.is_empty();
     Decision { computed, left: 0.0, surfaces: facts.falls.clone(), reason, ..decision }
 }
@@ -268,10 +276,9 @@ fn object(facts: &Facts, allowed: f64, choice: Choice) -> Decision {
     let decision = whole(Effect::FiniteObject, choice, moved, allowed, "mm");
     let reason = match facts.object {
         None => "the object is at infinity".to_owned(),
-        Some((distance, moved)) => format!(
-            "from infinity rays would land {:.3} um away from where they land from {distance} mm",
-            1e3 * moved
-        ),
+        Some((distance, moved)) => {
+            format!("from infinity instead of {distance} mm {}", way(moved, allowed))
+        }
     };
     let computed = decision.computed && facts.object.is_some();
     Decision { computed, reason, ..decision }

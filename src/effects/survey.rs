@@ -9,7 +9,7 @@ use crate::lens::{Field, Lens, Object, Shape, System};
 use crate::math::Vec3;
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, Bench, BenchError, Launch, Pattern, pattern};
-use crate::trace::{Fates, Ray, Tracer};
+use crate::trace::{Fate, Fates, Ray, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -78,8 +78,6 @@ pub fn survey(lens: &Lens, zoom: usize) -> Result<Facts, BenchError> {
     let system = &bench.colors[bench.primary].system;
     let sights: Vec<Sight> =
         bench.fields.par_iter().flat_map_iter(|field| Sight::of_field(&bench, *field)).collect();
-    let mut fates = Fates::default();
-    sights.iter().flat_map(|sight| &sight.fates).for_each(|fate| fates.count(*fate));
     Ok(Facts {
         colors: bench.colors.len(),
         surfaces: system.surfaces.len(),
@@ -88,12 +86,21 @@ pub fn survey(lens: &Lens, zoom: usize) -> Result<Facts, BenchError> {
         dispersion: dispersion(&bench, &sights),
         aspheres: aspheres(&bench, &sights)?,
         rims: rims(&bench)?,
-        fates,
+        fates: sights.iter().fold(Fates::default(), |sum, sight| plus(sum, sight.fates)),
         falls: falls(system),
-        critical: critical(&bench, &sights),
+        critical: sights.iter().filter_map(|sight| sight.grazing).reduce(f64::min),
         miss,
         object: object(lens, zoom, &bench, &sights)?,
     })
+}
+
+fn plus(a: Fates, b: Fates) -> Fates {
+    Fates {
+        imaged: a.imaged + b.imaged,
+        missed: a.missed + b.missed,
+        clipped: a.clipped + b.clipped,
+        total_reflection: a.total_reflection + b.total_reflection,
+    }
 }
 
 fn length(system: &System<f64>) -> f64 {
@@ -116,7 +123,10 @@ struct Sight {
     rays: Vec<Option<Ray<f64>>>,
     /// Where they land; `None` for a ray that is lost.
     landed: Vec<Option<Vec3<f64>>>,
-    fates: Vec<crate::trace::Fate>,
+    fates: Fates,
+    /// The smallest angle between a ray and a surface that it leaves where the index falls, in
+    /// degrees; 0 for one that is totally reflected.
+    grazing: Option<f64>,
 }
 
 impl Sight {
@@ -128,19 +138,30 @@ impl Sight {
     }
 
     fn new(launch: &Launch<'_>, places: &[[f64; 2]]) -> Self {
-        let rays: Vec<_> = places.iter().map(|p| launch.ray(*p)).collect();
-        let landings: Vec<_> =
-            rays.iter().map(|ray| ray.map(|ray| launch.color().tracer.trace(ray))).collect();
-        Self {
+        let mut sight = Self {
             field: launch.field,
             wavelength: launch.wavelength,
-            landed: landings
-                .iter()
-                .map(|l| l.filter(|l| l.fate.is_imaged()).map(|l| l.ray.point))
-                .collect(),
-            fates: landings.iter().flatten().map(|landing| landing.fate).collect(),
-            rays,
+            rays: places.iter().map(|p| launch.ray(*p)).collect(),
+            landed: Vec::with_capacity(places.len()),
+            fates: Fates::default(),
+            grazing: None,
+        };
+        let color = launch.color();
+        let falls = falls(&color.system);
+        let mut points = Vec::with_capacity(color.system.surfaces.len());
+        for ray in &sight.rays {
+            points.clear();
+            let landing = ray.map(|ray| color.tracer.visit(ray, |i, p| points.push((i, p))));
+            let imaged = landing.filter(|landing| landing.fate.is_imaged());
+            sight.landed.push(imaged.map(|landing| landing.ray.point));
+            let Some(landing) = landing else { continue };
+            sight.fates.count(landing.fate);
+            let reflected = matches!(landing.fate, Fate::TotalReflection(_)).then_some(0.0);
+            let leaving = leaving(&color.system, &points).filter(|(i, _)| falls.contains(i));
+            let angles = leaving.map(|(_, angle)| angle).chain(reflected);
+            sight.grazing = angles.chain(sight.grazing).reduce(f64::min);
         }
+        sight
     }
 
     /// Where the rays inside the pupil land.
@@ -208,7 +229,7 @@ fn moves(bench: &Bench, sights: &[Sight], other: &System<f64>) -> Result<f64, Be
 
 fn aspheres(bench: &Bench, sights: &[Sight]) -> Result<Vec<(usize, f64)>, BenchError> {
     let system = &bench.colors[bench.primary].system;
-    let figured = (0..system.surfaces.len()).filter(|i| is_figured(system, *i));
+    let figured = (0..system.surfaces.len()).into_par_iter().filter(|i| is_figured(system, *i));
     let moved = |i: usize| {
         let mut plain = without_rims(bench);
         drop_terms(&mut plain.surfaces[i]);
@@ -269,28 +290,6 @@ fn falls(system: &System<f64>) -> Vec<usize> {
         !surface.mirror && surface.index < system.index_before(*i)
     };
     (0..system.surfaces.len()).filter(falls).collect()
-}
-
-/// The angle by which the ray nearest to total reflection leaves its surface, from the margin
-/// `n'² cos² I'`.
-fn critical(bench: &Bench, sights: &[Sight]) -> Option<f64> {
-    let mut least: Option<f64> = None;
-    for sight in sights {
-        let color = &bench.colors[sight.wavelength];
-        let falls = falls(&color.system);
-        for ray in sight.rays.iter().flatten() {
-            let mut points = Vec::with_capacity(color.system.surfaces.len());
-            let landing = color.tracer.visit(*ray, |i, p| points.push((i, p)));
-            if let crate::trace::Fate::TotalReflection(_) = landing.fate {
-                return Some(0.0);
-            }
-            let angles = leaving(&color.system, &points);
-            for (_, angle) in angles.filter(|(i, _)| falls.contains(i)) {
-                least = Some(least.map_or(angle, |least: f64| least.min(angle)));
-            }
-        }
-    }
-    least
 }
 
 /// The angle between a ray and each surface that it leaves, in degrees.

@@ -72,6 +72,11 @@ impl Studio {
         &self.session
     }
 
+    /// The same, to be told commands directly.
+    pub const fn session_mut(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
     /// Does what a command says, as a panel would ask for it.
     pub fn apply(&mut self, context: &Context, command: Command) {
         let events = self.session.apply(command);
@@ -87,7 +92,7 @@ impl Studio {
         self.name_window(ui.ctx(), &view);
         let mut wishes = menu::keys(ui, &view, self.dock.is_typing());
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut wishes));
-        bar_frame(ui, Side::bottom("status"), |ui| self.status(ui, &view, &mut wishes));
+        bar_frame(ui, Side::bottom("status"), |ui| Self::status(ui, &view, &mut wishes));
         let mut commands = Vec::new();
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut commands));
         wishes.extend(commands.into_iter().map(Wish::Do));
@@ -138,7 +143,7 @@ impl Studio {
             Purpose::Open => self.replace(context, Command::Open(path)),
             Purpose::Save => self.apply(context, Command::Save(Some(path))),
             Purpose::ExportZemax | Purpose::ExportJson => {
-                self.apply(context, Command::Export(path))
+                self.apply(context, Command::Export(path));
             }
         }
     }
@@ -235,7 +240,7 @@ impl Studio {
     }
 
     /// The line at the bottom: the last message, and how old the numbers are.
-    fn status(&self, ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
+    fn status(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
         ui.horizontal(|ui| {
             messages(ui, &view.messages, wishes);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

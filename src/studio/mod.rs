@@ -7,6 +7,7 @@ pub mod chooser;
 pub mod dock;
 pub mod draw;
 pub mod field;
+mod gauge;
 mod menu;
 pub mod number;
 pub mod palette;
@@ -17,8 +18,9 @@ pub mod theme;
 pub mod wording;
 
 pub use app::Studio;
+pub use gauge::{Figures, measure};
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use shell::{Memory, StudioError};
 
@@ -31,13 +33,13 @@ use crate::session::{Command, Session, blank};
 ///
 /// # Errors
 /// Where no window can open: see [`StudioError`]. A file that cannot be read is said in the window.
-pub fn run(path: Option<PathBuf>) -> Result<(), StudioError> {
+pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
     shell::open(Memory::Kept, |context, backing| {
         let wake = context.egui_ctx.clone();
         let session = Session::new(first_lens(), move || wake.request_repaint())?;
         let mut studio = Studio::new(session, backing, Memory::Kept, context.storage);
-        if let Some(path) = &path {
-            studio.apply(&context.egui_ctx, Command::Open(path.clone()));
+        if let Some(path) = path {
+            studio.apply(&context.egui_ctx, Command::Open(path.to_owned()));
         }
         Ok(Box::new(studio))
     })

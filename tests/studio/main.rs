@@ -3,6 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot prepare its case should fail")]
 #![expect(clippy::print_stdout, reason = "`--nocapture` shows how near the two drawings are")]
 
+mod bench;
 mod chooser;
 mod drawing;
+mod panels;
 mod shaders;
+mod window;

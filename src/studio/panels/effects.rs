@@ -1,6 +1,6 @@
 //! Which physics is computed for this lens, on which number that rests, and what it saves.
 
-use eframe::egui::{Color32, ComboBox, Frame, Margin, RichText, ScrollArea, Ui};
+use eframe::egui::{Align, Color32, ComboBox, Frame, Layout, Margin, RichText, ScrollArea, Ui};
 
 use super::{Panel, no_numbers, shown};
 use crate::effects::{Choice, Decision, Plan};
@@ -61,7 +61,7 @@ fn state(ui: &mut Ui, decision: &Decision) {
 
 fn choice(ui: &mut Ui, decision: &Decision, old: Choice, wishes: &mut Vec<Command>) {
     let mut chosen = old;
-    ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let combo = ComboBox::from_id_salt(decision.effect.name()).width(56.0);
         let combo = combo.selected_text(name(chosen)).show_ui(ui, |ui| {
             for choice in [Choice::Auto, Choice::On, Choice::Off] {
@@ -88,13 +88,11 @@ const fn name(choice: Choice) -> &'static str {
 fn numbers(decision: &Decision) -> String {
     let digits = |value: f64| number::show_digits(value, 3);
     let Decision { error, limit, unit, saves, .. } = decision;
-    let mut text = format!("{} {unit}, limit {} {unit}", digits(*error), digits(*limit));
-    if *saves > 0.0 {
-        let verb = if decision.computed { "would save" } else { "saves" };
-        text += &format!("; {verb} {:.0} % of tracing", 100.0 * saves);
-        if let Some(ms) = decision.saved_ms {
-            text += &format!(" ({ms:.2} ms)");
-        }
+    let rests = format!("{} {unit}, limit {} {unit}", digits(*error), digits(*limit));
+    if *saves <= 0.0 {
+        return rests;
     }
-    text
+    let verb = if decision.computed { "would save" } else { "saves" };
+    let time = decision.saved_ms.map(|ms| format!(" ({ms:.2} ms)")).unwrap_or_default();
+    format!("{rests}; {verb} {:.0} % of tracing{time}", 100.0 * saves)
 }

@@ -224,17 +224,16 @@ impl Drawing {
         let Some(row) = view.lens.surfaces.get(surface) else { return "Image plane".to_owned() };
         let shape = &self.system.surfaces[surface].shape;
         let radius = number::show(number::radius(shape.curvature()));
-        let mut text = format!("Surface {}, radius {radius} mm", surface + 1);
-        if row.stop {
-            text += ", the stop";
-        }
-        if let Some(limit) = row.semi_diameter {
-            text += &format!("\nsemi-diameter {} mm", number::show(limit));
-        }
-        if let Some(reached) = self.reached.get(surface) {
-            text += &format!("\nrays reach {} mm", number::show_digits(*reached, 5));
-        }
-        text
+        let stop = if row.stop { ", the stop" } else { "" };
+        let first = format!("Surface {}, radius {radius} mm{stop}", surface + 1);
+        let limit = row.semi_diameter.map(|limit| {
+            format!("\nsemi-diameter {} mm: rays beyond it are clipped", number::show(limit))
+        });
+        let reached = self
+            .reached
+            .get(surface)
+            .map(|height| format!("\nrays reach {} mm", number::show_digits(*height, 5)));
+        first + &limit.unwrap_or_default() + &reached.unwrap_or_default()
     }
 }
 

@@ -12,6 +12,7 @@ pub use first_order::FirstOrderData;
 pub use layout::LensLayout;
 pub use optimizer::Optimizer;
 pub use prescription::Prescription;
+pub(super) use prescription::first_field;
 pub use spot::SpotDiagram;
 
 use std::sync::Arc;

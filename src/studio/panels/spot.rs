@@ -71,7 +71,7 @@ impl Panel for SpotDiagram {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, "Spots"));
         let cells = cells(rect, numbers.spots.value.len());
-        self.draw(ui, rect, Arc::clone(results), numbers, &cells);
+        self.draw(ui, rect, results, numbers, &cells);
         for (i, cell) in cells.iter().enumerate() {
             words(ui, *cell, &results.lens, numbers, i);
         }
@@ -84,7 +84,7 @@ impl SpotDiagram {
         &mut self,
         ui: &Ui,
         rect: Rect,
-        results: Arc<Results>,
+        results: &Arc<Results>,
         numbers: &Numbers,
         cells: &[Rect],
     ) {
@@ -92,7 +92,7 @@ impl SpotDiagram {
         let palette = Palette::of(ui.visuals());
         let relative = |cell: &Rect| picture(*cell).translate(-rect.min.to_vec2());
         let cells = cells.iter().map(relative).collect();
-        let source = Source { results: Arc::clone(&results), cells, palette, per_point };
+        let source = Source { results: Arc::clone(results), cells, palette, per_point };
         if self.drawing.as_ref().is_none_or(|(drawn, _)| *drawn != source) {
             let scene = Arc::new(scene(ui, &source, numbers));
             self.drawing = Some((source, scene));

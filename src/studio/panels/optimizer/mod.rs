@@ -109,17 +109,19 @@ impl Optimizer {
     fn method(&mut self, ui: &mut Ui, under_way: bool) {
         ui.horizontal(|ui| {
             ui.weak("Method");
-            ui.add_enabled_ui(!under_way, |ui| {
-                let combo = ComboBox::from_id_salt("method").selected_text(self.method.name());
-                let combo = combo.width(160.0).show_ui(ui, |ui| {
-                    for method in [Method::DampedLeastSquares, Method::Adam] {
-                        ui.selectable_value(&mut self.method, method, method.name());
-                    }
-                });
-                combo.response.accessible_name("Method");
-            });
+            ui.add_enabled_ui(!under_way, |ui| methods(ui, &mut self.method));
         });
     }
+}
+
+fn methods(ui: &mut Ui, chosen: &mut Method) {
+    let combo = ComboBox::from_id_salt("method").selected_text(chosen.name()).width(160.0);
+    let combo = combo.show_ui(ui, |ui| {
+        for method in [Method::DampedLeastSquares, Method::Adam] {
+            ui.selectable_value(chosen, method, method.name());
+        }
+    });
+    combo.response.accessible_name("Method");
 }
 
 /// How the search stands, and the numbers a designer reads first, before and after.

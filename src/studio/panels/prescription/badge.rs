@@ -2,7 +2,7 @@
 
 use eframe::egui::{
     Align, Button, Color32, CornerRadius, Id, Popup, PopupCloseBehavior, Response, RichText, Sense,
-    Ui, vec2,
+    Ui, Visuals, vec2,
 };
 
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
@@ -94,7 +94,7 @@ fn badge(ui: &mut Ui, decides: Decides) -> Response {
     let visuals = ui.visuals();
     let (fill, text) = match decides {
         Decides::Nobody => (Color32::TRANSPARENT, visuals.weak_text_color()),
-        Decides::Optimizer(_) => (visuals.selection.bg_fill, visuals.strong_text_color()),
+        Decides::Optimizer(_) => (accent(visuals), Color32::WHITE),
         Decides::Another(_) | Decides::Focus(_) => {
             (visuals.widgets.inactive.bg_fill, visuals.strong_text_color())
         }
@@ -108,6 +108,11 @@ fn badge(ui: &mut Ui, decides: Decides) -> Response {
         .sense(Sense::CLICK);
     ui.spacing_mut().button_padding = vec2(0.0, 0.0);
     ui.add_sized(vec2(WIDTH - 2.0, 16.0), button)
+}
+
+/// Dark enough for white letters on dark and on light.
+fn accent(visuals: &Visuals) -> Color32 {
+    if visuals.dark_mode { Color32::from_rgb(40, 92, 160) } else { Color32::from_rgb(40, 104, 196) }
 }
 
 /// The menu of a badge.

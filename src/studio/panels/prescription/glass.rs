@@ -43,7 +43,7 @@ pub(super) fn parse(text: &str) -> Medium {
 /// Glasses whose names go on like what was typed, then those that contain it.
 pub(super) fn proposals(text: &str) -> Vec<String> {
     let wanted = text.trim().to_uppercase();
-    if wanted.is_empty() || wanted.starts_with(|c: char| c == '.' || c == '1') {
+    if wanted.is_empty() || wanted.starts_with(['.', '1']) {
         return Vec::new();
     }
     let all = || glass::catalogue().iter().map(|glass| (glass, glass.full_name().to_uppercase()));

@@ -9,12 +9,11 @@ mod badge;
 mod glass;
 mod table;
 
-use eframe::egui::{Button, Frame, Key, Margin, Panel as SidePanel, RichText, Ui};
+use eframe::egui::{Button, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
 use super::Panel;
 use crate::session::{Command, View};
 use crate::studio::field::{Drafts, error_color};
-use crate::studio::wording::{capital, counted_from_one};
 use actions::Action;
 use table::Table;
 
@@ -43,6 +42,11 @@ impl Panel for Prescription {
     fn is_typing(&self) -> bool {
         !self.drafts.is_empty()
     }
+}
+
+/// The field of the first radius.
+pub(in crate::studio) fn first_field() -> Id {
+    table::first_field()
 }
 
 impl Prescription {
@@ -82,10 +86,9 @@ impl Prescription {
     /// The last text that was refused, where it can be read in full.
     fn complaint(&self, ui: &mut Ui) {
         let Some(why) = self.drafts.complaint() else { return };
-        let text = capital(&counted_from_one(why));
         let frame = Frame::new().inner_margin(Margin::symmetric(4, 2));
         SidePanel::bottom("complaint").frame(frame).show_separator_line(false).show(ui, |ui| {
-            ui.label(RichText::new(text).color(error_color(ui)));
+            ui.label(RichText::new(why).color(error_color(ui)));
         });
     }
 }

@@ -181,7 +181,7 @@ impl Table<'_> {
             row.col(|ui| match column {
                 Column::Radius => still(ui, "Infinity", badge::WIDTH),
                 Column::SemiDiameter => {
-                    still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0)
+                    still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0);
                 }
                 _ => {}
             });
@@ -251,11 +251,11 @@ impl Table<'_> {
         let cell = Cell { name: &name, shown: &shown, hint: &hint, align: Align::Max };
         let place = (column, surface);
         let response = self.field(ui, place, cell, |text| Ok(typed(parameter, text)));
-        if !limit {
+        if limit {
+            response.on_hover_text(column.hint());
+        } else {
             badge::show(ui, &self.view.lens, parameter, self.drafts, self.wishes);
             self.toggle_by_key(ui, &response, parameter);
-        } else {
-            response.on_hover_text(column.hint());
         }
     }
 
@@ -370,12 +370,14 @@ impl Table<'_> {
         let layout = Layout::left_to_right(Align::Center);
         let entry = ui.allocate_ui_with_layout(size, layout, |ui| self.drafts.show(ui, id, cell));
         let entry = entry.inner;
-        let enter = ui.input(|input| input.key_pressed(Key::Enter));
+        // Consumed, so that the next cell does not end its typing by the same key.
+        let left = entry.response.lost_focus();
+        let enter = left && ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Enter));
         let fits = match entry.typed {
             Some(text) => self.take(id, edit(&text)),
             None => true,
         };
-        if entry.response.lost_focus() && enter {
+        if enter {
             let below = if row == OBJECT { 0 } else { row + 1 };
             let next = if fits { cell_id(column, below) } else { id };
             ui.memory_mut(|memory| memory.request_focus(next));
@@ -405,6 +407,11 @@ impl Table<'_> {
 
 /// Stands for the row of the object where a surface is named.
 const OBJECT: usize = usize::MAX;
+
+/// The field of the first radius.
+pub(super) fn first_field() -> Id {
+    cell_id(Column::Radius, 0)
+}
 
 fn cell_id(column: Column, row: usize) -> Id {
     Id::unique(("prescription cell", column, row))

@@ -1,0 +1,46 @@
+//! What this process has used up so far: its age and its processor time, all threads together.
+//!
+//! Linux counts both in `/proc`; elsewhere they are unknown.
+
+use std::fs;
+
+/// Ticks in a second, as Linux counts for programs on every processor.
+const TICKS: f64 = 100.0;
+
+/// Milliseconds since the process began, to a hundredth of a second.
+pub fn age_ms() -> Option<f64> {
+    let stat = fs::read_to_string("/proc/self/stat").ok()?;
+    // The name in brackets may contain blanks; the start is the 20th number behind it.
+    let (_, numbers) = stat.rsplit_once(')')?;
+    let begun: f64 = numbers.split_whitespace().nth(19)?.parse().ok()?;
+    let uptime = fs::read_to_string("/proc/uptime").ok()?;
+    let now: f64 = uptime.split_whitespace().next()?.parse().ok()?;
+    Some(1e3 * (now - begun / TICKS))
+}
+
+/// Milliseconds that processors have worked for the threads that there are now.
+pub fn processor_ms() -> Option<f64> {
+    let mut sum = 0.0;
+    for thread in fs::read_dir("/proc/self/task").ok()? {
+        let path = thread.ok()?.path().join("schedstat");
+        // A thread may have ended since it was listed.
+        let Ok(text) = fs::read_to_string(path) else { continue };
+        let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
+        sum += 1e-6 * nanoseconds;
+    }
+    Some(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_only_grows() {
+        let (Some(age), Some(work)) = (age_ms(), processor_ms()) else { return };
+        let sum: f64 = (0..100_000).map(f64::from).map(f64::sqrt).sum();
+        assert!(sum > 0.0 && age >= 0.0);
+        assert!(age_ms().is_some_and(|later| later >= age));
+        assert!(processor_ms().is_some_and(|later| later >= work));
+    }
+}

@@ -1,0 +1,205 @@
+//! What the window costs: a real one is opened, edited, repainted, left alone and closed again.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use eframe::egui::{Context, Ui, ViewportCommand};
+use eframe::{App, CreationContext};
+use serde::Serialize;
+
+use super::app::Studio;
+use super::draw::Backing;
+use super::shell::{self, Memory, Started, StudioError};
+use super::{first_lens, panels};
+use crate::measure::{age_ms, processor_ms, timed};
+use crate::session::{Command, Edit, Session};
+
+/// How many edits are timed.
+const EDITS: usize = 21;
+/// How many repainted frames share the measured processor time.
+const FRAMES: usize = 20;
+/// How long the window is left alone.
+const ALONE: Duration = Duration::from_secs(5);
+/// How long it may go on settling before that.
+const SETTLE: Duration = Duration::from_millis(700);
+/// How long the numbers of an edit may take at most.
+const PATIENCE: u32 = 20_000; // looks, a tenth of a millisecond apart
+
+/// What a window costs. What the system does not count is absent.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Figures {
+    /// What draws the window.
+    pub renderer: String,
+    /// Width and height of the window in pixels.
+    pub size: [u32; 2],
+    /// From the start of the process to the first frame on the screen.
+    pub first_frame_ms: Option<f64>,
+    /// From an edit to the numbers of all panels, frames apart: the median of 21 edits.
+    pub edit_ms: f64,
+    /// The slowest of them.
+    pub slowest_edit_ms: f64,
+    /// Processor time of a frame in which no drawing changed, all threads together.
+    pub frame_processor_ms: Option<f64>,
+    /// How long the window was left alone with the cursor in a text field.
+    pub idle_seconds: f64,
+    /// Processor time in that time, all threads together.
+    pub idle_processor_ms: Option<f64>,
+}
+
+/// Opens a window, measures it, and closes it again.
+///
+/// # Errors
+/// Where no window can open: see [`StudioError`].
+pub fn measure() -> Result<Figures, StudioError> {
+    let figures = Arc::new(Mutex::new(Figures::default()));
+    let shared = Arc::clone(&figures);
+    shell::open(Memory::None, move |context, backing| gauge(context, backing, &shared))?;
+    let found = figures.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    Ok(found)
+}
+
+fn gauge(
+    context: &CreationContext<'_>,
+    backing: Backing,
+    figures: &Arc<Mutex<Figures>>,
+) -> Started {
+    let wake = context.egui_ctx.clone();
+    let session = Session::new(first_lens(), move || wake.request_repaint())?;
+    let studio = Studio::new(session, backing, Memory::None, None);
+    let renderer = context.wgpu_render_state.as_ref().map_or_else(
+        || "OpenGL".to_owned(),
+        |state| {
+            let info = state.adapter.get_info();
+            format!("{} ({})", info.name, info.backend)
+        },
+    );
+    let figures = Arc::clone(figures);
+    figures.lock().unwrap_or_else(PoisonError::into_inner).renderer = renderer;
+    Ok(Box::new(Gauge { studio, figures, stage: Stage::Opening }))
+}
+
+/// A studio that measures itself.
+struct Gauge {
+    studio: Studio,
+    figures: Arc<Mutex<Figures>>,
+    stage: Stage,
+}
+
+/// What is being measured.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    /// The first frame is not on the screen yet.
+    Opening,
+    /// So many frames until the drawings are there.
+    Settling(usize),
+    /// So many frames are still to be repainted; the processor time when that began.
+    Repainting(usize, Option<f64>),
+    /// So many frames until the window is left alone.
+    Calming(usize),
+    /// Another thread looks on.
+    Alone,
+}
+
+impl App for Gauge {
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let context = ui.ctx().clone();
+        self.stage = self.next(&context);
+        self.studio.ui(ui);
+    }
+
+    fn persist_egui_memory(&self) -> bool {
+        false
+    }
+}
+
+impl Gauge {
+    /// Does what belongs to this frame and tells what comes next.
+    fn next(&mut self, context: &Context) -> Stage {
+        if !matches!(self.stage, Stage::Alone) {
+            context.request_repaint();
+        }
+        match self.stage {
+            Stage::Opening if context.cumulative_frame_nr() == 0 => Stage::Opening,
+            Stage::Opening => {
+                let size = context.content_rect().size() * context.pixels_per_point();
+                self.note(|figures| {
+                    figures.first_frame_ms = age_ms();
+                    figures.size = [size.x as u32, size.y as u32];
+                });
+                self.edit();
+                Stage::Settling(5)
+            }
+            Stage::Settling(0) => Stage::Repainting(FRAMES, processor_ms()),
+            Stage::Settling(left) => Stage::Settling(left - 1),
+            Stage::Repainting(0, before) => {
+                let spent = spent_since(before).map(|ms| ms / FRAMES as f64);
+                self.note(|figures| figures.frame_processor_ms = spent);
+                context.memory_mut(|memory| memory.request_focus(panels::first_field()));
+                Stage::Calming(5)
+            }
+            Stage::Repainting(left, before) => Stage::Repainting(left - 1, before),
+            Stage::Calming(0) => {
+                self.look_on(context);
+                Stage::Alone
+            }
+            Stage::Calming(left) => Stage::Calming(left - 1),
+            Stage::Alone => Stage::Alone,
+        }
+    }
+
+    fn note(&self, note: impl FnOnce(&mut Figures)) {
+        note(&mut self.figures.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// Types radii and waits each time for the numbers of all panels.
+    fn edit(&mut self) {
+        let mut times: Vec<f64> = (0..EDITS).map(|i| self.time_edit(i)).collect();
+        times.sort_by(f64::total_cmp);
+        self.note(|figures| {
+            figures.edit_ms = times[EDITS / 2];
+            figures.slowest_edit_ms = times[EDITS - 1];
+        });
+    }
+
+    fn time_edit(&mut self, i: usize) -> f64 {
+        let text = if i.is_multiple_of(2) { "*1.001" } else { "/1.001" };
+        let edit = Edit::TypeRadius { surface: 0, text: text.to_owned() };
+        let session = self.studio.session_mut();
+        let ((), ms) = timed(|| {
+            session.apply(Command::Edit(edit));
+            session.apply(Command::Settle);
+            for _ in 0..PATIENCE {
+                if session.view().is_current() {
+                    break;
+                }
+                thread::sleep(Duration::from_micros(100));
+            }
+        });
+        ms
+    }
+
+    /// Leaves the window alone, looks at the processor time meanwhile, and closes it.
+    fn look_on(&self, context: &Context) {
+        let (figures, window) = (Arc::clone(&self.figures), context.clone());
+        let look = move || {
+            thread::sleep(SETTLE);
+            let before = processor_ms();
+            thread::sleep(ALONE);
+            let spent = spent_since(before);
+            let mut figures = figures.lock().unwrap_or_else(PoisonError::into_inner);
+            figures.idle_seconds = ALONE.as_secs_f64();
+            figures.idle_processor_ms = spent;
+            drop(figures);
+            window.send_viewport_cmd(ViewportCommand::Close);
+        };
+        if let Err(error) = thread::Builder::new().name("idle".into()).spawn(look) {
+            log::warn!("the idle window cannot be watched: {error}");
+            context.send_viewport_cmd(ViewportCommand::Close);
+        }
+    }
+}
+
+fn spent_since(before: Option<f64>) -> Option<f64> {
+    Some(processor_ms()? - before?)
+}

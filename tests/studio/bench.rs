@@ -1,0 +1,48 @@
+//! What the tests of panels share: a lens, a view of it with its numbers, a panel in a harness.
+
+use std::sync::Arc;
+
+use aplanat::files;
+use aplanat::lens::Lens;
+use aplanat::session::{Command, Results, View, compute};
+use aplanat::studio::panels::Panel;
+use aplanat::studio::theme;
+use egui_kittest::Harness;
+
+/// The lens that the studio opens with.
+pub(super) fn double_gauss() -> Lens {
+    let bundled = &files::library()[0];
+    files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens
+}
+
+/// A view of a lens with all its numbers.
+pub(super) fn view_of(lens: Lens) -> View {
+    let lens = Arc::new(lens);
+    let view = View { lens: Arc::clone(&lens), version: 1, ..View::default() };
+    let (version, settings) = (view.version, view.settings.clone());
+    let numbers = compute(&lens, &settings);
+    let results = Results { version, lens, settings, numbers, ms: 1.0 };
+    View { results: Some(Arc::new(results)), ..view }
+}
+
+/// A view of the double Gauss.
+pub(super) fn view() -> View {
+    view_of(double_gauss())
+}
+
+/// A panel alone, with what it shows and what was wished in it.
+pub(super) struct Stand<P> {
+    pub(super) panel: P,
+    pub(super) view: View,
+    pub(super) wishes: Vec<Command>,
+}
+
+/// A harness around a panel, large enough for all of it.
+pub(super) fn stand<P: Panel + 'static>(panel: P, view: View) -> Harness<'static, Stand<P>> {
+    let state = Stand { panel, view, wishes: Vec::new() };
+    let builder = Harness::builder().with_size([900.0, 620.0]).with_context_setup(theme::dress);
+    let show = |ui: &mut eframe::egui::Ui, stand: &mut Stand<P>| {
+        stand.panel.ui(ui, &stand.view, &mut stand.wishes);
+    };
+    builder.build_ui_state(show, state)
+}

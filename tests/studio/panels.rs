@@ -1,0 +1,298 @@
+//! Panels by what a screen reader calls their parts: they show a view and write down wishes.
+
+use std::sync::Arc;
+
+use aplanat::effects::{Choice, Effect};
+use aplanat::lens::{Medium, Object, Parameter, Quantity, Variable};
+use aplanat::optimize::{Method, Progress};
+use aplanat::session::{Command, Edit, Search, Standing, Task, View};
+use aplanat::studio::draw::Backing;
+use aplanat::studio::panels::{
+    Effects, FirstOrderData, LensLayout, Optimizer, Panel, Prescription, SpotDiagram,
+};
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+
+use crate::bench::{Stand, double_gauss, stand, view};
+
+fn prescription() -> Harness<'static, Stand<Prescription>> {
+    let mut harness = stand(Prescription::default(), view());
+    harness.run();
+    harness
+}
+
+/// Types into a field as a person does: enter it, type over what is there, end with a key.
+fn type_into<P: Panel>(harness: &mut Harness<'_, Stand<P>>, field: &str, text: &str, end: Key) {
+    harness.get_by_label(field).focus();
+    harness.run();
+    harness.get_by_label(field).type_text(text);
+    harness.run();
+    harness.key_press(end);
+    harness.run();
+}
+
+fn edits(wishes: &[Command]) -> Vec<&Edit> {
+    wishes
+        .iter()
+        .filter_map(|wish| if let Command::Edit(edit) = wish { Some(edit) } else { None })
+        .collect()
+}
+
+#[test]
+fn a_typed_radius_is_wished_for_at_enter() {
+    let mut harness = prescription();
+    type_into(&mut harness, "Radius of surface 1", "15*1.1", Key::Enter);
+    let wanted = Edit::TypeRadius { surface: 0, text: "15*1.1".into() };
+    assert_eq!(harness.state().wishes, [Command::Edit(wanted), Command::Settle]);
+    assert!(harness.get_by_label("Radius of surface 2").is_focused(), "Enter goes down");
+}
+
+#[test]
+fn a_typed_thickness_is_wished_for_at_tab() {
+    let mut harness = prescription();
+    type_into(&mut harness, "Thickness of surface 2", "*2", Key::Tab);
+    let parameter = Parameter::new(1, Quantity::Thickness);
+    let wanted = Edit::Type { parameter, text: "*2".into() };
+    assert_eq!(edits(&harness.state().wishes), [&wanted]);
+    assert!(harness.get_by_label("Glass of surface 2").is_focused(), "Tab goes to the right");
+}
+
+#[test]
+fn what_is_no_number_stays_in_its_cell_with_the_reason() {
+    let mut harness = prescription();
+    type_into(&mut harness, "Radius of surface 3", "abc", Key::Enter);
+    assert_eq!(harness.state().wishes, []);
+    let cell = harness.get_by_label("Radius of surface 3");
+    assert_eq!(cell.value().as_deref(), Some("abc"), "nothing is lost");
+    assert!(harness.query_by_label_contains("is no number; expected").is_some());
+    assert!(harness.state().panel.is_typing());
+}
+
+#[test]
+fn a_glass_that_nobody_makes_is_refused_with_its_surface() {
+    let mut harness = prescription();
+    type_into(&mut harness, "Glass of surface 3", "SCHOTT BK7", Key::Enter);
+    assert_eq!(harness.state().wishes, []);
+    harness.get_by_label_contains("Surface 3: unknown glass `SCHOTT BK7`; similar names");
+}
+
+#[test]
+fn escape_gives_up_what_was_typed() {
+    let mut harness = prescription();
+    type_into(&mut harness, "Radius of surface 1", "99", Key::Escape);
+    assert_eq!(harness.state().wishes, []);
+    let value = harness.get_by_label("Radius of surface 1").value();
+    assert_eq!(value.as_deref(), Some("14.1615"));
+}
+
+#[test]
+fn a_glass_may_be_a_name_a_model_or_nothing() {
+    let media = [
+        ("n-sf6", Medium::Glass("SCHOTT N-SF6".into())),
+        ("1.62 36.4", Medium::Model { nd: 1.62, vd: 36.4 }),
+        ("1.5", Medium::Index(1.5)),
+    ];
+    for (text, medium) in media {
+        let mut harness = prescription();
+        type_into(&mut harness, "Glass of surface 1", text, Key::Enter);
+        assert_eq!(edits(&harness.state().wishes), [&Edit::SetMedium { surface: 0, medium }]);
+    }
+}
+
+#[test]
+fn the_object_can_come_near() {
+    let mut harness = prescription();
+    type_into(&mut harness, "Object distance", "1000", Key::Enter);
+    let wanted = Edit::SetObject(Object::Finite(1000.0));
+    assert_eq!(edits(&harness.state().wishes), [&wanted]);
+}
+
+#[test]
+fn a_badge_frees_and_fixes() {
+    let mut harness = prescription();
+    harness.get_by_label("Radius of surface 1 variable").click();
+    harness.run();
+    harness.get_by_label("Conic of surface 2 variable").click();
+    harness.run();
+    let free = Parameter::new(0, Quantity::Curvature);
+    let parameter = Parameter::new(1, Quantity::Conic);
+    let wanted = [Edit::Fix(free), Edit::Free(Variable { parameter, min: None, max: None })];
+    assert_eq!(edits(&harness.state().wishes), wanted.iter().collect::<Vec<_>>());
+}
+
+#[test]
+fn a_key_frees_the_number_under_the_cursor() {
+    let mut harness = prescription();
+    harness.get_by_label("Conic of surface 1").focus();
+    harness.run();
+    harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::V);
+    harness.run();
+    let parameter = Parameter::new(0, Quantity::Conic);
+    let wanted = Edit::Free(Variable { parameter, min: None, max: None });
+    assert_eq!(edits(&harness.state().wishes), [&wanted]);
+}
+
+#[test]
+fn a_selected_row_can_be_deleted_and_flipped() {
+    let mut harness = prescription();
+    harness.get_by_label("Row of surface 3").click();
+    harness.run();
+    harness.key_press(Key::Delete);
+    harness.run();
+    harness.get_by_label("Flip element").click();
+    harness.run();
+    let wanted = [Edit::RemoveRow(2), Edit::FlipRows { first: 2, last: 4 }];
+    assert_eq!(edits(&harness.state().wishes), wanted.iter().collect::<Vec<_>>());
+}
+
+#[test]
+fn a_row_has_a_menu_of_its_own() {
+    let mut harness = prescription();
+    harness.get_by_label("Row of surface 2").click_secondary();
+    harness.run();
+    harness.get_all_by_label("Make stop").last().unwrap().click();
+    harness.run();
+    assert_eq!(edits(&harness.state().wishes), [&Edit::SetStop(1)]);
+}
+
+/// A search that stands somehow.
+fn searching(standing: Standing) -> View {
+    let view = view();
+    let goal = aplanat::merit::Goal::sensible(&view.lens).unwrap();
+    let method = Method::Adam;
+    let task = Task { method, lens: Arc::clone(&view.lens), goal, tolerance: 1e-3 };
+    let refused = Some("ray 4 is lost: clipped at surface 2".to_owned());
+    let progress =
+        Progress { step: 7, merit: 0.5, best: 0.25, accepted: 1.0, refused, finished: false };
+    let search = Search {
+        number: 1,
+        standing,
+        task: Arc::new(task),
+        progress: Some(progress),
+        best: Arc::clone(&view.lens),
+        current: Arc::clone(&view.lens),
+        before: Vec::new(),
+        terms: Vec::new(),
+        history: Vec::new(),
+    };
+    View { search: Some(Arc::new(search)), ..view }
+}
+
+fn optimizer(view: View) -> Harness<'static, Stand<Optimizer>> {
+    let mut harness = stand(Optimizer::default(), view);
+    harness.run();
+    harness
+}
+
+#[test]
+fn optimize_wishes_for_a_search_with_the_terms_of_the_panel() {
+    let mut harness = optimizer(view());
+    type_into(&mut harness, "Weight of Spot", "3", Key::Enter);
+    harness.get_by_label("Focal length").click();
+    harness.run();
+    harness.get_by_label("Optimize").click();
+    harness.run();
+    let [Command::Optimize { method, goal }] = harness.state().wishes.as_slice() else {
+        panic!("{:?}", harness.state().wishes);
+    };
+    assert_eq!(*method, Method::DampedLeastSquares);
+    assert_eq!(goal.terms[0].weight, 3.0);
+    assert!(goal.terms.iter().all(|weighted| weighted.term.name() != "focal_length"));
+}
+
+#[test]
+fn a_search_can_be_held_stepped_ended_and_taken() {
+    let cases = [
+        (Standing::Running, "Pause", Command::Pause),
+        (Standing::Running, "Stop", Command::Stop),
+        (Standing::Paused, "Resume", Command::Resume),
+        (Standing::Paused, "Step", Command::Step),
+        (Standing::Stopped, "Take", Command::Take),
+        (Standing::Finished, "Discard", Command::Discard),
+    ];
+    for (standing, button, command) in cases {
+        let mut harness = optimizer(searching(standing));
+        harness.get_by_label(button).click();
+        harness.run();
+        assert_eq!(harness.state().wishes, [command], "{button}");
+    }
+}
+
+#[test]
+fn a_refused_step_names_parameter_and_ray_counted_as_in_the_table() {
+    let harness = optimizer(searching(Standing::Running));
+    harness.get_by_label("Ray 4 is lost: clipped at surface 3");
+    harness.get_by_label("after step 7");
+}
+
+#[test]
+fn a_lens_without_variables_cannot_be_optimized() {
+    let mut lens = double_gauss();
+    lens.variables.clear();
+    let mut harness = optimizer(crate::bench::view_of(lens));
+    harness.get_by_label("Optimize").click();
+    harness.run();
+    assert_eq!(harness.state().wishes, []);
+}
+
+#[test]
+fn spots_show_radii_with_errors_and_rays() {
+    let mut harness = stand(SpotDiagram::new(Backing::Software), view());
+    harness.run();
+    for text in ["RMS 50.59 µm ±", "RMS 93.31 µm ±", "RMS 101.3 µm ±", "GEO 152.1 µm ±"] {
+        harness.get_by_label_contains(text);
+    }
+    assert_eq!(harness.get_all_by_label_contains(" rays").count(), 3);
+}
+
+#[test]
+fn the_error_of_spots_can_be_chosen() {
+    let mut harness = stand(SpotDiagram::new(Backing::Software), view());
+    harness.run();
+    harness.get_by_label("Allowed error").click();
+    harness.run();
+    harness.get_by_label("1e-6").click();
+    harness.run();
+    assert_eq!(harness.state().wishes, [Command::SetTolerance(1e-6)]);
+}
+
+#[test]
+fn the_layout_tells_how_many_rays_are_lost_and_how() {
+    let mut harness = stand(LensLayout::new(Backing::Software), view());
+    harness.run();
+    harness.get_by_label_contains("clipped of 45 rays");
+    harness.get_by_label_contains("Section of");
+}
+
+#[test]
+fn first_order_data_are_there_by_name() {
+    let mut harness = stand(FirstOrderData, view());
+    harness.run();
+    for text in ["Focal length", "49.38898 mm", "Petzval radius", "Seidel sums, µm"] {
+        harness.get_by_label(text);
+    }
+}
+
+#[test]
+fn an_effect_can_be_forced() {
+    let mut harness = stand(Effects, view());
+    harness.run();
+    harness.get_by_label("Choice of ray aiming").click();
+    harness.run();
+    harness.get_by_label("On").click();
+    harness.run();
+    assert_eq!(harness.state().wishes, [Command::Choose(Effect::Aiming, Choice::On)]);
+}
+
+#[test]
+fn a_lens_that_cannot_be_traced_says_why_in_every_panel() {
+    let mut broken = view();
+    let results = broken.results.take().unwrap();
+    let mut results = Arc::unwrap_or_clone(results);
+    results.numbers = Err("no beam at surface 2".to_owned());
+    broken.results = Some(Arc::new(results));
+    let mut harness = stand(SpotDiagram::new(Backing::Software), broken);
+    harness.run();
+    harness.get_by_label("No beam at surface 3");
+}

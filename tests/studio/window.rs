@@ -1,0 +1,172 @@
+//! The whole window on a real session, without a display: what is typed reaches every panel.
+
+use std::time::Duration;
+
+use aplanat::session::Session;
+use aplanat::studio::Studio;
+use aplanat::studio::draw::Backing;
+use aplanat::studio::shell::Memory;
+use aplanat::studio::theme;
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+
+use crate::bench::double_gauss;
+
+/// How long numbers may take on a slow and busy machine.
+const DEADLINE: Duration = Duration::from_secs(60);
+const PAUSE: Duration = Duration::from_millis(5);
+
+fn window() -> Harness<'static, Studio> {
+    let session = Session::new(double_gauss(), || {}).unwrap();
+    let studio = Studio::new(session, Backing::Software, Memory::None, None);
+    let builder = Harness::builder().with_size([1280.0, 800.0]).with_context_setup(theme::dress);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
+    settle(&mut harness);
+    harness
+}
+
+/// Goes on until something is so.
+fn wait(harness: &mut Harness<'_, Studio>, what: &str, so: impl Fn(&Harness<'_, Studio>) -> bool) {
+    let mut left = DEADLINE;
+    loop {
+        harness.step();
+        if so(harness) {
+            return;
+        }
+        left = left.checked_sub(PAUSE).unwrap_or_else(|| panic!("{what} never happened"));
+        std::thread::sleep(PAUSE);
+    }
+}
+
+/// Waits until all numbers belong to the lens as it is.
+fn settle(harness: &mut Harness<'_, Studio>) {
+    wait(harness, "fresh numbers", |harness| harness.state().session().view().is_current());
+    harness.run_steps(3);
+}
+
+fn spots(harness: &Harness<'_, Studio>) -> Vec<String> {
+    harness.get_all_by_label_contains("RMS ").map(|node| node.value().unwrap()).collect()
+}
+
+fn type_radius(harness: &mut Harness<'_, Studio>, text: &str) {
+    harness.get_by_label("Radius of surface 1").focus();
+    harness.run_steps(2);
+    harness.get_by_label("Radius of surface 1").type_text(text);
+    harness.run_steps(2);
+    harness.key_press(Key::Enter);
+    harness.run_steps(2);
+    settle(harness);
+}
+
+#[test]
+fn a_typed_radius_reaches_every_panel_and_undo_takes_it_back() {
+    let mut harness = window();
+    let before = (harness.state().session().view().version, spots(&harness));
+    assert_eq!(before.1.len(), 3);
+    harness.get_by_label("49.38898 mm");
+
+    type_radius(&mut harness, "14.5");
+    assert!(harness.state().session().view().version > before.0);
+    assert_ne!(spots(&harness), before.1);
+    assert!(harness.query_by_label("49.38898 mm").is_none(), "first-order data follow");
+    assert!(harness.state().session().is_dirty());
+
+    harness.get_by_label("Undo").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    let value = harness.get_by_label("Radius of surface 1").value();
+    assert_eq!(value.as_deref(), Some("14.1615"));
+    harness.get_by_label("49.38898 mm");
+    assert_eq!(radii(&spots(&harness)), radii(&before.1));
+    assert!(!harness.state().session().is_dirty());
+}
+
+/// The radii without their errors, which may differ in their last digits.
+fn radii(spots: &[String]) -> Vec<&str> {
+    spots.iter().map(|text| text.split('±').next().unwrap_or_default()).collect()
+}
+
+#[test]
+fn keys_undo_and_redo() {
+    let mut harness = window();
+    type_radius(&mut harness, "*1.1");
+    let changed = harness.state().session().lens().surfaces[0].curvature;
+    for (keys, key, undone) in [
+        (Modifiers::COMMAND, Key::Z, true),
+        (Modifiers::COMMAND | Modifiers::SHIFT, Key::Z, false),
+        (Modifiers::COMMAND, Key::Z, true),
+        (Modifiers::COMMAND, Key::Y, false),
+    ] {
+        harness.key_press_modifiers(keys, key);
+        harness.run_steps(3);
+        let now = harness.state().session().lens().surfaces[0].curvature;
+        assert_eq!(now != changed, undone);
+    }
+}
+
+#[test]
+fn changes_are_not_lost_without_a_question() {
+    let mut harness = window();
+    type_radius(&mut harness, "15");
+    let lens = harness.state().session().lens().clone();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::N);
+    harness.run_steps(3);
+    assert_eq!(*harness.state().session().lens(), lens, "the lens is still there");
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Save the changes first?").is_none());
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::N);
+    harness.run_steps(3);
+    harness.get_by_label("Don't save").click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().session().lens().name, "New lens");
+}
+
+#[test]
+fn a_search_bends_the_shown_lens_and_its_result_is_one_step() {
+    let mut harness = window();
+    let before = spots(&harness);
+    harness.get_by_label("Optimize").click();
+    harness.run_steps(3);
+    wait(&mut harness, "a better spot", |harness| {
+        let view = harness.state().session().view();
+        let steps = view.search.and_then(|search| search.progress.as_ref().map(|p| p.step));
+        view.preview.is_some() && steps.unwrap_or(0) > 3
+    });
+    harness.get_by_label("Stop").click();
+    wait(&mut harness, "the end", |harness| {
+        harness.query_by_label("Stopped").is_some() || harness.query_by_label("Finished").is_some()
+    });
+    assert_eq!(*harness.state().session().lens().as_ref(), double_gauss(), "not taken yet");
+    harness.get_by_label("Take").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    assert_ne!(radii(&spots(&harness)), radii(&before));
+    harness.get_by_label("Undo").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    assert_eq!(radii(&spots(&harness)), radii(&before));
+}
+
+#[test]
+fn bundled_lenses_open_from_the_menu() {
+    let mut harness = window();
+    harness.get_by_label("File").click();
+    harness.run_steps(3);
+    harness.get_by_label("Bundled lenses").click();
+    harness.run_steps(3);
+    harness.get_by_label("Triplet 100 mm f/2.7").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    assert_eq!(harness.state().session().lens().surfaces.len(), 7);
+}
+
+#[test]
+fn nothing_repaints_while_nothing_changes() {
+    let mut harness = window();
+    harness.get_by_label("Radius of surface 1").focus();
+    harness.run();
+    let next = harness.output().viewport_output.values().next().unwrap().repaint_delay;
+    assert_eq!(next, Duration::MAX, "a text cursor does not blink");
+}
