@@ -1,15 +1,54 @@
 //! What the window costs.
 
 use crate::cli::failure::Failure;
-use crate::cli::output::Output;
+use crate::cli::output::{Number, Output, Table};
+use crate::cli::window;
+use crate::measure::Machine;
+use serde::Serialize;
+use serde_json::Value;
+use std::fmt::{self, Display};
 
-/// First frame, edits and frames of the studio, which needs a display
+/// First frame, edits and frames of the studio, measured in a real window that needs a display
 #[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("../help/measure_window.txt"))]
 pub(super) struct Window {}
 
 impl Window {
-    pub(super) fn run(&self, _output: &Output) -> Result<(), Failure> {
-        let _ = self;
-        Err(Failure::Failed("the window cannot be measured yet".to_owned()))
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let Self {} = self;
+        output.print(&Report { machine: Machine::here(), figures: window::figures()? })
+    }
+}
+
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    #[serde(flatten)]
+    figures: Value,
+}
+
+/// The keys of the figures, and what they are.
+const NAMES: [(&str, &str); 7] = [
+    ("first_frame_ms", "process start to first frame, ms"),
+    ("edit_ms", "an edit to the numbers of all panels, ms"),
+    ("slowest_edit_ms", "the slowest edit, ms"),
+    ("frame_processor_ms", "processor time of a frame without changes, ms"),
+    ("idle_seconds", "left alone for, s"),
+    ("idle_processor_ms", "processor time in that time, ms"),
+    ("renderer", "drawn by"),
+];
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.machine)?;
+        let mut table = Table::default();
+        for (key, name) in NAMES {
+            let value = match &self.figures[key] {
+                Value::String(text) => text.clone(),
+                value => value.as_f64().map_or("-".to_owned(), |v| Number(v).to_string()),
+            };
+            table.row([name.to_owned(), value]);
+        }
+        write!(f, "{table}")
     }
 }
