@@ -72,6 +72,11 @@ impl Studio {
         &self.session
     }
 
+    /// Lets the window close although changes are lost.
+    pub const fn leave_without_asking(&mut self) {
+        self.leaving = true;
+    }
+
     /// The same, to be told commands directly.
     pub const fn session_mut(&mut self) -> &mut Session {
         &mut self.session
