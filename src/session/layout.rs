@@ -31,8 +31,7 @@ pub struct DrawnRay {
     pub path: Path,
 }
 
-/// How far in front of the lens rays begin, as a share of the length from the first vertex to the
-/// image.
+/// How far in front of the lens rays begin, as a share of its length with the way to the image.
 const LEAD: f64 = 0.15;
 
 /// A fan of rays of each field in the meridional plane, at the primary wavelength.
@@ -79,17 +78,27 @@ impl Layout {
     }
 }
 
+/// Where drawn rays begin: in front of everything, mirrors that stand before the first vertex too.
+fn front(bench: &Bench) -> f64 {
+    let surfaces = &bench.colors[bench.primary].system.surfaces;
+    let (mut z, mut first, mut last) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for surface in surfaces {
+        (first, last) = (first.min(z), last.max(z));
+        z += surface.thickness;
+    }
+    first - LEAD * (last - first)
+}
+
 /// Moves the start of a ray to where drawing begins: the object, or a plane in front of the lens.
 fn lead_in(bench: &Bench, points: &mut [Vec3<f64>]) {
     let [start, next, ..] = points else { return };
-    let surfaces = &bench.colors[bench.primary].system.surfaces;
-    let length: f64 = surfaces.iter().map(|surface| surface.thickness).sum();
+    let front = front(bench);
     let from = match bench.beam.object {
         crate::lens::Object::Finite(distance) if distance > 0.0 => -distance,
         _ => f64::NEG_INFINITY,
     };
     let along = *next - *start;
-    let s = (from.max(-LEAD * length.abs()) - start.z) / along.z;
+    let s = (from.max(front) - start.z) / along.z;
     let moved = *start + along * s;
     if along.z > 0.0 && moved.is_finite() {
         *start = moved;
