@@ -298,7 +298,8 @@ impl Display for Report {
             writeln!(f, "{} steps refused or shortened, the last: {refusal}", self.refused_steps)?;
         }
         writeln!(f, "merit {} -> {}\n", Number(*merit_before), Number(*merit_after))?;
-        let mut table = Table::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
+        let mut table =
+            Table::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
         for TermKeys { term, weight, before, after } in &self.terms {
             let numbers = [*weight, before.value].map(|v| Number(v).to_string());
             let start = std::iter::once((*term).to_owned()).chain(numbers);

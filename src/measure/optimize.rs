@@ -75,11 +75,8 @@ fn free(mut lens: Lens) -> Lens {
     let bent = |i: usize| (!lens.surfaces[i].stop).then_some((i, Quantity::Curvature));
     let curvatures = (0..lens.surfaces.len()).filter_map(bent);
     let thicknesses = (0..lens.surfaces.len()).map(|i| (i, Quantity::Thickness));
-    let variable = |(i, quantity)| Variable {
-        parameter: Parameter::new(i, quantity),
-        min: None,
-        max: None,
-    };
+    let variable =
+        |(i, quantity)| Variable { parameter: Parameter::new(i, quantity), min: None, max: None };
     lens.variables = curvatures.chain(thicknesses).map(variable).collect();
     lens
 }

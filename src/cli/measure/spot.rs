@@ -48,8 +48,8 @@ impl Spot {
             bar.set_position(done as u64);
         });
         bar.finish_and_clear();
-        let curves =
-            curves.map_err(|e| Failure::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
+        let curves = curves
+            .map_err(|e| Failure::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
         if let Some(path) = &self.plot {
             let title = format!("{}, field {}", opened.lens.name, Number(field.y));
             let png = plot::draw(&curves, &title).map_err(|e| Failure::Failed(e.to_string()))?;
@@ -93,9 +93,7 @@ impl Display for Report {
 
 fn table(curves: &SpotCurves, pupil: Pupil) -> Table {
     let mut table = Table::new(&["", "rays", "f64 error", "ms", "f32 error", "ms"]);
-    let of = |precision| {
-        move |row: &&SpotRow| row.pupil == pupil && row.precision == precision
-    };
+    let of = |precision| move |row: &&SpotRow| row.pupil == pupil && row.precision == precision;
     let single: Vec<&SpotRow> = curves.rows.iter().filter(of(Precision::F32)).collect();
     for row in curves.rows.iter().filter(of(Precision::F64)) {
         let same = |other: &&&SpotRow| other.method == row.method && other.rays == row.rays;

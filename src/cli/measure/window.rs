@@ -49,7 +49,11 @@ mod shown {
             writeln!(f, "{width} x {height} pixels, drawn by {}\n", figures.renderer)?;
             writeln!(f, "start of the process to a full frame   {}", ms(figures.first_frame_ms))?;
             writeln!(f, "an edit to the numbers of all panels   {:.1} ms", figures.edit_ms)?;
-            writeln!(f, "  the slowest of 21 edits              {:.1} ms", figures.slowest_edit_ms)?;
+            writeln!(
+                f,
+                "  the slowest of 21 edits              {:.1} ms",
+                figures.slowest_edit_ms
+            )?;
             writeln!(
                 f,
                 "a frame without new drawings           {} of processor time",
