@@ -221,7 +221,7 @@ impl Studio {
             ui.label(capital(&counted_from_one(words)));
             if !table.is_empty() {
                 ScrollArea::both().max_height(440.0).show(ui, |ui| {
-                    let table = RichText::new(table).monospace();
+                    let table = RichText::new(counted_from_one(table)).monospace();
                     ui.add(Label::new(table).extend().selectable(true));
                 });
             }

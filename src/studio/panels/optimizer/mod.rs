@@ -18,8 +18,7 @@ use goal::Aims;
 /// How high the merit history is, in points; less where there is little room.
 const HISTORY: f32 = 130.0;
 
-const NO_VARIABLES: &str =
-    "No number is variable: press the badge beside one in the prescription.";
+const NO_VARIABLES: &str = "No number is variable: press the badge beside one in the prescription.";
 
 /// The panel.
 #[derive(Debug, Default)]
@@ -101,11 +100,7 @@ impl Optimizer {
         let text = RichText::new("Optimize").strong();
         let button = ui.add_enabled(ready, Button::new(text).fill(fill));
         let button = button.on_hover_text("Search for a better lens in the background, on a copy");
-        let why = if under_way {
-            "A search is under way"
-        } else {
-            NO_VARIABLES
-        };
+        let why = if under_way { "A search is under way" } else { NO_VARIABLES };
         if button.on_disabled_hover_text(why).clicked() {
             let goal = self.aims.goal();
             wishes.push(Command::Optimize { method: self.method, goal });
