@@ -2,6 +2,7 @@
 
 use super::failure::Failure;
 use crate::files;
+use serde_json::Value;
 use std::path::Path;
 
 /// Opens the studio on a lens, or on the one that comes first in the library.
@@ -13,22 +14,36 @@ pub(super) fn open(lens: Option<&Path>) -> Result<(), Failure> {
     show(lens)
 }
 
+/// What the window costs, measured in a real one.
+pub(super) fn figures() -> Result<Value, Failure> {
+    measured()
+}
+
 #[cfg(feature = "studio")]
 fn show(lens: Option<&Path>) -> Result<(), Failure> {
     let studio = crate::studio::run(lens);
     studio.map_err(|why| Failure::Failed(why.to_string()))
 }
 
-#[cfg(not(feature = "studio"))]
-fn show(_lens: Option<&Path>) -> Result<(), Failure> {
-    Err(Failure::Failed(WITHOUT.to_owned()))
+#[cfg(feature = "studio")]
+fn measured() -> Result<Value, Failure> {
+    let figures = crate::studio::measure().map_err(|why| Failure::Failed(why.to_string()))?;
+    serde_json::to_value(figures).map_err(|why| Failure::Failed(why.to_string()))
 }
 
 #[cfg(not(feature = "studio"))]
-const WITHOUT: &str = "this program was built without its window (cargo feature `studio`)\n\
-    with it: `cargo run --release`\n\
-    the same work without a window: `aplanat info LENS`, `aplanat analyze LENS spot`, \
-    `aplanat optimize LENS --out FILE`, `aplanat convert IN OUT`; `aplanat --help` lists all";
+fn show(_lens: Option<&Path>) -> Result<(), Failure> {
+    measured().map(drop)
+}
+
+#[cfg(not(feature = "studio"))]
+fn measured() -> Result<Value, Failure> {
+    let without = "this program was built without its window (cargo feature `studio`)\n\
+        with it: `cargo run --release`\n\
+        the same work without a window: `aplanat info LENS`, `aplanat analyze LENS spot`, \
+        `aplanat optimize LENS --out FILE`, `aplanat convert IN OUT`; `aplanat --help` lists all";
+    Err(Failure::Failed(without.to_owned()))
+}
 
 /// A word that is neither a file nor looks like one was meant as a subcommand.
 fn refuse_typing_error(path: &Path) -> Result<(), Failure> {

@@ -1,8 +1,8 @@
 //! Which physical effects a lens calls for, each decision with the number it rests on.
 //!
-//! [`survey`] traces a few hundred rays and measures what each effect does; [`plan`] is a pure
+//! [`survey()`] traces a few hundred rays and measures what each effect does; [`plan()`] is a pure
 //! function of these [`Facts`] and says for each effect whether it is computed, where and why;
-//! [`bench`] resolves the lens accordingly. What is left out is not there: a surface whose figuring
+//! [`bench()`] resolves the lens accordingly. What is left out is not there: a surface whose figuring
 //! does not matter *is* a conic, a lens without dispersion *has* one wavelength.
 //!
 //! Nobody has to agree: every effect can be forced on or off ([`Choices`]).

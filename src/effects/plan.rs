@@ -244,6 +244,9 @@ fn reflection(facts: &Facts, choice: Choice) -> Decision {
         }
         Some(angle) => format!("no ray leaves a surface at less than {angle:.1} degrees to it"),
     };
+    let kept =
+        if choice == Choice::Off { "; the test is part of refraction and stays" } else { "" };
+    let reason = reason + kept;
     let computed = !facts.falls.is_empty();
     Decision { computed, left: 0.0, surfaces: facts.falls.clone(), reason, ..decision }
 }

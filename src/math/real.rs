@@ -64,62 +64,37 @@ pub trait Real:
     fn is_finite(self) -> bool;
 }
 
-#[expect(clippy::use_self, reason = "the constant is an f64 for every number type")]
-impl Real for f64 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
-    const TWO: Self = 2.0;
-    const ORDER: usize = 0;
-    const EPSILON: f64 = 2.220446049250313e-16;
+macro_rules! real_for_float {
+    ($float:ident, $epsilon:literal, $round:expr) => {
+        impl Real for $float {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const TWO: Self = 2.0;
+            const EPSILON: f64 = $epsilon;
+            const ORDER: usize = 0;
 
-    #[inline(always)]
-    fn from_f64(value: f64) -> Self {
-        value
-    }
-    #[inline(always)]
-    fn value(self) -> f64 {
-        self
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-    #[inline(always)]
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                $round(value)
+            }
+            #[inline(always)]
+            fn value(self) -> f64 {
+                self.into()
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                self.sqrt()
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+            #[inline(always)]
+            fn is_finite(self) -> bool {
+                self.is_finite()
+            }
+        }
+    };
 }
-
-impl Real for f32 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
-    const TWO: Self = 2.0;
-    const ORDER: usize = 0;
-    const EPSILON: f64 = 1.1920928955078125e-7;
-
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what is asked")]
-    fn from_f64(value: f64) -> Self {
-        value as Self
-    }
-    #[inline(always)]
-    fn value(self) -> f64 {
-        f64::from(self)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-    #[inline(always)]
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
-}
+real_for_float!(f64, 2.220446049250313e-16, std::convert::identity);
+real_for_float!(f32, 1.1920928955078125e-7, |value: f64| value as f32);

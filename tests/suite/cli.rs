@@ -88,7 +88,17 @@ impl Drop for Scratch {
 
 #[test]
 fn every_subcommand_has_long_help_with_its_json() {
-    let names = ["info", "trace", "analyze", "gradient", "optimize", "convert", "measure trace"];
+    let names = [
+        "info",
+        "trace",
+        "analyze",
+        "gradient",
+        "optimize",
+        "convert",
+        "measure trace",
+        "measure spot",
+        "measure optimize",
+    ];
     for name in names {
         let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
         let help = done(&arguments, "");
@@ -137,8 +147,15 @@ fn info_gives_first_order_data() {
         "petzval_sum",
         "seidel",
         "semi_diameters",
+        "checks",
+        "effects",
     ];
     has_keys(&info, &keys);
+    let effects = info["effects"].as_array().unwrap();
+    assert_eq!(effects.len(), 6);
+    for effect in effects {
+        has_keys(effect, &["effect", "needed", "computed", "error", "reason", "saves", "saved_ms"]);
+    }
     has_keys(&info["entrance_pupil"], &["position", "diameter"]);
     assert!((info["efl"].as_f64().unwrap() - 49.389).abs() < 1e-3);
     assert_eq!(info["seidel"]["surfaces"].as_array().unwrap().len(), 11);
@@ -458,6 +475,51 @@ fn measure_trace_has_a_rate_for_every_way() {
     let rounding = |name: &str| measured[name]["point_rms_mm"].as_f64().unwrap();
     assert!(rounding("rounding_f64") < 1e-12 && rounding("rounding_f32") < 1e-4);
     assert_eq!(measured["rounding_f64"]["other_fates"], 0);
+}
+
+#[test]
+fn measure_trace_tells_what_derivatives_cost() {
+    let measured = done_json(&["measure", "trace", "--turns", "1"], "");
+    assert!(measured["gradient_over_forward"].as_f64().unwrap() > 0.0);
+    if cfg!(target_os = "linux") {
+        for memory in ["memory_trace", "memory_gradient"] {
+            let peak = measured[memory]["peak_mb"].as_f64().unwrap();
+            assert!(peak < 150.0, "{memory} {peak}");
+        }
+    }
+}
+
+#[test]
+fn measure_spot_draws_error_against_time() {
+    let plot = Scratch::new("curves.png");
+    let singlet = "lenses/singlet_la1131.json";
+    let arguments = ["measure", "spot", singlet, "--field", "1", "--plot", plot.path()];
+    let curves = done_json(&arguments, "");
+    has_keys(&curves, &["machine", "lens", "y", "rms_clear", "rms_clipped", "lit", "rows"]);
+    let rows = curves["rows"].as_array().unwrap();
+    for key in ["pupil", "method", "precision", "rays", "error", "ms"] {
+        assert!(rows.iter().all(|row| row.get(key).is_some()), "{key}");
+    }
+    let best = |method: &str| {
+        let mine = rows.iter().filter(|row| {
+            row["method"] == method && row["precision"] == "f64" && row["pupil"] == "clear"
+        });
+        mine.map(|row| row["error"].as_f64().unwrap()).fold(f64::INFINITY, f64::min)
+    };
+    assert!(best("gauss") < 1e-10 && best("square_grid") > 1e-6);
+    assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
+    refused(2, &["measure", "spot", singlet, "--plot", "curves.gif"], "", &["`gif`", "`.png`"]);
+}
+
+#[test]
+fn measure_optimize_has_a_cost_for_every_search() {
+    let measured = done_json(&["measure", "optimize", "--steps", "2"], "");
+    has_keys(&measured, &["machine", "steps", "variables", "fields", "tolerance", "rows"]);
+    for row in measured["rows"].as_array().unwrap() {
+        let keys = ["name", "ms_per_iteration", "mean", "min", "max", "rays", "error"];
+        has_keys(row, &keys);
+        assert!(row["error"].as_f64().unwrap() < 1e-5, "{row}");
+    }
 }
 
 #[cfg(unix)]

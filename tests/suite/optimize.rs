@@ -2,7 +2,7 @@
 
 use super::merit::{bundled, vary};
 use aplanat::lens::Quantity;
-use aplanat::merit::{Goal, MeritError};
+use aplanat::merit::{Goal, MeritError, Term, Weighted};
 use aplanat::optimize::{Method, start};
 
 fn improve(method: Method, steps: usize) -> (f64, f64) {
@@ -58,4 +58,56 @@ fn bounds_hold_and_a_lens_without_variables_is_refused() {
             assert!((thickness..=thickness + 0.001).contains(&t), "{method:?}: {t}");
         }
     }
+}
+
+/// Somewhere on its way this search proposes a lens in which a ray dies: the step is shortened, the
+/// ray and the number are named, and no lens on the way is ever invalid.
+#[test]
+fn a_step_that_kills_a_ray_is_shortened_and_says_so() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    let goal = Goal {
+        terms: vec![Weighted { term: Term::BackFocus(400.0), weight: 1.0 }, spot()],
+        zoom_ratios: Vec::new(),
+    };
+    lens.variables.retain(|v| v.parameter.quantity == Quantity::Curvature);
+    let mut optimizer = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();
+    let mut reasons = Vec::new();
+    for _ in 0..60 {
+        let progress = optimizer.step();
+        assert!(progress.merit.is_finite());
+        optimizer.current().check().unwrap();
+        reasons.extend(progress.refused);
+    }
+    assert!(reasons.iter().any(|r| r.contains("ray ") && r.contains("moved the")), "{reasons:?}");
+}
+
+fn spot() -> Weighted {
+    Weighted { term: Term::Spot, weight: 1.0 }
+}
+
+#[test]
+fn a_goal_that_is_not_finite_or_does_not_apply_is_refused() {
+    let lens = bundled("double_gauss_rudolph_50");
+    for term in [Term::FocalLength(f64::NAN), Term::TotalTrack(f64::INFINITY)] {
+        let goal = Goal { terms: vec![Weighted { term, weight: 1.0 }], zoom_ratios: Vec::new() };
+        let refused = start(Method::Adam, &lens, &goal, 1e-3).unwrap_err();
+        assert!(matches!(refused, MeritError::DoesNotApply { .. }), "{refused}");
+    }
+    let mut afocal = lens.clone();
+    afocal.surfaces.iter_mut().for_each(|row| row.curvature = 0.0);
+    let goal = Goal {
+        terms: vec![Weighted { term: Term::FocalLength(50.0), weight: 1.0 }],
+        zoom_ratios: Vec::new(),
+    };
+    assert!(start(Method::Adam, &afocal, &goal, 1e-3).is_err());
+}
+
+/// Dark fields leave their share to the others; a lens with none but dark ones is refused.
+#[test]
+fn a_lens_without_light_has_no_merit() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.surfaces[0].semi_diameter = Some(0.0);
+    let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new() };
+    let refused = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap_err();
+    assert!(matches!(refused, MeritError::NoLight { .. }), "{refused}");
 }
