@@ -150,7 +150,7 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
         Edit::InsertZoom { at: 0, position: position.clone() },
         Edit::SetZoom { at: 0, position: ZoomPosition { name: "far".into(), ..position } },
         Edit::RemoveZoom(0),
-        Edit::SetVariables(vec![Variable { parameter: CURVATURE, min: None, max: Some(1.0) }]),
+        Edit::SetVariables(vec![Variable { parameter: CURVATURE, min: None, max: None }]),
         Edit::Replace(Box::new(aplanat::session::blank())),
     ]
 }
