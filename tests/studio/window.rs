@@ -14,7 +14,7 @@ use egui_kittest::kittest::Queryable;
 use crate::bench::double_gauss;
 
 /// How long numbers may take on a slow and busy machine.
-const DEADLINE: Duration = Duration::from_secs(60);
+const DEADLINE: Duration = Duration::from_mins(1);
 const PAUSE: Duration = Duration::from_millis(5);
 
 fn window() -> Harness<'static, Studio> {

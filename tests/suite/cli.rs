@@ -12,7 +12,8 @@ const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
 /// Runs the program without a display.
 fn aplanat(arguments: &[&str], input: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
-    command.args(arguments).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.args(arguments).env_remove("DISPLAY");
+    command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
     let written = child.stdin.take().unwrap().write_all(input.as_bytes());
@@ -89,8 +90,16 @@ impl Drop for Scratch {
 #[test]
 fn every_subcommand_has_long_help_with_its_json() {
     let names = [
-        "info", "trace", "analyze", "gradient", "optimize", "convert", "measure trace",
-        "measure spot", "measure optimize",
+        "info",
+        "trace",
+        "analyze",
+        "gradient",
+        "optimize",
+        "convert",
+        "measure trace",
+        "measure spot",
+        "measure optimize",
+        "measure window",
     ];
     for name in names {
         let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
@@ -99,6 +108,23 @@ fn every_subcommand_has_long_help_with_its_json() {
     }
     assert!(done(&["--help"], "").contains("Exit status"));
     assert!(done(&["--version"], "").starts_with("aplanat "));
+}
+
+#[test]
+fn the_readme_has_the_json_of_every_subcommand() {
+    let readme = std::fs::read_to_string("README.md").unwrap();
+    for entry in std::fs::read_dir("src/cli/help").unwrap() {
+        let path = entry.unwrap().path();
+        let help = std::fs::read_to_string(&path).unwrap();
+        assert!(readme.contains(&help), "README.md does not have {}", path.display());
+    }
+}
+
+#[test]
+fn without_a_display_it_says_what_works() {
+    refused(1, &[], "", &["window", "aplanat info LENS", "aplanat --help"]);
+    refused(1, &[LENS], "", &["window", "aplanat optimize"]);
+    refused(1, &["measure", "window"], "", &["window"]);
 }
 
 #[test]
@@ -319,8 +345,7 @@ fn a_gradient_is_what_a_changed_file_shows() {
     // Nothing but the disc of the pupil limits the light, and on the axis it does not matter where
     // that disc is: here the biased kind is exact.
     let lens = std::fs::read_to_string(LENS).unwrap();
-    let open = lens
-        .replace("\"stop_semi_diameter\": 4.215", "\"entrance_pupil_diameter\": 6.0");
+    let open = lens.replace("\"stop_semi_diameter\": 4.215", "\"entrance_pupil_diameter\": 6.0");
     let changed = |name: &str, step: f64| {
         let curvature = 0.07061398863114783 + step;
         let text = open.replacen("0.07061398863114783", &curvature.to_string(), 1);
@@ -329,8 +354,7 @@ fn a_gradient_is_what_a_changed_file_shows() {
     };
     let step = 1e-6;
     let (_, slopes) = changed("open.json", 0.0);
-    let difference =
-        (changed("plus.json", step).0 - changed("minus.json", -step).0) / (2.0 * step);
+    let difference = (changed("plus.json", step).0 - changed("minus.json", -step).0) / (2.0 * step);
     assert!((slopes[0] - difference).abs() < 1e-6 * difference.abs(), "{slopes:?} {difference}");
 }
 
@@ -347,8 +371,20 @@ fn optimize_makes_the_lens_better_and_saves_it() {
     let (out, history) = (Scratch::new("better.json"), Scratch::new("history.json"));
     for method in ["dls", "adam"] {
         let arguments = [
-            "optimize", LENS, "--out", out.path(), "--history", history.path(), "--steps", "8",
-            "--vary", "curvatures,thicknesses", "--error", "0.1%", "--method", method,
+            "optimize",
+            LENS,
+            "--out",
+            out.path(),
+            "--history",
+            history.path(),
+            "--steps",
+            "8",
+            "--vary",
+            "curvatures,thicknesses",
+            "--error",
+            "0.1%",
+            "--method",
+            method,
         ];
         let report = done_json(&arguments, "");
         let number = |key: &str| report[key].as_f64().unwrap();
@@ -368,7 +404,8 @@ fn optimize_makes_the_lens_better_and_saves_it() {
 #[test]
 fn optimize_aims_at_a_goal() {
     let goal = json!({"terms": [{"term": {"focal_length": 52.0}, "weight": 1.0}]});
-    let (goal, out) = (Scratch::with("goal.json", &goal.to_string()), Scratch::new("goal-out.json"));
+    let (goal, out) =
+        (Scratch::with("goal.json", &goal.to_string()), Scratch::new("goal-out.json"));
     let arguments = ["optimize", LENS, "--out", out.path(), "--goal", goal.path()];
     done(&[&arguments[..], &["--vary", "curvatures"]].concat(), "");
     let efl = done_json(&["info", out.path()], "")["efl"].as_f64().unwrap();
