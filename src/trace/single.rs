@@ -93,7 +93,7 @@ impl<R: Real> Tracer<R> {
             }
             landing.ray.point = crossing.point;
             landing.opl += crossing.s * interface.n2;
-            if crossing.s < R::ZERO && landing.backwards.is_none() {
+            if landing.backwards.is_none() && is_backwards(crossing.s, p, interface.n2) {
                 landing.backwards = Some(i);
             }
             visit(i, crossing.point);
@@ -108,6 +108,13 @@ impl<R: Real> Tracer<R> {
         landing.ray.direction = k * (R::ONE / index);
         landing
     }
+}
+
+/// Whether a way of length `s k` from `p` leads back by more than rounding can explain, as between
+/// surfaces that touch.
+fn is_backwards<R: Real>(s: R, p: Vec3<R>, n2: R) -> bool {
+    let size = p.x.value().abs() + p.y.value().abs() + p.z.value().abs();
+    s.value() * n2.value().sqrt() < -16.0 * R::EPSILON * size
 }
 
 impl Tracer<f64> {
