@@ -262,9 +262,8 @@ impl<'a> Scene<'a> {
     ) -> Option<(Sampled, f64)> {
         let (mut result, first) = timed(|| self.sample(method, precision, step, attempt));
         let mut times = vec![first];
-        let enough = |times: &[f64]| {
-            times.len() >= OFTEN_ENOUGH || times.iter().sum::<f64>() >= LONG_ENOUGH
-        };
+        let enough =
+            |times: &[f64]| times.len() >= OFTEN_ENOUGH || times.iter().sum::<f64>() >= LONG_ENOUGH;
         while times.len() < 3 || !enough(&times) {
             let (again, ms) = timed(|| self.sample(method, precision, step, attempt));
             result = again;

@@ -203,7 +203,7 @@ fn open_up(surface: &mut Surface<f64>) {
 }
 
 /// How far an asphere goes on behind its rim.
-const BEYOND: f64 = 1.05;
+const BEYOND: f64 = 1.2;
 
 /// What follows the variables at a wavelength; the system is written in forms that have all these
 /// numbers.

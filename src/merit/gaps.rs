@@ -50,10 +50,12 @@ impl Zoom {
         (0..self.glass.len() - 1).filter(move |gap| self.glass[*gap] == glass)
     }
 
-    /// The larger semi-diameter of the two surfaces of a gap.
+    /// The height at which a gap has its edge: glass reaches to the larger semi-diameter of its two
+    /// surfaces, and elements can touch only within the smaller one.
     fn rim(&self, gap: usize) -> Option<f64> {
         let sizes = [self.rims[gap], self.rims.get(gap + 1).copied().flatten()];
-        sizes.into_iter().flatten().reduce(f64::max)
+        let edge = if self.glass[gap] { f64::max } else { f64::min };
+        sizes.into_iter().flatten().reduce(edge)
     }
 }
 

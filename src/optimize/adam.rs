@@ -72,9 +72,7 @@ impl Adam {
         self.age = 0;
         self.mean.fill(0.0);
         self.square.fill(0.0);
-        self.state.values = self.state.merit.values(&self.state.best);
-        self.state.current = self.state.best.clone();
-        self.state.value = self.state.best_value;
+        self.state.return_to_best();
         self.differentiate();
     }
 
@@ -88,7 +86,7 @@ impl Adam {
 
 impl Optimizer for Adam {
     fn step(&mut self) -> Progress {
-        if self.rate < SMALLEST_RATE {
+        if self.rate < SMALLEST_RATE || self.state.has_ended() {
             return self.state.progress(0.0, true);
         }
         let step = self.direction();

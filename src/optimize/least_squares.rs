@@ -127,7 +127,7 @@ fn scale(matrix: &mut DMatrix<f64>, scales: &DVector<f64>) {
 
 impl Optimizer for LeastSquares {
     fn step(&mut self) -> Progress {
-        if self.idle >= PATIENCE {
+        if self.idle >= PATIENCE || self.state.has_ended() {
             return self.state.progress(0.0, true);
         }
         let before = self.state.value;

@@ -9,6 +9,10 @@ use crate::merit::{Detail, Merit, MeritError, Sum, TermValue};
 const HALVINGS: usize = 12;
 /// Steps between two searches for the rays of the spots.
 const RESAMPLE: usize = 25;
+/// As many of these without a better lens end the search.
+const PATIENCE: usize = 4;
+/// Relative improvement below which a lens counts as no better.
+const SMALLEST_GAIN: f64 = 1e-4;
 
 /// A lens on its way.
 #[derive(Debug, Clone)]
@@ -24,6 +28,11 @@ pub(super) struct State {
     pub(super) best: Lens,
     pub(super) value: f64,
     pub(super) best_value: f64,
+    /// The best lens by its own rays, and what it is worth.
+    verified: Lens,
+    verified_value: f64,
+    /// How often since then none better was found.
+    stale: usize,
     pub(super) steps: usize,
     pub(super) refused: Option<String>,
 }
@@ -45,6 +54,9 @@ impl State {
             best: lens.clone(),
             value,
             best_value: value,
+            verified: lens.clone(),
+            verified_value: value,
+            stale: 0,
             steps: 0,
             refused: None,
         })
@@ -124,37 +136,58 @@ impl State {
         self.refused = Some(format!("{cause}; the step moved the {parameter} most"));
     }
 
-    /// Every so often the rays of the spots are found anew, because the pupil has moved. The best
-    /// merit is then that of the best lens by the new rays. A lens that has lost its light goes
-    /// back to the best one.
+    /// Every so often the rays of the spots are found anew, because the pupil has moved.
     ///
-    /// Returns whether the merit function has changed.
+    /// Between, the merit is that of the rays of some lens before. Only here the best lens shows
+    /// what it is worth by its own rays; a search that finds none better for long has ended. A lens
+    /// that has lost its light goes back to the best one. Returns whether the merit function has
+    /// changed.
     pub(super) fn resample_if_due(&mut self) -> bool {
         if self.steps == 0 || !self.steps.is_multiple_of(RESAMPLE) {
             return false;
         }
+        self.verify_best();
         let mut merit = self.merit.clone();
-        let current = self.current.clone();
-        match merit.resample(&current) {
-            Ok(()) => {
-                let best = merit.value(&merit.values(&self.best));
-                let value = merit.value(&self.values);
-                if let (Ok(best), Ok(value)) = (best, value) {
-                    (self.merit, self.best_value, self.value) = (merit, best, value);
-                    if value < best {
-                        self.best = current;
-                        self.best_value = value;
-                    }
-                }
-            }
+        let value = merit.resample(&self.current).and_then(|()| merit.value(&self.values));
+        match value {
+            Ok(value) => (self.merit, self.value) = (merit, value),
             Err(cause) => {
                 self.refused = Some(cause.to_string());
-                self.current = self.best.clone();
-                self.values = self.merit.values(&self.best);
-                self.value = self.best_value;
+                self.return_to_best();
             }
         }
         true
+    }
+
+    /// Judges the best lens by its own rays, and takes the last one that was so judged instead if
+    /// that is better.
+    fn verify_best(&mut self) {
+        let mut merit = self.merit.clone();
+        let values = merit.values(&self.best);
+        let value = merit.resample(&self.best).and_then(|()| merit.value(&values));
+        let enough = self.verified_value * (1.0 - SMALLEST_GAIN);
+        match value {
+            Ok(value) if value < enough => {
+                self.verified.clone_from(&self.best);
+                self.verified_value = value;
+                self.stale = 0;
+            }
+            Ok(_) | Err(_) => self.stale += 1,
+        }
+        self.best.clone_from(&self.verified);
+        self.best_value = self.verified_value;
+    }
+
+    /// Whether the last looks at the best lens have found none better.
+    pub(super) fn has_ended(&self) -> bool {
+        self.stale >= PATIENCE
+    }
+
+    /// Goes on from the best lens.
+    pub(super) fn return_to_best(&mut self) {
+        self.current.clone_from(&self.best);
+        self.values = self.merit.values(&self.best);
+        self.value = self.merit.value(&self.values).unwrap_or(self.best_value);
     }
 
     pub(super) fn progress(&mut self, accepted: f64, finished: bool) -> Progress {
@@ -181,8 +214,11 @@ impl State {
         (0..self.values.len()).map(held).collect()
     }
 
+    /// The terms of the best lens, by its own rays.
     pub(super) fn terms(&self) -> Result<Vec<TermValue>, MeritError> {
-        self.merit.terms(&self.merit.values(&self.best))
+        let mut merit = self.merit.clone();
+        merit.resample(&self.best)?;
+        merit.terms(&merit.values(&self.best))
     }
 }
 

@@ -175,6 +175,8 @@ pub enum Edit {
     Free(Variable),
     /// Let it no longer.
     Fix(Parameter),
+    /// Let an optimizer change these numbers and no others.
+    SetVariables(Vec<Variable>),
     /// Let a number follow another.
     SetPickup(Pickup),
     /// Let it follow no longer; it keeps its value.
@@ -258,6 +260,7 @@ impl Edit {
             Self::SetWavelengths(_) => "wavelengths".to_owned(),
             Self::SetFocus(_) => "focus solve".to_owned(),
             Self::Free(variable) => format!("free the {}", variable.parameter),
+            Self::SetVariables(_) => "variables".to_owned(),
             Self::Fix(parameter) => format!("fix the {parameter}"),
             Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter),
             Self::RemovePickup(parameter) => format!("no pickup of the {parameter}"),

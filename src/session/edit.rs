@@ -116,6 +116,7 @@ impl Lens {
             Edit::SetFocus(offset) => self.solve_focus(*offset)?,
             Edit::Free(variable) => self.free(*variable)?,
             Edit::Fix(parameter) => self.variables.retain(|v| v.parameter != *parameter),
+            Edit::SetVariables(variables) => self.variables.clone_from(variables),
             Edit::SetPickup(pickup) => self.pick_up(*pickup),
             Edit::RemovePickup(follower) => self.pickups.retain(|p| p.parameter != *follower),
             Edit::InsertZoom { at, position } => self.insert_zoom(*at, position)?,

@@ -31,8 +31,7 @@ pub struct DrawnRay {
     pub path: Path,
 }
 
-/// How far in front of the lens rays begin, as a share of the length from the first vertex to the
-/// image.
+/// How far in front of the lens rays begin, as a share of its length with the way to the image.
 const LEAD: f64 = 0.15;
 
 /// A fan of rays of each field in the meridional plane, at the primary wavelength.
@@ -46,9 +45,11 @@ pub fn layout(bench: &Bench, count: usize) -> Layout {
             Ok(launch) => {
                 for pupil in across(count) {
                     if let Some(ray) = launch.ray([0.0, pupil]) {
-                        let path = launch.color().tracer.path(ray);
-                        layout
-                            .add(bench, DrawnRay { field, wavelength: bench.primary, pupil, path });
+                        let mut path = launch.color().tracer.path(ray);
+                        layout.count(&path);
+                        lead_in(bench, &mut path.points, ray.direction);
+                        let wavelength = bench.primary;
+                        layout.rays.push(DrawnRay { field, wavelength, pupil, path });
                     }
                 }
             }
@@ -67,29 +68,37 @@ fn across(count: usize) -> impl Iterator<Item = f64> {
 }
 
 impl Layout {
-    fn add(&mut self, bench: &Bench, mut ray: DrawnRay) {
-        self.fates.count(ray.path.fate);
-        let met = ray.path.fate.surface().unwrap_or(self.reached.len());
-        let points = &ray.path.points;
+    /// Notes how a ray ended and how far from the axis it met each surface.
+    fn count(&mut self, path: &Path) {
+        self.fates.count(path.fate);
+        let met = path.fate.surface().unwrap_or(self.reached.len());
+        let points = &path.points;
         for (reached, point) in self.reached.iter_mut().zip(&points[1..]).take(met) {
             *reached = reached.max(point.x.hypot(point.y));
         }
-        lead_in(bench, &mut ray.path.points);
-        self.rays.push(ray);
     }
 }
 
-/// Moves the start of a ray to where drawing begins: the object, or a plane in front of the lens.
-fn lead_in(bench: &Bench, points: &mut [Vec3<f64>]) {
-    let [start, next, ..] = points else { return };
+/// Where drawn rays begin: in front of everything, mirrors that stand before the first vertex too.
+fn front(bench: &Bench) -> f64 {
     let surfaces = &bench.colors[bench.primary].system.surfaces;
-    let length: f64 = surfaces.iter().map(|surface| surface.thickness).sum();
+    let (mut z, mut first, mut last) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for surface in surfaces {
+        (first, last) = (first.min(z), last.max(z));
+        z += surface.thickness;
+    }
+    first - LEAD * (last - first)
+}
+
+/// Moves the start of a ray to where drawing begins: the object, or a plane in front of the lens.
+fn lead_in(bench: &Bench, points: &mut [Vec3<f64>], along: Vec3<f64>) {
+    let [start, ..] = points else { return };
+    let front = front(bench);
     let from = match bench.beam.object {
         crate::lens::Object::Finite(distance) if distance > 0.0 => -distance,
         _ => f64::NEG_INFINITY,
     };
-    let along = *next - *start;
-    let s = (from.max(-LEAD * length.abs()) - start.z) / along.z;
+    let s = (from.max(front) - start.z) / along.z;
     let moved = *start + along * s;
     if along.z > 0.0 && moved.is_finite() {
         *start = moved;

@@ -72,6 +72,11 @@ impl Studio {
         &self.session
     }
 
+    /// Lets the window close although changes are lost.
+    pub const fn leave_without_asking(&mut self) {
+        self.leaving = true;
+    }
+
     /// The same, to be told commands directly.
     pub const fn session_mut(&mut self) -> &mut Session {
         &mut self.session
@@ -216,7 +221,7 @@ impl Studio {
             ui.label(capital(&counted_from_one(words)));
             if !table.is_empty() {
                 ScrollArea::both().max_height(440.0).show(ui, |ui| {
-                    let table = RichText::new(table).monospace();
+                    let table = RichText::new(counted_from_one(table)).monospace();
                     ui.add(Label::new(table).extend().selectable(true));
                 });
             }

@@ -90,7 +90,7 @@ fn usual() -> Tree<Kind> {
     let facts = tiles.insert_tab_tile(vec![first, effects]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(layout, 0.52), (table, 0.48)]);
-    let right = column(&mut tiles, &[(spot, 0.44), (optimizer, 0.56)]);
+    let right = column(&mut tiles, &[(spot, 0.375), (optimizer, 0.625)]);
     let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
     Tree::new(Id::unique("dock"), root, tiles)
 }

@@ -38,6 +38,17 @@ pub struct Field<'a> {
     pub hint: &'a str,
     /// Numbers stand at the right.
     pub align: Align,
+    /// Where it stands.
+    pub place: Place,
+}
+
+/// Where a field stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// In a table, whose lines are frame enough.
+    Table,
+    /// By itself, with a frame that says where one can type.
+    Form,
 }
 
 /// What became of a field in this frame.
@@ -158,13 +169,19 @@ pub fn error_color(ui: &Ui) -> Color32 {
 
 fn edit(ui: &mut Ui, id: Id, field: Field<'_>, text: &mut String, refused: bool) -> Response {
     let focused = ui.memory(|memory| memory.has_focus(id));
+    let hovered = ui.ctx().read_response(id).is_some_and(|last| last.hovered());
     let visuals = ui.visuals();
-    let line = match (refused, focused) {
-        (true, _) => visuals.error_fg_color,
-        (false, true) => visuals.selection.stroke.color,
-        (false, false) => Color32::TRANSPARENT,
+    let boxed = field.place == Place::Form;
+    let line = if refused {
+        visuals.error_fg_color
+    } else if focused {
+        visuals.selection.stroke.color
+    } else if boxed || hovered {
+        visuals.widgets.noninteractive.bg_stroke.color
+    } else {
+        Color32::TRANSPARENT
     };
-    let fill = if focused { visuals.extreme_bg_color } else { Color32::TRANSPARENT };
+    let fill = if focused || boxed { visuals.extreme_bg_color } else { Color32::TRANSPARENT };
     let frame = Frame::new()
         .inner_margin(Margin::symmetric(4, 1))
         .corner_radius(2)

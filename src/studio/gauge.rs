@@ -33,7 +33,8 @@ pub struct Figures {
     pub renderer: String,
     /// Width and height of the window in pixels.
     pub size: [u32; 2],
-    /// From the start of the process to the first frame on the screen.
+    /// From the start of the process to the first frame with the lens and all its numbers on the
+    /// screen.
     pub first_frame_ms: Option<f64>,
     /// From an edit to the numbers of all panels, frames apart: the median of 21 edits.
     pub edit_ms: f64,
@@ -66,7 +67,8 @@ fn gauge(
 ) -> Started {
     let wake = context.egui_ctx.clone();
     let session = Session::new(first_lens(), move || wake.request_repaint())?;
-    let studio = Studio::new(session, backing, Memory::None, None);
+    let mut studio = Studio::new(session, backing, Memory::None, None);
+    studio.leave_without_asking();
     let renderer = context.wgpu_render_state.as_ref().map_or_else(
         || "OpenGL".to_owned(),
         |state| {
@@ -89,8 +91,10 @@ struct Gauge {
 /// What is being measured.
 #[derive(Debug, Clone, Copy)]
 enum Stage {
-    /// The first frame is not on the screen yet.
+    /// The first frame with the lens and all its numbers is not on the screen yet.
     Opening,
+    /// It is being drawn.
+    Drawing,
     /// So many frames until the drawings are there.
     Settling(usize),
     /// So many frames are still to be repainted; the processor time when that began.
@@ -120,8 +124,9 @@ impl Gauge {
             context.request_repaint();
         }
         match self.stage {
-            Stage::Opening if context.cumulative_frame_nr() == 0 => Stage::Opening,
-            Stage::Opening => {
+            Stage::Opening if self.studio.session().view().is_current() => Stage::Drawing,
+            Stage::Opening => Stage::Opening,
+            Stage::Drawing => {
                 let size = context.content_rect().size() * context.pixels_per_point();
                 self.note(|figures| {
                     figures.first_frame_ms = age_ms();

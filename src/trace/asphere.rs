@@ -20,7 +20,25 @@ pub(super) fn steepest<R: Real>(shape: &Shape<R>, radius: f64) -> f64 {
     steepest_between(curvature.value(), conic.value(), &terms.map(Real::value), (0.0, radius), 64)
 }
 
-/// The same between two distances from the axis, from some intervals of them.
+/// Between which heights an asphere lies within `radius` of the axis; infinite without a bound.
+pub(super) fn span<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
+    let Shape::Asphere { curvature, conic, terms } = shape else { return (0.0, 0.0) };
+    let (c, conic, terms) = (curvature.value(), conic.value(), terms.map(Real::value));
+    let plain = Shape::Asphere { curvature: c, conic, terms };
+    let (mut low, mut high, width) = (0.0_f64, 0.0_f64, radius / 64.0);
+    for i in 0..64 {
+        let (from, to) = (f64::from(i) * width, f64::from(i + 1) * width);
+        let middle = 0.5 * (from + to);
+        let change = 0.5 * width * steepest_between(c, conic, &terms, (from, to), 1);
+        let Some((z, _)) = plain.sag(middle * middle).filter(|_| change.is_finite()) else {
+            return (f64::NEG_INFINITY, f64::INFINITY);
+        };
+        (low, high) = (low.min(z - change), high.max(z + change));
+    }
+    (low, high)
+}
+
+/// A bound of the slope between two distances from the axis, from some intervals of them.
 fn steepest_between(
     c: f64,
     conic: f64,
@@ -57,7 +75,8 @@ fn bend_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f64 {
         return f64::INFINITY;
     }
     // Where the conic flattens outwards it bends most at the vertex.
-    let mut bound = c.abs() / radicand.min(1.0).powf(1.5);
+    let least = radicand.min(1.0);
+    let mut bound = c.abs() / (least * least.sqrt());
     let mut power = r2;
     for (j, a) in terms.iter().enumerate() {
         bound += ((2 * j + 4) * (2 * j + 3)) as f64 * a.abs() * power;
@@ -200,10 +219,12 @@ pub(super) fn isolated(
     let inside = rim.min(edge);
     if inside.is_finite() {
         let outside = if rim < edge { edge.min(4.0 * rim) } else { edge };
-        return problem.first(inside).or_else(|| problem.first(outside));
+        let anywhere = (f64::NEG_INFINITY, f64::INFINITY);
+        let found = problem.first(inside, problem.surface.span);
+        return found.or_else(|| problem.first(outside, anywhere));
     }
-    let reach = problem.reach();
-    problem.first(reach).or_else(|| problem.first(64.0 * reach))
+    let (reach, anywhere) = (problem.reach(), (f64::NEG_INFINITY, f64::INFINITY));
+    problem.first(reach, anywhere).or_else(|| problem.first(64.0 * reach, anywhere))
 }
 
 impl Problem {
@@ -248,10 +269,15 @@ impl Problem {
         (self.p.x.abs() + self.p.y.abs() + self.p.z.abs()) / k
     }
 
-    /// The first crossing within `radius` of the axis behind the start of the ray, or else the
-    /// last one in front of it.
-    fn first(&self, radius: f64) -> Option<f64> {
+    /// The first crossing within `radius` of the axis and between two heights, behind the start of
+    /// the ray, or else the last one in front of it.
+    fn first(&self, radius: f64, heights: (f64, f64)) -> Option<f64> {
         let (from, to) = self.within(radius)?;
+        let (low, high) = self.between(heights);
+        let (from, to) = (from.max(low), to.min(high));
+        if !(from <= to) {
+            return None;
+        }
         let start = self.start.max(from).min(to);
         let behind = self.search(start, to, radius, Order::First);
         behind.or_else(|| self.search(from, start, radius, Order::Last))
@@ -271,6 +297,17 @@ impl Problem {
             let root = root.sqrt();
             ((-self.slant - root) / square, (-self.slant + root) / square)
         })
+    }
+
+    /// The part of the ray between two heights, a little more for rounding.
+    fn between(&self, (low, high): (f64, f64)) -> (f64, f64) {
+        let (a, b) = ((low - self.p.z) / self.k.z, (high - self.p.z) / self.k.z);
+        let slack = 1e-9 * (a.abs() + b.abs() + self.scale());
+        if slack.is_finite() {
+            (a.min(b) - slack, a.max(b) + slack)
+        } else {
+            (f64::NEG_INFINITY, f64::INFINITY)
+        }
     }
 
     fn search(&self, from: f64, to: f64, radius: f64, order: Order) -> Option<f64> {

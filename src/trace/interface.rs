@@ -57,6 +57,8 @@ pub(super) struct Interface<R> {
     pub(super) sheet: R,
     /// The largest slope of an asphere inside its semi-diameter; infinite where there is no bound.
     pub(super) steepest: f64,
+    /// The lowest and the highest point of an asphere inside its semi-diameter.
+    pub(super) span: (f64, f64),
 }
 
 /// Where a ray meets a surface, before anything happens to it.
@@ -115,6 +117,7 @@ pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
             rim2,
             sheet: R::from_f64(if whole { f64::NEG_INFINITY } else { 0.0 }),
             steepest: asphere::steepest(&surface.shape, surface.semi_diameter.value()),
+            span: asphere::span(&surface.shape, surface.semi_diameter.value()),
         };
         (n, gap) = (behind, surface.thickness);
         medium = if surface.mirror { medium } else { Some(i) };
@@ -280,6 +283,7 @@ impl<R: Real> Interface<R> {
             rim2: self.rim2.value(),
             sheet: self.sheet.value(),
             steepest: self.steepest,
+            span: self.span,
         }
     }
 

@@ -150,6 +150,7 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
         Edit::InsertZoom { at: 0, position: position.clone() },
         Edit::SetZoom { at: 0, position: ZoomPosition { name: "far".into(), ..position } },
         Edit::RemoveZoom(0),
+        Edit::SetVariables(vec![Variable { parameter: CURVATURE, min: None, max: None }]),
         Edit::Replace(Box::new(aplanat::session::blank())),
     ]
 }
@@ -187,7 +188,8 @@ fn kind(edit: &Edit) -> usize {
         Edit::InsertZoom { .. } => 27,
         Edit::SetZoom { .. } => 28,
         Edit::RemoveZoom(_) => 29,
-        Edit::Replace(_) => 30,
+        Edit::SetVariables(_) => 30,
+        Edit::Replace(_) => 31,
     }
 }
 
@@ -195,7 +197,7 @@ fn kind(edit: &Edit) -> usize {
 fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut session = session(double_gauss());
     let edits = every_edit(session.lens());
-    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..31).collect::<Vec<_>>());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..32).collect::<Vec<_>>());
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());

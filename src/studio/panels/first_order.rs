@@ -95,7 +95,7 @@ fn plain(value: Option<f64>) -> String {
 }
 
 fn mm(value: Option<f64>) -> String {
-    value.map_or_else(|| "none".to_owned(), |value| format!("{} mm", number::show_digits(value, 7)))
+    value.map_or_else(|| "none".to_owned(), |value| format!("{} mm", number::show_digits(value, 6)))
 }
 
 /// The columns of the sums and what they stand for.

@@ -300,7 +300,7 @@ fn name(ui: &mut Ui, lens: &Lens, field: usize) {
 fn lit(ui: &mut Ui, spot: &Spot) {
     let lit = spot.colors.iter().filter_map(|color| color.as_ref().ok());
     let area = lit.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI;
-    if area < 1.0 - 1e-6 {
+    if area < 0.995 {
         let text = RichText::new(format!("{:.0} % of pupil", 100.0 * area)).small();
         ui.label(text.weak()).on_hover_text(
             "Surfaces clip the rest. The integral follows the edge of what gets through.",

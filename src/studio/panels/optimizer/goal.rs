@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::merit::{Goal, Term, Weighted};
 use crate::session::{Search, View, evaluate};
-use crate::studio::field::{Drafts, Field};
+use crate::studio::field::{Drafts, Field, Place};
 use crate::studio::number;
 use crate::studio::panels::numbers;
 
@@ -129,7 +129,7 @@ fn root(value: f64) -> String {
 fn number_field(ui: &mut Ui, drafts: &mut Drafts, name: &str, value: &mut f64, width: f32) {
     let id = Id::unique(("optimizer", name));
     let shown = number::show_digits(*value, 5);
-    let field = Field { name, shown: &shown, hint: "", align: Align::Max };
+    let field = Field { name, shown: &shown, hint: "", align: Align::Max, place: Place::Form };
     let layout = Arrange::left_to_right(Align::Center);
     let size = vec2(width, ui.spacing().interact_size.y);
     let entry = ui.allocate_ui_with_layout(size, layout, |ui| drafts.show(ui, id, field));

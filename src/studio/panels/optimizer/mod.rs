@@ -18,6 +18,8 @@ use goal::Aims;
 /// How high the merit history is, in points; less where there is little room.
 const HISTORY: f32 = 130.0;
 
+const NO_VARIABLES: &str = "No number is variable: press the badge beside one in the prescription.";
+
 /// The panel.
 #[derive(Debug, Default)]
 pub struct Optimizer {
@@ -39,6 +41,9 @@ impl Panel for Optimizer {
             let plot = Side::bottom("merit history").frame(Frame::NONE).show_separator_line(false);
             let room = (0.45 * ui.available_height()).min(HISTORY);
             plot.exact_size(room).show(ui, |ui| history::plot(ui, search));
+        }
+        if view.lens.variables.is_empty() {
+            ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             self.aims.ui(ui, view, &mut self.drafts);
@@ -95,11 +100,7 @@ impl Optimizer {
         let text = RichText::new("Optimize").strong();
         let button = ui.add_enabled(ready, Button::new(text).fill(fill));
         let button = button.on_hover_text("Search for a better lens in the background, on a copy");
-        let why = if under_way {
-            "A search is under way"
-        } else {
-            "No number is variable: press the badge beside one in the prescription"
-        };
+        let why = if under_way { "A search is under way" } else { NO_VARIABLES };
         if button.on_disabled_hover_text(why).clicked() {
             let goal = self.aims.goal();
             wishes.push(Command::Optimize { method: self.method, goal });

@@ -7,7 +7,7 @@ use eframe::egui::{
 
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 use crate::session::{Command, Edit, evaluate};
-use crate::studio::field::{Drafts, Field};
+use crate::studio::field::{Drafts, Field, Place};
 use crate::studio::number;
 use crate::studio::wording::counted_from_one;
 
@@ -196,7 +196,7 @@ impl Menu<'_> {
             Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => "mm",
             Quantity::Conic | Quantity::Asphere(_) | Quantity::Index => "number",
         };
-        ui.weak(format!("Bounds ({unit}); empty for none"));
+        ui.weak(format!("Bounds, {unit}; empty for none"));
         let limit =
             |text: &str| if text.trim().is_empty() { Some(None) } else { value(text).map(Some) };
         if let Some(min) = self.line(ui, "Minimum", variable.min, drafts, limit) {
@@ -244,7 +244,8 @@ impl Menu<'_> {
         let shown = shown.map(number::show).unwrap_or_default();
         let entry = ui.horizontal(|ui| {
             ui.label(name);
-            let field = Field { name, shown: &shown, hint: "none", align: Align::Max };
+            let field =
+                Field { name, shown: &shown, hint: "none", align: Align::Max, place: Place::Form };
             drafts.show(ui, id, field)
         });
         let text = entry.inner.typed?;

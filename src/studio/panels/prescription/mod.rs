@@ -8,6 +8,7 @@ mod actions;
 mod badge;
 mod glass;
 mod table;
+mod variables;
 
 use eframe::egui::{Button, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
@@ -74,12 +75,7 @@ impl Prescription {
                     wishes.push(edit.into());
                 }
             }
-            let free = lens.variables.len();
-            let text = if free == 1 { "1 variable".into() } else { format!("{free} variables") };
-            ui.weak(text).on_hover_text(
-                "Numbers with the badge V are what the optimizer may change. \
-                 Press the badge beside a number to free or fix it.",
-            );
+            variables::menu(ui, lens, wishes);
         });
     }
 

@@ -10,7 +10,7 @@ use super::badge::{self, Decides};
 use super::{actions, glass};
 use crate::lens::{Lens, Medium, Object, Parameter, Quantity};
 use crate::session::{Command, Edit, View, edited, evaluate};
-use crate::studio::field::{Drafts, Field as Cell};
+use crate::studio::field::{Drafts, Field as Cell, Place};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::numbers;
@@ -72,12 +72,13 @@ impl Column {
 
     fn width(self) -> Width {
         match self {
-            Self::Radius | Self::Thickness => Width::initial(104.0).at_least(70.0),
-            Self::Glass => Width::initial(122.0).at_least(70.0),
-            Self::SemiDiameter => Width::initial(92.0).at_least(60.0),
-            Self::Conic => Width::initial(86.0).at_least(60.0),
+            Self::Radius => Width::initial(94.0).at_least(70.0),
+            Self::Thickness => Width::initial(90.0).at_least(70.0),
+            Self::Glass => Width::initial(118.0).at_least(70.0),
+            Self::SemiDiameter => Width::initial(90.0).at_least(60.0),
+            Self::Conic => Width::initial(64.0).at_least(50.0),
             Self::Asphere(_) => Width::initial(112.0).at_least(60.0),
-            Self::Comment => Width::remainder().at_least(90.0).clip(true),
+            Self::Comment => Width::remainder().at_least(60.0).clip(true),
         }
     }
 
@@ -138,7 +139,7 @@ impl Table<'_> {
                 .resizable(true)
                 .auto_shrink([false, false])
                 .cell_layout(Layout::left_to_right(Align::Center))
-                .column(Width::exact(54.0));
+                .column(Width::exact(62.0));
             for column in &columns {
                 table = table.column(column.width());
             }
@@ -248,7 +249,13 @@ impl Table<'_> {
         let limit = column == Column::SemiDiameter;
         let (name, shown) = (name_of(parameter), self.shown(parameter));
         let hint = if limit { self.reached(surface) } else { String::new() };
-        let cell = Cell { name: &name, shown: &shown, hint: &hint, align: Align::Max };
+        let cell = Cell {
+            name: &name,
+            shown: &shown,
+            hint: &hint,
+            align: Align::Max,
+            place: Place::Table,
+        };
         let place = (column, surface);
         let response = self.field(ui, place, cell, |text| Ok(typed(parameter, text)));
         if limit {
@@ -297,7 +304,8 @@ impl Table<'_> {
     fn glass(&mut self, ui: &mut Ui, surface: usize) {
         let medium = &self.view.lens.surfaces[surface].medium;
         let (name, shown) = (format!("Glass of surface {}", surface + 1), glass::show(medium));
-        let cell = Cell { name: &name, shown: &shown, hint: "", align: Align::Min };
+        let cell =
+            Cell { name: &name, shown: &shown, hint: "", align: Align::Min, place: Place::Table };
         let edit = move |text: &str| Edit::SetMedium { surface, medium: glass::parse(text) };
         let field = self.field(ui, (Column::Glass, surface), cell, |text| Ok(edit(text)));
         self.propose(&field, edit);
@@ -326,7 +334,8 @@ impl Table<'_> {
     fn comment(&mut self, ui: &mut Ui, surface: usize) {
         let shown = self.view.lens.surfaces[surface].comment.clone();
         let name = format!("Remark on surface {}", surface + 1);
-        let cell = Cell { name: &name, shown: &shown, hint: "", align: Align::Min };
+        let cell =
+            Cell { name: &name, shown: &shown, hint: "", align: Align::Min, place: Place::Table };
         let edit = |text: &str| Ok(Edit::SetComment { surface, text: text.to_owned() });
         self.field(ui, (Column::Comment, surface), cell, edit);
     }
@@ -337,7 +346,13 @@ impl Table<'_> {
             Object::Finite(distance) => distance,
         };
         let shown = number::show(old);
-        let cell = Cell { name: "Object distance", shown: &shown, hint: "", align: Align::Max };
+        let cell = Cell {
+            name: "Object distance",
+            shown: &shown,
+            hint: "",
+            align: Align::Max,
+            place: Place::Table,
+        };
         let object = |distance: f64| {
             if distance.is_infinite() { Object::Infinity } else { Object::Finite(distance) }
         };
@@ -350,8 +365,13 @@ impl Table<'_> {
 
     fn object_medium(&mut self, ui: &mut Ui) {
         let shown = glass::show(&self.view.lens.object_medium);
-        let cell =
-            Cell { name: "Medium of the object", shown: &shown, hint: "", align: Align::Min };
+        let cell = Cell {
+            name: "Medium of the object",
+            shown: &shown,
+            hint: "",
+            align: Align::Min,
+            place: Place::Table,
+        };
         let edit = |text: &str| Ok(Edit::SetObjectMedium(glass::parse(text)));
         self.field(ui, (Column::Glass, OBJECT), cell, edit);
     }
