@@ -4,7 +4,7 @@
 //! when the work is done, 1 when it failed, 2 when the input is wrong. An error names the file, the
 //! place in it, what was found and what was expected.
 //!
-//! A subcommand is a file of this folder, a line in [`Command`] and a line in its `run`. The JSON
+//! A subcommand is a file of this folder, a line in `Command` and a line in its `run`. The JSON
 //! that it reads and writes stands in `help/`, which is its `--help` and a part of the README.
 
 mod analyze;

@@ -95,7 +95,7 @@ impl Studio {
         self.hear(events);
         let view = self.session.view();
         self.name_window(ui.ctx(), &view);
-        let mut wishes = menu::keys(ui, &view, self.dock.is_typing());
+        let mut wishes = menu::keys(ui, &view, self.dock.is_typing(ui.ctx()));
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut wishes));
         bar_frame(ui, Side::bottom("status"), |ui| Self::status(ui, &view, &mut wishes));
         let mut commands = Vec::new();

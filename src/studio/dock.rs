@@ -1,7 +1,7 @@
 //! The arrangement of the panels: tabs that can be dragged side by side, on top of each other, or
 //! closed and opened again from the menu.
 
-use eframe::egui::{Color32, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText};
+use eframe::egui::{Color32, Context, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles,
     Tree, UiResponse,
@@ -62,9 +62,9 @@ impl Dock {
         panel.map_or("", |(_, panel)| panel.title())
     }
 
-    /// Whether something is typed into a panel that is not accepted yet.
-    pub fn is_typing(&self) -> bool {
-        self.panels.iter().any(|(_, panel)| panel.is_typing())
+    /// Whether something is being typed into a panel.
+    pub fn is_typing(&self, context: &Context) -> bool {
+        self.panels.iter().any(|(_, panel)| panel.is_typing(context))
     }
 
     /// Shows all panels.

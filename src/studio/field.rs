@@ -6,7 +6,8 @@
 use eframe::egui::text::{CCursor, CCursorRange};
 use eframe::egui::text_edit::TextEditState;
 use eframe::egui::{
-    Align, Align2, Color32, Frame, Id, Key, Margin, Response, Stroke, TextEdit, Ui, WidgetText,
+    Align, Align2, Color32, Context, Frame, Id, Key, Margin, Memory, Response, Stroke, TextEdit,
+    Ui, WidgetText,
 };
 
 /// What was typed into the fields of a panel and is not accepted yet.
@@ -107,9 +108,10 @@ impl Drafts {
         self.drafts.iter().find(|draft| draft.field == field).map(|draft| draft.text.as_str())
     }
 
-    /// Whether something is being typed, or was and is not accepted.
-    pub fn is_empty(&self) -> bool {
-        self.drafts.is_empty()
+    /// Whether something is being typed into the field that has the cursor.
+    pub fn is_typing(&self, context: &Context) -> bool {
+        let cursor = context.memory(Memory::focused);
+        self.drafts.iter().any(|draft| Some(draft.field) == cursor)
     }
 
     fn keep(&mut self, field: Id, shown: &str, text: &str) {

@@ -106,6 +106,20 @@ fn keys_undo_and_redo() {
 }
 
 #[test]
+fn a_refused_text_does_not_stand_in_the_way_of_undo() {
+    let mut harness = window();
+    type_radius(&mut harness, "*1.1");
+    type_radius(&mut harness, "abc");
+    harness.key_press(Key::Escape);
+    harness.run_steps(2);
+    harness.get_by_label("Thickness of surface 1").focus();
+    harness.run_steps(2);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    harness.run_steps(3);
+    assert_eq!(*harness.state().session().lens().as_ref(), double_gauss());
+}
+
+#[test]
 fn changes_are_not_lost_without_a_question() {
     let mut harness = window();
     type_radius(&mut harness, "15");

@@ -17,7 +17,7 @@ pub use spot::SpotDiagram;
 
 use std::sync::Arc;
 
-use eframe::egui::{Color32, Sense, Ui, vec2};
+use eframe::egui::{Color32, Context, Sense, Ui, vec2};
 use serde::{Deserialize, Serialize};
 
 use super::draw::Backing;
@@ -34,8 +34,8 @@ pub trait Panel {
     /// Shows it.
     fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>);
 
-    /// Whether something is typed into it that is not accepted yet.
-    fn is_typing(&self) -> bool {
+    /// Whether something is being typed into it.
+    fn is_typing(&self, _context: &Context) -> bool {
         false
     }
 }

@@ -14,7 +14,7 @@ use glam::DVec2;
 
 use super::{Panel, field_name, no_numbers, shown, swatch};
 use crate::analysis::{Estimate, Spot};
-use crate::lens::Lens;
+use crate::lens::Fields;
 use crate::session::{Command, Numbers, Results, View};
 use crate::studio::draw::{Backing, Camera, Canvas, Scene, length_text, round_length};
 use crate::studio::number;
@@ -73,7 +73,8 @@ impl Panel for SpotDiagram {
         let cells = cells(rect, numbers.spots.value.len());
         self.draw(ui, rect, results, numbers, &cells);
         for (i, cell) in cells.iter().enumerate() {
-            words(ui, *cell, &results.lens, numbers, i);
+            let fields = results.lens.fields_at(results.settings.zoom);
+            words(ui, *cell, fields, numbers, i);
         }
         bar(ui, &cells, half_width(numbers));
     }
@@ -250,7 +251,7 @@ impl Frame {
 }
 
 /// The words of a cell: its field above the picture, its numbers below.
-fn words(ui: &mut Ui, cell: Rect, lens: &Lens, numbers: &Numbers, field: usize) {
+fn words(ui: &mut Ui, cell: Rect, fields: &Fields, numbers: &Numbers, field: usize) {
     let picture = picture(cell);
     let above =
         Rect::from_min_max(pos2(picture.left(), picture.top() - WORDS.0), picture.right_top());
@@ -261,7 +262,7 @@ fn words(ui: &mut Ui, cell: Rect, lens: &Lens, numbers: &Numbers, field: usize) 
     let spot = &numbers.spots.value[field];
     within(ui, above, |ui| {
         ui.horizontal(|ui| {
-            name(ui, lens, field);
+            name(ui, fields, field);
             if let Ok(spot) = spot {
                 lit(ui, spot);
             }
@@ -287,9 +288,8 @@ fn within(ui: &mut Ui, rect: Rect, show: impl FnOnce(&mut Ui)) {
     });
 }
 
-fn name(ui: &mut Ui, lens: &Lens, field: usize) {
+fn name(ui: &mut Ui, fields: &Fields, field: usize) {
     let palette = Palette::of(ui.visuals());
-    let fields = &lens.fields;
     let Some(point) = fields.values.get(field) else { return };
     let color = color32(palette.field(field));
     swatch(ui, color);

@@ -5,7 +5,7 @@
 mod goal;
 mod history;
 
-use eframe::egui::{Button, ComboBox, Frame, Panel as Side, RichText, ScrollArea, Ui};
+use eframe::egui::{Button, ComboBox, Context, Frame, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::Panel;
 use crate::optimize::Method;
@@ -50,8 +50,8 @@ impl Panel for Optimizer {
         });
     }
 
-    fn is_typing(&self) -> bool {
-        !self.drafts.is_empty()
+    fn is_typing(&self, context: &Context) -> bool {
+        self.drafts.is_typing(context)
     }
 }
 

@@ -10,7 +10,7 @@ mod glass;
 mod table;
 mod variables;
 
-use eframe::egui::{Button, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
+use eframe::egui::{Button, Context, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
 use super::Panel;
 use crate::session::{Command, View};
@@ -40,8 +40,8 @@ impl Panel for Prescription {
         Table { view, drafts, selected, wishes }.show(ui);
     }
 
-    fn is_typing(&self) -> bool {
-        !self.drafts.is_empty()
+    fn is_typing(&self, context: &Context) -> bool {
+        self.drafts.is_typing(context)
     }
 }
 
