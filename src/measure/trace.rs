@@ -17,7 +17,7 @@ const RAYS: usize = 2 * 4096;
 /// Rays of a turn on two threads: 24 tasks.
 const SHARED_RAYS: usize = 24 * 4096;
 /// Rays that are traced one at a time in a turn.
-const SINGLE_RAYS: usize = 4096;
+const SINGLE_RAYS: usize = 512;
 /// Rays on which rounding is measured.
 const ROUNDED_RAYS: usize = 4096;
 /// Rays for which memory is measured.

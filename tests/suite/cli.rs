@@ -12,7 +12,8 @@ const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
 /// Runs the program without a display.
 fn aplanat(arguments: &[&str], input: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
-    command.args(arguments).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.args(arguments).env_remove("DISPLAY");
+    command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
     let written = child.stdin.take().unwrap().write_all(input.as_bytes());
@@ -98,6 +99,7 @@ fn every_subcommand_has_long_help_with_its_json() {
         "measure trace",
         "measure spot",
         "measure optimize",
+        "measure window",
     ];
     for name in names {
         let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
@@ -106,6 +108,23 @@ fn every_subcommand_has_long_help_with_its_json() {
     }
     assert!(done(&["--help"], "").contains("Exit status"));
     assert!(done(&["--version"], "").starts_with("aplanat "));
+}
+
+#[test]
+fn the_readme_has_the_json_of_every_subcommand() {
+    let readme = std::fs::read_to_string("README.md").unwrap();
+    for entry in std::fs::read_dir("src/cli/help").unwrap() {
+        let path = entry.unwrap().path();
+        let help = std::fs::read_to_string(&path).unwrap();
+        assert!(readme.contains(&help), "README.md does not have {}", path.display());
+    }
+}
+
+#[test]
+fn without_a_display_it_says_what_works() {
+    refused(1, &[], "", &["window", "aplanat info LENS", "aplanat --help"]);
+    refused(1, &[LENS], "", &["window", "aplanat optimize"]);
+    refused(1, &["measure", "window"], "", &["window"]);
 }
 
 #[test]
