@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use super::draw::Backing;
 use super::number;
 use super::wording::{capital, counted_from_one};
+use crate::analysis::Spot;
 use crate::lens::{Field, FieldKind};
 use crate::session::{Command, Numbers, Results, View};
 
@@ -91,6 +92,12 @@ fn numbers(view: &View) -> Option<&Numbers> {
 fn shown(view: &View) -> Option<(&Arc<Results>, &Numbers)> {
     let results = view.preview.as_ref().or(view.results.as_ref())?;
     Some((results, results.numbers.as_ref().ok()?))
+}
+
+/// The share of the pupil through which a field is lit.
+fn lit(spot: Option<&Spot>) -> f64 {
+    let colors = spot.iter().flat_map(|spot| &spot.colors).flatten();
+    colors.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI
 }
 
 /// A small square in the colour of what stands behind it.

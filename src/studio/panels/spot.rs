@@ -12,7 +12,7 @@ use eframe::egui::{
 };
 use glam::DVec2;
 
-use super::{Panel, field_name, no_numbers, shown, swatch};
+use super::{Panel, field_name, lit, no_numbers, shown, swatch};
 use crate::analysis::{Estimate, Spot};
 use crate::lens::Fields;
 use crate::session::{Command, Numbers, Results, View};
@@ -263,9 +263,7 @@ fn words(ui: &mut Ui, cell: Rect, fields: &Fields, numbers: &Numbers, field: usi
     within(ui, above, |ui| {
         ui.horizontal(|ui| {
             name(ui, fields, field);
-            if let Ok(spot) = spot {
-                lit(ui, spot);
-            }
+            clipped(ui, lit(spot.as_ref().ok()));
         });
     });
     within(ui, below, |ui| {
@@ -297,11 +295,9 @@ fn name(ui: &mut Ui, fields: &Fields, field: usize) {
 }
 
 /// How much of the pupil is lit, where it is clipped.
-fn lit(ui: &mut Ui, spot: &Spot) {
-    let lit = spot.colors.iter().filter_map(|color| color.as_ref().ok());
-    let area = lit.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI;
-    if area < 0.995 {
-        let text = RichText::new(format!("{:.0} % of pupil", 100.0 * area)).small();
+fn clipped(ui: &mut Ui, lit: f64) {
+    if lit < 0.995 {
+        let text = RichText::new(format!("{:.0} % of pupil", 100.0 * lit)).small();
         ui.label(text.weak()).on_hover_text(
             "Surfaces clip the rest. The integral follows the edge of what gets through.",
         );

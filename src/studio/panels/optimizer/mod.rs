@@ -5,9 +5,11 @@
 mod goal;
 mod history;
 
-use eframe::egui::{Button, ComboBox, Context, Frame, Panel as Side, RichText, ScrollArea, Ui};
+use eframe::egui::{
+    Button, ComboBox, Context, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui,
+};
 
-use super::Panel;
+use super::{Panel, lit};
 use crate::optimize::Method;
 use crate::session::{Command, Numbers, Search, Standing, View};
 use crate::studio::field::Drafts;
@@ -38,7 +40,8 @@ impl Panel for Optimizer {
         self.controls(ui, view, wishes);
         if let Some(search) = view.search.as_deref() {
             progress(ui, view, search);
-            let plot = Side::bottom("merit history").frame(Frame::NONE).show_separator_line(false);
+            let frame = Frame::new().inner_margin(Margin { right: 10, ..Margin::ZERO });
+            let plot = Side::bottom("merit history").frame(frame).show_separator_line(false);
             let room = (0.45 * ui.available_height()).min(HISTORY);
             plot.exact_size(room).show(ui, |ui| history::plot(ui, search));
         }
@@ -142,7 +145,10 @@ fn progress(ui: &mut Ui, view: &View, search: &Search) {
             ui.label(format!("merit {:.3e} to {:.3e}", first.current, last.best));
         }
     });
-    ui.label(changes(view).join(", "));
+    ui.label(changes(view).join(", ")).on_hover_text(
+        "Mean RMS radius of the spots, focal length, and the mean share of the pupil that gets \
+         through: of the design and of the lens that the search shows",
+    );
     let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
     if let Some(why) = refused {
         let text = RichText::new(capital(&counted_from_one(why))).small();
@@ -162,9 +168,19 @@ fn changes(view: &View) -> Vec<String> {
         texts.push(format!("mean RMS {} to {} µm", short(1e3 * old), short(1e3 * new)));
     }
     if let (Some(old), Some(new)) = (before.first().efl, after.first().efl) {
-        texts.push(format!("focal length {} to {} mm", short(old), short(new)));
+        texts.push(format!("f {} to {} mm", short(old), short(new)));
+    }
+    if let (Some(old), Some(new)) = (mean_light(before), mean_light(after)) {
+        texts.push(format!("light {:.0} to {:.0} %", 100.0 * old, 100.0 * new));
     }
     texts
+}
+
+/// The mean share of the pupil that gets through. A search that does not ask for light may buy
+/// sharpness with it, so that it is shown beside the spots.
+fn mean_light(numbers: &Numbers) -> Option<f64> {
+    let shares: Vec<f64> = numbers.spots.value.iter().map(|spot| lit(spot.as_ref().ok())).collect();
+    (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
 }
 
 /// The mean RMS radius of the fields with light, in mm.
