@@ -381,8 +381,19 @@ impl<R: Real> Block<R> {
         self.meet(interface, number, |j, s| distance[j] = s);
     }
 
+    /// Crosses a surface; the two senses of travel are compiled apart, since a factor that is known
+    /// to be one costs nothing.
     #[inline(always)]
     fn meet(&mut self, interface: &Interface<R>, number: u32, keep: impl FnMut(usize, R)) {
+        if interface.sense > R::ZERO {
+            self.meet_along(&Interface { sense: R::ONE, ..*interface }, number, keep);
+        } else {
+            self.meet_along(&Interface { sense: -R::ONE, ..*interface }, number, keep);
+        }
+    }
+
+    #[inline(always)]
+    fn meet_along(&mut self, interface: &Interface<R>, number: u32, keep: impl FnMut(usize, R)) {
         match interface.form {
             Form::Plane => self.sweep(interface, number, |i, _, p, k| i.meet_plane(p, k), keep),
             Form::Sphere => self.sweep(interface, number, |i, _, p, k| i.meet_sphere(p, k), keep),
