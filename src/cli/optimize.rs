@@ -7,7 +7,7 @@ use super::vary::{Kind, vary};
 use crate::files::{self, native};
 use crate::lens::Lens;
 use crate::measure::timed;
-use crate::merit::{Goal, MeritError, TermValue};
+use crate::merit::{Goal, Merit, MeritError, TermValue};
 use crate::optimize::{Method, Optimizer, Progress, start};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -93,12 +93,14 @@ impl Optimize {
         let before = optimizer.terms().map_err(refuse)?;
         let (search, ms) = timed(|| self.search(optimizer.as_mut()));
         let after = optimizer.terms().map_err(refuse)?;
+        let light = |lens: &Lens| Merit::new(lens, &goal, self.error.0).map(|m| m.light());
+        let light = [light(&lens).map_err(refuse)?, light(optimizer.best()).map_err(refuse)?];
         let best = Lens { variables: opened.lens.variables.clone(), ..optimizer.best().clone() };
         files::save(&best, &self.out)?;
         if let Some(path) = &self.history {
             files::replace(path, native::pretty(&History { steps: &search.steps }).as_bytes())?;
         }
-        let found = Found { search: &search, ms, before, after };
+        let found = Found { search: &search, ms, light, before, after };
         output.print(&Report::new(self, &lens, &best, found))
     }
 
@@ -205,6 +207,8 @@ struct History<'a> {
 struct Found<'a> {
     search: &'a Search,
     ms: f64,
+    /// Before and after.
+    light: [f64; 2],
     before: Vec<TermValue>,
     after: Vec<TermValue>,
 }
@@ -218,6 +222,8 @@ struct Report {
     ms: f64,
     merit_before: f64,
     merit_after: f64,
+    light_before: f64,
+    light_after: f64,
     refused_steps: usize,
     last_refusal: Option<String>,
     terms: Vec<TermKeys>,
@@ -255,7 +261,7 @@ struct VariableKeys {
 
 impl Report {
     fn new(asked: &Optimize, lens: &Lens, best: &Lens, found: Found<'_>) -> Self {
-        let Found { search, ms, before, after } = found;
+        let Found { search, ms, light, before, after } = found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
         let variable = |v: &crate::lens::Variable| VariableKeys {
@@ -276,6 +282,8 @@ impl Report {
             ms,
             merit_before: merit(&before),
             merit_after: merit(&after),
+            light_before: light[0],
+            light_after: light[1],
             refused_steps: refusals().count(),
             last_refusal: refusals().next_back().cloned(),
             terms: before.iter().zip(&after).map(term).collect(),
@@ -297,7 +305,13 @@ impl Display for Report {
         if let Some(refusal) = &self.last_refusal {
             writeln!(f, "{} steps refused or shortened, the last: {refusal}", self.refused_steps)?;
         }
-        writeln!(f, "merit {} -> {}\n", Number(*merit_before), Number(*merit_after))?;
+        writeln!(f, "merit {} -> {}", Number(*merit_before), Number(*merit_after))?;
+        let [before, after] = [self.light_before, self.light_after].map(|light| 100.0 * light);
+        writeln!(f, "light {before:.1} % -> {after:.1} % of the pupil, mean over the spots")?;
+        if after < before - 1.0 {
+            writeln!(f, "  no term asks for light: some of the sharpness was bought by clipping")?;
+        }
+        writeln!(f)?;
         let mut table =
             Table::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
         for TermKeys { term, weight, before, after } in &self.terms {

@@ -127,6 +127,13 @@ impl Goal {
 
     /// Refuses what a lens cannot be asked for.
     pub fn check(&self, lens: &Lens) -> Result<(), MeritError> {
+        let refuse = |why| Err(MeritError::DoesNotApply { term: "goal", why });
+        if self.terms.is_empty() {
+            return refuse("it has no terms");
+        }
+        if !self.zoom_ratios.is_empty() && self.zoom_ratios.len() != lens.zoom_positions() {
+            return refuse("it has not one of `zoom_ratios` for each zoom position");
+        }
         for Weighted { term, weight } in &self.terms {
             let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
             if !(weight.is_finite() && *weight >= 0.0) {
@@ -134,6 +141,11 @@ impl Goal {
             }
             if !term.numbers().iter().all(|v| v.is_finite()) {
                 return refuse("its target is not finite");
+            }
+            if let [min, max] = term.numbers()[..]
+                && min > max
+            {
+                return refuse("its smallest thickness is larger than its largest");
             }
             if matches!(term, Term::FocalLength(_)) && focal_lengths(lens)?.contains(&None) {
                 return refuse("the lens is afocal");

@@ -188,6 +188,13 @@ impl Merit {
         self.samplings.iter().flat_map(Sampling::sampled).collect()
     }
 
+    /// The mean share of the paraxial entrance pupil that gets through, over all spots. A goal
+    /// without a term for light may buy sharpness by clipping it, so it is worth a look.
+    pub fn light(&self) -> f64 {
+        let sampled = self.sampled();
+        sampled.iter().map(|spot| spot.light).sum::<f64>() / sampled.len().max(1) as f64
+    }
+
     /// The merit at these values of the variables.
     pub fn value(&self, values: &[f64]) -> Result<f64, MeritError> {
         self.sum(values, Detail::Value).map(|sum| sum.value)

@@ -20,6 +20,8 @@ pub struct Sampled {
     pub rays: usize,
     /// The estimated relative error of the spot's radius.
     pub error: f64,
+    /// The share of the paraxial entrance pupil that gets through.
+    pub light: f64,
 }
 
 /// The rays of one zoom position.
@@ -76,7 +78,8 @@ impl Sampling {
                 let launch = bench.launch(field, wavelength);
                 let launch =
                     launch.map_err(|cause| MeritError::Launch { field: number, zoom, cause })?;
-                let place = Sampled { zoom, field: number, um: color.um, rays: 0, error: 0.0 };
+                let place =
+                    Sampled { zoom, field: number, um: color.um, rays: 0, error: 0.0, light: 0.0 };
                 if wavelength == bench.primary {
                     sampling.chief.push(chief(&launch).ok_or_else(|| dark(&place))?);
                 }
@@ -153,7 +156,8 @@ impl Color {
         }
         let radius = found.values[0].max(f64::MIN_POSITIVE);
         let error = found.errors[0] / radius;
-        Sampled { rays: self.weights.len() - before, error, ..place }
+        let light = lit / std::f64::consts::PI;
+        Sampled { rays: self.weights.len() - before, error, light, ..place }
     }
 }
 

@@ -217,7 +217,10 @@ impl State {
     /// The terms of the best lens, by its own rays.
     pub(super) fn terms(&self) -> Result<Vec<TermValue>, MeritError> {
         let mut merit = self.merit.clone();
-        merit.resample(&self.best)?;
+        // The rays of the current lens were found a few steps ago.
+        if self.best != self.current || self.has_ended() {
+            merit.resample(&self.best)?;
+        }
         merit.terms(&merit.values(&self.best))
     }
 }

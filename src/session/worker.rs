@@ -227,6 +227,9 @@ impl Desk {
         let start = AssertUnwindSafe(|| (self.start)(&task));
         match catch_unwind(start).unwrap_or_else(|panic| Err(said(panic.as_ref()))) {
             Ok(optimizer) => {
+                let before = optimizer.terms().unwrap_or_default();
+                let merit = before.iter().map(|term| term.weight * term.value).sum();
+                let start = HistoryPoint { step: 0, current: merit, best: merit };
                 let state = Search {
                     number,
                     standing: Standing::Running,
@@ -234,9 +237,9 @@ impl Desk {
                     best: Arc::clone(&task.lens),
                     current: Arc::clone(&task.lens),
                     task: Arc::new(task),
-                    before: optimizer.terms().unwrap_or_default(),
+                    before,
                     terms: Vec::new(),
-                    history: Vec::new(),
+                    history: vec![start],
                 };
                 let run = Run { optimizer, state, stride: 1 };
                 self.tell(&run, News::Started(number));

@@ -25,7 +25,12 @@ pub(super) fn illuminations(task: &Task) -> Vec<AtField<LightKeys>> {
     let skipped = usize::from(!listed && !alone);
     let bench = Bench { fields, ..task.bench.clone() };
     let (results, ms) = timed(|| illumination(&bench, bench.primary, task.accuracy));
-    results.iter().skip(skipped).map(|light| keys(light, ms)).collect()
+    let dark = results.iter().all(|light| light.dark.is_some());
+    let found = |light: &Illumination| match light.dark {
+        Some(why) if dark => AtField::new(light.field, Err(why)),
+        _ => keys(light, ms),
+    };
+    results.iter().skip(skipped).map(found).collect()
 }
 
 fn keys(light: &Illumination, milliseconds: f64) -> AtField<LightKeys> {
