@@ -91,12 +91,14 @@ impl Optimize {
         let started = start(self.method.method(), &lens, &goal, self.error.0);
         let mut optimizer = started.map_err(refuse)?;
         let before = optimizer.terms().map_err(refuse)?;
-        let (search, ms) = timed(|| self.search(optimizer.as_mut()));
-        let after = optimizer.terms().map_err(refuse)?;
         let light = |lens: &Lens| Merit::new(lens, &goal, self.error.0).map(|m| m.light());
-        let light = [light(&lens).map_err(refuse)?, light(optimizer.best()).map_err(refuse)?];
+        let light_before = light(&lens).map_err(refuse)?;
+        let (search, ms) = timed(|| self.search(optimizer.as_mut()));
+        // The lens is safe before anything else is worked out about it.
         let best = Lens { variables: opened.lens.variables.clone(), ..optimizer.best().clone() };
         files::save(&best, &self.out)?;
+        let after = optimizer.terms().map_err(refuse)?;
+        let light = [light_before, light(optimizer.best()).map_err(refuse)?];
         if let Some(path) = &self.history {
             files::replace(path, native::pretty(&History { steps: &search.steps }).as_bytes())?;
         }
@@ -132,6 +134,7 @@ impl Optimize {
                 break;
             }
         }
+        optimizer.settle();
         bar.finish_and_clear();
         search
     }

@@ -173,13 +173,14 @@ impl Merit {
         self.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect()
     }
 
-    /// The lens with these values of the variables; pickups follow when it is resolved.
+    /// The lens with these values of the variables, and pickups that follow them.
     pub fn lens(&self, values: &[f64]) -> Lens {
         let mut lens = self.lens.clone();
         for (variable, value) in self.variables.iter().zip(values) {
             lens.set(variable.parameter, *value);
         }
-        lens
+        // A lens that was checked has pickups that can be followed.
+        lens.with_pickups().unwrap_or(lens)
     }
 
     /// How the spots are sampled, by zoom position, field and wavelength; a spot without rays has no

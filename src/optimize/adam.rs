@@ -107,6 +107,10 @@ impl Optimizer for Adam {
         progress
     }
 
+    fn settle(&mut self) {
+        self.state.verify_best();
+    }
+
     fn best(&self) -> &Lens {
         &self.state.best
     }

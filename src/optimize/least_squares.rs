@@ -12,6 +12,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// The first damping.
 const DAMPING: f64 = 1e-3;
+/// How much more a step is damped after the first one that was no good; twice as much each time.
+const GROWTH: f64 = 2.0;
 const LEAST_DAMPING: f64 = 1e-12;
 /// Above this no step is worth taking.
 const MOST_DAMPING: f64 = 1e10;
@@ -33,7 +35,7 @@ impl LeastSquares {
     pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
         let state = State::new(merit, lens)?;
         let sum = state.merit.sum(&state.values, Detail::Normal)?;
-        Ok(Self { state, sum, damping: DAMPING, growth: 2.0, idle: 0 })
+        Ok(Self { state, sum, damping: DAMPING, growth: GROWTH, idle: 0 })
     }
 
     /// The damped step in scaled variables, and the reduction of the merit that it promises.
@@ -67,7 +69,7 @@ impl LeastSquares {
     fn relax(&mut self, gain: f64) {
         self.damping =
             (self.damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 5.0)).max(LEAST_DAMPING);
-        self.growth = 2.0;
+        self.growth = GROWTH;
     }
 
     fn tighten(&mut self) {
@@ -105,7 +107,7 @@ impl LeastSquares {
             }
             self.tighten();
         }
-        self.damping = DAMPING;
+        (self.damping, self.growth) = (DAMPING, GROWTH);
         0.0
     }
 }
@@ -135,11 +137,18 @@ impl Optimizer for LeastSquares {
         let gain = (before - self.state.value) / before.max(f64::MIN_POSITIVE);
         self.idle = if gain > SMALLEST_GAIN { 0 } else { self.idle + 1 };
         let finished = self.idle >= PATIENCE;
+        if finished {
+            self.settle();
+        }
         let progress = self.state.progress(accepted, finished);
         if self.state.resample_if_due() {
             self.differentiate();
         }
         progress
+    }
+
+    fn settle(&mut self) {
+        self.state.verify_best();
     }
 
     fn best(&self) -> &Lens {

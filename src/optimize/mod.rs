@@ -16,6 +16,9 @@ use std::fmt::Debug;
 pub trait Optimizer: Send + Debug {
     /// Takes one step; a step that would make the lens invalid is refused and shortened.
     fn step(&mut self) -> Progress;
+    /// Judges the best lens by its own rays, as the search itself does from time to time; to be
+    /// called when it is stopped, so that the best lens is one that is known to be better.
+    fn settle(&mut self);
     /// The best lens so far.
     fn best(&self) -> &Lens;
     /// The lens at the current step.

@@ -161,7 +161,7 @@ impl State {
 
     /// Judges the best lens by its own rays, and takes the last one that was so judged instead if
     /// that is better.
-    fn verify_best(&mut self) {
+    pub(super) fn verify_best(&mut self) {
         let mut merit = self.merit.clone();
         let values = merit.values(&self.best);
         let value = merit.resample(&self.best).and_then(|()| merit.value(&values));

@@ -297,29 +297,31 @@ impl Session {
             return self.say(Severity::Warning, text.to_owned());
         };
         match files::save(&self.lens, &path) {
-            Ok(_) => {
+            Ok(saved) if saved.format == files::Format::Native => {
                 self.saved = Arc::clone(&self.lens);
                 self.path = Some(path.clone());
                 self.events.push(Event::Saved(path));
             }
+            // A foreign file may hold less than the lens, which stays unsaved.
+            Ok(saved) => self.exported(&path, saved),
             Err(why) => self.say(Severity::Error, why.to_string()),
         }
     }
 
     fn export(&mut self, path: &Path) {
         match files::save(&self.lens, path) {
-            Ok(saved) => {
-                let mut text = format!("exported to {}", path.display());
-                for part in
-                    [saved.proof.map(|p| p.to_string()), saved.report.map(|r| r.to_string())]
-                {
-                    text += &part.map(|part| format!("\n{part}")).unwrap_or_default();
-                }
-                self.say(Severity::Note, text);
-                self.events.push(Event::Saved(path.to_owned()));
-            }
+            Ok(saved) => self.exported(path, saved),
             Err(why) => self.say(Severity::Error, why.to_string()),
         }
+    }
+
+    /// Says what a written file holds and what it could not hold.
+    fn exported(&mut self, path: &Path, saved: files::SaveReport) {
+        let head = Some(format!("exported to {}", path.display()));
+        let proof = saved.proof.map(|p| p.to_string());
+        let parts = [head, proof, saved.report.map(|r| r.to_string())];
+        self.say(Severity::Note, parts.into_iter().flatten().collect::<Vec<_>>().join("\n"));
+        self.events.push(Event::Saved(path.to_owned()));
     }
 
     fn optimize(&mut self, method: Method, goal: Goal) {

@@ -269,6 +269,7 @@ impl Desk {
             }
             (Order::Stop, Standing::Running | Standing::Paused) => {
                 run.state.standing = Standing::Stopped;
+                run.optimizer.settle();
                 self.tell(&run, News::Stopped(number));
                 return None;
             }

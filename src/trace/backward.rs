@@ -264,10 +264,11 @@ impl<R: Real> Tracer<R> {
         self.sow(&mut way, count, &seed, harvest);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
             way.s = *distance;
-            match interface.form {
-                Form::Plane | Form::Sphere => way.retrace(interface, sphere_normal),
-                Form::Conic => way.retrace(interface, conic_normal),
-                Form::Asphere => way.retrace_asphere(interface),
+            // A factor that is known to be one costs nothing.
+            if interface.sense > R::ZERO {
+                way.pass(&Interface { sense: R::ONE, ..*interface });
+            } else {
+                way.pass(&Interface { sense: -R::ONE, ..*interface });
             }
             way.harvest(interface, i, harvest);
         }
@@ -442,6 +443,16 @@ impl<R: Real> Homeward<R> {
     fn set(&mut self, j: usize, by_point: Vec3<R>, by_k: Vec3<R>) {
         (self.by_x[j], self.by_y[j], self.by_z[j]) = (by_point.x, by_point.y, by_point.z);
         (self.by_kx[j], self.by_ky[j], self.by_kz[j]) = (by_k.x, by_k.y, by_k.z);
+    }
+
+    /// Goes back through a surface to the one before.
+    #[inline(always)]
+    fn pass(&mut self, surface: &Interface<R>) {
+        match surface.form {
+            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal),
+            Form::Conic => self.retrace(surface, conic_normal),
+            Form::Asphere => self.retrace_asphere(surface),
+        }
     }
 
     /// Goes back through a conic (a plane, a sphere) to the surface before.

@@ -1,7 +1,7 @@
 //! Local search on real lenses.
 
 use super::merit::{bundled, vary};
-use aplanat::lens::Quantity;
+use aplanat::lens::{Parameter, Pickup, Quantity};
 use aplanat::merit::{Goal, MeritError, Term, Weighted};
 use aplanat::optimize::{Method, start};
 
@@ -110,4 +110,23 @@ fn a_lens_without_light_has_no_merit() {
     let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new() };
     let refused = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap_err();
     assert!(matches!(refused, MeritError::NoLight { .. }), "{refused}");
+}
+
+/// What follows a variable is written into every lens on the way, so that a table shows it.
+#[test]
+fn pickups_follow_the_search() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    let (front, back) = (Quantity::Curvature, Parameter::new(10, Quantity::Curvature));
+    lens.variables.retain(|v| v.parameter != back);
+    let source = Parameter::new(0, front);
+    lens.pickups.push(Pickup { parameter: back, source, scale: -1.0, offset: 0.0 });
+    let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new() };
+    let mut optimizer = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();
+    for _ in 0..5 {
+        optimizer.step();
+    }
+    optimizer.settle();
+    let best = optimizer.best();
+    assert_ne!(best.surfaces[0].curvature, lens.surfaces[0].curvature);
+    assert_eq!(best.surfaces[10].curvature, -best.surfaces[0].curvature);
 }

@@ -46,6 +46,8 @@ impl Optimizer for Toy {
         Progress { step: self.step, merit, best: merit, accepted: 1.0, refused: None, finished }
     }
 
+    fn settle(&mut self) {}
+
     fn best(&self) -> &Lens {
         &self.lens
     }
