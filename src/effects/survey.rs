@@ -90,7 +90,7 @@ pub fn survey(lens: &Lens, zoom: usize) -> Result<Facts, BenchError> {
         falls: falls(system),
         critical: sights.iter().filter_map(|sight| sight.grazing).reduce(f64::min),
         miss,
-        object: object(lens, zoom, &bench, &sights)?,
+        object: object(lens, zoom, &bench, &sights),
     })
 }
 
@@ -309,28 +309,29 @@ fn leaving<'a>(
     })
 }
 
-fn object(
-    lens: &Lens,
-    zoom: usize,
-    bench: &Bench,
-    sights: &[Sight],
-) -> Result<Option<(f64, f64)>, BenchError> {
-    let Object::Finite(distance) = lens.object else { return Ok(None) };
+fn object(lens: &Lens, zoom: usize, bench: &Bench, sights: &[Sight]) -> Option<(f64, f64)> {
+    let Object::Finite(distance) = lens.object else { return None };
     let Some((beam, fields)) = collimated(bench, &Beam::of(lens, zoom)) else {
-        return Ok(Some((distance, f64::INFINITY)));
+        return Some((distance, f64::INFINITY));
     };
     let systems =
         bench.colors.iter().map(|color| (color.um, color.weight, color.system.clone())).collect();
-    let far = Bench::new(systems, bench.primary, beam, bench.aiming)?;
+    // What cannot be set up or launched from infinity calls for the finite object.
+    let Ok(far) = Bench::new(systems, bench.primary, beam, bench.aiming) else {
+        return Some((distance, f64::INFINITY));
+    };
     let places = places(bench);
     let mut most: f64 = 0.0;
     for (field, parallel) in bench.fields.iter().zip(fields) {
         let mut here = sights.iter().filter(|s| s.field == *field && s.wavelength == bench.primary);
-        let there = far.launch(parallel, bench.primary).ok();
-        if let (Some(here), Some(there)) = (here.next(), there) {
-            let there = Sight::new(&there, &places);
-            most = most.max(here.moved(|i, _| there.landed[i]));
-        }
+        let Some(here) = here.next() else { continue };
+        most = match far.launch(parallel, bench.primary) {
+            Ok(there) => {
+                let there = Sight::new(&there, &places);
+                most.max(here.moved(|i, _| there.landed[i]))
+            }
+            Err(_) => f64::INFINITY,
+        };
     }
-    Ok(Some((distance, most)))
+    Some((distance, most))
 }
