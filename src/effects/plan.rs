@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Rays are aimed at the real stop where the paraxial chief ray misses its centre by more than so
 /// many stop radii: paraxial coordinates would waste much of the beam.
-pub const AIMING: f64 = 0.25;
+pub const AIMING: f64 = crate::pupil::MISS;
 
 /// A rim that no ray comes nearer than this, in semi-diameters, clips nothing.
 const NEAR_RIM: f64 = 0.98;

@@ -25,7 +25,7 @@ pub enum Aiming {
 
 /// Beyond this miss of the stop's centre by the paraxial chief ray, in stop radii, the pupil of a
 /// wide field is looked for where it is: paraxial coordinates would waste half of the beam.
-const MISS: f64 = 0.25;
+pub const MISS: f64 = 0.25;
 
 /// Why a lens cannot be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -131,14 +131,14 @@ impl Bench {
         Launch::new(self, field, wavelength, self.aiming)
     }
 
-    /// The third-order sums, chromatic ones between the shortest and the longest wavelength; `None`
-    /// where there is no chief ray.
+    /// The third-order sums, chromatic ones between the shortest and the longest wavelength where
+    /// there are two; `None` where there is no chief ray.
     pub fn seidel(&self) -> Option<Seidel<f64>> {
         let by_length = |a: &&Color, b: &&Color| a.um.total_cmp(&b.um);
         let short = self.colors.iter().min_by(by_length)?;
         let long = self.colors.iter().max_by(by_length)?;
-        let system = &self.colors[self.primary].system;
-        seidel(system, &self.first, Some((&short.system, &long.system)))
+        let outer = (short.um < long.um).then_some((&short.system, &long.system));
+        seidel(&self.colors[self.primary].system, &self.first, outer)
     }
 
     /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces

@@ -21,7 +21,7 @@ mod region;
 mod rules;
 mod sample;
 
-pub use bench::{Aiming, Bench, BenchError, Color, Dual2};
+pub use bench::{Aiming, Bench, BenchError, Color, Dual2, MISS};
 pub use boundary::{Arc, Boundary, Edge, Frame, Limit};
 pub use launch::{Launch, LaunchError};
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};

@@ -14,7 +14,7 @@ use crate::analysis::{Curvature, Dark, Distortion, Fan, Illumination, Spot};
 use crate::effects;
 use crate::effects::{Plan, Task};
 use crate::lens::{Field, Lens};
-use crate::paraxial::{FirstOrder, Seidel, seidel};
+use crate::paraxial::{FirstOrder, Seidel};
 use crate::pupil::{Accuracy, Bench, BenchError};
 use rayon::prelude::*;
 use std::io;
@@ -246,7 +246,7 @@ impl Numbers {
         let illumination = timed(|| analysis::illumination(&b, b.primary, accuracy));
         go_on()?;
         Some(Self {
-            seidel: timed(|| third_order(&b)),
+            seidel: timed(|| b.seidel()),
             airy: analysis::airy_radius(&b),
             distortion: timed(|| each(&b, |field| analysis::distortion(&b, field, b.primary))),
             curvature: timed(|| each(&b, |field| analysis::field_curvature(&b, field, b.primary))),
@@ -274,12 +274,4 @@ fn timed_spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, D
 /// A result for each field, in order.
 fn each<T: Send>(bench: &Bench, of: impl Fn(Field) -> T + Sync) -> Vec<T> {
     bench.fields.par_iter().map(|field| of(*field)).collect()
-}
-
-fn third_order(bench: &Bench) -> Option<Seidel<f64>> {
-    let by_length = |a: &&crate::pupil::Color, b: &&crate::pupil::Color| a.um.total_cmp(&b.um);
-    let short = bench.colors.iter().min_by(by_length)?;
-    let long = bench.colors.iter().max_by(by_length)?;
-    let outer = (short.um < long.um).then_some((&short.system, &long.system));
-    seidel(&bench.colors[bench.primary].system, &bench.first, outer)
 }

@@ -25,11 +25,6 @@ impl<T> Slot<T> {
         *locked(&self.0) = Some(Arc::new(value));
     }
 
-    /// Empties the slot.
-    pub fn clear(&self) {
-        *locked(&self.0) = None;
-    }
-
     /// The newest value.
     pub fn latest(&self) -> Option<Arc<T>> {
         locked(&self.0).clone()
