@@ -143,6 +143,7 @@ impl Zoom {
                 Slot::Term(term) => surface.terms[term],
                 Slot::Thickness => surface.thickness,
                 Slot::Index => surface.index,
+                Slot::SemiDiameter => surface.semi_diameter,
             };
             by_variable[line.variable] += line.factor * by_number;
         }
@@ -281,6 +282,7 @@ fn number_mut<R: Real>(system: &mut System<R>, surface: usize, slot: Slot) -> &m
     let surface = &mut system.surfaces[surface];
     match (slot, &mut surface.shape) {
         (Slot::Thickness, _) => &mut surface.thickness,
+        (Slot::SemiDiameter, _) => &mut surface.semi_diameter,
         (
             Slot::Curvature,
             Shape::Sphere { curvature }

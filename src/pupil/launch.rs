@@ -139,6 +139,20 @@ impl<'a> Launch<'a> {
         self.field.x == 0.0
     }
 
+    /// The area in mm² of the first vertex plane that one unit of pupil coordinates stands for: the
+    /// measure of integrals over a pupil. Where a collimated beam grazes that plane (a direction
+    /// cosine below 0.05), across the beam instead.
+    pub fn area(&self) -> f64 {
+        let [[a, b], [c, d]] = self.chart.columns;
+        let area = (a * d - b * c).abs();
+        match self.source {
+            Source::Collimated { direction, .. } if direction.z > GRAZING => area / direction.z,
+            Source::Collimated { .. } => area,
+            Source::Point { from, through } => area * (from.z / (through - from.z)).powi(2),
+            Source::Slopes { from } => area * from.z * from.z,
+        }
+    }
+
     /// The ray at these pupil coordinates; `None` where none was found that crosses the stop
     /// there.
     pub fn ray(&self, p: [f64; 2]) -> Option<Ray<f64>> {

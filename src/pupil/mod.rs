@@ -15,6 +15,7 @@
 mod aim;
 mod bench;
 mod boundary;
+mod gradient;
 mod launch;
 mod quadrature;
 mod region;
@@ -23,6 +24,7 @@ mod sample;
 
 pub use bench::{Aiming, Bench, BenchError, Color, Dual2, MISS};
 pub use boundary::{Arc, Boundary, Edge, Frame, Limit};
+pub use gradient::{Cost, Derivative};
 pub use launch::{Launch, LaunchError};
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};

@@ -47,6 +47,8 @@ pub struct SurfaceGradient<R> {
     pub thickness: R,
     /// By the index behind it.
     pub index: R,
+    /// By the semi-diameter: zero for rays that are kept, something for the edge of a pupil.
+    pub semi_diameter: R,
 }
 
 /// Derivatives by every number of a system.
@@ -72,6 +74,7 @@ impl<R: Real> Gradient<R> {
             to.conic += from.conic * factor;
             to.thickness += from.thickness * factor;
             to.index += from.index * factor;
+            to.semi_diameter += from.semi_diameter * factor;
             to.terms.iter_mut().zip(from.terms).for_each(|(t, f)| *t += f * factor);
         }
     }
@@ -90,6 +93,8 @@ pub enum Slot {
     Thickness,
     /// The index behind the surface; `None` of the surfaces for the one in front of all.
     Index,
+    /// The semi-diameter, on which no ray depends but the edge of a pupil does.
+    SemiDiameter,
 }
 
 /// Who takes the derivatives of a block of rays as they come.
@@ -114,6 +119,7 @@ impl<R: Real> Harvest<R> for Gradient<R> {
             Slot::Term(term) => surface.terms[term] += sum,
             Slot::Thickness => surface.thickness += sum,
             Slot::Index => surface.index += sum,
+            Slot::SemiDiameter => surface.semi_diameter += sum,
         }
     }
 }

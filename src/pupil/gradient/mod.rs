@@ -1,0 +1,64 @@
+//! Derivatives of integrals over a pupil whose edge moves with the lens.
+//!
+//! `L = ∫ C(p) dw` over the rays that get through, each named by the point `w` where it crosses
+//! the plane through the first vertex, `p` where it lands. When a number `t` of the lens changes,
+//! the integrand changes and so does the set. With `g` the limit that ends it somewhere, negative
+//! inside, Reynolds' transport theorem gives
+//!
+//! ```text
+//! dL/dt = ∫ dC/dt dw − ∮ C ∂g/∂t / |∇g| dl
+//! ```
+//!
+//! (Teh, *Computational Lens Design*, eq. 3.16, with the factor 1/|∇g| that is missing there.)
+//! Leaving out the second integral is the usual, biased derivative. All estimators differentiate
+//! by every number of a system at once, semi-diameters included.
+
+use crate::trace::Gradient;
+
+/// What each ray of a pupil contributes: `square |p − center|² + constant`, `p` its image point.
+///
+/// The spot (3.24) has `square = 1` about the centroid, which may be held fixed: moving it changes
+/// the integral by nothing in first order. The throughput (3.25) has `constant = −1`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost {
+    /// From where distances count, in mm on the image plane.
+    pub center: [f64; 2],
+    /// The factor of the square of the distance.
+    pub square: f64,
+    /// What every ray contributes.
+    pub constant: f64,
+}
+
+impl Cost {
+    /// The square of the distance from a point: the spot (3.24) where that is the centroid.
+    pub fn spread(center: [f64; 2]) -> Self {
+        Self { center, square: 1.0, constant: 0.0 }
+    }
+
+    /// Minus one for every ray: the throughput (3.25).
+    pub fn throughput() -> Self {
+        Self { center: [0.0; 2], square: 0.0, constant: -1.0 }
+    }
+
+    /// The contribution of a ray that lands at a point.
+    pub fn of(&self, p: [f64; 2]) -> f64 {
+        let [x, y] = [p[0] - self.center[0], p[1] - self.center[1]];
+        self.square * (x * x + y * y) + self.constant
+    }
+
+    /// Its derivative by the point.
+    pub fn slope(&self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| 2.0 * self.square * (p[i] - self.center[i]))
+    }
+}
+
+/// The derivative of an integral over a pupil.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derivative {
+    /// By every number of the system; the integral is in mm² of the first vertex plane.
+    pub by: Gradient<f64>,
+    /// How far each may be wrong: a standard error, or the difference of two orders.
+    pub error: Gradient<f64>,
+    /// Rays traced.
+    pub rays: usize,
+}
