@@ -21,6 +21,13 @@ pub enum Limit {
     Unaimed,
 }
 
+impl Limit {
+    /// Whether a cosine vanishes there, so that rays turn ever faster towards it.
+    pub fn is_grazing(self) -> bool {
+        matches!(self, Self::Surface(_, Hurdle::Miss | Hurdle::Reflection))
+    }
+}
+
 /// Polar coordinates about a point of the pupil, stretched with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -103,8 +110,8 @@ pub(super) struct Probe {
 /// A ray so close to the rim of the disc, relatively, counts as one at the rim: where the rim of
 /// the stop is the rim of the pupil as well, rounding must not decide ray by ray between them.
 const AT_DISC: f64 = 1e-10;
-/// A corner is located to this in azimuth and radius; the quadrature sees the square of it.
-const CORNER: f64 = 1e-9;
+/// A corner is located to this in azimuth and radius; the derivative by a rim is as wrong as this.
+const CORNER: f64 = 1e-11;
 /// A step along the radius that is rounding, relatively.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.

@@ -12,6 +12,7 @@
 mod asphere;
 mod backward;
 mod batch;
+mod edge;
 mod fate;
 mod interface;
 mod lanes;
@@ -46,6 +47,14 @@ impl<R: Real> Tracer<R> {
         system.check()?;
         let interfaces = interface::interfaces(system);
         Ok(Self { interfaces, index_before: system.index_before })
+    }
+
+    /// The same surfaces with no rim that clips. An asphere still ends where it was said to end:
+    /// behind that its polynomial means nothing.
+    #[must_use]
+    pub fn opened(mut self) -> Self {
+        self.interfaces.iter_mut().for_each(|i| i.rim2 = R::from_f64(f64::INFINITY));
+        self
     }
 
     /// How many surfaces a ray crosses, the image plane included.
