@@ -18,13 +18,15 @@ mod interface;
 mod lanes;
 mod margin;
 mod single;
+mod slot;
 
-pub use backward::{Gradient, Seed, Slot, SurfaceGradient};
+pub use backward::{Gradient, Seed, SurfaceGradient};
 pub use batch::{Hits, Points, Rays, Sink};
 pub use fate::{Fate, Fates};
 pub use lanes::Width;
 pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};
+pub use slot::Slot;
 
 use crate::lens::Invalid;
 use crate::lens::System;
