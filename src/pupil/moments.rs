@@ -18,8 +18,7 @@ pub struct Moments {
 impl Region<'_> {
     /// The moments of the light at some nodes.
     pub fn moments(&self, nodes: &Nodes) -> Moments {
-        let landed = self.trace::<Points<f64>>(nodes);
-        moments(&landed, nodes.mirrored, self.launch.area())
+        moments(&self.trace(nodes), nodes.mirrored, self.launch.area())
     }
 }
 

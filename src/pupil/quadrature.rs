@@ -144,9 +144,12 @@ impl Region<'_> {
         let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
         for arc in &boundary.arcs {
             let length = arc.to - arc.from;
-            for (t, share) in legendre(azimuths) {
+            let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
+            for (t, share) in legendre(if alike { 1 } else { azimuths }) {
                 let azimuth = arc.from + t * length;
-                if let Some(edge) = search.edge(azimuth, boundary.near(azimuth), NEAR) {
+                let guess = boundary.near(azimuth);
+                let expected = search.expected(arc.limit, azimuth, guess);
+                if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, NEAR)) {
                     spokes.push(Spoke { azimuth, edge, share: factor * share * length });
                 }
             }

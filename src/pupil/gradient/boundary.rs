@@ -10,61 +10,51 @@
 //! Split at its corners, the edge is smooth along every arc, and Gauss nodes converge spectrally.
 //! Rays are traced backwards, so that the cost does not depend on the number of parameters.
 
-use super::{Cost, Derivative};
-use crate::pupil::boundary::Limit;
-use crate::pupil::quadrature::{Nodes, SPLIT, Spoke, nodes_of};
-use crate::pupil::region::{Kind, Region};
-use crate::trace::{Gradient, Hurdle, Points, Rays, Seed};
+use super::Cost;
+use crate::math::Vec3;
+use crate::pupil::boundary::{Frame, Limit};
+use crate::pupil::lit::Lit;
+use crate::pupil::quadrature::Spoke;
+use crate::pupil::region::Kind;
+use crate::trace::{Gradient, Hurdle, Ray, Rays, Seed};
 
-impl Region<'_> {
-    /// The derivative of an integral with the motion of the edge, at an order of quadrature
-    /// counted from 0; its error is left at zero. `None` where the pupil is not one star-shaped
-    /// piece or has no light.
-    pub fn boundary_derivative(&self, cost: &Cost, order: usize) -> Option<Derivative> {
-        let Kind::Split(boundary) = &self.kind else {
-            let kept = matches!(self.kind, Kind::Clear);
-            return kept.then(|| self.biased_derivative(cost, &self.nodes(order)));
-        };
-        let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
-        let (spokes, rays) = self.spokes(boundary, azimuths);
-        let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
-        nodes.mirrored = self.launch.is_symmetric();
-        let mut found = self.biased_derivative(cost, &nodes);
-        found.by.add(&self.edge_motion(cost, &spokes), 1.0);
-        found.rays += rays + 3 * spokes.len();
-        Some(found)
+impl Lit<'_> {
+    /// The derivative with the motion of the edge, by every number of the system; `None` where the
+    /// pupil is not one piece that a point inside sees all of.
+    pub fn boundary_derivative(&self, cost: &Cost) -> Option<Gradient<f64>> {
+        let mut total = self.biased_derivative(cost);
+        match &self.region.kind {
+            // The disc of the pupil does not move.
+            Kind::Clear => {}
+            Kind::Split(boundary) => {
+                total.add(&self.edge_motion(cost, &boundary.frame), 1.0);
+            }
+            Kind::Dark | Kind::Ragged { .. } | Kind::Endless => return None,
+        }
+        Some(total)
     }
 
-    /// The integral of `dC/dt` over fixed nodes: the derivative without the motion of the edge,
-    /// biased wherever something clips. Its error is left at zero.
-    pub fn biased_derivative(&self, cost: &Cost, nodes: &Nodes) -> Derivative {
-        let scale = self.launch.area();
-        let started = nodes.points.iter().zip(&nodes.weights);
-        let started = started.filter_map(|(p, w)| Some((self.launch.ray(*p)?, *w)));
-        let (rays, weights): (Vec<_>, Vec<f64>) = started.unzip();
-        let rays: Rays<f64> = rays.into_iter().collect();
-        let mut points = Points::default();
-        let tracer = &self.launch.color().tracer;
-        tracer.batch(&rays, &mut points);
+    /// The integral of `dC/dt` over fixed rays: the derivative without the motion of the edge,
+    /// biased wherever something clips.
+    pub fn biased_derivative(&self, cost: &Cost) -> Gradient<f64> {
+        let launch = &self.region.launch;
+        let (scale, points) = (launch.area(), &self.landed.sink);
         let seed = |i: usize| {
             let [x, y] = cost.slope([points.x[i], points.y[i]]);
-            let weight = scale * weights[i];
-            let point = crate::math::Vec3::new(weight * x, weight * y, 0.0);
-            Seed { point, ..Seed::default() }
+            let weight = scale * self.landed.weights[i];
+            Seed { point: Vec3::new(weight * x, weight * y, 0.0), ..Seed::default() }
         };
-        let by = tracer.gradient(&rays, seed);
-        let error = Gradient::zero(tracer.surfaces());
-        Derivative { by, error, rays: 2 * rays.len() + nodes.rays }
+        launch.color().tracer.gradient(&self.rays, seed)
     }
 
     /// What the motion of the edge contributes.
-    fn edge_motion(&self, cost: &Cost, spokes: &[Spoke]) -> Gradient<f64> {
-        let tracer = &self.launch.color().tracer;
+    pub fn edge_motion(&self, cost: &Cost, frame: &Frame) -> Gradient<f64> {
+        let tracer = &self.region.launch.color().tracer;
         let mut total = Gradient::zero(tracer.surfaces());
-        for limit in limits(spokes) {
+        for limit in self.limits() {
             let Limit::Surface(surface, hurdle) = limit else { continue };
-            let on_limit = spokes.iter().filter(|spoke| spoke.edge.limit == limit);
-            let moved = on_limit.filter_map(|spoke| self.edge_ray(cost, spoke, surface, hurdle));
+            let on_limit = self.spokes.iter().filter(|spoke| spoke.edge.limit == limit);
+            let moved = on_limit.filter_map(|s| self.edge_ray(cost, frame, s, (surface, hurdle)));
             let (rays, weights): (Vec<_>, Vec<f64>) = moved.unzip();
             let rays: Rays<f64> = rays.into_iter().collect();
             total.add(&tracer.margin_gradient(surface, hurdle, &rays, &weights), 1.0);
@@ -76,32 +66,20 @@ impl Region<'_> {
     fn edge_ray(
         &self,
         cost: &Cost,
+        frame: &Frame,
         spoke: &Spoke,
-        surface: usize,
-        hurdle: Hurdle,
-    ) -> Option<(crate::trace::Ray<f64>, f64)> {
-        let Kind::Split(boundary) = &self.kind else { return None };
-        let frame = &boundary.frame;
+        (surface, hurdle): (usize, Hurdle),
+    ) -> Option<(Ray<f64>, f64)> {
+        let launch = &self.region.launch;
         let p = frame.point(spoke.azimuth, spoke.edge.radius);
-        let ray = self.launch.ray(p)?;
-        let color = self.launch.color();
+        let ray = launch.ray(p)?;
+        let color = launch.color();
         let landed = color.tracer.land_at_edge(ray, surface, hurdle)?;
-        let slope = color.open.margin(self.launch.dual_ray(p)?, surface, hurdle)?.slope;
+        let slope = color.open.margin(launch.dual_ray(p)?, surface, hurdle)?.slope;
         let direction = frame.direction(spoke.azimuth);
         let outwards = slope[0] * direction[0] + slope[1] * direction[1];
-        let measure = self.launch.area() * spoke.share * spoke.edge.radius;
+        let measure = launch.area() * spoke.share * spoke.edge.radius;
         let weight = -measure * cost.of([landed.x, landed.y]) / outwards;
         weight.is_finite().then_some((ray, weight))
     }
-}
-
-/// The limits of some spokes, each once.
-fn limits(spokes: &[Spoke]) -> Vec<Limit> {
-    let mut found: Vec<Limit> = Vec::new();
-    for spoke in spokes {
-        if !found.contains(&spoke.edge.limit) {
-            found.push(spoke.edge.limit);
-        }
-    }
-    found
 }

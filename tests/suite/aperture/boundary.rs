@@ -16,7 +16,7 @@ fn aperture_gradients_by_boundary_match_every_case() {
     for case in cases() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
-        let moments = region.moments(&region.nodes(ORDER));
+        let moments = region.lit(ORDER).moments;
         let name = case.name();
         for (key, got) in [
             ("area", moments.area),
@@ -39,14 +39,14 @@ fn compare(
     term: &str,
     worst: &mut Worst,
 ) {
-    let found = region.boundary_derivative(&cost, ORDER).unwrap();
+    let found = region.lit(ORDER).boundary_derivative(&cost).unwrap();
     for name in GROUPS {
         let expected = exact(expected, name);
         let largest = expected.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
         if largest == 0.0 {
             continue;
         }
-        for (i, (got, exact)) in group(&found.by, name).iter().zip(expected).enumerate() {
+        for (i, (got, exact)) in group(&found, name).iter().zip(expected).enumerate() {
             let Some(exact) = exact else { continue };
             let place = format!("{name} {i} of {term} of {}: {got:e}, {exact:e}", case.name());
             worst.note(*got, exact, TOLERANCE * largest, place);
