@@ -1,6 +1,6 @@
 //! A lens with its beam, ready for rays.
 
-use crate::lens::{Aperture, Field, Invalid, Lens, LensError, System};
+use crate::lens::{Aperture, Field, Invalid, Lens, LensError, Surface, System};
 use crate::math::Dual;
 use crate::paraxial::{Beam, FirstOrder, Seidel, Undefined, first_order, seidel};
 use crate::trace::Tracer;
@@ -114,8 +114,7 @@ impl Bench {
             rim.into_iter().for_each(|radius| system.surfaces[stop].semi_diameter = radius);
             let tracer = Tracer::new(&system)?;
             let mut open = system.lift::<Dual2>();
-            let unlimited = Dual2::constant(f64::INFINITY);
-            open.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = unlimited);
+            open.surfaces.iter_mut().for_each(Surface::clear);
             Ok(Color { um, weight, system, tracer, open: Tracer::new(&open)? })
         };
         let colors: Result<Vec<_>, Invalid> = systems.into_iter().map(color).collect();

@@ -150,6 +150,7 @@ fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
         thickness,
         index,
         semi_diameter,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     };

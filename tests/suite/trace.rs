@@ -194,6 +194,7 @@ fn scale(surface: &Surface<f64>, factor: f64) -> Surface<f64> {
         shape: Shape::simplest(c / factor, k, terms),
         thickness: surface.thickness * factor,
         semi_diameter: surface.semi_diameter * factor,
+        obstruction: surface.obstruction * factor,
         ..*surface
     }
 }
@@ -232,6 +233,7 @@ fn reversed(system: &System<f64>) -> System<f64> {
         thickness,
         index,
         semi_diameter: f64::INFINITY,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     };

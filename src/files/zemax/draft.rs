@@ -91,6 +91,8 @@ pub(super) struct Surface {
     pub(super) semi_diameter: Option<SemiDiameter>,
     /// The radius outside which a circular aperture cuts.
     pub(super) clip: Option<f64>,
+    /// The radius inside which an aperture or an obscuration cuts.
+    pub(super) obstruction: Option<f64>,
     pub(super) variable_thickness: Option<(f64, f64, usize)>,
     pub(super) thickness_pickup: Option<PickupLine>,
     /// Height, zone and line of a marginal ray height solve.
