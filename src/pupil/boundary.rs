@@ -107,6 +107,8 @@ const AT_DISC: f64 = 1e-10;
 const CORNER: f64 = 1e-9;
 /// A step along the radius that is rounding, relatively.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Two edges as close as that differ by less than this, relatively, unless the edge jumps.
+const JUMP: f64 = 1e-5;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.
 pub(super) const NEAR: f64 = 0.003;
 /// How far inside the edge, relatively, margins are looked at.
@@ -377,7 +379,11 @@ impl<'a> Search<'a> {
             return Some(());
         }
         let middle = 0.5 * (a.0 + b.0);
-        let found = if b.0 - a.0 <= CORNER { Some(middle) } else { self.corner(a, b) };
+        let next = b.0 - a.0 <= CORNER;
+        if next && hides_light(a.1, b.1) {
+            return None;
+        }
+        let found = if next { Some(middle) } else { self.corner(a, b) };
         if let Some(corner) = found {
             let end = arcs.last_mut().map(|arc| std::mem::replace(&mut arc.to, corner))?;
             arcs.push(Arc { from: corner, to: end, limit: b.1.limit });
@@ -388,6 +394,14 @@ impl<'a> Search<'a> {
         self.corners(a, between, arcs)?;
         self.corners(between, b, arcs)
     }
+}
+
+/// Whether the edge jumps from the near side of a shadow to what ends the pupil behind it: there
+/// is light behind the shadow that the centre does not see. The two edges are next to a corner.
+fn hides_light(a: Edge, b: Edge) -> bool {
+    let shadow = |edge: Edge| matches!(edge.limit, Limit::Surface(_, Hurdle::Obstruction));
+    let jump = (a.radius - b.radius).abs() > JUMP * a.radius.max(b.radius);
+    jump && (shadow(a) || shadow(b))
 }
 
 /// Where margins dip between rays at equal steps of azimuth, in steps from the first of them: the

@@ -63,17 +63,18 @@ impl<'a> Region<'a> {
     /// The region of a launch.
     pub fn new(launch: Launch<'a>) -> Self {
         let disc = launch.bench.ends_at_disc();
+        let shadows = launch.shadows();
         let mut rays = 0;
         if launch.bench.stop_radius() == 0.0 {
             return Self { launch, kind: Kind::Dark, rays };
         }
-        if disc && launch.is_clear(&mut rays) {
+        if disc && launch.is_clear(&shadows, &mut rays) {
             return Self { launch, kind: Kind::Clear, rays };
         }
         let Some(grid) = Grid::on_light(&launch, &mut rays) else {
             return Self { launch, kind: Kind::Dark, rays };
         };
-        let kind = grid.kind(&launch);
+        let kind = grid.kind(&launch, &shadows);
         if let Kind::Split(boundary) = &kind {
             rays += boundary.rays;
         }
@@ -115,10 +116,25 @@ fn rim(azimuth: f64) -> [f64; 2] {
     azimuth.sin_cos().into()
 }
 
+/// The point of the unit disc nearest to another one.
+fn in_disc([x, y]: [f64; 2]) -> [f64; 2] {
+    let outside = x.hypot(y).max(1.0);
+    [x / outside, y / outside]
+}
+
 impl Launch<'_> {
-    /// Whether the whole disc gets through, told by the margins of rays at its rim and by where
-    /// they are least in between.
-    fn is_clear(&self, rays: &mut usize) -> bool {
+    /// Where in the pupil, inside or not, the shadow of every obstruction has its middle: the ray
+    /// through the vertex of the surface. `None` for one that was not found.
+    fn shadows(&self) -> Vec<Option<[f64; 2]>> {
+        let surfaces = self.color().system.surfaces.iter().enumerate();
+        let obstructed = surfaces.filter(|(_, surface)| surface.obstruction > 0.0);
+        obstructed.map(|(i, _)| self.through_vertex(i)).collect()
+    }
+
+    /// Whether the whole disc gets through, told by the margins of rays at its rim, by where they
+    /// are least in between, and by the ray that comes nearest to the middle of each shadow, which
+    /// may be too small for all of them.
+    fn is_clear(&self, shadows: &[Option<[f64; 2]>], rays: &mut usize) -> bool {
         let half = self.is_symmetric();
         let step = if half { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
         let mut margins = Vec::with_capacity(RIM_RAYS);
@@ -131,7 +147,10 @@ impl Launch<'_> {
         let dips = dips(&margins, half);
         *rays += dips.len();
         let passes = |p: [f64; 2]| self.margins_of_passing(p).is_some();
-        passes([0.0, 0.0]) && dips.into_iter().all(|dip| passes(rim(step * dip)))
+        *rays += shadows.len();
+        passes([0.0, 0.0])
+            && dips.into_iter().all(|dip| passes(rim(step * dip)))
+            && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(in_disc(p))))
     }
 
     /// Which of these pupil points get through the surfaces.
@@ -249,7 +268,7 @@ impl Grid {
         self.lit_cells().any(|i| at_edge(i % self.cells) || at_edge(i / self.cells))
     }
 
-    fn kind(&self, launch: &Launch<'_>) -> Kind {
+    fn kind(&self, launch: &Launch<'_>, shadows: &[Option<[f64; 2]>]) -> Kind {
         if !launch.bench.ends_at_disc() && self.touches_its_edge() {
             return Kind::Endless;
         }
@@ -262,7 +281,7 @@ impl Grid {
         let end = if launch.is_symmetric() { PI } else { TAU };
         let azimuths = if launch.is_symmetric() { AZIMUTHS } else { 2 * AZIMUTHS };
         match Search::new(launch, frame).boundary(end, azimuths) {
-            Some(boundary) if self.agrees(launch, &boundary) => Kind::Split(boundary),
+            Some(boundary) if self.agrees(launch, &boundary, shadows) => Kind::Split(boundary),
             Some(_) | None => ragged,
         }
     }
@@ -349,19 +368,26 @@ impl Grid {
         near(row).flat_map(move |r| near(column).map(move |c| r * cells + c))
     }
 
-    /// Whether light and dark lie on their sides of the edge; where a grid point is close to it,
-    /// the edge is looked for at its azimuth.
-    fn agrees(&self, launch: &Launch<'_>, boundary: &Boundary) -> bool {
+    /// Whether light and dark, the middle of every shadow too, lie on their sides of the edge;
+    /// where a point is close to it, the edge is looked for at its azimuth.
+    fn agrees(
+        &self,
+        launch: &Launch<'_>,
+        boundary: &Boundary,
+        shadows: &[Option<[f64; 2]>],
+    ) -> bool {
         let end = boundary.samples.last().map_or(TAU, |s| s.0);
         let mut search = Search::new(launch, boundary.frame);
-        (0..self.lit.len()).all(|i| {
-            let (mut azimuth, r) = boundary.frame.polar(self.point(i));
+        let cells = self.lit.iter().enumerate().map(|(i, lit)| (self.point(i), *lit));
+        let shadows = shadows.iter().flatten().map(|p| (*p, false));
+        cells.chain(shadows).all(|(point, lit)| {
+            let (mut azimuth, r) = boundary.frame.polar(point);
             if azimuth > end {
                 azimuth = TAU - azimuth;
             }
             let near = boundary.near(azimuth);
             let fits = |radius: f64, slack: f64| {
-                if self.lit[i] { r <= radius + slack } else { r >= radius - slack }
+                if lit { r <= radius + slack } else { r >= radius - slack }
             };
             let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
             fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
