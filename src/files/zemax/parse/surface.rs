@@ -141,8 +141,10 @@ fn semi_diameter(line: &Line<'_>) -> Result<SemiDiameter, Malformed> {
 /// `CLAP rmin rmax`, `FLAP rmin rmax`: what lies inside the one and outside the other is cut.
 fn clip(surface: &mut Surface, line: &Line<'_>) -> Result<(), Malformed> {
     let (inner, outer) = radii(line)?;
-    surface.clip = Some(surface.clip.map_or(outer, |other| other.min(outer)));
-    obstruct(surface, inner);
+    if surface.clip.is_none_or(|(other, _)| outer < other) {
+        surface.clip = Some((outer, line.number));
+    }
+    obstruct(surface, inner, line);
     Ok(())
 }
 
@@ -152,7 +154,7 @@ fn obscuration(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malfor
     if inner > 0.0 {
         return Ok(dropped("a ring that is dark with light inside cannot be had here"));
     }
-    obstruct(surface, outer);
+    obstruct(surface, outer, line);
     Ok(used())
 }
 
@@ -167,9 +169,9 @@ fn radii(line: &Line<'_>) -> Result<(f64, f64), Malformed> {
 }
 
 /// Darkens the middle as far as the widest of its obstructions.
-fn obstruct(surface: &mut Surface, radius: f64) {
-    if radius > 0.0 {
-        surface.obstruction = Some(surface.obstruction.map_or(radius, |other| other.max(radius)));
+fn obstruct(surface: &mut Surface, radius: f64, line: &Line<'_>) {
+    if radius > surface.obstruction.map_or(0.0, |(other, _)| other) {
+        surface.obstruction = Some((radius, line.number));
     }
 }
 
