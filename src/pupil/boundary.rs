@@ -122,9 +122,45 @@ pub(super) const MOST_ARCS: usize = 24;
 /// A pupil that reaches this far, in its frame, is limited by nothing.
 const ENDLESS: f64 = 1e4;
 
+/// Which limits a search for the edge looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Seen {
+    /// All.
+    All,
+    /// All but the obstructions.
+    Rims,
+    /// The obstructions alone, from inside: the edge is where their shadow ends.
+    Shadow,
+}
+
 impl Launch<'_> {
     /// Whether the ray at `p` gets through, and its margin at one limit.
     pub(super) fn probe(&self, p: [f64; 2], wanted: Limit) -> Probe {
+        self.probe_seeing(p, wanted, |_| true)
+    }
+
+    /// Whether the ray at `p` is in no shadow, with margins that are negative there.
+    fn probe_shadow(&self, p: [f64; 2], wanted: Limit) -> Probe {
+        let mut probe = Probe { failed: None, wanted: f64::NAN };
+        let Some(ray) = self.ray(p) else { return probe };
+        let mut deepest: Option<(Limit, f64)> = None;
+        self.color().tracer.margins(ray, |surface, hurdle, margin| {
+            if hurdle != Hurdle::Obstruction {
+                return;
+            }
+            let limit = Limit::Surface(surface, hurdle);
+            if limit == wanted {
+                probe.wanted = -margin;
+            }
+            if deepest.is_none_or(|(_, least)| margin < least) {
+                deepest = Some((limit, margin));
+            }
+        });
+        probe.failed = deepest.filter(|(_, m)| *m >= 0.0).map(|(limit, margin)| (limit, -margin));
+        probe
+    }
+
+    fn probe_seeing(&self, p: [f64; 2], wanted: Limit, sees: impl Fn(Hurdle) -> bool) -> Probe {
         let Some(ray) = self.ray(p) else {
             return Probe { failed: Some((Limit::Unaimed, -1.0)), wanted: f64::NAN };
         };
@@ -134,7 +170,7 @@ impl Launch<'_> {
             if limit == wanted {
                 probe.wanted = margin;
             }
-            if probe.failed.is_none() && !(margin >= 0.0) {
+            if probe.failed.is_none() && !(margin >= 0.0) && sees(hurdle) {
                 probe.failed = Some((limit, if margin < 0.0 { margin } else { -1.0 }));
             }
         });
@@ -160,16 +196,27 @@ pub(super) struct Search<'a> {
     pub(super) launch: &'a Launch<'a>,
     pub(super) frame: Frame,
     pub(super) rays: usize,
+    seen: Seen,
 }
 
 impl<'a> Search<'a> {
     pub(super) fn new(launch: &'a Launch<'a>, frame: Frame) -> Self {
-        Self { launch, frame, rays: 0 }
+        Self { launch, frame, rays: 0, seen: Seen::All }
+    }
+
+    /// The same search for another edge.
+    pub(super) fn seeing(self, seen: Seen) -> Self {
+        Self { seen, ..self }
     }
 
     fn probe(&mut self, azimuth: f64, r: f64, wanted: Limit) -> Probe {
         self.rays += 1;
-        self.launch.probe(self.frame.point(azimuth, r), wanted)
+        let p = self.frame.point(azimuth, r);
+        match self.seen {
+            Seen::All => self.launch.probe(p, wanted),
+            Seen::Rims => self.launch.probe_seeing(p, wanted, |h| h != Hurdle::Obstruction),
+            Seen::Shadow => self.launch.probe_shadow(p, wanted),
+        }
     }
 
     /// Where the radius leaves the unit disc; infinite where the disc is no limit.

@@ -19,6 +19,7 @@ mod gradient;
 mod launch;
 mod quadrature;
 mod region;
+mod ring;
 mod rules;
 mod sample;
 
@@ -28,4 +29,5 @@ pub use gradient::{Cost, Derivative};
 pub use launch::{Launch, LaunchError};
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};
+pub use ring::Ring;
 pub use sample::{Pattern, pattern};

@@ -80,7 +80,7 @@ impl Region<'_> {
         match self.kind {
             Kind::Dark | Kind::Endless => 0,
             Kind::Clear => CLEAR.len(),
-            Kind::Split(_) => SPLIT.len(),
+            Kind::Split(_) | Kind::Ragged { ring: Some(_), .. } => SPLIT.len(),
             Kind::Ragged { .. } => RAGGED_ORDERS,
         }
     }
@@ -92,6 +92,10 @@ impl Region<'_> {
             Kind::Dark | Kind::Endless => Nodes::default(),
             Kind::Clear => clear(CLEAR[order.min(CLEAR.len() - 1)], mirrored),
             Kind::Split(boundary) => self.split(boundary, SPLIT[order.min(SPLIT.len() - 1)]),
+            Kind::Ragged { ring: Some(ring), .. } => {
+                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
+                ring.nodes(&self.launch, azimuths, radii)
+            }
             Kind::Ragged { square, .. } => {
                 let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };
                 ragged(*square, RAGGED << (2 * order), reach)
@@ -218,7 +222,7 @@ pub fn converged<const K: usize>(
         if let Some(before) = before {
             let scales = scales(&values);
             now.errors = std::array::from_fn(|k| (values[k] - before.values[k]).abs());
-            if matches!(region.kind, Kind::Ragged { .. }) {
+            if matches!(region.kind, Kind::Ragged { ring: None, .. }) {
                 now.errors = std::array::from_fn(|k| cautious(now.errors[k], before.errors[k]));
             }
             now.reached = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());

@@ -4,9 +4,10 @@
 //! where light is, in how many pieces, and whether one point sees all of it; then the edge is
 //! followed from there.
 
-use super::boundary::{Boundary, Edge, Frame, NEAR, Search, dips};
+use super::boundary::{Boundary, Edge, Frame, NEAR, Search, Seen, dips};
 use super::launch::Launch;
 use super::quadrature::Nodes;
+use super::ring::Ring;
 use super::sample::{Pattern, pattern};
 use crate::trace::{Points, Rays, Sink};
 use std::f64::consts::{PI, TAU};
@@ -43,6 +44,8 @@ pub enum Kind {
         pieces: usize,
         /// A square that holds all of it: its centre and half of its side.
         square: ([f64; 2], f64),
+        /// Its two edges, where it is a ring about a shadow: its quadrature lies between them.
+        ring: Option<Box<Ring>>,
     },
     /// Nothing limits it, so that no beam is defined.
     Endless,
@@ -75,9 +78,11 @@ impl<'a> Region<'a> {
             return Self { launch, kind: Kind::Dark, rays };
         };
         let kind = grid.kind(&launch, &shadows);
-        if let Kind::Split(boundary) = &kind {
-            rays += boundary.rays;
-        }
+        rays += match &kind {
+            Kind::Split(boundary) => boundary.rays,
+            Kind::Ragged { ring: Some(ring), .. } => ring.rays(),
+            _ => 0,
+        };
         Self { launch, kind, rays }
     }
 
@@ -273,26 +278,40 @@ impl Grid {
             return Kind::Endless;
         }
         let pieces = self.pieces();
-        let ragged = Kind::Ragged { pieces, square: self.square() };
-        if pieces != 1 {
-            return ragged;
-        }
-        let frame = self.frame(launch);
         let end = if launch.is_symmetric() { PI } else { TAU };
         let azimuths = if launch.is_symmetric() { AZIMUTHS } else { 2 * AZIMUTHS };
-        match Search::new(launch, frame).boundary(end, azimuths) {
-            Some(boundary) if self.agrees(launch, &boundary, shadows) => Kind::Split(boundary),
-            Some(_) | None => ragged,
+        if pieces == 1
+            && let Some(boundary) = Search::new(launch, self.frame(launch)).boundary(end, azimuths)
+            && self.agrees(launch, &boundary, shadows)
+        {
+            return Kind::Split(boundary);
         }
+        let around = |middle: [f64; 2]| {
+            let symmetric = launch.is_symmetric();
+            let center = if symmetric { [0.0, middle[1]] } else { middle };
+            let frame = Frame { center, axes: self.axes(self.middle(), symmetric) };
+            Ring::around(launch, frame, end, azimuths)
+        };
+        let rings = shadows.iter().flatten().filter_map(|middle| around(*middle));
+        let ring = rings.into_iter().find(|ring| self.agrees_with_ring(launch, ring, shadows));
+        // A grid may be too coarse to see that a narrow ring hangs together.
+        let pieces = if ring.is_some() { 1 } else { pieces };
+        Kind::Ragged { pieces, square: self.square(), ring: ring.map(Box::new) }
+    }
+
+    /// The centroid of the light.
+    fn middle(&self) -> [f64; 2] {
+        let count = self.count() as f64;
+        let points = self.lit_cells().map(|i| self.point(i));
+        let sum = points.fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
+        [sum[0] / count, sum[1] / count]
     }
 
     /// The frame in which the light looks round about its centroid, or about the lit point nearest
     /// to that.
     fn frame(&self, launch: &Launch<'_>) -> Frame {
-        let count = self.count() as f64;
         let points = || self.lit_cells().map(|i| self.point(i));
-        let sum = points().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
-        let middle = [sum[0] / count, sum[1] / count];
+        let middle = self.middle();
         let mut center = if launch.is_symmetric() { [0.0, middle[1]] } else { middle };
         if !launch.is_lit(center) {
             let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
@@ -368,29 +387,56 @@ impl Grid {
         near(row).flat_map(move |r| near(column).map(move |c| r * cells + c))
     }
 
-    /// Whether light and dark, the middle of every shadow too, lie on their sides of the edge;
-    /// where a point is close to it, the edge is looked for at its azimuth.
+    /// Grid points and the middles of shadows, and whether they are lit.
+    fn seen<'b>(
+        &'b self,
+        shadows: &'b [Option<[f64; 2]>],
+    ) -> impl Iterator<Item = ([f64; 2], bool)> + 'b {
+        let cells = self.lit.iter().enumerate().map(|(i, lit)| (self.point(i), *lit));
+        cells.chain(shadows.iter().flatten().map(|p| (*p, false)))
+    }
+
+    /// Whether light and dark lie on their sides of the edge.
     fn agrees(
         &self,
         launch: &Launch<'_>,
         boundary: &Boundary,
         shadows: &[Option<[f64; 2]>],
     ) -> bool {
-        let end = boundary.samples.last().map_or(TAU, |s| s.0);
         let mut search = Search::new(launch, boundary.frame);
-        let cells = self.lit.iter().enumerate().map(|(i, lit)| (self.point(i), *lit));
-        let shadows = shadows.iter().flatten().map(|p| (*p, false));
-        cells.chain(shadows).all(|(point, lit)| {
-            let (mut azimuth, r) = boundary.frame.polar(point);
-            if azimuth > end {
-                azimuth = TAU - azimuth;
-            }
-            let near = boundary.near(azimuth);
-            let fits = |radius: f64, slack: f64| {
-                if lit { r <= radius + slack } else { r >= radius - slack }
-            };
-            let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
-            fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
+        self.seen(shadows).all(|(point, lit)| on_side(&mut search, boundary, point, lit))
+    }
+
+    /// Whether light lies between the two edges of a ring and dark does not.
+    fn agrees_with_ring(
+        &self,
+        launch: &Launch<'_>,
+        ring: &Ring,
+        shadows: &[Option<[f64; 2]>],
+    ) -> bool {
+        let Ring { outer, inner } = ring;
+        let mut rims = Search::new(launch, outer.frame).seeing(Seen::Rims);
+        let mut shadow = Search::new(launch, inner.frame).seeing(Seen::Shadow);
+        self.seen(shadows).all(|(point, lit)| {
+            let (light, dark) =
+                (on_side(&mut rims, outer, point, lit), on_side(&mut shadow, inner, point, !lit));
+            if lit { light && dark } else { light || dark }
         })
     }
+}
+
+/// Whether a point lies inside an edge, or outside, as it should; where it is close to it, the edge
+/// is looked for at its azimuth.
+fn on_side(search: &mut Search<'_>, boundary: &Boundary, point: [f64; 2], inside: bool) -> bool {
+    let end = boundary.samples.last().map_or(TAU, |s| s.0);
+    let (mut azimuth, r) = boundary.frame.polar(point);
+    if azimuth > end {
+        azimuth = TAU - azimuth;
+    }
+    let near = boundary.near(azimuth);
+    let fits = |radius: f64, slack: f64| {
+        if inside { r <= radius + slack } else { r >= radius - slack }
+    };
+    let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
+    fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
 }
