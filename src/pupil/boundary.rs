@@ -242,7 +242,7 @@ impl<'a> Search<'a> {
         let mut high = (guess * (1.0 + spread)).min(last);
         loop {
             if let Some(failed) = self.probe(azimuth, high, Limit::Disc).failed {
-                let from = if low > 0.0 { low } else { guess * (1.0 - spread) };
+                let from = if low > 0.0 { low } else { guess.min(high) * (1.0 - spread) };
                 return Some(self.between(azimuth, from, high, failed));
             }
             if high >= last {
