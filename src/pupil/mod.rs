@@ -22,6 +22,7 @@ mod lit;
 mod moments;
 mod quadrature;
 mod region;
+mod ring;
 mod rules;
 mod sample;
 
@@ -33,4 +34,5 @@ pub use lit::Lit;
 pub use moments::Moments;
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};
+pub use ring::Ring;
 pub use sample::{Pattern, pattern};
