@@ -24,7 +24,7 @@ mod sample;
 
 pub use bench::{Aiming, Bench, BenchError, Color, Dual2, MISS};
 pub use boundary::{Arc, Boundary, Edge, Frame, Limit};
-pub use gradient::{Cost, Derivative};
+pub use gradient::{Cost, Derivative, Warp};
 pub use launch::{Launch, LaunchError};
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};

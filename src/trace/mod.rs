@@ -15,6 +15,7 @@ mod batch;
 mod fate;
 mod interface;
 mod lanes;
+mod limit;
 mod margin;
 mod single;
 
@@ -22,6 +23,7 @@ pub use backward::{Gradient, Seed, Slot, SurfaceGradient};
 pub use batch::{Hits, Points, Rays, Sink};
 pub use fate::{Fate, Fates};
 pub use lanes::Width;
+pub use limit::{Abreast, LANES, PupilTracer};
 pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};
 

@@ -13,6 +13,10 @@
 //! Leaving out the second integral is the usual, biased derivative. All estimators differentiate
 //! by every number of a system at once, semi-diameters included.
 
+mod warp;
+
+pub use warp::Warp;
+
 use crate::trace::Gradient;
 
 /// What each ray of a pupil contributes: `square |p − center|² + constant`, `p` its image point.

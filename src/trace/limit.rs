@@ -1,0 +1,265 @@
+//! How far rays are from every limit that a surface sets them, and derivatives through that.
+//!
+//! An integral over the rays that get through changes with the place of its edge as well. What is
+//! needed for that is a family of rays with its second derivatives by two coordinates of the pupil
+//! ([`Jet`]), and at every surface the functions that are negative for a ray that passes and zero
+//! at the edge:
+//!
+//! ```text
+//! rim    (r²/R² − 1)/2
+//! angle  max(0, 1 − (n'/n)²) N·N − (k·N)²/n²
+//! sheet  −(1 − (1+κ) c z), or (1+κ) c² r² − 1 at an asphere
+//! ```
+//!
+//! All are smooth on the axis and of no dimension, so that none is near its edge by its unit alone.
+//! With N·N = 1 the angle is the square of the cosine of incidence against that of the critical
+//! angle where the index falls, and against grazing incidence elsewhere: where a sphere or a conic
+//! is just missed its discriminant (k·N)² is zero, and so it is where a ray touches an asphere. An
+//! asphere that a ray crosses more than once may end a family by another crossing that comes first
+//! all at once; no limit tells of that.
+//!
+//! Homeward, derivatives are first-order jets whose values matter. The transpose of multiplication
+//! by a jet `v + x ε + y η` is again a multiplication, of what is written as `v εη + x η + y ε`, in
+//! the algebra with ε² = η² = 0: so the adjoint of every ray runs unchanged over `Dual<Dual>`, and
+//! the answer is what stands at εη.
+
+use super::Tracer;
+use super::backward::{Gradient, Harvest, Pull, Seed, Slot, Sowing};
+use super::batch::{BLOCK, Block};
+use super::interface::{Form, Interface, Meeting};
+use super::lanes::{Width, widest};
+use super::single::Ray;
+use crate::lens::{Invalid, System};
+use crate::math::{Dual, Jet, Real, Vec3};
+
+/// Rays that travel abreast.
+pub const LANES: usize = BLOCK;
+
+/// A number of the algebra with ε² = η² = 0; the outer slope belongs to ε.
+type Pair<R> = Dual<Dual<R, 1>, 1>;
+
+/// A limit of a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Limit {
+    Rim,
+    Angle,
+    Sheet,
+}
+
+impl<R: Real> Interface<R> {
+    /// `max(0, n² − n'²)`.
+    #[inline(always)]
+    pub(super) fn loss(&self) -> R {
+        R::select(self.dn2 < R::ZERO, -self.dn2, R::ZERO)
+    }
+
+    /// Whether a limit can end anything. A plane ends no ray by its angle where the index does not
+    /// fall, and the rim keeps most rays from where a conic turns over.
+    fn has(&self, limit: Limit) -> bool {
+        let surface = self.value();
+        let c2 = (1.0 + surface.conic) * surface.curvature * surface.curvature;
+        let flat = surface.form != Form::Asphere && surface.curvature == 0.0;
+        match limit {
+            Limit::Rim => surface.rim2 < f64::INFINITY,
+            Limit::Angle => !flat || surface.dn2 < 0.0,
+            Limit::Sheet => {
+                let closed = surface.form == Form::Asphere || surface.sheet > f64::NEG_INFINITY;
+                closed && c2 > 0.0 && c2 * surface.rim2 >= 1.0
+            }
+        }
+    }
+
+    /// One of the functions above.
+    #[inline(always)]
+    fn limit(&self, limit: Limit, met: &Meeting<R>) -> R {
+        let p = met.point;
+        let r2 = p.x * p.x + p.y * p.y;
+        match limit {
+            Limit::Rim => (r2 * (R::ONE / self.rim2) - R::ONE) * R::from_f64(0.5),
+            Limit::Angle => (self.loss() * met.m - met.a * met.a) * (R::ONE / self.n2),
+            Limit::Sheet if self.form == Form::Asphere => {
+                r2 * ((R::ONE + self.conic) * self.curvature * self.curvature) - R::ONE
+            }
+            Limit::Sheet => -met.normal.z,
+        }
+    }
+}
+
+/// A block of rays that have arrived, each with its derivatives by two pupil coordinates, and the
+/// derivatives that their adjoint begins with.
+#[derive(Debug)]
+pub struct Abreast<R> {
+    /// Where they land across the axis.
+    pub landing: [[Jet<R>; LANES]; 2],
+    /// How far they are from every limit that may end them, below zero.
+    pub limits: Vec<[Jet<R>; LANES]>,
+    /// The derivative of the answer by where they land, to be filled in.
+    pub by_landing: [[R; LANES]; 2],
+    /// The derivative of the answer by each limit, to be filled in: by its value and by its two
+    /// slopes.
+    pub by_limit: Vec<[[R; 3]; LANES]>,
+}
+
+/// A system made ready for derivatives of integrals over the rays that get through it.
+#[derive(Debug, Clone)]
+pub struct PupilTracer<R> {
+    outward: Tracer<Jet<R>>,
+    homeward: Tracer<Pair<R>>,
+    /// Surface by surface.
+    limits: Vec<(usize, Limit)>,
+}
+
+impl<R: Real> PupilTracer<R> {
+    /// Prepares a system.
+    ///
+    /// # Errors
+    /// Numbers that no ray can be traced with: see [`System::check`].
+    pub fn new(system: &System<f64>) -> Result<Self, Invalid> {
+        let outward = Tracer::new(&system.lift::<Jet<R>>())?;
+        let all = |i: usize| [Limit::Rim, Limit::Angle, Limit::Sheet].map(|limit| (i, limit));
+        let limits = (0..outward.surfaces()).flat_map(all);
+        let limits = limits.filter(|(i, limit)| outward.interfaces[*i].has(*limit)).collect();
+        let mut homeward = Tracer::<Pair<R>>::new(&system.lift())?;
+        // The square of an infinite number has no slopes.
+        homeward.interfaces.iter_mut().for_each(|i| i.rim2 = Pair::from_f64(i.rim2.value()));
+        Ok(Self { outward, homeward, limits })
+    }
+
+    /// How many surfaces there are.
+    pub fn surfaces(&self) -> usize {
+        self.outward.surfaces()
+    }
+
+    /// The derivative by every number of the system, at fixed rays, of a sum over `count` rays,
+    /// `ray` number for number; `fill` gives the derivatives of the sum by where they land and by
+    /// their limits for the block that begins with a ray. All of them should arrive: one that does
+    /// not counts nothing.
+    pub fn gradient(
+        &self,
+        count: usize,
+        ray: impl Fn(usize) -> Ray<Jet<R>>,
+        fill: impl Fn(usize, &mut Abreast<R>),
+    ) -> Gradient<R> {
+        let mut gradient = Gradient::zero(self.outward.surfaces());
+        let mut room = Room::new(self);
+        widest(
+            Width::detect(),
+            #[inline(always)]
+            || {
+                for from in (0..count).step_by(BLOCK) {
+                    let count = BLOCK.min(count - from);
+                    let block = self.go(&mut room, count, |j| ray(from + j.min(count - 1)));
+                    fill(from, &mut room.abreast);
+                    room.spread(&self.limits);
+                    let sum = &mut Top(&mut gradient);
+                    self.homeward.homeward(block.map(pair), &room.distances, count, &room, sum);
+                }
+            },
+        );
+        gradient
+    }
+
+    /// Traces a block and keeps the limits and the distance to each surface.
+    #[inline(always)]
+    fn go(
+        &self,
+        room: &mut Room<R>,
+        count: usize,
+        ray: impl Fn(usize) -> Ray<Jet<R>>,
+    ) -> Block<Jet<R>> {
+        let mut block = Block::new();
+        block.start(self.outward.index_before, ray);
+        // What only fills the block up counts as lost.
+        block.code[count..].fill(Jet::ONE);
+        let mut next = 0;
+        for (i, interface) in self.outward.interfaces.iter().enumerate() {
+            let mine = self.limits[next..].iter().take_while(|(surface, _)| *surface == i);
+            let mine = &self.limits[next..next + mine.count()];
+            let distances = &mut room.distances[i];
+            let limits = &mut room.abreast.limits[next..next + mine.len()];
+            block.meet(interface, i as u32, |j, met| {
+                distances[j] = pair(met.s);
+                for ((_, limit), lanes) in mine.iter().zip(&mut *limits) {
+                    lanes[j] = interface.limit(*limit, met);
+                }
+            });
+            next += mine.len();
+        }
+        room.abreast.landing = [block.x, block.y];
+        block
+    }
+}
+
+/// A jet without its second derivatives.
+#[inline(always)]
+fn pair<R: Real>(jet: Jet<R>) -> Pair<R> {
+    let [x, y] = jet.slope;
+    Dual { value: Dual { value: jet.value, slope: [y] }, slope: [Dual { value: x, slope: [R::ZERO] }] }
+}
+
+/// What derivatives by a jet are as a number of the algebra.
+#[inline(always)]
+fn transposed<R: Real>([value, x, y]: [R; 3]) -> Pair<R> {
+    Dual { value: Dual { value: R::ZERO, slope: [x] }, slope: [Dual { value: y, slope: [value] }] }
+}
+
+/// What a block needs on its way, made once.
+struct Room<R> {
+    abreast: Abreast<R>,
+    distances: Vec<[Pair<R>; BLOCK]>,
+    pulls: Vec<[Pull<Pair<R>>; BLOCK]>,
+}
+
+impl<R: Real> Room<R> {
+    fn new(tracer: &PupilTracer<R>) -> Self {
+        let (surfaces, limits) = (tracer.outward.surfaces(), tracer.limits.len());
+        let jets = [Jet::ZERO; BLOCK];
+        let abreast = Abreast {
+            landing: [jets; 2],
+            limits: vec![jets; limits],
+            by_landing: [[R::ZERO; BLOCK]; 2],
+            by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
+        };
+        let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
+        Self { abreast, distances, pulls: vec![[Pull::default(); BLOCK]; surfaces] }
+    }
+
+    /// Brings what was filled in to its surface.
+    #[inline(always)]
+    fn spread(&mut self, limits: &[(usize, Limit)]) {
+        for ((surface, limit), by_limit) in limits.iter().zip(&self.abreast.by_limit) {
+            for (pull, by_limit) in self.pulls[*surface].iter_mut().zip(by_limit) {
+                let by_limit = transposed(*by_limit);
+                match limit {
+                    Limit::Rim => pull.rim = by_limit,
+                    Limit::Angle => pull.angle = by_limit,
+                    Limit::Sheet => pull.sheet = by_limit,
+                }
+            }
+        }
+    }
+}
+
+impl<R: Real> Sowing<Pair<R>> for Room<R> {
+    #[inline(always)]
+    fn seed(&self, j: usize) -> Seed<Pair<R>> {
+        let by = |i: usize| transposed([self.abreast.by_landing[i][j], R::ZERO, R::ZERO]);
+        Seed { point: Vec3::new(by(0), by(1), Pair::ZERO), ..Seed::default() }
+    }
+
+    #[inline(always)]
+    fn pull(&self, surface: usize, j: usize) -> Option<Pull<Pair<R>>> {
+        Some(self.pulls[surface][j])
+    }
+}
+
+/// Takes what stands at εη.
+struct Top<'a, R>(&'a mut Gradient<R>);
+
+impl<R: Real> Harvest<Pair<R>> for Top<'_, R> {
+    #[inline(always)]
+    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[Pair<R>; BLOCK]) {
+        let top = std::array::from_fn(|j| lanes[j].slope[0].slope[0]);
+        self.0.take(surface, slot, &top);
+    }
+}
