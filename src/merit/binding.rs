@@ -6,7 +6,6 @@
 use super::{Along, MeritError};
 use crate::lens::glass::model_index;
 use crate::lens::{FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System, focus_gap};
-use crate::math::Real;
 use crate::trace::{Gradient, Slot};
 use nalgebra::DVector;
 
@@ -87,7 +86,7 @@ impl Zoom {
         for (system, lines) in systems.iter_mut().zip(&self.lines) {
             for line in lines {
                 let number = line.offset + line.factor * values[line.variable];
-                *number_mut(system, line.surface, line.slot) = number;
+                *line.slot.of(system, line.surface) = number;
             }
         }
         let mut found = Systems { systems, focus: None };
@@ -112,7 +111,7 @@ impl Zoom {
     fn along_unfocused(&self, primary: &System<f64>, variable: usize) -> System<Along> {
         let mut system: System<Along> = primary.lift();
         for line in self.lines[self.primary].iter().filter(|line| line.variable == variable) {
-            number_mut(&mut system, line.surface, line.slot).slope[0] = line.factor;
+            line.slot.of(&mut system, line.surface).slope[0] = line.factor;
         }
         system
     }
@@ -229,8 +228,8 @@ fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<
             let growth = if slot == Slot::Index { index_growth(lens, surface, um) } else { 1.0 };
             let factor = factor * growth;
             for surface in followers_of_index(lens, surface, slot) {
-                widen(system, surface, slot);
-                let now = *number_mut(system, surface, slot);
+                slot.widen(system, surface);
+                let now = *slot.of(system, surface);
                 let offset = if factor == 1.0 && now == start { 0.0 } else { now - factor * start };
                 lines.push(Line { variable, surface, slot, factor, offset });
             }
@@ -264,34 +263,4 @@ fn followers_of_index(lens: &Lens, surface: usize, slot: Slot) -> Vec<usize> {
         }
     }
     all
-}
-
-/// Writes a surface in a form that has a number, even where it is zero.
-fn widen(system: &mut System<f64>, surface: usize, slot: Slot) {
-    let shape = &mut system.surfaces[surface].shape;
-    *shape = match (slot, *shape) {
-        (Slot::Curvature, Shape::Plane) => Shape::Sphere { curvature: 0.0 },
-        (Slot::Conic, shape) => shape.as_conic(),
-        (Slot::Term(_), shape) => shape.as_asphere(),
-        (_, shape) => shape,
-    };
-}
-
-/// A number of a system.
-fn number_mut<R: Real>(system: &mut System<R>, surface: usize, slot: Slot) -> &mut R {
-    let surface = &mut system.surfaces[surface];
-    match (slot, &mut surface.shape) {
-        (Slot::Thickness, _) => &mut surface.thickness,
-        (Slot::SemiDiameter, _) => &mut surface.semi_diameter,
-        (
-            Slot::Curvature,
-            Shape::Sphere { curvature }
-            | Shape::Conic { curvature, .. }
-            | Shape::Asphere { curvature, .. },
-        ) => curvature,
-        (Slot::Conic, Shape::Conic { conic, .. } | Shape::Asphere { conic, .. }) => conic,
-        (Slot::Term(term), Shape::Asphere { terms, .. }) => &mut terms[term],
-        // `widen` has written the form that has the number; an index is always there.
-        _ => &mut surface.index,
-    }
 }

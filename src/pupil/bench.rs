@@ -113,10 +113,8 @@ impl Bench {
             let stop = system.stop.unwrap_or(0);
             rim.into_iter().for_each(|radius| system.surfaces[stop].semi_diameter = radius);
             let tracer = Tracer::new(&system)?;
-            let mut open = system.lift::<Dual2>();
-            let unlimited = Dual2::constant(f64::INFINITY);
-            open.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = unlimited);
-            Ok(Color { um, weight, system, tracer, open: Tracer::new(&open)? })
+            let open = Tracer::new(&system.lift::<Dual2>())?.opened();
+            Ok(Color { um, weight, system, tracer, open })
         };
         let colors: Result<Vec<_>, Invalid> = systems.into_iter().map(color).collect();
         Ok(Self { beam, fields: Vec::new(), colors: colors?, primary, first, aiming })

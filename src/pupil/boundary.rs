@@ -21,6 +21,13 @@ pub enum Limit {
     Unaimed,
 }
 
+impl Limit {
+    /// Whether a cosine vanishes there, so that rays turn ever faster towards it.
+    pub fn is_grazing(self) -> bool {
+        matches!(self, Self::Surface(_, Hurdle::Miss | Hurdle::Reflection))
+    }
+}
+
 /// Polar coordinates about a point of the pupil, stretched with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -103,8 +110,8 @@ pub(super) struct Probe {
 /// A ray so close to the rim of the disc, relatively, counts as one at the rim: where the rim of
 /// the stop is the rim of the pupil as well, rounding must not decide ray by ray between them.
 const AT_DISC: f64 = 1e-10;
-/// A corner is located to this in azimuth and radius; the quadrature sees the square of it.
-const CORNER: f64 = 1e-9;
+/// A corner is located to this in azimuth and radius; the derivative by a rim is as wrong as this.
+const CORNER: f64 = 1e-11;
 /// A step along the radius that is rounding, relatively.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.
@@ -272,15 +279,33 @@ impl<'a> Search<'a> {
         Edge { radius: low, limit }
     }
 
+    /// The edge at an azimuth where it is expected of one limit: the zero of its margin alone, if
+    /// a ray just inside of it passes everything.
+    pub(super) fn expected(&mut self, limit: Limit, azimuth: f64, guess: f64) -> Option<Edge> {
+        let radius = self.zero(limit, azimuth, guess).filter(|r| *r > 0.0)?;
+        self.rays += 1;
+        let inside = self.frame.point(azimuth, radius * (1.0 - INSIDE));
+        self.launch.is_lit(inside).then_some(Edge { radius, limit })
+    }
+
+    /// The margin of a ray at one limit; not a number where it does not get there.
+    fn margin(&mut self, azimuth: f64, r: f64, limit: Limit) -> f64 {
+        self.rays += 1;
+        let Limit::Surface(surface, hurdle) = limit else { return f64::NAN };
+        let ray = self.launch.ray(self.frame.point(azimuth, r));
+        let tracer = &self.launch.color().tracer;
+        ray.and_then(|ray| tracer.margin(ray, surface, hurdle)).unwrap_or(f64::NAN)
+    }
+
     /// Where one limit alone would end the pupil along a radius, by secants from a guess.
     fn zero(&mut self, limit: Limit, azimuth: f64, guess: f64) -> Option<f64> {
         if limit == Limit::Disc {
             return Some(self.disc(azimuth));
         }
         let (mut r, mut step) = (guess, 1e-4 * guess);
-        let mut before = self.probe(azimuth, r - step, limit).wanted;
+        let mut before = self.margin(azimuth, r - step, limit);
         for _ in 0..20 {
-            let margin = self.probe(azimuth, r, limit).wanted;
+            let margin = self.margin(azimuth, r, limit);
             let next = -margin * step / (margin - before);
             if margin == 0.0 || next.abs() <= 1e-13 * guess {
                 return Some(r + if margin == 0.0 { 0.0 } else { next });

@@ -95,6 +95,25 @@ impl Chart {
     }
 }
 
+/// From where the rays of one field and wavelength start, whatever becomes of the lens behind: what
+/// an integral over a moving pupil keeps while the lens moves.
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor {
+    field: Field,
+    wavelength: usize,
+    aiming: Aiming,
+    source: Source,
+    chart: Chart,
+}
+
+impl Anchor {
+    /// The same rays through a lens of the same wavelengths.
+    pub fn launch(self, bench: &Bench) -> Launch<'_> {
+        let Self { field, wavelength, aiming, source, chart } = self;
+        Launch { bench, field, wavelength, aiming, source, chart }
+    }
+}
+
 /// The rays of one field at one wavelength.
 #[derive(Debug, Clone)]
 pub struct Launch<'a> {
@@ -130,6 +149,26 @@ impl<'a> Launch<'a> {
             }
         }
         Ok(launch)
+    }
+
+    /// Where its rays start.
+    pub fn anchor(&self) -> Anchor {
+        let Self { field, wavelength, aiming, source, chart, .. } = *self;
+        Anchor { field, wavelength, aiming, source, chart }
+    }
+
+    /// The cosine of the angle with the axis at which a collimated beam arrives; `None` for the
+    /// rays of an object point.
+    pub fn cosine(&self) -> Option<f64> {
+        match self.source {
+            Source::Collimated { direction, .. } => Some(direction.z),
+            Source::Point { .. } | Source::Slopes { .. } => None,
+        }
+    }
+
+    /// Whether the rays are those of a point on the axis, so that all azimuths are alike.
+    pub(super) fn is_axial(&self) -> bool {
+        self.field.x == 0.0 && self.field.y == 0.0
     }
 
     /// The lens at this wavelength.

@@ -5,7 +5,7 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
 //! is integrated over one half.
 
-use super::boundary::{Boundary, NEAR, Search};
+use super::boundary::{Boundary, Edge, Frame, NEAR, Search};
 use super::region::{Kind, Region};
 use super::rules::{legendre, radial};
 use super::sample::additive;
@@ -54,10 +54,42 @@ pub struct Converged<const K: usize> {
     pub reached: bool,
 }
 
+/// A radius of a split pupil, from the centre of its frame to its edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spoke {
+    pub(super) azimuth: f64,
+    pub(super) edge: Edge,
+    /// Its share of the turn, in the area of the frame.
+    pub(super) share: f64,
+}
+
+/// The nodes on some radii. Where a cosine vanishes at the edge, the image moves with the root of
+/// the distance from it: there `r = 1 − s²` with Gauss nodes in `s`.
+pub(super) fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
+    let mut nodes = Nodes::default();
+    for spoke in spokes {
+        let radius = spoke.edge.radius;
+        let sector = spoke.share * radius * radius;
+        let mut add = |r: f64, weight: f64| {
+            nodes.points.push(frame.point(spoke.azimuth, r * radius));
+            nodes.weights.push(sector * weight);
+        };
+        if spoke.edge.limit.is_grazing() {
+            legendre(2 * radii).iter().for_each(|(s, w)| {
+                let r = 1.0 - s * s;
+                add(r, 2.0 * s * r * w);
+            });
+        } else {
+            radial(radii).iter().for_each(|(r, weight)| add(*r, *weight));
+        }
+    }
+    nodes
+}
+
 /// Nodes along the radius and along half a turn, of the clear disc.
 const CLEAR: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
 /// Nodes along an arc and along the radius, of a piece.
-const SPLIT: [(usize, usize); 12] = [
+pub(super) const SPLIT: [(usize, usize); 12] = [
     (4, 3),
     (6, 4),
     (8, 5),
@@ -99,25 +131,31 @@ impl Region<'_> {
 
     /// Gauss nodes between the centre and the edge of every arc.
     fn split(&self, boundary: &Boundary, (azimuths, radii): (usize, usize)) -> Nodes {
+        let (spokes, rays) = self.spokes(boundary, azimuths);
+        let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
+        (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
+        nodes
+    }
+
+    /// Radii at the Gauss nodes of azimuth of every arc, and the rays traced to find their ends.
+    pub(super) fn spokes(&self, boundary: &Boundary, azimuths: usize) -> (Vec<Spoke>, usize) {
         let mut search = Search::new(&self.launch, boundary.frame);
-        let mirrored = self.launch.is_symmetric();
-        let factor = boundary.frame.area() * if mirrored { 2.0 } else { 1.0 };
-        let mut nodes = Nodes { mirrored, ..Nodes::default() };
+        let halves = if self.launch.is_symmetric() { 2.0 } else { 1.0 };
+        let factor = halves * boundary.frame.area();
+        let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
         for arc in &boundary.arcs {
             let length = arc.to - arc.from;
-            for (t, share) in legendre(azimuths) {
+            let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
+            for (t, share) in legendre(if alike { 1 } else { azimuths }) {
                 let azimuth = arc.from + t * length;
                 let guess = boundary.near(azimuth);
-                let Some(edge) = search.edge(azimuth, guess, NEAR) else { continue };
-                let sector = factor * share * length * edge.radius * edge.radius;
-                for (r, weight) in radial(radii) {
-                    nodes.points.push(boundary.frame.point(azimuth, r * edge.radius));
-                    nodes.weights.push(sector * weight);
+                let expected = search.expected(arc.limit, azimuth, guess);
+                if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, NEAR)) {
+                    spokes.push(Spoke { azimuth, edge, share: factor * share * length });
                 }
             }
         }
-        nodes.rays = search.rays;
-        nodes
+        (spokes, search.rays)
     }
 
     /// Traces nodes; `visit` gets the weight and the number of each ray that arrives in `sink`.

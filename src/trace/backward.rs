@@ -18,6 +18,7 @@ use super::Tracer;
 use super::batch::{BLOCK, Block, CHUNK, Hits, Rays};
 use super::interface::{Form, Interface};
 use super::lanes::{Width, widest};
+use super::slot::Slot;
 use crate::lens::ASPHERE_TERMS;
 use crate::math::Real;
 use crate::math::Vec3;
@@ -101,23 +102,6 @@ impl<R: Real> Gradient<R> {
             to.terms.iter_mut().zip(from.terms).for_each(|(t, f)| *t += f * factor);
         }
     }
-}
-
-/// A number of a surface that a ray depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Slot {
-    /// The curvature.
-    Curvature,
-    /// The conic constant.
-    Conic,
-    /// An asphere coefficient.
-    Term(usize),
-    /// The gap behind the surface.
-    Thickness,
-    /// The index behind the surface; `None` of the surfaces for the one in front of all.
-    Index,
-    /// The semi-diameter, on which no ray depends but the edge of a pupil does.
-    SemiDiameter,
 }
 
 /// The derivatives of something that the adjoint of a block of rays begins with.

@@ -24,11 +24,12 @@
 //! the answer is what stands at εη.
 
 use super::Tracer;
-use super::backward::{Gradient, Harvest, Pull, Seed, Slot, Sowing};
+use super::backward::{Gradient, Harvest, Pull, Seed, Sowing};
 use super::batch::{BLOCK, Block};
 use super::interface::{Form, Interface, Meeting};
 use super::lanes::{Width, widest};
 use super::single::Ray;
+use super::slot::Slot;
 use crate::lens::{Invalid, System};
 use crate::math::{Dual, Jet, Real, Vec3};
 

@@ -40,7 +40,7 @@ impl<R: Real> Tracer<R> {
             }
             let p = met.point;
             if interface.rim2.value() < f64::INFINITY {
-                visit(i, Hurdle::Rim, interface.rim2 - (p.x * p.x + p.y * p.y));
+                visit(i, Hurdle::Rim, interface.rim_margin(p));
             }
             if !interface.mirror {
                 let behind2 = met.a * met.a + interface.dn2 * met.m;
@@ -56,7 +56,11 @@ impl<R: Real> Tracer<R> {
 }
 
 impl<R: Real> Interface<R> {
-    fn meeting(&self, start: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+    pub(super) fn rim_margin(&self, p: Vec3<R>) -> R {
+        self.rim2 - (p.x * p.x + p.y * p.y)
+    }
+
+    pub(super) fn meeting(&self, start: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
         match self.form {
             Form::Plane => self.meet_plane(start, k),
             Form::Sphere => self.meet_sphere(start, k),
@@ -82,7 +86,7 @@ impl<R: Real> Interface<R> {
         R::select(agrees, margin, R::ZERO - R::from_f64(f64::from(u8::from(met.missed))))
     }
 
-    fn discriminant(&self, p: Vec3<R>, k: Vec3<R>) -> R {
+    pub(super) fn discriminant(&self, p: Vec3<R>, k: Vec3<R>) -> R {
         let c = self.curvature;
         let axial = self.conic * p.z;
         let b = k.z - c * (p.dot(k) + axial * k.z);

@@ -12,20 +12,23 @@
 mod asphere;
 mod backward;
 mod batch;
+mod edge;
 mod fate;
 mod interface;
 mod lanes;
 mod limit;
 mod margin;
 mod single;
+mod slot;
 
-pub use backward::{Gradient, Seed, Slot, SurfaceGradient};
+pub use backward::{Gradient, Seed, SurfaceGradient};
 pub use batch::{Hits, Points, Rays, Sink};
 pub use fate::{Fate, Fates};
 pub use lanes::Width;
 pub use limit::{Abreast, LANES, PupilTracer};
 pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};
+pub use slot::Slot;
 
 use crate::lens::Invalid;
 use crate::lens::System;
@@ -48,6 +51,14 @@ impl<R: Real> Tracer<R> {
         system.check()?;
         let interfaces = interface::interfaces(system);
         Ok(Self { interfaces, index_before: system.index_before })
+    }
+
+    /// The same surfaces with no rim that clips. An asphere still ends where it was said to end:
+    /// behind that its polynomial means nothing.
+    #[must_use]
+    pub fn opened(mut self) -> Self {
+        self.interfaces.iter_mut().for_each(|i| i.rim2 = R::from_f64(f64::INFINITY));
+        self
     }
 
     /// How many surfaces a ray crosses, the image plane included.

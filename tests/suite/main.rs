@@ -3,6 +3,7 @@
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
 mod analysis;
+mod aperture;
 mod cli;
 mod effects;
 mod files;

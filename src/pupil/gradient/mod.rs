@@ -13,6 +13,7 @@
 //! Leaving out the second integral is the usual, biased derivative. All estimators differentiate
 //! by every number of a system at once, semi-diameters included.
 
+mod boundary;
 mod warp;
 
 pub use warp::Warp;

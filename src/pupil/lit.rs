@@ -1,0 +1,78 @@
+//! The rays of a pupil at one order of quadrature, traced once: its moments, and from the same
+//! rays the derivatives of any integral over it.
+
+use super::boundary::Limit;
+use super::moments::{Moments, moments};
+use super::quadrature::{Landed, Nodes, SPLIT, Spoke, nodes_of};
+use super::region::{Kind, Region};
+use crate::trace::{Points, Rays, Sink};
+
+/// The light of a pupil.
+#[derive(Debug, Clone)]
+pub struct Lit<'a> {
+    pub(super) region: &'a Region<'a>,
+    /// Its radii, where it is split at its corners.
+    pub(super) spokes: Vec<Spoke>,
+    /// The rays that were traced.
+    pub rays: Rays<f64>,
+    /// Where they landed, each with its weight in pupil coordinates.
+    pub landed: Landed<Points<f64>>,
+    /// Whether every ray stands for its mirror image as well.
+    pub mirrored: bool,
+    /// Area, centroid, spread.
+    pub moments: Moments,
+    /// Rays traced for them, those that looked for the edge included.
+    pub traced: usize,
+}
+
+impl Region<'_> {
+    /// Traces the rays of an order of quadrature, counted from 0.
+    pub fn lit(&self, order: usize) -> Lit<'_> {
+        let (nodes, spokes) = match &self.kind {
+            Kind::Split(boundary) => {
+                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
+                let (spokes, rays) = self.spokes(boundary, azimuths);
+                let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
+                (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
+                (nodes, spokes)
+            }
+            Kind::Clear | Kind::Ragged { .. } | Kind::Dark | Kind::Endless => {
+                (self.nodes(order), Vec::new())
+            }
+        };
+        self.traced(&nodes, spokes)
+    }
+
+    fn traced(&self, nodes: &Nodes, spokes: Vec<Spoke>) -> Lit<'_> {
+        let started = nodes.points.iter().zip(&nodes.weights);
+        let started = started.filter_map(|(p, w)| Some((self.launch.ray(*p)?, *w)));
+        let (rays, weights): (Vec<_>, Vec<f64>) = started.unzip();
+        let rays: Rays<f64> = rays.into_iter().collect();
+        let lost = nodes.points.len() - rays.len();
+        let mut sink = Points::default();
+        self.launch.color().tracer.batch(&rays, &mut sink);
+        let landed = Landed { sink, weights, lost };
+        let mirrored = nodes.mirrored;
+        let moments = moments(&landed, mirrored, self.launch.area());
+        let traced = nodes.rays + rays.len();
+        Lit { region: self, spokes, rays, landed, mirrored, moments, traced }
+    }
+}
+
+impl Lit<'_> {
+    /// The limits at the ends of the spokes, each once.
+    pub(super) fn limits(&self) -> Vec<Limit> {
+        let mut found: Vec<Limit> = Vec::new();
+        for spoke in &self.spokes {
+            if !found.contains(&spoke.edge.limit) {
+                found.push(spoke.edge.limit);
+            }
+        }
+        found
+    }
+
+    /// Whether some ray arrives.
+    pub fn has_light(&self) -> bool {
+        (0..self.rays.len()).any(|i| self.landed.sink.fate(i).is_imaged())
+    }
+}
