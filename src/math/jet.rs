@@ -36,12 +36,23 @@ impl<R: Real> Jet<R> {
         Self { value, slope, bend: [R::ZERO; 3] }
     }
 
+    /// The product with a number that neither variable changes.
+    #[inline(always)]
+    #[must_use]
+    pub fn scaled(self, factor: R) -> Self {
+        self.zip(self, #[inline(always)] |a, _| a * factor)
+    }
+
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(R, R) -> R) -> Self {
         Self {
             value: f(self.value, other.value),
-            slope: std::array::from_fn(|i| f(self.slope[i], other.slope[i])),
-            bend: std::array::from_fn(|i| f(self.bend[i], other.bend[i])),
+            slope: [f(self.slope[0], other.slope[0]), f(self.slope[1], other.slope[1])],
+            bend: [
+                f(self.bend[0], other.bend[0]),
+                f(self.bend[1], other.bend[1]),
+                f(self.bend[2], other.bend[2]),
+            ],
         }
     }
 
@@ -86,7 +97,7 @@ impl<R: Real> Add for Jet<R> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
+        self.zip(other, #[inline(always)] |a, b| a + b)
     }
 }
 
@@ -94,7 +105,7 @@ impl<R: Real> Sub for Jet<R> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
+        self.zip(other, #[inline(always)] |a, b| a - b)
     }
 }
 
@@ -106,11 +117,15 @@ impl<R: Real> Mul for Jet<R> {
         let (a, b) = (self.value, other.value);
         let ([ax, ay], [bx, by]) = (self.slope, other.slope);
         let (xx, yy) = (ax * bx, ay * by);
-        let linear = |i: usize| self.bend[i] * b + a * other.bend[i];
+        let ([axx, axy, ayy], [bxx, bxy, byy]) = (self.bend, other.bend);
         Self {
             value: a * b,
             slope: [ax * b + a * bx, ay * b + a * by],
-            bend: [linear(0) + (xx + xx), linear(1) + (ax * by + ay * bx), linear(2) + (yy + yy)],
+            bend: [
+                axx * b + a * bxx + (xx + xx),
+                axy * b + a * bxy + (ax * by + ay * bx),
+                ayy * b + a * byy + (yy + yy),
+            ],
         }
     }
 }
@@ -127,14 +142,14 @@ impl<R: Real> Div for Jet<R> {
         let x = (self.slope[0] - q * bx) * inverse;
         let y = (self.slope[1] - q * by) * inverse;
         let (xx, yy) = (x * bx, y * by);
-        let linear = |i: usize| self.bend[i] - q * other.bend[i];
+        let ([axx, axy, ayy], [bxx, bxy, byy]) = (self.bend, other.bend);
         Self {
             value: q,
             slope: [x, y],
             bend: [
-                (linear(0) - (xx + xx)) * inverse,
-                (linear(1) - (x * by + y * bx)) * inverse,
-                (linear(2) - (yy + yy)) * inverse,
+                (axx - q * bxx - (xx + xx)) * inverse,
+                (axy - q * bxy - (x * by + y * bx)) * inverse,
+                (ayy - q * byy - (yy + yy)) * inverse,
             ],
         }
     }
@@ -144,7 +159,8 @@ impl<R: Real> Neg for Jet<R> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { value: -self.value, slope: self.slope.map(Neg::neg), bend: self.bend.map(Neg::neg) }
+        let ([x, y], [xx, xy, yy]) = (self.slope, self.bend);
+        Self { value: -self.value, slope: [-x, -y], bend: [-xx, -xy, -yy] }
     }
 }
 
@@ -185,7 +201,7 @@ impl<R: Real> Real for Jet<R> {
     }
     #[inline(always)]
     fn select(condition: bool, yes: Self, no: Self) -> Self {
-        yes.zip(no, |yes, no| R::select(condition, yes, no))
+        yes.zip(no, #[inline(always)] |yes, no| R::select(condition, yes, no))
     }
     fn is_finite(self) -> bool {
         self.value.is_finite()

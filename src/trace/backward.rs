@@ -109,10 +109,9 @@ pub(super) trait Sowing<R> {
     /// By the landing of ray `j`.
     fn seed(&self, j: usize) -> Seed<R>;
 
-    /// By how far ray `j` is from the limits of a surface; `None` for all where nothing depends on
-    /// that.
+    /// By how far each ray is from the limits of a surface, if anything depends on that.
     #[inline(always)]
-    fn pull(&self, _surface: usize, _j: usize) -> Option<Pull<R>> {
+    fn pulls(&self, _surface: usize) -> Option<&[Pull<R>; BLOCK]> {
         None
     }
 }
@@ -124,7 +123,7 @@ impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
     }
 }
 
-/// The derivative of something by the limits of a surface (see [`Interface::limit`]).
+/// The derivative of something by the limits of a surface (see [`super::limit`]).
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Pull<R> {
     pub(super) rim: R,
@@ -306,14 +305,15 @@ impl<R: Real> Tracer<R> {
         self.sow(&mut way, count, sowing, harvest);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
             way.s = *distance;
+            let pulls = sowing.pulls(i);
             // A factor that is known to be one costs nothing.
             if interface.sense > R::ZERO {
-                way.pass(&Interface { sense: R::ONE, ..*interface }, |j| sowing.pull(i, j));
+                way.pass(&Interface { sense: R::ONE, ..*interface }, pulls);
             } else {
-                way.pass(&Interface { sense: -R::ONE, ..*interface }, |j| sowing.pull(i, j));
+                way.pass(&Interface { sense: -R::ONE, ..*interface }, pulls);
             }
             way.harvest(interface, i, harvest);
-            if sowing.pull(i, 0).is_some() {
+            if pulls.is_some() {
                 let lanes = way.arrived(&way.by_semi_diameter);
                 harvest.take(Some(i), Slot::SemiDiameter, &lanes);
             }
@@ -416,7 +416,7 @@ struct Pulled<R> {
 }
 
 impl<R: Real> Interface<R> {
-    /// The adjoint of the limits of this surface at `p` (see [`Interface::limit`]), the sheet of a
+    /// The adjoint of the limits of this surface at `p` (see [`super::limit`]), the sheet of a
     /// conic apart.
     #[inline(always)]
     fn pulled(
@@ -535,11 +535,11 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through a surface to the one before.
     #[inline(always)]
-    fn pass(&mut self, surface: &Interface<R>, pull: impl Fn(usize) -> Option<Pull<R>>) {
+    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
         match surface.form {
-            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, pull),
-            Form::Conic => self.retrace(surface, conic_normal, pull),
-            Form::Asphere => self.retrace_asphere(surface, pull),
+            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, pulls),
+            Form::Conic => self.retrace(surface, conic_normal, pulls),
+            Form::Asphere => self.retrace_asphere(surface, pulls),
         }
     }
 
@@ -549,7 +549,7 @@ impl<R: Real> Homeward<R> {
         &mut self,
         surface: &Interface<R>,
         normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
-        pull: impl Fn(usize) -> Option<Pull<R>>,
+        pulls: Option<&[Pull<R>; BLOCK]>,
     ) {
         let surface = *surface;
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
@@ -559,10 +559,11 @@ impl<R: Real> Homeward<R> {
             let normal = normal(&surface, p);
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
             let mut by_point = self.by_point(j);
-            let pulled = pull(j).map(|pull| {
+            let mut pulled = None;
+            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
                 back.by_normal.z -= pull.sheet;
-                surface.pulled(pull, p, normal, &mut back, &mut by_point)
-            });
+                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+            }
             let n = back.by_normal;
             by_point = by_point - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
@@ -581,7 +582,7 @@ impl<R: Real> Homeward<R> {
     fn retrace_asphere(
         &mut self,
         surface: &Interface<R>,
-        pull: impl Fn(usize) -> Option<Pull<R>>,
+        pulls: Option<&[Pull<R>; BLOCK]>,
     ) {
         let surface = *surface;
         for j in 0..BLOCK {
@@ -592,11 +593,11 @@ impl<R: Real> Homeward<R> {
             let normal = Normal { vector, m: vector.dot(vector), unit: false };
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
             let mut by_point = self.by_point(j);
-            let mut edge = R::ZERO;
-            let pulled = pull(j).map(|pull| {
+            let (mut edge, mut pulled) = (R::ZERO, None);
+            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
                 edge = pull.sheet + pull.sheet;
-                surface.pulled(pull, p, normal, &mut back, &mut by_point)
-            });
+                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+            }
             // N = (−2 x w, −2 y w, 1) with w = dz/dr².
             let n = back.by_normal;
             let by_slope = -(p.x * n.x + p.y * n.y) * R::TWO;

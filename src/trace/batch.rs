@@ -431,9 +431,33 @@ impl<R: Real> Block<R> {
         keep: impl FnMut(usize, &Meeting<R>),
     ) {
         match interface.form {
-            Form::Plane => self.sweep(interface, number, |i, _, p, k| i.meet_plane(p, k), keep),
-            Form::Sphere => self.sweep(interface, number, |i, _, p, k| i.meet_sphere(p, k), keep),
-            Form::Conic => self.sweep(interface, number, |i, _, p, k| i.meet_conic(p, k), keep),
+            Form::Plane => {
+                self.sweep(
+                    interface,
+                    number,
+                    #[inline(always)]
+                    |i, _, p, k| i.meet_plane(p, k),
+                    keep,
+                );
+            }
+            Form::Sphere => {
+                self.sweep(
+                    interface,
+                    number,
+                    #[inline(always)]
+                    |i, _, p, k| i.meet_sphere(p, k),
+                    keep,
+                );
+            }
+            Form::Conic => {
+                self.sweep(
+                    interface,
+                    number,
+                    #[inline(always)]
+                    |i, _, p, k| i.meet_conic(p, k),
+                    keep,
+                );
+            }
             Form::Asphere if R::ORDER > 0 => {
                 self.sweep(interface, number, |i, _, p, k| i.meet_asphere(p, k), keep);
             }

@@ -26,7 +26,7 @@
 use super::Tracer;
 use super::backward::{Gradient, Harvest, Pull, Seed, Sowing};
 use super::batch::{BLOCK, Block};
-use super::interface::{Form, Interface, Meeting};
+use super::interface::{Form, Interface};
 use super::lanes::{Width, widest};
 use super::single::Ray;
 use super::slot::Slot;
@@ -70,20 +70,38 @@ impl<R: Real> Interface<R> {
         }
     }
 
+}
+
+impl<R: Real> Interface<Jet<R>> {
     /// One of the functions above.
     #[inline(always)]
-    fn limit(&self, limit: Limit, met: &Meeting<R>) -> R {
-        let p = met.point;
+    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, slant: Slant<Jet<R>>) -> Jet<R> {
         let r2 = p.x * p.x + p.y * p.y;
+        let c2 = (R::ONE + self.conic.value) * self.curvature.value;
+        let minus_one = Jet::constant(-R::ONE);
         match limit {
-            Limit::Rim => (r2 * (R::ONE / self.rim2) - R::ONE) * R::from_f64(0.5),
-            Limit::Angle => (self.loss() * met.m - met.a * met.a) * (R::ONE / self.n2),
-            Limit::Sheet if self.form == Form::Asphere => {
-                r2 * ((R::ONE + self.conic) * self.curvature * self.curvature) - R::ONE
+            Limit::Rim => {
+                let half = R::from_f64(0.5);
+                r2.scaled(half / self.rim2.value) - Jet::constant(half)
             }
-            Limit::Sheet => -met.normal.z,
+            Limit::Angle => {
+                let inverse = R::ONE / self.n2.value;
+                let loss = slant.m.scaled(self.loss().value * inverse);
+                loss - (slant.a * slant.a).scaled(inverse)
+            }
+            Limit::Sheet if self.form == Form::Asphere => {
+                r2.scaled(c2 * self.curvature.value) + minus_one
+            }
+            Limit::Sheet => p.z.scaled(c2) + minus_one,
         }
     }
+}
+
+/// How a ray stands to a surface: `k·N` and `N·N`.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slant<R> {
+    a: R,
+    m: R,
 }
 
 /// A block of rays that have arrived, each with its derivatives by two pupil coordinates, and the
@@ -131,29 +149,34 @@ impl<R: Real> PupilTracer<R> {
         self.outward.surfaces()
     }
 
-    /// The derivative by every number of the system, at fixed rays, of a sum over `count` rays,
-    /// `ray` number for number; `fill` gives the derivatives of the sum by where they land and by
-    /// their limits for the block that begins with a ray. All of them should arrive: one that does
-    /// not counts nothing.
+    /// The derivative by every number of the system, at fixed rays, of a sum over the rays at some
+    /// points; `fill` gives the derivatives of the sum by where a block of them lands and by their
+    /// limits. All of them should arrive: one that does not counts nothing.
     pub fn gradient(
         &self,
-        count: usize,
-        ray: impl Fn(usize) -> Ray<Jet<R>>,
-        fill: impl Fn(usize, &mut Abreast<R>),
+        points: &[[R; 2]],
+        ray: impl Fn([R; 2]) -> Ray<Jet<R>>,
+        fill: impl Fn(&[[R; 2]; LANES], &mut Abreast<R>),
     ) -> Gradient<R> {
-        let mut gradient = Gradient::zero(self.outward.surfaces());
+        let mut gradient = Gradient::zero(self.surfaces());
         let mut room = Room::new(self);
         widest(
             Width::detect(),
             #[inline(always)]
             || {
-                for from in (0..count).step_by(BLOCK) {
-                    let count = BLOCK.min(count - from);
-                    let block = self.go(&mut room, count, |j| ray(from + j.min(count - 1)));
-                    fill(from, &mut room.abreast);
+                for points in points.chunks(BLOCK) {
+                    let mut block_points = [points[0]; BLOCK];
+                    block_points[..points.len()].copy_from_slice(points);
+                    let block = self.go(
+                        &mut room,
+                        points.len(),
+                        #[inline(always)]
+                        |j| ray(block_points[j]),
+                    );
+                    fill(&block_points, &mut room.abreast);
                     room.spread(&self.limits);
-                    let sum = &mut Top(&mut gradient);
-                    self.homeward.homeward(block.map(pair), &room.distances, count, &room, sum);
+                    let (block, sum) = (block.map(pair), &mut Top(&mut gradient));
+                    self.homeward.homeward(block, &room.distances, points.len(), &room, sum);
                 }
             },
         );
@@ -172,19 +195,23 @@ impl<R: Real> PupilTracer<R> {
         block.start(self.outward.index_before, ray);
         // What only fills the block up counts as lost.
         block.code[count..].fill(Jet::ONE);
-        let mut next = 0;
+        let mut limits = self.limits.iter().zip(&mut room.abreast.limits).peekable();
         for (i, interface) in self.outward.interfaces.iter().enumerate() {
-            let mine = self.limits[next..].iter().take_while(|(surface, _)| *surface == i);
-            let mine = &self.limits[next..next + mine.count()];
-            let distances = &mut room.distances[i];
-            let limits = &mut room.abreast.limits[next..next + mine.len()];
-            block.meet(interface, i as u32, |j, met| {
-                distances[j] = pair(met.s);
-                for ((_, limit), lanes) in mine.iter().zip(&mut *limits) {
-                    lanes[j] = interface.limit(*limit, met);
+            let (distances, slants) = (&mut room.distances[i], &mut room.slants);
+            block.meet(
+                interface,
+                i as u32,
+                #[inline(always)]
+                |j, met| {
+                    distances[j] = pair(met.s);
+                    slants[j] = Slant { a: met.a, m: met.m };
+                },
+            );
+            while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i) {
+                for j in 0..BLOCK {
+                    lanes[j] = interface.limit(*limit, block.state(j).0, slants[j]);
                 }
-            });
-            next += mine.len();
+            }
         }
         room.abreast.landing = [block.x, block.y];
         block
@@ -207,6 +234,7 @@ fn transposed<R: Real>([value, x, y]: [R; 3]) -> Pair<R> {
 /// What a block needs on its way, made once.
 struct Room<R> {
     abreast: Abreast<R>,
+    slants: [Slant<Jet<R>>; BLOCK],
     distances: Vec<[Pair<R>; BLOCK]>,
     pulls: Vec<[Pull<Pair<R>>; BLOCK]>,
 }
@@ -222,7 +250,8 @@ impl<R: Real> Room<R> {
             by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
         };
         let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
-        Self { abreast, distances, pulls: vec![[Pull::default(); BLOCK]; surfaces] }
+        let (slants, pulls) = ([Slant::default(); BLOCK], vec![[Pull::default(); BLOCK]; surfaces]);
+        Self { abreast, slants, distances, pulls }
     }
 
     /// Brings what was filled in to its surface.
@@ -249,8 +278,8 @@ impl<R: Real> Sowing<Pair<R>> for Room<R> {
     }
 
     #[inline(always)]
-    fn pull(&self, surface: usize, j: usize) -> Option<Pull<Pair<R>>> {
-        Some(self.pulls[surface][j])
+    fn pulls(&self, surface: usize) -> Option<&[Pull<Pair<R>>; BLOCK]> {
+        self.pulls.get(surface)
     }
 }
 

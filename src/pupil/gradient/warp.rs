@@ -147,11 +147,6 @@ struct Estimator<'a, R> {
     tracer: PupilTracer<R>,
 }
 
-/// Points of the square whose rays get through.
-struct Lit<R> {
-    points: Vec<[R; 2]>,
-}
-
 impl<'a, R: Real> Estimator<'a, R> {
     fn new(launch: &'a Launch<'a>, cost: &Cost) -> Option<Self> {
         let system = &launch.color().system;
@@ -195,22 +190,20 @@ impl<'a, R: Real> Estimator<'a, R> {
         points: impl Iterator<Item = [f64; 2]>,
     ) -> Option<Gradient<f64>> {
         let lit = self.lit(square, points)?;
-        let ray = |i: usize| {
-            let [u, v] = lit.points[i];
-            self.ray(square, [Jet::variable(u, 0), Jet::variable(v, 1)])
-        };
-        let disc = self.launch.bench.ends_at_disc().then(|| square);
-        let fill = |from: usize, abreast: &mut Abreast<R>| {
-            let last = lit.points.len() - 1;
-            weigh(abreast, &self.cost, disc, |j| lit.points[(from + j).min(last)]);
-        };
-        let sum = self.tracer.gradient(lit.points.len(), ray, fill);
+        let disc = self.launch.bench.ends_at_disc().then_some(square);
+        let sum = self.tracer.gradient(
+            &lit,
+            #[inline(always)]
+            |[u, v]| self.ray(square, [Jet::variable(u, 0), Jet::variable(v, 1)]),
+            #[inline(always)]
+            |points, abreast| weigh(abreast, &self.cost, disc, points),
+        );
         let surfaces = sum.surfaces.len();
         Some(Gradient::from_numbers(surfaces, sum.numbers().map(Real::value)))
     }
 
     /// The points whose rays get through, told by tracing them without derivatives.
-    fn lit(&self, square: Frame, points: impl Iterator<Item = [f64; 2]>) -> Option<Lit<R>> {
+    fn lit(&self, square: Frame, points: impl Iterator<Item = [f64; 2]>) -> Option<Vec<[R; 2]>> {
         let disc = self.launch.bench.ends_at_disc();
         let inside = |p: &[f64; 2]| {
             let [x, y] = place(square, *p);
@@ -224,7 +217,7 @@ impl<'a, R: Real> Estimator<'a, R> {
         let lit = (0..points.len()).filter(|i| landed.fate(*i).is_imaged());
         let points: Vec<[R; 2]> = lit.map(|i| points[i]).collect();
         let outermost = |p: &[R; 2]| p.iter().any(|v| v.value().abs() > OUTERMOST);
-        (!points.iter().any(outermost)).then_some(Lit { points })
+        (!points.iter().any(outermost)).then_some(points)
     }
 
     /// The ray at a point of the square.
@@ -268,9 +261,9 @@ fn weigh<R: Real>(
     abreast: &mut Abreast<R>,
     cost: &Cost,
     disc: Option<Frame>,
-    point: impl Fn(usize) -> [R; 2],
+    points: &[[R; 2]; LANES],
 ) {
-    let balance = Balance::of(abreast, disc, point);
+    let balance = Balance::of(abreast, disc, points);
     let mut value = [R::ZERO; LANES];
     let mut slope = [[R::ZERO; 2]; LANES];
     let square = R::from_f64(cost.square);
@@ -292,14 +285,12 @@ fn weigh<R: Real>(
 
 impl<R: Real> Balance<R> {
     #[inline(always)]
-    fn of(abreast: &Abreast<R>, disc: Option<Frame>, point: impl Fn(usize) -> [R; 2]) -> Self {
+    fn of(abreast: &Abreast<R>, disc: Option<Frame>, points: &[[R; 2]; LANES]) -> Self {
         let far = [R::from_f64(1e30), R::ZERO, R::ZERO];
         let zero = [R::ZERO; LANES];
         let mut rim = [far; LANES];
         if let Some(frame) = disc {
-            for (j, rim) in rim.iter_mut().enumerate() {
-                *rim = disc_limit(frame, point(j));
-            }
+            rim = std::array::from_fn(|j| disc_limit(frame, points[j]));
         }
         let mut balance = Self { closest: rim, total: zero, drift: [[R::ZERO; 2]; LANES] };
         for limit in &abreast.limits {
