@@ -73,6 +73,19 @@ impl<R: Real> Interface<R> {
 }
 
 impl<R: Real> Interface<Jet<R>> {
+    #[inline(always)]
+    fn limits(
+        &self,
+        limit: Limit,
+        block: &Block<Jet<R>>,
+        slants: &[Slant<Jet<R>>; BLOCK],
+        lanes: &mut [Jet<R>; BLOCK],
+    ) {
+        for j in 0..BLOCK {
+            lanes[j] = self.limit(limit, block.state(j).0, slants[j]);
+        }
+    }
+
     /// One of the functions above.
     #[inline(always)]
     fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, slant: Slant<Jet<R>>) -> Jet<R> {
@@ -208,8 +221,11 @@ impl<R: Real> PupilTracer<R> {
                 },
             );
             while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i) {
-                for j in 0..BLOCK {
-                    lanes[j] = interface.limit(*limit, block.state(j).0, slants[j]);
+                // Known inside the loops, so that these have no branch.
+                match limit {
+                    Limit::Rim => interface.limits(Limit::Rim, &block, slants, lanes),
+                    Limit::Angle => interface.limits(Limit::Angle, &block, slants, lanes),
+                    Limit::Sheet => interface.limits(Limit::Sheet, &block, slants, lanes),
                 }
             }
         }
@@ -258,13 +274,11 @@ impl<R: Real> Room<R> {
     #[inline(always)]
     fn spread(&mut self, limits: &[(usize, Limit)]) {
         for ((surface, limit), by_limit) in limits.iter().zip(&self.abreast.by_limit) {
-            for (pull, by_limit) in self.pulls[*surface].iter_mut().zip(by_limit) {
-                let by_limit = transposed(*by_limit);
-                match limit {
-                    Limit::Rim => pull.rim = by_limit,
-                    Limit::Angle => pull.angle = by_limit,
-                    Limit::Sheet => pull.sheet = by_limit,
-                }
+            let lanes = self.pulls[*surface].iter_mut().zip(by_limit);
+            match limit {
+                Limit::Rim => lanes.for_each(|(pull, by)| pull.rim = transposed(*by)),
+                Limit::Angle => lanes.for_each(|(pull, by)| pull.angle = transposed(*by)),
+                Limit::Sheet => lanes.for_each(|(pull, by)| pull.sheet = transposed(*by)),
             }
         }
     }
