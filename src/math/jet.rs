@@ -40,7 +40,11 @@ impl<R: Real> Jet<R> {
     #[inline(always)]
     #[must_use]
     pub fn scaled(self, factor: R) -> Self {
-        self.zip(self, #[inline(always)] |a, _| a * factor)
+        self.zip(
+            self,
+            #[inline(always)]
+            |a, _| a * factor,
+        )
     }
 
     #[inline(always)]
@@ -97,7 +101,11 @@ impl<R: Real> Add for Jet<R> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.zip(other, #[inline(always)] |a, b| a + b)
+        self.zip(
+            other,
+            #[inline(always)]
+            |a, b| a + b,
+        )
     }
 }
 
@@ -105,7 +113,11 @@ impl<R: Real> Sub for Jet<R> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.zip(other, #[inline(always)] |a, b| a - b)
+        self.zip(
+            other,
+            #[inline(always)]
+            |a, b| a - b,
+        )
     }
 }
 
@@ -201,7 +213,11 @@ impl<R: Real> Real for Jet<R> {
     }
     #[inline(always)]
     fn select(condition: bool, yes: Self, no: Self) -> Self {
-        yes.zip(no, #[inline(always)] |yes, no| R::select(condition, yes, no))
+        yes.zip(
+            no,
+            #[inline(always)]
+            |yes, no| R::select(condition, yes, no),
+        )
     }
     fn is_finite(self) -> bool {
         self.value.is_finite()
@@ -235,7 +251,8 @@ mod tests {
             let [[xx, xy], [yx, yy]] = dual.slope.map(|s| s.slope);
             assert_eq!(xy, yx);
             let expected = [dual.value.value, dual.value.slope[0], dual.value.slope[1], xx, xy, yy];
-            let found = [jet.value, jet.slope[0], jet.slope[1], jet.bend[0], jet.bend[1], jet.bend[2]];
+            let found =
+                [jet.value, jet.slope[0], jet.slope[1], jet.bend[0], jet.bend[1], jet.bend[2]];
             for (found, expected) in found.into_iter().zip(expected) {
                 assert!((found - expected).abs() <= 1e-12 * expected.abs(), "{found} {expected}");
             }

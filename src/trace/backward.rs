@@ -579,11 +579,7 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through an asphere to the surface before.
     #[inline(always)]
-    fn retrace_asphere(
-        &mut self,
-        surface: &Interface<R>,
-        pulls: Option<&[Pull<R>; BLOCK]>,
-    ) {
+    fn retrace_asphere(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
         let surface = *surface;
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
@@ -605,7 +601,8 @@ impl<R: Real> Homeward<R> {
             by_point = by_point
                 + Vec3::new(p.x * radial + n.x * slope, p.y * radial + n.y * slope, R::ZERO);
             if pulled.is_some() {
-                let outward = (R::ONE + surface.conic) * surface.curvature * surface.curvature * edge;
+                let outward =
+                    (R::ONE + surface.conic) * surface.curvature * surface.curvature * edge;
                 by_point = by_point + Vec3::new(p.x * outward, p.y * outward, R::ZERO);
             }
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;

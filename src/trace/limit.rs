@@ -69,7 +69,6 @@ impl<R: Real> Interface<R> {
             }
         }
     }
-
 }
 
 impl<R: Real> Interface<Jet<R>> {
@@ -220,7 +219,8 @@ impl<R: Real> PupilTracer<R> {
                     slants[j] = Slant { a: met.a, m: met.m };
                 },
             );
-            while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i) {
+            while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i)
+            {
                 // Known inside the loops, so that these have no branch.
                 match limit {
                     Limit::Rim => interface.limits(Limit::Rim, &block, slants, lanes),
@@ -238,7 +238,10 @@ impl<R: Real> PupilTracer<R> {
 #[inline(always)]
 fn pair<R: Real>(jet: Jet<R>) -> Pair<R> {
     let [x, y] = jet.slope;
-    Dual { value: Dual { value: jet.value, slope: [y] }, slope: [Dual { value: x, slope: [R::ZERO] }] }
+    Dual {
+        value: Dual { value: jet.value, slope: [y] },
+        slope: [Dual { value: x, slope: [R::ZERO] }],
+    }
 }
 
 /// What derivatives by a jet are as a number of the algebra.

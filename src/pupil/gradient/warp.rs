@@ -27,11 +27,11 @@
 
 use super::{Cost, Derivative};
 use crate::math::{Jet, Real};
+use crate::pupil::Aiming;
 use crate::pupil::boundary::Frame;
 use crate::pupil::launch::Launch;
 use crate::pupil::region::{Kind, Region};
 use crate::pupil::sample::{SplitMix, additive};
-use crate::pupil::Aiming;
 use crate::trace::{Abreast, Gradient, LANES, Points, PupilTracer, Ray, Rays, Sink};
 use rayon::prelude::*;
 
@@ -184,11 +184,7 @@ impl<'a, R: Real> Estimator<'a, R> {
     }
 
     /// The sum of the integrand over some points of the square.
-    fn part(
-        &self,
-        square: Frame,
-        points: impl Iterator<Item = [f64; 2]>,
-    ) -> Option<Gradient<f64>> {
+    fn part(&self, square: Frame, points: impl Iterator<Item = [f64; 2]>) -> Option<Gradient<f64>> {
         let lit = self.lit(square, points)?;
         let disc = self.launch.bench.ends_at_disc().then_some(square);
         let sum = self.tracer.gradient(
@@ -209,8 +205,7 @@ impl<'a, R: Real> Estimator<'a, R> {
             let [x, y] = place(square, *p);
             !disc || x * x + y * y <= 1.0
         };
-        let points: Vec<[R; 2]> =
-            points.filter(inside).map(|p| p.map(R::from_f64)).collect();
+        let points: Vec<[R; 2]> = points.filter(inside).map(|p| p.map(R::from_f64)).collect();
         let rays: Rays<R> = points.iter().map(|p| self.ray(square, *p)).collect();
         let mut landed = Points::default();
         self.scout.batch(&rays, &mut landed);
@@ -231,9 +226,7 @@ impl<'a, R: Real> Estimator<'a, R> {
 #[inline(always)]
 fn place<R: Real>(square: Frame, [u, v]: [R; 2]) -> [R; 2] {
     let [a, b] = square.axes;
-    [0, 1].map(|i| {
-        R::from_f64(square.center[i]) + R::from_f64(a[i]) * u + R::from_f64(b[i]) * v
-    })
+    [0, 1].map(|i| R::from_f64(square.center[i]) + R::from_f64(a[i]) * u + R::from_f64(b[i]) * v)
 }
 
 /// The limits of a block of rays against each other, relative to the closest of each.
@@ -373,4 +366,144 @@ fn disc_limit<R: Real>(frame: Frame, point: [R; 2]) -> [R; 3] {
     let [a, b] = frame.axes.map(|axis| axis.map(R::from_f64));
     let g = (p[0] * p[0] + p[1] * p[1] - R::ONE) * R::from_f64(0.5);
     [distance(g), p[0] * a[0] + p[1] * a[1], p[0] * b[0] + p[1] * b[1]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Shape, Surface, System};
+    use crate::math::{Dual, Vec3};
+    use crate::trace::{Hurdle, Slot, Tracer};
+
+    /// By x, by y, and by a number of the lens.
+    type Dual3 = Dual<f64, 3>;
+
+    const COST: Cost = Cost { center: [0.3, -0.2], square: 0.7, constant: 0.4 };
+
+    /// A surface of every form, a plane into air, and a mirror.
+    fn system() -> System<f64> {
+        let surface = |shape, thickness, index, semi_diameter| {
+            let (mirror, hyper) = (false, false);
+            Surface { shape, thickness, index, semi_diameter, mirror, hyper }
+        };
+        let terms = [1e-5, -3e-8, 0.0, 1e-12, 0.0, 0.0, 0.0];
+        let mut surfaces = vec![
+            surface(Shape::Sphere { curvature: 0.02 }, 4.0, 1.5, 9.0),
+            surface(Shape::Conic { curvature: -0.015, conic: -0.5 }, 3.0, 1.1, 8.5),
+            surface(Shape::Asphere { curvature: 0.01, conic: 0.3, terms }, 5.0, 1.7, 8.0),
+            surface(Shape::Plane, 6.0, 1.0, 7.0),
+            surface(Shape::Asphere { curvature: -0.01, conic: 0.2, terms }, -9.0, 1.0, 7.5),
+            surface(Shape::Sphere { curvature: 0.13 }, 0.0, 1.0, 9.0),
+        ];
+        surfaces[4].mirror = true;
+        System { index_before: 1.05, surfaces, stop: None }
+    }
+
+    fn ray<R: Real>([x, y]: [R; 2]) -> Ray<R> {
+        let slant = Vec3::new(R::from_f64(0.02), R::from_f64(0.11), R::ONE);
+        Ray { point: Vec3::new(x, y, R::ZERO), direction: slant }
+    }
+
+    /// The limits of a ray with their slopes, from the margins that end it, and its cost.
+    fn limits(system: &System<Dual3>, [x, y]: [f64; 2]) -> (Vec<Dual3>, Dual3) {
+        let tracer = Tracer::new(system).unwrap();
+        let ray = ray([Dual3::variable(x, 0), Dual3::variable(y, 1)]);
+        let mut limits = Vec::new();
+        tracer.margins(ray, |i, hurdle, margin| {
+            let surface = &system.surfaces[i];
+            let before = system.index_before(i);
+            let rarer = surface.index < before;
+            let r = surface.semi_diameter;
+            let n2 = before * before;
+            match (hurdle, surface.shape) {
+                (Hurdle::Rim, _) => limits.push(-margin / (r * r * Dual3::TWO)),
+                (Hurdle::Reflection, _) if rarer => limits.push(-margin / n2),
+                // (k·N)² + n'² − n²
+                (Hurdle::Reflection, Shape::Sphere { .. }) => {
+                    limits.push((surface.index * surface.index - n2 - margin) / n2);
+                }
+                (Hurdle::Miss, Shape::Asphere { .. }) if !rarer => limits.push(-margin / n2),
+                (Hurdle::Miss | Hurdle::Reflection, _) => {}
+            }
+        });
+        let landing = tracer.trace(ray);
+        assert!(landing.fate.is_imaged(), "{:?}", landing.fate);
+        let [cx, cy] = COST.center.map(Dual3::from_f64);
+        let (dx, dy) = (landing.ray.point.x - cx, landing.ray.point.y - cy);
+        let square = Dual3::from_f64(COST.square) * (dx * dx + dy * dy);
+        (limits, square + Dual3::from_f64(COST.constant))
+    }
+
+    /// `C V` for the number of the lens (3.23), and `dC/dt`.
+    fn field(system: &System<Dual3>, p: [f64; 2]) -> ([f64; 2], f64) {
+        let (limits, cost) = limits(system, p);
+        let weights: Vec<f64> = limits.iter().map(|g| g.value.abs().powf(-EXPONENT)).collect();
+        let total: f64 = weights.iter().sum();
+        let mut v = [0.0; 2];
+        for (Dual { value: g, slope: [x, y, t] }, weight) in limits.iter().zip(weights) {
+            let square = x * x + y * y + (FLATNESS * g).powi(2);
+            let length = cost.value * weight / total * t / square;
+            v = [v[0] + length * x, v[1] + length * y];
+        }
+        (v, cost.slope[2])
+    }
+
+    /// `dC/dt − div(C V)` for one number of the lens, `None` for the index in front, by central
+    /// differences of fourth order; and the size of its parts.
+    fn literal(named: Option<(usize, Slot)>, p: [f64; 2]) -> (f64, f64) {
+        let mut system = system().lift::<Dual3>();
+        let number = match named {
+            Some((i, slot)) => slot.of(&mut system, i),
+            None => &mut system.index_before,
+        };
+        *number = Dual3::variable(number.value, 2);
+        let step = 2e-3;
+        let along = |i: usize, steps: f64| {
+            let mut there = p;
+            there[i] += steps * step;
+            field(&system, there).0[i]
+        };
+        let slope = |i: usize| {
+            let (near, far) = (along(i, 1.0) - along(i, -1.0), along(i, 2.0) - along(i, -2.0));
+            (8.0 * near - far) / (12.0 * step)
+        };
+        let (fixed, [x, y]) = (field(&system, p).1, [slope(0), slope(1)]);
+        (fixed - x - y, fixed.abs() + x.abs() + y.abs())
+    }
+
+    #[test]
+    fn aperture_aware_one_adjoint_gives_every_warp_field() {
+        let tracer = PupilTracer::<f64>::new(&system()).unwrap();
+        for p in [[0.4, 0.9], [-3.1, 2.2], [5.5, -1.7]] {
+            let found = tracer.gradient(
+                &[p],
+                |[x, y]| ray([Jet::variable(x, 0), Jet::variable(y, 1)]),
+                |points, abreast| weigh(abreast, &COST, None, points),
+            );
+            let check = |name: String, found: f64, named| {
+                let (expected, size) = literal(named, p);
+                let off = (found - expected).abs();
+                assert!(off <= 1e-6 * size, "{name} at {p:?}: {found} {expected}, of {size}");
+            };
+            check("index before".to_owned(), found.index_before, None);
+            for (i, by) in found.surfaces.iter().enumerate() {
+                let surface = &system().surfaces[i];
+                let check = |slot, found| check(format!("{slot:?} {i}"), found, Some((i, slot)));
+                if surface.shape != Shape::Plane {
+                    check(Slot::Curvature, by.curvature);
+                }
+                if !matches!(surface.shape, Shape::Plane | Shape::Sphere { .. }) {
+                    check(Slot::Conic, by.conic);
+                }
+                if matches!(surface.shape, Shape::Asphere { .. }) {
+                    (0..7).for_each(|t| check(Slot::Term(t), by.terms[t]));
+                }
+                check(Slot::Thickness, by.thickness);
+                if !surface.mirror {
+                    check(Slot::Index, by.index);
+                }
+                check(Slot::SemiDiameter, by.semi_diameter);
+            }
+        }
+    }
 }

@@ -107,7 +107,7 @@ pub(crate) fn exact(values: &Value, name: &str) -> Vec<Option<f64>> {
     list.iter().map(|value| (!value.is_null()).then(|| number(value))).collect()
 }
 
-fn image() -> Surface<f64> {
+pub(crate) fn image() -> Surface<f64> {
     Surface {
         shape: Shape::Plane,
         thickness: 0.0,
