@@ -139,6 +139,22 @@ impl Bench {
         seidel(&self.colors[self.primary].system, &self.first, outer)
     }
 
+    /// The same beam without a search for the stop: the rim of the stop limits it, where that is
+    /// what the coordinates of the pupil lead to.
+    pub(super) fn limited_by_stop(&self) -> Result<Self, Invalid> {
+        let (stop, radius) = (self.stop(), self.stop_radius());
+        let color = |color: &Color| {
+            let mut system = color.system.clone();
+            let rim = &mut system.surfaces[stop].semi_diameter;
+            *rim = rim.min(radius);
+            let tracer = Tracer::new(&system)?;
+            Ok(Color { system, tracer, ..color.clone() })
+        };
+        let colors: Result<_, Invalid> = self.colors.iter().map(color).collect();
+        let beam = Beam { aperture: Aperture::StopSemiDiameter(radius), ..self.beam };
+        Ok(Self { colors: colors?, beam, aiming: Aiming::Chief, ..self.clone() })
+    }
+
     /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces
     /// limit it, the stop among them.
     pub fn ends_at_disc(&self) -> bool {

@@ -550,6 +550,25 @@ impl Boundary {
         Frame { axes: self.frame.axes.map(|axis| axis.map(|v| v * grown)), ..self.frame }
     }
 
+    /// A frame whose square from −1 to 1 holds all of the pupil, with the same turn.
+    pub(super) fn boxed(&self, mirrored: bool) -> Frame {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for (azimuth, edge) in &self.samples {
+            let (sin, cos) = azimuth.sin_cos();
+            let p = [sin * edge.radius, cos * edge.radius];
+            low = [0, 1].map(|i| low[i].min(p[i]));
+            high = [0, 1].map(|i| high[i].max(p[i]));
+        }
+        if mirrored {
+            low[0] = -high[0];
+        }
+        let middle = [0, 1].map(|i| 0.5 * (low[i] + high[i]));
+        let half = [0, 1].map(|i| 0.5 * COVER * (high[i] - low[i]));
+        let [a, b] = self.frame.axes;
+        let center = [0, 1].map(|k| self.frame.center[k] + middle[0] * a[k] + middle[1] * b[k]);
+        Frame { center, axes: [a.map(|v| half[0] * v), b.map(|v| half[1] * v)] }
+    }
+
     /// A guess of the radius at an azimuth, from the nearest ones known.
     pub(super) fn near(&self, azimuth: f64) -> f64 {
         let end = self.samples.last().map_or(1.0, |s| s.0);

@@ -8,6 +8,7 @@
 use super::boundary::{Boundary, Edge, Frame, NEAR, Search};
 use super::region::{Kind, Region};
 use super::rules::{legendre, radial};
+use super::sample::additive;
 use crate::trace::{Rays, Sink};
 use std::f64::consts::PI;
 
@@ -217,12 +218,11 @@ fn clear(order: usize, mirrored: bool) -> Nodes {
     nodes
 }
 
-/// Roberts's additive sequence over a square: points that fill it evenly for any count. Those
-/// farther out than `reach`, where no beam is, are left out.
+/// An even sequence over a square. Points farther out than `reach`, where no beam is, are left out.
 fn ragged((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
-    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
     let point = |i: usize| {
-        [0, 1].map(|k| center[k] + half * (2.0 * (0.5 + STEP[k] * i as f64).fract() - 1.0))
+        let u = additive([0.5; 2], i);
+        [0, 1].map(|k| center[k] + half * (2.0 * u[k] - 1.0))
     };
     let weight = 4.0 * half * half / count as f64;
     let points: Vec<_> = (0..count).map(point).filter(|p| p[0].hypot(p[1]) <= reach).collect();

@@ -14,6 +14,9 @@
 //! by every number of a system at once, semi-diameters included.
 
 mod boundary;
+mod warp;
+
+pub use warp::Warp;
 
 use crate::trace::Gradient;
 
