@@ -110,3 +110,10 @@ impl<R: Real> Gradient<R> {
         front.into_iter().chain(self.surfaces.iter().map(move |surface| surface.by(slot)))
     }
 }
+
+impl Gradient<f64> {
+    /// The largest derivative by a number of one kind.
+    pub fn largest(&self, slot: Slot) -> f64 {
+        self.group(slot).fold(0.0, |largest, by| largest.max(by.abs()))
+    }
+}

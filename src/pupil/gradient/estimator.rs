@@ -5,10 +5,12 @@ use super::{Cost, Derivative, Warp};
 use crate::lens::Invalid;
 use crate::pupil::bench::Aiming;
 use crate::pupil::launch::LaunchError;
+use crate::pupil::moments::Moments;
 use crate::pupil::quadrature::Accuracy;
 use crate::pupil::region::{Kind, Region};
-use crate::trace::{Fate, Gradient};
+use crate::trace::{Fate, Gradient, Slot};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 use std::fmt::{self, Display};
 use std::str::FromStr;
 
@@ -83,18 +85,23 @@ pub enum NoDerivative {
     Launch(#[from] LaunchError),
 }
 
+/// What the warp field rounds its number of samples up to, at most.
+const REPLICATES: usize = 8;
 /// Samples of the warp field at first.
 const FIRST: usize = 1024;
-/// How many times more at the next try, at least and at most.
-const MORE: [f64; 2] = [2.0, 16.0];
+/// How many times more at the next try, at least.
+const LEAST: f64 = 2.0;
+/// And at most: the first standard errors are rough.
+const MOST: f64 = 16.0;
 
 /// The derivative of the integral of a cost over a pupil by every number of the lens, each with its
 /// estimated error: how much raising the order changed it, the standard error of the warp field, or
 /// what the step of a difference leaves open. The bias of `Biased` is in no error.
 ///
 /// The order or the number of samples is raised until [`Derivative::reaches`] the tolerance, or
-/// until more rays than allowed would be needed: then the result is what they gave. Where rays are
-/// aimed at the stop, its rim limits the beam and moves with its semi-diameter.
+/// until more rays than allowed would be needed: then the result is what they gave. The noise of the
+/// warp field in a kind of numbers with little or no effect counts against what such numbers can do.
+/// Where rays are aimed at the stop, its rim limits the beam and moves with its semi-diameter.
 ///
 /// # Errors
 /// A pupil without light or edge; `Boundary` for a pupil that is not star-shaped.
@@ -225,13 +232,9 @@ impl Region<'_> {
             last = now.rays;
             rays += last;
             now.rays = rays;
-            if let Some(before) = &before {
-                now.error = now.error.joined(&now.by.joined(&before.by, |a, b| (a - b).abs()), f64::max);
-                if now.reaches(asked.tolerance) {
-                    return Ok(now);
-                }
-            } else {
-                now.error = now.by.joined(&now.by, |_, _| f64::INFINITY);
+            now.compare(before.as_ref());
+            if now.reaches(asked.tolerance) {
+                return Ok(now);
             }
             before = Some(now);
         }
@@ -253,25 +256,88 @@ impl Region<'_> {
             Estimator::Biased => lit.biased_derivative(cost),
             _ => lit.boundary_derivative(cost).ok_or(NoDerivative::Endless)?,
         };
-        Ok(Derivative { error: Gradient::zero(by.surfaces.len()), by, rays: lit.traced })
+        let error = Gradient::zero(by.surfaces.len());
+        let mut found = Derivative { error, by, rays: lit.traced };
+        found.drop_rounding(natural(cost, &lit.moments));
+        Ok(found)
     }
 
     /// Raises the number of samples of the warp field.
     fn sampled_derivative(&self, cost: &Cost, asked: Accuracy) -> Result<Derivative, NoDerivative> {
+        // Numbers without an effect are never more than noise: it must be small against what
+        // numbers of their kind can do.
+        let natural = natural(cost, &self.lit(0).moments);
         let mut count = FIRST;
         let mut rays = 0;
         loop {
             let sampling = Warp { count, ..Warp::default() };
             let mut found = self.warp_derivative(cost, sampling).ok_or(NoDerivative::NoSquare)?;
+            let overhead = found.rays.saturating_sub(count);
             rays += found.rays;
             found.rays = rays;
-            let [least, most] = MORE;
-            let excess = found.excess(asked.tolerance);
-            let next = (count as f64 * (excess * excess).clamp(least, most)) as usize;
-            if found.reaches(asked.tolerance) || rays + next > asked.most_rays {
+            let excess = found.excess(asked.tolerance, |slot| NOTABLE * natural(slot));
+            let wanted = (count as f64 * (excess * excess).clamp(LEAST, MOST)) as usize;
+            let next = wanted.min(asked.most_rays.saturating_sub(rays + overhead + REPLICATES));
+            if excess <= 1.0 || (next as f64) < LEAST * count as f64 {
                 return Ok(found);
             }
             count = next;
         }
+    }
+}
+
+/// Of the natural size: what the noise of numbers without an effect is measured against.
+const NOTABLE: f64 = 0.1;
+/// A derivative this much smaller than its natural size is rounding.
+const ROUNDING: f64 = 1e-13;
+
+impl Derivative {
+    /// Adds what raising the order has changed to the errors; all of it where this is the first
+    /// one. A number cannot be known better, relatively, than the worst of its kind: some of them
+    /// always change little by chance.
+    fn compare(&mut self, before: Option<&Self>) {
+        let Some(before) = before else {
+            self.error = self.by.joined(&self.by, |_, _| f64::INFINITY);
+            return;
+        };
+        let change = self.by.joined(&before.by, |a, b| (a - b).abs());
+        self.error = self.error.joined(&change, |a, b| a + b);
+        for slot in Slot::all() {
+            let [worst, largest] = [&self.error, &self.by].map(|g| g.largest(slot));
+            let share = if largest > 0.0 { (worst / largest).min(1.0) } else { 0.0 };
+            for (error, by) in self.error.surfaces.iter_mut().zip(&self.by.surfaces) {
+                let error = error.by_mut(slot);
+                *error = error.max(share * by.by(slot).abs());
+            }
+        }
+    }
+
+    /// Sets to zero the kinds of numbers on which the integral depends by no more than rounding.
+    fn drop_rounding(&mut self, natural: impl Fn(Slot) -> f64) {
+        for slot in Slot::all() {
+            if self.by.largest(slot) <= ROUNDING * natural(slot) {
+                self.by.surfaces.iter_mut().for_each(|surface| *surface.by_mut(slot) = 0.0);
+                if slot == Slot::Index {
+                    self.by.index_before = 0.0;
+                }
+            }
+        }
+    }
+}
+
+/// How large the derivative by a number of some kind is that does what it can: the integral over
+/// the pupil's radius in the unit of the number.
+fn natural(cost: &Cost, light: &Moments) -> impl Fn(Slot) -> f64 + use<> {
+    let size = (light.area / PI).sqrt();
+    let positive = Cost { square: cost.square.abs(), constant: cost.constant.abs(), ..*cost };
+    let integral = positive.over(light);
+    move |slot| {
+        let power = match slot {
+            Slot::Curvature => 1,
+            Slot::Conic | Slot::Index => 0,
+            Slot::Term(term) => 2 * term as i32 + 3,
+            Slot::Thickness | Slot::SemiDiameter => -1,
+        };
+        integral * size.powi(power)
     }
 }

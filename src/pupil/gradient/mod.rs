@@ -83,17 +83,16 @@ impl Derivative {
     /// Whether every number is known within a tolerance of the largest of its kind: curvatures,
     /// conic constants, coefficients of each power, thicknesses, indices, semi-diameters.
     pub fn reaches(&self, tolerance: f64) -> bool {
-        self.excess(tolerance) <= 1.0
+        self.excess(tolerance, |_| 0.0) <= 1.0
     }
 
-    /// By how much the largest error of a kind exceeds what a tolerance allows there.
-    fn excess(&self, tolerance: f64) -> f64 {
-        let largest = |gradient: &Gradient<f64>, slot| {
-            gradient.group(slot).map(f64::abs).fold(0.0, f64::max)
-        };
+    /// By how much the largest error of a kind exceeds what a tolerance allows there, of the
+    /// largest number of the kind or of a floor.
+    fn excess(&self, tolerance: f64, floor: impl Fn(Slot) -> f64) -> f64 {
         let excess = |slot| {
-            let error = largest(&self.error, slot);
-            if error == 0.0 { 0.0 } else { error / (tolerance * largest(&self.by, slot)) }
+            let error = self.error.largest(slot);
+            let scale = self.by.largest(slot).max(floor(slot));
+            if error == 0.0 { 0.0 } else { error / (tolerance * scale) }
         };
         Slot::all().map(excess).fold(0.0, f64::max)
     }

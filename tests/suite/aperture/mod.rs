@@ -2,6 +2,7 @@
 
 mod boundary;
 mod estimators;
+mod hard;
 mod warp;
 
 use crate::reference::{count, number, numbers, read};
