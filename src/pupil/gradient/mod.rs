@@ -14,11 +14,15 @@
 //! by every number of a system at once, semi-diameters included.
 
 mod boundary;
+mod difference;
+mod estimator;
 mod warp;
 
+pub use estimator::{Estimator, NoDerivative, differentiate, plan};
 pub use warp::Warp;
 
-use crate::trace::Gradient;
+use super::moments::Moments;
+use crate::trace::{Gradient, Slot};
 
 /// What each ray of a pupil contributes: `square |p − center|² + constant`, `p` its image point.
 ///
@@ -51,6 +55,13 @@ impl Cost {
         self.square * (x * x + y * y) + self.constant
     }
 
+    /// Its integral over the light of a pupil.
+    pub fn over(&self, light: &Moments) -> f64 {
+        let [x, y] = [0, 1].map(|i| light.centroid[i] - self.center[i]);
+        let about_center = light.spread + light.area * (x * x + y * y);
+        self.square * about_center + self.constant * light.area
+    }
+
     /// Its derivative by the point.
     pub fn slope(&self, p: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|i| 2.0 * self.square * (p[i] - self.center[i]))
@@ -66,4 +77,23 @@ pub struct Derivative {
     pub error: Gradient<f64>,
     /// Rays traced.
     pub rays: usize,
+}
+
+impl Derivative {
+    /// Whether every number is known within a tolerance of the largest of its kind: curvatures,
+    /// conic constants, coefficients of each power, thicknesses, indices, semi-diameters.
+    pub fn reaches(&self, tolerance: f64) -> bool {
+        self.excess(tolerance, |_| 0.0) <= 1.0
+    }
+
+    /// By how much the largest error of a kind exceeds what a tolerance allows there, of the
+    /// largest number of the kind or of a floor.
+    fn excess(&self, tolerance: f64, floor: impl Fn(Slot) -> f64) -> f64 {
+        let excess = |slot| {
+            let error = self.error.largest(slot);
+            let scale = self.by.largest(slot).max(floor(slot));
+            if error == 0.0 { 0.0 } else { error / (tolerance * scale) }
+        };
+        Slot::all().map(excess).fold(0.0, f64::max)
+    }
 }

@@ -1,6 +1,8 @@
 //! Integrals over pupils whose edge moves, against the cases of `aperture_gradients.json`.
 
 mod boundary;
+mod estimators;
+mod hard;
 mod warp;
 
 use crate::reference::{count, number, numbers, read};

@@ -5,7 +5,7 @@ use image::{ImageError, ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
 
 /// Red, green, blue.
-pub(super) type Color = [u8; 3];
+pub(in crate::cli::measure) type Color = [u8; 3];
 pub(super) const BLACK: Color = [0; 3];
 pub(super) const GRID: Color = [0xdd; 3];
 
@@ -27,7 +27,7 @@ pub(super) enum Align {
 
 /// How a curve is drawn.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Stroke {
+pub(in crate::cli::measure) enum Stroke {
     Solid,
     Dashed,
 }

@@ -3,71 +3,69 @@
 mod canvas;
 mod font;
 
-use crate::measure::{Precision, Pupil, Sampling, SpotCurves, SpotRow};
-use canvas::{Align, BLACK, Canvas, Color, GRID, Stroke};
+use canvas::{Align, BLACK, Canvas, GRID};
 use image::ImageError;
+
+pub(super) use canvas::{Color, Stroke};
 
 const SIZE: [u32; 2] = [1800, 900];
 const TOP: f64 = 90.0;
 const BOTTOM: f64 = 800.0;
 /// Left and right of each chart.
-const CHARTS: [(f64, f64); 2] = [(120.0, 740.0), (860.0, 1480.0)];
+const PLACES: [(f64, f64); 2] = [(120.0, 740.0), (860.0, 1480.0)];
 const LEGEND: f64 = 1510.0;
 
-const COLORS: [(Sampling, Color); 6] = [
-    (Sampling::SquareGrid, [0x1f, 0x77, 0xb4]),
-    (Sampling::Hexapolar, [0x8c, 0x56, 0x4b]),
-    (Sampling::Random, [0x7f, 0x7f, 0x7f]),
-    (Sampling::LowDiscrepancy, [0x2c, 0xa0, 0x2c]),
-    (Sampling::Gauss, [0xff, 0x7f, 0x0e]),
-    (Sampling::SplitBoundary, [0xd6, 0x27, 0x28]),
-];
+/// Milliseconds and relative errors.
+pub(super) struct Curve {
+    pub(super) color: Color,
+    pub(super) stroke: Stroke,
+    pub(super) points: Vec<[f64; 2]>,
+}
 
-/// The curves as a PNG.
-pub(super) fn draw(curves: &SpotCurves, title: &str) -> Result<Vec<u8>, ImageError> {
+/// Curves over the same axes.
+pub(super) struct Chart {
+    pub(super) name: String,
+    pub(super) curves: Vec<Curve>,
+}
+
+/// What a kind of curve is called.
+pub(super) struct Label {
+    pub(super) name: &'static str,
+    pub(super) color: Color,
+    pub(super) stroke: Stroke,
+}
+
+impl Label {
+    /// The name of a color.
+    pub(super) fn of(name: &'static str, color: Color) -> Self {
+        Self { name, color, stroke: Stroke::Solid }
+    }
+
+    /// The name of a stroke.
+    pub(super) fn drawn(name: &'static str, stroke: Stroke) -> Self {
+        Self { name, color: BLACK, stroke }
+    }
+}
+
+/// One chart or two as a PNG.
+pub(super) fn draw(charts: &[Chart], labels: &[Label], title: &str) -> Result<Vec<u8>, ImageError> {
     let mut canvas = Canvas::new(SIZE);
     canvas.text([60.0, 30.0], title, BLACK, Align::Left);
-    let range = Range::of(&curves.rows);
-    for (pupil, (left, right)) in [Pupil::Clear, Pupil::Clipped].into_iter().zip(CHARTS) {
-        let chart = Chart { left, right, range };
-        let name = match pupil {
-            Pupil::Clear => "clear pupil".to_owned(),
-            Pupil::Clipped => format!("clipped pupil, {:.0} % lit", 100.0 * curves.lit),
-        };
-        chart.axes(&mut canvas, &name);
-        for (method, color) in COLORS {
-            for precision in [Precision::F32, Precision::F64] {
-                let mine = |row: &&SpotRow| {
-                    row.pupil == pupil && row.method == method && row.precision == precision
-                };
-                let points = curves.rows.iter().filter(mine).map(|row| chart.place(row));
-                canvas.curve(&points.collect::<Vec<_>>(), color, stroke(precision));
-            }
+    let range = Range::of(charts);
+    for (chart, (left, right)) in charts.iter().zip(PLACES) {
+        let axes = Axes { left, right, range };
+        axes.draw(&mut canvas, &chart.name);
+        for curve in &chart.curves {
+            let places: Vec<_> = curve.points.iter().map(|point| axes.place(*point)).collect();
+            canvas.curve(&places, curve.color, curve.stroke);
         }
     }
-    legend(&mut canvas);
+    for (i, label) in labels.iter().enumerate() {
+        let y = TOP + 20.0 + 34.0 * i as f64;
+        canvas.curve(&[[LEGEND, y], [LEGEND + 40.0, y]], label.color, label.stroke);
+        canvas.text([LEGEND + 52.0, y - 7.0], label.name, BLACK, Align::Left);
+    }
     canvas.png()
-}
-
-fn stroke(precision: Precision) -> Stroke {
-    match precision {
-        Precision::F32 => Stroke::Dashed,
-        Precision::F64 => Stroke::Solid,
-    }
-}
-
-fn legend(canvas: &mut Canvas) {
-    let mut y = TOP + 20.0;
-    for (method, color) in COLORS {
-        canvas.curve(&[[LEGEND, y], [LEGEND + 40.0, y]], color, Stroke::Solid);
-        canvas.text([LEGEND + 52.0, y - 7.0], method.name(), BLACK, Align::Left);
-        y += 34.0;
-    }
-    for (name, precision) in [("f64", Precision::F64), ("f32", Precision::F32)] {
-        canvas.curve(&[[LEGEND, y], [LEGEND + 40.0, y]], BLACK, stroke(precision));
-        canvas.text([LEGEND + 52.0, y - 7.0], name, BLACK, Align::Left);
-        y += 34.0;
-    }
 }
 
 /// Powers of ten around all points.
@@ -81,28 +79,30 @@ struct Range {
 const SMALLEST: f64 = 1e-16;
 
 impl Range {
-    fn of(rows: &[SpotRow]) -> Self {
-        let powers = |number: fn(&SpotRow) -> f64| {
-            let logs = rows.iter().map(|row| number(row).log10()).filter(|log| log.is_finite());
+    fn of(charts: &[Chart]) -> Self {
+        let curves = || charts.iter().flat_map(|chart| &chart.curves);
+        let powers = |number: fn(&[f64; 2]) -> f64| {
+            let points = curves().flat_map(|curve| &curve.points);
+            let logs = points.map(|point| number(point).log10()).filter(|log| log.is_finite());
             let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| {
                 (low.min(log), high.max(log))
             });
             if low <= high { [low.floor() as i32, high.ceil() as i32] } else { [-1, 1] }
         };
-        Self { ms: powers(|row| row.ms), error: powers(|row| row.error.max(SMALLEST)) }
+        Self { ms: powers(|point| point[0]), error: powers(|point| point[1].max(SMALLEST)) }
     }
 }
 
-/// One chart on the canvas.
-struct Chart {
+/// Where a chart stands on the canvas.
+struct Axes {
     left: f64,
     right: f64,
     range: Range,
 }
 
-impl Chart {
-    fn place(&self, row: &SpotRow) -> [f64; 2] {
-        [self.x(row.ms.log10()), self.y(row.error.max(SMALLEST).log10())]
+impl Axes {
+    fn place(&self, [ms, error]: [f64; 2]) -> [f64; 2] {
+        [self.x(ms.log10()), self.y(error.max(SMALLEST).log10())]
     }
 
     fn x(&self, log: f64) -> f64 {
@@ -116,7 +116,7 @@ impl Chart {
     }
 
     /// Grid, numbers and names of the axes.
-    fn axes(&self, canvas: &mut Canvas, name: &str) {
+    fn draw(&self, canvas: &mut Canvas, name: &str) {
         let Self { left, right, range } = self;
         for power in range.ms[0]..=range.ms[1] {
             let x = self.x(f64::from(power));
@@ -152,20 +152,14 @@ mod tests {
 
     #[test]
     fn curves_become_a_picture() {
-        let row = |ms, error| SpotRow {
-            pupil: Pupil::Clear,
-            method: Sampling::Gauss,
-            precision: Precision::F64,
-            rays: 9,
-            error,
-            ms,
-        };
-        let rows = vec![row(0.01, 1e-3), row(0.1, 0.0)];
-        let curves = SpotCurves { rms_clear: 1.0, rms_clipped: None, lit: 1.0, rows };
-        let png = draw(&curves, "a lens").unwrap();
+        let color = [0x1f, 0x77, 0xb4];
+        let points = vec![[0.01, 1e-3], [0.1, 0.0]];
+        let curve = Curve { color, stroke: Stroke::Solid, points };
+        let chart = Chart { name: "a chart".to_owned(), curves: vec![curve] };
+        let png = draw(&[chart], &[Label::of("a curve", color)], "a lens").unwrap();
         let picture = image::load_from_memory(&png).unwrap().to_rgb8();
         assert_eq!([picture.width(), picture.height()], SIZE);
-        assert!(picture.pixels().any(|pixel| pixel.0 == [0xff, 0x7f, 0x0e]));
-        assert!(draw(&SpotCurves { rows: Vec::new(), ..curves }, "nothing").is_ok());
+        assert!(picture.pixels().any(|pixel| pixel.0 == color));
+        assert!(draw(&[], &[], "nothing").is_ok());
     }
 }
