@@ -6,7 +6,7 @@ use super::output::{Number, Output, Table};
 use super::vary::{at_zoom, free};
 use crate::lens::{Fields, Lens, Parameter, Quantity};
 use crate::measure::timed;
-use crate::merit::{Detail, Goal, Merit, MeritError, Term, Weighted};
+use crate::merit::{Detail, Goal, Merit, MeritError, PupilEdge, Term, Weighted};
 use clap::ValueEnum;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -133,7 +133,11 @@ fn differentiate(
     term: Term,
     tolerance: f64,
 ) -> Result<(Derivative, Vec<f64>), MeritError> {
-    let goal = Goal { terms: vec![Weighted { term, weight: 1.0 }], zoom_ratios: Vec::new() };
+    let goal = Goal {
+        terms: vec![Weighted { term, weight: 1.0 }],
+        pupil: PupilEdge::Kept,
+        zoom_ratios: Vec::new(),
+    };
     let merit = Merit::new(lens, &goal, tolerance)?;
     let values = merit.values(lens);
     let sum = merit.sum(&values, Detail::Gradient)?;

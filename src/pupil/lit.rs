@@ -1,16 +1,30 @@
 //! The rays of a pupil at one order of quadrature, traced once: its moments, and from the same
 //! rays the derivatives of any integral over it.
 
-use super::boundary::Limit;
+use super::boundary::{Frame, Limit};
+use super::launch::Launch;
 use super::moments::{Moments, moments};
 use super::quadrature::{Landed, Nodes, SPLIT, Spoke, nodes_of};
 use super::region::{Kind, Region};
 use crate::trace::{Points, Rays, Sink};
 
+/// How the edge of a pupil is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Rim {
+    /// It is the disc of the pupil, which does not move.
+    Still,
+    /// It ends the spokes in this frame.
+    Spokes(Frame),
+    /// It is not.
+    Unknown,
+}
+
 /// The light of a pupil.
 #[derive(Debug, Clone)]
 pub struct Lit<'a> {
-    pub(super) region: &'a Region<'a>,
+    /// From where its rays start.
+    pub launch: Launch<'a>,
+    pub(super) rim: Rim,
     /// Its radii, where it is split at its corners.
     pub(super) spokes: Vec<Spoke>,
     /// The rays that were traced.
@@ -25,9 +39,9 @@ pub struct Lit<'a> {
     pub traced: usize,
 }
 
-impl Region<'_> {
+impl<'a> Region<'a> {
     /// Traces the rays of an order of quadrature, counted from 0.
-    pub fn lit(&self, order: usize) -> Lit<'_> {
+    pub fn lit(&self, order: usize) -> Lit<'a> {
         let (nodes, spokes) = match &self.kind {
             Kind::Split(boundary) => {
                 let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
@@ -43,7 +57,7 @@ impl Region<'_> {
         self.traced(&nodes, spokes)
     }
 
-    fn traced(&self, nodes: &Nodes, spokes: Vec<Spoke>) -> Lit<'_> {
+    fn traced(&self, nodes: &Nodes, spokes: Vec<Spoke>) -> Lit<'a> {
         let started = nodes.points.iter().zip(&nodes.weights);
         let started = started.filter_map(|(p, w)| Some((self.launch.ray(*p)?, *w)));
         let (rays, weights): (Vec<_>, Vec<f64>) = started.unzip();
@@ -55,7 +69,13 @@ impl Region<'_> {
         let mirrored = nodes.mirrored;
         let moments = moments(&landed, mirrored, self.launch.area());
         let traced = nodes.rays + rays.len();
-        Lit { region: self, spokes, rays, landed, mirrored, moments, traced }
+        let rim = match &self.kind {
+            Kind::Clear => Rim::Still,
+            Kind::Split(boundary) => Rim::Spokes(boundary.frame),
+            Kind::Dark | Kind::Ragged { .. } | Kind::Endless => Rim::Unknown,
+        };
+        let launch = self.launch.clone();
+        Lit { launch, rim, spokes, rays, landed, mirrored, moments, traced }
     }
 }
 

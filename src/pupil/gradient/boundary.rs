@@ -13,9 +13,8 @@
 use super::Cost;
 use crate::math::Vec3;
 use crate::pupil::boundary::{Frame, Limit};
-use crate::pupil::lit::Lit;
+use crate::pupil::lit::{Lit, Rim};
 use crate::pupil::quadrature::Spoke;
-use crate::pupil::region::Kind;
 use crate::trace::{Gradient, Hurdle, Ray, Rays, Seed};
 
 impl Lit<'_> {
@@ -23,34 +22,32 @@ impl Lit<'_> {
     /// pupil is not one piece that a point inside sees all of.
     pub fn boundary_derivative(&self, cost: &Cost) -> Option<Gradient<f64>> {
         let mut total = self.biased_derivative(cost);
-        match &self.region.kind {
-            // The disc of the pupil does not move.
-            Kind::Clear => {}
-            Kind::Split(boundary) => {
-                total.add(&self.edge_motion(cost, &boundary.frame), 1.0);
-            }
-            Kind::Dark | Kind::Ragged { .. } | Kind::Endless => return None,
-        }
+        total.add(&self.edge_motion(cost)?, 1.0);
         Some(total)
     }
 
     /// The integral of `dC/dt` over fixed rays: the derivative without the motion of the edge,
     /// biased wherever something clips.
     pub fn biased_derivative(&self, cost: &Cost) -> Gradient<f64> {
-        let launch = &self.region.launch;
-        let (scale, points) = (launch.area(), &self.landed.sink);
+        let (scale, points) = (self.launch.area(), &self.landed.sink);
         let seed = |i: usize| {
             let [x, y] = cost.slope([points.x[i], points.y[i]]);
             let weight = scale * self.landed.weights[i];
             Seed { point: Vec3::new(weight * x, weight * y, 0.0), ..Seed::default() }
         };
-        launch.color().tracer.gradient(&self.rays, seed)
+        self.launch.color().tracer.gradient(&self.rays, seed)
     }
 
-    /// What the motion of the edge contributes.
-    pub fn edge_motion(&self, cost: &Cost, frame: &Frame) -> Gradient<f64> {
-        let tracer = &self.region.launch.color().tracer;
+    /// What the motion of the edge contributes: nothing where it is the disc of the pupil, which
+    /// does not move; `None` where the edge is not known.
+    pub fn edge_motion(&self, cost: &Cost) -> Option<Gradient<f64>> {
+        let tracer = &self.launch.color().tracer;
         let mut total = Gradient::zero(tracer.surfaces());
+        let frame = match &self.rim {
+            Rim::Still => return Some(total),
+            Rim::Spokes(frame) => frame,
+            Rim::Unknown => return None,
+        };
         for limit in self.limits() {
             let Limit::Surface(surface, hurdle) = limit else { continue };
             let on_limit = self.spokes.iter().filter(|spoke| spoke.edge.limit == limit);
@@ -59,7 +56,7 @@ impl Lit<'_> {
             let rays: Rays<f64> = rays.into_iter().collect();
             total.add(&tracer.margin_gradient(surface, hurdle, &rays, &weights), 1.0);
         }
-        total
+        Some(total)
     }
 
     /// The ray at the end of a spoke, and what a change of its margin adds to the integral.
@@ -70,7 +67,7 @@ impl Lit<'_> {
         spoke: &Spoke,
         (surface, hurdle): (usize, Hurdle),
     ) -> Option<(Ray<f64>, f64)> {
-        let launch = &self.region.launch;
+        let launch = &self.launch;
         let p = frame.point(spoke.azimuth, spoke.edge.radius);
         let ray = launch.ray(p)?;
         let color = launch.color();
