@@ -68,6 +68,21 @@ impl Source {
     }
 }
 
+impl Source {
+    /// Where the ray meets the plane through the first vertex, in mm; across the beam where a
+    /// collimated one grazes that plane.
+    fn crossing<R: Real>(&self, q: [R; 2]) -> [R; 2] {
+        match self {
+            Self::Collimated { direction, .. } if direction.z <= GRAZING => q,
+            _ => {
+                let Ray { point, direction } = self.ray(q);
+                let met = point - direction * (point.z / direction.z);
+                [met.x, met.y]
+            }
+        }
+    }
+}
+
 /// A ray from a point, or from the first vertex plane towards a point behind it.
 fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
     let direction = along * (R::ONE / along.dot(along).sqrt());
@@ -159,6 +174,26 @@ impl<'a> Launch<'a> {
         Some(self.source.ray(self.place(p)?))
     }
 
+    /// Where the ray at these pupil coordinates crosses the plane in which [`Launch::area`] counts,
+    /// in mm from the axis; `None` where none was found that crosses the stop there.
+    pub fn crossing(&self, p: [f64; 2]) -> Option<[f64; 2]> {
+        self.place(p).map(|q| self.source.crossing(q))
+    }
+
+    /// The same with the area in mm² that one unit of pupil coordinates stands for there. Where
+    /// every ray is aimed at the stop, that changes over the pupil.
+    pub(super) fn crossing_with_area(&self, p: [f64; 2]) -> Option<([f64; 2], f64)> {
+        let [x, y] = self.source.crossing(self.dual_place(p)?);
+        let area = x.slope[0] * y.slope[1] - x.slope[1] * y.slope[0];
+        Some(([x.value, y.value], area.abs()))
+    }
+
+    /// Whether [`Launch::area`] and [`Launch::crossing`] count across the beam, which grazes the
+    /// plane through the first vertex.
+    pub fn is_grazing(&self) -> bool {
+        matches!(self.source, Source::Collimated { direction, .. } if direction.z <= GRAZING)
+    }
+
     /// The optical path from the object point to the start of a ray of this field, or from the
     /// plane wave through the first vertex, in mm.
     pub fn path_to(&self, ray: Ray<f64>) -> f64 {
@@ -172,17 +207,20 @@ impl<'a> Launch<'a> {
 
     /// The ray at these pupil coordinates with its derivatives by the two pupil coordinates.
     pub fn dual_ray(&self, p: [f64; 2]) -> Option<Ray<Dual2>> {
-        let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
+        self.dual_place(p).map(|q| self.source.ray(q))
+    }
+
+    fn dual_place(&self, p: [f64; 2]) -> Option<[Dual2; 2]> {
         if self.aiming != Aiming::Stop {
-            return Some(self.source.ray(self.chart.map(variables)));
+            let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
+            return Some(self.chart.map(variables));
         }
         let found = self.aim(p)?;
         let chart = found.chart(self.bench.stop_radius())?;
-        let q = |i: usize| Dual2 {
+        Some([0, 1].map(|i| Dual2 {
             value: found.q[i],
             slope: [chart.columns[0][i], chart.columns[1][i]],
-        };
-        Some(self.source.ray([q(0), q(1)]))
+        }))
     }
 
     /// Where the ray at these pupil coordinates crosses the stop, clipped by nothing.
