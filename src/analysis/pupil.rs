@@ -1,7 +1,7 @@
 //! The pupil: which rays of a field get through, what ends them, and how much light that is.
 //!
-//! Everything is in mm in the plane through the first vertex, across the beam where it grazes that
-//! plane, so that pupils of several fields and of other programs can be laid over each other.
+//! Everything is in mm in the plane through the first vertex, or across the beam where the field is
+//! wide, so that pupils of several fields can be laid over each other.
 
 use super::Estimate;
 use crate::lens::Field;
@@ -20,7 +20,7 @@ pub struct Pupil {
     /// The rim of the unit disc of the pupil coordinates: what would get through if the ideal
     /// entrance pupil alone limited the beam. Closed, in mm; empty where no ray can be started.
     pub disc: Vec<[f64; 2]>,
-    /// Whether mm are counted across the beam, which grazes the plane through the first vertex.
+    /// Whether mm are counted across the beam instead of in the plane through the first vertex.
     pub across: bool,
     /// Rays traced for all of it.
     pub rays: usize,
@@ -75,6 +75,9 @@ const CELLS: usize = 45;
 /// Rings of the pattern that tells where the rays of a dark field end.
 const RINGS: usize = 6;
 
+/// No sum over rays is more exact than this, relatively.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// The pupil of a field at a wavelength; the area is as exact as asked for.
 pub fn pupil(bench: &Bench, field: Field, wavelength: usize, accuracy: Accuracy) -> Pupil {
     match bench.launch(field, wavelength) {
@@ -94,7 +97,11 @@ fn of(region: Region<'_>, accuracy: Accuracy) -> Pupil {
     let extent = region.extent(accuracy);
     let (form, drawn) = form(&region);
     let light = extent.map(|found| {
-        let number = |i: usize| Estimate::new(found.values[i], found.errors[i], found.rays);
+        let size = [found.values[0], found.values[0].sqrt(), found.values[0].sqrt()];
+        let number = |i: usize| {
+            let rounding = ROUNDING * size[i];
+            Estimate::new(found.values[i], found.errors[i].max(rounding), found.rays)
+        };
         Light { area: number(0), centroid: [number(1), number(2)] }
     });
     let searched = extent.map_or(region.rays, |found| found.rays);
@@ -104,7 +111,7 @@ fn of(region: Region<'_>, accuracy: Accuracy) -> Pupil {
         form,
         light,
         disc: launch.rim(POINTS / 2),
-        across: launch.is_grazing(),
+        across: launch.is_across(),
         rays: searched + drawn,
     }
 }

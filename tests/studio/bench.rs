@@ -42,7 +42,13 @@ pub(super) fn stand<P: Panel + 'static>(panel: P, view: View) -> Harness<'static
     let state = Stand { panel, view, wishes: Vec::new() };
     let builder = Harness::builder().with_size([900.0, 620.0]).with_context_setup(theme::dress);
     let show = |ui: &mut eframe::egui::Ui, stand: &mut Stand<P>| {
+        let before = stand.wishes.len();
         stand.panel.ui(ui, &stand.view, &mut stand.wishes);
+        for wish in &stand.wishes[before..] {
+            if let Command::Select(surface) = wish {
+                stand.view.selected = *surface;
+            }
+        }
     };
     builder.build_ui_state(show, state)
 }
