@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use aplanat::files;
 use aplanat::lens::Lens;
-use aplanat::session::{Command, Results, View, compute};
+use aplanat::session::{Command, Results, Settings, View, compute};
 use aplanat::studio::panels::Panel;
 use aplanat::studio::theme;
 use egui_kittest::Harness;
@@ -15,10 +15,11 @@ pub(super) fn double_gauss() -> Lens {
     files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens
 }
 
-/// A view of a lens with all its numbers.
+/// A view of a lens with all its numbers, those of its pupils too.
 pub(super) fn view_of(lens: Lens) -> View {
     let lens = Arc::new(lens);
-    let view = View { lens: Arc::clone(&lens), version: 1, ..View::default() };
+    let settings = Settings { pupils: true, ..Settings::default() };
+    let view = View { lens: Arc::clone(&lens), version: 1, settings, ..View::default() };
     let (version, settings) = (view.version, view.settings.clone());
     let numbers = compute(&lens, &settings);
     let results = Results { version, lens, settings, numbers, ms: 1.0 };

@@ -18,10 +18,10 @@ use crate::studio::palette::{Palette, color32};
 use crate::studio::wording::{capital, counted_from_one};
 use picture::{Picture, Window};
 
-/// The field of a cell above, four lines of numbers below; a fifth one where a pupil has more
-/// limits than fit in one.
+/// The field of a cell above, four lines of numbers below; more where a pupil has more limits than
+/// fit in one.
 const WORDS: Words = Words { above: 20.0, below: 62.0 };
-const LINE: f32 = 15.0;
+const LINE: f32 = 14.0;
 /// The scale bar is at most this share of a picture's width, to stand in its corner.
 const BAR: f64 = 0.3;
 
@@ -176,10 +176,10 @@ impl Shown<'_> {
     fn legend(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
         let palette = Palette::of(ui.visuals());
         ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
             for limit in limits(self.pupils) {
-                swatch(ui, self.color(&palette, limit));
-                let label =
-                    ui.selectable_label(self.is_selected(limit), capital(&self.name(limit)));
+                let (color, name) = (self.color(&palette, limit), capital(&self.name(limit)));
+                let label = words::entry(ui, color, name, self.is_selected(limit));
                 if label.on_hover_text(words::hint(limit)).clicked() {
                     self.select(limit, wishes);
                 }
@@ -191,13 +191,12 @@ impl Shown<'_> {
     fn room(&self, ui: &Ui, rect: Rect) -> (Words, Vec<Rect>) {
         let fields = &self.pupils.fields;
         let cells = WORDS.cells(rect, fields.len());
-        let overflows = |(pupil, cell): (&Timed<Pupil>, &Rect)| {
-            self.overflows(ui, &pupil.value, WORDS.below(*cell).width())
+        let lines = |(pupil, cell): (&Timed<Pupil>, &Rect)| {
+            self.lines(ui, &pupil.value, WORDS.below(*cell).width())
         };
-        if !fields.iter().zip(&cells).any(overflows) {
-            return (WORDS, cells);
-        }
-        let words = Words { below: WORDS.below + LINE, ..WORDS };
+        let most = fields.iter().zip(&cells).map(lines).max().unwrap_or(1);
+        let below = WORDS.below + LINE * (most - 1) as f32;
+        let words = Words { below, ..WORDS };
         (words, words.cells(rect, fields.len()))
     }
 

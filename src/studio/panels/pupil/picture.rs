@@ -133,21 +133,23 @@ impl<'a> Picture<'a> {
         let palette = Palette::of(ui.visuals());
         let painter = ui.painter_at(self.rect);
         painter.rect_filled(self.rect, 0.0, color32(palette.background));
+        if matches!(self.pupil.form, Form::Dark(_) | Form::Endless | Form::NoRays(_)) {
+            return;
+        }
         self.paint_axes(&painter, &palette);
+        self.paint_disc(&painter, &palette);
         let lit = color32(palette.glass).gamma_multiply(0.8);
         match &self.pupil.form {
             Form::Outlined(outline) => {
                 painter.add(self.filled(outline, lit));
-                self.paint_disc(&painter, &palette);
                 self.paint_sides(ui, outline, |limit| color(&palette, limit), bold);
             }
             Form::Ragged { dots, .. } => {
-                self.paint_disc(&painter, &palette);
                 let dot = color32(palette.outline);
                 let dots = dots.iter().map(|p| Shape::circle_filled(self.place(*p), 1.3, dot));
                 painter.extend(dots);
             }
-            Form::Dark(_) | Form::Endless | Form::NoRays(_) => self.paint_disc(&painter, &palette),
+            Form::Dark(_) | Form::Endless | Form::NoRays(_) => {}
         }
         if let Some(light) = &self.pupil.light {
             let at = self.place([light.centroid[0].value, light.centroid[1].value]);

@@ -1,7 +1,11 @@
 //! The words around a pupil: its field, its numbers, and what is wrong where no light gets through.
 
-use eframe::egui::text::{LayoutJob, TextFormat};
-use eframe::egui::{Align, Label, Layout as Arrange, Rect, RichText, TextStyle, Ui, vec2};
+use std::sync::Arc;
+
+use eframe::egui::{
+    Align, Color32, Galley, Layout as Arrange, Rect, Response, RichText, Role, Sense, TextStyle,
+    Ui, Vec2, WidgetInfo, vec2,
+};
 
 use super::super::{field_name, relative_error};
 use super::{Shown, within};
@@ -14,6 +18,8 @@ use crate::trace::{Fate, Hurdle};
 
 /// The gap between two limits in a line, in points.
 const GAP: f32 = 7.0;
+/// The room that the square in front of a limit takes.
+const MARK: f32 = 12.0;
 
 /// What a limit is, for somebody who points at it.
 pub(super) const fn hint(limit: Limit) -> &'static str {
@@ -43,6 +49,7 @@ impl Shown<'_> {
     /// The numbers below a picture.
     pub(super) fn numbers(&self, ui: &mut Ui, field: usize) {
         ui.spacing_mut().item_spacing.y = 1.0;
+        ui.spacing_mut().interact_size.y = 0.0;
         let pupil = &self.pupils.fields[field];
         if let Some(light) = &pupil.value.light {
             self.area(ui, &pupil.value, light);
@@ -81,29 +88,36 @@ impl Shown<'_> {
 
     /// What limits the pupil and over what share of its edge.
     fn shares(&self, ui: &mut Ui, outline: &Outline) {
+        let palette = Palette::of(ui.visuals());
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing = vec2(GAP, 1.0);
             for (limit, share) in outline.limits() {
                 let long = format!("{}: {:.1} % of the edge", self.name(limit), 100.0 * share);
-                let part = self.share(ui, outline, limit, share);
-                ui.add(Label::new(part).extend()).on_hover_text(capital(&long));
+                let text = self.share(outline, limit, share);
+                marked(ui, self.color(&palette, limit), text).on_hover_text(capital(&long));
             }
         });
     }
 
-    /// Whether the shares of a pupil take more than a line of such a width.
-    pub(super) fn overflows(&self, ui: &Ui, pupil: &Pupil, width: f32) -> bool {
-        let Form::Outlined(outline) = &pupil.form else { return false };
-        let long = |(limit, share)| {
-            GAP + ui.painter().layout_job(self.share(ui, outline, limit, share)).size().x
-        };
-        outline.limits().into_iter().map(long).sum::<f32>() > width
+    /// How many lines of such a width the shares of a pupil take.
+    pub(super) fn lines(&self, ui: &Ui, pupil: &Pupil, width: f32) -> usize {
+        let Form::Outlined(outline) = &pupil.form else { return 1 };
+        let (mut lines, mut used) = (1, 0.0);
+        for (limit, share) in outline.limits() {
+            let text = laid_out(ui, self.share(outline, limit, share), &TextStyle::Small);
+            let long = MARK + text.size().x;
+            if used > 0.0 && used + long > width {
+                (lines, used) = (lines + 1, 0.0);
+            }
+            used += long + GAP;
+        }
+        lines
     }
 
-    /// One limit with its share, the square in front in its colour.
-    fn share(&self, ui: &Ui, outline: &Outline, limit: Limit, share: f64) -> LayoutJob {
+    /// One limit with its share, as short as can be.
+    fn share(&self, outline: &Outline, limit: Limit, share: f64) -> String {
         let who = match limit {
-            Limit::Disc if outline.is_clear() => "clear disc".to_owned(),
+            Limit::Disc if outline.is_clear() => return "clear disc".to_owned(),
             Limit::Disc => "pupil".to_owned(),
             Limit::Surface(i, Hurdle::Rim) if i == self.bench().stop() => "stop".to_owned(),
             Limit::Surface(i, Hurdle::Rim) => (i + 1).to_string(),
@@ -111,13 +125,7 @@ impl Shown<'_> {
             Limit::Surface(i, Hurdle::Reflection) => format!("{} TIR", i + 1),
             Limit::Unaimed => "unaimed".to_owned(),
         };
-        let words = if outline.is_clear() { who } else { format!("{who} {:.0} %", 100.0 * share) };
-        let font = TextStyle::Small.resolve(ui.style());
-        let format = |color| TextFormat::simple(font.clone(), color);
-        let mut job = LayoutJob::default();
-        job.append("■", 0.0, format(self.color(&Palette::of(ui.visuals()), limit)));
-        job.append(&words, 3.0, format(ui.visuals().text_color()));
-        job
+        format!("{who} {:.0} %", 100.0 * share)
     }
 
     /// What stands in a picture in which there is nothing to draw.
@@ -189,6 +197,43 @@ impl Shown<'_> {
             hint(limit)
         )
     }
+}
+
+/// Words, not yet in the window.
+fn laid_out(ui: &Ui, text: String, style: &TextStyle) -> Arc<Galley> {
+    let font = style.resolve(ui.style());
+    ui.painter().layout_no_wrap(text, font, ui.visuals().text_color())
+}
+
+/// Small words with a square in front that no end of a line parts from them.
+fn marked(ui: &mut Ui, color: Color32, text: String) -> Response {
+    let words = laid_out(ui, text, &TextStyle::Small);
+    let (rect, response) = ui.allocate_exact_size(words.size() + vec2(MARK, 0.0), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, words.text()));
+    paint_marked(ui, rect, color, words);
+    response
+}
+
+/// The same as a button that may be chosen.
+pub(super) fn entry(ui: &mut Ui, color: Color32, text: String, chosen: bool) -> Response {
+    let words = laid_out(ui, text, &TextStyle::Body);
+    let edge = vec2(4.0, 2.0);
+    let size = words.size() + vec2(MARK, 0.0) + 2.0 * edge;
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let info = || WidgetInfo::selected(Role::Button, true, chosen, words.text());
+    response.widget_info(info);
+    let visuals = ui.style().interact_selectable(&response, chosen);
+    if chosen || response.hovered() || response.has_focus() {
+        ui.painter().rect_filled(rect, visuals.corner_radius, visuals.weak_bg_fill);
+    }
+    paint_marked(ui, rect.shrink2(edge), color, words);
+    response
+}
+
+fn paint_marked(ui: &Ui, rect: Rect, color: Color32, words: Arc<Galley>) {
+    let mark = Rect::from_center_size(rect.left_center() + vec2(4.5, 0.0), Vec2::splat(8.0));
+    ui.painter().rect_filled(mark, 1.0, color);
+    ui.painter().galley(rect.min + vec2(MARK, 0.0), words, ui.visuals().text_color());
 }
 
 fn torn(pieces: usize) -> String {
