@@ -7,7 +7,9 @@
 mod picture;
 mod words;
 
-use eframe::egui::{Align, ComboBox, Id, Layout as Arrange, Rect, Response, Sense, Ui, WidgetInfo};
+use eframe::egui::{
+    Align, ComboBox, Id, Layout as Arrange, Rect, Response, Sense, Ui, WidgetInfo, vec2,
+};
 
 use super::cells::{Words, bar, within};
 use super::{Panel, no_numbers, shown, swatch, zoom_name};
