@@ -81,7 +81,7 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// The pupil of a field at a wavelength; the area is as exact as asked for.
 pub fn pupil(bench: &Bench, field: Field, wavelength: usize, accuracy: Accuracy) -> Pupil {
     match bench.launch(field, wavelength) {
-        Ok(launch) => of(Region::new(launch), accuracy),
+        Ok(launch) => of(&Region::new(launch), accuracy),
         Err(why) => Pupil {
             field,
             form: Form::NoRays(why),
@@ -93,9 +93,9 @@ pub fn pupil(bench: &Bench, field: Field, wavelength: usize, accuracy: Accuracy)
     }
 }
 
-fn of(region: Region<'_>, accuracy: Accuracy) -> Pupil {
+fn of(region: &Region<'_>, accuracy: Accuracy) -> Pupil {
     let extent = region.extent(accuracy);
-    let (form, drawn) = form(&region);
+    let (form, drawn) = form(region);
     let light = extent.map(|found| {
         let size = [found.values[0], found.values[0].sqrt(), found.values[0].sqrt()];
         let number = |i: usize| {
