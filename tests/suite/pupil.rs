@@ -3,8 +3,8 @@
 use crate::reference::{Reference, Worst, count, lenses, number, numbers};
 use aplanat::lens::{ASPHERE_TERMS, Aperture, Field, FieldKind, Object, Shape, Surface, System};
 use aplanat::paraxial::Beam;
-use aplanat::pupil::{Accuracy, Aiming, Bench, Kind, Pattern, Region, pattern};
-use aplanat::trace::{Points, Rays, Sink};
+use aplanat::pupil::{Accuracy, Aiming, Bench, Kind, Limit, Pattern, Region, pattern};
+use aplanat::trace::{Hurdle, Points, Rays, Sink};
 
 /// Relative to the RMS radius, or to the height of a centroid. One unit of a ray's rounding comes on
 /// top: a spot of 0.2 µm behind a pupil of 2.4 m has no eleven digits in double precision.
@@ -188,6 +188,105 @@ fn a_pupil_cut_by_a_distant_rim_is_the_overlap_of_two_discs() {
         let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
         let exact = overlap(5.0, 10.0 + offset, 10.0) / 25.0;
         assert!((area(&region) - exact).abs() < 1e-12, "{offset}: {} {exact}", area(&region));
+    }
+}
+
+/// A stop of radius 5 and a rim of radius `rim` 100 mm behind it, the centre of whose shadow lies
+/// 10 mm from the middle of the stop.
+fn vignetted(rim: f64, turn: f64) -> (Bench, Field) {
+    let edge = 0.1f64.atan().to_degrees();
+    let rows = [(0.0, 100.0, 1.0, 5.0), (0.0, 50.0, 1.0, rim)];
+    let bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
+    (bench, Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+}
+
+#[test]
+fn the_sides_of_an_outline_are_as_long_as_the_arcs_of_two_discs() {
+    for (rim, turn) in [(8.0, 0.0), (10.0, 0.0), (10.0, 0.7), (12.0, -2.0)] {
+        let (bench, field) = vignetted(rim, turn);
+        let region = Region::new(bench.launch(field, 0).unwrap());
+        let outline = region.outline(128).unwrap();
+        let (stop, clips) = (Limit::Surface(0, Hurdle::Rim), Limit::Surface(1, Hurdle::Rim));
+        assert_eq!(outline.sides.len(), 2, "{rim} {turn}");
+        // Half the angle that each arc spans about its own centre.
+        let half = |r: f64, s: f64| ((100.0 + r * r - s * s) / (20.0 * r)).acos();
+        let (a, b) = (10.0 * half(5.0, rim), 2.0 * rim * half(rim, 5.0));
+        for (limit, exact) in [(stop, a), (clips, b)] {
+            let share = outline.share(limit);
+            assert!((share - exact / (a + b)).abs() < 3e-6, "{rim} {turn} {limit:?} {share}");
+        }
+        let total: f64 = outline.limits().iter().map(|(_, share)| share).sum();
+        assert!((total - 1.0).abs() < 1e-12);
+        assert_eq!(outline.corners().count(), 2);
+        let first = &outline.sides[0];
+        let second = &outline.sides[1];
+        let gap = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        assert!(gap(first.points.last().unwrap(), &second.points[0]) < 1e-6);
+        assert!(gap(second.points.last().unwrap(), &first.points[0]) < 1e-6);
+        for [x, y] in &outline.sides.iter().find(|s| s.limit == stop).unwrap().points {
+            // A corner is located to a billionth of the radius.
+            assert!((x.hypot(*y) - 5.0).abs() < 2e-8, "on the rim of the stop, in mm: {x} {y}");
+        }
+    }
+}
+
+#[test]
+fn the_extent_of_a_pupil_is_in_square_millimetres_about_its_centroid() {
+    let accuracy = Accuracy { tolerance: 1e-10, most_rays: 100_000 };
+    for (rim, turn) in [(10.0, 0.0), (8.0, 0.7)] {
+        let (bench, field) = vignetted(rim, turn);
+        let region = Region::new(bench.launch(field, 0).unwrap());
+        let found = region.extent(accuracy).unwrap();
+        let exact = overlap(5.0, rim, 10.0);
+        assert!((found.values[0] - exact).abs() < 1e-9 * exact, "{} {exact}", found.values[0]);
+        // The first moments of two circular segments, about the middle of the stop.
+        let segment = |r: f64, s: f64| {
+            2.0 / 3.0 * (r * ((100.0 + r * r - s * s) / (20.0 * r)).acos().sin()).powi(3)
+        };
+        let (near, far) = (segment(5.0, rim), segment(rim, 5.0));
+        let centre = (10.0 * (exact - lone(5.0, rim)) - far + near) / exact;
+        let out = found.values[1].hypot(found.values[2]);
+        assert!((out - centre).abs() < 1e-8, "{out} {centre}");
+    }
+}
+
+/// The area of the segment of a disc of radius `r` that a chord shared with a disc of radius `s`,
+/// 10 mm away, cuts off.
+fn lone(r: f64, s: f64) -> f64 {
+    let half = ((100.0 + r * r - s * s) / (20.0 * r)).acos();
+    r * r * (half - half.sin() * half.cos())
+}
+
+#[test]
+fn a_clear_pupil_is_a_disc_of_the_aperture() {
+    let rows = [(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, f64::INFINITY)];
+    let aperture = Aperture::EntrancePupilDiameter(10.0);
+    for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
+        let bench = bench(system(&rows, 1), aperture, 20.0, aiming);
+        let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+        let outline = region.outline(64).unwrap();
+        assert!(outline.is_clear() && outline.corners().count() == 0);
+        assert_eq!(outline.limits(), [(Limit::Disc, 1.0)]);
+        let [area, x, y] = region.extent(Accuracy::default()).unwrap().values;
+        // In air, the plane of the stop is seen from the first vertex undistorted.
+        assert!((area / (25.0 * std::f64::consts::PI) - 1.0).abs() < 1e-12, "{aiming:?} {area}");
+        assert!(x.abs() < 1e-12 && (y + 100.0 * 20f64.to_radians().tan()).abs() < 1e-9, "{y}");
+    }
+}
+
+#[test]
+fn limits_have_names() {
+    let (bench, _) = vignetted(8.0, 0.0);
+    let cases = [
+        (Limit::Disc, "entrance pupil"),
+        (Limit::Surface(0, Hurdle::Rim), "stop, surface 0"),
+        (Limit::Surface(1, Hurdle::Rim), "rim of surface 1"),
+        (Limit::Surface(1, Hurdle::Miss), "missed surface 1"),
+        (Limit::Surface(1, Hurdle::Reflection), "critical angle at surface 1"),
+        (Limit::Unaimed, "no ray to the stop"),
+    ];
+    for (limit, name) in cases {
+        assert_eq!(bench.limit_name(limit), name);
     }
 }
 
