@@ -7,15 +7,18 @@
 //! Design* (thesis, Carnegie Mellon University), whose figure numbers name the experiments.
 
 mod aperture_stop;
+mod entrance_pupil;
 mod outcome;
 mod section;
 
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
 
+use crate::files;
+use crate::lens::Lens;
 use std::ops::ControlFlow;
 
 /// Every experiment, in the order of the thesis. A new one is a file and a line here.
-pub const ALL: &[Experiment] = &[aperture_stop::EXPERIMENT];
+pub const ALL: &[Experiment] = &[aperture_stop::EXPERIMENT, entrance_pupil::EXPERIMENT];
 
 /// A figure or table of the thesis.
 #[derive(Debug, Clone, Copy)]
@@ -95,4 +98,11 @@ fn report(watch: &mut Watch<'_>, done: f64, doing: &str) -> Result<(), Ended> {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(Ended::Stopped),
     }
+}
+
+/// A lens of the library.
+fn lens(name: &str) -> Result<Lens, Ended> {
+    let bundled = files::library().iter().find(|bundled| bundled.name == name);
+    let bundled = bundled.ok_or_else(|| Ended::Failed(format!("no lens `{name}` is bundled")))?;
+    files::native::read(bundled.text, name).map_err(Ended::from_error)
 }

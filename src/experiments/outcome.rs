@@ -181,7 +181,7 @@ impl From<String> for Cell {
 impl Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Number(value) if value.is_finite() => write!(f, "{value}"),
+            Self::Number(value) if value.is_finite() => write!(f, "{value:?}"),
             Self::Number(_) => Ok(()),
             Self::Word(word) => f.write_str(word),
         }

@@ -71,3 +71,13 @@ fn the_stop_closes_with_the_unbiased_gradient_alone() {
     assert!(unbiased[unbiased.len() - 1] < 0.1 * unbiased[0]);
     assert!(biased.iter().all(|radius| *radius == biased[0]) && biased[0] == unbiased[0]);
 }
+
+#[test]
+fn the_pupil_gains_corners_and_loses_area() {
+    let outcome = outcome("3.4");
+    let [corners, area, bitmap] =
+        ["corners", "area_mm2", "bitmap_area_mm2"].map(|name| column(&outcome.tables[0], name));
+    let last = corners.len() - 1;
+    assert!(corners[0] == 0.0 && corners[last] > 0.0 && area[last] < 0.9 * area[0]);
+    assert!(area.iter().zip(&bitmap).all(|(a, b)| (a / b - 1.0).abs() < 2e-3));
+}
