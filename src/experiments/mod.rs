@@ -8,6 +8,7 @@
 
 mod aperture_stop;
 mod entrance_pupil;
+mod gradient_image;
 mod outcome;
 mod section;
 
@@ -18,7 +19,8 @@ use crate::lens::Lens;
 use std::ops::ControlFlow;
 
 /// Every experiment, in the order of the thesis. A new one is a file and a line here.
-pub const ALL: &[Experiment] = &[aperture_stop::EXPERIMENT, entrance_pupil::EXPERIMENT];
+pub const ALL: &[Experiment] =
+    &[aperture_stop::EXPERIMENT, entrance_pupil::EXPERIMENT, gradient_image::EXPERIMENT];
 
 /// A figure or table of the thesis.
 #[derive(Debug, Clone, Copy)]

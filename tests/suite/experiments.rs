@@ -81,3 +81,12 @@ fn the_pupil_gains_corners_and_loses_area() {
     assert!(corners[0] == 0.0 && corners[last] > 0.0 && area[last] < 0.9 * area[0]);
     assert!(area.iter().zip(&bitmap).all(|(a, b)| (a / b - 1.0).abs() < 2e-3));
 }
+
+#[test]
+fn images_have_derivatives_that_the_biased_ones_miss() {
+    let outcome = outcome("3.5");
+    let names = ["by_stop_boundary_mm", "by_stop_difference_mm", "by_stop_biased_mm"];
+    let [boundary, difference, biased] = names.map(|name| column(&outcome.tables[0], name));
+    assert!(biased.iter().all(|v| *v == 0.0) && difference.iter().all(|v| *v > 0.1));
+    assert!(boundary.iter().zip(&difference).all(|(a, b)| (a / b - 1.0).abs() < 1e-3));
+}
