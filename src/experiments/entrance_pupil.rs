@@ -40,7 +40,7 @@ const ASKEW: [f64; 2] = [0.31, 0.17];
 const SIGMAS: f64 = 4.0;
 
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let (fields, cells) = effort.pick((13, 400), (5, 150));
+    let (fields, cells): (usize, usize) = effort.pick((13, 400), (5, 150));
     let bench = Bench::of(&lens(LENS)?, 0).map_err(Ended::from_error)?;
     let mut pupils = Vec::new();
     for i in 0..fields {
