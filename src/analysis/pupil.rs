@@ -127,7 +127,7 @@ fn form(region: &Region<'_>) -> (Form, usize) {
             // The edge is followed ray by ray, and one of them was not found.
             None => ragged(region, 1, ([0.0; 2], 1.0)),
         },
-        Kind::Ragged { pieces, square } => ragged(region, *pieces, *square),
+        Kind::Ragged { pieces, square, .. } => ragged(region, *pieces, *square),
         Kind::Dark => {
             let loss = loss(&region.launch);
             (Form::Dark(loss), loss.rays)

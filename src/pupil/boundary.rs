@@ -114,6 +114,8 @@ const AT_DISC: f64 = 1e-10;
 const CORNER: f64 = 1e-11;
 /// A step along the radius that is rounding, relatively.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Two edges as close as that differ by less than this, relatively, unless the edge jumps.
+const JUMP: f64 = 1e-5;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.
 pub(super) const NEAR: f64 = 0.003;
 /// How far inside the edge, relatively, margins are looked at.
@@ -127,9 +129,45 @@ pub(super) const MOST_ARCS: usize = 24;
 /// A pupil that reaches this far, in its frame, is limited by nothing.
 const ENDLESS: f64 = 1e4;
 
+/// Which limits a search for the edge looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Seen {
+    /// All.
+    All,
+    /// All but the obstructions.
+    Rims,
+    /// The obstructions alone, from inside: the edge is where their shadow ends.
+    Shadow,
+}
+
 impl Launch<'_> {
     /// Whether the ray at `p` gets through, and its margin at one limit.
     pub(super) fn probe(&self, p: [f64; 2], wanted: Limit) -> Probe {
+        self.probe_seeing(p, wanted, |_| true)
+    }
+
+    /// Whether the ray at `p` is in no shadow, with margins that are negative there.
+    fn probe_shadow(&self, p: [f64; 2], wanted: Limit) -> Probe {
+        let mut probe = Probe { failed: None, wanted: f64::NAN };
+        let Some(ray) = self.ray(p) else { return probe };
+        let mut deepest: Option<(Limit, f64)> = None;
+        self.color().tracer.margins(ray, |surface, hurdle, margin| {
+            if hurdle != Hurdle::Obstruction {
+                return;
+            }
+            let limit = Limit::Surface(surface, hurdle);
+            if limit == wanted {
+                probe.wanted = -margin;
+            }
+            if deepest.is_none_or(|(_, least)| margin < least) {
+                deepest = Some((limit, margin));
+            }
+        });
+        probe.failed = deepest.filter(|(_, m)| *m >= 0.0).map(|(limit, margin)| (limit, -margin));
+        probe
+    }
+
+    fn probe_seeing(&self, p: [f64; 2], wanted: Limit, sees: impl Fn(Hurdle) -> bool) -> Probe {
         let Some(ray) = self.ray(p) else {
             return Probe { failed: Some((Limit::Unaimed, -1.0)), wanted: f64::NAN };
         };
@@ -139,7 +177,7 @@ impl Launch<'_> {
             if limit == wanted {
                 probe.wanted = margin;
             }
-            if probe.failed.is_none() && !(margin >= 0.0) {
+            if probe.failed.is_none() && !(margin >= 0.0) && sees(hurdle) {
                 probe.failed = Some((limit, if margin < 0.0 { margin } else { -1.0 }));
             }
         });
@@ -165,16 +203,27 @@ pub(super) struct Search<'a> {
     pub(super) launch: &'a Launch<'a>,
     pub(super) frame: Frame,
     pub(super) rays: usize,
+    seen: Seen,
 }
 
 impl<'a> Search<'a> {
     pub(super) fn new(launch: &'a Launch<'a>, frame: Frame) -> Self {
-        Self { launch, frame, rays: 0 }
+        Self { launch, frame, rays: 0, seen: Seen::All }
+    }
+
+    /// The same search for another edge.
+    pub(super) fn seeing(self, seen: Seen) -> Self {
+        Self { seen, ..self }
     }
 
     fn probe(&mut self, azimuth: f64, r: f64, wanted: Limit) -> Probe {
         self.rays += 1;
-        self.launch.probe(self.frame.point(azimuth, r), wanted)
+        let p = self.frame.point(azimuth, r);
+        match self.seen {
+            Seen::All => self.launch.probe(p, wanted),
+            Seen::Rims => self.launch.probe_seeing(p, wanted, |h| h != Hurdle::Obstruction),
+            Seen::Shadow => self.launch.probe_shadow(p, wanted),
+        }
     }
 
     /// Where the radius leaves the unit disc; infinite where the disc is no limit.
@@ -200,7 +249,7 @@ impl<'a> Search<'a> {
         let mut high = (guess * (1.0 + spread)).min(last);
         loop {
             if let Some(failed) = self.probe(azimuth, high, Limit::Disc).failed {
-                let from = if low > 0.0 { low } else { guess * (1.0 - spread) };
+                let from = if low > 0.0 { low } else { guess.min(high) * (1.0 - spread) };
                 return Some(self.between(azimuth, from, high, failed));
             }
             if high >= last {
@@ -402,7 +451,11 @@ impl<'a> Search<'a> {
             return Some(());
         }
         let middle = 0.5 * (a.0 + b.0);
-        let found = if b.0 - a.0 <= CORNER { Some(middle) } else { self.corner(a, b) };
+        let next = b.0 - a.0 <= CORNER;
+        if next && hides_light(a.1, b.1) {
+            return None;
+        }
+        let found = if next { Some(middle) } else { self.corner(a, b) };
         if let Some(corner) = found {
             let end = arcs.last_mut().map(|arc| std::mem::replace(&mut arc.to, corner))?;
             arcs.push(Arc { from: corner, to: end, limit: b.1.limit });
@@ -413,6 +466,14 @@ impl<'a> Search<'a> {
         self.corners(a, between, arcs)?;
         self.corners(between, b, arcs)
     }
+}
+
+/// Whether the edge jumps from the near side of a shadow to what ends the pupil behind it: there
+/// is light behind the shadow that the centre does not see. The two edges are next to a corner.
+fn hides_light(a: Edge, b: Edge) -> bool {
+    let shadow = |edge: Edge| matches!(edge.limit, Limit::Surface(_, Hurdle::Obstruction));
+    let jump = (a.radius - b.radius).abs() > JUMP * a.radius.max(b.radius);
+    jump && (shadow(a) || shadow(b))
 }
 
 /// Where margins dip between rays at equal steps of azimuth, in steps from the first of them: the

@@ -5,7 +5,7 @@
 //! an object point the plane of the entrance pupil; in a telecentric beam `q` is the slope. A chart
 //! leads from pupil coordinates to that plane.
 
-use super::aim::{Aimed, aimed};
+use super::aim::{Aimed, aimed, solve};
 use super::bench::{Aiming, Bench, Color, Dual2};
 use crate::lens::{Field, FieldKind, Object};
 use crate::math::Real;
@@ -101,6 +101,11 @@ impl Chart {
             R::from_f64(self.origin[i]) + R::from_f64(a[i]) * p[0] + R::from_f64(b[i]) * p[1]
         };
         [row(0), row(1)]
+    }
+
+    fn inverse(&self, q: [f64; 2]) -> Option<[f64; 2]> {
+        let [[a, b], [c, d]] = self.columns;
+        solve([[a, c], [b, d]], [q[0] - self.origin[0], q[1] - self.origin[1]])
     }
 }
 
@@ -303,7 +308,27 @@ impl<'a> Launch<'a> {
 
     fn aim(&self, p: [f64; 2]) -> Option<Aimed> {
         let radius = self.bench.stop_radius();
-        aimed(self.bench, self.wavelength, &self.source, self.chart.map(p), p.map(|v| v * radius))
+        let (guess, target) = (self.chart.map(p), p.map(|v| v * radius));
+        aimed(self.bench, self.wavelength, &self.source, self.bench.stop(), guess, target)
+    }
+
+    /// The pupil point whose ray, clipped by nothing, goes through the vertex of a surface, inside
+    /// the pupil or not; `None` where none was found.
+    pub(super) fn through_vertex(&self, surface: usize) -> Option<[f64; 2]> {
+        let (bench, source) = (self.bench, &self.source);
+        let search = |start: [f64; 2]| {
+            let guess = self.chart.map(start);
+            aimed(bench, self.wavelength, source, surface, guess, [0.0; 2])
+        };
+        let starts = [[0.0, 0.0], [0.0, 0.9], [0.0, -0.9], [0.9, 0.0], [-0.9, 0.0]];
+        let q = starts.into_iter().find_map(search)?.q;
+        if self.aiming != Aiming::Stop {
+            return self.chart.inverse(q);
+        }
+        let landing = self.color().open.trace_to(source.ray(q.map(Dual2::constant)), bench.stop());
+        let point = landing.ray.point.value();
+        let radius = bench.stop_radius();
+        landing.fate.is_imaged().then_some([point.x / radius, point.y / radius])
     }
 
     /// The real ray through the centre of the stop, followed from the axis to the field.
@@ -340,7 +365,8 @@ impl<'a> Launch<'a> {
         let paraxial = paraxial_chart(self.bench, &source);
         let shift = walk.predict(fraction);
         let guess = [paraxial.origin[0] + shift[0], paraxial.origin[1] + shift[1]];
-        let mut found = aimed(self.bench, self.wavelength, &source, guess, [0.0; 2])?;
+        let mut found =
+            aimed(self.bench, self.wavelength, &source, self.bench.stop(), guess, [0.0; 2])?;
         found.shift = [found.q[0] - paraxial.origin[0], found.q[1] - paraxial.origin[1]];
         Some(found)
     }

@@ -23,6 +23,7 @@ mod moments;
 mod outline;
 mod quadrature;
 mod region;
+mod ring;
 mod rules;
 mod sample;
 
@@ -35,4 +36,5 @@ pub use moments::Moments;
 pub use outline::{Outline, Side};
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};
+pub use ring::Ring;
 pub use sample::{Pattern, pattern};

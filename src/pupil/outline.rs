@@ -87,6 +87,7 @@ impl Bench {
             Limit::Disc => "entrance pupil".to_owned(),
             Limit::Surface(i, Hurdle::Rim) if i == self.stop() => format!("stop, surface {i}"),
             Limit::Surface(i, Hurdle::Rim) => format!("rim of surface {i}"),
+            Limit::Surface(i, Hurdle::Obstruction) => format!("obstruction of surface {i}"),
             Limit::Surface(i, Hurdle::Miss) => format!("missed surface {i}"),
             Limit::Surface(i, Hurdle::Reflection) => format!("critical angle at surface {i}"),
             Limit::Unaimed => "no ray to the stop".to_owned(),
@@ -116,10 +117,10 @@ impl Region<'_> {
     /// `None` where no light gets through.
     pub fn extent(&self, accuracy: Accuracy) -> Option<Converged<3>> {
         let scales = |[area, ..]: &[f64; 3]| [*area, area.sqrt(), area.sqrt()];
-        converged(self, accuracy, |nodes| self.extent_of(nodes), scales)
+        converged(self, accuracy, |nodes| self.first_moments(nodes), scales)
     }
 
-    fn extent_of(&self, nodes: &Nodes) -> Option<[f64; 3]> {
+    fn first_moments(&self, nodes: &Nodes) -> Option<[f64; 3]> {
         let lit = self.launch.fates(&nodes.points);
         let (mut area, mut sum) = (0.0, [0.0; 2]);
         for ((p, weight), _) in nodes.points.iter().zip(&nodes.weights).zip(lit).filter(|n| n.1) {

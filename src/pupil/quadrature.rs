@@ -112,7 +112,7 @@ impl Region<'_> {
         match self.kind {
             Kind::Dark | Kind::Endless => 0,
             Kind::Clear => CLEAR.len(),
-            Kind::Split(_) => SPLIT.len(),
+            Kind::Split(_) | Kind::Ragged { ring: Some(_), .. } => SPLIT.len(),
             Kind::Ragged { .. } => RAGGED_ORDERS,
         }
     }
@@ -124,7 +124,14 @@ impl Region<'_> {
             Kind::Dark | Kind::Endless => Nodes::default(),
             Kind::Clear => clear(CLEAR[order.min(CLEAR.len() - 1)], mirrored),
             Kind::Split(boundary) => self.split(boundary, SPLIT[order.min(SPLIT.len() - 1)]),
-            Kind::Ragged { square, .. } => ragged(*square, RAGGED << (2 * order)),
+            Kind::Ragged { ring: Some(ring), .. } => {
+                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
+                ring.nodes(&self.launch, azimuths, radii)
+            }
+            Kind::Ragged { square, .. } => {
+                let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };
+                ragged(*square, RAGGED << (2 * order), reach)
+            }
         }
     }
 
@@ -210,19 +217,23 @@ fn clear(order: usize, mirrored: bool) -> Nodes {
     nodes
 }
 
-/// Roberts's additive sequence over a square: points that fill it evenly for any count.
-fn ragged((center, half): ([f64; 2], f64), count: usize) -> Nodes {
+/// Roberts's additive sequence over a square: points that fill it evenly for any count. Those
+/// farther out than `reach`, where no beam is, are left out.
+fn ragged((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
     const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
     let point = |i: usize| {
         [0, 1].map(|k| center[k] + half * (2.0 * (0.5 + STEP[k] * i as f64).fract() - 1.0))
     };
     let weight = 4.0 * half * half / count as f64;
-    Nodes {
-        points: (0..count).map(point).collect(),
-        weights: vec![weight; count],
-        mirrored: false,
-        rays: 0,
-    }
+    let points: Vec<_> = (0..count).map(point).filter(|p| p[0].hypot(p[1]) <= reach).collect();
+    Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
+}
+
+/// The error of clipped points from their last change: four times as many are no more than four
+/// times as good, even where two counts agree by chance.
+fn cautious(change: f64, error_before: f64) -> f64 {
+    let least = if error_before.is_finite() { 0.25 * error_before } else { 0.0 };
+    (2.0 * change).max(least)
 }
 
 /// Raises the order until each of some numbers changes by less than the tolerance times its scale;
@@ -249,10 +260,10 @@ pub fn converged<const K: usize>(
         if let Some(before) = before {
             let scales = scales(&values);
             now.errors = std::array::from_fn(|k| (values[k] - before.values[k]).abs());
-            now.reached = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
-            if matches!(region.kind, Kind::Ragged { .. }) {
-                now.errors = now.errors.map(|e| 2.0 * e);
+            if matches!(region.kind, Kind::Ragged { ring: None, .. }) {
+                now.errors = std::array::from_fn(|k| cautious(now.errors[k], before.errors[k]));
             }
+            now.reached = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
         }
         if now.reached {
             return Some(now);

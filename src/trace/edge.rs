@@ -93,6 +93,7 @@ impl<R: Real> Interface<R> {
         let met = self.meeting(start, k);
         match hurdle {
             Hurdle::Rim => self.rim_margin(met.point),
+            Hurdle::Obstruction => self.obstruction_margin(met.point),
             Hurdle::Reflection => met.a * met.a + self.dn2 * met.m,
             Hurdle::Miss => match self.form {
                 Form::Plane => self.sense * k.z,
@@ -207,6 +208,7 @@ impl Interface<f64> {
             index_behind: behind,
             dn2: (behind - before) * (behind + before),
             rim2: constant(self.rim2),
+            obstruction2: constant(self.obstruction2),
             sheet: constant(self.sheet),
             steepest: self.steepest,
             span: self.span,

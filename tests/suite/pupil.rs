@@ -5,6 +5,7 @@ use aplanat::lens::{ASPHERE_TERMS, Aperture, Field, FieldKind, Object, Shape, Su
 use aplanat::paraxial::Beam;
 use aplanat::pupil::{Accuracy, Aiming, Bench, Kind, Limit, Pattern, Region, pattern};
 use aplanat::trace::{Hurdle, Points, Rays, Sink};
+use std::f64::consts::PI;
 
 /// Relative to the RMS radius, or to the height of a centroid. One unit of a ray's rounding comes on
 /// top: a spot of 0.2 µm behind a pupil of 2.4 m has no eleven digits in double precision.
@@ -150,6 +151,7 @@ fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
         thickness,
         index,
         semi_diameter,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     };
@@ -360,6 +362,125 @@ fn a_pupil_in_two_pieces_is_told_and_sampled() {
     let square: f64 = lit().map(|i| landed.x[i].powi(2) + landed.y[i].powi(2)).sum();
     let rms = (square / lit().count() as f64).sqrt();
     assert!((spot.rms.value - rms).abs() < 3.0 * spot.rms.error + 2e-3 * rms, "{spot:?} {rms}");
+}
+
+/// A disc of radius 5 mm, and 100 mm behind it a plane that is obstructed as far as `inner`: its
+/// shadow lies `away` radii of the disc from the middle.
+fn shadowed(inner: f64, away: f64, turn: f64) -> (Bench, Field) {
+    let mut lens = system(&[(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, f64::INFINITY)], 0);
+    lens.surfaces[1].obstruction = 5.0 * inner;
+    let edge = (0.05 * away).atan().to_degrees();
+    let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
+    (bench, Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+}
+
+/// The area of a pupil, with its error.
+fn lit(bench: &Bench, field: Field, tolerance: f64) -> aplanat::analysis::Estimate {
+    let accuracy = Accuracy { tolerance, most_rays: 300_000 };
+    aplanat::analysis::spot(bench, field, accuracy).unwrap().colors[0].unwrap().area
+}
+
+#[test]
+fn an_annular_pupil_is_one_piece_that_no_point_sees() {
+    for inner in [0.02, 0.1, 0.4, 0.75, 0.95] {
+        for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
+            let mut lens = system(&[(0.0, 50.0, 1.0, 5.0)], 0);
+            lens.surfaces[0].obstruction = 5.0 * inner;
+            let bench = bench(lens, Aperture::StopSemiDiameter(5.0), 1.0, aiming);
+            let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+            assert_ring(&region);
+            let exact = PI * (1.0 - inner * inner);
+            assert!((area(&region) - exact).abs() < 1e-12, "{inner} {aiming:?}");
+            let estimate = lit(&bench, bench.fields[0], 1e-6);
+            assert!((estimate.value - exact).abs() < 1e-9, "{inner} {aiming:?}: {estimate:?}");
+            assert!(estimate.rays < 2000, "{inner} {aiming:?}: {estimate:?}");
+        }
+    }
+}
+
+/// A ring is one piece that no point sees, with two edges.
+fn assert_ring(region: &Region<'_>) {
+    let ring = matches!(region.kind, Kind::Ragged { pieces: 1, ring: Some(_), .. });
+    assert!(ring, "{:?}", region.kind);
+}
+
+#[test]
+fn a_shadow_smaller_than_the_first_look_is_found() {
+    for inner in [0.05, 0.01, 1e-3, 1e-6] {
+        for away in [0.0, 0.043, 0.51, 0.93, 0.9999] {
+            for turn in [0.0f64, 0.2, 2.9] {
+                let (bench, field) = shadowed(inner, away, turn);
+                let region = Region::new(bench.launch(field, 0).unwrap());
+                let whole = away + inner < 1.0;
+                if whole {
+                    assert_ring(&region);
+                    let exact = PI * (1.0 - inner * inner);
+                    let found = lit(&bench, field, 1e-3);
+                    let error = (found.value - exact).abs();
+                    let what = format!("{inner} {away} {turn}: {error:e} {found:?}");
+                    assert!(error <= 3.0 * found.error + 1e-9, "{what}");
+                    // Beside the edge the ring is very narrow on one side.
+                    let best = (area(&region) - exact).abs();
+                    assert!(away > 0.6 || best < 1e-9, "{what} {best:e}");
+                } else {
+                    let ragged = matches!(region.kind, Kind::Ragged { pieces: 1, ring: None, .. });
+                    assert!(ragged, "{inner} {away} {turn}: {:?}", region.kind);
+                }
+            }
+        }
+        // Just outside, and far from it.
+        for away in [1.0 + 1.01 * inner, 3.0, 40.0] {
+            let (bench, field) = shadowed(inner, away, 0.2);
+            let region = Region::new(bench.launch(field, 0).unwrap());
+            assert_eq!(region.kind, Kind::Clear, "{inner} {away}");
+        }
+    }
+}
+
+#[test]
+fn a_shadow_that_bites_the_edge_leaves_a_pupil_that_is_split_where_one_point_sees_it() {
+    let mut split = 0;
+    for (inner, away) in
+        [(2.0, 2.5), (2.0, 2.9), (0.5, 1.3), (0.02, 1.01), (0.2, 1.1), (2.0, 2.0), (0.5, 0.9)]
+    {
+        for turn in [0.0, 0.3] {
+            let (bench, field) = shadowed(inner, away, turn);
+            let region = Region::new(bench.launch(field, 0).unwrap());
+            let exact = PI - overlap(1.0, inner, away);
+            match region.kind {
+                Kind::Split(_) => {
+                    split += 1;
+                    // Slower where the pupil has horns.
+                    assert!((area(&region) - exact).abs() < 1e-7, "{inner} {away} {turn}");
+                }
+                Kind::Ragged { .. } => {
+                    let area = lit(&bench, field, 1e-3);
+                    let error = (area.value - exact).abs();
+                    assert!(error <= 3.0 * area.error, "{inner} {away}: {area:?} {exact}");
+                }
+                kind => panic!("{inner} {away} {turn}: {kind:?}"),
+            }
+        }
+    }
+    assert!(split >= 8, "{split}");
+}
+
+#[test]
+fn a_shadow_across_a_narrow_pupil_leaves_two_pieces() {
+    // The disc and a rim of the same size, 8 mm off; the shadow lies in the middle between them.
+    let rows = [(0.0, 50.0, 1.0, 5.0), (0.0, 50.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, 5.0)];
+    let mut lens = system(&rows, 0);
+    lens.surfaces[1].obstruction = 1.5;
+    let edge = 0.08f64.atan().to_degrees();
+    let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
+    let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+    assert!(matches!(region.kind, Kind::Ragged { pieces: 2, .. }), "{:?}", region.kind);
+}
+
+#[test]
+fn an_obstruction_as_wide_as_the_beam_is_dark() {
+    let (bench, field) = shadowed(1.5, 0.2, 0.0);
+    assert!(Region::new(bench.launch(field, 0).unwrap()).is_dark());
 }
 
 #[test]

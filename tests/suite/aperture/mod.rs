@@ -112,6 +112,7 @@ fn image() -> Surface<f64> {
         thickness: 0.0,
         index: 1.0,
         semi_diameter: f64::INFINITY,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     }

@@ -7,12 +7,12 @@ use eframe::egui::{
     Ui, Vec2, WidgetInfo, vec2,
 };
 
-use super::super::{field_name, relative_error};
 use super::{Shown, within};
 use crate::analysis::{Estimate, Form, Light, Loss, Pupil};
 use crate::pupil::{Limit, Outline};
 use crate::studio::number;
 use crate::studio::palette::Palette;
+use crate::studio::panels::{field_name, relative_error};
 use crate::studio::wording::capital;
 use crate::trace::{Fate, Hurdle};
 
@@ -27,6 +27,9 @@ pub(super) const fn hint(limit: Limit) -> &'static str {
         Limit::Disc => "The beam ends as the aperture of the lens says; no surface clips it there.",
         Limit::Surface(_, Hurdle::Rim) => {
             "The beam ends at the semi-diameter of this surface. Click to point the surface out."
+        }
+        Limit::Surface(_, Hurdle::Obstruction) => {
+            "The obstruction of this surface stops rays nearer to the axis. Click to point it out."
         }
         Limit::Surface(_, Hurdle::Miss) => {
             "Rays beyond pass by this surface without meeting it. Click to point it out."
@@ -121,6 +124,7 @@ impl Shown<'_> {
             Limit::Disc => "pupil".to_owned(),
             Limit::Surface(i, Hurdle::Rim) if i == self.bench().stop() => "stop".to_owned(),
             Limit::Surface(i, Hurdle::Rim) => (i + 1).to_string(),
+            Limit::Surface(i, Hurdle::Obstruction) => format!("{} obstructs", i + 1),
             Limit::Surface(i, Hurdle::Miss) => format!("{} missed", i + 1),
             Limit::Surface(i, Hurdle::Reflection) => format!("{} TIR", i + 1),
             Limit::Unaimed => "unaimed".to_owned(),
