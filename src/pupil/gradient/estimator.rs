@@ -64,9 +64,7 @@ impl FromStr for Estimator {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoDerivative {
     /// No light, so that nothing says where it would come back.
-    #[error(
-        "no light gets through ({0}), and the derivative of nothing is no way back: {1}"
-    )]
+    #[error("no light gets through ({0}), and the derivative of nothing is no way back: {1}")]
     Dark(String, &'static str),
     /// No edge.
     #[error("nothing limits the beam; give the stop or another surface a semi-diameter")]
@@ -207,7 +205,8 @@ impl Region<'_> {
                 (found, "flatten it or take a field nearer to the axis")
             }
             Fate::TotalReflection(i) => {
-                let found = format!("the ray through the centre is totally reflected at surface {i}");
+                let found =
+                    format!("the ray through the centre is totally reflected at surface {i}");
                 (found, "flatten it or take a field nearer to the axis")
             }
         }

@@ -59,10 +59,9 @@ fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_foun
         for part in fields {
             let region = Region::new(launch(&bench, part));
             let lit = region.lit(ORDER);
-            for (term, cost) in [
-                ("spot", Cost::spread(lit.moments.centroid)),
-                ("throughput", Cost::throughput()),
-            ] {
+            for (term, cost) in
+                [("spot", Cost::spread(lit.moments.centroid)), ("throughput", Cost::throughput())]
+            {
                 let differences = region.difference_derivative(&cost, ORDER).unwrap();
                 let found = lit.boundary_derivative(&cost).unwrap();
                 let what = format!("{term} of {name}, zoom {zoom}, field {part}");

@@ -5,12 +5,12 @@ use super::cases;
 use super::estimators::compare;
 use crate::reference::Worst;
 use aplanat::lens::{Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::math::Vec3;
 use aplanat::paraxial::Beam;
 use aplanat::pupil::{
     Accuracy, Aiming, Bench, Cost, Derivative, Estimator, Kind, Launch, Limit, NoDerivative,
     Region, Warp, differentiate, plan,
 };
-use aplanat::math::Vec3;
 use aplanat::trace::{Gradient, Hurdle, Ray, Slot, Tracer};
 use std::f64::consts::PI;
 
@@ -29,6 +29,7 @@ fn system(rows: &[Row], stop: usize) -> System<f64> {
         thickness,
         index,
         semi_diameter,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     };
@@ -87,7 +88,10 @@ fn by_warp_too(what: &str, region: &Region<'_>, cost: &Cost, exact: &Gradient<f6
         let pairs = found.by.group(slot).zip(exact.group(slot)).zip(found.error.group(slot));
         for (i, ((got, exact), error)) in pairs.enumerate() {
             let off = (got - exact).abs();
-            assert!(off <= 6.0 * error + floor, "{what}, {slot:?} {i}: {got:e} +- {error:e}, {exact:e}");
+            assert!(
+                off <= 6.0 * error + floor,
+                "{what}, {slot:?} {i}: {got:e} +- {error:e}, {exact:e}"
+            );
         }
     }
 }
@@ -204,15 +208,20 @@ fn aperture_gradients_of_no_light_are_an_error_that_says_what_to_do() {
     let rows = [(0.0, 50.0, 1.0, 4.0), (0.02, 5.0, 1.5, 5.0), (0.0, 50.0, 1.0, 5.0)];
     let clipped = bench(system(&rows, 0));
     let closed = bench(system(&[(0.0, 5.0, 1.0, 0.0)], 0));
-    for (bench, degrees, says) in [
-        (&clipped, 30.0, "clipped by surface 1"),
-        (&closed, 0.0, "open the stop"),
-    ] {
+    for (bench, degrees, says) in
+        [(&clipped, 30.0, "clipped by surface 1"), (&closed, 0.0, "open the stop")]
+    {
         let region = Region::new(launch(bench, degrees));
         let dark = plan(&region, ASKED).unwrap_err();
-        assert!(matches!(dark, NoDerivative::Dark(..)) && dark.to_string().contains(says), "{dark}");
+        assert!(
+            matches!(dark, NoDerivative::Dark(..)) && dark.to_string().contains(says),
+            "{dark}"
+        );
         for estimator in Estimator::ALL {
-            assert_eq!(differentiate(&region, &Cost::throughput(), estimator, ASKED), Err(dark.clone()));
+            assert_eq!(
+                differentiate(&region, &Cost::throughput(), estimator, ASKED),
+                Err(dark.clone())
+            );
         }
     }
 }
@@ -271,8 +280,12 @@ fn aperture_gradients_of_a_pupil_in_pieces_come_from_the_warp_field() {
         };
         let step = 1e-5 * *slot.of(&mut system.clone(), surface);
         let exact = -(changed(step) - changed(-step)) / (2.0 * step);
-        let (got, error) = (found.by.surfaces[surface].by(slot), found.error.surfaces[surface].by(slot));
-        assert!((got - exact).abs() <= 6.0 * error, "{slot:?} {surface}: {got} +- {error}, {exact}");
+        let (got, error) =
+            (found.by.surfaces[surface].by(slot), found.error.surfaces[surface].by(slot));
+        assert!(
+            (got - exact).abs() <= 6.0 * error,
+            "{slot:?} {surface}: {got} +- {error}, {exact}"
+        );
     }
 }
 
