@@ -16,8 +16,8 @@ use crate::lens::{Aperture, Field, Invalid, Lens, Shape, Surface, System};
 use crate::math::{Real, Vec3};
 use crate::paraxial::Beam;
 use crate::pupil::{
-    Accuracy, Aiming, Bench, BenchError, Cost, Derivative, Estimator, Kind, Launch, LaunchError, NoDerivative,
-    Pattern, Region, Warp, plan,
+    Accuracy, Aiming, Bench, BenchError, Cost, Derivative, Estimator, Kind, Launch, LaunchError,
+    NoDerivative, Pattern, Region, Warp, plan,
 };
 use crate::trace::{Gradient, Points, Ray, Rays, Seed, Sink, Slot, Tracer};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -272,10 +272,7 @@ fn limited_by_stop(
     change: impl FnOnce(System<f64>) -> System<f64>,
 ) -> Result<Bench, BenchError> {
     let color = &given.colors[given.primary];
-    let beam = Beam {
-        aperture: Aperture::StopSemiDiameter(given.stop_radius()),
-        ..given.beam
-    };
+    let beam = Beam { aperture: Aperture::StopSemiDiameter(given.stop_radius()), ..given.beam };
     let aiming = if given.aiming == Aiming::Stop { Aiming::Chief } else { given.aiming };
     Bench::new(vec![(color.um, 1.0, change(color.system.clone()))], 0, beam, aiming)
 }
@@ -306,11 +303,7 @@ fn with_planes(mut system: System<f64>, planes: usize) -> System<f64> {
         let Some(gap) = (at..last).chain(0..at.min(last)).find(open) else { break };
         let before = &mut system.surfaces[gap];
         before.thickness *= 0.5;
-        let plane = Surface {
-            shape: Shape::Plane,
-            semi_diameter: f64::INFINITY,
-            ..*before
-        };
+        let plane = Surface { shape: Shape::Plane, semi_diameter: f64::INFINITY, ..*before };
         system.surfaces.insert(gap + 1, plane);
         system.stop = system.stop.map(|stop| if stop > gap { stop + 1 } else { stop });
         at = gap + 2;
@@ -392,7 +385,8 @@ impl<'a> Scene<'a> {
             return Ok(Reference { spot, throughput, by: Estimator::Warp, checked });
         }
         let lit = region.lit(HIGHEST);
-        let [Some(spot), Some(throughput)] = costs.map(|cost| lit.boundary_derivative(&cost)) else {
+        let [Some(spot), Some(throughput)] = costs.map(|cost| lit.boundary_derivative(&cost))
+        else {
             return Err(NoDerivative::Endless.into());
         };
         let differences = costs.map(|cost| region.difference_derivative(&cost, CHECKED));
@@ -542,7 +536,9 @@ impl<'a> Scene<'a> {
         let mut turns: Vec<Box<dyn FnMut() + '_>> = vec![
             Box::new(|| drop(black_box(along(false)))),
             Box::new(|| drop(black_box(along(true)))),
-            Box::new(|| drop(black_box(fresh().map(|r| r.difference_derivative(&spot, COST_ORDER))))),
+            Box::new(|| {
+                drop(black_box(fresh().map(|r| r.difference_derivative(&spot, COST_ORDER))))
+            }),
             Box::new(|| tracer.batch(&rays, &mut points)),
             Box::new(|| drop(black_box(region.warp_derivative(&spot, sampling)))),
             Box::new(|| drop(black_box(region.warp_derivative_in::<f32>(&spot, sampling)))),

@@ -157,11 +157,7 @@ impl Bench {
 
     /// The same beam through a lens that has changed at one wavelength: where its stop limits it,
     /// the stop is as large as that says.
-    pub(super) fn changed(
-        &self,
-        wavelength: usize,
-        system: System<f64>,
-    ) -> Result<Self, Invalid> {
+    pub(super) fn changed(&self, wavelength: usize, system: System<f64>) -> Result<Self, Invalid> {
         let mut bench = self.clone();
         if let Aperture::StopSemiDiameter(radius) = &mut bench.beam.aperture {
             *radius = system.surfaces[self.stop()].semi_diameter;

@@ -50,6 +50,13 @@ impl<'a> Region<'a> {
                 (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
                 (nodes, spokes)
             }
+            Kind::Ragged { ring: Some(ring), .. } => {
+                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
+                let (spokes, rays) = ring.spokes(&self.launch, azimuths);
+                let mut nodes = ring.nodes_of(&spokes, radii);
+                (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
+                (nodes, spokes.into_iter().flatten().collect())
+            }
             Kind::Clear | Kind::Ragged { .. } | Kind::Dark | Kind::Endless => {
                 (self.nodes(order), Vec::new())
             }
@@ -72,6 +79,7 @@ impl<'a> Region<'a> {
         let rim = match &self.kind {
             Kind::Clear => Rim::Still,
             Kind::Split(boundary) => Rim::Spokes(boundary.frame),
+            Kind::Ragged { ring: Some(ring), .. } => Rim::Spokes(ring.outer.frame),
             Kind::Dark | Kind::Ragged { .. } | Kind::Endless => Rim::Unknown,
         };
         let launch = self.launch.clone();

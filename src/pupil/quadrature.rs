@@ -181,7 +181,8 @@ impl Region<'_> {
             Kind::Split(boundary) => self.split(boundary, SPLIT[order.min(SPLIT.len() - 1)]),
             Kind::Ragged { ring: Some(ring), .. } => {
                 let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
-                ring.nodes(&self.launch, azimuths, radii)
+                let (spokes, rays) = ring.spokes(&self.launch, azimuths);
+                Nodes { mirrored, rays, ..ring.nodes_of(&spokes, radii) }
             }
             Kind::Ragged { square, .. } => {
                 let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };

@@ -50,8 +50,7 @@ impl Gradient {
             bar.set_position(done as u64);
         });
         bar.finish_and_clear();
-        let measured =
-            measured.map_err(|e| Failure::Input(format!("{}: {e}", opened.file)))?;
+        let measured = measured.map_err(|e| Failure::Input(format!("{}: {e}", opened.file)))?;
         if let Some(path) = &self.plot {
             let png = picture(&measured, &opened.lens.name);
             files::replace(path, &png.map_err(|e| Failure::Failed(e.to_string()))?)?;
@@ -124,7 +123,10 @@ fn write_curves(f: &mut fmt::Formatter<'_>, curves: &GradientCurves) -> fmt::Res
         _ => "central differences are off by",
     };
     let [spot, throughput] = checked;
-    writeln!(f, "reference: {reference}; {check} {spot:.0e} (spot), {throughput:.0e} (throughput)")?;
+    writeln!(
+        f,
+        "reference: {reference}; {check} {spot:.0e} (spot), {throughput:.0e} (throughput)"
+    )?;
     for (integral, name) in [(Integral::Spot, "spot"), (Integral::Throughput, "throughput")] {
         let rows = curves.rows.iter().filter(|row| row.integral == integral);
         write!(f, "\n{}", table(name, rows))?;

@@ -64,9 +64,7 @@ impl FromStr for Estimator {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoDerivative {
     /// No light, so that nothing says where it would come back.
-    #[error(
-        "no light gets through ({0}), and the derivative of nothing is no way back: {1}"
-    )]
+    #[error("no light gets through ({0}), and the derivative of nothing is no way back: {1}")]
     Dark(String, &'static str),
     /// No edge.
     #[error("nothing limits the beam; give the stop or another surface a semi-diameter")]
@@ -74,6 +72,9 @@ pub enum NoDerivative {
     /// An edge that no point sees all of.
     #[error("{0}, and `boundary` needs one that a point inside sees all of; expected `warp`")]
     NotStarShaped(String),
+    /// A shadow in the light, whose edge the warp field does not move.
+    #[error("the warp field knows no obstructions; expected `boundary`")]
+    Obstructed,
     /// Samples that are never all inside the square in which they are drawn.
     #[error("the square around the pupil for the warp field was not found")]
     NoSquare,
@@ -104,7 +105,8 @@ const MOST: f64 = 16.0;
 /// Where rays are aimed at the stop, its rim limits the beam and moves with its semi-diameter.
 ///
 /// # Errors
-/// A pupil without light or edge; `Boundary` for a pupil that is not star-shaped.
+/// A pupil without light or edge; `Boundary` for a pupil that is neither star-shaped nor a ring,
+/// `Warp` for a lens with an obstruction.
 pub fn differentiate(
     region: &Region<'_>,
     cost: &Cost,
@@ -119,9 +121,10 @@ pub fn differentiate(
     }
     region.has_edge()?;
     match (estimator, &region.kind) {
-        (Estimator::Boundary, Kind::Ragged { pieces, .. }) => {
+        (Estimator::Boundary, Kind::Ragged { pieces, ring: None, .. }) => {
             Err(NoDerivative::NotStarShaped(shape(*pieces)))
         }
+        (Estimator::Warp, _) if region.is_obstructed() => Err(NoDerivative::Obstructed),
         (Estimator::Warp, _) => region.sampled_derivative(cost, asked),
         (Estimator::Biased | Estimator::Boundary | Estimator::Difference, _) => {
             region.ordered_derivative(cost, estimator, asked)
@@ -141,6 +144,9 @@ pub fn plan(region: &Region<'_>, asked: Accuracy) -> Result<(Estimator, String),
             let edge = if arcs == 1 { "one arc".to_owned() } else { format!("{arcs} arcs") };
             let reason = format!("the pupil is one piece with an edge of {edge}");
             Ok((Estimator::Boundary, reason))
+        }
+        Kind::Ragged { ring: Some(_), .. } => {
+            Ok((Estimator::Boundary, "the pupil is a ring around a shadow".to_owned()))
         }
         Kind::Ragged { pieces, .. } => {
             let shape = shape(*pieces);
@@ -175,6 +181,11 @@ fn shape(pieces: usize) -> String {
 }
 
 impl Region<'_> {
+    /// Whether some surface casts a shadow.
+    fn is_obstructed(&self) -> bool {
+        self.launch.color().system.surfaces.iter().any(|surface| surface.obstruction > 0.0)
+    }
+
     fn has_edge(&self) -> Result<(), NoDerivative> {
         match self.kind {
             Kind::Dark => {
@@ -207,7 +218,8 @@ impl Region<'_> {
                 (found, "flatten it or take a field nearer to the axis")
             }
             Fate::TotalReflection(i) => {
-                let found = format!("the ray through the centre is totally reflected at surface {i}");
+                let found =
+                    format!("the ray through the centre is totally reflected at surface {i}");
                 (found, "flatten it or take a field nearer to the axis")
             }
         }

@@ -59,10 +59,9 @@ fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_foun
         for part in fields {
             let region = Region::new(launch(&bench, part));
             let lit = region.lit(ORDER);
-            for (term, cost) in [
-                ("spot", Cost::spread(lit.moments.centroid)),
-                ("throughput", Cost::throughput()),
-            ] {
+            for (term, cost) in
+                [("spot", Cost::spread(lit.moments.centroid)), ("throughput", Cost::throughput())]
+            {
                 let differences = region.difference_derivative(&cost, ORDER).unwrap();
                 let found = lit.boundary_derivative(&cost).unwrap();
                 let what = format!("{term} of {name}, zoom {zoom}, field {part}");
@@ -76,7 +75,7 @@ fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_foun
 /// Errors that are larger than stated, in parts of what is stated.
 fn beyond(found: &Derivative, exact: &Gradient<f64>, slot: Slot) -> f64 {
     let errors = found.by.group(slot).zip(exact.group(slot)).zip(found.error.group(slot));
-    let floor = 1e-12 * exact.largest(slot);
+    let floor = 1e-12 * exact.largest(slot).max(1.0);
     errors.map(|((got, exact), error)| (got - exact).abs() / (error + floor)).fold(0.0, f64::max)
 }
 
