@@ -10,6 +10,7 @@ mod check;
 pub mod glass;
 mod parameter;
 mod resolve;
+mod reversed;
 mod system;
 
 pub use check::LensError;

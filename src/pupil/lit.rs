@@ -40,12 +40,15 @@ pub struct Lit<'a> {
 }
 
 impl<'a> Region<'a> {
-    /// Traces the rays of an order of quadrature, counted from 0.
+    /// Traces the rays of an order of quadrature, counted from 0. Of a round pupil on the axis that
+    /// is one radius: for integrands that depend on the distance from the axis alone, and for those
+    /// that a mirror image makes such, as squares of distances from a point do.
     pub fn lit(&self, order: usize) -> Lit<'a> {
         let (nodes, spokes) = match &self.kind {
             Kind::Split(boundary) => {
                 let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
-                let (spokes, rays) = self.spokes(boundary, azimuths);
+                let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
+                let (spokes, rays) = self.spokes(boundary, if alike { 1 } else { azimuths });
                 let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
                 (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
                 (nodes, spokes)
@@ -62,6 +65,11 @@ impl<'a> Region<'a> {
             }
         };
         self.traced(&nodes, spokes)
+    }
+
+    /// Traces some nodes; what moves the edge is not known then.
+    pub fn at(&self, nodes: &Nodes) -> Lit<'a> {
+        Lit { rim: Rim::Unknown, ..self.traced(nodes, Vec::new()) }
     }
 
     fn traced(&self, nodes: &Nodes, spokes: Vec<Spoke>) -> Lit<'a> {

@@ -207,9 +207,8 @@ impl Region<'_> {
         let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
         for (i, arc) in boundary.arcs.iter().enumerate() {
             let length = arc.to - arc.from;
-            let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
             let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
-            for (t, share) in legendre(if alike { 1 } else { azimuths }) {
+            for (t, share) in legendre(azimuths) {
                 let (t, stretch) = grading.place(*t);
                 let azimuth = arc.from + t * length;
                 let guess = boundary.near(azimuth);

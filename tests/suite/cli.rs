@@ -96,6 +96,7 @@ fn every_subcommand_has_long_help_with_its_json() {
         "gradient",
         "optimize",
         "convert",
+        "experiment",
         "measure trace",
         "measure spot",
         "measure gradient",
@@ -481,6 +482,34 @@ fn convert_refuses_what_is_no_lens_and_where_it_cannot_write() {
     refused(2, &["convert", LENS, "lens.dat"], "", &["lens.dat", "`dat`"]);
     refused(2, &["convert", LENS, "/nowhere/lens.zmx"], "", &["/nowhere/lens.zmx"]);
     assert!(!out.0.exists());
+}
+
+#[test]
+fn experiment_writes_its_data_and_its_pictures() {
+    let folder = temporary("experiment");
+    let arguments = ["experiment", "3.3", "--out", folder.to_str().unwrap()];
+    let report = done_json(&arguments, "");
+    has_keys(&report, &["id", "title", "claim", "ms", "holds", "claims", "tables", "rays"]);
+    let keys = ["says", "value", "error", "unit", "rule", "limit", "holds"];
+    assert!(report["claims"].as_array().unwrap().iter().all(|claim| {
+        has_keys(claim, &keys);
+        claim["holds"] == true
+    }));
+    for file in report["files"].as_array().unwrap() {
+        let path = folder.join(file.as_str().unwrap());
+        assert!(std::fs::metadata(&path).unwrap().len() > 100, "{}", path.display());
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn experiment_lists_all_and_refuses_others() {
+    let list = done_json(&["experiment"], "");
+    has_keys(&list[0], &["id", "title", "claim", "seconds"]);
+    assert!(done(&["experiment"], "").contains("3.3"));
+    refused(2, &["experiment", "9.9"], "", &["`9.9`", "3.3"]);
+    refused(2, &["experiment", "3.3", "--out", LENS], "", &[LENS, "folder"]);
+    refused(2, &["experiment", "--out", "here"], "", &["FIGURE"]);
 }
 
 #[test]

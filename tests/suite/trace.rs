@@ -445,3 +445,38 @@ fn lost_rays_end_with_a_surface_and_finite_numbers() {
     assert!(fates.len() >= 3, "{fates:?}");
     assert!(matches!(tracer.trace(rays.get(0)).fate, Fate::Clipped(_) | Fate::Imaged));
 }
+
+#[test]
+fn a_reversed_lens_leads_rays_back_to_where_they_came_from() {
+    for name in ["double_gauss_canon_fd50_f12", "phone_us7558005_1", "telescope_rc_f8"] {
+        let lens = bundled(name);
+        let system = lens.system(0, lens.wavelengths[lens.primary()].um).unwrap();
+        let size = system.surfaces[0].semi_diameter.min(100.0);
+        let (there, back) =
+            (Tracer::new(&system).unwrap(), Tracer::new(&system.reversed(0.0)).unwrap());
+        let last = system.surfaces[system.surfaces.len() - 2].thickness;
+        let mut arrived = 0;
+        for i in 0..40 {
+            let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
+            let (x, y) = (0.02 * f64::from(i) * size * cos, 0.02 * f64::from(i) * size * sin);
+            let start = Ray { point: Vec3::new(x, y, 0.0), direction: Vec3::new(0.01, 0.0, 1.0) };
+            let landing = there.trace(start);
+            if !landing.fate.is_imaged() {
+                continue;
+            }
+            arrived += 1;
+            let (p, d) = (landing.ray.point, landing.ray.direction);
+            // What was behind the last vertex is in front of it now.
+            let turned = Ray {
+                point: Vec3::new(p.x, p.y, -(last + p.z)),
+                direction: Vec3::new(-d.x, -d.y, d.z),
+            };
+            let home = back.trace(turned);
+            assert!(home.fate.is_imaged(), "{name}: {:?}", home.fate);
+            let (q, e) = (home.ray.point, home.ray.direction);
+            assert!((q.x - x).hypot(q.y - y) < 1e-9 * size, "{name}: {q:?} for {x}, {y}");
+            assert!((e.x / e.z + 0.01).hypot(e.y / e.z) < 1e-10, "{name}: {e:?}");
+        }
+        assert!(arrived > 10, "{name}: {arrived}");
+    }
+}

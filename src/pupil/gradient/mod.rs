@@ -24,6 +24,15 @@ pub use warp::Warp;
 use super::moments::Moments;
 use crate::trace::{Gradient, Slot};
 
+/// What each ray of a pupil contributes by where it lands. Where a pupil is its own mirror image, so
+/// must be the contribution.
+pub trait Integrand: Sync {
+    /// The contribution of a ray that lands at a point, in mm on the image plane.
+    fn of(&self, p: [f64; 2]) -> f64;
+    /// Its derivative by the point.
+    fn slope(&self, p: [f64; 2]) -> [f64; 2];
+}
+
 /// What each ray of a pupil contributes: `square |p − center|² + constant`, `p` its image point.
 ///
 /// The spot (3.24) has `square = 1` about the centroid, which may be held fixed: moving it changes
@@ -48,23 +57,25 @@ impl Cost {
     pub fn throughput() -> Self {
         Self { center: [0.0; 2], square: 0.0, constant: -1.0 }
     }
+}
 
-    /// The contribution of a ray that lands at a point.
-    pub fn of(&self, p: [f64; 2]) -> f64 {
+impl Integrand for Cost {
+    fn of(&self, p: [f64; 2]) -> f64 {
         let [x, y] = [p[0] - self.center[0], p[1] - self.center[1]];
         self.square * (x * x + y * y) + self.constant
     }
 
+    fn slope(&self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| 2.0 * self.square * (p[i] - self.center[i]))
+    }
+}
+
+impl Cost {
     /// Its integral over the light of a pupil.
     pub fn over(&self, light: &Moments) -> f64 {
         let [x, y] = [0, 1].map(|i| light.centroid[i] - self.center[i]);
         let about_center = light.spread + light.area * (x * x + y * y);
         self.square * about_center + self.constant * light.area
-    }
-
-    /// Its derivative by the point.
-    pub fn slope(&self, p: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|i| 2.0 * self.square * (p[i] - self.center[i]))
     }
 }
 
