@@ -111,7 +111,7 @@ pub(super) trait Sowing<R> {
 
     /// By how far each ray is from the limits of a surface, if anything depends on that.
     #[inline(always)]
-    fn pulls(&self, _surface: usize) -> Option<&[Pull<R>; BLOCK]> {
+    fn pulls(&self, _surface: usize) -> Option<&Pulls<R>> {
         None
     }
 }
@@ -124,11 +124,31 @@ impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
 }
 
 /// The derivative of something by the limits of a surface (see [`super::limit`]).
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Pull<R> {
-    pub(super) rim: R,
-    pub(super) angle: R,
-    pub(super) sheet: R,
+struct Pull<R> {
+    rim: R,
+    angle: R,
+    sheet: R,
+}
+
+/// The same for a block of rays: a column for each limit, since lanes are read with no more than
+/// eight numbers from one ray to the next.
+#[derive(Debug, Clone)]
+pub(super) struct Pulls<R> {
+    pub(super) rim: [R; BLOCK],
+    pub(super) angle: [R; BLOCK],
+    pub(super) sheet: [R; BLOCK],
+}
+
+impl<R: Real> Pulls<R> {
+    pub(super) fn none() -> Self {
+        let zero = [R::ZERO; BLOCK];
+        Self { rim: zero, angle: zero, sheet: zero }
+    }
+
+    #[inline(always)]
+    fn of(&self, j: usize) -> Pull<R> {
+        Pull { rim: self.rim[j], angle: self.angle[j], sheet: self.sheet[j] }
+    }
 }
 
 /// Who takes the derivatives of a block of rays as they come.
@@ -409,6 +429,7 @@ fn conic_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
 }
 
 /// What the limits of a surface leave for its numbers.
+#[derive(Clone, Copy)]
 struct Pulled<R> {
     by_semi_diameter: R,
     /// By the square of the index in front, all else of the index apart.
@@ -421,7 +442,7 @@ impl<R: Real> Interface<R> {
     #[inline(always)]
     fn pulled(
         &self,
-        pull: Pull<R>,
+        pull: &Pull<R>,
         p: Vec3<R>,
         normal: Normal<R>,
         back: &mut Refracted<R>,
@@ -535,7 +556,7 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through a surface to the one before.
     #[inline(always)]
-    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
+    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&Pulls<R>>) {
         match surface.form {
             Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, pulls),
             Form::Conic => self.retrace(surface, conic_normal, pulls),
@@ -549,7 +570,7 @@ impl<R: Real> Homeward<R> {
         &mut self,
         surface: &Interface<R>,
         normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
-        pulls: Option<&[Pull<R>; BLOCK]>,
+        pulls: Option<&Pulls<R>>,
     ) {
         let surface = *surface;
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
@@ -560,9 +581,9 @@ impl<R: Real> Homeward<R> {
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
             let mut by_point = self.by_point(j);
             let mut pulled = None;
-            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
+            if let Some(pull) = pulls.map(|pulls| pulls.of(j)) {
                 back.by_normal.z -= pull.sheet;
-                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+                pulled = Some(surface.pulled(&pull, p, normal, &mut back, &mut by_point));
             }
             let n = back.by_normal;
             by_point = by_point - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
@@ -579,7 +600,7 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through an asphere to the surface before.
     #[inline(always)]
-    fn retrace_asphere(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
+    fn retrace_asphere(&mut self, surface: &Interface<R>, pulls: Option<&Pulls<R>>) {
         let surface = *surface;
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
@@ -590,9 +611,9 @@ impl<R: Real> Homeward<R> {
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
             let mut by_point = self.by_point(j);
             let (mut edge, mut pulled) = (R::ZERO, None);
-            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
+            if let Some(pull) = pulls.map(|pulls| pulls.of(j)) {
                 edge = pull.sheet + pull.sheet;
-                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+                pulled = Some(surface.pulled(&pull, p, normal, &mut back, &mut by_point));
             }
             // N = (−2 x w, −2 y w, 1) with w = dz/dr².
             let n = back.by_normal;

@@ -24,7 +24,7 @@
 //! the answer is what stands at εη.
 
 use super::Tracer;
-use super::backward::{Gradient, Harvest, Pull, Seed, Sowing};
+use super::backward::{Gradient, Harvest, Pulls, Seed, Sowing};
 use super::batch::{BLOCK, Block};
 use super::interface::{Form, Interface};
 use super::lanes::{Width, widest};
@@ -77,17 +77,17 @@ impl<R: Real> Interface<Jet<R>> {
         &self,
         limit: Limit,
         block: &Block<Jet<R>>,
-        slants: &[Slant<Jet<R>>; BLOCK],
+        [slants, lengths]: &[[Jet<R>; BLOCK]; 2],
         lanes: &mut [Jet<R>; BLOCK],
     ) {
         for j in 0..BLOCK {
-            lanes[j] = self.limit(limit, block.state(j).0, slants[j]);
+            lanes[j] = self.limit(limit, block.state(j).0, (slants[j], lengths[j]));
         }
     }
 
-    /// One of the functions above.
+    /// One of the functions above, from the point, `k·N` and `N·N`.
     #[inline(always)]
-    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, slant: Slant<Jet<R>>) -> Jet<R> {
+    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, (a, m): (Jet<R>, Jet<R>)) -> Jet<R> {
         let r2 = p.x * p.x + p.y * p.y;
         let c2 = (R::ONE + self.conic.value) * self.curvature.value;
         let minus_one = Jet::constant(-R::ONE);
@@ -98,8 +98,8 @@ impl<R: Real> Interface<Jet<R>> {
             }
             Limit::Angle => {
                 let inverse = R::ONE / self.n2.value;
-                let loss = slant.m.scaled(self.loss().value * inverse);
-                loss - (slant.a * slant.a).scaled(inverse)
+                let loss = m.scaled(self.loss().value * inverse);
+                loss - (a * a).scaled(inverse)
             }
             Limit::Sheet if self.form == Form::Asphere => {
                 r2.scaled(c2 * self.curvature.value) + minus_one
@@ -107,13 +107,6 @@ impl<R: Real> Interface<Jet<R>> {
             Limit::Sheet => p.z.scaled(c2) + minus_one,
         }
     }
-}
-
-/// How a ray stands to a surface: `k·N` and `N·N`.
-#[derive(Debug, Clone, Copy, Default)]
-struct Slant<R> {
-    a: R,
-    m: R,
 }
 
 /// A block of rays that have arrived, each with its derivatives by two pupil coordinates, and the
@@ -209,23 +202,23 @@ impl<R: Real> PupilTracer<R> {
         block.code[count..].fill(Jet::ONE);
         let mut limits = self.limits.iter().zip(&mut room.abreast.limits).peekable();
         for (i, interface) in self.outward.interfaces.iter().enumerate() {
-            let (distances, slants) = (&mut room.distances[i], &mut room.slants);
+            let (distances, normals) = (&mut room.distances[i], &mut room.normals);
             block.meet(
                 interface,
                 i as u32,
                 #[inline(always)]
                 |j, met| {
                     distances[j] = pair(met.s);
-                    slants[j] = Slant { a: met.a, m: met.m };
+                    (normals[0][j], normals[1][j]) = (met.a, met.m);
                 },
             );
             while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i)
             {
                 // Known inside the loops, so that these have no branch.
                 match limit {
-                    Limit::Rim => interface.limits(Limit::Rim, &block, slants, lanes),
-                    Limit::Angle => interface.limits(Limit::Angle, &block, slants, lanes),
-                    Limit::Sheet => interface.limits(Limit::Sheet, &block, slants, lanes),
+                    Limit::Rim => interface.limits(Limit::Rim, &block, normals, lanes),
+                    Limit::Angle => interface.limits(Limit::Angle, &block, normals, lanes),
+                    Limit::Sheet => interface.limits(Limit::Sheet, &block, normals, lanes),
                 }
             }
         }
@@ -253,9 +246,10 @@ fn transposed<R: Real>([value, x, y]: [R; 3]) -> Pair<R> {
 /// What a block needs on its way, made once.
 struct Room<R> {
     abreast: Abreast<R>,
-    slants: [Slant<Jet<R>>; BLOCK],
+    /// `k·N` and `N·N` at a surface.
+    normals: [[Jet<R>; BLOCK]; 2],
     distances: Vec<[Pair<R>; BLOCK]>,
-    pulls: Vec<[Pull<Pair<R>>; BLOCK]>,
+    pulls: Vec<Pulls<Pair<R>>>,
 }
 
 impl<R: Real> Room<R> {
@@ -269,19 +263,22 @@ impl<R: Real> Room<R> {
             by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
         };
         let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
-        let (slants, pulls) = ([Slant::default(); BLOCK], vec![[Pull::default(); BLOCK]; surfaces]);
-        Self { abreast, slants, distances, pulls }
+        let (normals, pulls) = ([jets; 2], vec![Pulls::none(); surfaces]);
+        Self { abreast, normals, distances, pulls }
     }
 
     /// Brings what was filled in to its surface.
     #[inline(always)]
     fn spread(&mut self, limits: &[(usize, Limit)]) {
         for ((surface, limit), by_limit) in limits.iter().zip(&self.abreast.by_limit) {
-            let lanes = self.pulls[*surface].iter_mut().zip(by_limit);
-            match limit {
-                Limit::Rim => lanes.for_each(|(pull, by)| pull.rim = transposed(*by)),
-                Limit::Angle => lanes.for_each(|(pull, by)| pull.angle = transposed(*by)),
-                Limit::Sheet => lanes.for_each(|(pull, by)| pull.sheet = transposed(*by)),
+            let pulls = &mut self.pulls[*surface];
+            let lanes = match limit {
+                Limit::Rim => &mut pulls.rim,
+                Limit::Angle => &mut pulls.angle,
+                Limit::Sheet => &mut pulls.sheet,
+            };
+            for (pull, by_limit) in lanes.iter_mut().zip(by_limit) {
+                *pull = transposed(*by_limit);
             }
         }
     }
@@ -295,7 +292,7 @@ impl<R: Real> Sowing<Pair<R>> for Room<R> {
     }
 
     #[inline(always)]
-    fn pulls(&self, surface: usize) -> Option<&[Pull<Pair<R>>; BLOCK]> {
+    fn pulls(&self, surface: usize) -> Option<&Pulls<Pair<R>>> {
         self.pulls.get(surface)
     }
 }

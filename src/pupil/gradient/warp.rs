@@ -287,14 +287,14 @@ impl<R: Real> Balance<R> {
         }
         let mut balance = Self { closest: rim, total: zero, drift: [[R::ZERO; 2]; LANES] };
         for limit in &abreast.limits {
-            for j in 0..LANES {
-                let Jet { value, slope: [x, y], .. } = limit[j];
+            for (j, limit) in limit.iter().enumerate() {
+                let Jet { value, slope: [x, y], .. } = *limit;
                 balance.approach(j, [distance(value), x, y]);
             }
         }
         for limit in &abreast.limits {
-            for j in 0..LANES {
-                let Jet { value, slope: [x, y], .. } = limit[j];
+            for (j, limit) in limit.iter().enumerate() {
+                let Jet { value, slope: [x, y], .. } = *limit;
                 balance.add(j, [distance(value), x, y]);
             }
         }
