@@ -165,26 +165,38 @@ impl<R: Real> PupilTracer<R> {
     ) -> Gradient<R> {
         let mut gradient = Gradient::zero(self.surfaces());
         let mut room = Room::new(self);
-        widest(
-            Width::detect(),
-            #[inline(always)]
-            || {
-                for points in points.chunks(BLOCK) {
-                    let mut block_points = [points[0]; BLOCK];
-                    block_points[..points.len()].copy_from_slice(points);
-                    let block = self.go(
+        let width = Width::detect();
+        for points in points.chunks(BLOCK) {
+            let mut all = [points[0]; BLOCK];
+            all[..points.len()].copy_from_slice(points);
+            // Compiled apart: all in one is too much for the lanes to be found.
+            let block = widest(
+                width,
+                #[inline(always)]
+                || {
+                    self.go(
                         &mut room,
                         points.len(),
                         #[inline(always)]
-                        |j| ray(block_points[j]),
-                    );
-                    fill(&block_points, &mut room.abreast);
+                        |j| ray(all[j]),
+                    )
+                },
+            );
+            widest(
+                width,
+                #[inline(always)]
+                || fill(&all, &mut room.abreast),
+            );
+            widest(
+                width,
+                #[inline(always)]
+                || {
                     room.spread(&self.limits);
                     let (block, sum) = (block.map(pair), &mut Top(&mut gradient));
                     self.homeward.homeward(block, &room.distances, points.len(), &room, sum);
-                }
-            },
-        );
+                },
+            );
+        }
         gradient
     }
 
@@ -202,23 +214,25 @@ impl<R: Real> PupilTracer<R> {
         block.code[count..].fill(Jet::ONE);
         let mut limits = self.limits.iter().zip(&mut room.abreast.limits).peekable();
         for (i, interface) in self.outward.interfaces.iter().enumerate() {
-            let (distances, normals) = (&mut room.distances[i], &mut room.normals);
+            // Local, so that the lanes need not ask whether it overlaps the block.
+            let mut kept = [[Jet::ZERO; BLOCK]; 3];
             block.meet(
                 interface,
                 i as u32,
                 #[inline(always)]
-                |j, met| {
-                    distances[j] = pair(met.s);
-                    (normals[0][j], normals[1][j]) = (met.a, met.m);
-                },
+                |j, met| (kept[0][j], kept[1][j], kept[2][j]) = (met.s, met.a, met.m),
             );
+            let [distances, normals @ ..] = kept;
+            for (to, from) in room.distances[i].iter_mut().zip(&distances) {
+                *to = pair(*from);
+            }
             while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i)
             {
                 // Known inside the loops, so that these have no branch.
                 match limit {
-                    Limit::Rim => interface.limits(Limit::Rim, &block, normals, lanes),
-                    Limit::Angle => interface.limits(Limit::Angle, &block, normals, lanes),
-                    Limit::Sheet => interface.limits(Limit::Sheet, &block, normals, lanes),
+                    Limit::Rim => interface.limits(Limit::Rim, &block, &normals, lanes),
+                    Limit::Angle => interface.limits(Limit::Angle, &block, &normals, lanes),
+                    Limit::Sheet => interface.limits(Limit::Sheet, &block, &normals, lanes),
                 }
             }
         }
@@ -246,8 +260,6 @@ fn transposed<R: Real>([value, x, y]: [R; 3]) -> Pair<R> {
 /// What a block needs on its way, made once.
 struct Room<R> {
     abreast: Abreast<R>,
-    /// `k·N` and `N·N` at a surface.
-    normals: [[Jet<R>; BLOCK]; 2],
     distances: Vec<[Pair<R>; BLOCK]>,
     pulls: Vec<Pulls<Pair<R>>>,
 }
@@ -263,8 +275,7 @@ impl<R: Real> Room<R> {
             by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
         };
         let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
-        let (normals, pulls) = ([jets; 2], vec![Pulls::none(); surfaces]);
-        Self { abreast, normals, distances, pulls }
+        Self { abreast, distances, pulls: vec![Pulls::none(); surfaces] }
     }
 
     /// Brings what was filled in to its surface.
@@ -293,7 +304,7 @@ impl<R: Real> Sowing<Pair<R>> for Room<R> {
 
     #[inline(always)]
     fn pulls(&self, surface: usize) -> Option<&Pulls<Pair<R>>> {
-        self.pulls.get(surface)
+        Some(&self.pulls[surface])
     }
 }
 
