@@ -72,22 +72,40 @@ impl<R: Real> Interface<R> {
 }
 
 impl<R: Real> Interface<Jet<R>> {
+    /// `N·N` at a point of the surface.
+    #[inline(always)]
+    fn square_of_normal(&self, p: Vec3<Jet<R>>) -> Jet<R> {
+        let c = self.curvature;
+        let r2 = p.x * p.x + p.y * p.y;
+        match self.form {
+            Form::Plane | Form::Sphere => Jet::ONE,
+            Form::Conic => {
+                let z = Jet::ONE - c * (p.z + self.conic * p.z);
+                c * c * r2 + z * z
+            }
+            Form::Asphere => {
+                let slope = self.sag(r2).1;
+                slope * slope * r2 * Jet::from_f64(4.0) + Jet::ONE
+            }
+        }
+    }
+
     #[inline(always)]
     fn limits(
         &self,
         limit: Limit,
         block: &Block<Jet<R>>,
-        [slants, lengths]: &[[Jet<R>; BLOCK]; 2],
+        slants: &[Jet<R>; BLOCK],
         lanes: &mut [Jet<R>; BLOCK],
     ) {
         for j in 0..BLOCK {
-            lanes[j] = self.limit(limit, block.state(j).0, (slants[j], lengths[j]));
+            lanes[j] = self.limit(limit, block.state(j).0, slants[j]);
         }
     }
 
-    /// One of the functions above, from the point, `k·N` and `N·N`.
+    /// One of the functions above, from the point and `k·N`.
     #[inline(always)]
-    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, (a, m): (Jet<R>, Jet<R>)) -> Jet<R> {
+    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, a: Jet<R>) -> Jet<R> {
         let r2 = p.x * p.x + p.y * p.y;
         let c2 = (R::ONE + self.conic.value) * self.curvature.value;
         let minus_one = Jet::constant(-R::ONE);
@@ -98,8 +116,9 @@ impl<R: Real> Interface<Jet<R>> {
             }
             Limit::Angle => {
                 let inverse = R::ONE / self.n2.value;
-                let loss = m.scaled(self.loss().value * inverse);
-                loss - (a * a).scaled(inverse)
+                let loss = self.loss().value * inverse;
+                let m = if loss > R::ZERO { self.square_of_normal(p) } else { Jet::ZERO };
+                m.scaled(loss) - (a * a).scaled(inverse)
             }
             Limit::Sheet if self.form == Form::Asphere => {
                 r2.scaled(c2 * self.curvature.value) + minus_one
@@ -215,14 +234,14 @@ impl<R: Real> PupilTracer<R> {
         let mut limits = self.limits.iter().zip(&mut room.abreast.limits).peekable();
         for (i, interface) in self.outward.interfaces.iter().enumerate() {
             // Local, so that the lanes need not ask whether it overlaps the block.
-            let mut kept = [[Jet::ZERO; BLOCK]; 3];
+            let mut kept = [[Jet::ZERO; BLOCK]; 2];
             block.meet(
                 interface,
                 i as u32,
                 #[inline(always)]
-                |j, met| (kept[0][j], kept[1][j], kept[2][j]) = (met.s, met.a, met.m),
+                |j, met| (kept[0][j], kept[1][j]) = (met.s, met.a),
             );
-            let [distances, normals @ ..] = kept;
+            let [distances, slants] = kept;
             for (to, from) in room.distances[i].iter_mut().zip(&distances) {
                 *to = pair(*from);
             }
@@ -230,9 +249,9 @@ impl<R: Real> PupilTracer<R> {
             {
                 // Known inside the loops, so that these have no branch.
                 match limit {
-                    Limit::Rim => interface.limits(Limit::Rim, &block, &normals, lanes),
-                    Limit::Angle => interface.limits(Limit::Angle, &block, &normals, lanes),
-                    Limit::Sheet => interface.limits(Limit::Sheet, &block, &normals, lanes),
+                    Limit::Rim => interface.limits(Limit::Rim, &block, &slants, lanes),
+                    Limit::Angle => interface.limits(Limit::Angle, &block, &slants, lanes),
+                    Limit::Sheet => interface.limits(Limit::Sheet, &block, &slants, lanes),
                 }
             }
         }
@@ -275,7 +294,9 @@ impl<R: Real> Room<R> {
             by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
         };
         let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
-        Self { abreast, distances, pulls: vec![Pulls::none(); surfaces] }
+        let none = [Pair::ZERO; BLOCK];
+        let pulls = vec![Pulls { rim: none, angle: none, sheet: None }; surfaces];
+        Self { abreast, distances, pulls }
     }
 
     /// Brings what was filled in to its surface.
@@ -286,7 +307,7 @@ impl<R: Real> Room<R> {
             let lanes = match limit {
                 Limit::Rim => &mut pulls.rim,
                 Limit::Angle => &mut pulls.angle,
-                Limit::Sheet => &mut pulls.sheet,
+                Limit::Sheet => pulls.sheet.get_or_insert([Pair::ZERO; BLOCK]),
             };
             for (pull, by_limit) in lanes.iter_mut().zip(by_limit) {
                 *pull = transposed(*by_limit);
