@@ -222,9 +222,10 @@ impl Zoom {
     }
 }
 
-/// Rays may pass a rim by any amount while the lens moves, but an asphere ends not far behind its
+/// Rays may pass a rim or an obstruction by any amount while the lens moves, but an asphere ends not far behind its
 /// own: outside, its polynomial means nothing, and rays may cross it several times.
 fn open_up(surface: &mut Surface<f64>) {
+    surface.obstruction = 0.0;
     surface.semi_diameter = match surface.shape {
         Shape::Asphere { .. } => BEYOND * surface.semi_diameter,
         Shape::Plane | Shape::Sphere { .. } | Shape::Conic { .. } => f64::INFINITY,

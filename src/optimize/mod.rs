@@ -5,6 +5,7 @@
 
 mod adam;
 mod least_squares;
+pub mod pareto;
 mod state;
 
 use crate::lens::Lens;
@@ -23,6 +24,10 @@ pub trait Optimizer: Send + Debug {
     fn best(&self) -> &Lens;
     /// The lens at the current step.
     fn current(&self) -> &Lens;
+    /// Steps that it will still take, where that is known beforehand.
+    fn left(&self) -> Option<usize> {
+        None
+    }
     /// Every term of the merit function for the best lens so far.
     fn terms(&self) -> Result<Vec<TermValue>, MeritError>;
 }
@@ -77,7 +82,22 @@ pub fn start(
 ) -> Result<Box<dyn Optimizer>, MeritError> {
     let merit = Merit::new(lens, goal, tolerance)?;
     Ok(match method {
-        Method::Adam => Box::new(adam::Adam::new(merit, lens)?),
+        Method::Adam => Box::new(adam::Adam::new(merit, lens, adam::Pace::Patient)?),
         Method::DampedLeastSquares => Box::new(least_squares::LeastSquares::new(merit, lens)?),
     })
+}
+
+/// Begins a search by Adam that takes this many steps while its rate falls to zero; spots are good
+/// to `tolerance` of their radius.
+///
+/// # Errors
+/// As [`start`].
+pub fn annealed(
+    lens: &Lens,
+    goal: &Goal,
+    tolerance: f64,
+    steps: usize,
+) -> Result<Box<dyn Optimizer>, MeritError> {
+    let merit = Merit::new(lens, goal, tolerance)?;
+    Ok(Box::new(adam::Adam::new(merit, lens, adam::Pace::Annealed(steps))?))
 }

@@ -155,6 +155,20 @@ impl Bench {
         Ok(Self { colors: colors?, beam, aiming: Aiming::Chief, ..self.clone() })
     }
 
+    /// The same beam through a lens that has changed at one wavelength: where its stop limits it,
+    /// the stop is as large as that says.
+    pub(super) fn changed(&self, wavelength: usize, system: System<f64>) -> Result<Self, Invalid> {
+        let mut bench = self.clone();
+        if let Aperture::StopSemiDiameter(radius) = &mut bench.beam.aperture {
+            *radius = system.surfaces[self.stop()].semi_diameter;
+        }
+        let color = &mut bench.colors[wavelength];
+        color.tracer = Tracer::new(&system)?;
+        color.open = Tracer::new(&system.lift::<Dual2>())?.opened();
+        color.system = system;
+        Ok(bench)
+    }
+
     /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces
     /// limit it, the stop among them.
     pub fn ends_at_disc(&self) -> bool {

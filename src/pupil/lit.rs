@@ -57,6 +57,11 @@ impl<'a> Region<'a> {
         self.traced(&nodes, spokes)
     }
 
+    /// Traces some nodes; what moves the edge is not known then.
+    pub fn at(&self, nodes: &Nodes) -> Lit<'a> {
+        Lit { rim: Rim::Unknown, ..self.traced(nodes, Vec::new()) }
+    }
+
     fn traced(&self, nodes: &Nodes, spokes: Vec<Spoke>) -> Lit<'a> {
         let started = nodes.points.iter().zip(&nodes.weights);
         let started = started.filter_map(|(p, w)| Some((self.launch.ray(*p)?, *w)));

@@ -421,6 +421,22 @@ impl<R: Real> Block<R> {
         } else {
             self.meet_along(&Interface { sense: -R::ONE, ..*interface }, number, keep);
         }
+        if interface.obstruction2 > R::ZERO {
+            self.obstruct(interface, number);
+        }
+    }
+
+    /// Clips the rays that met a surface inside its obstruction.
+    #[inline(always)]
+    fn obstruct(&mut self, interface: &Interface<R>, number: u32) {
+        let lost = |cause: u32| R::from_f64(f64::from(4 * number + cause));
+        let (clipped, reflected) = (lost(CLIPPED), lost(TOTAL_REFLECTION));
+        for j in 0..BLOCK {
+            let (p, _) = self.state(j);
+            let code = self.code[j];
+            let arrived = !(code > R::ZERO) | (code == reflected);
+            self.code[j] = R::select(arrived & interface.obstructs(p), clipped, code);
+        }
     }
 
     #[inline(always)]

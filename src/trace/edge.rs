@@ -93,6 +93,7 @@ impl<R: Real> Interface<R> {
         let met = self.meeting(start, k);
         match hurdle {
             Hurdle::Rim => self.rim_margin(met.point),
+            Hurdle::Obstruction => self.obstruction_margin(met.point),
             Hurdle::Reflection => met.a * met.a + self.dn2 * met.m,
             Hurdle::Miss => match self.form {
                 Form::Plane => self.sense * k.z,
@@ -160,8 +161,12 @@ impl Tracer<f64> {
         let numbers = &mut total.surfaces[surface];
         numbers.index += by[7];
         numbers.curvature += by[8];
-        numbers.conic += by[9];
-        numbers.terms.iter_mut().zip(&by[10..]).for_each(|(to, from)| *to += from);
+        if matches!(own.form, Form::Conic | Form::Asphere) {
+            numbers.conic += by[9];
+        }
+        if own.form == Form::Asphere {
+            numbers.terms.iter_mut().zip(&by[10..]).for_each(|(to, from)| *to += from);
+        }
         if let Some(before) = surface.checked_sub(1) {
             total.surfaces[before].thickness -= by[2];
         }
@@ -207,6 +212,7 @@ impl Interface<f64> {
             index_behind: behind,
             dn2: (behind - before) * (behind + before),
             rim2: constant(self.rim2),
+            obstruction2: constant(self.obstruction2),
             sheet: constant(self.sheet),
             steepest: self.steepest,
             span: self.span,

@@ -17,6 +17,8 @@ pub enum Hurdle {
     Miss,
     /// The ray meets it outside the semi-diameter.
     Rim,
+    /// The ray meets it inside the obstruction.
+    Obstruction,
     /// The ray is totally reflected.
     Reflection,
 }
@@ -24,10 +26,12 @@ pub enum Hurdle {
 impl<R: Real> Tracer<R> {
     /// Follows a ray and calls `visit` with every hurdle on its way and the margin by which it is
     /// taken: positive for a ray that passes, negative for one that does not. A ray goes on behind
-    /// a rim that clips it, but not behind a surface that it misses or that reflects it totally.
+    /// a rim or an obstruction that clips it, but not behind a surface that it misses or that
+    /// reflects it totally.
     ///
-    /// The margin is `sd² − r²` in mm² at a rim, the square of the optical direction's component
-    /// along the normal at a miss and at a total reflection, and −1 at an asphere that is missed.
+    /// The margin is `sd² − r²` in mm² at a rim and `r² − h²` at an obstruction, the square of the
+    /// optical direction's component along the normal at a miss and at a total reflection, and −1
+    /// at an asphere that is missed.
     pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, Hurdle, R)) {
         let mut k = launch(ray.direction, self.index_before);
         let mut point = ray.point;
@@ -41,6 +45,9 @@ impl<R: Real> Tracer<R> {
             let p = met.point;
             if interface.rim2.value() < f64::INFINITY {
                 visit(i, Hurdle::Rim, interface.rim_margin(p));
+            }
+            if interface.obstruction2.value() > 0.0 {
+                visit(i, Hurdle::Obstruction, interface.obstruction_margin(p));
             }
             if !interface.mirror {
                 let behind2 = met.a * met.a + interface.dn2 * met.m;
@@ -58,6 +65,10 @@ impl<R: Real> Tracer<R> {
 impl<R: Real> Interface<R> {
     pub(super) fn rim_margin(&self, p: Vec3<R>) -> R {
         self.rim2 - (p.x * p.x + p.y * p.y)
+    }
+
+    pub(super) fn obstruction_margin(&self, p: Vec3<R>) -> R {
+        p.x * p.x + p.y * p.y - self.obstruction2
     }
 
     pub(super) fn meeting(&self, start: Vec3<R>, k: Vec3<R>) -> Meeting<R> {

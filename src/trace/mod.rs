@@ -57,7 +57,9 @@ impl<R: Real> Tracer<R> {
     /// behind that its polynomial means nothing.
     #[must_use]
     pub fn opened(mut self) -> Self {
-        self.interfaces.iter_mut().for_each(|i| i.rim2 = R::from_f64(f64::INFINITY));
+        for interface in &mut self.interfaces {
+            (interface.rim2, interface.obstruction2) = (R::from_f64(f64::INFINITY), R::ZERO);
+        }
         self
     }
 

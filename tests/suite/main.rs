@@ -6,6 +6,7 @@ mod analysis;
 mod aperture;
 mod cli;
 mod effects;
+mod experiments;
 mod files;
 mod hard_cases;
 mod library;

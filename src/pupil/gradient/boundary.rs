@@ -10,7 +10,7 @@
 //! Split at its corners, the edge is smooth along every arc, and Gauss nodes converge spectrally.
 //! Rays are traced backwards, so that the cost does not depend on the number of parameters.
 
-use super::Cost;
+use super::Integrand;
 use crate::math::Vec3;
 use crate::pupil::boundary::{Frame, Limit};
 use crate::pupil::lit::{Lit, Rim};
@@ -18,9 +18,16 @@ use crate::pupil::quadrature::Spoke;
 use crate::trace::{Gradient, Hurdle, Ray, Rays, Seed};
 
 impl Lit<'_> {
+    /// The integral itself, in mm² of the first vertex plane times the unit of the integrand.
+    pub fn integral(&self, cost: &impl Integrand) -> f64 {
+        let points = &self.landed.sink;
+        let of = |(i, weight): (usize, f64)| weight * cost.of([points.x[i], points.y[i]]);
+        self.launch.area() * self.landed.arrived().map(of).sum::<f64>()
+    }
+
     /// The derivative with the motion of the edge, by every number of the system; `None` where the
     /// pupil is not one piece that a point inside sees all of.
-    pub fn boundary_derivative(&self, cost: &Cost) -> Option<Gradient<f64>> {
+    pub fn boundary_derivative(&self, cost: &impl Integrand) -> Option<Gradient<f64>> {
         let mut total = self.biased_derivative(cost);
         total.add(&self.edge_motion(cost)?, 1.0);
         Some(total)
@@ -28,7 +35,7 @@ impl Lit<'_> {
 
     /// The integral of `dC/dt` over fixed rays: the derivative without the motion of the edge,
     /// biased wherever something clips.
-    pub fn biased_derivative(&self, cost: &Cost) -> Gradient<f64> {
+    pub fn biased_derivative(&self, cost: &impl Integrand) -> Gradient<f64> {
         let (scale, points) = (self.launch.area(), &self.landed.sink);
         let seed = |i: usize| {
             let [x, y] = cost.slope([points.x[i], points.y[i]]);
@@ -40,7 +47,7 @@ impl Lit<'_> {
 
     /// What the motion of the edge contributes: nothing where it is the disc of the pupil, which
     /// does not move; `None` where the edge is not known.
-    pub fn edge_motion(&self, cost: &Cost) -> Option<Gradient<f64>> {
+    pub fn edge_motion(&self, cost: &impl Integrand) -> Option<Gradient<f64>> {
         let tracer = &self.launch.color().tracer;
         let mut total = Gradient::zero(tracer.surfaces());
         let frame = match &self.rim {
@@ -62,7 +69,7 @@ impl Lit<'_> {
     /// The ray at the end of a spoke, and what a change of its margin adds to the integral.
     fn edge_ray(
         &self,
-        cost: &Cost,
+        cost: &impl Integrand,
         frame: &Frame,
         spoke: &Spoke,
         (surface, hurdle): (usize, Hurdle),

@@ -1,6 +1,8 @@
 //! Integrals over pupils whose edge moves, against the cases of `aperture_gradients.json`.
 
 mod boundary;
+mod estimators;
+mod hard;
 mod warp;
 
 use crate::reference::{count, number, numbers, read};
@@ -113,6 +115,7 @@ pub(crate) fn image() -> Surface<f64> {
         thickness: 0.0,
         index: 1.0,
         semi_diameter: f64::INFINITY,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     }
