@@ -129,6 +129,8 @@ impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
 pub(super) struct Pulls<R> {
     pub(super) rim: [R; BLOCK],
     pub(super) angle: [R; BLOCK],
+    /// Only where there is one.
+    pub(super) obstruction: Option<[R; BLOCK]>,
     /// Only where a sheet can end anything.
     pub(super) sheet: Option<[R; BLOCK]>,
 }
@@ -431,6 +433,7 @@ impl<R: Real> Interface<R> {
 }
 
 /// What refraction read backwards gives.
+#[derive(Clone, Copy)]
 struct Refracted<R> {
     /// The direction in front.
     k: Vec3<R>,
@@ -520,6 +523,9 @@ impl<R: Real> Homeward<R> {
     fn pass(&mut self, surface: &Interface<R>, pulls: Option<&Pulls<R>>) {
         let sheet = pulls.and_then(|pulls| {
             self.pull_rim(surface, &pulls.rim);
+            if let Some(pull) = &pulls.obstruction {
+                self.pull_radius(pull, -(R::ONE / surface.obstruction2));
+            }
             pulls.sheet.as_ref().map(|sheet| self.pull_sheet(surface, sheet))
         });
         let angle = pulls.map(|pulls| &pulls.angle);
@@ -540,12 +546,21 @@ impl<R: Real> Homeward<R> {
     #[inline(always)]
     fn pull_rim(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) {
         let (inverse, radius) = (R::ONE / surface.rim2, surface.rim2.sqrt());
-        for j in 0..BLOCK {
+        self.pull_radius(pull, inverse);
+        for (j, pull) in pull.iter().enumerate() {
             let (p, _) = self.block.state(j);
-            let share = pull[j] * inverse;
+            self.by_semi_diameter[j] = -(*pull * inverse * (p.x * p.x + p.y * p.y) / radius);
+        }
+    }
+
+    /// The adjoint of half the square of the distance from the axis, `factor` times.
+    #[inline(always)]
+    fn pull_radius(&mut self, pull: &[R; BLOCK], factor: R) {
+        for (j, pull) in pull.iter().enumerate() {
+            let (p, _) = self.block.state(j);
+            let share = *pull * factor;
             self.by_x[j] += p.x * share;
             self.by_y[j] += p.y * share;
-            self.by_semi_diameter[j] = -(share * (p.x * p.x + p.y * p.y) / radius);
         }
     }
 
@@ -554,17 +569,17 @@ impl<R: Real> Homeward<R> {
     fn pull_sheet(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) -> [[R; BLOCK]; 2] {
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
         let mut left = [[R::ZERO; BLOCK]; 2];
-        for j in 0..BLOCK {
+        for (j, pull) in pull.iter().enumerate() {
             let (p, _) = self.block.state(j);
             if surface.form == Form::Asphere {
-                let (r2, pull) = (p.x * p.x + p.y * p.y, c * pull[j]);
+                let (r2, pull) = (p.x * p.x + p.y * p.y, c * *pull);
                 let outward = k1 * c * pull * R::TWO;
                 self.by_x[j] += p.x * outward;
                 self.by_y[j] += p.y * outward;
                 (left[0][j], left[1][j]) = (k1 * r2 * pull * R::TWO, c * r2 * pull);
             } else {
-                let along = p.z * pull[j];
-                self.by_z[j] += k1 * c * pull[j];
+                let along = p.z * *pull;
+                self.by_z[j] += k1 * c * *pull;
                 (left[0][j], left[1][j]) = (k1 * along, c * along);
             }
         }

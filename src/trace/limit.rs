@@ -6,7 +6,7 @@
 //! at the edge:
 //!
 //! ```text
-//! rim    (r²/R² − 1)/2
+//! rim    (r²/R² − 1)/2, and of an obstruction (1 − r²/h²)/2
 //! angle  max(0, 1 − (n'/n)²) N·N − (k·N)²/n²
 //! sheet  −(1 − (1+κ) c z), or (1+κ) c² r² − 1 at an asphere
 //! ```
@@ -43,6 +43,7 @@ type Pair<R> = Dual<Dual<R, 1>, 1>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Limit {
     Rim,
+    Obstruction,
     Angle,
     Sheet,
 }
@@ -62,6 +63,7 @@ impl<R: Real> Interface<R> {
         let flat = surface.form != Form::Asphere && surface.curvature == 0.0;
         match limit {
             Limit::Rim => surface.rim2 < f64::INFINITY,
+            Limit::Obstruction => surface.obstruction2 > 0.0,
             Limit::Angle => !flat || surface.dn2 < 0.0,
             Limit::Sheet => {
                 let closed = surface.form == Form::Asphere || surface.sheet > f64::NEG_INFINITY;
@@ -114,6 +116,10 @@ impl<R: Real> Interface<Jet<R>> {
                 let half = R::from_f64(0.5);
                 r2.scaled(half / self.rim2.value) - Jet::constant(half)
             }
+            Limit::Obstruction => {
+                let half = R::from_f64(0.5);
+                Jet::constant(half) - r2.scaled(half / self.obstruction2.value)
+            }
             Limit::Angle => {
                 let inverse = R::ONE / self.n2.value;
                 let loss = self.loss().value * inverse;
@@ -159,7 +165,8 @@ impl<R: Real> PupilTracer<R> {
     /// Numbers that no ray can be traced with: see [`System::check`].
     pub fn new(system: &System<f64>) -> Result<Self, Invalid> {
         let outward = Tracer::new(&system.lift::<Jet<R>>())?;
-        let all = |i: usize| [Limit::Rim, Limit::Angle, Limit::Sheet].map(|limit| (i, limit));
+        let kinds = [Limit::Rim, Limit::Obstruction, Limit::Angle, Limit::Sheet];
+        let all = |i: usize| kinds.map(|limit| (i, limit));
         let limits = (0..outward.surfaces()).flat_map(all);
         let limits = limits.filter(|(i, limit)| outward.interfaces[*i].has(*limit)).collect();
         let mut homeward = Tracer::<Pair<R>>::new(&system.lift())?;
@@ -250,6 +257,9 @@ impl<R: Real> PupilTracer<R> {
                 // Known inside the loops, so that these have no branch.
                 match limit {
                     Limit::Rim => interface.limits(Limit::Rim, &block, &slants, lanes),
+                    Limit::Obstruction => {
+                        interface.limits(Limit::Obstruction, &block, &slants, lanes);
+                    }
                     Limit::Angle => interface.limits(Limit::Angle, &block, &slants, lanes),
                     Limit::Sheet => interface.limits(Limit::Sheet, &block, &slants, lanes),
                 }
@@ -295,7 +305,8 @@ impl<R: Real> Room<R> {
         };
         let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
         let none = [Pair::ZERO; BLOCK];
-        let pulls = vec![Pulls { rim: none, angle: none, sheet: None }; surfaces];
+        let pulls =
+            vec![Pulls { rim: none, angle: none, obstruction: None, sheet: None }; surfaces];
         Self { abreast, distances, pulls }
     }
 
@@ -306,6 +317,7 @@ impl<R: Real> Room<R> {
             let pulls = &mut self.pulls[*surface];
             let lanes = match limit {
                 Limit::Rim => &mut pulls.rim,
+                Limit::Obstruction => pulls.obstruction.get_or_insert([Pair::ZERO; BLOCK]),
                 Limit::Angle => &mut pulls.angle,
                 Limit::Sheet => pulls.sheet.get_or_insert([Pair::ZERO; BLOCK]),
             };

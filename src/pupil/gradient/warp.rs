@@ -384,8 +384,8 @@ mod tests {
     /// the image are wider than their conic.
     fn system() -> System<f64> {
         let surface = |shape, thickness, index, semi_diameter| {
-            let (mirror, hyper) = (false, false);
-            Surface { shape, thickness, index, semi_diameter, mirror, hyper }
+            let (obstruction, mirror, hyper) = (0.0, false, false);
+            Surface { shape, thickness, index, semi_diameter, obstruction, mirror, hyper }
         };
         let terms = [1e-5, -3e-8, 0.0, 1e-12, 0.0, 0.0, 0.0];
         let mut surfaces = vec![
@@ -396,6 +396,7 @@ mod tests {
             surface(Shape::Asphere { curvature: -0.01, conic: 0.2, terms }, -9.0, 1.0, 7.5),
             surface(Shape::Sphere { curvature: 0.13 }, 0.0, 1.0, 9.0),
         ];
+        surfaces[1].obstruction = 0.3;
         surfaces[4].mirror = true;
         System { index_before: 1.05, surfaces, stop: None }
     }
@@ -419,6 +420,10 @@ mod tests {
             let n2 = before * before;
             match (hurdle, surface.shape) {
                 (Hurdle::Rim, _) => limits.push(-margin / (r * r * Dual3::TWO)),
+                (Hurdle::Obstruction, _) => {
+                    let h = surface.obstruction;
+                    limits.push(-margin / (h * h * Dual3::TWO));
+                }
                 (Hurdle::Reflection, _) if rarer => limits.push(-margin / n2),
                 // (k·N)² + n'² − n²
                 (Hurdle::Reflection, Shape::Sphere { .. }) => {
