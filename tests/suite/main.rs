@@ -6,6 +6,7 @@ mod analysis;
 mod cli;
 mod effects;
 mod files;
+mod grin;
 mod hard_cases;
 mod library;
 mod merit;

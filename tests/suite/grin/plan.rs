@@ -1,0 +1,1 @@
+//! Placeholder for tests of this kind.
