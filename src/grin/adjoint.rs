@@ -20,6 +20,8 @@ use super::lanes::{Column, Columns, LANES, get, put};
 use super::tracer::{Ray, Tracer, drift};
 use crate::math::Real;
 use crate::math::Vec3;
+use crate::math::Width;
+use crate::math::widest;
 
 /// The derivative of a loss by a ray's position, velocity and optical path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -128,7 +130,11 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
             self.fill_back(&mut block, lane, (&mut queue, clock), chunk);
         }
         while block.seat.iter().any(Option::is_some) {
-            self.undo_block(&mut block, &mut scratch, gradient);
+            widest(
+                Width::detect(),
+                #[inline(always)]
+                || self.undo_block(&mut block, &mut scratch, gradient),
+            );
             clock += 1;
             for lane in 0..LANES {
                 // Only the first step on the way back may be a cut one.
@@ -204,6 +210,7 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
     }
 
     /// Undoes one step of every ray of a block.
+    #[inline(always)]
     fn undo_block(&self, block: &mut Block<R>, scratch: &mut Scratch<R>, gradient: &mut [R]) {
         for op in self.ops.iter().rev() {
             match *op {

@@ -33,6 +33,7 @@ pub use fate::{Fate, Fates};
 pub use field::Field;
 pub use gradient::{Gradient, Outcome};
 pub use integrator::{Integrator, Op};
+pub use lanes::{Column, Columns, LANES};
 pub use plan::{Plan, plan};
 pub use region::{Face, Region};
 pub use setup::{End, LastStep, Launch, Setup, SetupError};

@@ -12,6 +12,8 @@ use super::lanes::{Column, Columns, LANES, get, put};
 use super::setup::{Setup, SetupError};
 use crate::math::Real;
 use crate::math::Vec3;
+use crate::math::Width;
+use crate::math::widest;
 use rayon::prelude::*;
 
 /// Rays that one task traces when all cores work.
@@ -201,9 +203,16 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
             if self.setup.is_fractional() {
                 (before.x, before.v, before.path) = (block.x, block.v, block.path);
             }
-            self.advance_block(&mut block);
             clock += 1;
-            if !self.any_due(&block, clock) {
+            let any_due = widest(
+                Width::detect(),
+                #[inline(always)]
+                || {
+                    self.advance_block(&mut block);
+                    self.any_due(&block, clock)
+                },
+            );
+            if !any_due {
                 continue;
             }
             for lane in 0..LANES {
@@ -252,6 +261,7 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
     }
 
     /// Whether any ray has to be looked at.
+    #[inline(always)]
     fn any_due(&self, block: &Block<R>, clock: u64) -> bool {
         let mut due = false;
         for lane in 0..LANES {
@@ -267,6 +277,7 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
     }
 
     /// One step of every ray of a block.
+    #[inline(always)]
     fn advance_block(&self, block: &mut Block<R>) {
         let mut samples = Samples::default();
         for op in &self.ops {

@@ -5,11 +5,14 @@
 
 mod double;
 mod dual;
+mod lanes;
 pub mod quadrature;
 mod real;
 mod vec3;
 
 pub use double::Double;
 pub use dual::Dual;
+pub use lanes::Width;
+pub(crate) use lanes::widest;
 pub use real::Real;
 pub use vec3::Vec3;

@@ -14,14 +14,13 @@ mod backward;
 mod batch;
 mod fate;
 mod interface;
-mod lanes;
 mod margin;
 mod single;
 
+pub use crate::math::Width;
 pub use backward::{Gradient, Seed, Slot, SurfaceGradient};
 pub use batch::{Hits, Points, Rays, Sink};
 pub use fate::{Fate, Fates};
-pub use lanes::Width;
 pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};
 

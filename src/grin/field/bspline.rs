@@ -1,5 +1,6 @@
 //! Uniform cubic B-splines, and a profile made of them.
 
+use super::cell::{cell, integer};
 use super::{Profile, Profiled};
 use crate::math::Real;
 
@@ -39,14 +40,6 @@ pub(super) fn bends<R: Real>(t: R) -> [R; 4] {
     [u, c(3.0) * t - R::TWO, c(3.0) * u - R::TWO, t]
 }
 
-/// The cell of a coordinate counted in cells from the first, kept within `0..=last`; what is not a
-/// number falls into the first.
-#[inline(always)]
-pub(super) fn cell<R: Real>(u: R, last: usize) -> usize {
-    // A cast of a float saturates, so numbers below zero, too large or not numbers need no branch.
-    (u.value() as usize).min(last)
-}
-
 /// A cubic B-spline in `s` with even knots; the parameters are its coefficients. Beyond its ends
 /// the polynomials of the outer cells continue.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,8 +66,8 @@ impl<R: Real> BSpline<R> {
     #[inline(always)]
     fn locate(&self, s: R) -> (usize, R) {
         let u = (s - self.start) / self.spacing;
-        let first = cell(u, self.coefficients.len() - 4);
-        (first, u - R::from_f64(first as f64))
+        let first = cell(u.value(), (self.coefficients.len() - 4) as f64);
+        (integer(first), u - R::from_f64(first))
     }
 }
 

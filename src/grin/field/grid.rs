@@ -1,6 +1,6 @@
 //! Where the values of a sampled field stand: a block of nodes with even spacing on each axis.
 
-use super::bspline::cell;
+use super::cell::{cell, integer};
 use crate::math::Real;
 use crate::math::Vec3;
 
@@ -133,29 +133,33 @@ impl<R: Real> Grid<R> {
         }
     }
 
-    /// The cell of a point, whose support is `width` nodes wide, and the place within it; outside
-    /// the grid the outermost cell.
+    /// The cell of a point, whose support is `width` nodes wide; outside the grid the outermost cell.
     #[inline(always)]
-    pub(super) fn locate(&self, at: Vec3<R>, width: usize) -> ([usize; 3], Vec3<R>) {
+    pub(super) fn locate(&self, at: Vec3<R>, width: usize) -> Place<R> {
         let [nx, ny, nz] = self.counts;
         let (x, tx) = along(at.x, self.low.x, self.density.x, nx - width);
         let (y, ty) = along(at.y, self.low.y, self.density.y, ny - width);
         let (z, tz) = along(at.z, self.low.z, self.density.z, nz - width);
-        ([x, y, z], Vec3::new(tx, ty, tz))
+        let first = (z * ny as f64 + y) * nx as f64 + x;
+        Place { cell: [x, y, z], first: integer(first), t: Vec3::new(tx, ty, tz) }
     }
+}
 
-    /// The number of a node.
-    #[inline(always)]
-    pub(super) fn number(&self, [i, j, k]: [usize; 3]) -> usize {
-        let [nx, ny, _] = self.counts;
-        (k * ny + j) * nx + i
-    }
+/// Where a point lies in a grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<R> {
+    /// The cell along each axis, a whole number.
+    pub(super) cell: [f64; 3],
+    /// The number of the first node that counts.
+    pub(super) first: usize,
+    /// Where the point lies within the cell: from 0 to 1 unless it is outside the grid.
+    pub(super) t: Vec3<R>,
 }
 
 /// The cell along one axis and the place within it.
 #[inline(always)]
-fn along<R: Real>(x: R, low: R, density: R, last: usize) -> (usize, R) {
+fn along<R: Real>(x: R, low: R, density: R, last: usize) -> (f64, R) {
     let u = (x - low) * density;
-    let i = cell(u, last);
-    (i, u - R::from_f64(i as f64))
+    let i = cell(u.value(), last as f64);
+    (i, u - R::from_f64(i))
 }

@@ -51,7 +51,7 @@ impl<R: Real> Profile<R> for Luneburg<R> {
         Profiled { value, slope, bend: -(slope * slope / value) }
     }
 
-    /// `∂f/∂R = q/(f R)` and `∂f'/∂R = (2 - q/f²)/(2 f R³)` with `q = s/R²`.
+    /// `∂f/∂R = q/(f R)` and `∂f'/∂R = (2 + q/f²)/(2 f R³)` with `q = s/R²`.
     #[inline(always)]
     fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         let [radius] = self.radius;
@@ -59,7 +59,7 @@ impl<R: Real> Profile<R> for Luneburg<R> {
         let value = (R::TWO - q).sqrt();
         let by_radius = q / (value * radius);
         let slope_by_radius =
-            (R::TWO - q / (value * value)) / (R::TWO * value * radius * radius * radius);
+            (R::TWO + q / (value * value)) / (R::TWO * value * radius * radius * radius);
         gradient[0] += on * (weight * by_radius + pull * slope_by_radius);
     }
 }

@@ -4,6 +4,7 @@
 //! [`Profile`] of its own.
 
 mod bspline;
+mod cell;
 mod grid;
 mod layered;
 mod luneburg;
@@ -28,6 +29,8 @@ pub use trilinear::{Diagonal, Trilinear};
 use super::lanes::{Column, Columns, LANES, get, put};
 use crate::math::Real;
 use crate::math::Vec3;
+use crate::math::Width;
+use crate::math::widest;
 use std::fmt::Debug;
 
 /// The index at a point, and its gradient.
@@ -96,9 +99,15 @@ pub trait Field<R: Real>: Debug + Send + Sync {
 
     /// Index and gradient for a block of rays.
     fn samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
-        for lane in 0..LANES {
-            out.put(lane, self.sample(get(at, lane)));
-        }
+        widest(
+            Width::detect(),
+            #[inline(always)]
+            || {
+                for lane in 0..LANES {
+                    out.put(lane, self.sample(get(at, lane)));
+                }
+            },
+        );
     }
 
     /// The same, and the Hessian times a vector for each ray.
@@ -109,11 +118,17 @@ pub trait Field<R: Real>: Debug + Send + Sync {
         out: &mut Samples<R>,
         product: &mut Columns<R>,
     ) {
-        for lane in 0..LANES {
-            let x = get(at, lane);
-            out.put(lane, self.sample(x));
-            put(product, lane, self.hessian(x).times(get(times, lane)));
-        }
+        widest(
+            Width::detect(),
+            #[inline(always)]
+            || {
+                for lane in 0..LANES {
+                    let x = get(at, lane);
+                    out.put(lane, self.sample(x));
+                    put(product, lane, self.hessian(x).times(get(times, lane)));
+                }
+            },
+        );
     }
 
     /// [`Self::deposit`] for a block of rays, in order.
@@ -141,7 +156,7 @@ impl<R: Real> Default for Samples<R> {
 
 impl<R: Real> Samples<R> {
     #[inline(always)]
-    fn put(&mut self, lane: usize, sample: Sample<R>) {
+    pub(super) fn put(&mut self, lane: usize, sample: Sample<R>) {
         self.index[lane] = sample.index;
         put(&mut self.gradient, lane, sample.gradient);
     }

@@ -66,8 +66,8 @@ impl<R: Real> Tricubic<R> {
     /// The first coefficient that counts at a point, and the place within its cell.
     #[inline(always)]
     fn locate(&self, at: Vec3<R>) -> (usize, Vec3<R>) {
-        let (cell, t) = self.grid.locate(at, 4);
-        (self.grid.number(cell), t)
+        let place = self.grid.locate(at, 4);
+        (place.first, place.t)
     }
 
     /// The number of the first of four coefficients in row `j` of layer `k`.
