@@ -38,9 +38,14 @@ fn luneburg_error(integrator: Integrator, count: u32) -> f64 {
 fn grin_luneburg_focuses_with_the_order_of_each_integrator() {
     for integrator in Integrator::ALL {
         let kicks = integrator.kicks() as u32;
-        let (coarse, fine) = (luneburg_error(integrator, 48 / kicks), luneburg_error(integrator, 192 / kicks));
+        let (coarse, fine) =
+            (luneburg_error(integrator, 48 / kicks), luneburg_error(integrator, 192 / kicks));
         let order = (coarse / fine).log2() / 2.0;
-        println!("{}: {} kicks a ray {fine:.1e}, order {order:.2}", integrator.name(), 192 / kicks * kicks);
+        println!(
+            "{}: {} kicks a ray {fine:.1e}, order {order:.2}",
+            integrator.name(),
+            192 / kicks * kicks
+        );
         assert!(order > f64::from(integrator.order()) - 0.35, "{order}");
     }
     assert!(luneburg_error(Integrator::BlanesMoan, 14) < 5e-9);
@@ -50,8 +55,10 @@ fn grin_luneburg_focuses_with_the_order_of_each_integrator() {
 #[test]
 fn grin_every_path_through_luneburg_to_its_focus_is_equally_long() {
     let field = Layered::sphere(Luneburg::new(1.0));
-    let plane: Vec<_> =
-        onto_unit_ball().iter().map(|ray| Ray { x: vec3([ray.x.x, ray.x.y, -1.0]), ..*ray }).collect();
+    let plane: Vec<_> = onto_unit_ball()
+        .iter()
+        .map(|ray| Ray { x: vec3([ray.x.x, ray.x.y, -1.0]), ..*ray })
+        .collect();
     let region = Region::ball(1.0);
     let setup = until(Integrator::BlanesMoan, 0.05, region, LastStep::Fractional);
     for exit in Tracer::new(&field, setup).unwrap().rays(&plane) {
@@ -114,9 +121,9 @@ fn grin_a_fibre_of_ten_thousand_periods_stays_a_sinusoid() {
         "{count} steps: off by {error:.1e} across the axis, excess {:.1e}, retrace {retrace:.1e} steps",
         exit.excess
     );
-    assert!(error < 2e-2 && exit.excess.abs() < 1e-6);
-    assert!((exit.x.z / (vz * sigma) - 1.0).abs() < 1e-12);
-    assert!(retrace < 1e-7, "{retrace}");
+    assert!(error < 1e-4 && exit.excess.abs() < 1e-11);
+    assert!((exit.x.z / (vz * sigma) - 1.0).abs() < 1e-10);
+    assert!(retrace < 1e-8, "{retrace}");
     assert!((outcome.gradient.starts[0].x.x - 1.0).abs() < 0.1);
 }
 
@@ -189,7 +196,7 @@ fn grin_a_ball_of_glass_refracts_as_snell_says() {
         let (alpha, beta) = (h.asin(), (h / 1.5).asin());
         let direction = -2.0 * (alpha - beta);
         let leaves = 2.0 * beta - alpha; // polar angle of the exit, seen from the far pole
-        let (x, z) = (-leaves.sin(), leaves.cos());
+        let (x, z) = (leaves.sin(), leaves.cos());
         let reach = (3.0 - z) / direction.cos();
         let path = (4.0 - alpha.cos()) + 1.5 * 2.0 * beta.cos() + reach;
         assert!((exit.x.x - (x + reach * direction.sin())).abs() < 1e-12, "{h}: {:?}", exit.x);
