@@ -12,7 +12,7 @@
 //! thesis for any list of drifts and kicks (its Algorithm 3 accumulates after `μ` has changed and
 //! lacks the factor `h`).
 
-use super::exit::Exit;
+use super::exit::{Entry, Exit};
 use super::fate::Fate;
 use super::field::{Field, Samples};
 use super::integrator::Op;
@@ -131,14 +131,14 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
         }
         while block.seat.iter().any(Option::is_some) {
             widest(
-                Width::detect(),
+                Width::Bits512,
                 #[inline(always)]
                 || self.undo_block(&mut block, &mut scratch, gradient),
             );
             clock += 1;
-            for lane in 0..LANES {
+            for (h, due) in block.h.iter_mut().zip(&block.due) {
                 // Only the first step on the way back may be a cut one.
-                block.h[lane] = R::select(block.due[lane] == u64::MAX, R::ZERO, self.setup.step);
+                *h = R::select(*due == u64::MAX, R::ZERO, self.setup.step);
             }
             for lane in 0..LANES {
                 let Some(ray) = block.seat[lane].filter(|_| clock >= block.due[lane]) else {
@@ -161,21 +161,22 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
         retraced: &mut Retraced,
     ) {
         let start = &chunk.rays[ray];
-        let error = self.retrace_error(start, get(&block.x, lane));
         let seed = block.seed(lane);
-        if error <= tolerance::<R>() && seed.is_finite() {
-            retraced.worst = retraced.worst.max(error);
-            chunk.starts[ray] = self.enter_back(start, seed, gradient);
-        } else {
-            retraced.lost += 1;
-            chunk.exits[ray].fate = Fate::Chaotic;
-            chunk.starts[ray] = Seed::default();
+        if let Ok(entry) = self.enter(start) {
+            let error = self.retrace_error(&entry, get(&block.x, lane));
+            if error <= tolerance::<R>() && seed.is_finite() {
+                retraced.worst = retraced.worst.max(error);
+                chunk.starts[ray] = self.enter_back(start, &entry, seed, gradient);
+                return;
+            }
         }
+        retraced.lost += 1;
+        chunk.exits[ray].fate = Fate::Chaotic;
+        chunk.starts[ray] = Seed::default();
     }
 
     /// How far the way back ended from the start, in steps; infinite for what is no number.
-    fn retrace_error(&self, start: &Ray<R>, back: Vec3<R>) -> f64 {
-        let Ok(entry) = self.enter(start) else { return f64::INFINITY };
+    fn retrace_error(&self, entry: &Entry<R>, back: Vec3<R>) -> f64 {
         let miss = (back - entry.state.x).value();
         let v = entry.state.v.value();
         let step = self.setup.step.value() * v.dot(v).sqrt();
@@ -239,7 +240,7 @@ fn tolerance<R: Real>() -> f64 {
 #[inline(always)]
 fn undo_kick<R: Real>(block: &mut Block<R>, scratch: &mut Scratch<R>, c: R) {
     let Scratch { samples, bent, weight, pull } = scratch;
-    for lane in 0..LANES {
+    for (lane, weight) in weight.iter_mut().enumerate() {
         let (index, g) = (samples.index[lane], get(&samples.gradient, lane));
         let (step, by_v) = (c * block.h[lane], get(&block.by_v, lane));
         let force = step * index;
@@ -248,7 +249,7 @@ fn undo_kick<R: Real>(block: &mut Block<R>, scratch: &mut Scratch<R>, c: R) {
         let by_index = step * (by_v.dot(g) + R::TWO * block.by_path[lane] * index);
         let by_x = get(&block.by_x, lane) + g * by_index + get(bent, lane) * force;
         put(&mut block.by_x, lane, by_x);
-        weight[lane] = by_index;
+        *weight = by_index;
         put(pull, lane, by_v * force);
     }
 }

@@ -90,8 +90,13 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
     }
 
     /// The transpose of [`Self::enter`]: takes the gradient from the state inside to the ray.
-    pub(super) fn enter_back(&self, ray: &Ray<R>, inside: Seed<R>, gradient: &mut [R]) -> Seed<R> {
-        let Ok(entry) = self.enter(ray) else { return Seed::default() };
+    pub(super) fn enter_back(
+        &self,
+        ray: &Ray<R>,
+        entry: &Entry<R>,
+        inside: Seed<R>,
+        gradient: &mut [R],
+    ) -> Seed<R> {
         let x = entry.state.x;
         let mut seed = inside;
         // What the speed takes from the index at the start.
@@ -171,58 +176,52 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
                 let (face, back) = region.entry(after.x, -after.v)?;
                 Some(Landing { slide: -back, face: Some(face), ..whole })
             }
-            LastStep::Fractional => self.cut_last_step(region, before),
+            LastStep::Fractional => self.cut_last_step(region, before, after),
         }
     }
 
-    /// The length of the last step that ends on the boundary, by Newton's iteration from the full
-    /// step, between two lengths that lie inside and outside.
-    fn cut_last_step(&self, region: &Region<R>, before: &State<R>) -> Option<Landing<R>> {
-        let (mut inside, mut outside) = (R::ZERO, self.setup.step);
-        let mut length = outside;
-        let smallest = self.setup.step.value() * 4.0 * R::EPSILON;
+    /// The length of the last step that ends on the boundary, by Newton's iteration between two
+    /// lengths that lie inside and outside.
+    fn cut_last_step(
+        &self,
+        region: &Region<R>,
+        before: &State<R>,
+        after: &State<R>,
+    ) -> Option<Landing<R>> {
+        let step = self.setup.step;
+        let (mut inside, mut outside) = (R::ZERO, step);
+        let (from, to) = (region.outermost(before.x).1, region.outermost(after.x).1);
+        let mut length = R::select(from < R::ZERO, step * (from / (from - to)), step);
+        let settled = step.value() * R::EPSILON.sqrt();
         for _ in 0..60 {
-            let (correction, distance) = self.overshoot(region, before, length);
+            // The end moves with the velocity, up to the error of the integrator.
+            let end = self.advance(*before, length);
+            let (face, distance) = region.outermost(end.x);
             if distance < R::ZERO {
                 inside = length;
             } else {
                 outside = length;
             }
-            let newton = length - correction;
+            let newton = length - correction(&region.face(face), end.x, end.v);
             let bracketed = newton > inside && newton < outside;
-            let half = (inside + outside) * R::from_f64(0.5);
-            let next = R::select(bracketed, newton, half);
+            let next = R::select(bracketed, newton, (inside + outside) * R::from_f64(0.5));
             let change = (next - length).value().abs();
             length = next;
-            if change <= smallest {
+            if change <= settled {
                 break;
             }
         }
-        // Derivatives that a number carries settle one step after its value.
+        // With the exact derivative; those that a number carries settle one step after its value.
         for _ in 0..=R::ORDER {
-            let (correction, _) = self.overshoot(region, before, length);
-            length = length - correction;
+            let (end, rate) = self.advance_with_rate(*before, length);
+            let (face, _) = region.outermost(end.x);
+            length -= correction(&region.face(face), end.x, rate.x);
         }
         let (state, rate) = self.advance_with_rate(*before, length);
         let (face, distance) = region.outermost(state.x);
         let near = distance.abs() <= rounding(state.x, state.x - before.x);
-        (near && length.is_finite()).then_some(Landing {
-            state,
-            last: length,
-            rate: Some(rate),
-            slide: R::ZERO,
-            face: Some(face),
-            flight: R::ZERO,
-        })
-    }
-
-    /// Newton's correction to the length of a step that should end on the boundary, and how far
-    /// outside it ends.
-    fn overshoot(&self, region: &Region<R>, before: &State<R>, length: R) -> (R, R) {
-        let (state, rate) = self.advance_with_rate(*before, length);
-        let (face, distance) = region.outermost(state.x);
-        let face = region.face(face);
-        (face.height(state.x) / face.normal(state.x).dot(rate.x), distance)
+        let cut = Landing { state, last: length, rate: Some(rate), ..Landing::default() };
+        (near && length.is_finite()).then_some(Landing { face: Some(face), ..cut })
     }
 
     /// From the boundary into air and on to the screen.
@@ -288,6 +287,11 @@ fn approach<R: Real>(region: &Region<R>, ray: &Ray<R>) -> Option<(Option<Face<R>
     let face = region.face(face);
     let inwards = face.normal(ray.x + ray.v * slide).dot(ray.v) < R::ZERO;
     inwards.then_some((Some(face), slide))
+}
+
+/// Newton's correction to a length whose end `x` should lie on the face and moves at this rate.
+fn correction<R: Real>(face: &Face<R>, x: Vec3<R>, rate: Vec3<R>) -> R {
+    face.height(x) / face.normal(x).dot(rate)
 }
 
 /// The state after a straight way `t v`, whose optical path is `t |v|²`.

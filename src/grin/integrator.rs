@@ -30,7 +30,7 @@ pub enum Integrator {
     Yoshida,
     /// Order 4 with 4 kicks (Omelyan, Mryglod and Folk, Comput. Phys. Commun. 146, 2002).
     Pefrl,
-    /// Order 4 with 7 kicks, SRKN₆ᵇ (Blanes and Moan, J. Comput. Appl. Math. 142, 2002): the most
+    /// Order 4 with 7 kicks (SRKN, Blanes and Moan, J. Comput. Appl. Math. 142, 2002): the most
     /// accurate per kick in smooth fields.
     BlanesMoan,
 }
@@ -88,7 +88,7 @@ impl Integrator {
             }
             Self::Pefrl => {
                 let (xi, lambda, chi) =
-                    (0.1786178958448091, -0.2123418310626054, -0.06626458266981849);
+                    (0.1786178958448091, -0.2123418310626054, -0.0662645826698185);
                 let half = [drift(xi), kick(0.5 * (1.0 - 2.0 * lambda)), drift(chi), kick(lambda)];
                 mirrored(&half, drift(1.0 - 2.0 * (chi + xi)))
             }

@@ -43,7 +43,9 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
             if exits[i].fate.arrived() {
                 let seed = self.leave_back(&exits[i], seeds[i]);
                 let inside = self.play_back(tape, &exits[i], seed, &mut parameters);
-                starts[i] = self.enter_back(&rays[i], inside, &mut parameters);
+                if let Ok(entry) = self.enter(&rays[i]) {
+                    starts[i] = self.enter_back(&rays[i], &entry, inside, &mut parameters);
+                }
             }
         }
         Taped { parameters, starts, bytes: stored * size_of::<Vec3<R>>() }

@@ -205,7 +205,7 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
             }
             clock += 1;
             let any_due = widest(
-                Width::detect(),
+                Width::Bits512,
                 #[inline(always)]
                 || {
                     self.advance_block(&mut block);
@@ -295,8 +295,8 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
 /// `x += c h v` for every lane.
 #[inline(always)]
 pub(super) fn drift<R: Real>(x: &mut Columns<R>, v: &Columns<R>, h: &Column<R>, c: R) {
-    for lane in 0..LANES {
-        let step = c * h[lane];
+    for (lane, h) in h.iter().enumerate() {
+        let step = c * *h;
         x.x[lane] += v.x[lane] * step;
         x.y[lane] += v.y[lane] * step;
         x.z[lane] += v.z[lane] * step;

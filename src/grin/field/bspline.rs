@@ -1,7 +1,8 @@
 //! Uniform cubic B-splines, and a profile made of them.
 
 use super::cell::{cell, integer};
-use super::{Profile, Profiled};
+use super::{Profile, Profiled, ProfiledColumns};
+use crate::grin::lanes::{Column, LANES};
 use crate::math::Real;
 
 /// The four cubic B-splines that are not zero in a cell, at `0 ≤ t < 1`; outside that range the
@@ -97,6 +98,29 @@ impl<R: Real> Profile<R> for BSpline<R> {
             value: sum(basis(t), values),
             slope: sum(slopes(t), values) * scale,
             bend: sum(bends(t), values) * scale * scale,
+        }
+    }
+
+    /// Finds the cells, collects the coefficients, sums: lanes do all but the second.
+    #[inline(always)]
+    fn at_all(&self, s: &Column<R>, out: &mut ProfiledColumns<R>) {
+        let (mut first, mut t) = ([0; LANES], [R::ZERO; LANES]);
+        for lane in 0..LANES {
+            (first[lane], t[lane]) = self.locate(s[lane]);
+        }
+        let mut four = [[R::ZERO; LANES]; 4];
+        for (lane, first) in first.into_iter().enumerate() {
+            let values = &self.coefficients[first..first + 4];
+            for (column, value) in four.iter_mut().zip(values) {
+                column[lane] = *value;
+            }
+        }
+        let scale = R::ONE / self.spacing;
+        for (lane, &t) in t.iter().enumerate() {
+            let values = [four[0][lane], four[1][lane], four[2][lane], four[3][lane]];
+            out.value[lane] = sum(basis(t), &values);
+            out.slope[lane] = sum(slopes(t), &values) * scale;
+            out.bend[lane] = sum(bends(t), &values) * scale * scale;
         }
     }
 

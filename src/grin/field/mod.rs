@@ -17,7 +17,7 @@ mod trilinear;
 
 pub use bspline::BSpline;
 pub use grid::{Grid, GridError};
-pub use layered::{Coordinate, Layered, Profile, Profiled};
+pub use layered::{Coordinate, Layered, Profile, Profiled, ProfiledColumns};
 pub use luneburg::Luneburg;
 pub use maxwell::Maxwell;
 pub use parabolic::Parabolic;
@@ -100,7 +100,7 @@ pub trait Field<R: Real>: Debug + Send + Sync {
     /// Index and gradient for a block of rays.
     fn samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
         widest(
-            Width::detect(),
+            Width::Bits512,
             #[inline(always)]
             || {
                 for lane in 0..LANES {
@@ -119,7 +119,7 @@ pub trait Field<R: Real>: Debug + Send + Sync {
         product: &mut Columns<R>,
     ) {
         widest(
-            Width::detect(),
+            Width::Bits512,
             #[inline(always)]
             || {
                 for lane in 0..LANES {
@@ -133,8 +133,8 @@ pub trait Field<R: Real>: Debug + Send + Sync {
 
     /// [`Self::deposit`] for a block of rays, in order.
     fn deposits(&self, at: &Columns<R>, weight: &Column<R>, pull: &Columns<R>, gradient: &mut [R]) {
-        for lane in 0..LANES {
-            self.deposit(get(at, lane), weight[lane], get(pull, lane), gradient);
+        for (lane, weight) in weight.iter().enumerate() {
+            self.deposit(get(at, lane), *weight, get(pull, lane), gradient);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! A profile that is a polynomial: `f = Σ cₖ sᵏ`.
 
-use super::{Profile, Profiled};
+use super::{Profile, Profiled, ProfiledColumns};
+use crate::grin::lanes::{Column, LANES};
 use crate::math::Real;
 
 /// `f = Σ cₖ sᵏ`; the parameters are the coefficients.
@@ -29,6 +30,25 @@ impl<R: Real> Profile<R> for Polynomial<R> {
             value = value * s + c;
         }
         Profiled { value, slope, bend: half_bend + half_bend }
+    }
+
+    /// One coefficient for all rays, then the next.
+    #[inline(always)]
+    fn at_all(&self, s: &Column<R>, out: &mut ProfiledColumns<R>) {
+        let ProfiledColumns { value, slope, bend } = out;
+        for column in [&mut *value, &mut *slope, &mut *bend] {
+            *column = [R::ZERO; LANES];
+        }
+        for &c in self.coefficients.iter().rev() {
+            for lane in 0..LANES {
+                bend[lane] = bend[lane] * s[lane] + slope[lane];
+                slope[lane] = slope[lane] * s[lane] + value[lane];
+                value[lane] = value[lane] * s[lane] + c;
+            }
+        }
+        for bend in bend {
+            *bend = *bend + *bend;
+        }
     }
 
     #[inline(always)]

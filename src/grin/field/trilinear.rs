@@ -52,6 +52,13 @@ struct Blend<R> {
     mixed: Vec3<R>,
 }
 
+/// Two neighbours along x.
+#[inline(always)]
+fn pair<R: Real>(values: &[R], first: usize) -> [R; 2] {
+    let pair = &values[first..][..2];
+    [pair[0], pair[1]]
+}
+
 /// Interpolates along x, then y, then z; differences instead of weights, for fewer operations.
 #[inline(always)]
 fn blend<R: Real>(c: &Corners<R>, t: Vec3<R>) -> Blend<R> {
@@ -128,16 +135,12 @@ impl<R: Real> Trilinear<R> {
     }
 
     #[inline(always)]
-    fn pair(&self, first: usize) -> [R; 2] {
-        let pair = &self.values[first..first + 2];
-        [pair[0], pair[1]]
-    }
-
-    #[inline(always)]
     fn corners(&self, first: usize) -> Corners<R> {
+        // One check that they are there; what remains to be checked is the same for every voxel.
         let [_, row, layer, both] = self.strides();
-        let (a, b) = (self.pair(first), self.pair(first + row));
-        let (c, d) = (self.pair(first + layer), self.pair(first + both));
+        let near = &self.values[first..][..both + 2];
+        let (a, b) = (pair(near, 0), pair(near, row));
+        let (c, d) = (pair(near, layer), pair(near, both));
         [a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]]
     }
 
@@ -162,14 +165,15 @@ impl<R: Real> Trilinear<R> {
 
     #[inline(always)]
     fn outer_inside(&self, first: usize, t: Vec3<R>) -> Vec3<R> {
+        // One check, as for the corners: the first node is one layer before them.
         let [_, row, layer, both] = self.strides();
+        let near = &self.values[first - layer..][..2 * layer + both + 2];
         let across = |stride: usize, step: usize| {
-            let first = first + stride;
-            let (before, behind) = (self.pair(first - step), self.pair(first + 2 * step));
-            [[before[0], behind[0]], [before[1], behind[1]]]
+            let (a, b) = (pair(near, layer + stride - step), pair(near, layer + stride + 2 * step));
+            [[a[0], b[0]], [a[1], b[1]]]
         };
         let along = |stride: usize| {
-            let four = &self.values[first + stride - 1..first + stride + 3];
+            let four = &near[layer + stride - 1..][..4];
             [four[0], four[3]]
         };
         let [y0, y1] = [across(0, row), across(layer, row)];
@@ -251,12 +255,27 @@ impl<R: Real> Trilinear<R> {
 
     #[inline(always)]
     fn add(&self, first: usize, shares: &Corners<R>, gradient: &mut [R]) {
-        for (n, stride) in self.strides().into_iter().enumerate() {
-            let pair = &mut gradient[first + stride..first + stride + 2];
-            pair[0] += shares[2 * n];
-            pair[1] += shares[2 * n + 1];
+        let strides = self.strides();
+        let near = &mut gradient[first..][..strides[3] + 2];
+        for (n, stride) in strides.into_iter().enumerate() {
+            near[stride] += shares[2 * n];
+            near[stride + 1] += shares[2 * n + 1];
         }
     }
+}
+
+/// Puts the corners of one ray into columns.
+#[inline(always)]
+fn spread<R: Real>(columns: &mut [Column<R>; 8], lane: usize, corners: &Corners<R>) {
+    for (column, corner) in columns.iter_mut().zip(corners) {
+        column[lane] = *corner;
+    }
+}
+
+/// Takes the corners of one ray out of columns.
+#[inline(always)]
+fn collect<R: Real>(columns: &[Column<R>; 8], lane: usize) -> Corners<R> {
+    std::array::from_fn(|n| columns[n][lane])
 }
 
 /// The voxels of a block of rays.
@@ -301,10 +320,7 @@ impl<R: Real> Trilinear<R> {
     fn all_corners(&self, places: &Places<R>) -> [Column<R>; 8] {
         let mut all = [[R::ZERO; LANES]; 8];
         for lane in 0..LANES {
-            let corners = self.corners(places.first[lane]);
-            for n in 0..8 {
-                all[n][lane] = corners[n];
-            }
+            spread(&mut all, lane, &self.corners(places.first[lane]));
         }
         all
     }
@@ -330,7 +346,7 @@ impl<R: Real> Trilinear<R> {
         let places = self.places(at);
         let corners = self.all_corners(&places);
         for lane in 0..LANES {
-            let corners: Corners<R> = std::array::from_fn(|n| corners[n][lane]);
+            let corners = collect(&corners, lane);
             out.put(lane, self.finish(&blend(&corners, get(&places.t, lane))));
         }
     }
@@ -349,7 +365,7 @@ impl<R: Real> Trilinear<R> {
         let smoothed = self.diagonal == Diagonal::Smoothed;
         for lane in 0..LANES {
             let t = get(&places.t, lane);
-            let corners: Corners<R> = std::array::from_fn(|n| corners[n][lane]);
+            let corners = collect(&corners, lane);
             let blend = blend(&corners, t);
             out.put(lane, self.finish(&blend));
             let diagonal = if smoothed {
@@ -372,15 +388,12 @@ impl<R: Real> Trilinear<R> {
     ) {
         let places = self.places(at);
         let mut all = [[R::ZERO; LANES]; 8];
-        for lane in 0..LANES {
-            let shares = self.shares(get(&places.t, lane), weight[lane], get(pull, lane));
-            for n in 0..8 {
-                all[n][lane] = shares[n];
-            }
+        for (lane, weight) in weight.iter().enumerate() {
+            let shares = self.shares(get(&places.t, lane), *weight, get(pull, lane));
+            spread(&mut all, lane, &shares);
         }
         for lane in 0..LANES {
-            let shares: Corners<R> = std::array::from_fn(|n| all[n][lane]);
-            self.add(places.first[lane], &shares, gradient);
+            self.add(places.first[lane], &collect(&all, lane), gradient);
         }
     }
 }
@@ -420,7 +433,7 @@ impl<R: Real> Field<R> for Trilinear<R> {
 
     fn samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
         widest(
-            Width::detect(),
+            Width::Bits512,
             #[inline(always)]
             || self.block_samples(at, out),
         );
@@ -434,7 +447,7 @@ impl<R: Real> Field<R> for Trilinear<R> {
         product: &mut Columns<R>,
     ) {
         widest(
-            Width::detect(),
+            Width::Bits512,
             #[inline(always)]
             || self.block_hessians(at, times, out, product),
         );
@@ -442,7 +455,7 @@ impl<R: Real> Field<R> for Trilinear<R> {
 
     fn deposits(&self, at: &Columns<R>, weight: &Column<R>, pull: &Columns<R>, gradient: &mut [R]) {
         widest(
-            Width::detect(),
+            Width::Bits512,
             #[inline(always)]
             || self.block_deposits(at, weight, pull, gradient),
         );

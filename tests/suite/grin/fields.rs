@@ -140,8 +140,8 @@ fn grin_lenses_have_their_textbook_indices() {
     let r = vec3([0.3, 0.4, 7.0]);
     close(parabolic.sample(r).index, 1.5 * (1.0 - 0.25 * 0.25f64).sqrt(), "parabolic");
     let sech = Layered::cylinder(Sech::new(1.6, 2.0));
-    for r in [0.0, 1e-9, 0.1, 1.0, 3.0] {
-        let exact = 1.6 / (2.0 * r as f64).cosh();
+    for r in [0.0f64, 1e-9, 0.1, 1.0, 3.0] {
+        let exact = 1.6 / (2.0 * r).cosh();
         close(sech.sample(vec3([0.0, r, 1.0])).index, exact, "sech");
     }
 }

@@ -105,8 +105,11 @@ fn grin_every_integrator_end_and_start_has_its_exact_adjoint() {
     worst.check("grin adjoint against forward differentiation", 1e-11);
 }
 
+/// A field, a way to trace, and rays.
+type Scene = (Box<dyn Field<f64>>, Setup<f64>, Vec<Ray<f64>>);
+
 /// A strongly bent trilinear field with a batch through it.
-fn trilinear() -> (Box<dyn Field<f64>>, Setup<f64>, Vec<Ray<f64>>) {
+fn trilinear() -> Scene {
     let trilinear = kinds().into_iter().find(|kind| kind.name == "trilinear").unwrap();
     let kind = Kind { diagonal: Diagonal::Smoothed, ..trilinear };
     let region = Region::cube(0.9);
