@@ -15,6 +15,7 @@
 //! Lengths are in the unit of the field (mm for a lens), `v` has no unit, σ is a length.
 
 mod adjoint;
+mod descent;
 mod exit;
 mod fate;
 pub mod field;
@@ -28,6 +29,7 @@ mod tape;
 mod tracer;
 
 pub use adjoint::Seed;
+pub use descent::{Adam, Descended, Lbfgs, Limits};
 pub use exit::Exit;
 pub use fate::{Fate, Fates};
 pub use field::Field;

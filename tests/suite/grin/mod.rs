@@ -1,5 +1,6 @@
 //! Light in gradient-index fields.
 
+mod descent;
 mod fields;
 mod gradient;
 mod hard;
