@@ -176,17 +176,14 @@ impl Lbfgs {
             step.iter_mut().zip(y).for_each(|(d, y)| *d -= weight * y);
             weights.push(weight);
         }
-        match self.pairs.back() {
-            Some((s, y)) => {
-                let scale = dot(s, y) / dot(y, y);
-                step.iter_mut().for_each(|d| *d *= scale);
-            }
+        if let Some((s, y)) = self.pairs.back() {
+            let scale = dot(s, y) / dot(y, y);
+            step.iter_mut().for_each(|d| *d *= scale);
+        } else {
             // Nothing is known of the curvature: a small step.
-            None => {
-                let largest = step.iter().fold(0.0, |max: f64, s| max.max(s.abs()));
-                let scale = if largest > 0.0 { 0.1 * limits.change / largest } else { 0.0 };
-                step.iter_mut().for_each(|d| *d *= scale);
-            }
+            let largest = step.iter().fold(0.0, |max: f64, s| max.max(s.abs()));
+            let scale = if largest > 0.0 { 0.1 * limits.change / largest } else { 0.0 };
+            step.iter_mut().for_each(|d| *d *= scale);
         }
         for ((s, y), weight) in self.pairs.iter().zip(weights.into_iter().rev()) {
             let correction = weight - dot(y, &step) / dot(s, y);

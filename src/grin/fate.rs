@@ -85,6 +85,11 @@ impl Fates {
         Fate::ALL.into_iter().filter(|fate| fate.arrived()).map(|fate| self.of(fate)).sum()
     }
 
+    /// How many ended how, of the ways that occurred.
+    pub fn iter(self) -> impl Iterator<Item = (Fate, usize)> {
+        Fate::ALL.into_iter().map(move |fate| (fate, self.of(fate))).filter(|(_, count)| *count > 0)
+    }
+
     /// How many rays there are.
     pub fn total(self) -> usize {
         self.0.iter().sum()

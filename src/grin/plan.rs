@@ -139,7 +139,10 @@ fn straight_way(region: &Region<f64>, ray: &Ray<f64>) -> f64 {
     };
     let ahead = |n| region.face(n).crossings(start, ray.v).unwrap_or([f64::INFINITY; 2]);
     let size = start.dot(start).sqrt() * 1e-9;
-    let far = (0..region.len()).flat_map(ahead).filter(|t| *t > size).fold(f64::INFINITY, f64::min);
+    let far = (0..region.face_count())
+        .flat_map(ahead)
+        .filter(|t| *t > size)
+        .fold(f64::INFINITY, f64::min);
     if far.is_finite() { far } else { 0.0 }
 }
 

@@ -131,13 +131,8 @@ impl<R: Real> Region<R> {
     }
 
     /// How many faces there are, those of the box included.
-    pub fn len(&self) -> usize {
+    pub fn face_count(&self) -> usize {
         SIDES + self.faces.len()
-    }
-
-    /// Never: the box always counts.
-    pub fn is_empty(&self) -> bool {
-        false
     }
 
     /// Face number `n`: those of the box in the order low x, high x, low y, …, then the further ones.
@@ -162,7 +157,7 @@ impl<R: Real> Region<R> {
     /// The face that a point is farthest outside of, in units of length, and how far.
     pub fn outermost(&self, p: Vec3<R>) -> (usize, R) {
         let mut found = (0, R::from_f64(f64::NEG_INFINITY));
-        for n in 0..self.len() {
+        for n in 0..self.face_count() {
             let distance = self.distance(n, p);
             if distance > found.1 {
                 found = (n, distance);
@@ -184,7 +179,7 @@ impl<R: Real> Region<R> {
     /// crossed the boundary.
     pub fn entry(&self, x: Vec3<R>, v: Vec3<R>) -> Option<(usize, R)> {
         let mut found: Option<(usize, R)> = None;
-        for n in 0..self.len() {
+        for n in 0..self.face_count() {
             let face = self.face(n);
             if !(face.height(x) >= R::ZERO) {
                 continue;

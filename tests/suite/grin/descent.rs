@@ -30,7 +30,7 @@ fn fan(count: usize, edge: f64, z: f64) -> Vec<Ray<f64>> {
 fn error(field: &Layered<BSpline<f64>>, exact: impl Fn(f64) -> f64) -> f64 {
     let (mut difference, mut norm) = (0.0, 0.0);
     for i in 0..200 {
-        let r = (i as f64 + 0.5) / 200.0;
+        let r = (f64::from(i) + 0.5) / 200.0;
         let (got, exact) = (field.profile.at(r * r).value, exact(r));
         difference += r * r * (got - exact).powi(2);
         norm += r * r * exact * exact;

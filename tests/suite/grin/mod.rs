@@ -7,6 +7,7 @@ mod hard;
 mod lenses;
 mod plan;
 mod reference;
+mod speed;
 
 use aplanat::grin::field::{
     BSpline, Coordinate, Diagonal, Grid, Layered, Luneburg, Maxwell, Parabolic, Polynomial, Sech,
