@@ -1,15 +1,18 @@
 //! Numbers without optics.
 //!
 //! The physics is written once over the trait [`Real`]: `f64` gives a ray, `f32` a fast preview,
-//! a [`Dual`] a derivative, a dual of duals a second derivative.
+//! a [`Dual`] a derivative, a dual of duals a second derivative, a [`Jet`] all second derivatives by
+//! two variables.
 
 mod double;
 mod dual;
+mod jet;
 pub mod quadrature;
 mod real;
 mod vec3;
 
 pub use double::Double;
 pub use dual::Dual;
+pub use jet::Jet;
 pub use real::Real;
 pub use vec3::Vec3;

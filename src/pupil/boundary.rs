@@ -95,6 +95,8 @@ pub struct Boundary {
     pub arcs: Vec<Arc>,
     /// The edge at the azimuths that were looked at.
     pub(super) samples: Vec<(f64, Edge)>,
+    /// Limits at which a cosine vanishes on the edge or not far behind it.
+    pub(super) grazing: Vec<Limit>,
     /// Rays traced to find it.
     pub rays: usize,
 }
@@ -122,6 +124,11 @@ pub(super) const NEAR: f64 = 0.003;
 const INSIDE: f64 = 1e-9;
 /// A margin this small against its neighbours is one that ends the pupil.
 const ENDING: f64 = 1e-6;
+/// A cosine that vanishes this much inside the edge, relatively, vanishes there but for rounding.
+const GRAZED: f64 = 1.0 - 1e-9;
+/// A squared cosine that has fallen to this part of what it is at the centre is one that vanishes
+/// not far away.
+const NEARLY: f64 = 0.3;
 /// What is added to the largest radius seen so that none is larger.
 const COVER: f64 = 1.02;
 /// More arcs than this are no pupil but noise.
@@ -367,6 +374,15 @@ impl<'a> Search<'a> {
         None
     }
 
+    /// Where along a radius the nearest of some cosines vanishes, in parts of the distance to the
+    /// edge; the one that is the edge does not count.
+    pub(super) fn grazing(&mut self, limits: &[Limit], azimuth: f64, edge: Edge) -> f64 {
+        let others = limits.iter().filter(|limit| **limit != edge.limit);
+        let zeros = others.filter_map(|limit| self.zero(*limit, azimuth, edge.radius));
+        let parts = zeros.map(|radius| radius / edge.radius).filter(|part| *part > GRAZED);
+        parts.fold(f64::INFINITY, f64::min).max(1.0)
+    }
+
     /// The corner between two edges where the limit of one takes over from that of the other, by
     /// a bracketed secant on the distance between the two; `None` where a third one is in the way.
     fn corner(&mut self, a: (f64, Edge), b: (f64, Edge)) -> Option<f64> {
@@ -412,7 +428,36 @@ impl<'a> Search<'a> {
         if end > 1.5 * PI {
             joined(&mut arcs, end);
         }
-        Some(Boundary { frame: self.frame, arcs, samples, rays: self.rays })
+        let grazing = self.grazed(&samples);
+        Some(Boundary { frame: self.frame, arcs, samples, grazing, rays: self.rays })
+    }
+
+    /// The limits whose squared cosine falls from the centre to the edge by so much that it will
+    /// vanish not far behind.
+    fn grazed(&mut self, samples: &[(f64, Edge)]) -> Vec<Limit> {
+        let inside = 1.0 - INSIDE;
+        let mut margins = |p: [f64; 2]| {
+            self.rays += 1;
+            let mut found = Vec::new();
+            if let Some(ray) = self.launch.ray(p) {
+                self.launch.color().tracer.margins(ray, |surface, hurdle, margin| {
+                    found.push((Limit::Surface(surface, hurdle), margin));
+                });
+            }
+            found
+        };
+        let frame = self.frame;
+        let center = margins(frame.center);
+        let mut grazed = Vec::new();
+        for (azimuth, edge) in samples {
+            let there = margins(frame.point(*azimuth, edge.radius * inside));
+            for ((limit, from), (_, to)) in center.iter().zip(there) {
+                if limit.is_grazing() && to < NEARLY * from && !grazed.contains(limit) {
+                    grazed.push(*limit);
+                }
+            }
+        }
+        grazed
     }
 
     /// Edges at equal steps of azimuth, and where another limit comes close in between.
@@ -548,6 +593,25 @@ impl Boundary {
         let reach = self.samples.iter().map(|(_, edge)| edge.radius).fold(0.0, f64::max);
         let grown = COVER * reach;
         Frame { axes: self.frame.axes.map(|axis| axis.map(|v| v * grown)), ..self.frame }
+    }
+
+    /// A frame whose square from −1 to 1 holds all of the pupil, with the same turn.
+    pub(super) fn boxed(&self, mirrored: bool) -> Frame {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for (azimuth, edge) in &self.samples {
+            let (sin, cos) = azimuth.sin_cos();
+            let p = [sin * edge.radius, cos * edge.radius];
+            low = [0, 1].map(|i| low[i].min(p[i]));
+            high = [0, 1].map(|i| high[i].max(p[i]));
+        }
+        if mirrored {
+            low[0] = -high[0];
+        }
+        let middle = [0, 1].map(|i| 0.5 * (low[i] + high[i]));
+        let half = [0, 1].map(|i| 0.5 * COVER * (high[i] - low[i]));
+        let [a, b] = self.frame.axes;
+        let center = [0, 1].map(|k| self.frame.center[k] + middle[0] * a[k] + middle[1] * b[k]);
+        Frame { center, axes: [a.map(|v| half[0] * v), b.map(|v| half[1] * v)] }
     }
 
     /// A guess of the radius at an azimuth, from the nearest ones known.

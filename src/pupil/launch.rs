@@ -48,6 +48,7 @@ const GRAZING: f64 = 0.05;
 const WIDE: f64 = 45.0;
 
 impl Source {
+    #[inline(always)]
     pub(super) fn ray<R: Real>(&self, q: [R; 2]) -> Ray<R> {
         match *self {
             Self::Collimated { direction, across, ahead } => {
@@ -81,6 +82,7 @@ impl Source {
 }
 
 /// A ray from a point, or from the first vertex plane towards a point behind it.
+#[inline(always)]
 fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
     let direction = along * (R::ONE / along.dot(along).sqrt());
     let point = if from.z > R::ZERO { from - direction * (from.z / direction.z) } else { from };
@@ -95,6 +97,7 @@ pub(super) struct Chart {
 }
 
 impl Chart {
+    #[inline(always)]
     pub(super) fn map<R: Real>(&self, p: [R; 2]) -> [R; 2] {
         let [a, b] = self.columns;
         let row = |i: usize| {
@@ -253,6 +256,13 @@ impl<'a> Launch<'a> {
             Source::Point { from, .. } | Source::Slopes { from } => ray.point - from,
         };
         index * away.dot(ray.direction)
+    }
+
+    /// The ray at these pupil coordinates over any number type, for coordinates that need no search
+    /// for the stop: an affine map to the plane in which rays are named.
+    #[inline(always)]
+    pub(super) fn charted<R: Real>(&self, p: [R; 2]) -> Ray<R> {
+        self.source.ray(self.chart.map(p))
     }
 
     /// The ray at these pupil coordinates with its derivatives by the two pupil coordinates.

@@ -29,7 +29,9 @@ mod sample;
 
 pub use bench::{Aiming, Bench, BenchError, Color, Dual2, MISS};
 pub use boundary::{Arc, Boundary, Edge, Frame, Limit};
-pub use gradient::{Cost, Derivative, Integrand};
+pub use gradient::{
+    Cost, Derivative, Estimator, Integrand, NoDerivative, Warp, differentiate, plan,
+};
 pub use launch::{Anchor, Launch, LaunchError};
 pub use lit::Lit;
 pub use moments::Moments;

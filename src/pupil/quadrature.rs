@@ -5,9 +5,10 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
 //! is integrated over one half.
 
-use super::boundary::{Boundary, Edge, Frame, NEAR, Search};
+use super::boundary::{Arc, Boundary, Edge, Frame, NEAR, Search};
 use super::region::{Kind, Region};
 use super::rules::{legendre, radial};
+use super::sample::additive;
 use crate::trace::{Rays, Sink};
 use std::f64::consts::PI;
 
@@ -60,10 +61,16 @@ pub(super) struct Spoke {
     pub(super) edge: Edge,
     /// Its share of the turn, in the area of the frame.
     pub(super) share: f64,
+    /// Where a cosine vanishes behind its end, in parts of its length: infinite where none does
+    /// nearby.
+    pub(super) grazing: f64,
 }
 
-/// The nodes on some radii. Where a cosine vanishes at the edge, the image moves with the root of
-/// the distance from it: there `r = 1 − s²` with Gauss nodes in `s`.
+/// A cosine that vanishes farther out than this, in parts of the radius, is far away.
+const FAR: f64 = 1.5;
+
+/// The nodes on some radii. Where a cosine vanishes at the edge or close behind it, the image moves
+/// with the root of the distance from there: Gauss nodes in a variable that makes it smooth.
 pub(super) fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
     let mut nodes = Nodes::default();
     for spoke in spokes {
@@ -73,16 +80,64 @@ pub(super) fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
             nodes.points.push(frame.point(spoke.azimuth, r * radius));
             nodes.weights.push(sector * weight);
         };
-        if spoke.edge.limit.is_grazing() {
-            legendre(2 * radii).iter().for_each(|(s, w)| {
+        let beyond = spoke.grazing - 1.0;
+        match (spoke.edge.limit.is_grazing(), spoke.grazing < FAR) {
+            (false, false) => radial(radii).iter().for_each(|(r, weight)| add(*r, *weight)),
+            // r = 1 − s²
+            (true, false) => legendre(2 * radii).iter().for_each(|(s, w)| {
                 let r = 1.0 - s * s;
                 add(r, 2.0 * s * r * w);
-            });
-        } else {
-            radial(radii).iter().for_each(|(r, weight)| add(*r, *weight));
+            }),
+            // r = 1 + beyond − s²
+            (false, true) => {
+                let [first, last] = [beyond.sqrt(), spoke.grazing.sqrt()];
+                legendre(2 * radii).iter().for_each(|(t, w)| {
+                    let s = first + t * (last - first);
+                    let r = spoke.grazing - s * s;
+                    add(r, 2.0 * s * (last - first) * r * w);
+                });
+            }
+            // r = 1 − beyond sinh² v, for both roots at once
+            (true, true) => {
+                let beyond = beyond.max(f64::EPSILON);
+                let last = (1.0 / beyond).sqrt().asinh();
+                legendre(3 * radii).iter().for_each(|(t, w)| {
+                    let v = t * last;
+                    let r = 1.0 - beyond * v.sinh().powi(2);
+                    add(r, beyond * (2.0 * v).sinh() * last * r * w);
+                });
+            }
         }
     }
     nodes
+}
+
+/// How nodes are drawn to the ends of an arc: next to one along which a cosine vanishes, integrals
+/// along the radius change with the root of the distance from the corner.
+#[derive(Debug, Clone, Copy)]
+struct Grading {
+    from: bool,
+    to: bool,
+}
+
+impl Grading {
+    fn of(arcs: &[Arc], i: usize, whole: bool) -> Self {
+        let count = arcs.len();
+        let differs = |other: &Arc| other.limit.is_grazing() && other.limit != arcs[i].limit;
+        let before = if i > 0 || whole { arcs.get((i + count - 1) % count) } else { None };
+        let after = if i + 1 < count || whole { arcs.get((i + 1) % count) } else { None };
+        Self { from: before.is_some_and(differs), to: after.is_some_and(differs) }
+    }
+
+    /// The place between 0 and 1 of a node, and how densely nodes lie there.
+    fn place(self, t: f64) -> (f64, f64) {
+        match (self.from, self.to) {
+            (false, false) => (t, 1.0),
+            (true, false) => (t * t, 2.0 * t),
+            (false, true) => (t * (2.0 - t), 2.0 * (1.0 - t)),
+            (true, true) => (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)),
+        }
+    }
 }
 
 /// Nodes along the radius and along half a turn, of the clear disc.
@@ -149,15 +204,19 @@ impl Region<'_> {
         let halves = if self.launch.is_symmetric() { 2.0 } else { 1.0 };
         let factor = halves * boundary.frame.area();
         let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
-        for arc in &boundary.arcs {
+        for (i, arc) in boundary.arcs.iter().enumerate() {
             let length = arc.to - arc.from;
             let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
+            let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
             for (t, share) in legendre(if alike { 1 } else { azimuths }) {
+                let (t, stretch) = grading.place(*t);
                 let azimuth = arc.from + t * length;
                 let guess = boundary.near(azimuth);
                 let expected = search.expected(arc.limit, azimuth, guess);
                 if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, NEAR)) {
-                    spokes.push(Spoke { azimuth, edge, share: factor * share * length });
+                    let grazing = search.grazing(&boundary.grazing, azimuth, edge);
+                    let share = factor * share * stretch * length;
+                    spokes.push(Spoke { azimuth, edge, share, grazing });
                 }
             }
         }
@@ -217,12 +276,11 @@ fn clear(order: usize, mirrored: bool) -> Nodes {
     nodes
 }
 
-/// Roberts's additive sequence over a square: points that fill it evenly for any count. Those
-/// farther out than `reach`, where no beam is, are left out.
+/// An even sequence over a square. Points farther out than `reach`, where no beam is, are left out.
 fn ragged((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
-    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
     let point = |i: usize| {
-        [0, 1].map(|k| center[k] + half * (2.0 * (0.5 + STEP[k] * i as f64).fract() - 1.0))
+        let u = additive([0.5; 2], i);
+        [0, 1].map(|k| center[k] + half * (2.0 * u[k] - 1.0))
     };
     let weight = 4.0 * half * half / count as f64;
     let points: Vec<_> = (0..count).map(point).filter(|p| p[0].hypot(p[1]) <= reach).collect();

@@ -67,6 +67,29 @@ impl<R: Real> Gradient<R> {
         Self { index_before: R::ZERO, surfaces: vec![SurfaceGradient::default(); surfaces] }
     }
 
+    /// All numbers, in a fixed order.
+    pub fn numbers(&self) -> impl Iterator<Item = R> {
+        let of = |s: &SurfaceGradient<R>| {
+            let SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter } = *s;
+            [curvature, conic, thickness, index, semi_diameter].into_iter().chain(terms)
+        };
+        std::iter::once(self.index_before).chain(self.surfaces.iter().flat_map(of))
+    }
+
+    /// The gradient of as many surfaces with these numbers, in that order; zero where there are
+    /// not enough of them.
+    pub fn from_numbers(surfaces: usize, numbers: impl IntoIterator<Item = R>) -> Self {
+        let mut numbers = numbers.into_iter();
+        let mut next = || numbers.next().unwrap_or_default();
+        let index_before = next();
+        let surface = |_| {
+            let [curvature, conic, thickness, index, semi_diameter] = [(); 5].map(|()| next());
+            let terms = [(); ASPHERE_TERMS].map(|()| next());
+            SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter }
+        };
+        Self { index_before, surfaces: (0..surfaces).map(surface).collect() }
+    }
+
     /// Adds another one, `factor` times.
     pub fn add(&mut self, other: &Self, factor: R) {
         self.index_before += other.index_before * factor;
@@ -81,8 +104,35 @@ impl<R: Real> Gradient<R> {
     }
 }
 
+/// The derivatives of something that the adjoint of a block of rays begins with.
+pub(super) trait Sowing<R> {
+    /// By the landing of ray `j`.
+    fn seed(&self, j: usize) -> Seed<R>;
+
+    /// By how far each ray is from the limits of a surface, if anything depends on that.
+    #[inline(always)]
+    fn pulls(&self, _surface: usize) -> Option<&[Pull<R>; BLOCK]> {
+        None
+    }
+}
+
+impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
+    #[inline(always)]
+    fn seed(&self, j: usize) -> Seed<R> {
+        self(j)
+    }
+}
+
+/// The derivative of something by the limits of a surface (see [`super::limit`]).
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Pull<R> {
+    pub(super) rim: R,
+    pub(super) angle: R,
+    pub(super) sheet: R,
+}
+
 /// Who takes the derivatives of a block of rays as they come.
-trait Harvest<R> {
+pub(super) trait Harvest<R> {
     /// The derivatives of a block by a number of a surface, to be added to what came before.
     /// `surface` is `None` for the index in front of the first surface.
     fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]);
@@ -181,7 +231,8 @@ impl<R: Real> Tracer<R> {
                 for from in (start..end).step_by(BLOCK) {
                     let count = BLOCK.min(end - from);
                     let block = self.outward(rays, from, count, &mut distances);
-                    self.homeward(block, &distances, count, |j| seed(from + j), &mut gradient);
+                    let seed = |j| seed(from + j);
+                    self.homeward(block, &distances, count, &seed, &mut gradient);
                 }
             },
         );
@@ -210,9 +261,9 @@ impl<R: Real> Tracer<R> {
                     columns.fill([R::ZERO; BLOCK]);
                     let (of_x, of_y) = columns.split_at_mut(wanted.len());
                     let mut rows = Rows { wanted, columns: of_x };
-                    self.homeward(block.clone(), &distances, count, |_| x, &mut rows);
+                    self.homeward(block.clone(), &distances, count, &|_| x, &mut rows);
                     let mut rows = Rows { wanted, columns: of_y };
-                    self.homeward(block, &distances, count, |_| y, &mut rows);
+                    self.homeward(block, &distances, count, &|_| y, &mut rows);
                     for j in 0..count {
                         let to = &mut matrix[(from + j) * row..(from + j + 1) * row];
                         to.iter_mut().zip(&columns).for_each(|(to, column)| *to = column[j]);
@@ -242,25 +293,30 @@ impl<R: Real> Tracer<R> {
 
     /// Retraces a block from the last surface to its start and passes on the derivatives.
     #[inline(always)]
-    fn homeward(
+    pub(super) fn homeward(
         &self,
         block: Block<R>,
         distances: &[[R; BLOCK]],
         count: usize,
-        seed: impl Fn(usize) -> Seed<R>,
+        sowing: &impl Sowing<R>,
         harvest: &mut impl Harvest<R>,
     ) {
         let mut way = Homeward::new(block);
-        self.sow(&mut way, count, &seed, harvest);
+        self.sow(&mut way, count, sowing, harvest);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
             way.s = *distance;
+            let pulls = sowing.pulls(i);
             // A factor that is known to be one costs nothing.
             if interface.sense > R::ZERO {
-                way.pass(&Interface { sense: R::ONE, ..*interface });
+                way.pass(&Interface { sense: R::ONE, ..*interface }, pulls);
             } else {
-                way.pass(&Interface { sense: -R::ONE, ..*interface });
+                way.pass(&Interface { sense: -R::ONE, ..*interface }, pulls);
             }
             way.harvest(interface, i, harvest);
+            if pulls.is_some() {
+                let lanes = way.arrived(&way.by_semi_diameter);
+                harvest.take(Some(i), Slot::SemiDiameter, &lanes);
+            }
         }
         self.launch_index(&way, harvest);
     }
@@ -271,7 +327,7 @@ impl<R: Real> Tracer<R> {
         &self,
         way: &mut Homeward<R>,
         count: usize,
-        seed: &impl Fn(usize) -> Seed<R>,
+        sowing: &impl Sowing<R>,
         harvest: &mut impl Harvest<R>,
     ) {
         let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
@@ -281,7 +337,7 @@ impl<R: Real> Tracer<R> {
             if way.block.code[j] > R::ZERO {
                 continue;
             }
-            let seed = seed(j);
+            let seed = sowing.seed(j);
             let (_, k) = way.block.state(j);
             let direction = seed.direction * inverse;
             way.set(j, seed.point, direction);
@@ -322,6 +378,7 @@ struct Homeward<R> {
     by_curvature: [R; BLOCK],
     by_conic: [R; BLOCK],
     by_gap: [R; BLOCK],
+    by_semi_diameter: [R; BLOCK],
     by_index_before: [R; BLOCK],
     by_index_behind: [R; BLOCK],
     by_terms: [[R; BLOCK]; ASPHERE_TERMS],
@@ -349,6 +406,46 @@ fn conic_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
     let c = surface.curvature;
     let vector = Vec3::new(-(c * p.x), -(c * p.y), R::ONE - c * (p.z + surface.conic * p.z));
     Normal { vector, m: vector.dot(vector), unit: false }
+}
+
+/// What the limits of a surface leave for its numbers.
+struct Pulled<R> {
+    by_semi_diameter: R,
+    /// By the square of the index in front, all else of the index apart.
+    by_n2: R,
+}
+
+impl<R: Real> Interface<R> {
+    /// The adjoint of the limits of this surface at `p` (see [`super::limit`]), the sheet of a
+    /// conic apart.
+    #[inline(always)]
+    fn pulled(
+        &self,
+        pull: Pull<R>,
+        p: Vec3<R>,
+        normal: Normal<R>,
+        back: &mut Refracted<R>,
+        by_point: &mut Vec3<R>,
+    ) -> Pulled<R> {
+        let rim = pull.rim / self.rim2;
+        let r2 = p.x * p.x + p.y * p.y;
+        by_point.x += p.x * rim;
+        by_point.y += p.y * rim;
+        let share = pull.angle / self.n2;
+        let loss = self.loss();
+        let by_a = -((back.a + back.a) * share);
+        back.by_k = back.by_k + normal.vector * by_a;
+        back.by_normal = back.by_normal + back.k * by_a;
+        if !normal.unit {
+            back.by_normal = back.by_normal + normal.vector * (loss * share * R::TWO);
+        }
+        let denser_behind = R::select(loss > R::ZERO, R::ZERO, share * normal.m);
+        back.by_dn2 += denser_behind - share * normal.m;
+        Pulled {
+            by_semi_diameter: -(rim * r2 / self.rim2.sqrt()),
+            by_n2: (back.a * back.a - loss * normal.m) * share / self.n2,
+        }
+    }
 }
 
 /// What refraction read backwards gives.
@@ -413,6 +510,7 @@ impl<R: Real> Homeward<R> {
             by_curvature: zero,
             by_conic: zero,
             by_gap: zero,
+            by_semi_diameter: zero,
             by_index_before: zero,
             by_index_behind: zero,
             by_terms: [zero; ASPHERE_TERMS],
@@ -437,11 +535,11 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through a surface to the one before.
     #[inline(always)]
-    fn pass(&mut self, surface: &Interface<R>) {
+    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
         match surface.form {
-            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal),
-            Form::Conic => self.retrace(surface, conic_normal),
-            Form::Asphere => self.retrace_asphere(surface),
+            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, pulls),
+            Form::Conic => self.retrace(surface, conic_normal, pulls),
+            Form::Asphere => self.retrace_asphere(surface, pulls),
         }
     }
 
@@ -451,6 +549,7 @@ impl<R: Real> Homeward<R> {
         &mut self,
         surface: &Interface<R>,
         normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
+        pulls: Option<&[Pull<R>; BLOCK]>,
     ) {
         let surface = *surface;
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
@@ -458,9 +557,15 @@ impl<R: Real> Homeward<R> {
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
             let normal = normal(&surface, p);
-            let back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut by_point = self.by_point(j);
+            let mut pulled = None;
+            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
+                back.by_normal.z -= pull.sheet;
+                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+            }
             let n = back.by_normal;
-            let by_point = self.by_point(j) - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
+            by_point = by_point - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             let bulge = p.x * p.x + p.y * p.y + k1 * p.z * p.z;
             self.by_curvature[j] = lambda * bulge * half - (p.x * n.x + p.y * n.y + k1 * p.z * n.z);
@@ -468,12 +573,13 @@ impl<R: Real> Homeward<R> {
                 self.by_conic[j] = c * p.z * (lambda * p.z * half - n.z);
             }
             self.step_back(&surface, j, p, &back, by_point - normal.vector * lambda);
+            self.count(&surface, j, pulled);
         }
     }
 
     /// Goes back through an asphere to the surface before.
     #[inline(always)]
-    fn retrace_asphere(&mut self, surface: &Interface<R>) {
+    fn retrace_asphere(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
         let surface = *surface;
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
@@ -481,18 +587,36 @@ impl<R: Real> Homeward<R> {
             let slope = -(sag.slope + sag.slope);
             let vector = Vec3::new(p.x * slope, p.y * slope, R::ONE);
             let normal = Normal { vector, m: vector.dot(vector), unit: false };
-            let back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut by_point = self.by_point(j);
+            let (mut edge, mut pulled) = (R::ZERO, None);
+            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
+                edge = pull.sheet + pull.sheet;
+                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+            }
             // N = (−2 x w, −2 y w, 1) with w = dz/dr².
             let n = back.by_normal;
             let by_slope = -(p.x * n.x + p.y * n.y) * R::TWO;
             let radial = by_slope * sag.bend * R::TWO;
-            let by_point = self.by_point(j)
+            by_point = by_point
                 + Vec3::new(p.x * radial + n.x * slope, p.y * radial + n.y * slope, R::ZERO);
+            if pulled.is_some() {
+                let outward =
+                    (R::ONE + surface.conic) * surface.curvature * surface.curvature * edge;
+                by_point = by_point + Vec3::new(p.x * outward, p.y * outward, R::ZERO);
+            }
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             (self.by_curvature[j], self.by_conic[j]) = sag.by_conic(lambda, by_slope);
+            if pulled.is_some() {
+                // (1+κ) c² r² − 1
+                let (bent, half) = (surface.curvature * sag.r2 * edge, R::from_f64(0.5));
+                self.by_curvature[j] += (R::ONE + surface.conic) * bent;
+                self.by_conic[j] += surface.curvature * bent * half;
+            }
             let terms = sag.by_terms(lambda, by_slope);
             self.by_terms.iter_mut().zip(terms).for_each(|(column, by_term)| column[j] = by_term);
             self.step_back(&surface, j, p, &back, by_point - vector * lambda);
+            self.count(&surface, j, pulled);
         }
     }
 
@@ -517,13 +641,25 @@ impl<R: Real> Homeward<R> {
         self.block.set(j, Vec3::new(start.x, start.y, start.z + surface.gap), back.k);
     }
 
-    /// Hands over the derivatives by the numbers of a surface. A lost ray counts nothing, whatever
-    /// its numbers have become.
+    /// What the limits of a surface owe to its semi-diameter and to the index in front.
+    #[inline(always)]
+    fn count(&mut self, surface: &Interface<R>, j: usize, pulled: Option<Pulled<R>>) {
+        if let Some(Pulled { by_semi_diameter, by_n2 }) = pulled {
+            self.by_semi_diameter[j] = by_semi_diameter;
+            self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
+        }
+    }
+
+    /// A lost ray counts nothing, whatever its numbers have become.
+    #[inline(always)]
+    fn arrived(&self, lanes: &[R; BLOCK]) -> [R; BLOCK] {
+        std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
+    }
+
+    /// Hands over the derivatives by the numbers of a surface.
     #[inline(always)]
     fn harvest(&self, surface: &Interface<R>, i: usize, harvest: &mut impl Harvest<R>) {
-        let arrived = |lanes: &[R; BLOCK]| -> [R; BLOCK] {
-            std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
-        };
+        let arrived = |lanes: &[R; BLOCK]| self.arrived(lanes);
         harvest.take(Some(i), Slot::Curvature, &arrived(&self.by_curvature));
         if matches!(surface.form, Form::Conic | Form::Asphere) {
             harvest.take(Some(i), Slot::Conic, &arrived(&self.by_conic));

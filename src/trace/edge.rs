@@ -161,8 +161,12 @@ impl Tracer<f64> {
         let numbers = &mut total.surfaces[surface];
         numbers.index += by[7];
         numbers.curvature += by[8];
-        numbers.conic += by[9];
-        numbers.terms.iter_mut().zip(&by[10..]).for_each(|(to, from)| *to += from);
+        if matches!(own.form, Form::Conic | Form::Asphere) {
+            numbers.conic += by[9];
+        }
+        if own.form == Form::Asphere {
+            numbers.terms.iter_mut().zip(&by[10..]).for_each(|(to, from)| *to += from);
+        }
         if let Some(before) = surface.checked_sub(1) {
             total.surfaces[before].thickness -= by[2];
         }

@@ -99,6 +99,7 @@ fn every_subcommand_has_long_help_with_its_json() {
         "experiment",
         "measure trace",
         "measure spot",
+        "measure gradient",
         "measure optimize",
         "measure window",
     ];
@@ -557,6 +558,36 @@ fn measure_spot_draws_error_against_time() {
     assert!(best("gauss") < 1e-10 && best("square_grid") > 1e-6);
     assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
     refused(2, &["measure", "spot", singlet, "--plot", "curves.gif"], "", &["`gif`", "`.png`"]);
+}
+
+#[test]
+fn measure_gradient_draws_the_error_of_every_estimator_against_time() {
+    let plot = Scratch::new("gradients.png");
+    let singlet = "lenses/singlet_la1131.json";
+    let measured = done_json(&["measure", "gradient", singlet, "--plot", plot.path()], "");
+    has_keys(&measured, &["machine", "lens", "fields", "costs"]);
+    let fields = measured["fields"].as_array().unwrap();
+    assert_eq!(fields[0]["y"], 0.0);
+    for field in fields {
+        let keys = ["light", "planned", "reason", "reference", "checked", "rows"];
+        has_keys(field, &keys);
+        assert!(field["checked"][0].as_f64().unwrap() < 1e-6, "{field}");
+        let worst = |estimator: &str, last: bool| {
+            let rows = field["rows"].as_array().unwrap();
+            let mut mine = rows.iter().filter(|row| row["estimator"] == estimator);
+            let row = if last { mine.next_back() } else { mine.next() }.unwrap();
+            let errors = row["errors"].as_array().unwrap().iter().filter_map(Value::as_f64);
+            errors.fold(0.0, f64::max)
+        };
+        assert!(worst("boundary", true) < 1e-10 && worst("biased", true) > 0.1);
+        assert!(worst("warp", true) < 0.1 && worst("difference", true) < 1e-6);
+    }
+    let cost = |i: usize, key: &str| measured["costs"][i][key].as_f64().unwrap();
+    assert!(cost(3, "numbers") > 2.0 * cost(0, "numbers"));
+    assert!(cost(3, "boundary") < 2.0 * cost(0, "boundary"), "{measured}");
+    assert!(cost(3, "difference") > 2.0 * cost(0, "difference"), "{measured}");
+    assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
+    refused(2, &["measure", "gradient", singlet, "--plot", "x.gif"], "", &["`gif`", "`.png`"]);
 }
 
 #[test]

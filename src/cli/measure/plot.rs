@@ -1,52 +1,70 @@
-//! Curves of error against time as a picture: two log-log charts side by side.
+//! Curves of error against time as a picture: one log-log chart or two side by side.
 
-use crate::measure::{Precision, Pupil, Sampling, SpotCurves, SpotRow};
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, Stroke};
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart as Axes};
 use image::ImageError;
+
+pub(super) use crate::picture::{Color, Stroke};
 
 const SIZE: [u32; 2] = [1800, 900];
 const TOP: f64 = 120.0;
 const BOTTOM: f64 = 800.0;
 /// Left and right of each chart.
-const CHARTS: [(f64, f64); 2] = [(120.0, 740.0), (860.0, 1480.0)];
+const PLACES: [(f64, f64); 2] = [(120.0, 740.0), (860.0, 1480.0)];
 const LEGEND: f64 = 1510.0;
 /// Below this an error is drawn at the foot of the chart.
 const SMALLEST: f64 = 1e-16;
 
-const COLORS: [(Sampling, Color); 6] = [
-    (Sampling::SquareGrid, [0x1f, 0x77, 0xb4]),
-    (Sampling::Hexapolar, [0x8c, 0x56, 0x4b]),
-    (Sampling::Random, [0x7f, 0x7f, 0x7f]),
-    (Sampling::LowDiscrepancy, [0x2c, 0xa0, 0x2c]),
-    (Sampling::Gauss, [0xff, 0x7f, 0x0e]),
-    (Sampling::SplitBoundary, [0xd6, 0x27, 0x28]),
-];
+/// Milliseconds and relative errors.
+pub(super) struct Curve {
+    pub(super) color: Color,
+    pub(super) stroke: Stroke,
+    pub(super) points: Vec<[f64; 2]>,
+}
 
-/// The curves as a PNG.
-pub(super) fn draw(curves: &SpotCurves, title: &str) -> Result<Vec<u8>, ImageError> {
+/// Curves over the same axes.
+pub(super) struct Chart {
+    pub(super) name: String,
+    pub(super) curves: Vec<Curve>,
+}
+
+/// What a kind of curve is called.
+pub(super) struct Label {
+    pub(super) name: &'static str,
+    pub(super) color: Color,
+    pub(super) stroke: Stroke,
+}
+
+impl Label {
+    /// The name of a color.
+    pub(super) fn of(name: &'static str, color: Color) -> Self {
+        Self { name, color, stroke: Stroke::Solid }
+    }
+
+    /// The name of a stroke.
+    pub(super) fn drawn(name: &'static str, stroke: Stroke) -> Self {
+        Self { name, color: BLACK, stroke }
+    }
+}
+
+/// One chart or two as a PNG.
+pub(super) fn draw(charts: &[Chart], labels: &[Label], title: &str) -> Result<Vec<u8>, ImageError> {
     let mut canvas = Canvas::new(SIZE);
     canvas.text([60.0, 30.0], title, BLACK, Align::Left);
-    let rows = || curves.rows.iter();
-    let x = Axis::logarithmic("time, ms", rows().map(|row| row.ms), SMALLEST);
-    let y = Axis::logarithmic("relative error", rows().map(|row| row.error), SMALLEST);
-    for (pupil, (left, right)) in [Pupil::Clear, Pupil::Clipped].into_iter().zip(CHARTS) {
-        let chart = Chart::new([left, TOP], [right, BOTTOM], x.clone(), y.clone());
-        let name = match pupil {
-            Pupil::Clear => "clear pupil".to_owned(),
-            Pupil::Clipped => format!("clipped pupil, {:.0} % lit", 100.0 * curves.lit),
-        };
-        chart.draw(&mut canvas, &name);
-        for (method, color) in COLORS {
-            for precision in [Precision::F32, Precision::F64] {
-                let mine = |row: &&SpotRow| {
-                    row.pupil == pupil && row.method == method && row.precision == precision
-                };
-                let points = rows().filter(mine).map(|row| chart.place([row.ms, row.error]));
-                marked(&mut canvas, &points.collect::<Vec<_>>(), color, stroke(precision));
-            }
+    let points = || charts.iter().flat_map(|c| &c.curves).flat_map(|curve| &curve.points);
+    let x = Axis::logarithmic("time, ms", points().map(|p| p[0]), SMALLEST);
+    let y = Axis::logarithmic("relative error", points().map(|p| p[1]), SMALLEST);
+    for (chart, (left, right)) in charts.iter().zip(PLACES) {
+        let axes = Axes::new([left, TOP], [right, BOTTOM], x.clone(), y.clone());
+        axes.draw(&mut canvas, &chart.name);
+        for curve in &chart.curves {
+            marked(&mut canvas, &axes.places(&curve.points), curve.color, curve.stroke);
         }
     }
-    legend(&mut canvas);
+    for (i, label) in labels.iter().enumerate() {
+        let y = TOP + 20.0 + 34.0 * i as f64;
+        marked(&mut canvas, &[[LEGEND, y], [LEGEND + 40.0, y]], label.color, label.stroke);
+        canvas.text([LEGEND + 52.0, y - 7.0], label.name, BLACK, Align::Left);
+    }
     canvas.png()
 }
 
@@ -55,47 +73,22 @@ fn marked(canvas: &mut Canvas, points: &[[f64; 2]], color: Color, stroke: Stroke
     canvas.marks(points, color);
 }
 
-fn stroke(precision: Precision) -> Stroke {
-    match precision {
-        Precision::F32 => Stroke::Dashed,
-        Precision::F64 => Stroke::Solid,
-    }
-}
-
-fn legend(canvas: &mut Canvas) {
-    let mut y = TOP + 20.0;
-    for (method, color) in COLORS {
-        marked(canvas, &[[LEGEND, y], [LEGEND + 40.0, y]], color, Stroke::Solid);
-        canvas.text([LEGEND + 52.0, y - 7.0], method.name(), BLACK, Align::Left);
-        y += 34.0;
-    }
-    for (name, precision) in [("f64", Precision::F64), ("f32", Precision::F32)] {
-        marked(canvas, &[[LEGEND, y], [LEGEND + 40.0, y]], BLACK, stroke(precision));
-        canvas.text([LEGEND + 52.0, y - 7.0], name, BLACK, Align::Left);
-        y += 34.0;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn curves_become_a_picture() {
-        let row = |ms, error| SpotRow {
-            pupil: Pupil::Clear,
-            method: Sampling::Gauss,
-            precision: Precision::F64,
-            rays: 9,
-            error,
-            ms,
+        let color = [0xff, 0x7f, 0x0e];
+        let points = vec![[0.01, 1e-3], [0.1, 0.0]];
+        let chart = |points| {
+            let curves = vec![Curve { color, stroke: Stroke::Solid, points }];
+            Chart { name: "clear pupil".to_owned(), curves }
         };
-        let rows = vec![row(0.01, 1e-3), row(0.1, 0.0)];
-        let curves = SpotCurves { rms_clear: 1.0, rms_clipped: None, lit: 1.0, rows };
-        let png = draw(&curves, "a lens").unwrap();
+        let png = draw(&[chart(points)], &[Label::of("Gauss", color)], "a lens").unwrap();
         let picture = image::load_from_memory(&png).unwrap().to_rgb8();
         assert_eq!([picture.width(), picture.height()], SIZE);
-        assert!(picture.pixels().any(|pixel| pixel.0 == [0xff, 0x7f, 0x0e]));
-        assert!(draw(&SpotCurves { rows: Vec::new(), ..curves }, "nothing").is_ok());
+        assert!(picture.pixels().any(|pixel| pixel.0 == color));
+        assert!(draw(&[chart(Vec::new())], &[], "nothing").is_ok());
     }
 }

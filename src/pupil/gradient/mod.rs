@@ -14,8 +14,15 @@
 //! by every number of a system at once, semi-diameters included.
 
 mod boundary;
+mod difference;
+mod estimator;
+mod warp;
 
-use crate::trace::Gradient;
+pub use estimator::{Estimator, NoDerivative, differentiate, plan};
+pub use warp::Warp;
+
+use super::moments::Moments;
+use crate::trace::{Gradient, Slot};
 
 /// What each ray of a pupil contributes by where it lands. Where a pupil is its own mirror image, so
 /// must be the contribution.
@@ -63,6 +70,15 @@ impl Integrand for Cost {
     }
 }
 
+impl Cost {
+    /// Its integral over the light of a pupil.
+    pub fn over(&self, light: &Moments) -> f64 {
+        let [x, y] = [0, 1].map(|i| light.centroid[i] - self.center[i]);
+        let about_center = light.spread + light.area * (x * x + y * y);
+        self.square * about_center + self.constant * light.area
+    }
+}
+
 /// The derivative of an integral over a pupil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Derivative {
@@ -72,4 +88,23 @@ pub struct Derivative {
     pub error: Gradient<f64>,
     /// Rays traced.
     pub rays: usize,
+}
+
+impl Derivative {
+    /// Whether every number is known within a tolerance of the largest of its kind: curvatures,
+    /// conic constants, coefficients of each power, thicknesses, indices, semi-diameters.
+    pub fn reaches(&self, tolerance: f64) -> bool {
+        self.excess(tolerance, |_| 0.0) <= 1.0
+    }
+
+    /// By how much the largest error of a kind exceeds what a tolerance allows there, of the
+    /// largest number of the kind or of a floor.
+    fn excess(&self, tolerance: f64, floor: impl Fn(Slot) -> f64) -> f64 {
+        let excess = |slot| {
+            let error = self.error.largest(slot);
+            let scale = self.by.largest(slot).max(floor(slot));
+            if error == 0.0 { 0.0 } else { error / (tolerance * scale) }
+        };
+        Slot::all().map(excess).fold(0.0, f64::max)
+    }
 }

@@ -1,6 +1,9 @@
 //! Integrals over pupils whose edge moves, against the cases of `aperture_gradients.json`.
 
 mod boundary;
+mod estimators;
+mod hard;
+mod warp;
 
 use crate::reference::{count, number, numbers, read};
 use aplanat::lens::{Aperture, Field, FieldKind, Object, Shape, Surface, System};
@@ -106,7 +109,7 @@ pub(crate) fn exact(values: &Value, name: &str) -> Vec<Option<f64>> {
     list.iter().map(|value| (!value.is_null()).then(|| number(value))).collect()
 }
 
-fn image() -> Surface<f64> {
+pub(crate) fn image() -> Surface<f64> {
     Surface {
         shape: Shape::Plane,
         thickness: 0.0,
