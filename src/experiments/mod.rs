@@ -10,9 +10,12 @@ mod aperture_stop;
 mod entrance_pupil;
 mod front;
 mod gradient_image;
+mod motion;
 mod outcome;
 mod section;
 mod trade;
+mod vignetting;
+mod zoom;
 
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
 
@@ -26,6 +29,9 @@ pub const ALL: &[Experiment] = &[
     entrance_pupil::EXPERIMENT,
     gradient_image::EXPERIMENT,
     front::EXPERIMENT,
+    motion::EXPERIMENT,
+    vignetting::EXPERIMENT,
+    zoom::EXPERIMENT,
 ];
 
 /// A figure or table of the thesis.
