@@ -3,8 +3,7 @@
 use super::failure::Failure;
 use super::input::{LensFile, Opened, Tolerance};
 use super::output::{Number, Output, Table};
-use super::vary::{at_zoom, free};
-use crate::lens::{Fields, Lens, Parameter, Quantity};
+use crate::lens::{Fields, Lens, Parameter, Quantity, at_zoom, free};
 use crate::measure::timed;
 use crate::merit::{Detail, Goal, Merit, MeritError, PupilEdge, Term, Weighted};
 use clap::ValueEnum;

@@ -12,11 +12,13 @@ mod parameter;
 mod resolve;
 mod reversed;
 mod system;
+mod vary;
 
 pub use check::LensError;
 pub use parameter::{Parameter, Quantity};
 pub use resolve::focus_gap;
 pub use system::{Invalid, Shape, Surface, System};
+pub use vary::{NumberKind, at_zoom, free, vary};
 
 use serde::{Deserialize, Serialize};
 
