@@ -8,11 +8,10 @@
 //! two-dimensional pupils.
 
 use super::section::Section;
-use super::trade::{self, Part, View, at_angles, opened, swept, views};
+use super::trade::{self, Part, Plan, View, at_angles, opened, searched, views};
 use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Watch, lens};
 use crate::lens::Lens;
-use crate::merit::PupilEdge;
-use crate::optimize::pareto::{Design, Front, Settings};
+use crate::optimize::pareto::{Design, Front};
 use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke};
 use crate::pupil::{Bench, Pattern, pattern};
 
@@ -27,7 +26,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 /// The fields, in degrees.
 pub(super) const ANGLES: [f64; 3] = [0.0, 10.0, 20.0];
 /// The apertures chosen for the biased searches, relative to the start.
-const OPENINGS: [f64; 3] = [0.8, 1.0, 1.2];
+const OPENINGS: [f64; 5] = [0.6, 0.8, 1.0, 1.2, 1.3];
 const ONE_OPENING: [f64; 1] = [1.0];
 
 /// RMS radius in um and area of the pupil in mm² at the three fields.
@@ -40,11 +39,9 @@ const AUTHORS: [Theirs; 3] = [
     ("authors, beta 5e-4", [23.0, 19.0, 43.0], [93.9, 93.1, 70.3]),
 ];
 
-/// How the front of a lens is swept.
-pub(super) fn settings(effort: Effort) -> Settings {
-    let points = effort.pick(16, 4);
-    let steps = effort.pick(1000, 150);
-    Settings { points, steps, ..Settings::default() }
+/// How the designs of a front are searched for.
+pub(super) fn plan(effort: Effort) -> Plan {
+    Plan::new(effort.pick(14, 4), effort.pick(1200, 150))
 }
 
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
@@ -59,6 +56,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
         let study = Study::of(&start, effort, span, watch)?;
         outcome.claims.extend(study.claims(name, authors, &mut outcome.rays)?);
         outcome.tables.push(trade::table(name, &study.designs(), &mut outcome.rays)?);
+        outcome.lenses.extend(study.lenses(name));
         outcome.pictures.push(Picture { name, canvas: study.draw(name, authors)? });
     }
     Ok(outcome)
@@ -79,31 +77,35 @@ impl Study {
         watch: &mut Watch<'_>,
     ) -> Result<Self, Ended> {
         let openings = effort.pick(OPENINGS.as_slice(), &ONE_OPENING);
-        let moving = settings(effort);
-        let middle = from + 0.7 * (to - from);
+        let plan = plan(effort);
+        let middle = from + 0.6 * (to - from);
         let part = Part { from, to: middle, name: "unbiased gradient" };
-        let sweep = swept(start, &moving, part, watch)?;
-        let mut biased = Front::default();
+        let found = searched(start, &plan, part, watch)?;
+        let start_design = found[0].clone();
+        let unbiased = front(found);
+        let mut biased = Vec::new();
         let share = (to - middle) / openings.len() as f64;
         for (i, opening) in openings.iter().enumerate() {
-            // Every weight is the same: each aperture has the steps of a whole chain of weights.
-            let steps = moving.steps * moving.points / 4;
-            let kept = Settings { points: 1, steps, pupil: PupilEdge::Kept, ..moving.clone() };
             let from = middle + share * i as f64;
             let name = format!("biased gradient, opened {opening}");
             let part = Part { from, to: from + share, name: &name };
-            let sweep = swept(&opened(start, *opening), &kept, part, watch)?;
-            for design in sweep.front().designs() {
-                biased.offer(design.clone());
-            }
+            let found = searched(&opened(start, *opening), &plan.biased(), part, watch)?;
+            biased.extend(found.into_iter().next_back());
         }
-        Ok(Self { start: sweep.start.clone(), unbiased: sweep.front().clone(), biased })
+        Ok(Self { start: start_design, unbiased, biased: front(biased) })
     }
 
     fn designs(&self) -> Vec<(&'static str, &Design)> {
         let unbiased = self.unbiased.designs().iter().map(|design| ("unbiased", design));
         let biased = self.biased.designs().iter().map(|design| ("biased", design));
         std::iter::once(("start", &self.start)).chain(unbiased).chain(biased).collect()
+    }
+
+    /// Every design of the unbiased front, under its weight.
+    fn lenses(&self, name: &str) -> impl Iterator<Item = (String, Lens)> {
+        let weighted = self.unbiased.designs().iter();
+        weighted
+            .filter_map(move |d| Some((format!("{name}-beta-{:.1e}", d.weight?), d.lens.clone())))
     }
 
     fn claims(
@@ -119,12 +121,12 @@ impl Study {
         let left = biased.designs().iter().filter(|design| !beaten(design)).count();
         let mut claims = vec![
             Claim::at_least(
-                format!("{name}: hypervolume of the unbiased front over that of the biased one"),
-                front / other,
-                1.05,
+                format!(
+                    "{name}: hypervolume of the unbiased front, against that of the biased one"
+                ),
+                front,
+                other,
             ),
-            Claim::at_least(format!("{name}: hypervolume of the unbiased front"), front, other),
-            Claim::at_least(format!("{name}: hypervolume of the biased front"), other, 0.0),
             Claim::at_most(
                 format!("{name}: biased designs that no unbiased one dominates"),
                 left as f64,
@@ -179,6 +181,15 @@ impl Study {
         }
         Ok(canvas)
     }
+}
+
+/// The front of some designs.
+fn front(designs: Vec<Design>) -> Front {
+    let mut front = Front::default();
+    designs.into_iter().for_each(|design| {
+        front.offer(design);
+    });
+    front
 }
 
 /// Whether every field is no less sharp and no less bright.

@@ -65,6 +65,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     Ok(Outcome {
         claims: images.claims(),
         tables: vec![images.table()],
+        lenses: Vec::new(),
         pictures: vec![Picture { name: "images", canvas: images.draw() }],
         rays: images.pixels.iter().map(|pixel| pixel.rays).sum(),
     })
@@ -233,6 +234,9 @@ fn follow<'a>(before: &Kind, anchor: Anchor, bench: &'a Bench) -> Lit<'a> {
     Region::followed(before, anchor.launch(bench)).lit(ORDER)
 }
 
+/// Two numbers of a pixel.
+type Numbers = fn(&Pixel) -> [f64; 2];
+
 /// All pixels, row by row.
 struct Images {
     side: usize,
@@ -349,7 +353,7 @@ impl Images {
         panel(0, 0, "image", image.collect());
         for i in 0..2 {
             let largest = self.pixels.iter().map(|p| p.difference[i].abs()).fold(0.0, f64::max);
-            let kinds: [(&str, fn(&Pixel) -> [f64; 2]); 4] = [
+            let kinds: [(&str, Numbers); 4] = [
                 ("boundary", |pixel| pixel.boundary),
                 ("warp field", |pixel| pixel.warp),
                 ("differences", |pixel| pixel.difference),

@@ -6,8 +6,8 @@
 //! length. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that of
 //! the way `s` that the image of the target goes meanwhile, `|sin(π ν s) / (π ν s)|`.
 
-use super::front::{ANGLES, settings};
-use super::trade::{Part, at_angles, focal_length, swept};
+use super::front::{ANGLES, plan};
+use super::trade::{Part, at_angles, focal_length, searched};
 use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
 use crate::lens::Lens;
 use crate::optimize::pareto::Design;
@@ -40,10 +40,9 @@ const TIMES: f64 = 2.0;
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     let start = at_angles(lens(LENS)?, &ANGLES);
     let part = Part { from: 0.0, to: 1.0, name: "front of sharpness and light" };
-    let sweep = swept(&start, &settings(effort), part, watch)?;
-    let ends = [sweep.front().designs().first(), sweep.front().designs().last()];
-    let [Some(dark), Some(bright)] = ends else {
-        return Err(Ended::Failed("the front is empty".to_owned()));
+    let designs = searched(&start, &plan(effort), part, watch)?;
+    let [Some(bright), Some(dark)] = [designs.get(1), designs.last()] else {
+        return Err(Ended::Failed("no design was found".to_owned()));
     };
     let mut rays = 0;
     let [dark, bright] = [Shot::of(dark, &mut rays)?, Shot::of(bright, &mut rays)?];
@@ -53,6 +52,10 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
         claims: pair.claims(),
         tables: vec![pair.lenses(), pair.table()],
         pictures: vec![Picture { name: "contrast", canvas: pair.draw() }],
+        lenses: vec![
+            ("darkest".to_owned(), pair.dark.design.lens.clone()),
+            ("brightest".to_owned(), pair.bright.design.lens.clone()),
+        ],
         rays,
     })
 }

@@ -3,6 +3,8 @@
 
 use super::{Cell, Ended, Table, Watch, report};
 use crate::lens::{Aperture, Field, FieldKind, Fields, Lens};
+use crate::merit::{Goal, PupilEdge, Term, Weighted};
+use crate::optimize::annealed;
 use crate::optimize::pareto::{Design, Settings, Sweep};
 use crate::pupil::{Bench, Region};
 
@@ -36,6 +38,41 @@ pub(super) fn opened(lens: &Lens, factor: f64) -> Lens {
     lens
 }
 
+/// A search for lenses of ever less weight on their light.
+#[derive(Debug, Clone)]
+pub(super) struct Plan {
+    /// The weights β in mm², the largest first.
+    pub(super) betas: Vec<f64>,
+    /// Steps of Adam for each.
+    pub(super) steps: usize,
+    /// How the edges of the pupils are treated.
+    pub(super) pupil: PupilEdge,
+    /// How much smaller and larger a semi-diameter may become.
+    pub(super) rims: [f64; 2],
+}
+
+/// The largest weight: so large that the rim ray of a lens that is not sharp yet is kept. What is
+/// clipped early does not come back.
+const LARGEST: f64 = 3e-2;
+/// How many powers of ten the smallest one is below.
+const DECADES: f64 = 4.0;
+
+impl Plan {
+    /// So many weights, evenly on a logarithmic scale, by derivatives that follow the pupils.
+    pub(super) fn new(weights: usize, steps: usize) -> Self {
+        let last = (weights - 1).max(1) as f64;
+        let beta = |i: usize| LARGEST * 10f64.powf(-DECADES * i as f64 / last);
+        let betas = (0..weights).map(beta).collect();
+        Self { betas, steps, pupil: PupilEdge::Moving, rims: [0.25, 1.3] }
+    }
+
+    /// The usual search, which cannot see light: one weight is as good as another.
+    pub(super) fn biased(&self) -> Self {
+        let steps = 2 * self.steps;
+        Self { betas: vec![0.0], steps, pupil: PupilEdge::Kept, ..self.clone() }
+    }
+}
+
 /// The part of an experiment that a search is, from one share to another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Part<'a> {
@@ -44,23 +81,56 @@ pub(super) struct Part<'a> {
     pub(super) name: &'a str,
 }
 
-/// Sweeps the front of a lens to its end.
-pub(super) fn swept(
+/// How exact the spots of a search are, and those of its designs, relatively.
+const SEARCHED: f64 = 1e-3;
+const JUDGED: f64 = 1e-4;
+/// No rim may cut more of its sphere than this: curvature times semi-diameter.
+const STEEPEST: f64 = 0.9;
+
+/// The lens at the start, limited by its stop and with everything free, and a design for each
+/// weight, the search for each beginning where the one before has led.
+pub(super) fn searched(
     lens: &Lens,
-    settings: &Settings,
+    plan: &Plan,
     part: Part<'_>,
     watch: &mut Watch<'_>,
-) -> Result<Sweep, Ended> {
-    let mut sweep = Sweep::new(lens, settings).map_err(Ended::from_error)?;
-    let mut done = 0.0;
-    loop {
-        report(watch, part.from + (part.to - part.from) * done, part.name)?;
-        let slice = sweep.step();
-        done = (slice.done as f64 / slice.total as f64).clamp(done, 1.0);
-        if slice.finished {
-            return Ok(sweep);
+) -> Result<Vec<Design>, Ended> {
+    let settings = Settings { rims: plan.rims, pupil: plan.pupil, ..Settings::default() };
+    let start = Sweep::new(lens, &settings).map_err(Ended::from_error)?.start;
+    let goal = composite(&start, plan.pupil)?;
+    let total = (plan.betas.len() * plan.steps) as f64;
+    let mut designs = vec![start];
+    for (i, beta) in plan.betas.iter().enumerate() {
+        let mut goal = goal.clone();
+        goal.terms.push(Weighted { term: Term::Throughput, weight: *beta });
+        let begin = &designs[designs.len() - 1].lens;
+        let search = annealed(begin, &goal, SEARCHED, plan.steps);
+        let mut search = search.map_err(Ended::from_error)?;
+        for step in 0..plan.steps {
+            let done = (i * plan.steps + step) as f64 / total;
+            report(watch, part.from + (part.to - part.from) * done, part.name)?;
+            if search.step().finished {
+                break;
+            }
         }
+        search.settle();
+        let design = Design::of(search.best(), Some(*beta), JUDGED);
+        designs.push(design.map_err(Ended::from_error)?);
     }
+    Ok(designs)
+}
+
+/// What (3.26) asks for besides light: the integrals of the spots, and that the lens stays one: its
+/// focal length, glass and air that can be made, no hemispheres. The integral of a spot is its mean
+/// square times the light, and so the others count.
+fn composite(start: &Design, pupil: PupilEdge) -> Result<Goal, Ended> {
+    let mut goal = Goal::sensible(&start.lens).map_err(Ended::from_error)?;
+    goal.terms.retain(|weighted| !matches!(weighted.term, Term::Spot | Term::Light(_)));
+    goal.terms.push(Weighted { term: Term::Steepness(STEEPEST), weight: 1.0 });
+    goal.terms.iter_mut().for_each(|weighted| weighted.weight *= start.light);
+    goal.terms.push(Weighted { term: Term::SpotIntegral, weight: 1.0 });
+    goal.pupil = pupil;
+    Ok(goal)
 }
 
 /// A field of a lens.

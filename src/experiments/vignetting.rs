@@ -5,13 +5,12 @@
 //! larger aperture. Of the unbiased front that lens is shown which is brightest at the corner among
 //! those that are no less sharp than the biased one.
 
-use super::front::{ANGLES, settings};
-use super::trade::{Part, View, at_angles, means, swept, views};
+use super::front::{ANGLES, plan};
+use super::trade::{Part, View, at_angles, means, searched, views};
 use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
 use crate::analysis::{Illumination, illumination};
 use crate::lens::{Lens, Parameter, Quantity, Variable};
-use crate::merit::PupilEdge;
-use crate::optimize::pareto::{Design, Settings};
+use crate::optimize::pareto::Design;
 use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, grey};
 use crate::pupil::{Accuracy, Bench};
 
@@ -31,19 +30,15 @@ const ACCURACY: Accuracy = Accuracy { tolerance: 1e-5, most_rays: 100_000 };
 
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     let start = with_its_stop(at_angles(lens(LENS)?, &ANGLES));
-    let moving = settings(effort);
-    let steps = moving.steps * moving.points / 4;
-    let kept = Settings { points: 1, steps, pupil: PupilEdge::Kept, ..moving.clone() };
+    let plan = plan(effort);
     let part = Part { from: 0.0, to: 0.2, name: "biased gradient" };
-    let without = swept(&start, &kept, part, watch)?;
+    let without = searched(&start, &plan.biased(), part, watch)?;
     let part = Part { from: 0.2, to: 1.0, name: "unbiased gradient" };
-    let with = swept(&start, &moving, part, watch)?;
+    let with = searched(&start, &plan, part, watch)?;
     let mut rays = 0;
-    let sharpest = without.front().designs().iter().min_by(|a, b| a.spot.total_cmp(&b.spot));
-    let empty = || Ended::Failed("a front is empty".to_owned());
-    let biased = Lit::of(sharpest.ok_or_else(empty)?, &mut rays)?;
+    let biased = Lit::of(&without[without.len() - 1], &mut rays)?;
     let mut unbiased: Option<Lit> = None;
-    for design in with.front().designs().iter().filter(|d| d.spot <= biased.blur()) {
+    for design in with.iter().filter(|design| design.spot <= biased.blur()) {
         let lit = Lit::of(design, &mut rays)?;
         if unbiased.as_ref().is_none_or(|best| lit.corner()[0] > best.corner()[0]) {
             unbiased = Some(lit);
@@ -55,6 +50,10 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
         claims: claims(&pair),
         tables: vec![table(&pair)],
         pictures: vec![Picture { name: "illumination", canvas: draw(&pair) }],
+        lenses: vec![
+            ("biased".to_owned(), pair[0].lens.clone()),
+            ("unbiased".to_owned(), pair[1].lens.clone()),
+        ],
         rays,
     })
 }
@@ -72,6 +71,7 @@ fn with_its_stop(mut lens: Lens) -> Lens {
 
 /// A lens with its illumination from the axis to the corner.
 struct Lit {
+    lens: Lens,
     views: Vec<View>,
     light: Vec<Illumination>,
 }
@@ -85,7 +85,7 @@ impl Lit {
         let bench = bench.map_err(Ended::from_error)?;
         let light = illumination(&bench, bench.primary, ACCURACY);
         *rays += light.iter().map(|field| field.cone.rays).sum::<usize>();
-        Ok(Self { views, light })
+        Ok(Self { lens: design.lens.clone(), views, light })
     }
 
     /// The root of the mean square radius of its spots, in mm.

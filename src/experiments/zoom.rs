@@ -5,10 +5,10 @@
 //! there the groups stand on parabolas through their three places, and the image plane in focus, for
 //! the lens at the start and for the better one alike.
 
-use super::trade::{Part, in_one_color, means, swept, view_at};
+use super::trade::{Part, Plan, in_one_color, means, searched, view_at};
 use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
 use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, at_zoom, focus_gap};
-use crate::optimize::pareto::{Design, Settings};
+use crate::optimize::pareto::Design;
 use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke};
 use crate::pupil::Bench;
 
@@ -28,17 +28,14 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     let lenses = [("nikkor", "zoom_nikkor_28_80"), ("tamron", "zoom_tamron_28_75_f28")];
     for (i, (name, file)) in lenses.into_iter().enumerate() {
         let zoom = in_one_color(lens(file)?);
-        let settings = Settings {
-            points: effort.pick(8, 4),
-            steps: effort.pick(800, 60),
-            rims: [1.0, 1.0],
-            ..Settings::default()
-        };
+        let weights = effort.pick(10, 4);
+        let plan = Plan { rims: [1.0, 1.0], ..Plan::new(weights, effort.pick(800, 60)) };
         let (from, to) = (0.5 * i as f64, 0.5 * (i + 1) as f64);
         let part = Part { from, to, name };
-        let sweep = swept(&zoom, &settings, part, watch)?;
-        let before = Range::of(&sweep.start.lens, &mut outcome.rays)?;
-        let after = best(sweep.front().designs(), &before, &mut outcome.rays)?;
+        let designs = searched(&zoom, &plan, part, watch)?;
+        let before = Range::of(&designs[0].lens, &mut outcome.rays)?;
+        let (lens, after) = best(&designs[1..], &before, &mut outcome.rays)?;
+        outcome.lenses.push((format!("{name}-optimised"), lens));
         outcome.claims.extend(claims(name, &before, &after));
         outcome.tables.push(table(name, &before, &after));
         outcome.pictures.push(Picture { name, canvas: draw(name, &before, &after) });
@@ -86,15 +83,15 @@ impl Range {
 const GENTLY: f64 = 20.0;
 
 /// The design that is better at every place of the search, by the largest margin.
-fn best(designs: &[Design], before: &Range, rays: &mut usize) -> Result<Range, Ended> {
-    let mut best: Option<Range> = None;
+fn best(designs: &[Design], before: &Range, rays: &mut usize) -> Result<(Lens, Range), Ended> {
+    let mut best: Option<(Lens, Range)> = None;
     for design in designs {
         let range = Range::of(&design.lens, rays)?;
-        if best.as_ref().is_none_or(|b| range.gain(before) > b.gain(before)) {
-            best = Some(range);
+        if best.as_ref().is_none_or(|(_, other)| range.gain(before) > other.gain(before)) {
+            best = Some((design.lens.clone(), range));
         }
     }
-    best.ok_or_else(|| Ended::Failed("the front is empty".to_owned()))
+    best.ok_or_else(|| Ended::Failed("no design was found".to_owned()))
 }
 
 /// The parabola through three values at 0, 1 and 2.

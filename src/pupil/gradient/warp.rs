@@ -374,6 +374,7 @@ mod tests {
     use super::*;
     use crate::lens::{Shape, Surface, System};
     use crate::math::{Dual, Vec3};
+    use crate::pupil::Cost;
     use crate::trace::{Hurdle, Slot, Tracer};
 
     /// By x, by y, and by a number of the lens.
@@ -385,7 +386,8 @@ mod tests {
     fn system() -> System<f64> {
         let surface = |shape, thickness, index, semi_diameter| {
             let (mirror, hyper) = (false, false);
-            Surface { shape, thickness, index, semi_diameter, mirror, hyper }
+            let obstruction = 0.0;
+            Surface { shape, thickness, index, semi_diameter, obstruction, mirror, hyper }
         };
         let terms = [1e-5, -3e-8, 0.0, 1e-12, 0.0, 0.0, 0.0];
         let mut surfaces = vec![
