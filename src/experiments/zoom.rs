@@ -67,11 +67,10 @@ impl Range {
         [0, 1].map(|k| self.points[i][k] / other.points[i][k])
     }
 
-    /// How much better it is than another one where it is so least, at the places of the search:
-    /// above 1 where it is better everywhere.
+    /// How much better it is than another one where it is so least: above 1 where it is better
+    /// everywhere.
     fn gain(&self, other: &Self) -> f64 {
-        let searched = (0..PLACES.len()).filter(|i| PLACES[*i].fract() == 0.0);
-        let least = searched.map(|i| {
+        let least = (0..PLACES.len()).map(|i| {
             let [blur, light] = self.over(other, i);
             (1.0 / blur).min(1.0 + GENTLY * (light - 1.0))
         });
@@ -82,7 +81,7 @@ impl Range {
 /// How much more a gain in light counts than one in sharpness, when one design is chosen.
 const GENTLY: f64 = 20.0;
 
-/// The design that is better at every place of the search, by the largest margin.
+/// The design that is better at every place, by the largest margin.
 fn best(designs: &[Design], before: &Range, rays: &mut usize) -> Result<(Lens, Range), Ended> {
     let mut best: Option<(Lens, Range)> = None;
     for design in designs {
