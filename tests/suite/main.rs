@@ -13,6 +13,7 @@ mod library;
 mod merit;
 mod optimize;
 mod paraxial;
+mod pareto;
 mod pupil;
 mod reference;
 mod session;
