@@ -8,6 +8,7 @@ mod cli;
 mod effects;
 mod experiments;
 mod files;
+mod front;
 mod hard_cases;
 mod library;
 mod merit;
