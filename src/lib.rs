@@ -51,6 +51,9 @@ pub mod optimize;
 // Plots and images: what a result looks like, as PNG.
 pub mod picture;
 
+// A front of sharpness against light as files: table, picture, lenses.
+pub mod front;
+
 // The figures and tables of the thesis as studies that check their own claims.
 pub mod experiments;
 

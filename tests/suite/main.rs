@@ -9,6 +9,7 @@ mod effects;
 mod experiments;
 mod files;
 mod grin;
+mod front;
 mod hard_cases;
 mod library;
 mod merit;

@@ -3,7 +3,7 @@
 use eframe::egui::{Align, Grid, Id, Layout as Arrange, Ui, vec2};
 use std::path::PathBuf;
 
-use crate::merit::{Goal, Term, Weighted};
+use crate::merit::{Goal, PupilEdge, Term, Weighted};
 use crate::session::{Search, View, evaluate};
 use crate::studio::field::{Drafts, Field, Place};
 use crate::studio::number;
@@ -13,6 +13,7 @@ use crate::studio::panels::numbers;
 #[derive(Debug, Default)]
 pub(super) struct Aims {
     terms: Vec<Aim>,
+    pupil: PupilEdge,
     zoom_ratios: Vec<f64>,
     /// The lens for which they were proposed.
     lens: Option<(String, Option<PathBuf>, usize)>,
@@ -34,10 +35,15 @@ impl Aims {
         }
         let spot = Weighted { term: Term::Spot, weight: 1.0 };
         let goal = Goal::sensible(&view.lens);
-        let goal = goal.unwrap_or_else(|_| Goal { terms: vec![spot], zoom_ratios: Vec::new() });
+        let goal = goal.unwrap_or_else(|_| Goal {
+            terms: vec![spot],
+            pupil: PupilEdge::default(),
+            zoom_ratios: Vec::new(),
+        });
         let aim = |weighted: Weighted| Aim { counts: true, weighted };
         *self = Self {
             terms: goal.terms.into_iter().map(aim).collect(),
+            pupil: goal.pupil,
             zoom_ratios: goal.zoom_ratios,
             lens,
         };
@@ -48,6 +54,7 @@ impl Aims {
         let counting = self.terms.iter().filter(|aim| aim.counts);
         Goal {
             terms: counting.map(|aim| aim.weighted).collect(),
+            pupil: self.pupil,
             zoom_ratios: self.zoom_ratios.clone(),
         }
     }
@@ -147,15 +154,19 @@ fn number_field(ui: &mut Ui, drafts: &mut Drafts, name: &str, value: &mut f64, w
 /// The targets of a term and what they are called.
 fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
     match term {
-        Term::Spot | Term::Distortion => Vec::new(),
-        Term::GlassCenter { min, max } | Term::AirCenter { min, max } => {
-            vec![("Minimum", min), ("Maximum", max)]
+        Term::Spot | Term::SpotIntegral | Term::Throughput | Term::Distortion => Vec::new(),
+        Term::GlassCenter { min, max }
+        | Term::AirCenter { min, max }
+        | Term::SemiDiameter { min, max } => vec![("Minimum", min), ("Maximum", max)],
+        Term::FocalLength(target) | Term::FNumber(target) | Term::ThroughputLoss(target) => {
+            vec![("Target", target)]
         }
-        Term::FocalLength(target) => vec![("Target", target)],
-        Term::GlassEdge(least) | Term::AirEdge(least) | Term::BackFocus(least) => {
-            vec![("Minimum", least)]
-        }
-        Term::TotalTrack(most) => vec![("Maximum", most)],
+        Term::GlassEdge(least)
+        | Term::AirEdge(least)
+        | Term::BackFocus(least)
+        | Term::Light(least)
+        | Term::RelativeIllumination { min: least, .. } => vec![("Minimum", least)],
+        Term::TotalTrack(most) | Term::Steepness(most) => vec![("Maximum", most)],
     }
 }
 
@@ -188,6 +199,14 @@ const fn title(term: Term) -> &'static str {
         Term::AirEdge(_) => "Air edge",
         Term::TotalTrack(_) => "Total track",
         Term::BackFocus(_) => "Back focus",
+        Term::SpotIntegral => "Spot integral",
+        Term::Throughput => "Throughput",
+        Term::ThroughputLoss(_) => "Throughput loss",
+        Term::Light(_) => "Light",
+        Term::RelativeIllumination { .. } => "Relative illumination",
+        Term::FNumber(_) => "F-number",
+        Term::Steepness(_) => "Steepness",
+        Term::SemiDiameter { .. } => "Semi-diameter",
     }
 }
 
@@ -202,5 +221,13 @@ const fn hint(term: Term) -> &'static str {
         Term::AirEdge(_) => "Air thinner than this at the rim",
         Term::TotalTrack(_) => "From the first vertex to the image longer than this",
         Term::BackFocus(_) => "From the last vertex to the image shorter than this",
+        Term::SpotIntegral => "Square distance from the centroid, integrated over the pupil",
+        Term::Throughput => "Minus the mean area of the pupils",
+        Term::ThroughputLoss(_) => "One minus the mean area of the pupils over this one, in mm²",
+        Term::Light(_) => "Light lost below this share of what the pupils let through at first",
+        Term::RelativeIllumination { .. } => "A field darker than this share of the axis",
+        Term::FNumber(_) => "Square of the deviation of the f-number of the light from this",
+        Term::Steepness(_) => "A surface steeper at its rim: curvature times semi-diameter",
+        Term::SemiDiameter { .. } => "Surfaces smaller or larger than this",
     }
 }
