@@ -69,6 +69,8 @@ pub struct Design {
     pub light: f64,
     /// Its estimated error, in mm².
     pub light_error: f64,
+    /// Whether light gets through at every field; a spot without light is none.
+    pub lit: bool,
     /// Rays that these numbers rest on.
     pub rays: usize,
 }
@@ -92,6 +94,7 @@ impl Design {
             spot_error: if spot > 0.0 { 0.5 * square.error / spot } else { 0.0 },
             light: -area.value,
             light_error: area.error,
+            lit: merit.is_lit(),
             rays: square.rays,
         })
     }
@@ -119,7 +122,7 @@ impl Front {
     /// whether it was taken.
     pub fn offer(&mut self, design: Design) -> bool {
         let no_worse = |d: &Design| d.spot <= design.spot && d.light >= design.light;
-        let sound = design.spot.is_finite() && design.light.is_finite() && design.light > 0.0;
+        let sound = design.spot.is_finite() && design.light.is_finite() && design.lit;
         if !sound || self.designs.iter().any(no_worse) {
             return false;
         }
@@ -172,6 +175,8 @@ const FIRST: usize = 3;
 const SLICE: usize = 25;
 /// Relative error of the numbers that lenses are compared by.
 const JUDGED: f64 = 1e-4;
+/// The share of its light that every field keeps.
+const LEAST_LIGHT: f64 = 0.1;
 /// No surface may be steeper than this: curvature times semi-diameter.
 const STEEPEST: f64 = 0.9;
 
@@ -396,7 +401,15 @@ fn goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
         sensible.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
     terms.extend(others.map(|w| Weighted { weight: light * w.weight, ..w }));
     terms.push(Weighted { term: Term::Steepness(STEEPEST), weight: light });
+    // No field may go dark: a spot without light would be the sharpest of all.
+    let worth = terms[0].weight * light * goal_size(lens).powi(2);
+    terms.push(Weighted { term: Term::Light(LEAST_LIGHT), weight: worth });
     Ok(Goal { terms, pupil, zoom_ratios: sensible.zoom_ratios })
+}
+
+/// A spot as large as this is not worth the light that a field must keep, in mm.
+fn goal_size(lens: &Lens) -> f64 {
+    1e-3 * lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>()
 }
 
 /// The focal length that the goal asks for, or the length of an afocal lens.
