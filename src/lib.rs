@@ -48,6 +48,12 @@ pub mod effects;
 // Local search: Adam and damped least squares, one step at a time.
 pub mod optimize;
 
+// Plots and images: what a result looks like, as PNG.
+pub mod picture;
+
+// The figures and tables of the thesis as studies that check their own claims.
+pub mod experiments;
+
 // Accuracy against time, throughput, memory.
 pub mod measure;
 

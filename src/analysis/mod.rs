@@ -10,6 +10,7 @@ mod distortion;
 mod fan;
 mod illumination;
 mod mtf;
+mod pupil;
 mod spot;
 mod wavefront;
 
@@ -17,6 +18,7 @@ pub use distortion::{Curvature, Distortion, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, illumination};
 pub use mtf::{Contrast, contrast};
+pub use pupil::{Form, Light, Loss, Pupil, pupil};
 pub use spot::{ColorSpot, Spot, airy_radius, rounding, spot, spots};
 pub use wavefront::{Wavefront, path_differences, wavefront};
 

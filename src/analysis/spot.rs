@@ -290,6 +290,9 @@ fn edge_points(region: &Region<'_>) -> Vec<[f64; 2]> {
             .map(|(s, c)| [inside * s, inside * c])
             .collect(),
         Kind::Split(boundary) => boundary.points(&region.launch, EDGE_RAYS, inside),
+        Kind::Ragged { ring: Some(ring), .. } => {
+            ring.outer.points(&region.launch, EDGE_RAYS, inside)
+        }
         Kind::Dark | Kind::Endless | Kind::Ragged { .. } => Vec::new(),
     }
 }

@@ -9,6 +9,7 @@
 
 mod analyze;
 mod convert;
+mod experiment;
 mod failure;
 mod gradient;
 mod info;
@@ -54,6 +55,7 @@ enum Command {
     Gradient(gradient::Gradient),
     Optimize(optimize::Optimize),
     Convert(convert::Convert),
+    Experiment(experiment::Experiment),
     Measure(measure::Measure),
 }
 
@@ -66,6 +68,7 @@ impl Command {
             Self::Gradient(gradient) => gradient.run(output),
             Self::Optimize(optimize) => optimize.run(output),
             Self::Convert(convert) => convert.run(output),
+            Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),
         }
     }

@@ -3,9 +3,9 @@
 use super::failure::Failure;
 use super::input::{self, LensFile, Opened, Tolerance};
 use super::output::{Number, Output, Table};
-use super::vary::{Kind, vary};
+use super::vary::KindName;
 use crate::files::{self, native};
-use crate::lens::Lens;
+use crate::lens::{Lens, vary};
 use crate::measure::timed;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
 use crate::optimize::{Method, Optimizer, Progress, start};
@@ -42,7 +42,7 @@ pub(super) struct Optimize {
 
     /// Kinds of numbers to vary besides the variables of the lens
     #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]
-    vary: Vec<Kind>,
+    vary: Vec<KindName>,
 
     /// What to aim at, as JSON; sharp spots at the focal length it has where it is absent
     #[arg(long, value_name = "FILE")]
@@ -85,7 +85,7 @@ impl Optimize {
         input::check_target(&self.out, &["json", "zmx"])?;
         self.history.iter().try_for_each(|path| input::check_target(path, &["json"]))?;
         let mut lens = opened.lens.clone();
-        vary(&mut lens, &self.vary);
+        vary(&mut lens, &KindName::kinds(&self.vary));
         let refuse = |source| refused(&opened, source);
         let goal = self.goal(&lens).map_err(|e| e.or_else(refuse))?;
         let started = start(self.method.method(), &lens, &goal, self.error.0);

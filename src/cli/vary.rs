@@ -1,11 +1,11 @@
-//! Which numbers of a lens are free.
+//! Naming kinds of numbers on the command line.
 
-use crate::lens::{Lens, Medium, Parameter, Quantity, Variable};
+use crate::lens::NumberKind;
 use clap::ValueEnum;
 
 /// A kind of number that an optimizer may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Kind {
+pub(super) enum KindName {
     /// Every curvature with a medium of its own behind it
     Curvatures,
     /// Every gap, at each zoom position by itself where it moves
@@ -16,111 +16,38 @@ pub(super) enum Kind {
     Aspheres,
     /// Every index of a model glass or constant medium
     Indices,
+    /// Every semi-diameter that is written
+    SemiDiameters,
 }
 
-/// Frees every number of some kinds that does not follow another one; what is a variable already
-/// keeps its bounds.
-pub(super) fn vary(lens: &mut Lens, kinds: &[Kind]) {
-    let chosen: Vec<Parameter> = kinds.iter().flat_map(|kind| parameters(lens, *kind)).collect();
-    for parameter in chosen {
-        free(lens, parameter);
+impl KindName {
+    /// The kinds that are meant.
+    pub(super) fn kinds(names: &[Self]) -> Vec<NumberKind> {
+        names.iter().map(|name| name.kind()).collect()
     }
-}
 
-/// Makes a number a variable, unless it is one, follows another number or does not exist.
-pub(super) fn free(lens: &mut Lens, parameter: Parameter) -> bool {
-    let follows = lens.pickups.iter().any(|pickup| pickup.parameter == parameter);
-    if follows || solved(lens, parameter) || lens.get(parameter).is_none() {
-        return false;
-    }
-    if lens.variable(parameter).is_none() {
-        lens.variables.push(Variable { parameter, min: None, max: None });
-    }
-    true
-}
-
-/// Whether it is the last gap and the focus decides it.
-fn solved(lens: &Lens, parameter: Parameter) -> bool {
-    let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
-    lens.focus.is_some() && gap && parameter.surface + 1 == lens.surfaces.len()
-}
-
-fn parameters(lens: &Lens, kind: Kind) -> Vec<Parameter> {
-    let rows = 0..lens.surfaces.len();
-    let all = |quantity: Quantity| rows.clone().map(move |i| Parameter::new(i, quantity));
-    match kind {
-        Kind::Curvatures => all(Quantity::Curvature).filter(|p| bends(lens, p.surface)).collect(),
-        Kind::Thicknesses => rows.flat_map(|surface| gaps(lens, surface)).collect(),
-        Kind::Conics => {
-            all(Quantity::Conic).filter(|p| lens.surfaces[p.surface].conic != 0.0).collect()
+    fn kind(self) -> NumberKind {
+        match self {
+            Self::Curvatures => NumberKind::Curvatures,
+            Self::Thicknesses => NumberKind::Thicknesses,
+            Self::Conics => NumberKind::Conics,
+            Self::Aspheres => NumberKind::Aspheres,
+            Self::Indices => NumberKind::Indices,
+            Self::SemiDiameters => NumberKind::SemiDiameters,
         }
-        Kind::Aspheres => rows
-            .flat_map(|i| (0..lens.surfaces[i].asphere.len()).map(move |term| (i, term)))
-            .map(|(i, term)| Parameter::new(i, Quantity::Asphere(term)))
-            .collect(),
-        Kind::Indices => all(Quantity::Index).collect(),
     }
-}
-
-/// Whether light changes its direction at a surface.
-fn bends(lens: &Lens, surface: usize) -> bool {
-    let before = match surface.checked_sub(1) {
-        Some(before) => &lens.surfaces[before].medium,
-        None => &lens.object_medium,
-    };
-    let behind = &lens.surfaces[surface].medium;
-    *behind == Medium::Mirror || before != behind
-}
-
-/// The numbers that say how wide a gap is: one, or one for each zoom position.
-fn gaps(lens: &Lens, surface: usize) -> Vec<Parameter> {
-    let own = |zoom: &usize| lens.zoom[*zoom].thicknesses.iter().any(|gap| gap.surface == surface);
-    let moving: Vec<usize> = (0..lens.zoom.len()).filter(own).collect();
-    let fixed = moving.len() < lens.zoom_positions();
-    let fixed = fixed.then_some(Parameter::new(surface, Quantity::Thickness));
-    let own = moving.iter().map(|z| Parameter::new(surface, Quantity::ZoomThickness(*z)));
-    fixed.into_iter().chain(own).collect()
-}
-
-/// The lens at one of its zoom positions, as if it had no others.
-pub(super) fn at_zoom(lens: &Lens, zoom: usize) -> Lens {
-    let mut single = lens.clone();
-    single.zoom.clear();
-    single.fields = lens.fields_at(zoom).clone();
-    single.aperture = lens.aperture_at(zoom);
-    for (i, row) in single.surfaces.iter_mut().enumerate() {
-        row.thickness = lens.thickness_at(i, zoom).unwrap_or(row.thickness);
-    }
-    // What follows a gap of another position, or is followed by one, keeps its value.
-    let here = |parameter: Parameter| match parameter.quantity {
-        Quantity::ZoomThickness(z) if z == zoom => {
-            Some(Parameter::new(parameter.surface, Quantity::Thickness))
-        }
-        Quantity::ZoomThickness(_) => None,
-        _ => Some(parameter),
-    };
-    single.pickups = lens
-        .pickups
-        .iter()
-        .filter_map(|pickup| {
-            let (parameter, source) = (here(pickup.parameter)?, here(pickup.source)?);
-            Some(crate::lens::Pickup { parameter, source, ..*pickup })
-        })
-        .collect();
-    single.variables.retain(|v| !matches!(v.parameter.quantity, Quantity::ZoomThickness(_)));
-    single
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::files::{library, native};
+    use crate::lens::{NumberKind, at_zoom, vary};
     use crate::measure::double_gauss;
 
     #[test]
     fn a_plane_stop_in_air_is_not_varied() {
         let mut lens = double_gauss();
-        vary(&mut lens, &[Kind::Curvatures, Kind::Thicknesses]);
+        vary(&mut lens, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
         assert_eq!(lens.variables.len(), 10 + 11);
         assert!(lens.check().is_ok());
     }
@@ -134,7 +61,7 @@ mod tests {
             let single = at_zoom(&lens, position);
             assert_eq!(single.system(0, um).unwrap(), lens.system(position, um).unwrap());
         }
-        vary(&mut lens, &[Kind::Thicknesses]);
+        vary(&mut lens, &[NumberKind::Thicknesses]);
         assert!(lens.check().is_ok());
         let moving = lens.zoom[0].thicknesses.len() * lens.zoom.len();
         let fixed = lens.surfaces.len() - lens.zoom[0].thicknesses.len();

@@ -85,7 +85,7 @@ pub struct Plan {
     pub decisions: Vec<Decision>,
     /// Figured surfaces whose figuring is left out.
     pub plain: Vec<usize>,
-    /// Surfaces whose rim is left out.
+    /// Surfaces whose rim, and obstruction, is left out.
     pub open: Vec<usize>,
 }
 
@@ -199,7 +199,8 @@ fn way(moved: f64, allowed: f64) -> String {
 /// What a crossing of a figured surface costs, in crossings of a sphere.
 const ITERATION: f64 = 15.0;
 
-/// Keeps the rims that a ray may reach, and those that tell an iteration where to look.
+/// Keeps the rims that a ray may reach, those that tell an iteration where to look, and whatever
+/// obstructs.
 fn clipping(facts: &Facts, choice: Choice) -> (Decision, Vec<usize>) {
     let ratio = |rim: &super::Rim| {
         if rim.reached == 0.0 { 0.0 } else { rim.reached / rim.semi_diameter }
@@ -207,7 +208,7 @@ fn clipping(facts: &Facts, choice: Choice) -> (Decision, Vec<usize>) {
     let nearest = facts.rims.iter().map(ratio).fold(0.0, f64::max);
     let decision = whole(Effect::Clipping, choice, nearest, NEAR_RIM, "of the semi-diameter");
     let goes = |rim: &&super::Rim| match choice {
-        Choice::Auto => !rim.figured && ratio(rim) <= NEAR_RIM,
+        Choice::Auto => !rim.figured && !rim.obstructed && ratio(rim) <= NEAR_RIM,
         Choice::On => false,
         Choice::Off => true,
     };
@@ -215,19 +216,26 @@ fn clipping(facts: &Facts, choice: Choice) -> (Decision, Vec<usize>) {
     let left = facts.rims.iter().filter(goes).map(ratio).fold(0.0, f64::max);
     let kept = facts.rims.iter().map(|rim| rim.surface).filter(|i| !open.contains(i));
     let surfaces: Vec<usize> = kept.collect();
+    let obstructed = facts.rims.iter().filter(|rim| rim.obstructed).count();
+    let obstructing = match obstructed {
+        0 => String::new(),
+        1 => " and at an obstruction".to_owned(),
+        all => format!(" and at {all} obstructions"),
+    };
     let reason = if facts.rims.is_empty() {
-        "no surface has a semi-diameter".to_owned()
+        "no surface has a semi-diameter or an obstruction".to_owned()
     } else {
         let (clipped, rays) = (facts.fates.clipped, facts.fates.total());
         let limiting = facts.rims.iter().filter(|rim| ratio(rim) > NEAR_RIM).count();
         format!(
             "rays come to {:.0} % of a semi-diameter, and near the rim at {limiting} surfaces; \
-             {clipped} of {rays} are lost there",
+             {clipped} of {rays} are lost there{obstructing}",
             100.0 * nearest
         )
     };
     let computed = !surfaces.is_empty();
-    (Decision { computed, surfaces, left, reason, ..decision }, open)
+    let needed = decision.needed || obstructed > 0;
+    (Decision { needed, computed, surfaces, left, reason, ..decision }, open)
 }
 
 /// The test is the sign of the number whose root refraction takes anyway: it cannot be left out

@@ -51,12 +51,14 @@ pub struct Facts {
 pub struct Rim {
     /// The surface.
     pub surface: usize,
-    /// Its semi-diameter, in mm.
+    /// Its semi-diameter, in mm; infinite for a surface that has an obstruction alone.
     pub semi_diameter: f64,
     /// How far from the axis rays meet it that nothing else stops, in mm.
     pub reached: f64,
     /// Whether the surface is figured: its iteration needs the rim to know where to look.
     pub figured: bool,
+    /// Whether the surface has an obstruction as well, with or without a rim.
+    pub obstructed: bool,
 }
 
 /// Rays inside the pupil in rings that stand for equal areas, and rays on its rim.
@@ -247,6 +249,7 @@ fn is_figured(system: &System<f64>, surface: usize) -> bool {
 fn without_rims(bench: &Bench) -> System<f64> {
     let mut system = bench.colors[bench.primary].system.clone();
     for i in 0..system.surfaces.len() {
+        system.surfaces[i].obstruction = 0.0;
         let limits = !bench.ends_at_disc() && i == bench.stop();
         if !(is_figured(&system, i) || limits) {
             system.surfaces[i].semi_diameter = f64::INFINITY;
@@ -280,8 +283,10 @@ fn rims(bench: &Bench) -> Result<Vec<Rim>, BenchError> {
         semi_diameter: system.surfaces[surface].semi_diameter,
         reached: all.iter().map(|field| field[surface]).fold(0.0, f64::max),
         figured: is_figured(system, surface),
+        obstructed: system.surfaces[surface].obstruction > 0.0,
     };
-    Ok((0..count).map(rim).filter(|rim| rim.semi_diameter.is_finite()).collect())
+    let clips = |rim: &Rim| rim.semi_diameter.is_finite() || rim.obstructed;
+    Ok((0..count).map(rim).filter(clips).collect())
 }
 
 fn falls(system: &System<f64>) -> Vec<usize> {

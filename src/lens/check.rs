@@ -123,6 +123,12 @@ impl Lens {
                 let what = format!("semi-diameter of surface {i}");
                 number(what, sd, sd >= 0.0, "zero or more, in mm")?;
             }
+            if let Some(inner) = row.obstruction {
+                let what = format!("obstruction of surface {i}");
+                let leaves_light = row.semi_diameter.is_none_or(|sd| inner == 0.0 || inner < sd);
+                let expected = "zero or more and less than the semi-diameter, in mm";
+                number(what, inner, inner >= 0.0 && leaves_light, expected)?;
+            }
             check_medium(i, &row.medium)?;
         }
         check_medium(0, &self.object_medium)

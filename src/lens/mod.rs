@@ -10,12 +10,15 @@ mod check;
 pub mod glass;
 mod parameter;
 mod resolve;
+mod reversed;
 mod system;
+mod vary;
 
 pub use check::LensError;
 pub use parameter::{Parameter, Quantity};
 pub use resolve::focus_gap;
 pub use system::{Invalid, Shape, Surface, System};
+pub use vary::{NumberKind, at_zoom, free, vary};
 
 use serde::{Deserialize, Serialize};
 
@@ -143,6 +146,9 @@ pub struct Row {
     pub medium: Medium,
     /// Rays that meet the surface farther from the axis are clipped, in mm; `None` clips nothing.
     pub semi_diameter: Option<f64>,
+    /// Rays that meet the surface nearer to the axis are clipped, in mm: a central obstruction, or
+    /// the hole of a mirror; `None` clips nothing.
+    pub obstruction: Option<f64>,
     /// Whether this is the aperture stop.
     pub stop: bool,
     /// Whether the far half of the sphere or ellipsoid counts too (a hyper-hemisphere).

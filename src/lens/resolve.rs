@@ -91,6 +91,7 @@ impl Row {
             thickness,
             index,
             semi_diameter: self.semi_diameter.unwrap_or(f64::INFINITY),
+            obstruction: self.obstruction.unwrap_or(0.0),
             mirror: self.medium == Medium::Mirror,
             hyper: self.hyper,
         }
@@ -104,6 +105,7 @@ fn image_plane(index: f64) -> Surface<f64> {
         thickness: 0.0,
         index,
         semi_diameter: f64::INFINITY,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     }

@@ -129,6 +129,8 @@ pub struct Surface<R> {
     pub index: R,
     /// Rays farther from the axis are clipped, the rim itself passes; infinite where nothing is.
     pub semi_diameter: R,
+    /// Rays nearer to the axis are clipped, the edge itself passes; 0 where nothing is obstructed.
+    pub obstruction: R,
     /// Whether it reflects.
     pub mirror: bool,
     /// Whether the far half of the sphere or ellipsoid counts too.
@@ -178,6 +180,19 @@ pub enum Invalid {
         surface: usize,
         /// The value.
         found: f64,
+    },
+    /// An obstruction that is negative or leaves no light.
+    #[error(
+        "obstruction of surface {surface} is {found}; expected zero or more, and less than the \
+         semi-diameter {semi_diameter}"
+    )]
+    Obstruction {
+        /// The surface, counted from 0.
+        surface: usize,
+        /// The value.
+        found: f64,
+        /// The semi-diameter.
+        semi_diameter: f64,
     },
     /// More coefficients than the model has.
     #[error("surface {surface} has {found} asphere coefficients; expected at most 7 (r^4 to r^16)")]
@@ -246,12 +261,22 @@ impl<R: Real> Surface<R> {
         terms.iter().try_for_each(|a| finite("asphere coefficient", i, a.value()))?;
         finite("thickness", i, self.thickness.value())?;
         positive(|| format!("after surface {i}"), self.index.value())?;
-        let semi_diameter = self.semi_diameter.value();
-        if semi_diameter >= 0.0 {
+        let (semi_diameter, obstruction) = (self.semi_diameter.value(), self.obstruction.value());
+        if !(semi_diameter >= 0.0) {
+            return Err(Invalid::SemiDiameter { surface: i, found: semi_diameter });
+        }
+        let leaves_light = obstruction > 0.0 && obstruction < semi_diameter;
+        if obstruction == 0.0 || leaves_light && obstruction <= LARGEST {
             Ok(())
         } else {
-            Err(Invalid::SemiDiameter { surface: i, found: semi_diameter })
+            Err(Invalid::Obstruction { surface: i, found: obstruction, semi_diameter })
         }
+    }
+
+    /// Takes away what clips: rim and obstruction.
+    pub fn clear(&mut self) {
+        self.semi_diameter = R::from_f64(f64::INFINITY);
+        self.obstruction = R::ZERO;
     }
 
     /// The same surface with every number mapped.
@@ -271,6 +296,7 @@ impl<R: Real> Surface<R> {
             thickness: f(self.thickness),
             index: f(self.index),
             semi_diameter: f(self.semi_diameter),
+            obstruction: f(self.obstruction),
             mirror: self.mirror,
             hyper: self.hyper,
         }

@@ -142,6 +142,11 @@ impl<R: Real, const N: usize> Real for Dual<R, N> {
         let root = self.value.sqrt();
         self.chain(root, R::ONE / (root + root))
     }
+    #[inline(always)]
+    fn select(condition: bool, yes: Self, no: Self) -> Self {
+        let slope = std::array::from_fn(|i| R::select(condition, yes.slope[i], no.slope[i]));
+        Self { value: R::select(condition, yes.value, no.value), slope }
+    }
     fn is_finite(self) -> bool {
         self.value.is_finite() && self.slope.iter().all(|s| s.is_finite())
     }

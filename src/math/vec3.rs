@@ -24,6 +24,7 @@ impl<R> Vec3<R> {
 
 impl<R: Real> Vec3<R> {
     /// The vector of constants `v`.
+    #[inline(always)]
     pub fn from_f64(v: Vec3<f64>) -> Self {
         Self::new(R::from_f64(v.x), R::from_f64(v.y), R::from_f64(v.z))
     }

@@ -6,6 +6,7 @@
 
 mod clock;
 mod double_gauss;
+mod gradient;
 mod machine;
 mod memory;
 mod optimize;
@@ -17,6 +18,9 @@ mod trace;
 
 pub use clock::timed;
 pub use double_gauss::double_gauss;
+pub use gradient::{
+    GradientCost, GradientCurves, GradientRow, Gradients, Integral, NoGradients, Numbers, gradients,
+};
 pub use machine::Machine;
 pub use memory::{Memory, peak_megabytes};
 pub use optimize::{StepCosts, StepRow, step_costs};

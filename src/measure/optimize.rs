@@ -5,7 +5,7 @@ use super::double_gauss::double_gauss;
 use super::rates::Rate;
 use super::trace::Unmeasured;
 use crate::lens::{Lens, Parameter, Quantity, Variable};
-use crate::merit::{Goal, Term, Weighted};
+use crate::merit::{Goal, PupilEdge, Term, Weighted};
 use crate::optimize::{Method, start};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
@@ -91,7 +91,7 @@ fn time(
         Weighted { term: Term::Spot, weight: 1.0 },
         Weighted { term: Term::FocalLength(99.5), weight: 1e-2 },
     ];
-    let goal = Goal { terms, zoom_ratios: Vec::new() };
+    let goal = Goal { terms, pupil: PupilEdge::Kept, zoom_ratios: Vec::new() };
     let mut search = start(method, lens, &goal, TOLERANCE)?;
     let before = search.terms()?;
     let mut times = Vec::with_capacity(steps);

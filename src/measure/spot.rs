@@ -5,7 +5,7 @@
 //! square of several tries. The reference is the split boundary at its highest order.
 
 use super::clock::timed;
-use crate::lens::{Aperture, Field, Lens};
+use crate::lens::{Aperture, Field, Lens, Surface};
 use crate::math::Real;
 use crate::pupil::{
     Accuracy, Aiming, Bench, BenchError, Kind, Launch, LaunchError, Nodes, Pattern, Region,
@@ -184,7 +184,7 @@ fn bench(lens: &Lens, zoom: usize, pupil: Pupil) -> Result<Bench, NoCurves> {
     let color = &given.colors[given.primary];
     let mut system = color.system.clone();
     if pupil == Pupil::Clear {
-        system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = f64::INFINITY);
+        system.surfaces.iter_mut().for_each(Surface::clear);
     }
     let aiming = if given.aiming == Aiming::Stop { Aiming::Chief } else { given.aiming };
     Ok(Bench::new(vec![(color.um, 1.0, system)], 0, beam, aiming)?)

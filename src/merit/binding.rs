@@ -5,8 +5,11 @@
 
 use super::{Along, MeritError};
 use crate::lens::glass::model_index;
-use crate::lens::{FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System, focus_gap};
-use crate::math::Real;
+use crate::lens::{
+    Aperture, FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System, focus_gap,
+};
+use crate::paraxial::Beam;
+use crate::pupil::{Aiming, Bench};
 use crate::trace::{Gradient, Slot};
 use nalgebra::DVector;
 
@@ -29,10 +32,10 @@ pub(super) struct Zoom {
     pub(super) field: FieldKind,
     /// Which gaps are glass.
     pub(super) glass: Vec<bool>,
-    /// One for each wavelength, opened so that rims do not clip.
+    /// One for each wavelength.
     systems: Vec<System<f64>>,
-    /// What clips them.
-    pub(super) rims: Vec<Option<f64>>,
+    /// How the beam is limited.
+    aperture: Aperture,
     lines: Vec<Vec<Line>>,
     /// The distance of the image plane from the paraxial focus, where the last gap is solved.
     focus: Option<f64>,
@@ -42,19 +45,24 @@ pub(super) struct Zoom {
 /// The systems of a zoom position at some values of the variables.
 #[derive(Debug, Clone)]
 pub(super) struct Systems {
-    /// One for each wavelength.
+    /// One for each wavelength, opened so that rims do not clip.
     pub(super) systems: Vec<System<f64>>,
+    /// The same with their rims.
+    pub(super) rimmed: Vec<System<f64>>,
     /// The derivative of the last gap by the variables where it is solved.
     focus: Option<DVector<f64>>,
 }
 
 impl Zoom {
     pub(super) fn new(lens: &Lens, number: usize) -> Result<Self, MeritError> {
+        let aperture = lens.aperture_at(number);
         let mut systems = Vec::new();
         let mut lines = Vec::new();
         for wavelength in &lens.wavelengths {
             let mut system = lens.system(number, wavelength.um)?;
-            system.surfaces.iter_mut().for_each(open_up);
+            if let (Some(stop), Aperture::StopSemiDiameter(radius)) = (system.stop, aperture) {
+                system.surfaces[stop].semi_diameter = radius;
+            }
             let found = lines_of(lens, number, wavelength.um, &mut system);
             lines.push(found);
             systems.push(system);
@@ -73,7 +81,7 @@ impl Zoom {
             object: lens.object,
             field: lens.fields_at(number).kind,
             glass: (0..lens.surfaces.len()).map(glass).collect(),
-            rims: lens.surfaces.iter().map(|row| row.semi_diameter).collect(),
+            aperture,
             focus: lens.focus,
             variables: lens.variables.len(),
             lines,
@@ -83,27 +91,47 @@ impl Zoom {
 
     /// The systems at some values of the variables.
     pub(super) fn at(&self, values: &[f64]) -> Systems {
-        let mut systems = self.systems.clone();
-        for (system, lines) in systems.iter_mut().zip(&self.lines) {
+        let mut rimmed = self.systems.clone();
+        for (system, lines) in rimmed.iter_mut().zip(&self.lines) {
             for line in lines {
                 let number = line.offset + line.factor * values[line.variable];
-                *number_mut(system, line.surface, line.slot) = number;
+                *line.slot.of(system, line.surface) = number;
             }
         }
-        let mut found = Systems { systems, focus: None };
+        let mut found = Systems { systems: Vec::new(), rimmed, focus: None };
         if let Some(offset) = self.focus {
             self.solve_focus(&mut found, offset);
         }
+        found.systems.clone_from(&found.rimmed);
+        let surfaces = found.systems.iter_mut().flat_map(|system| &mut system.surfaces);
+        surfaces.for_each(open_up);
         found
     }
 
+    /// The lens with its rims, ready for rays; a stop whose semi-diameter is the aperture has it.
+    pub(super) fn bench(
+        &self,
+        found: &Systems,
+        lens: &Lens,
+        aiming: Aiming,
+    ) -> Result<Bench, MeritError> {
+        let weighted = lens.wavelengths.iter().zip(&found.rimmed);
+        let systems = weighted.map(|(w, system)| (w.um, w.weight, system.clone())).collect();
+        let mut beam = Beam::of(lens, self.number);
+        let primary = &found.rimmed[self.primary];
+        if let (Some(stop), Aperture::StopSemiDiameter(_)) = (primary.stop, self.aperture) {
+            beam.aperture = Aperture::StopSemiDiameter(primary.surfaces[stop].semi_diameter);
+        }
+        Ok(Bench::new(systems, self.primary, beam, aiming)?)
+    }
+
     fn solve_focus(&self, found: &mut Systems, offset: f64) {
-        let primary = &found.systems[self.primary];
+        let primary = &found.rimmed[self.primary];
         let gap = focus_gap(primary, self.object) + offset;
         let slope =
             |variable| focus_gap(&self.along_unfocused(primary, variable), self.object).slope[0];
         found.focus = Some(DVector::from_iterator(self.variables, (0..self.variables).map(slope)));
-        for system in &mut found.systems {
+        for system in &mut found.rimmed {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness = gap;
         }
@@ -112,14 +140,14 @@ impl Zoom {
     fn along_unfocused(&self, primary: &System<f64>, variable: usize) -> System<Along> {
         let mut system: System<Along> = primary.lift();
         for line in self.lines[self.primary].iter().filter(|line| line.variable == variable) {
-            number_mut(&mut system, line.surface, line.slot).slope[0] = line.factor;
+            line.slot.of(&mut system, line.surface).slope[0] = line.factor;
         }
         system
     }
 
     /// The system at the primary wavelength with its derivative along one variable.
     pub(super) fn along(&self, found: &Systems, variable: usize) -> System<Along> {
-        let mut system = self.along_unfocused(&found.systems[self.primary], variable);
+        let mut system = self.along_unfocused(&found.rimmed[self.primary], variable);
         if let Some(focus) = &found.focus {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness.slope[0] = focus[variable];
@@ -194,9 +222,10 @@ impl Zoom {
     }
 }
 
-/// Rays may pass a rim by any amount while the lens moves, but an asphere ends not far behind its
+/// Rays may pass a rim or an obstruction by any amount while the lens moves, but an asphere ends not far behind its
 /// own: outside, its polynomial means nothing, and rays may cross it several times.
 fn open_up(surface: &mut Surface<f64>) {
+    surface.obstruction = 0.0;
     surface.semi_diameter = match surface.shape {
         Shape::Asphere { .. } => BEYOND * surface.semi_diameter,
         Shape::Plane | Shape::Sphere { .. } | Shape::Conic { .. } => f64::INFINITY,
@@ -222,6 +251,9 @@ fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<
                 Quantity::Thickness if !own_gap => Slot::Thickness,
                 Quantity::ZoomThickness(z) if z == zoom => Slot::Thickness,
                 Quantity::Index => Slot::Index,
+                Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
+                    Slot::SemiDiameter
+                }
                 Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => {
                     continue;
                 }
@@ -229,8 +261,8 @@ fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<
             let growth = if slot == Slot::Index { index_growth(lens, surface, um) } else { 1.0 };
             let factor = factor * growth;
             for surface in followers_of_index(lens, surface, slot) {
-                widen(system, surface, slot);
-                let now = *number_mut(system, surface, slot);
+                slot.widen(system, surface);
+                let now = *slot.of(system, surface);
                 let offset = if factor == 1.0 && now == start { 0.0 } else { now - factor * start };
                 lines.push(Line { variable, surface, slot, factor, offset });
             }
@@ -242,6 +274,11 @@ fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<
 fn has_own_gap(lens: &Lens, zoom: usize, surface: usize) -> bool {
     let position = lens.zoom.get(zoom);
     position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == surface))
+}
+
+/// Whether the surface is the stop of a zoom position whose own aperture says how large it is.
+fn has_own_aperture(lens: &Lens, zoom: usize, surface: usize) -> bool {
+    lens.surfaces[surface].stop && lens.zoom.get(zoom).is_some_and(|z| z.aperture.is_some())
 }
 
 /// How fast the index of a gap grows with its nd.
@@ -264,34 +301,4 @@ fn followers_of_index(lens: &Lens, surface: usize, slot: Slot) -> Vec<usize> {
         }
     }
     all
-}
-
-/// Writes a surface in a form that has a number, even where it is zero.
-fn widen(system: &mut System<f64>, surface: usize, slot: Slot) {
-    let shape = &mut system.surfaces[surface].shape;
-    *shape = match (slot, *shape) {
-        (Slot::Curvature, Shape::Plane) => Shape::Sphere { curvature: 0.0 },
-        (Slot::Conic, shape) => shape.as_conic(),
-        (Slot::Term(_), shape) => shape.as_asphere(),
-        (_, shape) => shape,
-    };
-}
-
-/// A number of a system.
-fn number_mut<R: Real>(system: &mut System<R>, surface: usize, slot: Slot) -> &mut R {
-    let surface = &mut system.surfaces[surface];
-    match (slot, &mut surface.shape) {
-        (Slot::Thickness, _) => &mut surface.thickness,
-        (Slot::SemiDiameter, _) => &mut surface.semi_diameter,
-        (
-            Slot::Curvature,
-            Shape::Sphere { curvature }
-            | Shape::Conic { curvature, .. }
-            | Shape::Asphere { curvature, .. },
-        ) => curvature,
-        (Slot::Conic, Shape::Conic { conic, .. } | Shape::Asphere { conic, .. }) => conic,
-        (Slot::Term(term), Shape::Asphere { terms, .. }) => &mut terms[term],
-        // `widen` has written the form that has the number; an index is always there.
-        _ => &mut surface.index,
-    }
 }

@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 /// The square of the deviation of the focal length from a target.
 pub(super) fn focal_length(scene: &Scene<'_>, target: f64, sum: &mut Sum) {
-    let focal = efl(&scene.systems.systems[scene.zoom.primary]);
+    let focal = efl(&scene.systems.rimmed[scene.zoom.primary]);
     sum.residual(1.0, focal - target, &slopes(scene, sum.detail, efl));
 }
 

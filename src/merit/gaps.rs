@@ -2,7 +2,7 @@
 //! length of the lens, room behind it. Each is the square of what is missing, zero where nothing
 //! is.
 
-use super::binding::Zoom;
+use super::binding::{Systems, Zoom};
 use super::first_order::slopes;
 use super::sum::Sum;
 use super::{Along, MeritError, Scene, Term};
@@ -25,7 +25,19 @@ pub(super) fn gaps(scene: &Scene<'_>, term: Term, sum: &mut Sum) {
             let number = Number { of: Of::Center(last), scene };
             number.at_least(min, sum);
         }
-        Term::Spot | Term::Distortion | Term::FocalLength(_) => {}
+        Term::Steepness(max) => {
+            for surface in 0..=last {
+                Number { of: Of::Steepness(surface), scene }.at_most(max, sum);
+            }
+        }
+        Term::SemiDiameter { min, max } => {
+            for surface in scene.zoom.rims(scene.systems) {
+                let number = Number { of: Of::Rim(surface), scene };
+                number.at_least(min, sum);
+                number.at_most(max, sum);
+            }
+        }
+        _ => {}
     }
 }
 
@@ -39,8 +51,7 @@ fn centers(scene: &Scene<'_>, glass: bool, (min, max): (f64, f64), sum: &mut Sum
 
 fn edges(scene: &Scene<'_>, glass: bool, min: f64, sum: &mut Sum) {
     for gap in scene.zoom.inner_gaps(glass) {
-        let Some(height) = scene.zoom.rim(gap) else { continue };
-        Number { of: Of::Edge(gap, height), scene }.at_least(min, sum);
+        Number { of: Of::Edge { gap, glass }, scene }.at_least(min, sum);
     }
 }
 
@@ -50,12 +61,10 @@ impl Zoom {
         (0..self.glass.len() - 1).filter(move |gap| self.glass[*gap] == glass)
     }
 
-    /// The height at which a gap has its edge: glass reaches to the larger semi-diameter of its two
-    /// surfaces, and elements can touch only within the smaller one.
-    fn rim(&self, gap: usize) -> Option<f64> {
-        let sizes = [self.rims[gap], self.rims.get(gap + 1).copied().flatten()];
-        let edge = if self.glass[gap] { f64::max } else { f64::min };
-        sizes.into_iter().flatten().reduce(edge)
+    /// The surfaces that have a rim.
+    fn rims(&self, found: &Systems) -> Vec<usize> {
+        let surfaces = &found.rimmed[self.primary].surfaces;
+        (0..self.glass.len()).filter(|i| surfaces[*i].semi_diameter.is_finite()).collect()
     }
 }
 
@@ -78,10 +87,10 @@ impl Slimmest {
             let zoom = Zoom::new(lens, number)?;
             let values: Vec<f64> =
                 lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
-            let system = &zoom.at(&values).systems[zoom.primary];
+            let system = &zoom.at(&values).rimmed[zoom.primary];
             for gap in 0..zoom.glass.len() - 1 {
                 let center = Of::Center(gap).length(system);
-                let edge = zoom.rim(gap).map_or(none, |h| Of::Edge(gap, h).length(system));
+                let edge = Of::Edge { gap, glass: zoom.glass[gap] }.length(system);
                 let (to_center, to_edge) = if zoom.glass[gap] {
                     (&mut found.glass_center, &mut found.glass_edge)
                 } else {
@@ -95,21 +104,33 @@ impl Slimmest {
     }
 }
 
-/// A length that a term is about.
+/// A number that a term is about.
 #[derive(Clone, Copy)]
 enum Of {
     Center(usize),
-    Edge(usize, f64),
+    /// Glass reaches to the larger semi-diameter of its two surfaces, and elements can touch only
+    /// within the smaller one; infinite where neither is limited.
+    Edge {
+        gap: usize,
+        glass: bool,
+    },
     Track,
+    /// `|curvature| × semi-diameter`: 1 for a hemisphere; 0 where nothing limits the surface.
+    Steepness(usize),
+    Rim(usize),
 }
 
 impl Of {
-    /// In mm, counted along the light.
+    /// In mm, lengths counted along the light.
     fn length<R: Real>(self, system: &System<R>) -> R {
         match self {
             Self::Center(gap) => along_light(system, gap),
-            Self::Edge(gap, height) => {
+            Self::Edge { gap, glass } => {
                 let (before, behind) = (&system.surfaces[gap], &system.surfaces[gap + 1]);
+                let Some(height) = edge_height(before.semi_diameter, behind.semi_diameter, glass)
+                else {
+                    return R::from_f64(f64::INFINITY);
+                };
                 let sags = sag_at(behind, height) - sag_at(before, height);
                 let sense = if is_backwards(system, gap) { -R::ONE } else { R::ONE };
                 along_light(system, gap) + sense * sags
@@ -118,17 +139,34 @@ impl Of {
                 let gaps = 0..system.surfaces.len() - 1;
                 gaps.fold(R::ZERO, |sum, gap| sum + along_light(system, gap))
             }
+            Self::Steepness(surface) => {
+                let surface = &system.surfaces[surface];
+                let limited = surface.semi_diameter.value() < f64::INFINITY;
+                if limited {
+                    (surface.shape.curvature() * surface.semi_diameter).abs()
+                } else {
+                    R::ZERO
+                }
+            }
+            Self::Rim(surface) => system.surfaces[surface].semi_diameter,
         }
     }
 }
 
+/// The height at which a gap has its edge.
+fn edge_height<R: Real>(before: R, behind: R, glass: bool) -> Option<R> {
+    let limited = [before, behind].into_iter().filter(|rim| rim.value() < f64::INFINITY);
+    let outer = |a: R, b: R| if (a > b) == glass { a } else { b };
+    limited.reduce(outer)
+}
+
 /// The sag at a height, at the edge of the surface where it ends before.
-fn sag_at<R: Real>(surface: &crate::lens::Surface<R>, height: f64) -> R {
+fn sag_at<R: Real>(surface: &crate::lens::Surface<R>, height: R) -> R {
     let (c, k, _) = surface.shape.numbers();
     let square = (1.0 + k.value()) * c.value() * c.value();
     let edge = if square > 0.0 { 0.999 / square.sqrt() } else { f64::INFINITY };
-    let height = height.min(edge);
-    surface.shape.sag(R::from_f64(height * height)).map_or(R::ZERO, |(z, _)| z)
+    let height = if height.value() < edge { height } else { R::from_f64(edge) };
+    surface.shape.sag(height * height).map_or(R::ZERO, |(z, _)| z)
 }
 
 fn is_backwards<R>(system: &System<R>, gap: usize) -> bool {
@@ -162,7 +200,7 @@ impl Number<'_> {
     }
 
     fn value(&self) -> f64 {
-        self.of.length(&self.scene.systems.systems[self.scene.zoom.primary])
+        self.of.length(&self.scene.systems.rimmed[self.scene.zoom.primary])
     }
 
     fn residual(&self, r: f64, sum: &mut Sum) {

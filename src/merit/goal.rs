@@ -2,7 +2,7 @@
 
 use super::MeritError;
 use super::gaps::Slimmest;
-use crate::lens::Lens;
+use crate::lens::{Lens, Object};
 use crate::paraxial::{Beam, first_order};
 use serde::{Deserialize, Serialize};
 
@@ -12,9 +12,25 @@ use serde::{Deserialize, Serialize};
 pub struct Goal {
     /// The terms that are summed.
     pub terms: Vec<Weighted>,
+    /// Whether derivatives know that the pupil moves with the lens.
+    #[serde(default)]
+    pub pupil: PupilEdge,
     /// The focal length at each zoom position relative to the first; a single lens needs none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zoom_ratios: Vec<f64>,
+}
+
+/// How the edge of the pupil is treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PupilEdge {
+    /// It is followed wherever the lens moves it: values are those of the light that gets through,
+    /// and their derivatives are unbiased.
+    #[default]
+    Moving,
+    /// The rays that got through when it was last looked for are kept: what most programs do.
+    /// Faster, blind to light, biased wherever something clips.
+    Kept,
 }
 
 /// A term and its weight.
@@ -27,14 +43,36 @@ pub struct Weighted {
     pub weight: f64,
 }
 
-/// One thing that a lens is asked for. Every term is a sum of squares, and the mean over the zoom
-/// positions.
+/// One thing that a lens is asked for. Every term is the mean over the zoom positions; all but
+/// those about light are sums of squares.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Term {
     /// The mean square radius of the spots about their centroids, over fields, wavelengths and
     /// zoom positions by weight, in mm².
     Spot,
+    /// The integral of the square distance from the centroid over the pupil, in mm⁴: (3.24), the
+    /// mean over fields and wavelengths by weight.
+    SpotIntegral,
+    /// Minus the area of the pupil in mm² of the first vertex plane: (3.25), the mean over fields
+    /// and wavelengths by weight.
+    Throughput,
+    /// One minus that area over this one in mm²: (4.3).
+    ThroughputLoss(f64),
+    /// The mean square of what each pupil's area lacks of this share of the area that it has in the
+    /// lens with which a search begins.
+    Light(f64),
+    /// The square of what a field's illumination lacks of this share of that on the axis: the
+    /// ratio of the pupils' areas times cos⁴ of the field angle, as for a lens without distortion.
+    RelativeIllumination {
+        /// The field, counted from 0.
+        field: usize,
+        /// Not less than this.
+        min: f64,
+    },
+    /// The square of the deviation from this of the f-number that the light on the axis has: the
+    /// focal length over the diameter of a disc as large as the pupil.
+    FNumber(f64),
     /// The square of the deviation of the focal length from this, in mm².
     FocalLength(f64),
     /// The mean square of the distance of the chief rays' image points from the paraxial image
@@ -62,6 +100,15 @@ pub enum Term {
     TotalTrack(f64),
     /// From the last vertex to the image shorter than this, in mm².
     BackFocus(f64),
+    /// `|curvature| × semi-diameter` larger than this at some surface; 1 is a hemisphere.
+    Steepness(f64),
+    /// Semi-diameters smaller or larger than this, in mm².
+    SemiDiameter {
+        /// Not smaller than this.
+        min: f64,
+        /// Not larger than this.
+        max: f64,
+    },
 }
 
 impl Term {
@@ -77,14 +124,41 @@ impl Term {
             Self::AirEdge(_) => "air_edge",
             Self::TotalTrack(_) => "total_track",
             Self::BackFocus(_) => "back_focus",
+            Self::SpotIntegral => "spot_integral",
+            Self::Throughput => "throughput",
+            Self::ThroughputLoss(_) => "throughput_loss",
+            Self::Light(_) => "light",
+            Self::RelativeIllumination { .. } => "relative_illumination",
+            Self::FNumber(_) => "f_number",
+            Self::Steepness(_) => "steepness",
+            Self::SemiDiameter { .. } => "semi_diameter",
         }
+    }
+
+    /// Whether it asks how much light gets through.
+    pub fn is_about_light(self) -> bool {
+        matches!(
+            self,
+            Self::Throughput
+                | Self::ThroughputLoss(_)
+                | Self::Light(_)
+                | Self::RelativeIllumination { .. }
+                | Self::FNumber(_)
+        )
     }
 
     fn numbers(self) -> Vec<f64> {
         match self {
-            Self::Spot | Self::Distortion => Vec::new(),
-            Self::GlassCenter { min, max } | Self::AirCenter { min, max } => vec![min, max],
-            Self::FocalLength(v)
+            Self::Spot | Self::SpotIntegral | Self::Throughput | Self::Distortion => Vec::new(),
+            Self::GlassCenter { min, max }
+            | Self::AirCenter { min, max }
+            | Self::SemiDiameter { min, max } => vec![min, max],
+            Self::RelativeIllumination { min, .. } => vec![min],
+            Self::ThroughputLoss(v)
+            | Self::Light(v)
+            | Self::FNumber(v)
+            | Self::Steepness(v)
+            | Self::FocalLength(v)
             | Self::GlassEdge(v)
             | Self::AirEdge(v)
             | Self::TotalTrack(v)
@@ -93,10 +167,13 @@ impl Term {
     }
 }
 
+/// The radius of a spot, relative to the focal length, that is given away for all of the light.
+const LIGHT_IN_SPOT: f64 = 0.02;
+
 impl Goal {
-    /// What a designer would ask of a lens first: sharp spots at the focal length it has, glass
-    /// and air that can be made or are no thinner than they are, nothing longer than it is by more
-    /// than a fifth.
+    /// What a designer would ask of a lens first: sharp spots at the focal length it has and with
+    /// the light it has, glass and air that can be made or are no thinner than they are, nothing
+    /// longer than it is by more than a fifth.
     pub fn sensible(lens: &Lens) -> Result<Self, MeritError> {
         let focal_lengths = focal_lengths(lens)?;
         let first = focal_lengths[0];
@@ -116,13 +193,14 @@ impl Goal {
         ] {
             terms.push(Weighted { term, weight: 1.0 });
         }
+        terms.push(Weighted { term: Term::Light(1.0), weight: (LIGHT_IN_SPOT * size).powi(2) });
         let zoom_ratios = match first {
             Some(first) if lens.zoom.len() > 1 => {
                 focal_lengths.iter().map(|f| f.unwrap_or(first) / first).collect()
             }
             _ => Vec::new(),
         };
-        Ok(Self { terms, zoom_ratios })
+        Ok(Self { terms, pupil: PupilEdge::default(), zoom_ratios })
     }
 
     /// Refuses what a lens cannot be asked for.
@@ -147,8 +225,34 @@ impl Goal {
             {
                 return refuse("its smallest thickness is larger than its largest");
             }
-            if matches!(term, Term::FocalLength(_)) && focal_lengths(lens)?.contains(&None) {
+            let focal = matches!(term, Term::FocalLength(_) | Term::FNumber(_));
+            if focal && focal_lengths(lens)?.contains(&None) {
                 return refuse("the lens is afocal");
+            }
+            self.check_light(*term, lens)?;
+        }
+        Ok(())
+    }
+
+    fn check_light(&self, term: Term, lens: &Lens) -> Result<(), MeritError> {
+        let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
+        if let Term::ThroughputLoss(v) | Term::Light(v) | Term::FNumber(v) | Term::Steepness(v) =
+            term
+            && !(v > 0.0)
+        {
+            return refuse("its number is not positive");
+        }
+        let axial = |zoom| lens.fields_at(zoom).values.iter().any(|f| f.x == 0.0 && f.y == 0.0);
+        let needs_axis = matches!(term, Term::FNumber(_) | Term::RelativeIllumination { .. });
+        if needs_axis && !(0..lens.zoom_positions()).all(axial) {
+            return refuse("the lens has no field on the axis to compare with");
+        }
+        if let Term::RelativeIllumination { field, .. } = term {
+            if lens.object != Object::Infinity {
+                return refuse("the object is not at infinity");
+            }
+            if (0..lens.zoom_positions()).any(|z| field >= lens.fields_at(z).values.len()) {
+                return refuse("the lens has no field of that number");
             }
         }
         Ok(())

@@ -6,26 +6,29 @@
 //! search sees a smooth function; [`Merit::resample`] finds them anew. Derivatives of the rays come
 //! from the backward pass, those of first-order data from dual numbers.
 //!
-//! The pupil is kept: this is the biased derivative of a spot, which ignores that the set of rays
-//! that get through moves with the lens. Semi-diameters therefore clip when nodes are found, and
-//! not in between.
+//! The set of rays that get through moves with the lens. Unless the goal says otherwise its edge is
+//! followed at every evaluation, and derivatives count its motion (Teh, *Computational Lens
+//! Design*, chapter 3): so a search can be asked for light, and does not mistake clipping for
+//! sharpness. A goal that keeps its pupils has the usual, biased derivatives.
 
 mod binding;
 mod first_order;
 mod gaps;
 mod goal;
+mod light;
 mod sampling;
 mod spot;
 mod sum;
 
-pub use goal::{Goal, Term, Weighted};
+pub use goal::{Goal, PupilEdge, Term, Weighted};
 pub use sampling::Sampled;
 
 use crate::lens::{Lens, LensError, Variable};
 use crate::math::Dual;
-use crate::pupil::{BenchError, LaunchError};
+use crate::pupil::{BenchError, Cost, LaunchError, Lit};
 use crate::trace::Fate;
 use binding::Zoom;
+use nalgebra::DVector;
 use sampling::Sampling;
 use serde::Serialize;
 pub use sum::{Detail, Sum};
@@ -124,6 +127,8 @@ pub struct Merit {
     variables: Vec<Variable>,
     zooms: Vec<Zoom>,
     samplings: Vec<Sampling>,
+    /// The areas of the pupils with which it began, by zoom position.
+    start: Vec<Vec<f64>>,
     tolerance: f64,
 }
 
@@ -142,10 +147,12 @@ impl Merit {
             variables: lens.variables.clone(),
             zooms,
             samplings: Vec::new(),
+            start: Vec::new(),
             tolerance,
         };
         merit.goal.check(lens)?;
         merit.resample(lens)?;
+        merit.start = merit.samplings.iter().map(Sampling::areas).collect();
         Ok(merit)
     }
 
@@ -204,57 +211,86 @@ impl Merit {
     /// The merit, its derivatives, and, where asked for, the normal equations of its residuals.
     pub fn sum(&self, values: &[f64], detail: Detail) -> Result<Sum, MeritError> {
         let mut total = Sum::zero(values.len(), detail);
-        for weighted in &self.goal.terms {
-            let sum = self.term(weighted.term, values, detail)?;
-            total.add(&sum, weighted.weight);
+        for (sum, weighted) in self.sums(values, detail)?.iter().zip(&self.goal.terms) {
+            total.add(sum, weighted.weight);
         }
         Ok(total)
     }
 
     /// Every term by itself.
     pub fn terms(&self, values: &[f64]) -> Result<Vec<TermValue>, MeritError> {
-        let report = |weighted: &Weighted| {
-            let sum = self.term(weighted.term, values, Detail::Value)?;
+        let report = |(sum, weighted): (Sum, &Weighted)| {
             let (error, rays) = self.trust(weighted.term, sum.value);
             let (term, weight) = (weighted.term.name(), weighted.weight);
-            Ok(TermValue { term, weight, value: sum.value, error, rays })
+            TermValue { term, weight, value: sum.value, error, rays }
         };
-        self.goal.terms.iter().map(report).collect()
+        let sums = self.sums(values, Detail::Value)?;
+        Ok(sums.into_iter().zip(&self.goal.terms).map(report).collect())
     }
 
     /// Estimated error and rays of a term.
     fn trust(&self, term: Term, value: f64) -> (f64, usize) {
+        let sampled = self.sampled();
+        let worst = sampled.iter().fold(0.0, |e: f64, s| e.max(s.error));
+        let rays = sampled.iter().map(|s| s.rays).sum();
         match term {
-            Term::Spot => {
-                let sampled = self.sampled();
-                let worst = sampled.iter().fold(0.0, |e: f64, s| e.max(s.error));
-                (2.0 * worst * value, sampled.iter().map(|s| s.rays).sum())
-            }
+            Term::Spot | Term::SpotIntegral => (2.0 * worst * value, rays),
+            _ if term.is_about_light() => (worst * value.abs(), rays),
             Term::Distortion => (0.0, self.samplings.iter().map(Sampling::chiefs).sum()),
             _ => (0.0, 0),
         }
     }
 
-    fn term(&self, term: Term, values: &[f64], detail: Detail) -> Result<Sum, MeritError> {
-        let mut sum = Sum::zero(values.len(), detail);
-        for (zoom, sampling) in self.zooms.iter().zip(&self.samplings) {
+    /// The sum of every term, the mean over the zoom positions.
+    fn sums(&self, values: &[f64], detail: Detail) -> Result<Vec<Sum>, MeritError> {
+        let mut sums = vec![Sum::zero(values.len(), detail); self.goal.terms.len()];
+        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.start);
+        for ((zoom, sampling), start) in positions {
             let systems = zoom.at(values);
-            let scene = Scene { zoom, sampling, systems: &systems, values };
-            match term {
-                Term::Spot => spot::spot(&scene, &mut sum)?,
-                Term::Distortion => spot::distortion(&scene, &mut sum)?,
-                Term::FocalLength(target) => {
-                    first_order::focal_length(
-                        &scene,
-                        self.goal.target(zoom.number, target),
-                        &mut sum,
-                    );
-                }
-                _ => gaps::gaps(&scene, term, &mut sum),
+            if self.follows_pupils() {
+                let bench = zoom.bench(&systems, &self.lens, sampling.aiming)?;
+                let light = sampling.lit(&bench, true);
+                let sampling = &sampling.with_light(&bench, &light);
+                let light = &light[..];
+                let scene = Scene { zoom, sampling, systems: &systems, values, start, light };
+                self.add_terms(&scene, &mut sums)?;
+            } else {
+                let light = &[];
+                let scene = Scene { zoom, sampling, systems: &systems, values, start, light };
+                self.add_terms(&scene, &mut sums)?;
             }
         }
-        sum.scale(1.0 / self.zooms.len() as f64);
-        if sum.is_finite() { Ok(sum) } else { Err(MeritError::NotFinite { term: term.name() }) }
+        for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
+            sum.scale(1.0 / self.zooms.len() as f64);
+            if !sum.is_finite() {
+                return Err(MeritError::NotFinite { term: weighted.term.name() });
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Whether some term needs to know where the edges of the pupils are.
+    fn follows_pupils(&self) -> bool {
+        let needs =
+            |term: Term| matches!(term, Term::Spot | Term::SpotIntegral) || term.is_about_light();
+        self.goal.pupil == PupilEdge::Moving && self.goal.terms.iter().any(|w| needs(w.term))
+    }
+
+    fn add_terms(&self, scene: &Scene<'_>, sums: &mut [Sum]) -> Result<(), MeritError> {
+        for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
+            match weighted.term {
+                Term::Spot => spot::spot(scene, spot::Per::Area, sum)?,
+                Term::SpotIntegral => spot::spot(scene, spot::Per::Nothing, sum)?,
+                Term::Distortion => spot::distortion(scene, sum)?,
+                Term::FocalLength(target) => {
+                    let target = self.goal.target(scene.zoom.number, target);
+                    first_order::focal_length(scene, target, sum);
+                }
+                term if term.is_about_light() => light::light(scene, term, sum),
+                term => gaps::gaps(scene, term, sum),
+            }
+        }
+        Ok(())
     }
 }
 
@@ -264,4 +300,23 @@ struct Scene<'a> {
     sampling: &'a Sampling,
     systems: &'a binding::Systems,
     values: &'a [f64],
+    /// The areas of the pupils with which the search began.
+    start: &'a [f64],
+    /// The light of every pupil of the sampling; none where pupils are kept.
+    light: &'a [Lit<'a>],
+}
+
+impl Scene<'_> {
+    /// The derivatives by the variables that the motion of the pupils' edges contributes to
+    /// integrals of these costs, one for each pupil; zeros where pupils are kept.
+    fn edge_motion(&self, costs: impl Iterator<Item = Cost>) -> DVector<f64> {
+        let mut total = DVector::zeros(self.values.len());
+        for ((lit, pupil), cost) in self.light.iter().zip(&self.sampling.pupils).zip(costs) {
+            let asked = cost.square != 0.0 || cost.constant != 0.0;
+            if let Some(motion) = asked.then(|| lit.edge_motion(&cost)).flatten() {
+                total += self.zoom.collect(self.systems, pupil.wavelength, &motion);
+            }
+        }
+        total
+    }
 }

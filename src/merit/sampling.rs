@@ -2,9 +2,12 @@
 
 use super::MeritError;
 use crate::lens::{Field, Lens};
-use crate::pupil::{Accuracy, Bench, Launch, Nodes, Region, converged};
-use crate::trace::{Points, Ray, Rays};
+use crate::pupil::{
+    Accuracy, Aiming, Anchor, Bench, Kind, Launch, Lit, Moments, Nodes, Region, converged,
+};
+use crate::trace::{Ray, Rays};
 use serde::Serialize;
+use std::f64::consts::PI;
 
 /// How one spot is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -22,6 +25,24 @@ pub struct Sampled {
     pub error: f64,
     /// The share of the paraxial entrance pupil that gets through.
     pub light: f64,
+    /// The area of the pupil in mm² of the first vertex plane.
+    pub area: f64,
+}
+
+/// The pupil of one field and wavelength, as it was when it was looked for.
+#[derive(Debug, Clone)]
+pub(super) struct Pupil {
+    pub(super) field: usize,
+    pub(super) wavelength: usize,
+    /// Its part of the whole: fields and wavelengths weighted, one in all.
+    pub(super) share: f64,
+    /// The cosine of the angle with the axis at which a collimated beam arrives.
+    cosine: Option<f64>,
+    anchor: Anchor,
+    kind: Kind,
+    /// The order of quadrature that was good enough.
+    order: usize,
+    pub(super) moments: Moments,
 }
 
 /// The rays of one zoom position.
@@ -32,6 +53,8 @@ pub(super) struct Sampling {
     /// The chief ray of each field at the primary wavelength.
     pub(super) chief: Rays<f64>,
     pub(super) fields: Vec<Field>,
+    pub(super) pupils: Vec<Pupil>,
+    pub(super) aiming: Aiming,
     sampled: Vec<Sampled>,
 }
 
@@ -49,6 +72,11 @@ pub(super) struct Color {
 }
 
 impl Color {
+    fn new(um: f64) -> Self {
+        let (weights, ends, mirrored) = (Vec::new(), Vec::new(), Vec::new());
+        Self { um, rays: Rays::default(), weights, ends, mirrored }
+    }
+
     /// The rays of a field.
     pub(super) fn range(&self, field: usize) -> std::ops::Range<usize> {
         let start = field.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -57,55 +85,139 @@ impl Color {
 }
 
 impl Sampling {
+    /// Finds the pupils of a lens, each sampled so that the radius of its spot is good to a
+    /// tolerance.
     pub(super) fn new(lens: &Lens, zoom: usize, tolerance: f64) -> Result<Self, MeritError> {
         let bench = Bench::of(lens, zoom)?;
-        let fields = bench.fields.clone();
-        let total: f64 = fields.iter().map(|f| f.weight).sum();
+        let mut sampling = Self {
+            colors: Vec::new(),
+            chief: Rays::default(),
+            fields: bench.fields.clone(),
+            pupils: Vec::new(),
+            aiming: bench.aiming,
+            sampled: Vec::new(),
+        };
+        let total: f64 = sampling.fields.iter().map(|f| f.weight).sum();
         let colors: f64 = bench.colors.iter().map(|c| c.weight).sum();
-        let mut sampling =
-            Self { colors: Vec::new(), chief: Rays::default(), fields, sampled: Vec::new() };
         for (wavelength, color) in bench.colors.iter().enumerate() {
-            let mut found = Color {
-                um: color.um,
-                rays: Rays::default(),
-                weights: Vec::new(),
-                ends: Vec::new(),
-                mirrored: Vec::new(),
-            };
             for number in 0..sampling.fields.len() {
                 let field = sampling.fields[number];
-                let share = field.weight / total * color.weight / colors;
+                let place = Sampled::at(zoom, number, color.um);
                 let launch = bench.launch(field, wavelength);
                 let launch =
                     launch.map_err(|cause| MeritError::Launch { field: number, zoom, cause })?;
-                let place =
-                    Sampled { zoom, field: number, um: color.um, rays: 0, error: 0.0, light: 0.0 };
                 if wavelength == bench.primary {
                     sampling.chief.push(chief(&launch).ok_or_else(|| dark(&place))?);
                 }
-                found.mirrored.push(launch.is_symmetric());
+                let share = field.weight / total * color.weight / colors;
                 if share > 0.0 {
-                    sampling.sampled.push(found.add(launch, share, tolerance, place));
+                    sampling.look(launch, share, tolerance, place);
                 }
-                found.ends.push(found.weights.len());
             }
-            sampling.colors.push(found);
         }
         sampling.share_of_light();
+        let lit = sampling.lit(&bench, false);
+        sampling.colors = sampling.colors(&bench, &lit);
+        for (sampled, (pupil, lit)) in
+            sampling.sampled.iter_mut().zip(sampling.pupils.iter_mut().zip(&lit))
+        {
+            pupil.moments = lit.moments;
+            sampled.area = lit.moments.area;
+            sampled.light = lit.landed.arrived().map(|(_, w)| w).sum::<f64>() / PI;
+            sampled.rays = if sampled.light > 0.0 { lit.rays.len() } else { 0 };
+        }
         match sampling.sampled.first() {
             Some(first) if sampling.sampled.iter().all(|s| s.rays == 0) => Err(dark(first)),
             _ => Ok(sampling),
         }
     }
 
+    /// Looks for the pupil of a field and how finely it has to be sampled.
+    fn look(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: Sampled) {
+        let (field, wavelength) = (place.field, launch.wavelength);
+        let (anchor, cosine) = (launch.anchor(), launch.cosine());
+        let region = Region::new(launch);
+        let accuracy = Accuracy { tolerance, ..Accuracy::default() };
+        let mut orders = 0_usize;
+        let radius = |nodes: &Nodes| {
+            orders += 1;
+            let moments = region.moments(nodes);
+            (moments.area > 0.0).then(|| [(moments.spread / moments.area).sqrt()])
+        };
+        let found = converged(&region, accuracy, radius, |values| *values);
+        let error = found.map_or(0.0, |f| f.errors[0] / f.values[0].max(f64::MIN_POSITIVE));
+        let (kind, moments) = (region.kind, Moments::default());
+        let order = orders.saturating_sub(1);
+        let found = Pupil { field, wavelength, share, cosine, anchor, kind, order, moments };
+        self.pupils.push(found);
+        self.sampled.push(Sampled { error, ..place });
+    }
+
     /// Spots without light leave their share to the others.
     fn share_of_light(&mut self) {
-        let weights = || self.colors.iter().flat_map(|color| &color.weights);
-        let lit: f64 = weights().sum();
+        let is_lit = |pupil: &&mut Pupil| !matches!(pupil.kind, Kind::Dark | Kind::Endless);
+        let lit: f64 = self.pupils.iter_mut().filter(is_lit).map(|pupil| pupil.share).sum();
         if lit > 0.0 {
-            let all = self.colors.iter_mut().flat_map(|color| &mut color.weights);
-            all.for_each(|weight| *weight /= lit);
+            self.pupils.iter_mut().filter(is_lit).for_each(|pupil| pupil.share /= lit);
         }
+    }
+
+    /// The light of every pupil through a lens: where it was found, or followed to where it is now.
+    pub(super) fn lit<'a>(&self, bench: &'a Bench, follow: bool) -> Vec<Lit<'a>> {
+        let lit = |pupil: &Pupil| {
+            let launch = pupil.anchor.launch(bench);
+            let region = if follow {
+                Region::followed(&pupil.kind, launch)
+            } else {
+                Region { launch, kind: pupil.kind.clone(), rays: 0 }
+            };
+            region.lit(pupil.order)
+        };
+        self.pupils.iter().map(lit).collect()
+    }
+
+    /// The same sampling with the rays of other light.
+    pub(super) fn with_light(&self, bench: &Bench, lit: &[Lit<'_>]) -> Self {
+        let mut pupils = self.pupils.clone();
+        pupils.iter_mut().zip(lit).for_each(|(pupil, lit)| pupil.moments = lit.moments);
+        Self { colors: self.colors(bench, lit), pupils, ..self.clone() }
+    }
+
+    /// The rays of all pupils, sorted by wavelength and field.
+    fn colors(&self, bench: &Bench, lit: &[Lit<'_>]) -> Vec<Color> {
+        let mut colors: Vec<Color> = bench.colors.iter().map(|c| Color::new(c.um)).collect();
+        for (wavelength, color) in colors.iter_mut().enumerate() {
+            for field in 0..self.fields.len() {
+                color.mirrored.push(self.fields[field].x == 0.0);
+                let mine = self.pupils.iter().zip(lit);
+                for (pupil, lit) in
+                    mine.filter(|(p, _)| (p.wavelength, p.field) == (wavelength, field))
+                {
+                    let weight: f64 = lit.landed.arrived().map(|(_, w)| w).sum();
+                    for (i, w) in lit.landed.arrived() {
+                        color.rays.push(lit.rays.get(i));
+                        color.weights.push(pupil.share * w / weight);
+                    }
+                }
+                color.ends.push(color.weights.len());
+            }
+        }
+        colors
+    }
+
+    /// The areas of the pupils.
+    pub(super) fn areas(&self) -> Vec<f64> {
+        self.pupils.iter().map(|pupil| pupil.moments.area).collect()
+    }
+
+    /// The field on the axis, if there is one.
+    pub(super) fn axis(&self) -> Option<usize> {
+        self.fields.iter().position(|field| field.x == 0.0 && field.y == 0.0)
+    }
+
+    /// The cosine of the angle with the axis at which the beam of a field arrives.
+    pub(super) fn cosine(&self, field: usize) -> Option<f64> {
+        self.pupils.iter().find(|pupil| pupil.field == field)?.cosine
     }
 
     pub(super) fn sampled(&self) -> Vec<Sampled> {
@@ -122,6 +234,12 @@ impl Sampling {
     }
 }
 
+impl Sampled {
+    fn at(zoom: usize, field: usize, um: f64) -> Self {
+        Self { zoom, field, um, rays: 0, error: 0.0, light: 0.0, area: 0.0 }
+    }
+}
+
 fn dark(place: &Sampled) -> MeritError {
     MeritError::NoLight { field: place.field, zoom: place.zoom, um: place.um }
 }
@@ -129,51 +247,4 @@ fn dark(place: &Sampled) -> MeritError {
 /// The ray through the centre of the pupil.
 fn chief(launch: &Launch<'_>) -> Option<Ray<f64>> {
     launch.ray([0.0, 0.0])
-}
-
-impl Color {
-    /// Adds the rays of one field with a share of the whole; none where no light gets through.
-    fn add(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: Sampled) -> Sampled {
-        let region = Region::new(launch);
-        let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-        let mut kept = Nodes::default();
-        let spot = |nodes: &Nodes| {
-            kept.clone_from(nodes);
-            mean_square(&region, nodes).map(|square| [square.sqrt()])
-        };
-        let Some(found) = converged(&region, accuracy, spot, |values| *values) else {
-            return place;
-        };
-        let before = self.weights.len();
-        let landed = region.trace::<Points<f64>>(&kept);
-        let arrived: Vec<_> = landed.arrived().collect();
-        let lit: f64 = arrived.iter().map(|(_, weight)| weight).sum();
-        let started = kept.points.iter().filter_map(|p| region.launch.ray(*p));
-        let rays: Vec<_> = started.collect();
-        for (i, weight) in arrived {
-            self.rays.push(rays[i]);
-            self.weights.push(share * weight / lit);
-        }
-        let radius = found.values[0].max(f64::MIN_POSITIVE);
-        let error = found.errors[0] / radius;
-        let light = lit / std::f64::consts::PI;
-        Sampled { rays: self.weights.len() - before, error, light, ..place }
-    }
-}
-
-/// The mean square radius of a spot about its centroid.
-fn mean_square(region: &Region<'_>, nodes: &Nodes) -> Option<f64> {
-    let landed = region.trace::<Points<f64>>(nodes);
-    let (mut sum, mut x, mut y) = (0.0, 0.0, 0.0);
-    for (i, w) in landed.arrived() {
-        sum += w;
-        x += if nodes.mirrored { 0.0 } else { w * landed.sink.x[i] };
-        y += w * landed.sink.y[i];
-    }
-    if !(sum > 0.0) {
-        return None;
-    }
-    let (x, y) = (x / sum, y / sum);
-    let square = |i: usize| (landed.sink.x[i] - x).powi(2) + (landed.sink.y[i] - y).powi(2);
-    Some(landed.arrived().map(|(i, w)| w * square(i)).sum::<f64>() / sum)
 }

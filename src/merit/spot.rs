@@ -5,6 +5,7 @@ use super::sum::{Detail, Sum};
 use super::{MeritError, Scene};
 use crate::lens::{FieldKind, Object};
 use crate::math::Vec3;
+use crate::pupil::{Cost, Moments};
 use crate::trace::{Fate, Points, Seed, Sink, Tracer};
 use nalgebra::{DMatrix, DVector};
 
@@ -12,6 +13,8 @@ use nalgebra::{DMatrix, DVector};
 struct Landed {
     tracer: Tracer<f64>,
     points: Points<f64>,
+    /// The weight of each in the sum.
+    weights: Vec<f64>,
 }
 
 /// The centroid of each field over all wavelengths, and the share of the field in the whole.
@@ -21,10 +24,20 @@ struct Centroid {
     share: f64,
 }
 
-/// The mean square radius of the spots about their polychromatic centroids.
-pub(super) fn spot(scene: &Scene<'_>, sum: &mut Sum) -> Result<(), MeritError> {
+/// What a spot is divided by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Per {
+    /// The area of its pupil: a mean square radius.
+    Area,
+    /// Nothing: the integral over the pupil (3.24).
+    Nothing,
+}
+
+/// The spots about their polychromatic centroids.
+pub(super) fn spot(scene: &Scene<'_>, per: Per, sum: &mut Sum) -> Result<(), MeritError> {
+    let wavelengths = 0..scene.sampling.colors.len();
     let landed: Result<Vec<_>, _> =
-        (0..scene.sampling.colors.len()).map(|wavelength| trace(scene, wavelength)).collect();
+        wavelengths.map(|wavelength| trace(scene, wavelength, per)).collect();
     let landed = landed?;
     let centroids: Vec<_> =
         (0..scene.sampling.fields.len()).map(|field| centroid(scene, &landed, field)).collect();
@@ -32,19 +45,38 @@ pub(super) fn spot(scene: &Scene<'_>, sum: &mut Sum) -> Result<(), MeritError> {
         for (field, centroid) in centroids.iter().enumerate() {
             for i in color.range(field) {
                 let (x, y) = (landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y);
-                sum.value += color.weights[i] * (x * x + y * y);
+                sum.value += landed.weights[i] * (x * x + y * y);
             }
         }
     }
     match sum.detail {
-        Detail::Value => {}
+        Detail::Value => return Ok(()),
         Detail::Gradient => gradient(scene, &landed, &centroids, sum),
         Detail::Normal => normal(scene, &landed, &centroids, sum),
     }
+    edges(scene, per, &centroids, sum);
     Ok(())
 }
 
-fn trace(scene: &Scene<'_>, wavelength: usize) -> Result<Landed, MeritError> {
+/// What the motion of the pupils' edges adds to the derivative.
+fn edges(scene: &Scene<'_>, per: Per, centroids: &[Centroid], sum: &mut Sum) {
+    let costs = scene.sampling.pupils.iter().map(|pupil| {
+        let Centroid { x, y, .. } = centroids[pupil.field];
+        let Moments { area, centroid, spread } = pupil.moments;
+        let [dx, dy] = [centroid[0] - x, centroid[1] - y];
+        let spread = spread + area * (dx * dx + dy * dy);
+        let share = pupil.share;
+        let (square, constant) = match per {
+            Per::Area if area > 0.0 => (share / area, -share * spread / (area * area)),
+            Per::Area => (0.0, 0.0),
+            Per::Nothing => (share, 0.0),
+        };
+        Cost { center: [x, y], square, constant }
+    });
+    sum.gradient += scene.edge_motion(costs);
+}
+
+fn trace(scene: &Scene<'_>, wavelength: usize, per: Per) -> Result<Landed, MeritError> {
     let color = &scene.sampling.colors[wavelength];
     let system = &scene.systems.systems[wavelength];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
@@ -52,9 +84,20 @@ fn trace(scene: &Scene<'_>, wavelength: usize) -> Result<Landed, MeritError> {
     tracer.batch(&color.rays, &mut points);
     let lost = (0..color.rays.len()).find(|i| !points.fate(*i).is_imaged());
     match lost {
-        None => Ok(Landed { tracer, points }),
+        None => Ok(Landed { tracer, points, weights: weights(scene, wavelength, per) }),
         Some(i) => Err(lost_ray(scene, wavelength, i, points.fate(i))),
     }
+}
+
+fn weights(scene: &Scene<'_>, wavelength: usize, per: Per) -> Vec<f64> {
+    let color = &scene.sampling.colors[wavelength];
+    let mut weights = color.weights.clone();
+    if per == Per::Nothing {
+        for pupil in scene.sampling.pupils.iter().filter(|p| p.wavelength == wavelength) {
+            weights[color.range(pupil.field)].iter_mut().for_each(|w| *w *= pupil.moments.area);
+        }
+    }
+    weights
 }
 
 fn lost_ray(scene: &Scene<'_>, wavelength: usize, i: usize, fate: Fate) -> MeritError {
@@ -68,7 +111,7 @@ fn centroid(scene: &Scene<'_>, landed: &[Landed], field: usize) -> Centroid {
     let (mut x, mut y, mut share) = (0.0, 0.0, 0.0);
     for (color, landed) in scene.sampling.colors.iter().zip(landed) {
         for i in color.range(field) {
-            let w = color.weights[i];
+            let w = landed.weights[i];
             share += w;
             x += if color.mirrored[field] { 0.0 } else { w * landed.points.x[i] };
             y += w * landed.points.y[i];
@@ -85,7 +128,7 @@ fn gradient(scene: &Scene<'_>, landed: &[Landed], centroids: &[Centroid], sum: &
         let mut seeds = vec![Vec3::default(); color.rays.len()];
         for (field, centroid) in centroids.iter().enumerate() {
             for i in color.range(field) {
-                let w = 2.0 * color.weights[i];
+                let w = 2.0 * landed.weights[i];
                 let (x, y) = (landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y);
                 seeds[i] = Vec3::new(w * x, w * y, 0.0);
             }
@@ -110,7 +153,7 @@ fn normal(scene: &Scene<'_>, landed: &[Landed], centroids: &[Centroid], sum: &mu
         for (field, centroid) in centroids.iter().enumerate() {
             let axes = color.range(field).flat_map(|i| [(i, 0), (i, 1)]);
             for (i, axis) in axes {
-                let w = color.weights[i];
+                let w = landed.weights[i];
                 let at = [landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y][axis];
                 let from = (2 * i + axis) * moving.len();
                 let row = &rows[from..from + moving.len()];

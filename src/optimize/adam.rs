@@ -1,13 +1,16 @@
 //! Adam: first-order descent with running means of the gradient and of its square (Kingma and Ba,
 //! "Adam: A Method for Stochastic Optimization", ICLR 2015, algorithm 1).
 //!
-//! The merit may rise for a while; the best lens is kept. When it has not improved for long, the
-//! rate is halved and the search goes back to the best lens.
+//! The merit may rise for a while; the best lens is kept. A patient search halves its rate when the
+//! merit has not improved for long, and goes back to the best lens; an annealed one takes a given
+//! number of steps, while its rate falls to zero as a cosine (Loshchilov and Hutter, "SGDR", ICLR
+//! 2017), so that a run costs what it was meant to cost.
 
 use super::state::State;
 use super::{Optimizer, Progress};
 use crate::lens::Lens;
 use crate::merit::{Detail, Merit, MeritError, TermValue};
+use std::f64::consts::PI;
 
 /// Decay of the mean gradient and of the mean square.
 const DECAY: [f64; 2] = [0.9, 0.999];
@@ -17,8 +20,19 @@ const RATE: f64 = 0.1;
 const SMALLEST_RATE: f64 = 1e-7;
 /// Steps without improvement before the rate is halved.
 const PATIENCE: usize = 40;
-/// A step may not multiply the merit by more than this.
-const WORST: f64 = 2.0;
+/// A step may not add more than this part of the merit to it.
+const WORSE: f64 = 1.0;
+/// The first rate of an annealed search, in scaled variables.
+const ANNEALED_RATE: f64 = 0.01;
+
+/// How the rate falls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pace {
+    /// By half, whenever patience ends.
+    Patient,
+    /// As a cosine, to zero after so many steps.
+    Annealed(usize),
+}
 
 #[derive(Debug)]
 pub(super) struct Adam {
@@ -27,22 +41,26 @@ pub(super) struct Adam {
     mean: Vec<f64>,
     square: Vec<f64>,
     rate: f64,
+    pace: Pace,
     /// Steps since the moments were reset.
     age: i32,
     since_better: usize,
 }
 
 impl Adam {
-    pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
+    pub(super) fn new(merit: Merit, lens: &Lens, pace: Pace) -> Result<Self, MeritError> {
         let mut state = State::new(merit, lens)?;
         let count = state.values.len();
         let sum = state.merit.sum(&state.values, Detail::Normal)?;
-        state.rescale(&sum);
+        if pace == Pace::Patient {
+            state.rescale(&sum);
+        }
         Ok(Self {
             gradient: sum.gradient.iter().copied().collect(),
             mean: vec![0.0; count],
             square: vec![0.0; count],
-            rate: RATE,
+            rate: if pace == Pace::Patient { RATE } else { ANNEALED_RATE },
+            pace,
             age: 0,
             since_better: 0,
             state,
@@ -78,19 +96,17 @@ impl Adam {
 
     fn differentiate(&mut self) {
         if let Ok(sum) = self.state.merit.sum(&self.state.values, Detail::Normal) {
-            self.state.rescale(&sum);
+            if self.pace == Pace::Patient {
+                self.state.rescale(&sum);
+            }
             self.gradient = sum.gradient.iter().copied().collect();
         }
     }
-}
 
-impl Optimizer for Adam {
-    fn step(&mut self) -> Progress {
-        if self.rate < SMALLEST_RATE || self.state.has_ended() {
-            return self.state.progress(0.0, true);
-        }
+    fn patient_step(&mut self) -> f64 {
         let step = self.direction();
-        let (before, limit) = (self.state.best_value, WORST * self.state.value);
+        let before = self.state.best_value;
+        let limit = self.state.value + WORSE * self.state.value.abs();
         let (accepted, sum) = self.state.advance(&step, Detail::Gradient, |value| value <= limit);
         match sum {
             Some(sum) => self.gradient = sum.gradient.iter().copied().collect(),
@@ -100,8 +116,44 @@ impl Optimizer for Adam {
         if self.since_better >= PATIENCE {
             self.slow_down();
         }
+        accepted
+    }
+
+    /// The rate falls with the steps, whatever they do to the merit.
+    fn annealed_step(&mut self, steps: usize) -> f64 {
+        let done = self.state.steps as f64 / steps as f64;
+        self.rate = 0.5 * ANNEALED_RATE * (1.0 + (PI * done).cos());
+        let step = self.direction();
+        let (accepted, sum) = self.state.advance(&step, Detail::Gradient, |_| true);
+        match sum {
+            Some(sum) => self.gradient = sum.gradient.iter().copied().collect(),
+            None => {
+                self.state.return_to_best();
+                self.differentiate();
+            }
+        }
+        accepted
+    }
+
+    fn has_ended(&self) -> bool {
+        match self.pace {
+            Pace::Patient => self.rate < SMALLEST_RATE || self.state.has_ended(),
+            Pace::Annealed(steps) => self.state.steps >= steps,
+        }
+    }
+}
+
+impl Optimizer for Adam {
+    fn step(&mut self) -> Progress {
+        if self.has_ended() {
+            return self.state.progress(0.0, true);
+        }
+        let accepted = match self.pace {
+            Pace::Patient => self.patient_step(),
+            Pace::Annealed(steps) => self.annealed_step(steps),
+        };
         let progress = self.state.progress(accepted, false);
-        if self.state.resample_if_due() {
+        if self.state.resample_if_due() && self.pace == Pace::Patient {
             self.differentiate();
         }
         progress

@@ -5,6 +5,7 @@
 
 mod adam;
 mod least_squares;
+pub mod pareto;
 mod state;
 
 use crate::lens::Lens;
@@ -77,7 +78,22 @@ pub fn start(
 ) -> Result<Box<dyn Optimizer>, MeritError> {
     let merit = Merit::new(lens, goal, tolerance)?;
     Ok(match method {
-        Method::Adam => Box::new(adam::Adam::new(merit, lens)?),
+        Method::Adam => Box::new(adam::Adam::new(merit, lens, adam::Pace::Patient)?),
         Method::DampedLeastSquares => Box::new(least_squares::LeastSquares::new(merit, lens)?),
     })
+}
+
+/// Begins a search by Adam that takes this many steps while its rate falls to zero; spots are good
+/// to `tolerance` of their radius.
+///
+/// # Errors
+/// As [`start`].
+pub fn annealed(
+    lens: &Lens,
+    goal: &Goal,
+    tolerance: f64,
+    steps: usize,
+) -> Result<Box<dyn Optimizer>, MeritError> {
+    let merit = Merit::new(lens, goal, tolerance)?;
+    Ok(Box::new(adam::Adam::new(merit, lens, adam::Pace::Annealed(steps))?))
 }

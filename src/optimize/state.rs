@@ -165,7 +165,7 @@ impl State {
         let mut merit = self.merit.clone();
         let values = merit.values(&self.best);
         let value = merit.resample(&self.best).and_then(|()| merit.value(&values));
-        let enough = self.verified_value * (1.0 - SMALLEST_GAIN);
+        let enough = self.verified_value - SMALLEST_GAIN * self.verified_value.abs();
         match value {
             Ok(value) if value < enough => {
                 self.verified.clone_from(&self.best);

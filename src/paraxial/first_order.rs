@@ -354,6 +354,7 @@ mod tests {
             thickness: R::from_f64(thickness),
             index: R::from_f64(index),
             semi_diameter: R::from_f64(f64::INFINITY),
+            obstruction: R::ZERO,
             mirror: false,
             hyper: false,
         }

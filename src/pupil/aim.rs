@@ -1,16 +1,16 @@
-//! The ray of a field that crosses the stop at a given point: Newton's iteration on the two
+//! The ray of a field that crosses the stop, or another surface, at a given point: Newton's iteration on the two
 //! coordinates that name the ray, with the derivative from dual numbers.
 
 use super::bench::{Bench, Dual2};
 use super::launch::{Chart, Source};
 use crate::math::Vec3;
 
-/// A ray that crosses the stop where it was asked to.
+/// A ray that crosses a surface where it was asked to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aimed {
     /// What names it.
     pub(super) q: [f64; 2],
-    /// Derivatives of the point at the stop: `slopes[i][j]` is coordinate `i` by `q[j]`.
+    /// Derivatives of the point at the surface: `slopes[i][j]` is coordinate `i` by `q[j]`.
     pub(super) slopes: [[f64; 2]; 2],
     /// How far `q` lies from the paraxial place.
     pub(super) shift: [f64; 2],
@@ -27,7 +27,7 @@ impl Aimed {
 }
 
 /// The solution of a system of two linear equations.
-fn solve([[a, b], [c, d]]: [[f64; 2]; 2], [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+pub(super) fn solve([[a, b], [c, d]]: [[f64; 2]; 2], [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let determinant = a * d - b * c;
     let solution = [(d * x - b * y) / determinant, (a * y - c * x) / determinant];
     solution.iter().all(|v| v.is_finite()).then_some(solution)
@@ -39,15 +39,16 @@ const HALVINGS: usize = 12;
 /// A miss that is no longer reduced counts as rounding if it is this small against the stop.
 const ROUNDING: f64 = 1e-10;
 
-/// The ray of a source that crosses the stop at `target`, searched from the ray named `guess`.
+/// The ray of a source that crosses `surface` at `target`, searched from the ray named `guess`.
 pub(super) fn aimed(
     bench: &Bench,
     wavelength: usize,
     source: &Source,
+    surface: usize,
     guess: [f64; 2],
     target: [f64; 2],
 ) -> Option<Aimed> {
-    let search = Search { bench, wavelength, source, target };
+    let search = Search { bench, wavelength, source, surface, target };
     let mut here = search.miss(guess)?;
     for _ in 0..STEPS {
         if here.size == 0.0 {
@@ -71,10 +72,11 @@ struct Search<'a> {
     bench: &'a Bench,
     wavelength: usize,
     source: &'a Source,
+    surface: usize,
     target: [f64; 2],
 }
 
-/// How far from the target a ray crosses the stop.
+/// How far from the target a ray crosses the surface.
 struct Miss {
     q: [f64; 2],
     offset: [f64; 2],
@@ -92,7 +94,7 @@ impl Search<'_> {
 
     fn miss(&self, q: [f64; 2]) -> Option<Miss> {
         let ray = self.source.ray([Dual2::variable(q[0], 0), Dual2::variable(q[1], 1)]);
-        let landing = self.bench.colors[self.wavelength].open.trace_to(ray, self.bench.stop());
+        let landing = self.bench.colors[self.wavelength].open.trace_to(ray, self.surface);
         let Vec3 { x, y, .. } = landing.ray.point;
         let offset = [x.value - self.target[0], y.value - self.target[1]];
         let size = offset[0].hypot(offset[1]);

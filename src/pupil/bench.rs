@@ -113,10 +113,8 @@ impl Bench {
             let stop = system.stop.unwrap_or(0);
             rim.into_iter().for_each(|radius| system.surfaces[stop].semi_diameter = radius);
             let tracer = Tracer::new(&system)?;
-            let mut open = system.lift::<Dual2>();
-            let unlimited = Dual2::constant(f64::INFINITY);
-            open.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = unlimited);
-            Ok(Color { um, weight, system, tracer, open: Tracer::new(&open)? })
+            let open = Tracer::new(&system.lift::<Dual2>())?.opened();
+            Ok(Color { um, weight, system, tracer, open })
         };
         let colors: Result<Vec<_>, Invalid> = systems.into_iter().map(color).collect();
         Ok(Self { beam, fields: Vec::new(), colors: colors?, primary, first, aiming })
@@ -139,6 +137,36 @@ impl Bench {
         let long = self.colors.iter().max_by(by_length)?;
         let outer = (short.um < long.um).then_some((&short.system, &long.system));
         seidel(&self.colors[self.primary].system, &self.first, outer)
+    }
+
+    /// The same beam without a search for the stop: the rim of the stop limits it, where that is
+    /// what the coordinates of the pupil lead to.
+    pub(super) fn limited_by_stop(&self) -> Result<Self, Invalid> {
+        let (stop, radius) = (self.stop(), self.stop_radius());
+        let color = |color: &Color| {
+            let mut system = color.system.clone();
+            let rim = &mut system.surfaces[stop].semi_diameter;
+            *rim = rim.min(radius);
+            let tracer = Tracer::new(&system)?;
+            Ok(Color { system, tracer, ..color.clone() })
+        };
+        let colors: Result<_, Invalid> = self.colors.iter().map(color).collect();
+        let beam = Beam { aperture: Aperture::StopSemiDiameter(radius), ..self.beam };
+        Ok(Self { colors: colors?, beam, aiming: Aiming::Chief, ..self.clone() })
+    }
+
+    /// The same beam through a lens that has changed at one wavelength: where its stop limits it,
+    /// the stop is as large as that says.
+    pub(super) fn changed(&self, wavelength: usize, system: System<f64>) -> Result<Self, Invalid> {
+        let mut bench = self.clone();
+        if let Aperture::StopSemiDiameter(radius) = &mut bench.beam.aperture {
+            *radius = system.surfaces[self.stop()].semi_diameter;
+        }
+        let color = &mut bench.colors[wavelength];
+        color.tracer = Tracer::new(&system)?;
+        color.open = Tracer::new(&system.lift::<Dual2>())?.opened();
+        color.system = system;
+        Ok(bench)
     }
 
     /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces

@@ -21,6 +21,13 @@ pub enum Limit {
     Unaimed,
 }
 
+impl Limit {
+    /// Whether a cosine vanishes there, so that rays turn ever faster towards it.
+    pub fn is_grazing(self) -> bool {
+        matches!(self, Self::Surface(_, Hurdle::Miss | Hurdle::Reflection))
+    }
+}
+
 /// Polar coordinates about a point of the pupil, stretched with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -88,6 +95,8 @@ pub struct Boundary {
     pub arcs: Vec<Arc>,
     /// The edge at the azimuths that were looked at.
     pub(super) samples: Vec<(f64, Edge)>,
+    /// Limits at which a cosine vanishes on the edge or not far behind it.
+    pub(super) grazing: Vec<Limit>,
     /// Rays traced to find it.
     pub rays: usize,
 }
@@ -103,16 +112,23 @@ pub(super) struct Probe {
 /// A ray so close to the rim of the disc, relatively, counts as one at the rim: where the rim of
 /// the stop is the rim of the pupil as well, rounding must not decide ray by ray between them.
 const AT_DISC: f64 = 1e-10;
-/// A corner is located to this in azimuth and radius; the quadrature sees the square of it.
-const CORNER: f64 = 1e-9;
+/// A corner is located to this in azimuth and radius; the derivative by a rim is as wrong as this.
+const CORNER: f64 = 1e-11;
 /// A step along the radius that is rounding, relatively.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Two edges as close as that differ by less than this, relatively, unless the edge jumps.
+const JUMP: f64 = 1e-5;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.
 pub(super) const NEAR: f64 = 0.003;
 /// How far inside the edge, relatively, margins are looked at.
 const INSIDE: f64 = 1e-9;
 /// A margin this small against its neighbours is one that ends the pupil.
 const ENDING: f64 = 1e-6;
+/// A cosine that vanishes this much inside the edge, relatively, vanishes there but for rounding.
+const GRAZED: f64 = 1.0 - 1e-9;
+/// A squared cosine that has fallen to this part of what it is at the centre is one that vanishes
+/// not far away.
+const NEARLY: f64 = 0.3;
 /// What is added to the largest radius seen so that none is larger.
 const COVER: f64 = 1.02;
 /// More arcs than this are no pupil but noise.
@@ -120,9 +136,45 @@ pub(super) const MOST_ARCS: usize = 24;
 /// A pupil that reaches this far, in its frame, is limited by nothing.
 const ENDLESS: f64 = 1e4;
 
+/// Which limits a search for the edge looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Seen {
+    /// All.
+    All,
+    /// All but the obstructions.
+    Rims,
+    /// The obstructions alone, from inside: the edge is where their shadow ends.
+    Shadow,
+}
+
 impl Launch<'_> {
     /// Whether the ray at `p` gets through, and its margin at one limit.
     pub(super) fn probe(&self, p: [f64; 2], wanted: Limit) -> Probe {
+        self.probe_seeing(p, wanted, |_| true)
+    }
+
+    /// Whether the ray at `p` is in no shadow, with margins that are negative there.
+    fn probe_shadow(&self, p: [f64; 2], wanted: Limit) -> Probe {
+        let mut probe = Probe { failed: None, wanted: f64::NAN };
+        let Some(ray) = self.ray(p) else { return probe };
+        let mut deepest: Option<(Limit, f64)> = None;
+        self.color().tracer.margins(ray, |surface, hurdle, margin| {
+            if hurdle != Hurdle::Obstruction {
+                return;
+            }
+            let limit = Limit::Surface(surface, hurdle);
+            if limit == wanted {
+                probe.wanted = -margin;
+            }
+            if deepest.is_none_or(|(_, least)| margin < least) {
+                deepest = Some((limit, margin));
+            }
+        });
+        probe.failed = deepest.filter(|(_, m)| *m >= 0.0).map(|(limit, margin)| (limit, -margin));
+        probe
+    }
+
+    fn probe_seeing(&self, p: [f64; 2], wanted: Limit, sees: impl Fn(Hurdle) -> bool) -> Probe {
         let Some(ray) = self.ray(p) else {
             return Probe { failed: Some((Limit::Unaimed, -1.0)), wanted: f64::NAN };
         };
@@ -132,7 +184,7 @@ impl Launch<'_> {
             if limit == wanted {
                 probe.wanted = margin;
             }
-            if probe.failed.is_none() && !(margin >= 0.0) {
+            if probe.failed.is_none() && !(margin >= 0.0) && sees(hurdle) {
                 probe.failed = Some((limit, if margin < 0.0 { margin } else { -1.0 }));
             }
         });
@@ -158,16 +210,27 @@ pub(super) struct Search<'a> {
     pub(super) launch: &'a Launch<'a>,
     pub(super) frame: Frame,
     pub(super) rays: usize,
+    seen: Seen,
 }
 
 impl<'a> Search<'a> {
     pub(super) fn new(launch: &'a Launch<'a>, frame: Frame) -> Self {
-        Self { launch, frame, rays: 0 }
+        Self { launch, frame, rays: 0, seen: Seen::All }
+    }
+
+    /// The same search for another edge.
+    pub(super) fn seeing(self, seen: Seen) -> Self {
+        Self { seen, ..self }
     }
 
     fn probe(&mut self, azimuth: f64, r: f64, wanted: Limit) -> Probe {
         self.rays += 1;
-        self.launch.probe(self.frame.point(azimuth, r), wanted)
+        let p = self.frame.point(azimuth, r);
+        match self.seen {
+            Seen::All => self.launch.probe(p, wanted),
+            Seen::Rims => self.launch.probe_seeing(p, wanted, |h| h != Hurdle::Obstruction),
+            Seen::Shadow => self.launch.probe_shadow(p, wanted),
+        }
     }
 
     /// Where the radius leaves the unit disc; infinite where the disc is no limit.
@@ -193,7 +256,7 @@ impl<'a> Search<'a> {
         let mut high = (guess * (1.0 + spread)).min(last);
         loop {
             if let Some(failed) = self.probe(azimuth, high, Limit::Disc).failed {
-                let from = if low > 0.0 { low } else { guess * (1.0 - spread) };
+                let from = if low > 0.0 { low } else { guess.min(high) * (1.0 - spread) };
                 return Some(self.between(azimuth, from, high, failed));
             }
             if high >= last {
@@ -272,15 +335,33 @@ impl<'a> Search<'a> {
         Edge { radius: low, limit }
     }
 
+    /// The edge at an azimuth where it is expected of one limit: the zero of its margin alone, if
+    /// a ray just inside of it passes everything.
+    pub(super) fn expected(&mut self, limit: Limit, azimuth: f64, guess: f64) -> Option<Edge> {
+        let radius = self.zero(limit, azimuth, guess).filter(|r| *r > 0.0)?;
+        self.rays += 1;
+        let inside = self.frame.point(azimuth, radius * (1.0 - INSIDE));
+        self.launch.is_lit(inside).then_some(Edge { radius, limit })
+    }
+
+    /// The margin of a ray at one limit; not a number where it does not get there.
+    fn margin(&mut self, azimuth: f64, r: f64, limit: Limit) -> f64 {
+        self.rays += 1;
+        let Limit::Surface(surface, hurdle) = limit else { return f64::NAN };
+        let ray = self.launch.ray(self.frame.point(azimuth, r));
+        let tracer = &self.launch.color().tracer;
+        ray.and_then(|ray| tracer.margin(ray, surface, hurdle)).unwrap_or(f64::NAN)
+    }
+
     /// Where one limit alone would end the pupil along a radius, by secants from a guess.
     fn zero(&mut self, limit: Limit, azimuth: f64, guess: f64) -> Option<f64> {
         if limit == Limit::Disc {
             return Some(self.disc(azimuth));
         }
         let (mut r, mut step) = (guess, 1e-4 * guess);
-        let mut before = self.probe(azimuth, r - step, limit).wanted;
+        let mut before = self.margin(azimuth, r - step, limit);
         for _ in 0..20 {
-            let margin = self.probe(azimuth, r, limit).wanted;
+            let margin = self.margin(azimuth, r, limit);
             let next = -margin * step / (margin - before);
             if margin == 0.0 || next.abs() <= 1e-13 * guess {
                 return Some(r + if margin == 0.0 { 0.0 } else { next });
@@ -291,6 +372,15 @@ impl<'a> Search<'a> {
             (before, step, r) = (margin, next, r + next);
         }
         None
+    }
+
+    /// Where along a radius the nearest of some cosines vanishes, in parts of the distance to the
+    /// edge; the one that is the edge does not count.
+    pub(super) fn grazing(&mut self, limits: &[Limit], azimuth: f64, edge: Edge) -> f64 {
+        let others = limits.iter().filter(|limit| **limit != edge.limit);
+        let zeros = others.filter_map(|limit| self.zero(*limit, azimuth, edge.radius));
+        let parts = zeros.map(|radius| radius / edge.radius).filter(|part| *part > GRAZED);
+        parts.fold(f64::INFINITY, f64::min).max(1.0)
     }
 
     /// The corner between two edges where the limit of one takes over from that of the other, by
@@ -338,7 +428,36 @@ impl<'a> Search<'a> {
         if end > 1.5 * PI {
             joined(&mut arcs, end);
         }
-        Some(Boundary { frame: self.frame, arcs, samples, rays: self.rays })
+        let grazing = self.grazed(&samples);
+        Some(Boundary { frame: self.frame, arcs, samples, grazing, rays: self.rays })
+    }
+
+    /// The limits whose squared cosine falls from the centre to the edge by so much that it will
+    /// vanish not far behind.
+    fn grazed(&mut self, samples: &[(f64, Edge)]) -> Vec<Limit> {
+        let inside = 1.0 - INSIDE;
+        let mut margins = |p: [f64; 2]| {
+            self.rays += 1;
+            let mut found = Vec::new();
+            if let Some(ray) = self.launch.ray(p) {
+                self.launch.color().tracer.margins(ray, |surface, hurdle, margin| {
+                    found.push((Limit::Surface(surface, hurdle), margin));
+                });
+            }
+            found
+        };
+        let frame = self.frame;
+        let center = margins(frame.center);
+        let mut grazed = Vec::new();
+        for (azimuth, edge) in samples {
+            let there = margins(frame.point(*azimuth, edge.radius * inside));
+            for ((limit, from), (_, to)) in center.iter().zip(there) {
+                if limit.is_grazing() && to < NEARLY * from && !grazed.contains(limit) {
+                    grazed.push(*limit);
+                }
+            }
+        }
+        grazed
     }
 
     /// Edges at equal steps of azimuth, and where another limit comes close in between.
@@ -377,7 +496,11 @@ impl<'a> Search<'a> {
             return Some(());
         }
         let middle = 0.5 * (a.0 + b.0);
-        let found = if b.0 - a.0 <= CORNER { Some(middle) } else { self.corner(a, b) };
+        let next = b.0 - a.0 <= CORNER;
+        if next && hides_light(a.1, b.1) {
+            return None;
+        }
+        let found = if next { Some(middle) } else { self.corner(a, b) };
         if let Some(corner) = found {
             let end = arcs.last_mut().map(|arc| std::mem::replace(&mut arc.to, corner))?;
             arcs.push(Arc { from: corner, to: end, limit: b.1.limit });
@@ -388,6 +511,14 @@ impl<'a> Search<'a> {
         self.corners(a, between, arcs)?;
         self.corners(between, b, arcs)
     }
+}
+
+/// Whether the edge jumps from the near side of a shadow to what ends the pupil behind it: there
+/// is light behind the shadow that the centre does not see. The two edges are next to a corner.
+fn hides_light(a: Edge, b: Edge) -> bool {
+    let shadow = |edge: Edge| matches!(edge.limit, Limit::Surface(_, Hurdle::Obstruction));
+    let jump = (a.radius - b.radius).abs() > JUMP * a.radius.max(b.radius);
+    jump && (shadow(a) || shadow(b))
 }
 
 /// Where margins dip between rays at equal steps of azimuth, in steps from the first of them: the
@@ -462,6 +593,25 @@ impl Boundary {
         let reach = self.samples.iter().map(|(_, edge)| edge.radius).fold(0.0, f64::max);
         let grown = COVER * reach;
         Frame { axes: self.frame.axes.map(|axis| axis.map(|v| v * grown)), ..self.frame }
+    }
+
+    /// A frame whose square from −1 to 1 holds all of the pupil, with the same turn.
+    pub(super) fn boxed(&self, mirrored: bool) -> Frame {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for (azimuth, edge) in &self.samples {
+            let (sin, cos) = azimuth.sin_cos();
+            let p = [sin * edge.radius, cos * edge.radius];
+            low = [0, 1].map(|i| low[i].min(p[i]));
+            high = [0, 1].map(|i| high[i].max(p[i]));
+        }
+        if mirrored {
+            low[0] = -high[0];
+        }
+        let middle = [0, 1].map(|i| 0.5 * (low[i] + high[i]));
+        let half = [0, 1].map(|i| 0.5 * COVER * (high[i] - low[i]));
+        let [a, b] = self.frame.axes;
+        let center = [0, 1].map(|k| self.frame.center[k] + middle[0] * a[k] + middle[1] * b[k]);
+        Frame { center, axes: [a.map(|v| half[0] * v), b.map(|v| half[1] * v)] }
     }
 
     /// A guess of the radius at an azimuth, from the nearest ones known.

@@ -5,7 +5,7 @@
 //! an object point the plane of the entrance pupil; in a telecentric beam `q` is the slope. A chart
 //! leads from pupil coordinates to that plane.
 
-use super::aim::{Aimed, aimed};
+use super::aim::{Aimed, aimed, solve};
 use super::bench::{Aiming, Bench, Color, Dual2};
 use crate::lens::{Field, FieldKind, Object};
 use crate::math::Real;
@@ -44,7 +44,11 @@ pub(super) enum Source {
 /// vertex plane, which it may meet far behind the lens or never.
 const GRAZING: f64 = 0.05;
 
+/// A field beyond this many degrees is a wide one.
+const WIDE: f64 = 45.0;
+
 impl Source {
+    #[inline(always)]
     pub(super) fn ray<R: Real>(&self, q: [R; 2]) -> Ray<R> {
         match *self {
             Self::Collimated { direction, across, ahead } => {
@@ -68,7 +72,17 @@ impl Source {
     }
 }
 
+impl Source {
+    /// Where the ray meets the plane through the first vertex, in mm.
+    fn at_vertex<R: Real>(&self, q: [R; 2]) -> [R; 2] {
+        let Ray { point, direction } = self.ray(q);
+        let met = point - direction * (point.z / direction.z);
+        [met.x, met.y]
+    }
+}
+
 /// A ray from a point, or from the first vertex plane towards a point behind it.
+#[inline(always)]
 fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
     let direction = along * (R::ONE / along.dot(along).sqrt());
     let point = if from.z > R::ZERO { from - direction * (from.z / direction.z) } else { from };
@@ -83,12 +97,37 @@ pub(super) struct Chart {
 }
 
 impl Chart {
+    #[inline(always)]
     pub(super) fn map<R: Real>(&self, p: [R; 2]) -> [R; 2] {
         let [a, b] = self.columns;
         let row = |i: usize| {
             R::from_f64(self.origin[i]) + R::from_f64(a[i]) * p[0] + R::from_f64(b[i]) * p[1]
         };
         [row(0), row(1)]
+    }
+
+    fn inverse(&self, q: [f64; 2]) -> Option<[f64; 2]> {
+        let [[a, b], [c, d]] = self.columns;
+        solve([[a, c], [b, d]], [q[0] - self.origin[0], q[1] - self.origin[1]])
+    }
+}
+
+/// From where the rays of one field and wavelength start, whatever becomes of the lens behind: what
+/// an integral over a moving pupil keeps while the lens moves.
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor {
+    field: Field,
+    wavelength: usize,
+    aiming: Aiming,
+    source: Source,
+    chart: Chart,
+}
+
+impl Anchor {
+    /// The same rays through a lens of the same wavelengths.
+    pub fn launch(self, bench: &Bench) -> Launch<'_> {
+        let Self { field, wavelength, aiming, source, chart } = self;
+        Launch { bench, field, wavelength, aiming, source, chart }
     }
 }
 
@@ -129,6 +168,26 @@ impl<'a> Launch<'a> {
         Ok(launch)
     }
 
+    /// Where its rays start.
+    pub fn anchor(&self) -> Anchor {
+        let Self { field, wavelength, aiming, source, chart, .. } = *self;
+        Anchor { field, wavelength, aiming, source, chart }
+    }
+
+    /// The cosine of the angle with the axis at which a collimated beam arrives; `None` for the
+    /// rays of an object point.
+    pub fn cosine(&self) -> Option<f64> {
+        match self.source {
+            Source::Collimated { direction, .. } => Some(direction.z),
+            Source::Point { .. } | Source::Slopes { .. } => None,
+        }
+    }
+
+    /// Whether the rays are those of a point on the axis, so that all azimuths are alike.
+    pub(super) fn is_axial(&self) -> bool {
+        self.field.x == 0.0 && self.field.y == 0.0
+    }
+
     /// The lens at this wavelength.
     pub fn color(&self) -> &'a Color {
         &self.bench.colors[self.wavelength]
@@ -159,6 +218,35 @@ impl<'a> Launch<'a> {
         Some(self.source.ray(self.place(p)?))
     }
 
+    /// Where the ray at these pupil coordinates crosses the plane in which pupils are compared, in
+    /// mm: the plane through the first vertex, or, where the field of the lens is wide
+    /// ([`Launch::is_across`]), the one across the beam. `None` where no ray was found that crosses
+    /// the stop there.
+    pub fn crossing(&self, p: [f64; 2]) -> Option<[f64; 2]> {
+        self.place(p).map(|q| self.crossing_of(q))
+    }
+
+    fn crossing_of<R: Real>(&self, q: [R; 2]) -> [R; 2] {
+        if self.is_across() { q } else { self.source.at_vertex(q) }
+    }
+
+    /// The same with the area in mm² that one unit of pupil coordinates stands for there. Where
+    /// every ray is aimed at the stop, that changes over the pupil.
+    pub(super) fn crossing_with_area(&self, p: [f64; 2]) -> Option<([f64; 2], f64)> {
+        let [x, y] = self.crossing_of(self.dual_place(p)?);
+        let area = x.slope[0] * y.slope[1] - x.slope[1] * y.slope[0];
+        Some(([x.value, y.value], area.abs()))
+    }
+
+    /// Whether [`Launch::crossing`] looks along the beam: a collimated one that grazes the plane
+    /// through the first vertex, and every one of a lens whose field reaches beyond 45 degrees,
+    /// where that plane stretches the pupils at the edge out of all comparison.
+    pub fn is_across(&self) -> bool {
+        let Source::Collimated { direction, .. } = self.source else { return false };
+        let beam = &self.bench.beam;
+        direction.z <= GRAZING || (beam.field == FieldKind::Angle && beam.edge.abs() > WIDE)
+    }
+
     /// The optical path from the object point to the start of a ray of this field, or from the
     /// plane wave through the first vertex, in mm.
     pub fn path_to(&self, ray: Ray<f64>) -> f64 {
@@ -170,19 +258,29 @@ impl<'a> Launch<'a> {
         index * away.dot(ray.direction)
     }
 
+    /// The ray at these pupil coordinates over any number type, for coordinates that need no search
+    /// for the stop: an affine map to the plane in which rays are named.
+    #[inline(always)]
+    pub(super) fn charted<R: Real>(&self, p: [R; 2]) -> Ray<R> {
+        self.source.ray(self.chart.map(p))
+    }
+
     /// The ray at these pupil coordinates with its derivatives by the two pupil coordinates.
     pub fn dual_ray(&self, p: [f64; 2]) -> Option<Ray<Dual2>> {
-        let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
+        self.dual_place(p).map(|q| self.source.ray(q))
+    }
+
+    fn dual_place(&self, p: [f64; 2]) -> Option<[Dual2; 2]> {
         if self.aiming != Aiming::Stop {
-            return Some(self.source.ray(self.chart.map(variables)));
+            let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
+            return Some(self.chart.map(variables));
         }
         let found = self.aim(p)?;
         let chart = found.chart(self.bench.stop_radius())?;
-        let q = |i: usize| Dual2 {
+        Some([0, 1].map(|i| Dual2 {
             value: found.q[i],
             slope: [chart.columns[0][i], chart.columns[1][i]],
-        };
-        Some(self.source.ray([q(0), q(1)]))
+        }))
     }
 
     /// Where the ray at these pupil coordinates crosses the stop, clipped by nothing.
@@ -220,7 +318,27 @@ impl<'a> Launch<'a> {
 
     fn aim(&self, p: [f64; 2]) -> Option<Aimed> {
         let radius = self.bench.stop_radius();
-        aimed(self.bench, self.wavelength, &self.source, self.chart.map(p), p.map(|v| v * radius))
+        let (guess, target) = (self.chart.map(p), p.map(|v| v * radius));
+        aimed(self.bench, self.wavelength, &self.source, self.bench.stop(), guess, target)
+    }
+
+    /// The pupil point whose ray, clipped by nothing, goes through the vertex of a surface, inside
+    /// the pupil or not; `None` where none was found.
+    pub(super) fn through_vertex(&self, surface: usize) -> Option<[f64; 2]> {
+        let (bench, source) = (self.bench, &self.source);
+        let search = |start: [f64; 2]| {
+            let guess = self.chart.map(start);
+            aimed(bench, self.wavelength, source, surface, guess, [0.0; 2])
+        };
+        let starts = [[0.0, 0.0], [0.0, 0.9], [0.0, -0.9], [0.9, 0.0], [-0.9, 0.0]];
+        let q = starts.into_iter().find_map(search)?.q;
+        if self.aiming != Aiming::Stop {
+            return self.chart.inverse(q);
+        }
+        let landing = self.color().open.trace_to(source.ray(q.map(Dual2::constant)), bench.stop());
+        let point = landing.ray.point.value();
+        let radius = bench.stop_radius();
+        landing.fate.is_imaged().then_some([point.x / radius, point.y / radius])
     }
 
     /// The real ray through the centre of the stop, followed from the axis to the field.
@@ -257,7 +375,8 @@ impl<'a> Launch<'a> {
         let paraxial = paraxial_chart(self.bench, &source);
         let shift = walk.predict(fraction);
         let guess = [paraxial.origin[0] + shift[0], paraxial.origin[1] + shift[1]];
-        let mut found = aimed(self.bench, self.wavelength, &source, guess, [0.0; 2])?;
+        let mut found =
+            aimed(self.bench, self.wavelength, &source, self.bench.stop(), guess, [0.0; 2])?;
         found.shift = [found.q[0] - paraxial.origin[0], found.q[1] - paraxial.origin[1]];
         Some(found)
     }

@@ -15,17 +15,30 @@
 mod aim;
 mod bench;
 mod boundary;
+mod follow;
 mod gradient;
 mod launch;
+mod lit;
+mod moments;
+mod outline;
 mod quadrature;
 mod region;
+mod ring;
 mod rules;
 mod sample;
+mod stopped;
 
 pub use bench::{Aiming, Bench, BenchError, Color, Dual2, MISS};
 pub use boundary::{Arc, Boundary, Edge, Frame, Limit};
-pub use gradient::{Cost, Derivative};
-pub use launch::{Launch, LaunchError};
+pub use gradient::{
+    Cost, Derivative, Estimator, Integrand, NoDerivative, Warp, differentiate, plan,
+};
+pub use launch::{Anchor, Launch, LaunchError};
+pub use lit::Lit;
+pub use moments::Moments;
+pub use outline::{Outline, Side};
 pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};
+pub use ring::Ring;
 pub use sample::{Pattern, pattern};
+pub use stopped::limited_by_stop;

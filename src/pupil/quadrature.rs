@@ -5,9 +5,10 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
 //! is integrated over one half.
 
-use super::boundary::{Boundary, NEAR, Search};
+use super::boundary::{Arc, Boundary, Edge, Frame, NEAR, Search};
 use super::region::{Kind, Region};
 use super::rules::{legendre, radial};
+use super::sample::additive;
 use crate::trace::{Rays, Sink};
 use std::f64::consts::PI;
 
@@ -53,10 +54,96 @@ pub struct Converged<const K: usize> {
     pub reached: bool,
 }
 
+/// A radius of a split pupil, from the centre of its frame to its edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spoke {
+    pub(super) azimuth: f64,
+    pub(super) edge: Edge,
+    /// Its share of the turn, in the area of the frame.
+    pub(super) share: f64,
+    /// Where a cosine vanishes behind its end, in parts of its length: infinite where none does
+    /// nearby.
+    pub(super) grazing: f64,
+}
+
+/// A cosine that vanishes farther out than this, in parts of the radius, is far away.
+const FAR: f64 = 1.5;
+
+/// The nodes on some radii. Where a cosine vanishes at the edge or close behind it, the image moves
+/// with the root of the distance from there: Gauss nodes in a variable that makes it smooth.
+pub(super) fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
+    let mut nodes = Nodes::default();
+    for spoke in spokes {
+        let radius = spoke.edge.radius;
+        let sector = spoke.share * radius * radius;
+        let mut add = |r: f64, weight: f64| {
+            nodes.points.push(frame.point(spoke.azimuth, r * radius));
+            nodes.weights.push(sector * weight);
+        };
+        let beyond = spoke.grazing - 1.0;
+        match (spoke.edge.limit.is_grazing(), spoke.grazing < FAR) {
+            (false, false) => radial(radii).iter().for_each(|(r, weight)| add(*r, *weight)),
+            // r = 1 − s²
+            (true, false) => legendre(2 * radii).iter().for_each(|(s, w)| {
+                let r = 1.0 - s * s;
+                add(r, 2.0 * s * r * w);
+            }),
+            // r = 1 + beyond − s²
+            (false, true) => {
+                let [first, last] = [beyond.sqrt(), spoke.grazing.sqrt()];
+                legendre(2 * radii).iter().for_each(|(t, w)| {
+                    let s = first + t * (last - first);
+                    let r = spoke.grazing - s * s;
+                    add(r, 2.0 * s * (last - first) * r * w);
+                });
+            }
+            // r = 1 − beyond sinh² v, for both roots at once
+            (true, true) => {
+                let beyond = beyond.max(f64::EPSILON);
+                let last = (1.0 / beyond).sqrt().asinh();
+                legendre(3 * radii).iter().for_each(|(t, w)| {
+                    let v = t * last;
+                    let r = 1.0 - beyond * v.sinh().powi(2);
+                    add(r, beyond * (2.0 * v).sinh() * last * r * w);
+                });
+            }
+        }
+    }
+    nodes
+}
+
+/// How nodes are drawn to the ends of an arc: next to one along which a cosine vanishes, integrals
+/// along the radius change with the root of the distance from the corner.
+#[derive(Debug, Clone, Copy)]
+struct Grading {
+    from: bool,
+    to: bool,
+}
+
+impl Grading {
+    fn of(arcs: &[Arc], i: usize, whole: bool) -> Self {
+        let count = arcs.len();
+        let differs = |other: &Arc| other.limit.is_grazing() && other.limit != arcs[i].limit;
+        let before = if i > 0 || whole { arcs.get((i + count - 1) % count) } else { None };
+        let after = if i + 1 < count || whole { arcs.get((i + 1) % count) } else { None };
+        Self { from: before.is_some_and(differs), to: after.is_some_and(differs) }
+    }
+
+    /// The place between 0 and 1 of a node, and how densely nodes lie there.
+    fn place(self, t: f64) -> (f64, f64) {
+        match (self.from, self.to) {
+            (false, false) => (t, 1.0),
+            (true, false) => (t * t, 2.0 * t),
+            (false, true) => (t * (2.0 - t), 2.0 * (1.0 - t)),
+            (true, true) => (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)),
+        }
+    }
+}
+
 /// Nodes along the radius and along half a turn, of the clear disc.
 const CLEAR: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
 /// Nodes along an arc and along the radius, of a piece.
-const SPLIT: [(usize, usize); 12] = [
+pub(super) const SPLIT: [(usize, usize); 12] = [
     (4, 3),
     (6, 4),
     (8, 5),
@@ -80,7 +167,7 @@ impl Region<'_> {
         match self.kind {
             Kind::Dark | Kind::Endless => 0,
             Kind::Clear => CLEAR.len(),
-            Kind::Split(_) => SPLIT.len(),
+            Kind::Split(_) | Kind::Ragged { ring: Some(_), .. } => SPLIT.len(),
             Kind::Ragged { .. } => RAGGED_ORDERS,
         }
     }
@@ -92,31 +179,48 @@ impl Region<'_> {
             Kind::Dark | Kind::Endless => Nodes::default(),
             Kind::Clear => clear(CLEAR[order.min(CLEAR.len() - 1)], mirrored),
             Kind::Split(boundary) => self.split(boundary, SPLIT[order.min(SPLIT.len() - 1)]),
-            Kind::Ragged { square, .. } => ragged(*square, RAGGED << (2 * order)),
+            Kind::Ragged { ring: Some(ring), .. } => {
+                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
+                let (spokes, rays) = ring.spokes(&self.launch, azimuths);
+                Nodes { mirrored, rays, ..ring.nodes_of(&spokes, radii) }
+            }
+            Kind::Ragged { square, .. } => {
+                let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };
+                ragged(*square, RAGGED << (2 * order), reach)
+            }
         }
     }
 
     /// Gauss nodes between the centre and the edge of every arc.
     fn split(&self, boundary: &Boundary, (azimuths, radii): (usize, usize)) -> Nodes {
+        let (spokes, rays) = self.spokes(boundary, azimuths);
+        let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
+        (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
+        nodes
+    }
+
+    /// Radii at the Gauss nodes of azimuth of every arc, and the rays traced to find their ends.
+    pub(super) fn spokes(&self, boundary: &Boundary, azimuths: usize) -> (Vec<Spoke>, usize) {
         let mut search = Search::new(&self.launch, boundary.frame);
-        let mirrored = self.launch.is_symmetric();
-        let factor = boundary.frame.area() * if mirrored { 2.0 } else { 1.0 };
-        let mut nodes = Nodes { mirrored, ..Nodes::default() };
-        for arc in &boundary.arcs {
+        let halves = if self.launch.is_symmetric() { 2.0 } else { 1.0 };
+        let factor = halves * boundary.frame.area();
+        let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
+        for (i, arc) in boundary.arcs.iter().enumerate() {
             let length = arc.to - arc.from;
+            let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
             for (t, share) in legendre(azimuths) {
+                let (t, stretch) = grading.place(*t);
                 let azimuth = arc.from + t * length;
                 let guess = boundary.near(azimuth);
-                let Some(edge) = search.edge(azimuth, guess, NEAR) else { continue };
-                let sector = factor * share * length * edge.radius * edge.radius;
-                for (r, weight) in radial(radii) {
-                    nodes.points.push(boundary.frame.point(azimuth, r * edge.radius));
-                    nodes.weights.push(sector * weight);
+                let expected = search.expected(arc.limit, azimuth, guess);
+                if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, NEAR)) {
+                    let grazing = search.grazing(&boundary.grazing, azimuth, edge);
+                    let share = factor * share * stretch * length;
+                    spokes.push(Spoke { azimuth, edge, share, grazing });
                 }
             }
         }
-        nodes.rays = search.rays;
-        nodes
+        (spokes, search.rays)
     }
 
     /// Traces nodes; `visit` gets the weight and the number of each ray that arrives in `sink`.
@@ -172,19 +276,22 @@ fn clear(order: usize, mirrored: bool) -> Nodes {
     nodes
 }
 
-/// Roberts's additive sequence over a square: points that fill it evenly for any count.
-fn ragged((center, half): ([f64; 2], f64), count: usize) -> Nodes {
-    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+/// An even sequence over a square. Points farther out than `reach`, where no beam is, are left out.
+fn ragged((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
     let point = |i: usize| {
-        [0, 1].map(|k| center[k] + half * (2.0 * (0.5 + STEP[k] * i as f64).fract() - 1.0))
+        let u = additive([0.5; 2], i);
+        [0, 1].map(|k| center[k] + half * (2.0 * u[k] - 1.0))
     };
     let weight = 4.0 * half * half / count as f64;
-    Nodes {
-        points: (0..count).map(point).collect(),
-        weights: vec![weight; count],
-        mirrored: false,
-        rays: 0,
-    }
+    let points: Vec<_> = (0..count).map(point).filter(|p| p[0].hypot(p[1]) <= reach).collect();
+    Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
+}
+
+/// The error of clipped points from their last change: four times as many are no more than four
+/// times as good, even where two counts agree by chance.
+fn cautious(change: f64, error_before: f64) -> f64 {
+    let least = if error_before.is_finite() { 0.25 * error_before } else { 0.0 };
+    (2.0 * change).max(least)
 }
 
 /// Raises the order until each of some numbers changes by less than the tolerance times its scale;
@@ -211,10 +318,10 @@ pub fn converged<const K: usize>(
         if let Some(before) = before {
             let scales = scales(&values);
             now.errors = std::array::from_fn(|k| (values[k] - before.values[k]).abs());
-            now.reached = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
-            if matches!(region.kind, Kind::Ragged { .. }) {
-                now.errors = now.errors.map(|e| 2.0 * e);
+            if matches!(region.kind, Kind::Ragged { ring: None, .. }) {
+                now.errors = std::array::from_fn(|k| cautious(now.errors[k], before.errors[k]));
             }
+            now.reached = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
         }
         if now.reached {
             return Some(now);

@@ -4,9 +4,10 @@
 //! where light is, in how many pieces, and whether one point sees all of it; then the edge is
 //! followed from there.
 
-use super::boundary::{Boundary, Edge, Frame, NEAR, Search, dips};
+use super::boundary::{Boundary, Edge, Frame, NEAR, Search, Seen, dips};
 use super::launch::Launch;
 use super::quadrature::Nodes;
+use super::ring::Ring;
 use super::sample::{Pattern, pattern};
 use crate::trace::{Points, Rays, Sink};
 use std::f64::consts::{PI, TAU};
@@ -43,6 +44,8 @@ pub enum Kind {
         pieces: usize,
         /// A square that holds all of it: its centre and half of its side.
         square: ([f64; 2], f64),
+        /// Its two edges, where it is a ring about a shadow: its quadrature lies between them.
+        ring: Option<Box<Ring>>,
     },
     /// Nothing limits it, so that no beam is defined.
     Endless,
@@ -63,20 +66,23 @@ impl<'a> Region<'a> {
     /// The region of a launch.
     pub fn new(launch: Launch<'a>) -> Self {
         let disc = launch.bench.ends_at_disc();
+        let shadows = launch.shadows();
         let mut rays = 0;
         if launch.bench.stop_radius() == 0.0 {
             return Self { launch, kind: Kind::Dark, rays };
         }
-        if disc && launch.is_clear(&mut rays) {
+        if disc && launch.is_clear(&shadows, &mut rays) {
             return Self { launch, kind: Kind::Clear, rays };
         }
         let Some(grid) = Grid::on_light(&launch, &mut rays) else {
             return Self { launch, kind: Kind::Dark, rays };
         };
-        let kind = grid.kind(&launch);
-        if let Kind::Split(boundary) = &kind {
-            rays += boundary.rays;
-        }
+        let kind = grid.kind(&launch, &shadows);
+        rays += match &kind {
+            Kind::Split(boundary) => boundary.rays,
+            Kind::Ragged { ring: Some(ring), .. } => ring.rays(),
+            _ => 0,
+        };
         Self { launch, kind, rays }
     }
 
@@ -115,10 +121,25 @@ fn rim(azimuth: f64) -> [f64; 2] {
     azimuth.sin_cos().into()
 }
 
+/// The point of the unit disc nearest to another one.
+fn in_disc([x, y]: [f64; 2]) -> [f64; 2] {
+    let outside = x.hypot(y).max(1.0);
+    [x / outside, y / outside]
+}
+
 impl Launch<'_> {
-    /// Whether the whole disc gets through, told by the margins of rays at its rim and by where
-    /// they are least in between.
-    fn is_clear(&self, rays: &mut usize) -> bool {
+    /// Where in the pupil, inside or not, the shadow of every obstruction has its middle: the ray
+    /// through the vertex of the surface. `None` for one that was not found.
+    fn shadows(&self) -> Vec<Option<[f64; 2]>> {
+        let surfaces = self.color().system.surfaces.iter().enumerate();
+        let obstructed = surfaces.filter(|(_, surface)| surface.obstruction > 0.0);
+        obstructed.map(|(i, _)| self.through_vertex(i)).collect()
+    }
+
+    /// Whether the whole disc gets through, told by the margins of rays at its rim, by where they
+    /// are least in between, and by the ray that comes nearest to the middle of each shadow, which
+    /// may be too small for all of them.
+    fn is_clear(&self, shadows: &[Option<[f64; 2]>], rays: &mut usize) -> bool {
         let half = self.is_symmetric();
         let step = if half { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
         let mut margins = Vec::with_capacity(RIM_RAYS);
@@ -131,7 +152,10 @@ impl Launch<'_> {
         let dips = dips(&margins, half);
         *rays += dips.len();
         let passes = |p: [f64; 2]| self.margins_of_passing(p).is_some();
-        passes([0.0, 0.0]) && dips.into_iter().all(|dip| passes(rim(step * dip)))
+        *rays += shadows.len();
+        passes([0.0, 0.0])
+            && dips.into_iter().all(|dip| passes(rim(step * dip)))
+            && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(in_disc(p))))
     }
 
     /// Which of these pupil points get through the surfaces.
@@ -249,31 +273,45 @@ impl Grid {
         self.lit_cells().any(|i| at_edge(i % self.cells) || at_edge(i / self.cells))
     }
 
-    fn kind(&self, launch: &Launch<'_>) -> Kind {
+    fn kind(&self, launch: &Launch<'_>, shadows: &[Option<[f64; 2]>]) -> Kind {
         if !launch.bench.ends_at_disc() && self.touches_its_edge() {
             return Kind::Endless;
         }
         let pieces = self.pieces();
-        let ragged = Kind::Ragged { pieces, square: self.square() };
-        if pieces != 1 {
-            return ragged;
-        }
-        let frame = self.frame(launch);
         let end = if launch.is_symmetric() { PI } else { TAU };
         let azimuths = if launch.is_symmetric() { AZIMUTHS } else { 2 * AZIMUTHS };
-        match Search::new(launch, frame).boundary(end, azimuths) {
-            Some(boundary) if self.agrees(launch, &boundary) => Kind::Split(boundary),
-            Some(_) | None => ragged,
+        if pieces == 1
+            && let Some(boundary) = Search::new(launch, self.frame(launch)).boundary(end, azimuths)
+            && self.agrees(launch, &boundary, shadows)
+        {
+            return Kind::Split(boundary);
         }
+        let around = |middle: [f64; 2]| {
+            let symmetric = launch.is_symmetric();
+            let center = if symmetric { [0.0, middle[1]] } else { middle };
+            let frame = Frame { center, axes: self.axes(self.middle(), symmetric) };
+            Ring::around(launch, frame, end, azimuths)
+        };
+        let rings = shadows.iter().flatten().filter_map(|middle| around(*middle));
+        let ring = rings.into_iter().find(|ring| self.agrees_with_ring(launch, ring, shadows));
+        // A grid may be too coarse to see that a narrow ring hangs together.
+        let pieces = if ring.is_some() { 1 } else { pieces };
+        Kind::Ragged { pieces, square: self.square(), ring: ring.map(Box::new) }
+    }
+
+    /// The centroid of the light.
+    fn middle(&self) -> [f64; 2] {
+        let count = self.count() as f64;
+        let points = self.lit_cells().map(|i| self.point(i));
+        let sum = points.fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
+        [sum[0] / count, sum[1] / count]
     }
 
     /// The frame in which the light looks round about its centroid, or about the lit point nearest
     /// to that.
     fn frame(&self, launch: &Launch<'_>) -> Frame {
-        let count = self.count() as f64;
         let points = || self.lit_cells().map(|i| self.point(i));
-        let sum = points().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
-        let middle = [sum[0] / count, sum[1] / count];
+        let middle = self.middle();
         let mut center = if launch.is_symmetric() { [0.0, middle[1]] } else { middle };
         if !launch.is_lit(center) {
             let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
@@ -349,22 +387,56 @@ impl Grid {
         near(row).flat_map(move |r| near(column).map(move |c| r * cells + c))
     }
 
-    /// Whether light and dark lie on their sides of the edge; where a grid point is close to it,
-    /// the edge is looked for at its azimuth.
-    fn agrees(&self, launch: &Launch<'_>, boundary: &Boundary) -> bool {
-        let end = boundary.samples.last().map_or(TAU, |s| s.0);
+    /// Grid points and the middles of shadows, and whether they are lit.
+    fn seen<'b>(
+        &'b self,
+        shadows: &'b [Option<[f64; 2]>],
+    ) -> impl Iterator<Item = ([f64; 2], bool)> + 'b {
+        let cells = self.lit.iter().enumerate().map(|(i, lit)| (self.point(i), *lit));
+        cells.chain(shadows.iter().flatten().map(|p| (*p, false)))
+    }
+
+    /// Whether light and dark lie on their sides of the edge.
+    fn agrees(
+        &self,
+        launch: &Launch<'_>,
+        boundary: &Boundary,
+        shadows: &[Option<[f64; 2]>],
+    ) -> bool {
         let mut search = Search::new(launch, boundary.frame);
-        (0..self.lit.len()).all(|i| {
-            let (mut azimuth, r) = boundary.frame.polar(self.point(i));
-            if azimuth > end {
-                azimuth = TAU - azimuth;
-            }
-            let near = boundary.near(azimuth);
-            let fits = |radius: f64, slack: f64| {
-                if self.lit[i] { r <= radius + slack } else { r >= radius - slack }
-            };
-            let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
-            fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
+        self.seen(shadows).all(|(point, lit)| on_side(&mut search, boundary, point, lit))
+    }
+
+    /// Whether light lies between the two edges of a ring and dark does not.
+    fn agrees_with_ring(
+        &self,
+        launch: &Launch<'_>,
+        ring: &Ring,
+        shadows: &[Option<[f64; 2]>],
+    ) -> bool {
+        let Ring { outer, inner } = ring;
+        let mut rims = Search::new(launch, outer.frame).seeing(Seen::Rims);
+        let mut shadow = Search::new(launch, inner.frame).seeing(Seen::Shadow);
+        self.seen(shadows).all(|(point, lit)| {
+            let (light, dark) =
+                (on_side(&mut rims, outer, point, lit), on_side(&mut shadow, inner, point, !lit));
+            if lit { light && dark } else { light || dark }
         })
     }
+}
+
+/// Whether a point lies inside an edge, or outside, as it should; where it is close to it, the edge
+/// is looked for at its azimuth.
+fn on_side(search: &mut Search<'_>, boundary: &Boundary, point: [f64; 2], inside: bool) -> bool {
+    let end = boundary.samples.last().map_or(TAU, |s| s.0);
+    let (mut azimuth, r) = boundary.frame.polar(point);
+    if azimuth > end {
+        azimuth = TAU - azimuth;
+    }
+    let near = boundary.near(azimuth);
+    let fits = |radius: f64, slack: f64| {
+        if inside { r <= radius + slack } else { r >= radius - slack }
+    };
+    let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
+    fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
 }

@@ -81,11 +81,18 @@ fn disc(u: f64, v: f64) -> [f64; 2] {
     [u.sqrt() * cos, u.sqrt() * sin]
 }
 
+/// Point `i` of Roberts's additive sequence over the unit square, begun at `start`: points that fill
+/// it evenly for any count.
+pub(super) fn additive(start: [f64; 2], i: usize) -> [f64; 2] {
+    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+    [0, 1].map(|k| (start[k] + STEP[k] * i as f64).fract())
+}
+
 /// Steele, Lea and Flood's generator (OOPSLA 2014): small, seeded, the same everywhere.
-struct SplitMix(u64);
+pub(super) struct SplitMix(pub(super) u64);
 
 impl SplitMix {
-    fn uniform(&mut self) -> f64 {
+    pub(super) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

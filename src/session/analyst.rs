@@ -5,6 +5,7 @@
 
 use super::clock::{Timed, now, timed};
 use super::layout::{Layout, layout};
+use super::pupils::{Pupils, pupils};
 use super::saving::timed_plan;
 use super::scatter::{Scatter, scatter};
 use super::slot::{Mailbox, Slot};
@@ -54,6 +55,8 @@ pub struct Numbers {
     pub spots: Timed<Vec<Result<Spot, Dark>>>,
     /// The radius of the first dark ring of a perfect lens, in mm.
     pub airy: Option<f64>,
+    /// The pupil of each field; `None` where none is shown.
+    pub pupils: Option<Timed<Pupils>>,
     /// The ray fans of each field.
     pub fans: Timed<Vec<Result<Vec<Fan>, Dark>>>,
     /// Distortion at each field.
@@ -241,6 +244,8 @@ impl Numbers {
         go_on()?;
         let spots = timed(|| each(&b, |field| timed_spot(&b, field, accuracy)));
         go_on()?;
+        let pupils = settings.pupils.then(|| timed(|| pupils(&b, settings, accuracy)));
+        go_on()?;
         let fans = timed(|| each(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
         go_on()?;
         let illumination = timed(|| analysis::illumination(&b, b.primary, accuracy));
@@ -255,6 +260,7 @@ impl Numbers {
             layout,
             scatter,
             spots,
+            pupils,
             fans,
             illumination,
         })
@@ -272,6 +278,6 @@ fn timed_spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, D
 }
 
 /// A result for each field, in order.
-fn each<T: Send>(bench: &Bench, of: impl Fn(Field) -> T + Sync) -> Vec<T> {
+pub(super) fn each<T: Send>(bench: &Bench, of: impl Fn(Field) -> T + Sync) -> Vec<T> {
     bench.fields.par_iter().map(|field| of(*field)).collect()
 }

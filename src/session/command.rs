@@ -61,6 +61,12 @@ pub enum Command {
     ShowRays(usize),
     /// Whether a physical effect is computed: as planned, always or never.
     Choose(Effect, Choice),
+    /// Whether the pupils of the fields are computed: while a panel shows them.
+    ShowPupils(bool),
+    /// The wavelength of the pupils that are shown; `None` for the primary one.
+    ShowPupilWavelength(Option<usize>),
+    /// Point out a surface in every panel, or none.
+    Select(Option<usize>),
     /// Forget the messages so far.
     ClearMessages,
 }

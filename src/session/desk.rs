@@ -51,6 +51,8 @@ pub struct Session {
     /// The lens as its file has it.
     saved: Arc<Lens>,
     settings: Settings,
+    /// The surface that every panel points out.
+    selected: Option<usize>,
     messages: Vec<Message>,
     analyst: Analyst,
     worker: Worker,
@@ -96,6 +98,7 @@ impl Session {
             history: History::default(),
             path: None,
             settings: Settings::default(),
+            selected: None,
             messages: Vec::new(),
             analyst: Analyst::spawn(Savings::Measured, wake.clone())?,
             follower: Analyst::spawn(Savings::Left, wake.clone())?,
@@ -131,6 +134,11 @@ impl Session {
             Command::ShowZoom(zoom) => self.show_zoom(zoom),
             Command::ShowRays(rays) => self.set_up(|settings| settings.rays = rays.min(MOST_RAYS)),
             Command::Choose(effect, choice) => self.set_up(|s| s.choices.choose(effect, choice)),
+            Command::ShowPupils(shown) => self.set_up(|settings| settings.pupils = shown),
+            Command::ShowPupilWavelength(wavelength) => {
+                self.set_up(|settings| settings.pupil_wavelength = wavelength);
+            }
+            Command::Select(surface) => self.selected = surface,
             Command::ClearMessages => self.messages.clear(),
         }
         self.poll()
@@ -159,6 +167,7 @@ impl Session {
             path: self.path.clone(),
             dirty: self.is_dirty(),
             settings: self.settings.clone(),
+            selected: self.selected.filter(|surface| *surface < self.lens.surfaces.len()),
         }
     }
 
@@ -273,6 +282,8 @@ impl Session {
         self.saved = Arc::clone(&lens);
         self.path = path;
         self.settings.zoom = 0;
+        self.settings.pupil_wavelength = None;
+        self.selected = None;
         self.show(lens);
     }
 

@@ -22,6 +22,7 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         row.curvature *= factor.powi(-1);
         row.thickness *= factor;
         row.semi_diameter = row.semi_diameter.map(|sd| sd * factor);
+        row.obstruction = row.obstruction.map(|inner| inner * factor);
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
         }

@@ -34,6 +34,8 @@ pub struct View {
     pub dirty: bool,
     /// What is shown and how exactly.
     pub settings: Settings,
+    /// The surface that every panel points out.
+    pub selected: Option<usize>,
 }
 
 impl Default for View {
@@ -50,6 +52,7 @@ impl Default for View {
             path: None,
             dirty: false,
             settings: Settings::default(),
+            selected: None,
         }
     }
 }
@@ -82,11 +85,22 @@ pub struct Settings {
     pub rays: usize,
     /// Effects that are not left to the plan.
     pub choices: Choices,
+    /// Whether pupils are computed: what is not shown is not.
+    pub pupils: bool,
+    /// The wavelength of the pupils; `None` for the primary one.
+    pub pupil_wavelength: Option<usize>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance: 1e-3, zoom: 0, rays: 15, choices: Choices::default() }
+        Self {
+            tolerance: 1e-3,
+            zoom: 0,
+            rays: 15,
+            choices: Choices::default(),
+            pupils: false,
+            pupil_wavelength: None,
+        }
     }
 }
 

@@ -47,6 +47,12 @@ impl Dock {
         self.tree.tiles.find_pane(&kind).is_some_and(|tile| self.tree.tiles.is_visible(tile))
     }
 
+    /// Whether a panel can be seen: open, and not behind another one.
+    fn is_shown(&self, kind: Kind) -> bool {
+        let tile = self.tree.tiles.find_pane(&kind);
+        tile.is_some_and(|tile| self.tree.active_tiles().contains(&tile))
+    }
+
     /// Shows or hides a panel.
     pub fn toggle(&mut self, kind: Kind) {
         let open = !self.is_open(kind);
@@ -71,6 +77,10 @@ impl Dock {
     pub fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
         let Self { tree, panels } = self;
         tree.ui(&mut Shown { panels, view, wishes }, ui);
+        let pupils = self.is_shown(Kind::Pupil);
+        if pupils != view.settings.pupils {
+            wishes.push(Command::ShowPupils(pupils));
+        }
     }
 }
 
@@ -78,9 +88,10 @@ impl Dock {
 fn usual() -> Tree<Kind> {
     let mut tiles = Tiles::default();
     let mut pane = |kind: Kind| tiles.insert_pane(kind);
-    let [layout, spot, table, optimizer, first, effects] = [
+    let [layout, spot, pupil, table, optimizer, first, effects] = [
         Kind::Layout,
         Kind::Spot,
+        Kind::Pupil,
         Kind::Prescription,
         Kind::Optimizer,
         Kind::FirstOrder,
@@ -88,9 +99,10 @@ fn usual() -> Tree<Kind> {
     ]
     .map(&mut pane);
     let facts = tiles.insert_tab_tile(vec![first, effects]);
+    let light = tiles.insert_tab_tile(vec![spot, pupil]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(layout, 0.52), (table, 0.48)]);
-    let right = column(&mut tiles, &[(spot, 0.375), (optimizer, 0.625)]);
+    let right = column(&mut tiles, &[(light, 0.375), (optimizer, 0.625)]);
     let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
     Tree::new(Id::unique("dock"), root, tiles)
 }

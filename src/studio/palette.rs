@@ -25,6 +25,30 @@ const FIELDS_LIGHT: [[u8; 3]; 7] = [
     [90, 90, 90],
 ];
 
+/// Colours of what limits a pupil, in the order in which limits turn up: after the bright set of
+/// Paul Tol (2021), told apart by people with every kind of colour blindness. None stands for a
+/// field.
+const LIMITS_DARK: [[u8; 3]; 8] = [
+    [238, 119, 51],
+    [51, 187, 238],
+    [238, 90, 150],
+    [190, 200, 60],
+    [0, 175, 155],
+    [190, 140, 250],
+    [220, 190, 150],
+    [120, 150, 190],
+];
+const LIMITS_LIGHT: [[u8; 3]; 8] = [
+    [205, 85, 10],
+    [0, 120, 190],
+    [200, 30, 100],
+    [120, 125, 0],
+    [0, 125, 110],
+    [125, 70, 200],
+    [130, 90, 50],
+    [60, 85, 125],
+];
+
 /// What a drawing is coloured with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Palette {
@@ -78,6 +102,13 @@ impl Palette {
     /// The colour of a field by its place in the list.
     pub fn field(&self, index: usize) -> Colour {
         let set = if self.dark { FIELDS_DARK } else { FIELDS_LIGHT };
+        let [r, g, b] = set[index % set.len()];
+        [r, g, b, 255]
+    }
+
+    /// The colour of what limits a pupil, by the order in which limits have turned up.
+    pub fn limit(&self, index: usize) -> Colour {
+        let set = if self.dark { LIMITS_DARK } else { LIMITS_LIGHT };
         let [r, g, b] = set[index % set.len()];
         [r, g, b, 255]
     }

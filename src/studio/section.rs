@@ -200,7 +200,8 @@ mod tests {
 
     fn surface(curvature: f64, thickness: f64, index: f64, semi_diameter: f64) -> Surface<f64> {
         let shape = Shape::Sphere { curvature };
-        Surface { shape, thickness, index, semi_diameter, mirror: false, hyper: false }
+        let obstruction = 0.0;
+        Surface { shape, thickness, index, semi_diameter, obstruction, mirror: false, hyper: false }
     }
 
     fn singlet() -> System<f64> {

@@ -17,6 +17,7 @@
 use super::Tracer;
 use super::batch::{BLOCK, Block, CHUNK, Hits, Rays};
 use super::interface::{Form, Interface};
+use super::slot::Slot;
 use crate::lens::ASPHERE_TERMS;
 use crate::math::Real;
 use crate::math::Vec3;
@@ -66,6 +67,29 @@ impl<R: Real> Gradient<R> {
         Self { index_before: R::ZERO, surfaces: vec![SurfaceGradient::default(); surfaces] }
     }
 
+    /// All numbers, in a fixed order.
+    pub fn numbers(&self) -> impl Iterator<Item = R> {
+        let of = |s: &SurfaceGradient<R>| {
+            let SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter } = *s;
+            [curvature, conic, thickness, index, semi_diameter].into_iter().chain(terms)
+        };
+        std::iter::once(self.index_before).chain(self.surfaces.iter().flat_map(of))
+    }
+
+    /// The gradient of as many surfaces with these numbers, in that order; zero where there are
+    /// not enough of them.
+    pub fn from_numbers(surfaces: usize, numbers: impl IntoIterator<Item = R>) -> Self {
+        let mut numbers = numbers.into_iter();
+        let mut next = || numbers.next().unwrap_or_default();
+        let index_before = next();
+        let surface = |_| {
+            let [curvature, conic, thickness, index, semi_diameter] = [(); 5].map(|()| next());
+            let terms = [(); ASPHERE_TERMS].map(|()| next());
+            SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter }
+        };
+        Self { index_before, surfaces: (0..surfaces).map(surface).collect() }
+    }
+
     /// Adds another one, `factor` times.
     pub fn add(&mut self, other: &Self, factor: R) {
         self.index_before += other.index_before * factor;
@@ -80,25 +104,39 @@ impl<R: Real> Gradient<R> {
     }
 }
 
-/// A number of a surface that a ray depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Slot {
-    /// The curvature.
-    Curvature,
-    /// The conic constant.
-    Conic,
-    /// An asphere coefficient.
-    Term(usize),
-    /// The gap behind the surface.
-    Thickness,
-    /// The index behind the surface; `None` of the surfaces for the one in front of all.
-    Index,
-    /// The semi-diameter, on which no ray depends but the edge of a pupil does.
-    SemiDiameter,
+/// The derivatives of something that the adjoint of a block of rays begins with.
+pub(super) trait Sowing<R> {
+    /// By the landing of ray `j`.
+    fn seed(&self, j: usize) -> Seed<R>;
+
+    /// By how far each ray is from the limits of a surface, if anything depends on that.
+    #[inline(always)]
+    fn pulls(&self, _surface: usize) -> Option<&Pulls<R>> {
+        None
+    }
+}
+
+impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
+    #[inline(always)]
+    fn seed(&self, j: usize) -> Seed<R> {
+        self(j)
+    }
+}
+
+/// The derivatives of something by the limits of a surface (see [`super::limit`]): a column for each
+/// limit.
+#[derive(Debug, Clone)]
+pub(super) struct Pulls<R> {
+    pub(super) rim: [R; BLOCK],
+    pub(super) angle: [R; BLOCK],
+    /// Only where there is one.
+    pub(super) obstruction: Option<[R; BLOCK]>,
+    /// Only where a sheet can end anything.
+    pub(super) sheet: Option<[R; BLOCK]>,
 }
 
 /// Who takes the derivatives of a block of rays as they come.
-trait Harvest<R> {
+pub(super) trait Harvest<R> {
     /// The derivatives of a block by a number of a surface, to be added to what came before.
     /// `surface` is `None` for the index in front of the first surface.
     fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]);
@@ -197,7 +235,8 @@ impl<R: Real> Tracer<R> {
                 for from in (start..end).step_by(BLOCK) {
                     let count = BLOCK.min(end - from);
                     let block = self.outward(rays, from, count, &mut distances);
-                    self.homeward(block, &distances, count, |j| seed(from + j), &mut gradient);
+                    let seed = |j| seed(from + j);
+                    self.homeward(block, &distances, count, &seed, &mut gradient);
                 }
             },
         );
@@ -226,9 +265,9 @@ impl<R: Real> Tracer<R> {
                     columns.fill([R::ZERO; BLOCK]);
                     let (of_x, of_y) = columns.split_at_mut(wanted.len());
                     let mut rows = Rows { wanted, columns: of_x };
-                    self.homeward(block.clone(), &distances, count, |_| x, &mut rows);
+                    self.homeward(block.clone(), &distances, count, &|_| x, &mut rows);
                     let mut rows = Rows { wanted, columns: of_y };
-                    self.homeward(block, &distances, count, |_| y, &mut rows);
+                    self.homeward(block, &distances, count, &|_| y, &mut rows);
                     for j in 0..count {
                         let to = &mut matrix[(from + j) * row..(from + j + 1) * row];
                         to.iter_mut().zip(&columns).for_each(|(to, column)| *to = column[j]);
@@ -258,25 +297,30 @@ impl<R: Real> Tracer<R> {
 
     /// Retraces a block from the last surface to its start and passes on the derivatives.
     #[inline(always)]
-    fn homeward(
+    pub(super) fn homeward(
         &self,
         block: Block<R>,
         distances: &[[R; BLOCK]],
         count: usize,
-        seed: impl Fn(usize) -> Seed<R>,
+        sowing: &impl Sowing<R>,
         harvest: &mut impl Harvest<R>,
     ) {
         let mut way = Homeward::new(block);
-        self.sow(&mut way, count, &seed, harvest);
+        self.sow(&mut way, count, sowing, harvest);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
             way.s = *distance;
+            let pulls = sowing.pulls(i);
             // A factor that is known to be one costs nothing.
             if interface.sense > R::ZERO {
-                way.pass(&Interface { sense: R::ONE, ..*interface });
+                way.pass(&Interface { sense: R::ONE, ..*interface }, pulls);
             } else {
-                way.pass(&Interface { sense: -R::ONE, ..*interface });
+                way.pass(&Interface { sense: -R::ONE, ..*interface }, pulls);
             }
             way.harvest(interface, i, harvest);
+            if pulls.is_some() {
+                let lanes = way.arrived(&way.by_semi_diameter);
+                harvest.take(Some(i), Slot::SemiDiameter, &lanes);
+            }
         }
         self.launch_index(&way, harvest);
     }
@@ -287,7 +331,7 @@ impl<R: Real> Tracer<R> {
         &self,
         way: &mut Homeward<R>,
         count: usize,
-        seed: &impl Fn(usize) -> Seed<R>,
+        sowing: &impl Sowing<R>,
         harvest: &mut impl Harvest<R>,
     ) {
         let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
@@ -297,7 +341,7 @@ impl<R: Real> Tracer<R> {
             if way.block.code[j] > R::ZERO {
                 continue;
             }
-            let seed = seed(j);
+            let seed = sowing.seed(j);
             let (_, k) = way.block.state(j);
             let direction = seed.direction * inverse;
             way.set(j, seed.point, direction);
@@ -338,6 +382,7 @@ struct Homeward<R> {
     by_curvature: [R; BLOCK],
     by_conic: [R; BLOCK],
     by_gap: [R; BLOCK],
+    by_semi_diameter: [R; BLOCK],
     by_index_before: [R; BLOCK],
     by_index_behind: [R; BLOCK],
     by_terms: [[R; BLOCK]; ASPHERE_TERMS],
@@ -367,7 +412,28 @@ fn conic_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
     Normal { vector, m: vector.dot(vector), unit: false }
 }
 
+impl<R: Real> Interface<R> {
+    /// The adjoint of the limit of the angle, and what is left of it for the square of the index in
+    /// front, all else of the index apart.
+    #[inline(always)]
+    fn slanted(&self, pull: R, normal: Normal<R>, back: Refracted<R>) -> (Refracted<R>, R) {
+        let share = pull / self.n2;
+        let loss = self.loss();
+        let by_a = -((back.a + back.a) * share);
+        let mut by_normal = back.by_normal + back.k * by_a;
+        if !normal.unit {
+            by_normal = by_normal + normal.vector * (loss * share * R::TWO);
+        }
+        let by_k = back.by_k + normal.vector * by_a;
+        let by_behind2 = R::select(loss > R::ZERO, -(share * normal.m), R::ZERO);
+        let by_dn2 = back.by_dn2 + by_behind2;
+        let by_n2 = (back.a * back.a - loss * normal.m) * share / self.n2;
+        (Refracted { by_k, by_normal, by_dn2, ..back }, by_n2)
+    }
+}
+
 /// What refraction read backwards gives.
+#[derive(Clone, Copy)]
 struct Refracted<R> {
     /// The direction in front.
     k: Vec3<R>,
@@ -429,6 +495,7 @@ impl<R: Real> Homeward<R> {
             by_curvature: zero,
             by_conic: zero,
             by_gap: zero,
+            by_semi_diameter: zero,
             by_index_before: zero,
             by_index_behind: zero,
             by_terms: [zero; ASPHERE_TERMS],
@@ -453,12 +520,70 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through a surface to the one before.
     #[inline(always)]
-    fn pass(&mut self, surface: &Interface<R>) {
+    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&Pulls<R>>) {
+        let sheet = pulls.and_then(|pulls| {
+            self.pull_rim(surface, &pulls.rim);
+            if let Some(pull) = &pulls.obstruction {
+                self.pull_radius(pull, -(R::ONE / surface.obstruction2));
+            }
+            pulls.sheet.as_ref().map(|sheet| self.pull_sheet(surface, sheet))
+        });
+        let angle = pulls.map(|pulls| &pulls.angle);
         match surface.form {
-            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal),
-            Form::Conic => self.retrace(surface, conic_normal),
-            Form::Asphere => self.retrace_asphere(surface),
+            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, angle),
+            Form::Conic => self.retrace(surface, conic_normal, angle),
+            Form::Asphere => self.retrace_asphere(surface, angle),
         }
+        if let Some([by_curvature, by_conic]) = sheet {
+            for j in 0..BLOCK {
+                self.by_curvature[j] += by_curvature[j];
+                self.by_conic[j] += by_conic[j];
+            }
+        }
+    }
+
+    /// The adjoint of the rim.
+    #[inline(always)]
+    fn pull_rim(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) {
+        let (inverse, radius) = (R::ONE / surface.rim2, surface.rim2.sqrt());
+        self.pull_radius(pull, inverse);
+        for (j, pull) in pull.iter().enumerate() {
+            let (p, _) = self.block.state(j);
+            self.by_semi_diameter[j] = -(*pull * inverse * (p.x * p.x + p.y * p.y) / radius);
+        }
+    }
+
+    /// The adjoint of half the square of the distance from the axis, `factor` times.
+    #[inline(always)]
+    fn pull_radius(&mut self, pull: &[R; BLOCK], factor: R) {
+        for (j, pull) in pull.iter().enumerate() {
+            let (p, _) = self.block.state(j);
+            let share = *pull * factor;
+            self.by_x[j] += p.x * share;
+            self.by_y[j] += p.y * share;
+        }
+    }
+
+    /// The adjoint of the edge of a conic; what it leaves for the curvature and the conic constant.
+    #[inline(always)]
+    fn pull_sheet(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) -> [[R; BLOCK]; 2] {
+        let (c, k1) = (surface.curvature, R::ONE + surface.conic);
+        let mut left = [[R::ZERO; BLOCK]; 2];
+        for (j, pull) in pull.iter().enumerate() {
+            let (p, _) = self.block.state(j);
+            if surface.form == Form::Asphere {
+                let (r2, pull) = (p.x * p.x + p.y * p.y, c * *pull);
+                let outward = k1 * c * pull * R::TWO;
+                self.by_x[j] += p.x * outward;
+                self.by_y[j] += p.y * outward;
+                (left[0][j], left[1][j]) = (k1 * r2 * pull * R::TWO, c * r2 * pull);
+            } else {
+                let along = p.z * *pull;
+                self.by_z[j] += k1 * c * *pull;
+                (left[0][j], left[1][j]) = (k1 * along, c * along);
+            }
+        }
+        left
     }
 
     /// Goes back through a conic (a plane, a sphere) to the surface before.
@@ -467,6 +592,7 @@ impl<R: Real> Homeward<R> {
         &mut self,
         surface: &Interface<R>,
         normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
+        angle: Option<&[R; BLOCK]>,
     ) {
         let surface = *surface;
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
@@ -474,7 +600,11 @@ impl<R: Real> Homeward<R> {
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
             let normal = normal(&surface, p);
-            let back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut by_n2 = R::ZERO;
+            if let Some(angle) = angle {
+                (back, by_n2) = surface.slanted(angle[j], normal, back);
+            }
             let n = back.by_normal;
             let by_point = self.by_point(j) - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
@@ -484,12 +614,15 @@ impl<R: Real> Homeward<R> {
                 self.by_conic[j] = c * p.z * (lambda * p.z * half - n.z);
             }
             self.step_back(&surface, j, p, &back, by_point - normal.vector * lambda);
+            if angle.is_some() {
+                self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
+            }
         }
     }
 
     /// Goes back through an asphere to the surface before.
     #[inline(always)]
-    fn retrace_asphere(&mut self, surface: &Interface<R>) {
+    fn retrace_asphere(&mut self, surface: &Interface<R>, angle: Option<&[R; BLOCK]>) {
         let surface = *surface;
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
@@ -497,7 +630,11 @@ impl<R: Real> Homeward<R> {
             let slope = -(sag.slope + sag.slope);
             let vector = Vec3::new(p.x * slope, p.y * slope, R::ONE);
             let normal = Normal { vector, m: vector.dot(vector), unit: false };
-            let back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut back = unrefract(&surface, normal, behind, self.by_k(j));
+            let mut by_n2 = R::ZERO;
+            if let Some(angle) = angle {
+                (back, by_n2) = surface.slanted(angle[j], normal, back);
+            }
             // N = (−2 x w, −2 y w, 1) with w = dz/dr².
             let n = back.by_normal;
             let by_slope = -(p.x * n.x + p.y * n.y) * R::TWO;
@@ -509,6 +646,9 @@ impl<R: Real> Homeward<R> {
             let terms = sag.by_terms(lambda, by_slope);
             self.by_terms.iter_mut().zip(terms).for_each(|(column, by_term)| column[j] = by_term);
             self.step_back(&surface, j, p, &back, by_point - vector * lambda);
+            if angle.is_some() {
+                self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
+            }
         }
     }
 
@@ -533,13 +673,16 @@ impl<R: Real> Homeward<R> {
         self.block.set(j, Vec3::new(start.x, start.y, start.z + surface.gap), back.k);
     }
 
-    /// Hands over the derivatives by the numbers of a surface. A lost ray counts nothing, whatever
-    /// its numbers have become.
+    /// A lost ray counts nothing, whatever its numbers have become.
+    #[inline(always)]
+    fn arrived(&self, lanes: &[R; BLOCK]) -> [R; BLOCK] {
+        std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
+    }
+
+    /// Hands over the derivatives by the numbers of a surface.
     #[inline(always)]
     fn harvest(&self, surface: &Interface<R>, i: usize, harvest: &mut impl Harvest<R>) {
-        let arrived = |lanes: &[R; BLOCK]| -> [R; BLOCK] {
-            std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
-        };
+        let arrived = |lanes: &[R; BLOCK]| self.arrived(lanes);
         harvest.take(Some(i), Slot::Curvature, &arrived(&self.by_curvature));
         if matches!(surface.form, Form::Conic | Form::Asphere) {
             harvest.take(Some(i), Slot::Conic, &arrived(&self.by_conic));

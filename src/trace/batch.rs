@@ -346,6 +346,32 @@ impl<R: Real> Block<R> {
         }
     }
 
+    /// Takes rays as they are made.
+    #[inline(always)]
+    pub(super) fn start(&mut self, index: R, ray: impl Fn(usize) -> Ray<R>) {
+        for j in 0..BLOCK {
+            let ray = ray(j);
+            self.set(j, ray.point, launch(ray.direction, index));
+            self.code[j] = R::ZERO;
+        }
+    }
+
+    /// The same rays over another number type.
+    #[inline(always)]
+    pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Block<S> {
+        let column = |from: &[R; BLOCK]| std::array::from_fn(|j| f(from[j]));
+        Block {
+            x: column(&self.x),
+            y: column(&self.y),
+            z: column(&self.z),
+            kx: column(&self.kx),
+            ky: column(&self.ky),
+            kz: column(&self.kz),
+            opl: column(&self.opl),
+            code: column(&self.code),
+        }
+    }
+
     /// Point and optical direction of a ray.
     #[inline(always)]
     pub(super) fn state(&self, j: usize) -> (Vec3<R>, Vec3<R>) {
@@ -363,7 +389,7 @@ impl<R: Real> Block<R> {
     fn cross<S: Sink<R>>(&mut self, interface: &Interface<R>, number: u32) {
         if S::PATH {
             let mut opl = self.opl;
-            self.meet(interface, number, |j, s| opl[j] += s * interface.n2);
+            self.meet(interface, number, |j, met| opl[j] += met.s * interface.n2);
             self.opl = opl;
         } else {
             self.meet(interface, number, |_, _| {});
@@ -378,26 +404,76 @@ impl<R: Real> Block<R> {
         number: u32,
         distance: &mut [R; BLOCK],
     ) {
-        self.meet(interface, number, |j, s| distance[j] = s);
+        self.meet(interface, number, |j, met| distance[j] = met.s);
     }
 
     /// Crosses a surface; the two senses of travel are compiled apart, since a factor that is known
     /// to be one costs nothing.
     #[inline(always)]
-    fn meet(&mut self, interface: &Interface<R>, number: u32, keep: impl FnMut(usize, R)) {
+    pub(super) fn meet(
+        &mut self,
+        interface: &Interface<R>,
+        number: u32,
+        keep: impl FnMut(usize, &Meeting<R>),
+    ) {
         if interface.sense > R::ZERO {
             self.meet_along(&Interface { sense: R::ONE, ..*interface }, number, keep);
         } else {
             self.meet_along(&Interface { sense: -R::ONE, ..*interface }, number, keep);
         }
+        if interface.obstruction2 > R::ZERO {
+            self.obstruct(interface, number);
+        }
+    }
+
+    /// Clips the rays that met a surface inside its obstruction.
+    #[inline(always)]
+    fn obstruct(&mut self, interface: &Interface<R>, number: u32) {
+        let lost = |cause: u32| R::from_f64(f64::from(4 * number + cause));
+        let (clipped, reflected) = (lost(CLIPPED), lost(TOTAL_REFLECTION));
+        for j in 0..BLOCK {
+            let (p, _) = self.state(j);
+            let code = self.code[j];
+            let arrived = !(code > R::ZERO) | (code == reflected);
+            self.code[j] = R::select(arrived & interface.obstructs(p), clipped, code);
+        }
     }
 
     #[inline(always)]
-    fn meet_along(&mut self, interface: &Interface<R>, number: u32, keep: impl FnMut(usize, R)) {
+    fn meet_along(
+        &mut self,
+        interface: &Interface<R>,
+        number: u32,
+        keep: impl FnMut(usize, &Meeting<R>),
+    ) {
         match interface.form {
-            Form::Plane => self.sweep(interface, number, |i, _, p, k| i.meet_plane(p, k), keep),
-            Form::Sphere => self.sweep(interface, number, |i, _, p, k| i.meet_sphere(p, k), keep),
-            Form::Conic => self.sweep(interface, number, |i, _, p, k| i.meet_conic(p, k), keep),
+            Form::Plane => {
+                self.sweep(
+                    interface,
+                    number,
+                    #[inline(always)]
+                    |i, _, p, k| i.meet_plane(p, k),
+                    keep,
+                );
+            }
+            Form::Sphere => {
+                self.sweep(
+                    interface,
+                    number,
+                    #[inline(always)]
+                    |i, _, p, k| i.meet_sphere(p, k),
+                    keep,
+                );
+            }
+            Form::Conic => {
+                self.sweep(
+                    interface,
+                    number,
+                    #[inline(always)]
+                    |i, _, p, k| i.meet_conic(p, k),
+                    keep,
+                );
+            }
             Form::Asphere if R::ORDER > 0 => {
                 self.sweep(interface, number, |i, _, p, k| i.meet_asphere(p, k), keep);
             }
@@ -442,7 +518,7 @@ impl<R: Real> Block<R> {
         interface: &Interface<R>,
         number: u32,
         meet: impl Fn(&Interface<R>, usize, Vec3<R>, Vec3<R>) -> Meeting<R>,
-        mut keep: impl FnMut(usize, R),
+        mut keep: impl FnMut(usize, &Meeting<R>),
     ) {
         let interface = *interface;
         let lost = |cause: u32| R::from_f64(f64::from(4 * number + cause));
@@ -451,9 +527,10 @@ impl<R: Real> Block<R> {
         for j in 0..BLOCK {
             let (p, k) = self.state(j);
             let p = Vec3::new(p.x, p.y, p.z - interface.gap);
-            let crossing = interface.go_on(meet(&interface, j, p, k), k);
+            let met = meet(&interface, j, p, k);
+            keep(j, &met);
+            let crossing = interface.go_on(met, k);
             self.set(j, crossing.point, crossing.k);
-            keep(j, crossing.s);
             let code = code(&crossing, missed, clipped, reflected);
             self.code[j] = R::select(self.code[j] > R::ZERO, self.code[j], code);
         }

@@ -9,7 +9,7 @@ pub enum Fate {
     Imaged,
     /// It does not meet the surface.
     Missed(u32),
-    /// It meets the surface outside the semi-diameter.
+    /// It meets the surface outside the semi-diameter or inside the obstruction.
     Clipped(u32),
     /// It is totally reflected.
     TotalReflection(u32),
@@ -63,7 +63,7 @@ pub struct Fates {
     pub imaged: usize,
     /// Missed a surface.
     pub missed: usize,
-    /// Clipped by a semi-diameter.
+    /// Clipped by a semi-diameter or an obstruction.
     pub clipped: usize,
     /// Totally reflected.
     pub total_reflection: usize,

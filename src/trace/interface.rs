@@ -52,6 +52,8 @@ pub(super) struct Interface<R> {
     pub(super) dn2: R,
     /// The square of the semi-diameter.
     pub(super) rim2: R,
+    /// The square of the radius of the obstruction, 0 where there is none.
+    pub(super) obstruction2: R,
     /// `1 − (1+κ) c z` may not fall below this: 0 on the sag sheet, anything where the far half
     /// of an ellipsoid counts too.
     pub(super) sheet: R,
@@ -115,6 +117,7 @@ pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
             index_behind: behind,
             dn2: (behind - n) * (behind + n),
             rim2,
+            obstruction2: surface.obstruction * surface.obstruction,
             sheet: R::from_f64(if whole { f64::NEG_INFINITY } else { 0.0 }),
             steepest: asphere::steepest(&surface.shape, surface.semi_diameter.value()),
             span: asphere::span(&surface.shape, surface.semi_diameter.value()),
@@ -147,10 +150,19 @@ impl<R: Real> Interface<R> {
             Form::Conic => self.meet_conic(start, k),
             Form::Asphere => self.meet_asphere(start, k),
         };
-        self.go_on(met, k)
+        let crossing = self.go_on(met, k);
+        let clipped = crossing.clipped || self.obstructs(met.point);
+        Crossing { clipped, ..crossing }
     }
 
-    /// Clips, then refracts or reflects.
+    /// Whether a point of the surface lies inside its obstruction. Asked apart from
+    /// [`Interface::go_on`], so that the many surfaces without one pay nothing.
+    #[inline(always)]
+    pub(super) fn obstructs(&self, p: Vec3<R>) -> bool {
+        p.x * p.x + p.y * p.y < self.obstruction2
+    }
+
+    /// Clips at the rim, then refracts or reflects.
     #[inline(always)]
     pub(super) fn go_on(&self, met: Meeting<R>, k: Vec3<R>) -> Crossing<R> {
         let p = met.point;
@@ -281,6 +293,7 @@ impl<R: Real> Interface<R> {
             index_behind: self.index_behind.value(),
             dn2: self.dn2.value(),
             rim2: self.rim2.value(),
+            obstruction2: self.obstruction2.value(),
             sheet: self.sheet.value(),
             steepest: self.steepest,
             span: self.span,

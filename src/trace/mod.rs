@@ -12,17 +12,22 @@
 mod asphere;
 mod backward;
 mod batch;
+mod edge;
 mod fate;
 mod interface;
+mod limit;
 mod margin;
 mod single;
+mod slot;
 
 pub use crate::math::Width;
-pub use backward::{Gradient, Seed, Slot, SurfaceGradient};
+pub use backward::{Gradient, Seed, SurfaceGradient};
 pub use batch::{Hits, Points, Rays, Sink};
 pub use fate::{Fate, Fates};
+pub use limit::{Abreast, LANES, PupilTracer};
 pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};
+pub use slot::Slot;
 
 use crate::lens::Invalid;
 use crate::lens::System;
@@ -45,6 +50,16 @@ impl<R: Real> Tracer<R> {
         system.check()?;
         let interfaces = interface::interfaces(system);
         Ok(Self { interfaces, index_before: system.index_before })
+    }
+
+    /// The same surfaces with no rim that clips. An asphere still ends where it was said to end:
+    /// behind that its polynomial means nothing.
+    #[must_use]
+    pub fn opened(mut self) -> Self {
+        for interface in &mut self.interfaces {
+            (interface.rim2, interface.obstruction2) = (R::from_f64(f64::INFINITY), R::ZERO);
+        }
+        self
     }
 
     /// How many surfaces a ray crosses, the image plane included.

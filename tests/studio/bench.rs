@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use aplanat::files;
 use aplanat::lens::Lens;
-use aplanat::session::{Command, Results, View, compute};
+use aplanat::session::{Command, Results, Settings, View, compute};
 use aplanat::studio::panels::Panel;
 use aplanat::studio::theme;
 use egui_kittest::Harness;
@@ -15,10 +15,11 @@ pub(super) fn double_gauss() -> Lens {
     files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens
 }
 
-/// A view of a lens with all its numbers.
+/// A view of a lens with all its numbers, those of its pupils too.
 pub(super) fn view_of(lens: Lens) -> View {
     let lens = Arc::new(lens);
-    let view = View { lens: Arc::clone(&lens), version: 1, ..View::default() };
+    let settings = Settings { pupils: true, ..Settings::default() };
+    let view = View { lens: Arc::clone(&lens), version: 1, settings, ..View::default() };
     let (version, settings) = (view.version, view.settings.clone());
     let numbers = compute(&lens, &settings);
     let results = Results { version, lens, settings, numbers, ms: 1.0 };
@@ -42,7 +43,13 @@ pub(super) fn stand<P: Panel + 'static>(panel: P, view: View) -> Harness<'static
     let state = Stand { panel, view, wishes: Vec::new() };
     let builder = Harness::builder().with_size([900.0, 620.0]).with_context_setup(theme::dress);
     let show = |ui: &mut eframe::egui::Ui, stand: &mut Stand<P>| {
+        let before = stand.wishes.len();
         stand.panel.ui(ui, &stand.view, &mut stand.wishes);
+        for wish in &stand.wishes[before..] {
+            if let Command::Select(surface) = wish {
+                stand.view.selected = *surface;
+            }
+        }
     };
     builder.build_ui_state(show, state)
 }

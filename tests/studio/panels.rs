@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use aplanat::effects::{Choice, Effect};
-use aplanat::lens::{Medium, Object, Parameter, Quantity, Variable};
+use aplanat::lens::{Aperture, Medium, Object, Parameter, Quantity, Row, Variable};
 use aplanat::optimize::{Method, Progress};
 use aplanat::session::{Command, Edit, Search, Standing, Task, View};
 use aplanat::studio::draw::Backing;
 use aplanat::studio::panels::{
-    Effects, FirstOrderData, LensLayout, Optimizer, Panel, Prescription, SpotDiagram,
+    Effects, FirstOrderData, LensLayout, Optimizer, Panel, Prescription, Pupils, SpotDiagram,
 };
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
@@ -254,6 +254,98 @@ fn the_error_of_spots_can_be_chosen() {
     harness.get_by_label("1e-6").click();
     harness.run();
     assert_eq!(harness.state().wishes, [Command::SetTolerance(1e-6)]);
+}
+
+fn pupils(lens: aplanat::lens::Lens) -> Harness<'static, Stand<Pupils>> {
+    let mut harness = stand(Pupils::default(), crate::bench::view_of(lens));
+    harness.run();
+    harness
+}
+
+#[test]
+fn pupils_show_what_limits_them_with_area_and_error() {
+    let harness = pupils(double_gauss());
+    harness.get_by_label("Pupil of field 1: stop, surface 6 100 %");
+    harness.get_by_label(
+        "Pupil of field 3: rim of surface 1 47 %, rim of surface 11 43 %, stop, surface 6 10 %",
+    );
+    for text in ["94.61 mm² ±", "100 % of the axis ±", "64.82 % of the axis ±"] {
+        harness.get_by_label_contains(text);
+    }
+    harness.get_by_label("11 43 %");
+    assert_eq!(harness.get_all_by_label_contains(" rays, ").count(), 3);
+}
+
+#[test]
+fn a_limit_of_the_pupil_points_its_surface_out_and_no_longer() {
+    let mut harness = pupils(double_gauss());
+    for wanted in [Some(10), None] {
+        harness.get_by_label("Rim of surface 11").click();
+        harness.run();
+        assert_eq!(harness.state().wishes.last(), Some(&Command::Select(wanted)));
+    }
+}
+
+#[test]
+fn a_click_on_the_edge_of_a_pupil_points_its_surface_out() {
+    let mut harness = pupils(double_gauss());
+    // The rim of surface 1 is the lower edge of the third pupil: the first thing above its bottom.
+    let picture = harness.get_by_label_contains("Pupil of field 3").rect();
+    for i in 0..60 {
+        let at = picture.center_bottom() - eframe::egui::vec2(0.0, 4.0 * i as f32);
+        harness.hover_at(at);
+        harness.run();
+        harness.drag_at(at);
+        harness.drop_at(at);
+        harness.run();
+        if !harness.state().wishes.is_empty() {
+            break;
+        }
+    }
+    assert_eq!(harness.state().wishes, [Command::Select(Some(0))]);
+}
+
+#[test]
+fn the_wavelength_of_pupils_can_be_chosen() {
+    let mut harness = pupils(double_gauss());
+    harness.get_by_label("Wavelength of the pupils").click();
+    harness.run();
+    harness.get_by_label("486.1 nm").click();
+    harness.run();
+    assert_eq!(harness.state().wishes, [Command::ShowPupilWavelength(Some(0))]);
+}
+
+#[test]
+fn a_dark_pupil_says_what_ends_its_rays_and_what_to_do() {
+    let mut lens = double_gauss();
+    lens.fields.values[2].y = 40.0;
+    let harness = pupils(lens);
+    harness.get_by_label("Pupil of field 3: dark");
+    harness
+        .get_by_label_contains("Dark: surface 1 clips 90 of 127 rays, the chief ray among them.");
+}
+
+#[test]
+fn a_ragged_pupil_is_told_in_pieces() {
+    let mut lens = double_gauss();
+    let row = |curvature, thickness, medium, limit: f64| Row {
+        curvature,
+        thickness,
+        medium,
+        semi_diameter: Some(limit),
+        ..Row::default()
+    };
+    // Spherical aberration behind a small hole: the middle and one zone get through.
+    lens.surfaces = vec![
+        Row { stop: true, ..row(0.02, 8.0, Medium::Index(1.5), 14.0) },
+        row(-0.02, 44.4, Medium::Air, 14.0),
+        row(0.0, 5.0, Medium::Air, 0.12),
+    ];
+    lens.aperture = Aperture::EntrancePupilDiameter(26.0);
+    lens.fields.values.truncate(1);
+    lens.variables.clear();
+    let harness = pupils(lens);
+    harness.get_by_label("ragged: 2 pieces");
 }
 
 #[test]

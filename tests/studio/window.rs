@@ -177,6 +177,30 @@ fn bundled_lenses_open_from_the_menu() {
 }
 
 #[test]
+fn pupils_are_computed_while_they_are_shown_and_follow_an_edit() {
+    let mut harness = window();
+    let pupils = |harness: &Harness<'_, Studio>| {
+        let results = harness.state().session().results().unwrap();
+        results.numbers.as_ref().unwrap().pupils.is_some()
+    };
+    assert!(!pupils(&harness), "what is not shown is not computed");
+    harness.get_by_label("Pupil").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    assert!(pupils(&harness));
+    harness.get_by_label_contains("94.61 mm² ±");
+    type_radius(&mut harness, "14.5");
+    assert!(harness.query_by_label_contains("94.61 mm² ±").is_none(), "the pupil follows");
+    harness.get_by_label("Rim of surface 11").click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().session().view().selected, Some(10));
+    harness.get_by_label("Spot diagram").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    assert!(!pupils(&harness));
+}
+
+#[test]
 fn nothing_repaints_while_nothing_changes() {
     let mut harness = window();
     harness.get_by_label("Radius of surface 1").focus();

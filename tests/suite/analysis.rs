@@ -2,12 +2,13 @@
 
 use crate::reference::{Reference, Worst, count, lenses, number, numbers};
 use aplanat::analysis::{
-    contrast, distortion, fan, field_curvature, illumination, path_differences, spot, wavefront,
+    Form, contrast, distortion, fan, field_curvature, illumination, path_differences, pupil, spot,
+    wavefront,
 };
 use aplanat::lens::{Field, FieldKind};
 use aplanat::paraxial::{Beam, first_order, seidel};
 use aplanat::pupil::{Accuracy, Bench};
-use aplanat::trace::Tracer;
+use aplanat::trace::{Fate, Tracer};
 
 const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, most_rays: 400_000 };
 
@@ -245,4 +246,44 @@ fn an_error_estimate_covers_the_error() {
     }
     println!("largest error over its estimate: {worst:.2} in {count} spots");
     assert!(worst < 1.0);
+}
+
+fn bundled(name: &str) -> aplanat::lens::Lens {
+    aplanat::files::open(format!("lenses/{name}.json")).unwrap().lens
+}
+
+#[test]
+fn the_pupil_of_a_dark_field_tells_which_surface_ends_most_rays() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    let field = Field { x: 0.0, y: 40.0, weight: 1.0 };
+    lens.fields.values.push(field);
+    let bench = Bench::of(&lens, 0).unwrap();
+    let dark = pupil(&bench, field, bench.primary, Accuracy::default());
+    let Form::Dark(loss) = dark.form else { panic!("{:?}", dark.form) };
+    assert_eq!((loss.most, loss.rays, loss.chief), (Some(Fate::Clipped(0)), 127, true));
+    let whole = pupil(&bench, Field { y: 0.0, ..field }, bench.primary, Accuracy::default());
+    let share = dark.share_of(whole.light.unwrap().area).unwrap();
+    assert_eq!(share.value, 0.0);
+    assert!(dark.light.is_none());
+}
+
+#[test]
+fn wide_pupils_are_compared_across_the_beam() {
+    let bench = Bench::of(&bundled("fisheye_minolta_16_f28"), 0).unwrap();
+    let seen = |y: f64| {
+        let field = Field { x: 0.0, y, weight: 1.0 };
+        pupil(&bench, field, bench.primary, Accuracy::default())
+    };
+    let axis = seen(0.0).light.unwrap().area;
+    // The aperture is f/2.8 at 16 mm, and no surface clips on the axis.
+    let exact = std::f64::consts::PI * (bench.first.entrance_pupil.diameter.unwrap() / 2.0).powi(2);
+    assert!((axis.value / exact - 1.0).abs() < 1e-12);
+    let mut before = 1.0 + 1e-9;
+    for angle in [20.0, 45.0, 80.0, 92.0] {
+        let pupil = seen(angle);
+        let share = pupil.share_of(axis).unwrap();
+        println!("{angle} degrees: {:.4} of the pupil on the axis", share.value);
+        assert!(pupil.across && share.value < before && share.value > 0.1);
+        before = share.value;
+    }
 }

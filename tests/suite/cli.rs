@@ -96,8 +96,10 @@ fn every_subcommand_has_long_help_with_its_json() {
         "gradient",
         "optimize",
         "convert",
+        "experiment",
         "measure trace",
         "measure spot",
+        "measure gradient",
         "measure optimize",
         "measure window",
     ];
@@ -483,6 +485,34 @@ fn convert_refuses_what_is_no_lens_and_where_it_cannot_write() {
 }
 
 #[test]
+fn experiment_writes_its_data_and_its_pictures() {
+    let folder = temporary("experiment");
+    let arguments = ["experiment", "3.3", "--out", folder.to_str().unwrap()];
+    let report = done_json(&arguments, "");
+    has_keys(&report, &["id", "title", "claim", "ms", "holds", "claims", "tables", "rays"]);
+    let keys = ["says", "value", "error", "unit", "rule", "limit", "holds"];
+    assert!(report["claims"].as_array().unwrap().iter().all(|claim| {
+        has_keys(claim, &keys);
+        claim["holds"] == true
+    }));
+    for file in report["files"].as_array().unwrap() {
+        let path = folder.join(file.as_str().unwrap());
+        assert!(std::fs::metadata(&path).unwrap().len() > 100, "{}", path.display());
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn experiment_lists_all_and_refuses_others() {
+    let list = done_json(&["experiment"], "");
+    has_keys(&list[0], &["id", "title", "claim", "seconds"]);
+    assert!(done(&["experiment"], "").contains("3.3"));
+    refused(2, &["experiment", "9.9"], "", &["`9.9`", "3.3"]);
+    refused(2, &["experiment", "3.3", "--out", LENS], "", &[LENS, "folder"]);
+    refused(2, &["experiment", "--out", "here"], "", &["FIGURE"]);
+}
+
+#[test]
 fn measure_trace_has_a_rate_for_every_way() {
     let measured = done_json(&["measure", "trace", "--turns", "1"], "");
     has_keys(&measured["machine"], &["processor", "cores", "lane_bits", "optimised"]);
@@ -528,6 +558,37 @@ fn measure_spot_draws_error_against_time() {
     assert!(best("gauss") < 1e-10 && best("square_grid") > 1e-6);
     assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
     refused(2, &["measure", "spot", singlet, "--plot", "curves.gif"], "", &["`gif`", "`.png`"]);
+}
+
+#[test]
+fn measure_gradient_draws_the_error_of_every_estimator_against_time() {
+    let plot = Scratch::new("gradients.png");
+    let singlet = "lenses/singlet_la1131.json";
+    let measured = done_json(&["measure", "gradient", singlet, "--plot", plot.path()], "");
+    has_keys(&measured, &["machine", "lens", "fields", "costs"]);
+    let fields = measured["fields"].as_array().unwrap();
+    assert_eq!(fields[0]["y"], 0.0);
+    for field in fields {
+        let keys = ["light", "planned", "reason", "reference", "checked", "rows"];
+        has_keys(field, &keys);
+        assert!(field["checked"][0].as_f64().unwrap() < 1e-6, "{field}");
+        let worst = |estimator: &str, last: bool| {
+            let rows = field["rows"].as_array().unwrap();
+            let mut mine = rows.iter().filter(|row| row["estimator"] == estimator);
+            let row = if last { mine.next_back() } else { mine.next() }.unwrap();
+            let errors = row["errors"].as_array().unwrap().iter().filter_map(Value::as_f64);
+            errors.fold(0.0, f64::max)
+        };
+        assert!(worst("boundary", true) < 1e-10 && worst("biased", true) > 0.1);
+        assert!(worst("warp", true) < 0.1 && worst("difference", true) < 1e-6);
+    }
+    let cost = |i: usize, key: &str| measured["costs"][i][key].as_f64().unwrap();
+    assert!(cost(3, "numbers") > 2.0 * cost(0, "numbers"));
+    for key in ["integral_ms", "boundary", "difference", "warp", "warp_single"] {
+        assert!(cost(3, key) > 0.0, "{measured}");
+    }
+    assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
+    refused(2, &["measure", "gradient", singlet, "--plot", "x.gif"], "", &["`gif`", "`.png`"]);
 }
 
 #[test]

@@ -71,6 +71,7 @@ impl<R: Real> Lift<'_, R> {
                 thickness: own("t", 0.0),
                 index: own("n", 1.0),
                 semi_diameter: R::from_f64(get(s, "sd", f64::INFINITY)),
+                obstruction: R::ZERO,
                 mirror: s["mirror"] == true,
                 hyper: s["hyper"] == true,
             });

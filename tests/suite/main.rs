@@ -3,8 +3,10 @@
 #![expect(clippy::print_stdout, reason = "the worst errors are the result of a reference test")]
 
 mod analysis;
+mod aperture;
 mod cli;
 mod effects;
+mod experiments;
 mod files;
 mod grin;
 mod hard_cases;
@@ -12,6 +14,7 @@ mod library;
 mod merit;
 mod optimize;
 mod paraxial;
+mod pareto;
 mod pupil;
 mod reference;
 mod session;

@@ -3,8 +3,9 @@
 use crate::reference::{Reference, Worst, count, lenses, number, numbers};
 use aplanat::lens::{ASPHERE_TERMS, Aperture, Field, FieldKind, Object, Shape, Surface, System};
 use aplanat::paraxial::Beam;
-use aplanat::pupil::{Accuracy, Aiming, Bench, Kind, Pattern, Region, pattern};
-use aplanat::trace::{Points, Rays, Sink};
+use aplanat::pupil::{Accuracy, Aiming, Bench, Kind, Limit, Pattern, Region, pattern};
+use aplanat::trace::{Hurdle, Points, Rays, Sink};
+use std::f64::consts::PI;
 
 /// Relative to the RMS radius, or to the height of a centroid. One unit of a ray's rounding comes on
 /// top: a spot of 0.2 µm behind a pupil of 2.4 m has no eleven digits in double precision.
@@ -150,6 +151,7 @@ fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
         thickness,
         index,
         semi_diameter,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     };
@@ -188,6 +190,105 @@ fn a_pupil_cut_by_a_distant_rim_is_the_overlap_of_two_discs() {
         let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
         let exact = overlap(5.0, 10.0 + offset, 10.0) / 25.0;
         assert!((area(&region) - exact).abs() < 1e-12, "{offset}: {} {exact}", area(&region));
+    }
+}
+
+/// A stop of radius 5 and a rim of radius `rim` 100 mm behind it, the centre of whose shadow lies
+/// 10 mm from the middle of the stop.
+fn vignetted(rim: f64, turn: f64) -> (Bench, Field) {
+    let edge = 0.1f64.atan().to_degrees();
+    let rows = [(0.0, 100.0, 1.0, 5.0), (0.0, 50.0, 1.0, rim)];
+    let bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
+    (bench, Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+}
+
+#[test]
+fn the_sides_of_an_outline_are_as_long_as_the_arcs_of_two_discs() {
+    for (rim, turn) in [(8.0, 0.0), (10.0, 0.0), (10.0, 0.7), (12.0, -2.0)] {
+        let (bench, field) = vignetted(rim, turn);
+        let region = Region::new(bench.launch(field, 0).unwrap());
+        let outline = region.outline(128).unwrap();
+        let (stop, clips) = (Limit::Surface(0, Hurdle::Rim), Limit::Surface(1, Hurdle::Rim));
+        assert_eq!(outline.sides.len(), 2, "{rim} {turn}");
+        // Half the angle that each arc spans about its own centre.
+        let half = |r: f64, s: f64| ((100.0 + r * r - s * s) / (20.0 * r)).acos();
+        let (a, b) = (10.0 * half(5.0, rim), 2.0 * rim * half(rim, 5.0));
+        for (limit, exact) in [(stop, a), (clips, b)] {
+            let share = outline.share(limit);
+            assert!((share - exact / (a + b)).abs() < 3e-6, "{rim} {turn} {limit:?} {share}");
+        }
+        let total: f64 = outline.limits().iter().map(|(_, share)| share).sum();
+        assert!((total - 1.0).abs() < 1e-12);
+        assert_eq!(outline.corners().count(), 2);
+        let first = &outline.sides[0];
+        let second = &outline.sides[1];
+        let gap = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        assert!(gap(first.points.last().unwrap(), &second.points[0]) < 1e-6);
+        assert!(gap(second.points.last().unwrap(), &first.points[0]) < 1e-6);
+        for [x, y] in &outline.sides.iter().find(|s| s.limit == stop).unwrap().points {
+            // A corner is located to a billionth of the radius.
+            assert!((x.hypot(*y) - 5.0).abs() < 2e-8, "on the rim of the stop, in mm: {x} {y}");
+        }
+    }
+}
+
+#[test]
+fn the_extent_of_a_pupil_is_in_square_millimetres_about_its_centroid() {
+    let accuracy = Accuracy { tolerance: 1e-10, most_rays: 100_000 };
+    for (rim, turn) in [(10.0, 0.0), (8.0, 0.7)] {
+        let (bench, field) = vignetted(rim, turn);
+        let region = Region::new(bench.launch(field, 0).unwrap());
+        let found = region.extent(accuracy).unwrap();
+        let exact = overlap(5.0, rim, 10.0);
+        assert!((found.values[0] - exact).abs() < 1e-9 * exact, "{} {exact}", found.values[0]);
+        // The first moments of two circular segments, about the middle of the stop.
+        let segment = |r: f64, s: f64| {
+            2.0 / 3.0 * (r * ((100.0 + r * r - s * s) / (20.0 * r)).acos().sin()).powi(3)
+        };
+        let (near, far) = (segment(5.0, rim), segment(rim, 5.0));
+        let centre = (10.0 * (exact - lone(5.0, rim)) - far + near) / exact;
+        let out = found.values[1].hypot(found.values[2]);
+        assert!((out - centre).abs() < 1e-8, "{out} {centre}");
+    }
+}
+
+/// The area of the segment of a disc of radius `r` that a chord shared with a disc of radius `s`,
+/// 10 mm away, cuts off.
+fn lone(r: f64, s: f64) -> f64 {
+    let half = ((100.0 + r * r - s * s) / (20.0 * r)).acos();
+    r * r * (half - half.sin() * half.cos())
+}
+
+#[test]
+fn a_clear_pupil_is_a_disc_of_the_aperture() {
+    let rows = [(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, f64::INFINITY)];
+    let aperture = Aperture::EntrancePupilDiameter(10.0);
+    for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
+        let bench = bench(system(&rows, 1), aperture, 20.0, aiming);
+        let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+        let outline = region.outline(64).unwrap();
+        assert!(outline.is_clear() && outline.corners().count() == 0);
+        assert_eq!(outline.limits(), [(Limit::Disc, 1.0)]);
+        let [area, x, y] = region.extent(Accuracy::default()).unwrap().values;
+        // In air, the plane of the stop is seen from the first vertex undistorted.
+        assert!((area / (25.0 * std::f64::consts::PI) - 1.0).abs() < 1e-12, "{aiming:?} {area}");
+        assert!(x.abs() < 1e-12 && (y + 100.0 * 20f64.to_radians().tan()).abs() < 1e-9, "{y}");
+    }
+}
+
+#[test]
+fn limits_have_names() {
+    let (bench, _) = vignetted(8.0, 0.0);
+    let cases = [
+        (Limit::Disc, "entrance pupil"),
+        (Limit::Surface(0, Hurdle::Rim), "stop, surface 0"),
+        (Limit::Surface(1, Hurdle::Rim), "rim of surface 1"),
+        (Limit::Surface(1, Hurdle::Miss), "missed surface 1"),
+        (Limit::Surface(1, Hurdle::Reflection), "critical angle at surface 1"),
+        (Limit::Unaimed, "no ray to the stop"),
+    ];
+    for (limit, name) in cases {
+        assert_eq!(bench.limit_name(limit), name);
     }
 }
 
@@ -261,6 +362,125 @@ fn a_pupil_in_two_pieces_is_told_and_sampled() {
     let square: f64 = lit().map(|i| landed.x[i].powi(2) + landed.y[i].powi(2)).sum();
     let rms = (square / lit().count() as f64).sqrt();
     assert!((spot.rms.value - rms).abs() < 3.0 * spot.rms.error + 2e-3 * rms, "{spot:?} {rms}");
+}
+
+/// A disc of radius 5 mm, and 100 mm behind it a plane that is obstructed as far as `inner`: its
+/// shadow lies `away` radii of the disc from the middle.
+fn shadowed(inner: f64, away: f64, turn: f64) -> (Bench, Field) {
+    let mut lens = system(&[(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, f64::INFINITY)], 0);
+    lens.surfaces[1].obstruction = 5.0 * inner;
+    let edge = (0.05 * away).atan().to_degrees();
+    let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
+    (bench, Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+}
+
+/// The area of a pupil, with its error.
+fn lit(bench: &Bench, field: Field, tolerance: f64) -> aplanat::analysis::Estimate {
+    let accuracy = Accuracy { tolerance, most_rays: 300_000 };
+    aplanat::analysis::spot(bench, field, accuracy).unwrap().colors[0].unwrap().area
+}
+
+#[test]
+fn an_annular_pupil_is_one_piece_that_no_point_sees() {
+    for inner in [0.02, 0.1, 0.4, 0.75, 0.95] {
+        for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
+            let mut lens = system(&[(0.0, 50.0, 1.0, 5.0)], 0);
+            lens.surfaces[0].obstruction = 5.0 * inner;
+            let bench = bench(lens, Aperture::StopSemiDiameter(5.0), 1.0, aiming);
+            let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+            assert_ring(&region);
+            let exact = PI * (1.0 - inner * inner);
+            assert!((area(&region) - exact).abs() < 1e-12, "{inner} {aiming:?}");
+            let estimate = lit(&bench, bench.fields[0], 1e-6);
+            assert!((estimate.value - exact).abs() < 1e-9, "{inner} {aiming:?}: {estimate:?}");
+            assert!(estimate.rays < 2000, "{inner} {aiming:?}: {estimate:?}");
+        }
+    }
+}
+
+/// A ring is one piece that no point sees, with two edges.
+fn assert_ring(region: &Region<'_>) {
+    let ring = matches!(region.kind, Kind::Ragged { pieces: 1, ring: Some(_), .. });
+    assert!(ring, "{:?}", region.kind);
+}
+
+#[test]
+fn a_shadow_smaller_than_the_first_look_is_found() {
+    for inner in [0.05, 0.01, 1e-3, 1e-6] {
+        for away in [0.0, 0.043, 0.51, 0.93, 0.9999] {
+            for turn in [0.0f64, 0.2, 2.9] {
+                let (bench, field) = shadowed(inner, away, turn);
+                let region = Region::new(bench.launch(field, 0).unwrap());
+                let whole = away + inner < 1.0;
+                if whole {
+                    assert_ring(&region);
+                    let exact = PI * (1.0 - inner * inner);
+                    let found = lit(&bench, field, 1e-3);
+                    let error = (found.value - exact).abs();
+                    let what = format!("{inner} {away} {turn}: {error:e} {found:?}");
+                    assert!(error <= 3.0 * found.error + 1e-9, "{what}");
+                    // Beside the edge the ring is very narrow on one side.
+                    let best = (area(&region) - exact).abs();
+                    assert!(away > 0.6 || best < 1e-9, "{what} {best:e}");
+                } else {
+                    let ragged = matches!(region.kind, Kind::Ragged { pieces: 1, ring: None, .. });
+                    assert!(ragged, "{inner} {away} {turn}: {:?}", region.kind);
+                }
+            }
+        }
+        // Just outside, and far from it.
+        for away in [1.0 + 1.01 * inner, 3.0, 40.0] {
+            let (bench, field) = shadowed(inner, away, 0.2);
+            let region = Region::new(bench.launch(field, 0).unwrap());
+            assert_eq!(region.kind, Kind::Clear, "{inner} {away}");
+        }
+    }
+}
+
+#[test]
+fn a_shadow_that_bites_the_edge_leaves_a_pupil_that_is_split_where_one_point_sees_it() {
+    let mut split = 0;
+    for (inner, away) in
+        [(2.0, 2.5), (2.0, 2.9), (0.5, 1.3), (0.02, 1.01), (0.2, 1.1), (2.0, 2.0), (0.5, 0.9)]
+    {
+        for turn in [0.0, 0.3] {
+            let (bench, field) = shadowed(inner, away, turn);
+            let region = Region::new(bench.launch(field, 0).unwrap());
+            let exact = PI - overlap(1.0, inner, away);
+            match region.kind {
+                Kind::Split(_) => {
+                    split += 1;
+                    // Slower where the pupil has horns.
+                    assert!((area(&region) - exact).abs() < 1e-7, "{inner} {away} {turn}");
+                }
+                Kind::Ragged { .. } => {
+                    let area = lit(&bench, field, 1e-3);
+                    let error = (area.value - exact).abs();
+                    assert!(error <= 3.0 * area.error, "{inner} {away}: {area:?} {exact}");
+                }
+                kind => panic!("{inner} {away} {turn}: {kind:?}"),
+            }
+        }
+    }
+    assert!(split >= 8, "{split}");
+}
+
+#[test]
+fn a_shadow_across_a_narrow_pupil_leaves_two_pieces() {
+    // The disc and a rim of the same size, 8 mm off; the shadow lies in the middle between them.
+    let rows = [(0.0, 50.0, 1.0, 5.0), (0.0, 50.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, 5.0)];
+    let mut lens = system(&rows, 0);
+    lens.surfaces[1].obstruction = 1.5;
+    let edge = 0.08f64.atan().to_degrees();
+    let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
+    let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+    assert!(matches!(region.kind, Kind::Ragged { pieces: 2, .. }), "{:?}", region.kind);
+}
+
+#[test]
+fn an_obstruction_as_wide_as_the_beam_is_dark() {
+    let (bench, field) = shadowed(1.5, 0.2, 0.0);
+    assert!(Region::new(bench.launch(field, 0).unwrap()).is_dark());
 }
 
 #[test]

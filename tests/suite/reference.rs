@@ -158,6 +158,7 @@ fn surface(row: &Value, wavelength: usize) -> Surface<f64> {
         thickness: row["t"].as_f64().unwrap_or(0.0),
         index: number(&row["n"][wavelength]),
         semi_diameter: row["sd"].as_f64().unwrap_or(f64::INFINITY),
+        obstruction: 0.0,
         mirror: row["mirror"].as_bool().unwrap_or(false),
         hyper: false,
     }

@@ -6,7 +6,7 @@ use aplanat::lens::{
     Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
     Variable, ZoomPosition, ZoomThickness,
 };
-use aplanat::merit::{Goal, MeritError, TermValue};
+use aplanat::merit::{Goal, MeritError, PupilEdge, TermValue};
 use aplanat::optimize::{Method, Optimizer, Progress};
 use aplanat::session::{
     Command, Edit, Event, Session, Settings, Severity, Standing, Starter, View, compute,
@@ -81,7 +81,7 @@ fn session(lens: Lens) -> Session {
 
 const OPTIMIZE: Command = Command::Optimize {
     method: Method::Adam,
-    goal: Goal { terms: Vec::new(), zoom_ratios: Vec::new() },
+    goal: Goal { terms: Vec::new(), zoom_ratios: Vec::new(), pupil: PupilEdge::Moving },
 };
 
 /// Waits until something has happened in the background.

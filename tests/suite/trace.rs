@@ -4,7 +4,7 @@ use super::merit::bundled;
 use super::reference::{self, Reference, number, numbers};
 use aplanat::lens::{Shape, Surface, System};
 use aplanat::math::{Dual, Real, Vec3};
-use aplanat::trace::{Fate, Gradient, Hits, Points, Ray, Rays, Seed, Sink, Tracer, Width};
+use aplanat::trace::{Fate, Gradient, Hits, Hurdle, Points, Ray, Rays, Seed, Sink, Tracer, Width};
 use serde_json::Value;
 
 const EPSILON: f64 = f64::EPSILON;
@@ -140,6 +140,113 @@ fn one_thread_two_threads_and_single_rays_give_the_same_bits() {
     }
 }
 
+/// The lens with a mirror-like hole in the middle of a sphere, a conic, an asphere and a plane.
+fn obstructed(radius: f64) -> System<f64> {
+    let mut system = system();
+    let c = system.surfaces[3].shape.curvature();
+    let mut terms = [0.0; aplanat::lens::ASPHERE_TERMS];
+    terms[0] = 1e-7;
+    system.surfaces[2].shape = system.surfaces[2].shape.as_conic();
+    system.surfaces[3].shape = Shape::Asphere { curvature: c, conic: 0.0, terms };
+    let count = system.surfaces.len();
+    for i in [0, 2, 3, 5, count - 1] {
+        system.surfaces[i].obstruction = radius * (1.0 + 0.1 * i as f64);
+    }
+    system
+}
+
+#[test]
+fn an_obstruction_clips_inside_and_its_edge_passes() {
+    let plane = |obstruction: f64| Surface {
+        shape: Shape::Plane,
+        thickness: 1.0,
+        index: 1.5,
+        semi_diameter: 4.0,
+        obstruction,
+        mirror: false,
+        hyper: false,
+    };
+    let surfaces = vec![plane(0.0), plane(2.0), plane(0.0)];
+    let tracer = Tracer::new(&System { index_before: 1.0, surfaces, stop: None }).unwrap();
+    let below = f64::from_bits(2.0_f64.to_bits() - 1);
+    for (y, fate) in [
+        (0.0, Fate::Clipped(1)),
+        (below, Fate::Clipped(1)),
+        (-below, Fate::Clipped(1)),
+        (2.0, Fate::Imaged),
+        (-2.0, Fate::Imaged),
+        (4.0, Fate::Imaged),
+        (4.1, Fate::Clipped(0)),
+    ] {
+        let ray = Ray { point: Vec3::new(0.0, y, -1.0), direction: Vec3::new(0.0, 0.0, 1.0) };
+        assert_eq!(tracer.trace(ray).fate, fate, "{y}");
+        let mut hits = Hits::default();
+        tracer.batch(&std::iter::once(ray).collect(), &mut hits);
+        assert_eq!(hits.fate(0), fate, "{y}");
+        let mut found = None;
+        tracer.margins(ray, |surface, hurdle, margin| {
+            if hurdle == Hurdle::Obstruction {
+                assert!(found.replace((surface, margin)).is_none());
+            }
+        });
+        assert_eq!(found, Some((1, y * y - 4.0)));
+    }
+}
+
+#[test]
+fn obstructed_rays_end_alike_in_blocks_and_alone() {
+    let (clear, system) = (system(), obstructed(1.0));
+    let tracer = Tracer::new(&system).unwrap();
+    let rays = some_rays(5000);
+    let (mut hits, mut without) = (Hits::default(), Hits::default());
+    tracer.batch(&rays, &mut hits);
+    let mut open = system.clone();
+    open.surfaces.iter_mut().for_each(|surface| surface.obstruction = 0.0);
+    Tracer::new(&open).unwrap().batch(&rays, &mut without);
+    let mut narrow = Hits::default();
+    tracer.batch_with(Width::Baseline, &rays, &mut narrow);
+    assert_eq!(hits, narrow);
+    let mut blocked = std::collections::BTreeSet::new();
+    for i in 0..rays.len() {
+        let ray = rays.get(i);
+        let landing = tracer.trace(ray);
+        assert_eq!(landing.fate, hits.fate(i), "ray {i}");
+        let mut first = None;
+        tracer.margins(ray, |surface, hurdle, margin| {
+            if first.is_none() && !(margin >= 0.0) {
+                first = Some((surface, hurdle));
+            }
+        });
+        assert_eq!(first.map(|(surface, _)| surface), landing.fate.surface(), "ray {i}");
+        if let Some((surface, Hurdle::Obstruction)) = first {
+            assert_eq!(landing.fate, Fate::Clipped(u32::try_from(surface).unwrap()));
+            blocked.insert(surface);
+        } else {
+            assert_eq!(landing.fate, without.fate(i), "ray {i}");
+            assert_eq!((hits.x[i], hits.opl[i]), (without.x[i], without.opl[i]));
+        }
+    }
+    assert!(blocked.len() >= 4, "{blocked:?}");
+    assert!(clear.surfaces.iter().all(|surface| surface.obstruction == 0.0));
+}
+
+#[test]
+fn obstructions_that_leave_no_light_are_refused() {
+    for (wrong, semi_diameter) in
+        [(-1.0, 5.0), (f64::NAN, 5.0), (5.0, 5.0), (6.0, 5.0), (f64::INFINITY, f64::INFINITY)]
+    {
+        let mut system = system();
+        system.surfaces[2].obstruction = wrong;
+        system.surfaces[2].semi_diameter = semi_diameter;
+        let error = Tracer::new(&system).unwrap_err().to_string();
+        assert!(error.starts_with("obstruction of surface 2 is "), "{error}");
+    }
+    let mut system = system();
+    (system.surfaces[2].obstruction, system.surfaces[2].semi_diameter) = (0.0, 0.0);
+    assert!(Tracer::new(&system).is_ok());
+    assert_eq!(obstructed(1.0).lift::<f32>().surfaces[0].obstruction, 1.0);
+}
+
 #[test]
 fn a_ray_turned_about_the_axis_lands_turned() {
     let tracer = Tracer::new(&system()).unwrap();
@@ -194,6 +301,7 @@ fn scale(surface: &Surface<f64>, factor: f64) -> Surface<f64> {
         shape: Shape::simplest(c / factor, k, terms),
         thickness: surface.thickness * factor,
         semi_diameter: surface.semi_diameter * factor,
+        obstruction: surface.obstruction * factor,
         ..*surface
     }
 }
@@ -232,6 +340,7 @@ fn reversed(system: &System<f64>) -> System<f64> {
         thickness,
         index,
         semi_diameter: f64::INFINITY,
+        obstruction: 0.0,
         mirror: false,
         hyper: false,
     };
@@ -335,4 +444,39 @@ fn lost_rays_end_with_a_surface_and_finite_numbers() {
     assert_eq!(hits.fates().total(), rays.len());
     assert!(fates.len() >= 3, "{fates:?}");
     assert!(matches!(tracer.trace(rays.get(0)).fate, Fate::Clipped(_) | Fate::Imaged));
+}
+
+#[test]
+fn a_reversed_lens_leads_rays_back_to_where_they_came_from() {
+    for name in ["double_gauss_canon_fd50_f12", "phone_us7558005_1", "telescope_rc_f8"] {
+        let lens = bundled(name);
+        let system = lens.system(0, lens.wavelengths[lens.primary()].um).unwrap();
+        let size = system.surfaces[0].semi_diameter.min(100.0);
+        let (there, back) =
+            (Tracer::new(&system).unwrap(), Tracer::new(&system.reversed(0.0)).unwrap());
+        let last = system.surfaces[system.surfaces.len() - 2].thickness;
+        let mut arrived = 0;
+        for i in 0..40 {
+            let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
+            let (x, y) = (0.02 * f64::from(i) * size * cos, 0.02 * f64::from(i) * size * sin);
+            let start = Ray { point: Vec3::new(x, y, 0.0), direction: Vec3::new(0.01, 0.0, 1.0) };
+            let landing = there.trace(start);
+            if !landing.fate.is_imaged() {
+                continue;
+            }
+            arrived += 1;
+            let (p, d) = (landing.ray.point, landing.ray.direction);
+            // What was behind the last vertex is in front of it now.
+            let turned = Ray {
+                point: Vec3::new(p.x, p.y, -(last + p.z)),
+                direction: Vec3::new(-d.x, -d.y, d.z),
+            };
+            let home = back.trace(turned);
+            assert!(home.fate.is_imaged(), "{name}: {:?}", home.fate);
+            let (q, e) = (home.ray.point, home.ray.direction);
+            assert!((q.x - x).hypot(q.y - y) < 1e-9 * size, "{name}: {q:?} for {x}, {y}");
+            assert!((e.x / e.z + 0.01).hypot(e.y / e.z) < 1e-10, "{name}: {e:?}");
+        }
+        assert!(arrived > 10, "{name}: {arrived}");
+    }
 }

@@ -51,17 +51,22 @@ struct Report {
     first: Option<Position>,
     semi_diameters: Vec<Option<f64>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    obstructions: Vec<Option<f64>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     positions: Vec<Position>,
 }
 
 impl Report {
     fn new(opened: &Opened, positions: Vec<Position>) -> Self {
         let Lens { name, surfaces, .. } = &opened.lens;
+        let obstructed = surfaces.iter().any(|row| row.obstruction.is_some());
+        let obstructions = surfaces.iter().filter(|_| obstructed).map(|row| row.obstruction);
         Self {
             name: name.clone(),
             wavelength_um: opened.primary_um(),
             first: positions.first().cloned(),
             semi_diameters: surfaces.iter().map(|row| row.semi_diameter).collect(),
+            obstructions: obstructions.collect(),
             positions: if positions.len() > 1 { positions } else { Vec::new() },
         }
     }
@@ -204,10 +209,18 @@ impl Display for Report {
         for position in self.positions() {
             write!(f, "\n{}", position.effects_and_checks())?;
         }
-        let shown = |sd: &Option<f64>| sd.map_or("unlimited".into(), |sd| Number(sd).to_string());
-        let list: Vec<String> = self.semi_diameters.iter().map(shown).collect();
-        writeln!(f, "\nsemi-diameters  {}", list.join("  "))
+        writeln!(f, "\nsemi-diameters  {}", radii(&self.semi_diameters, "unlimited"))?;
+        if self.obstructions.is_empty() {
+            return Ok(());
+        }
+        writeln!(f, "obstructions    {}", radii(&self.obstructions, "none"))
     }
+}
+
+/// Radii in a row, with a word for those that are not there.
+fn radii(radii: &[Option<f64>], none: &str) -> String {
+    let shown = |r: &Option<f64>| r.map_or(none.to_owned(), |r| Number(r).to_string());
+    radii.iter().map(shown).collect::<Vec<_>>().join("  ")
 }
 
 /// A row of the table of first-order data.

@@ -1,5 +1,6 @@
 //! Accuracy against time, throughput, memory.
 
+mod gradient;
 mod optimize;
 mod plot;
 mod spot;
@@ -20,9 +21,9 @@ pub(super) struct Measure {
 /// Everything that is measured.
 #[derive(Debug, Subcommand)]
 enum What {
-    #[command(visible_alias = "gradient")]
     Trace(trace::Trace),
     Spot(spot::Spot),
+    Gradient(gradient::Gradient),
     Optimize(optimize::Optimize),
     Window(window::Window),
 }
@@ -32,6 +33,7 @@ impl Measure {
         match &self.what {
             What::Trace(trace) => trace.run(output),
             What::Spot(spot) => spot.run(output),
+            What::Gradient(gradient) => gradient.run(output),
             What::Optimize(optimize) => optimize.run(output),
             What::Window(window) => window.run(output),
         }

@@ -1,11 +1,12 @@
 //! Accuracy of a spot against time.
 
-use super::plot;
+use super::plot::{self, Chart, Color, Curve, Label, Stroke};
 use crate::cli::failure::Failure;
 use crate::cli::input::{LensFile, check_target};
 use crate::cli::output::{Number, Output, Table};
 use crate::files;
-use crate::measure::{Machine, Precision, Pupil, SpotCurves, SpotRow, spot_curves};
+use crate::measure::{Machine, Precision, Pupil, Sampling, SpotCurves, SpotRow, spot_curves};
+use image::ImageError;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -52,11 +53,46 @@ impl Spot {
             .map_err(|e| Failure::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
         if let Some(path) = &self.plot {
             let title = format!("{}, field {}", opened.lens.name, Number(field.y));
-            let png = plot::draw(&curves, &title).map_err(|e| Failure::Failed(e.to_string()))?;
+            let png = picture(&curves, &title).map_err(|e| Failure::Failed(e.to_string()))?;
             files::replace(path, &png)?;
         }
         output.print(&Report { machine: Machine::here(), lens: opened.file, y: field.y, curves })
     }
+}
+
+const COLORS: [(Sampling, Color); 6] = [
+    (Sampling::SquareGrid, [0x1f, 0x77, 0xb4]),
+    (Sampling::Hexapolar, [0x8c, 0x56, 0x4b]),
+    (Sampling::Random, [0x7f, 0x7f, 0x7f]),
+    (Sampling::LowDiscrepancy, [0x2c, 0xa0, 0x2c]),
+    (Sampling::Gauss, [0xff, 0x7f, 0x0e]),
+    (Sampling::SplitBoundary, [0xd6, 0x27, 0x28]),
+];
+const STROKES: [(Precision, Stroke); 2] =
+    [(Precision::F64, Stroke::Solid), (Precision::F32, Stroke::Dashed)];
+
+/// The clear pupil beside the clipped one.
+fn picture(curves: &SpotCurves, title: &str) -> Result<Vec<u8>, ImageError> {
+    let chart = |pupil| {
+        let name = match pupil {
+            Pupil::Clear => "clear pupil".to_owned(),
+            Pupil::Clipped => format!("clipped pupil, {:.0} % lit", 100.0 * curves.lit),
+        };
+        let curve = |(method, color), (precision, stroke)| {
+            let mine = |row: &&SpotRow| {
+                row.pupil == pupil && row.method == method && row.precision == precision
+            };
+            let points = curves.rows.iter().filter(mine).map(|row| [row.ms, row.error]).collect();
+            Curve { color, stroke, points }
+        };
+        let all = COLORS.into_iter().flat_map(|c| STROKES.map(|s| curve(c, s))).collect();
+        Chart { name, curves: all }
+    };
+    let colors = COLORS.map(|(method, color)| Label::of(method.name(), color));
+    let strokes = [("f64", Stroke::Solid), ("f32", Stroke::Dashed)];
+    let strokes = strokes.map(|(name, stroke)| Label::drawn(name, stroke));
+    let labels: Vec<Label> = colors.into_iter().chain(strokes).collect();
+    plot::draw(&[chart(Pupil::Clear), chart(Pupil::Clipped)], &labels, title)
 }
 
 /// What is printed.

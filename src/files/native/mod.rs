@@ -231,6 +231,8 @@ struct RowKeys {
     glass: Medium,
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "given")]
     semi_diameter: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "given")]
+    obstruction: Option<f64>,
     #[serde(default, skip_serializing_if = "is_false")]
     stop: bool,
     #[serde(default, skip_serializing_if = "is_false")]
@@ -274,6 +276,7 @@ impl Serialize for Row {
             thickness: self.thickness,
             glass: self.medium.clone(),
             semi_diameter: self.semi_diameter,
+            obstruction: self.obstruction,
             stop: self.stop,
             hyper: self.hyper,
             comment: self.comment.clone(),
@@ -306,6 +309,7 @@ impl<'de> Visitor<'de> for RowText {
             thickness: keys.thickness,
             medium: keys.glass,
             semi_diameter: keys.semi_diameter,
+            obstruction: keys.obstruction,
             stop: keys.stop,
             hyper: keys.hyper,
             comment: keys.comment,
@@ -468,6 +472,8 @@ mod tests {
         lens.surfaces[0].conic = -0.0;
         lens.surfaces[0].curvature = 5e-324;
         lens.surfaces[0].hyper = true;
+        lens.surfaces[0].obstruction = Some(0.1 + 0.7);
+        lens.surfaces[1].obstruction = Some(0.0);
         lens.surfaces[2].asphere = vec![0.1 + 0.2, -1.2345678901234567e-19];
         lens.focus = Some(0.0);
         let gap = ZoomThickness { surface: 0, thickness: 1e23 };

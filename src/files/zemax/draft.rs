@@ -89,8 +89,10 @@ pub(super) struct Surface {
     pub(super) thickness: Option<(f64, usize)>,
     pub(super) glass: Option<GlassLine>,
     pub(super) semi_diameter: Option<SemiDiameter>,
-    /// The radius outside which a circular aperture cuts.
-    pub(super) clip: Option<f64>,
+    /// The radius outside which a circular aperture cuts, and its line.
+    pub(super) clip: Option<(f64, usize)>,
+    /// The radius inside which an aperture or an obscuration cuts, and its line.
+    pub(super) obstruction: Option<(f64, usize)>,
     pub(super) variable_thickness: Option<(f64, f64, usize)>,
     pub(super) thickness_pickup: Option<PickupLine>,
     /// Height, zone and line of a marginal ray height solve.

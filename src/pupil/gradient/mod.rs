@@ -13,7 +13,26 @@
 //! Leaving out the second integral is the usual, biased derivative. All estimators differentiate
 //! by every number of a system at once, semi-diameters included.
 
-use crate::trace::Gradient;
+mod boundary;
+mod difference;
+mod estimator;
+mod warp;
+
+pub use estimator::{Estimator, NoDerivative, differentiate, plan};
+pub use warp::Warp;
+
+use super::moments::Moments;
+use crate::math::Real;
+use crate::trace::{Gradient, Slot};
+
+/// What each ray of a pupil contributes by where it lands. Where a pupil is its own mirror image, so
+/// must be the contribution.
+pub trait Integrand: Sync {
+    /// The contribution of a ray that lands at a point, in mm on the image plane.
+    fn of<R: Real>(&self, p: [R; 2]) -> R;
+    /// Its derivative by the point.
+    fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2];
+}
 
 /// What each ray of a pupil contributes: `square |p − center|² + constant`, `p` its image point.
 ///
@@ -39,16 +58,28 @@ impl Cost {
     pub fn throughput() -> Self {
         Self { center: [0.0; 2], square: 0.0, constant: -1.0 }
     }
+}
 
-    /// The contribution of a ray that lands at a point.
-    pub fn of(&self, p: [f64; 2]) -> f64 {
-        let [x, y] = [p[0] - self.center[0], p[1] - self.center[1]];
-        self.square * (x * x + y * y) + self.constant
+impl Integrand for Cost {
+    #[inline(always)]
+    fn of<R: Real>(&self, p: [R; 2]) -> R {
+        let [x, y] = [0, 1].map(|i| p[i] - R::from_f64(self.center[i]));
+        R::from_f64(self.square) * (x * x + y * y) + R::from_f64(self.constant)
     }
 
-    /// Its derivative by the point.
-    pub fn slope(&self, p: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|i| 2.0 * self.square * (p[i] - self.center[i]))
+    #[inline(always)]
+    fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2] {
+        let factor = R::from_f64(2.0 * self.square);
+        [0, 1].map(|i| factor * (p[i] - R::from_f64(self.center[i])))
+    }
+}
+
+impl Cost {
+    /// Its integral over the light of a pupil.
+    pub fn over(&self, light: &Moments) -> f64 {
+        let [x, y] = [0, 1].map(|i| light.centroid[i] - self.center[i]);
+        let about_center = light.spread + light.area * (x * x + y * y);
+        self.square * about_center + self.constant * light.area
     }
 }
 
@@ -61,4 +92,23 @@ pub struct Derivative {
     pub error: Gradient<f64>,
     /// Rays traced.
     pub rays: usize,
+}
+
+impl Derivative {
+    /// Whether every number is known within a tolerance of the largest of its kind: curvatures,
+    /// conic constants, coefficients of each power, thicknesses, indices, semi-diameters.
+    pub fn reaches(&self, tolerance: f64) -> bool {
+        self.excess(tolerance, |_| 0.0) <= 1.0
+    }
+
+    /// By how much the largest error of a kind exceeds what a tolerance allows there, of the
+    /// largest number of the kind or of a floor.
+    fn excess(&self, tolerance: f64, floor: impl Fn(Slot) -> f64) -> f64 {
+        let excess = |slot| {
+            let error = self.error.largest(slot);
+            let scale = self.by.largest(slot).max(floor(slot));
+            if error == 0.0 { 0.0 } else { error / (tolerance * scale) }
+        };
+        Slot::all().map(excess).fold(0.0, f64::max)
+    }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use eframe::egui::{Align, ComboBox, DragValue, Layout as Arrange, RichText, Stroke, Ui};
 use glam::DVec2;
 
-use super::{Panel, field_name, no_numbers, shown, swatch};
+use super::{Panel, field_name, no_numbers, shown, swatch, zoom_name};
 use crate::lens::System;
 use crate::math::Vec3;
 use crate::session::{Command, DrawnRay, Layout, Numbers, Results, View};
@@ -81,7 +81,10 @@ impl Panel for LensLayout {
         let Some(drawing) = &self.drawing else { return no_numbers(ui, view) };
         let label = format!("Section of {}", view.lens.name);
         let shown = self.stage.show(ui, self.backing, &drawing.scene, drawing.whole, &label);
-        drawing.name_surface(ui, view, &shown);
+        let near = drawing.name_surface(ui, view, &shown);
+        if shown.response.clicked() && near != view.selected {
+            wishes.push(Command::Select(near));
+        }
     }
 }
 
@@ -158,10 +161,7 @@ fn zoom_position(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
     if lens.zoom_positions() < 2 {
         return;
     }
-    let name = |i: usize| match lens.zoom.get(i).map(|position| position.name.as_str()) {
-        None | Some("") => format!("Zoom {}", i + 1),
-        Some(name) => name.to_owned(),
-    };
+    let name = |i: usize| zoom_name(lens, i);
     let mut chosen = view.settings.zoom;
     let combo = ComboBox::from_id_salt("zoom position").selected_text(name(chosen));
     let shown = combo.show_ui(ui, |ui| {
@@ -209,15 +209,22 @@ impl Drawing {
         })
     }
 
-    /// Names the surface under the pointer and draws it bold.
-    fn name_surface(&self, ui: &Ui, view: &View, shown: &Shown) {
-        let Some((at, point)) = shown.pointer() else { return };
+    /// Draws the selected surface and the one under the pointer bold; the latter is named and
+    /// given back, the image plane excepted.
+    fn name_surface(&self, ui: &Ui, view: &View, shown: &Shown) -> Option<usize> {
         let section = Section::new(&self.system, &self.reached);
-        let Some(surface) = section.surface_near(at, NEAR * point) else { return };
-        let curve = section.outline_of(surface).into_iter().map(|mm| shown.on_screen(mm)).collect();
-        let stroke = Stroke::new(2.5, ui.visuals().selection.stroke.color);
-        ui.painter_at(shown.response.rect).line(curve, stroke);
-        shown.response.clone().on_hover_text_at_pointer(self.describe(view, surface));
+        let count = self.system.surfaces.len();
+        let near = shown.pointer().and_then(|(at, mm)| section.surface_near(at, NEAR * mm));
+        let selected = view.selected.filter(|surface| *surface < count && near != view.selected);
+        for surface in selected.into_iter().chain(near) {
+            let curve = section.outline_of(surface);
+            let curve = curve.into_iter().map(|mm| shown.on_screen(mm)).collect();
+            let stroke = Stroke::new(2.5, ui.visuals().selection.stroke.color);
+            ui.painter_at(shown.response.rect).line(curve, stroke);
+        }
+        let near = near?;
+        shown.response.clone().on_hover_text_at_pointer(self.describe(view, near));
+        (near < view.lens.surfaces.len()).then_some(near)
     }
 
     fn describe(&self, view: &View, surface: usize) -> String {

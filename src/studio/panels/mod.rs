@@ -1,10 +1,12 @@
 //! What the window is made of: one panel a question that a designer asks.
 
+mod cells;
 mod effects;
 mod first_order;
 mod layout;
 mod optimizer;
 mod prescription;
+mod pupil;
 mod spot;
 
 pub use effects::Effects;
@@ -13,6 +15,7 @@ pub use layout::LensLayout;
 pub use optimizer::Optimizer;
 pub use prescription::Prescription;
 pub(super) use prescription::first_field;
+pub use pupil::Pupils;
 pub use spot::SpotDiagram;
 
 use std::sync::Arc;
@@ -23,8 +26,8 @@ use serde::{Deserialize, Serialize};
 use super::draw::Backing;
 use super::number;
 use super::wording::{capital, counted_from_one};
-use crate::analysis::Spot;
-use crate::lens::{Field, FieldKind};
+use crate::analysis::{Estimate, Spot};
+use crate::lens::{Field, FieldKind, Lens};
 use crate::session::{Command, Numbers, Results, View};
 
 /// A part of the window. It shows a view and writes down wishes; it changes nothing.
@@ -51,6 +54,8 @@ pub enum Kind {
     Prescription,
     /// Where the rays of each field land.
     Spot,
+    /// Which rays of each field get through, and what ends the others.
+    Pupil,
     /// The search for a better lens.
     Optimizer,
     /// Focal lengths, pupils, third-order sums.
@@ -61,10 +66,11 @@ pub enum Kind {
 
 impl Kind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Layout,
         Self::Prescription,
         Self::Spot,
+        Self::Pupil,
         Self::Optimizer,
         Self::FirstOrder,
         Self::Effects,
@@ -76,6 +82,7 @@ impl Kind {
             Self::Layout => Box::new(LensLayout::new(backing)),
             Self::Prescription => Box::new(Prescription::default()),
             Self::Spot => Box::new(SpotDiagram::new(backing)),
+            Self::Pupil => Box::new(Pupils::default()),
             Self::Optimizer => Box::new(Optimizer::default()),
             Self::FirstOrder => Box::new(FirstOrderData),
             Self::Effects => Box::new(Effects),
@@ -100,6 +107,18 @@ fn lit(spot: Option<&Spot>) -> f64 {
     colors.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI
 }
 
+/// The relative error of a number, as it stands behind it.
+fn relative_error(estimate: Estimate) -> String {
+    let share = (estimate.error / estimate.value).abs();
+    if !share.is_finite() {
+        String::new()
+    } else if share >= 5e-5 {
+        format!(" ± {} %", number::show_digits(100.0 * share, 2))
+    } else {
+        format!(" ± {share:.0e}")
+    }
+}
+
 /// A small square in the colour of what stands behind it.
 fn swatch(ui: &mut Ui, color: Color32) {
     let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
@@ -113,6 +132,14 @@ fn no_numbers(ui: &mut Ui, view: &View) {
         _ => "Computing…".to_owned(),
     };
     ui.weak(why);
+}
+
+/// What a zoom position is called.
+fn zoom_name(lens: &Lens, position: usize) -> String {
+    match lens.zoom.get(position).map(|position| position.name.as_str()) {
+        None | Some("") => format!("Zoom {}", position + 1),
+        Some(name) => name.to_owned(),
+    }
 }
 
 /// A field point as it is read: `14°`, `20 mm`, with both coordinates where it has two.

@@ -7,24 +7,24 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use eframe::egui::{
-    Align, ComboBox, Layout as Arrange, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2,
-    WidgetInfo, pos2, vec2,
+    Align, ComboBox, Layout as Arrange, Rect, Response, RichText, Sense, Ui, WidgetInfo,
 };
 use glam::DVec2;
 
-use super::{Panel, field_name, lit, no_numbers, shown, swatch};
+use super::cells::{Words, bar, within};
+use super::{Panel, field_name, lit, no_numbers, relative_error, shown, swatch};
 use crate::analysis::{Estimate, Spot};
 use crate::lens::Fields;
 use crate::session::{Command, Numbers, Results, View};
-use crate::studio::draw::{Backing, Camera, Canvas, Scene, length_text, round_length};
+use crate::studio::draw::{Backing, Camera, Canvas, Scene};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
 /// The errors that can be asked for, and what they are called.
 const TOLERANCES: [(f64, &str); 3] = [(1e-2, "1 %"), (1e-3, "0.1 %"), (1e-6, "1e-6")];
 
-/// The height of the words of a cell, in points: its field above, three lines of numbers below.
-const WORDS: (f32, f32) = (20.0, 47.0);
+/// The field of a cell above, three lines of numbers below.
+const WORDS: Words = Words { above: 20.0, below: 47.0 };
 
 /// The panel.
 #[derive(Debug)]
@@ -70,13 +70,13 @@ impl Panel for SpotDiagram {
         let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, "Spots"));
-        let cells = cells(rect, numbers.spots.value.len());
+        let cells = WORDS.cells(rect, numbers.spots.value.len());
         self.draw(ui, rect, results, numbers, &cells);
         for (i, cell) in cells.iter().enumerate() {
             let fields = results.lens.fields_at(results.settings.zoom);
             words(ui, *cell, fields, numbers, i);
         }
-        bar(ui, &cells, half_width(numbers));
+        scale_bar(ui, &cells, half_width(numbers));
     }
 }
 
@@ -91,7 +91,7 @@ impl SpotDiagram {
     ) {
         let per_point = ui.ctx().pixels_per_point();
         let palette = Palette::of(ui.visuals());
-        let relative = |cell: &Rect| picture(*cell).translate(-rect.min.to_vec2());
+        let relative = |cell: &Rect| WORDS.picture(*cell).translate(-rect.min.to_vec2());
         let cells = cells.iter().map(relative).collect();
         let source = Source { results: Arc::clone(results), cells, palette, per_point };
         if self.drawing.as_ref().is_none_or(|(drawn, _)| *drawn != source) {
@@ -136,28 +136,6 @@ fn tolerance(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
     if chosen != view.settings.tolerance {
         wishes.push(Command::SetTolerance(chosen));
     }
-}
-
-/// Cells of one size that fill a part of the window, as large as can be.
-fn cells(rect: Rect, count: usize) -> Vec<Rect> {
-    let size = |columns: usize| {
-        let rows = count.div_ceil(columns);
-        vec2(rect.width() / columns as f32, rect.height() / rows as f32)
-    };
-    let side = |columns: &usize| picture(Rect::from_min_size(rect.min, size(*columns))).width();
-    let columns = (1..=count).max_by(|a, b| side(a).total_cmp(&side(b)));
-    let Some(columns) = columns else { return Vec::new() };
-    let size = size(columns);
-    let place = |i: usize| vec2((i % columns) as f32 * size.x, (i / columns) as f32 * size.y);
-    (0..count).map(|i| Rect::from_min_size(rect.min + place(i), size)).collect()
-}
-
-/// The square of a cell in which its dots are.
-fn picture(cell: Rect) -> Rect {
-    let room = cell.size() - vec2(6.0, WORDS.0 + WORDS.1);
-    let side = room.min_elem().max(1.0);
-    let middle = pos2(cell.center().x, cell.top() + WORDS.0 + 0.5 * room.y.max(side));
-    Rect::from_center_size(middle, Vec2::splat(side))
 }
 
 /// Half of what the side of every picture shows, in mm.
@@ -252,21 +230,14 @@ impl Frame {
 
 /// The words of a cell: its field above the picture, its numbers below.
 fn words(ui: &mut Ui, cell: Rect, fields: &Fields, numbers: &Numbers, field: usize) {
-    let picture = picture(cell);
-    let above =
-        Rect::from_min_max(pos2(picture.left(), picture.top() - WORDS.0), picture.right_top());
-    let below = Rect::from_min_max(
-        pos2(cell.left() + 3.0, picture.bottom() + 2.0),
-        pos2(cell.right(), picture.bottom() + WORDS.1),
-    );
     let spot = &numbers.spots.value[field];
-    within(ui, above, |ui| {
+    within(ui, WORDS.above(cell), |ui| {
         ui.horizontal(|ui| {
             name(ui, fields, field);
             clipped(ui, lit(spot.as_ref().ok()));
         });
     });
-    within(ui, below, |ui| {
+    within(ui, WORDS.below(cell), |ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
         match spot {
             Ok(spot) => radii(ui, spot),
@@ -275,14 +246,6 @@ fn words(ui: &mut Ui, cell: Rect, fields: &Fields, numbers: &Numbers, field: usi
                 ui.label(text.color(ui.visuals().warn_fg_color));
             }
         }
-    });
-}
-
-fn within(ui: &mut Ui, rect: Rect, show: impl FnOnce(&mut Ui)) {
-    let builder = UiBuilder::new().max_rect(rect).layout(Arrange::top_down(Align::Min));
-    ui.scope_builder(builder, |ui| {
-        ui.set_clip_rect(rect.expand(2.0).intersect(ui.clip_rect()));
-        show(ui);
     });
 }
 
@@ -318,29 +281,11 @@ fn radii(ui: &mut Ui, spot: &Spot) {
 /// A length with its relative error.
 fn in_um(estimate: Estimate) -> String {
     let value = number::show_digits(1e3 * estimate.value, 4);
-    let share = (estimate.error / estimate.value).abs();
-    let error = if !share.is_finite() {
-        String::new()
-    } else if share >= 5e-5 {
-        format!(" ± {} %", number::show_digits(100.0 * share, 2))
-    } else {
-        format!(" ± {share:.0e}")
-    };
-    format!("{value} µm{error}")
+    format!("{value} µm{}", relative_error(estimate))
 }
 
 /// The scale of all cells, in the first one.
-fn bar(ui: &Ui, cells: &[Rect], half: f64) {
-    let Some(first) = cells.first().map(|cell| picture(*cell)) else { return };
-    let scale = 0.5 * f64::from(first.width()) / half;
-    let length = round_length(0.4 * f64::from(first.width()) / scale);
-    let width = (length * scale) as f32;
-    let color = ui.visuals().strong_text_color();
-    let corner = first.left_bottom() + vec2(6.0, -6.0);
-    let rect = Rect::from_min_size(corner - vec2(0.0, 2.0), vec2(width, 2.0));
-    ui.painter().rect_filled(rect, 0.0, color);
-    let font = eframe::egui::TextStyle::Small.resolve(ui.style());
-    let at = rect.left_top() - vec2(0.0, 1.0);
-    let painter = ui.painter();
-    painter.text(at, eframe::egui::Align2::LEFT_BOTTOM, length_text(length), font, color);
+fn scale_bar(ui: &Ui, cells: &[Rect], half: f64) {
+    let Some(first) = cells.first().map(|cell| WORDS.picture(*cell)) else { return };
+    bar(ui, first, 0.5 * f64::from(first.width()) / half, 0.4);
 }

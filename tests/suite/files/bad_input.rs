@@ -55,11 +55,18 @@ type Spoil = fn(&mut Lens);
 #[test]
 fn lenses_that_make_no_sense_are_refused_on_reading_and_on_writing() {
     let folder = folder("senseless");
-    let wrong: [(&str, Spoil); 6] = [
+    let wrong: [(&str, Spoil); 9] = [
         ("the lens has no surfaces", |lens| lens.surfaces.clear()),
         ("no surface is the stop", |lens| lens.surfaces[5].stop = false),
         ("surfaces 2 and 5 are both the stop", |lens| lens.surfaces[2].stop = true),
         ("semi-diameter of surface 3 is -1", |lens| lens.surfaces[3].semi_diameter = Some(-1.0)),
+        ("obstruction of surface 3 is -1", |lens| lens.surfaces[3].obstruction = Some(-1.0)),
+        ("obstruction of surface 3 is inf", |lens| {
+            lens.surfaces[3].obstruction = Some(f64::INFINITY);
+        }),
+        ("obstruction of surface 3 is 99; expected zero or more and less than", |lens| {
+            lens.surfaces[3].obstruction = Some(99.0);
+        }),
         ("curvature of surface 0 is NaN", |lens| lens.surfaces[0].curvature = f64::NAN),
         ("f-number is inf", |lens| lens.aperture = Aperture::FNumber(f64::INFINITY)),
     ];

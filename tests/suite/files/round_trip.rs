@@ -63,6 +63,25 @@ fn every_foreign_file_is_the_same_after_export_and_import() {
 }
 
 #[test]
+fn obstructions_go_through_both_formats() {
+    let folder = folder("obstructions");
+    let (_, mut lens) = library().next().unwrap();
+    lens.surfaces[0].obstruction = Some(0.1 + 0.7);
+    lens.surfaces[3].semi_diameter = None;
+    lens.surfaces[3].obstruction = Some(1.0 / 3.0);
+    for name in ["a.json", "a.zmx"] {
+        let target = folder.join(name);
+        let saved = files::save(&lens, &target).unwrap_or_else(|error| panic!("{error}"));
+        let back = files::open(&target).unwrap().lens;
+        assert_eq!(without_bounds(back), without_bounds(lens.clone()), "{name}");
+        if let Some(report) = saved.report {
+            assert!(report.rows.iter().any(|row| row.text == "2 obstructions"), "{report}");
+        }
+    }
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn what_an_export_cannot_hold_is_in_its_report() {
     let folder = folder("losses");
     let (_, mut lens) = library().next().unwrap();

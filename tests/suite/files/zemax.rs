@@ -217,6 +217,38 @@ fn apertures_fields_and_objects_are_read_in_every_kind() {
 }
 
 #[test]
+fn obscurations_and_inner_radii_obstruct() {
+    let read = |to: &str| {
+        let opened = changed("  CLAP 0 8.6 0", to).unwrap_or_else(|error| panic!("{error}"));
+        let row = &opened.lens.surfaces[0];
+        let sizes = (row.obstruction, row.semi_diameter);
+        let report = opened.report.unwrap();
+        let line = to.trim().lines().next().unwrap().trim().to_owned();
+        (sizes, outcome(&report, &line).0, outcome(&report, "DIAM 8.6 1").0)
+    };
+    let (used, dropped) = (Outcome::Used, Outcome::Dropped);
+    assert_eq!(read("  CLAP 2.5 8.6 0"), ((Some(2.5), Some(8.6)), used, used));
+    assert_eq!(read("  FLAP 0 8.6 0"), ((None, Some(8.6)), used, used));
+    // A semi-diameter that a person fixed is only drawn there.
+    assert_eq!(read("  OBSC 0 2.5 0"), ((Some(2.5), Some(8.6)), used, Outcome::Approximated));
+    // That of an obscuration is often its own size.
+    assert_eq!(read("  OBSC 0 8.6 0"), ((Some(8.6), None), used, Outcome::Preserved));
+    assert_eq!(read("  OBSC 1 2.5 0"), ((None, Some(8.6)), dropped, Outcome::Approximated));
+    assert_eq!(read("  SQAP 1 2.5 0"), ((None, Some(8.6)), dropped, Outcome::Approximated));
+    let both = read("  CLAP 1 8.6 0\r\n  OBSC 0 2.5 0").0;
+    assert_eq!(both, (Some(2.5), Some(8.6)));
+    let inches = achromat().replace("UNIT MM", "UNIT IN").replace("CLAP 0 8.6", "CLAP 1 8.6");
+    assert_eq!(lens(&inches).surfaces[0].obstruction, Some(25.4));
+    for (wrong, found) in [("CLAP 9 8.6", "from 9 to 8.6"), ("OBSC 0 -1", "from 0 to -1")] {
+        let text = refusal("CLAP 0 8.6", wrong);
+        assert!(text.contains("line 38: found an aperture") && text.contains(found), "{text}");
+    }
+    let at_image = achromat().replace("  DIAM 3.6 0", "  OBSC 0 1 0\r\n  DIAM 3.6 0");
+    let report = open(at_image.as_bytes()).unwrap().report.unwrap();
+    assert_eq!(outcome(&report, "OBSC").0, Outcome::Dropped);
+}
+
+#[test]
 fn solves_that_cannot_be_kept_are_frozen_and_said_so() {
     let cases = [
         (

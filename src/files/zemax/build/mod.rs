@@ -156,6 +156,9 @@ fn image(draft: &Draft, report: &mut Report) {
         if let Some(given) = surface.semi_diameter {
             report.amend(given.line, Outcome::Preserved, "object and image clip nothing here");
         }
+        for (_, line) in surface.clip.into_iter().chain(surface.obstruction) {
+            report.amend(line, Outcome::Dropped, "object and image clip nothing here");
+        }
         let terms = surface.parameters.iter().chain(&surface.extra);
         for (_, _, line) in terms.filter(|(_, value, _)| *value != 0.0) {
             report.amend(*line, Outcome::Dropped, "object and image are planes here");

@@ -39,6 +39,7 @@ pub(super) fn row(
         thickness: thickness(surface, number)? * unit,
         medium,
         semi_diameter: semi_diameter(draft, number, stop, report).map(|radius| radius * unit),
+        obstruction: surface.obstruction.map(|(radius, _)| radius * unit),
         stop: number == stop,
         hyper: false,
         comment: surface.comment.clone(),
@@ -59,13 +60,18 @@ fn thickness(surface: &Surface, number: usize) -> Result<f64, Malformed> {
 /// an automatic one is wide enough for every ray.
 fn semi_diameter(draft: &Draft, number: usize, stop: usize, report: &mut Report) -> Option<f64> {
     let surface = &draft.surfaces[number];
-    if surface.clip.is_some() {
-        return surface.clip;
+    if let Some((radius, _)) = surface.clip {
+        return Some(radius);
     }
     let given = surface.semi_diameter?;
     let floating = matches!(draft.aperture, Some((ApertureLine::FloatByStop, _)));
     if floating && number == stop {
         return None; // it is the aperture of the whole lens
+    }
+    if given.fixed && surface.obstruction.is_some_and(|(inner, _)| inner >= given.value) {
+        let note = "the size of the obscuration, which is drawn; nothing is clipped outside it";
+        report.amend(given.line, Outcome::Preserved, note);
+        return None;
     }
     if given.fixed && given.value > 0.0 {
         let note = "clips here; in the file it is only drawn";

@@ -8,8 +8,9 @@ use crate::files::zemax::draft::{
 use crate::files::zemax::line::Line;
 
 /// The keywords that make no sense outside a surface.
-pub(super) const KEYWORDS: &[&str] =
-    &["STOP", "TYPE", "CURV", "DISZ", "CONI", "PARM", "XDAT", "GLAS", "DIAM", "CLAP", "FLAP"];
+pub(super) const KEYWORDS: &[&str] = &[
+    "STOP", "TYPE", "CURV", "DISZ", "CONI", "PARM", "XDAT", "GLAS", "DIAM", "CLAP", "FLAP", "OBSC",
+];
 
 /// `SURF k`: surfaces come in order, from 0.
 pub(super) fn begin(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
@@ -34,7 +35,8 @@ pub(super) fn read(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Ma
         "DISZ" => surface.thickness = Some((thickness(line)?, line.number)),
         "GLAS" => surface.glass = Some(glass(line)?),
         "DIAM" => surface.semi_diameter = Some(semi_diameter(line)?),
-        "CLAP" | "FLAP" => return clip(surface, line),
+        "CLAP" | "FLAP" => clip(surface, line)?,
+        "OBSC" => return obscuration(surface, line),
         "VCON" => surface.variable_conic = Some(line.number),
         "VPAR" => surface.variable_parameters.push((line.count(0)?, line.number)),
         "VDSZ" => {
@@ -55,8 +57,8 @@ pub(super) fn read(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Ma
 fn rare(line: &Line<'_>) -> Result<Verdict, Malformed> {
     let zeros = |from| (from..line.fields.len()).all(|field| line.number(field) == Ok(0.0));
     Ok(match line.keyword {
-        "OBSC" | "SQAP" | "ELAP" | "OBDC" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
-            dropped("only round, centred, clear apertures clip here")
+        "SQAP" | "ELAP" | "OBDC" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
+            dropped("only round, centred apertures and obstructions clip here")
         }
         "PPAR" | "CHZH" | "TOLE" | "TCOM" | "EDGE" | "PMVA" | "PUPZ" | "CENT" => {
             approximated("the value that is solved for is kept as it is")
@@ -136,18 +138,41 @@ fn semi_diameter(line: &Line<'_>) -> Result<SemiDiameter, Malformed> {
     Ok(SemiDiameter { value, fixed: line.number_or(1, 0.0)? == 1.0, line: line.number })
 }
 
-/// `CLAP rmin rmax`, `FLAP rmin rmax`: what lies outside is cut.
-fn clip(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
-    let (inner, outer) = (line.number(0)?, line.number(1)?);
-    if inner < 0.0 || outer < 0.0 {
-        let found = format!("an aperture from {inner} to {outer}");
-        return Err(line.wrong(found, "radii of zero or more"));
+/// `CLAP rmin rmax`, `FLAP rmin rmax`: what lies inside the one and outside the other is cut.
+fn clip(surface: &mut Surface, line: &Line<'_>) -> Result<(), Malformed> {
+    let (inner, outer) = radii(line)?;
+    if surface.clip.is_none_or(|(other, _)| outer < other) {
+        surface.clip = Some((outer, line.number));
     }
-    surface.clip = Some(surface.clip.map_or(outer, |other| other.min(outer)));
+    obstruct(surface, inner, line);
+    Ok(())
+}
+
+/// `OBSC rmin rmax`: what lies between is cut.
+fn obscuration(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    let (inner, outer) = radii(line)?;
     if inner > 0.0 {
-        return Ok(approximated(format!("the hole inside {inner} is open here")));
+        return Ok(dropped("a ring that is dark with light inside cannot be had here"));
     }
+    obstruct(surface, outer, line);
     Ok(used())
+}
+
+/// The two radii of a circular aperture.
+fn radii(line: &Line<'_>) -> Result<(f64, f64), Malformed> {
+    let (inner, outer) = (line.number(0)?, line.number(1)?);
+    if inner >= 0.0 && (outer > inner || (inner, outer) == (0.0, 0.0)) {
+        return Ok((inner, outer));
+    }
+    let found = format!("an aperture from {inner} to {outer}");
+    Err(line.wrong(found, "radii of zero or more, the inner one smaller"))
+}
+
+/// Darkens the middle as far as the widest of its obstructions.
+fn obstruct(surface: &mut Surface, radius: f64, line: &Line<'_>) {
+    if radius > surface.obstruction.map_or(0.0, |(other, _)| other) {
+        surface.obstruction = Some((radius, line.number));
+    }
 }
 
 /// `PZUP surface scale offset column`.

@@ -127,6 +127,11 @@ impl Export {
             let note = "semi-diameters alone clip nothing there: written with circular apertures";
             self.note(Outcome::Used, format!("{clipping} semi-diameters that clip"), note);
         }
+        let obstructing = lens.surfaces.iter().filter(|row| row.obstruction.is_some()).count();
+        if obstructing > 0 {
+            let note = "written as obscurations, or as inner radii of the circular apertures";
+            self.note(Outcome::Used, format!("{obstructing} obstructions"), note);
+        }
         for variable in &lens.variables {
             let what = format!("variable: {}", variable.parameter);
             let bounded = variable.min.is_some() || variable.max.is_some();

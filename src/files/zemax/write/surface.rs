@@ -147,7 +147,8 @@ impl Export {
         }
     }
 
-    /// The semi-diameter, and the aperture that makes it clip.
+    /// The semi-diameter, and the aperture that makes it and the obstruction clip: a surface has one
+    /// aperture there, with an inner radius too.
     fn semi_diameter(&mut self, row: &Row) {
         let aperture = match self.lens.aperture {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
@@ -157,8 +158,16 @@ impl Export {
             Some(radius) => self.inner(format!("DIAM {} 1 0 0 1 \"\"", number(radius))),
             None => self.inner("DIAM 0 0 0 0 1 \"\""),
         }
-        if let Some(radius) = row.semi_diameter {
-            self.inner(format!("CLAP 0 {} 0", number(radius)));
+        let inner = row.obstruction.filter(|radius| *radius > 0.0);
+        match (row.semi_diameter, inner) {
+            (Some(outer), Some(inner)) => self.clap(&number(inner), outer),
+            (Some(outer), None) => self.clap("0", outer),
+            (None, Some(inner)) => self.inner(format!("OBSC 0 {} 0", number(inner))),
+            (None, None) => {}
         }
+    }
+
+    fn clap(&mut self, inner: &str, outer: f64) {
+        self.inner(format!("CLAP {inner} {} 0", number(outer)));
     }
 }

@@ -22,8 +22,6 @@ use table::Table;
 #[derive(Debug, Default)]
 pub struct Prescription {
     drafts: Drafts,
-    /// The surface whose row is selected, counted from 0.
-    selected: Option<usize>,
 }
 
 impl Panel for Prescription {
@@ -32,12 +30,10 @@ impl Panel for Prescription {
     }
 
     fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        self.selected = self.selected.filter(|row| *row < view.lens.surfaces.len());
-        self.keys(ui, view, wishes);
-        self.toolbar(ui, view, wishes);
+        keys(ui, view, wishes);
+        toolbar(ui, view, wishes);
         self.complaint(ui);
-        let Self { drafts, selected } = self;
-        Table { view, drafts, selected, wishes }.show(ui);
+        Table { view, drafts: &mut self.drafts, wishes }.show(ui);
     }
 
     fn is_typing(&self, context: &Context) -> bool {
@@ -51,34 +47,6 @@ pub(in crate::studio) fn first_field() -> Id {
 }
 
 impl Prescription {
-    /// Insert and Delete work on the selected row while no text is being edited.
-    fn keys(&self, ui: &Ui, view: &View, wishes: &mut Vec<Command>) {
-        let Some(row) = self.selected.filter(|_| !ui.ctx().egui_wants_keyboard_input()) else {
-            return;
-        };
-        for (key, action) in [(Key::Delete, Action::Remove), (Key::Insert, Action::InsertBefore)] {
-            if ui.input(|input| input.key_pressed(key)) {
-                wishes.extend(action.edit(&view.lens, row).map(Command::Edit));
-            }
-        }
-    }
-
-    fn toolbar(&self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        let lens = &view.lens;
-        ui.horizontal(|ui| {
-            for action in actions::ALL {
-                let edit = self.selected.and_then(|row| action.edit(lens, row));
-                let button = ui.add_enabled(edit.is_some(), Button::new(action.title()).small());
-                let button = button.on_hover_text(action.hint());
-                let button = button.on_disabled_hover_text("Select a row by its number first.");
-                if let Some(edit) = edit.filter(|_| button.clicked()) {
-                    wishes.push(edit.into());
-                }
-            }
-            variables::menu(ui, lens, wishes);
-        });
-    }
-
     /// The last text that was refused, where it can be read in full.
     fn complaint(&self, ui: &mut Ui) {
         let Some(why) = self.drafts.complaint() else { return };
@@ -87,4 +55,32 @@ impl Prescription {
             ui.label(RichText::new(why).color(error_color(ui)));
         });
     }
+}
+
+/// Insert and Delete work on the selected row while no text is being edited.
+fn keys(ui: &Ui, view: &View, wishes: &mut Vec<Command>) {
+    let Some(row) = view.selected.filter(|_| !ui.ctx().egui_wants_keyboard_input()) else {
+        return;
+    };
+    for (key, action) in [(Key::Delete, Action::Remove), (Key::Insert, Action::InsertBefore)] {
+        if ui.input(|input| input.key_pressed(key)) {
+            wishes.extend(action.edit(&view.lens, row).map(Command::Edit));
+        }
+    }
+}
+
+fn toolbar(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    let lens = &view.lens;
+    ui.horizontal(|ui| {
+        for action in actions::ALL {
+            let edit = view.selected.and_then(|row| action.edit(lens, row));
+            let button = ui.add_enabled(edit.is_some(), Button::new(action.title()).small());
+            let button = button.on_hover_text(action.hint());
+            let button = button.on_disabled_hover_text("Select a row by its number first.");
+            if let Some(edit) = edit.filter(|_| button.clicked()) {
+                wishes.push(edit.into());
+            }
+        }
+        variables::menu(ui, lens, wishes);
+    });
 }

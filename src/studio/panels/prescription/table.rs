@@ -125,7 +125,6 @@ pub(super) fn name_of(parameter: Parameter) -> String {
 pub(super) struct Table<'a> {
     pub(super) view: &'a View,
     pub(super) drafts: &'a mut Drafts,
-    pub(super) selected: &'a mut Option<usize>,
     pub(super) wishes: &'a mut Vec<Command>,
 }
 
@@ -190,7 +189,7 @@ impl Table<'_> {
     }
 
     fn surface_row(&mut self, row: &mut TableRow<'_, '_>, surface: usize, columns: &[Column]) {
-        row.set_selected(*self.selected == Some(surface));
+        row.set_selected(self.view.selected == Some(surface));
         row.col(|ui| self.surface_name(ui, surface));
         for column in columns {
             row.col(|ui| {
@@ -214,10 +213,10 @@ impl Table<'_> {
         let stop = self.view.lens.surfaces[surface].stop;
         let text = if stop { format!("{} STO", surface + 1) } else { (surface + 1).to_string() };
         let text = if stop { RichText::new(text).strong() } else { RichText::new(text) };
-        let chosen = *self.selected == Some(surface);
+        let chosen = self.view.selected == Some(surface);
         let label = ui.selectable_label(chosen, text).accessible_name(row_label(surface));
         if label.clicked() || label.secondary_clicked() {
-            *self.selected = Some(surface);
+            self.wishes.push(Command::Select(Some(surface)));
         }
         label.context_menu(|ui| self.row_menu(ui, surface));
         label.on_hover_text(format!(

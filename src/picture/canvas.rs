@@ -1,13 +1,9 @@
-//! Lines, markers and letters on a white picture.
+//! Lines, markers, letters and rasters on a white picture.
 
+use super::color::Color;
 use super::font::glyph;
 use image::{ImageError, ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
-
-/// Red, green, blue.
-pub(super) type Color = [u8; 3];
-pub(super) const BLACK: Color = [0; 3];
-pub(super) const GRID: Color = [0xdd; 3];
 
 /// How large a dot of a letter is, in pixels.
 const DOT: i32 = 2;
@@ -18,26 +14,43 @@ const DASH: f64 = 8.0;
 const PERIOD: f64 = 14.0;
 
 /// Where a text stands from its place.
-#[derive(Clone, Copy)]
-pub(super) enum Align {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Align {
+    /// It begins there.
     Left,
+    /// Its middle is there.
     Middle,
+    /// It ends there.
     Right,
 }
 
 /// How a curve is drawn.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Stroke {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stroke {
+    /// Without gaps.
     Solid,
+    /// With gaps.
     Dashed,
 }
 
-/// A picture.
-pub(super) struct Canvas(RgbImage);
+/// A picture; places are in pixels from its upper left corner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Canvas(RgbImage);
 
 impl Canvas {
-    pub(super) fn new([width, height]: [u32; 2]) -> Self {
+    /// A white picture of this width and height.
+    pub fn new([width, height]: [u32; 2]) -> Self {
         Self(RgbImage::from_pixel(width, height, Rgb([0xff; 3])))
+    }
+
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        [self.0.width(), self.0.height()]
+    }
+
+    /// Its pixels row by row from the upper left corner: red, green, blue.
+    pub fn pixels(&self) -> &[u8] {
+        self.0.as_raw()
     }
 
     fn dot(&mut self, x: i32, y: i32, color: Color) {
@@ -48,8 +61,8 @@ impl Canvas {
         }
     }
 
-    /// A filled square around a place.
-    fn square(&mut self, [x, y]: [f64; 2], half: i32, color: Color) {
+    /// A filled square around a place, `half` pixels to each side.
+    pub fn square(&mut self, [x, y]: [f64; 2], half: i32, color: Color) {
         let (x, y) = (x.round() as i32, y.round() as i32);
         for dy in -half..=half {
             (-half..=half).for_each(|dx| self.dot(x + dx, y + dy, color));
@@ -57,14 +70,14 @@ impl Canvas {
     }
 
     /// A line one pixel wide.
-    pub(super) fn line(&mut self, from: [f64; 2], to: [f64; 2], color: Color) {
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], color: Color) {
         let place = |t: f64| [0, 1].map(|i| from[i] + t * (to[i] - from[i]));
         let steps = length(from, to).ceil().max(1.0);
         (0..=steps as i32).for_each(|i| self.square(place(f64::from(i) / steps), 0, color));
     }
 
-    /// A broken line three pixels wide, with a marker at every point.
-    pub(super) fn curve(&mut self, points: &[[f64; 2]], color: Color, stroke: Stroke) {
+    /// A broken line three pixels wide.
+    pub fn curve(&mut self, points: &[[f64; 2]], color: Color, stroke: Stroke) {
         let mut way = 0.0;
         for pair in points.windows(2) {
             let (from, to) = (pair[0], pair[1]);
@@ -79,11 +92,27 @@ impl Canvas {
             }
             way += length;
         }
+    }
+
+    /// A marker at every point.
+    pub fn marks(&mut self, points: &[[f64; 2]], color: Color) {
         points.iter().for_each(|point| self.square(*point, 3, color));
     }
 
+    /// A raster from its upper left corner, row by row, `cell` pixels to a side of each value.
+    pub fn raster(&mut self, [x, y]: [f64; 2], columns: usize, cell: usize, colors: &[Color]) {
+        let (x, y) = (x.round() as i32, y.round() as i32);
+        for (i, color) in colors.iter().enumerate() {
+            let corner = [i % columns, i / columns].map(|k| (k * cell) as i32);
+            for pixel in 0..cell * cell {
+                let [dx, dy] = [pixel % cell, pixel / cell].map(|k| k as i32);
+                self.dot(x + corner[0] + dx, y + corner[1] + dy, *color);
+            }
+        }
+    }
+
     /// A line of text; the place is at its top.
-    pub(super) fn text(&mut self, [x, y]: [f64; 2], text: &str, color: Color, align: Align) {
+    pub fn text(&mut self, [x, y]: [f64; 2], text: &str, color: Color, align: Align) {
         let width = DOT * ADVANCE * text.chars().count() as i32;
         let start = x.round() as i32
             - match align {
@@ -108,7 +137,7 @@ impl Canvas {
     }
 
     /// The picture as a file.
-    pub(super) fn png(&self) -> Result<Vec<u8>, ImageError> {
+    pub fn png(&self) -> Result<Vec<u8>, ImageError> {
         let mut bytes = Cursor::new(Vec::new());
         self.0.write_to(&mut bytes, ImageFormat::Png)?;
         Ok(bytes.into_inner())

@@ -1,0 +1,180 @@
+//! Accuracy of aperture-aware derivatives against time.
+
+use super::plot::{self, Chart, Color, Curve, Label, Stroke};
+use crate::cli::failure::Failure;
+use crate::cli::input::{LensFile, check_target};
+use crate::cli::output::{Number, Output, Table};
+use crate::files;
+use crate::measure::{
+    GradientCost, GradientCurves, GradientRow, Gradients, Integral, Machine, Precision, gradients,
+};
+use crate::pupil::Estimator;
+use image::ImageError;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+/// Error against milliseconds of every estimator of derivatives over a pupil that moves
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("../help/measure_gradient.txt"))]
+pub(super) struct Gradient {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// The field beside the axis, in the unit of the lens's fields; the most vignetted field of
+    /// the lens where it is absent
+    #[arg(long, value_name = "Y", allow_negative_numbers = true)]
+    field: Option<f64>,
+
+    /// The zoom position, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    zoom: usize,
+
+    /// Draws the curves, each the worst of all kinds of numbers
+    #[arg(long, value_name = "FILE.png")]
+    plot: Option<PathBuf>,
+}
+
+impl Gradient {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let opened = self.lens.open()?;
+        self.plot.iter().try_for_each(|path| check_target(path, &["png"]))?;
+        opened.bench(self.zoom)?;
+        self.field.map(|y| opened.field(y, self.zoom)).transpose()?;
+        let bar = ProgressBar::new(0);
+        let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} curves");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let measured = gradients(&opened.lens, self.zoom, self.field, |done, all| {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+        });
+        bar.finish_and_clear();
+        let measured = measured.map_err(|e| Failure::Input(format!("{}: {e}", opened.file)))?;
+        if let Some(path) = &self.plot {
+            let png = picture(&measured, &opened.lens.name);
+            files::replace(path, &png.map_err(|e| Failure::Failed(e.to_string()))?)?;
+        }
+        output.print(&Report { machine: Machine::here(), lens: opened.file, measured })
+    }
+}
+
+const COLORS: [(Estimator, Color); 4] = [
+    (Estimator::Biased, [0x7f, 0x7f, 0x7f]),
+    (Estimator::Boundary, [0xd6, 0x27, 0x28]),
+    (Estimator::Warp, [0x2c, 0xa0, 0x2c]),
+    (Estimator::Difference, [0x1f, 0x77, 0xb4]),
+];
+const STROKES: [(Integral, Stroke); 2] =
+    [(Integral::Spot, Stroke::Solid), (Integral::Throughput, Stroke::Dashed)];
+
+/// A chart for each field, in `f64`.
+fn picture(measured: &Gradients, title: &str) -> Result<Vec<u8>, ImageError> {
+    let chart = |curves: &GradientCurves| {
+        let curve = |(estimator, color), (integral, stroke)| {
+            let mine = |row: &&GradientRow| {
+                row.integral == integral
+                    && row.estimator == estimator
+                    && row.precision == Precision::F64
+            };
+            let points = curves.rows.iter().filter(mine).map(|row| [row.ms, row.worst()]);
+            Curve { color, stroke, points: points.collect() }
+        };
+        let name = format!("field {}, {:.0} % light", Number(curves.y), 100.0 * curves.light);
+        let all = COLORS.into_iter().flat_map(|c| STROKES.map(|s| curve(c, s))).collect();
+        Chart { name, curves: all }
+    };
+    let charts: Vec<Chart> = measured.fields.iter().map(chart).collect();
+    let colors = COLORS.map(|(estimator, color)| Label::of(estimator.name(), color));
+    let strokes = [("spot", Stroke::Solid), ("throughput", Stroke::Dashed)];
+    let strokes = strokes.map(|(name, stroke)| Label::drawn(name, stroke));
+    let labels: Vec<Label> = colors.into_iter().chain(strokes).collect();
+    plot::draw(&charts, &labels, title)
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    lens: String,
+    #[serde(flatten)]
+    measured: Gradients,
+}
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { machine, lens, measured } = self;
+        writeln!(f, "{machine}\n{lens}: relative errors of derivatives, one thread")?;
+        for curves in &measured.fields {
+            write_curves(f, curves)?;
+        }
+        writeln!(f, "\nwhat derivatives cost, in times of what they are derivatives of:\n")?;
+        write!(f, "{}", costs(&measured.costs))
+    }
+}
+
+fn write_curves(f: &mut fmt::Formatter<'_>, curves: &GradientCurves) -> fmt::Result {
+    let GradientCurves { y, light, planned, reason, reference, checked, .. } = curves;
+    let light = 100.0 * light;
+    writeln!(f, "\nfield {}, {light:.1} % of the light on the axis", Number(*y))?;
+    writeln!(f, "planned: {planned}, because {reason}")?;
+    let check = match reference {
+        Estimator::Warp => "its standard error",
+        _ => "central differences are off by",
+    };
+    let [spot, throughput] = checked;
+    writeln!(
+        f,
+        "reference: {reference}; {check} {spot:.0e} (spot), {throughput:.0e} (throughput)"
+    )?;
+    for (integral, name) in [(Integral::Spot, "spot"), (Integral::Throughput, "throughput")] {
+        let rows = curves.rows.iter().filter(|row| row.integral == integral);
+        write!(f, "\n{}", table(name, rows))?;
+    }
+    Ok(())
+}
+
+fn table<'a>(name: &str, rows: impl Iterator<Item = &'a GradientRow>) -> Table {
+    let kinds = ["curvature", "conic", "asphere", "thickness", "index", "semi-d."];
+    let rows: Vec<&GradientRow> = rows.collect();
+    let used = |i: &usize| rows.iter().any(|row| row.errors[*i].is_some());
+    let columns: Vec<usize> = (0..kinds.len()).filter(used).collect();
+    let head = [name, "rays", "ms"].into_iter().chain(columns.iter().map(|i| kinds[*i]));
+    let mut table = Table::new(&head.collect::<Vec<_>>());
+    for row in rows {
+        let precision = if row.precision == Precision::F32 { " f32" } else { "" };
+        let start = [
+            format!("{}{precision}", row.estimator),
+            row.rays.to_string(),
+            format!("{:.3}", row.ms),
+        ];
+        let error = |i: &usize| row.errors[*i].map_or("-".to_owned(), |e| format!("{e:.1e}"));
+        table.row(start.into_iter().chain(columns.iter().map(error)));
+    }
+    table
+}
+
+fn costs(costs: &[GradientCost]) -> Table {
+    let mut table = Table::new(&[
+        "surfaces",
+        "numbers",
+        "integral ms",
+        "boundary",
+        "difference",
+        "warp/trace",
+        "in f32",
+    ]);
+    for cost in costs {
+        let times = |times: f64| format!("{times:.2}");
+        table.row([
+            cost.surfaces.to_string(),
+            cost.numbers.to_string(),
+            format!("{:.3}", cost.integral_ms),
+            cost.boundary.map_or("-".to_owned(), times),
+            times(cost.difference),
+            times(cost.warp),
+            times(cost.warp_single),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,307 @@
+//! Figure 3.3: the stop of a lens that should only be sharp closes to a pinhole, if the gradient
+//! knows that the pupil has an edge.
+//!
+//! Two singlets around a stop, `C = |p − o|²` with `o` the middle of the sensor, and the stop's
+//! semi-diameter `R` the only variable. The image point of a ray does not depend on `R`, so that
+//! the biased gradient (3.15) is zero and nothing moves. The unbiased one (3.16) is
+//! `dL/dR = 2π r r' C(rim)` with `r` the radius of the pupil: positive, and the stop closes.
+//!
+//! The image plane stands behind the paraxial focus. In front of it there is a zone that crosses the
+//! axis in the plane, where `C(rim) = 0` and descent would come to rest.
+
+use super::section::Section;
+use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report};
+use crate::lens::{
+    Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength, focus_gap,
+};
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke};
+use crate::pupil::{Bench, Cost, Region};
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "3.3",
+    title: "An aperture stop optimised for sharpness alone",
+    claim: "The unbiased gradient closes the stop to a pinhole; the biased one leaves it as it is",
+    seconds: 1.0,
+    run,
+};
+
+/// Curvature in 1/mm, thickness in mm, semi-diameter in mm, index behind the surface.
+const SURFACES: [[f64; 4]; 5] = [
+    [1.0 / 60.0, 5.0, 14.0, 1.5168],
+    [-1.0 / 120.0, 6.0, 14.0, 1.0],
+    [0.0, 4.0, START, 1.0],
+    [1.0 / 90.0, 5.0, 13.0, 1.5168],
+    [-1.0 / 70.0, 0.0, 13.0, 1.0],
+];
+const STOP: usize = 2;
+/// The semi-diameter of the stop at the start, in mm.
+const START: f64 = 9.0;
+/// How far the image plane stands behind the paraxial focus, in mm.
+const BEHIND_FOCUS: f64 = 1.0;
+const AXIS: Field = Field { x: 0.0, y: 0.0, weight: 1.0 };
+
+/// Adam's rate in mm, and how often it steps.
+const RATE: f64 = 0.2;
+const STEPS: usize = 4000;
+const FEW_STEPS: usize = 2000;
+/// The stop cannot close further than this, in mm.
+const CLOSED: f64 = 0.01;
+/// Order of quadrature: eight digits are plenty for a descent, and the checks raise it.
+const ORDER: usize = 4;
+const HIGH_ORDER: usize = 8;
+/// A pinhole is what is left when the stop has closed to this part.
+const PINHOLE: f64 = 0.1;
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let steps = effort.pick(STEPS, FEW_STEPS);
+    let mut outcome = Outcome::default();
+    let start = Point::at(START, HIGH_ORDER)?;
+    let mut ways = Vec::new();
+    for gradient in [Gradient::Unbiased, Gradient::Biased] {
+        ways.push(Descent::run(gradient, steps, watch)?);
+    }
+    outcome.rays = start.rays + ways.iter().map(|way| way.rays).sum::<usize>();
+    let [unbiased, biased] = [&ways[0], &ways[1]];
+    outcome.claims = claims(&start, unbiased, biased, &mut outcome.rays)?;
+    outcome.tables.push(table(unbiased, biased));
+    outcome.pictures.push(Picture { name: "radius", canvas: radii(unbiased, biased) });
+    outcome.pictures.push(Picture { name: "lens", canvas: lenses(unbiased, biased)? });
+    Ok(outcome)
+}
+
+/// Which derivative by the radius is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Gradient {
+    Unbiased,
+    Biased,
+}
+
+/// The two singlets with a stop of this semi-diameter.
+fn lens(radius: f64) -> Result<Lens, Ended> {
+    let row = |(i, [curvature, thickness, semi_diameter, index]): (usize, &[f64; 4])| Row {
+        curvature: *curvature,
+        thickness: *thickness,
+        medium: if *index == 1.0 { Medium::Air } else { Medium::Index(*index) },
+        semi_diameter: Some(if i == STOP { radius } else { *semi_diameter }),
+        stop: i == STOP,
+        ..Row::default()
+    };
+    let mut lens = Lens {
+        name: "Two singlets and a stop".to_owned(),
+        source: String::new(),
+        notes: String::new(),
+        object: Object::Infinity,
+        object_medium: Medium::Air,
+        aperture: Aperture::StopSemiDiameter(radius),
+        fields: Fields { kind: FieldKind::Angle, values: vec![AXIS] },
+        wavelengths: vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }],
+        surfaces: SURFACES.iter().enumerate().map(row).collect(),
+        zoom: Vec::new(),
+        variables: Vec::new(),
+        pickups: Vec::new(),
+        focus: None,
+    };
+    let system = lens.system(0, lens.wavelengths[0].um).map_err(Ended::from_error)?;
+    let gap = focus_gap(&system, Object::Infinity) + BEHIND_FOCUS;
+    lens.surfaces[SURFACES.len() - 1].thickness = gap;
+    Ok(lens)
+}
+
+fn bench(radius: f64) -> Result<Bench, Ended> {
+    Bench::of(&lens(radius)?, 0).map_err(Ended::from_error)
+}
+
+/// The objective at a radius of the stop.
+struct Point {
+    /// `L = ∫ |p − o|² dw`, in mm⁴.
+    blur: f64,
+    /// The area of the pupil, in mm².
+    area: f64,
+    /// The derivatives of `L` by the radius, in mm³.
+    unbiased: f64,
+    biased: f64,
+    rays: usize,
+}
+
+impl Point {
+    fn at(radius: f64, order: usize) -> Result<Self, Ended> {
+        let bench = bench(radius)?;
+        let region = Region::new(bench.launch(AXIS, 0).map_err(Ended::from_error)?);
+        let lit = region.lit(order);
+        let cost = Cost::spread([0.0; 2]);
+        let failed = || Ended::Failed(format!("the pupil of a stop of {radius} mm has no edge"));
+        let unbiased = lit.boundary_derivative(&cost).ok_or_else(failed)?;
+        let biased = lit.biased_derivative(&cost);
+        let by_radius = |by: &crate::trace::Gradient<f64>| by.surfaces[STOP].semi_diameter;
+        Ok(Self {
+            blur: lit.moments.spread,
+            area: lit.moments.area,
+            unbiased: by_radius(&unbiased),
+            biased: by_radius(&biased),
+            rays: region.rays + lit.traced,
+        })
+    }
+
+    /// The root mean square distance from the middle of the sensor, in mm.
+    fn rms(&self) -> f64 {
+        (self.blur / self.area).sqrt()
+    }
+}
+
+/// What a descent went through: the radius and the objective at every step.
+struct Descent {
+    radii: Vec<f64>,
+    blurs: Vec<f64>,
+    rms: Vec<f64>,
+    rays: usize,
+}
+
+impl Descent {
+    /// Adam in one variable (Kingma and Ba, ICLR 2015, algorithm 1).
+    fn run(gradient: Gradient, steps: usize, watch: &mut Watch<'_>) -> Result<Self, Ended> {
+        let (name, done) = match gradient {
+            Gradient::Unbiased => ("descent by the unbiased gradient", 0.0),
+            Gradient::Biased => ("descent by the biased gradient", 0.5),
+        };
+        let mut way = Self { radii: Vec::new(), blurs: Vec::new(), rms: Vec::new(), rays: 0 };
+        let (mut radius, mut mean, mut square) = (START, 0.0, 0.0);
+        let [b1, b2]: [f64; 2] = [0.9, 0.999];
+        for step in 0..=steps {
+            report(watch, done + 0.5 * step as f64 / steps as f64, name)?;
+            let point = Point::at(radius, ORDER)?;
+            way.note(radius, &point);
+            let slope = match gradient {
+                Gradient::Unbiased => point.unbiased,
+                Gradient::Biased => point.biased,
+            };
+            let age = step as i32 + 1;
+            mean = b1 * mean + (1.0 - b1) * slope;
+            square = b2 * square + (1.0 - b2) * slope * slope;
+            let size = (square / (1.0 - b2.powi(age))).sqrt();
+            let along = if size > 0.0 { mean / (1.0 - b1.powi(age)) / size } else { 0.0 };
+            radius = (radius - RATE * along).max(CLOSED);
+        }
+        Ok(way)
+    }
+
+    fn note(&mut self, radius: f64, point: &Point) {
+        self.radii.push(radius);
+        self.blurs.push(point.blur);
+        self.rms.push(point.rms());
+        self.rays += point.rays;
+    }
+
+    fn end(&self) -> f64 {
+        self.radii.last().copied().unwrap_or(START)
+    }
+}
+
+fn claims(
+    start: &Point,
+    unbiased: &Descent,
+    biased: &Descent,
+    rays: &mut usize,
+) -> Result<Vec<Claim>, Ended> {
+    let step = 1e-4 * START;
+    let [below, above] =
+        [Point::at(START - step, HIGH_ORDER)?, Point::at(START + step, HIGH_ORDER)?];
+    *rays += below.rays + above.rays;
+    let difference = (above.blur - below.blur) / (2.0 * step);
+    let grown = unbiased.radii.windows(2).filter(|pair| pair[1] > pair[0]).count();
+    let moved = biased.radii.iter().filter(|radius| **radius != START).count();
+    let last = |values: &[f64]| values.last().copied().unwrap_or(f64::NAN);
+    Ok(vec![
+        Claim::at_most(
+            "unbiased: radius of the stop at the end over that at the start",
+            unbiased.end() / START,
+            PINHOLE,
+        ),
+        Claim::at_most("unbiased: steps on which the stop opens", grown as f64, 0.0),
+        Claim::at_most(
+            "unbiased: blur (rms) at the end over that at the start",
+            last(&unbiased.rms) / unbiased.rms[0],
+            PINHOLE,
+        ),
+        Claim::exactly("biased: derivative by the radius at the start", start.biased, 0.0)
+            .in_unit("mm^3"),
+        Claim::exactly("biased: steps after which the radius is another", moved as f64, 0.0),
+        Claim::exactly("biased: radius of the stop at the end", biased.end(), START).in_unit("mm"),
+        Claim::at_most(
+            "unbiased derivative at the start against central differences, relative error",
+            (start.unbiased / difference - 1.0).abs(),
+            1e-6,
+        ),
+    ])
+}
+
+fn table(unbiased: &Descent, biased: &Descent) -> Table {
+    let columns = [
+        "step",
+        "unbiased_radius_mm",
+        "unbiased_blur_mm4",
+        "unbiased_rms_mm",
+        "biased_radius_mm",
+        "biased_blur_mm4",
+        "biased_rms_mm",
+    ];
+    let mut table = Table::new("radius", &columns);
+    for step in 0..unbiased.radii.len() {
+        let of = |way: &Descent| [way.radii[step], way.blurs[step], way.rms[step]];
+        let numbers = of(unbiased).into_iter().chain(of(biased));
+        table.row(std::iter::once(step.into()).chain(numbers.map(Into::into)));
+    }
+    table
+}
+
+const UNBIASED: Color = PALETTE[0];
+const BIASED: Color = PALETTE[1];
+
+/// Radius and blur over the steps.
+fn radii(unbiased: &Descent, biased: &Descent) -> Canvas {
+    let mut canvas = Canvas::new([1500, 700]);
+    let ways = [("unbiased", unbiased, UNBIASED), ("biased", biased, BIASED)];
+    let x = Axis::linear("step", [0.0, unbiased.radii.len() as f64 - 1.0]);
+    let radius = Axis::linear("mm", ways.iter().flat_map(|way| way.1.radii.iter().copied()));
+    let rms = Axis::logarithmic("mm", ways.iter().flat_map(|way| way.1.rms.iter().copied()), 1e-9);
+    let charts = [
+        Chart::new([120.0, 110.0], [700.0, 580.0], x.clone(), radius),
+        Chart::new([860.0, 110.0], [1440.0, 580.0], x, rms),
+    ];
+    charts[0].draw(&mut canvas, "radius of the stop");
+    charts[1].draw(&mut canvas, "blur, root mean square");
+    for (i, (name, way, color)) in ways.into_iter().enumerate() {
+        for (chart, values) in charts.iter().zip([&way.radii, &way.rms]) {
+            let points = values.iter().enumerate().map(|(step, v)| chart.place([step as f64, *v]));
+            canvas.curve(&points.collect::<Vec<_>>(), color, Stroke::Solid);
+        }
+        let y = 20.0 + 24.0 * i as f64;
+        canvas.curve(&[[120.0, y + 7.0], [170.0, y + 7.0]], color, Stroke::Solid);
+        canvas.text([180.0, y], name, BLACK, Align::Left);
+    }
+    canvas
+}
+
+/// The lens at the start and at both ends.
+fn lenses(unbiased: &Descent, biased: &Descent) -> Result<Canvas, Ended> {
+    let mut canvas = Canvas::new([1800, 720]);
+    let panels = [
+        ("start", START, BLACK),
+        ("biased gradient", biased.end(), BIASED),
+        ("unbiased gradient", unbiased.end(), UNBIASED),
+    ];
+    for (i, (name, radius, color)) in panels.into_iter().enumerate() {
+        let bench = bench(radius)?;
+        let section = Section::new(&bench.colors[0].system);
+        let [z, y] = section.extent();
+        let left = 90.0 + 600.0 * i as f64;
+        let (x, y) = (Axis::linear("z, mm", z), Axis::linear("y, mm", y));
+        let chart = Chart::new([left, 110.0], [left + 480.0, 600.0], x, y).to_scale();
+        chart.draw(&mut canvas, &format!("{name}: stop {radius:.3} mm"));
+        let launch = bench.launch(AXIS, 0).map_err(Ended::from_error)?;
+        for ray in -4..=4 {
+            section.draw_ray(&mut canvas, &chart, &launch, [0.0, 0.24 * f64::from(ray)], color);
+        }
+        section.draw(&mut canvas, &chart);
+    }
+    Ok(canvas)
+}

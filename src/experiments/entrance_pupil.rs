@@ -1,0 +1,367 @@
+//! Figure 3.4: the entrance pupil of a double Gauss, field by field: what ends it where.
+//!
+//! The edge of every pupil is followed and split at its corners, each side with the limit that makes
+//! it; that is what the boundary integral of (3.16) runs along. Two checks know nothing of edges: a
+//! bitmap of rays started at the points of a grid in the first vertex plane, whose lit cells must
+//! add up to the same area, and rays started close to the edge on both sides, which must arrive or
+//! end at the surface that is named.
+
+use super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens, report};
+use crate::lens::Field;
+use crate::math::Vec3;
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke};
+use crate::pupil::{Accuracy, Bench, Converged, Limit, Outline, Region};
+use crate::trace::{Fate, Points, Ray, Rays, Sink};
+use std::f64::consts::PI;
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "3.4",
+    title: "The entrance pupil of a double Gauss by what ends it",
+    claim: "Off the axis the pupil is no disc: ever more limits make its edge, corners between them",
+    seconds: 2.0,
+    run,
+};
+
+const LENS: &str = "double_gauss_nikkor_s_50";
+/// The last field, in degrees.
+const EDGE: f64 = 24.0;
+/// Points of an outline.
+const POINTS: usize = 256;
+/// How exact its area is, relatively.
+const ACCURACY: Accuracy = Accuracy { tolerance: 1e-7, most_rays: 100_000 };
+/// How far from the edge, relatively, rays are started to see what ends them there.
+const BESIDE: f64 = 1e-6;
+/// The bitmap is this much larger than the pupil.
+const MARGIN: f64 = 1.08;
+/// How far its cells stand askew of the pupil's axes of symmetry, in cells: the errors of mirrored
+/// cells would be the same.
+const ASKEW: [f64; 2] = [0.31, 0.17];
+/// Standard errors by which the area of a bitmap may be off.
+const SIGMAS: f64 = 4.0;
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let (fields, cells): (usize, usize) = effort.pick((13, 400), (5, 150));
+    let bench = Bench::of(&lens(LENS)?, 0).map_err(Ended::from_error)?;
+    let mut pupils = Vec::new();
+    for i in 0..fields {
+        let angle = EDGE * i as f64 / (fields - 1) as f64;
+        report(watch, i as f64 / fields as f64, &format!("pupil at {angle} degrees"))?;
+        pupils.push(Pupil::at(&bench, angle, cells)?);
+    }
+    Ok(Outcome {
+        claims: claims(&pupils),
+        tables: vec![areas(&pupils), shares(&bench, &pupils), edges(&bench, &pupils)],
+        lenses: Vec::new(),
+        pictures: vec![
+            Picture { name: "pupils", canvas: maps(&bench, &pupils) },
+            Picture { name: "shares", canvas: curves(&bench, &pupils) },
+        ],
+        rays: pupils.iter().map(|pupil| pupil.rays).sum(),
+    })
+}
+
+/// The pupil of a field.
+struct Pupil {
+    /// In degrees.
+    angle: f64,
+    outline: Outline,
+    area: Converged<3>,
+    bitmap: Bitmap,
+    /// Rays beside the edge that do not end as the outline says.
+    wrong: usize,
+    rays: usize,
+}
+
+impl Pupil {
+    fn at(bench: &Bench, angle: f64, cells: usize) -> Result<Self, Ended> {
+        let field = Field { x: 0.0, y: angle, weight: 1.0 };
+        let launch = bench.launch(field, bench.primary).map_err(Ended::from_error)?;
+        let region = Region::new(launch);
+        let dark = || Ended::Failed(format!("the pupil at {angle} degrees has no edge"));
+        let outline = region.outline(POINTS).ok_or_else(dark)?;
+        let area = region.extent(ACCURACY).ok_or_else(dark)?;
+        let bitmap = Bitmap::of(bench, angle, &outline, cells);
+        let (wrong, beside) = wrong_fates(bench, angle, &outline);
+        let rays = area.rays + outline.rays + beside + cells * cells;
+        Ok(Self { angle, outline, area, bitmap, wrong, rays })
+    }
+
+    fn area(&self) -> f64 {
+        self.area.values[0]
+    }
+
+    fn corners(&self) -> usize {
+        self.outline.corners().count()
+    }
+
+    fn perimeter(&self) -> f64 {
+        self.outline.sides.iter().map(|side| side.length).sum()
+    }
+
+    /// `4π A / P²`: 1 for a disc and for nothing else.
+    fn roundness(&self) -> f64 {
+        4.0 * PI * self.area() / self.perimeter().powi(2)
+    }
+
+    /// The standard error of the area of the bitmap: the part of a cell on the edge that is lit is
+    /// anything between 0 and 1, and the edge crosses `4/π` cells on each of its cells' lengths.
+    fn grid_error(&self) -> f64 {
+        let cell = self.bitmap.cell;
+        let crossed = 4.0 / PI * self.perimeter() / cell;
+        cell * cell * (crossed / 12.0).sqrt()
+    }
+
+    /// By how many standard errors the bitmap is off.
+    fn deviation(&self) -> f64 {
+        (self.bitmap.area() - self.area()).abs() / self.grid_error()
+    }
+}
+
+/// The ray of a field that crosses the first vertex plane at a point.
+fn ray(angle: f64, [x, y]: [f64; 2]) -> Ray<f64> {
+    let (sin, cos) = angle.to_radians().sin_cos();
+    Ray { point: Vec3::new(x, y, 0.0), direction: Vec3::new(0.0, sin, cos) }
+}
+
+/// How the rays through some points end.
+fn fates(bench: &Bench, angle: f64, points: impl Iterator<Item = [f64; 2]>) -> Vec<Fate> {
+    let rays: Rays<f64> = points.map(|p| ray(angle, p)).collect();
+    let mut landed = Points::default();
+    bench.colors[bench.primary].tracer.batch(&rays, &mut landed);
+    (0..rays.len()).map(|i| landed.fate(i)).collect()
+}
+
+/// How the rays at the points of a square grid end.
+struct Bitmap {
+    /// The side of a cell in mm, cells along a side, the middle of the first cell.
+    cell: f64,
+    cells: usize,
+    corner: [f64; 2],
+    fates: Vec<Fate>,
+}
+
+impl Bitmap {
+    fn of(bench: &Bench, angle: f64, outline: &Outline, cells: usize) -> Self {
+        let points = || outline.sides.iter().flat_map(|side| &side.points);
+        let ends = [0, 1].map(|k| {
+            let values = || points().map(|p| p[k]);
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
+        });
+        let width = MARGIN * ends.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
+        let cell = width / cells as f64;
+        let middle = ends.map(|(low, high)| 0.5 * (low + high - width + cell));
+        let corner = [0, 1].map(|k| middle[k] + ASKEW[k] * cell);
+        let at = |i: usize| {
+            [corner[0] + (i % cells) as f64 * cell, corner[1] + (i / cells) as f64 * cell]
+        };
+        let fates = fates(bench, angle, (0..cells * cells).map(at));
+        Self { cell, cells, corner, fates }
+    }
+
+    fn area(&self) -> f64 {
+        let lit = self.fates.iter().filter(|fate| fate.is_imaged()).count();
+        lit as f64 * self.cell * self.cell
+    }
+}
+
+/// Rays just inside the edge that do not arrive and rays just outside that do not end at the surface
+/// of its side, away from corners; and how many rays there are.
+fn wrong_fates(bench: &Bench, angle: f64, outline: &Outline) -> (usize, usize) {
+    let [x, y] = outline.center;
+    let mut wrong = 0;
+    let mut rays = 0;
+    for side in &outline.sides {
+        let Some((_, rest)) = side.points.split_first() else { continue };
+        let Some((_, points)) = rest.split_last() else { continue };
+        let beside = |factor: f64| {
+            let moved = points
+                .iter()
+                .map(move |p| [x + (1.0 + factor) * (p[0] - x), y + (1.0 + factor) * (p[1] - y)]);
+            fates(bench, angle, moved)
+        };
+        let lost = beside(-BESIDE).iter().filter(|fate| !fate.is_imaged()).count();
+        let surface = side.limit.surface();
+        let other = beside(BESIDE).iter().filter(|fate| fate.surface() != surface).count();
+        wrong += lost + other;
+        rays += 2 * points.len();
+    }
+    (wrong, rays)
+}
+
+fn claims(pupils: &[Pupil]) -> Vec<Claim> {
+    let (first, last) = (&pupils[0], &pupils[pupils.len() - 1]);
+    let fewer = pupils.windows(2).filter(|pair| pair[1].corners() < pair[0].corners()).count();
+    let off = pupils.iter().map(Pupil::deviation).fold(0.0, f64::max);
+    let wrong: usize = pupils.iter().map(|pupil| pupil.wrong).sum();
+    let share = last.area() / first.area();
+    let error = share * (last.area.errors[0] / last.area() + first.area.errors[0] / first.area());
+    vec![
+        Claim::exactly("corners of the pupil on the axis", first.corners() as f64, 0.0),
+        Claim::at_most(
+            "on the axis: 1 - 4 pi area / perimeter^2, zero for a disc",
+            (1.0 - first.roundness()).abs(),
+            1e-6,
+        ),
+        Claim::at_least("corners at the last field", last.corners() as f64, 4.0),
+        Claim::at_most("fields with fewer corners than the one before", fewer as f64, 0.0),
+        Claim::at_most(
+            "roundness 4 pi area / perimeter^2 at the last field",
+            last.roundness(),
+            0.95,
+        ),
+        Claim::at_most("area at the last field over that on the axis", share, 0.9)
+            .with_error(error),
+        Claim::at_most("area against a bitmap of rays: worst, in standard errors", off, SIGMAS),
+        Claim::at_most("rays beside the edge that do not end as its side says", wrong as f64, 0.0),
+    ]
+}
+
+fn areas(pupils: &[Pupil]) -> Table {
+    let columns = [
+        "field_deg",
+        "corners",
+        "area_mm2",
+        "area_error_mm2",
+        "bitmap_area_mm2",
+        "bitmap_error_mm2",
+        "perimeter_mm",
+        "roundness",
+    ];
+    let mut table = Table::new("areas", &columns);
+    for pupil in pupils {
+        table.row([
+            pupil.angle.into(),
+            pupil.corners().into(),
+            pupil.area().into(),
+            pupil.area.errors[0].into(),
+            pupil.bitmap.area().into(),
+            pupil.grid_error().into(),
+            pupil.perimeter().into(),
+            pupil.roundness().into(),
+        ]);
+    }
+    table
+}
+
+fn shares(bench: &Bench, pupils: &[Pupil]) -> Table {
+    let mut table = Table::new("shares", &["field_deg", "limit", "surface", "share_of_edge"]);
+    for pupil in pupils {
+        for (limit, share) in pupil.outline.limits() {
+            let surface = limit.surface().map_or(Cell::Number(f64::NAN), Cell::from);
+            let name = bench.limit_name(limit);
+            table.row([pupil.angle.into(), name.into(), surface, share.into()]);
+        }
+    }
+    table
+}
+
+fn edges(bench: &Bench, pupils: &[Pupil]) -> Table {
+    let mut table = Table::new("edges", &["field_deg", "side", "limit", "x_mm", "y_mm"]);
+    for pupil in pupils {
+        for (i, side) in pupil.outline.sides.iter().enumerate() {
+            for [x, y] in &side.points {
+                let name = bench.limit_name(side.limit);
+                let angle = pupil.angle.into();
+                table.row([angle, i.into(), name.into(), (*x).into(), (*y).into()]);
+            }
+        }
+    }
+    table
+}
+
+/// Every limit in the order in which the fields meet it, with its colour.
+fn colors(pupils: &[Pupil]) -> Vec<(Limit, Color)> {
+    let mut found: Vec<Limit> = Vec::new();
+    for (limit, _) in pupils.iter().flat_map(|pupil| pupil.outline.limits()) {
+        if !found.contains(&limit) {
+            found.push(limit);
+        }
+    }
+    found.into_iter().zip(PALETTE.into_iter().cycle()).collect()
+}
+
+fn color_of(colors: &[(Limit, Color)], limit: Limit) -> Color {
+    colors.iter().find(|known| known.0 == limit).map_or(GREY, |known| known.1)
+}
+
+/// The colour of a fate in a bitmap: white for light, that of its surface's limit, else grey.
+fn fate_color(colors: &[(Limit, Color)], fate: Fate) -> Color {
+    let of = |surface: usize| colors.iter().find(|known| known.0.surface() == Some(surface));
+    match fate.surface() {
+        None => [0xff; 3],
+        Some(surface) => of(surface).map_or(GREY, |known| known.1.map(|c| c / 2 + 0x7f)),
+    }
+}
+
+/// How many fields are drawn, and how large.
+const DRAWN: usize = 5;
+const PANEL: f64 = 400.0;
+
+/// Outlines above, bitmaps below.
+fn maps(bench: &Bench, pupils: &[Pupil]) -> Canvas {
+    let mut canvas = Canvas::new([120 + DRAWN as u32 * 500, 1240]);
+    let colors = colors(pupils);
+    legend(&mut canvas, bench, &colors, [90.0, 20.0]);
+    let step = (pupils.len() - 1) as f64 / (DRAWN - 1) as f64;
+    for i in 0..DRAWN {
+        let pupil = &pupils[(step * i as f64).round() as usize];
+        let left = 100.0 + 500.0 * i as f64;
+        let Bitmap { cell, cells, corner, fates } = &pupil.bitmap;
+        let ends = corner.map(|low| [low, low + cell * (cells - 1) as f64]);
+        let [x, y] =
+            [("x, mm", ends[0]), ("y, mm", ends[1])].map(|(n, ends)| Axis::linear(n, ends));
+        let chart = Chart::new([left, 150.0], [left + PANEL, 150.0 + PANEL], x, y).to_scale();
+        let title = format!("{} deg: {} corners", pupil.angle, pupil.corners());
+        chart.draw(&mut canvas, &title);
+        for side in &pupil.outline.sides {
+            let color = color_of(&colors, side.limit);
+            canvas.curve(&chart.places(&side.points), color, Stroke::Solid);
+        }
+        canvas.marks(&chart.places(&pupil.outline.corners().collect::<Vec<_>>()), BLACK);
+        // Rows go downwards in a picture and upwards in the pupil.
+        let rows = fates.chunks_exact(*cells).rev();
+        let raster: Vec<Color> = rows.flatten().map(|fate| fate_color(&colors, *fate)).collect();
+        let size = ((PANEL / *cells as f64) as usize).max(1);
+        canvas.raster([left, 700.0], *cells, size, &raster);
+        let text = format!("bitmap {:.3} mm^2, edge {:.3} mm^2", pupil.bitmap.area(), pupil.area());
+        canvas.text([left + 0.5 * PANEL, 1150.0], &text, BLACK, Align::Middle);
+    }
+    canvas
+}
+
+/// Area and shares of the edge against the field.
+fn curves(bench: &Bench, pupils: &[Pupil]) -> Canvas {
+    let mut canvas = Canvas::new([1500, 800]);
+    let colors = colors(pupils);
+    legend(&mut canvas, bench, &colors, [120.0, 20.0]);
+    let x = || Axis::linear("field, deg", pupils.iter().map(|pupil| pupil.angle));
+    let area = Axis::linear("mm^2", pupils.iter().map(Pupil::area).chain([0.0]));
+    let share = Axis::linear("share", [0.0, 1.0]);
+    let left = Chart::new([120.0, 190.0], [700.0, 690.0], x(), area);
+    let right = Chart::new([860.0, 190.0], [1440.0, 690.0], x(), share);
+    left.draw(&mut canvas, "area of the pupil");
+    right.draw(&mut canvas, "share of the edge by limit");
+    let places = pupils.iter().map(|pupil| left.place([pupil.angle, pupil.area()]));
+    let places: Vec<_> = places.collect();
+    canvas.curve(&places, BLACK, Stroke::Solid);
+    canvas.marks(&places, BLACK);
+    for (limit, color) in &colors {
+        let share = |pupil: &Pupil| right.place([pupil.angle, pupil.outline.share(*limit)]);
+        let places: Vec<_> = pupils.iter().map(share).collect();
+        canvas.curve(&places, *color, Stroke::Solid);
+        canvas.marks(&places, *color);
+    }
+    canvas
+}
+
+fn legend(canvas: &mut Canvas, bench: &Bench, colors: &[(Limit, Color)], [x, y]: [f64; 2]) {
+    for (i, (limit, color)) in colors.iter().enumerate() {
+        let place = [x + 340.0 * (i % 4) as f64, y + 30.0 * (i / 4) as f64];
+        canvas.curve(
+            &[[place[0], place[1] + 7.0], [place[0] + 40.0, place[1] + 7.0]],
+            *color,
+            Stroke::Solid,
+        );
+        canvas.text([place[0] + 52.0, place[1]], &bench.limit_name(*limit), BLACK, Align::Left);
+    }
+}

@@ -1,0 +1,370 @@
+//! Figure 3.5: the image of a glyph through a lens, differentiated by the stop and by a curvature.
+//!
+//! Light is followed backwards: from a pixel of the sensor through the rear of the lens to a chart
+//! in front of it. A pixel is `∫ c(p) dw` over the rays that get through, `c` the brightness of the
+//! chart where a ray lands. Its derivatives by the boundary integral and by the warp field
+//! stand beside central differences of the image and beside the biased derivative, which cannot see
+//! the stop: no ray that passes it lands elsewhere when it opens.
+//!
+//! The chart is a smooth function, so that pixels are integrals without noise and the three can be
+//! compared to many digits. Figure 3.5 of the thesis shows a trademark in its place.
+
+use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens, report};
+use crate::lens::{Aperture, Field, FieldKind, Object, System};
+use crate::math::Real;
+use crate::paraxial::Beam;
+use crate::picture::{Align, BLACK, Canvas, Color, GREY, diverging, grey};
+use crate::pupil::{Aiming, Anchor, Bench, Integrand, Kind, Lit, Pattern, Region, Warp};
+use crate::trace::{Gradient, Slot};
+use rayon::prelude::*;
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "3.5",
+    title: "Gradient images by the stop and by a curvature",
+    claim: "The unbiased derivative of an image matches finite differences; the biased one by the \
+            stop is zero everywhere",
+    seconds: 15.0,
+    run,
+};
+
+const LENS: &str = "double_gauss_rudolph_50";
+const UM: f64 = 0.5875618;
+/// From the middle of the sensor to its sides, in mm.
+const HALF: f64 = 6.0;
+/// How far in front of the lens the chart stands, in mm.
+const DISTANCE: f64 = 10_000.0;
+/// Order of quadrature.
+const ORDER: usize = 4;
+/// Rays of the crude image beside it.
+const SCATTERED: usize = 4096;
+/// Samples of the warp field in a pixel.
+const SAMPLES: usize = 4096;
+const FEW_SAMPLES: usize = 2048;
+/// How far the warp field may be off, by the stop and by the curvature: it has a standard error.
+const NOISE: [f64; 2] = [0.05, 0.1];
+/// Steps of the differences: the radius of the stop in mm, the curvature in 1/mm.
+const STEPS: [f64; 2] = [1e-5, 1e-6];
+/// What the integrals and their differences leave.
+const AGREEMENT: f64 = 1e-4;
+/// The front of the lens hardly limits these pixels, so that the biased derivative is nearly right.
+const NEARLY: f64 = 0.05;
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let side = effort.pick(40, 10);
+    let camera = Camera::new(effort.pick(SAMPLES, FEW_SAMPLES))?;
+    let mut pixels = Vec::with_capacity(side * side);
+    for row in 0..side {
+        report(watch, row as f64 / side as f64, "pixels")?;
+        let line: Result<Vec<Pixel>, Ended> = (0..side)
+            .into_par_iter()
+            .map(|column| camera.pixel(place(row, column, side)))
+            .collect();
+        pixels.extend(line?);
+    }
+    let images = Images { side, pixels };
+    Ok(Outcome {
+        claims: images.claims(),
+        tables: vec![images.table()],
+        lenses: Vec::new(),
+        pictures: vec![Picture { name: "images", canvas: images.draw() }],
+        rays: images.pixels.iter().map(|pixel| pixel.rays).sum(),
+    })
+}
+
+/// The middle of a pixel, in mm, the first row at the top. The image stands upside down.
+fn place(row: usize, column: usize, side: usize) -> [f64; 2] {
+    let at = |i: usize| HALF * ((2.0 * i as f64 + 1.0) / side as f64 - 1.0);
+    [-at(column), at(row)]
+}
+
+/// A capital A in soft strokes, bright on a darker ground.
+#[derive(Debug, Clone, Copy)]
+struct Chart {
+    /// How many mm on the chart belong to the side of the sensor.
+    unit: f64,
+}
+
+/// The strokes from end to end, in units of half the side of the image.
+const STROKES: [[[f64; 2]; 2]; 3] =
+    [[[-0.55, -0.7], [0.0, 0.7]], [[0.55, -0.7], [0.0, 0.7]], [[-0.31, -0.1], [0.31, -0.1]]];
+/// Half the width of a stroke, and how soft its rim is.
+const WIDTH: f64 = 0.13;
+const SOFT: f64 = 0.03;
+/// Brightness of the ground and of a stroke.
+const GROUND: f64 = 0.15;
+const BRIGHT: f64 = 0.9;
+
+impl Chart {
+    /// How much of a stroke is at a point, 0 to 1, and its slope: a logistic function of the square
+    /// of the distance, which has no kink anywhere.
+    fn stroke([from, to]: [[f64; 2]; 2], t: [f64; 2]) -> (f64, [f64; 2]) {
+        let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+        let along = (t[0] - from[0]) * dx + (t[1] - from[1]) * dy;
+        let share = (along / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+        let away = [t[0] - from[0] - share * dx, t[1] - from[1] - share * dy];
+        let square = away[0] * away[0] + away[1] * away[1];
+        let depth = (square - WIDTH * WIDTH) / (2.0 * WIDTH * SOFT);
+        let ink = 1.0 / (1.0 + depth.exp());
+        (ink, away.map(|v| -ink * (1.0 - ink) * v / (WIDTH * SOFT)))
+    }
+
+    /// What no stroke covers, and its slope.
+    fn bare(t: [f64; 2]) -> (f64, [f64; 2]) {
+        STROKES.into_iter().fold((1.0, [0.0; 2]), |(bare, slope), ends| {
+            let (ink, by) = Self::stroke(ends, t);
+            (bare * (1.0 - ink), [0, 1].map(|k| slope[k] * (1.0 - ink) - bare * by[k]))
+        })
+    }
+}
+
+impl Integrand for Chart {
+    fn of<R: Real>(&self, p: [R; 2]) -> R {
+        let (bare, _) = Self::bare(p.map(|v| v.value() / self.unit));
+        R::from_f64(BRIGHT - (BRIGHT - GROUND) * bare)
+    }
+
+    fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2] {
+        let (_, slope) = Self::bare(p.map(|v| v.value() / self.unit));
+        slope.map(|v| R::from_f64(-(BRIGHT - GROUND) * v / self.unit))
+    }
+}
+
+/// The lens as seen from the sensor, and the same with a number changed a little.
+struct Camera {
+    chart: Chart,
+    bench: Bench,
+    /// By the stop and by the curvature, each a step down and a step up.
+    moved: [[Bench; 2]; 2],
+    /// How the warp field is sampled.
+    warp: Warp,
+    stop: usize,
+    /// The first surface of the lens, which backwards is the last one.
+    front: usize,
+}
+
+/// A pixel and its derivatives by the stop and by the curvature.
+struct Pixel {
+    value: f64,
+    scattered: f64,
+    boundary: [f64; 2],
+    warp: [f64; 2],
+    biased: [f64; 2],
+    difference: [f64; 2],
+    rays: usize,
+}
+
+impl Camera {
+    fn new(samples: usize) -> Result<Self, Ended> {
+        let lens = lens(LENS)?;
+        let forwards = lens.system(0, UM).map_err(Ended::from_error)?;
+        let rear = lens.surfaces.len() - 1;
+        let object = Object::Finite(forwards.surfaces[rear].thickness);
+        let focal = Bench::of(&lens, 0).map_err(Ended::from_error)?.first.efl;
+        let focal = focal.ok_or_else(|| Ended::Failed("the lens is afocal".to_owned()))?;
+        let system = forwards.reversed(DISTANCE);
+        let stop = system.stop.unwrap_or(0);
+        let radius = system.surfaces[stop].semi_diameter;
+        let bench = |radius: f64, bend: f64| {
+            let mut system = system.clone();
+            // The curvature counts from the other side.
+            *Slot::Curvature.of(&mut system, rear) -= bend;
+            backwards(system, object, radius)
+        };
+        let [wider, bent] = STEPS;
+        Ok(Self {
+            chart: Chart { unit: DISTANCE * HALF / focal },
+            bench: bench(radius, 0.0)?,
+            moved: [
+                [bench(radius - wider, 0.0)?, bench(radius + wider, 0.0)?],
+                [bench(radius, -bent)?, bench(radius, bent)?],
+            ],
+            warp: Warp { count: samples, seed: 1 },
+            stop,
+            front: rear,
+        })
+    }
+
+    fn pixel(&self, [x, y]: [f64; 2]) -> Result<Pixel, Ended> {
+        let field = Field { x, y, weight: 1.0 };
+        let launch = self.bench.launch(field, 0).map_err(Ended::from_error)?;
+        let anchor = launch.anchor();
+        let region = Region::new(launch);
+        let lit = region.lit(ORDER);
+        let failed = || Ended::Failed(format!("the pupil of the pixel at {x}, {y} has no edge"));
+        let boundary = lit.boundary_derivative(&self.chart).ok_or_else(failed)?;
+        let warp = region.warp_derivative(&self.chart, self.warp).ok_or_else(failed)?;
+        let biased = lit.biased_derivative(&self.chart);
+        let nodes = region.sampled(Pattern::Sobol { count: SCATTERED, seed: 1 });
+        let mut rays = region.rays + lit.traced + warp.rays + nodes.points.len();
+        let mut difference = [0.0; 2];
+        for (i, benches) in self.moved.iter().enumerate() {
+            let ends = benches.each_ref().map(|bench| follow(&region.kind, anchor, bench));
+            rays += ends[0].traced + ends[1].traced;
+            let [low, high] = ends.map(|lit| lit.integral(&self.chart));
+            difference[i] = (high - low) / (2.0 * STEPS[i]);
+        }
+        let scattered = region.at(&nodes).integral(&self.chart);
+        Ok(Pixel {
+            value: lit.integral(&self.chart),
+            scattered,
+            boundary: self.numbers(&boundary),
+            warp: self.numbers(&warp.by),
+            biased: self.numbers(&biased),
+            difference,
+            rays,
+        })
+    }
+
+    /// By the semi-diameter of the stop and by the curvature of the first surface.
+    fn numbers(&self, by: &Gradient<f64>) -> [f64; 2] {
+        [by.surfaces[self.stop].semi_diameter, -by.surfaces[self.front].curvature]
+    }
+}
+
+/// A lens met from the sensor.
+fn backwards(system: System<f64>, object: Object, radius: f64) -> Result<Bench, Ended> {
+    let aperture = Aperture::StopSemiDiameter(radius);
+    let edge = HALF * std::f64::consts::SQRT_2;
+    let beam = Beam { object, aperture, field: FieldKind::ObjectHeight, edge };
+    Bench::new(vec![(UM, 1.0, system)], 0, beam, Aiming::Paraxial).map_err(Ended::from_error)
+}
+
+/// The light of the same pixel through a lens that was changed a little.
+fn follow<'a>(before: &Kind, anchor: Anchor, bench: &'a Bench) -> Lit<'a> {
+    Region::followed(before, anchor.launch(bench)).lit(ORDER)
+}
+
+/// Two numbers of a pixel.
+type Numbers = fn(&Pixel) -> [f64; 2];
+
+/// All pixels, row by row.
+struct Images {
+    side: usize,
+    pixels: Vec<Pixel>,
+}
+
+/// The length of an image of differences over that of an image.
+fn relative(pixels: &[Pixel], of: impl Fn(&Pixel) -> f64, against: impl Fn(&Pixel) -> f64) -> f64 {
+    let length = |number: &dyn Fn(&Pixel) -> f64| -> f64 {
+        pixels.iter().map(|pixel| number(pixel).powi(2)).sum::<f64>().sqrt()
+    };
+    length(&|pixel| of(pixel) - against(pixel)) / length(&against)
+}
+
+/// By what the image is differentiated.
+const NAMES: [&str; 2] = ["semi-diameter of the stop", "curvature of the first surface"];
+
+impl Images {
+    fn claims(&self) -> Vec<Claim> {
+        let pixels = &self.pixels;
+        let mut claims = vec![Claim::at_most(
+            format!("image against {SCATTERED} scattered rays a pixel, relative L2"),
+            relative(pixels, |pixel| pixel.scattered, |pixel| pixel.value),
+            0.02,
+        )];
+        for (i, name) in NAMES.into_iter().enumerate() {
+            claims.push(Claim::at_most(
+                format!("by the {name}: boundary against differences, relative L2"),
+                relative(pixels, |pixel| pixel.boundary[i], |pixel| pixel.difference[i]),
+                AGREEMENT,
+            ));
+            claims.push(Claim::at_most(
+                format!("by the {name}: warp field against differences, relative L2"),
+                relative(pixels, |pixel| pixel.warp[i], |pixel| pixel.difference[i]),
+                NOISE[i],
+            ));
+        }
+        let largest = |of: &dyn Fn(&Pixel) -> f64| {
+            pixels.iter().map(|pixel| of(pixel).abs()).fold(0.0, f64::max)
+        };
+        let [bright, dark] =
+            [largest(&|pixel| pixel.difference[0]), largest(&|pixel| pixel.biased[0])];
+        claims.push(
+            Claim::at_least(
+                format!("by the {}: differences, largest pixel", NAMES[0]),
+                bright,
+                1.0,
+            )
+            .in_unit("mm"),
+        );
+        claims.push(
+            Claim::exactly(format!("by the {}: biased, largest pixel", NAMES[0]), dark, 0.0)
+                .in_unit("mm"),
+        );
+        claims.push(Claim::exactly(
+            format!("by the {}: biased against differences, relative L2", NAMES[0]),
+            relative(pixels, |pixel| pixel.biased[0], |pixel| pixel.difference[0]),
+            1.0,
+        ));
+        claims.push(Claim::at_most(
+            format!("by the {}: biased against differences, relative L2", NAMES[1]),
+            relative(pixels, |pixel| pixel.biased[1], |pixel| pixel.difference[1]),
+            NEARLY,
+        ));
+        claims
+    }
+
+    fn table(&self) -> Table {
+        let columns = [
+            "row",
+            "column",
+            "image_mm2",
+            "scattered_mm2",
+            "by_stop_boundary_mm",
+            "by_stop_warp_mm",
+            "by_stop_difference_mm",
+            "by_stop_biased_mm",
+            "by_curvature_boundary_mm3",
+            "by_curvature_warp_mm3",
+            "by_curvature_difference_mm3",
+            "by_curvature_biased_mm3",
+        ];
+        let mut table = Table::new("images", &columns);
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            let place = [i / self.side, i % self.side];
+            let derivatives = [0, 1]
+                .map(|k| [pixel.boundary[k], pixel.warp[k], pixel.difference[k], pixel.biased[k]]);
+            let numbers = [pixel.value, pixel.scattered].into_iter().chain(derivatives.concat());
+            table.row(place.map(Into::into).into_iter().chain(numbers.map(Into::into)));
+        }
+        table
+    }
+
+    /// The image, and in a row for each number its derivatives on one scale.
+    fn draw(&self) -> Canvas {
+        let cell = (320 / self.side).max(1);
+        let width = cell * self.side;
+        let step = width as f64 + 60.0;
+        let size = [5 * (width + 60) + 60, 2 * (width + 90) + 60];
+        let mut canvas = Canvas::new(size.map(|v| v as u32));
+        let mut panel = |column: usize, row: usize, title: &str, colors: Vec<Color>| {
+            let corner = [60.0 + step * column as f64, 70.0 + (step + 30.0) * row as f64];
+            canvas.raster(corner, self.side, cell, &colors);
+            let end = corner.map(|v| v + width as f64);
+            for [x, y] in [[end[0], corner[1]], [corner[0], end[1]]] {
+                canvas.line(corner, [x, y], GREY);
+                canvas.line([x, y], end, GREY);
+            }
+            let middle = corner[0] + 0.5 * width as f64;
+            canvas.text([middle, corner[1] - 26.0], title, BLACK, Align::Middle);
+        };
+        let brightest = self.pixels.iter().map(|pixel| pixel.value).fold(0.0, f64::max);
+        let image = self.pixels.iter().map(|pixel| grey(pixel.value / brightest));
+        panel(0, 0, "image", image.collect());
+        for i in 0..2 {
+            let largest = self.pixels.iter().map(|p| p.difference[i].abs()).fold(0.0, f64::max);
+            let kinds: [(&str, Numbers); 4] = [
+                ("boundary", |pixel| pixel.boundary),
+                ("warp field", |pixel| pixel.warp),
+                ("differences", |pixel| pixel.difference),
+                ("biased", |pixel| pixel.biased),
+            ];
+            for (column, (name, of)) in kinds.into_iter().enumerate() {
+                let shown = self.pixels.iter().map(|pixel| diverging(of(pixel)[i] / largest));
+                let title = ["by the stop", "by curvature 0"][i];
+                panel(column + 1, i, &format!("{name}, {title}"), shown.collect());
+            }
+        }
+        canvas
+    }
+}

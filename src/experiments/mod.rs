@@ -1,0 +1,122 @@
+//! The figures and tables of the thesis as studies that anyone can run: data, pictures, and what
+//! the figure claims, checked.
+//!
+//! An [`Experiment`] is a file of this folder and a line in [`ALL`]; it reads no clock, draws its
+//! own pictures and can be stopped between two steps. What it claims are numbers against limits: an
+//! [`Outcome`] in which one of them fails is a failed experiment. After Teh, *Computational Lens
+//! Design* (thesis, Carnegie Mellon University), whose figure numbers name the experiments.
+
+mod aperture_stop;
+mod entrance_pupil;
+mod front;
+mod gradient_image;
+mod motion;
+mod outcome;
+mod section;
+mod trade;
+mod vignetting;
+mod zoom;
+
+pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
+
+use crate::files;
+use crate::lens::Lens;
+use std::ops::ControlFlow;
+
+/// Every experiment, in the order of the thesis. A new one is a file and a line here.
+pub const ALL: &[Experiment] = &[
+    aperture_stop::EXPERIMENT,
+    entrance_pupil::EXPERIMENT,
+    gradient_image::EXPERIMENT,
+    front::EXPERIMENT,
+    motion::EXPERIMENT,
+    vignetting::EXPERIMENT,
+    zoom::EXPERIMENT,
+];
+
+/// A figure or table of the thesis.
+#[derive(Debug, Clone, Copy)]
+pub struct Experiment {
+    /// The number of the figure or table.
+    pub id: &'static str,
+    /// What it is about.
+    pub title: &'static str,
+    /// What it shows, in one sentence.
+    pub claim: &'static str,
+    /// About how long it takes at full effort on two cores.
+    pub seconds: f64,
+    /// Does the work.
+    ///
+    /// # Errors
+    /// The callback asked it to stop, or there was nothing to work with.
+    pub run: fn(Effort, &mut Watch<'_>) -> Result<Outcome, Ended>,
+}
+
+/// The experiment of a figure.
+pub fn find(id: &str) -> Option<&'static Experiment> {
+    ALL.iter().find(|experiment| experiment.id == id)
+}
+
+/// Gets to know how far an experiment is, and says whether it shall go on.
+pub type Watch<'a> = dyn FnMut(Progress<'_>) -> ControlFlow<()> + 'a;
+
+/// How far an experiment is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress<'a> {
+    /// The part that is done, 0 to 1.
+    pub done: f64,
+    /// What it is doing.
+    pub doing: &'a str,
+}
+
+/// How much an experiment works for its claims.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// As the figure deserves.
+    Full,
+    /// As little as its claims need: a test.
+    Small,
+}
+
+impl Effort {
+    /// One of two numbers: for the figure, or for a test.
+    fn pick<T>(self, full: T, small: T) -> T {
+        match self {
+            Self::Full => full,
+            Self::Small => small,
+        }
+    }
+}
+
+/// Why an experiment has no outcome.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Ended {
+    /// It was asked to stop.
+    #[error("stopped")]
+    Stopped,
+    /// Its lens could not be worked with.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl Ended {
+    /// An error of a lower floor.
+    fn from_error(error: impl std::fmt::Display) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// Tells how far the work is, and ends it where that is wanted.
+fn report(watch: &mut Watch<'_>, done: f64, doing: &str) -> Result<(), Ended> {
+    match watch(Progress { done, doing }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Ended::Stopped),
+    }
+}
+
+/// A lens of the library.
+fn lens(name: &str) -> Result<Lens, Ended> {
+    let bundled = files::library().iter().find(|bundled| bundled.name == name);
+    let bundled = bundled.ok_or_else(|| Ended::Failed(format!("no lens `{name}` is bundled")))?;
+    files::native::read(bundled.text, name).map_err(Ended::from_error)
+}

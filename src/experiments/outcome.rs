@@ -1,0 +1,225 @@
+//! What an experiment found: numbers against limits, tables, pictures.
+
+use crate::lens::Lens;
+use crate::picture::Canvas;
+use serde::Serialize;
+use std::fmt::{self, Display};
+
+/// What an experiment found.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Outcome {
+    /// What the figure claims, each with its number.
+    pub claims: Vec<Claim>,
+    /// The data behind them.
+    pub tables: Vec<Table>,
+    /// What they look like; not a part of the JSON.
+    #[serde(skip)]
+    pub pictures: Vec<Picture>,
+    /// The lenses that were found, under names; not a part of the JSON.
+    #[serde(skip)]
+    pub lenses: Vec<(String, Lens)>,
+    /// Rays traced.
+    pub rays: usize,
+}
+
+impl Outcome {
+    /// The claims that do not hold.
+    pub fn failed(&self) -> impl Iterator<Item = &Claim> {
+        self.claims.iter().filter(|claim| !claim.holds)
+    }
+}
+
+/// A number that must keep a limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Claim {
+    /// What the number is.
+    pub says: String,
+    /// The number.
+    pub value: f64,
+    /// How far it may be wrong; 0 for one that is exact.
+    pub error: f64,
+    /// The unit of all three numbers; empty for a ratio or a count.
+    pub unit: &'static str,
+    /// How the number must stand to the limit.
+    pub rule: Rule,
+    /// The limit.
+    pub limit: f64,
+    /// Whether it does, its error counted against it.
+    pub holds: bool,
+}
+
+/// How a number must stand to its limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// Not above it.
+    AtMost,
+    /// Not below it.
+    AtLeast,
+    /// The very same number.
+    Exactly,
+}
+
+impl Claim {
+    /// A number that may not be above a limit.
+    pub fn at_most(says: impl Into<String>, value: f64, limit: f64) -> Self {
+        Self::new(says, value, Rule::AtMost, limit)
+    }
+
+    /// A number that may not be below a limit.
+    pub fn at_least(says: impl Into<String>, value: f64, limit: f64) -> Self {
+        Self::new(says, value, Rule::AtLeast, limit)
+    }
+
+    /// A number that must be exactly another one.
+    pub fn exactly(says: impl Into<String>, value: f64, limit: f64) -> Self {
+        Self::new(says, value, Rule::Exactly, limit)
+    }
+
+    fn new(says: impl Into<String>, value: f64, rule: Rule, limit: f64) -> Self {
+        let says = says.into();
+        Self { says, value, error: 0.0, unit: "", rule, limit, holds: false }.judged()
+    }
+
+    /// The same in a unit.
+    #[must_use]
+    pub fn in_unit(mut self, unit: &'static str) -> Self {
+        self.unit = unit;
+        self
+    }
+
+    /// The same with an error, which counts against it.
+    #[must_use]
+    pub fn with_error(mut self, error: f64) -> Self {
+        self.error = error;
+        self.judged()
+    }
+
+    fn judged(mut self) -> Self {
+        let Self { value, error, limit, .. } = self;
+        self.holds = match self.rule {
+            Rule::AtMost => value + error <= limit,
+            Rule::AtLeast => value - error >= limit,
+            Rule::Exactly => value == limit,
+        };
+        self
+    }
+}
+
+/// Rows of numbers and words under names.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Table {
+    /// What it is called, as a part of a file name.
+    pub name: &'static str,
+    /// What stands in each column, with its unit: `radius_mm`.
+    pub columns: Vec<&'static str>,
+    /// The rows, each as long as there are columns.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(name: &'static str, columns: &[&'static str]) -> Self {
+        Self { name, columns: columns.to_vec(), rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    /// The text of a CSV file (RFC 4180).
+    pub fn csv(&self) -> String {
+        let head = self.columns.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(",");
+        let line = |row: &Vec<Cell>| {
+            let cells: Vec<String> = row.iter().map(|cell| quoted(&cell.to_string())).collect();
+            cells.join(",")
+        };
+        let lines = std::iter::once(head).chain(self.rows.iter().map(line));
+        lines.map(|line| line + "\r\n").collect()
+    }
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+/// A number or a word.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Cell {
+    /// A number; written as nothing where it is none.
+    Number(f64),
+    /// A word.
+    Word(String),
+}
+
+impl From<f64> for Cell {
+    fn from(value: f64) -> Self {
+        Self::Number(value)
+    }
+}
+
+impl From<usize> for Cell {
+    fn from(value: usize) -> Self {
+        Self::Number(value as f64)
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Word(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Word(text)
+    }
+}
+
+impl Display for Cell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value) if value.is_finite() => write!(f, "{value:?}"),
+            Self::Number(_) => Ok(()),
+            Self::Word(word) => f.write_str(word),
+        }
+    }
+}
+
+/// A picture with its name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// What it is called, as a part of a file name.
+    pub name: &'static str,
+    /// What it looks like.
+    pub canvas: Canvas,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_counts_against_a_claim() {
+        let claim = Claim::at_most("a", 0.9, 1.0);
+        assert!(claim.holds && !claim.clone().with_error(0.2).holds);
+        assert!(!Claim::at_least("b", 1.1, 1.0).with_error(0.2).holds);
+        assert!(Claim::exactly("c", 0.0, 0.0).holds && !Claim::exactly("c", 1e-300, 0.0).holds);
+        assert!(!Claim::at_most("d", f64::NAN, 1.0).holds);
+        assert!(!Claim::at_least("e", f64::NAN, 1.0).holds);
+    }
+
+    #[test]
+    fn a_table_becomes_csv() {
+        let mut table = Table::new("t", &["name", "mm"]);
+        table.row(["rim of 3, 4".into(), 0.5.into()]);
+        table.row(["a \"stop\"".into(), f64::NAN.into()]);
+        assert_eq!(table.csv(), "name,mm\r\n\"rim of 3, 4\",0.5\r\n\"a \"\"stop\"\"\",\r\n");
+    }
+}

@@ -1,0 +1,111 @@
+//! A lens in section, as every figure of the thesis shows it: glass, stop, rays.
+
+use crate::lens::System;
+use crate::picture::{BLACK, Canvas, Chart, Color, GREY, Stroke};
+use crate::pupil::Launch;
+
+/// Points of a surface on each side of the axis.
+const POINTS: i32 = 24;
+/// How far the blades of a stop reach beyond its opening, in semi-diameters of the largest surface.
+const BLADE: f64 = 1.1;
+
+/// A system in its section through the axis, `z` to the right and `y` upwards, in mm.
+pub(super) struct Section<'a> {
+    system: &'a System<f64>,
+    vertices: Vec<f64>,
+    reach: f64,
+}
+
+impl<'a> Section<'a> {
+    pub(super) fn new(system: &'a System<f64>) -> Self {
+        let mut z = 0.0;
+        let vertices = system.surfaces.iter().map(|surface| {
+            let here = z;
+            z += surface.thickness;
+            here
+        });
+        let vertices = vertices.collect();
+        let sizes = system.surfaces.iter().map(|surface| surface.semi_diameter);
+        let reach = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
+        Self { system, vertices, reach }
+    }
+
+    /// The corners of what is drawn: `z` and `y`.
+    pub(super) fn extent(&self) -> [[f64; 2]; 2] {
+        let high = BLADE * self.reach;
+        let image = self.vertices.last().copied().unwrap_or(0.0);
+        [[-self.reach, image], [-high, high]]
+    }
+
+    /// Draws the surfaces, the edges of the glass, the blades of the stop and the image plane.
+    pub(super) fn draw(&self, canvas: &mut Canvas, chart: &Chart) {
+        let last = self.system.surfaces.len() - 1;
+        for i in 0..last {
+            if self.system.stop == Some(i) && self.system.index_before(i) == self.index_behind(i) {
+                self.draw_blades(canvas, chart, i);
+                continue;
+            }
+            canvas.curve(&chart.places(&self.arc(i)), GREY, Stroke::Solid);
+            if self.index_behind(i) != 1.0 {
+                self.draw_edges(canvas, chart, i);
+            }
+        }
+        let image = self.vertices[last];
+        let ends = [[image, -self.reach], [image, self.reach]];
+        canvas.curve(&chart.places(&ends), BLACK, Stroke::Dashed);
+    }
+
+    /// Draws the way of a ray, as far as it gets.
+    pub(super) fn draw_ray(
+        &self,
+        canvas: &mut Canvas,
+        chart: &Chart,
+        launch: &Launch<'_>,
+        p: [f64; 2],
+        color: Color,
+    ) {
+        let Some(ray) = launch.ray(p) else { return };
+        let path = launch.color().tracer.path(ray);
+        let before = ray.point - ray.direction * self.reach;
+        let start = [before.z, before.y];
+        let corners = std::iter::once(start).chain(path.points.iter().map(|p| [p.z, p.y]));
+        let corners: Vec<[f64; 2]> = corners.collect();
+        for pair in chart.places(&corners).windows(2) {
+            canvas.line(pair[0], pair[1], color);
+        }
+    }
+
+    fn index_behind(&self, surface: usize) -> f64 {
+        self.system.surfaces[surface].index
+    }
+
+    fn arc(&self, surface: usize) -> Vec<[f64; 2]> {
+        let (row, vertex) = (&self.system.surfaces[surface], self.vertices[surface]);
+        let height = row.semi_diameter.min(self.reach);
+        let at = |i: i32| {
+            let y = height * f64::from(i) / f64::from(POINTS);
+            row.shape.sag(y * y).map(|(sag, _)| [vertex + sag, y])
+        };
+        (-POINTS..=POINTS).filter_map(at).collect()
+    }
+
+    /// From the rim of a surface to that of the next one.
+    fn draw_edges(&self, canvas: &mut Canvas, chart: &Chart, surface: usize) {
+        let (left, right) = (self.arc(surface), self.arc(surface + 1));
+        for (a, b) in [(left.first(), right.first()), (left.last(), right.last())] {
+            if let (Some(a), Some(b)) = (a, b) {
+                canvas.curve(&chart.places(&[*a, *b]), GREY, Stroke::Solid);
+            }
+        }
+    }
+
+    fn draw_blades(&self, canvas: &mut Canvas, chart: &Chart, surface: usize) {
+        let (opening, z) = (self.system.surfaces[surface].semi_diameter, self.vertices[surface]);
+        for side in [-1.0, 1.0] {
+            let blade = [[z, side * opening], [z, side * BLADE * self.reach]];
+            let blade = chart.places(&blade);
+            canvas.curve(&blade, BLACK, Stroke::Solid);
+            canvas.marks(&blade[..1], BLACK);
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! A lens met by the light from its other end.
+
+use super::system::{Shape, Surface, System};
+use crate::math::Real;
+
+impl<R: Real> System<R> {
+    /// The same surfaces met by light that comes from the image: the first vertex is the last one
+    /// before the image plane, and the new image plane stands `distance` mm behind what was the
+    /// first vertex. What was the image plane is left out; it is an object as far in front of the
+    /// new first vertex as the last thickness said.
+    #[must_use]
+    pub fn reversed(&self, distance: R) -> Self {
+        let Some((image, surfaces)) = self.surfaces.split_last() else { return self.clone() };
+        let mirrors = surfaces.iter().filter(|surface| surface.mirror).count();
+        // Light that travels towards −z at the end already goes the right way.
+        let turn = if mirrors % 2 == 0 { -R::ONE } else { R::ONE };
+        let gap = |i: usize| i.checked_sub(1).map_or(distance, |i| -(turn * surfaces[i].thickness));
+        let count = surfaces.len();
+        let reversed = (0..count).rev().map(|i| Surface {
+            shape: surfaces[i].shape.turned(turn),
+            thickness: gap(i),
+            index: self.index_before(i),
+            ..surfaces[i]
+        });
+        let plane = Surface { index: self.index_before, thickness: R::ZERO, ..*image };
+        Self {
+            index_before: surfaces.last().map_or(self.index_before, |surface| surface.index),
+            surfaces: reversed.chain(std::iter::once(plane)).collect(),
+            stop: self.stop.map(|stop| count - 1 - stop),
+        }
+    }
+}
+
+impl<R: Real> Shape<R> {
+    /// The same form with its sag times `turn`, which is 1 or −1.
+    fn turned(self, turn: R) -> Self {
+        match self {
+            Self::Plane => Self::Plane,
+            Self::Sphere { curvature } => Self::Sphere { curvature: turn * curvature },
+            Self::Conic { curvature, conic } => Self::Conic { curvature: turn * curvature, conic },
+            Self::Asphere { curvature, conic, terms } => Self::Asphere {
+                curvature: turn * curvature,
+                conic,
+                terms: terms.map(|term| turn * term),
+            },
+        }
+    }
+}

@@ -1,0 +1,429 @@
+//! The front of sharpness against light: what a lens can have of one for how much of the other.
+//!
+//! For every weight β the composite objective `L_spot + β L_throughput` (Teh, *Computational Lens
+//! Design*, eq. 3.26) is descended, each time from the lens that the weight before has led to. At
+//! the optimum the ray at the rim is off by √β: that is how weights are named here. Every lens on
+//! the way may join the front; those that another one beats in both are dropped.
+//!
+//! Light is given away faster than aberrations are corrected, and what is given away at first is not
+//! found again. So a chain of weights begins with a lens that has been corrected: once with all of
+//! its light, at the largest weight, and once with its pupils kept, as a designer would have it
+//! without the derivative of light. From both the weights fall in one chain and rise in another;
+//! the four run side by side, so that the result does not depend on how many cores there are. The
+//! caller owns the loop.
+
+use super::{Method, Optimizer, annealed, start};
+use crate::lens::{Lens, LensError, NumberKind, Quantity, vary};
+use crate::merit::{Goal, Merit, MeritError, PupilEdge, Term, Weighted};
+use crate::pupil::{BenchError, limited_by_stop};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How a front is swept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// How many weights.
+    pub points: usize,
+    /// What descends.
+    pub method: Method,
+    /// No more steps than this for each weight.
+    pub steps: usize,
+    /// The blur of the rim ray √β that the smallest and the largest weight stand for, relative to
+    /// the focal length.
+    pub blur: [f64; 2],
+    /// How the motion of the pupil enters the derivatives.
+    pub pupil: PupilEdge,
+    /// The error allowed of the radius of each spot while searching, relatively.
+    pub tolerance: f64,
+    /// How much smaller and larger a semi-diameter may become.
+    pub rims: [f64; 2],
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            points: 20,
+            method: Method::DampedLeastSquares,
+            steps: 100,
+            blur: [4e-5, 1e-3],
+            pupil: PupilEdge::Moving,
+            tolerance: 1e-3,
+            rims: [0.25, 1.3],
+        }
+    }
+}
+
+/// A lens with what it is worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    /// The lens.
+    pub lens: Lens,
+    /// The weight β that it was found with, in mm²; none for the lens at the start.
+    pub weight: Option<f64>,
+    /// The root of the mean square radius of its spots, in mm.
+    pub spot: f64,
+    /// Its estimated error, in mm.
+    pub spot_error: f64,
+    /// The mean area of its pupils, in mm² of the first vertex plane.
+    pub light: f64,
+    /// Its estimated error, in mm².
+    pub light_error: f64,
+    /// Rays that these numbers rest on.
+    pub rays: usize,
+}
+
+impl Design {
+    /// Judges a lens by its own rays, good to a tolerance.
+    ///
+    /// # Errors
+    /// A lens without merit.
+    pub fn of(lens: &Lens, weight: Option<f64>, tolerance: f64) -> Result<Self, MeritError> {
+        let terms = [Term::Spot, Term::Throughput].map(|term| Weighted { term, weight: 1.0 });
+        let goal = Goal { terms: terms.to_vec(), pupil: PupilEdge::Kept, zoom_ratios: Vec::new() };
+        let merit = Merit::new(lens, &goal, tolerance)?;
+        let values = merit.terms(&merit.values(lens))?;
+        let (square, area) = (&values[0], &values[1]);
+        let spot = square.value.sqrt();
+        Ok(Self {
+            lens: lens.clone(),
+            weight,
+            spot,
+            spot_error: if spot > 0.0 { 0.5 * square.error / spot } else { 0.0 },
+            light: -area.value,
+            light_error: area.error,
+            rays: square.rays,
+        })
+    }
+
+    /// Whether it is at least as sharp and as bright as another one, and better in one of them.
+    pub fn dominates(&self, other: &Self) -> bool {
+        let no_worse = self.spot <= other.spot && self.light >= other.light;
+        no_worse && (self.spot < other.spot || self.light > other.light)
+    }
+}
+
+/// Lenses of which none is beaten by another one in both sharpness and light, by growing light.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Front {
+    designs: Vec<Design>,
+}
+
+impl Front {
+    /// The lenses.
+    pub fn designs(&self) -> &[Design] {
+        &self.designs
+    }
+
+    /// Takes a lens in unless one that is there is no worse; those that it beats go. Returns
+    /// whether it was taken.
+    pub fn offer(&mut self, design: Design) -> bool {
+        let no_worse = |d: &Design| d.spot <= design.spot && d.light >= design.light;
+        let sound = design.spot.is_finite() && design.light.is_finite() && design.light > 0.0;
+        if !sound || self.designs.iter().any(no_worse) {
+            return false;
+        }
+        self.designs.retain(|other| !design.dominates(other));
+        let place = self.designs.partition_point(|other| other.light < design.light);
+        self.designs.insert(place, design);
+        true
+    }
+
+    /// The area that the front covers in the plane of spot and light, relative to a reference: of
+    /// all pairs that some lens of it beats, with spots no larger than that of the reference, as a
+    /// multiple of the reference's spot times its light (Zitzler and Thiele, PPSN V, 1998).
+    pub fn hypervolume(&self, spot: f64, light: f64) -> f64 {
+        let (mut covered, mut below) = (0.0, 0.0);
+        for design in self.designs.iter().filter(|design| design.spot < spot) {
+            covered += (spot - design.spot) * (design.light - below);
+            below = design.light;
+        }
+        covered / (spot * light)
+    }
+}
+
+/// Why there is no front.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoFront {
+    /// The lens.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
+    /// Its prescription.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// Its merit.
+    #[error(transparent)]
+    Merit(#[from] MeritError),
+    /// Settings without meaning.
+    #[error("{what} is {found}; expected {expected}")]
+    Settings {
+        /// Which setting.
+        what: &'static str,
+        /// Its value.
+        found: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+}
+
+/// How many times the steps of a weight correct the lens at the beginning of a chain.
+const FIRST: usize = 3;
+/// Steps between two looks at the lenses.
+const SLICE: usize = 25;
+/// Relative error of the numbers that lenses are compared by.
+const JUDGED: f64 = 1e-4;
+/// No surface may be steeper than this: curvature times semi-diameter.
+const STEEPEST: f64 = 0.9;
+
+/// A front on its way.
+#[derive(Debug)]
+pub struct Sweep {
+    /// The lens at the start, limited by its stop.
+    pub start: Design,
+    settings: Settings,
+    chains: Vec<Chain>,
+    front: Front,
+    tried: Vec<[f64; 2]>,
+    done: usize,
+}
+
+/// Some weights, one after the other.
+#[derive(Debug)]
+struct Chain {
+    lens: Lens,
+    goal: Goal,
+    /// Weight and treatment of the pupil with which the lens is corrected first.
+    begin: Option<(f64, PupilEdge)>,
+    /// The weights to come, the next one last.
+    weights: Vec<f64>,
+    method: Method,
+    steps: usize,
+    tolerance: f64,
+    running: Option<Running>,
+    refused: Option<String>,
+}
+
+/// The descent for one weight.
+#[derive(Debug)]
+struct Running {
+    weight: f64,
+    search: Box<dyn Optimizer>,
+    /// Steps that it may still take.
+    left: usize,
+}
+
+/// What a slice of a sweep has brought.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slice {
+    /// Steps so far, over all chains; those that a descent did not need count as taken.
+    pub done: usize,
+    /// Steps in all.
+    pub total: usize,
+    /// Lenses that have joined the front.
+    pub joined: usize,
+    /// What was given up and why, the last one.
+    pub refused: Option<String>,
+    /// Whether all weights are done.
+    pub finished: bool,
+}
+
+impl Sweep {
+    /// Prepares a sweep. A lens without variables has all its curvatures, gaps and semi-diameters
+    /// free; one with variables only those and its semi-diameters.
+    ///
+    /// # Errors
+    /// A lens without merit, settings without meaning.
+    pub fn new(lens: &Lens, settings: &Settings) -> Result<Self, NoFront> {
+        settings.check()?;
+        let lens = freed(&limited_by_stop(lens)?, settings.rims);
+        lens.check()?;
+        let start = Design::of(&lens, None, JUDGED)?;
+        let goal = goal(&lens, start.light, settings.pupil)?;
+        let weights = settings.weights(goal_focal_length(&goal, &lens));
+        let last = weights.last().copied().unwrap_or(0.0);
+        let begin = [(last, goal.pupil), (0.0, PupilEdge::Kept)];
+        let both = begin.into_iter().flat_map(|begin| [(begin, true), (begin, false)]);
+        let chain = |(begin, falling)| Chain {
+            lens: lens.clone(),
+            goal: goal.clone(),
+            begin: Some(begin),
+            // The next one is the last.
+            weights: if falling {
+                weights.clone()
+            } else {
+                weights.iter().rev().copied().collect()
+            },
+            method: settings.method,
+            steps: settings.steps,
+            tolerance: settings.tolerance,
+            running: None,
+            refused: None,
+        };
+        let chains: Vec<Chain> = both.map(chain).collect();
+        // A weight that cannot even begin is an error of the lens, not of the search.
+        Merit::new(&lens, &goal, settings.tolerance)?;
+        let mut front = Front::default();
+        front.offer(start.clone());
+        let settings = settings.clone();
+        Ok(Self { start, settings, chains, front, tried: Vec::new(), done: 0 })
+    }
+
+    /// Goes on for a slice of steps in every chain, on all cores.
+    pub fn step(&mut self) -> Slice {
+        let found: Vec<Vec<Design>> = self.chains.par_iter_mut().map(Chain::slice).collect();
+        let mut joined = 0;
+        for design in found.into_iter().flatten() {
+            self.tried.push([design.spot, design.light]);
+            joined += usize::from(self.front.offer(design));
+        }
+        let left: usize = self.chains.iter().map(Chain::left).sum();
+        self.done = self.total() - left;
+        let refused = self.chains.iter_mut().filter_map(|chain| chain.refused.take()).last();
+        let (done, total) = (self.done, self.total());
+        Slice { done, total, joined, refused, finished: left == 0 }
+    }
+
+    /// The front so far.
+    pub fn front(&self) -> &Front {
+        &self.front
+    }
+
+    /// Spot in mm and light in mm² of every lens that was looked at.
+    pub fn tried(&self) -> &[[f64; 2]] {
+        &self.tried
+    }
+
+    /// The hypervolume of the front against twice the spot of the lens at the start.
+    pub fn hypervolume(&self) -> f64 {
+        self.front.hypervolume(2.0 * self.start.spot, self.start.light)
+    }
+
+    fn total(&self) -> usize {
+        self.settings.steps * self.chains.len() * (self.settings.points + FIRST)
+    }
+}
+
+impl Settings {
+    fn check(&self) -> Result<(), NoFront> {
+        let refuse =
+            |what, found: String, expected| Err(NoFront::Settings { what, found, expected });
+        let [low, high] = self.blur;
+        let [narrow, wide] = self.rims;
+        if self.points == 0 || self.points > 1000 {
+            return refuse("the number of points", self.points.to_string(), "1 to 1000");
+        }
+        if self.steps == 0 {
+            return refuse("the number of steps", "0".to_owned(), "at least 1");
+        }
+        if !(low > 0.0 && low <= high && high < 1.0) {
+            return refuse("the blur", format!("{low} to {high}"), "0 < smallest <= largest < 1");
+        }
+        if !(narrow > 0.0 && narrow <= 1.0 && wide >= 1.0 && wide.is_finite()) {
+            return refuse("the range of rims", format!("{narrow} to {wide}"), "0 < a <= 1 <= b");
+        }
+        if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
+            return refuse("the tolerance", self.tolerance.to_string(), "between 0 and 1");
+        }
+        Ok(())
+    }
+
+    /// The weights in mm², ascending.
+    fn weights(&self, focal_length: f64) -> Vec<f64> {
+        let [low, high] = self.blur;
+        let last = (self.points - 1).max(1) as f64;
+        let blur = |i: usize| focal_length * low * (high / low).powf(i as f64 / last);
+        (0..self.points).map(|i| blur(i).powi(2)).collect()
+    }
+}
+
+impl Chain {
+    /// The next steps; the lenses that they have led to.
+    fn slice(&mut self) -> Vec<Design> {
+        if self.running.is_none() {
+            self.begin();
+        }
+        let Some(Running { weight, search, left }) = &mut self.running else { return Vec::new() };
+        for _ in 0..SLICE.min(*left) {
+            *left -= 1;
+            if search.step().finished {
+                *left = 0;
+                break;
+            }
+        }
+        let judge = |lens: &Lens| Design::of(lens, Some(*weight), JUDGED).ok();
+        if *left > 0 {
+            return judge(search.current()).into_iter().collect();
+        }
+        search.settle();
+        self.lens.clone_from(search.best());
+        let found = judge(&self.lens);
+        self.running = None;
+        found.into_iter().collect()
+    }
+
+    fn begin(&mut self) {
+        let begin = self.begin.take();
+        let left = if begin.is_some() { FIRST * self.steps } else { self.steps };
+        let next = begin.or_else(|| Some((self.weights.pop()?, self.goal.pupil)));
+        let Some((weight, pupil)) = next else { return };
+        let mut goal = Goal { pupil, ..self.goal.clone() };
+        if weight > 0.0 {
+            goal.terms.push(Weighted { term: Term::Throughput, weight });
+        }
+        let search = match self.method {
+            Method::Adam => annealed(&self.lens, &goal, self.tolerance, left),
+            Method::DampedLeastSquares => start(self.method, &self.lens, &goal, self.tolerance),
+        };
+        match search {
+            Ok(search) => self.running = Some(Running { weight, search, left }),
+            Err(cause) => self.refused = Some(cause.to_string()),
+        }
+    }
+
+    /// Steps to come, at most.
+    fn left(&self) -> usize {
+        let coming = self.weights.len() + if self.begin.is_some() { FIRST } else { 0 };
+        coming * self.steps + self.running.as_ref().map_or(0, |running| running.left)
+    }
+}
+
+/// What every weight asks for besides light.
+fn goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
+    let sensible = Goal::sensible(lens)?;
+    let mut terms = vec![Weighted { term: Term::SpotIntegral, weight: 1.0 }];
+    // The integral of a spot is its mean square times the light, and so must the others count.
+    let others =
+        sensible.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
+    terms.extend(others.map(|w| Weighted { weight: light * w.weight, ..w }));
+    terms.push(Weighted { term: Term::Steepness(STEEPEST), weight: light });
+    Ok(Goal { terms, pupil, zoom_ratios: sensible.zoom_ratios })
+}
+
+/// The focal length that the goal asks for, or the length of an afocal lens.
+fn goal_focal_length(goal: &Goal, lens: &Lens) -> f64 {
+    let asked = goal.terms.iter().find_map(|w| match w.term {
+        Term::FocalLength(focal) => Some(focal.abs()),
+        _ => None,
+    });
+    asked.unwrap_or_else(|| lens.surfaces.iter().map(|row| row.thickness.abs()).sum())
+}
+
+/// The lens with everything free that a sweep may change.
+fn freed(lens: &Lens, [narrow, wide]: [f64; 2]) -> Lens {
+    let mut lens = lens.clone();
+    let own: Vec<_> = lens.variables.clone();
+    if own.is_empty() {
+        vary(&mut lens, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
+    }
+    vary(&mut lens, &[NumberKind::SemiDiameters]);
+    let sizes: Vec<Option<f64>> = lens.surfaces.iter().map(|row| row.semi_diameter).collect();
+    for variable in &mut lens.variables {
+        if let (Quantity::SemiDiameter, Some(size)) =
+            (variable.parameter.quantity, sizes[variable.parameter.surface])
+        {
+            variable.min = variable.min.or(Some(narrow * size));
+            variable.max = variable.max.or(Some(wide * size));
+        }
+    }
+    lens
+}

@@ -1,0 +1,205 @@
+//! A chart: two axes, and the way from two quantities to a place on the canvas.
+
+use super::canvas::{Align, Canvas};
+use super::color::{BLACK, GRID};
+
+/// About how many lines a linear axis has.
+const LINES: f64 = 5.0;
+/// A line this close to the end of an axis, in steps, still belongs to it.
+const EVEN: f64 = 1e-6;
+/// Room for the letters of an axis, in pixels.
+const GAP: f64 = 10.0;
+const HALF_LETTER: f64 = 7.0;
+
+/// An axis from one whole step to another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    name: String,
+    /// The ends; for a logarithmic axis those of the decimal logarithm.
+    low: f64,
+    high: f64,
+    step: f64,
+    logarithmic: bool,
+}
+
+impl Axis {
+    /// A linear axis around all values.
+    pub fn linear(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let (low, high) = range(values).unwrap_or((0.0, 1.0));
+        let width = if high > low { high - low } else { low.abs().max(1.0) };
+        let step = round_step(width / LINES);
+        let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
+        let high = if high > low { high } else { low + step };
+        Self { name: name.to_owned(), low, high, step, logarithmic: false }
+    }
+
+    /// A logarithmic axis from one power of ten to another, around all values; what is smaller than
+    /// `smallest` is drawn at its foot.
+    pub fn logarithmic(name: &str, values: impl IntoIterator<Item = f64>, smallest: f64) -> Self {
+        let logs = values.into_iter().map(|value| value.max(smallest).log10());
+        let (low, high) = range(logs).unwrap_or((-1.0, 1.0));
+        let (low, high) = (low.floor(), high.ceil().max(low.floor() + 1.0));
+        Self { name: name.to_owned(), low, high, step: 1.0, logarithmic: true }
+    }
+
+    /// Where a value stands, 0 at the beginning of the axis and 1 at its end.
+    fn share(&self, value: f64) -> f64 {
+        let place = if self.logarithmic { value.log10().max(self.low) } else { value };
+        (place - self.low) / (self.high - self.low)
+    }
+
+    /// The lines of the grid with their labels.
+    fn lines(&self) -> impl Iterator<Item = (f64, String)> + '_ {
+        let [first, last] =
+            [(self.low / self.step - EVEN).ceil(), (self.high / self.step + EVEN).floor()];
+        (first as i32..=last as i32).map(|i| {
+            let place = f64::from(i) * self.step;
+            let share = (place - self.low) / (self.high - self.low);
+            let label =
+                if self.logarithmic { format!("1e{place:.0}") } else { label(place, self.step) };
+            (share, label)
+        })
+    }
+
+    /// The same axis with more room on both sides until it has this length.
+    fn widened(mut self, length: f64) -> Self {
+        let more = 0.5 * (length - (self.high - self.low)).max(0.0);
+        self.low -= more;
+        self.high += more;
+        self
+    }
+}
+
+fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    let finite = values.into_iter().filter(|value| value.is_finite());
+    finite.fold(None, |range, value| match range {
+        None => Some((value, value)),
+        Some((low, high)) => Some((value.min(low), value.max(high))),
+    })
+}
+
+/// The nearest of 1, 2 and 5 times a power of ten that is not less.
+fn round_step(step: f64) -> f64 {
+    let power = 10f64.powf(step.log10().floor());
+    let digits = [1.0, 2.0, 5.0, 10.0];
+    power * digits.into_iter().find(|digit| digit * power >= 0.999 * step).unwrap_or(10.0)
+}
+
+/// A place on an axis with as many digits as its steps need.
+fn label(place: f64, step: f64) -> String {
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    if decimals > 4 || step >= 1e6 {
+        return format!("{place:.1e}");
+    }
+    let text = format!("{place:.decimals$}");
+    if text.trim_start_matches(['-', '0', '.']).is_empty() { "0".to_owned() } else { text }
+}
+
+/// A rectangle of the canvas with two axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+    x: Axis,
+    y: Axis,
+}
+
+impl Chart {
+    /// A chart between two corners of the canvas, the upper left one first.
+    pub fn new([left, top]: [f64; 2], [right, bottom]: [f64; 2], x: Axis, y: Axis) -> Self {
+        Self { left, right, top, bottom, x, y }
+    }
+
+    /// The same with as many pixels a unit on one axis as on the other: a map.
+    #[must_use]
+    pub fn to_scale(mut self) -> Self {
+        let (width, height) = (self.right - self.left, self.bottom - self.top);
+        let (x, y) = (self.x.high - self.x.low, self.y.high - self.y.low);
+        let unit = (x / width).max(y / height);
+        self.x = self.x.widened(unit * width);
+        self.y = self.y.widened(unit * height);
+        self
+    }
+
+    /// Where two quantities stand on the canvas.
+    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [
+            self.left + (self.right - self.left) * self.x.share(x),
+            self.bottom - (self.bottom - self.top) * self.y.share(y),
+        ]
+    }
+
+    /// Where several pairs of quantities stand.
+    pub fn places(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        points.iter().map(|point| self.place(*point)).collect()
+    }
+
+    /// Draws the grid, the numbers and the names of the axes, and a title above.
+    pub fn draw(&self, canvas: &mut Canvas, title: &str) {
+        self.draw_grid(canvas);
+        self.draw_frame(canvas);
+        let middle = 0.5 * (self.left + self.right);
+        canvas.text([middle, self.top - 48.0], title, BLACK, Align::Middle);
+        canvas.text([middle, self.bottom + 46.0], &self.x.name, BLACK, Align::Middle);
+        let above = [self.left - GAP, self.top - 24.0];
+        canvas.text(above, &self.y.name, BLACK, Align::Left);
+    }
+
+    fn draw_grid(&self, canvas: &mut Canvas) {
+        for (share, label) in self.x.lines() {
+            let x = self.left + (self.right - self.left) * share;
+            canvas.line([x, self.top], [x, self.bottom], GRID);
+            canvas.text([x, self.bottom + GAP], &label, BLACK, Align::Middle);
+        }
+        for (share, label) in self.y.lines() {
+            let y = self.bottom - (self.bottom - self.top) * share;
+            canvas.line([self.left, y], [self.right, y], GRID);
+            canvas.text([self.left - GAP, y - HALF_LETTER], &label, BLACK, Align::Right);
+        }
+    }
+
+    fn draw_frame(&self, canvas: &mut Canvas) {
+        let Self { left, right, top, bottom, .. } = *self;
+        let corners = [[left, top], [right, top], [right, bottom], [left, bottom], [left, top]];
+        for side in corners.windows(2) {
+            canvas.line(side[0], side[1], BLACK);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_end_at_whole_steps_around_all_values() {
+        let axis = Axis::linear("mm", [0.13, 9.2]);
+        assert_eq!((axis.low, axis.high, axis.step), (0.0, 10.0, 2.0));
+        let axis = Axis::logarithmic("ms", [0.02, 700.0, 0.0], 1e-3);
+        assert_eq!((axis.low, axis.high), (-3.0, 3.0));
+        assert_eq!(axis.share(1.0), 0.5);
+        assert_eq!(axis.share(0.0), 0.0);
+        let labels: Vec<String> = axis.lines().map(|line| line.1).collect();
+        assert_eq!([&labels[0], &labels[3]], ["1e-3", "1e0"]);
+    }
+
+    #[test]
+    fn an_axis_of_one_value_or_none_has_a_length() {
+        for axis in [Axis::linear("", [3.0]), Axis::linear("", []), Axis::linear("", [f64::NAN])] {
+            assert!(axis.high > axis.low, "{axis:?}");
+        }
+        let axis = Axis::logarithmic("", [10.0], 1e-9);
+        assert!(axis.high > axis.low, "{axis:?}");
+    }
+
+    #[test]
+    fn a_chart_to_scale_has_square_units() {
+        let (x, y) = (Axis::linear("x", [0.0, 1.0]), Axis::linear("y", [0.0, 1.0]));
+        let chart = Chart::new([0.0, 0.0], [400.0, 100.0], x, y).to_scale();
+        let [a, b] = [chart.place([0.0, 0.0]), chart.place([0.5, 0.5])];
+        assert!(((b[0] - a[0]) - (a[1] - b[1])).abs() < 1e-9);
+        assert_eq!(chart.place([0.5, 0.5]), [200.0, 50.0]);
+    }
+}

@@ -1,0 +1,50 @@
+//! Colours: a few to tell curves apart, and scales for rasters.
+
+/// Red, green, blue.
+pub type Color = [u8; 3];
+
+/// Text and axes.
+pub const BLACK: Color = [0; 3];
+/// What stands in the background.
+pub const GREY: Color = [0x7f; 3];
+/// The lines of a grid.
+pub const GRID: Color = [0xdd; 3];
+
+/// Colours that are told apart easily, the most telling ones first.
+pub const PALETTE: [Color; 8] = [
+    [0xd6, 0x27, 0x28],
+    [0x1f, 0x77, 0xb4],
+    [0x2c, 0xa0, 0x2c],
+    [0xff, 0x7f, 0x0e],
+    [0x94, 0x67, 0xbd],
+    [0x8c, 0x56, 0x4b],
+    [0xe3, 0x77, 0xc2],
+    [0x17, 0xbe, 0xcf],
+];
+
+/// From black at 0 to white at 1.
+pub fn grey(value: f64) -> Color {
+    [level(value); 3]
+}
+
+/// From blue at −1 over white at 0 to red at 1.
+pub fn diverging(value: f64) -> Color {
+    let faded = level(1.0 - value.abs());
+    if value < 0.0 { [faded, faded, 0xff] } else { [0xff, faded, faded] }
+}
+
+fn level(share: f64) -> u8 {
+    (255.0 * share.clamp(0.0, 1.0)).round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_reach_their_ends_and_stay_there() {
+        assert_eq!([grey(0.0), grey(1.0), grey(9.0)], [BLACK, [0xff; 3], [0xff; 3]]);
+        assert_eq!(diverging(0.0), [0xff; 3]);
+        assert_eq!([diverging(-2.0), diverging(1.0)], [[0, 0, 0xff], [0xff, 0, 0]]);
+    }
+}

@@ -1,0 +1,13 @@
+//! Plots and images as PNG: lines, markers, letters, charts with axes, rasters in false colours.
+//!
+//! A [`Canvas`] knows pixels, a [`Chart`] leads from two quantities to them. Neither knows what is
+//! drawn.
+
+mod canvas;
+mod chart;
+mod color;
+mod font;
+
+pub use canvas::{Align, Canvas, Stroke};
+pub use chart::{Axis, Chart};
+pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, grey};

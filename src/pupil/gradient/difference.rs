@@ -1,0 +1,144 @@
+//! Central differences of the integral, the edge of the pupil found anew for every lens.
+//!
+//! Each number is moved up and down by a step and by twice that, while the rays keep their names:
+//!
+//! ```text
+//! D(h) = (L(t+h) − L(t−h)) / 2h    dL/dt ≈ D(h) + (D(h) − D(2h)) / 3
+//! ```
+//!
+//! (Richardson, Phil. Trans. A 210, 1911). The correction is the estimate of the error: it is far
+//! too large where the integral is smooth, and right where a step reaches a corner of it. Nothing
+//! here knows how a derivative is worked out, which makes it the check of what does, at four edges
+//! and four quadratures a number.
+
+use super::{Cost, Derivative};
+use crate::lens::{Invalid, System};
+use crate::pupil::lit::Lit;
+use crate::pupil::region::{Kind, Region};
+use crate::trace::{Gradient, Slot};
+
+/// The shorter step against the scale on which a number acts: long enough that rounding of the
+/// integral leaves ten digits, short enough that the fourth power of it is nothing.
+const STEP: f64 = 3e-4;
+/// A surface that light meets closer to the axis than this part of the widest one is stepped as if
+/// light met it there.
+const NARROW: f64 = 1e-3;
+/// A conic constant moves `c² r²` by a step; at flat surfaces, by a step of this.
+const FLAT: f64 = 1e-2;
+
+impl Region<'_> {
+    /// The derivative of the integral of a cost over this pupil by central differences, at an
+    /// order of quadrature; `None` where nothing gets through or nothing limits it.
+    pub fn difference_derivative(&self, cost: &Cost, order: usize) -> Option<Derivative> {
+        if matches!(self.kind, Kind::Dark | Kind::Endless) {
+            return None;
+        }
+        let lit = self.lit(order);
+        let scales = Scales::of(&lit);
+        let mut moved = Moved { region: self, cost, order, rays: self.rays + lit.traced };
+        let system = &self.launch.color().system;
+        let mut found = Derivative::zero(system.surfaces.len());
+        let of_index = |system: &mut System<f64>, step: f64| system.index_before += step;
+        [found.by.index_before, found.error.index_before] =
+            moved.derivative(STEP * system.index_before, of_index);
+        for (i, surface) in system.surfaces.iter().enumerate() {
+            for slot in Slot::all().filter(|slot| slot.is_of(&surface.shape)) {
+                let Some(step) = scales.step(system, i, slot) else { continue };
+                let by_slot = |system: &mut System<f64>, step: f64| {
+                    slot.widen(system, i);
+                    *slot.of(system, i) += step;
+                };
+                let [by, error] = moved.derivative(step, by_slot);
+                *found.by.surfaces[i].by_mut(slot) = by;
+                *found.error.surfaces[i].by_mut(slot) = error;
+            }
+        }
+        found.rays = moved.rays;
+        Some(found)
+    }
+}
+
+/// How far from the axis light meets each surface, in mm.
+struct Scales {
+    heights: Vec<f64>,
+    widest: f64,
+}
+
+impl Scales {
+    fn of(lit: &Lit<'_>) -> Self {
+        let tracer = &lit.launch.color().tracer;
+        let mut heights = vec![0.0_f64; tracer.surfaces()];
+        for i in 0..lit.rays.len() {
+            tracer.visit(lit.rays.get(i), |surface, p| {
+                heights[surface] = heights[surface].max(p.x.hypot(p.y));
+            });
+        }
+        let widest = heights.iter().copied().fold(0.0, f64::max);
+        heights.iter_mut().for_each(|height| *height = height.max(NARROW * widest));
+        Self { heights, widest }
+    }
+
+    /// The shorter step of a number: it turns rays by about the same small angle, whatever the
+    /// number. `None` for an infinite semi-diameter and where there are no scales.
+    fn step(&self, system: &System<f64>, surface: usize, slot: Slot) -> Option<f64> {
+        let (row, r) = (&system.surfaces[surface], self.heights[surface]);
+        let scale = match slot {
+            Slot::Curvature => 1.0 / r,
+            Slot::Conic => 1.0 / (row.shape.curvature() * r).powi(2).max(FLAT),
+            Slot::Term(term) => {
+                let power = 2 * i32::try_from(term).ok()? + 4;
+                1.0 / (f64::from(power) * r.powi(power - 1))
+            }
+            Slot::Thickness => self.widest,
+            Slot::Index => row.index,
+            Slot::SemiDiameter => row.semi_diameter,
+        };
+        let step = STEP * scale;
+        (step.is_finite() && step > 0.0).then_some(step)
+    }
+}
+
+/// The integral while the lens moves.
+struct Moved<'a> {
+    region: &'a Region<'a>,
+    cost: &'a Cost,
+    order: usize,
+    rays: usize,
+}
+
+impl Moved<'_> {
+    /// A derivative and how far it may be wrong: infinitely, where the changed lens has no beam.
+    fn derivative(&mut self, step: f64, change: impl Fn(&mut System<f64>, f64)) -> [f64; 2] {
+        let mut slope = |h: f64| {
+            let [up, down] = [h, -h].map(|h| self.integral(|system| change(system, h)));
+            Some((up? - down?) / (2.0 * h))
+        };
+        let Some((near, far)) = slope(step).zip(slope(2.0 * step)) else {
+            return [0.0, f64::INFINITY];
+        };
+        let correction = (near - far) / 3.0;
+        [near + correction, correction.abs()]
+    }
+
+    /// The integral over the pupil of a changed lens; `None` where nothing limits its beam.
+    fn integral(&mut self, change: impl FnOnce(&mut System<f64>)) -> Option<f64> {
+        let launch = &self.region.launch;
+        let mut system = launch.color().system.clone();
+        change(&mut system);
+        let bench: Result<_, Invalid> = launch.bench.changed(launch.wavelength, system);
+        let bench = bench.ok()?;
+        let region = Region::new(launch.anchor().launch(&bench));
+        if region.kind == Kind::Endless {
+            return None;
+        }
+        let lit = region.lit(self.order);
+        self.rays += region.rays + lit.traced;
+        Some(self.cost.over(&lit.moments))
+    }
+}
+
+impl Derivative {
+    fn zero(surfaces: usize) -> Self {
+        Self { by: Gradient::zero(surfaces), error: Gradient::zero(surfaces), rays: 0 }
+    }
+}

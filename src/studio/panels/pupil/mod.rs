@@ -1,0 +1,247 @@
+//! Which rays of each field get through, and what ends the others: the outline of every pupil, each
+//! side in the colour of what limits it.
+//!
+//! All pupils are drawn to one scale in the plane through the first vertex. The numbers below each
+//! are integrals over it, with their error, their rays and their time.
+
+mod picture;
+mod words;
+
+use eframe::egui::{
+    Align, ComboBox, Id, Layout as Arrange, Rect, Response, Sense, Ui, WidgetInfo, vec2,
+};
+
+use super::cells::{Words, bar, within};
+use super::{Panel, no_numbers, shown, swatch, zoom_name};
+use crate::analysis::{Form, Pupil};
+use crate::pupil::{Bench, Limit};
+use crate::session::{self, Command, Numbers, Results, Timed, View};
+use crate::studio::palette::{Palette, color32};
+use crate::studio::wording::{capital, counted_from_one};
+use picture::{Picture, Window};
+
+/// The field of a cell above, four lines of numbers below; more where a pupil has more limits than
+/// fit in one.
+const WORDS: Words = Words { above: 20.0, below: 62.0 };
+const LINE: f32 = 14.0;
+/// The scale bar is at most this share of a picture's width, to stand in its corner.
+const BAR: f64 = 0.3;
+
+/// The panel.
+#[derive(Debug, Default)]
+pub struct Pupils {
+    /// Limits in the order in which they have turned up, so that none changes its colour while the
+    /// lens is bent.
+    known: Vec<Limit>,
+    /// How many surfaces the lens has that they belong to.
+    surfaces: usize,
+}
+
+impl Panel for Pupils {
+    fn title(&self) -> &'static str {
+        "Pupil"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
+        let Some(pupils) = &numbers.pupils else {
+            ui.weak("Computing…");
+            return;
+        };
+        let pupils = &pupils.value;
+        self.learn(pupils, results.lens.surfaces.len());
+        header(ui, view, pupils, wishes);
+        let shown = Shown { known: &self.known, view, results, numbers, pupils };
+        shown.legend(ui, wishes);
+        shown.pictures(ui, wishes);
+    }
+}
+
+impl Pupils {
+    /// Notes limits that were not there before.
+    fn learn(&mut self, pupils: &session::Pupils, surfaces: usize) {
+        if self.surfaces != surfaces {
+            *self = Self { known: Vec::new(), surfaces };
+        }
+        for limit in limits(pupils) {
+            if !self.known.contains(&limit) {
+                self.known.push(limit);
+            }
+        }
+    }
+}
+
+/// All limits of all pupils, from the first surface to the last, the disc in front.
+fn limits(pupils: &session::Pupils) -> Vec<Limit> {
+    let sides = pupils.fields.iter().filter_map(|pupil| match &pupil.value.form {
+        Form::Outlined(outline) => Some(&outline.sides),
+        _ => None,
+    });
+    let mut limits: Vec<Limit> = sides.flatten().map(|side| side.limit).collect();
+    limits.sort_by_key(|limit| match limit {
+        Limit::Surface(surface, hurdle) => Some((*surface, *hurdle)),
+        Limit::Disc | Limit::Unaimed => None,
+    });
+    limits.dedup();
+    limits
+}
+
+/// What the drawings show.
+const HINT: &str = "Shaded: rays that get through. Coloured: what ends them. Dashed: the ideal \
+     entrance pupil, as it would be if no surface clipped. Rings: corners, where one limit takes \
+     over from another. Cross: the centroid. In the plane through the first vertex, seen along the \
+     axis; where the field reaches beyond 45°, seen along the beam of each field instead.";
+
+fn header(ui: &mut Ui, view: &View, pupils: &session::Pupils, wishes: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        wavelength(ui, view, pupils.wavelength, wishes);
+        ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
+            let across = pupils.fields.iter().any(|pupil| pupil.value.across);
+            let plane = if across { "across the beam" } else { "in the plane of the first vertex" };
+            ui.weak(plane).on_hover_text(HINT);
+            if view.lens.zoom_positions() > 1 {
+                ui.weak(format!("{},", zoom_name(&view.lens, view.settings.zoom)));
+            }
+        });
+    });
+}
+
+/// The choice of the wavelength; its name where there is no choice.
+fn wavelength(ui: &mut Ui, view: &View, shown: usize, wishes: &mut Vec<Command>) {
+    let palette = Palette::of(ui.visuals());
+    let waves = &view.lens.wavelengths;
+    let name =
+        |i: usize| waves.get(i).map_or_else(String::new, |wave| format!("{:.1} nm", 1e3 * wave.um));
+    if let Some(wave) = waves.get(shown) {
+        swatch(ui, color32(palette.wavelength(wave.um)));
+    }
+    if waves.len() < 2 {
+        ui.label(name(shown));
+        return;
+    }
+    let mut chosen = shown;
+    let combo = ComboBox::from_id_salt("pupil wavelength").width(80.0).selected_text(name(shown));
+    let combo = combo.show_ui(ui, |ui| {
+        for (i, wave) in waves.iter().enumerate() {
+            let primary = if wave.primary { ", primary" } else { "" };
+            ui.selectable_value(&mut chosen, i, format!("{}{primary}", name(i)));
+        }
+    });
+    combo.response.accessible_name("Wavelength of the pupils");
+    if chosen != shown {
+        wishes.push(Command::ShowPupilWavelength(Some(chosen)));
+    }
+}
+
+/// What is shown in one frame.
+struct Shown<'a> {
+    known: &'a [Limit],
+    view: &'a View,
+    results: &'a Results,
+    numbers: &'a Numbers,
+    pupils: &'a session::Pupils,
+}
+
+impl Shown<'_> {
+    fn bench(&self) -> &Bench {
+        &self.numbers.bench.value
+    }
+
+    /// A limit as the window counts surfaces.
+    fn name(&self, limit: Limit) -> String {
+        counted_from_one(&self.bench().limit_name(limit))
+    }
+
+    fn color(&self, palette: &Palette, limit: Limit) -> eframe::egui::Color32 {
+        if limit == Limit::Disc {
+            return color32(palette.strong);
+        }
+        let surfaces = || self.known.iter().filter(|limit| **limit != Limit::Disc);
+        color32(palette.limit(surfaces().position(|known| *known == limit).unwrap_or(0)))
+    }
+
+    /// Whether a limit belongs to the surface that is pointed out.
+    fn is_selected(&self, limit: Limit) -> bool {
+        limit.surface().is_some() && limit.surface() == self.view.selected
+    }
+
+    /// Points a limit's surface out, or no longer.
+    fn select(&self, limit: Limit, wishes: &mut Vec<Command>) {
+        let surface = limit.surface();
+        let wanted = surface.filter(|surface| self.view.selected != Some(*surface));
+        if surface.is_some() {
+            wishes.push(Command::Select(wanted));
+        }
+    }
+
+    /// The colours of the limits; a click points out the surface.
+    fn legend(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
+        let palette = Palette::of(ui.visuals());
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
+            for limit in limits(self.pupils) {
+                let (color, name) = (self.color(&palette, limit), capital(&self.name(limit)));
+                let label = words::entry(ui, color, name, self.is_selected(limit));
+                if label.on_hover_text(words::hint(limit)).clicked() {
+                    self.select(limit, wishes);
+                }
+            }
+        });
+    }
+
+    /// The room for the words of all cells, and the cells.
+    fn room(&self, ui: &Ui, rect: Rect) -> (Words, Vec<Rect>) {
+        let fields = &self.pupils.fields;
+        let cells = WORDS.cells(rect, fields.len());
+        let lines = |(pupil, cell): (&Timed<Pupil>, &Rect)| {
+            self.lines(ui, &pupil.value, WORDS.below(*cell).width())
+        };
+        let most = fields.iter().zip(&cells).map(lines).max().unwrap_or(1);
+        let below = WORDS.below + LINE * (most - 1) as f32;
+        let words = Words { below, ..WORDS };
+        (words, words.cells(rect, fields.len()))
+    }
+
+    fn pictures(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
+        let (rect, _) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+        let (words, cells) = self.room(ui, rect);
+        let Some(first) = cells.first() else { return };
+        let window = Window::of(self.pupils);
+        let all = self.pupils.fields.iter().zip(&cells).enumerate();
+        let pictures: Vec<_> = all
+            .map(|(i, (pupil, cell))| {
+                let rect = words.picture(*cell);
+                let response = self.touch(ui, rect, i, &pupil.value);
+                (Picture::new(&pupil.value, &window, i, rect), response)
+            })
+            .collect();
+        let pointed = pictures.iter().find_map(|(picture, response)| {
+            let limit = picture.limit_near(response.hover_pos()?)?;
+            Some((picture, response, limit))
+        });
+        if let Some((picture, response, limit)) = pointed {
+            response.clone().on_hover_text_at_pointer(self.describe(picture.pupil, limit));
+            if response.clicked() {
+                self.select(limit, wishes);
+            }
+        }
+        let bold = |limit| self.is_selected(limit) || pointed.is_some_and(|p| p.2 == limit);
+        for ((i, cell), (picture, _)) in cells.iter().enumerate().zip(&pictures) {
+            picture.paint(ui, |palette, limit| self.color(palette, limit), bold);
+            within(ui, words.above(*cell), |ui| self.title(ui, i));
+            self.message(ui, picture.rect, picture.pupil);
+            within(ui, words.below(*cell), |ui| self.numbers(ui, i));
+        }
+        let first = words.picture(*first);
+        bar(ui, first, window.scale(first), BAR);
+    }
+
+    /// Where a picture is touched, by the name that a screen reader gives it.
+    fn touch(&self, ui: &Ui, rect: Rect, field: usize, pupil: &Pupil) -> Response {
+        let id = Id::unique("pupil").with(field);
+        let response = ui.interact(rect, id, Sense::click());
+        let name = format!("Pupil of field {}: {}", field + 1, self.summary(pupil));
+        response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, &name));
+        response
+    }
+}

@@ -1,0 +1,353 @@
+//! How far rays are from every limit that a surface sets them, and derivatives through that.
+//!
+//! An integral over the rays that get through changes with the place of its edge as well. What is
+//! needed for that is a family of rays with its second derivatives by two coordinates of the pupil
+//! ([`Jet`]), and at every surface the functions that are negative for a ray that passes and zero
+//! at the edge:
+//!
+//! ```text
+//! rim    (r²/R² − 1)/2, and of an obstruction (1 − r²/h²)/2
+//! angle  max(0, 1 − (n'/n)²) N·N − (k·N)²/n²
+//! sheet  −(1 − (1+κ) c z), or (1+κ) c² r² − 1 at an asphere
+//! ```
+//!
+//! All are smooth on the axis and of no dimension, so that none is near its edge by its unit alone.
+//! With N·N = 1 the angle is the square of the cosine of incidence against that of the critical
+//! angle where the index falls, and against grazing incidence elsewhere: where a sphere or a conic
+//! is just missed its discriminant (k·N)² is zero, and so it is where a ray touches an asphere. An
+//! asphere that a ray crosses more than once may end a family by another crossing that comes first
+//! all at once; no limit tells of that.
+//!
+//! Homeward, derivatives are first-order jets whose values matter. The transpose of multiplication
+//! by a jet `v + x ε + y η` is again a multiplication, of what is written as `v εη + x η + y ε`, in
+//! the algebra with ε² = η² = 0: so the adjoint of every ray runs unchanged over `Dual<Dual>`, and
+//! the answer is what stands at εη.
+
+use super::Tracer;
+use super::backward::{Gradient, Harvest, Pulls, Seed, Sowing};
+use super::batch::{BLOCK, Block};
+use super::interface::{Form, Interface};
+use super::single::Ray;
+use super::slot::Slot;
+use crate::lens::{Invalid, System};
+use crate::math::{Dual, Jet, Real, Vec3};
+use crate::math::{Width, widest};
+
+/// Rays that travel abreast.
+pub const LANES: usize = BLOCK;
+
+/// A number of the algebra with ε² = η² = 0; the outer slope belongs to ε.
+type Pair<R> = Dual<Dual<R, 1>, 1>;
+
+/// A limit of a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Limit {
+    Rim,
+    Obstruction,
+    Angle,
+    Sheet,
+}
+
+impl<R: Real> Interface<R> {
+    /// `max(0, n² − n'²)`.
+    #[inline(always)]
+    pub(super) fn loss(&self) -> R {
+        R::select(self.dn2 < R::ZERO, -self.dn2, R::ZERO)
+    }
+
+    /// Whether a limit can end anything. A plane ends no ray by its angle where the index does not
+    /// fall, and the rim keeps most rays from where a conic turns over.
+    fn has(&self, limit: Limit) -> bool {
+        let surface = self.value();
+        let c2 = (1.0 + surface.conic) * surface.curvature * surface.curvature;
+        let flat = surface.form != Form::Asphere && surface.curvature == 0.0;
+        match limit {
+            Limit::Rim => surface.rim2 < f64::INFINITY,
+            Limit::Obstruction => surface.obstruction2 > 0.0,
+            Limit::Angle => !flat || surface.dn2 < 0.0,
+            Limit::Sheet => {
+                let closed = surface.form == Form::Asphere || surface.sheet > f64::NEG_INFINITY;
+                closed && c2 > 0.0 && c2 * surface.rim2 >= 1.0
+            }
+        }
+    }
+}
+
+impl<R: Real> Interface<Jet<R>> {
+    /// `N·N` at a point of the surface.
+    #[inline(always)]
+    fn square_of_normal(&self, p: Vec3<Jet<R>>) -> Jet<R> {
+        let c = self.curvature;
+        let r2 = p.x * p.x + p.y * p.y;
+        match self.form {
+            Form::Plane | Form::Sphere => Jet::ONE,
+            Form::Conic => {
+                let z = Jet::ONE - c * (p.z + self.conic * p.z);
+                c * c * r2 + z * z
+            }
+            Form::Asphere => {
+                let slope = self.sag(r2).1;
+                slope * slope * r2 * Jet::from_f64(4.0) + Jet::ONE
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn limits(
+        &self,
+        limit: Limit,
+        block: &Block<Jet<R>>,
+        slants: &[Jet<R>; BLOCK],
+        lanes: &mut [Jet<R>; BLOCK],
+    ) {
+        for j in 0..BLOCK {
+            lanes[j] = self.limit(limit, block.state(j).0, slants[j]);
+        }
+    }
+
+    /// One of the functions above, from the point and `k·N`.
+    #[inline(always)]
+    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, a: Jet<R>) -> Jet<R> {
+        let r2 = p.x * p.x + p.y * p.y;
+        let c2 = (R::ONE + self.conic.value) * self.curvature.value;
+        let minus_one = Jet::constant(-R::ONE);
+        match limit {
+            Limit::Rim => {
+                let half = R::from_f64(0.5);
+                r2.scaled(half / self.rim2.value) - Jet::constant(half)
+            }
+            Limit::Obstruction => {
+                let half = R::from_f64(0.5);
+                Jet::constant(half) - r2.scaled(half / self.obstruction2.value)
+            }
+            Limit::Angle => {
+                let inverse = R::ONE / self.n2.value;
+                let loss = self.loss().value * inverse;
+                let m = if loss > R::ZERO { self.square_of_normal(p) } else { Jet::ZERO };
+                m.scaled(loss) - (a * a).scaled(inverse)
+            }
+            Limit::Sheet if self.form == Form::Asphere => {
+                r2.scaled(c2 * self.curvature.value) + minus_one
+            }
+            Limit::Sheet => p.z.scaled(c2) + minus_one,
+        }
+    }
+}
+
+/// A block of rays that have arrived, each with its derivatives by two pupil coordinates, and the
+/// derivatives that their adjoint begins with.
+#[derive(Debug)]
+pub struct Abreast<R> {
+    /// Where they land across the axis.
+    pub landing: [[Jet<R>; LANES]; 2],
+    /// How far they are from every limit that may end them, below zero.
+    pub limits: Vec<[Jet<R>; LANES]>,
+    /// The derivative of the answer by where they land, to be filled in.
+    pub by_landing: [[R; LANES]; 2],
+    /// The derivative of the answer by each limit, to be filled in: by its value and by its two
+    /// slopes.
+    pub by_limit: Vec<[[R; 3]; LANES]>,
+}
+
+/// A system made ready for derivatives of integrals over the rays that get through it.
+#[derive(Debug, Clone)]
+pub struct PupilTracer<R> {
+    outward: Tracer<Jet<R>>,
+    homeward: Tracer<Pair<R>>,
+    /// Surface by surface.
+    limits: Vec<(usize, Limit)>,
+}
+
+impl<R: Real> PupilTracer<R> {
+    /// Prepares a system.
+    ///
+    /// # Errors
+    /// Numbers that no ray can be traced with: see [`System::check`].
+    pub fn new(system: &System<f64>) -> Result<Self, Invalid> {
+        let outward = Tracer::new(&system.lift::<Jet<R>>())?;
+        let kinds = [Limit::Rim, Limit::Obstruction, Limit::Angle, Limit::Sheet];
+        let all = |i: usize| kinds.map(|limit| (i, limit));
+        let limits = (0..outward.surfaces()).flat_map(all);
+        let limits = limits.filter(|(i, limit)| outward.interfaces[*i].has(*limit)).collect();
+        let mut homeward = Tracer::<Pair<R>>::new(&system.lift())?;
+        // The square of an infinite number has no slopes.
+        homeward.interfaces.iter_mut().for_each(|i| i.rim2 = Pair::from_f64(i.rim2.value()));
+        Ok(Self { outward, homeward, limits })
+    }
+
+    /// How many surfaces there are.
+    pub fn surfaces(&self) -> usize {
+        self.outward.surfaces()
+    }
+
+    /// The derivative by every number of the system, at fixed rays, of a sum over the rays at some
+    /// points; `fill` gives the derivatives of the sum by where a block of them lands and by their
+    /// limits. All of them should arrive: one that does not counts nothing.
+    pub fn gradient(
+        &self,
+        points: &[[R; 2]],
+        ray: impl Fn([R; 2]) -> Ray<Jet<R>>,
+        fill: impl Fn(&[[R; 2]; LANES], &mut Abreast<R>),
+    ) -> Gradient<R> {
+        let mut gradient = Gradient::zero(self.surfaces());
+        let mut room = Room::new(self);
+        let width = Width::detect();
+        for points in points.chunks(BLOCK) {
+            let mut all = [points[0]; BLOCK];
+            all[..points.len()].copy_from_slice(points);
+            // Compiled apart: all in one is too much for the lanes to be found.
+            let block = widest(
+                width,
+                #[inline(always)]
+                || {
+                    self.go(
+                        &mut room,
+                        points.len(),
+                        #[inline(always)]
+                        |j| ray(all[j]),
+                    )
+                },
+            );
+            widest(
+                width,
+                #[inline(always)]
+                || fill(&all, &mut room.abreast),
+            );
+            widest(
+                width,
+                #[inline(always)]
+                || {
+                    room.spread(&self.limits);
+                    let (block, sum) = (block.map(pair), &mut Top(&mut gradient));
+                    self.homeward.homeward(block, &room.distances, points.len(), &room, sum);
+                },
+            );
+        }
+        gradient
+    }
+
+    /// Traces a block and keeps the limits and the distance to each surface.
+    #[inline(always)]
+    fn go(
+        &self,
+        room: &mut Room<R>,
+        count: usize,
+        ray: impl Fn(usize) -> Ray<Jet<R>>,
+    ) -> Block<Jet<R>> {
+        let mut block = Block::new();
+        block.start(self.outward.index_before, ray);
+        // What only fills the block up counts as lost.
+        block.code[count..].fill(Jet::ONE);
+        let mut limits = self.limits.iter().zip(&mut room.abreast.limits).peekable();
+        for (i, interface) in self.outward.interfaces.iter().enumerate() {
+            // Local, so that the lanes need not ask whether it overlaps the block.
+            let mut kept = [[Jet::ZERO; BLOCK]; 2];
+            block.meet(
+                interface,
+                i as u32,
+                #[inline(always)]
+                |j, met| (kept[0][j], kept[1][j]) = (met.s, met.a),
+            );
+            let [distances, slants] = kept;
+            for (to, from) in room.distances[i].iter_mut().zip(&distances) {
+                *to = pair(*from);
+            }
+            while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i)
+            {
+                // Known inside the loops, so that these have no branch.
+                match limit {
+                    Limit::Rim => interface.limits(Limit::Rim, &block, &slants, lanes),
+                    Limit::Obstruction => {
+                        interface.limits(Limit::Obstruction, &block, &slants, lanes);
+                    }
+                    Limit::Angle => interface.limits(Limit::Angle, &block, &slants, lanes),
+                    Limit::Sheet => interface.limits(Limit::Sheet, &block, &slants, lanes),
+                }
+            }
+        }
+        room.abreast.landing = [block.x, block.y];
+        block
+    }
+}
+
+/// A jet without its second derivatives.
+#[inline(always)]
+fn pair<R: Real>(jet: Jet<R>) -> Pair<R> {
+    let [x, y] = jet.slope;
+    Dual {
+        value: Dual { value: jet.value, slope: [y] },
+        slope: [Dual { value: x, slope: [R::ZERO] }],
+    }
+}
+
+/// What derivatives by a jet are as a number of the algebra.
+#[inline(always)]
+fn transposed<R: Real>([value, x, y]: [R; 3]) -> Pair<R> {
+    Dual { value: Dual { value: R::ZERO, slope: [x] }, slope: [Dual { value: y, slope: [value] }] }
+}
+
+/// What a block needs on its way, made once.
+struct Room<R> {
+    abreast: Abreast<R>,
+    distances: Vec<[Pair<R>; BLOCK]>,
+    pulls: Vec<Pulls<Pair<R>>>,
+}
+
+impl<R: Real> Room<R> {
+    fn new(tracer: &PupilTracer<R>) -> Self {
+        let (surfaces, limits) = (tracer.outward.surfaces(), tracer.limits.len());
+        let jets = [Jet::ZERO; BLOCK];
+        let abreast = Abreast {
+            landing: [jets; 2],
+            limits: vec![jets; limits],
+            by_landing: [[R::ZERO; BLOCK]; 2],
+            by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
+        };
+        let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
+        let none = [Pair::ZERO; BLOCK];
+        let pulls =
+            vec![Pulls { rim: none, angle: none, obstruction: None, sheet: None }; surfaces];
+        Self { abreast, distances, pulls }
+    }
+
+    /// Brings what was filled in to its surface.
+    #[inline(always)]
+    fn spread(&mut self, limits: &[(usize, Limit)]) {
+        for ((surface, limit), by_limit) in limits.iter().zip(&self.abreast.by_limit) {
+            let pulls = &mut self.pulls[*surface];
+            let lanes = match limit {
+                Limit::Rim => &mut pulls.rim,
+                Limit::Obstruction => pulls.obstruction.get_or_insert([Pair::ZERO; BLOCK]),
+                Limit::Angle => &mut pulls.angle,
+                Limit::Sheet => pulls.sheet.get_or_insert([Pair::ZERO; BLOCK]),
+            };
+            for (pull, by_limit) in lanes.iter_mut().zip(by_limit) {
+                *pull = transposed(*by_limit);
+            }
+        }
+    }
+}
+
+impl<R: Real> Sowing<Pair<R>> for Room<R> {
+    #[inline(always)]
+    fn seed(&self, j: usize) -> Seed<Pair<R>> {
+        let by = |i: usize| transposed([self.abreast.by_landing[i][j], R::ZERO, R::ZERO]);
+        Seed { point: Vec3::new(by(0), by(1), Pair::ZERO), ..Seed::default() }
+    }
+
+    #[inline(always)]
+    fn pulls(&self, surface: usize) -> Option<&Pulls<Pair<R>>> {
+        Some(&self.pulls[surface])
+    }
+}
+
+/// Takes what stands at εη.
+struct Top<'a, R>(&'a mut Gradient<R>);
+
+impl<R: Real> Harvest<Pair<R>> for Top<'_, R> {
+    #[inline(always)]
+    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[Pair<R>; BLOCK]) {
+        let top = std::array::from_fn(|j| lanes[j].slope[0].slope[0]);
+        self.0.take(surface, slot, &top);
+    }
+}

@@ -1,0 +1,139 @@
+//! Estimators against each other: every number of lenses of the library, on and off the axis; the
+//! errors they state; and which of them a pupil calls for.
+
+use super::cases;
+use crate::reference::Worst;
+use aplanat::files;
+use aplanat::lens::Field;
+use aplanat::pupil::{
+    Accuracy, Bench, Cost, Derivative, Estimator, Launch, Region, differentiate, plan,
+};
+use aplanat::trace::{Gradient, Slot};
+use std::path::PathBuf;
+
+/// Of the largest of a kind of numbers; what central differences leave of fifteen digits.
+const TOLERANCE: f64 = 1e-7;
+const ORDER: usize = 8;
+
+/// Lens, zoom position and fields, in parts of the farthest one: spheres, conics and aspheres, and
+/// a zoom lens where it is vignetted.
+const CASES: [(&str, usize, [f64; 2]); 4] = [
+    ("double_gauss_nikkor_s_50", 0, [0.0, 0.7]),
+    ("double_gauss_rudolph_50", 0, [0.5, 1.0]),
+    ("phone_us7558005_1", 0, [0.0, 0.6]),
+    ("zoom_nikkor_28_80", 1, [0.0, 1.0]),
+];
+
+fn bench(name: &str, zoom: usize) -> Bench {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("lenses/{name}.json"));
+    Bench::of(&files::open(&path).unwrap().lens, zoom).unwrap()
+}
+
+fn launch(bench: &Bench, part: f64) -> Launch<'_> {
+    let field = Field { x: 0.0, y: part * bench.beam.edge, weight: 1.0 };
+    bench.launch(field, bench.primary).unwrap()
+}
+
+/// Notes the differences between two derivatives, each against the largest of its kind and a
+/// `floor` below which all of a kind is rounding.
+pub(super) fn compare(
+    worst: &mut Worst,
+    (tolerance, floor): (f64, f64),
+    [got, exact]: [&Gradient<f64>; 2],
+    what: &str,
+) {
+    for slot in Slot::all() {
+        let scale = tolerance * exact.largest(slot).max(floor);
+        for (i, (got, exact)) in got.group(slot).zip(exact.group(slot)).enumerate() {
+            let place = format!("{slot:?} {i} of {what}: {got:e}, {exact:e}");
+            worst.note(got, exact, scale, place);
+        }
+    }
+}
+
+#[test]
+fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_found_anew() {
+    let mut worst = Worst::default();
+    for (name, zoom, fields) in CASES {
+        let bench = bench(name, zoom);
+        for part in fields {
+            let region = Region::new(launch(&bench, part));
+            let lit = region.lit(ORDER);
+            for (term, cost) in
+                [("spot", Cost::spread(lit.moments.centroid)), ("throughput", Cost::throughput())]
+            {
+                let differences = region.difference_derivative(&cost, ORDER).unwrap();
+                let found = lit.boundary_derivative(&cost).unwrap();
+                let what = format!("{term} of {name}, zoom {zoom}, field {part}");
+                compare(&mut worst, (TOLERANCE, 0.0), [&found, &differences.by], &what);
+            }
+        }
+    }
+    worst.check("aperture gradients by boundary against differences", 1.0);
+}
+
+/// Errors that are larger than stated, in parts of what is stated.
+fn beyond(found: &Derivative, exact: &Gradient<f64>, slot: Slot) -> f64 {
+    let errors = found.by.group(slot).zip(exact.group(slot)).zip(found.error.group(slot));
+    let floor = 1e-12 * exact.largest(slot).max(1.0);
+    errors.map(|((got, exact), error)| (got - exact).abs() / (error + floor)).fold(0.0, f64::max)
+}
+
+#[test]
+fn aperture_gradients_are_as_good_as_asked_for_and_as_stated() {
+    for case in cases() {
+        let bench = case.bench();
+        let region = Region::new(case.launch(&bench));
+        let lit = region.lit(10);
+        for cost in [Cost::spread(lit.moments.centroid), Cost::throughput()] {
+            let exact = lit.boundary_derivative(&cost).unwrap();
+            for (estimator, tolerance, standard_errors) in [
+                (Estimator::Boundary, 1e-3, 1.0),
+                (Estimator::Boundary, 1e-7, 1.0),
+                (Estimator::Difference, 1e-4, 1.0),
+                (Estimator::Warp, 0.2, 6.0),
+            ] {
+                let asked = Accuracy { tolerance, most_rays: 4_000_000 };
+                let found = differentiate(&region, &cost, estimator, asked).unwrap();
+                let what = format!("{estimator} to {tolerance:e} of {cost:?}, {}", case.name());
+                // Numbers without an effect keep some noise.
+                let reached = found.reaches(tolerance) || estimator == Estimator::Warp;
+                assert!(reached, "{what}: {} rays", found.rays);
+                for slot in Slot::all() {
+                    let beyond = beyond(&found, &exact, slot);
+                    assert!(beyond <= standard_errors, "{what}, {slot:?}: {beyond}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn aperture_gradients_stop_where_the_rays_run_out_and_say_so() {
+    let case = &cases()[2];
+    let bench = case.bench();
+    let region = Region::new(case.launch(&bench));
+    let (cost, _) = case.spot();
+    for (estimator, most_rays) in [
+        (Estimator::Biased, 10_000),
+        (Estimator::Boundary, 10_000),
+        (Estimator::Warp, 10_000),
+        (Estimator::Difference, 1_000_000),
+    ] {
+        let asked = Accuracy { tolerance: 1e-16, most_rays };
+        let found = differentiate(&region, &cost, estimator, asked).unwrap();
+        assert!(found.rays <= most_rays, "{estimator}: {}", found.rays);
+        assert!(found.reaches(1.0) && !found.reaches(1e-16), "{estimator}");
+    }
+}
+
+#[test]
+fn an_aperture_in_one_piece_calls_for_its_boundary() {
+    for case in cases() {
+        let bench = case.bench();
+        let region = Region::new(case.launch(&bench));
+        let (estimator, reason) = plan(&region, Accuracy::default()).unwrap();
+        assert_eq!(estimator, Estimator::Boundary, "{reason}");
+        assert!(reason.contains("one piece"), "{reason}");
+    }
+}

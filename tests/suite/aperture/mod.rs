@@ -1,0 +1,122 @@
+//! Integrals over pupils whose edge moves, against the cases of `aperture_gradients.json`.
+
+mod boundary;
+mod estimators;
+mod hard;
+mod warp;
+
+use crate::reference::{count, number, numbers, read};
+use aplanat::lens::{Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::paraxial::Beam;
+use aplanat::pupil::{Aiming, Bench, Cost, Launch};
+use aplanat::trace::{Gradient, SurfaceGradient};
+use serde_json::Value;
+
+/// A lens and a field with the exact integrals.
+pub(crate) struct Case {
+    data: Value,
+}
+
+/// Every case of the file.
+pub(crate) fn cases() -> Vec<Case> {
+    let file = read("aperture_gradients.json");
+    let cases = file["cases"].as_array().unwrap();
+    assert!(!cases.is_empty(), "no cases");
+    cases.iter().map(|data| Case { data: data.clone() }).collect()
+}
+
+impl Case {
+    pub(crate) fn name(&self) -> String {
+        let field = number(&self.data["field_deg"]);
+        format!("{} at {field} deg", self.data["lens"]["name"].as_str().unwrap())
+    }
+
+    pub(crate) fn number(&self, key: &str) -> f64 {
+        number(&self.data[key])
+    }
+
+    pub(crate) fn system(&self) -> System<f64> {
+        let lens = &self.data["lens"];
+        let column = |key: &str| numbers(&lens[key]);
+        let (c, t, sd, n) = (
+            column("curvature"),
+            column("thickness"),
+            column("semi_diameter"),
+            column("index_after"),
+        );
+        let row = |i: usize| Surface {
+            shape: Shape::simplest(c[i], 0.0, [0.0; 7]),
+            thickness: t[i],
+            index: n[i],
+            semi_diameter: sd[i],
+            ..image()
+        };
+        let surfaces = (0..c.len()).map(row).chain([image()]).collect();
+        let stop = lens["stop_surface"].as_u64().map(|_| count(&lens["stop_surface"]) - 1);
+        System { index_before: number(&lens["index_before_first"]), surfaces, stop }
+    }
+
+    pub(crate) fn bench(&self) -> Bench {
+        self.bench_of(self.system())
+    }
+
+    /// A changed system with the field of the case.
+    pub(crate) fn bench_of(&self, system: System<f64>) -> Bench {
+        let edge = self.number("field_deg");
+        let rim = system.surfaces[system.stop.unwrap_or(0)].semi_diameter;
+        let beam = Beam {
+            object: Object::Infinity,
+            aperture: Aperture::StopSemiDiameter(rim),
+            field: FieldKind::Angle,
+            edge,
+        };
+        Bench::new(vec![(0.5876, 1.0, system)], 0, beam, Aiming::Paraxial).unwrap()
+    }
+
+    pub(crate) fn launch<'a>(&self, bench: &'a Bench) -> Launch<'a> {
+        let field = Field { x: 0.0, y: self.number("field_deg"), weight: 1.0 };
+        bench.launch(field, 0).unwrap()
+    }
+
+    /// The spot about the exact centroid, and the exact derivative of its integral.
+    pub(crate) fn spot(&self) -> (Cost, &Value) {
+        (Cost::spread([0.0, self.number("centroid_y")]), &self.data["d_L_spot"])
+    }
+
+    /// The throughput and the exact derivative of its integral.
+    pub(crate) fn throughput(&self) -> (Cost, &Value) {
+        (Cost::throughput(), &self.data["d_L_throughput"])
+    }
+}
+
+/// The three groups of parameters of the file.
+pub(crate) const GROUPS: [&str; 3] = ["curvature", "thickness", "semi_diameter"];
+
+/// A group of a derivative.
+pub(crate) fn group(gradient: &Gradient<f64>, name: &str) -> Vec<f64> {
+    let of = |surface: &SurfaceGradient<f64>| match name {
+        "curvature" => surface.curvature,
+        "thickness" => surface.thickness,
+        "semi_diameter" => surface.semi_diameter,
+        other => panic!("group {other}"),
+    };
+    gradient.surfaces.iter().map(of).collect()
+}
+
+/// The exact numbers of a group; `None` for what is no parameter.
+pub(crate) fn exact(values: &Value, name: &str) -> Vec<Option<f64>> {
+    let list = values[name].as_array().unwrap();
+    list.iter().map(|value| (!value.is_null()).then(|| number(value))).collect()
+}
+
+pub(crate) fn image() -> Surface<f64> {
+    Surface {
+        shape: Shape::Plane,
+        thickness: 0.0,
+        index: 1.0,
+        semi_diameter: f64::INFINITY,
+        obstruction: 0.0,
+        mirror: false,
+        hyper: false,
+    }
+}

@@ -1,0 +1,288 @@
+//! The warp field against the exact derivatives, and where it has to stay finite.
+
+use super::{Case, GROUPS, cases, exact, group, image};
+use aplanat::lens::{Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::paraxial::Beam;
+use aplanat::pupil::{Aiming, Bench, Cost, Derivative, Kind, Region, Warp};
+use aplanat::trace::Gradient;
+use serde_json::Value;
+
+/// A Student t of seven degrees of freedom (eight replicates) is beyond this once in 270 000; there
+/// are about 250 numbers, most of which hang together.
+const FARTHEST: f64 = 12.0;
+/// Once in fifty it is beyond three standard errors; the numbers of one pupil are all beyond if one
+/// is, so that a few times as many are let pass.
+const BEYOND: f64 = 0.06;
+
+/// Estimate, standard error and exact value of every number of a group.
+fn compare(found: &Derivative, expected: &Value, name: &str) -> Vec<[f64; 3]> {
+    let (by, error) = (group(&found.by, name), group(&found.error, name));
+    let each = by.into_iter().zip(error).zip(exact(expected, name));
+    each.filter_map(|((by, error), exact)| Some([by, error, exact?])).collect()
+}
+
+fn objectives(case: &Case) -> [(&'static str, (Cost, &Value)); 2] {
+    [("spot", case.spot()), ("throughput", case.throughput())]
+}
+
+fn norm(numbers: impl Iterator<Item = f64>) -> f64 {
+    numbers.map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// By how many standard errors an estimate is off; zero for what is exactly zero.
+fn errors_off([found, error, exact]: [f64; 3]) -> f64 {
+    if found == exact { 0.0 } else { (found - exact).abs() / error }
+}
+
+#[test]
+fn aperture_gradients_by_the_warp_field_are_within_their_standard_errors() {
+    let (mut numbers, mut beyond, mut farthest) = (0, 0, 0.0_f64);
+    for case in cases() {
+        let bench = case.bench();
+        let region = Region::new(case.launch(&bench));
+        for (seed, (what, (cost, expected))) in objectives(&case).into_iter().enumerate() {
+            let sampling = Warp { count: 8192, seed: seed as u32 + 1 };
+            let found = region.warp_derivative(&cost, sampling).unwrap();
+            for name in GROUPS {
+                let rows = compare(&found, expected, name);
+                let off = norm(rows.iter().map(|r| r[0] - r[2]));
+                let share = off / norm(rows.iter().map(|r| r[2]));
+                let most = rows.iter().map(|r| errors_off(*r)).fold(0.0, f64::max);
+                println!("{} {what} {name}: {share:.1e}, {most:.1} standard errors", case.name());
+                numbers += rows.len();
+                beyond += rows.iter().filter(|r| !(errors_off(**r) <= 3.0)).count();
+                farthest = farthest.max(most);
+            }
+        }
+    }
+    println!("{beyond} of {numbers} beyond 3 standard errors, the farthest {farthest:.1}");
+    assert!(beyond as f64 <= BEYOND * numbers as f64, "{beyond} of {numbers}");
+    assert!(farthest <= FARTHEST, "{farthest}");
+}
+
+/// Estimates from this many seeds tell a bias of an eighth of their spread.
+const SEEDS: u32 = 64;
+/// A Student t of 63 degrees of freedom is beyond this once in a hundred million.
+const BIASED: f64 = 6.5;
+
+#[test]
+fn aperture_gradients_by_the_warp_field_have_no_bias() {
+    let mut farthest = (0.0_f64, String::new());
+    for case in cases() {
+        let bench = case.bench();
+        let region = Region::new(case.launch(&bench));
+        for (what, (cost, expected)) in objectives(&case) {
+            let estimates: Vec<Derivative> = (0..SEEDS)
+                .map(|seed| region.warp_derivative(&cost, Warp { count: 256, seed }).unwrap())
+                .collect();
+            for name in GROUPS {
+                let columns: Vec<_> =
+                    estimates.iter().map(|e| compare(e, expected, name)).collect();
+                for i in 0..columns[0].len() {
+                    let each = || columns.iter().map(|rows| rows[i][0]);
+                    let count = f64::from(SEEDS);
+                    let mean = each().sum::<f64>() / count;
+                    let spread = norm(each().map(|v| v - mean)) / (count * (count - 1.0)).sqrt();
+                    let off = errors_off([mean, spread, columns[0][i][2]]);
+                    if !(off <= farthest.0) {
+                        farthest = (off, format!("{name} {i} of {what} of {}", case.name()));
+                    }
+                }
+            }
+        }
+    }
+    let (off, place) = farthest;
+    println!("mean of {SEEDS}: {off:.2} standard errors off at most, in {place}");
+    assert!(off <= BIASED, "{off} in {place}");
+}
+
+fn bits(found: &Derivative) -> Vec<u64> {
+    found.by.numbers().chain(found.error.numbers()).map(f64::to_bits).collect()
+}
+
+#[test]
+fn aperture_gradients_by_the_warp_field_do_not_depend_on_threads() {
+    let case = &cases()[2];
+    let bench = case.bench();
+    let region = Region::new(case.launch(&bench));
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let sampling = Warp { count: 8 * 5000, seed: 3 };
+        bits(&pool.install(|| region.warp_derivative(&case.spot().0, sampling)).unwrap())
+    };
+    assert!(on(1) == on(2));
+}
+
+#[test]
+fn aperture_gradients_by_the_warp_field_hold_in_single_precision() {
+    for case in cases() {
+        let bench = case.bench();
+        let region = Region::new(case.launch(&bench));
+        for (what, (cost, _)) in objectives(&case) {
+            let sampling = Warp { count: 2048, seed: 5 };
+            let double = region.warp_derivative(&cost, sampling).unwrap();
+            let single = region.warp_derivative_in::<f32>(&cost, sampling).unwrap();
+            assert!(single.by.numbers().all(f64::is_finite), "{}", case.name());
+            for name in GROUPS {
+                let (a, b) = (group(&double.by, name), group(&single.by, name));
+                let off = norm(a.iter().zip(&b).map(|(a, b)| a - b));
+                let error = norm(group(&double.error, name).into_iter());
+                // What is exactly zero is rounding in both.
+                let rounding = 1e-6 * norm(double.by.numbers());
+                assert!(off <= error + rounding, "{} {what} {name}: {off} {error}", case.name());
+            }
+        }
+    }
+}
+
+fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> Bench {
+    let beam = Beam { object: Object::Infinity, aperture, field: FieldKind::Angle, edge };
+    Bench::new(vec![(0.5876, 1.0, system)], 0, beam, aiming).unwrap()
+}
+
+fn region(bench: &Bench) -> Region<'_> {
+    let field = Field { x: 0.0, y: bench.beam.edge, weight: 1.0 };
+    Region::new(bench.launch(field, 0).unwrap())
+}
+
+#[test]
+fn aperture_gradients_where_a_disc_ends_the_beam_have_no_motion_of_it() {
+    // Nothing clips: all of the derivative is that of fixed rays.
+    let mut system = cases()[3].system();
+    system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = f64::INFINITY);
+    let bench = bench(system, Aperture::EntrancePupilDiameter(12.0), 3.0, Aiming::Paraxial);
+    let region = region(&bench);
+    assert_eq!(region.kind, Kind::Clear);
+    for cost in [Cost::spread([0.0, 2.3]), Cost::throughput()] {
+        let found = region.warp_derivative(&cost, Warp { count: 8192, seed: 2 }).unwrap();
+        let exact = region.lit(8).biased_derivative(&cost);
+        let rows = found.by.numbers().zip(found.error.numbers()).zip(exact.numbers());
+        for ((by, error), exact) in rows {
+            assert!((by - exact).abs() <= 6.0 * error + 1e-9 * exact.abs(), "{by} {error} {exact}");
+        }
+    }
+}
+
+#[test]
+fn aperture_gradients_of_rays_aimed_at_the_stop_move_with_its_rim() {
+    for case in [&cases()[1], &cases()[4]] {
+        let plain = case.bench();
+        let system = plain.colors[0].system.clone();
+        let bench = bench(system, plain.beam.aperture, plain.beam.edge, Aiming::Stop);
+        let (cost, expected) = case.throughput();
+        let found = region(&bench).warp_derivative(&cost, Warp { count: 8192, seed: 4 }).unwrap();
+        for name in GROUPS {
+            for row in compare(&found, expected, name) {
+                assert!(errors_off(row) <= FARTHEST, "{name} {row:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn aperture_gradients_scale_with_the_lens() {
+    let case = &cases()[4];
+    let found = |scale: f64| {
+        let mut system = case.system();
+        for surface in &mut system.surfaces {
+            surface.shape = match surface.shape {
+                Shape::Sphere { curvature } => Shape::Sphere { curvature: curvature / scale },
+                shape => shape,
+            };
+            surface.thickness *= scale;
+            surface.semi_diameter *= scale;
+        }
+        let bench = case.bench_of(system);
+        let launch = case.launch(&bench);
+        let cost = Cost { center: [0.0, case.number("centroid_y") * scale], ..case.spot().0 };
+        Region::new(launch).warp_derivative(&cost, Warp { count: 1024, seed: 1 }).unwrap()
+    };
+    let unit = found(1.0);
+    for scale in [1e-50, 1e-20, 1e-3, 1e20, 1e50] {
+        let scaled = found(scale);
+        for (name, powers) in [("curvature", 5), ("thickness", 3), ("semi_diameter", 3)] {
+            for (of, with) in [(&unit.by, &scaled.by), (&unit.error, &scaled.error)] {
+                let (a, b) = (group(of, name), group(with, name));
+                let size = norm(a.iter().copied());
+                for (a, b) in a.iter().zip(b) {
+                    let b = (0..powers).fold(b, |b, _| b / scale);
+                    assert!((a - b).abs() <= 1e-6 * size, "{scale:e} {name}: {a} {b}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn aperture_gradients_move_the_shadow_of_an_obstruction() {
+    let case = &cases()[4];
+    let mut system = case.system();
+    system.surfaces[0].obstruction = 3.0;
+    let bench = case.bench_of(system);
+    let region = Region::new(case.launch(&bench));
+    let light = region.lit(9);
+    for cost in [case.spot().0, case.throughput().0] {
+        let found = region.warp_derivative(&cost, Warp { count: 8192, seed: 6 }).unwrap();
+        let exact = light.boundary_derivative(&cost).unwrap();
+        for name in GROUPS {
+            let (by, error) = (group(&found.by, name), group(&found.error, name));
+            for (i, exact) in group(&exact, name).into_iter().enumerate() {
+                let off = (by[i] - exact).abs();
+                println!("{name} {i}: {} {exact}, {:.1} errors", by[i], off / error[i]);
+                assert!(off <= FARTHEST * error[i] + 1e-9, "{name} {i}: {} {exact}", by[i]);
+            }
+        }
+    }
+}
+
+/// Curvature, thickness, index behind, semi-diameter of each surface, and a plane image.
+fn system(rows: &[(f64, f64, f64, f64)]) -> System<f64> {
+    let surface = |&(curvature, thickness, index, semi_diameter): &(f64, f64, f64, f64)| {
+        let shape = Shape::simplest(curvature, 0.0, [0.0; 7]);
+        Surface { shape, thickness, index, semi_diameter, ..image() }
+    };
+    let surfaces = rows.iter().map(surface).chain([image()]).collect();
+    System { index_before: 1.0, surfaces, stop: Some(0) }
+}
+
+fn all_finite(gradient: &Gradient<f64>) -> bool {
+    gradient.numbers().all(f64::is_finite)
+}
+
+#[test]
+fn aperture_gradients_by_the_warp_field_are_finite_in_hard_cases() {
+    use Aperture::{EntrancePupilDiameter as Beam, StopSemiDiameter as Stop};
+    let hard: [(&str, &[(f64, f64, f64, f64)], Aperture, f64); 8] = [
+        ("a plane plate", &[(0.0, 5.0, 1.5, 5.0), (0.0, 9.0, 1.0, 6.0)], Stop(5.0), 0.0),
+        ("equal indices", &[(0.02, 5.0, 1.0, 5.0), (0.0, 9.0, 1.0, 6.0)], Stop(5.0), 8.0),
+        ("a ball", &[(0.1, 20.0, 1.5, 10.0), (-0.1, 5.0, 1.0, 10.0)], Stop(10.0), 0.0),
+        ("rims beyond a ball", &[(0.1, 20.0, 1.5, 12.0), (-0.1, 5.0, 1.0, 15.0)], Stop(12.0), 3.0),
+        ("grazing", &[(0.0, 5.0, 1.0, 9.0), (0.12, 3.0, 1.7, 30.0)], Stop(9.0), 20.0),
+        ("no light", &[(0.01, 5.0, 1.5, 5.0), (0.0, 9.0, 1.0, 0.0)], Stop(5.0), 0.0),
+        (
+            "two pieces",
+            &[(0.02, 8.0, 1.5, 14.0), (-0.02, 44.4, 1.0, 14.0), (0.0, 5.0, 1.0, 0.12)],
+            Beam(26.0),
+            0.0,
+        ),
+        (
+            "no star",
+            &[(0.02, 8.0, 1.5, 14.0), (-0.02, 44.4, 1.0, 14.0), (0.0, 5.0, 1.0, 0.3)],
+            Beam(26.0),
+            0.1,
+        ),
+    ];
+    for (name, rows, aperture, edge) in hard {
+        let bench = bench(system(rows), aperture, edge, Aiming::Paraxial);
+        let region = region(&bench);
+        for cost in [Cost::spread([0.0; 2]), Cost::throughput()] {
+            let sampling = Warp { count: 4096, seed: 9 };
+            let double = region.warp_derivative(&cost, sampling);
+            let single = region.warp_derivative_in::<f32>(&cost, sampling);
+            assert_eq!(double.is_none(), name == "no light", "{name} {:?}", region.kind);
+            for found in [double, single].into_iter().flatten() {
+                assert!(all_finite(&found.by) && all_finite(&found.error), "{name}");
+            }
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Every experiment at small effort: its claims hold, its data and pictures are there, it can be
+//! stopped; and the checks can fail.
+
+use aplanat::experiments::{self, ALL, Cell, Effort, Ended, Outcome, Table};
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+
+/// Runs an experiment and checks what all of them have in common.
+fn outcome(id: &str) -> Outcome {
+    let mut last = 0.0;
+    let study = experiments::find(id).unwrap();
+    let found = (study.run)(Effort::Small, &mut |progress| {
+        assert!(progress.done >= last && progress.done <= 1.0, "{id}: {progress:?} after {last}");
+        last = progress.done;
+        ControlFlow::Continue(())
+    });
+    let outcome = found.unwrap_or_else(|ended| panic!("{id}: {ended}"));
+    for claim in &outcome.claims {
+        println!("{id}: {} {:e} ± {:.1e} {}", claim.says, claim.value, claim.error, claim.unit);
+    }
+    let failed: Vec<_> = outcome.failed().collect();
+    assert!(failed.is_empty(), "{id}: {failed:#?}");
+    assert!(!outcome.claims.is_empty() && !outcome.tables.is_empty(), "{id} shows nothing");
+    assert!(!outcome.pictures.is_empty() && outcome.rays > 0, "{id} draws nothing");
+    for table in &outcome.tables {
+        let ragged = table.rows.iter().any(|row| row.len() != table.columns.len());
+        assert!(!table.rows.is_empty() && !ragged, "{id}: table {}", table.name);
+    }
+    for picture in &outcome.pictures {
+        let inked = picture.canvas.pixels().iter().filter(|level| **level < 0xff).count();
+        assert!(inked > 1000, "{id}: picture {} is empty", picture.name);
+    }
+    outcome
+}
+
+/// A column of a table, as numbers.
+fn column(table: &Table, name: &str) -> Vec<f64> {
+    let place = table.columns.iter().position(|column| *column == name).unwrap();
+    let number = |row: &Vec<Cell>| match &row[place] {
+        Cell::Number(value) => *value,
+        Cell::Word(word) => panic!("{name} is `{word}`"),
+    };
+    table.rows.iter().map(number).collect()
+}
+
+#[test]
+fn experiments_have_names_of_their_own() {
+    let ids: BTreeSet<&str> = ALL.iter().map(|study| study.id).collect();
+    assert_eq!(ids.len(), ALL.len());
+    assert!(experiments::find("no such figure").is_none());
+}
+
+#[test]
+fn an_experiment_stops_when_it_is_told_to() {
+    for study in ALL {
+        let mut asked = 0;
+        let ended = (study.run)(Effort::Small, &mut |_| {
+            asked += 1;
+            if asked < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        assert_eq!((ended.unwrap_err(), asked), (Ended::Stopped, 3), "{}", study.id);
+    }
+}
+
+#[test]
+fn the_stop_closes_with_the_unbiased_gradient_alone() {
+    let outcome = outcome("3.3");
+    let [unbiased, biased] =
+        ["unbiased_radius_mm", "biased_radius_mm"].map(|name| column(&outcome.tables[0], name));
+    assert!(unbiased.windows(2).all(|pair| pair[1] < pair[0]));
+    assert!(unbiased[unbiased.len() - 1] < 0.1 * unbiased[0]);
+    assert!(biased.iter().all(|radius| *radius == biased[0]) && biased[0] == unbiased[0]);
+}
+
+#[test]
+fn the_pupil_gains_corners_and_loses_area() {
+    let outcome = outcome("3.4");
+    let [corners, area, bitmap] =
+        ["corners", "area_mm2", "bitmap_area_mm2"].map(|name| column(&outcome.tables[0], name));
+    let last = corners.len() - 1;
+    assert!(corners[0] == 0.0 && corners[last] > 0.0 && area[last] < 0.9 * area[0]);
+    assert!(area.iter().zip(&bitmap).all(|(a, b)| (a / b - 1.0).abs() < 2e-3));
+}
+
+#[test]
+fn images_have_derivatives_that_the_biased_ones_miss() {
+    let outcome = outcome("3.5");
+    let names = ["by_stop_boundary_mm", "by_stop_difference_mm", "by_stop_biased_mm"];
+    let [boundary, difference, biased] = names.map(|name| column(&outcome.tables[0], name));
+    assert!(biased.iter().all(|v| *v == 0.0) && difference.iter().all(|v| *v > 0.1));
+    assert!(boundary.iter().zip(&difference).all(|(a, b)| (a / b - 1.0).abs() < 1e-3));
+}
+
+#[test]
+fn a_front_by_unbiased_gradients_dominates_the_biased_designs() {
+    let outcome = outcome("3.6");
+    assert_eq!(outcome.tables.len(), 2);
+    assert!(outcome.lenses.len() > 4);
+    assert!(outcome.lenses.iter().all(|(_, lens)| lens.check().is_ok()));
+}
+
+#[test]
+fn a_bright_lens_shows_sharper_what_moves() {
+    let outcome = outcome("3.8");
+    let [dark, bright] =
+        ["dark_moving", "bright_moving"].map(|name| column(&outcome.tables[1], name));
+    assert!(dark[0] < bright[0], "{} {}", dark[0], bright[0]);
+}
+
+#[test]
+fn a_corner_is_brighter_by_gradients_that_see_it() {
+    let outcome = outcome("3.9");
+    let [biased, unbiased] =
+        ["biased_cone", "unbiased_cone"].map(|name| column(&outcome.tables[0], name));
+    assert!(unbiased[unbiased.len() - 1] > biased[biased.len() - 1]);
+}
+
+#[test]
+fn zoom_lenses_get_better_between_their_positions_too() {
+    let outcome = outcome("3.10");
+    let [start, now] = ["start_blur_mm", "blur_mm"].map(|name| column(&outcome.tables[0], name));
+    assert!(start.iter().zip(&now).all(|(start, now)| now < start));
+}
