@@ -101,7 +101,7 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
 
     /// The transpose of one kick over `step`.
     fn kick_back(&self, x: Vec3<R>, step: R, seed: &mut Seed<R>, gradient: &mut [R]) {
-        let (sample, hessian) = (self.field.sample(x), self.field.hessian(x));
+        let (sample, hessian) = self.field.sample_and_hessian(x);
         let (index, g) = (sample.index, sample.gradient);
         let by_index = step * (seed.v.dot(g) + R::TWO * seed.path * index);
         let force = step * index;

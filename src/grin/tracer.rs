@@ -177,7 +177,7 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
                     rate.x = rate.x + (v + rate.v * h) * c;
                 }
                 Op::Kick(c) => {
-                    let (sample, hessian) = (self.field.sample(x), self.field.hessian(x));
+                    let (sample, hessian) = self.field.sample_and_hessian(x);
                     let (index, gradient) = (sample.index, sample.gradient);
                     let weight = c * h * index;
                     v = v + gradient * weight;

@@ -91,6 +91,12 @@ pub trait Field<R: Real>: Debug + Send + Sync {
     /// The second derivatives at a point.
     fn hessian(&self, at: Vec3<R>) -> Hessian<R>;
 
+    /// Both at once.
+    #[inline(always)]
+    fn sample_and_hessian(&self, at: Vec3<R>) -> (Sample<R>, Hessian<R>) {
+        (self.sample(at), self.hessian(at))
+    }
+
     /// Adds `weight ∂η/∂θ + pull · ∂∇η/∂θ` to the gradient by the parameters.
     fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]);
 
@@ -124,8 +130,9 @@ pub trait Field<R: Real>: Debug + Send + Sync {
             || {
                 for lane in 0..LANES {
                     let x = get(at, lane);
-                    out.put(lane, self.sample(x));
-                    put(product, lane, self.hessian(x).times(get(times, lane)));
+                    let (sample, hessian) = self.sample_and_hessian(x);
+                    out.put(lane, sample);
+                    put(product, lane, hessian.times(get(times, lane)));
                 }
             },
         );
@@ -133,9 +140,15 @@ pub trait Field<R: Real>: Debug + Send + Sync {
 
     /// [`Self::deposit`] for a block of rays, in order.
     fn deposits(&self, at: &Columns<R>, weight: &Column<R>, pull: &Columns<R>, gradient: &mut [R]) {
-        for (lane, weight) in weight.iter().enumerate() {
-            self.deposit(get(at, lane), *weight, get(pull, lane), gradient);
-        }
+        widest(
+            Width::Bits512,
+            #[inline(always)]
+            || {
+                for (lane, weight) in weight.iter().enumerate() {
+                    self.deposit(get(at, lane), *weight, get(pull, lane), gradient);
+                }
+            },
+        );
     }
 }
 

@@ -123,8 +123,14 @@ impl<R: Real> Field<R> for Tricubic<R> {
 
     #[inline(always)]
     fn hessian(&self, at: Vec3<R>) -> Hessian<R> {
+        self.sample_and_hessian(at).1
+    }
+
+    #[inline(always)]
+    fn sample_and_hessian(&self, at: Vec3<R>) -> (Sample<R>, Hessian<R>) {
         let (first, t) = self.locate(at);
         let (b, s, c) = (weights(t, basis), weights(t, slopes), weights(t, bends));
+        let (mut index, mut g) = (R::ZERO, Vec3::default());
         let (mut diagonal, mut mixed) = (Vec3::default(), Vec3::default());
         for k in 0..4 {
             let [mut value, mut dx, mut dy, mut dxx, mut dxy, mut dyy] = [R::ZERO; 6];
@@ -139,18 +145,22 @@ impl<R: Real> Field<R> for Tricubic<R> {
                 dxy += s.y[j] * slope;
                 dyy += c.y[j] * along;
             }
+            index += b.z[k] * value;
+            g = g + Vec3::new(b.z[k] * dx, b.z[k] * dy, s.z[k] * value);
             diagonal = diagonal + Vec3::new(b.z[k] * dxx, b.z[k] * dyy, c.z[k] * value);
             mixed = mixed + Vec3::new(s.z[k] * dy, s.z[k] * dx, b.z[k] * dxy);
         }
         let d = self.grid.density;
-        Hessian {
+        let sample = Sample { index, gradient: Vec3::new(g.x * d.x, g.y * d.y, g.z * d.z) };
+        let hessian = Hessian {
             diagonal: Vec3::new(
                 diagonal.x * d.x * d.x,
                 diagonal.y * d.y * d.y,
                 diagonal.z * d.z * d.z,
             ),
             mixed: Vec3::new(mixed.x * d.y * d.z, mixed.y * d.z * d.x, mixed.z * d.x * d.y),
-        }
+        };
+        (sample, hessian)
     }
 
     #[inline(always)]
