@@ -17,11 +17,11 @@
 use super::Tracer;
 use super::batch::{BLOCK, Block, CHUNK, Hits, Rays};
 use super::interface::{Form, Interface};
-use super::lanes::{Width, widest};
 use super::slot::Slot;
 use crate::lens::ASPHERE_TERMS;
 use crate::math::Real;
 use crate::math::Vec3;
+use crate::math::{Width, widest};
 use rayon::prelude::*;
 
 /// The derivative of something by where and how a ray lands.

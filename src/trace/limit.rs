@@ -27,11 +27,11 @@ use super::Tracer;
 use super::backward::{Gradient, Harvest, Pulls, Seed, Sowing};
 use super::batch::{BLOCK, Block};
 use super::interface::{Form, Interface};
-use super::lanes::{Width, widest};
 use super::single::Ray;
 use super::slot::Slot;
 use crate::lens::{Invalid, System};
 use crate::math::{Dual, Jet, Real, Vec3};
+use crate::math::{Width, widest};
 
 /// Rays that travel abreast.
 pub const LANES: usize = BLOCK;
