@@ -342,7 +342,7 @@ impl Run {
 }
 
 /// The words of a panic.
-fn said(panic: &(dyn Any + Send)) -> String {
+pub(super) fn said(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
     format!("the search failed: {}", text.unwrap_or_else(|| "for an unknown reason".to_owned()))

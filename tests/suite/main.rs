@@ -8,6 +8,8 @@ mod cli;
 mod effects;
 mod experiments;
 mod files;
+mod grin;
+mod front;
 mod hard_cases;
 mod library;
 mod merit;

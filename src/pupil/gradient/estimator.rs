@@ -72,9 +72,6 @@ pub enum NoDerivative {
     /// An edge that no point sees all of.
     #[error("{0}, and `boundary` needs one that a point inside sees all of; expected `warp`")]
     NotStarShaped(String),
-    /// A shadow in the light, whose edge the warp field does not move.
-    #[error("the warp field knows no obstructions; expected `boundary`")]
-    Obstructed,
     /// Samples that are never all inside the square in which they are drawn.
     #[error("the square around the pupil for the warp field was not found")]
     NoSquare,
@@ -124,7 +121,6 @@ pub fn differentiate(
         (Estimator::Boundary, Kind::Ragged { pieces, ring: None, .. }) => {
             Err(NoDerivative::NotStarShaped(shape(*pieces)))
         }
-        (Estimator::Warp, _) if region.is_obstructed() => Err(NoDerivative::Obstructed),
         (Estimator::Warp, _) => region.sampled_derivative(cost, asked),
         (Estimator::Biased | Estimator::Boundary | Estimator::Difference, _) => {
             region.ordered_derivative(cost, estimator, asked)
@@ -181,11 +177,6 @@ fn shape(pieces: usize) -> String {
 }
 
 impl Region<'_> {
-    /// Whether some surface casts a shadow.
-    fn is_obstructed(&self) -> bool {
-        self.launch.color().system.surfaces.iter().any(|surface| surface.obstruction > 0.0)
-    }
-
     fn has_edge(&self) -> Result<(), NoDerivative> {
         match self.kind {
             Kind::Dark => {
