@@ -45,7 +45,7 @@ const AUTHORS: [Theirs; 3] = [
 
 /// How the designs of a front are searched for.
 pub(super) fn plan(effort: Effort) -> Plan {
-    Plan::new(effort.pick(14, 4), effort.pick(1200, 150))
+    Plan::new(effort.pick(14, 8), 1200)
 }
 
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
@@ -54,9 +54,10 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
         ("rudolph", "double_gauss_rudolph_50", AUTHORS.as_slice()),
         ("nikkor", "double_gauss_nikkor_s_50", &[]),
     ];
-    for (i, (name, file, authors)) in lenses.into_iter().enumerate() {
+    let count = effort.pick(lenses.len(), 1);
+    for (i, (name, file, authors)) in lenses.into_iter().take(count).enumerate() {
         let start = at_angles(lens(file)?, &ANGLES);
-        let span = [0.5 * i as f64, 0.5 * (i + 1) as f64];
+        let span = [i, i + 1].map(|part| part as f64 / count as f64);
         let study = Study::of(&start, effort, span, watch)?;
         outcome.claims.extend(study.claims(name, authors, &mut outcome.rays)?);
         outcome.tables.push(trade::table(name, &study.designs(), &mut outcome.rays)?);

@@ -101,8 +101,8 @@ fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, Ended> {
     let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
     let launch = bench.launch(bench.fields[0], bench.primary).map_err(Ended::from_error)?;
     let region = Region::new(launch);
-    // Across the axis every azimuth counts, which nodes along a single radius do not tell: turned
-    // by a quarter, a radius stands for the cosine of a whole turn.
+    // All azimuths are alike on the axis, and the nodes of one may stand for them: each is turned
+    // through half a turn.
     let lit = region.lit(ORDER);
     *rays += region.rays + lit.traced;
     let turn = |i: usize| {
