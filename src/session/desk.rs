@@ -146,7 +146,7 @@ impl Session {
             Command::ResumeFront => self.fronts.sweeper().resume(),
             Command::StopFront => self.fronts.sweeper().stop(),
             Command::ClearFronts => self.fronts.clear(),
-            Command::ExportFront(folder) => self.fronts.write(folder),
+            Command::ExportFront(folder) => self.export_front(folder),
             Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),
             Command::TakePreview => self.take_preview(),
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
@@ -410,6 +410,16 @@ impl Session {
                 self.show(Arc::new(lens));
             }
             Err(why) => self.say(Severity::Warning, why.to_string()),
+        }
+    }
+
+    fn export_front(&mut self, folder: Option<PathBuf>) {
+        match folder {
+            Some(folder) => self.fronts.sweeper().write(folder),
+            None => {
+                let text = "choose a folder to export the front to";
+                self.say(Severity::Warning, text.to_owned());
+            }
         }
     }
 

@@ -4,7 +4,6 @@ use super::sweeper::{FrontRun, Job, Judged, Sweeper, Told};
 use crate::lens::Lens;
 use crate::optimize::pareto::Settings;
 use std::io;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// How many earlier runs are kept.
@@ -75,10 +74,6 @@ impl FrontDesk {
         self.earlier.clear();
         self.failed = None;
         self.asked = None;
-    }
-
-    pub(super) fn write(&self, folder: PathBuf) {
-        self.sweeper.write(folder);
     }
 
     /// What happened since the last look to the run that is shown.
