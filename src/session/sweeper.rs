@@ -476,3 +476,57 @@ fn judge(lens: &Lens) -> Result<Design, String> {
 fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(said(panic.as_ref())))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::blank;
+
+    /// Breaks at its third step.
+    struct Breaks {
+        start: Design,
+        front: Front,
+        steps: usize,
+    }
+
+    impl Sweeps for Breaks {
+        fn step(&mut self) -> Slice {
+            self.steps += 1;
+            assert!(self.steps < 3, "the toy breaks");
+            Slice { done: self.steps, total: 9, joined: 0, refused: None, finished: false }
+        }
+
+        fn start(&self) -> &Design {
+            &self.start
+        }
+
+        fn front(&self) -> &Front {
+            &self.front
+        }
+
+        fn tried(&self) -> &[[f64; 2]] {
+            &[]
+        }
+    }
+
+    #[test]
+    fn a_panic_ends_the_sweep_and_is_told_and_the_next_one_runs() -> io::Result<()> {
+        let begin = |lens: &Lens, _: &Settings| {
+            let start = judge(lens)?;
+            let mut front = Front::default();
+            front.offer(start.clone());
+            Ok(Box::new(Breaks { start, front, steps: 0 }) as Box<dyn Sweeps>)
+        };
+        let sweeper = Sweeper::with(Box::new(begin), || {})?;
+        for number in 1..3 {
+            let (lens, settings) = (Arc::new(blank()), Settings::default());
+            sweeper.start(Job { number, lens, settings, compare: false });
+            let told: Vec<Told> = sweeper.told.iter().take(2).collect();
+            let failed = Told::Failed(number, "the search failed: the toy breaks".to_owned());
+            assert_eq!(told, [Told::Now(number, Standing::Running), failed]);
+            let run = sweeper.run().map(|run| (run.number, run.standing, run.main.done));
+            assert_eq!(run, Some((number, Standing::Stopped, 2)), "what was found stays");
+        }
+        Ok(())
+    }
+}

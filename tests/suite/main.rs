@@ -17,4 +17,5 @@ mod paraxial;
 mod pupil;
 mod reference;
 mod session;
+mod session_front;
 mod trace;
