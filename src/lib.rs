@@ -18,6 +18,9 @@
 // Numbers without optics: the number types, vectors, roots, quadrature, samplers.
 pub mod math;
 
+// Light in one gradient-index field: fields, ray integrators, their discrete adjoint; knows no lens.
+pub mod grin;
+
 // The prescription that a designer writes, and the system of plain numbers it resolves to.
 pub mod lens;
 

@@ -16,6 +16,8 @@ pub struct ColorSpot {
     pub centroid: [Estimate; 2],
     /// The area of the pupil that is lit, in pupil coordinates: π where nothing is clipped.
     pub area: Estimate,
+    /// The same in mm² of the plane through the first vertex: how much light the spot has.
+    pub light: Estimate,
     /// What the spot does out of focus.
     blur: Blur,
     /// Whether the tolerance was met.
@@ -175,10 +177,13 @@ fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
     let estimate = |k: usize, least: f64| {
         Estimate::new(found.values[k], found.errors[k].max(least), found.rays)
     };
+    let area = estimate(3, f64::EPSILON);
+    let scale = region.launch.area();
     Some(ColorSpot {
         rms: estimate(0, rounding),
         centroid: [estimate(1, rounding), estimate(2, rounding)],
-        area: estimate(3, f64::EPSILON),
+        area,
+        light: Estimate::new(scale * area.value, scale * area.error, area.rays),
         blur: Blur {
             square: found.values[4],
             covariance: found.values[5],

@@ -141,6 +141,11 @@ impl Report {
             files::replace(&folder.join(&name), &png)?;
             self.files.push(name);
         }
+        for (name, lens) in &self.outcome.lenses {
+            let name = format!("{id}-{name}.json");
+            files::save(lens, folder.join(&name))?;
+            self.files.push(name);
+        }
         let name = format!("{id}.json");
         self.files.push(name.clone());
         Ok(files::replace(&folder.join(name), native::pretty(self).as_bytes())?)

@@ -191,6 +191,8 @@ pub enum Edit {
     SetObject(Object),
     /// How wide the beam is.
     SetAperture(Aperture),
+    /// Limit the beam by the rim of the stop as it is now, instead of by an ideal entrance pupil.
+    LimitByStop,
     /// The field points.
     SetFields(Fields),
     /// The wavelengths.
@@ -283,6 +285,7 @@ impl Edit {
             Self::SetNotes(_) => "notes".to_owned(),
             Self::SetObject(_) => "object".to_owned(),
             Self::SetAperture(_) => "aperture".to_owned(),
+            Self::LimitByStop => "limit the beam by the stop".to_owned(),
             Self::SetFields(_) => "fields".to_owned(),
             Self::SetWavelengths(_) => "wavelengths".to_owned(),
             Self::SetFocus(_) => "focus solve".to_owned(),

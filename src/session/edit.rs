@@ -11,6 +11,7 @@ use crate::lens::{
     Aperture, Lens, LensError, Medium, Parameter, Pickup, Quantity, Row, Variable, ZoomPosition,
     ZoomThickness,
 };
+use crate::pupil::{BenchError, limited_by_stop};
 
 /// Why an edit was refused; the lens is what it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -18,6 +19,9 @@ pub enum EditError {
     /// The lens would be one that cannot be used.
     #[error(transparent)]
     Lens(#[from] LensError),
+    /// A beam that cannot be set up.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
     /// A text that is no number.
     #[error(transparent)]
     NoNumber(#[from] NoNumber),
@@ -111,6 +115,7 @@ impl Lens {
             Edit::SetNotes(text) => self.notes.clone_from(text),
             Edit::SetObject(object) => self.object = *object,
             Edit::SetAperture(aperture) => self.open(*aperture),
+            Edit::LimitByStop => *self = limited_by_stop(self)?,
             Edit::SetFields(fields) => self.fields.clone_from(fields),
             Edit::SetWavelengths(wavelengths) => self.wavelengths.clone_from(wavelengths),
             Edit::SetFocus(offset) => self.solve_focus(*offset)?,

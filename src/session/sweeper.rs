@@ -55,7 +55,7 @@ pub struct Leg {
     pub tried: Arc<Vec<[f64; 2]>>,
     /// The hypervolume of the front against twice the spot of the lens at the start.
     pub hypervolume: f64,
-    /// Steps of Adam so far, over all chains.
+    /// Steps so far, over all chains; those that a descent did not need count as taken.
     pub done: usize,
     /// Steps in all.
     pub total: usize,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use aplanat::effects::{Choice, Effect};
 use aplanat::lens::{Aperture, Medium, Object, Parameter, Quantity, Row, Variable};
+use aplanat::merit::{Goal, PupilEdge, Term};
 use aplanat::optimize::{Method, Progress, pareto};
 use aplanat::session::{Command, Edit, FrontRun, Fronts, Leg, Search, Standing, Task, View};
 use aplanat::studio::draw::Backing;
@@ -199,6 +200,81 @@ fn optimize_wishes_for_a_search_with_the_terms_of_the_panel() {
     assert_eq!(*method, Method::DampedLeastSquares);
     assert_eq!(goal.terms[0].weight, 3.0);
     assert!(goal.terms.iter().all(|weighted| weighted.term.name() != "focal_length"));
+}
+
+/// Presses something by its name.
+fn press<P: Panel>(harness: &mut Harness<'_, Stand<P>>, name: &str) {
+    harness.get_by_label(name).click();
+    harness.run();
+}
+
+fn goal_of(wishes: &[Command]) -> &Goal {
+    let goal =
+        |wish| if let &Command::Optimize { ref goal, .. } = wish { Some(goal) } else { None };
+    wishes.iter().find_map(goal).unwrap()
+}
+
+#[test]
+fn more_light_is_asked_for_in_a_few_clicks() {
+    let mut harness = optimizer(view());
+    assert!(harness.query_by_label("Limit the beam by the stop").is_none(), "nobody asks for more");
+    type_into(&mut harness, "Minimum of Light", "1.2", Key::Enter);
+    press(&mut harness, "Limit the beam by the stop");
+    press(&mut harness, "Free the semi-diameters");
+    press(&mut harness, "Optimize");
+    let wishes = &harness.state().wishes;
+    let [limit, Edit::SetVariables(freed)] = edits(wishes)[..] else { panic!("{wishes:?}") };
+    assert_eq!(*limit, Edit::LimitByStop);
+    let rims = freed.iter().filter(|v| v.parameter.quantity == Quantity::SemiDiameter).count();
+    assert_eq!(rims, double_gauss().surfaces.len());
+    let goal = goal_of(wishes);
+    assert_eq!(goal.pupil, PupilEdge::Moving);
+    assert!(goal.terms.iter().any(|weighted| weighted.term == Term::Light(1.2)));
+
+    let mut lens = aplanat::pupil::limited_by_stop(&double_gauss()).unwrap();
+    lens.variables.clone_from(freed);
+    let mut ready = optimizer(crate::bench::view_of(lens));
+    type_into(&mut ready, "Minimum of Light", "1.2", Key::Enter);
+    assert!(ready.query_by_label_contains("Limit the beam").is_none());
+    assert!(ready.query_by_label_contains("Free the semi").is_none());
+}
+
+#[test]
+fn a_new_term_begins_with_what_the_lens_has() {
+    let mut harness = optimizer(view());
+    for term in ["F-number", "Relative illumination", "Throughput"] {
+        press(&mut harness, "Add a term");
+        press(&mut harness, term);
+    }
+    press(&mut harness, "Optimize");
+    let goal = goal_of(&harness.state().wishes);
+    let lens = &harness.state().view.lens;
+    goal.check(lens).unwrap();
+    let terms: Vec<Term> = goal.terms.iter().map(|weighted| weighted.term).collect();
+    // 94.61 mm² on the axis and 49.389 mm of focal length.
+    let number = 49.389 / (2.0 * (94.61 / std::f64::consts::PI).sqrt());
+    assert!(terms.iter().any(|t| matches!(t, Term::FNumber(n) if (n - number).abs() < 2e-3)));
+    assert!(terms.contains(&Term::RelativeIllumination { field: 2, min: 0.5 }));
+    assert!(terms.contains(&Term::Throughput));
+}
+
+#[test]
+fn kept_rays_are_said_to_be_blind_to_light() {
+    let mut harness = optimizer(view());
+    assert!(harness.query_by_label_contains("Kept rays tell nothing").is_none());
+    press(&mut harness, "Keep the rays");
+    harness.get_by_label_contains("Kept rays tell nothing about light");
+    press(&mut harness, "Optimize");
+    assert_eq!(goal_of(&harness.state().wishes).pupil, PupilEdge::Kept);
+}
+
+#[test]
+fn a_semi_diameter_is_freed_by_its_badge() {
+    let mut harness = prescription();
+    press(&mut harness, "Semi-diameter of surface 1 variable");
+    let parameter = Parameter::new(0, Quantity::SemiDiameter);
+    let wanted = Edit::Free(Variable { parameter, min: None, max: None });
+    assert_eq!(edits(&harness.state().wishes), [&wanted]);
 }
 
 #[test]

@@ -138,6 +138,7 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
         Edit::SetNotes("a note".into()),
         Edit::SetObject(Object::Finite(1000.0)),
         Edit::SetAperture(Aperture::EntrancePupilDiameter(1.25)),
+        Edit::LimitByStop,
         Edit::SetFields(Fields { kind: FieldKind::Angle, values: angles }),
         Edit::SetWavelengths(vec![aplanat::lens::Wavelength {
             um: 0.55,
@@ -180,18 +181,19 @@ fn kind(edit: &Edit) -> usize {
         Edit::SetNotes(_) => 17,
         Edit::SetObject(_) => 18,
         Edit::SetAperture(_) => 19,
-        Edit::SetFields(_) => 20,
-        Edit::SetWavelengths(_) => 21,
-        Edit::SetFocus(_) => 22,
-        Edit::Free(_) => 23,
-        Edit::Fix(_) => 24,
-        Edit::SetPickup(_) => 25,
-        Edit::RemovePickup(_) => 26,
-        Edit::InsertZoom { .. } => 27,
-        Edit::SetZoom { .. } => 28,
-        Edit::RemoveZoom(_) => 29,
-        Edit::SetVariables(_) => 30,
-        Edit::Replace(_) => 31,
+        Edit::LimitByStop => 20,
+        Edit::SetFields(_) => 21,
+        Edit::SetWavelengths(_) => 22,
+        Edit::SetFocus(_) => 23,
+        Edit::Free(_) => 24,
+        Edit::Fix(_) => 25,
+        Edit::SetPickup(_) => 26,
+        Edit::RemovePickup(_) => 27,
+        Edit::InsertZoom { .. } => 28,
+        Edit::SetZoom { .. } => 29,
+        Edit::RemoveZoom(_) => 30,
+        Edit::SetVariables(_) => 31,
+        Edit::Replace(_) => 32,
     }
 }
 
@@ -199,7 +201,7 @@ fn kind(edit: &Edit) -> usize {
 fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut session = session(double_gauss());
     let edits = every_edit(session.lens());
-    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..32).collect::<Vec<_>>());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..33).collect::<Vec<_>>());
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());

@@ -29,8 +29,8 @@ use super::draw::Backing;
 use super::number;
 use super::wording::{capital, counted_from_one};
 use crate::analysis::{Estimate, Spot};
-use crate::lens::{Field, FieldKind, Lens};
-use crate::session::{Command, Numbers, Results, View};
+use crate::lens::{Field, FieldKind, Lens, NumberKind, vary};
+use crate::session::{Command, Edit, Numbers, Results, View};
 
 /// A part of the window. It shows a view and writes down wishes; it changes nothing.
 pub trait Panel {
@@ -111,6 +111,28 @@ fn shown(view: &View) -> Option<(&Arc<Results>, &Numbers)> {
 fn lit(spot: Option<&Spot>) -> f64 {
     let colors = spot.iter().flat_map(|spot| &spot.colors).flatten();
     colors.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI
+}
+
+/// The light of a lens: the mean area of its pupils in mm², over fields and wavelengths by weight.
+fn light(numbers: &Numbers) -> f64 {
+    let bench = &numbers.bench.value;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (spot, field) in numbers.spots.value.iter().zip(&bench.fields) {
+        for (i, color) in bench.colors.iter().enumerate() {
+            let lit = spot.as_ref().ok().and_then(|spot| spot.colors[i].as_ref().ok());
+            let weight = field.weight * color.weight;
+            sum += weight * lit.map_or(0.0, |color| color.light.value);
+            weights += weight;
+        }
+    }
+    if weights > 0.0 { sum / weights } else { 0.0 }
+}
+
+/// The edit that lets the optimizer change some kinds of numbers too.
+fn freed(lens: &Lens, kinds: &[NumberKind]) -> Edit {
+    let mut freed = lens.clone();
+    vary(&mut freed, kinds);
+    Edit::SetVariables(freed.variables)
 }
 
 /// The relative error of a number, as it stands behind it.

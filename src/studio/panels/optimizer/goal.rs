@@ -1,13 +1,15 @@
-//! What a search aims at: terms with weights and targets.
+//! What a search aims at: terms with weights and targets, and how it treats the edge of the pupil.
 
-use eframe::egui::{Align, Grid, Id, Layout as Arrange, Ui, vec2};
+use eframe::egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::path::PathBuf;
 
+use super::terms::{self, asks_for_more, hint, reading, targets, title, unit};
+use crate::lens::{Aperture, Lens, NumberKind, Quantity};
 use crate::merit::{Goal, PupilEdge, Term, Weighted};
-use crate::session::{Search, View, evaluate};
+use crate::session::{Command, Edit, Search, View, evaluate};
 use crate::studio::field::{Drafts, Field, Place};
 use crate::studio::number;
-use crate::studio::panels::numbers;
+use crate::studio::panels::{field_name, freed};
 
 /// The terms of the panel.
 #[derive(Debug, Default)]
@@ -26,6 +28,21 @@ struct Aim {
     weighted: Weighted,
 }
 
+/// Both ways to treat the edge of the pupil, each with what it means.
+const EDGES: [(PupilEdge, &str, &str); 2] = [
+    (
+        PupilEdge::Moving,
+        "Follow its edge",
+        "Derivatives know that the pupil moves with the lens: unbiased, and light can be asked for.",
+    ),
+    (
+        PupilEdge::Kept,
+        "Keep the rays",
+        "The rays of now are kept, as in most programs: faster, but biased wherever something \
+         clips, and blind to light.",
+    ),
+];
+
 impl Aims {
     /// Proposes what a designer would ask of a lens first, once for each lens.
     pub(super) fn keep_up(&mut self, view: &View) {
@@ -33,17 +50,15 @@ impl Aims {
         if self.lens == lens {
             return;
         }
-        let spot = Weighted { term: Term::Spot, weight: 1.0 };
-        let goal = Goal::sensible(&view.lens);
-        let goal = goal.unwrap_or_else(|_| Goal {
-            terms: vec![spot],
+        let goal = Goal::sensible(&view.lens).unwrap_or_else(|_| Goal {
+            terms: vec![Weighted { term: Term::Spot, weight: 1.0 }],
             pupil: PupilEdge::default(),
             zoom_ratios: Vec::new(),
         });
         let aim = |weighted: Weighted| Aim { counts: true, weighted };
         *self = Self {
             terms: goal.terms.into_iter().map(aim).collect(),
-            pupil: goal.pupil,
+            pupil: self.pupil,
             zoom_ratios: goal.zoom_ratios,
             lens,
         };
@@ -51,45 +66,114 @@ impl Aims {
 
     /// What the search is to aim at.
     pub(super) fn goal(&self) -> Goal {
-        let counting = self.terms.iter().filter(|aim| aim.counts);
         Goal {
-            terms: counting.map(|aim| aim.weighted).collect(),
+            terms: self.counting().collect(),
             pupil: self.pupil,
             zoom_ratios: self.zoom_ratios.clone(),
         }
     }
 
-    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View, drafts: &mut Drafts) {
+    /// The terms that count.
+    fn counting(&self) -> impl Iterator<Item = Weighted> {
+        self.terms.iter().filter(|aim| aim.counts).map(|aim| aim.weighted)
+    }
+
+    /// The choice of how the edge of the pupil is treated.
+    pub(super) fn pupil(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.weak("Pupil");
+            for (edge, text, what) in EDGES {
+                ui.radio_value(&mut self.pupil, edge, text).on_hover_text(what);
+            }
+        });
+        let chosen = EDGES.iter().find(|(edge, ..)| *edge == self.pupil);
+        ui.label(RichText::new(chosen.map_or("", |(.., what)| what)).small().weak());
+    }
+
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        view: &View,
+        drafts: &mut Drafts,
+        wishes: &mut Vec<Command>,
+    ) {
+        self.advice(ui, &view.lens, wishes);
         let search = view.search.as_deref();
-        Grid::new("terms").num_columns(5).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
-            ui.weak("Term");
-            ui.weak("Weight");
-            ui.weak("Target, mm");
+        let mut unwanted = None;
+        Grid::new("terms").num_columns(6).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
+            for (text, what) in [("Term", ""), ("Weight", ""), ("Target", "")] {
+                heading(ui, text, what);
+            }
             if search.is_some() {
-                ui.weak("Before").on_hover_text("Root of the term at the design");
-                ui.weak("Now").on_hover_text("Root of the term at the best lens so far");
+                heading(ui, "Before", "What the design lacks of it, or how much of it there is");
+                heading(ui, "Now", "The same at the best lens so far");
             }
             ui.end_row();
-            for aim in &mut self.terms {
-                aim.ui(ui, search, drafts);
+            for (i, aim) in self.terms.iter_mut().enumerate() {
+                if aim.ui(ui, view, drafts) {
+                    unwanted = Some(i);
+                }
                 ui.end_row();
             }
         });
+        if let Some(i) = unwanted {
+            self.terms.remove(i);
+        }
         self.add(ui, view);
+    }
+
+    /// What stands in the way of the light that is asked for, each with the remedy.
+    fn advice(&mut self, ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
+        let more: Vec<&str> = self
+            .counting()
+            .filter(|weighted| asks_for_more(weighted.term))
+            .map(|weighted| title(weighted.term))
+            .collect();
+        let about_light = self.counting().any(|weighted| weighted.term.is_about_light());
+        if about_light && self.pupil == PupilEdge::Kept {
+            let what = "Kept rays tell nothing about light: those terms are counted but do not \
+                        guide the search.";
+            if remedy(ui, what, "Follow the edge", EDGES[0].2) {
+                self.pupil = PupilEdge::Moving;
+            }
+        }
+        if more.is_empty() {
+            return;
+        }
+        let asked = more.join(" and ");
+        if !is_limited_by_stop(lens) {
+            let what = format!(
+                "{asked}: the beam ends at the ideal entrance pupil, which no surface moves, so it \
+                 cannot grow.",
+            );
+            let hint = "Makes the rim of the stop, as large as the beam is there now, the aperture \
+                        of the lens: one undo step";
+            if remedy(ui, &what, "Limit the beam by the stop", hint) {
+                wishes.push(Edit::LimitByStop.into());
+            }
+        }
+        let rim = |v: &crate::lens::Variable| v.parameter.quantity == Quantity::SemiDiameter;
+        if !lens.variables.iter().any(rim) {
+            let what = format!("{asked}: no semi-diameter is variable, so rims stay as they are.");
+            let hint = "Lets the optimizer change every semi-diameter that is written: one undo \
+                        step";
+            if remedy(ui, &what, "Free the semi-diameters", hint) {
+                wishes.push(freed(lens, &[NumberKind::SemiDiameters]).into());
+            }
+        }
     }
 
     /// A menu of the terms that are not there yet.
     fn add(&mut self, ui: &mut Ui, view: &View) {
-        let there =
-            |term: Term| self.terms.iter().any(|aim| aim.weighted.term.name() == term.name());
-        let missing: Vec<Term> = every(view).into_iter().filter(|term| !there(*term)).collect();
-        if missing.is_empty() {
-            return;
-        }
         ui.menu_button("Add a term", |ui| {
-            for term in missing {
-                if ui.button(title(term)).clicked() {
-                    self.terms.push(Aim { counts: true, weighted: Weighted { term, weight: 1.0 } });
+            let there =
+                |term: Term| self.terms.iter().any(|aim| aim.weighted.term.name() == term.name());
+            let every = terms::every(view).into_iter();
+            let missing: Vec<Weighted> = every.filter(|new| !there(new.term)).collect();
+            for weighted in missing {
+                let button = ui.button(title(weighted.term));
+                if button.on_hover_text(hint(weighted.term)).clicked() {
+                    self.terms.push(Aim { counts: true, weighted });
                     ui.close();
                 }
             }
@@ -97,8 +181,32 @@ impl Aims {
     }
 }
 
+/// Whether rims alone limit the beam, at every zoom position.
+fn is_limited_by_stop(lens: &Lens) -> bool {
+    let by_stop = |zoom| matches!(lens.aperture_at(zoom), Aperture::StopSemiDiameter(_));
+    (0..lens.zoom_positions()).all(by_stop)
+}
+
+/// A warning and the button that removes its reason.
+fn remedy(ui: &mut Ui, what: &str, button: &str, hint: &str) -> bool {
+    let text = RichText::new(what).small().color(ui.visuals().warn_fg_color);
+    ui.horizontal_wrapped(|ui| {
+        ui.label(text);
+        ui.small_button(button).on_hover_text(hint).clicked()
+    })
+    .inner
+}
+
+fn heading(ui: &mut Ui, text: &str, what: &str) {
+    let label = ui.weak(text);
+    if !what.is_empty() {
+        label.on_hover_text(what);
+    }
+}
+
 impl Aim {
-    fn ui(&mut self, ui: &mut Ui, search: Option<&Search>, drafts: &mut Drafts) {
+    /// Shows it; says whether it is to go.
+    fn ui(&mut self, ui: &mut Ui, view: &View, drafts: &mut Drafts) -> bool {
         let term = self.weighted.term;
         ui.checkbox(&mut self.counts, title(term)).on_hover_text(hint(term));
         let name = format!("Weight of {}", title(term));
@@ -111,24 +219,44 @@ impl Aim {
                 let name = format!("{what} of {}", title(term));
                 number_field(ui, drafts, &name, value, width);
             }
+            ui.weak(unit(term));
+            self.field(ui, view);
         });
-        let Some(search) = search else { return };
-        for terms in [&search.before, &search.terms] {
-            let value = terms.iter().find(|value| value.term == term.name());
-            ui.label(value.map(|value| root(value.value)).unwrap_or_default());
+        if let Some(search) = view.search.as_deref() {
+            self.readings(ui, search);
         }
+        ui.small_button("×").on_hover_text("Take the term out of the goal").clicked()
     }
-}
 
-/// The root of a term, in the unit in which it is easiest to read.
-fn root(value: f64) -> String {
-    let mm = value.max(0.0).sqrt();
-    if mm == 0.0 {
-        "met".to_owned()
-    } else if mm < 0.1 {
-        format!("{} µm", number::show_digits(1e3 * mm, 3))
-    } else {
-        format!("{} mm", number::show_digits(mm, 3))
+    /// The choice of the field where the term is about one.
+    fn field(&mut self, ui: &mut Ui, view: &View) {
+        let Term::RelativeIllumination { field, .. } = &mut self.weighted.term else { return };
+        let fields = view.lens.fields_at(view.settings.zoom);
+        let name = |i: usize| {
+            let point = fields.values.get(i);
+            point.map_or_else(|| "no field".to_owned(), |point| field_name(fields.kind, *point))
+        };
+        ui.weak("at");
+        let combo = ComboBox::from_id_salt("field of illumination").width(60.0);
+        let combo = combo.selected_text(name(*field)).show_ui(ui, |ui| {
+            for i in 0..fields.values.len() {
+                ui.selectable_value(field, i, name(i));
+            }
+        });
+        combo.response.accessible_name("Field of Relative illumination");
+    }
+
+    /// What the search has made of it.
+    fn readings(&self, ui: &mut Ui, search: &Search) {
+        let asked = search.task.goal.terms.iter();
+        let term = asked.map(|w| w.term).find(|t| t.name() == self.weighted.term.name());
+        for values in [&search.before, &search.terms] {
+            let value = term.and_then(|term| {
+                let value = values.iter().find(|value| value.term == term.name())?;
+                Some(reading(term, value.value))
+            });
+            ui.label(value.unwrap_or_default());
+        }
     }
 }
 
@@ -148,86 +276,5 @@ fn number_field(ui: &mut Ui, drafts: &mut Drafts, name: &str, value: &mut f64, w
         }
         Ok(new) => drafts.refuse(id, format!("{name} is {new}; expected a finite number")),
         Err(why) => drafts.refuse(id, why.to_string()),
-    }
-}
-
-/// The targets of a term and what they are called.
-fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
-    match term {
-        Term::Spot | Term::SpotIntegral | Term::Throughput | Term::Distortion => Vec::new(),
-        Term::GlassCenter { min, max }
-        | Term::AirCenter { min, max }
-        | Term::SemiDiameter { min, max } => vec![("Minimum", min), ("Maximum", max)],
-        Term::FocalLength(target) | Term::FNumber(target) | Term::ThroughputLoss(target) => {
-            vec![("Target", target)]
-        }
-        Term::GlassEdge(least)
-        | Term::AirEdge(least)
-        | Term::BackFocus(least)
-        | Term::Light(least)
-        | Term::RelativeIllumination { min: least, .. } => vec![("Minimum", least)],
-        Term::TotalTrack(most) | Term::Steepness(most) => vec![("Maximum", most)],
-    }
-}
-
-/// Every term, with targets that the lens meets now.
-fn every(view: &View) -> Vec<Term> {
-    let efl = numbers(view).and_then(|numbers| numbers.first().efl).unwrap_or(100.0);
-    let track: f64 = view.lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
-    let size = efl.abs();
-    vec![
-        Term::Spot,
-        Term::FocalLength(efl),
-        Term::Distortion,
-        Term::GlassCenter { min: 0.01 * size, max: 0.5 * size },
-        Term::GlassEdge(0.01 * size),
-        Term::AirCenter { min: 0.002 * size, max: 3.0 * track },
-        Term::AirEdge(0.001 * size),
-        Term::TotalTrack(1.2 * track),
-        Term::BackFocus(view.lens.surfaces.last().map_or(0.0, |row| row.thickness)),
-    ]
-}
-
-const fn title(term: Term) -> &'static str {
-    match term {
-        Term::Spot => "Spot",
-        Term::FocalLength(_) => "Focal length",
-        Term::Distortion => "Distortion",
-        Term::GlassCenter { .. } => "Glass thickness",
-        Term::GlassEdge(_) => "Glass edge",
-        Term::AirCenter { .. } => "Air gap",
-        Term::AirEdge(_) => "Air edge",
-        Term::TotalTrack(_) => "Total track",
-        Term::BackFocus(_) => "Back focus",
-        Term::SpotIntegral => "Spot integral",
-        Term::Throughput => "Throughput",
-        Term::ThroughputLoss(_) => "Throughput loss",
-        Term::Light(_) => "Light",
-        Term::RelativeIllumination { .. } => "Relative illumination",
-        Term::FNumber(_) => "F-number",
-        Term::Steepness(_) => "Steepness",
-        Term::SemiDiameter { .. } => "Semi-diameter",
-    }
-}
-
-const fn hint(term: Term) -> &'static str {
-    match term {
-        Term::Spot => "Mean square spot radius over fields and wavelengths, about the centroids",
-        Term::FocalLength(_) => "Square of the deviation of the focal length from the target",
-        Term::Distortion => "Distance of the chief rays' image points from the paraxial image",
-        Term::GlassCenter { .. } => "Glass thinner or thicker than this on the axis",
-        Term::GlassEdge(_) => "Glass thinner than this at the rim",
-        Term::AirCenter { .. } => "Air thinner or thicker than this on the axis",
-        Term::AirEdge(_) => "Air thinner than this at the rim",
-        Term::TotalTrack(_) => "From the first vertex to the image longer than this",
-        Term::BackFocus(_) => "From the last vertex to the image shorter than this",
-        Term::SpotIntegral => "Square distance from the centroid, integrated over the pupil",
-        Term::Throughput => "Minus the mean area of the pupils",
-        Term::ThroughputLoss(_) => "One minus the mean area of the pupils over this one, in mm²",
-        Term::Light(_) => "Light lost below this share of what the pupils let through at first",
-        Term::RelativeIllumination { .. } => "A field darker than this share of the axis",
-        Term::FNumber(_) => "Square of the deviation of the f-number of the light from this",
-        Term::Steepness(_) => "A surface steeper at its rim: curvature times semi-diameter",
-        Term::SemiDiameter { .. } => "Surfaces smaller or larger than this",
     }
 }

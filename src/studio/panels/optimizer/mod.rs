@@ -4,12 +4,13 @@
 
 mod goal;
 mod history;
+mod terms;
 
 use eframe::egui::{
     Button, ComboBox, Context, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui,
 };
 
-use super::{Panel, lit};
+use super::{Panel, light};
 use crate::optimize::Method;
 use crate::session::{Command, Numbers, Search, Standing, View};
 use crate::studio::field::Drafts;
@@ -49,7 +50,7 @@ impl Panel for Optimizer {
             ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            self.aims.ui(ui, view, &mut self.drafts);
+            self.aims.ui(ui, view, &mut self.drafts, wishes);
         });
     }
 
@@ -95,6 +96,7 @@ impl Optimizer {
             }
         });
         self.method(ui, under_way);
+        ui.add_enabled_ui(!under_way, |ui| self.aims.pupil(ui));
     }
 
     fn begin(&self, ui: &mut Ui, view: &View, under_way: bool, wishes: &mut Vec<Command>) {
@@ -118,7 +120,7 @@ impl Optimizer {
     }
 }
 
-fn methods(ui: &mut Ui, chosen: &mut Method) {
+pub(super) fn methods(ui: &mut Ui, chosen: &mut Method) {
     let combo = ComboBox::from_id_salt("method").selected_text(chosen.name()).width(160.0);
     let combo = combo.show_ui(ui, |ui| {
         for method in [Method::DampedLeastSquares, Method::Adam] {
@@ -146,7 +148,7 @@ fn progress(ui: &mut Ui, view: &View, search: &Search) {
         }
     });
     ui.label(changes(view).join(", ")).on_hover_text(
-        "Mean RMS radius of the spots, focal length, and the mean share of the pupil that gets \
+        "Mean RMS radius of the spots, focal length, and the mean area of the pupils that gets \
          through: of the design and of the lens that the search shows",
     );
     let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
@@ -170,17 +172,14 @@ fn changes(view: &View) -> Vec<String> {
     if let (Some(old), Some(new)) = (before.first().efl, after.first().efl) {
         texts.push(format!("f {} to {} mm", short(old), short(new)));
     }
-    if let (Some(old), Some(new)) = (mean_light(before), mean_light(after)) {
-        texts.push(format!("light {:.0} to {:.0} %", 100.0 * old, 100.0 * new));
+    // A search that does not ask for light may buy sharpness with it: it is told beside the spots.
+    let (old, new) = (light(before), light(after));
+    if old > 0.0 {
+        let change = number::show_digits(100.0 * (new / old - 1.0), 3);
+        let sign = if new > old { "+" } else { "" };
+        texts.push(format!("light {} to {} mm² ({sign}{change} %)", short(old), short(new)));
     }
     texts
-}
-
-/// The mean share of the pupil that gets through. A search that does not ask for light may buy
-/// sharpness with it, so that it is shown beside the spots.
-fn mean_light(numbers: &Numbers) -> Option<f64> {
-    let shares: Vec<f64> = numbers.spots.value.iter().map(|spot| lit(spot.as_ref().ok())).collect();
-    (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
 }
 
 /// The mean RMS radius of the fields with light, in mm.

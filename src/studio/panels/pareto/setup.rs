@@ -7,6 +7,7 @@ use eframe::egui::{DragValue, Ui};
 use crate::optimize::pareto::Settings;
 use crate::session::{Command, View};
 use crate::studio::panels::numbers;
+use crate::studio::panels::optimizer::methods;
 
 /// The settings that a person sees.
 #[derive(Debug, Default)]
@@ -22,13 +23,18 @@ impl Setup {
     }
 
     pub(super) fn ui(&mut self, ui: &mut Ui, view: &View) {
-        let Settings { points, steps, blur, .. } = &mut self.settings;
+        let Settings { points, steps, blur, method, .. } = &mut self.settings;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             count(ui, "points", points, 1..=200, "How many weights between sharpness and light");
-            count(ui, "steps each", steps, 25..=100_000, "Steps of Adam for every weight");
-            ui.weak("rim blur").on_hover_text(BLUR);
+            count(ui, "steps each", steps, 1..=100_000, "No more steps than this for every weight");
+            methods(ui, method);
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.weak("Rim blur").on_hover_text(BLUR);
             blurs(ui, blur, focal_length(view));
+            ui.add_space(6.0);
             ui.checkbox(&mut self.compare, "Compare with kept pupils").on_hover_text(COMPARE);
         });
     }

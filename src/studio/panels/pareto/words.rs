@@ -18,8 +18,11 @@ pub(super) fn free(ui: &mut Ui, view: &View) {
         }
         None => format!("the {} variables and all semi-diameters", view.lens.variables.len()),
     };
-    let text = format!("Free: {free}. Fields and wavelengths: those of the lens.");
-    ui.add(Label::new(RichText::new(text).small().weak()).truncate()).on_hover_text(
+    let text = format!(
+        "Free: {free}. Fields and wavelengths are those of the lens, its aperture becomes the rim \
+         of the stop."
+    );
+    ui.add(Label::new(RichText::new(text).small().weak()).wrap()).on_hover_text(
         "A lens without variables has all its curvatures and gaps free; the focal length and the \
          thicknesses of glass and air stay sensible. The aperture becomes the semi-diameter of the \
          stop, so that the pupil is what the rims let through and nothing else.",
@@ -65,9 +68,10 @@ pub(super) fn progress(run: &FrontRun) -> String {
 pub(super) fn volumes(ui: &mut Ui, run: &FrontRun) {
     let main = &run.main;
     let (lenses, tried) = (main.front.designs().len(), main.tried.len());
-    let mut text = format!("{lenses} of {tried} lenses, hypervolume {:.4}", main.hypervolume);
+    let volume = main.hypervolume;
+    let mut text = format!("{lenses} lenses on the front, {tried} tried; hypervolume {volume:.4}");
     if let Some(biased) = &run.biased {
-        text += &format!("; pupils kept {:.4}", biased.hypervolume);
+        text += &format!(", {:.4} with pupils kept", biased.hypervolume);
     }
     ui.label(text).on_hover_text(
         "The area that the front covers in the plane of spot and light, against twice the spot of \
@@ -97,10 +101,11 @@ pub(super) fn worth(design: &Design, start: &Design) -> String {
     let spot = with_error(1e3 * design.spot, 1e3 * design.spot_error);
     let light = with_error(design.light, design.light_error);
     let percent = number::show_digits(100.0 * design.light / start.light, 4);
-    let blur = design.weight.map_or_else(
-        || "start of the sweep".to_owned(),
-        |weight| format!("rim blur {} µm", number::show_digits(1e3 * weight.sqrt(), 3)),
-    );
+    let blur = match design.weight {
+        None => "start of the sweep".to_owned(),
+        Some(0.0) => "found without a weight for light".to_owned(),
+        Some(weight) => format!("rim blur {} µm", number::show_digits(1e3 * weight.sqrt(), 3)),
+    };
     format!(
         "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{blur}\n{} rays",
         design.rays

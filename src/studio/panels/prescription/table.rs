@@ -75,7 +75,7 @@ impl Column {
             Self::Radius => Width::initial(94.0).at_least(70.0),
             Self::Thickness => Width::initial(90.0).at_least(70.0),
             Self::Glass => Width::initial(118.0).at_least(70.0),
-            Self::SemiDiameter => Width::initial(90.0).at_least(60.0),
+            Self::SemiDiameter => Width::initial(98.0).at_least(70.0),
             Self::Conic => Width::initial(64.0).at_least(50.0),
             Self::Asphere(_) => Width::initial(112.0).at_least(60.0),
             Self::Comment => Width::remainder().at_least(60.0).clip(true),
@@ -83,7 +83,7 @@ impl Column {
     }
 
     const fn has_badge(self) -> bool {
-        matches!(self, Self::Radius | Self::Thickness | Self::Conic | Self::Asphere(_))
+        !matches!(self, Self::Glass | Self::Comment)
     }
 
     /// The number in a row of this column; none where it holds text.
@@ -181,7 +181,8 @@ impl Table<'_> {
             row.col(|ui| match column {
                 Column::Radius => still(ui, "Infinity", badge::WIDTH),
                 Column::SemiDiameter => {
-                    still(ui, &self.reached(self.view.lens.surfaces.len()), 0.0);
+                    let reached = self.reached(self.view.lens.surfaces.len());
+                    still(ui, &reached, badge::WIDTH);
                 }
                 _ => {}
             });
@@ -257,11 +258,13 @@ impl Table<'_> {
         };
         let place = (column, surface);
         let response = self.field(ui, place, cell, |text| Ok(typed(parameter, text)));
-        if limit {
-            response.on_hover_text(column.hint());
-        } else {
+        // A rim that is not written has nothing to vary.
+        if self.view.lens.get(parameter).is_some() || !limit {
             badge::show(ui, &self.view.lens, parameter, self.drafts, self.wishes);
             self.toggle_by_key(ui, &response, parameter);
+        }
+        if limit {
+            response.on_hover_text(column.hint());
         }
     }
 

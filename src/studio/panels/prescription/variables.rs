@@ -1,24 +1,35 @@
 //! Freeing and fixing many numbers at once.
 
-use eframe::egui::Ui;
+use eframe::egui::{Button, Ui};
 
-use crate::lens::{Lens, Medium, Parameter, Quantity, Variable};
+use crate::lens::{Lens, Medium, NumberKind, Parameter, Quantity, Variable};
 use crate::session::{Command, Edit};
+use crate::studio::panels::freed;
+
+/// What can be freed at once.
+const KINDS: [(&str, NumberKind); 6] = [
+    ("Free every radius", NumberKind::Curvatures),
+    ("Free every thickness", NumberKind::Thicknesses),
+    ("Free every semi-diameter", NumberKind::SemiDiameters),
+    ("Free every conic constant that is not 0", NumberKind::Conics),
+    ("Free every asphere coefficient", NumberKind::Aspheres),
+    ("Free every index that is no catalogue glass's", NumberKind::Indices),
+];
 
 /// How many numbers are variable, with a menu to free or fix many at once, as one undo step.
 pub(super) fn menu(ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
     let count = lens.variables.len();
     let text = if count == 1 { "1 variable".to_owned() } else { format!("{count} variables") };
     let button = ui.menu_button(text, |ui| {
-        let choices: [(&str, Vec<Variable>); 4] = [
-            ("Free every radius", with(lens, radii(lens))),
-            ("Free every thickness", with(lens, thicknesses(lens, |_| true))),
-            ("Free every air gap", with(lens, thicknesses(lens, |m| *m == Medium::Air))),
-            ("Fix everything", Vec::new()),
-        ];
-        for (title, variables) in choices {
-            if ui.button(title).clicked() {
-                wishes.push(Edit::SetVariables(variables).into());
+        let freeing = KINDS.iter().map(|(title, kind)| (*title, freed(lens, &[*kind])));
+        let mut choices: Vec<(&str, Edit)> = freeing.collect();
+        choices.insert(2, ("Free every air gap", air_gaps(lens)));
+        choices.push(("Fix every semi-diameter", fixed(lens, Quantity::SemiDiameter)));
+        choices.push(("Fix everything", Edit::SetVariables(Vec::new())));
+        let now = Edit::SetVariables(lens.variables.clone());
+        for (title, edit) in choices {
+            if ui.add_enabled(edit != now, Button::new(title)).clicked() {
+                wishes.push(edit.into());
                 ui.close();
             }
         }
@@ -29,35 +40,21 @@ pub(super) fn menu(ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
     );
 }
 
-/// The variables of a lens and some more.
-fn with(lens: &Lens, more: impl Iterator<Item = Parameter>) -> Vec<Variable> {
-    let mut variables = lens.variables.clone();
-    for parameter in more {
-        let taken = lens.pickups.iter().any(|pickup| pickup.parameter == parameter);
-        if !taken && variables.iter().all(|variable| variable.parameter != parameter) {
-            variables.push(Variable { parameter, min: None, max: None });
-        }
+/// Frees the gaps without glass and leaves the others as they are.
+fn air_gaps(lens: &Lens) -> Edit {
+    let mut edit = freed(lens, &[NumberKind::Thicknesses]);
+    if let Edit::SetVariables(variables) = &mut edit {
+        let in_air = |parameter: Parameter| lens.surfaces[parameter.surface].medium == Medium::Air;
+        let before = |parameter: Parameter| lens.variable(parameter).is_some();
+        variables.retain(|v| before(v.parameter) || in_air(v.parameter));
     }
-    variables
+    edit
 }
 
-/// The curvatures that do something: those of mirrors and of surfaces between two media.
-fn radii(lens: &Lens) -> impl Iterator<Item = Parameter> {
-    let before =
-        |i: usize| i.checked_sub(1).map_or(&lens.object_medium, |i| &lens.surfaces[i].medium);
-    let acts = move |i: &usize| {
-        let behind = &lens.surfaces[*i].medium;
-        *behind == Medium::Mirror || before(*i) != behind
-    };
-    let surfaces = (0..lens.surfaces.len()).filter(acts);
-    surfaces.map(|surface| Parameter::new(surface, Quantity::Curvature))
-}
-
-/// The gaps that nothing else decides.
-fn thicknesses(lens: &Lens, of: impl Fn(&Medium) -> bool) -> impl Iterator<Item = Parameter> {
-    let free = if lens.focus.is_some() { lens.surfaces.len() - 1 } else { lens.surfaces.len() };
-    let gaps = (0..free).filter(move |i| of(&lens.surfaces[*i].medium));
-    gaps.map(|surface| Parameter::new(surface, Quantity::Thickness))
+/// Fixes every number of a kind.
+fn fixed(lens: &Lens, quantity: Quantity) -> Edit {
+    let other = |v: &&Variable| v.parameter.quantity != quantity;
+    Edit::SetVariables(lens.variables.iter().filter(other).copied().collect())
 }
 
 #[cfg(test)]
@@ -72,11 +69,15 @@ mod tests {
         let stop = lens.stop().unwrap();
         lens.variables.truncate(1);
         let kept = lens.variables[0];
-        let variables = with(&lens, radii(&lens));
-        assert_eq!(variables[0], kept);
-        assert_eq!(variables.len(), lens.surfaces.len() - 1, "all but the stop in air");
-        assert!(variables.iter().all(|variable| variable.parameter.surface != stop));
-        let gaps = thicknesses(&lens, |_| true).count();
-        assert_eq!(gaps, lens.surfaces.len());
+        let variables = |edit| if let Edit::SetVariables(all) = edit { all } else { Vec::new() };
+        let radii = variables(freed(&lens, &[NumberKind::Curvatures]));
+        assert_eq!(radii[0], kept);
+        assert_eq!(radii.len(), lens.surfaces.len() - 1, "all but the stop in air");
+        assert!(radii.iter().all(|variable| variable.parameter.surface != stop));
+        let air = lens.surfaces.iter().filter(|row| row.medium == Medium::Air).count();
+        assert_eq!(variables(air_gaps(&lens)).len(), 1 + air);
+        let rims = freed(&lens, &[NumberKind::SemiDiameters]);
+        assert_eq!(variables(rims).len(), 1 + lens.surfaces.len());
+        assert_eq!(variables(fixed(&lens, Quantity::Curvature)).len(), 0);
     }
 }

@@ -1,0 +1,257 @@
+//! What each term of a goal is called, measured in and explained by, and what it begins with.
+
+use std::f64::consts::PI;
+
+use crate::lens::Lens;
+use crate::merit::{Term, Weighted};
+use crate::session::{Numbers, View};
+use crate::studio::number;
+use crate::studio::panels::{light, numbers};
+
+/// The radius of a spot, relative to the focal length, that is given away for all of the light: the
+/// same exchange as in [`Goal::sensible`](crate::merit::Goal::sensible).
+const LIGHT_IN_SPOT: f64 = 0.02;
+/// A surface this steep is hard to make: 1 is a hemisphere.
+const STEEP: f64 = 0.9;
+/// The share of the light on the axis that the last field shall have, until somebody says better.
+const CORNER: f64 = 0.5;
+
+/// What a term is called.
+pub(super) const fn title(term: Term) -> &'static str {
+    match term {
+        Term::Spot => "Spot",
+        Term::SpotIntegral => "Spot × light",
+        Term::Throughput => "Throughput",
+        Term::ThroughputLoss(_) => "Throughput loss",
+        Term::Light(_) => "Light",
+        Term::RelativeIllumination { .. } => "Relative illumination",
+        Term::FNumber(_) => "F-number",
+        Term::FocalLength(_) => "Focal length",
+        Term::Distortion => "Distortion",
+        Term::GlassCenter { .. } => "Glass thickness",
+        Term::GlassEdge(_) => "Glass edge",
+        Term::AirCenter { .. } => "Air gap",
+        Term::AirEdge(_) => "Air edge",
+        Term::TotalTrack(_) => "Total track",
+        Term::BackFocus(_) => "Back focus",
+        Term::Steepness(_) => "Steepness",
+        Term::SemiDiameter { .. } => "Semi-diameter",
+    }
+}
+
+/// What it asks for.
+pub(super) const fn hint(term: Term) -> &'static str {
+    match term {
+        Term::Spot => "Mean square spot radius over fields and wavelengths, about the centroids",
+        Term::SpotIntegral => {
+            "Square distance from the centroid, summed over all light that gets through instead \
+             of averaged: it falls when light is lost, so pair it with a term for light"
+        }
+        Term::Throughput => {
+            "As much light as possible: minus the mean area of the pupils. It has no target and \
+             never stops asking; its weight sets how much blur a square millimetre is worth"
+        }
+        Term::ThroughputLoss(_) => {
+            "As much light as possible, counted as a share: one minus the mean area of the pupils \
+             over this one"
+        }
+        Term::Light(_) => {
+            "At least this share of the light that each field has now: 1 loses none, 1.2 asks for \
+             20 % more. Met as soon as the light is there"
+        }
+        Term::RelativeIllumination { .. } => {
+            "The light of a field over that on the axis not below this share: the ratio of the \
+             pupils' areas times cos⁴ of the field angle"
+        }
+        Term::FNumber(_) => {
+            "The f-number of the light that gets through on the axis: focal length over the \
+             diameter of a disc as large as the pupil"
+        }
+        Term::FocalLength(_) => "Square of the deviation of the focal length from the target",
+        Term::Distortion => "Distance of the chief rays' image points from the paraxial image",
+        Term::GlassCenter { .. } => "Glass thinner or thicker than this on the axis",
+        Term::GlassEdge(_) => "Glass thinner than this at the rim",
+        Term::AirCenter { .. } => "Air thinner or thicker than this on the axis",
+        Term::AirEdge(_) => "Air thinner than this at the rim",
+        Term::TotalTrack(_) => "From the first vertex to the image longer than this",
+        Term::BackFocus(_) => "From the last vertex to the image shorter than this",
+        Term::Steepness(_) => {
+            "Curvature times semi-diameter larger than this at some surface; 1 is a hemisphere"
+        }
+        Term::SemiDiameter { .. } => "Semi-diameters smaller or larger than this",
+    }
+}
+
+/// The unit of its targets.
+pub(super) const fn unit(term: Term) -> &'static str {
+    match term {
+        Term::ThroughputLoss(_) => "mm²",
+        Term::Light(_) => "× now",
+        Term::RelativeIllumination { .. } => "× axis",
+        Term::Spot
+        | Term::SpotIntegral
+        | Term::Throughput
+        | Term::Distortion
+        | Term::FNumber(_)
+        | Term::Steepness(_) => "",
+        Term::FocalLength(_)
+        | Term::GlassCenter { .. }
+        | Term::GlassEdge(_)
+        | Term::AirCenter { .. }
+        | Term::AirEdge(_)
+        | Term::TotalTrack(_)
+        | Term::BackFocus(_)
+        | Term::SemiDiameter { .. } => "mm",
+    }
+}
+
+/// The targets of a term and what they are called.
+pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
+    match term {
+        Term::Spot | Term::SpotIntegral | Term::Throughput | Term::Distortion => Vec::new(),
+        Term::GlassCenter { min, max }
+        | Term::AirCenter { min, max }
+        | Term::SemiDiameter { min, max } => vec![("Minimum", min), ("Maximum", max)],
+        Term::FocalLength(target) | Term::FNumber(target) => vec![("Target", target)],
+        Term::ThroughputLoss(full) => vec![("Full light", full)],
+        Term::Light(least)
+        | Term::RelativeIllumination { min: least, .. }
+        | Term::GlassEdge(least)
+        | Term::AirEdge(least)
+        | Term::BackFocus(least) => vec![("Minimum", least)],
+        Term::TotalTrack(most) | Term::Steepness(most) => vec![("Maximum", most)],
+    }
+}
+
+/// The value of a term as it is easiest to read.
+pub(super) fn reading(term: Term, value: f64) -> String {
+    let short = |value: f64| number::show_digits(value, 3);
+    let root = value.max(0.0).sqrt();
+    match term {
+        Term::SpotIntegral => format!("{} mm⁴", short(value)),
+        Term::Throughput => format!("{} mm²", number::show_digits(-value, 4)),
+        Term::ThroughputLoss(_) => format!("{} %", short(100.0 * value)),
+        _ if root == 0.0 => "met".to_owned(),
+        Term::Light(_) | Term::RelativeIllumination { .. } => {
+            format!("{} % short", short(100.0 * root))
+        }
+        Term::FNumber(_) => format!("off by {}", short(root)),
+        Term::Steepness(_) => format!("{} over", short(root)),
+        _ if root < 0.1 => format!("{} µm", short(1e3 * root)),
+        _ => format!("{} mm", short(root)),
+    }
+}
+
+/// Whether it may want more light than the lens has.
+pub(super) fn asks_for_more(term: Term) -> bool {
+    match term {
+        Term::Light(share) => share > 1.0,
+        Term::Throughput | Term::ThroughputLoss(_) | Term::FNumber(_) => true,
+        _ => false,
+    }
+}
+
+/// Every term, with targets that the lens meets now or nearly so, and weights that stand in
+/// proportion to its spots.
+pub(super) fn every(view: &View) -> Vec<Weighted> {
+    let now = Now::of(view);
+    let plain = |term| Weighted { term, weight: 1.0 };
+    let in_spots = |term, weight| Weighted { term, weight };
+    let Now { size, track, .. } = now;
+    let given_away = (LIGHT_IN_SPOT * size).powi(2);
+    let field = view.lens.fields_at(view.settings.zoom).values.len().saturating_sub(1);
+    vec![
+        plain(Term::Spot),
+        in_spots(Term::SpotIntegral, 1.0 / now.light),
+        in_spots(Term::Light(1.0), given_away),
+        in_spots(Term::FNumber(now.f_number), given_away / now.f_number.powi(2)),
+        in_spots(Term::RelativeIllumination { field, min: CORNER }, given_away),
+        in_spots(Term::ThroughputLoss(now.light), now.spot),
+        in_spots(Term::Throughput, now.spot / now.light),
+        plain(Term::FocalLength(now.efl)),
+        plain(Term::Distortion),
+        plain(Term::GlassCenter { min: 0.01 * size, max: 0.5 * size }),
+        plain(Term::GlassEdge(0.01 * size)),
+        plain(Term::AirCenter { min: 0.002 * size, max: 3.0 * track }),
+        plain(Term::AirEdge(0.001 * size)),
+        plain(Term::TotalTrack(1.2 * track)),
+        plain(Term::BackFocus(view.lens.surfaces.last().map_or(0.0, |row| row.thickness))),
+        in_spots(Term::Steepness(now.steepest.max(STEEP)), given_away),
+        plain(Term::SemiDiameter { min: 0.5 * now.rims[0], max: 1.5 * now.rims[1] }),
+    ]
+    .into_iter()
+    .map(rounded)
+    .collect()
+}
+
+/// What the lens is like now; plain guesses where it has no numbers.
+struct Now {
+    efl: f64,
+    /// The focal length without its sign.
+    size: f64,
+    track: f64,
+    /// The mean area of the pupils, in mm².
+    light: f64,
+    f_number: f64,
+    /// The mean square radius of the spots, in mm².
+    spot: f64,
+    /// The largest curvature times semi-diameter.
+    steepest: f64,
+    /// The smallest and the largest semi-diameter.
+    rims: [f64; 2],
+}
+
+impl Now {
+    fn of(view: &View) -> Self {
+        let numbers = numbers(view);
+        let positive = |value: Option<f64>, otherwise: f64| {
+            value.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(otherwise)
+        };
+        let efl = numbers.and_then(|numbers| numbers.first().efl).unwrap_or(100.0);
+        let size = positive(Some(efl.abs()), 100.0);
+        let axis = positive(numbers.and_then(on_axis), 0.01 * size * size);
+        let rims = || view.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
+        let steep = |lens: &Lens| {
+            let rows = lens.surfaces.iter();
+            rows.map(|row| (row.curvature * row.semi_diameter.unwrap_or(0.0)).abs())
+                .fold(0.0, f64::max)
+        };
+        Self {
+            efl,
+            size,
+            track: view.lens.surfaces.iter().map(|row| row.thickness.abs()).sum(),
+            light: positive(numbers.map(light), axis),
+            f_number: size / (2.0 * (axis / PI).sqrt()),
+            spot: positive(numbers.and_then(mean_square), 1e-6 * size * size),
+            steepest: steep(&view.lens),
+            rims: [rims().fold(size, f64::min), rims().fold(0.0, f64::max).max(0.1 * size)],
+        }
+    }
+}
+
+/// The area of the pupil on the axis in mm², the mean over wavelengths.
+fn on_axis(numbers: &Numbers) -> Option<f64> {
+    let bench = &numbers.bench.value;
+    let spots = numbers.spots.value.iter().flatten();
+    let spot = spots.into_iter().find(|spot| spot.field.x == 0.0 && spot.field.y == 0.0)?;
+    let weights: f64 = bench.colors.iter().map(|color| color.weight).sum();
+    let lit = spot.colors.iter().zip(&bench.colors);
+    let area = lit.filter_map(|(spot, color)| Some(color.weight * spot.as_ref().ok()?.light.value));
+    Some(area.sum::<f64>() / weights)
+}
+
+fn mean_square(numbers: &Numbers) -> Option<f64> {
+    let squares: Vec<f64> =
+        numbers.spots.value.iter().flatten().map(|spot| spot.rms.value.powi(2)).collect();
+    (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64)
+}
+
+/// A term with numbers as a person would write them.
+fn rounded(mut weighted: Weighted) -> Weighted {
+    let short = |value: f64| number::show_digits(value, 4).parse().unwrap_or(value);
+    weighted.weight = short(weighted.weight);
+    for (_, target) in targets(&mut weighted.term) {
+        *target = short(*target);
+    }
+    weighted
+}
