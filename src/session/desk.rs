@@ -142,9 +142,9 @@ impl Session {
             Command::StartFront { settings, compare } => {
                 self.fronts.start(&self.lens, settings, compare);
             }
-            Command::PauseFront => self.fronts.sweeper().pause(),
-            Command::ResumeFront => self.fronts.sweeper().resume(),
-            Command::StopFront => self.fronts.sweeper().stop(),
+            Command::PauseFront => self.fronts.stand(Standing::Paused),
+            Command::ResumeFront => self.fronts.stand(Standing::Running),
+            Command::StopFront => self.fronts.stand(Standing::Stopped),
             Command::ClearFronts => self.fronts.clear(),
             Command::ExportFront(folder) => self.export_front(folder),
             Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),

@@ -12,6 +12,7 @@ use crate::lens::Lens;
 use crate::merit::PupilEdge;
 use crate::optimize::pareto::{Design, Front, Settings, Slice, Sweep};
 use crate::pupil::limited_by_stop;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -156,9 +157,7 @@ pub(super) struct Job {
 /// What a sweep is told.
 enum Order {
     Start(Job),
-    Pause,
-    Resume,
-    Stop,
+    Stand(Standing),
     Clear,
     Write(PathBuf),
     Judge(Arc<Lens>),
@@ -216,12 +215,15 @@ impl Sweeper {
         let (orders, inbox) = mpsc::channel();
         let (outbox, told) = mpsc::channel();
         let (shown, judged) = (Slot::default(), Slot::default());
+        let name = |i: usize| format!("front {i}");
+        let pool = ThreadPoolBuilder::new().thread_name(name).build().map_err(io::Error::other)?;
         let desk = Desk {
             inbox,
             outbox,
             shown: shown.clone(),
             judged: judged.clone(),
             begin,
+            pool,
             wake: Box::new(wake),
             pace: Pace::new(BETWEEN),
             run: None,
@@ -234,16 +236,9 @@ impl Sweeper {
         self.tell(Order::Start(job));
     }
 
-    pub(super) fn pause(&self) {
-        self.tell(Order::Pause);
-    }
-
-    pub(super) fn resume(&self) {
-        self.tell(Order::Resume);
-    }
-
-    pub(super) fn stop(&self) {
-        self.tell(Order::Stop);
+    /// Holds the sweep, lets it go on or ends it, after its slice.
+    pub(super) fn stand(&self, standing: Standing) {
+        self.tell(Order::Stand(standing));
     }
 
     /// Ends the sweep and forgets it.
@@ -300,6 +295,8 @@ struct Desk {
     shown: Slot<FrontRun>,
     judged: Slot<Judged>,
     begin: Box<Begin>,
+    /// Threads of its own: numbers of panels do not queue behind a slice.
+    pool: ThreadPool,
     wake: Box<dyn Fn() + Send>,
     pace: Pace,
     run: Option<Run>,
@@ -337,22 +334,20 @@ impl Desk {
     }
 
     fn obey(&mut self, order: Order) {
-        let standing = self.run.as_ref().map(|run| run.state.standing);
-        match (order, standing) {
-            (Order::Start(job), _) => self.start(job),
-            (Order::Pause, Some(Standing::Running)) => self.stand(Standing::Paused),
-            (Order::Resume, Some(Standing::Paused)) => self.stand(Standing::Running),
-            (Order::Stop, Some(Standing::Running | Standing::Paused)) => {
-                self.stand(Standing::Stopped);
+        match order {
+            Order::Start(job) => self.start(job),
+            Order::Stand(standing) => {
+                if self.run.as_ref().is_some_and(|run| run.state.is_under_way()) {
+                    self.stand(standing);
+                }
             }
-            (Order::Clear, _) => self.run = None,
-            (Order::Write(folder), _) => self.write(&folder),
-            (Order::Judge(lens), _) => {
+            Order::Clear => self.run = None,
+            Order::Write(folder) => self.write(&folder),
+            Order::Judge(lens) => {
                 let found = guarded(|| judge(&lens));
                 self.judged.set(Judged { lens, found });
                 (self.wake)();
             }
-            _ => {}
         }
     }
 
@@ -396,7 +391,7 @@ impl Desk {
     /// Goes on for a slice; then the next leg follows, or the end.
     fn advance(&mut self) {
         let Some(run) = &mut self.run else { return };
-        let finished = match guarded(|| Ok(run.step())) {
+        let finished = match guarded(|| Ok(run.step(&self.pool))) {
             Ok(finished) => finished,
             Err(why) => return self.give_up(why),
         };
@@ -459,8 +454,9 @@ impl Run {
     }
 
     /// Whether the slice was the last one.
-    fn step(&mut self) -> bool {
-        let Timed { value: slice, ms } = timed(|| self.sweep.step());
+    fn step(&mut self, pool: &ThreadPool) -> bool {
+        let sweep = &mut self.sweep;
+        let Timed { value: slice, ms } = timed(|| pool.install(|| sweep.step()));
         let finished = slice.finished;
         self.leg().count(slice, ms);
         finished

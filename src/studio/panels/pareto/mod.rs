@@ -21,6 +21,9 @@ const WHAT: &str = "How sharp can this lens be for how much light? The sweep tra
     that none beats in both.\n\
     Click a point to see its lens, double click to take it. The design stays what it is meanwhile.";
 
+/// The height of what is said about the lens that was clicked: buttons and two lines.
+const CHOICE: f32 = 62.0;
+
 /// The panel.
 #[derive(Debug)]
 pub struct ParetoFront {
@@ -56,6 +59,9 @@ impl Panel for ParetoFront {
         }
         match view.fronts.run.as_deref() {
             Some(run) => self.show(ui, view, run, wishes),
+            None if view.fronts.starting => {
+                ui.weak("Looking at the lens…");
+            }
             None => {
                 ui.separator();
                 ui.label(WHAT);
@@ -125,11 +131,14 @@ impl ParetoFront {
 
     fn show(&mut self, ui: &mut Ui, view: &View, run: &FrontRun, wishes: &mut Vec<Command>) {
         let share = run.done() as f32;
-        let bar = ProgressBar::new(share).desired_height(16.0).text(words::progress(run));
+        let bar = ProgressBar::new(share)
+            .desired_height(16.0)
+            .text(words::progress(run, view.fronts.pending));
         ui.add(bar.corner_radius(2));
         words::volumes(ui, run);
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
-        Side::bottom("chosen lens").frame(frame).show_separator_line(false).show(ui, |ui| {
+        let side = Side::bottom("chosen lens").frame(frame).show_separator_line(false);
+        side.exact_size(CHOICE).show(ui, |ui| {
             self.choice(ui, view, run, wishes);
         });
         let clicked = plot::plot(ui, view, run, self.chosen.as_ref(), &mut self.fitted);
@@ -167,7 +176,12 @@ impl ParetoFront {
                 wishes.push(Command::TakePreview);
             }
             let back = ui.add_enabled(shown, Button::new("Back to the design"));
-            if back.on_hover_text("Show the design again in all panels").clicked() {
+            if back
+                .on_hover_text(
+                    "Show the design again in all panels; the table of surfaces never left it",
+                )
+                .clicked()
+            {
                 wishes.push(Command::Preview(None));
             }
         });

@@ -54,7 +54,7 @@ pub(super) fn plot(
         .show_crosshair(false)
         .label_formatter(|_| None)
         .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
-        .grid_spacing(24.0..=160.0);
+        .grid_spacing(12.0..=70.0);
     let fit = *fitted;
     let shown = plot.show(ui, |plot| {
         if fit {

@@ -49,8 +49,10 @@ fn counted(lens: &Lens) -> String {
 }
 
 /// How far the run is.
-pub(super) fn progress(run: &FrontRun) -> String {
+pub(super) fn progress(run: &FrontRun, pending: Option<Standing>) -> String {
     let standing = match run.standing {
+        _ if pending == Some(Standing::Paused) => "Pausing…",
+        _ if pending == Some(Standing::Stopped) => "Stopping…",
         Standing::Running => "Running",
         Standing::Paused => "Paused",
         Standing::Stopped => "Stopped",
