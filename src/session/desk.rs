@@ -414,13 +414,11 @@ impl Session {
     }
 
     fn export_front(&mut self, folder: Option<PathBuf>) {
-        match folder {
-            Some(folder) => self.fronts.sweeper().write(folder),
-            None => {
-                let text = "choose a folder to export the front to";
-                self.say(Severity::Warning, text.to_owned());
-            }
-        }
+        let Some(folder) = folder else {
+            let text = "choose a folder to export the front to";
+            return self.say(Severity::Warning, text.to_owned());
+        };
+        self.fronts.sweeper().write(folder);
     }
 
     fn hear_front(&mut self, told: Told) {

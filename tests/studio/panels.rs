@@ -468,7 +468,7 @@ fn a_lens_that_cannot_be_traced_says_why_in_every_panel() {
 /// A front of the double Gauss that stands somehow, and one before it.
 fn fronts(standing: Standing) -> View {
     let view = view();
-    let settings = pareto::Settings { points: 4, steps: 50, ..pareto::Settings::default() };
+    let settings = pareto::Settings { points: 2, steps: 10, ..pareto::Settings::default() };
     let mut sweep = pareto::Sweep::new(&view.lens, &settings).unwrap();
     while !sweep.step().finished {}
     let leg = Leg {

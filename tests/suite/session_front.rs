@@ -17,10 +17,10 @@ fn double_gauss() -> Lens {
 
 /// A sweep that ends soon, or not by itself.
 fn start(steps: usize, compare: bool) -> Command {
-    Command::StartFront { settings: Settings { points: 4, steps, ..Settings::default() }, compare }
+    Command::StartFront { settings: Settings { points: 2, steps, ..Settings::default() }, compare }
 }
 
-const SOON: usize = 50;
+const SOON: usize = 10;
 const NEVER: usize = 10_000_000;
 
 /// Waits until something has happened in the background.

@@ -31,18 +31,16 @@ pub(super) fn free(ui: &mut Ui, view: &View) {
 
 /// How many numbers of each kind are free.
 fn counted(lens: &Lens) -> String {
-    let kinds: [(&str, fn(Quantity) -> bool); 3] = [
-        ("curvatures", |quantity| quantity == Quantity::Curvature),
-        ("gaps", |quantity| quantity == Quantity::Thickness),
-        ("semi-diameters", |quantity| quantity == Quantity::SemiDiameter),
+    let kinds = [
+        ("curvatures", Quantity::Curvature),
+        ("gaps", Quantity::Thickness),
+        ("semi-diameters", Quantity::SemiDiameter),
     ];
-    let count = |is: fn(Quantity) -> bool| {
-        lens.variables.iter().filter(|variable| is(variable.parameter.quantity)).count()
-    };
-    let named: usize = kinds.iter().map(|(_, is)| count(*is)).sum();
-    let mut parts: Vec<(usize, &str)> =
-        kinds.iter().map(|(name, is)| (count(*is), *name)).collect();
-    parts.push((lens.variables.len() - named, "others"));
+    let free = || lens.variables.iter().map(|variable| variable.parameter.quantity);
+    let count = |kind: Quantity| free().filter(|quantity| *quantity == kind).count();
+    let mut parts = kinds.map(|(name, kind)| (count(kind), name)).to_vec();
+    let named: usize = parts.iter().map(|(count, _)| count).sum();
+    parts.push((free().count() - named, "others"));
     parts.retain(|(count, _)| *count > 0);
     let parts: Vec<String> = parts.iter().map(|(count, name)| format!("{count} {name}")).collect();
     parts.join(", ")
@@ -71,11 +69,10 @@ pub(super) fn volumes(ui: &mut Ui, run: &FrontRun) {
     let main = &run.main;
     let (lenses, tried) = (main.front.designs().len(), main.tried.len());
     let volume = main.hypervolume;
-    let mut text = format!("{lenses} lenses on the front, {tried} tried; hypervolume {volume:.4}");
-    if let Some(biased) = &run.biased {
-        text += &format!(", {:.4} with pupils kept", biased.hypervolume);
-    }
-    ui.label(text).on_hover_text(
+    let kept = run.biased.as_ref();
+    let kept = kept.map(|leg| format!(", {:.4} with pupils kept", leg.hypervolume));
+    let text = format!("{lenses} lenses on the front, {tried} tried; hypervolume {volume:.4}");
+    ui.label(text + &kept.unwrap_or_default()).on_hover_text(
         "The area that the front covers in the plane of spot and light, against twice the spot of \
          the lens at the start, in multiples of the start's spot times its light: larger is better",
     );
