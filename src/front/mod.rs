@@ -92,7 +92,7 @@ impl Survey<'_> {
         let mut canvas = Canvas::new(SIZE);
         let (front, start) = (places(self.front.designs()), place(self.start));
         let biased = places(self.biased.map_or(&[], Front::designs));
-        let chart = self.chart(&[&front, &biased, &[start]]);
+        let chart = chart(&[&front, &biased, &[start]]);
         chart.draw(&mut canvas, &format!("Sharpness against light: {}", self.name));
         for [spot, light] in self.tried {
             let at = [*light, 1e3 * spot];
@@ -110,16 +110,6 @@ impl Survey<'_> {
         canvas
     }
 
-    /// The axes: around the fronts and the start, not around all that was tried on the way.
-    fn chart(&self, shown: &[&[[f64; 2]]]) -> Chart {
-        let all = || shown.iter().flat_map(|points| points.iter());
-        let x = Axis::linear("light, mm^2", all().map(|point| point[0]));
-        let y = Axis::linear("RMS spot, um", all().map(|point| point[1]).chain([0.0]));
-        let [left, top, right, bottom] = MARGINS;
-        let [width, height] = SIZE.map(f64::from);
-        Chart::new([left, top], [width - right, height - bottom], x, y)
-    }
-
     fn legend(&self, canvas: &mut Canvas) {
         let volume = |front: &Front| format!("hypervolume {:.4}", hypervolume(front, self.start));
         let mut lines: Vec<(String, Color)> = vec![
@@ -133,6 +123,16 @@ impl Survey<'_> {
             canvas.text([MARGINS[0] + 32.0, y], text, BLACK, Align::Left);
         }
     }
+}
+
+/// The axes: around the fronts and the start, not around all that was tried on the way.
+fn chart(shown: &[&[[f64; 2]]]) -> Chart {
+    let all = || shown.iter().flat_map(|points| points.iter());
+    let x = Axis::linear("light, mm^2", all().map(|point| point[0]));
+    let y = Axis::linear("RMS spot, um", all().map(|point| point[1]).chain([0.0]));
+    let [left, top, right, bottom] = MARGINS;
+    let [width, height] = SIZE.map(f64::from);
+    Chart::new([left, top], [width - right, height - bottom], x, y)
 }
 
 /// Light in mm² and spot in µm.

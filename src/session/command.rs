@@ -68,8 +68,8 @@ pub enum Command {
     StopFront,
     /// End the sweep and forget its front and all earlier ones.
     ClearFronts,
-    /// Write the front into a folder: table, picture and every lens.
-    ExportFront(PathBuf),
+    /// Write the front into this folder: table, picture and every lens.
+    ExportFront(Option<PathBuf>),
     /// Show another lens in place of the design, which stays what it is; `None` for the design.
     Preview(Option<Box<Lens>>),
     /// Make the lens that is shown in place of the design the design, as one undo step.

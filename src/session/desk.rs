@@ -142,11 +142,11 @@ impl Session {
             Command::StartFront { settings, compare } => {
                 self.fronts.start(&self.lens, settings, compare);
             }
-            Command::PauseFront => self.fronts.sweeper().pause(),
-            Command::ResumeFront => self.fronts.sweeper().resume(),
-            Command::StopFront => self.fronts.sweeper().stop(),
+            Command::PauseFront => self.fronts.stand(Standing::Paused),
+            Command::ResumeFront => self.fronts.stand(Standing::Running),
+            Command::StopFront => self.fronts.stand(Standing::Stopped),
             Command::ClearFronts => self.fronts.clear(),
-            Command::ExportFront(folder) => self.fronts.write(folder),
+            Command::ExportFront(folder) => self.export_front(folder),
             Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),
             Command::TakePreview => self.take_preview(),
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
@@ -411,6 +411,14 @@ impl Session {
             }
             Err(why) => self.say(Severity::Warning, why.to_string()),
         }
+    }
+
+    fn export_front(&mut self, folder: Option<PathBuf>) {
+        let Some(folder) = folder else {
+            let text = "choose a folder to export the front to";
+            return self.say(Severity::Warning, text.to_owned());
+        };
+        self.fronts.sweeper().write(folder);
     }
 
     fn hear_front(&mut self, told: Told) {

@@ -1,10 +1,10 @@
 //! The fronts of a session: the one that is swept, those before it, and where the design stands.
 
 use super::sweeper::{FrontRun, Job, Judged, Sweeper, Told};
+use super::worker::Standing;
 use crate::lens::Lens;
 use crate::optimize::pareto::Settings;
 use std::io;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// How many earlier runs are kept.
@@ -17,6 +17,8 @@ pub struct Fronts {
     pub run: Option<Arc<FrontRun>>,
     /// Whether one was asked for that has not begun yet.
     pub starting: bool,
+    /// How the run will stand once its slice is done, where it was told so.
+    pub pending: Option<Standing>,
     /// Runs before it, the oldest first.
     pub earlier: Vec<Arc<FrontRun>>,
     /// The design among them; maybe as it was a moment ago.
@@ -35,6 +37,7 @@ pub(super) struct FrontDesk {
     number: Option<u64>,
     earlier: Vec<Arc<FrontRun>>,
     failed: Option<String>,
+    pending: Option<Standing>,
     /// The design that was judged last.
     asked: Option<Arc<Lens>>,
 }
@@ -47,6 +50,7 @@ impl FrontDesk {
             number: None,
             earlier: Vec::new(),
             failed: None,
+            pending: None,
             asked: None,
         })
     }
@@ -64,8 +68,18 @@ impl FrontDesk {
         self.count += 1;
         self.number = Some(self.count);
         self.failed = None;
+        self.pending = None;
         let lens = Arc::clone(lens);
         self.sweeper.start(Job { number: self.count, lens, settings, compare });
+    }
+
+    /// Lets the run stand otherwise once its slice is done; a run that has ended stays so.
+    pub(super) fn stand(&mut self, standing: Standing) {
+        let ended = self.run().is_some_and(|run| !run.is_under_way());
+        if self.number.is_some() && self.failed.is_none() && !ended {
+            self.pending = Some(standing);
+            self.sweeper.stand(standing);
+        }
     }
 
     /// Ends the run and forgets all of them.
@@ -73,12 +87,9 @@ impl FrontDesk {
         self.sweeper.clear();
         self.number = None;
         self.earlier.clear();
+        self.pending = None;
         self.failed = None;
         self.asked = None;
-    }
-
-    pub(super) fn write(&self, folder: PathBuf) {
-        self.sweeper.write(folder);
     }
 
     /// What happened since the last look to the run that is shown.
@@ -89,8 +100,16 @@ impl FrontDesk {
             Told::Written(..) | Told::NotWritten(_) => true,
         });
         for told in &told {
-            if let Told::Failed(_, why) = told {
-                self.failed = Some(why.clone());
+            match told {
+                Told::Failed(_, why) => {
+                    self.failed = Some(why.clone());
+                    self.pending = None;
+                }
+                // What it stands as now may be older than what it was told since.
+                Told::Now(_, now) if Some(*now) == self.pending || !goes_on(*now) => {
+                    self.pending = None;
+                }
+                _ => {}
             }
         }
         told
@@ -110,6 +129,7 @@ impl FrontDesk {
         Fronts {
             starting: self.number.is_some() && run.is_none() && self.failed.is_none(),
             run,
+            pending: self.pending,
             earlier: self.earlier.clone(),
             here: self.sweeper.judged().filter(|_| self.asked.is_some()),
             failed: self.failed.clone(),
@@ -119,4 +139,8 @@ impl FrontDesk {
     fn run(&self) -> Option<Arc<FrontRun>> {
         self.sweeper.run().filter(|run| Some(run.number) == self.number)
     }
+}
+
+const fn goes_on(standing: Standing) -> bool {
+    matches!(standing, Standing::Running | Standing::Paused)
 }

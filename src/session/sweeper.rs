@@ -12,6 +12,7 @@ use crate::lens::Lens;
 use crate::merit::PupilEdge;
 use crate::optimize::pareto::{Design, Front, Settings, Slice, Sweep};
 use crate::pupil::limited_by_stop;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -55,7 +56,7 @@ pub struct Leg {
     pub tried: Arc<Vec<[f64; 2]>>,
     /// The hypervolume of the front against twice the spot of the lens at the start.
     pub hypervolume: f64,
-    /// Steps of Adam so far, over all chains.
+    /// Steps so far, over all chains; those that a descent did not need count as taken.
     pub done: usize,
     /// Steps in all.
     pub total: usize,
@@ -156,9 +157,7 @@ pub(super) struct Job {
 /// What a sweep is told.
 enum Order {
     Start(Job),
-    Pause,
-    Resume,
-    Stop,
+    Stand(Standing),
     Clear,
     Write(PathBuf),
     Judge(Arc<Lens>),
@@ -216,12 +215,15 @@ impl Sweeper {
         let (orders, inbox) = mpsc::channel();
         let (outbox, told) = mpsc::channel();
         let (shown, judged) = (Slot::default(), Slot::default());
+        let name = |i: usize| format!("front {i}");
+        let pool = ThreadPoolBuilder::new().thread_name(name).build().map_err(io::Error::other)?;
         let desk = Desk {
             inbox,
             outbox,
             shown: shown.clone(),
             judged: judged.clone(),
             begin,
+            pool,
             wake: Box::new(wake),
             pace: Pace::new(BETWEEN),
             run: None,
@@ -234,16 +236,9 @@ impl Sweeper {
         self.tell(Order::Start(job));
     }
 
-    pub(super) fn pause(&self) {
-        self.tell(Order::Pause);
-    }
-
-    pub(super) fn resume(&self) {
-        self.tell(Order::Resume);
-    }
-
-    pub(super) fn stop(&self) {
-        self.tell(Order::Stop);
+    /// Holds the sweep, lets it go on or ends it, after its slice.
+    pub(super) fn stand(&self, standing: Standing) {
+        self.tell(Order::Stand(standing));
     }
 
     /// Ends the sweep and forgets it.
@@ -300,6 +295,8 @@ struct Desk {
     shown: Slot<FrontRun>,
     judged: Slot<Judged>,
     begin: Box<Begin>,
+    /// Threads of its own: numbers of panels do not queue behind a slice.
+    pool: ThreadPool,
     wake: Box<dyn Fn() + Send>,
     pace: Pace,
     run: Option<Run>,
@@ -337,22 +334,20 @@ impl Desk {
     }
 
     fn obey(&mut self, order: Order) {
-        let standing = self.run.as_ref().map(|run| run.state.standing);
-        match (order, standing) {
-            (Order::Start(job), _) => self.start(job),
-            (Order::Pause, Some(Standing::Running)) => self.stand(Standing::Paused),
-            (Order::Resume, Some(Standing::Paused)) => self.stand(Standing::Running),
-            (Order::Stop, Some(Standing::Running | Standing::Paused)) => {
-                self.stand(Standing::Stopped);
+        match order {
+            Order::Start(job) => self.start(job),
+            Order::Stand(standing) => {
+                if self.run.as_ref().is_some_and(|run| run.state.is_under_way()) {
+                    self.stand(standing);
+                }
             }
-            (Order::Clear, _) => self.run = None,
-            (Order::Write(folder), _) => self.write(&folder),
-            (Order::Judge(lens), _) => {
+            Order::Clear => self.run = None,
+            Order::Write(folder) => self.write(&folder),
+            Order::Judge(lens) => {
                 let found = guarded(|| judge(&lens));
                 self.judged.set(Judged { lens, found });
                 (self.wake)();
             }
-            _ => {}
         }
     }
 
@@ -396,7 +391,7 @@ impl Desk {
     /// Goes on for a slice; then the next leg follows, or the end.
     fn advance(&mut self) {
         let Some(run) = &mut self.run else { return };
-        let finished = match guarded(|| Ok(run.step())) {
+        let finished = match guarded(|| Ok(run.step(&self.pool))) {
             Ok(finished) => finished,
             Err(why) => return self.give_up(why),
         };
@@ -459,8 +454,9 @@ impl Run {
     }
 
     /// Whether the slice was the last one.
-    fn step(&mut self) -> bool {
-        let Timed { value: slice, ms } = timed(|| self.sweep.step());
+    fn step(&mut self, pool: &ThreadPool) -> bool {
+        let sweep = &mut self.sweep;
+        let Timed { value: slice, ms } = timed(|| pool.install(|| sweep.step()));
         let finished = slice.finished;
         self.leg().count(slice, ms);
         finished
@@ -475,4 +471,58 @@ fn judge(lens: &Lens) -> Result<Design, String> {
 /// Does something; a panic becomes its words.
 fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(said(panic.as_ref())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::blank;
+
+    /// Breaks at its third step.
+    struct Breaks {
+        start: Design,
+        front: Front,
+        steps: usize,
+    }
+
+    impl Sweeps for Breaks {
+        fn step(&mut self) -> Slice {
+            self.steps += 1;
+            assert!(self.steps < 3, "the toy breaks");
+            Slice { done: self.steps, total: 9, joined: 0, refused: None, finished: false }
+        }
+
+        fn start(&self) -> &Design {
+            &self.start
+        }
+
+        fn front(&self) -> &Front {
+            &self.front
+        }
+
+        fn tried(&self) -> &[[f64; 2]] {
+            &[]
+        }
+    }
+
+    #[test]
+    fn a_panic_ends_the_sweep_and_is_told_and_the_next_one_runs() -> io::Result<()> {
+        let begin = |lens: &Lens, _: &Settings| {
+            let start = judge(lens)?;
+            let mut front = Front::default();
+            front.offer(start.clone());
+            Ok(Box::new(Breaks { start, front, steps: 0 }) as Box<dyn Sweeps>)
+        };
+        let sweeper = Sweeper::with(Box::new(begin), || {})?;
+        for number in 1..3 {
+            let (lens, settings) = (Arc::new(blank()), Settings::default());
+            sweeper.start(Job { number, lens, settings, compare: false });
+            let told: Vec<Told> = sweeper.told.iter().take(2).collect();
+            let failed = Told::Failed(number, "the search failed: the toy breaks".to_owned());
+            assert_eq!(told, [Told::Now(number, Standing::Running), failed]);
+            let run = sweeper.run().map(|run| (run.number, run.standing, run.main.done));
+            assert_eq!(run, Some((number, Standing::Stopped, 2)), "what was found stays");
+        }
+        Ok(())
+    }
 }

@@ -110,6 +110,11 @@ impl Studio {
 
     fn fulfil(&mut self, context: &Context, view: &View, wish: Wish) {
         match wish {
+            Wish::Do(Command::ExportFront(None)) => {
+                let folder = view.path.as_deref().map(|path| path.with_file_name("front"));
+                let folder = folder.unwrap_or_else(|| PathBuf::from("front"));
+                self.chooser.ask(context, Purpose::ExportFront, Some(&folder));
+            }
             Wish::Choose(purpose) => self.chooser.ask(context, purpose, view.path.as_deref()),
             Wish::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name) {
                 Ok(opened) => self.replace(context, Command::New(Box::new(opened.lens))),
@@ -147,6 +152,7 @@ impl Studio {
         match purpose {
             Purpose::Open => self.replace(context, Command::Open(path)),
             Purpose::Save => self.apply(context, Command::Save(Some(path))),
+            Purpose::ExportFront => self.apply(context, Command::ExportFront(Some(path))),
             Purpose::ExportZemax | Purpose::ExportJson => {
                 self.apply(context, Command::Export(path));
             }

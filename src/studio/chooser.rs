@@ -18,6 +18,8 @@ pub enum Purpose {
     ExportZemax,
     /// To write a copy of the lens in our own form.
     ExportJson,
+    /// To write a front into a folder.
+    ExportFront,
 }
 
 impl Purpose {
@@ -27,6 +29,7 @@ impl Purpose {
             Self::Save => "Save the lens",
             Self::ExportZemax => "Export the lens for Zemax",
             Self::ExportJson => "Export a copy of the lens",
+            Self::ExportFront => "Export the front into a folder",
         }
     }
 
@@ -35,15 +38,23 @@ impl Purpose {
             Self::Open => &["json", "zmx", "ZMX"],
             Self::Save | Self::ExportJson => &["json"],
             Self::ExportZemax => &["zmx"],
+            Self::ExportFront => &[],
         }
+    }
+
+    /// Whether the name of a new file is asked for.
+    fn names_a_file(self) -> bool {
+        !matches!(self, Self::Open | Self::ExportFront)
     }
 
     /// The path with the extension that it needs, if it has none.
     fn complete(self, path: PathBuf) -> PathBuf {
-        if self == Self::Open || path.extension().is_some() {
-            return path;
+        match self.extensions().first() {
+            Some(extension) if self != Self::Open && path.extension().is_none() => {
+                path.with_extension(extension)
+            }
+            _ => path,
         }
-        path.with_extension(self.extensions()[0])
     }
 }
 
@@ -134,18 +145,23 @@ fn open_dialog(
     near: Option<&Path>,
 ) -> std::io::Result<Receiver<Option<PathBuf>>> {
     let (give, answer) = channel();
-    let mut dialog = rfd::FileDialog::new()
-        .set_title(purpose.title())
-        .add_filter("Lenses", purpose.extensions());
+    let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
+    if purpose != Purpose::ExportFront {
+        dialog = dialog.add_filter("Lenses", purpose.extensions());
+    }
     if let Some(directory) = near.and_then(Path::parent).filter(|dir| dir.is_dir()) {
         dialog = dialog.set_directory(directory);
     }
-    if let Some(name) = near.and_then(Path::file_name).filter(|_| purpose != Purpose::Open) {
+    if let Some(name) = near.and_then(Path::file_name).filter(|_| purpose.names_a_file()) {
         dialog = dialog.set_file_name(name.to_string_lossy());
     }
     let context = context.clone();
     thread::Builder::new().name("file dialog".into()).spawn(move || {
-        let path = if purpose == Purpose::Open { dialog.pick_file() } else { dialog.save_file() };
+        let path = match purpose {
+            Purpose::Open => dialog.pick_file(),
+            Purpose::ExportFront => dialog.pick_folder(),
+            _ => dialog.save_file(),
+        };
         // Nobody listens when the window was closed before the dialog.
         drop(give.send(path));
         context.request_repaint();
@@ -174,5 +190,6 @@ mod tests {
         assert_eq!(complete(Purpose::Save, "a/lens.v2"), PathBuf::from("a/lens.v2"));
         assert_eq!(complete(Purpose::ExportZemax, "lens"), PathBuf::from("lens.zmx"));
         assert_eq!(complete(Purpose::Open, "lens"), PathBuf::from("lens"));
+        assert_eq!(complete(Purpose::ExportFront, "front"), PathBuf::from("front"));
     }
 }

@@ -128,6 +128,11 @@ fn file(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
     if item(ui, "Export a copy as JSON…", None) {
         wishes.push(Wish::Choose(Purpose::ExportJson));
     }
+    ui.add_enabled_ui(view.fronts.run.is_some(), |ui| {
+        if item(ui, "Export the front…", None) {
+            wishes.push(Wish::Do(Command::ExportFront(None)));
+        }
+    });
     ui.separator();
     if item(ui, "Quit", None) {
         ui.ctx().send_viewport_cmd(ViewportCommand::Close);

@@ -46,8 +46,10 @@ pub(super) fn stand<P: Panel + 'static>(panel: P, view: View) -> Harness<'static
         let before = stand.wishes.len();
         stand.panel.ui(ui, &stand.view, &mut stand.wishes);
         for wish in &stand.wishes[before..] {
-            if let Command::Select(surface) = wish {
-                stand.view.selected = *surface;
+            match wish {
+                Command::Select(surface) => stand.view.selected = *surface,
+                Command::Preview(lens) => stand.view.candidate = lens.clone().map(Arc::from),
+                _ => {}
             }
         }
     };

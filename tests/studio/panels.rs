@@ -5,11 +5,12 @@ use std::sync::Arc;
 use aplanat::effects::{Choice, Effect};
 use aplanat::lens::{Aperture, Medium, Object, Parameter, Quantity, Row, Variable};
 use aplanat::merit::{Goal, PupilEdge, Term};
-use aplanat::optimize::{Method, Progress};
-use aplanat::session::{Command, Edit, Search, Standing, Task, View};
+use aplanat::optimize::{Method, Progress, pareto};
+use aplanat::session::{Command, Edit, FrontRun, Fronts, Leg, Search, Standing, Task, View};
 use aplanat::studio::draw::Backing;
 use aplanat::studio::panels::{
-    Effects, FirstOrderData, LensLayout, Optimizer, Panel, Prescription, Pupils, SpotDiagram,
+    Effects, FirstOrderData, LensLayout, Optimizer, Panel, ParetoFront, Prescription, Pupils,
+    SpotDiagram,
 };
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
@@ -462,4 +463,129 @@ fn a_lens_that_cannot_be_traced_says_why_in_every_panel() {
     let mut harness = stand(SpotDiagram::new(Backing::Software), broken);
     harness.run();
     harness.get_by_label("No beam at surface 3");
+}
+
+/// A front of the double Gauss that stands somehow, and one before it.
+fn fronts(standing: Standing) -> View {
+    let view = view();
+    let settings = pareto::Settings { points: 2, steps: 10, ..pareto::Settings::default() };
+    let mut sweep = pareto::Sweep::new(&view.lens, &settings).unwrap();
+    while !sweep.step().finished {}
+    let leg = Leg {
+        front: Arc::new(sweep.front().clone()),
+        tried: Arc::new(sweep.tried().to_vec()),
+        hypervolume: sweep.hypervolume(),
+        done: 400,
+        total: 400,
+        seconds: 2.0,
+        refused: None,
+    };
+    let run = FrontRun {
+        number: 2,
+        standing,
+        settings,
+        compare: true,
+        lens: Arc::clone(&view.lens),
+        start: Arc::new(sweep.start),
+        main: leg.clone(),
+        biased: Some(leg),
+    };
+    let earlier = vec![Arc::new(FrontRun { number: 1, ..run.clone() })];
+    let fronts = Fronts { run: Some(Arc::new(run)), earlier, ..Fronts::default() };
+    View { fronts, ..view }
+}
+
+fn pareto_front(view: View) -> Harness<'static, Stand<ParetoFront>> {
+    let mut harness = stand(ParetoFront::default(), view);
+    harness.run();
+    harness
+}
+
+#[test]
+fn a_front_is_wished_for_with_the_settings_of_the_panel() {
+    let mut harness = pareto_front(view());
+    harness.get_by_label_contains("How sharp can this lens be for how much light?");
+    harness.get_by_label("Compare with kept pupils").click();
+    harness.run();
+    harness.get_by_label("Start").click();
+    harness.run();
+    let settings = pareto::Settings::default();
+    assert_eq!(harness.state().wishes, [Command::StartFront { settings, compare: true }]);
+}
+
+#[test]
+fn a_sweep_can_be_held_ended_exported_and_forgotten() {
+    let cases = [
+        (Standing::Running, "Pause", Command::PauseFront),
+        (Standing::Paused, "Resume", Command::ResumeFront),
+        (Standing::Running, "Stop", Command::StopFront),
+        (Standing::Finished, "Export…", Command::ExportFront(None)),
+        (Standing::Stopped, "Clear", Command::ClearFronts),
+    ];
+    for (standing, button, command) in cases {
+        let mut harness = pareto_front(fronts(standing));
+        harness.get_by_label(button).click();
+        harness.run();
+        assert_eq!(harness.state().wishes, [command], "{button}");
+    }
+}
+
+#[test]
+fn lenses_of_the_front_are_stepped_through_and_taken() {
+    let view = fronts(Standing::Finished);
+    let run = view.fronts.run.clone().unwrap();
+    let designs = run.main.front.designs();
+    let mut harness = pareto_front(view);
+    harness.get_by_label_contains("hypervolume");
+    harness.get_by_label("Sharper").click();
+    harness.run();
+    let preview = |i: usize| Command::Preview(Some(Box::new(designs[i].lens.clone())));
+    assert_eq!(harness.state().wishes, [preview(0)]);
+    harness.get_by_label("Brighter").click();
+    harness.run();
+    harness.get_by_label_contains("% of the start");
+    harness.get_by_label("Take this lens").click();
+    harness.run();
+    assert_eq!(harness.state().wishes[1..], [preview(1), Command::TakePreview]);
+}
+
+#[test]
+fn a_click_on_a_point_shows_its_lens() {
+    let mut harness = pareto_front(fronts(Standing::Finished));
+    let plot = harness.get_by_label_contains("Front of").rect();
+    // Somewhere on the way across the plot lies a point.
+    'search: for i in 0..40 {
+        for j in 0..25 {
+            let share = eframe::egui::vec2(i as f32 / 40.0, j as f32 / 25.0);
+            let at = plot.min + share * plot.size();
+            harness.hover_at(at);
+            harness.run();
+            if harness.query_by_label_contains("RMS ").is_some() {
+                harness.drag_at(at);
+                harness.drop_at(at);
+                harness.run();
+                break 'search;
+            }
+        }
+    }
+    let [Command::Preview(Some(_))] = harness.state().wishes.as_slice() else {
+        panic!("{:?}", harness.state().wishes.len());
+    };
+}
+
+#[test]
+fn a_front_that_failed_says_why_and_a_dark_lens_cannot_begin_one() {
+    let mut failed = view();
+    failed.fronts.failed = Some("surface 2 is steeper than a hemisphere".to_owned());
+    pareto_front(failed).get_by_label("Surface 3 is steeper than a hemisphere");
+
+    let mut dark = view();
+    let mut results = Arc::unwrap_or_clone(dark.results.take().unwrap());
+    results.numbers = Err("no beam at surface 2".to_owned());
+    dark.results = Some(Arc::new(results));
+    let mut harness = pareto_front(dark);
+    harness.get_by_label("Start").click();
+    harness.run();
+    assert_eq!(harness.state().wishes, []);
+    harness.get_by_label("No light gets through this lens");
 }

@@ -7,7 +7,7 @@ use aplanat::optimize::pareto::{Design, Front, Settings, Sweep};
 
 /// The lens at the start and the front of a short sweep.
 fn swept() -> Sweep {
-    let settings = Settings { points: 4, steps: 50, ..Settings::default() };
+    let settings = Settings { points: 2, steps: 20, ..Settings::default() };
     let mut sweep = Sweep::new(&bundled("double_gauss_rudolph_50"), &settings).unwrap();
     while !sweep.step().finished {}
     sweep
@@ -22,7 +22,7 @@ fn a_front_is_written_with_every_lens() {
     let survey = Survey { name: "test", start, front, tried, biased };
     let written = write(&survey, &folder.join("new")).unwrap();
     let designs = front.designs();
-    assert!(designs.len() > 3);
+    assert!(designs.len() > 1);
     assert_eq!(written.len(), 3 + 2 * designs.len());
 
     let table = std::fs::read_to_string(&written[0]).unwrap();

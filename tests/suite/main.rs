@@ -19,4 +19,5 @@ mod pareto;
 mod pupil;
 mod reference;
 mod session;
+mod session_front;
 mod trace;

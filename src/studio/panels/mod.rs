@@ -5,6 +5,7 @@ mod effects;
 mod first_order;
 mod layout;
 mod optimizer;
+mod pareto;
 mod prescription;
 mod pupil;
 mod spot;
@@ -13,6 +14,7 @@ pub use effects::Effects;
 pub use first_order::FirstOrderData;
 pub use layout::LensLayout;
 pub use optimizer::Optimizer;
+pub use pareto::ParetoFront;
 pub use prescription::Prescription;
 pub(super) use prescription::first_field;
 pub use pupil::Pupils;
@@ -58,6 +60,8 @@ pub enum Kind {
     Pupil,
     /// The search for a better lens.
     Optimizer,
+    /// What the lens can have of sharpness for how much light.
+    Pareto,
     /// Focal lengths, pupils, third-order sums.
     FirstOrder,
     /// Which physics is computed, and why.
@@ -66,12 +70,13 @@ pub enum Kind {
 
 impl Kind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Layout,
         Self::Prescription,
         Self::Spot,
         Self::Pupil,
         Self::Optimizer,
+        Self::Pareto,
         Self::FirstOrder,
         Self::Effects,
     ];
@@ -84,6 +89,7 @@ impl Kind {
             Self::Spot => Box::new(SpotDiagram::new(backing)),
             Self::Pupil => Box::new(Pupils::default()),
             Self::Optimizer => Box::new(Optimizer::default()),
+            Self::Pareto => Box::new(ParetoFront::default()),
             Self::FirstOrder => Box::new(FirstOrderData),
             Self::Effects => Box::new(Effects),
         }

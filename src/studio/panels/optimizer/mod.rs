@@ -120,7 +120,7 @@ impl Optimizer {
     }
 }
 
-fn methods(ui: &mut Ui, chosen: &mut Method) {
+pub(super) fn methods(ui: &mut Ui, chosen: &mut Method) {
     let combo = ComboBox::from_id_salt("method").selected_text(chosen.name()).width(160.0);
     let combo = combo.show_ui(ui, |ui| {
         for method in [Method::DampedLeastSquares, Method::Adam] {

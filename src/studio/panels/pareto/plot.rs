@@ -1,0 +1,188 @@
+//! The plane of light and sharpness: the front over all that was tried, the biased front and
+//! earlier ones in grey, the design as a ring.
+
+use std::ops::RangeInclusive;
+
+use eframe::egui::{Color32, CursorIcon, PointerButton, Pos2, Role, Ui, WidgetInfo};
+use egui_plot::{
+    Corner, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform,
+    PlotUi, Points,
+};
+
+use super::words;
+use crate::optimize::pareto::{Design, Front};
+use crate::session::{FrontRun, View};
+
+/// How near the pointer must be to a point to mean it, in points of the screen.
+const NEAR: f32 = 14.0;
+/// The room around what is shown, as a share of it.
+const MARGIN: f64 = 0.06;
+
+/// A lens that was clicked.
+pub(super) struct Clicked {
+    pub(super) design: Design,
+    pub(super) twice: bool,
+}
+
+/// Light in mm² and spot in µm.
+fn place(design: &Design) -> [f64; 2] {
+    [design.light, 1e3 * design.spot]
+}
+
+fn places(front: &Front) -> Vec<[f64; 2]> {
+    front.designs().iter().map(place).collect()
+}
+
+/// Shows the plane in all the room that is left; the lens that was clicked, if one was.
+pub(super) fn plot(
+    ui: &mut Ui,
+    view: &View,
+    run: &FrontRun,
+    chosen: Option<&Design>,
+    fitted: &mut bool,
+) -> Option<Clicked> {
+    let colors = Colors::of(ui);
+    let bounds = bounds(view, run);
+    let plot = Plot::new("front")
+        .height(ui.available_height())
+        .legend(Legend::default().position(Corner::LeftTop).background_alpha(0.6))
+        .x_axis_label("light, mm²")
+        .y_axis_label("RMS spot, µm")
+        .y_axis_min_width(36.0)
+        .allow_scroll(false)
+        .allow_double_click_reset(false)
+        .show_crosshair(false)
+        .label_formatter(|_| None)
+        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
+        .grid_spacing(12.0..=70.0);
+    let fit = *fitted;
+    let shown = plot.show(ui, |plot| {
+        if fit {
+            plot.set_plot_bounds_x(bounds[0].clone());
+            plot.set_plot_bounds_y(bounds[1].clone());
+        }
+        draw(plot, view, run, chosen, &colors);
+    });
+    let response = shown.response;
+    if response.dragged() || response.hovered() && ui.input(|input| input.zoom_delta() != 1.0) {
+        *fitted = false;
+    }
+    let label = format!("Front of {} lenses, spot against light", run.main.front.designs().len());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
+    let (design, at) = nearest(view, run, response.hover_pos()?, &shown.transform)?;
+    let ring = ui.visuals().selection.stroke;
+    ui.painter_at(response.rect).circle_stroke(at, 7.0, ring);
+    let clicked = response.clicked_by(PointerButton::Primary);
+    let twice = response.double_clicked_by(PointerButton::Primary);
+    response
+        .on_hover_cursor(CursorIcon::PointingHand)
+        .on_hover_text_at_pointer(words::worth(design, &run.start));
+    (clicked || twice).then(|| Clicked { design: design.clone(), twice })
+}
+
+/// The lens nearest to a place on the screen: of the front, of the biased one, of earlier ones.
+fn nearest<'a>(
+    view: &'a View,
+    run: &'a FrontRun,
+    pointer: Pos2,
+    transform: &PlotTransform,
+) -> Option<(&'a Design, Pos2)> {
+    let earlier = view.fronts.earlier.iter().flat_map(|run| run.main.front.designs());
+    let biased = run.biased.iter().flat_map(|leg| leg.front.designs());
+    let all = run.main.front.designs().iter().chain(biased).chain(earlier);
+    let on_screen = |design: &'a Design| {
+        let [x, y] = place(design);
+        (design, transform.position_from_point(&PlotPoint::new(x, y)))
+    };
+    let distance = |(_, at): &(&Design, Pos2)| at.distance(pointer);
+    let near = all.map(on_screen).filter(|found| distance(found) < NEAR);
+    near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+/// The range of both axes that shows all fronts, the start and the design. What was tried on the
+/// way may lie far outside.
+fn bounds(view: &View, run: &FrontRun) -> [RangeInclusive<f64>; 2] {
+    let legs = std::iter::once(&run.main).chain(&run.biased);
+    let legs = legs.chain(view.fronts.earlier.iter().map(|run| &run.main));
+    let mut points: Vec<[f64; 2]> = legs.flat_map(|leg| places(&leg.front)).collect();
+    points.push(place(&run.start));
+    points.extend(here(view));
+    [0, 1].map(|axis| {
+        let values = points.iter().map(|point| point[axis]).filter(|value| value.is_finite());
+        let (low, high) = values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
+        // A single point has no range of its own.
+        let room = (MARGIN * (high - low)).max(0.02 * high.abs()).max(f64::MIN_POSITIVE);
+        low - room..=high + room
+    })
+}
+
+/// Where the design stands.
+fn here(view: &View) -> Option<[f64; 2]> {
+    let judged = view.fronts.here.as_deref()?;
+    Some(place(judged.found.as_ref().ok()?))
+}
+
+/// What the plane is coloured with.
+struct Colors {
+    front: Color32,
+    kept: Color32,
+    faint: Color32,
+    strong: Color32,
+    chosen: Color32,
+}
+
+impl Colors {
+    fn of(ui: &Ui) -> Self {
+        let visuals = ui.visuals();
+        Self {
+            front: visuals.hyperlink_color,
+            kept: visuals.weak_text_color(),
+            faint: visuals.weak_text_color().gamma_multiply(0.45),
+            strong: visuals.strong_text_color(),
+            chosen: visuals.warn_fg_color,
+        }
+    }
+}
+
+fn draw(
+    plot: &mut PlotUi<'_>,
+    view: &View,
+    run: &FrontRun,
+    chosen: Option<&Design>,
+    colors: &Colors,
+) {
+    let tried: Vec<[f64; 2]> =
+        run.leg().tried.iter().map(|[spot, light]| [*light, 1e3 * spot]).collect();
+    plot.points(Points::new("tried", tried).radius(1.2).color(colors.faint).allow_hover(false));
+    for earlier in &view.fronts.earlier {
+        let name = format!("run {}: {:.4}", earlier.number, earlier.main.hypervolume);
+        curve(plot, &name, &earlier.main.front, colors.faint, LineStyle::Solid);
+    }
+    if let Some(biased) = &run.biased {
+        let name = format!("pupils kept: {:.4}", biased.hypervolume);
+        curve(plot, &name, &biased.front, colors.kept, LineStyle::dashed_dense());
+    }
+    let name = format!("run {}: {:.4}", run.number, run.main.hypervolume);
+    curve(plot, &name, &run.main.front, colors.front, LineStyle::Solid);
+    let start = Points::new("start", vec![place(&run.start)]).shape(MarkerShape::Cross);
+    plot.points(start.radius(5.0).color(colors.strong).allow_hover(false));
+    if let Some(here) = here(view) {
+        ring(plot, "design", here, 6.0, colors.strong);
+    }
+    if let Some(chosen) = chosen {
+        ring(plot, "shown lens", place(chosen), 8.0, colors.chosen);
+    }
+}
+
+/// A front as connected points.
+fn curve(plot: &mut PlotUi<'_>, name: &str, front: &Front, color: Color32, style: LineStyle) {
+    let line = Line::new(name, PlotPoints::from(places(front))).color(color).width(1.2);
+    plot.line(line.style(style).allow_hover(false));
+    plot.points(Points::new(name, places(front)).color(color).radius(2.6).allow_hover(false));
+}
+
+fn ring(plot: &mut PlotUi<'_>, name: &str, at: [f64; 2], radius: f32, color: Color32) {
+    let ring = Points::new(name, vec![at]).shape(MarkerShape::Circle).filled(false);
+    plot.points(ring.radius(radius).color(color).allow_hover(false));
+}

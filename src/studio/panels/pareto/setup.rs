@@ -1,0 +1,79 @@
+//! How a front is to be swept: how many weights, how long each, from which blur to which.
+
+use std::ops::RangeInclusive;
+
+use eframe::egui::{DragValue, Ui};
+
+use crate::optimize::pareto::Settings;
+use crate::session::{Command, View};
+use crate::studio::panels::numbers;
+use crate::studio::panels::optimizer::methods;
+
+/// The settings that a person sees.
+#[derive(Debug, Default)]
+pub(super) struct Setup {
+    settings: Settings,
+    compare: bool,
+}
+
+impl Setup {
+    /// The wish for a sweep.
+    pub(super) fn command(&self) -> Command {
+        Command::StartFront { settings: self.settings.clone(), compare: self.compare }
+    }
+
+    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View) {
+        let Settings { points, steps, blur, method, .. } = &mut self.settings;
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            count(ui, "points", points, 1..=200, "How many weights between sharpness and light");
+            count(ui, "steps each", steps, 1..=100_000, "No more steps than this for every weight");
+            methods(ui, method);
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.weak("Rim blur").on_hover_text(BLUR);
+            blurs(ui, blur, focal_length(view));
+            ui.add_space(6.0);
+            ui.checkbox(&mut self.compare, "Compare with kept pupils").on_hover_text(COMPARE);
+        });
+    }
+}
+
+const BLUR: &str = "How far a ray at the rim of the pupil may be off before light is given up for \
+    sharpness: the root of the weight. A small blur asks for sharp lenses, a large one for bright \
+    ones.";
+const COMPARE: &str = "Afterwards the same again with derivatives that keep the rays as they are, \
+    as most programs do: they do not see what the rims of the lens let through. Its front is drawn \
+    in grey.";
+
+fn count(ui: &mut Ui, name: &str, value: &mut usize, range: RangeInclusive<usize>, hint: &str) {
+    let drag = DragValue::new(value).range(range).speed(0.5);
+    ui.add(drag).on_hover_text(hint).accessible_name(name);
+    ui.weak(name);
+}
+
+/// The smallest and the largest blur, in µm of this focal length in mm.
+fn blurs(ui: &mut Ui, [low, high]: &mut [f64; 2], focal_length: f64) {
+    let um = 1e3 * focal_length;
+    blur(ui, "Smallest blur", low, um, 1e-6..=*high);
+    ui.weak("to");
+    blur(ui, "Largest blur", high, um, *low..=0.1);
+}
+
+fn blur(ui: &mut Ui, name: &str, share: &mut f64, um: f64, range: RangeInclusive<f64>) {
+    let mut value = *share * um;
+    let range = range.start() * um..=range.end() * um;
+    let drag = DragValue::new(&mut value).range(range).speed(0.01 * *share * um);
+    let drag = ui.add(drag.max_decimals(1).suffix(" µm")).on_hover_text(BLUR);
+    if drag.accessible_name(name).changed() {
+        *share = value / um;
+    }
+}
+
+/// The focal length in mm; for a lens without one its length, as the sweep takes it.
+fn focal_length(view: &View) -> f64 {
+    let efl = numbers(view).and_then(|numbers| numbers.first().efl).map(f64::abs);
+    let length = || view.lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
+    efl.filter(|efl| efl.is_finite() && *efl > 0.0).unwrap_or_else(length)
+}

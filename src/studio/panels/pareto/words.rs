@@ -1,0 +1,117 @@
+//! The numbers of a front in words: how far it is, how much it covers, what a lens on it is worth.
+
+use eframe::egui::{Label, RichText, Ui};
+
+use crate::lens::{Lens, Quantity};
+use crate::optimize::pareto::Design;
+use crate::session::{FrontRun, Standing, View};
+use crate::studio::number;
+use crate::studio::wording::{capital, counted_from_one};
+
+/// What a sweep may change, and what it takes as it is.
+pub(super) fn free(ui: &mut Ui, view: &View) {
+    let lens = view.fronts.run.as_ref().filter(|run| run.is_under_way());
+    let free = match lens {
+        Some(run) => counted(&run.start.lens),
+        None if view.lens.variables.is_empty() => {
+            "all curvatures, gaps and semi-diameters".to_owned()
+        }
+        None => format!("the {} variables and all semi-diameters", view.lens.variables.len()),
+    };
+    let text = format!(
+        "Free: {free}. Fields and wavelengths are those of the lens, its aperture becomes the rim \
+         of the stop."
+    );
+    ui.add(Label::new(RichText::new(text).small().weak()).wrap()).on_hover_text(
+        "A lens without variables has all its curvatures and gaps free; the focal length and the \
+         thicknesses of glass and air stay sensible. The aperture becomes the semi-diameter of the \
+         stop, so that the pupil is what the rims let through and nothing else.",
+    );
+}
+
+/// How many numbers of each kind are free.
+fn counted(lens: &Lens) -> String {
+    let kinds = [
+        ("curvatures", Quantity::Curvature),
+        ("gaps", Quantity::Thickness),
+        ("semi-diameters", Quantity::SemiDiameter),
+    ];
+    let free = || lens.variables.iter().map(|variable| variable.parameter.quantity);
+    let count = |kind: Quantity| free().filter(|quantity| *quantity == kind).count();
+    let mut parts = kinds.map(|(name, kind)| (count(kind), name)).to_vec();
+    let named: usize = parts.iter().map(|(count, _)| count).sum();
+    parts.push((free().count() - named, "others"));
+    parts.retain(|(count, _)| *count > 0);
+    let parts: Vec<String> = parts.iter().map(|(count, name)| format!("{count} {name}")).collect();
+    parts.join(", ")
+}
+
+/// How far the run is.
+pub(super) fn progress(run: &FrontRun, pending: Option<Standing>) -> String {
+    let standing = match run.standing {
+        _ if pending == Some(Standing::Paused) => "Pausing…",
+        _ if pending == Some(Standing::Stopped) => "Stopping…",
+        Standing::Running => "Running",
+        Standing::Paused => "Paused",
+        Standing::Stopped => "Stopped",
+        Standing::Finished => "Finished",
+    };
+    let leg = run.leg();
+    let kept = if run.biased.is_some() { ", pupils kept" } else { "" };
+    let rate = leg.done as f64 / leg.seconds;
+    let rate = if rate.is_finite() { format!(", {rate:.0} steps/s") } else { String::new() };
+    let (done, total, seconds) = (leg.done, leg.total, leg.seconds);
+    format!("{standing}{kept}: {done} of {total} steps{rate}, {seconds:.1} s")
+}
+
+/// How many lenses there are, and how much their fronts cover.
+pub(super) fn volumes(ui: &mut Ui, run: &FrontRun) {
+    let main = &run.main;
+    let (lenses, tried) = (main.front.designs().len(), main.tried.len());
+    let volume = main.hypervolume;
+    let kept = run.biased.as_ref();
+    let kept = kept.map(|leg| format!(", {:.4} with pupils kept", leg.hypervolume));
+    let text = format!("{lenses} lenses on the front, {tried} tried; hypervolume {volume:.4}");
+    ui.label(text + &kept.unwrap_or_default()).on_hover_text(
+        "The area that the front covers in the plane of spot and light, against twice the spot of \
+         the lens at the start, in multiples of the start's spot times its light: larger is better",
+    );
+    if let Some(why) = &run.leg().refused {
+        let text = RichText::new(capital(&counted_from_one(why))).small();
+        ui.label(text.color(ui.visuals().warn_fg_color))
+            .on_hover_text("A weight that could not be searched for is left out");
+    }
+}
+
+/// What the lens that was clicked is worth, with errors.
+pub(super) fn chosen(ui: &mut Ui, run: &FrontRun, chosen: Option<&Design>) {
+    match chosen {
+        Some(design) => {
+            ui.add(Label::new(worth(design, &run.start).replace('\n', ", ")).wrap());
+        }
+        None => {
+            ui.weak("Click a point to see its lens in every panel; the design stays.");
+        }
+    }
+}
+
+/// What a lens is worth, a line a number.
+pub(super) fn worth(design: &Design, start: &Design) -> String {
+    let spot = with_error(1e3 * design.spot, 1e3 * design.spot_error);
+    let light = with_error(design.light, design.light_error);
+    let percent = number::show_digits(100.0 * design.light / start.light, 4);
+    let blur = match design.weight {
+        None => "start of the sweep".to_owned(),
+        Some(0.0) => "found without a weight for light".to_owned(),
+        Some(weight) => format!("rim blur {} µm", number::show_digits(1e3 * weight.sqrt(), 3)),
+    };
+    format!(
+        "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{blur}\n{} rays",
+        design.rays
+    )
+}
+
+/// A number with its error, both to the digits that the error leaves.
+fn with_error(value: f64, error: f64) -> String {
+    format!("{} ± {}", number::show_digits(value, 5), number::show_digits(error, 1))
+}
