@@ -46,7 +46,7 @@ pub(super) struct Zoom {
 #[derive(Debug, Clone)]
 pub(super) struct Systems {
     /// One for each wavelength, opened so that rims do not clip.
-    pub(super) systems: Vec<System<f64>>,
+    pub(super) opened: Vec<System<f64>>,
     /// The same with their rims.
     pub(super) rimmed: Vec<System<f64>>,
     /// The derivative of the last gap by the variables where it is solved.
@@ -98,12 +98,12 @@ impl Zoom {
                 *line.slot.of(system, line.surface) = number;
             }
         }
-        let mut found = Systems { systems: Vec::new(), rimmed, focus: None };
+        let mut found = Systems { opened: Vec::new(), rimmed, focus: None };
         if let Some(offset) = self.focus {
             self.solve_focus(&mut found, offset);
         }
-        found.systems.clone_from(&found.rimmed);
-        let surfaces = found.systems.iter_mut().flat_map(|system| &mut system.surfaces);
+        found.opened.clone_from(&found.rimmed);
+        let surfaces = found.opened.iter_mut().flat_map(|system| &mut system.surfaces);
         surfaces.for_each(open_up);
         found
     }

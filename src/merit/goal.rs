@@ -147,6 +147,31 @@ impl Term {
         )
     }
 
+    /// Refuses what a lens cannot be asked for about its light.
+    fn check_light(self, lens: &Lens) -> Result<(), MeritError> {
+        let refuse = |why| Err(MeritError::DoesNotApply { term: self.name(), why });
+        if let Term::ThroughputLoss(v) | Term::Light(v) | Term::FNumber(v) | Term::Steepness(v) =
+            self
+            && !(v > 0.0)
+        {
+            return refuse("its number is not positive");
+        }
+        let axial = |zoom| lens.fields_at(zoom).values.iter().any(|f| f.x == 0.0 && f.y == 0.0);
+        let needs_axis = matches!(self, Term::FNumber(_) | Term::RelativeIllumination { .. });
+        if needs_axis && !(0..lens.zoom_positions()).all(axial) {
+            return refuse("the lens has no field on the axis to compare with");
+        }
+        if let Term::RelativeIllumination { field, .. } = self {
+            if lens.object != Object::Infinity {
+                return refuse("the object is not at infinity");
+            }
+            if (0..lens.zoom_positions()).any(|z| field >= lens.fields_at(z).values.len()) {
+                return refuse("the lens has no field of that number");
+            }
+        }
+        Ok(())
+    }
+
     fn numbers(self) -> Vec<f64> {
         match self {
             Self::Spot | Self::SpotIntegral | Self::Throughput | Self::Distortion => Vec::new(),
@@ -229,31 +254,7 @@ impl Goal {
             if focal && focal_lengths(lens)?.contains(&None) {
                 return refuse("the lens is afocal");
             }
-            self.check_light(*term, lens)?;
-        }
-        Ok(())
-    }
-
-    fn check_light(&self, term: Term, lens: &Lens) -> Result<(), MeritError> {
-        let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
-        if let Term::ThroughputLoss(v) | Term::Light(v) | Term::FNumber(v) | Term::Steepness(v) =
-            term
-            && !(v > 0.0)
-        {
-            return refuse("its number is not positive");
-        }
-        let axial = |zoom| lens.fields_at(zoom).values.iter().any(|f| f.x == 0.0 && f.y == 0.0);
-        let needs_axis = matches!(term, Term::FNumber(_) | Term::RelativeIllumination { .. });
-        if needs_axis && !(0..lens.zoom_positions()).all(axial) {
-            return refuse("the lens has no field on the axis to compare with");
-        }
-        if let Term::RelativeIllumination { field, .. } = term {
-            if lens.object != Object::Infinity {
-                return refuse("the object is not at infinity");
-            }
-            if (0..lens.zoom_positions()).any(|z| field >= lens.fields_at(z).values.len()) {
-                return refuse("the lens has no field of that number");
-            }
+            term.check_light(lens)?;
         }
         Ok(())
     }

@@ -77,6 +77,15 @@ impl Color {
         Self { um, rays: Rays::default(), weights, ends, mirrored }
     }
 
+    /// Adds the rays of a pupil with their share of the whole.
+    fn add(&mut self, lit: &Lit<'_>, share: f64) {
+        let weight: f64 = lit.landed.arrived().map(|(_, w)| w).sum();
+        for (i, w) in lit.landed.arrived() {
+            self.rays.push(lit.rays.get(i));
+            self.weights.push(share * w / weight);
+        }
+    }
+
     /// The rays of a field.
     pub(super) fn range(&self, field: usize) -> std::ops::Range<usize> {
         let start = field.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -200,16 +209,11 @@ impl Sampling {
         for (wavelength, color) in colors.iter_mut().enumerate() {
             for field in 0..self.fields.len() {
                 color.mirrored.push(self.fields[field].x == 0.0);
-                let mine = self.pupils.iter().zip(lit);
-                for (pupil, lit) in
-                    mine.filter(|(p, _)| (p.wavelength, p.field) == (wavelength, field))
-                {
-                    let weight: f64 = lit.landed.arrived().map(|(_, w)| w).sum();
-                    for (i, w) in lit.landed.arrived() {
-                        color.rays.push(lit.rays.get(i));
-                        color.weights.push(pupil.share * w / weight);
-                    }
-                }
+                let here = |(pupil, _): &(&Pupil, &Lit<'_>)| {
+                    (pupil.wavelength, pupil.field) == (wavelength, field)
+                };
+                let mine = self.pupils.iter().zip(lit).filter(here);
+                mine.for_each(|(pupil, lit)| color.add(lit, pupil.share));
                 color.ends.push(color.weights.len());
             }
         }

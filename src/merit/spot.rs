@@ -78,7 +78,7 @@ fn edges(scene: &Scene<'_>, per: Per, centroids: &[Centroid], sum: &mut Sum) {
 
 fn trace(scene: &Scene<'_>, wavelength: usize, per: Per) -> Result<Landed, MeritError> {
     let color = &scene.sampling.colors[wavelength];
-    let system = &scene.systems.systems[wavelength];
+    let system = &scene.systems.opened[wavelength];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
     let mut points = Points::default();
     tracer.batch(&color.rays, &mut points);
@@ -179,7 +179,7 @@ fn normal(scene: &Scene<'_>, landed: &[Landed], centroids: &[Centroid], sum: &mu
 pub(super) fn distortion(scene: &Scene<'_>, sum: &mut Sum) -> Result<(), MeritError> {
     let primary = scene.zoom.primary;
     let heights = heights(scene)?;
-    let system = &scene.systems.systems[primary];
+    let system = &scene.systems.opened[primary];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
     let scale = image_scale(system, scene.zoom.object);
     let scale_slope = slopes(scene, sum.detail, |system| image_scale(system, scene.zoom.object));

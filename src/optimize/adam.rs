@@ -125,12 +125,11 @@ impl Adam {
         self.rate = 0.5 * ANNEALED_RATE * (1.0 + (PI * done).cos());
         let step = self.direction();
         let (accepted, sum) = self.state.advance(&step, Detail::Gradient, |_| true);
-        match sum {
-            Some(sum) => self.gradient = sum.gradient.iter().copied().collect(),
-            None => {
-                self.state.return_to_best();
-                self.differentiate();
-            }
+        if let Some(sum) = sum {
+            self.gradient = sum.gradient.iter().copied().collect();
+        } else {
+            self.state.return_to_best();
+            self.differentiate();
         }
         accepted
     }
