@@ -1,6 +1,7 @@
 //! What a panel reads: a snapshot of the session that nothing changes.
 
 use super::analyst::Results;
+use super::laboratory::Trial;
 use super::worker::Search;
 use crate::effects::Choices;
 use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength};
@@ -22,6 +23,8 @@ pub struct View {
     pub search: Option<Arc<Search>>,
     /// The numbers of the lens that the search shows, maybe of a step before.
     pub preview: Option<Arc<Results>>,
+    /// The experiment in the background, or the last one until it is put away.
+    pub trial: Option<Arc<Trial>>,
     /// What was said, newest last.
     pub messages: Vec<Message>,
     /// What undo would take back; `None` where there is nothing.
@@ -46,6 +49,7 @@ impl Default for View {
             results: None,
             search: None,
             preview: None,
+            trial: None,
             messages: Vec::new(),
             undo: None,
             redo: None,

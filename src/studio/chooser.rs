@@ -18,6 +18,8 @@ pub enum Purpose {
     ExportZemax,
     /// To write a copy of the lens in our own form.
     ExportJson,
+    /// To write the data and pictures of an experiment into it.
+    ExperimentFolder,
 }
 
 impl Purpose {
@@ -27,6 +29,7 @@ impl Purpose {
             Self::Save => "Save the lens",
             Self::ExportZemax => "Export the lens for Zemax",
             Self::ExportJson => "Export a copy of the lens",
+            Self::ExperimentFolder => "Save the experiment into a folder",
         }
     }
 
@@ -35,15 +38,18 @@ impl Purpose {
             Self::Open => &["json", "zmx", "ZMX"],
             Self::Save | Self::ExportJson => &["json"],
             Self::ExportZemax => &["zmx"],
+            Self::ExperimentFolder => &[],
         }
     }
 
     /// The path with the extension that it needs, if it has none.
     fn complete(self, path: PathBuf) -> PathBuf {
-        if self == Self::Open || path.extension().is_some() {
-            return path;
+        match self.extensions() {
+            [first, ..] if self != Self::Open && path.extension().is_none() => {
+                path.with_extension(first)
+            }
+            _ => path,
         }
-        path.with_extension(self.extensions()[0])
     }
 }
 
@@ -77,6 +83,8 @@ impl Chooser {
 
     /// Asks with a line to type a path into.
     pub fn ask_for_path(&mut self, purpose: Purpose, near: Option<&Path>) {
+        let near =
+            if purpose == Purpose::ExperimentFolder { near.and_then(Path::parent) } else { near };
         let start = near.map(|path| path.display().to_string()).unwrap_or_default();
         self.typed = Some((purpose, start));
     }
@@ -134,9 +142,10 @@ fn open_dialog(
     near: Option<&Path>,
 ) -> std::io::Result<Receiver<Option<PathBuf>>> {
     let (give, answer) = channel();
-    let mut dialog = rfd::FileDialog::new()
-        .set_title(purpose.title())
-        .add_filter("Lenses", purpose.extensions());
+    let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
+    if !purpose.extensions().is_empty() {
+        dialog = dialog.add_filter("Lenses", purpose.extensions());
+    }
     if let Some(directory) = near.and_then(Path::parent).filter(|dir| dir.is_dir()) {
         dialog = dialog.set_directory(directory);
     }
@@ -145,7 +154,11 @@ fn open_dialog(
     }
     let context = context.clone();
     thread::Builder::new().name("file dialog".into()).spawn(move || {
-        let path = if purpose == Purpose::Open { dialog.pick_file() } else { dialog.save_file() };
+        let path = match purpose {
+            Purpose::Open => dialog.pick_file(),
+            Purpose::ExperimentFolder => dialog.pick_folder(),
+            _ => dialog.save_file(),
+        };
         // Nobody listens when the window was closed before the dialog.
         drop(give.send(path));
         context.request_repaint();

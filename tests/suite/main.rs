@@ -15,5 +15,6 @@ mod optimize;
 mod paraxial;
 mod pupil;
 mod reference;
+mod rims;
 mod session;
 mod trace;
