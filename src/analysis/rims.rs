@@ -50,6 +50,8 @@ impl RimEffect {
 const SAMPLED: Accuracy = Accuracy { tolerance: 0.05, most_rays: 32_768 };
 /// The order of quadrature of area and spot.
 const ORDER: usize = 3;
+/// No sum over rays is more exact than this, relatively.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// What the rims do to a field at a wavelength. Where the edge of the pupil is sampled instead of
 /// followed, no more than a few per cent of the largest effect are known.
@@ -93,14 +95,11 @@ fn effect(
     // The throughput is minus the area.
     let (brightening, square, scale) = (-darkening, rms * rms, 2.0 * area * rms);
     let over = |value: f64| if scale > 0.0 { value / scale } else { 0.0 };
-    RimEffect {
-        area: Estimate::new(brightening, dark_error, rays),
-        rms: Estimate::new(
-            over(spread - square * brightening),
-            over(spread_error + square * dark_error),
-            rays,
-        ),
-    }
+    let blur = over(spread - square * brightening);
+    let blur_error = over(spread_error + square * dark_error);
+    let number =
+        |value: f64, error: f64| Estimate::new(value, error.max(ROUNDING * value.abs()), rays);
+    RimEffect { area: number(brightening, dark_error), rms: number(blur, blur_error) }
 }
 
 /// What the rims do to several fields together, each with its weight: to the mean of their areas,

@@ -2,8 +2,8 @@
 //! pictures, and a button to keep them.
 
 use eframe::egui::{
-    Align, Button, ColorImage, Context, Grid, Id, Image, Label, Layout, ProgressBar, RichText,
-    ScrollArea, TextureHandle, TextureOptions, Ui, Window, vec2,
+    Align, Button, ColorImage, Context, Grid, Id, Image, Layout, ProgressBar, RichText, ScrollArea,
+    TextureHandle, TextureOptions, Ui, Window, vec2,
 };
 
 use super::chooser::Purpose;
@@ -148,9 +148,8 @@ fn verdict(ui: &mut Ui, report: &Report, wishes: &mut Vec<Wish>) {
 }
 
 fn claims(ui: &mut Ui, claims: &[Claim]) {
-    let width = (ui.available_width() - 330.0).max(180.0);
-    Grid::new("claims").num_columns(4).spacing([12.0, 3.0]).striped(true).show(ui, |ui| {
-        for heading in ["", "Claim", "Found", "Expected"] {
+    Grid::new("claims").num_columns(4).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
+        for heading in ["", "Found", "Expected", "Claim"] {
             ui.weak(heading);
         }
         ui.end_row();
@@ -161,12 +160,9 @@ fn claims(ui: &mut Ui, claims: &[Claim]) {
                 ("fails", ui.visuals().error_fg_color)
             };
             ui.label(RichText::new(word).strong().color(color));
-            ui.allocate_ui(vec2(width, 0.0), |ui| {
-                ui.set_width(width);
-                ui.add(Label::new(capital(&claim.says)).wrap());
-            });
             ui.label(found(claim));
             ui.label(format!("{} {} {}", claim.rule, short(claim.limit), claim.unit));
+            ui.label(capital(&claim.says));
             ui.end_row();
         }
     });

@@ -25,14 +25,17 @@ const HEAD: f32 = 30.0;
 const CELL: f32 = 58.0;
 /// The largest arrow.
 const ARROW: f32 = 10.0;
-/// At most this share of the panel belongs to the table.
-const SHARE: f32 = 0.42;
+/// The line above the table.
+const TITLE: f32 = 19.0;
+/// What the pictures with their words need.
+const PICTURES: f32 = 205.0;
 
 const HINT: &str = "What each rim would do if its semi-diameter were 0.1 mm larger: the change of \
      the light, in per cent of the mean area of the pupils, and of the RMS radius of the spot at \
      this wavelength, in µm. To first order, with the motion of the pupil's edge. Blue is for the \
      better, orange for the worse; the length of an arrow compares within its kind. The ideal \
-     entrance pupil (dashed) is no rim: where it ends the beam, no glass moves it.";
+     entrance pupil (dashed) is no rim: where it ends the beam, no glass moves it. A higher panel \
+     shows the table.";
 
 /// The two numbers of a rim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,13 +65,18 @@ pub(super) fn strip(ui: &mut Ui, shown: &Shown<'_>, wishes: &mut Vec<Command>) {
     let Some(all) = &shown.pupils.all_rims else { return };
     let table = Table::new(shown, all);
     let felt: Vec<usize> = (0..all.surfaces.len()).filter(|i| table.is_felt(*i)).collect();
-    let rows = HEAD + ROW * felt.len().max(1) as f32;
-    let height = (rows + ROW + 12.0).min(SHARE * ui.available_height());
+    let whole = TITLE + HEAD + ROW * felt.len().max(1) as f32 + 8.0;
+    let room = ui.available_height() - PICTURES;
+    // Where there is little room the pictures come first, and the title stands for the table.
+    let height = if room < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(room) };
     let frame = Frame::new().inner_margin(Margin { top: 3, ..Margin::ZERO });
     let side = Side::bottom("rims").frame(frame).show_separator_line(true).exact_size(height);
     side.show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
         title(ui, shown, all, &felt);
+        if height < TITLE + HEAD {
+            return;
+        }
         if felt.is_empty() {
             ui.weak("No rim ends a ray: the beam ends at the ideal entrance pupil.");
             return;
@@ -80,13 +88,13 @@ pub(super) fn strip(ui: &mut Ui, shown: &Shown<'_>, wishes: &mut Vec<Command>) {
 fn title(ui: &mut Ui, shown: &Shown<'_>, all: &Rims, felt: &[usize]) {
     ui.horizontal(|ui| {
         ui.strong("+0.1 mm of semi-diameter").on_hover_text(HINT);
-        let others = others(felt, all.surfaces.len());
+        let others = others(felt, shown.results.lens.surfaces.len());
         if !others.is_empty() {
             let text = format!("no ray ends at {others}");
             ui.label(RichText::new(text).small().weak());
         }
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
-            let cost = format!("{} rays, {:.2} ms", all.rays, shown.pupils.rims.ms);
+            let cost = format!("{} rays in {:.2} ms", all.rays, shown.pupils.rims.ms);
             ui.label(RichText::new(cost).small().weak());
         });
     });
@@ -218,6 +226,9 @@ impl<'a> Table<'a> {
             Ok(rims) => {
                 let of = |kind, unit| {
                     let change = self.change(&rims.surfaces[surface], kind);
+                    if change.value == 0.0 && change.error == 0.0 {
+                        return "none".to_owned();
+                    }
                     format!("{} ± {:.0e} {unit}", signed(change.value), change.error)
                 };
                 let (light, blur) = (of(Kind::Light, "%"), of(Kind::Blur, "µm"));
