@@ -18,6 +18,9 @@
 // Numbers without optics: the number types, vectors, roots, quadrature, samplers.
 pub mod math;
 
+// Light in one gradient-index field: fields, ray integrators, their discrete adjoint; knows no lens.
+pub mod grin;
+
 // The prescription that a designer writes, and the system of plain numbers it resolves to.
 pub mod lens;
 
@@ -47,6 +50,9 @@ pub mod optimize;
 
 // Plots and images: what a result looks like, as PNG.
 pub mod picture;
+
+// A front of sharpness against light as files: table, picture, lenses.
+pub mod front;
 
 // The figures and tables of the thesis as studies that check their own claims.
 pub mod experiments;

@@ -10,7 +10,7 @@ const CLOCK: [&str; 2] = ["measure", "session"];
 
 /// Files that may contain `unsafe`, and why.
 const UNSAFE: [(&str, &str); 1] =
-    [("src/trace/lanes.rs", "vector instructions that the processor was asked for before")];
+    [("src/math/lanes.rs", "vector instructions that the processor was asked for before")];
 
 /// Names of the top modules, lowest first.
 fn floors() -> Vec<String> {

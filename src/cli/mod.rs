@@ -17,6 +17,7 @@ mod input;
 mod measure;
 mod optimize;
 mod output;
+mod pareto;
 mod trace;
 mod vary;
 mod window;
@@ -54,6 +55,7 @@ enum Command {
     Analyze(analyze::Analyze),
     Gradient(gradient::Gradient),
     Optimize(optimize::Optimize),
+    Pareto(pareto::Pareto),
     Convert(convert::Convert),
     Experiment(experiment::Experiment),
     Measure(measure::Measure),
@@ -67,6 +69,7 @@ impl Command {
             Self::Analyze(analyze) => analyze.run(output),
             Self::Gradient(gradient) => gradient.run(output),
             Self::Optimize(optimize) => optimize.run(output),
+            Self::Pareto(pareto) => pareto.run(output),
             Self::Convert(convert) => convert.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),

@@ -167,7 +167,7 @@ fn refused(opened: &Opened, source: MeritError) -> Failure {
 }
 
 /// A flag that Ctrl-C raises; a second Ctrl-C does no more than the first.
-fn stop_flag() -> Arc<AtomicBool> {
+pub(super) fn stop_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
@@ -177,7 +177,7 @@ fn stop_flag() -> Arc<AtomicBool> {
 }
 
 /// A bar on standard error, where that is a terminal.
-fn progress_bar(steps: usize) -> ProgressBar {
+pub(super) fn progress_bar(steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64);
     let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {eta}");
     bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))

@@ -51,6 +51,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     Ok(Outcome {
         claims: claims(&pupils),
         tables: vec![areas(&pupils), shares(&bench, &pupils), edges(&bench, &pupils)],
+        lenses: Vec::new(),
         pictures: vec![
             Picture { name: "pupils", canvas: maps(&bench, &pupils) },
             Picture { name: "shares", canvas: curves(&bench, &pupils) },

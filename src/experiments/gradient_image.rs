@@ -2,18 +2,19 @@
 //!
 //! Light is followed backwards: from a pixel of the sensor through the rear of the lens to a chart
 //! in front of it. A pixel is `∫ c(p) dw` over the rays that get through, `c` the brightness of the
-//! chart where a ray lands. Its derivatives by the boundary integral stand beside central
-//! differences of the image and beside the biased derivative, which cannot see the stop: no ray that
-//! passes it lands elsewhere when it opens.
+//! chart where a ray lands. Its derivatives by the boundary integral and by the warp field
+//! stand beside central differences of the image and beside the biased derivative, which cannot see
+//! the stop: no ray that passes it lands elsewhere when it opens.
 //!
 //! The chart is a smooth function, so that pixels are integrals without noise and the three can be
 //! compared to many digits. Figure 3.5 of the thesis shows a trademark in its place.
 
 use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens, report};
 use crate::lens::{Aperture, Field, FieldKind, Object, System};
+use crate::math::Real;
 use crate::paraxial::Beam;
 use crate::picture::{Align, BLACK, Canvas, Color, GREY, diverging, grey};
-use crate::pupil::{Aiming, Anchor, Bench, Integrand, Kind, Lit, Pattern, Region};
+use crate::pupil::{Aiming, Anchor, Bench, Integrand, Kind, Lit, Pattern, Region, Warp};
 use crate::trace::{Gradient, Slot};
 use rayon::prelude::*;
 
@@ -22,7 +23,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     title: "Gradient images by the stop and by a curvature",
     claim: "The unbiased derivative of an image matches finite differences; the biased one by the \
             stop is zero everywhere",
-    seconds: 3.0,
+    seconds: 15.0,
     run,
 };
 
@@ -36,6 +37,11 @@ const DISTANCE: f64 = 10_000.0;
 const ORDER: usize = 4;
 /// Rays of the crude image beside it.
 const SCATTERED: usize = 4096;
+/// Samples of the warp field in a pixel.
+const SAMPLES: usize = 4096;
+const FEW_SAMPLES: usize = 2048;
+/// How far the warp field may be off, by the stop and by the curvature: it has a standard error.
+const NOISE: [f64; 2] = [0.05, 0.1];
 /// Steps of the differences: the radius of the stop in mm, the curvature in 1/mm.
 const STEPS: [f64; 2] = [1e-5, 1e-6];
 /// What the integrals and their differences leave.
@@ -45,7 +51,7 @@ const NEARLY: f64 = 0.05;
 
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     let side = effort.pick(40, 10);
-    let camera = Camera::new()?;
+    let camera = Camera::new(effort.pick(SAMPLES, FEW_SAMPLES))?;
     let mut pixels = Vec::with_capacity(side * side);
     for row in 0..side {
         report(watch, row as f64 / side as f64, "pixels")?;
@@ -59,6 +65,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     Ok(Outcome {
         claims: images.claims(),
         tables: vec![images.table()],
+        lenses: Vec::new(),
         pictures: vec![Picture { name: "images", canvas: images.draw() }],
         rays: images.pixels.iter().map(|pixel| pixel.rays).sum(),
     })
@@ -111,13 +118,14 @@ impl Chart {
 }
 
 impl Integrand for Chart {
-    fn of(&self, p: [f64; 2]) -> f64 {
-        BRIGHT - (BRIGHT - GROUND) * Self::bare(p.map(|v| v / self.unit)).0
+    fn of<R: Real>(&self, p: [R; 2]) -> R {
+        let (bare, _) = Self::bare(p.map(|v| v.value() / self.unit));
+        R::from_f64(BRIGHT - (BRIGHT - GROUND) * bare)
     }
 
-    fn slope(&self, p: [f64; 2]) -> [f64; 2] {
-        let (_, slope) = Self::bare(p.map(|v| v / self.unit));
-        slope.map(|v| -(BRIGHT - GROUND) * v / self.unit)
+    fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2] {
+        let (_, slope) = Self::bare(p.map(|v| v.value() / self.unit));
+        slope.map(|v| R::from_f64(-(BRIGHT - GROUND) * v / self.unit))
     }
 }
 
@@ -127,6 +135,8 @@ struct Camera {
     bench: Bench,
     /// By the stop and by the curvature, each a step down and a step up.
     moved: [[Bench; 2]; 2],
+    /// How the warp field is sampled.
+    warp: Warp,
     stop: usize,
     /// The first surface of the lens, which backwards is the last one.
     front: usize,
@@ -137,13 +147,14 @@ struct Pixel {
     value: f64,
     scattered: f64,
     boundary: [f64; 2],
+    warp: [f64; 2],
     biased: [f64; 2],
     difference: [f64; 2],
     rays: usize,
 }
 
 impl Camera {
-    fn new() -> Result<Self, Ended> {
+    fn new(samples: usize) -> Result<Self, Ended> {
         let lens = lens(LENS)?;
         let forwards = lens.system(0, UM).map_err(Ended::from_error)?;
         let rear = lens.surfaces.len() - 1;
@@ -167,6 +178,7 @@ impl Camera {
                 [bench(radius - wider, 0.0)?, bench(radius + wider, 0.0)?],
                 [bench(radius, -bent)?, bench(radius, bent)?],
             ],
+            warp: Warp { count: samples, seed: 1 },
             stop,
             front: rear,
         })
@@ -180,9 +192,10 @@ impl Camera {
         let lit = region.lit(ORDER);
         let failed = || Ended::Failed(format!("the pupil of the pixel at {x}, {y} has no edge"));
         let boundary = lit.boundary_derivative(&self.chart).ok_or_else(failed)?;
+        let warp = region.warp_derivative(&self.chart, self.warp).ok_or_else(failed)?;
         let biased = lit.biased_derivative(&self.chart);
         let nodes = region.sampled(Pattern::Sobol { count: SCATTERED, seed: 1 });
-        let mut rays = region.rays + lit.traced + nodes.points.len();
+        let mut rays = region.rays + lit.traced + warp.rays + nodes.points.len();
         let mut difference = [0.0; 2];
         for (i, benches) in self.moved.iter().enumerate() {
             let ends = benches.each_ref().map(|bench| follow(&region.kind, anchor, bench));
@@ -195,6 +208,7 @@ impl Camera {
             value: lit.integral(&self.chart),
             scattered,
             boundary: self.numbers(&boundary),
+            warp: self.numbers(&warp.by),
             biased: self.numbers(&biased),
             difference,
             rays,
@@ -219,6 +233,9 @@ fn backwards(system: System<f64>, object: Object, radius: f64) -> Result<Bench, 
 fn follow<'a>(before: &Kind, anchor: Anchor, bench: &'a Bench) -> Lit<'a> {
     Region::followed(before, anchor.launch(bench)).lit(ORDER)
 }
+
+/// Two numbers of a pixel.
+type Numbers = fn(&Pixel) -> [f64; 2];
 
 /// All pixels, row by row.
 struct Images {
@@ -250,6 +267,11 @@ impl Images {
                 format!("by the {name}: boundary against differences, relative L2"),
                 relative(pixels, |pixel| pixel.boundary[i], |pixel| pixel.difference[i]),
                 AGREEMENT,
+            ));
+            claims.push(Claim::at_most(
+                format!("by the {name}: warp field against differences, relative L2"),
+                relative(pixels, |pixel| pixel.warp[i], |pixel| pixel.difference[i]),
+                NOISE[i],
             ));
         }
         let largest = |of: &dyn Fn(&Pixel) -> f64| {
@@ -289,17 +311,19 @@ impl Images {
             "image_mm2",
             "scattered_mm2",
             "by_stop_boundary_mm",
+            "by_stop_warp_mm",
             "by_stop_difference_mm",
             "by_stop_biased_mm",
             "by_curvature_boundary_mm3",
+            "by_curvature_warp_mm3",
             "by_curvature_difference_mm3",
             "by_curvature_biased_mm3",
         ];
         let mut table = Table::new("images", &columns);
         for (i, pixel) in self.pixels.iter().enumerate() {
             let place = [i / self.side, i % self.side];
-            let derivatives =
-                [0, 1].map(|k| [pixel.boundary[k], pixel.difference[k], pixel.biased[k]]);
+            let derivatives = [0, 1]
+                .map(|k| [pixel.boundary[k], pixel.warp[k], pixel.difference[k], pixel.biased[k]]);
             let numbers = [pixel.value, pixel.scattered].into_iter().chain(derivatives.concat());
             table.row(place.map(Into::into).into_iter().chain(numbers.map(Into::into)));
         }
@@ -311,7 +335,7 @@ impl Images {
         let cell = (320 / self.side).max(1);
         let width = cell * self.side;
         let step = width as f64 + 60.0;
-        let size = [4 * (width + 60) + 60, 2 * (width + 90) + 60];
+        let size = [5 * (width + 60) + 60, 2 * (width + 90) + 60];
         let mut canvas = Canvas::new(size.map(|v| v as u32));
         let mut panel = |column: usize, row: usize, title: &str, colors: Vec<Color>| {
             let corner = [60.0 + step * column as f64, 70.0 + (step + 30.0) * row as f64];
@@ -329,8 +353,9 @@ impl Images {
         panel(0, 0, "image", image.collect());
         for i in 0..2 {
             let largest = self.pixels.iter().map(|p| p.difference[i].abs()).fold(0.0, f64::max);
-            let kinds: [(&str, fn(&Pixel) -> [f64; 2]); 3] = [
+            let kinds: [(&str, Numbers); 4] = [
                 ("boundary", |pixel| pixel.boundary),
+                ("warp field", |pixel| pixel.warp),
                 ("differences", |pixel| pixel.difference),
                 ("biased", |pixel| pixel.biased),
             ];

@@ -8,10 +8,15 @@
 
 mod aperture_stop;
 mod entrance_pupil;
+mod front;
 mod gradient_image;
+mod motion;
 mod outcome;
 mod report;
 mod section;
+mod trade;
+mod vignetting;
+mod zoom;
 
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
 pub use report::Report;
@@ -22,8 +27,15 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Every experiment, in the order of the thesis. A new one is a file and a line here.
-pub const ALL: &[Experiment] =
-    &[aperture_stop::EXPERIMENT, entrance_pupil::EXPERIMENT, gradient_image::EXPERIMENT];
+pub const ALL: &[Experiment] = &[
+    aperture_stop::EXPERIMENT,
+    entrance_pupil::EXPERIMENT,
+    gradient_image::EXPERIMENT,
+    front::EXPERIMENT,
+    motion::EXPERIMENT,
+    vignetting::EXPERIMENT,
+    zoom::EXPERIMENT,
+];
 
 /// A figure or table of the thesis.
 #[derive(Debug, Clone, Copy)]

@@ -1,5 +1,6 @@
 //! What an experiment found: numbers against limits, tables, pictures.
 
+use crate::lens::Lens;
 use crate::picture::Canvas;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -14,6 +15,9 @@ pub struct Outcome {
     /// What they look like; not a part of the JSON.
     #[serde(skip)]
     pub pictures: Vec<Picture>,
+    /// The lenses that were found, under names; not a part of the JSON.
+    #[serde(skip)]
+    pub lenses: Vec<(String, Lens)>,
     /// Rays traced.
     pub rays: usize,
 }

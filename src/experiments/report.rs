@@ -34,7 +34,8 @@ impl Report {
         Self { id, title, claim, ms, holds, outcome, files: Vec::new() }
     }
 
-    /// Writes everything into a folder: tables as CSV, pictures as PNG, all numbers as JSON.
+    /// Writes everything into a folder: tables as CSV, pictures as PNG, lenses in our own form, all
+    /// numbers as JSON.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -54,6 +55,11 @@ impl Report {
                 source: io::Error::other(error),
             })?;
             files::replace(&file, &png)?;
+            self.files.push(name);
+        }
+        for (name, lens) in &self.outcome.lenses {
+            let name = format!("{id}-{name}.json");
+            files::save(lens, folder.join(&name))?;
             self.files.push(name);
         }
         let name = format!("{id}.json");

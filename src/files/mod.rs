@@ -1,4 +1,4 @@
-//! Reading and writing lenses.
+//! Reading and writing lenses and volumes.
 //!
 //! A file is known by its content first and its extension second. An import reports what it used,
 //! approximated, preserved and dropped; an export is read back and traced before it counts as
@@ -12,6 +12,7 @@ mod probe;
 mod report;
 mod save;
 mod text;
+mod volume;
 pub mod zemax;
 
 pub use convert::{Conversion, convert};
@@ -20,6 +21,7 @@ pub use library::{Bundled, library};
 pub use probe::{Proof, SelfCheck};
 pub use report::{Outcome, Report, ReportRow};
 pub use save::replace;
+pub use volume::{Volume, read_volume, write_volume};
 
 use crate::lens::Lens;
 use serde::Serialize;

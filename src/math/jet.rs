@@ -121,7 +121,6 @@ impl<R: Real> Sub for Jet<R> {
     }
 }
 
-#[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule has sums")]
 impl<R: Real> Mul for Jet<R> {
     type Output = Self;
     #[inline(always)]
@@ -142,7 +141,6 @@ impl<R: Real> Mul for Jet<R> {
     }
 }
 
-#[expect(clippy::suspicious_arithmetic_impl, reason = "the quotient rule has differences")]
 impl<R: Real> Div for Jet<R> {
     type Output = Self;
     #[inline(always)]

@@ -7,6 +7,7 @@
 mod double;
 mod dual;
 mod jet;
+mod lanes;
 pub mod quadrature;
 mod real;
 mod vec3;
@@ -14,5 +15,7 @@ mod vec3;
 pub use double::Double;
 pub use dual::Dual;
 pub use jet::Jet;
+pub use lanes::Width;
+pub(crate) use lanes::widest;
 pub use real::Real;
 pub use vec3::Vec3;

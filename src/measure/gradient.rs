@@ -16,8 +16,8 @@ use crate::lens::{Aperture, Field, Invalid, Lens, Shape, Surface, System};
 use crate::math::{Real, Vec3};
 use crate::paraxial::Beam;
 use crate::pupil::{
-    Accuracy, Aiming, Bench, BenchError, Cost, Derivative, Estimator, Integrand, Kind, Launch,
-    LaunchError, NoDerivative, Pattern, Region, Warp, plan,
+    Accuracy, Aiming, Bench, BenchError, Cost, Derivative, Estimator, Integrand, Launch,
+    LaunchError, NoDerivative, Pattern, Region, Warp, differentiate, plan,
 };
 use crate::trace::{Gradient, Points, Ray, Rays, Seed, Sink, Slot, Tracer};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -186,10 +186,9 @@ pub enum NoGradients {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
-/// The order of the reference, and of the differences that check it.
-const HIGHEST: usize = 11;
+/// The order of the differences that check the reference.
 const CHECKED: usize = 8;
-/// Samples of the reference where there is no edge to follow.
+/// Rays of the reference.
 const MANY: usize = 1 << 21;
 /// Orders of the curves.
 const ORDERS: usize = 10;
@@ -238,7 +237,7 @@ pub fn gradients(
                 report(done, all);
             }
         }
-        fields.push(scene.curves(exact, axis, rows)?);
+        fields.push(scene.curves(&exact, axis, rows)?);
     }
     let costs = PLANES.into_iter().map(|planes| {
         let bench = limited_by_stop(&bench, |system| with_planes(system, planes))?;
@@ -371,42 +370,31 @@ impl<'a> Scene<'a> {
 
     fn reference(&self) -> Result<Reference, NoGradients> {
         let region = Region::new(self.bench.launch(at(self.y), 0)?);
-        let costs = [self.spot, Cost::throughput()];
-        if !matches!(region.kind, Kind::Clear | Kind::Split(_)) {
-            let sampling = Warp { count: MANY, seed: 1000 };
-            let found = costs.map(|cost| region.warp_derivative(&cost, sampling));
-            let [Some(spot), Some(throughput)] = found else {
-                return Err(NoDerivative::NoSquare.into());
+        let (by, _) = plan(&region, Accuracy::default())?;
+        let asked = Accuracy { tolerance: f64::EPSILON, most_rays: MANY };
+        let found = |cost| differentiate(&region, &cost, by, asked);
+        let [spot, throughput] = [found(self.spot)?, found(Cost::throughput())?];
+        let check = |cost, found: &Derivative| {
+            let other = match by {
+                Estimator::Warp => Some(found.by.joined(&found.error, |by, error| by + error)),
+                _ => region.difference_derivative(&cost, CHECKED).map(|found| found.by),
             };
-            let checked = [&spot, &throughput].map(|found| {
-                worst(&found.by.joined(&found.error, |by, error| by + error), &found.by)
-            });
-            let (spot, throughput) = (spot.by, throughput.by);
-            return Ok(Reference { spot, throughput, by: Estimator::Warp, checked });
-        }
-        let lit = region.lit(HIGHEST);
-        let [Some(spot), Some(throughput)] = costs.map(|cost| lit.boundary_derivative(&cost))
-        else {
-            return Err(NoDerivative::Endless.into());
+            other.map_or(f64::INFINITY, |other| worst(&other, &found.by))
         };
-        let differences = costs.map(|cost| region.difference_derivative(&cost, CHECKED));
-        let off = |found: &Option<Derivative>, exact| {
-            found.as_ref().map_or(f64::INFINITY, |found| worst(&found.by, exact))
-        };
-        let checked = [off(&differences[0], &spot), off(&differences[1], &throughput)];
-        Ok(Reference { spot, throughput, by: Estimator::Boundary, checked })
+        let checked = [check(self.spot, &spot), check(Cost::throughput(), &throughput)];
+        Ok(Reference { spot: spot.by, throughput: throughput.by, by, checked })
     }
 
     fn curves(
         &self,
-        exact: Reference,
+        exact: &Reference,
         axis: f64,
         rows: Vec<GradientRow>,
     ) -> Result<GradientCurves, NoGradients> {
         let region = Region::new(self.bench.launch(at(self.y), 0)?);
         let (planned, reason) = plan(&region, Accuracy::default())?;
         let light = region.lit(4).moments.area / axis;
-        let Reference { by: reference, checked, .. } = exact;
+        let Reference { by: reference, checked, .. } = *exact;
         Ok(GradientCurves { y: self.y, light, planned, reason, reference, checked, rows })
     }
 
@@ -518,7 +506,7 @@ impl<'a> Scene<'a> {
         Some((by, region.rays + nodes.rays + rays.len()))
     }
 
-    /// What derivatives cost against integrals, taken turn by turn.
+    /// What derivatives cost against integrals, each at its fastest.
     fn cost(&self) -> Result<GradientCost, NoGradients> {
         let region = Region::new(self.bench.launch(at(self.y), 0)?);
         let spot = self.spot;
@@ -537,7 +525,7 @@ impl<'a> Scene<'a> {
             Box::new(|| drop(black_box(along(false)))),
             Box::new(|| drop(black_box(along(true)))),
             Box::new(|| {
-                drop(black_box(fresh().map(|r| r.difference_derivative(&spot, COST_ORDER))))
+                drop(black_box(fresh().map(|r| r.difference_derivative(&spot, COST_ORDER))));
             }),
             Box::new(|| tracer.batch(&rays, &mut points)),
             Box::new(|| drop(black_box(region.warp_derivative(&spot, sampling)))),
@@ -548,8 +536,9 @@ impl<'a> Scene<'a> {
         let rates = compete(&mut contestants, TURNS, TURN);
         drop(contestants);
         drop(turns);
-        let seconds: Vec<f64> = rates.iter().map(|rate| 1.0 / rate.median).collect();
-        let has_edge = matches!(region.kind, Kind::Clear | Kind::Split(_));
+        // The fastest turns: slower ones had company.
+        let seconds: Vec<f64> = rates.iter().map(|rate| 1.0 / rate.max).collect();
+        let has_edge = region.lit(0).boundary_derivative(&spot).is_some();
         let system = &self.bench.colors[0].system;
         Ok(GradientCost {
             surfaces: system.surfaces.len(),

@@ -190,6 +190,11 @@ impl Merit {
         lens.with_pickups().unwrap_or(lens)
     }
 
+    /// Whether light gets through at every field, zoom position and wavelength.
+    pub fn is_lit(&self) -> bool {
+        self.samplings.iter().flat_map(Sampling::areas).all(|area| area > 0.0)
+    }
+
     /// How the spots are sampled, by zoom position, field and wavelength; a spot without rays has no
     /// light and counts nothing.
     pub fn sampled(&self) -> Vec<Sampled> {
@@ -250,6 +255,7 @@ impl Merit {
             if self.follows_pupils() {
                 let bench = zoom.bench(&systems, &self.lens, sampling.aiming)?;
                 let light = sampling.lit(&bench, true);
+                sampling.check_light(&light)?;
                 let sampling = &sampling.with_light(&bench, &light);
                 let light = &light[..];
                 let scene = Scene { zoom, sampling, systems: &systems, values, start, light };

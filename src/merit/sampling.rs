@@ -176,6 +176,17 @@ impl Sampling {
         self.pupils.iter().map(lit).collect()
     }
 
+    /// Refuses light that has gone out since the pupils were looked for: what a dark pupil would
+    /// need to be lit again is told by no derivative.
+    pub(super) fn check_light(&self, lit: &[Lit<'_>]) -> Result<(), MeritError> {
+        let was_lit = |pupil: &Pupil| pupil.moments.area > 0.0;
+        let mut all = self.pupils.iter().zip(lit).zip(&self.sampled);
+        match all.find(|((pupil, lit), _)| was_lit(pupil) && !(lit.moments.area > 0.0)) {
+            Some((_, place)) => Err(dark(place)),
+            None => Ok(()),
+        }
+    }
+
     /// The same sampling with the rays of other light.
     pub(super) fn with_light(&self, bench: &Bench, lit: &[Lit<'_>]) -> Self {
         let mut pupils = self.pupils.clone();

@@ -159,13 +159,6 @@ impl Optimizer for Adam {
         progress
     }
 
-    fn left(&self) -> Option<usize> {
-        match self.pace {
-            Pace::Patient => None,
-            Pace::Annealed(steps) => Some(steps.saturating_sub(self.state.steps)),
-        }
-    }
-
     fn settle(&mut self) {
         self.state.verify_best();
     }

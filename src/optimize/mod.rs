@@ -24,10 +24,6 @@ pub trait Optimizer: Send + Debug {
     fn best(&self) -> &Lens;
     /// The lens at the current step.
     fn current(&self) -> &Lens;
-    /// Steps that it will still take, where that is known beforehand.
-    fn left(&self) -> Option<usize> {
-        None
-    }
     /// Every term of the merit function for the best lens so far.
     fn terms(&self) -> Result<Vec<TermValue>, MeritError>;
 }

@@ -1,14 +1,18 @@
 //! The front of sharpness against light: what a lens can have of one for how much of the other.
 //!
 //! For every weight β the composite objective `L_spot + β L_throughput` (Teh, *Computational Lens
-//! Design*, eq. 3.26) is descended by annealed Adam, each time from the lens that the weight before
-//! has led to. At the optimum the ray at the rim is off by √β: that is how weights are named here.
-//! Every lens on the way may join the front; those that another one beats in both are dropped.
+//! Design*, eq. 3.26) is descended, each time from the lens that the weight before has led to. At
+//! the optimum the ray at the rim is off by √β: that is how weights are named here. Every lens on
+//! the way may join the front; those that another one beats in both are dropped.
 //!
-//! The weights are shared out to a fixed number of chains, so that the result does not depend on how
-//! many cores there are. The caller owns the loop.
+//! Light is given away faster than aberrations are corrected, and what is given away at first is not
+//! found again. So a chain of weights begins with a lens that has been corrected: once with all of
+//! its light, at the largest weight, and once with its pupils kept, as a designer would have it
+//! without the derivative of light. From both the weights fall in one chain and rise in another;
+//! the four run side by side, so that the result does not depend on how many cores there are. The
+//! caller owns the loop.
 
-use super::{Optimizer, annealed};
+use super::{Method, Optimizer, annealed, start};
 use crate::lens::{Lens, LensError, NumberKind, Quantity, vary};
 use crate::merit::{Goal, Merit, MeritError, PupilEdge, Term, Weighted};
 use crate::pupil::{BenchError, limited_by_stop};
@@ -21,7 +25,9 @@ use serde::{Deserialize, Serialize};
 pub struct Settings {
     /// How many weights.
     pub points: usize,
-    /// Steps of Adam for each; twice as many for the first of a chain.
+    /// What descends.
+    pub method: Method,
+    /// No more steps than this for each weight.
     pub steps: usize,
     /// The blur of the rim ray √β that the smallest and the largest weight stand for, relative to
     /// the focal length.
@@ -38,7 +44,8 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             points: 20,
-            steps: 1000,
+            method: Method::DampedLeastSquares,
+            steps: 100,
             blur: [4e-5, 1e-3],
             pupil: PupilEdge::Moving,
             tolerance: 1e-3,
@@ -62,6 +69,8 @@ pub struct Design {
     pub light: f64,
     /// Its estimated error, in mm².
     pub light_error: f64,
+    /// Whether light gets through at every field; a spot without light is none.
+    pub lit: bool,
     /// Rays that these numbers rest on.
     pub rays: usize,
 }
@@ -85,6 +94,7 @@ impl Design {
             spot_error: if spot > 0.0 { 0.5 * square.error / spot } else { 0.0 },
             light: -area.value,
             light_error: area.error,
+            lit: merit.is_lit(),
             rays: square.rays,
         })
     }
@@ -112,7 +122,7 @@ impl Front {
     /// whether it was taken.
     pub fn offer(&mut self, design: Design) -> bool {
         let no_worse = |d: &Design| d.spot <= design.spot && d.light >= design.light;
-        let sound = design.spot.is_finite() && design.light.is_finite() && design.light > 0.0;
+        let sound = design.spot.is_finite() && design.light.is_finite() && design.lit;
         if !sound || self.designs.iter().any(no_worse) {
             return false;
         }
@@ -159,12 +169,14 @@ pub enum NoFront {
     },
 }
 
-/// Chains that are searched side by side.
-const CHAINS: usize = 4;
+/// How many times the steps of a weight correct the lens at the beginning of a chain.
+const FIRST: usize = 3;
 /// Steps between two looks at the lenses.
 const SLICE: usize = 25;
 /// Relative error of the numbers that lenses are compared by.
 const JUDGED: f64 = 1e-4;
+/// The share of its light that every field keeps.
+const LEAST_LIGHT: f64 = 0.1;
 /// No surface may be steeper than this: curvature times semi-diameter.
 const STEEPEST: f64 = 0.9;
 
@@ -185,19 +197,30 @@ pub struct Sweep {
 struct Chain {
     lens: Lens,
     goal: Goal,
+    /// Weight and treatment of the pupil with which the lens is corrected first.
+    begin: Option<(f64, PupilEdge)>,
     /// The weights to come, the next one last.
     weights: Vec<f64>,
+    method: Method,
     steps: usize,
     tolerance: f64,
-    running: Option<(f64, Box<dyn Optimizer>)>,
-    first: bool,
+    running: Option<Running>,
     refused: Option<String>,
+}
+
+/// The descent for one weight.
+#[derive(Debug)]
+struct Running {
+    weight: f64,
+    search: Box<dyn Optimizer>,
+    /// Steps that it may still take.
+    left: usize,
 }
 
 /// What a slice of a sweep has brought.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slice {
-    /// Steps of Adam so far, over all chains.
+    /// Steps so far, over all chains; those that a descent did not need count as taken.
     pub done: usize,
     /// Steps in all.
     pub total: usize,
@@ -222,18 +245,26 @@ impl Sweep {
         let start = Design::of(&lens, None, JUDGED)?;
         let goal = goal(&lens, start.light, settings.pupil)?;
         let weights = settings.weights(goal_focal_length(&goal, &lens));
-        let each = weights.len().div_ceil(CHAINS);
-        let chain = |weights: &[f64]| Chain {
+        let last = weights.last().copied().unwrap_or(0.0);
+        let begin = [(last, goal.pupil), (0.0, PupilEdge::Kept)];
+        let both = begin.into_iter().flat_map(|begin| [(begin, true), (begin, false)]);
+        let chain = |(begin, falling)| Chain {
             lens: lens.clone(),
             goal: goal.clone(),
-            weights: weights.iter().rev().copied().collect(),
+            begin: Some(begin),
+            // The next one is the last.
+            weights: if falling {
+                weights.clone()
+            } else {
+                weights.iter().rev().copied().collect()
+            },
+            method: settings.method,
             steps: settings.steps,
             tolerance: settings.tolerance,
             running: None,
-            first: true,
             refused: None,
         };
-        let chains: Vec<Chain> = weights.chunks(each).map(chain).collect();
+        let chains: Vec<Chain> = both.map(chain).collect();
         // A weight that cannot even begin is an error of the lens, not of the search.
         Merit::new(&lens, &goal, settings.tolerance)?;
         let mut front = Front::default();
@@ -273,7 +304,7 @@ impl Sweep {
     }
 
     fn total(&self) -> usize {
-        self.settings.steps * (self.settings.points + self.chains.len())
+        self.settings.steps * self.chains.len() * (self.settings.points + FIRST)
     }
 }
 
@@ -316,45 +347,48 @@ impl Chain {
         if self.running.is_none() {
             self.begin();
         }
-        let Some((weight, search)) = &mut self.running else { return Vec::new() };
-        let mut finished = false;
-        for _ in 0..SLICE {
-            finished = search.step().finished;
-            if finished {
+        let Some(Running { weight, search, left }) = &mut self.running else { return Vec::new() };
+        for _ in 0..SLICE.min(*left) {
+            *left -= 1;
+            if search.step().finished {
+                *left = 0;
                 break;
             }
         }
-        finished |= search.left() == Some(0);
-        let mut found = Vec::new();
-        let mut judge = |lens: &Lens| found.extend(Design::of(lens, Some(*weight), JUDGED).ok());
-        if finished {
-            search.settle();
-            judge(search.best());
-            self.lens = search.best().clone();
-            self.running = None;
-        } else {
-            judge(search.current());
+        let judge = |lens: &Lens| Design::of(lens, Some(*weight), JUDGED).ok();
+        if *left > 0 {
+            return judge(search.current()).into_iter().collect();
         }
-        found
+        search.settle();
+        self.lens.clone_from(search.best());
+        let found = judge(&self.lens);
+        self.running = None;
+        found.into_iter().collect()
     }
 
     fn begin(&mut self) {
-        let Some(weight) = self.weights.pop() else { return };
-        let mut goal = self.goal.clone();
-        goal.terms.push(Weighted { term: Term::Throughput, weight });
-        let steps = if self.first { 2 * self.steps } else { self.steps };
-        self.first = false;
-        match annealed(&self.lens, &goal, self.tolerance, steps) {
-            Ok(search) => self.running = Some((weight, search)),
+        let begin = self.begin.take();
+        let left = if begin.is_some() { FIRST * self.steps } else { self.steps };
+        let next = begin.or_else(|| Some((self.weights.pop()?, self.goal.pupil)));
+        let Some((weight, pupil)) = next else { return };
+        let mut goal = Goal { pupil, ..self.goal.clone() };
+        if weight > 0.0 {
+            goal.terms.push(Weighted { term: Term::Throughput, weight });
+        }
+        let search = match self.method {
+            Method::Adam => annealed(&self.lens, &goal, self.tolerance, left),
+            Method::DampedLeastSquares => start(self.method, &self.lens, &goal, self.tolerance),
+        };
+        match search {
+            Ok(search) => self.running = Some(Running { weight, search, left }),
             Err(cause) => self.refused = Some(cause.to_string()),
         }
     }
 
-    /// Steps to come.
+    /// Steps to come, at most.
     fn left(&self) -> usize {
-        let coming = self.weights.len() + usize::from(self.first);
-        let running = self.running.as_ref().map_or(0, |(_, search)| search.left().unwrap_or(0));
-        coming * self.steps + running
+        let coming = self.weights.len() + if self.begin.is_some() { FIRST } else { 0 };
+        coming * self.steps + self.running.as_ref().map_or(0, |running| running.left)
     }
 }
 
@@ -367,7 +401,15 @@ fn goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
         sensible.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
     terms.extend(others.map(|w| Weighted { weight: light * w.weight, ..w }));
     terms.push(Weighted { term: Term::Steepness(STEEPEST), weight: light });
+    // No field may go dark: a spot without light would be the sharpest of all.
+    let worth = terms[0].weight * light * goal_size(lens).powi(2);
+    terms.push(Weighted { term: Term::Light(LEAST_LIGHT), weight: worth });
     Ok(Goal { terms, pupil, zoom_ratios: sensible.zoom_ratios })
+}
+
+/// A spot as large as this is not worth the light that a field must keep, in mm.
+fn goal_size(lens: &Lens) -> f64 {
+    1e-3 * lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>()
 }
 
 /// The focal length that the goal asks for, or the length of an afocal lens.

@@ -131,6 +131,12 @@ impl Chart {
         ]
     }
 
+    /// Whether two quantities are within the axes.
+    pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
+        let within = |share: f64| (0.0..=1.0).contains(&share);
+        within(self.x.share(x)) && within(self.y.share(y))
+    }
+
     /// Where several pairs of quantities stand.
     pub fn places(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
         points.iter().map(|point| self.place(*point)).collect()

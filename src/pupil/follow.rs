@@ -13,6 +13,10 @@ const STEPS: usize = 12;
 const FAR: f64 = 0.3;
 /// An arc shorter than this, in radians, is about to vanish.
 const SHORTEST: f64 = 1e-6;
+/// Rays along a side of the grid that looks for lost light, and how far it reaches, in sizes of the
+/// pupil.
+const CELLS: usize = 21;
+const AROUND: f64 = 1.5;
 
 impl<'a> Region<'a> {
     /// The region of a launch whose lens has moved little since it was `before`: its edge is
@@ -24,10 +28,28 @@ impl<'a> Region<'a> {
                     let rays = boundary.rays;
                     Self { launch, kind: Kind::Split(boundary), rays }
                 }
-                None => Self::new(launch),
+                None => Self::new_near(boundary, launch),
             },
             Kind::Clear | Kind::Dark | Kind::Ragged { .. } | Kind::Endless => Self::new(launch),
         }
+    }
+}
+
+impl<'a> Region<'a> {
+    /// The region of a launch, searched anew unless no ray gets through around where the light was:
+    /// then it is dark, and no larger search is worth its rays.
+    fn new_near(before: &Boundary, launch: Launch<'a>) -> Self {
+        let cover = before.cover();
+        let place = |i: usize| {
+            let at = |k: usize| AROUND * (2.0 * (k as f64 + 0.5) / CELLS as f64 - 1.0);
+            let (u, v) = (at(i % CELLS), at(i / CELLS));
+            [0, 1].map(|k| cover.center[k] + u * cover.axes[0][k] + v * cover.axes[1][k])
+        };
+        let points: Vec<_> = (0..CELLS * CELLS).map(place).collect();
+        if launch.fates(&points).into_iter().any(|lit| lit) {
+            return Self::new(launch);
+        }
+        Self { launch, kind: Kind::Dark, rays: points.len() }
     }
 }
 

@@ -40,15 +40,25 @@ pub struct Lit<'a> {
 }
 
 impl<'a> Region<'a> {
-    /// Traces the rays of an order of quadrature, counted from 0.
+    /// Traces the rays of an order of quadrature, counted from 0. Of a round pupil on the axis that
+    /// is one radius: for integrands that depend on the distance from the axis alone, and for those
+    /// that a mirror image makes such, as squares of distances from a point do.
     pub fn lit(&self, order: usize) -> Lit<'a> {
         let (nodes, spokes) = match &self.kind {
             Kind::Split(boundary) => {
                 let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
-                let (spokes, rays) = self.spokes(boundary, azimuths);
+                let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
+                let (spokes, rays) = self.spokes(boundary, if alike { 1 } else { azimuths });
                 let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
                 (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
                 (nodes, spokes)
+            }
+            Kind::Ragged { ring: Some(ring), .. } => {
+                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
+                let (spokes, rays) = ring.spokes(&self.launch, azimuths);
+                let mut nodes = ring.nodes_of(&spokes, radii);
+                (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
+                (nodes, spokes.into_iter().flatten().collect())
             }
             Kind::Clear | Kind::Ragged { .. } | Kind::Dark | Kind::Endless => {
                 (self.nodes(order), Vec::new())
@@ -77,6 +87,7 @@ impl<'a> Region<'a> {
         let rim = match &self.kind {
             Kind::Clear => Rim::Still,
             Kind::Split(boundary) => Rim::Spokes(boundary.frame),
+            Kind::Ragged { ring: Some(ring), .. } => Rim::Spokes(ring.outer.frame),
             Kind::Dark | Kind::Ragged { .. } | Kind::Endless => Rim::Unknown,
         };
         let launch = self.launch.clone();

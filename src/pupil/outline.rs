@@ -89,6 +89,7 @@ impl Bench {
             Limit::Surface(i, Hurdle::Rim) => format!("rim of surface {i}"),
             Limit::Surface(i, Hurdle::Obstruction) => format!("obstruction of surface {i}"),
             Limit::Surface(i, Hurdle::Miss) => format!("missed surface {i}"),
+            Limit::Surface(i, Hurdle::Equator) => format!("equator of surface {i}"),
             Limit::Surface(i, Hurdle::Reflection) => format!("critical angle at surface {i}"),
             Limit::Unaimed => "no ray to the stop".to_owned(),
         }

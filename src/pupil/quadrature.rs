@@ -181,7 +181,8 @@ impl Region<'_> {
             Kind::Split(boundary) => self.split(boundary, SPLIT[order.min(SPLIT.len() - 1)]),
             Kind::Ragged { ring: Some(ring), .. } => {
                 let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
-                ring.nodes(&self.launch, azimuths, radii)
+                let (spokes, rays) = ring.spokes(&self.launch, azimuths);
+                Nodes { mirrored, rays, ..ring.nodes_of(&spokes, radii) }
             }
             Kind::Ragged { square, .. } => {
                 let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };
@@ -206,9 +207,8 @@ impl Region<'_> {
         let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
         for (i, arc) in boundary.arcs.iter().enumerate() {
             let length = arc.to - arc.from;
-            let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
             let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
-            for (t, share) in legendre(if alike { 1 } else { azimuths }) {
+            for (t, share) in legendre(azimuths) {
                 let (t, stretch) = grading.place(*t);
                 let azimuth = arc.from + t * length;
                 let guess = boundary.near(azimuth);

@@ -5,7 +5,7 @@
 
 use super::boundary::{Boundary, Frame, Limit, NEAR, Search, Seen};
 use super::launch::Launch;
-use super::quadrature::Nodes;
+use super::quadrature::{Nodes, Spoke};
 use super::rules::legendre;
 use crate::trace::Hurdle;
 use std::f64::consts::PI;
@@ -47,31 +47,42 @@ impl Ring {
         self.outer.rays + self.inner.rays
     }
 
-    /// Gauss nodes in azimuth between corners of either edge, and in the radius between the two.
-    pub(super) fn nodes(&self, launch: &Launch<'_>, azimuths: usize, radii: usize) -> Nodes {
+    /// The ends of radii at Gauss nodes of azimuth between corners of either edge, the outer one
+    /// first, and the rays traced to find them. The shares of the inner ends are negative: what
+    /// lies within is not lit.
+    pub(super) fn spokes(&self, launch: &Launch<'_>, azimuths: usize) -> (Vec<[Spoke; 2]>, usize) {
         let frame = self.outer.frame;
         let mut outer = Search::new(launch, frame).seeing(Seen::Rims);
         let mut inner = Search::new(launch, frame).seeing(Seen::Shadow);
-        let mirrored = launch.is_symmetric();
-        let factor = frame.area() * if mirrored { 2.0 } else { 1.0 };
-        let mut nodes = Nodes { mirrored, ..Nodes::default() };
+        let factor = frame.area() * if launch.is_symmetric() { 2.0 } else { 1.0 };
+        let mut spokes = Vec::new();
         for (from, to) in self.stretches() {
             for (t, share) in legendre(azimuths) {
                 let azimuth = from + t * (to - from);
-                let ends = [(&mut outer, &self.outer), (&mut inner, &self.inner)];
-                let [far, near] = ends.map(|(search, edge)| {
-                    search.edge(azimuth, edge.near(azimuth), NEAR).map(|edge| edge.radius)
+                let share = factor * share * (to - from);
+                let ends = [(&mut outer, &self.outer, share), (&mut inner, &self.inner, -share)];
+                let [far, near] = ends.map(|(search, side, share)| {
+                    let edge = search.edge(azimuth, side.near(azimuth), NEAR)?;
+                    Some(Spoke { azimuth, edge, share, grazing: f64::INFINITY })
                 });
-                let (Some(far), Some(near)) = (far, near) else { continue };
-                let width = (far - near).max(0.0);
-                for (u, weight) in legendre(radii) {
-                    let r = near + u * width;
-                    nodes.points.push(frame.point(azimuth, r));
-                    nodes.weights.push(factor * share * (to - from) * weight * width * r);
-                }
+                spokes.extend(far.zip(near).map(|(far, near)| [far, near]));
             }
         }
-        nodes.rays = outer.rays + inner.rays;
+        (spokes, outer.rays + inner.rays)
+    }
+
+    /// Gauss nodes along radii from one edge to the other.
+    pub(super) fn nodes_of(&self, spokes: &[[Spoke; 2]], radii: usize) -> Nodes {
+        let mut nodes = Nodes::default();
+        for [far, near] in spokes {
+            let from = near.edge.radius;
+            let width = (far.edge.radius - from).max(0.0);
+            for (u, weight) in legendre(radii) {
+                let r = from + u * width;
+                nodes.points.push(self.outer.frame.point(far.azimuth, r));
+                nodes.weights.push(far.share * weight * width * r);
+            }
+        }
         nodes
     }
 

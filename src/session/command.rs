@@ -11,7 +11,7 @@ use crate::lens::{
     ZoomPosition,
 };
 use crate::merit::Goal;
-use crate::optimize::Method;
+use crate::optimize::{Method, pareto};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -54,6 +54,27 @@ pub enum Command {
     Take,
     /// End the search and throw its result away.
     Discard,
+    /// Sweep the front of sharpness against light in the background, from the design.
+    StartFront {
+        /// How.
+        settings: pareto::Settings,
+        /// Whether to do the same afterwards with pupils that the derivatives keep as they are.
+        compare: bool,
+    },
+    /// Hold the sweep after its current slice.
+    PauseFront,
+    /// Let it go on.
+    ResumeFront,
+    /// End the sweep; its front stays.
+    StopFront,
+    /// End the sweep and forget its front and all earlier ones.
+    ClearFronts,
+    /// Write the front into a folder: table, picture and every lens.
+    ExportFront(PathBuf),
+    /// Show another lens in place of the design, which stays what it is; `None` for the design.
+    Preview(Option<Box<Lens>>),
+    /// Make the lens that is shown in place of the design the design, as one undo step.
+    TakePreview,
     /// How exact the shown numbers have to be: a relative error, 0.001 for 0.1 %.
     SetTolerance(f64),
     /// Which zoom position is shown.

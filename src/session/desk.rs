@@ -3,8 +3,10 @@
 use super::analyst::{Analyst, Request, Results, Savings};
 use super::command::{Command, Edit};
 use super::edit::edited;
+use super::fronts::FrontDesk;
 use super::history::History;
 use super::laboratory::{Laboratory, Stage};
+use super::sweeper::Told;
 use super::view::{Message, Settings, Severity, View};
 use super::worker::{News, Search, Standing, Starter, Task, Worker};
 use crate::experiments::{self, Effort, Report};
@@ -36,6 +38,8 @@ pub enum Event {
     SearchStopped,
     /// It ended by itself; its result can be taken.
     SearchFinished,
+    /// The sweep of a front stands so.
+    Front(Standing),
     /// Something to tell the person.
     Said(Message),
 }
@@ -58,7 +62,10 @@ pub struct Session {
     messages: Vec<Message>,
     analyst: Analyst,
     worker: Worker,
-    /// Computes the numbers of the lens that the search shows.
+    fronts: FrontDesk,
+    /// A lens that is shown in place of the design.
+    candidate: Option<Arc<Lens>>,
+    /// Computes the numbers of that lens, or of the one that the search shows.
     follower: Analyst,
     /// That lens, and what the numbers were asked for with.
     followed: Option<(Arc<Lens>, Settings)>,
@@ -107,7 +114,9 @@ impl Session {
             follower: Analyst::spawn(Savings::Left, wake.clone())?,
             followed: None,
             laboratory: Laboratory::spawn(wake.clone())?,
-            worker: Worker::spawn(start, wake)?,
+            worker: Worker::spawn(start, wake.clone())?,
+            fronts: FrontDesk::spawn(wake)?,
+            candidate: None,
             searches: 0,
             search: None,
             events: Vec::new(),
@@ -134,6 +143,16 @@ impl Session {
             Command::Stop => self.worker.stop(),
             Command::Take => self.take(),
             Command::Discard => self.discard(),
+            Command::StartFront { settings, compare } => {
+                self.fronts.start(&self.lens, settings, compare);
+            }
+            Command::PauseFront => self.fronts.sweeper().pause(),
+            Command::ResumeFront => self.fronts.sweeper().resume(),
+            Command::StopFront => self.fronts.sweeper().stop(),
+            Command::ClearFronts => self.fronts.clear(),
+            Command::ExportFront(folder) => self.fronts.write(folder),
+            Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),
+            Command::TakePreview => self.take_preview(),
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
             Command::ShowZoom(zoom) => self.show_zoom(zoom),
             Command::ShowRays(rays) => self.set_up(|settings| settings.rays = rays.min(MOST_RAYS)),
@@ -157,6 +176,10 @@ impl Session {
         for news in self.worker.news() {
             self.hear(news);
         }
+        for told in self.fronts.told() {
+            self.hear_front(told);
+        }
+        self.fronts.keep_up(&self.lens);
         self.follow();
         std::mem::take(&mut self.events)
     }
@@ -168,6 +191,8 @@ impl Session {
             version: self.version,
             results: self.analyst.results(),
             search: self.search(),
+            fronts: self.fronts.view(),
+            candidate: self.candidate.clone(),
             preview: self.preview(),
             trial: self.laboratory.trial(),
             messages: self.messages.clone(),
@@ -199,28 +224,31 @@ impl Session {
         self.worker.search().filter(|search| Some(search.number) == self.search)
     }
 
-    /// Asks for the numbers of the lens that the search shows, if it is another one by now.
+    /// The lens that is shown in place of the design, and what numbers of it are known by: the
+    /// number of the search that it belongs to, or 0.
+    fn followed(&self) -> Option<(u64, Arc<Lens>)> {
+        let search = || self.search().map(|search| (search.number, Arc::clone(search.shown())));
+        self.candidate.clone().map(|lens| (0, lens)).or_else(search)
+    }
+
+    /// Asks for the numbers of that lens, if it is another one by now.
     fn follow(&mut self) {
-        let Some(search) = self.search() else {
+        let Some((version, lens)) = self.followed() else {
             self.followed = None;
             return;
         };
-        let (lens, settings) = (search.shown(), &self.settings);
+        let settings = &self.settings;
         let known = self.followed.as_ref();
-        if known.is_some_and(|(old, with)| Arc::ptr_eq(old, lens) && with == settings) {
+        if known.is_some_and(|(old, with)| Arc::ptr_eq(old, &lens) && with == settings) {
             return;
         }
-        self.followed = Some((Arc::clone(lens), settings.clone()));
-        self.follower.ask(Request {
-            version: search.number,
-            lens: Arc::clone(lens),
-            settings: settings.clone(),
-        });
+        self.followed = Some((Arc::clone(&lens), settings.clone()));
+        self.follower.ask(Request { version, lens, settings: settings.clone() });
     }
 
-    /// The numbers of the search that is shown, if there are any yet.
+    /// The numbers of the lens that is shown in place of the design, if there are any yet.
     fn preview(&self) -> Option<Arc<Results>> {
-        let number = self.search().map(|search| search.number)?;
+        let (number, _) = self.followed()?;
         self.follower.results().filter(|results| results.version == number)
     }
 
@@ -253,6 +281,7 @@ impl Session {
     fn show(&mut self, lens: Arc<Lens>) {
         self.settings.zoom = self.settings.zoom.min(lens.zoom_positions() - 1);
         self.lens = lens;
+        self.candidate = None;
         self.renew();
     }
 
@@ -286,6 +315,7 @@ impl Session {
             return self.say(Severity::Error, why.to_string());
         }
         self.discard();
+        self.fronts.clear();
         let lens = Arc::new(lens);
         self.history = History::default();
         self.saved = Arc::clone(&lens);
@@ -346,6 +376,7 @@ impl Session {
 
     fn optimize(&mut self, method: Method, goal: Goal) {
         self.discard();
+        self.candidate = None;
         self.searches += 1;
         self.search = Some(self.searches);
         let (lens, tolerance) = (Arc::clone(&self.lens), self.settings.tolerance);
@@ -369,6 +400,41 @@ impl Session {
                 self.show(Arc::new(lens));
             }
             Err(why) => self.say(Severity::Warning, why),
+        }
+    }
+
+    /// Makes the lens that is shown in place of the design the design. It keeps the design's
+    /// variables, where it can: a sweep frees more than a person did.
+    fn take_preview(&mut self) {
+        let Some(candidate) = self.candidate.take() else {
+            let text = "there is no lens in place of the design to take";
+            return self.say(Severity::Warning, text.to_owned());
+        };
+        let own = Lens { variables: self.lens.variables.clone(), ..Lens::clone(&candidate) };
+        let lens = if own.check().is_ok() { own } else { Lens::clone(&candidate) };
+        match lens.check() {
+            Ok(()) => {
+                let title = "take a lens of the front".to_owned();
+                self.history.note(Arc::clone(&self.lens), title, None);
+                self.show(Arc::new(lens));
+            }
+            Err(why) => self.say(Severity::Warning, why.to_string()),
+        }
+    }
+
+    fn hear_front(&mut self, told: Told) {
+        match told {
+            Told::Now(_, standing) => self.events.push(Event::Front(standing)),
+            Told::Failed(_, why) => {
+                self.say(Severity::Error, format!("no front: {why}"));
+                self.events.push(Event::Front(Standing::Stopped));
+            }
+            Told::Written(folder, files) => {
+                let text = format!("{files} files of the front written to {}", folder.display());
+                self.say(Severity::Note, text);
+                self.events.push(Event::Saved(folder));
+            }
+            Told::NotWritten(why) => self.say(Severity::Error, why),
         }
     }
 

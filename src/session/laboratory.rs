@@ -6,7 +6,7 @@
 
 use super::clock::{Pace, Timed, timed};
 use super::slot::{Mailbox, Slot};
-use super::worker::words_of;
+use super::worker::said;
 use crate::experiments::{Effort, Ended, Experiment, Outcome, Progress, Report};
 use std::io;
 use std::ops::ControlFlow;
@@ -154,7 +154,7 @@ fn carry_out(
     let run = AssertUnwindSafe(|| timed(|| (study.run)(effort, &mut watch)));
     let stage = match catch_unwind(run) {
         Ok(ended) => Stage::after(study, ended),
-        Err(panic) => Stage::Failed(words_of(panic.as_ref())),
+        Err(panic) => Stage::Failed(said(panic.as_ref())),
     };
     // The place belongs to the next one by now, where there is one.
     if !inbox.interrupts() {

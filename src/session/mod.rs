@@ -6,7 +6,7 @@
 //! - *The document changes only by a command*, and an edit that would leave a lens that cannot be
 //!   used is refused: the document is then what it was.
 //! - *A search works on its own copy*: its result becomes the document when it is taken, as one
-//!   undo step.
+//!   undo step. So does the sweep of a front, whose lenses can be looked at before.
 //! - *Nothing here waits*: numbers and searches are in newest-value slots, and `wake` is called when
 //!   something new is in one.
 
@@ -15,6 +15,7 @@ mod clock;
 mod command;
 mod desk;
 mod edit;
+mod fronts;
 mod history;
 mod laboratory;
 mod layout;
@@ -24,6 +25,7 @@ mod saving;
 mod scale;
 mod scatter;
 mod slot;
+mod sweeper;
 mod typed;
 mod view;
 mod worker;
@@ -33,12 +35,14 @@ pub use clock::Timed;
 pub use command::{Command, Edit};
 pub use desk::{Event, Session};
 pub use edit::{EditError, edited};
+pub use fronts::Fronts;
 pub use laboratory::{Stage, Trial};
 pub use layout::{DrawnRay, Layout, layout};
 pub use pupils::Pupils;
 pub use saving::timed_plan;
 pub use scatter::{Scatter, scatter};
 pub use slot::Slot;
+pub use sweeper::{FrontRun, Judged, Leg};
 pub use typed::{NoNumber, evaluate};
 pub use view::{Message, Settings, Severity, View, blank};
 pub use worker::{HistoryPoint, Search, Standing, Starter, Task};

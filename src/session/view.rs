@@ -1,6 +1,7 @@
 //! What a panel reads: a snapshot of the session that nothing changes.
 
 use super::analyst::Results;
+use super::fronts::Fronts;
 use super::laboratory::Trial;
 use super::worker::Search;
 use crate::effects::Choices;
@@ -21,7 +22,11 @@ pub struct View {
     /// The search in the background, or the last one whose result was neither taken nor thrown
     /// away.
     pub search: Option<Arc<Search>>,
-    /// The numbers of the lens that the search shows, maybe of a step before.
+    /// The fronts of sharpness against light.
+    pub fronts: Fronts,
+    /// A lens that is shown in place of the design.
+    pub candidate: Option<Arc<Lens>>,
+    /// The numbers of that lens, or of the one that the search shows, maybe of a step before.
     pub preview: Option<Arc<Results>>,
     /// The experiment in the background, or the last one until it is put away.
     pub trial: Option<Arc<Trial>>,
@@ -48,6 +53,8 @@ impl Default for View {
             version: 0,
             results: None,
             search: None,
+            fronts: Fronts::default(),
+            candidate: None,
             preview: None,
             trial: None,
             messages: Vec::new(),

@@ -341,13 +341,9 @@ impl Run {
     }
 }
 
-fn said(panic: &(dyn Any + Send)) -> String {
-    format!("the search failed: {}", words_of(panic))
-}
-
 /// The words of a panic.
-pub(super) fn words_of(panic: &(dyn Any + Send)) -> String {
+pub(super) fn said(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-    text.unwrap_or_else(|| "for an unknown reason".to_owned())
+    format!("the search failed: {}", text.unwrap_or_else(|| "for an unknown reason".to_owned()))
 }

@@ -17,11 +17,11 @@
 use super::Tracer;
 use super::batch::{BLOCK, Block, CHUNK, Hits, Rays};
 use super::interface::{Form, Interface};
-use super::lanes::{Width, widest};
 use super::slot::Slot;
 use crate::lens::ASPHERE_TERMS;
 use crate::math::Real;
 use crate::math::Vec3;
+use crate::math::{Width, widest};
 use rayon::prelude::*;
 
 /// The derivative of something by where and how a ray lands.
@@ -111,7 +111,7 @@ pub(super) trait Sowing<R> {
 
     /// By how far each ray is from the limits of a surface, if anything depends on that.
     #[inline(always)]
-    fn pulls(&self, _surface: usize) -> Option<&[Pull<R>; BLOCK]> {
+    fn pulls(&self, _surface: usize) -> Option<&Pulls<R>> {
         None
     }
 }
@@ -123,12 +123,16 @@ impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
     }
 }
 
-/// The derivative of something by the limits of a surface (see [`super::limit`]).
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Pull<R> {
-    pub(super) rim: R,
-    pub(super) angle: R,
-    pub(super) sheet: R,
+/// The derivatives of something by the limits of a surface (see [`super::limit`]): a column for each
+/// limit.
+#[derive(Debug, Clone)]
+pub(super) struct Pulls<R> {
+    pub(super) rim: [R; BLOCK],
+    pub(super) angle: [R; BLOCK],
+    /// Only where there is one.
+    pub(super) obstruction: Option<[R; BLOCK]>,
+    /// Only where a sheet can end anything.
+    pub(super) sheet: Option<[R; BLOCK]>,
 }
 
 /// Who takes the derivatives of a block of rays as they come.
@@ -408,47 +412,28 @@ fn conic_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
     Normal { vector, m: vector.dot(vector), unit: false }
 }
 
-/// What the limits of a surface leave for its numbers.
-struct Pulled<R> {
-    by_semi_diameter: R,
-    /// By the square of the index in front, all else of the index apart.
-    by_n2: R,
-}
-
 impl<R: Real> Interface<R> {
-    /// The adjoint of the limits of this surface at `p` (see [`super::limit`]), the sheet of a
-    /// conic apart.
+    /// The adjoint of the limit of the angle, and what is left of it for the square of the index in
+    /// front, all else of the index apart.
     #[inline(always)]
-    fn pulled(
-        &self,
-        pull: Pull<R>,
-        p: Vec3<R>,
-        normal: Normal<R>,
-        back: &mut Refracted<R>,
-        by_point: &mut Vec3<R>,
-    ) -> Pulled<R> {
-        let rim = pull.rim / self.rim2;
-        let r2 = p.x * p.x + p.y * p.y;
-        by_point.x += p.x * rim;
-        by_point.y += p.y * rim;
-        let share = pull.angle / self.n2;
+    fn slanted(&self, pull: R, normal: Normal<R>, back: Refracted<R>) -> (Refracted<R>, R) {
+        let share = pull / self.n2;
         let loss = self.loss();
         let by_a = -((back.a + back.a) * share);
-        back.by_k = back.by_k + normal.vector * by_a;
-        back.by_normal = back.by_normal + back.k * by_a;
+        let mut by_normal = back.by_normal + back.k * by_a;
         if !normal.unit {
-            back.by_normal = back.by_normal + normal.vector * (loss * share * R::TWO);
+            by_normal = by_normal + normal.vector * (loss * share * R::TWO);
         }
-        let denser_behind = R::select(loss > R::ZERO, R::ZERO, share * normal.m);
-        back.by_dn2 += denser_behind - share * normal.m;
-        Pulled {
-            by_semi_diameter: -(rim * r2 / self.rim2.sqrt()),
-            by_n2: (back.a * back.a - loss * normal.m) * share / self.n2,
-        }
+        let by_k = back.by_k + normal.vector * by_a;
+        let by_behind2 = R::select(loss > R::ZERO, -(share * normal.m), R::ZERO);
+        let by_dn2 = back.by_dn2 + by_behind2;
+        let by_n2 = (back.a * back.a - loss * normal.m) * share / self.n2;
+        (Refracted { by_k, by_normal, by_dn2, ..back }, by_n2)
     }
 }
 
 /// What refraction read backwards gives.
+#[derive(Clone, Copy)]
 struct Refracted<R> {
     /// The direction in front.
     k: Vec3<R>,
@@ -535,12 +520,70 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through a surface to the one before.
     #[inline(always)]
-    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
+    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&Pulls<R>>) {
+        let sheet = pulls.and_then(|pulls| {
+            self.pull_rim(surface, &pulls.rim);
+            if let Some(pull) = &pulls.obstruction {
+                self.pull_radius(pull, -(R::ONE / surface.obstruction2));
+            }
+            pulls.sheet.as_ref().map(|sheet| self.pull_sheet(surface, sheet))
+        });
+        let angle = pulls.map(|pulls| &pulls.angle);
         match surface.form {
-            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, pulls),
-            Form::Conic => self.retrace(surface, conic_normal, pulls),
-            Form::Asphere => self.retrace_asphere(surface, pulls),
+            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, angle),
+            Form::Conic => self.retrace(surface, conic_normal, angle),
+            Form::Asphere => self.retrace_asphere(surface, angle),
         }
+        if let Some([by_curvature, by_conic]) = sheet {
+            for j in 0..BLOCK {
+                self.by_curvature[j] += by_curvature[j];
+                self.by_conic[j] += by_conic[j];
+            }
+        }
+    }
+
+    /// The adjoint of the rim.
+    #[inline(always)]
+    fn pull_rim(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) {
+        let (inverse, radius) = (R::ONE / surface.rim2, surface.rim2.sqrt());
+        self.pull_radius(pull, inverse);
+        for (j, pull) in pull.iter().enumerate() {
+            let (p, _) = self.block.state(j);
+            self.by_semi_diameter[j] = -(*pull * inverse * (p.x * p.x + p.y * p.y) / radius);
+        }
+    }
+
+    /// The adjoint of half the square of the distance from the axis, `factor` times.
+    #[inline(always)]
+    fn pull_radius(&mut self, pull: &[R; BLOCK], factor: R) {
+        for (j, pull) in pull.iter().enumerate() {
+            let (p, _) = self.block.state(j);
+            let share = *pull * factor;
+            self.by_x[j] += p.x * share;
+            self.by_y[j] += p.y * share;
+        }
+    }
+
+    /// The adjoint of the edge of a conic; what it leaves for the curvature and the conic constant.
+    #[inline(always)]
+    fn pull_sheet(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) -> [[R; BLOCK]; 2] {
+        let (c, k1) = (surface.curvature, R::ONE + surface.conic);
+        let mut left = [[R::ZERO; BLOCK]; 2];
+        for (j, pull) in pull.iter().enumerate() {
+            let (p, _) = self.block.state(j);
+            if surface.form == Form::Asphere {
+                let (r2, pull) = (p.x * p.x + p.y * p.y, c * *pull);
+                let outward = k1 * c * pull * R::TWO;
+                self.by_x[j] += p.x * outward;
+                self.by_y[j] += p.y * outward;
+                (left[0][j], left[1][j]) = (k1 * r2 * pull * R::TWO, c * r2 * pull);
+            } else {
+                let along = p.z * *pull;
+                self.by_z[j] += k1 * c * *pull;
+                (left[0][j], left[1][j]) = (k1 * along, c * along);
+            }
+        }
+        left
     }
 
     /// Goes back through a conic (a plane, a sphere) to the surface before.
@@ -549,7 +592,7 @@ impl<R: Real> Homeward<R> {
         &mut self,
         surface: &Interface<R>,
         normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
-        pulls: Option<&[Pull<R>; BLOCK]>,
+        angle: Option<&[R; BLOCK]>,
     ) {
         let surface = *surface;
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
@@ -558,14 +601,12 @@ impl<R: Real> Homeward<R> {
             let (p, behind) = self.block.state(j);
             let normal = normal(&surface, p);
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
-            let mut by_point = self.by_point(j);
-            let mut pulled = None;
-            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
-                back.by_normal.z -= pull.sheet;
-                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+            let mut by_n2 = R::ZERO;
+            if let Some(angle) = angle {
+                (back, by_n2) = surface.slanted(angle[j], normal, back);
             }
             let n = back.by_normal;
-            by_point = by_point - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
+            let by_point = self.by_point(j) - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             let bulge = p.x * p.x + p.y * p.y + k1 * p.z * p.z;
             self.by_curvature[j] = lambda * bulge * half - (p.x * n.x + p.y * n.y + k1 * p.z * n.z);
@@ -573,13 +614,15 @@ impl<R: Real> Homeward<R> {
                 self.by_conic[j] = c * p.z * (lambda * p.z * half - n.z);
             }
             self.step_back(&surface, j, p, &back, by_point - normal.vector * lambda);
-            self.count(&surface, j, pulled);
+            if angle.is_some() {
+                self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
+            }
         }
     }
 
     /// Goes back through an asphere to the surface before.
     #[inline(always)]
-    fn retrace_asphere(&mut self, surface: &Interface<R>, pulls: Option<&[Pull<R>; BLOCK]>) {
+    fn retrace_asphere(&mut self, surface: &Interface<R>, angle: Option<&[R; BLOCK]>) {
         let surface = *surface;
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
@@ -588,35 +631,24 @@ impl<R: Real> Homeward<R> {
             let vector = Vec3::new(p.x * slope, p.y * slope, R::ONE);
             let normal = Normal { vector, m: vector.dot(vector), unit: false };
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
-            let mut by_point = self.by_point(j);
-            let (mut edge, mut pulled) = (R::ZERO, None);
-            if let Some(pull) = pulls.map(|pulls| pulls[j]) {
-                edge = pull.sheet + pull.sheet;
-                pulled = Some(surface.pulled(pull, p, normal, &mut back, &mut by_point));
+            let mut by_n2 = R::ZERO;
+            if let Some(angle) = angle {
+                (back, by_n2) = surface.slanted(angle[j], normal, back);
             }
             // N = (−2 x w, −2 y w, 1) with w = dz/dr².
             let n = back.by_normal;
             let by_slope = -(p.x * n.x + p.y * n.y) * R::TWO;
             let radial = by_slope * sag.bend * R::TWO;
-            by_point = by_point
+            let by_point = self.by_point(j)
                 + Vec3::new(p.x * radial + n.x * slope, p.y * radial + n.y * slope, R::ZERO);
-            if pulled.is_some() {
-                let outward =
-                    (R::ONE + surface.conic) * surface.curvature * surface.curvature * edge;
-                by_point = by_point + Vec3::new(p.x * outward, p.y * outward, R::ZERO);
-            }
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             (self.by_curvature[j], self.by_conic[j]) = sag.by_conic(lambda, by_slope);
-            if pulled.is_some() {
-                // (1+κ) c² r² − 1
-                let (bent, half) = (surface.curvature * sag.r2 * edge, R::from_f64(0.5));
-                self.by_curvature[j] += (R::ONE + surface.conic) * bent;
-                self.by_conic[j] += surface.curvature * bent * half;
-            }
             let terms = sag.by_terms(lambda, by_slope);
             self.by_terms.iter_mut().zip(terms).for_each(|(column, by_term)| column[j] = by_term);
             self.step_back(&surface, j, p, &back, by_point - vector * lambda);
-            self.count(&surface, j, pulled);
+            if angle.is_some() {
+                self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
+            }
         }
     }
 
@@ -639,15 +671,6 @@ impl<R: Real> Homeward<R> {
         self.by_index_before[j] = (path - back.by_dn2) * surface.index_before * R::TWO;
         self.set(j, by_start, back.by_k + by_start * s);
         self.block.set(j, Vec3::new(start.x, start.y, start.z + surface.gap), back.k);
-    }
-
-    /// What the limits of a surface owe to its semi-diameter and to the index in front.
-    #[inline(always)]
-    fn count(&mut self, surface: &Interface<R>, j: usize, pulled: Option<Pulled<R>>) {
-        if let Some(Pulled { by_semi_diameter, by_n2 }) = pulled {
-            self.by_semi_diameter[j] = by_semi_diameter;
-            self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
-        }
     }
 
     /// A lost ray counts nothing, whatever its numbers have become.

@@ -9,12 +9,12 @@
 use super::asphere;
 use super::fate::{CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
 use super::interface::{Crossing, Form, Interface, Meeting};
-use super::lanes::{Width, widest};
 use super::single::{Ray, launch};
 use super::{Fates, Tracer};
 use crate::lens::Invalid;
 use crate::math::Real;
 use crate::math::Vec3;
+use crate::math::{Width, widest};
 use rayon::prelude::*;
 
 /// Rays in a block.

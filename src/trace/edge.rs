@@ -66,7 +66,8 @@ impl<R: Real> Interface<R> {
             }
             _ => self.meeting(start, k),
         };
-        if met.missed {
+        // At the equator rounding decides whether a ray counts as missed: it does not.
+        if met.missed && limit != Some(Hurdle::Equator) {
             return None;
         }
         if limit == Some(Hurdle::Reflection) {
@@ -98,18 +99,10 @@ impl<R: Real> Interface<R> {
             Hurdle::Miss => match self.form {
                 Form::Plane => self.sense * k.z,
                 Form::Asphere => met.a * met.a,
-                Form::Sphere | Form::Conic => self.sphere_margin(&met, start, k),
+                Form::Sphere | Form::Conic => self.discriminant(start, k),
             },
+            Hurdle::Equator => self.equator_margin(&met),
         }
-    }
-
-    /// What decides whether a sphere or conic is missed: its discriminant or its sheet, whichever
-    /// is nearer to zero.
-    fn sphere_margin(&self, met: &Meeting<R>, start: Vec3<R>, k: Vec3<R>) -> R {
-        let square = self.discriminant(start, k);
-        let sheet = met.normal.z - self.sheet;
-        let decides = sheet.value().abs() * self.n2.value() < square.value().abs();
-        if decides { sheet } else { square }
     }
 }
 

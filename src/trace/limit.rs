@@ -6,7 +6,7 @@
 //! at the edge:
 //!
 //! ```text
-//! rim    (r²/R² − 1)/2
+//! rim    (r²/R² − 1)/2, and of an obstruction (1 − r²/h²)/2
 //! angle  max(0, 1 − (n'/n)²) N·N − (k·N)²/n²
 //! sheet  −(1 − (1+κ) c z), or (1+κ) c² r² − 1 at an asphere
 //! ```
@@ -24,14 +24,14 @@
 //! the answer is what stands at εη.
 
 use super::Tracer;
-use super::backward::{Gradient, Harvest, Pull, Seed, Sowing};
+use super::backward::{Gradient, Harvest, Pulls, Seed, Sowing};
 use super::batch::{BLOCK, Block};
 use super::interface::{Form, Interface};
-use super::lanes::{Width, widest};
 use super::single::Ray;
 use super::slot::Slot;
 use crate::lens::{Invalid, System};
 use crate::math::{Dual, Jet, Real, Vec3};
+use crate::math::{Width, widest};
 
 /// Rays that travel abreast.
 pub const LANES: usize = BLOCK;
@@ -43,6 +43,7 @@ type Pair<R> = Dual<Dual<R, 1>, 1>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Limit {
     Rim,
+    Obstruction,
     Angle,
     Sheet,
 }
@@ -62,6 +63,7 @@ impl<R: Real> Interface<R> {
         let flat = surface.form != Form::Asphere && surface.curvature == 0.0;
         match limit {
             Limit::Rim => surface.rim2 < f64::INFINITY,
+            Limit::Obstruction => surface.obstruction2 > 0.0,
             Limit::Angle => !flat || surface.dn2 < 0.0,
             Limit::Sheet => {
                 let closed = surface.form == Form::Asphere || surface.sheet > f64::NEG_INFINITY;
@@ -72,12 +74,30 @@ impl<R: Real> Interface<R> {
 }
 
 impl<R: Real> Interface<Jet<R>> {
+    /// `N·N` at a point of the surface.
+    #[inline(always)]
+    fn square_of_normal(&self, p: Vec3<Jet<R>>) -> Jet<R> {
+        let c = self.curvature;
+        let r2 = p.x * p.x + p.y * p.y;
+        match self.form {
+            Form::Plane | Form::Sphere => Jet::ONE,
+            Form::Conic => {
+                let z = Jet::ONE - c * (p.z + self.conic * p.z);
+                c * c * r2 + z * z
+            }
+            Form::Asphere => {
+                let slope = self.sag(r2).1;
+                slope * slope * r2 * Jet::from_f64(4.0) + Jet::ONE
+            }
+        }
+    }
+
     #[inline(always)]
     fn limits(
         &self,
         limit: Limit,
         block: &Block<Jet<R>>,
-        slants: &[Slant<Jet<R>>; BLOCK],
+        slants: &[Jet<R>; BLOCK],
         lanes: &mut [Jet<R>; BLOCK],
     ) {
         for j in 0..BLOCK {
@@ -85,9 +105,9 @@ impl<R: Real> Interface<Jet<R>> {
         }
     }
 
-    /// One of the functions above.
+    /// One of the functions above, from the point and `k·N`.
     #[inline(always)]
-    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, slant: Slant<Jet<R>>) -> Jet<R> {
+    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, a: Jet<R>) -> Jet<R> {
         let r2 = p.x * p.x + p.y * p.y;
         let c2 = (R::ONE + self.conic.value) * self.curvature.value;
         let minus_one = Jet::constant(-R::ONE);
@@ -96,10 +116,15 @@ impl<R: Real> Interface<Jet<R>> {
                 let half = R::from_f64(0.5);
                 r2.scaled(half / self.rim2.value) - Jet::constant(half)
             }
+            Limit::Obstruction => {
+                let half = R::from_f64(0.5);
+                Jet::constant(half) - r2.scaled(half / self.obstruction2.value)
+            }
             Limit::Angle => {
                 let inverse = R::ONE / self.n2.value;
-                let loss = slant.m.scaled(self.loss().value * inverse);
-                loss - (slant.a * slant.a).scaled(inverse)
+                let loss = self.loss().value * inverse;
+                let m = if loss > R::ZERO { self.square_of_normal(p) } else { Jet::ZERO };
+                m.scaled(loss) - (a * a).scaled(inverse)
             }
             Limit::Sheet if self.form == Form::Asphere => {
                 r2.scaled(c2 * self.curvature.value) + minus_one
@@ -107,13 +132,6 @@ impl<R: Real> Interface<Jet<R>> {
             Limit::Sheet => p.z.scaled(c2) + minus_one,
         }
     }
-}
-
-/// How a ray stands to a surface: `k·N` and `N·N`.
-#[derive(Debug, Clone, Copy, Default)]
-struct Slant<R> {
-    a: R,
-    m: R,
 }
 
 /// A block of rays that have arrived, each with its derivatives by two pupil coordinates, and the
@@ -147,7 +165,8 @@ impl<R: Real> PupilTracer<R> {
     /// Numbers that no ray can be traced with: see [`System::check`].
     pub fn new(system: &System<f64>) -> Result<Self, Invalid> {
         let outward = Tracer::new(&system.lift::<Jet<R>>())?;
-        let all = |i: usize| [Limit::Rim, Limit::Angle, Limit::Sheet].map(|limit| (i, limit));
+        let kinds = [Limit::Rim, Limit::Obstruction, Limit::Angle, Limit::Sheet];
+        let all = |i: usize| kinds.map(|limit| (i, limit));
         let limits = (0..outward.surfaces()).flat_map(all);
         let limits = limits.filter(|(i, limit)| outward.interfaces[*i].has(*limit)).collect();
         let mut homeward = Tracer::<Pair<R>>::new(&system.lift())?;
@@ -172,26 +191,38 @@ impl<R: Real> PupilTracer<R> {
     ) -> Gradient<R> {
         let mut gradient = Gradient::zero(self.surfaces());
         let mut room = Room::new(self);
-        widest(
-            Width::detect(),
-            #[inline(always)]
-            || {
-                for points in points.chunks(BLOCK) {
-                    let mut block_points = [points[0]; BLOCK];
-                    block_points[..points.len()].copy_from_slice(points);
-                    let block = self.go(
+        let width = Width::detect();
+        for points in points.chunks(BLOCK) {
+            let mut all = [points[0]; BLOCK];
+            all[..points.len()].copy_from_slice(points);
+            // Compiled apart: all in one is too much for the lanes to be found.
+            let block = widest(
+                width,
+                #[inline(always)]
+                || {
+                    self.go(
                         &mut room,
                         points.len(),
                         #[inline(always)]
-                        |j| ray(block_points[j]),
-                    );
-                    fill(&block_points, &mut room.abreast);
+                        |j| ray(all[j]),
+                    )
+                },
+            );
+            widest(
+                width,
+                #[inline(always)]
+                || fill(&all, &mut room.abreast),
+            );
+            widest(
+                width,
+                #[inline(always)]
+                || {
                     room.spread(&self.limits);
                     let (block, sum) = (block.map(pair), &mut Top(&mut gradient));
                     self.homeward.homeward(block, &room.distances, points.len(), &room, sum);
-                }
-            },
-        );
+                },
+            );
+        }
         gradient
     }
 
@@ -209,23 +240,28 @@ impl<R: Real> PupilTracer<R> {
         block.code[count..].fill(Jet::ONE);
         let mut limits = self.limits.iter().zip(&mut room.abreast.limits).peekable();
         for (i, interface) in self.outward.interfaces.iter().enumerate() {
-            let (distances, slants) = (&mut room.distances[i], &mut room.slants);
+            // Local, so that the lanes need not ask whether it overlaps the block.
+            let mut kept = [[Jet::ZERO; BLOCK]; 2];
             block.meet(
                 interface,
                 i as u32,
                 #[inline(always)]
-                |j, met| {
-                    distances[j] = pair(met.s);
-                    slants[j] = Slant { a: met.a, m: met.m };
-                },
+                |j, met| (kept[0][j], kept[1][j]) = (met.s, met.a),
             );
+            let [distances, slants] = kept;
+            for (to, from) in room.distances[i].iter_mut().zip(&distances) {
+                *to = pair(*from);
+            }
             while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i)
             {
                 // Known inside the loops, so that these have no branch.
                 match limit {
-                    Limit::Rim => interface.limits(Limit::Rim, &block, slants, lanes),
-                    Limit::Angle => interface.limits(Limit::Angle, &block, slants, lanes),
-                    Limit::Sheet => interface.limits(Limit::Sheet, &block, slants, lanes),
+                    Limit::Rim => interface.limits(Limit::Rim, &block, &slants, lanes),
+                    Limit::Obstruction => {
+                        interface.limits(Limit::Obstruction, &block, &slants, lanes);
+                    }
+                    Limit::Angle => interface.limits(Limit::Angle, &block, &slants, lanes),
+                    Limit::Sheet => interface.limits(Limit::Sheet, &block, &slants, lanes),
                 }
             }
         }
@@ -253,9 +289,8 @@ fn transposed<R: Real>([value, x, y]: [R; 3]) -> Pair<R> {
 /// What a block needs on its way, made once.
 struct Room<R> {
     abreast: Abreast<R>,
-    slants: [Slant<Jet<R>>; BLOCK],
     distances: Vec<[Pair<R>; BLOCK]>,
-    pulls: Vec<[Pull<Pair<R>>; BLOCK]>,
+    pulls: Vec<Pulls<Pair<R>>>,
 }
 
 impl<R: Real> Room<R> {
@@ -269,19 +304,25 @@ impl<R: Real> Room<R> {
             by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
         };
         let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
-        let (slants, pulls) = ([Slant::default(); BLOCK], vec![[Pull::default(); BLOCK]; surfaces]);
-        Self { abreast, slants, distances, pulls }
+        let none = [Pair::ZERO; BLOCK];
+        let pulls =
+            vec![Pulls { rim: none, angle: none, obstruction: None, sheet: None }; surfaces];
+        Self { abreast, distances, pulls }
     }
 
     /// Brings what was filled in to its surface.
     #[inline(always)]
     fn spread(&mut self, limits: &[(usize, Limit)]) {
         for ((surface, limit), by_limit) in limits.iter().zip(&self.abreast.by_limit) {
-            let lanes = self.pulls[*surface].iter_mut().zip(by_limit);
-            match limit {
-                Limit::Rim => lanes.for_each(|(pull, by)| pull.rim = transposed(*by)),
-                Limit::Angle => lanes.for_each(|(pull, by)| pull.angle = transposed(*by)),
-                Limit::Sheet => lanes.for_each(|(pull, by)| pull.sheet = transposed(*by)),
+            let pulls = &mut self.pulls[*surface];
+            let lanes = match limit {
+                Limit::Rim => &mut pulls.rim,
+                Limit::Obstruction => pulls.obstruction.get_or_insert([Pair::ZERO; BLOCK]),
+                Limit::Angle => &mut pulls.angle,
+                Limit::Sheet => pulls.sheet.get_or_insert([Pair::ZERO; BLOCK]),
+            };
+            for (pull, by_limit) in lanes.iter_mut().zip(by_limit) {
+                *pull = transposed(*by_limit);
             }
         }
     }
@@ -295,8 +336,8 @@ impl<R: Real> Sowing<Pair<R>> for Room<R> {
     }
 
     #[inline(always)]
-    fn pulls(&self, surface: usize) -> Option<&[Pull<Pair<R>>; BLOCK]> {
-        self.pulls.get(surface)
+    fn pulls(&self, surface: usize) -> Option<&Pulls<Pair<R>>> {
+        Some(&self.pulls[surface])
     }
 }
 

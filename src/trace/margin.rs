@@ -15,6 +15,8 @@ use crate::math::Vec3;
 pub enum Hurdle {
     /// The surface is not met: the ray passes by it.
     Miss,
+    /// The ray meets the far half of a sphere or conic, behind its equator, which does not count.
+    Equator,
     /// The ray meets it outside the semi-diameter.
     Rim,
     /// The ray meets it inside the obstruction.
@@ -30,15 +32,22 @@ impl<R: Real> Tracer<R> {
     /// reflects it totally.
     ///
     /// The margin is `sd² − r²` in mm² at a rim and `r² − h²` at an obstruction, the square of the
-    /// optical direction's component along the normal at a miss and at a total reflection, and −1
-    /// at an asphere that is missed.
+    /// optical direction's component along the normal at a miss and at a total reflection, −1 at an
+    /// asphere that is missed, and the normal's component along the axis at an equator.
     pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, Hurdle, R)) {
         let mut k = launch(ray.direction, self.index_before);
         let mut point = ray.point;
         for (i, interface) in self.interfaces.iter().enumerate() {
             let start = Vec3::new(point.x, point.y, point.z - interface.gap);
             let met = interface.meeting(start, k);
-            visit(i, Hurdle::Miss, interface.miss_margin(&met, start, k));
+            let passes_by = met.missed && !interface.is_behind_equator(&met);
+            visit(i, Hurdle::Miss, interface.miss_margin(&met, start, k, passes_by));
+            if passes_by {
+                return;
+            }
+            if interface.has_equator() {
+                visit(i, Hurdle::Equator, interface.equator_margin(&met));
+            }
             if met.missed {
                 return;
             }
@@ -80,21 +89,32 @@ impl<R: Real> Interface<R> {
         }
     }
 
-    /// `(k·N)²`, negative where no point of the ray lies on the surface, or what the sheet of the
-    /// surface leaves where that is less.
-    fn miss_margin(&self, met: &Meeting<R>, p: Vec3<R>, k: Vec3<R>) -> R {
+    /// `(k·N)²`, negative where no point of the ray lies on the surface.
+    fn miss_margin(&self, met: &Meeting<R>, p: Vec3<R>, k: Vec3<R>, passes_by: bool) -> R {
         let square = match self.form {
             Form::Plane => return self.sense * k.z,
             Form::Asphere if met.missed => return -R::ONE,
             Form::Asphere => return met.a * met.a,
             Form::Sphere | Form::Conic => self.discriminant(p, k),
         };
-        let sheet = met.normal.z - self.sheet;
-        let sheet_decides = square > R::ZERO && sheet < square;
-        let margin = R::select(sheet_decides, sheet, square);
         // Rounding may tell the two computations of the discriminant apart: the ray decides.
-        let agrees = met.missed != (margin > R::ZERO);
-        R::select(agrees, margin, R::ZERO - R::from_f64(f64::from(u8::from(met.missed))))
+        let agrees = passes_by != (square > R::ZERO);
+        R::select(agrees, square, R::ZERO - R::from_f64(f64::from(u8::from(passes_by))))
+    }
+
+    /// Whether only the half of the surface in front of its equator counts.
+    fn has_equator(&self) -> bool {
+        matches!(self.form, Form::Sphere | Form::Conic) && self.sheet.value() > f64::NEG_INFINITY
+    }
+
+    /// The normal's component along the axis, negative behind the equator.
+    pub(super) fn equator_margin(&self, met: &Meeting<R>) -> R {
+        met.normal.z - self.sheet
+    }
+
+    /// Whether the ray meets the surface behind its equator, instead of not at all.
+    fn is_behind_equator(&self, met: &Meeting<R>) -> bool {
+        self.has_equator() && self.equator_margin(met) < R::ZERO
     }
 
     pub(super) fn discriminant(&self, p: Vec3<R>, k: Vec3<R>) -> R {

@@ -15,16 +15,15 @@ mod batch;
 mod edge;
 mod fate;
 mod interface;
-mod lanes;
 mod limit;
 mod margin;
 mod single;
 mod slot;
 
+pub use crate::math::Width;
 pub use backward::{Gradient, Seed, SurfaceGradient};
 pub use batch::{Hits, Points, Rays, Sink};
 pub use fate::{Fate, Fates};
-pub use lanes::Width;
 pub use limit::{Abreast, LANES, PupilTracer};
 pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};

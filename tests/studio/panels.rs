@@ -159,7 +159,7 @@ fn a_row_has_a_menu_of_its_own() {
 /// A search that stands somehow.
 fn searching(standing: Standing) -> View {
     let view = view();
-    let goal = aplanat::merit::Goal::sensible(&view.lens).unwrap();
+    let goal = Goal::sensible(&view.lens).unwrap();
     let method = Method::Adam;
     let task = Task { method, lens: Arc::clone(&view.lens), goal, tolerance: 1e-3 };
     let refused = Some("ray 4 is lost: clipped at surface 2".to_owned());

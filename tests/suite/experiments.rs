@@ -90,3 +90,34 @@ fn images_have_derivatives_that_the_biased_ones_miss() {
     assert!(biased.iter().all(|v| *v == 0.0) && difference.iter().all(|v| *v > 0.1));
     assert!(boundary.iter().zip(&difference).all(|(a, b)| (a / b - 1.0).abs() < 1e-3));
 }
+
+#[test]
+fn a_front_by_unbiased_gradients_dominates_the_biased_designs() {
+    let outcome = outcome("3.6");
+    assert_eq!(outcome.tables.len(), 2);
+    assert!(outcome.lenses.len() > 4);
+    assert!(outcome.lenses.iter().all(|(_, lens)| lens.check().is_ok()));
+}
+
+#[test]
+fn a_bright_lens_shows_sharper_what_moves() {
+    let outcome = outcome("3.8");
+    let [dark, bright] =
+        ["dark_moving", "bright_moving"].map(|name| column(&outcome.tables[1], name));
+    assert!(dark[0] < bright[0], "{} {}", dark[0], bright[0]);
+}
+
+#[test]
+fn a_corner_is_brighter_by_gradients_that_see_it() {
+    let outcome = outcome("3.9");
+    let [biased, unbiased] =
+        ["biased_cone", "unbiased_cone"].map(|name| column(&outcome.tables[0], name));
+    assert!(unbiased[unbiased.len() - 1] > biased[biased.len() - 1]);
+}
+
+#[test]
+fn zoom_lenses_get_better_between_their_positions_too() {
+    let outcome = outcome("3.10");
+    let [start, now] = ["start_blur_mm", "blur_mm"].map(|name| column(&outcome.tables[0], name));
+    assert!(start.iter().zip(&now).all(|(start, now)| now < start));
+}

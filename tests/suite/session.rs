@@ -543,7 +543,9 @@ fn an_experiment_runs_in_the_background_and_can_be_saved() {
     session.apply(Command::SaveExperiment(folder.join("deep")));
     let written = std::fs::read_dir(folder.join("deep")).unwrap().count();
     std::fs::remove_dir_all(&folder).unwrap();
-    assert_eq!(written, report.outcome.tables.len() + report.outcome.pictures.len() + 1);
+    let outcome = &report.outcome;
+    let expected = outcome.tables.len() + outcome.pictures.len() + outcome.lenses.len() + 1;
+    assert_eq!(written, expected);
     assert_eq!(session.view().messages.last().unwrap().severity, Severity::Note);
     session.apply(Command::CloseExperiment);
     assert!(session.view().trial.is_none());

@@ -102,7 +102,8 @@ const MOST: f64 = 16.0;
 /// Where rays are aimed at the stop, its rim limits the beam and moves with its semi-diameter.
 ///
 /// # Errors
-/// A pupil without light or edge; `Boundary` for a pupil that is not star-shaped.
+/// A pupil without light or edge; `Boundary` for a pupil that is neither star-shaped nor a ring,
+/// `Warp` for a lens with an obstruction.
 pub fn differentiate(
     region: &Region<'_>,
     cost: &Cost,
@@ -117,7 +118,7 @@ pub fn differentiate(
     }
     region.has_edge()?;
     match (estimator, &region.kind) {
-        (Estimator::Boundary, Kind::Ragged { pieces, .. }) => {
+        (Estimator::Boundary, Kind::Ragged { pieces, ring: None, .. }) => {
             Err(NoDerivative::NotStarShaped(shape(*pieces)))
         }
         (Estimator::Warp, _) => region.sampled_derivative(cost, asked),
@@ -139,6 +140,9 @@ pub fn plan(region: &Region<'_>, asked: Accuracy) -> Result<(Estimator, String),
             let edge = if arcs == 1 { "one arc".to_owned() } else { format!("{arcs} arcs") };
             let reason = format!("the pupil is one piece with an edge of {edge}");
             Ok((Estimator::Boundary, reason))
+        }
+        Kind::Ragged { ring: Some(_), .. } => {
+            Ok((Estimator::Boundary, "the pupil is a ring around a shadow".to_owned()))
         }
         Kind::Ragged { pieces, .. } => {
             let shape = shape(*pieces);
@@ -247,17 +251,21 @@ impl Region<'_> {
         estimator: Estimator,
         order: usize,
     ) -> Result<Derivative, NoDerivative> {
-        if estimator == Estimator::Difference {
-            return self.difference_derivative(cost, order).ok_or(NoDerivative::Endless);
-        }
         let lit = self.lit(order);
+        let natural = natural(cost, &lit.moments);
+        if estimator == Estimator::Difference {
+            let found = self.difference_derivative(cost, order);
+            let mut found = found.ok_or(NoDerivative::Endless)?;
+            found.drop_rounding(DIFFERENCE_ROUNDING, natural);
+            return Ok(found);
+        }
         let by = match estimator {
             Estimator::Biased => lit.biased_derivative(cost),
             _ => lit.boundary_derivative(cost).ok_or(NoDerivative::Endless)?,
         };
         let error = Gradient::zero(by.surfaces.len());
         let mut found = Derivative { error, by, rays: lit.traced };
-        found.drop_rounding(natural(cost, &lit.moments));
+        found.drop_rounding(ROUNDING, natural);
         Ok(found)
     }
 
@@ -289,6 +297,8 @@ impl Region<'_> {
 const NOTABLE: f64 = 0.1;
 /// A derivative this much smaller than its natural size is rounding.
 const ROUNDING: f64 = 1e-13;
+/// The same where it was divided by a small step.
+const DIFFERENCE_ROUNDING: f64 = 1e-9;
 
 impl Derivative {
     /// Adds what raising the order has changed to the errors; all of it where this is the first
@@ -312,12 +322,16 @@ impl Derivative {
     }
 
     /// Sets to zero the kinds of numbers on which the integral depends by no more than rounding.
-    fn drop_rounding(&mut self, natural: impl Fn(Slot) -> f64) {
+    fn drop_rounding(&mut self, rounding: f64, natural: impl Fn(Slot) -> f64) {
+        let Self { by, error, .. } = self;
         for slot in Slot::all() {
-            if self.by.largest(slot) <= ROUNDING * natural(slot) {
-                self.by.surfaces.iter_mut().for_each(|surface| *surface.by_mut(slot) = 0.0);
+            if by.largest(slot) > rounding * natural(slot) {
+                continue;
+            }
+            for numbers in [&mut *by, &mut *error] {
+                numbers.surfaces.iter_mut().for_each(|surface| *surface.by_mut(slot) = 0.0);
                 if slot == Slot::Index {
-                    self.by.index_before = 0.0;
+                    numbers.index_before = 0.0;
                 }
             }
         }

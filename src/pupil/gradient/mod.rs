@@ -22,15 +22,16 @@ pub use estimator::{Estimator, NoDerivative, differentiate, plan};
 pub use warp::Warp;
 
 use super::moments::Moments;
+use crate::math::Real;
 use crate::trace::{Gradient, Slot};
 
 /// What each ray of a pupil contributes by where it lands. Where a pupil is its own mirror image, so
 /// must be the contribution.
 pub trait Integrand: Sync {
     /// The contribution of a ray that lands at a point, in mm on the image plane.
-    fn of(&self, p: [f64; 2]) -> f64;
+    fn of<R: Real>(&self, p: [R; 2]) -> R;
     /// Its derivative by the point.
-    fn slope(&self, p: [f64; 2]) -> [f64; 2];
+    fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2];
 }
 
 /// What each ray of a pupil contributes: `square |p − center|² + constant`, `p` its image point.
@@ -60,13 +61,16 @@ impl Cost {
 }
 
 impl Integrand for Cost {
-    fn of(&self, p: [f64; 2]) -> f64 {
-        let [x, y] = [p[0] - self.center[0], p[1] - self.center[1]];
-        self.square * (x * x + y * y) + self.constant
+    #[inline(always)]
+    fn of<R: Real>(&self, p: [R; 2]) -> R {
+        let [x, y] = [0, 1].map(|i| p[i] - R::from_f64(self.center[i]));
+        R::from_f64(self.square) * (x * x + y * y) + R::from_f64(self.constant)
     }
 
-    fn slope(&self, p: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|i| 2.0 * self.square * (p[i] - self.center[i]))
+    #[inline(always)]
+    fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2] {
+        let factor = R::from_f64(2.0 * self.square);
+        [0, 1].map(|i| factor * (p[i] - R::from_f64(self.center[i])))
     }
 }
 

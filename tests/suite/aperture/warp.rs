@@ -213,6 +213,28 @@ fn aperture_gradients_scale_with_the_lens() {
     }
 }
 
+#[test]
+fn aperture_gradients_move_the_shadow_of_an_obstruction() {
+    let case = &cases()[4];
+    let mut system = case.system();
+    system.surfaces[0].obstruction = 3.0;
+    let bench = case.bench_of(system);
+    let region = Region::new(case.launch(&bench));
+    let light = region.lit(9);
+    for cost in [case.spot().0, case.throughput().0] {
+        let found = region.warp_derivative(&cost, Warp { count: 8192, seed: 6 }).unwrap();
+        let exact = light.boundary_derivative(&cost).unwrap();
+        for name in GROUPS {
+            let (by, error) = (group(&found.by, name), group(&found.error, name));
+            for (i, exact) in group(&exact, name).into_iter().enumerate() {
+                let off = (by[i] - exact).abs();
+                println!("{name} {i}: {} {exact}, {:.1} errors", by[i], off / error[i]);
+                assert!(off <= FARTHEST * error[i] + 1e-9, "{name} {i}: {} {exact}", by[i]);
+            }
+        }
+    }
+}
+
 /// Curvature, thickness, index behind, semi-diameter of each surface, and a plane image.
 fn system(rows: &[(f64, f64, f64, f64)]) -> System<f64> {
     let surface = |&(curvature, thickness, index, semi_diameter): &(f64, f64, f64, f64)| {

@@ -3,6 +3,7 @@
 mod bad_input;
 mod mutations;
 mod round_trip;
+mod volume;
 mod zemax;
 
 use std::path::PathBuf;

@@ -31,7 +31,7 @@ pub(super) const fn hint(limit: Limit) -> &'static str {
         Limit::Surface(_, Hurdle::Obstruction) => {
             "The obstruction of this surface stops rays nearer to the axis. Click to point it out."
         }
-        Limit::Surface(_, Hurdle::Miss) => {
+        Limit::Surface(_, Hurdle::Miss | Hurdle::Equator) => {
             "Rays beyond pass by this surface without meeting it. Click to point it out."
         }
         Limit::Surface(_, Hurdle::Reflection) => {
@@ -125,7 +125,7 @@ impl Shown<'_> {
             Limit::Surface(i, Hurdle::Rim) if i == self.bench().stop() => "stop".to_owned(),
             Limit::Surface(i, Hurdle::Rim) => (i + 1).to_string(),
             Limit::Surface(i, Hurdle::Obstruction) => format!("{} obstructs", i + 1),
-            Limit::Surface(i, Hurdle::Miss) => format!("{} missed", i + 1),
+            Limit::Surface(i, Hurdle::Miss | Hurdle::Equator) => format!("{} missed", i + 1),
             Limit::Surface(i, Hurdle::Reflection) => format!("{} TIR", i + 1),
             Limit::Unaimed => "unaimed".to_owned(),
         };

@@ -42,7 +42,7 @@ impl Width {
     reason = "measured: 940 against 220 million ray-surfaces a second; see `measure trace`"
 )]
 #[inline]
-pub(super) fn widest<T>(width: Width, work: impl FnOnce() -> T) -> T {
+pub(crate) fn widest<T>(width: Width, work: impl FnOnce() -> T) -> T {
     #[cfg(target_arch = "x86_64")]
     match width.min(Width::detect()) {
         Width::Baseline => work(),

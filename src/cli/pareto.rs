@@ -1,0 +1,227 @@
+//! The front of sharpness against light.
+
+use super::failure::Failure;
+use super::input::{LensFile, Tolerance};
+use super::optimize::{progress_bar, stop_flag};
+use super::output::{Number, Output, Table};
+use crate::front::{self, Survey};
+use crate::lens::Lens;
+use crate::measure::timed;
+use crate::merit::PupilEdge;
+use crate::optimize::Method;
+use crate::optimize::pareto::{Design, Front, NoFront, Settings, Sweep};
+use clap::ValueEnum;
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Sweeps the front of sharpness against light; Ctrl-C ends it and writes what was found
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("help/pareto.txt"))]
+pub(super) struct Pareto {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// The folder into which table, picture and lenses are written
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+
+    /// How many weights
+    #[arg(long, default_value_t = Settings::default().points, value_name = "N")]
+    points: usize,
+
+    /// What descends
+    #[arg(long, value_enum, default_value_t = Descent::Dls)]
+    method: Descent,
+
+    /// No more steps than this for each weight; 100 for dls and 500 for adam where it is absent
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+
+    /// The error allowed of the radius of each spot while searching: `0.1%` or `1e-3`
+    #[arg(long, default_value = "1e-3", value_name = "TOLERANCE")]
+    error: Tolerance,
+
+    /// Without the same search by biased derivatives, which is made for comparison
+    #[arg(long)]
+    no_biased: bool,
+}
+
+/// The methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Descent {
+    /// Damped least squares
+    Dls,
+    /// First order, with moments, annealed
+    Adam,
+}
+
+impl Pareto {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let opened = self.lens.open()?;
+        if let Some(folder) = &self.out {
+            std::fs::create_dir_all(folder).map_err(|error| {
+                Failure::Input(format!("{}: {error}; expected a folder", folder.display()))
+            })?;
+        }
+        let stop = stop_flag();
+        let refuse = |cause: NoFront| Failure::Input(format!("{}: {cause}", opened.file));
+        let search = |pupil| self.search(&opened.lens, pupil, &stop).map_err(refuse);
+        let (sweep, ms) = search(PupilEdge::Moving)?;
+        let biased = if self.no_biased { None } else { Some(search(PupilEdge::Kept)?) };
+        let mut report = Report::new(&sweep, ms, biased.as_ref(), stop.load(Ordering::Relaxed));
+        if let Some(folder) = &self.out {
+            let survey = Survey {
+                name: &opened.lens.name,
+                start: &sweep.start,
+                front: sweep.front(),
+                tried: sweep.tried(),
+                biased: biased.as_ref().map(|(sweep, _)| sweep.front()),
+            };
+            let written = front::write(&survey, folder)?;
+            report.files = written.iter().map(|path| path.display().to_string()).collect();
+        }
+        output.print(&report)
+    }
+
+    fn search(
+        &self,
+        lens: &Lens,
+        pupil: PupilEdge,
+        stop: &AtomicBool,
+    ) -> Result<(Sweep, f64), NoFront> {
+        let (method, steps) = match self.method {
+            Descent::Dls => (Method::DampedLeastSquares, 100),
+            Descent::Adam => (Method::Adam, 500),
+        };
+        let settings = Settings {
+            points: self.points,
+            method,
+            steps: self.steps.unwrap_or(steps),
+            pupil,
+            tolerance: self.error.0,
+            ..Settings::default()
+        };
+        let (sweep, ms) = timed(|| -> Result<Sweep, NoFront> {
+            let mut sweep = Sweep::new(lens, &settings)?;
+            let bar = progress_bar(0);
+            while !stop.load(Ordering::Relaxed) {
+                let slice = sweep.step();
+                bar.set_length(slice.total as u64);
+                bar.set_position(slice.done as u64);
+                bar.set_message(format!("hypervolume {}", Number(sweep.hypervolume())));
+                if slice.finished {
+                    break;
+                }
+            }
+            bar.finish_and_clear();
+            Ok(sweep)
+        });
+        Ok((sweep?, ms))
+    }
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report {
+    ms: f64,
+    stopped: bool,
+    hypervolume: f64,
+    tried: usize,
+    start: Point,
+    front: Vec<Point>,
+    biased: Option<Biased>,
+    files: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Biased {
+    ms: f64,
+    hypervolume: f64,
+    dominated: usize,
+    front: Vec<Point>,
+}
+
+#[derive(Serialize)]
+struct Point {
+    spot: f64,
+    spot_error: f64,
+    light: f64,
+    light_error: f64,
+    weight: Option<f64>,
+    rays: usize,
+}
+
+impl Point {
+    fn of(design: &Design) -> Self {
+        let Design { spot, spot_error, light, light_error, weight, rays, .. } = *design;
+        Self { spot, spot_error, light, light_error, weight, rays }
+    }
+
+    fn all(front: &Front) -> Vec<Self> {
+        front.designs().iter().map(Self::of).collect()
+    }
+}
+
+impl Report {
+    fn new(sweep: &Sweep, ms: f64, biased: Option<&(Sweep, f64)>, stopped: bool) -> Self {
+        let ours = sweep.front().designs();
+        let beaten = |design: &&Design| ours.iter().any(|ours| ours.dominates(design));
+        let biased = biased.map(|(other, ms)| Biased {
+            ms: *ms,
+            hypervolume: other.hypervolume(),
+            dominated: other.front().designs().iter().filter(beaten).count(),
+            front: Point::all(other.front()),
+        });
+        Self {
+            ms,
+            stopped,
+            hypervolume: sweep.hypervolume(),
+            tried: sweep.tried().len(),
+            start: Point::of(&sweep.start),
+            front: Point::all(sweep.front()),
+            biased,
+            files: Vec::new(),
+        }
+    }
+}
+
+/// No more lenses than this are listed; the files have all.
+const LISTED: usize = 20;
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { ms, hypervolume, tried, front, .. } = self;
+        let stopped = if self.stopped { ", stopped" } else { "" };
+        let count = front.len();
+        writeln!(f, "{count} lenses of {tried} in {:.2} s{stopped}", 1e-3 * ms)?;
+        writeln!(f, "hypervolume {hypervolume:.4} of twice the spot and the light at the start")?;
+        if let Some(Biased { ms, hypervolume, dominated, front }) = &self.biased {
+            write!(f, "biased: {} lenses in {:.2} s, hypervolume ", front.len(), 1e-3 * ms)?;
+            writeln!(f, "{hypervolume:.4}; {dominated} of them are beaten in both")?;
+        }
+        writeln!(f)?;
+        let mut table =
+            Table::new(&["rms spot, um", "error", "light, mm^2", "error", "rim blur, um", "rays"]);
+        let every = count.div_ceil(LISTED).max(1);
+        for point in std::iter::once(&self.start).chain(front.iter().step_by(every)) {
+            let blur =
+                point.weight.map_or("start".to_owned(), |w| format!("{:.1}", 1e3 * w.sqrt()));
+            table.row([
+                format!("{:.3}", 1e3 * point.spot),
+                format!("{:.0e}", 1e3 * point.spot_error),
+                format!("{:.3}", point.light),
+                format!("{:.0e}", point.light_error),
+                blur,
+                point.rays.to_string(),
+            ]);
+        }
+        write!(f, "{table}")?;
+        match self.files.first() {
+            Some(first) => write!(f, "\n{} files, the table is {first}", self.files.len()),
+            None => Ok(()),
+        }
+    }
+}

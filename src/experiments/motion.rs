@@ -1,0 +1,211 @@
+//! Figure 3.8: a moving target, through the darkest and through the brightest lens of a front, each
+//! exposed until the image is as bright as with the other. The bright lens is less sharp, but needs
+//! so much less time that what moves is sharper.
+//!
+//! The brightness of an extended scene grows with the area of the pupil over the square of the focal
+//! length. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that of
+//! the way `s` that the image of the target goes meanwhile, `|sin(π ν s) / (π ν s)|`.
+
+use super::front::{ANGLES, plan};
+use super::trade::{Part, at_angles, focal_length, searched};
+use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
+use crate::lens::Lens;
+use crate::optimize::pareto::Design;
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke};
+use crate::pupil::{Bench, Region};
+use std::f64::consts::PI;
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "3.8",
+    title: "A moving target at equal brightness",
+    claim: "The brightest lens of a front needs a fraction of the time of the darkest one, and shows \
+            sharper what moves",
+    seconds: 5.0,
+    run,
+};
+
+const LENS: &str = "double_gauss_rudolph_50";
+/// Order of quadrature.
+const ORDER: usize = 6;
+/// Line pairs per mm up to which contrast is shown.
+const FREQUENCIES: [f64; 2] = [0.5, 40.0];
+const STEPS: usize = 80;
+/// How far the image moves during the exposure of the dark lens, in mm.
+const WAY: f64 = 0.2;
+/// The line pairs per mm at which both are compared.
+const COMPARED: f64 = 4.0;
+/// How many times as long the dark lens must be exposed.
+const TIMES: f64 = 2.0;
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let start = at_angles(lens(LENS)?, &ANGLES);
+    let part = Part { from: 0.0, to: 1.0, name: "front of sharpness and light" };
+    let designs = searched(&start, &plan(effort), part, watch)?;
+    let [Some(bright), Some(dark)] = [designs.get(1), designs.last()] else {
+        return Err(Ended::Failed("no design was found".to_owned()));
+    };
+    let mut rays = 0;
+    let [dark, bright] = [Shot::of(dark, &mut rays)?, Shot::of(bright, &mut rays)?];
+    let times = bright.brightness / dark.brightness;
+    let pair = Pair { dark, bright, times };
+    Ok(Outcome {
+        claims: pair.claims(),
+        tables: vec![pair.lenses(), pair.table()],
+        pictures: vec![Picture { name: "contrast", canvas: pair.draw() }],
+        lenses: vec![
+            ("darkest".to_owned(), pair.dark.design.lens.clone()),
+            ("brightest".to_owned(), pair.bright.design.lens.clone()),
+        ],
+        rays,
+    })
+}
+
+/// A lens that takes a picture.
+struct Shot {
+    design: Design,
+    /// Light per area of the image, in arbitrary units, and its relative error.
+    brightness: f64,
+    error: f64,
+    /// Where the rays of the field on the axis land across, in mm, and the weight of each.
+    spot: Vec<[f64; 2]>,
+}
+
+impl Shot {
+    fn of(design: &Design, rays: &mut usize) -> Result<Self, Ended> {
+        let focal = focal_length(&design.lens)?;
+        let spot = spot(&design.lens, rays)?;
+        *rays += design.rays;
+        Ok(Self {
+            brightness: design.light / (focal * focal),
+            error: design.light_error / design.light,
+            spot,
+            design: design.clone(),
+        })
+    }
+
+    /// Contrast at some line pairs per mm of a target whose image moves a way in mm.
+    fn contrast(&self, frequency: f64, way: f64) -> f64 {
+        let (mut sum, mut light) = (0.0, 0.0);
+        for [x, weight] in &self.spot {
+            // The spot is its own mirror image.
+            sum += weight * (2.0 * PI * frequency * x).cos();
+            light += weight;
+        }
+        let phase = PI * frequency * way;
+        let smear = if phase == 0.0 { 1.0 } else { phase.sin() / phase };
+        (sum / light * smear).abs()
+    }
+}
+
+fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, Ended> {
+    let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
+    let launch = bench.launch(bench.fields[0], bench.primary).map_err(Ended::from_error)?;
+    let region = Region::new(launch);
+    // Across the axis every azimuth counts, which nodes along a single radius do not tell: turned
+    // by a quarter, a radius stands for the cosine of a whole turn.
+    let lit = region.lit(ORDER);
+    *rays += region.rays + lit.traced;
+    let turn = |i: usize| {
+        let radius = lit.landed.sink.x[i].hypot(lit.landed.sink.y[i]);
+        (0..AZIMUTHS).map(move |k| radius * (PI * (k as f64 + 0.5) / AZIMUTHS as f64).cos())
+    };
+    let places = lit.landed.arrived().flat_map(|(i, weight)| turn(i).map(move |x| [x, weight]));
+    Ok(places.collect())
+}
+
+/// Azimuths that a radius of the spot on the axis stands for.
+const AZIMUTHS: usize = 32;
+
+/// Both lenses at equal brightness.
+struct Pair {
+    dark: Shot,
+    bright: Shot,
+    /// How many times as long the dark one is exposed.
+    times: f64,
+}
+
+impl Pair {
+    /// Contrast of the dark and of the bright lens, standing still and moving.
+    fn contrasts(&self, frequency: f64) -> [f64; 4] {
+        [
+            self.dark.contrast(frequency, 0.0),
+            self.bright.contrast(frequency, 0.0),
+            self.dark.contrast(frequency, WAY),
+            self.bright.contrast(frequency, WAY / self.times),
+        ]
+    }
+
+    fn claims(&self) -> Vec<Claim> {
+        let [dark, bright, moving_dark, moving_bright] = self.contrasts(COMPARED);
+        let error = self.times * (self.dark.error + self.bright.error);
+        let sharper = self.dark.design.spot / self.bright.design.spot;
+        vec![
+            Claim::at_least(
+                "exposure of the darkest lens over that of the brightest at equal brightness",
+                self.times,
+                TIMES,
+            )
+            .with_error(error),
+            Claim::at_most("spot of the darkest lens over that of the brightest", sharper, 1.0),
+            Claim::at_most(
+                format!("at rest: contrast bright over dark, {COMPARED} line pairs/mm"),
+                bright / dark,
+                1.0,
+            ),
+            Claim::at_least(
+                format!("moving {WAY} mm in the longer exposure: contrast bright over dark"),
+                moving_bright / moving_dark,
+                1.1,
+            ),
+        ]
+    }
+
+    fn lenses(&self) -> Table {
+        let columns = ["lens", "spot_mm", "light_mm2", "brightness", "exposure"];
+        let mut table = Table::new("lenses", &columns);
+        let shots = [("darkest", &self.dark, self.times), ("brightest", &self.bright, 1.0)];
+        for (name, shot, exposure) in shots {
+            let numbers = [shot.design.spot, shot.design.light, shot.brightness, exposure];
+            table.row(std::iter::once(name.into()).chain(numbers.map(Into::into)));
+        }
+        table
+    }
+
+    fn table(&self) -> Table {
+        let columns =
+            ["line_pairs_per_mm", "dark_at_rest", "bright_at_rest", "dark_moving", "bright_moving"];
+        let mut table = Table::new("contrast", &columns);
+        for frequency in frequencies() {
+            let numbers = self.contrasts(frequency);
+            table.row(std::iter::once(frequency.into()).chain(numbers.map(Into::into)));
+        }
+        table
+    }
+
+    fn draw(&self) -> Canvas {
+        let mut canvas = Canvas::new([1200, 800]);
+        let x = Axis::linear("line pairs/mm", FREQUENCIES.into_iter().chain([0.0]));
+        let y = Axis::linear("contrast", [0.0, 1.0]);
+        let chart = Chart::new([120.0, 190.0], [1140.0, 690.0], x, y);
+        chart.draw(&mut canvas, &format!("the image moves {WAY} mm in the longer exposure"));
+        let kinds: [(&str, Color, Stroke); 4] = [
+            ("darkest, at rest", PALETTE[1], Stroke::Dashed),
+            ("brightest, at rest", PALETTE[0], Stroke::Dashed),
+            ("darkest, moving", PALETTE[1], Stroke::Solid),
+            ("brightest, moving", PALETTE[0], Stroke::Solid),
+        ];
+        for (i, (name, color, stroke)) in kinds.into_iter().enumerate() {
+            let curve = frequencies().map(|f| chart.place([f, self.contrasts(f)[i]]));
+            canvas.curve(&curve.collect::<Vec<_>>(), color, stroke);
+            let y = 20.0 + 28.0 * i as f64;
+            canvas.curve(&[[130.0, y + 7.0], [180.0, y + 7.0]], color, stroke);
+            canvas.text([195.0, y], name, BLACK, Align::Left);
+        }
+        canvas
+    }
+}
+
+fn frequencies() -> impl Iterator<Item = f64> {
+    let [low, high] = FREQUENCIES;
+    (0..=STEPS).map(move |i| low + (high - low) * i as f64 / STEPS as f64)
+}

@@ -1,0 +1,211 @@
+//! What figures 3.6 to 3.10 share: lenses optimised for sharpness and light at once (3.26), and how
+//! sharp and how bright each of their fields is.
+
+use super::{Cell, Ended, Table, Watch, report};
+use crate::lens::{Aperture, Field, FieldKind, Fields, Lens};
+use crate::merit::{Goal, PupilEdge, Term, Weighted};
+use crate::optimize::annealed;
+use crate::optimize::pareto::{Design, Settings, Sweep};
+use crate::pupil::{Bench, Region};
+
+/// Orders of quadrature of the numbers that are shown: the difference is the error.
+const ORDERS: [usize; 2] = [6, 8];
+
+/// The lens in one colour at some angles of field, in degrees.
+pub(super) fn at_angles(mut lens: Lens, angles: &[f64]) -> Lens {
+    lens = in_one_color(lens);
+    let values = angles.iter().map(|y| Field { x: 0.0, y: *y, weight: 1.0 }).collect();
+    lens.fields = Fields { kind: FieldKind::Angle, values };
+    lens
+}
+
+/// The lens at its primary wavelength alone, as the figures have it.
+pub(super) fn in_one_color(mut lens: Lens) -> Lens {
+    lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
+    lens
+}
+
+/// The same lens with its stop and its rims scaled: how an aperture is chosen for a search that
+/// cannot ask for light.
+pub(super) fn opened(lens: &Lens, factor: f64) -> Lens {
+    let mut lens = lens.clone();
+    for row in &mut lens.surfaces {
+        row.semi_diameter = row.semi_diameter.map(|size| factor * size);
+    }
+    if let Aperture::StopSemiDiameter(radius) = &mut lens.aperture {
+        *radius *= factor;
+    }
+    lens
+}
+
+/// A search for lenses of ever less weight on their light.
+#[derive(Debug, Clone)]
+pub(super) struct Plan {
+    /// The weights β in mm², the largest first.
+    pub(super) betas: Vec<f64>,
+    /// Steps of Adam for each.
+    pub(super) steps: usize,
+    /// How the edges of the pupils are treated.
+    pub(super) pupil: PupilEdge,
+    /// How much smaller and larger a semi-diameter may become.
+    pub(super) rims: [f64; 2],
+}
+
+/// The largest weight: so large that the rim ray of a lens that is not sharp yet is kept. What is
+/// clipped early does not come back.
+const LARGEST: f64 = 3e-2;
+/// How many powers of ten the smallest one is below.
+const DECADES: f64 = 4.0;
+
+impl Plan {
+    /// So many weights, evenly on a logarithmic scale, by derivatives that follow the pupils.
+    pub(super) fn new(weights: usize, steps: usize) -> Self {
+        let last = (weights - 1).max(1) as f64;
+        let beta = |i: usize| LARGEST * 10f64.powf(-DECADES * i as f64 / last);
+        let betas = (0..weights).map(beta).collect();
+        Self { betas, steps, pupil: PupilEdge::Moving, rims: [0.25, 1.3] }
+    }
+
+    /// The usual search, which cannot see light: one weight is as good as another.
+    pub(super) fn biased(&self) -> Self {
+        let steps = 2 * self.steps;
+        Self { betas: vec![0.0], steps, pupil: PupilEdge::Kept, ..self.clone() }
+    }
+}
+
+/// The part of an experiment that a search is, from one share to another.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part<'a> {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) name: &'a str,
+}
+
+/// How exact the spots of a search are, and those of its designs, relatively.
+const SEARCHED: f64 = 1e-3;
+const JUDGED: f64 = 1e-4;
+/// No rim may cut more of its sphere than this: curvature times semi-diameter.
+const STEEPEST: f64 = 0.9;
+
+/// The lens at the start, limited by its stop and with everything free, and a design for each
+/// weight, the search for each beginning where the one before has led.
+pub(super) fn searched(
+    lens: &Lens,
+    plan: &Plan,
+    part: Part<'_>,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Design>, Ended> {
+    let settings = Settings { rims: plan.rims, pupil: plan.pupil, ..Settings::default() };
+    let start = Sweep::new(lens, &settings).map_err(Ended::from_error)?.start;
+    let goal = composite(&start, plan.pupil)?;
+    let total = (plan.betas.len() * plan.steps) as f64;
+    let mut designs = vec![start];
+    for (i, beta) in plan.betas.iter().enumerate() {
+        let mut goal = goal.clone();
+        goal.terms.push(Weighted { term: Term::Throughput, weight: *beta });
+        let begin = &designs[designs.len() - 1].lens;
+        let search = annealed(begin, &goal, SEARCHED, plan.steps);
+        let mut search = search.map_err(Ended::from_error)?;
+        for step in 0..plan.steps {
+            let done = (i * plan.steps + step) as f64 / total;
+            report(watch, part.from + (part.to - part.from) * done, part.name)?;
+            if search.step().finished {
+                break;
+            }
+        }
+        search.settle();
+        let design = Design::of(search.best(), Some(*beta), JUDGED);
+        designs.push(design.map_err(Ended::from_error)?);
+    }
+    Ok(designs)
+}
+
+/// What (3.26) asks for besides light: the integrals of the spots, and that the lens stays one: its
+/// focal length, glass and air that can be made, no hemispheres. The integral of a spot is its mean
+/// square times the light, and so the others count.
+fn composite(start: &Design, pupil: PupilEdge) -> Result<Goal, Ended> {
+    let mut goal = Goal::sensible(&start.lens).map_err(Ended::from_error)?;
+    goal.terms.retain(|weighted| !matches!(weighted.term, Term::Spot | Term::Light(_)));
+    goal.terms.push(Weighted { term: Term::Steepness(STEEPEST), weight: 1.0 });
+    goal.terms.iter_mut().for_each(|weighted| weighted.weight *= start.light);
+    goal.terms.push(Weighted { term: Term::SpotIntegral, weight: 1.0 });
+    goal.pupil = pupil;
+    Ok(goal)
+}
+
+/// A field of a lens.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    /// In degrees.
+    pub(super) angle: f64,
+    /// The area of the pupil in mm², and the root mean square radius of the spot in mm, each with
+    /// its error.
+    pub(super) area: [f64; 2],
+    pub(super) rms: [f64; 2],
+}
+
+/// Every field of a lens; the rays traced are counted.
+pub(super) fn views(lens: &Lens, rays: &mut usize) -> Result<Vec<View>, Ended> {
+    let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
+    bench.fields.iter().map(|field| view_at(&bench, *field, rays)).collect()
+}
+
+/// The spot and the pupil of a field.
+pub(super) fn view_at(bench: &Bench, field: Field, rays: &mut usize) -> Result<View, Ended> {
+    let launch = bench.launch(field, bench.primary).map_err(Ended::from_error)?;
+    let region = Region::new(launch);
+    *rays += region.rays;
+    let [low, high] = ORDERS.map(|order| {
+        let lit = region.lit(order);
+        *rays += lit.traced;
+        let moments = lit.moments;
+        let rms = if moments.area > 0.0 { (moments.spread / moments.area).sqrt() } else { 0.0 };
+        [moments.area, rms]
+    });
+    let number = |i: usize| [high[i], (high[i] - low[i]).abs()];
+    Ok(View { angle: field.y, area: number(0), rms: number(1) })
+}
+
+/// The root of the mean square radius of some spots, in mm, and the mean area of their pupils in
+/// mm².
+pub(super) fn means(views: &[View]) -> [f64; 2] {
+    let count = views.len() as f64;
+    let square: f64 = views.iter().map(|view| view.rms[0].powi(2)).sum();
+    let area: f64 = views.iter().map(|view| view.area[0]).sum();
+    [(square / count).sqrt(), area / count]
+}
+
+/// The focal length of a lens, in mm.
+pub(super) fn focal_length(lens: &Lens) -> Result<f64, Ended> {
+    let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
+    bench.first.efl.ok_or_else(|| Ended::Failed(format!("{} is afocal", lens.name)))
+}
+
+/// A row for each field of each design.
+pub(super) fn table(
+    name: &'static str,
+    designs: &[(&str, &Design)],
+    rays: &mut usize,
+) -> Result<Table, Ended> {
+    let columns = [
+        "design",
+        "beta_mm2",
+        "focal_length_mm",
+        "field_deg",
+        "area_mm2",
+        "area_error_mm2",
+        "rms_mm",
+        "rms_error_mm",
+    ];
+    let mut table = Table::new(name, &columns);
+    for (name, design) in designs {
+        let beta = design.weight.unwrap_or(f64::NAN);
+        let focal = focal_length(&design.lens)?;
+        for view in views(&design.lens, rays)? {
+            let numbers = [beta, focal, view.angle].into_iter();
+            let numbers = numbers.chain(view.area).chain(view.rms).map(Cell::from);
+            table.row(std::iter::once((*name).into()).chain(numbers));
+        }
+    }
+    Ok(table)
+}

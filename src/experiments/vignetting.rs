@@ -1,0 +1,184 @@
+//! Figure 3.9: how bright the corner of a white target is, with a lens optimised by gradients that
+//! know of light off the axis, and with one by the biased gradients, which do not.
+//!
+//! Both searches begin with the same lens and keep its stop, so that the difference is not just a
+//! larger aperture. Of the unbiased front that lens is shown which is brightest at the corner among
+//! those that are no less sharp than the biased one.
+
+use super::front::{ANGLES, plan};
+use super::trade::{Part, View, at_angles, means, searched, views};
+use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
+use crate::analysis::{Illumination, illumination};
+use crate::lens::{Lens, Parameter, Quantity, Variable};
+use crate::optimize::pareto::Design;
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, grey};
+use crate::pupil::{Accuracy, Bench};
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "3.9",
+    title: "Vignetting with the same stop",
+    claim: "At the same sharpness the corner is brighter with unbiased gradients than with biased \
+            ones",
+    seconds: 5.0,
+    run,
+};
+
+const LENS: &str = "double_gauss_rudolph_50";
+/// Fields of the curves, from the axis to the corner.
+const FIELDS: usize = 21;
+const ACCURACY: Accuracy = Accuracy { tolerance: 1e-5, most_rays: 100_000 };
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let start = with_its_stop(at_angles(lens(LENS)?, &ANGLES));
+    let plan = plan(effort);
+    let part = Part { from: 0.0, to: 0.2, name: "biased gradient" };
+    let without = searched(&start, &plan.biased(), part, watch)?;
+    let part = Part { from: 0.2, to: 1.0, name: "unbiased gradient" };
+    let with = searched(&start, &plan, part, watch)?;
+    let mut rays = 0;
+    let biased = Lit::of(&without[without.len() - 1], &mut rays)?;
+    let mut unbiased: Option<Lit> = None;
+    for design in with.iter().filter(|design| design.spot <= biased.blur()) {
+        let lit = Lit::of(design, &mut rays)?;
+        if unbiased.as_ref().is_none_or(|best| lit.corner()[0] > best.corner()[0]) {
+            unbiased = Some(lit);
+        }
+    }
+    let none = || Ended::Failed("no unbiased design is as sharp as the biased one".to_owned());
+    let pair = [biased, unbiased.ok_or_else(none)?];
+    Ok(Outcome {
+        claims: claims(&pair),
+        tables: vec![table(&pair)],
+        pictures: vec![Picture { name: "illumination", canvas: draw(&pair) }],
+        lenses: vec![
+            ("biased".to_owned(), pair[0].lens.clone()),
+            ("unbiased".to_owned(), pair[1].lens.clone()),
+        ],
+        rays,
+    })
+}
+
+/// The lens with a stop that cannot be opened or closed.
+fn with_its_stop(mut lens: Lens) -> Lens {
+    let stop = lens.stop().and_then(|stop| Some((stop, lens.surfaces[stop].semi_diameter?)));
+    if let Some((surface, radius)) = stop {
+        let parameter = Parameter::new(surface, Quantity::SemiDiameter);
+        let (min, max) = (Some(radius), Some(radius));
+        lens.variables.push(Variable { parameter, min, max });
+    }
+    lens
+}
+
+/// A lens with its illumination from the axis to the corner.
+struct Lit {
+    lens: Lens,
+    views: Vec<View>,
+    light: Vec<Illumination>,
+}
+
+impl Lit {
+    fn of(design: &Design, rays: &mut usize) -> Result<Self, Ended> {
+        let views = views(&design.lens, rays)?;
+        let last = ANGLES[ANGLES.len() - 1];
+        let angles: Vec<f64> = (0..FIELDS).map(|i| last * i as f64 / (FIELDS - 1) as f64).collect();
+        let bench = Bench::of(&at_angles(design.lens.clone(), &angles), 0);
+        let bench = bench.map_err(Ended::from_error)?;
+        let light = illumination(&bench, bench.primary, ACCURACY);
+        *rays += light.iter().map(|field| field.cone.rays).sum::<usize>();
+        Ok(Self { lens: design.lens.clone(), views, light })
+    }
+
+    /// The root of the mean square radius of its spots, in mm.
+    fn blur(&self) -> f64 {
+        means(&self.views)[0]
+    }
+
+    /// The cone of light at a field, in direction cosines, and its error.
+    fn cone(&self, field: usize) -> [f64; 2] {
+        [self.light[field].cone.value, self.light[field].cone.error]
+    }
+
+    fn corner(&self) -> [f64; 2] {
+        self.cone(FIELDS - 1)
+    }
+
+    /// The illumination of the corner over that of the axis, and its error.
+    fn relative(&self) -> [f64; 2] {
+        ratio(self.corner(), self.cone(0))
+    }
+}
+
+/// A ratio with its error.
+fn ratio([a, da]: [f64; 2], [b, db]: [f64; 2]) -> [f64; 2] {
+    [a / b, (da + a / b * db) / b]
+}
+
+fn claims([biased, unbiased]: &[Lit; 2]) -> Vec<Claim> {
+    let [sharp, _] = ratio([unbiased.blur(), 0.0], [biased.blur(), 0.0]);
+    let [corner, corner_error] = ratio(unbiased.corner(), biased.corner());
+    let [axis, axis_error] = ratio(unbiased.cone(0), biased.cone(0));
+    let [relative, relative_error] = unbiased.relative();
+    let [before, _] = biased.relative();
+    vec![
+        Claim::at_most("blur, unbiased over biased", sharp, 1.0),
+        Claim::at_least("illumination of the corner, unbiased over biased", corner, 1.1)
+            .with_error(corner_error),
+        Claim::at_least("illumination of the axis, unbiased over biased", axis, 0.9)
+            .with_error(axis_error),
+        Claim::at_least(
+            "corner over axis with the unbiased gradient, against the biased one",
+            relative,
+            before,
+        )
+        .with_error(relative_error),
+    ]
+}
+
+fn table(pair: &[Lit; 2]) -> Table {
+    let columns = [
+        "field_deg",
+        "biased_cone",
+        "biased_cone_error",
+        "unbiased_cone",
+        "unbiased_cone_error",
+        "biased_relative",
+        "unbiased_relative",
+    ];
+    let mut table = Table::new("illumination", &columns);
+    for field in 0..FIELDS {
+        let cones = pair.each_ref().map(|lit| lit.cone(field));
+        let relative = pair.each_ref().map(|lit| ratio(lit.cone(field), lit.cone(0))[0]);
+        let numbers = [pair[0].light[field].field.y].into_iter().chain(cones.concat());
+        table.row(numbers.chain(relative).map(Into::into));
+    }
+    table
+}
+
+const KINDS: [(&str, Color); 2] =
+    [("biased gradient", PALETTE[1]), ("unbiased gradient", PALETTE[0])];
+
+/// Curves over the field, and a white target as both show it from the axis to the corner.
+fn draw(pair: &[Lit; 2]) -> Canvas {
+    let mut canvas = Canvas::new([1200, 1000]);
+    let brightest = pair.iter().map(|lit| lit.cone(0)[0]).fold(0.0, f64::max);
+    let x = Axis::linear("field, deg", ANGLES);
+    let y = Axis::linear("illumination", [0.0, 1.0]);
+    let chart = Chart::new([120.0, 190.0], [1140.0, 690.0], x, y);
+    chart.draw(&mut canvas, "illumination, the brighter axis 1");
+    for (i, ((name, color), lit)) in KINDS.into_iter().zip(pair).enumerate() {
+        let share = |field: usize| lit.cone(field)[0] / brightest;
+        let curve: Vec<[f64; 2]> = (0..FIELDS)
+            .map(|field| chart.place([lit.light[field].field.y, share(field)]))
+            .collect();
+        canvas.curve(&curve, color, Stroke::Solid);
+        canvas.marks(&curve, color);
+        let y = 20.0 + 28.0 * i as f64;
+        canvas.curve(&[[130.0, y + 7.0], [180.0, y + 7.0]], color, Stroke::Solid);
+        canvas.text([195.0, y], name, BLACK, Align::Left);
+        let strip: Vec<Color> = (0..FIELDS).map(|field| grey(share(field))).collect();
+        let top = 790.0 + 100.0 * i as f64;
+        canvas.raster([120.0, top], FIELDS, 48, &strip);
+        canvas.text([120.0, top + 56.0], name, BLACK, Align::Left);
+    }
+    canvas
+}

@@ -1,0 +1,78 @@
+//! Volumes: values on a grid, for fields of refractive index.
+//!
+//! Two formats, told apart by their content: `NumPy`'s `.npz`, and raw numbers with a JSON header. In
+//! both x runs fastest. A file for the first is written in Python by
+//! `np.savez("lens.npz", index=a, low=[-1, -1, -1], spacing=[0.1, 0.1, 0.1])` with `a.shape == (nz,
+//! ny, nx)`, lengths in mm.
+
+mod npy;
+mod npz;
+mod raw;
+
+use super::FileError;
+use super::error::Malformed;
+use crate::grin::field::Grid;
+use crate::math::Vec3;
+use std::path::Path;
+
+/// Values on a grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Volume {
+    /// Where the nodes stand, in mm.
+    pub grid: Grid<f64>,
+    /// A value for each node, in the order of the grid.
+    pub values: Vec<f64>,
+}
+
+/// Reads a volume.
+///
+/// # Errors
+/// A file that cannot be read or does not say what it should; see [`FileError`].
+pub fn read_volume(path: &Path) -> Result<Volume, FileError> {
+    let file = path.display().to_string();
+    let bytes = std::fs::read(path)
+        .map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
+    if bytes.starts_with(b"PK") {
+        return npz::read(&bytes).map_err(|malformed| malformed.of(&file));
+    }
+    raw::read(path, &bytes)
+}
+
+/// Writes a volume: `NumPy`'s format to a file that ends in `.npz`, else a JSON header and the numbers
+/// beside it in a file that ends in `.raw`.
+///
+/// # Errors
+/// A file that cannot be written; what was there before is untouched.
+pub fn write_volume(path: &Path, volume: &Volume) -> Result<(), FileError> {
+    let is_npz = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz"));
+    if is_npz { npz::write(path, volume) } else { raw::write(path, volume) }
+}
+
+/// The volume of these numbers; `place` is where they stand.
+fn volume(
+    counts: [usize; 3],
+    low: [f64; 3],
+    spacing: [f64; 3],
+    values: Vec<f64>,
+    place: &str,
+) -> Result<Volume, Malformed> {
+    let vector = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
+    let sound = |grid: &Grid<f64>| {
+        counts.iter().all(|count| *count > 0)
+            && grid.nodes() == values.len()
+            && values.iter().all(|value| value.is_finite())
+    };
+    match Grid::new(counts, vector(low), vector(spacing)) {
+        Ok(grid) if sound(&grid) => Ok(Volume { grid, values }),
+        Ok(_) => Err(Malformed {
+            place: place.to_owned(),
+            found: format!("{} values for {counts:?} nodes", values.len()),
+            expected: "one finite value for each node".to_owned(),
+        }),
+        Err(error) => Err(Malformed {
+            place: place.to_owned(),
+            found: error.to_string(),
+            expected: "a positive spacing".to_owned(),
+        }),
+    }
+}

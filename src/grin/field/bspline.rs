@@ -1,0 +1,140 @@
+//! Uniform cubic B-splines, and a profile made of them.
+
+use super::cell::{cell, integer};
+use super::{Profile, Profiled, ProfiledColumns};
+use crate::grin::lanes::{Column, LANES};
+use crate::math::Real;
+
+/// The four cubic B-splines that are not zero in a cell, at `0 ≤ t < 1`; outside that range the
+/// same polynomials.
+#[inline(always)]
+pub(super) fn basis<R: Real>(t: R) -> [R; 4] {
+    let c = R::from_f64;
+    let (u, sixth) = (R::ONE - t, c(1.0 / 6.0));
+    let (t2, u2) = (t * t, u * u);
+    [
+        u2 * u * sixth,
+        (c(3.0) * t2 * t - c(6.0) * t2 + c(4.0)) * sixth,
+        (c(3.0) * u2 * u - c(6.0) * u2 + c(4.0)) * sixth,
+        t2 * t * sixth,
+    ]
+}
+
+/// Their derivatives by `t`.
+#[inline(always)]
+pub(super) fn slopes<R: Real>(t: R) -> [R; 4] {
+    let c = R::from_f64;
+    let (u, half) = (R::ONE - t, c(0.5));
+    [
+        -(u * u * half),
+        (c(3.0) * t - c(4.0)) * t * half,
+        -((c(3.0) * u - c(4.0)) * u * half),
+        t * t * half,
+    ]
+}
+
+/// Their second derivatives.
+#[inline(always)]
+pub(super) fn bends<R: Real>(t: R) -> [R; 4] {
+    let c = R::from_f64;
+    let u = R::ONE - t;
+    [u, c(3.0) * t - R::TWO, c(3.0) * u - R::TWO, t]
+}
+
+/// A cubic B-spline in `s` with even knots; the parameters are its coefficients. Beyond its ends
+/// the polynomials of the outer cells continue.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BSpline<R> {
+    start: R,
+    spacing: R,
+    coefficients: Vec<R>,
+}
+
+impl<R: Real> BSpline<R> {
+    /// The spline over `start ≤ s ≤ end`; `None` with fewer than four coefficients or without a
+    /// range.
+    pub fn new(start: R, end: R, coefficients: Vec<R>) -> Option<Self> {
+        let cells = coefficients.len().checked_sub(3).filter(|cells| *cells > 0)?;
+        let spacing = (end - start) / R::from_f64(cells as f64);
+        (spacing > R::ZERO && spacing.is_finite() && start.is_finite()).then_some(Self {
+            start,
+            spacing,
+            coefficients,
+        })
+    }
+
+    /// The first coefficient that counts at `s`, and the place within its cell.
+    #[inline(always)]
+    fn locate(&self, s: R) -> (usize, R) {
+        let u = (s - self.start) / self.spacing;
+        let first = cell(u.value(), (self.coefficients.len() - 4) as f64);
+        (integer(first), u - R::from_f64(first))
+    }
+}
+
+#[inline(always)]
+fn sum<R: Real>(weights: [R; 4], values: &[R]) -> R {
+    weights[0] * values[0]
+        + weights[1] * values[1]
+        + weights[2] * values[2]
+        + weights[3] * values[3]
+}
+
+impl<R: Real> Profile<R> for BSpline<R> {
+    fn parameters(&self) -> &[R] {
+        &self.coefficients
+    }
+
+    fn parameters_mut(&mut self) -> &mut [R] {
+        &mut self.coefficients
+    }
+
+    #[inline(always)]
+    fn at(&self, s: R) -> Profiled<R> {
+        let (first, t) = self.locate(s);
+        let values = &self.coefficients[first..first + 4];
+        let scale = R::ONE / self.spacing;
+        Profiled {
+            value: sum(basis(t), values),
+            slope: sum(slopes(t), values) * scale,
+            bend: sum(bends(t), values) * scale * scale,
+        }
+    }
+
+    /// Finds the cells, collects the coefficients, sums: lanes do all but the second.
+    #[inline(always)]
+    fn at_all(&self, s: &Column<R>, out: &mut ProfiledColumns<R>) {
+        let (mut first, mut t) = ([0; LANES], [R::ZERO; LANES]);
+        for lane in 0..LANES {
+            (first[lane], t[lane]) = self.locate(s[lane]);
+        }
+        let mut four = [[R::ZERO; LANES]; 4];
+        for (lane, first) in first.into_iter().enumerate() {
+            let values = &self.coefficients[first..first + 4];
+            for (column, value) in four.iter_mut().zip(values) {
+                column[lane] = *value;
+            }
+        }
+        let scale = R::ONE / self.spacing;
+        for (lane, &t) in t.iter().enumerate() {
+            let values = [four[0][lane], four[1][lane], four[2][lane], four[3][lane]];
+            out.value[lane] = sum(basis(t), &values);
+            out.slope[lane] = sum(slopes(t), &values) * scale;
+            out.bend[lane] = sum(bends(t), &values) * scale * scale;
+        }
+    }
+
+    #[inline(always)]
+    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+        let (first, t) = self.locate(s);
+        let pull = pull / self.spacing;
+        let (values, slopes) = (basis(t), slopes(t));
+        for (q, g) in gradient[first..first + 4].iter_mut().enumerate() {
+            *g += weight * values[q] + pull * slopes[q];
+        }
+    }
+
+    fn knots(&self) -> Option<R> {
+        Some(self.spacing)
+    }
+}

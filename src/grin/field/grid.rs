@@ -1,0 +1,165 @@
+//! Where the values of a sampled field stand: a block of nodes with even spacing on each axis.
+
+use super::cell::{cell, integer};
+use crate::math::Real;
+use crate::math::Vec3;
+
+/// Nodes on a regular grid. Node `(i, j, k)` stands at `low + (i hx, j hy, k hz)` and has the number
+/// `(k ny + j) nx + i`: x runs fastest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid<R> {
+    counts: [usize; 3],
+    low: Vec3<R>,
+    spacing: Vec3<R>,
+    /// `1/h` on each axis.
+    pub(super) density: Vec3<R>,
+}
+
+/// Why values do not make a sampled field.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// Too few nodes on an axis.
+    #[error("{found} nodes along {axis}, expected at least {least}")]
+    TooFew {
+        /// `x`, `y` or `z`.
+        axis: char,
+        /// How many there are.
+        found: usize,
+        /// How many there must be.
+        least: usize,
+    },
+    /// Not one value for each node.
+    #[error("{found} values for {expected} nodes")]
+    Values {
+        /// How many values there are.
+        found: usize,
+        /// How many nodes there are.
+        expected: usize,
+    },
+    /// A spacing that is not positive, or a corner that is no number.
+    #[error("the grid has no extent along {axis}")]
+    Extent {
+        /// `x`, `y` or `z`.
+        axis: char,
+    },
+    /// A value that is no number.
+    #[error("value {node} is not a finite number")]
+    NotANumber {
+        /// Which value, counted from 0.
+        node: usize,
+    },
+}
+
+impl<R: Real> Grid<R> {
+    /// Nodes from the corner `low` on, `spacing` apart.
+    ///
+    /// # Errors
+    /// [`GridError::Extent`] for a spacing that is not positive.
+    pub fn new(counts: [usize; 3], low: Vec3<R>, spacing: Vec3<R>) -> Result<Self, GridError> {
+        let axes = [('x', low.x, spacing.x), ('y', low.y, spacing.y), ('z', low.z, spacing.z)];
+        for (axis, low, spacing) in axes {
+            let positive = spacing > R::ZERO && spacing.is_finite() && low.is_finite();
+            if !positive || !(R::ONE / spacing).is_finite() {
+                return Err(GridError::Extent { axis });
+            }
+        }
+        let one = R::ONE;
+        let density = Vec3::new(one / spacing.x, one / spacing.y, one / spacing.z);
+        Ok(Self { counts, low, spacing, density })
+    }
+
+    /// A cube of `count³` nodes from `-half` to `half` on each axis.
+    ///
+    /// # Errors
+    /// Fewer than two nodes, or no extent.
+    pub fn cube(count: usize, half: R) -> Result<Self, GridError> {
+        if count < 2 {
+            return Err(GridError::TooFew { axis: 'x', found: count, least: 2 });
+        }
+        let h = (half + half) / R::from_f64((count - 1) as f64);
+        Self::new([count; 3], Vec3::new(-half, -half, -half), Vec3::new(h, h, h))
+    }
+
+    /// Nodes along x, y and z.
+    pub fn counts(&self) -> [usize; 3] {
+        self.counts
+    }
+
+    /// The first node.
+    pub fn low(&self) -> Vec3<R> {
+        self.low
+    }
+
+    /// The distance between neighbours along x, y and z.
+    pub fn spacing(&self) -> Vec3<R> {
+        self.spacing
+    }
+
+    /// How many nodes there are; the largest number where there are more than that.
+    pub fn nodes(&self) -> usize {
+        let [x, y, z] = self.counts;
+        x.saturating_mul(y).saturating_mul(z)
+    }
+
+    /// Where node number `n` stands.
+    pub fn node(&self, n: usize) -> Vec3<R> {
+        let [nx, ny, _] = self.counts;
+        let at = |i: usize| R::from_f64(i as f64);
+        Vec3::new(
+            self.low.x + at(n % nx) * self.spacing.x,
+            self.low.y + at(n / nx % ny) * self.spacing.y,
+            self.low.z + at(n / nx / ny) * self.spacing.z,
+        )
+    }
+
+    /// The smallest spacing.
+    pub(super) fn voxel(&self) -> f64 {
+        self.spacing.x.value().min(self.spacing.y.value()).min(self.spacing.z.value())
+    }
+
+    /// Refuses values that do not fit.
+    pub(super) fn check(&self, values: &[R], least: usize) -> Result<(), GridError> {
+        for (axis, found) in ['x', 'y', 'z'].into_iter().zip(self.counts) {
+            if found < least {
+                return Err(GridError::TooFew { axis, found, least });
+            }
+        }
+        if values.len() != self.nodes() {
+            return Err(GridError::Values { found: values.len(), expected: self.nodes() });
+        }
+        match values.iter().position(|value| !value.is_finite()) {
+            Some(node) => Err(GridError::NotANumber { node }),
+            None => Ok(()),
+        }
+    }
+
+    /// The cell of a point, whose support is `width` nodes wide; outside the grid the outermost cell.
+    #[inline(always)]
+    pub(super) fn locate(&self, at: Vec3<R>, width: usize) -> Place<R> {
+        let [nx, ny, nz] = self.counts;
+        let (x, tx) = along(at.x, self.low.x, self.density.x, nx - width);
+        let (y, ty) = along(at.y, self.low.y, self.density.y, ny - width);
+        let (z, tz) = along(at.z, self.low.z, self.density.z, nz - width);
+        let first = (z * ny as f64 + y) * nx as f64 + x;
+        Place { cell: [x, y, z], first: integer(first), t: Vec3::new(tx, ty, tz) }
+    }
+}
+
+/// Where a point lies in a grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<R> {
+    /// The cell along each axis, a whole number.
+    pub(super) cell: [f64; 3],
+    /// The number of the first node that counts.
+    pub(super) first: usize,
+    /// Where the point lies within the cell: from 0 to 1 unless it is outside the grid.
+    pub(super) t: Vec3<R>,
+}
+
+/// The cell along one axis and the place within it.
+#[inline(always)]
+fn along<R: Real>(x: R, low: R, density: R, last: usize) -> (f64, R) {
+    let u = (x - low) * density;
+    let i = cell(u.value(), last as f64);
+    (i, u - R::from_f64(i))
+}

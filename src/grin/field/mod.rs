@@ -1,0 +1,176 @@
+//! Fields of refractive index: value, gradient, Hessian, and the transpose onto the parameters.
+//!
+//! To add a kind of field, write its file; a profile in one coordinate needs only a
+//! [`Profile`] of its own.
+
+mod bspline;
+mod cell;
+mod grid;
+mod layered;
+mod luneburg;
+mod maxwell;
+mod parabolic;
+mod polynomial;
+mod sech;
+mod tricubic;
+mod trilinear;
+
+pub use bspline::BSpline;
+pub use grid::{Grid, GridError};
+pub use layered::{Coordinate, Layered, Profile, Profiled, ProfiledColumns};
+pub use luneburg::Luneburg;
+pub use maxwell::Maxwell;
+pub use parabolic::Parabolic;
+pub use polynomial::Polynomial;
+pub use sech::Sech;
+pub use tricubic::Tricubic;
+pub use trilinear::{Diagonal, Trilinear};
+
+use super::lanes::{Column, Columns, LANES, get, put};
+use crate::math::Real;
+use crate::math::Vec3;
+use crate::math::Width;
+use crate::math::widest;
+use std::fmt::Debug;
+
+/// The index at a point, and its gradient.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sample<R> {
+    /// Refractive index η.
+    pub index: R,
+    /// ∇η, per unit of length.
+    pub gradient: Vec3<R>,
+}
+
+/// The second derivatives of the index: a symmetric matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Hessian<R> {
+    /// ∂²η/∂x², ∂²η/∂y², ∂²η/∂z².
+    pub diagonal: Vec3<R>,
+    /// ∂²η/∂y∂z, ∂²η/∂z∂x, ∂²η/∂x∂y.
+    pub mixed: Vec3<R>,
+}
+
+impl<R: Real> Hessian<R> {
+    /// The matrix times a vector.
+    #[inline(always)]
+    pub fn times(self, v: Vec3<R>) -> Vec3<R> {
+        let (d, m) = (self.diagonal, self.mixed);
+        Vec3::new(
+            d.x * v.x + m.z * v.y + m.y * v.z,
+            m.z * v.x + d.y * v.y + m.x * v.z,
+            m.y * v.x + m.x * v.y + d.z * v.z,
+        )
+    }
+}
+
+/// How a field is built, for the choice of integrator and step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grain {
+    /// Smallest distance over which it may change its formula; none for a field of one formula.
+    pub voxel: Option<f64>,
+    /// Whether the force `η ∇η` has no jumps.
+    pub continuous_force: bool,
+}
+
+/// A field of refractive index with parameters.
+///
+/// It has a value everywhere, also outside the region in which light is traced: a step may end
+/// outside. A block of rays is asked at once; the block forms must give the same bits as the
+/// single ones, and do unless they are overridden.
+pub trait Field<R: Real>: Debug + Send + Sync {
+    /// What an optimiser may change, in the order of the gradient.
+    fn parameters(&self) -> &[R];
+
+    /// The same, to be changed.
+    fn parameters_mut(&mut self) -> &mut [R];
+
+    /// Index and gradient at a point.
+    fn sample(&self, at: Vec3<R>) -> Sample<R>;
+
+    /// The second derivatives at a point.
+    fn hessian(&self, at: Vec3<R>) -> Hessian<R>;
+
+    /// Both at once.
+    #[inline(always)]
+    fn sample_and_hessian(&self, at: Vec3<R>) -> (Sample<R>, Hessian<R>) {
+        (self.sample(at), self.hessian(at))
+    }
+
+    /// Adds `weight ∂η/∂θ + pull · ∂∇η/∂θ` to the gradient by the parameters.
+    fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]);
+
+    /// How it is built.
+    fn grain(&self) -> Grain;
+
+    /// Index and gradient for a block of rays.
+    fn samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
+        widest(
+            Width::Bits512,
+            #[inline(always)]
+            || {
+                for lane in 0..LANES {
+                    out.put(lane, self.sample(get(at, lane)));
+                }
+            },
+        );
+    }
+
+    /// The same, and the Hessian times a vector for each ray.
+    fn samples_and_hessians(
+        &self,
+        at: &Columns<R>,
+        times: &Columns<R>,
+        out: &mut Samples<R>,
+        product: &mut Columns<R>,
+    ) {
+        widest(
+            Width::Bits512,
+            #[inline(always)]
+            || {
+                for lane in 0..LANES {
+                    let x = get(at, lane);
+                    let (sample, hessian) = self.sample_and_hessian(x);
+                    out.put(lane, sample);
+                    put(product, lane, hessian.times(get(times, lane)));
+                }
+            },
+        );
+    }
+
+    /// [`Self::deposit`] for a block of rays, in order.
+    fn deposits(&self, at: &Columns<R>, weight: &Column<R>, pull: &Columns<R>, gradient: &mut [R]) {
+        widest(
+            Width::Bits512,
+            #[inline(always)]
+            || {
+                for (lane, weight) in weight.iter().enumerate() {
+                    self.deposit(get(at, lane), *weight, get(pull, lane), gradient);
+                }
+            },
+        );
+    }
+}
+
+/// Indices and gradients for a block of rays.
+#[derive(Debug, Clone, Copy)]
+pub struct Samples<R> {
+    /// Refractive index η.
+    pub index: Column<R>,
+    /// ∇η.
+    pub gradient: Columns<R>,
+}
+
+impl<R: Real> Default for Samples<R> {
+    fn default() -> Self {
+        Self { index: [R::ZERO; LANES], gradient: Columns::default() }
+    }
+}
+
+impl<R: Real> Samples<R> {
+    #[inline(always)]
+    pub(super) fn put(&mut self, lane: usize, sample: Sample<R>) {
+        self.index[lane] = sample.index;
+        put(&mut self.gradient, lane, sample.gradient);
+    }
+}

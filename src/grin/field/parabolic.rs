@@ -1,0 +1,62 @@
+//! The parabolic fibre: `η² = n₀² (1 - g² s)`, in which every ray is an exact sinusoid.
+//!
+//! With `v_z` constant along a ray, `x(σ) = x₀ cos(n₀ g σ) + v₀ sin(n₀ g σ)/(n₀ g)` across the axis
+//! (Marchand, *Gradient Index Optics*, 1978).
+
+use super::{Profile, Profiled};
+use crate::math::Real;
+
+/// Where `g² s` exceeds this the profile is constant: the root must stay real.
+const CUT: f64 = 0.9;
+
+/// `f = n₀ √(1 - g² s)`; its parameters are `n₀` and `g`, per length where `s` is a squared radius.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parabolic<R> {
+    parameters: [R; 2],
+}
+
+impl<R: Real> Parabolic<R> {
+    /// The fibre of this index on its axis and this constant `g`.
+    pub fn new(axis: R, g: R) -> Self {
+        Self { parameters: [axis, g] }
+    }
+
+    /// `g² s`, not beyond the cut, and one before it, zero behind.
+    #[inline(always)]
+    fn relative(&self, s: R) -> (R, R) {
+        let [_, g] = self.parameters;
+        let (q, cut) = (g * g * s, R::from_f64(CUT));
+        let inside = q < cut;
+        (R::select(inside, q, cut), R::select(inside, R::ONE, R::ZERO))
+    }
+}
+
+impl<R: Real> Profile<R> for Parabolic<R> {
+    fn parameters(&self) -> &[R] {
+        &self.parameters
+    }
+
+    fn parameters_mut(&mut self) -> &mut [R] {
+        &mut self.parameters
+    }
+
+    #[inline(always)]
+    fn at(&self, s: R) -> Profiled<R> {
+        let [axis, g] = self.parameters;
+        let (q, on) = self.relative(s);
+        let value = axis * (R::ONE - q).sqrt();
+        let slope = -(on * axis * axis * g * g / (R::TWO * value));
+        Profiled { value, slope, bend: -(slope * slope / value) }
+    }
+
+    /// With `w = √(1 - g² s)`: `∂f/∂g = -n₀ g s/w`, `∂f'/∂g = -n₀ g (1 + g² s/(2 w²))/w`.
+    #[inline(always)]
+    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+        let [axis, g] = self.parameters;
+        let (q, on) = self.relative(s);
+        let root = (R::ONE - q).sqrt();
+        gradient[0] += weight * root - on * pull * g * g / (R::TWO * root);
+        let bracket = R::ONE + q / (R::TWO * root * root);
+        gradient[1] -= on * axis * g / root * (weight * s + pull * bracket);
+    }
+}

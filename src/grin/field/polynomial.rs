@@ -1,0 +1,64 @@
+//! A profile that is a polynomial: `f = Σ cₖ sᵏ`.
+
+use super::{Profile, Profiled, ProfiledColumns};
+use crate::grin::lanes::{Column, LANES};
+use crate::math::Real;
+
+/// `f = Σ cₖ sᵏ`; the parameters are the coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polynomial<R> {
+    /// `c₀, c₁, …`.
+    pub coefficients: Vec<R>,
+}
+
+impl<R: Real> Profile<R> for Polynomial<R> {
+    fn parameters(&self) -> &[R] {
+        &self.coefficients
+    }
+
+    fn parameters_mut(&mut self) -> &mut [R] {
+        &mut self.coefficients
+    }
+
+    /// Horner's rule for the value and both derivatives.
+    #[inline(always)]
+    fn at(&self, s: R) -> Profiled<R> {
+        let (mut value, mut slope, mut half_bend) = (R::ZERO, R::ZERO, R::ZERO);
+        for &c in self.coefficients.iter().rev() {
+            half_bend = half_bend * s + slope;
+            slope = slope * s + value;
+            value = value * s + c;
+        }
+        Profiled { value, slope, bend: half_bend + half_bend }
+    }
+
+    /// One coefficient for all rays, then the next.
+    #[inline(always)]
+    fn at_all(&self, s: &Column<R>, out: &mut ProfiledColumns<R>) {
+        let ProfiledColumns { value, slope, bend } = out;
+        for column in [&mut *value, &mut *slope, &mut *bend] {
+            *column = [R::ZERO; LANES];
+        }
+        for &c in self.coefficients.iter().rev() {
+            for lane in 0..LANES {
+                bend[lane] = bend[lane] * s[lane] + slope[lane];
+                slope[lane] = slope[lane] * s[lane] + value[lane];
+                value[lane] = value[lane] * s[lane] + c;
+            }
+        }
+        for bend in bend {
+            *bend = *bend + *bend;
+        }
+    }
+
+    #[inline(always)]
+    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+        // `power` is sᵏ and `slope` its derivative.
+        let (mut power, mut slope) = (R::ONE, R::ZERO);
+        for g in gradient {
+            *g += weight * power + pull * slope;
+            slope = slope * s + power;
+            power = power * s;
+        }
+    }
+}

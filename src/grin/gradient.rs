@@ -1,0 +1,133 @@
+//! Gradients of a loss on the exits of many rays, by the parameters of the field and by the starts.
+//!
+//! Rays are split into a number of parts that depends on the problem alone, never on the threads.
+//! Each part has its own gradient, and they are added in order: the same bits on any number of
+//! threads.
+
+use super::adjoint::{Chunk, Retraced, Seed};
+use super::exit::Exit;
+use super::fate::{Fate, Fates};
+use super::field::Field;
+use super::lanes::LANES;
+use super::tracer::{Ray, Tracer};
+use crate::math::Real;
+use rayon::prelude::*;
+
+/// Most private gradients at a time: their memory is this many times the parameters.
+const PARTS: usize = 16;
+/// Ray against parameter: a private gradient is worth clearing and adding from this many parameters
+/// a ray on.
+const PARAMETERS_PER_RAY: usize = 64;
+/// Parameters that one task adds.
+const STRIP: usize = 4096;
+
+/// The gradient of a loss.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gradient<R> {
+    /// By the parameters of the field.
+    pub parameters: Vec<R>,
+    /// By the start of each ray; zero for a ray that has no gradient.
+    pub starts: Vec<Seed<R>>,
+    /// The largest distance between a start and the end of its way back, in steps, of the rays
+    /// that count: rounding, unless the light is chaotic.
+    pub retrace_error: f64,
+}
+
+/// A loss with its gradient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome<R> {
+    /// The sum over all rays.
+    pub loss: R,
+    /// Its gradient.
+    pub gradient: Gradient<R>,
+    /// How each ray ended.
+    pub exits: Vec<Exit<R>>,
+    /// How many rays ended how.
+    pub fates: Fates,
+}
+
+impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
+    /// The sum of `loss` over rays.
+    ///
+    /// `loss` gets the number of the ray and its exit, and gives the loss and its derivative by the
+    /// exit. It is asked about every ray, also one that did not arrive, whose derivative is not
+    /// used: a constant for those keeps an optimiser from driving rays away. Where the way back
+    /// shows that a ray is chaotic it is asked again, with [`Fate::Chaotic`].
+    pub fn loss_and_gradient(
+        &self,
+        rays: &[Ray<R>],
+        loss: impl Fn(usize, &Exit<R>) -> (R, Seed<R>) + Sync,
+    ) -> Outcome<R> {
+        let mut exits = self.rays(rays);
+        let indexed = exits.par_iter().enumerate();
+        let (mut losses, seeds): (Vec<R>, Vec<Seed<R>>) =
+            indexed.map(|(i, exit)| loss(i, exit)).unzip();
+        let before: Vec<Fate> = exits.iter().map(|exit| exit.fate).collect();
+        let gradient = self.gradient(rays, &mut exits, &seeds);
+        for (i, exit) in exits.iter().enumerate() {
+            if exit.fate != before[i] {
+                losses[i] = loss(i, exit).0;
+            }
+        }
+        let mut sum = R::ZERO;
+        losses.into_iter().for_each(|loss| sum += loss);
+        let fates = exits.iter().map(|exit| exit.fate).collect();
+        Outcome { loss: sum, gradient, exits, fates }
+    }
+
+    /// The gradient of a loss whose derivatives by the exits are known: the second pass, where the
+    /// first was [`Self::rays`] with the same rays. A ray whose way back shows that it has no
+    /// gradient gets its new fate, and adds nothing.
+    ///
+    /// # Panics
+    /// If there is not one exit and one seed for each ray.
+    pub fn gradient(
+        &self,
+        rays: &[Ray<R>],
+        exits: &mut [Exit<R>],
+        seeds: &[Seed<R>],
+    ) -> Gradient<R> {
+        assert!(rays.len() == exits.len() && rays.len() == seeds.len(), "one exit and seed a ray");
+        let mut starts = vec![Seed::default(); rays.len()];
+        let size = self.rays_per_part(rays.len());
+        let parts: Vec<(Vec<R>, f64)> = rays
+            .par_chunks(size)
+            .zip(exits.par_chunks_mut(size))
+            .zip(seeds.par_chunks(size).zip(starts.par_chunks_mut(size)))
+            .map(|((rays, exits), (seeds, starts))| {
+                self.part(&mut Chunk { rays, exits, seeds, starts })
+            })
+            .collect();
+        let retrace_error = parts.iter().fold(0.0, |worst: f64, part| worst.max(part.1));
+        let mut parts = parts.into_iter().map(|part| part.0);
+        let zero = || vec![R::ZERO; self.field.parameters().len()];
+        let mut parameters = parts.next().unwrap_or_else(zero);
+        parts.for_each(|part| add(&mut parameters, &part));
+        Gradient { parameters, starts, retrace_error }
+    }
+
+    /// The gradient of one part of the rays. A chaotic ray is known by its way back, when it has
+    /// already deposited what is worth nothing: then the part begins again without it.
+    fn part(&self, chunk: &mut Chunk<'_, R>) -> (Vec<R>, f64) {
+        loop {
+            let mut parameters = vec![R::ZERO; self.field.parameters().len()];
+            let Retraced { worst, lost } = self.retrace(chunk, &mut parameters);
+            if lost == 0 {
+                return (parameters, worst);
+            }
+        }
+    }
+
+    /// How many rays share a private gradient.
+    fn rays_per_part(&self, rays: usize) -> usize {
+        let worth = rays * PARAMETERS_PER_RAY / self.field.parameters().len().max(1);
+        let parts = worth.clamp(2, PARTS).min(rays.div_ceil(LANES)).max(1);
+        rays.div_ceil(parts).max(1)
+    }
+}
+
+fn add<R: Real>(sum: &mut [R], part: &[R]) {
+    sum.par_chunks_mut(STRIP).zip(part.par_chunks(STRIP)).for_each(|(sum, part)| {
+        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += *part);
+    });
+}

@@ -1,0 +1,43 @@
+//! Light in one gradient-index field: fields, ray integrators, their discrete adjoint. Knows no lens.
+//!
+//! In the canonical parameter σ, with `dσ = ds/η`, a ray obeys `x' = v`, `v' = η ∇η` (Sharma et al.,
+//! Appl. Opt. 21, 1982; equations 5.5 and 5.6 of Pediredla et al., "Adjoint nonlinear ray tracing",
+//! ACM TOG 41, 2022) and `|v| = η` stays true along it; the optical path grows by `η²`. Every
+//! [`Integrator`] is a list of drifts, which move `x`, and kicks, which turn `v`. That makes each
+//! step exactly reversible, so the gradient of a loss needs no stored path: the ray is traced
+//! backwards from its end and the transpose of each drift and kick is applied on the way. Memory
+//! does not grow with the number of steps.
+//!
+//! The transpose is of the *discrete* map, so it equals what automatic differentiation gives. For a
+//! trilinear grid that is the wrong answer to the question a designer asks: see
+//! [`Trilinear`](field::Trilinear).
+//!
+//! Lengths are in the unit of the field (mm for a lens), `v` has no unit, σ is a length.
+
+mod adjoint;
+mod descent;
+mod exit;
+mod fate;
+pub mod field;
+mod gradient;
+mod integrator;
+mod lanes;
+mod plan;
+mod region;
+mod setup;
+mod tape;
+mod tracer;
+
+pub use adjoint::Seed;
+pub use descent::{Adam, Descended, Lbfgs, Limits};
+pub use exit::Exit;
+pub use fate::{Fate, Fates};
+pub use field::Field;
+pub use gradient::{Gradient, Outcome};
+pub use integrator::{Integrator, Op};
+pub use lanes::{Column, Columns, LANES};
+pub use plan::{Plan, plan};
+pub use region::{Face, Region};
+pub use setup::{End, LastStep, Launch, Setup, SetupError};
+pub use tape::Taped;
+pub use tracer::{Ray, State, Tracer};

@@ -1,0 +1,166 @@
+//! Which integrator and which step a field calls for, and why.
+//!
+//! On a trilinear grid the force jumps between voxels, which holds every integrator to the first
+//! order: the cheapest one with about two steps a voxel is right. A smooth field rewards order 4.
+//! The step comes from a sample of rays traced with it and with half of it. The conserved quantity
+//! `|v|² - η²` would be cheaper, but it underestimates the error of Blanes and Moan's method up to a
+//! hundredfold.
+
+use super::fate::Fate;
+use super::field::Field;
+use super::integrator::Integrator;
+use super::region::Region;
+use super::setup::{End, LastStep, Launch, Setup, SetupError};
+use super::tracer::{Ray, Tracer};
+use crate::math::Vec3;
+
+/// Rays that the step is tried on.
+const SAMPLE: usize = 64;
+/// Largest number of tries.
+const TRIES: usize = 24;
+/// A ray may be this many times longer than the longest straight way through the region.
+const LONGEST: f64 = 32.0;
+/// Most steps a straight way may take before the plan gives up on a tolerance.
+const MOST_STEPS: f64 = 1e6;
+/// Steps that are a simple fraction of a voxel would meet the same place of every voxel, and on a
+/// ray along the grid its faces, where rounding decides which voxel counts.
+const INCOMMENSURATE: f64 = 0.974;
+
+/// A setup and the reasons for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// How to trace.
+    pub setup: Setup<f64>,
+    /// The largest change of an exit position in the sample when the step is halved.
+    pub error: f64,
+    /// Whether that is within the tolerance.
+    pub reached: bool,
+    /// Why: a sentence for each decision, with the number it rests on.
+    pub reasons: Vec<String>,
+}
+
+/// Chooses integrator, step and last step for light in a region, so that exit positions are good to
+/// `tolerance`, judged by some of the rays.
+///
+/// # Errors
+/// A region that is empty.
+pub fn plan<F: Field<f64> + ?Sized>(
+    field: &F,
+    region: &Region<f64>,
+    launch: Launch,
+    rays: &[Ray<f64>],
+    tolerance: f64,
+) -> Result<Plan, SetupError> {
+    let stride = rays.len().div_ceil(SAMPLE).max(1);
+    let sample: Vec<Ray<f64>> = rays.iter().step_by(stride).copied().collect();
+    let way = sample.iter().map(|ray| straight_way(region, ray)).fold(0.0, f64::max);
+    let way = if way > 0.0 { way } else { 1.0 };
+    let mut reasons = Vec::new();
+    let (integrator, last) = integrator(field, &mut reasons);
+    let longest = longest_step(field, integrator, &sample, way, &mut reasons);
+    let setup = |step: f64| Setup {
+        integrator,
+        step,
+        launch,
+        end: End::Boundary {
+            region: region.clone(),
+            last,
+            limit: (LONGEST * way / step).clamp(64.0, f64::from(u32::MAX)) as u32,
+        },
+        screen: None,
+    };
+    let order = if field.grain().continuous_force { integrator.order() } else { 1 };
+    let (mut step, mut error) = (longest, f64::INFINITY);
+    for _ in 0..TRIES {
+        error = change(field, &setup(step), &setup(0.5 * step), &sample)?;
+        if error <= tolerance || step < way / MOST_STEPS {
+            break;
+        }
+        step *= (0.8 * tolerance / error).powf(1.0 / f64::from(order)).clamp(0.2, 0.7);
+    }
+    let reached = error <= tolerance;
+    let verdict = if reached { "within" } else { "not within" };
+    reasons.push(format!(
+        "step {step:.3e}: halving it moves the exits of {} rays by at most {error:.1e}, {verdict} {tolerance:.1e}",
+        sample.len(),
+    ));
+    Ok(Plan { setup: setup(step), error, reached, reasons })
+}
+
+/// What the force of the field allows.
+fn integrator<F: Field<f64> + ?Sized>(
+    field: &F,
+    reasons: &mut Vec<String>,
+) -> (Integrator, LastStep) {
+    if field.grain().continuous_force {
+        reasons.push(
+            "blanes_moan: the force is smooth, and this is the most accurate for a given number of \
+             kicks; the last step is cut to length, which keeps its order"
+                .into(),
+        );
+        return (Integrator::BlanesMoan, LastStep::Fractional);
+    }
+    reasons.push(
+        "leapfrog_dkd: the force jumps between voxels, so no order beyond the first is to be had; \
+         the last step is a broken line, which costs no accuracy between kicks"
+            .into(),
+    );
+    (Integrator::LeapfrogDkd, LastStep::BrokenLine)
+}
+
+/// The longest step to begin with.
+fn longest_step<F: Field<f64> + ?Sized>(
+    field: &F,
+    integrator: Integrator,
+    rays: &[Ray<f64>],
+    way: f64,
+    reasons: &mut Vec<String>,
+) -> f64 {
+    let free = way / if integrator.order() > 2 { 4.0 } else { 32.0 };
+    let Some(voxel) = field.grain().voxel else { return free };
+    // The ray moves by η times the step.
+    let index = rays.iter().map(|ray| field.sample(ray.x).index).fold(1.0, f64::max);
+    let limit = INCOMMENSURATE * voxel / index;
+    if limit >= free {
+        return free;
+    }
+    reasons.push(format!(
+        "at most one voxel of {voxel:.3e} a step, so that the gradient reaches every voxel, and no \
+         simple fraction of it"
+    ));
+    limit
+}
+
+/// The straight way of a ray through the region, in σ.
+fn straight_way(region: &Region<f64>, ray: &Ray<f64>) -> f64 {
+    let start = match region.entry(ray.x, ray.v) {
+        Some((_, t)) if region.height(ray.x) > 0.0 => ray.x + ray.v * t,
+        _ => ray.x,
+    };
+    let ahead = |n| region.face(n).crossings(start, ray.v).unwrap_or([f64::INFINITY; 2]);
+    let size = start.dot(start).sqrt() * 1e-9;
+    let far = (0..region.face_count())
+        .flat_map(ahead)
+        .filter(|t| *t > size)
+        .fold(f64::INFINITY, f64::min);
+    if far.is_finite() { far } else { 0.0 }
+}
+
+/// The largest change of an exit position between two setups, of the rays that arrive with both.
+fn change<F: Field<f64> + ?Sized>(
+    field: &F,
+    coarse: &Setup<f64>,
+    fine: &Setup<f64>,
+    rays: &[Ray<f64>],
+) -> Result<f64, SetupError> {
+    let trace = |setup: &Setup<f64>| Tracer::new(field, setup.clone()).map(|t| t.rays(rays));
+    let length = |v: Vec3<f64>| v.dot(v).sqrt();
+    let pairs = trace(coarse)?.into_iter().zip(trace(fine)?);
+    let moved = pairs.map(|(a, b)| match (a.fate, b.fate) {
+        (a_fate, b_fate) if a_fate.arrived() && b_fate.arrived() => length(a.x - b.x),
+        (Fate::Trapped | Fate::NeverEntered, _) => 0.0,
+        (a_fate, b_fate) if a_fate == b_fate => 0.0,
+        _ => f64::INFINITY,
+    });
+    Ok(moved.fold(0.0, f64::max))
+}

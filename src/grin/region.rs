@@ -1,0 +1,207 @@
+//! Where light is traced: a region bounded by planes and quadrics, and where a straight line
+//! crosses its boundary.
+
+use crate::math::Real;
+use crate::math::Vec3;
+
+/// A plane or quadric `φ(x) = Σ aᵢ xᵢ² + b·x + c`, negative inside: planes, spheres, cylinders and
+/// conics of revolution along an axis are all of this form.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Face<R> {
+    /// `a`.
+    pub square: Vec3<R>,
+    /// `b`.
+    pub linear: Vec3<R>,
+    /// `c`.
+    pub constant: R,
+}
+
+impl<R: Real> Face<R> {
+    /// The plane `normal · x = offset`; inside is where the normal points away from.
+    pub fn plane(normal: Vec3<R>, offset: R) -> Self {
+        Self { square: Vec3::default(), linear: normal, constant: -offset }
+    }
+
+    /// The sphere about the origin, seen from inside.
+    pub fn sphere(radius: R) -> Self {
+        let square = Vec3::new(R::ONE, R::ONE, R::ONE);
+        Self { square, linear: Vec3::default(), constant: -(radius * radius) }
+    }
+
+    /// The cylinder about the z axis, seen from inside.
+    pub fn cylinder(radius: R) -> Self {
+        let square = Vec3::new(R::ONE, R::ONE, R::ZERO);
+        Self { square, linear: Vec3::default(), constant: -(radius * radius) }
+    }
+
+    /// `φ` at a point.
+    #[inline(always)]
+    pub fn height(&self, p: Vec3<R>) -> R {
+        let (a, b) = (self.square, self.linear);
+        p.x * (a.x * p.x + b.x) + p.y * (a.y * p.y + b.y) + p.z * (a.z * p.z + b.z) + self.constant
+    }
+
+    /// `∇φ`: outwards, not normalised.
+    #[inline(always)]
+    pub fn normal(&self, p: Vec3<R>) -> Vec3<R> {
+        let (a, b, two) = (self.square, self.linear, R::TWO);
+        Vec3::new(two * a.x * p.x + b.x, two * a.y * p.y + b.y, two * a.z * p.z + b.z)
+    }
+
+    /// The two `t` at which `x + t v` meets the face, in ascending order; for a plane the other one
+    /// is infinite.
+    pub fn crossings(&self, x: Vec3<R>, v: Vec3<R>) -> Option<[R; 2]> {
+        let squares = self.square;
+        let a = squares.x * v.x * v.x + squares.y * v.y * v.y + squares.z * v.z * v.z;
+        let half_b = self.normal(x).dot(v) * R::from_f64(0.5);
+        let c = self.height(x);
+        let infinite = R::from_f64(f64::INFINITY);
+        if a == R::ZERO {
+            let t = -(c / (half_b + half_b));
+            return (half_b != R::ZERO).then_some([t, infinite]);
+        }
+        let radicand = half_b * half_b - a * c;
+        if !(radicand >= R::ZERO) {
+            return None;
+        }
+        // The sum that does not cancel, and the other root from the product of both.
+        let root = radicand.sqrt();
+        let q = -(half_b + R::select(half_b < R::ZERO, -root, root));
+        if q == R::ZERO {
+            return Some([R::ZERO, R::ZERO]);
+        }
+        let (t1, t2) = (q / a, c / q);
+        Some(if t1 < t2 { [t1, t2] } else { [t2, t1] })
+    }
+}
+
+/// A convex region: everything between two corners that is also inside every face.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region<R> {
+    /// Lower corner; minus infinity where there is none.
+    pub low: Vec3<R>,
+    /// Upper corner; infinity where there is none.
+    pub high: Vec3<R>,
+    /// Further faces.
+    pub faces: Vec<Face<R>>,
+}
+
+/// Faces of the box: they have the numbers 0 to 5, the further ones those behind.
+const SIDES: usize = 6;
+
+impl<R: Real> Region<R> {
+    /// The box between two corners.
+    pub fn block(low: Vec3<R>, high: Vec3<R>) -> Self {
+        Self { low, high, faces: Vec::new() }
+    }
+
+    /// The cube from `-half` to `half`.
+    pub fn cube(half: R) -> Self {
+        Self::block(Vec3::new(-half, -half, -half), Vec3::new(half, half, half))
+    }
+
+    /// Everything inside these faces.
+    pub fn inside(faces: Vec<Face<R>>) -> Self {
+        let infinite = R::from_f64(f64::INFINITY);
+        let high = Vec3::new(infinite, infinite, infinite);
+        Self { low: -high, high, faces }
+    }
+
+    /// The ball about the origin.
+    pub fn ball(radius: R) -> Self {
+        Self::inside(vec![Face::sphere(radius)])
+    }
+
+    /// A piece of fibre along z.
+    pub fn rod(radius: R, from: R, to: R) -> Self {
+        let mut rod = Self::inside(vec![Face::cylinder(radius)]);
+        (rod.low.z, rod.high.z) = (from, to);
+        rod
+    }
+
+    /// The largest `φ` of all faces: negative inside.
+    #[inline(always)]
+    pub fn height(&self, p: Vec3<R>) -> R {
+        let larger = |a: R, b: R| R::select(a < b, b, a);
+        let x = larger(self.low.x - p.x, p.x - self.high.x);
+        let y = larger(self.low.y - p.y, p.y - self.high.y);
+        let z = larger(self.low.z - p.z, p.z - self.high.z);
+        let sides = larger(x, larger(y, z));
+        self.faces.iter().fold(sides, |height, face| larger(height, face.height(p)))
+    }
+
+    /// How many faces there are, those of the box included.
+    pub fn face_count(&self) -> usize {
+        SIDES + self.faces.len()
+    }
+
+    /// Face number `n`: those of the box in the order low x, high x, low y, …, then the further ones.
+    ///
+    /// # Panics
+    /// If there are not that many.
+    pub fn face(&self, n: usize) -> Face<R> {
+        let (zero, one) = (R::ZERO, R::ONE);
+        let axis =
+            [Vec3::new(one, zero, zero), Vec3::new(zero, one, zero), Vec3::new(zero, zero, one)];
+        match n {
+            0 => Face::plane(-axis[0], -self.low.x),
+            1 => Face::plane(axis[0], self.high.x),
+            2 => Face::plane(-axis[1], -self.low.y),
+            3 => Face::plane(axis[1], self.high.y),
+            4 => Face::plane(-axis[2], -self.low.z),
+            5 => Face::plane(axis[2], self.high.z),
+            _ => self.faces[n - SIDES],
+        }
+    }
+
+    /// The face that a point is farthest outside of, in units of length, and how far.
+    pub fn outermost(&self, p: Vec3<R>) -> (usize, R) {
+        let mut found = (0, R::from_f64(f64::NEG_INFINITY));
+        for n in 0..self.face_count() {
+            let distance = self.distance(n, p);
+            if distance > found.1 {
+                found = (n, distance);
+            }
+        }
+        found
+    }
+
+    /// The distance of a point from a face, to first order; negative inside.
+    fn distance(&self, n: usize, p: Vec3<R>) -> R {
+        let face = self.face(n);
+        let normal = face.normal(p);
+        let length = normal.dot(normal).sqrt();
+        if length > R::ZERO { face.height(p) / length } else { face.height(p) }
+    }
+
+    /// Where the line `x + t v` from a point outside first is inside every face: the `t ≥ 0`, and the
+    /// face by which it goes in; none if it misses. With `-v` it is where a ray that has just left
+    /// crossed the boundary.
+    pub fn entry(&self, x: Vec3<R>, v: Vec3<R>) -> Option<(usize, R)> {
+        let mut found: Option<(usize, R)> = None;
+        for n in 0..self.face_count() {
+            let face = self.face(n);
+            if !(face.height(x) >= R::ZERO) {
+                continue;
+            }
+            let [near, far] = face.crossings(x, v)?;
+            let t = R::select(near >= R::ZERO, near, far);
+            if !(t >= R::ZERO) {
+                return None;
+            }
+            if found.is_none_or(|(_, farthest)| t > farthest) {
+                found = Some((n, t));
+            }
+        }
+        let (face, t) = found.filter(|(_, t)| t.is_finite())?;
+        let at = x + v * t;
+        let (_, distance) = self.outermost(at);
+        (distance <= rounding(at, v * t)).then_some((face, t))
+    }
+}
+
+/// A distance that rounding may explain at a point that was reached over this way.
+pub(super) fn rounding<R: Real>(at: Vec3<R>, way: Vec3<R>) -> R {
+    let size = at.dot(at).sqrt() + way.dot(way).sqrt();
+    R::from_f64(1e3 * R::EPSILON) * size
+}

@@ -1,0 +1,478 @@
+//! A front that is swept in the background: orders in, news out, and dropping the handle ends the
+//! thread.
+//!
+//! The sweep works on its own copy of the lens and never touches the design. What it has found sits
+//! in a newest-value slot; a panic inside ends the sweep and not the session.
+
+use super::clock::{Pace, Timed, timed};
+use super::slot::Slot;
+use super::worker::{Standing, said};
+use crate::front::{Survey, hypervolume, write};
+use crate::lens::Lens;
+use crate::merit::PupilEdge;
+use crate::optimize::pareto::{Design, Front, Settings, Slice, Sweep};
+use crate::pupil::limited_by_stop;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+/// The time between two looks of the window, at least.
+const BETWEEN: Duration = Duration::from_millis(100);
+/// The relative error of the numbers of the design, as a sweep judges its own lenses.
+const JUDGED: f64 = 1e-4;
+
+/// A front on its way, or as it was left.
+#[derive(Debug, Clone)]
+pub struct FrontRun {
+    /// Which of the session it is, counted from 1.
+    pub number: u64,
+    /// How it stands.
+    pub standing: Standing,
+    /// What it was told.
+    pub settings: Settings,
+    /// Whether the same search follows with pupils that the derivatives keep as they are.
+    pub compare: bool,
+    /// The design from which it began.
+    pub lens: Arc<Lens>,
+    /// The same as the sweep judges it: limited by its stop.
+    pub start: Arc<Design>,
+    /// What was found.
+    pub main: Leg,
+    /// What is found with kept pupils; `None` before that begins.
+    pub biased: Option<Leg>,
+}
+
+/// One sweep of a run.
+#[derive(Debug, Clone)]
+pub struct Leg {
+    /// The front so far.
+    pub front: Arc<Front>,
+    /// Spot in mm and light in mm² of every lens that was looked at.
+    pub tried: Arc<Vec<[f64; 2]>>,
+    /// The hypervolume of the front against twice the spot of the lens at the start.
+    pub hypervolume: f64,
+    /// Steps of Adam so far, over all chains.
+    pub done: usize,
+    /// Steps in all.
+    pub total: usize,
+    /// The time that they took, in seconds, pauses apart.
+    pub seconds: f64,
+    /// What was given up and why, the last one.
+    pub refused: Option<String>,
+}
+
+impl FrontRun {
+    /// Whether it goes on or can.
+    pub fn is_under_way(&self) -> bool {
+        matches!(self.standing, Standing::Running | Standing::Paused)
+    }
+
+    /// The sweep that runs, or ran last.
+    pub fn leg(&self) -> &Leg {
+        self.biased.as_ref().unwrap_or(&self.main)
+    }
+
+    /// The part that is done, 0 to 1.
+    pub fn done(&self) -> f64 {
+        let legs = 1 + usize::from(self.compare);
+        let done = self.main.done + self.biased.as_ref().map_or(0, |leg| leg.done);
+        done as f64 / (legs * self.main.total).max(1) as f64
+    }
+
+    /// The same as files need it.
+    fn survey(&self) -> Survey<'_> {
+        Survey {
+            name: &self.lens.name,
+            start: &self.start,
+            front: &self.main.front,
+            tried: &self.main.tried,
+            biased: self.biased.as_ref().map(|leg| &*leg.front),
+        }
+    }
+}
+
+impl Leg {
+    fn new(sweep: &dyn Sweeps) -> Self {
+        let mut leg = Self {
+            front: Arc::default(),
+            tried: Arc::default(),
+            hypervolume: 0.0,
+            done: 0,
+            total: 0,
+            seconds: 0.0,
+            refused: None,
+        };
+        leg.look(sweep);
+        leg
+    }
+
+    /// Takes over what a sweep has found.
+    fn look(&mut self, sweep: &dyn Sweeps) {
+        self.front = Arc::new(sweep.front().clone());
+        self.tried = Arc::new(sweep.tried().to_vec());
+        self.hypervolume = hypervolume(&self.front, sweep.start());
+    }
+
+    /// Takes over what a slice has told.
+    fn count(&mut self, slice: Slice, ms: f64) {
+        self.seconds += 1e-3 * ms;
+        self.done = slice.done;
+        self.total = slice.total;
+        self.refused = slice.refused.or(self.refused.take());
+    }
+}
+
+/// A design as a sweep judges lenses.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// The design.
+    pub lens: Arc<Lens>,
+    /// What it is worth, or why nothing.
+    pub found: Result<Design, String>,
+}
+
+/// What happened to a sweep; each carries its number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Told {
+    Now(u64, Standing),
+    Failed(u64, String),
+    Written(PathBuf, usize),
+    NotWritten(String),
+}
+
+/// What a run is to do.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub(super) number: u64,
+    pub(super) lens: Arc<Lens>,
+    pub(super) settings: Settings,
+    pub(super) compare: bool,
+}
+
+/// What a sweep is told.
+enum Order {
+    Start(Job),
+    Pause,
+    Resume,
+    Stop,
+    Clear,
+    Write(PathBuf),
+    Judge(Arc<Lens>),
+}
+
+/// What finds a front: the engine, or what a test puts in its place.
+trait Sweeps: Send {
+    fn step(&mut self) -> Slice;
+    fn start(&self) -> &Design;
+    fn front(&self) -> &Front;
+    fn tried(&self) -> &[[f64; 2]];
+}
+
+impl Sweeps for Sweep {
+    fn step(&mut self) -> Slice {
+        Self::step(self)
+    }
+
+    fn start(&self) -> &Design {
+        &self.start
+    }
+
+    fn front(&self) -> &Front {
+        Self::front(self)
+    }
+
+    fn tried(&self) -> &[[f64; 2]] {
+        Self::tried(self)
+    }
+}
+
+type Begin = dyn Fn(&Lens, &Settings) -> Result<Box<dyn Sweeps>, String> + Send;
+
+/// The handle of the thread that sweeps.
+#[derive(Debug)]
+pub(super) struct Sweeper {
+    orders: Option<Sender<Order>>,
+    told: Receiver<Told>,
+    run: Slot<FrontRun>,
+    judged: Slot<Judged>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Sweeper {
+    /// Starts the thread. `wake` is called from it when there is something new to look at.
+    pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+        let begin = |lens: &Lens, settings: &Settings| {
+            let sweep = Sweep::new(lens, settings).map_err(|why| why.to_string())?;
+            Ok(Box::new(sweep) as Box<dyn Sweeps>)
+        };
+        Self::with(Box::new(begin), wake)
+    }
+
+    fn with(begin: Box<Begin>, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+        let (orders, inbox) = mpsc::channel();
+        let (outbox, told) = mpsc::channel();
+        let (shown, judged) = (Slot::default(), Slot::default());
+        let desk = Desk {
+            inbox,
+            outbox,
+            shown: shown.clone(),
+            judged: judged.clone(),
+            begin,
+            wake: Box::new(wake),
+            pace: Pace::new(BETWEEN),
+            run: None,
+        };
+        let thread = thread::Builder::new().name("front".into()).spawn(move || desk.serve())?;
+        Ok(Self { orders: Some(orders), told, run: shown, judged, thread: Some(thread) })
+    }
+
+    pub(super) fn start(&self, job: Job) {
+        self.tell(Order::Start(job));
+    }
+
+    pub(super) fn pause(&self) {
+        self.tell(Order::Pause);
+    }
+
+    pub(super) fn resume(&self) {
+        self.tell(Order::Resume);
+    }
+
+    pub(super) fn stop(&self) {
+        self.tell(Order::Stop);
+    }
+
+    /// Ends the sweep and forgets it.
+    pub(super) fn clear(&self) {
+        self.tell(Order::Clear);
+    }
+
+    /// Writes the front as it is into a folder.
+    pub(super) fn write(&self, folder: PathBuf) {
+        self.tell(Order::Write(folder));
+    }
+
+    /// Asks what a design is worth beside the front.
+    pub(super) fn judge(&self, lens: Arc<Lens>) {
+        self.tell(Order::Judge(lens));
+    }
+
+    /// How far the sweep is.
+    pub(super) fn run(&self) -> Option<Arc<FrontRun>> {
+        self.run.latest()
+    }
+
+    /// The design that was judged last.
+    pub(super) fn judged(&self) -> Option<Arc<Judged>> {
+        self.judged.latest()
+    }
+
+    /// What happened since the last look.
+    pub(super) fn told(&self) -> Vec<Told> {
+        self.told.try_iter().collect()
+    }
+
+    /// The thread outlives every panic of a sweep, so it hears every order.
+    fn tell(&self, order: Order) {
+        if let Some(orders) = &self.orders {
+            orders.send(order).unwrap_or_default();
+        }
+    }
+}
+
+impl Drop for Sweeper {
+    fn drop(&mut self) {
+        self.orders = None;
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap_or_default();
+        }
+    }
+}
+
+/// What the thread works with.
+struct Desk {
+    inbox: Receiver<Order>,
+    outbox: Sender<Told>,
+    shown: Slot<FrontRun>,
+    judged: Slot<Judged>,
+    begin: Box<Begin>,
+    wake: Box<dyn Fn() + Send>,
+    pace: Pace,
+    run: Option<Run>,
+}
+
+/// A run under way or ended.
+struct Run {
+    sweep: Box<dyn Sweeps>,
+    state: FrontRun,
+}
+
+impl Desk {
+    /// Works until the handle is dropped.
+    fn serve(mut self) {
+        loop {
+            let running =
+                self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running);
+            let order = if running {
+                match self.inbox.try_recv() {
+                    Ok(order) => Some(order),
+                    Err(TryRecvError::Empty) => None,
+                    Err(TryRecvError::Disconnected) => return,
+                }
+            } else {
+                match self.inbox.recv() {
+                    Ok(order) => Some(order),
+                    Err(_) => return,
+                }
+            };
+            match order {
+                Some(order) => self.obey(order),
+                None => self.advance(),
+            }
+        }
+    }
+
+    fn obey(&mut self, order: Order) {
+        let standing = self.run.as_ref().map(|run| run.state.standing);
+        match (order, standing) {
+            (Order::Start(job), _) => self.start(job),
+            (Order::Pause, Some(Standing::Running)) => self.stand(Standing::Paused),
+            (Order::Resume, Some(Standing::Paused)) => self.stand(Standing::Running),
+            (Order::Stop, Some(Standing::Running | Standing::Paused)) => {
+                self.stand(Standing::Stopped);
+            }
+            (Order::Clear, _) => self.run = None,
+            (Order::Write(folder), _) => self.write(&folder),
+            (Order::Judge(lens), _) => {
+                let found = guarded(|| judge(&lens));
+                self.judged.set(Judged { lens, found });
+                (self.wake)();
+            }
+            _ => {}
+        }
+    }
+
+    fn start(&mut self, job: Job) {
+        let Job { number, lens, settings, compare } = job;
+        match guarded(|| (self.begin)(&lens, &settings)) {
+            Ok(sweep) => {
+                let start = Arc::new(sweep.start().clone());
+                let main = Leg::new(sweep.as_ref());
+                let standing = Standing::Running;
+                let compare = compare && settings.pupil != PupilEdge::Kept;
+                let state = FrontRun {
+                    number,
+                    standing,
+                    settings,
+                    compare,
+                    lens,
+                    start,
+                    main,
+                    biased: None,
+                };
+                self.run = Some(Run { sweep, state });
+                self.stand(standing);
+            }
+            Err(why) => {
+                self.run = None;
+                self.emit(Told::Failed(number, why));
+            }
+        }
+    }
+
+    /// Lets the sweep stand otherwise, shows it and says so.
+    fn stand(&mut self, standing: Standing) {
+        let Some(run) = &mut self.run else { return };
+        run.state.standing = standing;
+        let number = run.state.number;
+        self.shown.set(run.look());
+        self.emit(Told::Now(number, standing));
+    }
+
+    /// Goes on for a slice; then the next leg follows, or the end.
+    fn advance(&mut self) {
+        let Some(run) = &mut self.run else { return };
+        let finished = match guarded(|| Ok(run.step())) {
+            Ok(finished) => finished,
+            Err(why) => return self.give_up(why),
+        };
+        if finished && run.state.compare && run.state.biased.is_none() {
+            let settings = Settings { pupil: PupilEdge::Kept, ..run.state.settings.clone() };
+            run.look();
+            match guarded(|| (self.begin)(&run.state.lens, &settings)) {
+                Ok(sweep) => {
+                    run.state.biased = Some(Leg::new(sweep.as_ref()));
+                    run.sweep = sweep;
+                }
+                Err(why) => self.give_up(why),
+            }
+        } else if finished {
+            self.stand(Standing::Finished);
+        } else if self.pace.is_due() {
+            self.shown.set(run.look());
+            (self.wake)();
+        }
+    }
+
+    fn give_up(&mut self, why: String) {
+        let Some(run) = &mut self.run else { return };
+        run.state.standing = Standing::Stopped;
+        let number = run.state.number;
+        self.shown.set(run.state.clone());
+        self.emit(Told::Failed(number, why));
+    }
+
+    fn write(&mut self, folder: &Path) {
+        let Some(run) = &mut self.run else {
+            return self.emit(Told::NotWritten("there is no front to export yet".to_owned()));
+        };
+        let told = match write(&run.look().survey(), folder) {
+            Ok(files) => Told::Written(folder.to_owned(), files.len()),
+            Err(why) => Told::NotWritten(why.to_string()),
+        };
+        self.emit(told);
+    }
+
+    /// Nobody listens any more when the handle is being dropped; the next look at the inbox ends
+    /// the thread then.
+    fn emit(&self, told: Told) {
+        self.outbox.send(told).unwrap_or_default();
+        (self.wake)();
+    }
+}
+
+impl Run {
+    /// What is shown of the sweep that runs.
+    fn leg(&mut self) -> &mut Leg {
+        self.state.biased.as_mut().unwrap_or(&mut self.state.main)
+    }
+
+    /// Takes over what the sweep has found.
+    fn look(&mut self) -> FrontRun {
+        let leg = self.state.biased.as_mut().unwrap_or(&mut self.state.main);
+        leg.look(self.sweep.as_ref());
+        self.state.clone()
+    }
+
+    /// Whether the slice was the last one.
+    fn step(&mut self) -> bool {
+        let Timed { value: slice, ms } = timed(|| self.sweep.step());
+        let finished = slice.finished;
+        self.leg().count(slice, ms);
+        finished
+    }
+}
+
+fn judge(lens: &Lens) -> Result<Design, String> {
+    let lens = limited_by_stop(lens).map_err(|why| why.to_string())?;
+    Design::of(&lens, None, JUDGED).map_err(|why| why.to_string())
+}
+
+/// Does something; a panic becomes its words.
+fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(said(panic.as_ref())))
+}

@@ -1,0 +1,54 @@
+//! A front is written as a table, a picture and lenses that read back as they were found.
+
+use super::merit::bundled;
+use aplanat::files;
+use aplanat::front::{Survey, hypervolume, write};
+use aplanat::optimize::pareto::{Design, Front, Settings, Sweep};
+
+/// The lens at the start and the front of a short sweep.
+fn swept() -> Sweep {
+    let settings = Settings { points: 4, steps: 50, ..Settings::default() };
+    let mut sweep = Sweep::new(&bundled("double_gauss_rudolph_50"), &settings).unwrap();
+    while !sweep.step().finished {}
+    sweep
+}
+
+#[test]
+fn a_front_is_written_with_every_lens() {
+    let sweep = swept();
+    let folder = std::env::temp_dir().join(format!("aplanat-front-{}", std::process::id()));
+    let biased = Some(sweep.front());
+    let (start, front, tried) = (&sweep.start, sweep.front(), sweep.tried());
+    let survey = Survey { name: "test", start, front, tried, biased };
+    let written = write(&survey, &folder.join("new")).unwrap();
+    let designs = front.designs();
+    assert!(designs.len() > 3);
+    assert_eq!(written.len(), 3 + 2 * designs.len());
+
+    let table = std::fs::read_to_string(&written[0]).unwrap();
+    let lines: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(lines[0][0], "spot_mm");
+    assert_eq!(lines.len(), 2 + 2 * designs.len());
+    for (line, design) in lines[2..].iter().zip(designs.iter().chain(designs)) {
+        let numbers = [design.spot, design.spot_error, design.light, design.light_error];
+        let read: Vec<f64> = line[..4].iter().map(|word| word.parse().unwrap()).collect();
+        assert_eq!(read, numbers, "digits that bring back the same number");
+        let lens = files::open(folder.join("new").join(line[6])).unwrap().lens;
+        assert_eq!(lens, design.lens);
+        let again = Design::of(&lens, design.weight, 1e-4).unwrap();
+        assert!((again.spot - design.spot).abs() < 1e-3 * design.spot);
+    }
+    let picture = std::fs::read(&written[1]).unwrap();
+    assert!(picture.starts_with(b"\x89PNG"));
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_folder_that_is_a_file_is_named() {
+    let start = Design::of(&bundled("double_gauss_rudolph_50"), None, 1e-3).unwrap();
+    let front = Front::default();
+    let survey = Survey { name: "", start: &start, front: &front, tried: &[], biased: None };
+    let why = write(&survey, "Cargo.toml".as_ref()).unwrap_err().to_string();
+    assert!(why.starts_with("Cargo.toml: cannot be written"), "{why}");
+    assert_eq!(hypervolume(&front, &start), 0.0);
+}
