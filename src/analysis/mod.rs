@@ -11,6 +11,7 @@ mod fan;
 mod illumination;
 mod mtf;
 mod pupil;
+mod rims;
 mod spot;
 mod wavefront;
 
@@ -19,6 +20,7 @@ pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, illumination};
 pub use mtf::{Contrast, contrast};
 pub use pupil::{Form, Light, Loss, Pupil, pupil};
+pub use rims::{RimEffect, Rims, rims, together};
 pub use spot::{ColorSpot, Spot, airy_radius, rounding, spot, spots};
 pub use wavefront::{Wavefront, path_differences, wavefront};
 

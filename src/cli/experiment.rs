@@ -2,10 +2,7 @@
 
 use super::failure::Failure;
 use super::output::{Number, Output, Table};
-use crate::experiments::{
-    self, Claim, Effort, Ended, Experiment as Study, Outcome, Progress, Rule,
-};
-use crate::files::{self, native};
+use crate::experiments::{self, Claim, Effort, Ended, Experiment as Study, Progress, Report};
 use crate::measure::timed;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -40,7 +37,7 @@ impl Experiment {
             report.write(folder)?;
         }
         output.print(&report)?;
-        report.judge()
+        judge(&report)
     }
 }
 
@@ -107,60 +104,15 @@ impl Display for List {
     }
 }
 
-/// What is printed.
-#[derive(Serialize)]
-struct Report {
-    id: &'static str,
-    title: &'static str,
-    claim: &'static str,
-    ms: f64,
-    holds: bool,
-    #[serde(flatten)]
-    outcome: Outcome,
-    files: Vec<String>,
-}
-
-impl Report {
-    fn new(study: &Study, outcome: Outcome, ms: f64) -> Self {
-        let Study { id, title, claim, .. } = *study;
-        let holds = outcome.failed().next().is_none();
-        Self { id, title, claim, ms, holds, outcome, files: Vec::new() }
+/// A claim that does not hold is a failure.
+fn judge(report: &Report) -> Result<(), Failure> {
+    let failed: Vec<&str> = report.outcome.failed().map(|claim| claim.says.as_str()).collect();
+    if failed.is_empty() {
+        return Ok(());
     }
-
-    /// Writes everything into a folder.
-    fn write(&mut self, folder: &Path) -> Result<(), Failure> {
-        let id = self.id;
-        for table in &self.outcome.tables {
-            let name = format!("{id}-{}.csv", table.name);
-            files::replace(&folder.join(&name), table.csv().as_bytes())?;
-            self.files.push(name);
-        }
-        for picture in &self.outcome.pictures {
-            let name = format!("{id}-{}.png", picture.name);
-            let png = picture.canvas.png().map_err(|e| Failure::Failed(e.to_string()))?;
-            files::replace(&folder.join(&name), &png)?;
-            self.files.push(name);
-        }
-        for (name, lens) in &self.outcome.lenses {
-            let name = format!("{id}-{name}.json");
-            files::save(lens, folder.join(&name))?;
-            self.files.push(name);
-        }
-        let name = format!("{id}.json");
-        self.files.push(name.clone());
-        Ok(files::replace(&folder.join(name), native::pretty(self).as_bytes())?)
-    }
-
-    /// A claim that does not hold is a failure.
-    fn judge(&self) -> Result<(), Failure> {
-        let failed: Vec<&str> = self.outcome.failed().map(|claim| claim.says.as_str()).collect();
-        if failed.is_empty() {
-            return Ok(());
-        }
-        let (count, all) = (failed.len(), self.outcome.claims.len());
-        let text = format!("experiment {}: {count} of {all} claims do not hold", self.id);
-        Err(Failure::Failed(format!("{text}: {}", failed.join("; "))))
-    }
+    let (count, all) = (failed.len(), report.outcome.claims.len());
+    let text = format!("experiment {}: {count} of {all} claims do not hold", report.id);
+    Err(Failure::Failed(format!("{text}: {}", failed.join("; "))))
 }
 
 impl Display for Report {
@@ -178,11 +130,6 @@ impl Display for Report {
 
 fn cells(claim: &Claim) -> [String; 5] {
     let Claim { says, value, error, unit, rule, limit, holds } = claim;
-    let rule = match rule {
-        Rule::AtMost => "at most",
-        Rule::AtLeast => "at least",
-        Rule::Exactly => "exactly",
-    };
     let error = if *error == 0.0 { String::new() } else { format!("± {error:.1e}") };
     [
         says.clone(),

@@ -12,15 +12,18 @@ mod front;
 mod gradient_image;
 mod motion;
 mod outcome;
+mod report;
 mod section;
 mod trade;
 mod vignetting;
 mod zoom;
 
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
+pub use report::Report;
 
 use crate::files;
 use crate::lens::Lens;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Every experiment, in the order of the thesis. A new one is a file and a line here.
@@ -70,7 +73,8 @@ pub struct Progress<'a> {
 }
 
 /// How much an experiment works for its claims.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Effort {
     /// As the figure deserves.
     Full,

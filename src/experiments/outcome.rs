@@ -60,6 +60,16 @@ pub enum Rule {
     Exactly,
 }
 
+impl Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AtMost => "at most",
+            Self::AtLeast => "at least",
+            Self::Exactly => "exactly",
+        })
+    }
+}
+
 impl Claim {
     /// A number that may not be above a limit.
     pub fn at_most(says: impl Into<String>, value: f64, limit: f64) -> Self {

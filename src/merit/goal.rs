@@ -150,18 +150,18 @@ impl Term {
     /// Refuses what a lens cannot be asked for about its light.
     fn check_light(self, lens: &Lens) -> Result<(), MeritError> {
         let refuse = |why| Err(MeritError::DoesNotApply { term: self.name(), why });
-        if let Term::ThroughputLoss(v) | Term::Light(v) | Term::FNumber(v) | Term::Steepness(v) =
+        if let Self::ThroughputLoss(v) | Self::Light(v) | Self::FNumber(v) | Self::Steepness(v) =
             self
             && !(v > 0.0)
         {
             return refuse("its number is not positive");
         }
         let axial = |zoom| lens.fields_at(zoom).values.iter().any(|f| f.x == 0.0 && f.y == 0.0);
-        let needs_axis = matches!(self, Term::FNumber(_) | Term::RelativeIllumination { .. });
+        let needs_axis = matches!(self, Self::FNumber(_) | Self::RelativeIllumination { .. });
         if needs_axis && !(0..lens.zoom_positions()).all(axial) {
             return refuse("the lens has no field on the axis to compare with");
         }
-        if let Term::RelativeIllumination { field, .. } = self {
+        if let Self::RelativeIllumination { field, .. } = self {
             if lens.object != Object::Infinity {
                 return refuse("the object is not at infinity");
             }

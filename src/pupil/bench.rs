@@ -141,7 +141,10 @@ impl Bench {
 
     /// The same beam without a search for the stop: the rim of the stop limits it, where that is
     /// what the coordinates of the pupil lead to.
-    pub(super) fn limited_by_stop(&self) -> Result<Self, Invalid> {
+    ///
+    /// # Errors
+    /// Numbers that cannot be traced.
+    pub fn limited_by_stop(&self) -> Result<Self, Invalid> {
         let (stop, radius) = (self.stop(), self.stop_radius());
         let color = |color: &Color| {
             let mut system = color.system.clone();

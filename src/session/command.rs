@@ -5,6 +5,7 @@
 //! shown.
 
 use crate::effects::{Choice, Effect};
+use crate::experiments::Effort;
 use crate::lens::{
     Aperture, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, Variable, Wavelength,
     ZoomPosition,
@@ -86,6 +87,19 @@ pub enum Command {
     ShowPupils(bool),
     /// The wavelength of the pupils that are shown; `None` for the primary one.
     ShowPupilWavelength(Option<usize>),
+    /// Carry out an experiment in the background, in place of the one that runs.
+    Experiment {
+        /// The number of its figure or table.
+        id: String,
+        /// How much it works for its claims.
+        effort: Effort,
+    },
+    /// Tell the experiment to stop.
+    CancelExperiment,
+    /// End the experiment and forget what it found.
+    CloseExperiment,
+    /// Write what the experiment found into this folder.
+    SaveExperiment(PathBuf),
     /// Point out a surface in every panel, or none.
     Select(Option<usize>),
     /// Forget the messages so far.

@@ -5,9 +5,11 @@ use super::command::{Command, Edit};
 use super::edit::edited;
 use super::fronts::FrontDesk;
 use super::history::History;
+use super::laboratory::{Laboratory, Stage};
 use super::sweeper::Told;
 use super::view::{Message, Settings, Severity, View};
 use super::worker::{News, Search, Standing, Starter, Task, Worker};
+use crate::experiments::{self, Effort, Report};
 use crate::files;
 use crate::lens::Lens;
 use crate::merit::Goal;
@@ -67,6 +69,7 @@ pub struct Session {
     follower: Analyst,
     /// That lens, and what the numbers were asked for with.
     followed: Option<(Arc<Lens>, Settings)>,
+    laboratory: Laboratory,
     /// How many searches were begun.
     searches: u64,
     /// The last search, if its result is neither taken nor thrown away.
@@ -110,6 +113,7 @@ impl Session {
             analyst: Analyst::spawn(Savings::Measured, wake.clone())?,
             follower: Analyst::spawn(Savings::Left, wake.clone())?,
             followed: None,
+            laboratory: Laboratory::spawn(wake.clone())?,
             worker: Worker::spawn(start, wake.clone())?,
             fronts: FrontDesk::spawn(wake)?,
             candidate: None,
@@ -157,6 +161,10 @@ impl Session {
             Command::ShowPupilWavelength(wavelength) => {
                 self.set_up(|settings| settings.pupil_wavelength = wavelength);
             }
+            Command::Experiment { id, effort } => self.experiment(&id, effort),
+            Command::CancelExperiment => self.laboratory.cancel(),
+            Command::CloseExperiment => self.laboratory.put_away(),
+            Command::SaveExperiment(folder) => self.save_experiment(&folder),
             Command::Select(surface) => self.selected = surface,
             Command::ClearMessages => self.messages.clear(),
         }
@@ -186,6 +194,7 @@ impl Session {
             fronts: self.fronts.view(),
             candidate: self.candidate.clone(),
             preview: self.preview(),
+            trial: self.laboratory.trial(),
             messages: self.messages.clone(),
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),
@@ -458,6 +467,33 @@ impl Session {
         };
         if Some(number) == self.search {
             self.events.push(event);
+        }
+    }
+
+    fn experiment(&mut self, id: &str, effort: Effort) {
+        match experiments::find(id) {
+            Some(study) => self.laboratory.begin(study, effort),
+            None => self.say(Severity::Warning, format!("there is no experiment `{id}`")),
+        }
+    }
+
+    fn save_experiment(&mut self, folder: &Path) {
+        let trial = self.laboratory.trial();
+        let Some(Stage::Done(report)) = trial.as_deref().map(|trial| &trial.stage) else {
+            let text = "there is no experiment whose results could be saved";
+            return self.say(Severity::Warning, text.to_owned());
+        };
+        let mut report = Report::clone(report);
+        let made = std::fs::create_dir_all(folder).map_err(|why| why.to_string());
+        let written = made.and_then(|()| report.write(folder).map_err(|why| why.to_string()));
+        match written {
+            Ok(()) => {
+                let (id, count) = (report.id, report.files.len());
+                let folder = folder.display();
+                let text = format!("experiment {id}: {count} files written to {folder}");
+                self.say(Severity::Note, text);
+            }
+            Err(why) => self.say(Severity::Error, why),
         }
     }
 

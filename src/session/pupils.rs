@@ -4,9 +4,9 @@ use super::analyst::each;
 use super::clock::{Timed, timed};
 use super::view::Settings;
 use crate::analysis;
-use crate::analysis::{Estimate, Pupil};
+use crate::analysis::{Estimate, Pupil, Rims};
 use crate::lens::Field;
-use crate::pupil::{Accuracy, Bench};
+use crate::pupil::{Accuracy, Bench, NoDerivative};
 
 /// The pupils of all fields at one wavelength.
 #[derive(Debug, Clone)]
@@ -17,6 +17,10 @@ pub struct Pupils {
     pub fields: Vec<Timed<Pupil>>,
     /// The area of the pupil on the axis, in mm²; `None` where that one is dark.
     pub axis: Option<Estimate>,
+    /// What the rims of the lens do to each field, or why that is not known.
+    pub rims: Timed<Vec<Result<Rims, NoDerivative>>>,
+    /// What they do to all fields with light together.
+    pub all_rims: Option<Rims>,
 }
 
 /// The pupils of all fields at the wavelength that is asked for, or the primary one.
@@ -28,5 +32,9 @@ pub(super) fn pupils(bench: &Bench, settings: &Settings, accuracy: Accuracy) -> 
     let on_axis = |pupil: &&Timed<Pupil>| pupil.value.field.x == 0.0 && pupil.value.field.y == 0.0;
     let axis = fields.iter().find(on_axis).cloned();
     let axis = axis.unwrap_or_else(|| pupil(Field { x: 0.0, y: 0.0, weight: 1.0 }));
-    Pupils { wavelength, fields, axis: axis.value.light.map(|light| light.area) }
+    let rims = timed(|| each(bench, |field| analysis::rims(bench, field, wavelength, accuracy)));
+    let known = rims.value.iter().zip(&bench.fields);
+    let known = known.filter_map(|(rims, field)| Some((field.weight, rims.as_ref().ok()?)));
+    let all_rims = analysis::together(&known.collect::<Vec<_>>());
+    Pupils { wavelength, fields, axis: axis.value.light.map(|light| light.area), rims, all_rims }
 }

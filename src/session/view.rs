@@ -2,6 +2,7 @@
 
 use super::analyst::Results;
 use super::fronts::Fronts;
+use super::laboratory::Trial;
 use super::worker::Search;
 use crate::effects::Choices;
 use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength};
@@ -27,6 +28,8 @@ pub struct View {
     pub candidate: Option<Arc<Lens>>,
     /// The numbers of that lens, or of the one that the search shows, maybe of a step before.
     pub preview: Option<Arc<Results>>,
+    /// The experiment in the background, or the last one until it is put away.
+    pub trial: Option<Arc<Trial>>,
     /// What was said, newest last.
     pub messages: Vec<Message>,
     /// What undo would take back; `None` where there is nothing.
@@ -53,6 +56,7 @@ impl Default for View {
             fronts: Fronts::default(),
             candidate: None,
             preview: None,
+            trial: None,
             messages: Vec::new(),
             undo: None,
             redo: None,

@@ -12,6 +12,7 @@ use eframe::{App, Storage};
 use super::chooser::{Chooser, Purpose};
 use super::dock::Dock;
 use super::draw::Backing;
+use super::experiment::Bench;
 use super::menu::{self, Wish};
 use super::shell::Memory;
 use super::wording::{capital, counted_from_one};
@@ -27,6 +28,7 @@ pub struct Studio {
     session: Session,
     dock: Dock,
     chooser: Chooser,
+    bench: Bench,
     memory: Memory,
     /// What waits for the answer to whether changes may be lost.
     waiting: Option<Waiting>,
@@ -59,6 +61,7 @@ impl Studio {
             session,
             dock: Dock::new(backing, tree),
             chooser: Chooser::default(),
+            bench: Bench::default(),
             memory,
             waiting: None,
             report: None,
@@ -102,6 +105,7 @@ impl Studio {
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut commands));
         wishes.extend(commands.into_iter().map(Wish::Do));
         let context = ui.ctx().clone();
+        self.bench.ui(&context, view.trial.as_deref(), &mut wishes);
         self.dialogs(&context, &view);
         for wish in wishes {
             self.fulfil(&context, &view, wish);
@@ -151,6 +155,7 @@ impl Studio {
     fn chosen(&mut self, context: &Context, purpose: Purpose, path: PathBuf) {
         match purpose {
             Purpose::Open => self.replace(context, Command::Open(path)),
+            Purpose::ExperimentFolder => self.apply(context, Command::SaveExperiment(path)),
             Purpose::Save => self.apply(context, Command::Save(Some(path))),
             Purpose::ExportFront => self.apply(context, Command::ExportFront(Some(path))),
             Purpose::ExportZemax | Purpose::ExportJson => {

@@ -20,6 +20,8 @@ pub enum Purpose {
     ExportJson,
     /// To write a front into a folder.
     ExportFront,
+    /// To write the data and pictures of an experiment into it.
+    ExperimentFolder,
 }
 
 impl Purpose {
@@ -30,6 +32,7 @@ impl Purpose {
             Self::ExportZemax => "Export the lens for Zemax",
             Self::ExportJson => "Export a copy of the lens",
             Self::ExportFront => "Export the front into a folder",
+            Self::ExperimentFolder => "Save the experiment into a folder",
         }
     }
 
@@ -39,12 +42,13 @@ impl Purpose {
             Self::Save | Self::ExportJson => &["json"],
             Self::ExportZemax => &["zmx"],
             Self::ExportFront => &[],
+            Self::ExperimentFolder => &[],
         }
     }
 
     /// Whether the name of a new file is asked for.
     fn names_a_file(self) -> bool {
-        !matches!(self, Self::Open | Self::ExportFront)
+        !matches!(self, Self::Open | Self::ExportFront | Self::ExperimentFolder)
     }
 
     /// The path with the extension that it needs, if it has none.
@@ -88,6 +92,8 @@ impl Chooser {
 
     /// Asks with a line to type a path into.
     pub fn ask_for_path(&mut self, purpose: Purpose, near: Option<&Path>) {
+        let near =
+            if purpose == Purpose::ExperimentFolder { near.and_then(Path::parent) } else { near };
         let start = near.map(|path| path.display().to_string()).unwrap_or_default();
         self.typed = Some((purpose, start));
     }
@@ -146,7 +152,7 @@ fn open_dialog(
 ) -> std::io::Result<Receiver<Option<PathBuf>>> {
     let (give, answer) = channel();
     let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
-    if purpose != Purpose::ExportFront {
+    if !purpose.extensions().is_empty() {
         dialog = dialog.add_filter("Lenses", purpose.extensions());
     }
     if let Some(directory) = near.and_then(Path::parent).filter(|dir| dir.is_dir()) {
@@ -160,6 +166,7 @@ fn open_dialog(
         let path = match purpose {
             Purpose::Open => dialog.pick_file(),
             Purpose::ExportFront => dialog.pick_folder(),
+            Purpose::ExperimentFolder => dialog.pick_folder(),
             _ => dialog.save_file(),
         };
         // Nobody listens when the window was closed before the dialog.

@@ -104,7 +104,7 @@ fn usual() -> Tree<Kind> {
     let search = tiles.insert_tab_tile(vec![optimizer, pareto]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(layout, 0.52), (table, 0.48)]);
-    let right = column(&mut tiles, &[(light, 0.375), (search, 0.625)]);
+    let right = column(&mut tiles, &[(light, 0.44), (search, 0.56)]);
     let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
     Tree::new(Id::unique("dock"), root, tiles)
 }

@@ -6,6 +6,7 @@ use eframe::egui::{
 
 use super::chooser::Purpose;
 use super::dock::Dock;
+use super::experiment;
 use super::panels::Kind;
 use super::wording::counted_from_one;
 use crate::files::{self, Bundled};
@@ -82,6 +83,7 @@ pub(super) fn bar(ui: &mut Ui, view: &View, dock: &mut Dock, wishes: &mut Vec<Wi
         ui.menu_button("File", |ui| file(ui, view, wishes));
         ui.menu_button("Edit", |ui| edit(ui, view, wishes));
         ui.menu_button("View", |ui| panels(ui, dock));
+        ui.menu_button("Experiments", |ui| experiment::menu(ui, wishes));
         ui.separator();
         history_buttons(ui, view, wishes);
         ui.with_layout(Layout::right_to_left(Align::Center), theme_button);

@@ -6,6 +6,7 @@ mod app;
 pub mod chooser;
 pub mod dock;
 pub mod draw;
+mod experiment;
 pub mod field;
 mod gauge;
 mod menu;

@@ -67,6 +67,10 @@ pub struct Palette {
     pub faint: Colour,
     /// Where a ray has died.
     pub lost: Colour,
+    /// A change for the better.
+    pub better: Colour,
+    /// A change for the worse.
+    pub worse: Colour,
 }
 
 impl Palette {
@@ -85,6 +89,8 @@ impl Palette {
         strong: [235, 235, 235, 255],
         faint: [120, 125, 135, 130],
         lost: [255, 90, 90, 255],
+        better: [51, 187, 238, 255],
+        worse: [238, 119, 51, 255],
     };
 
     /// Dark on light.
@@ -97,6 +103,8 @@ impl Palette {
         strong: [25, 25, 25, 255],
         faint: [110, 115, 125, 130],
         lost: [205, 20, 20, 255],
+        better: [0, 105, 180, 255],
+        worse: [200, 75, 0, 255],
     };
 
     /// The colour of a field by its place in the list.

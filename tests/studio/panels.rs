@@ -160,7 +160,7 @@ fn a_row_has_a_menu_of_its_own() {
 /// A search that stands somehow.
 fn searching(standing: Standing) -> View {
     let view = view();
-    let goal = aplanat::merit::Goal::sensible(&view.lens).unwrap();
+    let goal = Goal::sensible(&view.lens).unwrap();
     let method = Method::Adam;
     let task = Task { method, lens: Arc::clone(&view.lens), goal, tolerance: 1e-3 };
     let refused = Some("ray 4 is lost: clipped at surface 2".to_owned());
@@ -209,14 +209,18 @@ fn press<P: Panel>(harness: &mut Harness<'_, Stand<P>>, name: &str) {
 }
 
 fn goal_of(wishes: &[Command]) -> &Goal {
-    let goal =
-        |wish| if let &Command::Optimize { ref goal, .. } = wish { Some(goal) } else { None };
+    let goal = |wish| match wish {
+        &Command::Optimize { ref goal, .. } => Some(goal),
+        _ => None,
+    };
     wishes.iter().find_map(goal).unwrap()
 }
 
 #[test]
 fn more_light_is_asked_for_in_a_few_clicks() {
-    let mut harness = optimizer(view());
+    let mut lens = double_gauss();
+    lens.aperture = Aperture::EntrancePupilDiameter(10.9);
+    let mut harness = optimizer(crate::bench::view_of(lens.clone()));
     assert!(harness.query_by_label("Limit the beam by the stop").is_none(), "nobody asks for more");
     type_into(&mut harness, "Minimum of Light", "1.2", Key::Enter);
     press(&mut harness, "Limit the beam by the stop");
@@ -231,7 +235,7 @@ fn more_light_is_asked_for_in_a_few_clicks() {
     assert_eq!(goal.pupil, PupilEdge::Moving);
     assert!(goal.terms.iter().any(|weighted| weighted.term == Term::Light(1.2)));
 
-    let mut lens = aplanat::pupil::limited_by_stop(&double_gauss()).unwrap();
+    let mut lens = aplanat::pupil::limited_by_stop(&lens).unwrap();
     lens.variables.clone_from(freed);
     let mut ready = optimizer(crate::bench::view_of(lens));
     type_into(&mut ready, "Minimum of Light", "1.2", Key::Enter);
@@ -361,6 +365,19 @@ fn a_limit_of_the_pupil_points_its_surface_out_and_no_longer() {
         harness.run();
         assert_eq!(harness.state().wishes.last(), Some(&Command::Select(wanted)));
     }
+}
+
+#[test]
+fn rims_tell_what_a_tenth_of_a_millimetre_would_do() {
+    let mut harness = pupils(double_gauss());
+    for surface in [1, 6, 11] {
+        harness.get_by_label_contains(&format!("Rim of surface {surface} by 0.1 mm: light +"));
+    }
+    harness.get_by_label("no ray ends at 2 to 5, 7 to 10");
+    assert!(harness.query_by_label_contains("Rim of surface 2 by").is_none());
+    harness.get_by_label_contains("Rim of surface 11 by 0.1 mm").click();
+    harness.run();
+    assert_eq!(harness.state().wishes.last(), Some(&Command::Select(Some(10))));
 }
 
 #[test]

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use aplanat::session::Session;
+use aplanat::experiments::{self, Effort, Experiment};
+use aplanat::session::{Command, Session, Stage};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::Backing;
 use aplanat::studio::shell::Memory;
@@ -198,6 +199,38 @@ fn pupils_are_computed_while_they_are_shown_and_follow_an_edit() {
     harness.run_steps(3);
     settle(&mut harness);
     assert!(!pupils(&harness));
+}
+
+#[test]
+fn an_experiment_runs_from_the_menu_and_shows_its_claims_and_pictures() {
+    let mut harness = window();
+    let by_time = |a: &&Experiment, b: &&Experiment| a.seconds.total_cmp(&b.seconds);
+    let study = experiments::ALL.iter().min_by(by_time).unwrap();
+    harness.get_by_label("Experiments").click();
+    harness.run_steps(3);
+    for study in experiments::ALL {
+        harness.get_by_label_contains(study.title);
+    }
+    harness.get_by_label_contains(study.title).click();
+    harness.run_steps(3);
+    harness.get_by_label("Cancel").click();
+    wait(&mut harness, "the end", |harness| {
+        harness.query_by_label("Stopped before it had found anything.").is_some()
+    });
+    let effort = Effort::Small;
+    harness.state_mut().session_mut().apply(Command::Experiment { id: study.id.into(), effort });
+    wait(&mut harness, "the outcome", |harness| {
+        harness.query_by_label_contains("claims hold").is_some()
+    });
+    harness.run_steps(3);
+    let count = harness.get_all_by_label("holds").count();
+    let view = harness.state().session().view();
+    let Some(Stage::Done(report)) = view.trial.as_deref().map(|trial| trial.stage.clone()) else {
+        panic!("{:?}", view.trial);
+    };
+    assert_eq!(count, report.outcome.claims.len());
+    let pictures = harness.get_all_by_label_contains("of the experiment").count();
+    assert_eq!(pictures, report.outcome.pictures.len());
 }
 
 #[test]

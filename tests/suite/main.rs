@@ -18,6 +18,7 @@ mod paraxial;
 mod pareto;
 mod pupil;
 mod reference;
+mod rims;
 mod session;
 mod session_front;
 mod trace;

@@ -1,6 +1,7 @@
 //! A session keeps the design sound, whatever it is told, and its threads keep their word.
 
 use aplanat::effects::{Choice, Effect};
+use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
 use aplanat::lens::{
     Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
@@ -8,8 +9,9 @@ use aplanat::lens::{
 };
 use aplanat::merit::{Goal, MeritError, PupilEdge, TermValue};
 use aplanat::optimize::{Method, Optimizer, Progress};
+use aplanat::pupil::Bench;
 use aplanat::session::{
-    Command, Edit, Event, Session, Settings, Severity, Standing, Starter, View, compute,
+    Command, Edit, Event, Session, Settings, Severity, Stage, Standing, Starter, View, compute,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -511,6 +513,92 @@ fn the_threads_end_when_the_session_is_dropped() {
     let last = steps.load(Ordering::SeqCst);
     std::thread::sleep(Duration::from_millis(30));
     assert_eq!(steps.load(Ordering::SeqCst), last);
+}
+
+/// An experiment of the list that runs quickly with little effort.
+fn quick() -> &'static Experiment {
+    let by_time = |a: &&Experiment, b: &&Experiment| a.seconds.total_cmp(&b.seconds);
+    experiments::ALL.iter().min_by(by_time).unwrap()
+}
+
+fn begin(study: &Experiment) -> Command {
+    Command::Experiment { id: study.id.to_owned(), effort: Effort::Small }
+}
+
+fn stage(view: &View) -> Option<&Stage> {
+    view.trial.as_deref().map(|trial| &trial.stage)
+}
+
+#[test]
+fn an_experiment_runs_in_the_background_and_can_be_saved() {
+    let mut session = session(double_gauss());
+    assert!(session.view().trial.is_none());
+    session.apply(begin(quick()));
+    assert!(matches!(stage(&session.view()), Some(Stage::Running { .. })), "at once");
+    wait(&mut session, "the outcome", |view, _| matches!(stage(view), Some(Stage::Done(_))));
+    let view = session.view();
+    let Some(Stage::Done(report)) = stage(&view) else { unreachable!() };
+    assert!(report.holds && report.ms > 0.0 && !report.outcome.claims.is_empty());
+    let folder = std::env::temp_dir().join(format!("aplanat-experiment-{}", std::process::id()));
+    session.apply(Command::SaveExperiment(folder.join("deep")));
+    let written = std::fs::read_dir(folder.join("deep")).unwrap().count();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let outcome = &report.outcome;
+    let expected = outcome.tables.len() + outcome.pictures.len() + outcome.lenses.len() + 1;
+    assert_eq!(written, expected);
+    assert_eq!(session.view().messages.last().unwrap().severity, Severity::Note);
+    session.apply(Command::CloseExperiment);
+    assert!(session.view().trial.is_none());
+    session.apply(Command::SaveExperiment(folder));
+    assert_eq!(session.view().messages.last().unwrap().severity, Severity::Warning);
+}
+
+#[test]
+fn an_experiment_is_cancelled_or_replaced_between_two_steps() {
+    let mut session = session(double_gauss());
+    session.apply(begin(quick()));
+    session.apply(Command::CancelExperiment);
+    wait(&mut session, "the end", |view, _| !matches!(stage(view), Some(Stage::Running { .. })));
+    assert!(matches!(stage(&session.view()), Some(Stage::Stopped)));
+    for study in experiments::ALL {
+        session.apply(Command::Experiment { id: study.id.to_owned(), effort: Effort::Full });
+    }
+    session.apply(begin(quick()));
+    wait(&mut session, "the last one", |view, _| matches!(stage(view), Some(Stage::Done(_))));
+    let trial = session.view().trial.unwrap();
+    assert_eq!((trial.study.id, trial.number), (quick().id, experiments::ALL.len() as u64 + 2));
+    let unknown = Command::Experiment { id: "0.0".into(), effort: Effort::Small };
+    session.apply(unknown);
+    assert_eq!(session.view().messages.last().unwrap().text, "there is no experiment `0.0`");
+}
+
+#[test]
+fn a_beam_limited_by_the_stop_is_as_wide_as_before_in_one_step() {
+    let mut lens = double_gauss();
+    lens.aperture = Aperture::FNumber(5.6);
+    let mut session = session(lens);
+    let entrance = |session: &Session| {
+        let bench = Bench::of(session.lens(), 0).unwrap();
+        bench.first.f_number.unwrap()
+    };
+    let before = entrance(&session);
+    session.apply(Edit::LimitByStop.into());
+    assert!(matches!(session.lens().aperture, Aperture::StopSemiDiameter(_)));
+    assert!((entrance(&session) / before - 1.0).abs() < 1e-12);
+    session.apply(Command::Undo);
+    assert_eq!(session.lens().aperture, Aperture::FNumber(5.6));
+}
+
+#[test]
+fn what_rims_do_is_computed_with_the_pupils() {
+    let settings = Settings { pupils: true, ..Settings::default() };
+    let numbers = compute(&double_gauss(), &settings).unwrap();
+    let pupils = numbers.pupils.unwrap().value;
+    assert_eq!(pupils.rims.value.len(), pupils.fields.len());
+    let all = pupils.all_rims.unwrap();
+    let felt: Vec<usize> = (0..all.surfaces.len()).filter(|i| all.surfaces[*i].is_felt()).collect();
+    assert_eq!(felt, [0, 5, 10], "front, stop and rear");
+    assert!(felt.iter().all(|i| all.surfaces[*i].area.value > 0.0), "glass lets light through");
 }
 
 #[test]

@@ -32,7 +32,7 @@ struct Aim {
 const EDGES: [(PupilEdge, &str, &str); 2] = [
     (
         PupilEdge::Moving,
-        "Follow its edge",
+        "Follow it",
         "Derivatives know that the pupil moves with the lens: unbiased, and light can be asked for.",
     ),
     (
@@ -81,7 +81,7 @@ impl Aims {
     /// The choice of how the edge of the pupil is treated.
     pub(super) fn pupil(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            ui.weak("Pupil");
+            ui.weak("Pupil edge");
             for (edge, text, what) in EDGES {
                 ui.radio_value(&mut self.pupil, edge, text).on_hover_text(what);
             }
@@ -210,11 +210,11 @@ impl Aim {
         let term = self.weighted.term;
         ui.checkbox(&mut self.counts, title(term)).on_hover_text(hint(term));
         let name = format!("Weight of {}", title(term));
-        number_field(ui, drafts, &name, &mut self.weighted.weight, 52.0);
+        number_field(ui, drafts, &name, &mut self.weighted.weight, 58.0);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             let targets = targets(&mut self.weighted.term);
-            let width = if targets.len() > 1 { 50.0 } else { 70.0 };
+            let width = if targets.len() > 1 { 54.0 } else { 70.0 };
             for (what, value) in targets {
                 let name = format!("{what} of {}", title(term));
                 number_field(ui, drafts, &name, value, width);
@@ -263,7 +263,7 @@ impl Aim {
 /// A number that belongs to the panel itself.
 fn number_field(ui: &mut Ui, drafts: &mut Drafts, name: &str, value: &mut f64, width: f32) {
     let id = Id::unique(("optimizer", name));
-    let shown = number::show_digits(*value, 5);
+    let shown = number::show_digits(*value, 4);
     let field = Field { name, shown: &shown, hint: "", align: Align::Max, place: Place::Form };
     let layout = Arrange::left_to_right(Align::Center);
     let size = vec2(width, ui.spacing().interact_size.y);

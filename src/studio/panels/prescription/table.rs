@@ -75,7 +75,7 @@ impl Column {
             Self::Radius => Width::initial(94.0).at_least(70.0),
             Self::Thickness => Width::initial(90.0).at_least(70.0),
             Self::Glass => Width::initial(118.0).at_least(70.0),
-            Self::SemiDiameter => Width::initial(98.0).at_least(70.0),
+            Self::SemiDiameter => Width::initial(106.0).at_least(70.0),
             Self::Conic => Width::initial(64.0).at_least(50.0),
             Self::Asphere(_) => Width::initial(112.0).at_least(60.0),
             Self::Comment => Width::remainder().at_least(60.0).clip(true),

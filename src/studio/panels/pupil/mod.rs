@@ -5,6 +5,7 @@
 //! are integrals over it, with their error, their rays and their time.
 
 mod picture;
+mod rims;
 mod words;
 
 use eframe::egui::{
@@ -52,6 +53,7 @@ impl Panel for Pupils {
         self.learn(pupils, results.lens.surfaces.len());
         header(ui, view, pupils, wishes);
         let shown = Shown { known: &self.known, view, results, numbers, pupils };
+        rims::strip(ui, &shown, wishes);
         shown.legend(ui, wishes);
         shown.pictures(ui, wishes);
     }

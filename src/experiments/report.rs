@@ -1,0 +1,69 @@
+//! An outcome with the experiment that it belongs to: what is printed, shown and written to files.
+
+use super::{Experiment, Outcome};
+use crate::files::{self, FileError, native};
+use serde::Serialize;
+use std::io;
+use std::path::Path;
+
+/// What a run of an experiment has found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// The number of the figure or table.
+    pub id: &'static str,
+    /// What it is about.
+    pub title: &'static str,
+    /// What it shows, in one sentence.
+    pub claim: &'static str,
+    /// How long it took, in milliseconds.
+    pub ms: f64,
+    /// Whether all claims hold.
+    pub holds: bool,
+    /// What it found.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+    /// The files that it was written to.
+    pub files: Vec<String>,
+}
+
+impl Report {
+    /// The report of an experiment that took so long.
+    pub fn new(study: &Experiment, outcome: Outcome, ms: f64) -> Self {
+        let Experiment { id, title, claim, .. } = *study;
+        let holds = outcome.failed().next().is_none();
+        Self { id, title, claim, ms, holds, outcome, files: Vec::new() }
+    }
+
+    /// Writes everything into a folder: tables as CSV, pictures as PNG, lenses in our own form, all
+    /// numbers as JSON.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&mut self, folder: &Path) -> Result<(), FileError> {
+        let id = self.id;
+        self.files.clear();
+        for table in &self.outcome.tables {
+            let name = format!("{id}-{}.csv", table.name);
+            files::replace(&folder.join(&name), table.csv().as_bytes())?;
+            self.files.push(name);
+        }
+        for picture in &self.outcome.pictures {
+            let name = format!("{id}-{}.png", picture.name);
+            let file = folder.join(&name);
+            let png = picture.canvas.png().map_err(|error| FileError::Unwritable {
+                file: file.display().to_string(),
+                source: io::Error::other(error),
+            })?;
+            files::replace(&file, &png)?;
+            self.files.push(name);
+        }
+        for (name, lens) in &self.outcome.lenses {
+            let name = format!("{id}-{name}.json");
+            files::save(lens, folder.join(&name))?;
+            self.files.push(name);
+        }
+        let name = format!("{id}.json");
+        self.files.push(name.clone());
+        files::replace(&folder.join(name), native::pretty(self).as_bytes())
+    }
+}

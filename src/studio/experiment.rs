@@ -1,0 +1,190 @@
+//! The window of an experiment: how far it is, then what the figure claims with its numbers, its
+//! pictures, and a button to keep them.
+
+use eframe::egui::{
+    Align, Button, ColorImage, Context, Grid, Id, Image, Layout, ProgressBar, RichText, ScrollArea,
+    TextureHandle, TextureOptions, Ui, Window, vec2,
+};
+
+use super::chooser::Purpose;
+use super::menu::Wish;
+use super::number;
+use super::palette::{Palette, color32};
+use super::wording::capital;
+use crate::experiments::{ALL, Claim, Effort, Experiment, Picture, Report};
+use crate::session::{Command, Stage, Trial};
+
+/// The pictures of the experiment that is shown, as textures.
+#[derive(Default)]
+pub(super) struct Bench {
+    /// The trial that they belong to.
+    number: u64,
+    pictures: Vec<(&'static str, TextureHandle)>,
+}
+
+impl std::fmt::Debug for Bench {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Bench").field("number", &self.number).finish_non_exhaustive()
+    }
+}
+
+/// The menu of all experiments.
+pub(super) fn menu(ui: &mut Ui, wishes: &mut Vec<Wish>) {
+    ui.set_min_width(380.0);
+    for study in ALL {
+        let button = Button::new(format!("{}  {}", study.id, study.title));
+        let button = ui.add(button.shortcut_text(seconds(study)));
+        if button.on_hover_text(format!("{}.", study.claim)).clicked() {
+            wishes.push(Wish::Do(begin(study)));
+            ui.close();
+        }
+    }
+}
+
+fn begin(study: &Experiment) -> Command {
+    Command::Experiment { id: study.id.to_owned(), effort: Effort::Full }
+}
+
+/// About how long it takes.
+fn seconds(study: &Experiment) -> String {
+    format!("about {} s", number::show_digits(study.seconds, 2))
+}
+
+impl Bench {
+    /// Shows an experiment, where there is one.
+    pub(super) fn ui(&mut self, context: &Context, trial: Option<&Trial>, wishes: &mut Vec<Wish>) {
+        let Some(trial) = trial else {
+            *self = Self::default();
+            return;
+        };
+        let study = trial.study;
+        let mut open = true;
+        let area = context.content_rect();
+        let window = Window::new(format!("Experiment {}: {}", study.id, study.title))
+            .id(Id::unique("experiment"))
+            .open(&mut open)
+            .collapsible(false)
+            .default_size(vec2(780.0, 0.8 * area.height()))
+            .default_pos(area.left_top() + vec2(0.18 * area.width(), 0.08 * area.height()));
+        window.show(context, |ui| {
+            ui.label(format!("{}.", study.claim));
+            ui.separator();
+            match &trial.stage {
+                Stage::Running { done, doing } => running(ui, study, *done, doing, wishes),
+                Stage::Done(report) => self.report(ui, trial.number, report, wishes),
+                Stage::Stopped => {
+                    ui.label("Stopped before it had found anything.");
+                    again(ui, study, wishes);
+                }
+                Stage::Failed(why) => {
+                    ui.colored_label(ui.visuals().error_fg_color, capital(why));
+                    again(ui, study, wishes);
+                }
+            }
+        });
+        if !open {
+            wishes.push(Wish::Do(Command::CloseExperiment));
+        }
+    }
+
+    fn report(&mut self, ui: &mut Ui, number: u64, report: &Report, wishes: &mut Vec<Wish>) {
+        if self.number != number {
+            let load = |picture: &Picture| (picture.name, texture(ui.ctx(), picture));
+            *self = Self { number, pictures: report.outcome.pictures.iter().map(load).collect() };
+        }
+        verdict(ui, report, wishes);
+        ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
+            claims(ui, &report.outcome.claims);
+            for (name, texture) in &self.pictures {
+                ui.add_space(8.0);
+                ui.strong(capital(&name.replace(['_', '-'], " ")));
+                let image = Image::new(texture).max_width(ui.available_width());
+                ui.add(image.alt_text(format!("Picture {name} of the experiment")));
+            }
+        });
+    }
+}
+
+fn running(ui: &mut Ui, study: &Experiment, done: f64, doing: &str, wishes: &mut Vec<Wish>) {
+    ui.horizontal(|ui| {
+        #[expect(clippy::cast_possible_truncation, reason = "a part of a bar")]
+        let bar = ProgressBar::new(done as f32).desired_width(0.6 * ui.available_width());
+        ui.add(bar.text(format!("{:.0} %  {doing}", 100.0 * done)));
+        if ui.button("Cancel").on_hover_text("Stop at the next step").clicked() {
+            wishes.push(Wish::Do(Command::CancelExperiment));
+        }
+        ui.weak(seconds(study)).on_hover_text("On two cores without other work");
+    });
+}
+
+fn again(ui: &mut Ui, study: &Experiment, wishes: &mut Vec<Wish>) {
+    if ui.button("Run again").clicked() {
+        wishes.push(Wish::Do(begin(study)));
+    }
+}
+
+/// Whether all claims hold, what it cost, and what can be done with it.
+fn verdict(ui: &mut Ui, report: &Report, wishes: &mut Vec<Wish>) {
+    let (failed, all) = (report.outcome.failed().count(), report.outcome.claims.len());
+    ui.horizontal(|ui| {
+        if failed == 0 {
+            let better = color32(Palette::of(ui.visuals()).better);
+            ui.label(RichText::new(format!("All {all} claims hold")).strong().color(better));
+        } else {
+            let text = format!("{failed} of {all} claims do not hold");
+            ui.label(RichText::new(text).strong().color(ui.visuals().error_fg_color));
+        }
+        ui.weak(format!("{} rays, {:.1} s", report.outcome.rays, 1e-3 * report.ms));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if let Some(study) = ALL.iter().find(|study| study.id == report.id) {
+                again(ui, study, wishes);
+            }
+            let hint = "Writes data (CSV, JSON) and pictures (PNG) into a folder";
+            if ui.button("Save…").on_hover_text(hint).clicked() {
+                wishes.push(Wish::Choose(Purpose::ExperimentFolder));
+            }
+        });
+    });
+}
+
+fn claims(ui: &mut Ui, claims: &[Claim]) {
+    Grid::new("claims").num_columns(4).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
+        for heading in ["", "Found", "Expected", "Claim"] {
+            ui.weak(heading);
+        }
+        ui.end_row();
+        for claim in claims {
+            let (word, color) = if claim.holds {
+                ("holds", color32(Palette::of(ui.visuals()).better))
+            } else {
+                ("fails", ui.visuals().error_fg_color)
+            };
+            ui.label(RichText::new(word).strong().color(color));
+            ui.label(found(claim));
+            ui.label(format!("{} {} {}", claim.rule, short(claim.limit), claim.unit));
+            ui.label(capital(&claim.says));
+            ui.end_row();
+        }
+    });
+}
+
+fn found(claim: &Claim) -> String {
+    let error = if claim.error == 0.0 { String::new() } else { format!(" ± {:.1e}", claim.error) };
+    format!("{}{error} {}", short(claim.value), claim.unit)
+}
+
+/// A number with few digits, whatever its size.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    if size > 0.0 && !(1e-3..1e6).contains(&size) {
+        format!("{value:.2e}")
+    } else {
+        number::show_digits(value, 4)
+    }
+}
+
+fn texture(context: &Context, picture: &Picture) -> TextureHandle {
+    let size = picture.canvas.size().map(|side| side as usize);
+    let image = ColorImage::from_rgb(size, picture.canvas.pixels());
+    context.load_texture(picture.name, image, TextureOptions::LINEAR)
+}

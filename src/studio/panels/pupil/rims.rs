@@ -1,0 +1,319 @@
+//! What a tenth of a millimetre of glass would do: for every rim that ends rays, how much light and
+//! sharpness it would win or lose with a larger semi-diameter.
+
+use std::ops::RangeInclusive;
+
+use eframe::egui::{
+    Align, Align2, Color32, Frame, Layout as Arrange, Margin, Panel as Side, Pos2, Rect, RichText,
+    Role, ScrollArea, Sense, Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
+};
+use egui_extras::{Column as Width, TableBuilder, TableRow};
+
+use super::Shown;
+use crate::analysis::{Estimate, RimEffect, Rims};
+use crate::session::Command;
+use crate::studio::number;
+use crate::studio::palette::{Palette, color32};
+use crate::studio::panels::field_name;
+
+/// By how much every semi-diameter is larger in the table, in mm.
+const STEP: f64 = 0.1;
+/// How high a row is, in points.
+const ROW: f32 = 17.0;
+const HEAD: f32 = 30.0;
+/// How wide a number with its arrow is.
+const CELL: f32 = 58.0;
+/// The largest arrow.
+const ARROW: f32 = 10.0;
+/// The line above the table.
+const TITLE: f32 = 19.0;
+/// What the pictures with their words need.
+const PICTURES: f32 = 205.0;
+
+const HINT: &str = "What each rim would do if its semi-diameter were 0.1 mm larger: the change of \
+     the light, in per cent of the mean area of the pupils, and of the RMS radius of the spot at \
+     this wavelength, in µm. To first order, with the motion of the pupil's edge. Blue is for the \
+     better, orange for the worse; the length of an arrow compares within its kind. The ideal \
+     entrance pupil (dashed) is no rim: where it ends the beam, no glass moves it. A higher panel \
+     shows the table.";
+
+/// The two numbers of a rim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Light,
+    Blur,
+}
+
+/// A group of two columns: all fields, or one.
+struct Group<'a> {
+    name: String,
+    rims: Result<&'a Rims, String>,
+}
+
+/// What the table shows.
+struct Table<'a> {
+    groups: Vec<Group<'a>>,
+    /// The mean area of the pupils in mm², of which light is a share.
+    area: f64,
+    /// The largest change of each kind.
+    largest: [f64; 2],
+    selected: Option<usize>,
+}
+
+/// The table below the pictures, where there is something to tell.
+pub(super) fn strip(ui: &mut Ui, shown: &Shown<'_>, wishes: &mut Vec<Command>) {
+    let Some(all) = &shown.pupils.all_rims else { return };
+    let table = Table::new(shown, all);
+    let felt: Vec<usize> = (0..all.surfaces.len()).filter(|i| table.is_felt(*i)).collect();
+    let whole = TITLE + HEAD + ROW * felt.len().max(1) as f32 + 8.0;
+    let room = ui.available_height() - PICTURES;
+    // Where there is little room the pictures come first, and the title stands for the table.
+    let height = if room < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(room) };
+    let frame = Frame::new().inner_margin(Margin { top: 3, ..Margin::ZERO });
+    let side = Side::bottom("rims").frame(frame).show_separator_line(true).exact_size(height);
+    side.show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 1.0;
+        title(ui, shown, all, &felt);
+        if height < TITLE + HEAD {
+            return;
+        }
+        if felt.is_empty() {
+            ui.weak("No rim ends a ray: the beam ends at the ideal entrance pupil.");
+            return;
+        }
+        table.show(ui, &felt, wishes);
+    });
+}
+
+fn title(ui: &mut Ui, shown: &Shown<'_>, all: &Rims, felt: &[usize]) {
+    ui.horizontal(|ui| {
+        ui.strong("+0.1 mm of semi-diameter").on_hover_text(HINT);
+        let others = others(felt, shown.results.lens.surfaces.len());
+        if !others.is_empty() {
+            let text = format!("no ray ends at {others}");
+            ui.label(RichText::new(text).small().weak());
+        }
+        ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
+            let cost = format!("{} rays in {:.2} ms", all.rays, shown.pupils.rims.ms);
+            ui.label(RichText::new(cost).small().weak());
+        });
+    });
+}
+
+impl<'a> Table<'a> {
+    fn new(shown: &'a Shown<'_>, all: &'a Rims) -> Self {
+        let fields = shown.results.lens.fields_at(shown.results.settings.zoom);
+        let mut groups = vec![Group { name: "All fields".to_owned(), rims: Ok(all) }];
+        for (point, rims) in fields.values.iter().zip(&shown.pupils.rims.value) {
+            let name = field_name(fields.kind, *point);
+            groups.push(Group { name, rims: rims.as_ref().map_err(ToString::to_string) });
+        }
+        let mut table =
+            Self { groups, area: all.area, largest: [0.0; 2], selected: shown.view.selected };
+        table.largest = [Kind::Light, Kind::Blur].map(|kind| table.largest_of(kind));
+        table
+    }
+
+    fn largest_of(&self, kind: Kind) -> f64 {
+        let known = self.groups.iter().filter_map(|group| group.rims.as_ref().ok());
+        let effects = known.flat_map(|rims| &rims.surfaces);
+        effects.map(|effect| self.change(effect, kind).value.abs()).fold(0.0, f64::max)
+    }
+
+    /// Whether a rim does something at some field.
+    fn is_felt(&self, surface: usize) -> bool {
+        let mut known = self.groups.iter().filter_map(|group| group.rims.as_ref().ok());
+        known.any(|rims| rims.surfaces[surface].is_felt())
+    }
+
+    /// The change for one step: of the light in per cent, of the radius in µm.
+    fn change(&self, effect: &RimEffect, kind: Kind) -> Estimate {
+        let (number, scale) = match kind {
+            Kind::Light => (effect.area, 100.0 * STEP / self.area),
+            Kind::Blur => (effect.rms, 1e3 * STEP),
+        };
+        Estimate::new(scale * number.value, scale * number.error, number.rays)
+    }
+
+    fn show(&self, ui: &mut Ui, felt: &[usize], wishes: &mut Vec<Command>) {
+        ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
+            ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
+            let mut table = TableBuilder::new(ui)
+                .id_salt(("rims", self.groups.len()))
+                .auto_shrink([false, false])
+                .striped(true)
+                .sense(Sense::click())
+                .cell_layout(Arrange::left_to_right(Align::Center))
+                .column(Width::exact(46.0));
+            for _ in 0..2 * self.groups.len() {
+                table = table.column(Width::exact(CELL));
+            }
+            table.header(HEAD, |row| self.head(row)).body(|mut body| {
+                for surface in felt {
+                    body.row(ROW, |row| self.row(row, *surface, wishes));
+                }
+            });
+        });
+    }
+
+    fn head(&self, mut row: TableRow<'_, '_>) {
+        row.col(|ui| {
+            lines(ui, "", "Surface", Align2::LEFT_CENTER);
+        });
+        for group in &self.groups {
+            for (name, unit) in [(group.name.as_str(), "light, %"), ("", "RMS, µm")] {
+                row.col(|ui| lines(ui, name, unit, Align2::RIGHT_CENTER));
+            }
+        }
+    }
+
+    fn row(&self, mut row: TableRow<'_, '_>, surface: usize, wishes: &mut Vec<Command>) {
+        let chosen = self.selected == Some(surface);
+        row.set_selected(chosen);
+        row.col(|ui| {
+            let name = self.summary(surface);
+            let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+            response.widget_info(|| WidgetInfo::selected(Role::Button, true, chosen, &name));
+            let font = TextStyle::Body.resolve(ui.style());
+            let at = rect.left_center() + vec2(6.0, 0.0);
+            let color = ui.visuals().strong_text_color();
+            ui.painter().text(at, Align2::LEFT_CENTER, surface + 1, font, color);
+        });
+        for group in &self.groups {
+            for kind in [Kind::Light, Kind::Blur] {
+                row.col(|ui| self.cell(ui, group, surface, kind));
+            }
+        }
+        let response = row.response().on_hover_text(self.details(surface));
+        if response.clicked() {
+            wishes.push(Command::Select((!chosen).then_some(surface)));
+        }
+    }
+
+    fn cell(&self, ui: &Ui, group: &Group<'_>, surface: usize, kind: Kind) {
+        let rect = ui.max_rect();
+        let Ok(rims) = &group.rims else { return };
+        let change = self.change(&rims.surfaces[surface], kind);
+        let felt = change.value.abs() > change.error;
+        let color =
+            if felt { color(ui, kind, change.value) } else { ui.visuals().weak_text_color() };
+        let font = TextStyle::Small.resolve(ui.style());
+        let text = if felt { signed(change.value) } else { "·".to_owned() };
+        let at = rect.right_center() - vec2(ARROW + 5.0, 0.0);
+        let ink = if felt { ui.visuals().text_color() } else { color };
+        ui.painter().text(at, Align2::RIGHT_CENTER, text, font, ink);
+        let share = change.value / self.largest[kind as usize];
+        if felt && share.is_finite() {
+            arrow(ui, pos2(rect.right() - 0.5 * ARROW - 2.0, rect.center().y), share, color);
+        }
+    }
+
+    /// A rim in one sentence.
+    fn summary(&self, surface: usize) -> String {
+        let Ok(rims) = &self.groups[0].rims else { return String::new() };
+        let of = |kind| signed(self.change(&rims.surfaces[surface], kind).value);
+        format!(
+            "Rim of surface {} by 0.1 mm: light {} %, RMS {} µm",
+            surface + 1,
+            of(Kind::Light),
+            of(Kind::Blur)
+        )
+    }
+
+    /// A rim with the errors of its numbers.
+    fn details(&self, surface: usize) -> String {
+        let line = |group: &Group<'_>| match &group.rims {
+            Ok(rims) => {
+                let of = |kind, unit| {
+                    let change = self.change(&rims.surfaces[surface], kind);
+                    if change.value == 0.0 && change.error == 0.0 {
+                        return "none".to_owned();
+                    }
+                    format!("{} ± {:.0e} {unit}", signed(change.value), change.error)
+                };
+                let (light, blur) = (of(Kind::Light, "%"), of(Kind::Blur, "µm"));
+                format!("{}: light {light}, RMS {blur}", group.name)
+            }
+            Err(why) => format!("{}: {why}", group.name),
+        };
+        let lines: Vec<String> = self.groups.iter().map(line).collect();
+        format!(
+            "Surface {}, semi-diameter 0.1 mm larger\n{}\nClick to point the surface out.",
+            surface + 1,
+            lines.join("\n")
+        )
+    }
+}
+
+/// More light is for the better, and a smaller spot.
+fn color(ui: &Ui, kind: Kind, change: f64) -> Color32 {
+    let palette = Palette::of(ui.visuals());
+    let better = (change > 0.0) == (kind == Kind::Light);
+    color32(if better { palette.better } else { palette.worse })
+}
+
+/// An arrow up or down, as long as its share of the largest says.
+fn arrow(ui: &Ui, middle: Pos2, share: f64, color: Color32) {
+    #[expect(clippy::cast_possible_truncation, reason = "a length on the screen")]
+    let length = ARROW * (0.35 + 0.65 * share.abs().min(1.0)) as f32;
+    let up = if share > 0.0 { -1.0 } else { 1.0 };
+    let tip = middle + vec2(0.0, 0.5 * up * length);
+    let foot = middle - vec2(0.0, 0.5 * up * length);
+    let side = vec2(0.35 * length, 0.0);
+    let points = vec![tip, foot + side, foot - side];
+    ui.painter().add(Shape::convex_polygon(points, color, Stroke::NONE));
+}
+
+/// Two lines at the head of a column.
+fn lines(ui: &Ui, above: &str, below: &str, align: Align2) {
+    let rect = ui.max_rect();
+    let (upper, lower) = rect.split_top_bottom_at_fraction(0.5);
+    let font = TextStyle::Small.resolve(ui.style());
+    let edge = |rect: Rect| {
+        if align == Align2::LEFT_CENTER {
+            rect.left_center() + vec2(2.0, 0.0)
+        } else {
+            rect.right_center() - vec2(3.0, 0.0)
+        }
+    };
+    let visuals = ui.visuals();
+    // The name of a group stands over both of its columns.
+    let painter = ui.painter().with_clip_rect(ui.clip_rect().expand2(vec2(CELL, 0.0)));
+    painter.text(edge(upper), align, above, font.clone(), visuals.text_color());
+    painter.text(edge(lower), align, below, font, visuals.weak_text_color());
+}
+
+/// A number with its sign.
+fn signed(value: f64) -> String {
+    let sign = if value > 0.0 { "+" } else { "" };
+    format!("{sign}{}", number::show_digits(value, 3))
+}
+
+/// The surfaces that are not among some, as the window counts them: `2 to 5, 7 to 10`.
+fn others(felt: &[usize], count: usize) -> String {
+    let mut ranges: Vec<RangeInclusive<usize>> = Vec::new();
+    for surface in (0..count).filter(|i| !felt.contains(i)).map(|i| i + 1) {
+        match ranges.last_mut() {
+            Some(range) if range.end() + 1 == surface => *range = *range.start()..=surface,
+            _ => ranges.push(surface..=surface),
+        }
+    }
+    let text = |range: &RangeInclusive<usize>| match (*range.start(), *range.end()) {
+        (first, last) if first == last => first.to_string(),
+        (first, last) if first + 1 == last => format!("{first}, {last}"),
+        (first, last) => format!("{first} to {last}"),
+    };
+    ranges.iter().map(text).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surfaces_without_effect_are_told_in_ranges() {
+        assert_eq!(others(&[0, 5, 10], 11), "2 to 5, 7 to 10");
+        assert_eq!(others(&[2], 4), "1, 2, 4");
+        assert_eq!(others(&[0, 1], 2), "");
+    }
+}

@@ -1,0 +1,90 @@
+//! What the size of every rim does, against lenses with larger and smaller rims.
+
+use aplanat::analysis::{self, RimEffect, Rims};
+use aplanat::files::{library, native};
+use aplanat::lens::{Lens, Parameter, Quantity};
+use aplanat::pupil::{Accuracy, Bench, NoDerivative};
+
+/// By how much rims are made larger and smaller, in mm.
+const STEP: f64 = 1e-3;
+/// What quadrature and step leave of a difference, relative to the largest.
+const LEFT: f64 = 1e-3;
+
+/// The first lens of the library: its rims alone limit the beam.
+fn double_gauss() -> Lens {
+    native::read(library()[0].text, library()[0].name).unwrap()
+}
+
+/// Area and RMS radius of a field at the primary wavelength.
+fn light_and_blur(lens: &Lens, field: usize) -> [f64; 2] {
+    let bench = Bench::of(lens, 0).unwrap();
+    let accuracy = Accuracy { tolerance: 1e-8, ..Accuracy::default() };
+    let spot = analysis::spot(&bench, bench.fields[field], accuracy).unwrap();
+    let color = spot.colors[bench.primary].unwrap();
+    [color.light.value, color.rms.value]
+}
+
+/// How both change when a rim grows, per mm.
+fn shown(lens: &Lens, field: usize, surface: usize) -> [f64; 2] {
+    let parameter = Parameter::new(surface, Quantity::SemiDiameter);
+    let at = |change: f64| {
+        let mut moved = lens.clone();
+        assert!(moved.set(parameter, lens.get(parameter).unwrap() + change));
+        light_and_blur(&moved, field)
+    };
+    let (more, less) = (at(STEP), at(-STEP));
+    [0, 1].map(|i| (more[i] - less[i]) / (2.0 * STEP))
+}
+
+fn of(lens: &Lens, field: usize, tolerance: f64) -> Result<Rims, NoDerivative> {
+    let bench = Bench::of(lens, 0).unwrap();
+    let accuracy = Accuracy { tolerance, ..Accuracy::default() };
+    analysis::rims(&bench, bench.fields[field], bench.primary, accuracy)
+}
+
+fn both(effect: &RimEffect) -> [analysis::Estimate; 2] {
+    [effect.area, effect.rms]
+}
+
+#[test]
+fn what_a_rim_does_is_what_a_larger_one_shows() {
+    let lens = double_gauss();
+    for field in 0..3 {
+        let rims = of(&lens, field, 1e-6).unwrap();
+        let [area, rms] = light_and_blur(&lens, field);
+        assert!((rims.area / area - 1.0).abs() < 1e-6, "{} {area}", rims.area);
+        assert!((rims.rms / rms - 1.0).abs() < 1e-5, "{} {rms}", rims.rms);
+        let effects = || rims.surfaces.iter().map(both);
+        let scale = [0, 1].map(|i| effects().map(|e| e[i].value.abs()).fold(0.0, f64::max));
+        for (surface, effect) in effects().enumerate() {
+            let shown = shown(&lens, field, surface);
+            for i in 0..2 {
+                let off = (effect[i].value - shown[i]).abs() / scale[i];
+                assert!(off < LEFT, "field {field}, surface {surface}: {effect:?}, {shown:?}");
+                assert!(effect[i].error <= LEFT * scale[i], "{effect:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn fields_together_have_the_mean_light_and_the_root_mean_square() {
+    let lens = double_gauss();
+    let [axis, edge] = [0, 2].map(|field| of(&lens, field, 1e-3).unwrap());
+    let both = analysis::together(&[(1.0, &axis), (3.0, &edge)]).unwrap();
+    assert!((both.area - 0.25 * axis.area - 0.75 * edge.area).abs() < 1e-9);
+    let square = 0.25 * axis.rms.powi(2) + 0.75 * edge.rms.powi(2);
+    assert!((both.rms.powi(2) - square).abs() < 1e-12);
+    let front = |rims: &Rims| rims.surfaces[0].rms.value;
+    let slope = 0.25 * axis.rms * front(&axis) + 0.75 * edge.rms * front(&edge);
+    assert!((both.rms * front(&both) - slope).abs() < 1e-12);
+    assert!(analysis::together(&[]).is_none());
+    assert!(analysis::together(&[(0.0, &axis)]).is_none());
+}
+
+#[test]
+fn a_dark_field_has_no_derivative_and_says_why() {
+    let mut lens = double_gauss();
+    lens.fields.values[2].y = 40.0;
+    assert!(matches!(of(&lens, 2, 1e-3), Err(NoDerivative::Dark(..))));
+}
