@@ -1,48 +1,95 @@
 //! The front of sharpness against light.
 
 use super::merit::bundled;
-use aplanat::lens::{Field, Wavelength};
+use aplanat::lens::{Field, Lens, Wavelength};
 use aplanat::merit::PupilEdge;
-use aplanat::optimize::Method;
-use aplanat::optimize::pareto::{Settings, Sweep};
+use aplanat::optimize::pareto::{Design, Front, NoFront, Settings, Sweep};
 
-fn sweep(name: &str, settings: &Settings) -> Sweep {
-    let mut lens = bundled(name);
+/// A lens in one colour at three fields.
+fn lens() -> Lens {
+    let mut lens = bundled("double_gauss_rudolph_50");
     lens.variables.clear();
     lens.wavelengths = vec![Wavelength { um: 0.587_561_8, weight: 1.0, primary: true }];
     lens.fields.values = [0.0, 10.0, 20.0].map(|y| Field { x: 0.0, y, weight: 1.0 }).to_vec();
-    let mut sweep = Sweep::new(&lens, settings).unwrap();
-    while !sweep.step().finished {}
-    sweep
+    lens
+}
+
+fn swept(pupil: PupilEdge) -> Sweep {
+    let settings = Settings { points: 3, steps: 20, pupil, ..Settings::default() };
+    let mut sweep = Sweep::new(&lens(), &settings).unwrap();
+    let mut before = 0.0;
+    loop {
+        let slice = sweep.step();
+        let covered = sweep.hypervolume();
+        assert!(covered >= before && slice.done <= slice.total);
+        before = covered;
+        if slice.finished {
+            return sweep;
+        }
+    }
 }
 
 #[test]
-#[ignore]
-fn look() {
-    let arg = |name: &str, or: usize| std::env::var(name).map_or(or, |v| v.parse().unwrap());
-    for name in ["double_gauss_rudolph_50", "double_gauss_nikkor_s_50"] {
-        for pupil in [PupilEdge::Moving, PupilEdge::Kept] {
-            let t = std::time::Instant::now();
-            let settings = Settings {
-                points: arg("POINTS", 8),
-                steps: arg("STEPS", 500),
-                pupil,
-                method: if arg("ADAM", 0) > 0 { Method::Adam } else { Method::DampedLeastSquares },
-                blur: [4e-5, std::env::var("BLUR").map_or(1e-3, |v| v.parse().unwrap())],
-                ..Settings::default()
-            };
-            let found = sweep(name, &settings);
-            println!(
-                "{name} {pupil:?} start {} {} hypervolume {} in {:.2} s",
-                found.start.spot,
-                found.start.light,
-                found.hypervolume(),
-                t.elapsed().as_secs_f64()
-            );
-            let designs = found.front().designs();
-            for d in designs.iter().step_by(designs.len().div_ceil(12)) {
-                println!("  {:?} {:.5} {:.2}", d.weight.map(f64::sqrt), d.spot, d.light);
-            }
-        }
+fn a_front_that_sees_light_covers_more_than_one_that_does_not() {
+    let [ours, biased] = [PupilEdge::Moving, PupilEdge::Kept].map(swept);
+    let [a, b] = [&ours, &biased].map(Sweep::hypervolume);
+    println!("hypervolume {a:.4}, biased {b:.4}");
+    assert!(a > b);
+    let designs = ours.front().designs();
+    for pair in designs.windows(2) {
+        assert!(pair[0].light < pair[1].light && pair[0].spot < pair[1].spot);
     }
+    for design in designs {
+        design.lens.check().unwrap();
+        let again = Design::of(&design.lens, design.weight, 1e-6).unwrap();
+        assert!((again.spot / design.spot - 1.0).abs() < 1e-3, "{} {}", again.spot, design.spot);
+        assert!((again.light / design.light - 1.0).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn a_front_is_the_same_on_one_thread_and_on_two() {
+    let settings = Settings { points: 2, steps: 5, ..Settings::default() };
+    let [one, two] = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut sweep = Sweep::new(&lens(), &settings).unwrap();
+            while !sweep.step().finished {}
+            sweep.front().clone()
+        })
+    });
+    assert_eq!(one, two);
+}
+
+#[test]
+fn a_front_drops_what_is_beaten() {
+    let start = Design::of(&lens(), None, 1e-4).unwrap();
+    let design = |spot: f64, light: f64| Design { spot, light, ..start.clone() };
+    let mut front = Front::default();
+    assert!(front.offer(design(2.0, 1.0)) && front.offer(design(3.0, 2.0)));
+    assert!(!front.offer(design(2.5, 1.0)) && !front.offer(design(2.0, 1.0)));
+    assert!(!front.offer(design(f64::NAN, 9.0)));
+    assert!(!front.offer(Design { lit: false, ..design(0.1, 9.0) }));
+    // (4 - 2) x 1 + (4 - 3) x (2 - 1), in multiples of 4 x 1.
+    assert!((front.hypervolume(4.0, 1.0) - 0.75).abs() < 1e-15);
+    assert!(front.offer(design(1.0, 3.0)));
+    assert_eq!(front.designs().len(), 1);
+}
+
+#[test]
+fn settings_without_meaning_and_lenses_without_light_are_refused() {
+    for settings in [
+        Settings { points: 0, ..Settings::default() },
+        Settings { steps: 0, ..Settings::default() },
+        Settings { blur: [0.0, 1e-3], ..Settings::default() },
+        Settings { blur: [f64::NAN, 1e-3], ..Settings::default() },
+        Settings { rims: [1.1, 1.3], ..Settings::default() },
+        Settings { tolerance: 0.0, ..Settings::default() },
+    ] {
+        let refused = Sweep::new(&lens(), &settings).unwrap_err();
+        assert!(matches!(refused, NoFront::Settings { .. }), "{refused}");
+    }
+    let mut dark = lens();
+    dark.surfaces[0].semi_diameter = Some(0.0);
+    assert!(matches!(Sweep::new(&dark, &Settings::default()), Err(NoFront::Merit(_))));
 }

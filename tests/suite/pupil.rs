@@ -271,7 +271,7 @@ fn a_clear_pupil_is_a_disc_of_the_aperture() {
         assert_eq!(outline.limits(), [(Limit::Disc, 1.0)]);
         let [area, x, y] = region.extent(Accuracy::default()).unwrap().values;
         // In air, the plane of the stop is seen from the first vertex undistorted.
-        assert!((area / (25.0 * std::f64::consts::PI) - 1.0).abs() < 1e-12, "{aiming:?} {area}");
+        assert!((area / (25.0 * PI) - 1.0).abs() < 1e-12, "{aiming:?} {area}");
         assert!(x.abs() < 1e-12 && (y + 100.0 * 20f64.to_radians().tan()).abs() < 1e-9, "{y}");
     }
 }
