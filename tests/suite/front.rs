@@ -7,7 +7,7 @@ use aplanat::optimize::pareto::{Design, Front, Settings, Sweep};
 
 /// The lens at the start and the front of a short sweep.
 fn swept() -> Sweep {
-    let settings = Settings { points: 2, steps: 20, ..Settings::default() };
+    let settings = Settings { points: 2, steps: 5, ..Settings::default() };
     let mut sweep = Sweep::new(&bundled("double_gauss_rudolph_50"), &settings).unwrap();
     while !sweep.step().finished {}
     sweep

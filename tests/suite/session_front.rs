@@ -20,7 +20,7 @@ fn start(steps: usize, compare: bool) -> Command {
     Command::StartFront { settings: Settings { points: 2, steps, ..Settings::default() }, compare }
 }
 
-const SOON: usize = 10;
+const SOON: usize = 4;
 const NEVER: usize = 10_000_000;
 
 /// Waits until something has happened in the background.
