@@ -45,7 +45,7 @@ const AUTHORS: [Theirs; 3] = [
 
 /// How the designs of a front are searched for.
 pub(super) fn plan(effort: Effort) -> Plan {
-    Plan::new(effort.pick(14, 8), 1200)
+    Plan::new(4.0, effort.pick(14, 8), 1200)
 }
 
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {

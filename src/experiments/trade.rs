@@ -54,14 +54,13 @@ pub(super) struct Plan {
 /// The largest weight: so large that the rim ray of a lens that is not sharp yet is kept. What is
 /// clipped early does not come back.
 const LARGEST: f64 = 3e-2;
-/// How many powers of ten the smallest one is below.
-const DECADES: f64 = 4.0;
 
 impl Plan {
-    /// So many weights, evenly on a logarithmic scale, by derivatives that follow the pupils.
-    pub(super) fn new(weights: usize, steps: usize) -> Self {
+    /// So many weights over some powers of ten, evenly on a logarithmic scale, by derivatives that
+    /// follow the pupils.
+    pub(super) fn new(decades: f64, weights: usize, steps: usize) -> Self {
         let last = (weights - 1).max(1) as f64;
-        let beta = |i: usize| LARGEST * 10f64.powf(-DECADES * i as f64 / last);
+        let beta = |i: usize| LARGEST * 10f64.powf(-decades * i as f64 / last);
         let betas = (0..weights).map(beta).collect();
         Self { betas, steps, pupil: PupilEdge::Moving, rims: [0.25, 1.3] }
     }

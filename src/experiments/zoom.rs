@@ -30,7 +30,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     for (i, (name, file)) in lenses.into_iter().take(count).enumerate() {
         let zoom = in_one_color(lens(file)?);
         let weights = effort.pick(10, 4);
-        let plan = Plan { rims: [1.0, 1.0], ..Plan::new(weights, effort.pick(800, 60)) };
+        let plan = Plan { rims: [1.0, 1.0], ..Plan::new(4.0, weights, effort.pick(800, 60)) };
         let [from, to] = [i, i + 1].map(|part| part as f64 / count as f64);
         let part = Part { from, to, name };
         let designs = searched(&zoom, &plan, part, watch)?;
