@@ -32,7 +32,7 @@ pub(super) struct Pareto {
     points: usize,
 
     /// What descends
-    #[arg(long, value_enum, default_value_t = Descent::Dls)]
+    #[arg(long, value_enum, default_value_t = Descent::Adam)]
     method: Descent,
 
     /// No more steps than this for each weight; 100 for dls and 500 for adam where it is absent

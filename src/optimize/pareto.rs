@@ -44,9 +44,9 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             points: 20,
-            method: Method::DampedLeastSquares,
-            steps: 100,
-            blur: [4e-5, 1e-3],
+            method: Method::Adam,
+            steps: 500,
+            blur: [4e-5, 3.5e-3],
             pupil: PupilEdge::Moving,
             tolerance: 1e-3,
             rims: [0.25, 1.3],

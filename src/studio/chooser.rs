@@ -41,8 +41,7 @@ impl Purpose {
             Self::Open => &["json", "zmx", "ZMX"],
             Self::Save | Self::ExportJson => &["json"],
             Self::ExportZemax => &["zmx"],
-            Self::ExportFront => &[],
-            Self::ExperimentFolder => &[],
+            Self::ExportFront | Self::ExperimentFolder => &[],
         }
     }
 
@@ -165,8 +164,7 @@ fn open_dialog(
     thread::Builder::new().name("file dialog".into()).spawn(move || {
         let path = match purpose {
             Purpose::Open => dialog.pick_file(),
-            Purpose::ExportFront => dialog.pick_folder(),
-            Purpose::ExperimentFolder => dialog.pick_folder(),
+            Purpose::ExportFront | Purpose::ExperimentFolder => dialog.pick_folder(),
             _ => dialog.save_file(),
         };
         // Nobody listens when the window was closed before the dialog.

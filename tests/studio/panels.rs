@@ -492,6 +492,7 @@ fn fronts(standing: Standing) -> View {
         spot_error: 1e-6,
         light: 10.0 * (3 + i) as f64,
         light_error: 1e-3,
+        lit: true,
         rays: 600,
     };
     let mut front = pareto::Front::default();

@@ -15,7 +15,7 @@ fn lens() -> Lens {
 }
 
 fn swept(pupil: PupilEdge) -> Sweep {
-    let settings = Settings { points: 3, steps: 20, pupil, ..Settings::default() };
+    let settings = Settings { points: 4, steps: 100, pupil, ..Settings::default() };
     let mut sweep = Sweep::new(&lens(), &settings).unwrap();
     let mut before = 0.0;
     loop {
