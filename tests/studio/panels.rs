@@ -210,7 +210,7 @@ fn press<P: Panel>(harness: &mut Harness<'_, Stand<P>>, name: &str) {
 
 fn goal_of(wishes: &[Command]) -> &Goal {
     let goal = |wish| match wish {
-        &Command::Optimize { ref goal, .. } => Some(goal),
+        Command::Optimize { goal, .. } => Some(goal),
         _ => None,
     };
     wishes.iter().find_map(goal).unwrap()
