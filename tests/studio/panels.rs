@@ -209,11 +209,11 @@ fn press<P: Panel>(harness: &mut Harness<'_, Stand<P>>, name: &str) {
 }
 
 fn goal_of(wishes: &[Command]) -> &Goal {
-    let goal = |wish| match wish {
+    let mut goals = wishes.iter().filter_map(|wish| match wish {
         Command::Optimize { goal, .. } => Some(goal),
         _ => None,
-    };
-    wishes.iter().find_map(goal).unwrap()
+    });
+    goals.next().unwrap()
 }
 
 #[test]
