@@ -33,7 +33,8 @@ pub mod trace;
 // Reading and writing lenses: the native JSON, Zemax; an export proves itself.
 pub mod files;
 
-// The set of rays that get through: where they start, their boundary, quadrature over them.
+// The set of rays that get through: where they start, their boundary, quadrature over them, and
+// derivatives of integrals over it that know that it moves.
 pub mod pupil;
 
 // What a designer reads, each number with its error estimate.
@@ -45,7 +46,7 @@ pub mod merit;
 // Which physical effects a scene calls for, each decision with the number it rests on.
 pub mod effects;
 
-// Local search: Adam and damped least squares, one step at a time.
+// Local search: Adam and damped least squares, one step at a time; the front of sharpness and light.
 pub mod optimize;
 
 // Plots and images: what a result looks like, as PNG.

@@ -296,6 +296,10 @@ impl Report {
     }
 }
 
+/// The terms that ask for light.
+const ASKING: [&str; 5] =
+    ["throughput", "throughput_loss", "light", "relative_illumination", "f_number"];
+
 impl Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { steps, ms, merit_before, merit_after, out, .. } = self;
@@ -309,9 +313,16 @@ impl Display for Report {
             writeln!(f, "{} steps refused or shortened, the last: {refusal}", self.refused_steps)?;
         }
         writeln!(f, "merit {} -> {}", Number(*merit_before), Number(*merit_after))?;
-        let [before, after] = [self.light_before, self.light_after].map(|light| 100.0 * light);
-        writeln!(f, "light {before:.1} % -> {after:.1} % of the pupil, mean over the spots")?;
-        if after < before - 1.0 {
+        let [before, after] = [self.light_before, self.light_after];
+        let change = 100.0 * (after / before - 1.0);
+        let light = [Number(before), Number(after)];
+        writeln!(
+            f,
+            "light {} -> {} mm^2 ({change:+.1} %), mean over the spots",
+            light[0], light[1]
+        )?;
+        let asks = self.terms.iter().any(|term| ASKING.contains(&term.term));
+        if change < -1.0 && !asks {
             writeln!(f, "  no term asks for light: some of the sharpness was bought by clipping")?;
         }
         writeln!(f)?;

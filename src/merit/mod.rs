@@ -201,11 +201,11 @@ impl Merit {
         self.samplings.iter().flat_map(Sampling::sampled).collect()
     }
 
-    /// The mean share of the paraxial entrance pupil that gets through, over all spots. A goal
-    /// without a term for light may buy sharpness by clipping it, so it is worth a look.
+    /// The mean area of the pupils over all spots, in mm² of the first vertex plane. A goal without
+    /// a term for light may buy sharpness by clipping it, so it is worth a look.
     pub fn light(&self) -> f64 {
         let sampled = self.sampled();
-        sampled.iter().map(|spot| spot.light).sum::<f64>() / sampled.len().max(1) as f64
+        sampled.iter().map(|spot| spot.area).sum::<f64>() / sampled.len().max(1) as f64
     }
 
     /// The merit at these values of the variables.
