@@ -9,7 +9,7 @@ mod rims;
 mod words;
 
 use eframe::egui::{
-    Align, ComboBox, Id, Layout as Arrange, Rect, Response, Sense, Ui, WidgetInfo, vec2,
+    Align, ComboBox, Id, Layout as Arrange, Rect, Response, Sense, Ui, UiBuilder, WidgetInfo, vec2,
 };
 
 use super::cells::{Words, bar, within};
@@ -53,9 +53,13 @@ impl Panel for Pupils {
         self.learn(pupils, results.lens.surfaces.len());
         header(ui, view, pupils, wishes);
         let shown = Shown { known: &self.known, view, results, numbers, pupils };
-        rims::strip(ui, &shown, wishes);
-        shown.legend(ui, wishes);
-        shown.pictures(ui, wishes);
+        let all = ui.available_rect_before_wrap();
+        let (above, below) = all.split_top_bottom_at_y(all.bottom() - rims::height(ui, &shown));
+        ui.scope_builder(UiBuilder::new().max_rect(above), |ui| {
+            shown.legend(ui, wishes);
+            shown.pictures(ui, wishes);
+        });
+        within(ui, below, |ui| rims::strip(ui, &shown, wishes));
     }
 }
 

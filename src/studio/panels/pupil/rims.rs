@@ -4,8 +4,8 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::{
-    Align, Align2, Color32, Frame, Layout as Arrange, Margin, Panel as Side, Pos2, Rect, RichText,
-    Role, ScrollArea, Sense, Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
+    Align, Align2, Color32, Layout as Arrange, Pos2, Rect, RichText, Role, ScrollArea, Sense,
+    Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
 };
 use egui_extras::{Column as Width, TableBuilder, TableRow};
 
@@ -60,29 +60,37 @@ struct Table<'a> {
     selected: Option<usize>,
 }
 
-/// The table below the pictures, where there is something to tell.
-pub(super) fn strip(ui: &mut Ui, shown: &Shown<'_>, wishes: &mut Vec<Command>) {
-    let Some(all) = &shown.pupils.all_rims else { return };
-    let table = Table::new(shown, all);
-    let felt: Vec<usize> = (0..all.surfaces.len()).filter(|i| table.is_felt(*i)).collect();
-    let whole = TITLE + HEAD + ROW * felt.len().max(1) as f32 + 8.0;
+/// How high the table below the pictures is: nothing where there is nothing to tell.
+pub(super) fn height(ui: &Ui, shown: &Shown<'_>) -> f32 {
+    let Some(all) = &shown.pupils.all_rims else { return 0.0 };
+    let whole = TITLE + HEAD + ROW * felt(&Table::new(shown, all), all).len().max(1) as f32 + 8.0;
     let room = ui.available_height() - PICTURES;
     // Where there is little room the pictures come first, and the title stands for the table.
-    let height = if room < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(room) };
-    let frame = Frame::new().inner_margin(Margin { top: 3, ..Margin::ZERO });
-    let side = Side::bottom("rims").frame(frame).show_separator_line(true).exact_size(height);
-    side.show(ui, |ui| {
-        ui.spacing_mut().item_spacing.y = 1.0;
-        title(ui, shown, all, &felt);
-        if height < TITLE + HEAD {
-            return;
-        }
-        if felt.is_empty() {
-            ui.weak("No rim ends a ray: the beam ends at the ideal entrance pupil.");
-            return;
-        }
-        table.show(ui, &felt, wishes);
-    });
+    if room < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(room) }
+}
+
+/// The table below the pictures, as high as there is room.
+pub(super) fn strip(ui: &mut Ui, shown: &Shown<'_>, wishes: &mut Vec<Command>) {
+    let Some(all) = &shown.pupils.all_rims else { return };
+    let room = ui.available_height();
+    let table = Table::new(shown, all);
+    let felt = felt(&table, all);
+    ui.separator();
+    ui.spacing_mut().item_spacing.y = 1.0;
+    title(ui, shown, all, &felt);
+    if room < TITLE + HEAD {
+        return;
+    }
+    if felt.is_empty() {
+        ui.weak("No rim ends a ray: the beam ends at the ideal entrance pupil.");
+        return;
+    }
+    table.show(ui, &felt, wishes);
+}
+
+/// The surfaces at whose rim some ray ends.
+fn felt(table: &Table<'_>, all: &Rims) -> Vec<usize> {
+    (0..all.surfaces.len()).filter(|i| table.is_felt(*i)).collect()
 }
 
 fn title(ui: &mut Ui, shown: &Shown<'_>, all: &Rims, felt: &[usize]) {
