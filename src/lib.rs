@@ -49,6 +49,9 @@ pub mod effects;
 // Local search: Adam and damped least squares, one step at a time; the front of sharpness and light.
 pub mod optimize;
 
+// Search over structure: a chain that descends, mutates, regenerates; reservoir, family tree.
+pub mod search;
+
 // Plots and images: what a result looks like, as PNG.
 pub mod picture;
 
