@@ -7,12 +7,15 @@
 //! settings say, whatever the number of threads, and whatever is remembered between two moves can
 //! be written down and read again.
 
+pub mod element;
 mod landscape;
 pub mod mutation;
+mod projection;
 mod rules;
 
 pub use landscape::{Landscape, Mutated, Point};
-pub use mutation::{Kind, Refusal};
+pub use mutation::{Kind, Mutant, Refusal, mutate, propose};
+pub use projection::Projection;
 pub use rules::Rules;
 
 /// The source of all chance in a search; its state is part of a checkpoint.
