@@ -74,7 +74,9 @@ pub fn stretch(
         }
         Method::DampedLeastSquares => {
             let mut search = LeastSquares::resumed(state, sum, memory.damping);
-            (0..asked.steps).for_each(|_| drop(search.descend()));
+            for _ in 0..asked.steps {
+                search.descend();
+            }
             memory.damping = Some(search.damping());
             Ok(search.into_current())
         }

@@ -9,6 +9,7 @@
 
 pub mod element;
 mod landscape;
+pub mod lens;
 pub mod mutation;
 mod projection;
 mod rules;
