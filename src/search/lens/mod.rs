@@ -10,11 +10,14 @@ mod draw;
 mod free;
 mod goal;
 mod open;
+mod walk;
 
 pub use goal::goal;
 pub use open::opened;
 
-use super::{Kind, Landscape, Mutated, Random, Refusal, Rules, element, mutation};
+use super::{
+    Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation,
+};
 use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
 use crate::optimize::{Memory, Method, Stretch, stretch};
@@ -245,11 +248,39 @@ impl Landscape for LensLandscape {
         Err(Refusal { kind: Kind::Global, why })
     }
 
-    fn mutate(&self, lens: &Lens, random: &mut Random) -> Result<Mutated<Lens>, Refusal> {
-        mutation::propose(lens, &self.rules, random).map(Into::into)
+    fn mutate(
+        &self,
+        lens: &Lens,
+        weights: &Weights,
+        random: &mut Random,
+    ) -> Result<Mutated<Lens>, Refusal> {
+        let own = Kind::MUTATIONS.map(|kind| (kind, self.rules.weight(kind) * weights.of(kind)));
+        let rules = Rules { weights: own.to_vec(), ..self.rules.clone() };
+        mutation::propose(lens, &rules, random).map(Into::into)
     }
 
     fn topology(&self, lens: &Lens) -> String {
         element::topology(lens)
+    }
+
+    fn about(&self) -> serde_json::Value {
+        serde_json::json!({
+            "start": self.start,
+            "goal": self.goal,
+            "rules": self.rules,
+            "local": self.local,
+        })
+    }
+
+    fn elements(&self, lens: &Lens) -> usize {
+        element::elements(lens).len()
+    }
+
+    fn slope(&self, lens: &Lens) -> Option<Slope> {
+        walk::slope(self, lens)
+    }
+
+    fn with_values(&self, lens: &Lens, values: &[f64]) -> Option<Lens> {
+        walk::with_values(self, lens, values)
     }
 }
