@@ -11,11 +11,12 @@ pub mod element;
 mod landscape;
 pub mod mutation;
 mod projection;
+mod repair;
 mod rules;
 
 pub use landscape::{Landscape, Mutated, Point};
 pub use mutation::{Kind, Mutant, Refusal, mutate, propose};
-pub use projection::Projection;
+pub use projection::{Projection, Unprojectable};
 pub use rules::Rules;
 
 /// The source of all chance in a search; its state is part of a checkpoint.
