@@ -9,11 +9,13 @@
 
 mod chain;
 mod checkpoint;
+pub mod clocks;
 mod error;
 mod family;
 mod landscape;
 mod metropolis;
 pub mod mutation;
+mod record;
 mod reservoir;
 mod rules;
 mod run;
@@ -21,6 +23,7 @@ mod settings;
 mod statistics;
 mod steer;
 mod temperature;
+pub mod toy;
 mod weights;
 
 pub use chain::{Chain, Tour};
