@@ -9,6 +9,7 @@
 
 mod chain;
 mod checkpoint;
+pub mod clocks;
 pub mod element;
 mod error;
 mod family;
@@ -17,6 +18,7 @@ pub mod lens;
 mod metropolis;
 pub mod mutation;
 mod projection;
+mod record;
 mod repair;
 mod reservoir;
 mod rules;
@@ -25,6 +27,7 @@ mod settings;
 mod statistics;
 mod steer;
 mod temperature;
+pub mod toy;
 mod weights;
 
 pub use chain::{Chain, Tour};

@@ -312,6 +312,27 @@ impl Landscape for LensLandscape {
         element::elements(lens).len()
     }
 
+    fn mutate_at(
+        &self,
+        lens: &Lens,
+        element: usize,
+        kind: Kind,
+        random: &mut Random,
+    ) -> Result<Mutated<Lens>, Refusal> {
+        let rows = lens.surfaces.len();
+        let Some(element) = element::elements(lens).get(element).copied() else {
+            return Err(Refusal::new(kind, "there is no such element"));
+        };
+        // Only what lies between these surfaces may change, and it must be allowed anyway.
+        let (first, last) = match kind {
+            Kind::AddSinglet => (element.last, element.last + 1),
+            _ => (element.first.saturating_sub(1), element.last + 1),
+        };
+        let mut rules = self.rules.clone().touching(first, last.min(rows - 1), rows);
+        rules.kept = [0, 1].map(|end| rules.kept[end].max(self.rules.kept[end]));
+        mutation::mutate(kind, lens, &rules, random).map(Into::into)
+    }
+
     fn slope(&self, lens: &Lens) -> Option<Slope> {
         walk::slope(self, lens)
     }

@@ -217,7 +217,8 @@ fn finished(scene: &Scene<'_>, kind: Kind, draft: Draft) -> Result<Mutant, Strin
     } else {
         (lens, None, Some(0.0))
     };
-    repair(&scene.lens, &mut lens, &rimless, scene.rules).map_err(|why| format!("{what}, but {why}"))?;
+    repair(&scene.lens, &mut lens, &rimless, scene.rules)
+        .map_err(|why| format!("{what}, but {why}"))?;
     let log_ratio = back.zip(stretch).and_then(|(back, stretch)| {
         log_ratio(scene.rules, &lens, kind, places, back).map(|log| log + stretch)
     });

@@ -111,7 +111,11 @@ pub(super) fn project(
         Err(_) => solve::nearest(&pair.new, &pair.zero(), &pair.target, &pair.bounds)?,
     };
     let log_determinant = if solution.exact { pair.log_determinant(map, &solution) } else { None };
-    Ok(Projected { lens: pair.lens(mutated, &solution), report: pair.report(&solution), log_determinant })
+    Ok(Projected {
+        lens: pair.lens(mutated, &solution),
+        report: pair.report(&solution),
+        log_determinant,
+    })
 }
 
 /// A lens before and after a mutation, as functions of the numbers that both have, counted from

@@ -75,7 +75,9 @@ impl Problem<'_> {
 
 fn largest(vector: &DVector<f64>) -> f64 {
     // Not a number counts as infinitely far.
-    vector.iter().fold(0.0, |most: f64, v| if v.is_nan() { f64::INFINITY } else { most.max(v.abs()) })
+    vector
+        .iter()
+        .fold(0.0, |most: f64, v| if v.is_nan() { f64::INFINITY } else { most.max(v.abs()) })
 }
 
 /// Solves `J Jᵀ λ = c`; none where the rows of `J` are nearly dependent.
@@ -136,10 +138,13 @@ fn feasible(
             jacobian.column_mut(i).fill(0.0);
         }
         let held = stopped.iter().filter(|s| **s).count();
-        let cause = if held > 0 { Unprojectable::Bounds(held, count) } else { Unprojectable::Singular };
+        let cause =
+            if held > 0 { Unprojectable::Bounds(held, count) } else { Unprojectable::Singular };
         let Some(multipliers) = multipliers(&jacobian, &missing) else { return Err(cause) };
         let step = jacobian.transpose() * multipliers;
-        let Some((next, left)) = shortened(problem, &at, &step, error, bounds) else { return Err(cause) };
+        let Some((next, left)) = shortened(problem, &at, &step, error, bounds) else {
+            return Err(cause);
+        };
         left.into_iter().for_each(|i| stopped[i] = true);
         at = next;
         missing = problem.missing(&at);
