@@ -186,14 +186,8 @@ fn extents(lens: &Lens) -> Result<Vec<f64>, String> {
 }
 
 /// Traces a ray, and widens the extents where it arrives without going backwards.
-fn widen(
-    extents: &mut [f64],
-    heights: &mut [f64],
-    tracer: &Tracer<f64>,
-    ray: Ray<f64>,
-) -> bool {
-    let landing =
-        tracer.visit(ray, |surface, point| heights[surface] = point.x.hypot(point.y));
+fn widen(extents: &mut [f64], heights: &mut [f64], tracer: &Tracer<f64>, ray: Ray<f64>) -> bool {
+    let landing = tracer.visit(ray, |surface, point| heights[surface] = point.x.hypot(point.y));
     let arrived = landing.fate.is_imaged() && landing.backwards.is_none();
     if arrived {
         for (extent, height) in extents.iter_mut().zip(heights) {

@@ -53,7 +53,11 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Place>, String> {
             found.push(Place { gap: Some(row), behind: false });
         }
     }
-    if found.is_empty() { Err("no air gap that the rules let change".to_owned()) } else { Ok(found) }
+    if found.is_empty() {
+        Err("no air gap that the rules let change".to_owned())
+    } else {
+        Ok(found)
+    }
 }
 
 impl Singlet {
@@ -86,7 +90,11 @@ fn lengths(rules: &Rules, size: f64) -> (Length, Length) {
 pub(super) fn keeps(lens: &Lens, gap: Option<usize>, rules: &Rules, length: f64) -> f64 {
     match gap {
         Some(gap) if has_choice(lens, gap) => {
-            if has_room(lens, gap, rules, length) { KEEPS } else { 0.0 }
+            if has_room(lens, gap, rules, length) {
+                KEEPS
+            } else {
+                0.0
+            }
         }
         _ => 0.0,
     }
@@ -120,9 +128,9 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     draft.rimless = vec![first, first + 1];
     draft.what = format!("added a singlet of {} before surface {first}", glass.full_name());
     let chosen = if kept { keeping } else { 1.0 - keeping };
-    let there = singlet.log_density(scene.rules, scene.scale).map(|log| {
-        log - (glasses.len() as f64).ln() + chosen.ln()
-    });
+    let there = singlet
+        .log_density(scene.rules, scene.scale)
+        .map(|log| log - (glasses.len() as f64).ln() + chosen.ln());
     let finite = place.gap.is_none() && scene.lens.object != Object::Infinity;
     draft.back = there.filter(|_| !finite).map(|there| Back {
         kind: Kind::RemoveSinglet,

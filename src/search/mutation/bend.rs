@@ -18,7 +18,11 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String>
         glass && free && (e.first..=e.last).all(bends)
     };
     let found: Vec<_> = elements(lens).into_iter().filter(may).collect();
-    if found.is_empty() { Err("no element whose curvatures are free".to_owned()) } else { Ok(found) }
+    if found.is_empty() {
+        Err("no element whose curvatures are free".to_owned())
+    } else {
+        Ok(found)
+    }
 }
 
 /// Bends an element.

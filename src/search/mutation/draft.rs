@@ -214,7 +214,8 @@ impl Draft {
     pub(super) fn settle(&mut self, rows: &[usize]) {
         let has = |quantity| self.lens.variables.iter().any(|v| v.parameter.quantity == quantity);
         let kinds = [Quantity::Curvature, Quantity::Thickness].map(|q| (q, has(q)));
-        for (row, (quantity, wanted)) in rows.iter().flat_map(|row| kinds.map(|kind| (*row, kind))) {
+        for (row, (quantity, wanted)) in rows.iter().flat_map(|row| kinds.map(|kind| (*row, kind)))
+        {
             if wanted {
                 free(&mut self.lens, Parameter::new(row, quantity));
             }
@@ -233,7 +234,9 @@ impl Draft {
     fn drop_solved(&mut self) {
         let last = self.lens.surfaces.len() - 1;
         if is_solved(&self.lens, last) {
-            self.lens.variables.retain(|v| v.parameter.surface != last || !is_gap(v.parameter.quantity));
+            self.lens
+                .variables
+                .retain(|v| v.parameter.surface != last || !is_gap(v.parameter.quantity));
             self.origins[last].gap = None;
         }
     }

@@ -51,8 +51,10 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     };
     let old = glass::find(name).ok_or("an unknown glass")?;
     let all = allowed(&scene.lens, scene.rules);
-    let choice: Vec<_> = all.into_iter().filter(|glass| !touches(&scene.lens, row, glass)).collect();
-    let weight = |from: &Glass, to: &Glass| if is_same(from, to) { 0.0 } else { nearness(from, to) };
+    let choice: Vec<_> =
+        all.into_iter().filter(|glass| !touches(&scene.lens, row, glass)).collect();
+    let weight =
+        |from: &Glass, to: &Glass| if is_same(from, to) { 0.0 } else { nearness(from, to) };
     let sum = |from: &Glass| choice.iter().map(|to| weight(from, to)).sum::<f64>();
     let mut left = random.random::<f64>() * sum(old);
     let chosen = choice.iter().find(|to| {

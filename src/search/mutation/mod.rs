@@ -211,13 +211,14 @@ fn length(lens: &Lens) -> f64 {
 fn finished(scene: &Scene<'_>, kind: Kind, draft: Draft) -> Result<Mutant, String> {
     let Draft { lens, origins, what, fresh, rimless, map, places, back } = draft;
     let (mut lens, projection, stretch) = if scene.rules.projection {
-        let found = project(&scene.lens, &lens, &origins, scene.rules, map);
+        let found = project(&scene.lens, &lens, &origins, scene.rules, map, back.is_some());
         let found = found.map_err(|why| format!("{what}, but {why}"))?;
         (found.lens, Some(found.report), found.log_determinant)
     } else {
         (lens, None, Some(0.0))
     };
-    repair(&scene.lens, &mut lens, &rimless, scene.rules).map_err(|why| format!("{what}, but {why}"))?;
+    repair(&scene.lens, &mut lens, &rimless, scene.rules)
+        .map_err(|why| format!("{what}, but {why}"))?;
     let log_ratio = back.zip(stretch).and_then(|(back, stretch)| {
         log_ratio(scene.rules, &lens, kind, places, back).map(|log| log + stretch)
     });

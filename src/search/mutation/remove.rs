@@ -2,10 +2,10 @@
 
 use super::super::element::{Element, elements, pieces};
 use super::super::{Random, Rules};
+use super::Kind;
 use super::add::{self, KEEPS, Singlet};
 use super::chance::{allowed, coin, pick};
 use super::draft::{Back, Draft, Room, Scene, hangs, is_gap, is_plain, is_solved, sense, zooms};
-use super::Kind;
 use crate::lens::glass;
 use crate::lens::{Lens, Medium, Object};
 
@@ -46,7 +46,13 @@ struct Way {
 pub(super) fn log_chance(lens: &Lens, first: usize, kept: bool) -> f64 {
     let sides = sides(lens, first);
     let choice = match remaining(lens, first) {
-        Some(gap) if add::has_choice(lens, gap) => if kept { KEEPS } else { 1.0 - KEEPS },
+        Some(gap) if add::has_choice(lens, gap) => {
+            if kept {
+                KEEPS
+            } else {
+                1.0 - KEEPS
+            }
+        }
         _ => 1.0,
     };
     choice.ln() - (sides.len() as f64).ln()

@@ -76,7 +76,8 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     put(&mut draft, gap, share * room);
     resize(&scene.lens, &mut draft.lens)?;
     let at = gap + 1;
-    draft.rimless = draft.lens.surfaces[at].semi_diameter.is_none().then_some(at).into_iter().collect();
+    draft.rimless =
+        draft.lens.surfaces[at].semi_diameter.is_none().then_some(at).into_iter().collect();
     draft.what = format!("moved the stop {:.3} mm behind surface {gap}", share * room);
     Ok(draft)
 }

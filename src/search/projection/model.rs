@@ -65,7 +65,9 @@ fn positions(lens: &Lens, reference: &Lens) -> Result<Vec<Position>, LensError> 
         indices.truncate(rows + 1);
         let gaps = system.surfaces[..rows].iter().map(|surface| surface.thickness).collect();
         let (height, slope) = match (lens.object, reference.object) {
-            (Object::Finite(here), Object::Finite(there)) => (here / there.abs(), indices[0] / there.abs()),
+            (Object::Finite(here), Object::Finite(there)) => {
+                (here / there.abs(), indices[0] / there.abs())
+            }
             _ => (1.0, 0.0),
         };
         Ok(Position { indices, gaps, height, slope })
@@ -198,7 +200,8 @@ impl Model {
 
     fn ray<R: Real>(&self, zoom: usize, curvatures: &[R], gaps: &[R]) -> Ray<R> {
         let position = &self.positions[zoom];
-        let (mut heights, mut slopes) = (Vec::with_capacity(gaps.len() + 1), Vec::with_capacity(gaps.len()));
+        let (mut heights, mut slopes) =
+            (Vec::with_capacity(gaps.len() + 1), Vec::with_capacity(gaps.len()));
         let (mut y, mut nu) = (R::from_f64(position.height), R::from_f64(position.slope));
         for (i, (c, d)) in curvatures.iter().zip(gaps).enumerate() {
             heights.push(y);

@@ -22,8 +22,10 @@ impl Bounds {
         Self(ranges)
     }
 
-    pub(super) fn none(count: usize) -> Self {
-        Self(vec![[f64::NEG_INFINITY, f64::INFINITY]; count])
+    /// The same, but for numbers that are outside already: those may stay where they are.
+    pub(super) fn around(&self, at: &[f64]) -> Self {
+        let widened = |([low, high], z): (&[f64; 2], &f64)| [low.min(*z), high.max(*z)];
+        Self(self.0.iter().zip(at).map(widened).collect())
     }
 
     fn hold(&self, at: &DVector<f64>) -> bool {
@@ -75,7 +77,9 @@ impl Problem<'_> {
 
 fn largest(vector: &DVector<f64>) -> f64 {
     // Not a number counts as infinitely far.
-    vector.iter().fold(0.0, |most: f64, v| if v.is_nan() { f64::INFINITY } else { most.max(v.abs()) })
+    vector
+        .iter()
+        .fold(0.0, |most: f64, v| if v.is_nan() { f64::INFINITY } else { most.max(v.abs()) })
 }
 
 /// Solves `J Jᵀ λ = c`; none where the rows of `J` are nearly dependent.
@@ -136,10 +140,13 @@ fn feasible(
             jacobian.column_mut(i).fill(0.0);
         }
         let held = stopped.iter().filter(|s| **s).count();
-        let cause = if held > 0 { Unprojectable::Bounds(held, count) } else { Unprojectable::Singular };
+        let cause =
+            if held > 0 { Unprojectable::Bounds(held, count) } else { Unprojectable::Singular };
         let Some(multipliers) = multipliers(&jacobian, &missing) else { return Err(cause) };
         let step = jacobian.transpose() * multipliers;
-        let Some((next, left)) = shortened(problem, &at, &step, error, bounds) else { return Err(cause) };
+        let Some((next, left)) = shortened(problem, &at, &step, error, bounds) else {
+            return Err(cause);
+        };
         left.into_iter().for_each(|i| stopped[i] = true);
         at = next;
         missing = problem.missing(&at);
