@@ -156,9 +156,7 @@ pub fn mutate(
     let refuse = |why: String| Refusal { kind, why };
     let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
     let Some(mutation) = mutation else { return Err(refuse("is no change of a lens".into())) };
-    if lens.surfaces.is_empty() {
-        return Err(refuse("the lens has no surfaces".into()));
-    }
+    lens.check().map_err(|error| refuse(error.to_string()))?;
     let resolved = lens.with_pickups().map_err(|error| refuse(error.to_string()))?;
     let size = match scale(&resolved) {
         Ok(size) => size,

@@ -6,11 +6,10 @@
 //! of `0.3/f` for curvatures and `0.01 f` for distances, else only curvatures would move; `f` is
 //! rounded to a power of two, so that the steps do not change with the lens.
 //!
-//! Two maps lead to such a lens, and each is the inverse of the other: [`Map::Closest`] goes to the
-//! nearest one, along the normals of the constraint where it arrives; [`Map::Along`] goes along the
-//! normals of the constraint of the lens from which it starts. That is what makes a mutation and
-//! the one that undoes it a reversible pair. A Jacobian of (4.30), with its factors put right, is in
-//! [`density`].
+//! Two maps lead to such a lens, and each is the inverse of the other: one goes to the nearest, along
+//! the normals of the constraint where it arrives; one goes along the normals of the constraint of
+//! the lens from which it starts. That is what makes a mutation and the one that undoes it a
+//! reversible pair. By how much they stretch volumes follows from (4.30), with its factors put right.
 
 mod density;
 mod model;
@@ -99,13 +98,7 @@ pub(super) fn project(
 ) -> Result<Projected, Unprojectable> {
     let pair = Pair::new(before, mutated, origins, rules)?;
     let mapped = if map == Map::Along && reversible { pair.along().ok() } else { None };
-    let solution = match mapped {
-        Some(solution) => solution,
-        None => {
-            let nearest = pair.closest()?;
-            Solution { exact: nearest.exact && map == Map::Closest, ..nearest }
-        }
-    };
+    let solution = mapped.map_or_else(|| pair.nearest(map), Ok)?;
     let exact = reversible && solution.exact;
     let log_determinant = if exact { pair.log_determinant(map, &solution) } else { None };
     Ok(Projected {
@@ -146,8 +139,10 @@ impl Pair {
         vec![0.0; self.coordinates.len()]
     }
 
-    fn closest(&self) -> Result<Solution, Unprojectable> {
-        solve::nearest(&self.new, &self.zero(), &self.target, &self.bounds())
+    /// The nearest lens; where another one was asked for, it is not exact.
+    fn nearest(&self, map: Map) -> Result<Solution, Unprojectable> {
+        let found = solve::nearest(&self.new, &self.zero(), &self.target, &self.bounds())?;
+        Ok(Solution { exact: found.exact && map == Map::Closest, ..found })
     }
 
     fn along(&self) -> Result<Solution, Unprojectable> {
