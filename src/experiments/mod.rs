@@ -16,6 +16,7 @@ mod outcome;
 mod report;
 mod sampling;
 mod section;
+mod structure;
 mod trade;
 mod vignetting;
 mod zoom;
@@ -38,6 +39,11 @@ pub const ALL: &[Experiment] = &[
     vignetting::EXPERIMENT,
     zoom::EXPERIMENT,
     sampling::EXPERIMENT,
+    structure::metropolis::EXPERIMENT,
+    structure::brute::EXPERIMENT,
+    structure::projection::EXPERIMENT,
+    structure::beyond::EXPERIMENT,
+    structure::teaser::EXPERIMENT,
 ];
 
 /// A figure or table of the thesis.

@@ -120,3 +120,51 @@ fn zoom_lenses_get_better_between_their_positions_too() {
     let [start, now] = ["start_blur_mm", "blur_mm"].map(|name| column(&outcome.tables[0], name));
     assert!(start.iter().zip(&now).all(|(start, now)| now < start));
 }
+
+/// The rows of a table in which a column has this word.
+fn rows_with(table: &Table, name: &str, word: &str) -> Table {
+    let place = table.columns.iter().position(|column| *column == name).unwrap();
+    let rows = table.rows.iter().filter(|row| row[place] == Cell::Word(word.to_owned()));
+    Table { rows: rows.cloned().collect(), ..table.clone() }
+}
+
+#[test]
+fn restore_finds_better_lenses_than_metropolis() {
+    let outcome = outcome("4.4");
+    let curves = &outcome.tables[1];
+    for sampler in ["RESTORE", "Metropolis and Hastings"] {
+        let own = rows_with(curves, "sampler", sampler);
+        let [least, median, most] = ["least", "median", "most"].map(|name| column(&own, name));
+        assert!(median.windows(2).all(|pair| pair[1] <= pair[0]), "{sampler}");
+        let ordered = |i: usize| least[i] <= median[i] && median[i] <= most[i];
+        assert!((0..median.len()).all(ordered), "{sampler}");
+    }
+}
+
+#[test]
+fn restore_finds_better_lenses_than_brute_force() {
+    let outcome = outcome("4.5");
+    let ends = rows_with(&outcome.tables[0], "sampler", "brute force");
+    assert!(column(&ends, "gradients").iter().all(|gradients| *gradients <= 800.0));
+    assert!(outcome.lenses.iter().all(|(_, lens)| lens.check().is_ok()));
+}
+
+#[test]
+fn projected_mutations_lead_to_better_lenses_more_often() {
+    let outcome = outcome("4.6");
+    let shares = column(&outcome.tables[0], "share");
+    assert!(shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
+}
+
+#[test]
+fn mutations_lead_beyond_the_front_of_one_structure() {
+    let outcome = outcome("4.7");
+    assert!(outcome.lenses.iter().all(|(_, lens)| lens.check().is_ok()));
+}
+
+#[test]
+fn a_search_makes_the_lens_of_1962_sharper() {
+    let outcome = outcome("teaser");
+    let found = rows_with(&outcome.tables[0], "design", "found");
+    assert_eq!(column(&found, "rms_mm").len(), 4);
+}

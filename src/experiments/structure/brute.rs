@@ -1,0 +1,23 @@
+//! Figure 4.5: RESTORE against brute force, which adds a singlet behind every element, removes each
+//! one, and descends from every such lens for its part of the gradients.
+//!
+//! Metropolis and Hastings stand beside them, and a descent from the start that never mutates: what
+//! lies below it is what mutations are worth.
+
+use super::super::{Effort, Ended, Experiment, Outcome, Watch};
+use super::race::{Race, Runner};
+
+pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
+    id: "4.5",
+    title: "RESTORE against brute force on four lenses",
+    claim: "After as many gradients RESTORE has found a better lens than either baseline",
+    seconds: 200.0,
+    run,
+};
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let (lenses, seeds, gradients) = effort.race();
+    let runners = &[Runner::Restore, Runner::Brute, Runner::Metropolis, Runner::Descent];
+    let rivals = &[Runner::Brute, Runner::Metropolis];
+    Race { runners, rivals, lenses, seeds, gradients }.run(watch)
+}

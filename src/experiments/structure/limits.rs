@@ -1,0 +1,48 @@
+//! The limits of a factory, as far as a published lens keeps them.
+
+use crate::lens::Lens;
+use crate::merit::{Goal, Margin, MeritError, Term, Weighted, margins};
+
+/// The same goal, each limit of a gap, an edge or a steepness no tighter than what the lens has.
+pub(super) fn kept_by(lens: &Lens, goal: &Goal) -> Result<Goal, MeritError> {
+    let found = margins(lens, goal.terms.iter().map(|w| w.term))?;
+    let loosened = |w: &Weighted| Weighted { term: loosened(w.term, &found), ..*w };
+    Ok(Goal { terms: goal.terms.iter().map(loosened).collect(), ..goal.clone() })
+}
+
+fn loosened(term: Term, found: &[Margin]) -> Term {
+    let values = || found.iter().filter(|margin| margin.term == term.name()).map(|m| m.value);
+    let least = |min: f64| values().fold(min, f64::min);
+    let most = |max: f64| values().fold(max, f64::max);
+    match term {
+        Term::GlassCenter { min, max } => Term::GlassCenter { min: least(min), max: most(max) },
+        Term::AirCenter { min, max } => Term::AirCenter { min: least(min), max: most(max) },
+        Term::GlassEdge(min) => Term::GlassEdge(least(min)),
+        Term::AirEdge(min) => Term::AirEdge(least(min)),
+        Term::Steepness(max) => Term::Steepness(most(max)),
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{SUBJECTS, at_heights, rules};
+    use super::*;
+    use crate::search::lens::goal;
+
+    #[test]
+    fn a_lens_keeps_its_own_limits_and_no_others_are_loosened() {
+        for subject in SUBJECTS {
+            let lens = at_heights(subject.file).unwrap();
+            let usual = goal(&lens, &rules(), None, 1.0).unwrap();
+            let kept = kept_by(&lens, &usual).unwrap();
+            let terms = |goal: &Goal| goal.terms.iter().map(|w| w.term).collect::<Vec<_>>();
+            let room = |goal: &Goal| {
+                let found = margins(&lens, terms(goal).into_iter()).unwrap();
+                found.iter().map(Margin::room).fold(f64::INFINITY, f64::min)
+            };
+            assert!(room(&kept) >= 0.0, "{}: {}", subject.name, room(&kept));
+            assert_eq!(room(&usual) >= 0.0, terms(&usual) == terms(&kept), "{}", subject.name);
+        }
+    }
+}

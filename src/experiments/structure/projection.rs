@@ -1,0 +1,202 @@
+//! Figure 4.6 and table 4.1: what paraxial projection is worth.
+//!
+//! The share of iterations at which a search is at something better than its start, with mutations
+//! that are projected and with such that are not. The thesis's shares stand beside ours; its lenses
+//! and steps are others, so that only the order of the two is compared.
+
+use super::super::trade::Part;
+use super::super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
+use super::course::{Course, Mark, finish};
+use super::{SUBJECTS, Subject, at_heights, plan, rules};
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke};
+use crate::search::{Kind, Rules};
+
+pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
+    id: "4.6",
+    title: "Mutations with paraxial projection and without, with table 4.1",
+    claim: "With projection a search is more often at a lens that is better than its start",
+    seconds: 150.0,
+    run,
+};
+
+/// After how many gradients the shares are read.
+const READ: [u64; 2] = [1000, 5000];
+
+/// Table 4.1 of the thesis: for every lens with projection at both places, then without.
+const THESIS: [[[f64; 2]; 2]; 4] = [
+    [[0.356, 0.358], [0.225, 0.241]],
+    [[0.964, 0.972], [0.554, 0.828]],
+    [[0.118, 0.424], [0.0, 0.015]],
+    [[0.087, 0.281], [0.009, 0.122]],
+];
+
+/// With and without.
+const SIDES: [(bool, &str); 2] = [(true, "projection"), (false, "no projection")];
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    // A test has room for the lens of the picture alone, and for one place.
+    let lenses = effort.pick(0..SUBJECTS.len(), 3..SUBJECTS.len());
+    let (seeds, read) = (effort.pick(10, 4), effort.pick(&READ[..], &READ[..1]));
+    let mut outcome = Outcome::default();
+    let mut table = shares_table();
+    let count = lenses.len() as f64;
+    for (done, i) in lenses.enumerate() {
+        let [from, to] = [done, done + 1].map(|part| part as f64 / count);
+        let part = Part { from, to, name: SUBJECTS[i].name };
+        let pair = Pair::of(SUBJECTS[i], seeds, read[read.len() - 1], part, watch)?;
+        for (k, gradients) in read.iter().enumerate() {
+            outcome.claims.push(pair.claim(*gradients));
+            pair.rows(&mut table, *gradients, THESIS[i].map(|side| side[k]));
+        }
+        outcome.rays += pair.sides.iter().flatten().map(Course::rays).sum::<usize>();
+        if i + 1 == SUBJECTS.len() {
+            outcome.pictures.push(Picture { name: "telephoto", canvas: pair.draw() });
+            outcome.tables.push(pair.moves());
+        }
+    }
+    outcome.tables.insert(0, table);
+    Ok(outcome)
+}
+
+fn shares_table() -> Table {
+    let columns =
+        ["lens", "mutations", "gradients", "share", "least", "most", "thesis", "generations"];
+    Table::new("shares", &columns)
+}
+
+/// A lens with searches on both sides, one for each seed.
+struct Pair {
+    subject: Subject,
+    sides: [Vec<Course>; 2],
+}
+
+impl Pair {
+    fn of(
+        subject: Subject,
+        seeds: u64,
+        gradients: u64,
+        part: Part<'_>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Ended> {
+        let start = at_heights(subject.file)?;
+        let mut all = Vec::new();
+        for (projection, _) in SIDES {
+            let mut plan = plan(&start, Rules { projection, ..rules() }, gradients)?;
+            for seed in 1..=seeds {
+                plan.settings.seed = seed;
+                all.push(Course::new(&start, &plan)?);
+            }
+        }
+        finish(&mut all, part, watch)?;
+        let without = all.split_off(seeds as usize);
+        Ok(Self { subject, sides: [all, without] })
+    }
+
+    /// The mean share of a side, and the least and the most of all seeds.
+    fn share(&self, side: usize, gradients: u64) -> [f64; 3] {
+        let shares: Vec<f64> =
+            self.sides[side].iter().map(|course| course.share_after(gradients)).collect();
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        let least = shares.iter().copied().fold(f64::INFINITY, f64::min);
+        [mean, least, shares.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+    }
+
+    fn claim(&self, gradients: u64) -> Claim {
+        let says = format!(
+            "{}: share of iterations better than the start after {gradients}, with projection \
+             against without",
+            self.subject.name
+        );
+        Claim::at_least(says, self.share(0, gradients)[0], self.share(1, gradients)[0])
+    }
+
+    fn rows(&self, table: &mut Table, gradients: u64, thesis: [f64; 2]) {
+        for (side, (_, name)) in SIDES.iter().enumerate() {
+            let [mean, least, most] = self.share(side, gradients);
+            let born = |course: &Course| {
+                let seen = course.marks.iter().take_while(|mark| mark.gradients <= gradients);
+                seen.map(|mark| mark.generation + 1).max().unwrap_or(1) as f64
+            };
+            let generations = self.sides[side].iter().map(born).sum::<f64>();
+            let generations = generations / self.sides[side].len() as f64;
+            let words = [self.subject.name, *name].map(Cell::from);
+            let numbers = [gradients as f64, mean, least, most, thesis[side], generations];
+            table.row(words.into_iter().chain(numbers.map(Cell::from)));
+        }
+    }
+
+    /// Every move of the first seed.
+    fn moves(&self) -> Table {
+        let columns = ["mutations", "gradients", "generation", "began_with", "merit", "best"];
+        let mut table = Table::new("moves", &columns);
+        for (courses, (_, name)) in self.sides.iter().zip(SIDES) {
+            for mark in &courses[0].marks {
+                let kind = mark.kind.map_or("start", Kind::name);
+                let numbers = [mark.gradients as f64, mark.generation as f64].map(Cell::from);
+                let merits = [mark.loss.unwrap_or(f64::NAN), mark.best].map(Cell::from);
+                let row = std::iter::once(Cell::from(name)).chain(numbers);
+                table.row(row.chain([kind.into()]).chain(merits));
+            }
+        }
+        table
+    }
+
+    /// The merit of every move of the first seed, on both sides, coloured by the mutation with which
+    /// its descent began.
+    fn draw(&self) -> Canvas {
+        let mut canvas = Canvas::new([1700, 1240]);
+        let all = || self.sides.iter().flat_map(|side| &side[0].marks);
+        let last = all().map(|mark| mark.gradients).max().unwrap_or(1) as f64;
+        let start = self.sides[0][0].start();
+        let losses = all().filter_map(|mark| mark.loss).filter(|loss| *loss < WORST * start);
+        let losses: Vec<f64> = losses.chain([start]).collect();
+        for (i, (_, name)) in SIDES.iter().enumerate() {
+            let top = 120.0 + 580.0 * i as f64;
+            let x = Axis::linear("gradients", [0.0, last]);
+            let y = Axis::logarithmic("merit", losses.iter().copied(), 1e-12);
+            let chart = Chart::new([120.0, top], [1380.0, top + 420.0], x, y);
+            chart.draw(&mut canvas, &format!("{}, {name}", self.subject.name));
+            let level = [[0.0, start], [last, start]];
+            canvas.curve(&chart.places(&level), GREY, Stroke::Dashed);
+            draw_moves(&mut canvas, &chart, &self.sides[i][0].marks);
+        }
+        key(&mut canvas);
+        canvas
+    }
+}
+
+/// What is worse than the start by this factor is not drawn.
+const WORST: f64 = 1e4;
+
+/// What a move is drawn in.
+fn color(kind: Option<Kind>) -> Color {
+    let place = kind.and_then(|kind| Kind::MUTATIONS.iter().position(|other| *other == kind));
+    match (kind, place) {
+        (None, _) => BLACK,
+        (_, Some(place)) if place < PALETTE.len() => PALETTE[place],
+        _ => GREY,
+    }
+}
+
+fn draw_moves(canvas: &mut Canvas, chart: &Chart, marks: &[Mark]) {
+    for descent in marks.chunk_by(|a, b| a.generation == b.generation) {
+        let losses = descent.iter().filter_map(|mark| Some([mark.gradients as f64, mark.loss?]));
+        let inside: Vec<[f64; 2]> = losses.filter(|point| chart.holds(*point)).collect();
+        let places = chart.places(&inside);
+        let color = color(descent[0].kind);
+        canvas.curve(&places, color, Stroke::Solid);
+        canvas.marks(&places[..places.len().min(1)], color);
+    }
+}
+
+/// Which mutation has which colour.
+fn key(canvas: &mut Canvas) {
+    let kinds = std::iter::once(None).chain(Kind::MUTATIONS.map(Some)).chain([Some(Kind::Global)]);
+    for (i, kind) in kinds.enumerate() {
+        let y = 140.0 + 30.0 * i as f64;
+        canvas.marks(&[[1420.0, y + 7.0]], color(kind));
+        canvas.text([1436.0, y], kind.map_or("start", Kind::name), BLACK, Align::Left);
+    }
+    canvas.curve(&[[1410.0, 507.0], [1430.0, 507.0]], GREY, Stroke::Dashed);
+    canvas.text([1436.0, 500.0], "merit of the start", BLACK, Align::Left);
+}

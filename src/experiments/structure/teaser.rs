@@ -1,0 +1,180 @@
+//! From a lens of 1962 towards one of 1980: what two decades of designing brought, searched for.
+//!
+//! The start is the 50 mm double Gauss by Nippon Kogaku (US 3,560,079) with its rims opened as far
+//! as its surfaces leave room; the mark is the 50 mm f/1.2 by Canon (US 4,364,644), which has an
+//! element more and an asphere. All are measured alike: one colour, four image heights, the RMS
+//! radius of each spot about its centroid, the clear area of each pupil. The search asks for sharp
+//! spots, and for so much more light that its mean over the fields is about that of the mark.
+
+use super::super::section::Section;
+use super::super::trade::Part;
+use super::super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
+use super::course::{Course, finish};
+use super::{at_heights, rules};
+use crate::lens::Lens;
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE};
+use crate::pupil::Bench;
+use crate::search::lens::{Figures, Plan, opened};
+use crate::search::{Rules, Settings};
+
+pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
+    id: "teaser",
+    title: "From a double Gauss of 1962 towards one of 1980",
+    claim: "A search finds a lens about as bright as the later design, and sharper",
+    seconds: 300.0,
+    run,
+};
+
+/// How far rims are opened at the start, in mm.
+const OPENED: f64 = 20.0;
+/// No rim becomes wider than that of the mark, in mm.
+const WIDEST: f64 = 26.0;
+/// The light asked for beyond that of the mark: penalties stop short of what they ask for.
+const MORE: f64 = 1.04;
+/// How exact the numbers are, relatively.
+const JUDGED: f64 = 1e-4;
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let own = at_heights("double_gauss_nikkor_s_50")?;
+    let start = opened(&own, OPENED);
+    let mark = Design::of("mark, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
+    let before = Design::of("start, opened", start.clone())?;
+    let share = MORE * mark.light() / before.light();
+    let mut found = vec![Course::new(&start, &plan(share, effort.pick(120_000, 1200)))?];
+    let part = Part { from: 0.0, to: 1.0, name: "search" };
+    finish(&mut found, part, watch)?;
+    let best = Design::of("found", found[0].run.best().point.clone())?;
+    let designs = [Design::of("start, 1962", own)?, before, best, mark];
+    let mut outcome = Outcome { claims: claims(&designs, effort), ..Outcome::default() };
+    outcome.rays = found[0].rays() + designs.iter().map(|d| d.figures.rays()).sum::<usize>();
+    outcome.tables.push(table(&designs));
+    outcome.tables.push(course(&found[0]));
+    outcome.pictures.push(Picture { name: "lenses", canvas: draw(&designs)? });
+    outcome.lenses.push(("found".to_owned(), designs[2].lens.clone()));
+    Ok(outcome)
+}
+
+fn plan(share: f64, gradients: u64) -> Plan {
+    let rules = Rules { semi_diameter: Some(WIDEST), ..rules() };
+    let default = Plan::default();
+    let settings = Settings { gradients: Some(gradients), ..default.settings };
+    Plan { light: share, rules, settings, ..default }
+}
+
+/// A lens with its numbers.
+struct Design {
+    name: &'static str,
+    lens: Lens,
+    figures: Figures,
+}
+
+impl Design {
+    fn of(name: &'static str, lens: Lens) -> Result<Self, Ended> {
+        let figures = Figures::of(&lens, JUDGED).map_err(Ended::from_error)?;
+        Ok(Self { name, lens, figures })
+    }
+
+    /// The mean area of the pupils, in mm².
+    fn light(&self) -> f64 {
+        let fields = &self.figures.fields;
+        fields.iter().map(|field| field.light.value).sum::<f64>() / fields.len() as f64
+    }
+
+    /// The root of the mean square radius of the spots, in mm; infinite where a field has no light.
+    fn spot(&self) -> f64 {
+        let fields = &self.figures.fields;
+        let square = |spot: Option<crate::analysis::Estimate>| {
+            spot.map_or(f64::INFINITY, |spot| spot.value * spot.value)
+        };
+        (fields.iter().map(|field| square(field.spot)).sum::<f64>() / fields.len() as f64).sqrt()
+    }
+}
+
+fn claims([_, before, found, mark]: &[Design; 4], effort: Effort) -> Vec<Claim> {
+    let um = |design: &Design| 1e3 * design.spot();
+    let sharper = format!("blur of the lens found, against that of `{}`", before.name);
+    let mut claims = vec![Claim::at_most(sharper, um(found), um(before)).in_unit("um")];
+    // A test has no room for more.
+    if effort == Effort::Full {
+        let brighter = "mean light of the lens found, against that of the mark";
+        claims.push(Claim::at_least(brighter, found.light(), mark.light()).in_unit("mm^2"));
+        let sharper = "blur of the lens found, against that of the mark";
+        claims.push(Claim::at_most(sharper, um(found), um(mark)).in_unit("um"));
+    }
+    claims
+}
+
+fn table(designs: &[Design]) -> Table {
+    let columns = [
+        "design",
+        "elements",
+        "focal_length_mm",
+        "track_mm",
+        "field_deg",
+        "rms_mm",
+        "rms_error_mm",
+        "area_mm2",
+        "area_error_mm2",
+    ];
+    let mut table = Table::new("designs", &columns);
+    for Design { name, figures, .. } in designs {
+        for field in &figures.fields {
+            let focal = figures.focal_lengths[0].unwrap_or(f64::NAN);
+            let spot = field.spot.map_or([f64::NAN; 2], |spot| [spot.value, spot.error]);
+            let whole = [figures.elements as f64, focal, figures.track, field.y];
+            let light = [field.light.value, field.light.error];
+            let numbers = whole.into_iter().chain(spot).chain(light);
+            table.row(std::iter::once((*name).into()).chain(numbers.map(Cell::from)));
+        }
+    }
+    table
+}
+
+/// The best merit as the search went on.
+fn course(course: &Course) -> Table {
+    let mut table = Table::new("course", &["gradients", "best"]);
+    let mut last = f64::INFINITY;
+    for mark in &course.marks {
+        if mark.best < last {
+            last = mark.best;
+            table.row([mark.gradients as f64, mark.best].map(Cell::from));
+        }
+    }
+    table
+}
+
+/// Every lens with its rays, and its numbers beside it.
+fn draw(designs: &[Design]) -> Result<Canvas, Ended> {
+    let mut canvas = Canvas::new([1500, 60 + 330 * designs.len() as u32]);
+    for (i, design) in designs.iter().enumerate() {
+        draw_design(&mut canvas, design, 60.0 + 330.0 * i as f64)?;
+    }
+    Ok(canvas)
+}
+
+fn draw_design(canvas: &mut Canvas, design: &Design, top: f64) -> Result<(), Ended> {
+    let bench = Bench::of(&design.lens, 0).map_err(Ended::from_error)?;
+    let section = Section::new(&bench.colors[0].system);
+    let [z, y] = section.extent();
+    let (x, y) = (Axis::linear("", z), Axis::linear("", y));
+    let chart = Chart::new([60.0, top], [760.0, top + 260.0], x, y).to_scale();
+    let (name, figures) = (design.name, &design.figures);
+    let title = format!("{name}: {} elements, {}", figures.elements, figures.topology);
+    canvas.text([60.0, top - 30.0], &title, BLACK, Align::Left);
+    for (i, field) in bench.fields.iter().enumerate() {
+        let launch = bench.launch(*field, bench.primary).map_err(Ended::from_error)?;
+        let color = PALETTE[i % PALETTE.len()];
+        for ray in -2..=2 {
+            section.draw_ray(canvas, &chart, &launch, [0.0, 0.45 * f64::from(ray)], color);
+        }
+        let numbers = &figures.fields[i];
+        let spot = numbers.spot.map_or(f64::NAN, |spot| 1e3 * spot.value);
+        let light = numbers.light.value;
+        let text = format!("{:.1} deg: {spot:.0} um rms, {light:.0} mm^2", numbers.y);
+        canvas.text([840.0, top + 40.0 + 34.0 * i as f64], &text, color, Align::Left);
+    }
+    let all = format!("all: {:.0} um rms, {:.0} mm^2", 1e3 * design.spot(), design.light());
+    canvas.text([840.0, top + 190.0], &all, BLACK, Align::Left);
+    section.draw(canvas, &chart);
+    Ok(())
+}
