@@ -38,7 +38,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
         Settings { points: effort.pick(8, 2), steps: effort.pick(400, 60), ..Settings::default() };
     let sweep = swept(&start, &settings, watch)?;
     let chosen = chosen(sweep.front(), effort.pick(8, 2));
-    let gradients = effort.pick(8000, 600);
+    let gradients = effort.pick(4000, 600);
     let sides = Sides::of(&sweep, &chosen, gradients, watch)?;
     let mut outcome = Outcome { claims: sides.claims(&sweep), ..Outcome::default() };
     outcome.rays = sides.rays;

@@ -59,6 +59,19 @@ impl Course {
         seen.last().map_or(f64::NAN, |mark| mark.better as f64 / mark.moves as f64)
     }
 
+    /// Of the moves behind a mutation: those that led to something better than the start, and all.
+    pub(super) fn mutants_after(&self, gradients: u64) -> [u64; 2] {
+        let (mut counts, mut last) = ([0, 0], [0, 0]);
+        for mark in self.marks.iter().take_while(|mark| mark.gradients <= gradients) {
+            let now = [mark.better, mark.moves];
+            if mark.kind.is_some() {
+                counts = [0, 1].map(|i| counts[i] + now[i] - last[i]);
+            }
+            last = now;
+        }
+        counts
+    }
+
     /// About how many rays it traced for its gradients.
     pub(super) fn rays(&self) -> usize {
         self.landscape.rays(self.landscape.start()) * self.run.statistics().gradients as usize

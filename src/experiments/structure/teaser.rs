@@ -40,7 +40,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     let mark = Design::of("mark, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
     let before = Design::of("start, opened", start.clone())?;
     let share = MORE * mark.light() / before.light();
-    let mut found = vec![Course::new(&start, &plan(share, effort.pick(120_000, 1200)))?];
+    let mut found = vec![Course::new(&start, &plan(share, effort.pick(60_000, 800)))?];
     let part = Part { from: 0.0, to: 1.0, name: "search" };
     finish(&mut found, part, watch)?;
     let best = Design::of("found", found[0].run.best().point.clone())?;
