@@ -12,7 +12,7 @@ use std::str::FromStr;
 
 /// What a search may do and aims at.
 #[derive(Debug, clap::Args)]
-pub(super) struct Asked {
+pub(in crate::cli) struct Asked {
     /// What to aim at, as JSON; sharp spots with the light it has, at its focal length, where absent
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
@@ -168,7 +168,7 @@ fn positive(name: &str, value: Option<f64>) -> Result<Option<f64>, Failure> {
 }
 
 impl Asked {
-    pub(super) fn plan(&self) -> Result<Plan, Failure> {
+    pub(in crate::cli) fn plan(&self) -> Result<Plan, Failure> {
         let mut plan = Plan { rules: self.rules()?, light: self.light, ..Plan::default() };
         positive("--light", Some(self.light))?;
         plan.focal_length = match self.focal_length {
@@ -224,7 +224,7 @@ impl Asked {
     }
 
     /// The lens that the search starts from.
-    pub(super) fn start(&self, lens: &Lens) -> Result<Lens, Failure> {
+    pub(in crate::cli) fn start(&self, lens: &Lens) -> Result<Lens, Failure> {
         let mut start = lens.clone();
         if self.free {
             start.variables.clear();

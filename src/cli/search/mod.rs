@@ -3,6 +3,8 @@
 mod asked;
 mod report;
 
+pub(super) use asked::Asked;
+
 use super::failure::Failure;
 use super::input::{self, LensFile};
 use super::optimize::{progress_bar, stop_flag};
@@ -59,7 +61,7 @@ pub(super) struct Search {
     finish: bool,
 
     #[command(flatten)]
-    asked: asked::Asked,
+    asked: Asked,
 }
 
 /// The samplers.
