@@ -122,12 +122,7 @@ fn time(lens: &Lens, plan: &Plan, race: Race) -> Result<SearchRow, NoSearch> {
 }
 
 /// One run; adds the merit of its best lens at every mark, and returns its gradients.
-fn one(
-    lens: &Lens,
-    plan: &Plan,
-    seconds: f64,
-    found: &mut [Vec<f64>],
-) -> Result<u64, NoSearch> {
+fn one(lens: &Lens, plan: &Plan, seconds: f64, found: &mut [Vec<f64>]) -> Result<u64, NoSearch> {
     let landscape = plan.landscape(lens)?;
     let settings = plan.settings(&landscape);
     let mut run = Run::new(&landscape, landscape.start().clone(), &settings)

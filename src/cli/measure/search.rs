@@ -73,8 +73,11 @@ impl Display for Report {
         for (title, rows) in [("sampler", methods), ("RESTORE", tolerances)] {
             let marks = rows.first().map_or(&[][..], |row| &row.marks);
             let after = marks.iter().map(|mark| format!("after {} s", mark.seconds));
-            let head: Vec<String> =
-                [title, "tolerance", "gradients"].map(str::to_owned).into_iter().chain(after).collect();
+            let head: Vec<String> = [title, "tolerance", "gradients"]
+                .map(str::to_owned)
+                .into_iter()
+                .chain(after)
+                .collect();
             let head: Vec<&str> = head.iter().map(String::as_str).collect();
             let mut table = Table::new(&head);
             for SearchRow { method, tolerance, gradients, marks } in rows {
