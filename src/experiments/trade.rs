@@ -3,9 +3,9 @@
 
 use super::{Cell, Ended, Table, Watch, report};
 use crate::lens::{Aperture, Field, FieldKind, Fields, Lens};
-use crate::merit::{Goal, PupilEdge, Term, Weighted};
+use crate::merit::{PupilEdge, Term, Weighted};
 use crate::optimize::annealed;
-use crate::optimize::pareto::{Design, Settings, Sweep};
+use crate::optimize::pareto::{Design, Settings, Sweep, composite};
 use crate::pupil::{Bench, Region};
 
 /// Orders of quadrature of the numbers that are shown: the difference is the error.
@@ -83,8 +83,6 @@ pub(super) struct Part<'a> {
 /// How exact the spots of a search are, and those of its designs, relatively.
 const SEARCHED: f64 = 1e-3;
 const JUDGED: f64 = 1e-4;
-/// No rim may cut more of its sphere than this: curvature times semi-diameter.
-const STEEPEST: f64 = 0.9;
 
 /// The lens at the start, limited by its stop and with everything free, and a design for each
 /// weight, the search for each beginning where the one before has led.
@@ -96,7 +94,7 @@ pub(super) fn searched(
 ) -> Result<Vec<Design>, Ended> {
     let settings = Settings { rims: plan.rims, pupil: plan.pupil, ..Settings::default() };
     let start = Sweep::new(lens, &settings).map_err(Ended::from_error)?.start;
-    let goal = composite(&start, plan.pupil)?;
+    let goal = composite(&start.lens, start.light, plan.pupil).map_err(Ended::from_error)?;
     let total = (plan.betas.len() * plan.steps) as f64;
     let mut designs = vec![start];
     for (i, beta) in plan.betas.iter().enumerate() {
@@ -117,19 +115,6 @@ pub(super) fn searched(
         designs.push(design.map_err(Ended::from_error)?);
     }
     Ok(designs)
-}
-
-/// What (3.26) asks for besides light: the integrals of the spots, and that the lens stays one: its
-/// focal length, glass and air that can be made, no hemispheres. The integral of a spot is its mean
-/// square times the light, and so the others count.
-fn composite(start: &Design, pupil: PupilEdge) -> Result<Goal, Ended> {
-    let mut goal = Goal::sensible(&start.lens).map_err(Ended::from_error)?;
-    goal.terms.retain(|weighted| !matches!(weighted.term, Term::Spot | Term::Light(_)));
-    goal.terms.push(Weighted { term: Term::Steepness(STEEPEST), weight: 1.0 });
-    goal.terms.iter_mut().for_each(|weighted| weighted.weight *= start.light);
-    goal.terms.push(Weighted { term: Term::SpotIntegral, weight: 1.0 });
-    goal.pupil = pupil;
-    Ok(goal)
 }
 
 /// A field of a lens.

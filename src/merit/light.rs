@@ -32,9 +32,9 @@ pub(super) fn light(scene: &Scene<'_>, term: Term, sum: &mut Sum) {
 fn kept(scene: &Scene<'_>, share: f64, sum: &mut Sum) {
     for (i, (pupil, before)) in scene.sampling.pupils.iter().zip(scene.start).enumerate() {
         let least = share * before;
-        if pupil.moments.area < least {
-            let slope = area(scene, sum.detail, |other| other == i, -1.0 / (least * pupil.share));
-            sum.residual(pupil.share, 1.0 - pupil.moments.area / least, &slope.slope);
+        if pupil.area < least {
+            let slope = area(scene, sum.detail, |other| other == i, -1.0 / (least * pupil.weight));
+            sum.residual(pupil.weight, 1.0 - pupil.area / least, &slope.slope);
         }
     }
 }
@@ -80,16 +80,16 @@ fn mean(scene: &Scene<'_>, detail: Detail) -> Sloped {
 /// The area of the pupil of a field, the mean over wavelengths by weight.
 fn of_field(scene: &Scene<'_>, field: usize, detail: Detail) -> Sloped {
     let pupils = &scene.sampling.pupils;
-    let share: f64 = pupils.iter().filter(|p| p.field == field).map(|p| p.share).sum();
+    let share: f64 = pupils.iter().filter(|p| p.field == field).map(|p| p.weight).sum();
     area(scene, detail, |i| pupils[i].field == field, 1.0 / share)
 }
 
 /// The areas of the pupils of some fields, each by its share and a factor.
 fn area(scene: &Scene<'_>, detail: Detail, chosen: impl Fn(usize) -> bool, factor: f64) -> Sloped {
     let pupils = &scene.sampling.pupils;
-    let share = |(i, p): (usize, &Pupil)| if chosen(i) { factor * p.share } else { 0.0 };
+    let share = |(i, p): (usize, &Pupil)| if chosen(i) { factor * p.weight } else { 0.0 };
     let shares = pupils.iter().enumerate().map(share);
-    let value = shares.clone().zip(pupils).map(|(share, pupil)| share * pupil.moments.area).sum();
+    let value = shares.clone().zip(pupils).map(|(share, pupil)| share * pupil.area).sum();
     let slope = if detail == Detail::Value {
         DVector::zeros(scene.values.len())
     } else {

@@ -159,8 +159,11 @@ impl Merit {
     /// Finds the rays of the spots anew for a lens of the same structure.
     pub fn resample(&mut self, lens: &Lens) -> Result<(), MeritError> {
         let positions = 0..lens.zoom_positions();
+        // A lens without light can be asked for light.
+        let about_light = self.goal.terms.iter().any(|w| w.term.is_about_light());
+        let dark = about_light && self.goal.pupil == PupilEdge::Moving;
         let found: Result<Vec<_>, _> =
-            positions.map(|zoom| Sampling::new(lens, zoom, self.tolerance)).collect();
+            positions.map(|zoom| Sampling::new(lens, zoom, self.tolerance, dark)).collect();
         self.samplings = found?;
         Ok(())
     }
@@ -192,7 +195,7 @@ impl Merit {
 
     /// Whether light gets through at every field, zoom position and wavelength.
     pub fn is_lit(&self) -> bool {
-        self.samplings.iter().flat_map(Sampling::areas).all(|area| area > 0.0)
+        self.samplings.iter().flat_map(|sampling| &sampling.pupils).all(|pupil| pupil.area > 0.0)
     }
 
     /// How the spots are sampled, by zoom position, field and wavelength; a spot without rays has no
@@ -319,8 +322,8 @@ impl Scene<'_> {
         let mut total = DVector::zeros(self.values.len());
         for ((lit, pupil), cost) in self.light.iter().zip(&self.sampling.pupils).zip(costs) {
             let asked = cost.square != 0.0 || cost.constant != 0.0;
-            if let Some(motion) = asked.then(|| lit.edge_motion(&cost)).flatten() {
-                total += self.zoom.collect(self.systems, pupil.wavelength, &motion);
+            if asked {
+                total += self.zoom.collect(self.systems, pupil.wavelength, &lit.motion(&cost));
             }
         }
         total

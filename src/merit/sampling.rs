@@ -36,6 +36,8 @@ pub(super) struct Pupil {
     pub(super) wavelength: usize,
     /// Its part of the whole: fields and wavelengths weighted, one in all.
     pub(super) share: f64,
+    /// Its share in means of light, to which dark pupils count as well.
+    pub(super) weight: f64,
     /// The cosine of the angle with the axis at which a collimated beam arrives.
     cosine: Option<f64>,
     anchor: Anchor,
@@ -43,6 +45,10 @@ pub(super) struct Pupil {
     /// The order of quadrature that was good enough.
     order: usize,
     pub(super) moments: Moments,
+    /// [`Lit::area`], in mm².
+    pub(super) area: f64,
+    /// The area of the ideal entrance pupil, in mm².
+    ideal: f64,
 }
 
 /// The rays of one zoom position.
@@ -95,8 +101,13 @@ impl Color {
 
 impl Sampling {
     /// Finds the pupils of a lens, each sampled so that the radius of its spot is good to a
-    /// tolerance.
-    pub(super) fn new(lens: &Lens, zoom: usize, tolerance: f64) -> Result<Self, MeritError> {
+    /// tolerance. A lens without any light is refused unless `dark_too`.
+    pub(super) fn new(
+        lens: &Lens,
+        zoom: usize,
+        tolerance: f64,
+        dark_too: bool,
+    ) -> Result<Self, MeritError> {
         let bench = Bench::of(lens, zoom)?;
         let mut sampling = Self {
             colors: Vec::new(),
@@ -130,13 +141,15 @@ impl Sampling {
         for (sampled, (pupil, lit)) in
             sampling.sampled.iter_mut().zip(sampling.pupils.iter_mut().zip(&lit))
         {
-            pupil.moments = lit.moments;
+            (pupil.moments, pupil.area) = (lit.moments, lit.area());
             sampled.area = lit.moments.area;
             sampled.light = lit.landed.arrived().map(|(_, w)| w).sum::<f64>() / PI;
             sampled.rays = if sampled.light > 0.0 { lit.rays.len() } else { 0 };
         }
         match sampling.sampled.first() {
-            Some(first) if sampling.sampled.iter().all(|s| s.rays == 0) => Err(dark(first)),
+            Some(first) if !dark_too && sampling.sampled.iter().all(|s| s.rays == 0) => {
+                Err(dark(first))
+            }
             _ => Ok(sampling),
         }
     }
@@ -145,6 +158,7 @@ impl Sampling {
     fn look(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: Sampled) {
         let (field, wavelength) = (place.field, launch.wavelength);
         let (anchor, cosine) = (launch.anchor(), launch.cosine());
+        let ideal = PI * launch.area();
         let region = Region::new(launch);
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let mut orders = 0_usize;
@@ -157,8 +171,19 @@ impl Sampling {
         let error = found.map_or(0.0, |f| f.errors[0] / f.values[0].max(f64::MIN_POSITIVE));
         let (kind, moments) = (region.kind, Moments::default());
         let order = orders.saturating_sub(1);
-        let found = Pupil { field, wavelength, share, cosine, anchor, kind, order, moments };
-        self.pupils.push(found);
+        self.pupils.push(Pupil {
+            field,
+            wavelength,
+            share,
+            weight: share,
+            cosine,
+            anchor,
+            kind,
+            order,
+            moments,
+            area: 0.0,
+            ideal,
+        });
         self.sampled.push(Sampled { error, ..place });
     }
 
@@ -185,8 +210,8 @@ impl Sampling {
         self.pupils.iter().map(lit).collect()
     }
 
-    /// Refuses light that has gone out since the pupils were looked for: what a dark pupil would
-    /// need to be lit again is told by no derivative.
+    /// Refuses light that has gone out since the pupils were looked for: a spot without light is
+    /// none, and would be the sharpest of all.
     pub(super) fn check_light(&self, lit: &[Lit<'_>]) -> Result<(), MeritError> {
         let was_lit = |pupil: &Pupil| pupil.moments.area > 0.0;
         let mut all = self.pupils.iter().zip(lit).zip(&self.sampled);
@@ -199,7 +224,9 @@ impl Sampling {
     /// The same sampling with the rays of other light.
     pub(super) fn with_light(&self, bench: &Bench, lit: &[Lit<'_>]) -> Self {
         let mut pupils = self.pupils.clone();
-        pupils.iter_mut().zip(lit).for_each(|(pupil, lit)| pupil.moments = lit.moments);
+        for (pupil, lit) in pupils.iter_mut().zip(lit) {
+            (pupil.moments, pupil.area) = (lit.moments, lit.area());
+        }
         Self { colors: self.colors(bench, lit), pupils, ..self.clone() }
     }
 
@@ -220,9 +247,10 @@ impl Sampling {
         colors
     }
 
-    /// The areas of the pupils.
+    /// The areas of the pupils; of dark ones those that they would ideally have.
     pub(super) fn areas(&self) -> Vec<f64> {
-        self.pupils.iter().map(|pupil| pupil.moments.area).collect()
+        let area = |pupil: &Pupil| if pupil.area > 0.0 { pupil.area } else { pupil.ideal };
+        self.pupils.iter().map(area).collect()
     }
 
     /// The field on the axis, if there is one.

@@ -243,7 +243,7 @@ impl Sweep {
         let lens = freed(&limited_by_stop(lens)?, settings.rims);
         lens.check()?;
         let start = Design::of(&lens, None, JUDGED)?;
-        let goal = goal(&lens, start.light, settings.pupil)?;
+        let goal = composite(&lens, start.light, settings.pupil)?;
         let weights = settings.weights(goal_focal_length(&goal, &lens));
         let last = weights.last().copied().unwrap_or(0.0);
         let begin = [(last, goal.pupil), (0.0, PupilEdge::Kept)];
@@ -392,8 +392,13 @@ impl Chain {
     }
 }
 
-/// What every weight asks for besides light.
-fn goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
+/// What (3.26) asks for besides light, of a lens with this mean area of its pupils in mm²: the
+/// integrals of the spots, and that the lens stays one: its focal length, glass and air that can be
+/// made, no hemispheres, no field without light.
+///
+/// # Errors
+/// A lens without first-order data.
+pub fn composite(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
     let sensible = Goal::sensible(lens)?;
     let mut terms = vec![Weighted { term: Term::SpotIntegral, weight: 1.0 }];
     // The integral of a spot is its mean square times the light, and so must the others count.

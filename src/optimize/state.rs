@@ -235,7 +235,9 @@ fn clamp(variable: &Variable, value: f64) -> f64 {
 fn scale(lens: &Lens, variable: &Variable) -> f64 {
     let size = lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>().max(1e-6);
     let rim = lens.surfaces[variable.parameter.surface].semi_diameter.unwrap_or(0.1 * size);
-    let rim = rim.clamp(1e-3 * size, size);
+    // A rim that is closed is one to be opened, by steps of the size of the others.
+    let widest = lens.surfaces.iter().filter_map(|row| row.semi_diameter).fold(0.0, f64::max);
+    let rim = rim.max(0.5 * widest).clamp(1e-3 * size, size);
     match variable.parameter.quantity {
         Quantity::Curvature => 0.1 / rim.max(0.05 * size),
         Quantity::Conic => 1.0,

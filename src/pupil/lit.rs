@@ -1,30 +1,18 @@
 //! The rays of a pupil at one order of quadrature, traced once: its moments, and from the same
 //! rays the derivatives of any integral over it.
 
-use super::boundary::{Frame, Limit};
-use super::launch::Launch;
+use super::boundary::Limit;
 use super::moments::{Moments, moments};
-use super::quadrature::{Landed, Nodes, SPLIT, Spoke, nodes_of};
-use super::region::{Kind, Region};
+use super::quadrature::{Landed, Nodes, Spoke};
+use super::region::Region;
+use super::shadow::Shadow;
 use crate::trace::{Points, Rays, Sink};
-
-/// How the edge of a pupil is known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Rim {
-    /// It is the disc of the pupil, which does not move.
-    Still,
-    /// It ends the spokes in this frame.
-    Spokes(Frame),
-    /// It is not.
-    Unknown,
-}
 
 /// The light of a pupil.
 #[derive(Debug, Clone)]
 pub struct Lit<'a> {
-    /// From where its rays start.
-    pub launch: Launch<'a>,
-    pub(super) rim: Rim,
+    /// The pupil.
+    pub(super) region: Region<'a>,
     /// Its radii, where it is split at its corners.
     pub(super) spokes: Vec<Spoke>,
     /// The rays that were traced.
@@ -35,6 +23,8 @@ pub struct Lit<'a> {
     pub mirrored: bool,
     /// Area, centroid, spread.
     pub moments: Moments,
+    /// How far a dark pupil is from light.
+    pub shadow: Option<Shadow>,
     /// Rays traced for them, those that looked for the edge included.
     pub traced: usize,
 }
@@ -44,35 +34,12 @@ impl<'a> Region<'a> {
     /// is one radius: for integrands that depend on the distance from the axis alone, and for those
     /// that a mirror image makes such, as squares of distances from a point do.
     pub fn lit(&self, order: usize) -> Lit<'a> {
-        let (nodes, spokes) = match &self.kind {
-            Kind::Split(boundary) => {
-                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
-                let alike = self.launch.is_axial() && boundary.arcs.len() == 1;
-                let (spokes, rays) = self.spokes(boundary, if alike { 1 } else { azimuths });
-                let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
-                (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
-                (nodes, spokes)
-            }
-            Kind::Ragged { ring: Some(ring), .. } => {
-                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
-                let (spokes, rays) = ring.spokes(&self.launch, azimuths);
-                let mut nodes = ring.nodes_of(&spokes, radii);
-                (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
-                (nodes, spokes.into_iter().flatten().collect())
-            }
-            Kind::Clear | Kind::Ragged { .. } | Kind::Dark | Kind::Endless => {
-                (self.nodes(order), Vec::new())
-            }
-        };
-        self.traced(&nodes, spokes)
+        let (nodes, spokes) = self.nodes_and_spokes(order, true);
+        Lit { spokes, shadow: self.shadow(), ..self.at(&nodes) }
     }
 
-    /// Traces some nodes; what moves the edge is not known then.
+    /// Traces some nodes; the motion of an edge is not known then.
     pub fn at(&self, nodes: &Nodes) -> Lit<'a> {
-        Lit { rim: Rim::Unknown, ..self.traced(nodes, Vec::new()) }
-    }
-
-    fn traced(&self, nodes: &Nodes, spokes: Vec<Spoke>) -> Lit<'a> {
         let started = nodes.points.iter().zip(&nodes.weights);
         let started = started.filter_map(|(p, w)| Some((self.launch.ray(*p)?, *w)));
         let (rays, weights): (Vec<_>, Vec<f64>) = started.unzip();
@@ -82,16 +49,16 @@ impl<'a> Region<'a> {
         self.launch.color().tracer.batch(&rays, &mut sink);
         let landed = Landed { sink, weights, lost };
         let mirrored = nodes.mirrored;
-        let moments = moments(&landed, mirrored, self.launch.area());
-        let traced = nodes.rays + rays.len();
-        let rim = match &self.kind {
-            Kind::Clear => Rim::Still,
-            Kind::Split(boundary) => Rim::Spokes(boundary.frame),
-            Kind::Ragged { ring: Some(ring), .. } => Rim::Spokes(ring.outer.frame),
-            Kind::Dark | Kind::Ragged { .. } | Kind::Endless => Rim::Unknown,
-        };
-        let launch = self.launch.clone();
-        Lit { launch, rim, spokes, rays, landed, mirrored, moments, traced }
+        Lit {
+            region: self.clone(),
+            spokes: Vec::new(),
+            moments: moments(&landed, mirrored, self.launch.area()),
+            landed,
+            mirrored,
+            shadow: None,
+            traced: nodes.rays + rays.len(),
+            rays,
+        }
     }
 }
 
@@ -105,6 +72,12 @@ impl Lit<'_> {
             }
         }
         found
+    }
+
+    /// The area of the pupil in mm² of the first vertex plane; of a dark one minus an area that
+    /// grows with how far it is from light, so that what asks for light is told the way back.
+    pub fn area(&self) -> f64 {
+        self.shadow.as_ref().map_or(self.moments.area, Shadow::area)
     }
 
     /// Whether some ray arrives.

@@ -26,6 +26,7 @@ mod region;
 mod ring;
 mod rules;
 mod sample;
+mod shadow;
 mod stopped;
 
 pub use bench::{Aiming, Bench, BenchError, Color, Dual2, MISS};
@@ -41,4 +42,5 @@ pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
 pub use region::{Kind, Region};
 pub use ring::Ring;
 pub use sample::{Pattern, pattern};
+pub use shadow::Shadow;
 pub use stopped::limited_by_stop;

@@ -71,7 +71,7 @@ const FAR: f64 = 1.5;
 
 /// The nodes on some radii. Where a cosine vanishes at the edge or close behind it, the image moves
 /// with the root of the distance from there: Gauss nodes in a variable that makes it smooth.
-pub(super) fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
+fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
     let mut nodes = Nodes::default();
     for spoke in spokes {
         let radius = spoke.edge.radius;
@@ -143,7 +143,7 @@ impl Grading {
 /// Nodes along the radius and along half a turn, of the clear disc.
 const CLEAR: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
 /// Nodes along an arc and along the radius, of a piece.
-pub(super) const SPLIT: [(usize, usize); 12] = [
+const SPLIT: [(usize, usize); 12] = [
     (4, 3),
     (6, 4),
     (8, 5),
@@ -174,29 +174,33 @@ impl Region<'_> {
 
     /// The nodes of an order, counted from 0; none where there is no light.
     pub fn nodes(&self, order: usize) -> Nodes {
+        self.nodes_and_spokes(order, false).0
+    }
+
+    /// The nodes of an order, and the radii that they lie on where the pupil is split; one radius
+    /// where all azimuths are `alike` and that is enough.
+    pub(super) fn nodes_and_spokes(&self, order: usize, alike: bool) -> (Nodes, Vec<Spoke>) {
         let mirrored = self.launch.is_symmetric();
+        let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
         match &self.kind {
-            Kind::Dark | Kind::Endless => Nodes::default(),
-            Kind::Clear => clear(CLEAR[order.min(CLEAR.len() - 1)], mirrored),
-            Kind::Split(boundary) => self.split(boundary, SPLIT[order.min(SPLIT.len() - 1)]),
+            Kind::Dark | Kind::Endless => Default::default(),
+            Kind::Clear => (clear(CLEAR[order.min(CLEAR.len() - 1)], mirrored), Vec::new()),
+            Kind::Split(boundary) => {
+                let alike = alike && self.launch.is_axial() && boundary.arcs.len() == 1;
+                let (spokes, rays) = self.spokes(boundary, if alike { 1 } else { azimuths });
+                let nodes = nodes_of(&spokes, &boundary.frame, radii);
+                (Nodes { mirrored, rays, ..nodes }, spokes)
+            }
             Kind::Ragged { ring: Some(ring), .. } => {
-                let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
                 let (spokes, rays) = ring.spokes(&self.launch, azimuths);
-                Nodes { mirrored, rays, ..ring.nodes_of(&spokes, radii) }
+                let nodes = ring.nodes_of(&spokes, radii);
+                (Nodes { mirrored, rays, ..nodes }, spokes.into_iter().flatten().collect())
             }
             Kind::Ragged { square, .. } => {
                 let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };
-                ragged(*square, RAGGED << (2 * order), reach)
+                (ragged(*square, RAGGED << (2 * order), reach), Vec::new())
             }
         }
-    }
-
-    /// Gauss nodes between the centre and the edge of every arc.
-    fn split(&self, boundary: &Boundary, (azimuths, radii): (usize, usize)) -> Nodes {
-        let (spokes, rays) = self.spokes(boundary, azimuths);
-        let mut nodes = nodes_of(&spokes, &boundary.frame, radii);
-        (nodes.mirrored, nodes.rays) = (self.launch.is_symmetric(), rays);
-        nodes
     }
 
     /// Radii at the Gauss nodes of azimuth of every arc, and the rays traced to find their ends.

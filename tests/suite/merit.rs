@@ -1,7 +1,7 @@
 //! Derivatives of every term by every kind of variable, against central differences.
 
 use aplanat::files;
-use aplanat::lens::{Lens, Medium, Parameter, Pickup, Quantity, Variable};
+use aplanat::lens::{Aperture, Field, Lens, Medium, Parameter, Pickup, Quantity, Row, Variable};
 use aplanat::merit::{Detail, Goal, Merit, PupilEdge, Term, Weighted};
 
 pub(crate) fn bundled(name: &str) -> Lens {
@@ -137,6 +137,86 @@ fn every_term_knows_that_the_pupil_moves() {
             check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
         }
     }
+}
+
+/// A lens whose fields off the axis end at its last rim.
+fn half_dark() -> Lens {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.variables.clear();
+    lens.surfaces[10].semi_diameter = Some(0.5);
+    for surface in 0..lens.surfaces.len() {
+        for quantity in [Quantity::Curvature, Quantity::Thickness, Quantity::SemiDiameter] {
+            vary(&mut lens, surface, quantity);
+        }
+    }
+    lens
+}
+
+#[test]
+fn dark_pupils_have_a_derivative_that_leads_back_to_light() {
+    let lens = half_dark();
+    for term in [Term::Throughput, Term::ThroughputLoss(200.0), Term::Light(0.8)] {
+        check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
+    }
+    let goal = Goal {
+        terms: vec![Weighted { term: Term::Throughput, weight: 1.0 }],
+        zoom_ratios: Vec::new(),
+        pupil: PupilEdge::Moving,
+    };
+    let merit = Merit::new(&lens, &goal, 1e-3).unwrap();
+    assert!(!merit.is_lit());
+    let gradient = merit.sum(&merit.values(&lens), Detail::Gradient).unwrap().gradient;
+    let by_rims = merit.variables().iter().zip(gradient.iter());
+    let by_rims = by_rims.filter(|(v, _)| v.parameter.quantity == Quantity::SemiDiameter);
+    let steepest = by_rims.min_by(|a, b| a.1.total_cmp(b.1)).unwrap();
+    assert_eq!(steepest.0.parameter.surface, 10);
+    assert!(*steepest.1 < 0.0);
+}
+
+#[test]
+fn a_pupil_in_pieces_has_the_derivative_of_the_warp_field() {
+    // A ball lens focuses its zones far apart; a small rim behind lets a disc and a ring through.
+    let row = |curvature, thickness, index, rim| Row {
+        curvature,
+        thickness,
+        medium: if index == 1.0 { Medium::Air } else { Medium::Index(index) },
+        semi_diameter: Some(rim),
+        ..Row::default()
+    };
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.surfaces = vec![
+        row(0.1, 18.0, 1.5, 9.9),
+        row(-0.1, 2.0, 1.0, 9.9),
+        Row { stop: true, ..row(0.0, 5.0, 1.0, 1.0) },
+    ];
+    lens.aperture = Aperture::StopSemiDiameter(1.0);
+    lens.fields.values = vec![Field { x: 0.0, y: 0.0, weight: 1.0 }];
+    lens.wavelengths.truncate(1);
+    lens.wavelengths[0].primary = true;
+    lens.variables.clear();
+    vary(&mut lens, 0, Quantity::Curvature);
+    vary(&mut lens, 2, Quantity::SemiDiameter);
+    let goal = |pupil| Goal {
+        terms: vec![Weighted { term: Term::Throughput, weight: 1.0 }],
+        zoom_ratios: Vec::new(),
+        pupil,
+    };
+    let gradient = |pupil| {
+        let merit = Merit::new(&lens, &goal(pupil), 1e-3).unwrap();
+        merit.sum(&merit.values(&lens), Detail::Gradient).unwrap().gradient
+    };
+    let moving = gradient(PupilEdge::Moving);
+    let area = |change: f64| {
+        let mut lens = lens.clone();
+        lens.surfaces[2].semi_diameter = Some(1.0 + change);
+        lens.aperture = Aperture::StopSemiDiameter(1.0 + change);
+        Merit::new(&lens, &goal(PupilEdge::Moving), 1e-4).unwrap().light()
+    };
+    // A smaller step meets the grid of rays that a ragged pupil is sampled by.
+    let exact = -(area(0.01) - area(-0.01)) / 0.02;
+    println!("by the rim: {} and {exact} by differences", moving[1]);
+    assert!((moving[1] / exact - 1.0).abs() < 0.05);
+    assert_eq!(gradient(PupilEdge::Kept)[1], 0.0);
 }
 
 #[test]

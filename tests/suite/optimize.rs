@@ -1,7 +1,7 @@
 //! Local search on real lenses.
 
 use super::merit::{bundled, vary};
-use aplanat::lens::{Lens, Parameter, Pickup, Quantity};
+use aplanat::lens::{self, Lens, NumberKind, Parameter, Pickup, Quantity};
 use aplanat::merit::{Goal, Merit, MeritError, PupilEdge, Term, Weighted};
 use aplanat::optimize::{Method, start};
 
@@ -140,6 +140,28 @@ fn a_lens_without_light_has_no_merit() {
     let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new(), pupil: PupilEdge::default() };
     let refused = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap_err();
     assert!(matches!(refused, MeritError::NoLight { .. }), "{refused}");
+}
+
+/// Light that was asked for is found again from darkness, of all fields and of some.
+#[test]
+fn a_dark_lens_that_is_asked_for_light_finds_the_way_back() {
+    let sound = bundled("double_gauss_rudolph_50");
+    let goal = Goal::sensible(&sound).unwrap();
+    let full = Merit::new(&sound, &goal, 1e-3).unwrap().light();
+    for (surface, rim) in [(0, 0.0), (10, 0.5)] {
+        let mut lens = sound.clone();
+        lens.surfaces[surface].semi_diameter = Some(rim);
+        lens::vary(&mut lens, &[NumberKind::SemiDiameters]);
+        for method in [Method::Adam, Method::DampedLeastSquares] {
+            let mut optimizer = start(method, &lens, &goal, 1e-3).unwrap();
+            let ended = (0..600).find(|_| optimizer.step().finished);
+            optimizer.settle();
+            let found = Merit::new(optimizer.best(), &goal, 1e-3).unwrap();
+            let share = found.light() / full;
+            println!("{method:?}, surface {surface}, ended {ended:?}: {share:.3} of the light");
+            assert!(found.is_lit() && share > 0.8, "{method:?}, surface {surface}: {share}");
+        }
+    }
 }
 
 /// What follows a variable is written into every lens on the way, so that a table shows it.

@@ -10,11 +10,12 @@
 //! Split at its corners, the edge is smooth along every arc, and Gauss nodes converge spectrally.
 //! Rays are traced backwards, so that the cost does not depend on the number of parameters.
 
-use super::Integrand;
+use super::{Cost, Integrand, Warp};
 use crate::math::Vec3;
 use crate::pupil::boundary::{Frame, Limit};
-use crate::pupil::lit::{Lit, Rim};
+use crate::pupil::lit::Lit;
 use crate::pupil::quadrature::Spoke;
+use crate::pupil::region::Kind;
 use crate::trace::{Gradient, Hurdle, Ray, Rays, Seed};
 
 impl Lit<'_> {
@@ -22,7 +23,7 @@ impl Lit<'_> {
     pub fn integral(&self, cost: &impl Integrand) -> f64 {
         let points = &self.landed.sink;
         let of = |(i, weight): (usize, f64)| weight * cost.of([points.x[i], points.y[i]]);
-        self.launch.area() * self.landed.arrived().map(of).sum::<f64>()
+        self.region.launch.area() * self.landed.arrived().map(of).sum::<f64>()
     }
 
     /// The derivative with the motion of the edge, by every number of the system; `None` where the
@@ -36,34 +37,57 @@ impl Lit<'_> {
     /// The integral of `dC/dt` over fixed rays: the derivative without the motion of the edge,
     /// biased wherever something clips.
     pub fn biased_derivative(&self, cost: &impl Integrand) -> Gradient<f64> {
-        let (scale, points) = (self.launch.area(), &self.landed.sink);
+        let (scale, points) = (self.region.launch.area(), &self.landed.sink);
         let seed = |i: usize| {
             let [x, y] = cost.slope([points.x[i], points.y[i]]);
             let weight = scale * self.landed.weights[i];
             Seed { point: Vec3::new(weight * x, weight * y, 0.0), ..Seed::default() }
         };
-        self.launch.color().tracer.gradient(&self.rays, seed)
+        self.region.launch.color().tracer.gradient(&self.rays, seed)
     }
 
     /// What the motion of the edge contributes: nothing where it is the disc of the pupil, which
     /// does not move; `None` where the edge is not known.
     pub fn edge_motion(&self, cost: &impl Integrand) -> Option<Gradient<f64>> {
-        let tracer = &self.launch.color().tracer;
+        let tracer = &self.region.launch.color().tracer;
         let mut total = Gradient::zero(tracer.surfaces());
-        let frame = match &self.rim {
-            Rim::Still => return Some(total),
-            Rim::Spokes(frame) => frame,
-            Rim::Unknown => return None,
+        let frame = match &self.region.kind {
+            Kind::Clear => return Some(total),
+            Kind::Split(boundary) => boundary.frame,
+            Kind::Ragged { ring: Some(ring), .. } => ring.outer.frame,
+            Kind::Ragged { ring: None, .. } | Kind::Dark | Kind::Endless => return None,
         };
+        if self.spokes.is_empty() {
+            return None;
+        }
         for limit in self.limits() {
             let Limit::Surface(surface, hurdle) = limit else { continue };
             let on_limit = self.spokes.iter().filter(|spoke| spoke.edge.limit == limit);
-            let moved = on_limit.filter_map(|s| self.edge_ray(cost, frame, s, (surface, hurdle)));
+            let moved = on_limit.filter_map(|s| self.edge_ray(cost, &frame, s, (surface, hurdle)));
             let (rays, weights): (Vec<_>, Vec<f64>) = moved.unzip();
             let rays: Rays<f64> = rays.into_iter().collect();
             total.add(&tracer.margin_gradient(surface, hurdle, &rays, &weights), 1.0);
         }
         Some(total)
+    }
+
+    /// The motion of the edge for a search, whatever the form of the pupil: in several pieces
+    /// estimated by the warp field, always with the same samples; of a dark pupil the motion of
+    /// [`Lit::area`] times the constant of the cost, which leads back to light.
+    pub fn motion(&self, cost: &Cost) -> Gradient<f64> {
+        if let Some(shadow) = &self.shadow {
+            return shadow.derivative(&self.region, cost.constant);
+        }
+        self.edge_motion(cost)
+            .or_else(|| self.sampled_motion(cost))
+            .unwrap_or_else(|| Gradient::zero(self.region.launch.color().tracer.surfaces()))
+    }
+
+    /// What the warp field finds besides the derivative of fixed rays.
+    fn sampled_motion(&self, cost: &Cost) -> Option<Gradient<f64>> {
+        let mut whole = self.region.warp_derivative(cost, Warp::default())?.by;
+        whole.add(&self.biased_derivative(cost), -1.0);
+        Some(whole)
     }
 
     /// The ray at the end of a spoke, and what a change of its margin adds to the integral.
@@ -74,7 +98,7 @@ impl Lit<'_> {
         spoke: &Spoke,
         (surface, hurdle): (usize, Hurdle),
     ) -> Option<(Ray<f64>, f64)> {
-        let launch = &self.launch;
+        let launch = &self.region.launch;
         let p = frame.point(spoke.azimuth, spoke.edge.radius);
         let ray = launch.ray(p)?;
         let color = launch.color();

@@ -66,7 +66,7 @@ struct Scales {
 
 impl Scales {
     fn of(lit: &Lit<'_>) -> Self {
-        let tracer = &lit.launch.color().tracer;
+        let tracer = &lit.region.launch.color().tracer;
         let mut heights = vec![0.0_f64; tracer.surfaces()];
         for i in 0..lit.rays.len() {
             tracer.visit(lit.rays.get(i), |surface, p| {
