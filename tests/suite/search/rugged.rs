@@ -51,7 +51,7 @@ impl Rugged {
         Self { fault }
     }
 
-    fn sound(&self, spot: &Spot) -> f64 {
+    fn sound(spot: &Spot) -> f64 {
         let off = spot.elements as f64 - 6.0;
         0.3 * off * off + spot.x * spot.x + 0.5 * (1.0 - (4.0 * spot.x).cos()) + 0.05
     }
@@ -87,7 +87,7 @@ impl Landscape for Rugged {
             Fault::Infinite => f64::INFINITY,
             Fault::Flat => 1.0,
             Fault::Huge => 1e308 * if spot.x > 1.0 { 1.0 } else { -1.0 },
-            _ => self.sound(spot),
+            _ => Self::sound(spot),
         }
     }
 
