@@ -168,3 +168,15 @@ fn a_search_makes_the_lens_of_1962_sharper() {
     let found = rows_with(&outcome.tables[0], "design", "found");
     assert_eq!(column(&found, "rms_mm").len(), 4);
 }
+
+#[test]
+fn the_exact_rate_samples_the_target_and_the_printed_one_does_not() {
+    let outcome = outcome("4.1");
+    let [time, count] =
+        ["distance_by_time", "distance_by_count"].map(|name| column(&outcome.tables[0], name));
+    // The exact rate is the first process on each toy.
+    for first in [0, time.len() / 2] {
+        assert!(time[first] < 0.02 && count[first] > 0.04, "{} {}", time[first], count[first]);
+        assert!(time[first + 1..time.len() / 2 + first].iter().all(|other| *other > time[first]));
+    }
+}
