@@ -145,7 +145,7 @@ fn restore_finds_better_lenses_than_metropolis() {
 fn restore_finds_better_lenses_than_brute_force() {
     let outcome = outcome("4.5");
     let ends = rows_with(&outcome.tables[0], "sampler", "brute force");
-    assert!(column(&ends, "gradients").iter().all(|gradients| *gradients <= 600.0));
+    assert!(column(&ends, "gradients").iter().all(|gradients| *gradients <= 200.0));
     assert!(outcome.lenses.iter().all(|(_, lens)| lens.check().is_ok()));
 }
 

@@ -149,7 +149,7 @@ impl Race {
         for heat in heats {
             for (runner, courses) in &heat.courses {
                 for gradients in self.places() {
-                    let [least, median, most] = heat.spread(courses, gradients);
+                    let [least, median, most] = spread(courses, gradients);
                     let words = [heat.subject.name, runner.name()].map(Cell::from);
                     let numbers = [gradients as f64, median, least, most].map(Cell::from);
                     table.row(words.into_iter().chain(numbers));
@@ -193,7 +193,7 @@ impl Race {
             let color = PALETTE[i % PALETTE.len()];
             let strokes = [Stroke::Dashed, Stroke::Solid, Stroke::Dashed];
             for (k, stroke) in strokes.into_iter().enumerate() {
-                let at = |g: u64| chart.place([g as f64, heat.spread(courses, g)[k] / heat.start]);
+                let at = |g: u64| chart.place([g as f64, spread(courses, g)[k] / heat.start]);
                 let points: Vec<[f64; 2]> = self.places().map(at).collect();
                 canvas.curve(&points, color, stroke);
             }
@@ -211,19 +211,19 @@ impl Heat {
         own.map_or(Vec::new(), |(_, courses)| courses.iter().map(|c| c.run.best().loss).collect())
     }
 
-    /// The best losses after so many gradients: least, middle and most of all seeds.
-    fn spread(&self, courses: &[Course], gradients: u64) -> [f64; 3] {
-        let mut all: Vec<f64> = courses.iter().map(|course| course.best_after(gradients)).collect();
-        all.sort_by(f64::total_cmp);
-        [0, all.len() / 2, all.len() - 1].map(|place| all[place])
-    }
-
     /// The best lens of all, with its name.
     fn best(&self) -> Option<(String, crate::lens::Lens)> {
         let all = self.courses.iter().flat_map(|(_, courses)| courses);
         let best = all.min_by(|a, b| a.run.best().loss.total_cmp(&b.run.best().loss))?;
         Some((self.subject.file.to_owned(), best.run.best().point.clone()))
     }
+}
+
+/// The best losses after so many gradients: least, middle and most of all seeds.
+fn spread(courses: &[Course], gradients: u64) -> [f64; 3] {
+    let mut all: Vec<f64> = courses.iter().map(|course| course.best_after(gradients)).collect();
+    all.sort_by(f64::total_cmp);
+    [0, all.len() / 2, all.len() - 1].map(|place| all[place])
 }
 
 /// Where every search has ended.
@@ -254,6 +254,6 @@ fn ends(heats: &[Heat]) -> Table {
 impl Effort {
     /// How much a race is worth: lenses, seeds, gradients.
     pub(super) fn race(self) -> (usize, u64, u64) {
-        self.pick((SUBJECTS.len(), 5, 2000), (1, 2, 600))
+        self.pick((SUBJECTS.len(), 5, 2000), (1, 2, 200))
     }
 }
