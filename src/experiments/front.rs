@@ -253,7 +253,8 @@ pub(super) fn lens_and_spots(
                 canvas.square([middle[0] + off[0], middle[1] - off[1]], 1, color);
             }
         }
-        canvas.text([middle[0], top + 215.0], &format!("{} deg", field.y), BLACK, Align::Middle);
+        let angle = format!("{} deg", (10.0 * field.y).round() / 10.0);
+        canvas.text([middle[0], top + 215.0], &angle, BLACK, Align::Middle);
     }
     section.draw(canvas, &chart);
     canvas.curve(&[[1600.0, top - 10.0], [1655.0, top - 10.0]], BLACK, Stroke::Solid);
