@@ -20,7 +20,7 @@ use crate::search::{Rules, Settings};
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "teaser",
     title: "From a double Gauss of 1962 towards one of 1980",
-    claim: "A search finds a lens about as bright as the later design, and sharper",
+    claim: "A search finds a spherical lens as bright as the later design, and sharper",
     seconds: 300.0,
     run,
 };
@@ -154,7 +154,7 @@ fn course(course: &Course) -> Table {
 
 /// Every lens with its rays, and its numbers beside it.
 fn draw(designs: &[Design]) -> Result<Canvas, Ended> {
-    let mut canvas = Canvas::new([1500, 60 + 330 * designs.len() as u32]);
+    let mut canvas = Canvas::new([1340, 60 + 330 * designs.len() as u32]);
     for (i, design) in designs.iter().enumerate() {
         draw_design(&mut canvas, design, 60.0 + 330.0 * i as f64)?;
     }
@@ -168,7 +168,9 @@ fn draw_design(canvas: &mut Canvas, design: &Design, top: f64) -> Result<(), End
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
     let chart = Chart::new([60.0, top], [760.0, top + 260.0], x, y).to_scale();
     let (name, figures) = (design.name, &design.figures);
-    let title = format!("{name}: {} elements, {}", figures.elements, figures.topology);
+    // The letters of a picture have no bar.
+    let topology = figures.topology.replace('|', "-");
+    let title = format!("{name}: {} elements, {topology}", figures.elements);
     canvas.text([60.0, top - 30.0], &title, BLACK, Align::Left);
     for (i, field) in bench.fields.iter().enumerate() {
         let launch = bench.launch(*field, bench.primary).map_err(Ended::from_error)?;
