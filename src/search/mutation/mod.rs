@@ -1,5 +1,29 @@
 //! Changes of the structure of a lens, one file each, and the list of them.
+//!
+//! A mutation draws a place uniformly and new numbers at random, then the rest of the lens is
+//! projected so that it focuses as before, and at last it is repaired. Where another mutation leads
+//! back, the two are a reversible pair in the sense of Green ("Reversible jump Markov chain Monte
+//! Carlo", Biometrika 82, 1995): the numbers of an element that comes or goes are drawn or
+//! forgotten, all others are mapped one to one, and semi-diameters count as following from them.
 
+mod add;
+mod bend;
+mod chance;
+mod draft;
+mod drop_layer;
+mod exchange;
+mod flip;
+mod glue;
+mod remove;
+mod split;
+mod stop;
+
+use super::projection::{Unprojectable, project, scale};
+use super::repair::repair;
+use super::{Mutated, Projection, Random, Rules};
+use crate::lens::Lens;
+use draft::{Back, Draft, New, Room, Scene};
+use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
 /// A kind of mutation.
@@ -67,4 +91,162 @@ pub struct Refusal {
     pub kind: Kind,
     /// Why not.
     pub why: String,
+}
+
+impl Refusal {
+    /// A mutation that does not apply, and why.
+    pub fn new(kind: Kind, why: impl Into<String>) -> Self {
+        Self { kind, why: why.into() }
+    }
+}
+
+/// A lens after a mutation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mutant {
+    /// The lens.
+    pub lens: Lens,
+    /// What was done.
+    pub kind: Kind,
+    /// What was done, where, in words.
+    pub what: String,
+    /// The rows behind which there is new glass.
+    pub fresh: Vec<usize>,
+    /// How the lens was made paraxially equivalent to the one before; none where the rules do not
+    /// ask for it.
+    pub projection: Option<Projection>,
+    /// The logarithm of the density of proposing the way back over that of the way there, times the
+    /// determinant of the map; none where there is no way back.
+    pub log_ratio: Option<f64>,
+}
+
+impl From<Mutant> for Mutated<Lens> {
+    fn from(mutant: Mutant) -> Self {
+        let Mutant { lens, kind, what, log_ratio, .. } = mutant;
+        Self { point: lens, kind, what, log_ratio }
+    }
+}
+
+/// A mutation whose kind is drawn by its weight in the rules, at an element drawn uniformly.
+///
+/// # Errors
+/// Why the kind that was drawn does not apply; a sampler that needs the densities right counts that
+/// as a move that was rejected.
+pub fn propose(lens: &Lens, rules: &Rules, random: &mut Random) -> Result<Mutant, Refusal> {
+    let sum: f64 = Kind::MUTATIONS.iter().map(|kind| rules.weight(*kind).max(0.0)).sum();
+    let mut left = random.random::<f64>() * sum;
+    for kind in Kind::MUTATIONS {
+        left -= rules.weight(kind).max(0.0);
+        if left < 0.0 {
+            return mutate(kind, lens, rules, random);
+        }
+    }
+    Err(Refusal::new(Kind::MUTATIONS[0], "every kind of mutation has weight 0"))
+}
+
+/// A mutation of a kind at an element drawn uniformly.
+///
+/// # Errors
+/// Why it does not apply to this lens, or led to what is none.
+pub fn mutate(
+    kind: Kind,
+    lens: &Lens,
+    rules: &Rules,
+    random: &mut Random,
+) -> Result<Mutant, Refusal> {
+    let refuse = |why: String| Refusal { kind, why };
+    let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
+    let Some(mutation) = mutation else { return Err(refuse("is no change of a lens".into())) };
+    lens.check().map_err(|error| refuse(error.to_string()))?;
+    let resolved = lens.with_pickups().map_err(|error| refuse(error.to_string()))?;
+    let size = match scale(&resolved) {
+        Ok(size) => size,
+        Err(Unprojectable::Afocal(_)) if !rules.projection => length(&resolved),
+        Err(why) => return Err(refuse(why.to_string())),
+    };
+    let scene = Scene::new(resolved, rules, size);
+    let draft = (mutation.draw)(&scene, random).map_err(refuse)?;
+    finished(&scene, kind, draft).map_err(refuse)
+}
+
+/// What a kind of mutation does.
+struct Mutation {
+    kind: Kind,
+    /// In how many places of a lens it could be made.
+    places: fn(&Lens, &Rules) -> Result<usize, String>,
+    draw: fn(&Scene<'_>, &mut Random) -> Result<Draft, String>,
+}
+
+macro_rules! mutations {
+    ($($kind:ident: $module:ident,)*) => {
+        [$(Mutation {
+            kind: Kind::$kind,
+            places: |lens, rules| $module::places(lens, rules).map(|places| places.len()),
+            draw: $module::draw,
+        },)*]
+    };
+}
+
+/// Every mutation, in the order of [`Kind::MUTATIONS`].
+const MUTATIONS: [Mutation; 9] = mutations! {
+    AddSinglet: add,
+    RemoveSinglet: remove,
+    Glue: glue,
+    Split: split,
+    DropLayer: drop_layer,
+    Bend: bend,
+    Flip: flip,
+    ExchangeGlass: exchange,
+    MoveStop: stop,
+};
+
+/// Half the length of a lens: what stands in for the focal length of an afocal one.
+fn length(lens: &Lens) -> f64 {
+    let track: f64 = lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
+    (0.5 * track).max(1.0)
+}
+
+/// Projects and repairs a draft.
+fn finished(scene: &Scene<'_>, kind: Kind, draft: Draft) -> Result<Mutant, String> {
+    let Draft { lens, origins, what, fresh, rimless, map, places, back } = draft;
+    let (mut lens, projection, stretch) = if scene.rules.projection {
+        let found = project(&scene.lens, &lens, &origins, scene.rules, map, back.is_some());
+        let found = found.map_err(|why| format!("{what}, but {why}"))?;
+        (found.lens, Some(found.report), found.log_determinant)
+    } else {
+        (lens, None, Some(0.0))
+    };
+    repair(&scene.lens, &mut lens, &rimless, scene.rules)
+        .map_err(|why| format!("{what}, but {why}"))?;
+    let log_ratio = back.zip(stretch).and_then(|(back, stretch)| {
+        log_ratio(scene.rules, &lens, kind, places, back).map(|log| log + stretch)
+    });
+    Ok(Mutant { lens, kind, what, fresh, projection, log_ratio })
+}
+
+/// The logarithm of the density of the way back over that of the way there, without the projection.
+fn log_ratio(rules: &Rules, lens: &Lens, kind: Kind, places: usize, back: Back) -> Option<f64> {
+    let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == back.kind)?;
+    let places_back = (mutation.places)(lens, rules).ok()?;
+    let choice = match back.room {
+        None => 1.0,
+        Some(room) => chance_of(room, lens, rules)?,
+    };
+    let drawn = match back.singlet {
+        None => 0.0,
+        Some(New { singlet, neighbour, scale }) => {
+            singlet.log_density(lens, neighbour, rules, scale)?
+        }
+    };
+    let kinds = rules.weight(back.kind) / rules.weight(kind);
+    let log =
+        kinds.ln() + (places as f64 / places_back as f64).ln() + choice.ln() + drawn + back.log;
+    log.is_finite().then_some(log)
+}
+
+/// How likely the way back would make the same choice of keeping the rest of the lens in its place;
+/// none where it could not.
+fn chance_of(room: Room, lens: &Lens, rules: &Rules) -> Option<f64> {
+    let keeps = add::keeps(lens, Some(room.gap), rules, room.length);
+    let chance = if room.kept { keeps } else { 1.0 - keeps };
+    (chance > 0.0).then_some(chance)
 }

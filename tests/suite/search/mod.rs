@@ -1,8 +1,23 @@
-//! Search over structure: chains, their reservoir, family tree and checkpoints, and what they sample.
+//! Search over structure: mutations and their paraxial projection; chains, their reservoir, family
+//! tree and checkpoints, and what they sample.
 
 mod chain;
 mod checkpoint;
 mod density;
+mod mutations;
+mod projection;
 mod reservoir;
 mod rugged;
 mod sampling;
+
+use aplanat::search::{Random, Rules};
+use rand::SeedableRng as _;
+
+fn seeded(seed: u64) -> Random {
+    Random::seed_from_u64(seed)
+}
+
+/// Rules that let every lens of the library change.
+fn generous() -> Rules {
+    Rules { elements: [1, 24], ..Rules::default() }
+}
