@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Plan {
-    /// What is asked for; none asks for what [`goal`] does.
+    /// What is asked for; none asks for what [`goal()`] does.
     pub goal: Option<Goal>,
     /// The focal length in mm that the usual goal asks for; none for what the lens has.
     pub focal_length: Option<f64>,

@@ -1,5 +1,9 @@
-//! A new singlet in an air gap: close to the surface in front of it or behind it, in random glass,
-//! with little power.
+//! A new singlet in an air gap: close to the surface in front of it or behind it and bent like that
+//! one, in random glass, with little power.
+//!
+//! So it changes little of what the rays do, and clips none: it is as thick, and the air beside it as
+//! wide, as the rim of that surface asks. (The thesis draws curvatures around 0 and puts the singlet
+//! in contact, where it would cut into every surface that is bent towards it.)
 
 use super::chance::{Length, allowed, coin, log_normal, normal, pick};
 use super::draft::{Back, Draft, Scene, filling, hangs, is_gap, is_solved, sense, shortest};
@@ -19,6 +23,15 @@ pub(super) struct Place {
     /// The surface in front of the air gap; none for the space in front of the lens.
     pub(super) gap: Option<usize>,
     /// Whether it stands close to that surface, else close to the next one.
+    pub(super) behind: bool,
+}
+
+/// The surface to which a singlet is close.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Neighbour {
+    /// Its row in the lens without the singlet.
+    pub(super) row: usize,
+    /// Whether the singlet stands behind it.
     pub(super) behind: bool,
 }
 
@@ -60,19 +73,39 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Place>, String> {
     }
 }
 
+impl Place {
+    fn neighbour(self) -> Neighbour {
+        let row = match self.gap {
+            Some(gap) if self.behind => gap,
+            Some(gap) => gap + 1,
+            None => 0,
+        };
+        Neighbour { row, behind: self.behind }
+    }
+}
+
 impl Singlet {
-    fn draw(scene: &Scene<'_>, random: &mut Random) -> Self {
-        let mut curvature = || normal(scene.bend(), random);
+    fn draw(scene: &Scene<'_>, neighbour: Neighbour, random: &mut Random) -> Self {
+        let mean = scene.lens.surfaces[neighbour.row].curvature;
+        let mut curvature = || mean + normal(scene.bend(), random);
         let curvatures = [curvature(), curvature()];
-        let (thickness, air) = lengths(scene.rules, scene.size());
+        let (thickness, air) =
+            lengths(&scene.lens, neighbour, curvatures, scene.rules, scene.size());
         Self { curvatures, thickness: thickness.draw(random), air: air.draw(random) }
     }
 
-    /// The logarithm of the density of these numbers for a lens of a scale; none where they cannot
-    /// be drawn.
-    pub(super) fn log_density(&self, rules: &Rules, scale: f64) -> Option<f64> {
-        let (thickness, air) = lengths(rules, scale / 50.0);
-        let bends = self.curvatures.map(|c| log_normal(c, 0.25 / scale));
+    /// The logarithm of the density of these numbers for a lens, without the singlet, of a scale;
+    /// none where they cannot be drawn.
+    pub(super) fn log_density(
+        &self,
+        lens: &Lens,
+        neighbour: Neighbour,
+        rules: &Rules,
+        scale: f64,
+    ) -> Option<f64> {
+        let mean = lens.surfaces.get(neighbour.row)?.curvature;
+        let (thickness, air) = lengths(lens, neighbour, self.curvatures, rules, scale / 50.0);
+        let bends = self.curvatures.map(|c| log_normal(c - mean, 0.25 / scale));
         let lengths = thickness.log_density(self.thickness)? + air.log_density(self.air)?;
         Some(bends[0] + bends[1] + lengths)
     }
@@ -82,8 +115,37 @@ impl Singlet {
     }
 }
 
-fn lengths(rules: &Rules, size: f64) -> (Length, Length) {
-    (Length::new(rules.glass_center, 0.75 * size), Length::new(rules.air_center, 0.1 * size))
+/// What the thickness of a singlet and the air beside it are drawn from: as much as the rules ask
+/// for on the axis and, up to the rim of the neighbour, off it.
+fn lengths(
+    lens: &Lens,
+    neighbour: Neighbour,
+    [front, rear]: [f64; 2],
+    rules: &Rules,
+    size: f64,
+) -> (Length, Length) {
+    let Neighbour { row, behind } = neighbour;
+    let beside = lens.surfaces[row].curvature;
+    let rim = lens.surfaces[row].semi_diameter.unwrap_or(0.0);
+    let sense = sense(lens, if behind { row } else { row.saturating_sub(1) });
+    // How much narrower than on the axis a gap is at the rim.
+    let narrower = |first: f64, second: f64| {
+        let (first, second) = (sag(first, rim), sag(second, rim));
+        sense * (first - second)
+    };
+    let (from, to) = if behind { (beside, front) } else { (rear, beside) };
+    let least = |[center, most]: [f64; 2], edge: f64, narrower: f64| {
+        [center.max(edge + narrower).min(most), most]
+    };
+    let thickness = least(rules.glass_center, rules.glass_edge, narrower(front, rear));
+    let air = least(rules.air_center, rules.air_edge, narrower(from, to));
+    (Length::new(thickness, 0.75 * size), Length::new(air, 0.1 * size))
+}
+
+/// The sag of a sphere at a height, or where it ends before.
+fn sag(curvature: f64, height: f64) -> f64 {
+    let t = (curvature * height).clamp(-1.0, 1.0);
+    if t == 0.0 { 0.0 } else { t * t / (curvature * (1.0 + (1.0 - t * t).sqrt())) }
 }
 
 /// How likely the rest of the lens keeps its place: never where there is no room.
@@ -92,11 +154,21 @@ pub(super) fn keeps(lens: &Lens, gap: Option<usize>, rules: &Rules, length: f64)
     if gap.is_some_and(room) { KEEPS } else { 0.0 }
 }
 
-/// Whether a gap could take a length in and still be one.
+/// Whether a gap could take a length in and still be one, on the axis and at the rim.
 pub(super) fn has_room(lens: &Lens, gap: usize, rules: &Rules, length: f64) -> bool {
-    let last = gap + 1 == lens.surfaces.len();
-    let least = if last { rules.back_focus.unwrap_or(0.0) } else { rules.air_center[0] };
-    shortest(lens, gap) - length >= least
+    let left = shortest(lens, gap) - length;
+    if gap + 1 == lens.surfaces.len() {
+        return left >= rules.back_focus.unwrap_or(0.0);
+    }
+    let [front, rear] = [gap, gap + 1].map(|row| &lens.surfaces[row]);
+    let rims = [front, rear].map(|row| row.semi_diameter.unwrap_or(f64::INFINITY));
+    let rim = rims[0].min(rims[1]);
+    let narrower = if rim.is_finite() {
+        sense(lens, gap) * (sag(front.curvature, rim) - sag(rear.curvature, rim))
+    } else {
+        0.0
+    };
+    left >= rules.air_center[0].max(rules.air_edge + narrower)
 }
 
 /// Whether a gap has a length of its own that could become shorter.
@@ -110,7 +182,7 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     let glasses = allowed(&scene.lens, scene.rules);
     let place = pick(&places, random).copied().ok_or("no place")?;
     let glass = pick(&glasses, random).copied().ok_or("no glass of the rules has an index here")?;
-    let singlet = Singlet::draw(scene, random);
+    let singlet = Singlet::draw(scene, place.neighbour(), random);
     let keeping = keeps(&scene.lens, place.gap, scene.rules, singlet.length());
     let kept = coin(keeping, random);
     let mut draft = scene.draft(places.len());
@@ -121,13 +193,11 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     draft.what = format!("added a singlet of {} before surface {first}", glass.full_name());
     let chosen = if kept { keeping } else { 1.0 - keeping };
     let there = singlet
-        .log_density(scene.rules, scene.scale)
+        .log_density(&scene.lens, place.neighbour(), scene.rules, scene.scale)
         .map(|log| log - (glasses.len() as f64).ln() + chosen.ln());
     let finite = place.gap.is_none() && scene.lens.object != Object::Infinity;
-    draft.back = there.filter(|_| !finite).map(|there| Back {
-        kind: Kind::RemoveSinglet,
-        log: remove::log_chance(&draft.lens, first, kept) - there,
-        room: None,
+    draft.back = there.filter(|_| !finite).map(|there| {
+        Back::by(Kind::RemoveSinglet, remove::log_chance(&draft.lens, first, kept) - there)
     });
     Ok(draft)
 }

@@ -37,7 +37,7 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
         inside(&draft.lens, row)?;
     }
     draft.map = either(random);
-    draft.back = Some(Back { kind: Kind::Bend, log: 0.0, room: None });
+    draft.back = Some(Back::by(Kind::Bend, 0.0));
     let Element { first, last, .. } = element;
     draft.what = format!("bent the element of surfaces {first} to {last} by {by:.5}/mm");
     Ok(draft)

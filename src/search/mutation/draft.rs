@@ -1,6 +1,7 @@
 //! A lens while it is being changed: where each number came from travels with the rows.
 
 use super::Kind;
+use super::add::{Neighbour, Singlet};
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row, ZoomThickness, free};
 use crate::search::Rules;
 use crate::search::projection::{Map, Origin, scale};
@@ -25,6 +26,23 @@ pub(super) struct Back {
     pub(super) log: f64,
     /// A choice of the way back that depends on how long a gap is at the end.
     pub(super) room: Option<Room>,
+    /// The singlet that the way back draws, whose density depends on its neighbour at the end.
+    pub(super) singlet: Option<New>,
+}
+
+impl Back {
+    /// A way back without choices.
+    pub(super) fn by(kind: Kind, log: f64) -> Self {
+        Self { kind, log, room: None, singlet: None }
+    }
+}
+
+/// A singlet that could be drawn for a lens of a scale.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct New {
+    pub(super) singlet: Singlet,
+    pub(super) neighbour: Neighbour,
+    pub(super) scale: f64,
 }
 
 /// The gap of a new element, in the lens without it.

@@ -69,7 +69,7 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     let known = choice.iter().any(|glass| is_same(glass, old));
     // The nearness is the same in both directions, what it is compared with is not.
     let log = sum(old).ln() - sum(new).ln();
-    draft.back = known.then_some(Back { kind: Kind::ExchangeGlass, log, room: None });
+    draft.back = known.then_some(Back::by(Kind::ExchangeGlass, log));
     draft.what = format!("exchanged {name} behind surface {row} for {}", new.full_name());
     Ok(draft)
 }

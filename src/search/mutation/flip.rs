@@ -32,7 +32,7 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
         draft.origins[row] = Origin { curvature, gap: Some(gap) };
     }
     draft.map = either(random);
-    draft.back = Some(Back { kind: Kind::Flip, log: 0.0, room: None });
+    draft.back = Some(Back::by(Kind::Flip, 0.0));
     draft.what = format!("turned the element of surfaces {first} to {last} around");
     Ok(draft)
 }

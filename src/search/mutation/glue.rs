@@ -54,7 +54,7 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     let scale = scene.scale_of(&draft.lens);
     let there = scale.and_then(|scale| cut.log_density(scene.rules, scale));
     // Mean and half difference of two numbers: the determinant is 1/2.
-    draft.back = there.map(|draws| Back { kind: Kind::Split, log: draws - 2f64.ln(), room: None });
+    draft.back = there.map(|draws| Back::by(Kind::Split, draws - 2f64.ln()));
     draft.what = format!("glued surfaces {row} and {} together", row + 1);
     Ok(draft)
 }

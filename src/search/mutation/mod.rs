@@ -22,7 +22,7 @@ use super::projection::{Unprojectable, project, scale};
 use super::repair::repair;
 use super::{Mutated, Projection, Random, Rules};
 use crate::lens::Lens;
-use draft::{Back, Draft, Room, Scene};
+use draft::{Back, Draft, New, Room, Scene};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
@@ -231,8 +231,15 @@ fn log_ratio(rules: &Rules, lens: &Lens, kind: Kind, places: usize, back: Back) 
         None => 1.0,
         Some(room) => chance_of(room, lens, rules)?,
     };
+    let drawn = match back.singlet {
+        None => 0.0,
+        Some(New { singlet, neighbour, scale }) => {
+            singlet.log_density(lens, neighbour, rules, scale)?
+        }
+    };
     let kinds = rules.weight(back.kind) / rules.weight(kind);
-    let log = kinds.ln() + (places as f64 / places_back as f64).ln() + choice.ln() + back.log;
+    let log =
+        kinds.ln() + (places as f64 / places_back as f64).ln() + choice.ln() + drawn + back.log;
     log.is_finite().then_some(log)
 }
 

@@ -1,9 +1,11 @@
 //! An element less: what was glass becomes air, or what stood behind moves forward.
 
 use super::Kind;
-use super::add::{self, KEEPS, Singlet};
+use super::add::{self, KEEPS, Neighbour, Singlet};
 use super::chance::{allowed, coin, pick};
-use super::draft::{Back, Draft, Room, Scene, hangs, is_gap, is_plain, is_solved, sense, zooms};
+use super::draft::{
+    Back, Draft, New, Room, Scene, hangs, is_gap, is_plain, is_solved, sense, zooms,
+};
 use crate::lens::glass;
 use crate::lens::{Lens, Medium, Object};
 use crate::search::element::{Element, elements, pieces};
@@ -148,8 +150,10 @@ fn back(scene: &Scene<'_>, small: &Lens, first: usize, way: Way) -> Option<Back>
     };
     let scale = scene.scale_of(small)?;
     let gap = first.checked_sub(1).filter(|gap| add::has_choice(small, *gap));
-    let draws = singlet.log_density(rules, scale)? - (glasses.len() as f64).ln();
-    let log = draws - log_chance(lens, first, way.kept);
+    let log = -(glasses.len() as f64).ln() - log_chance(lens, first, way.kept);
+    let row = if way.front { beside } else { first };
+    let neighbour = Neighbour { row, behind: way.front };
     let room = gap.map(|gap| Room { gap, length: singlet.length(), kept: way.kept });
-    Some(Back { kind: Kind::AddSinglet, log, room })
+    let singlet = Some(New { singlet, neighbour, scale });
+    Some(Back { kind: Kind::AddSinglet, log, room, singlet })
 }

@@ -61,7 +61,7 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
     draft.map = Map::Along;
     draft.what = format!("split the cemented surface {row}");
     let there = cut.log_density(scene.rules, scene.scale);
-    let back = |there: f64| Back { kind: Kind::Glue, log: 2f64.ln() - there, room: None };
+    let back = |there: f64| Back::by(Kind::Glue, 2f64.ln() - there);
     draft.back = there.filter(|_| glue::can(&draft.lens, row, scene.rules)).map(back);
     Ok(draft)
 }

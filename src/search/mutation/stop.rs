@@ -91,7 +91,7 @@ fn back(rules: &Rules, bare: &Lens, old: Option<usize>, gap: usize) -> Option<Ba
     let moves = [before, gap].iter().any(|row| zooms(bare, *row));
     let log = shortest(bare, gap).ln() - shortest(bare, before).ln();
     let possible = !moves && log.is_finite() && gaps(bare, rules).contains(&before);
-    possible.then_some(Back { kind: Kind::MoveStop, log, room: None })
+    possible.then_some(Back::by(Kind::MoveStop, log))
 }
 
 /// Puts a stop `length` behind a row.

@@ -4,7 +4,8 @@
 use super::{generous, seeded};
 use crate::merit::bundled;
 use aplanat::files;
-use aplanat::lens::{Lens, Medium, NumberKind, Parameter, Pickup, Quantity, System, vary};
+use aplanat::lens::{Field, Lens, Medium, NumberKind, Parameter, Pickup, Quantity, System, vary};
+use aplanat::pupil::{Bench, Region};
 use aplanat::search::element::{elements, pieces, topology};
 use aplanat::search::{Kind, Mutant, Rules, mutate, propose};
 
@@ -323,4 +324,30 @@ fn a_hundred_thousand_mutations_leave_a_lens() {
     chain("double_gauss_nikkor_s_50", 40_000);
     chain("cooke_triplet_100_f27", 40_000);
     chain("achromat_ac254_100", 20_000);
+}
+
+/// The share of its axial pupil that a lens lets through at the wavelength of its focal length.
+fn clear(lens: &Lens) -> f64 {
+    let bench = Bench::of(lens, 0).unwrap();
+    let axis = Field { x: 0.0, y: 0.0, weight: 1.0 };
+    Region::new(bench.launch(axis, bench.primary).unwrap()).lit(4).area()
+}
+
+/// A new element shall not be punished for light that only its rims took away.
+#[test]
+fn a_new_element_lets_the_light_through() {
+    for name in
+        ["double_gauss_canon_ef50_f18", "double_gauss_nikkor_s_50", "double_gauss_rudolph_50"]
+    {
+        let lens = bundled(name);
+        let (mut random, before) = (seeded(5), clear(&lens));
+        for kind in [Kind::AddSinglet, Kind::Split, Kind::Glue] {
+            let mutants =
+                (0..60).filter_map(|_| mutate(kind, &lens, &generous(), &mut random).ok());
+            let shares: Vec<f64> = mutants.map(|m| clear(&m.lens) / before).collect();
+            let sound = shares.iter().filter(|share| **share > 0.9).count();
+            println!("{name}: {}: {sound} of {} keep their light", kind.name(), shares.len());
+            assert!(kind == Kind::Glue || 2 * sound > shares.len());
+        }
+    }
 }
