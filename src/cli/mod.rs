@@ -12,6 +12,7 @@ mod convert;
 mod experiment;
 mod failure;
 mod gradient;
+mod grin;
 mod info;
 mod input;
 mod measure;
@@ -56,6 +57,7 @@ enum Command {
     Gradient(gradient::Gradient),
     Optimize(optimize::Optimize),
     Pareto(pareto::Pareto),
+    Grin(grin::Grin),
     Convert(convert::Convert),
     Experiment(experiment::Experiment),
     Measure(measure::Measure),
@@ -70,6 +72,7 @@ impl Command {
             Self::Gradient(gradient) => gradient.run(output),
             Self::Optimize(optimize) => optimize.run(output),
             Self::Pareto(pareto) => pareto.run(output),
+            Self::Grin(grin) => grin.run(output),
             Self::Convert(convert) => convert.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),

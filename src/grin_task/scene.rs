@@ -1,0 +1,361 @@
+//! What a field does to the light of a task: loss, gradient, misses, and what became of every ray.
+
+use super::check::TaskError;
+use super::source::{Draw, Sent};
+use super::space::length;
+use super::task::{Edge, Goal, MakerLimits, Space, Task, View};
+use crate::grin::{Exit, Fates, Field, Ray, Seed, Setup, Tracer, plan};
+use crate::math::Vec3;
+use rayon::prelude::*;
+
+/// A ray that leaves flatter than this, as a cosine, is left out: the derivative of its exit grows
+/// as the inverse.
+pub(super) const FLATTEST: f64 = 0.05;
+/// The field from which a measurement comes is traced so much better than the one that is sought.
+const FINER: f64 = 0.1;
+/// Points along a side of the box at which a slope is held.
+const LATTICE: usize = 24;
+/// Points of the surface at which the index is held.
+const SURFACE: usize = 2000;
+
+/// Where a ray shall go.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Aim {
+    x: Vec3<f64>,
+    v: Vec3<f64>,
+    /// What the square of a difference in `v` counts.
+    direction: f64,
+}
+
+/// The rays of a view, ready to be traced.
+#[derive(Debug, Clone)]
+pub(super) struct Shot {
+    pub(super) rays: Vec<Ray<f64>>,
+    pub(super) aims: Vec<Aim>,
+    pub(super) setup: Setup<f64>,
+    pub(super) weight: f64,
+    /// What a ray that is left out counts, in mm²: more than any that is not.
+    lost: f64,
+}
+
+/// Rays that are left out, by reason, and those that count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// How all rays ended.
+    pub fates: Fates,
+    /// Rays that arrived, but so flat to the boundary that their derivative is worth nothing.
+    pub flat: usize,
+}
+
+impl Counts {
+    /// Rays that count.
+    pub fn counted(self) -> usize {
+        self.fates.arrived() - self.flat
+    }
+
+    /// Rays that are left out, by reason.
+    pub fn excluded(self) -> impl Iterator<Item = (&'static str, usize)> {
+        let flat = (self.flat > 0).then_some(("flat", self.flat));
+        let lost = self.fates.iter().filter(|(fate, _)| !fate.arrived());
+        lost.map(|(fate, count)| (fate.name(), count)).chain(flat)
+    }
+
+    /// Those of two sets of rays.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        let mut both = self;
+        for (fate, count) in other.fates.iter() {
+            (0..count).for_each(|_| both.fates.count(fate));
+        }
+        both.flat += other.flat;
+        both
+    }
+}
+
+/// What became of the light of a view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewResult {
+    /// The loss of this view without its weight, in mm².
+    pub loss: f64,
+    /// The root of the mean square distance from the aim, in mm, of the rays that count.
+    pub spot: f64,
+    /// What became of the rays.
+    pub counts: Counts,
+    /// The largest distance between a start and the end of its way back, in steps.
+    pub retrace_error: f64,
+}
+
+/// The loss of a field with its gradient.
+#[derive(Debug, Clone)]
+pub(super) struct Evaluation {
+    pub(super) loss: f64,
+    pub(super) gradient: Vec<f64>,
+    pub(super) views: Vec<ViewResult>,
+}
+
+/// How rays are traced, for each view: chosen anew as the field takes shape.
+pub(super) fn setups(
+    task: &Task,
+    field: &dyn Field<f64>,
+    draw: Draw,
+) -> Result<Vec<Setup<f64>>, TaskError> {
+    let setup = |view: &View| {
+        let space = view.space.unwrap_or(task.space);
+        let rays: Vec<Ray<f64>> = view.source.rays(space, draw).iter().map(|s| s.ray).collect();
+        Ok(plan(field, &space.region(), task.launch, &rays, task.tolerance)?.setup)
+    };
+    task.views.iter().map(setup).collect()
+}
+
+/// The rays of every view with their aims.
+pub(super) fn shots(
+    task: &Task,
+    setups: &[Setup<f64>],
+    draw: Draw,
+) -> Result<Vec<Shot>, TaskError> {
+    let shot = |(view, setup): (&View, &Setup<f64>)| {
+        let space = view.space.unwrap_or(task.space);
+        let sent = view.source.rays(space, draw);
+        let aims = aims(task, view, space, &sent)?;
+        let rays = sent.into_iter().map(|sent| sent.ray).collect();
+        let lost = space.diameter() * space.diameter();
+        Ok(Shot { rays, aims, setup: setup.clone(), weight: view.weight, lost })
+    };
+    task.views.iter().zip(setups).map(shot).collect()
+}
+
+fn aims(task: &Task, view: &View, space: Space, sent: &[Sent]) -> Result<Vec<Aim>, TaskError> {
+    let at = |x| Aim { x, v: Vec3::default(), direction: 0.0 };
+    Ok(match &view.goal {
+        Goal::Point([x, y, z]) => vec![at(Vec3::new(*x, *y, *z)); sent.len()],
+        Goal::Antipode => {
+            let reach = 0.5 * space.diameter();
+            sent.iter().map(|sent| at(sent.opposite * reach)).collect()
+        }
+        Goal::Like { field, direction } => {
+            let place = format!("view {}", view.name);
+            let field = field.field().map_err(|source| TaskError::Field { place, source })?;
+            let rays: Vec<Ray<f64>> = sent.iter().map(|sent| sent.ray).collect();
+            let finer = FINER * task.tolerance;
+            let plan = plan(&*field, &space.region(), task.launch, &rays, finer)?;
+            let exits = Tracer::new(&*field, plan.setup)?.rays(&rays);
+            let aim = |exit: &Exit<f64>| Aim { x: exit.x, v: exit.v, direction: *direction };
+            exits.iter().map(aim).collect()
+        }
+    })
+}
+
+impl Evaluation {
+    /// What became of the rays of all views.
+    pub(super) fn counts(&self) -> Counts {
+        self.views.iter().fold(Counts::default(), |sum, view| sum.and(view.counts))
+    }
+}
+
+impl Shot {
+    /// Whether it is more than looked at.
+    pub(super) fn is_wanted(&self) -> bool {
+        self.weight > 0.0
+    }
+
+    /// How many rays there are.
+    pub(super) fn count(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// What a loss of this view adds to that of the task.
+    pub(super) fn share(&self, loss: f64) -> f64 {
+        self.weight * loss
+    }
+
+    /// Whether a ray counts.
+    fn counts(exit: &Exit<f64>) -> bool {
+        exit.fate.arrived() && exit.cosine.abs() >= FLATTEST
+    }
+
+    /// The loss of one ray and its derivative.
+    fn judge(&self, ray: usize, exit: &Exit<f64>) -> (f64, Seed<f64>) {
+        if !Self::counts(exit) {
+            return (self.lost, Seed::default());
+        }
+        let (dx, dv) = self.misses(ray, exit);
+        let direction = self.aims[ray].direction;
+        let seed = Seed { x: dx * 2.0, v: dv * (2.0 * direction), path: 0.0 };
+        (dx.dot(dx) + direction * dv.dot(dv), seed)
+    }
+
+    /// By how much a ray misses its aim.
+    fn misses(&self, ray: usize, exit: &Exit<f64>) -> (Vec3<f64>, Vec3<f64>) {
+        let aim = self.aims[ray];
+        (exit.x - aim.x, exit.v - aim.v)
+    }
+
+    /// What becomes of the light, without a gradient.
+    pub(super) fn look(&self, field: &dyn Field<f64>) -> Result<ViewResult, TaskError> {
+        let exits = Tracer::new(field, self.setup.clone())?.rays(&self.rays);
+        Ok(self.result(&exits, 0.0))
+    }
+
+    fn result(&self, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
+        let (mut loss, mut square, mut flat) = (0.0, 0.0, 0);
+        for (i, exit) in exits.iter().enumerate() {
+            loss += self.judge(i, exit).0;
+            if Self::counts(exit) {
+                let dx = self.misses(i, exit).0;
+                square += dx.dot(dx);
+            } else if exit.fate.arrived() {
+                flat += 1;
+            }
+        }
+        let fates = exits.iter().map(|exit| exit.fate).collect();
+        let counts = Counts { fates, flat };
+        let spot = (square / counts.counted() as f64).sqrt();
+        ViewResult { loss: loss / exits.len() as f64, spot, counts, retrace_error }
+    }
+
+    /// The loss with its gradient, added with the weight of the view.
+    pub(super) fn descend(
+        &self,
+        field: &dyn Field<f64>,
+        gradient: &mut [f64],
+    ) -> Result<ViewResult, TaskError> {
+        let tracer = Tracer::new(field, self.setup.clone())?;
+        let mut exits = tracer.rays(&self.rays);
+        let seeds: Vec<Seed<f64>> =
+            exits.iter().enumerate().map(|(i, exit)| self.judge(i, exit).1).collect();
+        let found = tracer.gradient(&self.rays, &mut exits, &seeds);
+        let share = self.weight / self.rays.len() as f64;
+        gradient.iter_mut().zip(&found.parameters).for_each(|(sum, g)| *sum += share * g);
+        Ok(self.result(&exits, found.retrace_error))
+    }
+
+    /// What each ray misses its aim by, as rows of a least-squares problem with their derivatives.
+    fn rows(&self, field: &dyn Field<f64>) -> Result<Vec<(f64, Vec<f64>)>, TaskError> {
+        let tracer = Tracer::new(field, self.setup.clone())?;
+        let scale = (self.weight / self.rays.len() as f64).sqrt();
+        let parameters = field.parameters().len();
+        let of_ray = |(i, ray): (usize, &Ray<f64>)| {
+            let exit = tracer.ray(ray);
+            if !Self::counts(&exit) {
+                return vec![(scale * self.lost.sqrt(), vec![0.0; parameters])];
+            }
+            let (dx, dv) = self.misses(i, &exit);
+            let row = |miss: f64, seed: Seed<f64>| {
+                let taped = tracer.taped_gradient(&[*ray], &[exit], &[seed]);
+                (miss, taped.parameters)
+            };
+            let root = scale * self.aims[i].direction.sqrt();
+            let axes = |scale: f64| {
+                [Vec3::new(scale, 0.0, 0.0), Vec3::new(0.0, scale, 0.0), Vec3::new(0.0, 0.0, scale)]
+            };
+            let at = axes(scale).map(|x| row(x.dot(dx), Seed { x, ..Seed::default() }));
+            let mut rows = at.to_vec();
+            if root > 0.0 {
+                rows.extend(axes(root).map(|v| row(v.dot(dv), Seed { v, ..Seed::default() })));
+            }
+            rows
+        };
+        Ok(self.rays.par_iter().enumerate().flat_map_iter(of_ray).collect())
+    }
+}
+
+/// What is asked of the field itself: its index at the edge, and a limit of its slope.
+#[derive(Debug, Clone)]
+pub(super) struct Hold {
+    edge: Option<(Edge, Vec<Vec3<f64>>)>,
+    slope: Option<(f64, f64, Vec<Vec3<f64>>)>,
+}
+
+impl Hold {
+    pub(super) fn new(task: &Task) -> Self {
+        let MakerLimits { slope, .. } = task.limits;
+        let radius = task.field.size();
+        let surface = || match task.field.is_radial() {
+            true => vec![Vec3::new(radius, 0.0, 0.0)],
+            false => task.space.surface(SURFACE),
+        };
+        let size = task.space.diameter();
+        Self {
+            edge: task.edge.filter(|edge| edge.weight > 0.0).map(|edge| (edge, surface())),
+            slope: slope.map(|slope| (slope, size * size, task.space.lattice(LATTICE))),
+        }
+    }
+
+    /// What each place counts: the residual, and its derivative by the index and its gradient.
+    fn each(&self, field: &dyn Field<f64>, mut visit: impl FnMut(Vec3<f64>, f64, f64, Vec3<f64>)) {
+        if let Some((edge, places)) = &self.edge {
+            let scale = (edge.weight / places.len() as f64).sqrt();
+            for p in places {
+                let off = field.sample(*p).index - edge.index;
+                visit(*p, scale * off, scale, Vec3::default());
+            }
+        }
+        if let Some((limit, square, places)) = &self.slope {
+            let scale = square / (places.len() as f64).sqrt();
+            for p in places {
+                let gradient = field.sample(*p).gradient;
+                let over = length(gradient) - limit;
+                if over > 0.0 {
+                    let outwards = gradient * (scale / (over + limit));
+                    visit(*p, scale * over, 0.0, outwards);
+                }
+            }
+        }
+    }
+
+    /// The sum of squares, and its gradient added.
+    fn descend(&self, field: &dyn Field<f64>, gradient: &mut [f64]) -> f64 {
+        let mut sum = 0.0;
+        self.each(field, |p, residual, by_index, by_slope| {
+            sum += residual * residual;
+            field.deposit(p, 2.0 * residual * by_index, by_slope * (2.0 * residual), gradient);
+        });
+        sum
+    }
+
+    fn rows(&self, field: &dyn Field<f64>) -> Vec<(f64, Vec<f64>)> {
+        let mut rows = Vec::new();
+        self.each(field, |p, residual, by_index, by_slope| {
+            let mut row = vec![0.0; field.parameters().len()];
+            field.deposit(p, by_index, by_slope, &mut row);
+            rows.push((residual, row));
+        });
+        rows
+    }
+
+    /// The sum of squares alone.
+    pub(super) fn look(&self, field: &dyn Field<f64>) -> f64 {
+        let mut sum = 0.0;
+        self.each(field, |_, residual, _, _| sum += residual * residual);
+        sum
+    }
+}
+
+/// The loss of a field by some rays, with its gradient; views of weight 0 are not looked at.
+pub(super) fn evaluate(
+    field: &dyn Field<f64>,
+    shots: &[Shot],
+    hold: &Hold,
+) -> Result<Evaluation, TaskError> {
+    let mut gradient = vec![0.0; field.parameters().len()];
+    let (mut loss, mut views) = (hold.descend(field, &mut gradient), Vec::new());
+    for shot in shots.iter().filter(|shot| shot.is_wanted()) {
+        let result = shot.descend(field, &mut gradient)?;
+        loss += shot.weight * result.loss;
+        views.push(result);
+    }
+    Ok(Evaluation { loss, gradient, views })
+}
+
+/// The same as rows of a least-squares problem: the loss is the sum of their squares.
+pub(super) fn rows(
+    field: &dyn Field<f64>,
+    shots: &[Shot],
+    hold: &Hold,
+) -> Result<Vec<(f64, Vec<f64>)>, TaskError> {
+    let mut all = hold.rows(field);
+    for shot in shots.iter().filter(|shot| shot.is_wanted()) {
+        all.extend(shot.rows(field)?);
+    }
+    Ok(all)
+}
