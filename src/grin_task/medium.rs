@@ -123,8 +123,9 @@ impl Medium {
         }
     }
 
-    /// The range of each of its numbers. A coefficient that stands outside the space is no index
-    /// of it and has more room.
+    /// The range of each of its numbers. What no coefficient of a spline exceeds, the spline does
+    /// not; the outer ones of a spline in one coordinate need more room all the same, since it
+    /// bends at its end, where the edge holds it.
     pub(super) fn ranges(
         &self,
         space: Space,
@@ -143,16 +144,11 @@ impl Medium {
                 let grid = field.grid();
                 (0..grid.nodes()).map(|n| range(is_inside(grid.node(n)), outside)).collect()
             }
-            Self::Tricubic(field) => {
-                let grid = field.grid();
-                // The first coefficient stands one spacing before the domain.
-                let place = |n: usize| grid.node(n) - grid.spacing();
-                (0..grid.nodes()).map(|n| range(is_inside(place(n)), wide)).collect()
-            }
+            Self::Tricubic(field) => vec![[low, high]; field.parameters().len()],
             Self::Radial(field, radius) => {
                 let spacing = field.profile.knots().unwrap_or(1.0);
                 let count = field.parameters().len();
-                let inside = |i: usize| i >= 1 && spacing * (i as f64 - 1.0) <= radius * radius;
+                let inside = |i: usize| i >= 1 && spacing * (i as f64 - 0.5) < radius * radius;
                 (0..count).map(|i| range(inside(i), wide)).collect()
             }
         }
@@ -216,6 +212,28 @@ pub(super) fn from_file<R: Real>(path: &Path) -> Result<Trilinear<R>, NoField> {
 }
 
 impl Exact {
+    /// The same sampled on a grid.
+    ///
+    /// # Errors
+    /// A volume that cannot be read, or a grid that cannot be made.
+    pub fn sampled<R: Real>(
+        &self,
+        cubic: bool,
+        nodes: usize,
+        half: f64,
+    ) -> Result<Box<dyn Field<R>>, NoField> {
+        let exact = self.field::<R>()?;
+        let value = |p: Vec3<R>| exact.sample(p).index;
+        let wrong = |source| NoField::Values { file: format!("{nodes} nodes"), source };
+        let half = R::from_f64(half);
+        if cubic {
+            let cells = nodes.saturating_sub(1);
+            return Ok(Box::new(Tricubic::near(cells, half, value).map_err(wrong)?));
+        }
+        let grid = Grid::cube(nodes, half).map_err(wrong)?;
+        Ok(Box::new(Trilinear::sampled(grid, value).map_err(wrong)?))
+    }
+
     /// The field.
     ///
     /// # Errors

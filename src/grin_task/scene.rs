@@ -93,6 +93,15 @@ pub(super) struct Evaluation {
     pub(super) views: Vec<ViewResult>,
 }
 
+impl Task {
+    /// The space of a view, and the rays by which fields are judged in it.
+    pub fn judging_rays(&self, view: &View) -> (Space, Vec<Ray<f64>>) {
+        let space = view.space.unwrap_or(self.space);
+        let rays = view.source.rays(space, Draw::Judge);
+        (space, rays.into_iter().map(|sent| sent.ray).collect())
+    }
+}
+
 /// How rays are traced, for each view: chosen anew as the field takes shape.
 pub(super) fn setups(
     task: &Task,

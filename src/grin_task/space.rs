@@ -1,7 +1,7 @@
 //! Where light bends, as the tracer wants it, and points spread over it.
 
 use super::task::Space;
-use crate::grin::{Face, Region};
+use crate::grin::Region;
 use crate::math::Vec3;
 use std::f64::consts::{PI, TAU};
 
@@ -81,17 +81,6 @@ impl Space {
                 (0..count).map(at).collect()
             }
         }
-    }
-
-    /// The face through which light would leave along a direction, moved outwards by a distance: a
-    /// plane across that direction.
-    pub(super) fn behind(self, direction: Vec3<f64>, distance: f64) -> Face<f64> {
-        let [low, high] = self.corners();
-        let far = |d: f64, low: f64, high: f64| if d < 0.0 { d * low } else { d * high };
-        let reach = far(direction.x, low.x, high.x)
-            + far(direction.y, low.y, high.y)
-            + far(direction.z, low.z, high.z);
-        Face::plane(direction, reach + distance)
     }
 }
 
