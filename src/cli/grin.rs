@@ -1,11 +1,13 @@
 //! A design task in a gradient-index field.
 
+use super::experiment::check_folder;
 use super::failure::Failure;
 use super::input::{check_target, read_json};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::{Number, Output, Table};
+use crate::experiments::medium_pictures;
 use crate::files;
-use crate::grin_task::{self, Judgement, Runner, Task, ViewResult};
+use crate::grin_task::{self, Judgement, Medium, Runner, Task, ViewResult};
 use crate::measure::{Memory, Stopwatch, peak_megabytes, processor_ms};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -26,6 +28,10 @@ pub(super) struct Grin {
     /// Writes the best field: NumPy's .npz, or .json with the numbers beside it in .raw
     #[arg(long, value_name = "FILE", requires = "task")]
     out: Option<PathBuf>,
+
+    /// Draws the best field into this folder
+    #[arg(long, value_name = "FOLDER", requires = "task")]
+    png: Option<PathBuf>,
 
     /// Nodes along a side of the written volume, where the field is a spline in one coordinate
     #[arg(long, value_name = "N", default_value_t = 65)]
@@ -52,6 +58,7 @@ impl Grin {
             return output.print(&Shown(task));
         }
         self.out.iter().try_for_each(|path| check_target(path, &["npz", "json"]))?;
+        self.png.iter().try_for_each(|folder| check_folder(folder))?;
         self.check()?;
         let refuse = |error| Failure::Input(format!("{name}: {error}"));
         let mut runner = Runner::new(&task).map_err(refuse)?;
@@ -61,13 +68,29 @@ impl Grin {
         let stopped = !worked.map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
         let ms = 1e3 * clock.seconds();
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
-        let report = Report::new(&runner, Cost { ms, processor_ms, memory, stopped })
+        let mut report = Report::new(&runner, Cost { ms, processor_ms, memory, stopped })
             .map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
-        if let Some(path) = &self.out {
-            let volume = runner.best().volume(task.space, self.nodes);
-            files::write_volume(path, &volume.map_err(|e| Failure::Failed(e.to_string()))?)?;
-        }
+        report.files = self.write(&task, runner.best())?;
         output.print(&report)
+    }
+
+    /// Writes what is asked for.
+    fn write(&self, task: &Task, best: &Medium) -> Result<Vec<String>, Failure> {
+        let failed = |error: &dyn std::error::Error| Failure::Failed(error.to_string());
+        let mut written = Vec::new();
+        if let Some(path) = &self.out {
+            let volume = best.volume(task.space, self.nodes).map_err(|error| failed(&error))?;
+            files::write_volume(path, &volume)?;
+            written.push(path.display().to_string());
+        }
+        if let Some(folder) = &self.png {
+            for picture in medium_pictures(task, best) {
+                let path = folder.join(format!("{}.png", picture.name));
+                files::replace(&path, &picture.canvas.png().map_err(|error| failed(&error))?)?;
+                written.push(path.display().to_string());
+            }
+        }
+        Ok(written)
     }
 
     fn check(&self) -> Result<(), Failure> {
@@ -195,6 +218,7 @@ struct Report {
     ms: f64,
     processor_ms: Option<f64>,
     memory: Option<Memory>,
+    files: Vec<String>,
 }
 
 /// What became of the light of a view.
@@ -251,6 +275,7 @@ impl Report {
             ms: cost.ms,
             processor_ms: cost.processor_ms,
             memory: cost.memory,
+            files: Vec::new(),
         })
     }
 }
@@ -288,6 +313,7 @@ impl Display for Report {
                 if lost.is_empty() { "none".to_owned() } else { lost.join(", ") },
             ]);
         }
-        write!(f, "{table}")
+        write!(f, "{table}")?;
+        self.files.iter().try_for_each(|file| writeln!(f, "written: {file}"))
     }
 }
