@@ -227,6 +227,7 @@ struct View {
     name: String,
     weight: f64,
     spot: f64,
+    quality_db: Option<f64>,
     rays: usize,
     excluded: BTreeMap<&'static str, usize>,
     retrace_error: f64,
@@ -247,6 +248,7 @@ impl Report {
             name: view.name.clone(),
             weight: view.weight,
             spot: result.spot,
+            quality_db: result.quality,
             rays: result.counts.fates.total(),
             excluded: result.counts.excluded().collect(),
             retrace_error: result.retrace_error,
@@ -308,7 +310,10 @@ impl Display for Report {
             table.row([
                 view.name.clone(),
                 Number(view.weight).to_string(),
-                format!("{:.3e}", view.spot),
+                match view.quality_db {
+                    Some(quality) => format!("{quality:.1} dB"),
+                    None => format!("{:.3e}", view.spot),
+                },
                 view.rays.to_string(),
                 if lost.is_empty() { "none".to_owned() } else { lost.join(", ") },
             ]);

@@ -21,6 +21,7 @@ pub const BUILTIN: &[Builtin] = &[
     },
     Builtin { name: "maxwell", text: include_str!("../../assets/grin/maxwell.json") },
     Builtin { name: "maxwell-radial", text: include_str!("../../assets/grin/maxwell-radial.json") },
+    Builtin { name: "display", text: include_str!("../../assets/grin/display.json") },
     Builtin { name: "fibre", text: include_str!("../../assets/grin/fibre.json") },
 ];
 

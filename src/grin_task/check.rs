@@ -84,6 +84,9 @@ impl Task {
         positive("field", self.field.size())?;
         self.space.check("space")?;
         positive("tolerance", self.tolerance)?;
+        if let Some(tracing) = self.tracing {
+            within("tracing, per_voxel", tracing.per_voxel, 0.25, 1000.0)?;
+        }
         self.check_limits()?;
         self.check_levels()?;
         if self.views.is_empty() {
@@ -155,6 +158,11 @@ impl Task {
                 let expected = "`given` or `even` ones: only adam may see new rays in every step";
                 Err(wrong("views, directions", "fresh", expected))
             }
+            Method::LeastSquares
+                if self.views.iter().any(|v| matches!(v.goal, Goal::Image { .. })) =>
+            {
+                Err(wrong("method", "least_squares", "adam or lbfgs for an image"))
+            }
             Method::LeastSquares if most > Some(FEW) => {
                 let found = format!("{} numbers", most.unwrap_or(0));
                 Err(wrong("method", found, format!("at most {FEW} for least_squares; or lbfgs")))
@@ -195,6 +203,14 @@ impl View {
             Goal::Like { field, direction } => {
                 within(format!("{goal}, direction"), *direction, 0.0, f64::MAX)?;
                 field.check(&goal)
+            }
+            Goal::Image { .. } if !matches!(self.source, Source::Beam { .. }) => {
+                Err(wrong(goal, "image", "a source that is a `beam`"))
+            }
+            Goal::Image { half, distance, pixels, .. } => {
+                within(format!("{goal}, pixels"), *pixels as f64, 4.0, 2048.0)?;
+                within(format!("{goal}, distance"), *distance, 0.0, f64::MAX)?;
+                positive(format!("{goal}, half"), *half)
             }
             Goal::Point(_) | Goal::Antipode => Ok(()),
         }

@@ -123,9 +123,8 @@ impl Medium {
         }
     }
 
-    /// The range of each of its numbers. What no coefficient of a spline exceeds, the spline does
-    /// not; the outer ones of a spline in one coordinate need more room all the same, since it
-    /// bends at its end, where the edge holds it.
+    /// The range of each of its numbers. A coefficient of a spline that stands outside the space is
+    /// no index of it and has more room; a penalty holds the index itself.
     pub(super) fn ranges(
         &self,
         space: Space,
@@ -144,7 +143,12 @@ impl Medium {
                 let grid = field.grid();
                 (0..grid.nodes()).map(|n| range(is_inside(grid.node(n)), outside)).collect()
             }
-            Self::Tricubic(field) => vec![[low, high]; field.parameters().len()],
+            Self::Tricubic(field) => {
+                let grid = field.grid();
+                // The first coefficient stands one spacing before the domain.
+                let place = |n: usize| grid.node(n) - grid.spacing();
+                (0..grid.nodes()).map(|n| range(is_inside(place(n)), wide)).collect()
+            }
             Self::Radial(field, radius) => {
                 let spacing = field.profile.knots().unwrap_or(1.0);
                 let count = field.parameters().len();

@@ -13,6 +13,7 @@ mod builtin;
 mod check;
 mod compare;
 mod descent;
+mod image;
 mod least_squares;
 mod medium;
 mod runner;
@@ -28,6 +29,6 @@ pub use medium::{Medium, NoField};
 pub use runner::{Judgement, Progress, Runner};
 pub use scene::{Counts, ViewResult};
 pub use task::{
-    Directions, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Source, Space, Start,
-    Task, VERSION, View,
+    Directions, Drawing, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Source, Space,
+    Start, Task, Tracing, VERSION, View,
 };

@@ -1,10 +1,11 @@
 //! What a field does to the light of a task: loss, gradient, misses, and what became of every ray.
 
 use super::check::TaskError;
+use super::image::Screen;
 use super::source::{Draw, Sent};
 use super::space::length;
-use super::task::{Edge, Goal, MakerLimits, Space, Task, View};
-use crate::grin::{Exit, Fates, Field, Ray, Seed, Setup, Tracer, plan};
+use super::task::{Edge, FieldKind, Goal, MakerLimits, Source, Space, Task, Tracing, View};
+use crate::grin::{End, Exit, Fates, Field, LastStep, Ray, Seed, Setup, Tracer, plan};
 use crate::math::Vec3;
 use rayon::prelude::*;
 
@@ -13,8 +14,16 @@ use rayon::prelude::*;
 pub(super) const FLATTEST: f64 = 0.05;
 /// The field from which a measurement comes is traced so much better than the one that is sought.
 const FINER: f64 = 0.1;
+/// Steps that are tied to voxels are no simple fraction of one; without voxels they are tied to this
+/// part of the space; and a ray counts as trapped when it is so many times longer than the space.
+const INCOMMENSURATE: f64 = 0.974;
+const COARSE: f64 = 0.02;
+const LONGEST: f64 = 32.0;
 /// Points along a side of the box at which a slope is held.
 const LATTICE: usize = 24;
+/// Points of a radius at which an index is held, and how firmly.
+const SPOKE: usize = 100;
+const FIRM: f64 = 10.0;
 /// Points of the surface at which the index is held.
 const SURFACE: usize = 2000;
 
@@ -36,6 +45,8 @@ pub(super) struct Shot {
     pub(super) weight: f64,
     /// What a ray that is left out counts, in mm²: more than any that is not.
     lost: f64,
+    /// What an image is made on.
+    screen: Option<Screen>,
 }
 
 /// Rays that are left out, by reason, and those that count.
@@ -77,8 +88,11 @@ impl Counts {
 pub struct ViewResult {
     /// The loss of this view without its weight, in mm².
     pub loss: f64,
-    /// The root of the mean square distance from the aim, in mm, of the rays that count.
+    /// The root of the mean square distance from the aim, in mm, of the rays that count; not a
+    /// number for an image.
     pub spot: f64,
+    /// Of an image: the square of the picture's peak over the mean square difference, in dB.
+    pub quality: Option<f64>,
     /// What became of the rays.
     pub counts: Counts,
     /// The largest distance between a start and the end of its way back, in steps.
@@ -111,9 +125,34 @@ pub(super) fn setups(
     let setup = |view: &View| {
         let space = view.space.unwrap_or(task.space);
         let rays: Vec<Ray<f64>> = view.source.rays(space, draw).iter().map(|s| s.ray).collect();
-        Ok(plan(field, &space.region(), task.launch, &rays, task.tolerance)?.setup)
+        let mut setup = match task.tracing {
+            Some(tracing) => tied(task, field, space, tracing),
+            None => plan(field, &space.region(), task.launch, &rays, task.tolerance)?.setup,
+        };
+        setup.screen = screen(view, space).map(|screen| screen.face);
+        Ok(setup)
     };
     task.views.iter().map(setup).collect()
+}
+
+/// Steps that are tied to the voxels; to the space where the field has none.
+fn tied(task: &Task, field: &dyn Field<f64>, space: Space, tracing: Tracing) -> Setup<f64> {
+    let voxel = field.grain().voxel.unwrap_or(COARSE * space.diameter());
+    let step = INCOMMENSURATE * voxel / tracing.per_voxel;
+    let limit = (LONGEST * space.diameter() / step).clamp(64.0, 1e9) as u32;
+    let end = End::Boundary { region: space.region(), last: LastStep::BrokenLine, limit };
+    let Tracing { integrator, .. } = tracing;
+    Setup { integrator, step, launch: task.launch, end, screen: None }
+}
+
+/// What a view makes its image on.
+fn screen(view: &View, space: Space) -> Option<Screen> {
+    match (&view.goal, &view.source) {
+        (Goal::Image { drawing, half, distance, pixels }, Source::Beam { direction, .. }) => {
+            Some(Screen::new(space, *direction, (*half, *distance, *pixels), *drawing))
+        }
+        _ => None,
+    }
 }
 
 /// The rays of every view with their aims.
@@ -128,7 +167,10 @@ pub(super) fn shots(
         let aims = aims(task, view, space, &sent)?;
         let rays = sent.into_iter().map(|sent| sent.ray).collect();
         let lost = space.diameter() * space.diameter();
-        Ok(Shot { rays, aims, setup: setup.clone(), weight: view.weight, lost })
+        let (setup, weight, screen) = (setup.clone(), view.weight, screen(view, space));
+        // The difference of an image has no unit.
+        let lost = if screen.is_some() { 1.0 } else { lost };
+        Ok(Shot { rays, aims, setup, weight, lost, screen })
     };
     task.views.iter().zip(setups).map(shot).collect()
 }
@@ -136,6 +178,7 @@ pub(super) fn shots(
 fn aims(task: &Task, view: &View, space: Space, sent: &[Sent]) -> Result<Vec<Aim>, TaskError> {
     let at = |x| Aim { x, v: Vec3::default(), direction: 0.0 };
     Ok(match &view.goal {
+        Goal::Image { .. } => Vec::new(),
         Goal::Point([x, y, z]) => vec![at(Vec3::new(*x, *y, *z)); sent.len()],
         Goal::Antipode => {
             let reach = 0.5 * space.diameter();
@@ -205,7 +248,47 @@ impl Shot {
         Ok(self.result(&exits, 0.0))
     }
 
+    /// The image of the rays that count.
+    fn image(&self, screen: &Screen, exits: &[Exit<f64>]) -> Vec<f64> {
+        screen.image(exits.iter().filter(|exit| Self::counts(exit)), exits.len())
+    }
+
+    /// The derivative of the loss by every exit, times the number of rays.
+    fn seeds(&self, exits: &[Exit<f64>]) -> Vec<Seed<f64>> {
+        let rays = exits.len();
+        let Some(screen) = &self.screen else {
+            return exits.iter().enumerate().map(|(i, exit)| self.judge(i, exit).1).collect();
+        };
+        let image = self.image(screen, exits);
+        let seed = |exit: &Exit<f64>| {
+            if !Self::counts(exit) {
+                return Seed::default();
+            }
+            let seed = screen.seed(&image, exit.x, rays);
+            Seed { x: seed.x * rays as f64, ..seed }
+        };
+        exits.iter().map(seed).collect()
+    }
+
     fn result(&self, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
+        match &self.screen {
+            Some(screen) => self.image_result(screen, exits, retrace_error),
+            None => self.spot_result(exits, retrace_error),
+        }
+    }
+
+    fn image_result(&self, screen: &Screen, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
+        let difference = screen.difference(&self.image(screen, exits));
+        let fates = exits.iter().map(|exit| exit.fate).collect();
+        let is_flat = |exit: &&Exit<f64>| exit.fate.arrived() && !Self::counts(exit);
+        let counts = Counts { fates, flat: exits.iter().filter(is_flat).count() };
+        let lost = exits.len() - counts.counted();
+        let loss = difference + self.lost * lost as f64 / exits.len() as f64;
+        let quality = Some(screen.quality(difference));
+        ViewResult { loss, spot: f64::NAN, quality, counts, retrace_error }
+    }
+
+    fn spot_result(&self, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
         let (mut loss, mut square, mut flat) = (0.0, 0.0, 0);
         for (i, exit) in exits.iter().enumerate() {
             loss += self.judge(i, exit).0;
@@ -219,7 +302,8 @@ impl Shot {
         let fates = exits.iter().map(|exit| exit.fate).collect();
         let counts = Counts { fates, flat };
         let spot = (square / counts.counted() as f64).sqrt();
-        ViewResult { loss: loss / exits.len() as f64, spot, counts, retrace_error }
+        let loss = loss / exits.len() as f64;
+        ViewResult { loss, spot, quality: None, counts, retrace_error }
     }
 
     /// The loss with its gradient, added with the weight of the view.
@@ -230,8 +314,7 @@ impl Shot {
     ) -> Result<ViewResult, TaskError> {
         let tracer = Tracer::new(field, self.setup.clone())?;
         let mut exits = tracer.rays(&self.rays);
-        let seeds: Vec<Seed<f64>> =
-            exits.iter().enumerate().map(|(i, exit)| self.judge(i, exit).1).collect();
+        let seeds = self.seeds(&exits);
         let found = tracer.gradient(&self.rays, &mut exits, &seeds);
         let share = self.weight / self.rays.len() as f64;
         gradient.iter_mut().zip(&found.parameters).for_each(|(sum, g)| *sum += share * g);
@@ -273,6 +356,8 @@ impl Shot {
 pub(super) struct Hold {
     edge: Option<(Edge, Vec<Vec3<f64>>)>,
     slope: Option<(f64, f64, Vec<Vec3<f64>>)>,
+    /// The smallest index, of a spline: its coefficients alone do not keep it.
+    floor: Option<(f64, f64, Vec<Vec3<f64>>)>,
 }
 
 impl Hold {
@@ -284,7 +369,15 @@ impl Hold {
             false => task.space.surface(SURFACE),
         };
         let size = task.space.diameter();
+        let inside = || match task.field.is_radial() {
+            true => {
+                (0..=SPOKE).map(|i| Vec3::new(radius * i as f64 / SPOKE as f64, 0.0, 0.0)).collect()
+            }
+            false => [task.space.lattice(LATTICE), surface()].concat(),
+        };
+        let is_spline = !matches!(task.field, FieldKind::Trilinear { .. });
         Self {
+            floor: is_spline.then(|| (task.limits.low, size, inside())),
             edge: task.edge.filter(|edge| edge.weight > 0.0).map(|edge| (edge, surface())),
             slope: slope.map(|slope| (slope, size * size, task.space.lattice(LATTICE))),
         }
@@ -297,6 +390,15 @@ impl Hold {
             for p in places {
                 let off = field.sample(*p).index - edge.index;
                 visit(*p, scale * off, scale, Vec3::default());
+            }
+        }
+        if let Some((low, size, places)) = &self.floor {
+            let scale = FIRM * size / (places.len() as f64).sqrt();
+            for p in places {
+                let under = low - field.sample(*p).index;
+                if under > 0.0 {
+                    visit(*p, scale * under, -scale, Vec3::default());
+                }
             }
         }
         if let Some((limit, square, places)) = &self.slope {

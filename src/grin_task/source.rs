@@ -60,6 +60,7 @@ impl Source {
     /// Whether it has other rays in every step.
     pub(super) fn is_fresh(&self) -> bool {
         matches!(self.directions(), Some(Directions::Fresh(_)))
+            || matches!(self, Self::Beam { fresh: true, .. })
     }
 
     /// Rays in a step.
@@ -91,8 +92,13 @@ impl Source {
                 let sent = |x| Sent { ray: Ray { x, v }, opposite: -x };
                 (0..*rays).map(|i| sent(at(i))).collect()
             }
-            Self::Beam { direction: [x, y, z], half, rays } => {
-                square(unit(Vec3::new(*x, *y, *z)), *half, *rays, space.diameter())
+            Self::Beam { direction: [x, y, z], half, rays, fresh } => {
+                let first = match draw {
+                    Draw::Step(step) if *fresh => (step + 1) * rays * rays,
+                    Draw::Step(_) | Draw::Judge => 0,
+                };
+                let d = unit(Vec3::new(*x, *y, *z));
+                square(d, *half, *rays, (space.diameter(), first))
             }
         }
     }
@@ -133,11 +139,11 @@ fn cone_of(
     })
 }
 
-/// A square beam, one ray in each of its squares.
-fn square(d: Vec3<f64>, half: f64, side: usize, back: f64) -> Vec<Sent> {
+/// A square beam, one ray in each of its squares: where, tells a sequence from its member `first` on.
+fn square(d: Vec3<f64>, half: f64, side: usize, (back, first): (f64, usize)) -> Vec<Sent> {
     let [u, v] = across(d);
     let ray = |n: usize| {
-        let (a, b) = even(n);
+        let (a, b) = even(first + n);
         let at = |i: usize, jitter: f64| half * (2.0 * (i as f64 + jitter) / side as f64 - 1.0);
         let x = u * at(n % side, a) + v * at(n / side, b) - d * back;
         Sent { ray: Ray { x, v: d }, opposite: d }

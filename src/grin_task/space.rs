@@ -1,7 +1,7 @@
 //! Where light bends, as the tracer wants it, and points spread over it.
 
 use super::task::Space;
-use crate::grin::Region;
+use crate::grin::{Face, Region};
 use crate::math::Vec3;
 use std::f64::consts::{PI, TAU};
 
@@ -53,6 +53,16 @@ impl Space {
             )
         };
         (0..count.pow(3)).map(at).filter(|p| region.height(*p) < 0.0).collect()
+    }
+
+    /// The plane across a direction that stands so far behind the space.
+    pub(super) fn behind(self, direction: Vec3<f64>, distance: f64) -> Face<f64> {
+        let [low, high] = self.corners();
+        let far = |d: f64, low: f64, high: f64| if d < 0.0 { d * low } else { d * high };
+        let reach = far(direction.x, low.x, high.x)
+            + far(direction.y, low.y, high.y)
+            + far(direction.z, low.z, high.z);
+        Face::plane(direction, reach + distance)
     }
 
     /// About so many points spread over its surface; of a rod, over its wall.

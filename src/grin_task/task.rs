@@ -1,6 +1,6 @@
 //! What a person asks of a field of refractive index: the task as it is written in a file.
 
-use crate::grin::Launch;
+use crate::grin::{Integrator, Launch};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -34,6 +34,9 @@ pub struct Task {
     pub start: Start,
     /// Exit positions are good to this length, where the field allows it.
     pub tolerance: f64,
+    /// The step of rays in a grid, where it is not to be chosen by the tolerance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracing: Option<Tracing>,
     /// What a maker can make.
     #[serde(default)]
     pub limits: MakerLimits,
@@ -155,8 +158,7 @@ pub enum Source {
         /// How many.
         rays: usize,
     },
-    /// A square beam from outside the space, its rays on a grid of squares and off their middles by
-    /// an even pattern.
+    /// A square beam from outside the space: a ray somewhere in each square of a grid.
     Beam {
         /// The direction in which light goes.
         direction: [f64; 3],
@@ -164,6 +166,9 @@ pub enum Source {
         half: f64,
         /// Rays along a side.
         rays: usize,
+        /// Whether they stand elsewhere in their squares in every step; for Adam.
+        #[serde(default)]
+        fresh: bool,
     },
 }
 
@@ -187,6 +192,18 @@ pub enum Goal {
     Point([f64; 3]),
     /// It leaves through the point of the space's surface opposite to its source. Likewise.
     Antipode,
+    /// It makes a picture on a square screen across a beam. The loss is the mean square difference
+    /// from the picture of mean 1, without a unit.
+    Image {
+        /// The picture.
+        drawing: Drawing,
+        /// Half the side of the screen.
+        half: f64,
+        /// How far it stands behind the space.
+        distance: f64,
+        /// Pixels along its side.
+        pixels: usize,
+    },
     /// It leaves as it does from another field, which a measurement of rays would give.
     Like {
         /// That field.
@@ -195,6 +212,16 @@ pub enum Goal {
         #[serde(default)]
         direction: f64,
     },
+}
+
+/// A picture that is drawn by formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drawing {
+    /// A smiling face.
+    Face,
+    /// A letter A in a frame.
+    Letter,
 }
 
 /// The field to begin with.
@@ -211,6 +238,16 @@ impl Default for Start {
     fn default() -> Self {
         Self::Uniform(1.0)
     }
+}
+
+/// Steps that are tied to the voxels of a grid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tracing {
+    /// The kind of step.
+    pub integrator: Integrator,
+    /// About how many steps a voxel has.
+    pub per_voxel: f64,
 }
 
 /// What a maker can make.

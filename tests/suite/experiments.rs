@@ -132,3 +132,29 @@ fn the_exact_rate_samples_the_target_and_the_printed_one_does_not() {
         assert!(time[first + 1..time.len() / 2 + first].iter().all(|other| *other > time[first]));
     }
 }
+
+#[test]
+fn the_adjoint_keeps_as_much_for_many_steps_as_for_few() {
+    let outcome = outcome("5.3");
+    let [tape, rays, steps] =
+        ["tape_bytes", "ray_bytes", "steps"].map(|name| column(&outcome.tables[0], name));
+    assert!(tape[3] > 7.0 * tape[0] && steps[3] > 7.0 * steps[0]);
+    assert!(rays.iter().all(|bytes| *bytes == rays[0]));
+}
+
+#[test]
+fn known_lenses_are_found_again() {
+    let outcome = outcome("5.8");
+    let relative = column(&outcome.tables[0], "relative");
+    let shape = column(&outcome.tables[0], "without_offset");
+    assert!(relative[0] < 1e-4 && shape.iter().zip(&relative).all(|(a, b)| a <= b));
+}
+
+#[test]
+fn a_fibre_focuses_better_than_the_parabolic_one() {
+    let outcome = outcome("5.9");
+    let [ours, theirs] =
+        ["spot_mm", "parabola_spot_mm"].map(|name| column(&outcome.tables[0], name));
+    assert!((theirs[0] - 0.0768).abs() < 1e-3 && (theirs[1] - 0.222).abs() < 2e-3, "{theirs:?}");
+    assert!(ours.iter().zip(&theirs).all(|(ours, theirs)| 1000.0 * ours < *theirs));
+}
