@@ -25,7 +25,7 @@ pub(super) struct Grin {
     #[arg(value_name = "TASK")]
     task: Option<String>,
 
-    /// Writes the best field: NumPy's .npz, or .json with the numbers beside it in .raw
+    /// Writes the best field: .npz for Python, or .json with the numbers beside it in .raw
     #[arg(long, value_name = "FILE", requires = "task")]
     out: Option<PathBuf>,
 
@@ -68,7 +68,7 @@ impl Grin {
         let stopped = !worked.map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
         let ms = 1e3 * clock.seconds();
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
-        let mut report = Report::new(&runner, Cost { ms, processor_ms, memory, stopped })
+        let mut report = Report::new(&runner, &Cost { ms, processor_ms, memory, stopped })
             .map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
         report.files = self.write(&task, runner.best())?;
         output.print(&report)
@@ -241,7 +241,7 @@ struct Error {
 }
 
 impl Report {
-    fn new(runner: &Runner, cost: Cost) -> Result<Self, Box<dyn std::error::Error>> {
+    fn new(runner: &Runner, cost: &Cost) -> Result<Self, Box<dyn std::error::Error>> {
         let (task, best) = (runner.task(), runner.best());
         let Judgement { loss, views } = runner.judge(best)?;
         let view = |(view, result): (&grin_task::View, &ViewResult)| View {

@@ -6,6 +6,7 @@ use super::task::{
 };
 use crate::grin::SetupError;
 use crate::grin::field::GridError;
+use std::fmt::Display;
 
 /// Most numbers that least squares are worth while for.
 const FEW: usize = 400;
@@ -52,8 +53,9 @@ pub enum TaskError {
 }
 
 /// An error at a place.
-fn wrong(place: impl Into<String>, found: impl ToString, expected: impl Into<String>) -> TaskError {
-    TaskError::Value { place: place.into(), found: found.to_string(), expected: expected.into() }
+fn wrong<T: Display>(place: impl Into<String>, found: T, expected: impl Into<String>) -> TaskError {
+    let found = format!("{found}");
+    TaskError::Value { place: place.into(), found, expected: expected.into() }
 }
 
 /// Refuses a number that is not above zero.

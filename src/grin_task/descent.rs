@@ -1,9 +1,10 @@
 //! The methods that a task may ask for, behind one step.
 
 use super::check::TaskError;
+use super::hold::Hold;
 use super::least_squares::{LeastSquares, Rows};
 use super::medium::Medium;
-use super::scene::{Counts, Evaluation, Hold, Shot, evaluate, rows};
+use super::scene::{Counts, Evaluation, Shot, evaluate, rows};
 use super::task::Method;
 use crate::grin::{Adam, Lbfgs, Limits};
 

@@ -13,6 +13,7 @@ mod builtin;
 mod check;
 mod compare;
 mod descent;
+mod hold;
 mod image;
 mod least_squares;
 mod medium;

@@ -2,8 +2,9 @@
 
 use super::check::TaskError;
 use super::descent::{Descent, Problem, Step};
+use super::hold::Hold;
 use super::medium::{Medium, from_file};
-use super::scene::{Counts, Hold, Shot, ViewResult, setups, shots};
+use super::scene::{Counts, Shot, ViewResult, setups, shots};
 use super::source::Draw;
 use super::task::{Start, Task};
 use crate::grin::field::Trilinear;

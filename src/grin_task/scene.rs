@@ -1,10 +1,10 @@
 //! What a field does to the light of a task: loss, gradient, misses, and what became of every ray.
 
 use super::check::TaskError;
+use super::hold::Hold;
 use super::image::Screen;
 use super::source::{Draw, Sent};
-use super::space::length;
-use super::task::{Edge, FieldKind, Goal, MakerLimits, Source, Space, Task, Tracing, View};
+use super::task::{Goal, Source, Space, Task, Tracing, View};
 use crate::grin::{End, Exit, Fates, Field, LastStep, Ray, Seed, Setup, Tracer, plan};
 use crate::math::Vec3;
 use rayon::prelude::*;
@@ -19,13 +19,6 @@ const FINER: f64 = 0.1;
 const INCOMMENSURATE: f64 = 0.974;
 const COARSE: f64 = 0.02;
 const LONGEST: f64 = 32.0;
-/// Points along a side of the box at which a slope is held.
-const LATTICE: usize = 24;
-/// Points of a radius at which an index is held, and how firmly.
-const SPOKE: usize = 100;
-const FIRM: f64 = 10.0;
-/// Points of the surface at which the index is held.
-const SURFACE: usize = 2000;
 
 /// Where a ray shall go.
 #[derive(Debug, Clone, Copy)]
@@ -249,7 +242,7 @@ impl Shot {
     }
 
     /// The image of the rays that count.
-    fn image(&self, screen: &Screen, exits: &[Exit<f64>]) -> Vec<f64> {
+    fn image(screen: &Screen, exits: &[Exit<f64>]) -> Vec<f64> {
         screen.image(exits.iter().filter(|exit| Self::counts(exit)), exits.len())
     }
 
@@ -259,7 +252,7 @@ impl Shot {
         let Some(screen) = &self.screen else {
             return exits.iter().enumerate().map(|(i, exit)| self.judge(i, exit).1).collect();
         };
-        let image = self.image(screen, exits);
+        let image = Self::image(screen, exits);
         let seed = |exit: &Exit<f64>| {
             if !Self::counts(exit) {
                 return Seed::default();
@@ -278,7 +271,7 @@ impl Shot {
     }
 
     fn image_result(&self, screen: &Screen, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
-        let difference = screen.difference(&self.image(screen, exits));
+        let difference = screen.difference(&Self::image(screen, exits));
         let fates = exits.iter().map(|exit| exit.fate).collect();
         let is_flat = |exit: &&Exit<f64>| exit.fate.arrived() && !Self::counts(exit);
         let counts = Counts { fates, flat: exits.iter().filter(is_flat).count() };
@@ -348,97 +341,6 @@ impl Shot {
             rows
         };
         Ok(self.rays.par_iter().enumerate().flat_map_iter(of_ray).collect())
-    }
-}
-
-/// What is asked of the field itself: its index at the edge, and a limit of its slope.
-#[derive(Debug, Clone)]
-pub(super) struct Hold {
-    edge: Option<(Edge, Vec<Vec3<f64>>)>,
-    slope: Option<(f64, f64, Vec<Vec3<f64>>)>,
-    /// The smallest index, of a spline: its coefficients alone do not keep it.
-    floor: Option<(f64, f64, Vec<Vec3<f64>>)>,
-}
-
-impl Hold {
-    pub(super) fn new(task: &Task) -> Self {
-        let MakerLimits { slope, .. } = task.limits;
-        let radius = task.field.size();
-        let surface = || match task.field.is_radial() {
-            true => vec![Vec3::new(radius, 0.0, 0.0)],
-            false => task.space.surface(SURFACE),
-        };
-        let size = task.space.diameter();
-        let inside = || match task.field.is_radial() {
-            true => {
-                (0..=SPOKE).map(|i| Vec3::new(radius * i as f64 / SPOKE as f64, 0.0, 0.0)).collect()
-            }
-            false => [task.space.lattice(LATTICE), surface()].concat(),
-        };
-        let is_spline = !matches!(task.field, FieldKind::Trilinear { .. });
-        Self {
-            floor: is_spline.then(|| (task.limits.low, size, inside())),
-            edge: task.edge.filter(|edge| edge.weight > 0.0).map(|edge| (edge, surface())),
-            slope: slope.map(|slope| (slope, size * size, task.space.lattice(LATTICE))),
-        }
-    }
-
-    /// What each place counts: the residual, and its derivative by the index and its gradient.
-    fn each(&self, field: &dyn Field<f64>, mut visit: impl FnMut(Vec3<f64>, f64, f64, Vec3<f64>)) {
-        if let Some((edge, places)) = &self.edge {
-            let scale = (edge.weight / places.len() as f64).sqrt();
-            for p in places {
-                let off = field.sample(*p).index - edge.index;
-                visit(*p, scale * off, scale, Vec3::default());
-            }
-        }
-        if let Some((low, size, places)) = &self.floor {
-            let scale = FIRM * size / (places.len() as f64).sqrt();
-            for p in places {
-                let under = low - field.sample(*p).index;
-                if under > 0.0 {
-                    visit(*p, scale * under, -scale, Vec3::default());
-                }
-            }
-        }
-        if let Some((limit, square, places)) = &self.slope {
-            let scale = square / (places.len() as f64).sqrt();
-            for p in places {
-                let gradient = field.sample(*p).gradient;
-                let over = length(gradient) - limit;
-                if over > 0.0 {
-                    let outwards = gradient * (scale / (over + limit));
-                    visit(*p, scale * over, 0.0, outwards);
-                }
-            }
-        }
-    }
-
-    /// The sum of squares, and its gradient added.
-    fn descend(&self, field: &dyn Field<f64>, gradient: &mut [f64]) -> f64 {
-        let mut sum = 0.0;
-        self.each(field, |p, residual, by_index, by_slope| {
-            sum += residual * residual;
-            field.deposit(p, 2.0 * residual * by_index, by_slope * (2.0 * residual), gradient);
-        });
-        sum
-    }
-
-    fn rows(&self, field: &dyn Field<f64>) -> Vec<(f64, Vec<f64>)> {
-        let mut rows = Vec::new();
-        self.each(field, |p, residual, by_index, by_slope| {
-            let mut row = vec![0.0; field.parameters().len()];
-            field.deposit(p, by_index, by_slope, &mut row);
-            rows.push((residual, row));
-        });
-        rows
-    }
-
-    /// The sum of squares alone.
-    pub(super) fn look(&self, field: &dyn Field<f64>) -> f64 {
-        let mut sum = 0.0;
-        self.each(field, |_, residual, _, _| sum += residual * residual);
-        sum
     }
 }
 

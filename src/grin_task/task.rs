@@ -230,7 +230,7 @@ pub enum Drawing {
 pub enum Start {
     /// The same index everywhere.
     Uniform(f64),
-    /// A volume from a file, NumPy's .npz or raw numbers with a header.
+    /// A volume from a file, `NumPy`'s .npz or raw numbers with a header.
     Volume(PathBuf),
 }
 

@@ -1,7 +1,7 @@
 //! Design tasks in gradient-index fields: lenses found again, limits kept, wrong tasks refused by
 //! name, and the same field on any number of threads.
 
-use aplanat::grin::{Fate, Field as _};
+use aplanat::grin::{Fate, Launch};
 use aplanat::grin_task::{
     self, BUILTIN, Directions, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Runner,
     Source, Space, Start, Task, TaskError, View,
@@ -31,7 +31,7 @@ fn small() -> Task {
         notes: String::new(),
         field: FieldKind::Trilinear { half: 1.0 },
         space: Space::Cube { half: 1.0 },
-        launch: Default::default(),
+        launch: Launch::default(),
         views: vec![view],
         start: Start::default(),
         tolerance: 0.05,
@@ -75,7 +75,7 @@ fn grin_a_grid_finds_the_shape_better_than_the_level() {
     let runner = solved(&task);
     let found = task.difference(runner.best()).unwrap().unwrap();
     println!("luneburg on 9^3: {found:?}");
-    assert!(found.relative < 4e-2 && found.without_offset < 0.5 * found.relative, "{found:?}");
+    assert!(found.relative < 6e-2 && found.without_offset < 0.3 * found.relative, "{found:?}");
     let judged = runner.judge(runner.best()).unwrap();
     assert_eq!(judged.views[0].counts.excluded().count(), 0);
     // Nodes outside the ball are held at 1, all others keep the limits.
@@ -93,9 +93,9 @@ fn grin_a_fibre_focuses_three_times_and_is_the_secant() {
     let runner = solved(&builtin("fibre"));
     let spots: Vec<f64> =
         runner.judge(runner.best()).unwrap().views.iter().map(|view| view.spot).collect();
-    // The parabolic fibre at its best planes: 0.0768, 0.222, 0.36 mm.
+    // The parabolic fibre at its best planes: 0.068, 0.196, 0.302 mm.
     println!("fibre: {spots:?}");
-    assert!(spots[0] < 7.6e-5 && spots[1] < 2.2e-4 && spots[2] < 3.6e-4, "{spots:?}");
+    assert!(spots[0] < 6.8e-5 && spots[1] < 1.96e-4 && spots[2] < 3.02e-4, "{spots:?}");
     for i in 0..95 {
         let r = 0.01 * f64::from(i);
         let index = runner.best().field().sample(Vec3::new(r, 0.0, 0.0)).index;
