@@ -270,3 +270,28 @@ fn grin_a_single_voxel_works_and_one_without_free_nodes_is_refused() {
     let error = Runner::new(&task).unwrap_err();
     assert!(matches!(error, TaskError::NothingFree { nodes: 2 }), "{error}");
 }
+
+#[test]
+fn grin_a_display_comes_nearer_to_both_of_its_pictures() {
+    let mut task = builtin("display");
+    task.levels = vec![Level { nodes: 5, steps: 20 }, Level { nodes: 9, steps: 20 }];
+    for view in &mut task.views {
+        if let Source::Beam { rays, .. } = &mut view.source {
+            *rays = 64;
+        }
+        if let Goal::Image { pixels, .. } = &mut view.goal {
+            *pixels = 32;
+        }
+    }
+    let quality = |runner: &Runner| -> Vec<f64> {
+        let views = runner.judge(runner.best()).unwrap().views;
+        views.iter().filter_map(|view| view.quality).collect()
+    };
+    let before = quality(&Runner::new(&task).unwrap());
+    let after = quality(&solved(&task));
+    println!("display: {before:.1?} to {after:.1?} dB");
+    assert!(after.len() == 2 && after.iter().zip(&before).all(|(a, b)| *a > b + 2.0));
+    task.method = Method::LeastSquares;
+    let error = Runner::new(&task).unwrap_err().to_string();
+    assert!(error.contains("fresh") || error.contains("image"), "{error}");
+}
