@@ -65,7 +65,7 @@ impl Hold {
             }
         }
         if let Some((limit, square, places)) = &self.slope {
-            let scale = square / (places.len() as f64).sqrt();
+            let scale = FIRM * square / (places.len() as f64).sqrt();
             for p in places {
                 let gradient = field.sample(*p).gradient;
                 let over = length(gradient) - limit;
