@@ -10,6 +10,7 @@ mod experiments;
 mod files;
 mod front;
 mod grin;
+mod grin_task;
 mod hard_cases;
 mod library;
 mod merit;
