@@ -4,6 +4,7 @@
 //! Indices are relative to air at about 20 °C, as in the makers' catalogues.
 
 use serde::Deserialize;
+use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// Wavelengths of the spectral lines that index and Abbe number refer to, in micrometres.
@@ -93,12 +94,22 @@ pub fn catalogue() -> &'static [Glass] {
 /// The glass with this name, `SCHOTT N-BK7` or, where only one maker has it, `N-BK7`; blanks and
 /// case do not matter.
 pub fn find(name: &str) -> Option<&'static Glass> {
-    let wanted = plain(name);
-    let full = catalogue().iter().find(|glass| plain(&glass.full_name()) == wanted);
-    full.or_else(|| {
-        let mut same = catalogue().iter().filter(|glass| plain(&glass.name) == wanted);
-        let only = same.next();
-        if same.next().is_some() { None } else { only }
+    names().get(&plain(name)).copied().flatten()
+}
+
+/// Every name by which a glass is found; none where two makers have the same one.
+fn names() -> &'static HashMap<String, Option<&'static Glass>> {
+    static NAMES: OnceLock<HashMap<String, Option<&'static Glass>>> = OnceLock::new();
+    NAMES.get_or_init(|| {
+        let mut names: HashMap<_, Option<&'static Glass>> = HashMap::new();
+        for glass in catalogue() {
+            let short = names.entry(plain(&glass.name));
+            short.and_modify(|only| *only = None).or_insert(Some(glass));
+        }
+        for glass in catalogue().iter().rev() {
+            names.insert(plain(&glass.full_name()), Some(glass));
+        }
+        names
     })
 }
 

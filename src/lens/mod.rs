@@ -11,6 +11,7 @@ pub mod glass;
 mod parameter;
 mod resolve;
 mod reversed;
+mod rows;
 mod system;
 mod vary;
 

@@ -168,6 +168,20 @@ impl Merit {
         Ok(())
     }
 
+    /// The areas of the pupils of the lens with which the search began, by zoom position: what
+    /// [`Term::Light`] compares with.
+    pub fn light_at_start(&self) -> &[Vec<f64>] {
+        &self.start
+    }
+
+    /// The same merit, compared with the light of another lens of as many zoom positions, fields
+    /// and wavelengths, whatever its structure.
+    #[must_use]
+    pub fn compared_with(mut self, light_at_start: &[Vec<f64>]) -> Self {
+        self.start = light_at_start.to_vec();
+        self
+    }
+
     /// What it aims at.
     pub fn goal(&self) -> &Goal {
         &self.goal

@@ -10,6 +10,7 @@ use super::state::State;
 use super::{Optimizer, Progress};
 use crate::lens::Lens;
 use crate::merit::{Detail, Merit, MeritError, TermValue};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Decay of the mean gradient and of the mean square.
@@ -34,34 +35,62 @@ pub(super) enum Pace {
     Annealed(usize),
 }
 
+/// The running means of a gradient in scaled variables and of its square.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Moments {
+    mean: Vec<f64>,
+    square: Vec<f64>,
+    /// Gradients that they have seen.
+    age: i32,
+}
+
+impl Moments {
+    /// Takes a gradient in; the step that follows, in scaled variables. None is taken through a
+    /// bound at which a variable is held.
+    pub(super) fn step(&mut self, gradient: &[f64], state: &State, rate: f64) -> Vec<f64> {
+        if self.mean.len() != gradient.len() {
+            *self = Self::default();
+            self.mean.resize(gradient.len(), 0.0);
+            self.square.resize(gradient.len(), 0.0);
+        }
+        self.age = self.age.saturating_add(1);
+        let [b1, b2] = DECAY;
+        let (c1, c2) = (1.0 - b1.powi(self.age), 1.0 - b2.powi(self.age));
+        let held = state.held(gradient);
+        let step = |i: usize| {
+            let g = gradient[i] * state.scales[i];
+            self.mean[i] = b1 * self.mean[i] + (1.0 - b1) * g;
+            self.square[i] = b2 * self.square[i] + (1.0 - b2) * g * g;
+            let size = (self.square[i] / c2).sqrt();
+            if held[i] || size == 0.0 { 0.0 } else { -rate * (self.mean[i] / c1) / size }
+        };
+        (0..gradient.len()).map(step).collect()
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct Adam {
     state: State,
     gradient: Vec<f64>,
-    mean: Vec<f64>,
-    square: Vec<f64>,
+    moments: Moments,
     rate: f64,
     pace: Pace,
-    /// Steps since the moments were reset.
-    age: i32,
     since_better: usize,
 }
 
 impl Adam {
     pub(super) fn new(merit: Merit, lens: &Lens, pace: Pace) -> Result<Self, MeritError> {
         let mut state = State::new(merit, lens)?;
-        let count = state.values.len();
         let sum = state.merit.sum(&state.values, Detail::Normal)?;
         if pace == Pace::Patient {
             state.rescale(&sum);
         }
         Ok(Self {
             gradient: sum.gradient.iter().copied().collect(),
-            mean: vec![0.0; count],
-            square: vec![0.0; count],
+            moments: Moments::default(),
             rate: if pace == Pace::Patient { RATE } else { ANNEALED_RATE },
             pace,
-            age: 0,
             since_better: 0,
             state,
         })
@@ -69,27 +98,14 @@ impl Adam {
 
     /// The step in scaled variables.
     fn direction(&mut self) -> Vec<f64> {
-        self.age += 1;
-        let [b1, b2] = DECAY;
-        let (c1, c2) = (1.0 - b1.powi(self.age), 1.0 - b2.powi(self.age));
-        let held = self.state.held(&self.gradient);
-        let step = |i: usize| {
-            let g = self.gradient[i] * self.state.scales[i];
-            self.mean[i] = b1 * self.mean[i] + (1.0 - b1) * g;
-            self.square[i] = b2 * self.square[i] + (1.0 - b2) * g * g;
-            let size = (self.square[i] / c2).sqrt();
-            if held[i] || size == 0.0 { 0.0 } else { -self.rate * (self.mean[i] / c1) / size }
-        };
-        (0..self.gradient.len()).map(step).collect()
+        self.moments.step(&self.gradient, &self.state, self.rate)
     }
 
     /// Back to the best lens with half of the rate and fresh moments.
     fn slow_down(&mut self) {
         self.rate *= 0.5;
         self.since_better = 0;
-        self.age = 0;
-        self.mean.fill(0.0);
-        self.square.fill(0.0);
+        self.moments = Moments::default();
         self.state.return_to_best();
         self.differentiate();
     }

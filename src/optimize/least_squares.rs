@@ -33,9 +33,24 @@ pub(super) struct LeastSquares {
 
 impl LeastSquares {
     pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
-        let state = State::new(merit, lens)?;
-        let sum = state.merit.sum(&state.values, Detail::Normal)?;
-        Ok(Self { state, sum, damping: DAMPING, growth: GROWTH, idle: 0 })
+        let (state, sum) = State::with_sum(merit, lens, Detail::Normal)?;
+        Ok(Self::resumed(state, sum, None))
+    }
+
+    /// A search that goes on with the damping, and its growth, of one before.
+    pub(super) fn resumed(state: State, sum: Sum, damping: Option<[f64; 2]>) -> Self {
+        let [damping, growth] = damping.unwrap_or([DAMPING, GROWTH]);
+        Self { state, sum, damping, growth, idle: 0 }
+    }
+
+    /// The damping, and how fast it grows.
+    pub(super) fn damping(&self) -> [f64; 2] {
+        [self.damping, self.growth]
+    }
+
+    /// The lens where it stands.
+    pub(super) fn into_current(self) -> Lens {
+        self.state.current
     }
 
     /// The damped step in scaled variables, and the reduction of the merit that it promises.
@@ -84,7 +99,7 @@ impl LeastSquares {
     }
 
     /// Tries dampings until a step reduces the merit; returns how much of the first one was taken.
-    fn descend(&mut self) -> f64 {
+    pub(super) fn descend(&mut self) -> f64 {
         let before = self.state.value;
         let mut first = None;
         while self.damping < MOST_DAMPING {

@@ -7,6 +7,9 @@ mod adam;
 mod least_squares;
 pub mod pareto;
 mod state;
+mod stretch;
+
+pub use stretch::{Memory, Stretch, stretch};
 
 use crate::lens::Lens;
 use crate::merit::{Goal, Merit, MeritError, TermValue};

@@ -39,13 +39,23 @@ pub(super) struct State {
 
 impl State {
     pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
+        Self::with_sum(merit, lens, Detail::Value).map(|(state, _)| state)
+    }
+
+    /// A lens at the beginning of a search, with its merit in some detail.
+    pub(super) fn with_sum(
+        merit: Merit,
+        lens: &Lens,
+        detail: Detail,
+    ) -> Result<(Self, Sum), MeritError> {
         if merit.variables().is_empty() {
             return Err(MeritError::NoVariables);
         }
         let values = merit.values(lens);
-        let value = merit.value(&values)?;
+        let sum = merit.sum(&values, detail)?;
+        let value = sum.value;
         let scales: Vec<f64> = merit.variables().iter().map(|v| scale(lens, v)).collect();
-        Ok(Self {
+        let state = Self {
             merit,
             values,
             widest: scales.clone(),
@@ -59,7 +69,8 @@ impl State {
             stale: 0,
             steps: 0,
             refused: None,
-        })
+        };
+        Ok((state, sum))
     }
 
     /// Moves by a step in scaled variables, halved until the lens is valid; returns how much of the

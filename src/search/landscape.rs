@@ -1,17 +1,21 @@
 //! What a search walks through.
 
-use super::{Kind, Random, Refusal};
+use super::{Kind, Random, Refusal, Weights};
 use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
 
 /// What a landscape consists of: a lens, or the numbers of a toy problem.
+///
+/// A checkpoint keeps it as JSON, which has no word for infinity: a type that can hold one writes
+/// it in another way. A checkpoint that would not read back as it was is refused when it is saved.
 pub trait Point: Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned {}
 
 impl<T: Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned> Point for T {}
 
 /// Points with a loss, a descent, mutations, and draws from anywhere.
 ///
-/// Every method is a function of its arguments alone: that is what makes runs repeatable.
+/// Every method is a function of its arguments alone: that is what makes runs repeatable, on any
+/// number of threads. A loss that is not finite says that a point is worth nothing.
 pub trait Landscape: Sync {
     /// A place in it.
     type Point: Point;
@@ -22,22 +26,70 @@ pub trait Landscape: Sync {
     /// What a point is worth, less being better: (4.6); infinite where it is worth nothing.
     fn loss(&self, point: &Self::Point) -> f64;
 
-    /// One local move, of as many gradient steps as the settings say: (4.12). Returns where it
-    /// leads, its loss there, and how many gradients it took.
+    /// One local move, of as many gradient steps as the landscape's settings say: (4.12). Returns
+    /// where it leads, its loss there, and how many gradients it took.
     fn descend(&self, point: &Self::Point, memory: &mut Self::Memory) -> (Self::Point, f64, usize);
 
     /// A point from anywhere: `p_global` of (4.14).
     fn draw(&self, random: &mut Random) -> Result<Self::Point, Refusal>;
 
-    /// A mutation of a point.
+    /// A mutation of a point, of a kind drawn with these weights times those of the landscape's own
+    /// rules; a weight of 0 forbids a kind.
     fn mutate(
         &self,
         point: &Self::Point,
+        weights: &Weights,
         random: &mut Random,
     ) -> Result<Mutated<Self::Point>, Refusal>;
 
     /// What two points of the same structure have in common: a reservoir may hold one of each.
     fn topology(&self, point: &Self::Point) -> String;
+
+    /// What distinguishes this landscape from others, like its rules and its objective: a
+    /// checkpoint made on another one is refused, by the name of the first field that differs.
+    fn about(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
+
+    /// How many elements a point has; brute force adds after each and removes each.
+    fn elements(&self, _point: &Self::Point) -> usize {
+        0
+    }
+
+    /// The mutation of this kind of one element, counted from 0: brute force asks for
+    /// [`Kind::AddSinglet`] and [`Kind::RemoveSinglet`].
+    fn mutate_at(
+        &self,
+        _point: &Self::Point,
+        _element: usize,
+        kind: Kind,
+        _random: &mut Random,
+    ) -> Result<Mutated<Self::Point>, Refusal> {
+        Err(Refusal { kind, why: "this landscape has no elements".to_owned() })
+    }
+
+    /// Loss and gradient by every variable, in the units in which a descent takes its steps: what
+    /// Langevin steps of Metropolis and Hastings need. None where there is no gradient.
+    fn slope(&self, _point: &Self::Point) -> Option<Slope> {
+        None
+    }
+
+    /// The point with other values of the variables that [`Landscape::slope`] lists; none where
+    /// they are out of bounds. It may not change them, or the proposal would be another one.
+    fn with_values(&self, _point: &Self::Point, _values: &[f64]) -> Option<Self::Point> {
+        None
+    }
+}
+
+/// A loss and its gradient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slope {
+    /// The loss.
+    pub loss: f64,
+    /// The variables.
+    pub values: Vec<f64>,
+    /// The derivative of the loss by each of them.
+    pub gradient: Vec<f64>,
 }
 
 /// A point after a mutation.

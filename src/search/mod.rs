@@ -7,13 +7,39 @@
 //! settings say, whatever the number of threads, and whatever is remembered between two moves can
 //! be written down and read again.
 
+mod chain;
+mod checkpoint;
+pub mod element;
+mod error;
+mod family;
 mod landscape;
+pub mod lens;
+mod metropolis;
 pub mod mutation;
+mod projection;
+mod reservoir;
 mod rules;
+mod run;
+mod settings;
+mod statistics;
+mod steer;
+mod temperature;
+mod weights;
 
-pub use landscape::{Landscape, Mutated, Point};
-pub use mutation::{Kind, Refusal};
+pub use chain::{Chain, Tour};
+pub use error::SearchError;
+pub use family::{Ended, Node, Tree};
+pub use landscape::{Landscape, Mutated, Point, Slope};
+pub use mutation::{Kind, Mutant, Refusal, mutate, propose};
+pub use projection::Projection;
+pub use reservoir::{Entry, Offer, Reservoir};
 pub use rules::Rules;
+pub use run::{Event, Over, Run, RunOf};
+pub use settings::{Langevin, Method, Settings};
+pub use statistics::{Statistics, Tally};
+pub use steer::Steer;
+pub use temperature::{Temperature, Termination};
+pub use weights::Weights;
 
 /// The source of all chance in a search; its state is part of a checkpoint.
 pub type Random = rand_xoshiro::Xoshiro256PlusPlus;

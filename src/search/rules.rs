@@ -12,8 +12,9 @@ pub struct Rules {
     /// The glasses that new elements may be made of, by maker and name; none allows all of the
     /// catalogue.
     pub glasses: Vec<String>,
-    /// The first and last surface, counted from 0, that mutations may touch; none allows all.
-    pub surfaces: Option<[usize; 2]>,
+    /// How many surfaces at the front and at the rear mutations leave alone. They are counted from
+    /// the ends, so that they stay the same ones while elements come and go between them.
+    pub kept: [usize; 2],
     /// How often each kind of mutation is tried, relatively; a kind that is not listed has 1, and 0
     /// forbids it.
     pub weights: Vec<(Kind, f64)>,
@@ -42,7 +43,7 @@ impl Default for Rules {
         Self {
             elements: [2, 8],
             glasses: Vec::new(),
-            surfaces: None,
+            kept: [0, 0],
             weights: Vec::new(),
             projection: true,
             glass_center: [1.0, 30.0],
@@ -62,5 +63,18 @@ impl Rules {
     pub fn weight(&self, kind: Kind) -> f64 {
         let listed = self.weights.iter().find(|(listed, _)| *listed == kind);
         listed.map_or(1.0, |(_, weight)| *weight)
+    }
+
+    /// The same rules for mutations that touch only the surfaces `first` to `last` of a lens of so
+    /// many rows.
+    #[must_use]
+    pub fn touching(mut self, first: usize, last: usize, rows: usize) -> Self {
+        self.kept = [first, rows.saturating_sub(last + 1)];
+        self
+    }
+
+    /// Whether mutations may touch a surface of a lens of so many rows.
+    pub fn allow(&self, surface: usize, rows: usize) -> bool {
+        surface >= self.kept[0] && surface + self.kept[1] < rows
     }
 }

@@ -313,18 +313,6 @@ impl Lens {
         });
     }
 
-    /// Renames every parameter that a variable or pickup mentions; what has no name any more goes.
-    pub(super) fn map_parameters(&mut self, map: impl Fn(Parameter) -> Option<Parameter>) {
-        let variable =
-            |v: &Variable| map(v.parameter).map(|parameter| Variable { parameter, ..*v });
-        let pickup = |p: &Pickup| {
-            let (parameter, source) = (map(p.parameter)?, map(p.source)?);
-            Some(Pickup { parameter, source, ..*p })
-        };
-        self.variables = self.variables.iter().filter_map(variable).collect();
-        self.pickups = self.pickups.iter().filter_map(pickup).collect();
-    }
-
     /// Refuses a lens whose pickups, glasses or solves lead to numbers that cannot be traced.
     fn check_resolved(&self) -> Result<(), LensError> {
         for zoom in 0..self.zoom_positions() {

@@ -1,0 +1,134 @@
+//! A run as a file, so that it goes on later as if it had never ended: bit for bit.
+
+use super::{Landscape, Method, Point, Run, SearchError, Settings};
+use crate::files;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+/// The version of the file; another one is not read.
+const VERSION: u32 = 1;
+
+/// What every version of the file begins with.
+#[derive(Deserialize)]
+struct Head {
+    aplanat_search: u32,
+}
+
+#[derive(Serialize)]
+struct Written<'a, R> {
+    aplanat_search: u32,
+    landscape: &'a Value,
+    run: &'a R,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Read<R> {
+    #[serde(rename = "aplanat_search")]
+    _version: u32,
+    landscape: Value,
+    run: R,
+}
+
+impl<P: Point, M: Point + Default> Run<P, M> {
+    /// Saves the run; where that fails, what was there before is untouched.
+    ///
+    /// # Errors
+    /// The system refuses the file, or the run would not read back as it is.
+    pub fn save<L>(&self, landscape: &L, path: &Path) -> Result<(), SearchError>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let about = landscape.about();
+        let written = Written { aplanat_search: VERSION, landscape: &about, run: self };
+        let file = path.display().to_string();
+        let unproven = |what: String| SearchError::NotProven { file: file.clone(), what };
+        let bytes = serde_json::to_vec(&written).map_err(|error| unproven(error.to_string()))?;
+        let read: Result<Read<Self>, _> = serde_json::from_slice(&bytes);
+        let read = read.map_err(|error| unproven(error.to_string()))?;
+        if read.run != *self {
+            return Err(unproven("it reads back as another run".to_owned()));
+        }
+        Ok(files::replace(path, &bytes)?)
+    }
+
+    /// A run that goes on where it was saved, on the same landscape by the same settings; only its
+    /// ends, [`Settings::moves`] and [`Settings::gradients`], may be others, except for brute
+    /// force, which has divided them.
+    ///
+    /// # Errors
+    /// The file cannot be read, is damaged, of another version, or of another search: the first
+    /// thing that differs is named.
+    pub fn load<L>(landscape: &L, settings: &Settings, path: &Path) -> Result<Self, SearchError>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        settings.check()?;
+        let file = path.display().to_string();
+        let unreadable = |source| files::FileError::Unreadable { file: file.clone(), source };
+        let bytes = fs::read(path).map_err(unreadable)?;
+        let corrupt = |what: String| SearchError::Corrupt { file: file.clone(), what };
+        let head: Head = serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
+        if head.aplanat_search != VERSION {
+            let (found, expected) = (head.aplanat_search, VERSION);
+            return Err(SearchError::Version { file, found, expected });
+        }
+        let mut read: Read<Self> =
+            serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
+        read.run.is_sound().map_err(corrupt)?;
+        let pairs = [
+            ("landscape", read.landscape, landscape.about()),
+            ("settings", fixed(read.run.settings())?, fixed(settings)?),
+        ];
+        for (name, found, expected) in pairs {
+            if let Some((name, found, expected)) = difference(name, &found, &expected) {
+                return Err(SearchError::Differs { file, name, found, expected });
+            }
+        }
+        read.run.settings = settings.clone();
+        Ok(read.run)
+    }
+
+    /// What a file that can be read may still get wrong.
+    fn is_sound(&self) -> Result<(), String> {
+        self.settings.check().map_err(|error| error.to_string())?;
+        let numbers = self.tree.nodes().iter().map(|node| node.number);
+        if self.chains.len() != self.settings.chains {
+            let [found, expected] = [self.chains.len(), self.settings.chains];
+            return Err(format!("found {found} chains; expected {expected}"));
+        }
+        if !numbers.clone().is_sorted_by(|a, b| a < b)
+            || numbers.last().is_some_and(|last| last >= self.tree.born())
+        {
+            return Err("the generations are out of order".to_owned());
+        }
+        Ok(())
+    }
+}
+
+/// The settings that a run cannot change any more.
+fn fixed(settings: &Settings) -> Result<Value, SearchError> {
+    let mut fixed = settings.clone();
+    if fixed.method != Method::Brute {
+        (fixed.moves, fixed.gradients) = (None, None);
+    }
+    let unwritable = |error: serde_json::Error| SearchError::Corrupt {
+        file: "settings".to_owned(),
+        what: error.to_string(),
+    };
+    serde_json::to_value(fixed).map_err(unwritable)
+}
+
+/// The first thing in which two values differ: its name, and what it is in each.
+fn difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
+    if let (Value::Object(a), Value::Object(b)) = (a, b) {
+        let mut keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+        let of = |map: &serde_json::Map<String, Value>, key: &String| {
+            map.get(key).cloned().unwrap_or_default()
+        };
+        return keys.find_map(|key| difference(&format!("{name}.{key}"), &of(a, key), &of(b, key)));
+    }
+    (a != b).then(|| (name.to_owned(), a.to_string(), b.to_string()))
+}

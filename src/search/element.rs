@@ -1,0 +1,120 @@
+//! Glass rows seen as elements: singlets, cemented groups, mirrors, and what stands between them.
+
+use crate::lens::{Lens, Medium};
+use std::fmt::Write as _;
+
+/// What an element is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Make {
+    /// This many pieces of glass, cemented where there are several, with air on both sides.
+    Glass(usize),
+    /// Pieces of glass that touch the object or the image, like the oil of a microscope or the cover
+    /// of a detector: mutations leave them alone.
+    Open(usize),
+    /// A mirror, with the glass that it is seen through: mutations leave it alone.
+    Mirror(usize),
+}
+
+/// Surfaces with nothing but glass between them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Element {
+    /// What it is made of.
+    pub make: Make,
+    /// Its first surface, counted from 0.
+    pub first: usize,
+    /// Its last surface.
+    pub last: usize,
+}
+
+impl Element {
+    /// How many pieces of glass it has.
+    pub fn pieces(&self) -> usize {
+        match self.make {
+            Make::Glass(pieces) | Make::Open(pieces) | Make::Mirror(pieces) => pieces,
+        }
+    }
+
+    /// Whether it is a single piece of glass in air.
+    pub fn is_singlet(&self) -> bool {
+        self.make == Make::Glass(1)
+    }
+
+    /// Whether a surface belongs to it.
+    pub fn has(&self, surface: usize) -> bool {
+        (self.first..=self.last).contains(&surface)
+    }
+}
+
+/// Which gaps are glass, the space in front of the first surface first; behind a mirror stands what
+/// stood before it. An index of less than 1.05 is a kind of air.
+fn filled(lens: &Lens) -> Vec<bool> {
+    let is_glass = |medium: &Medium, before: bool| match medium {
+        Medium::Air => false,
+        Medium::Mirror => before,
+        Medium::Index(n) => *n >= 1.05,
+        Medium::Glass(_) | Medium::Model { .. } => true,
+    };
+    let mut gaps = vec![is_glass(&lens.object_medium, false)];
+    for (i, row) in lens.surfaces.iter().enumerate() {
+        gaps.push(is_glass(&row.medium, gaps[i]));
+    }
+    gaps
+}
+
+/// The elements of a lens in the order of its rows; a stop in air is none.
+pub fn elements(lens: &Lens) -> Vec<Element> {
+    let gaps = filled(lens);
+    let rows = lens.surfaces.len();
+    let mut found = Vec::new();
+    let mut first = 0;
+    for last in 0..rows {
+        if gaps[last + 1] && last + 1 < rows {
+            continue;
+        }
+        let pieces = gaps[first..=last + 1].iter().filter(|glass| **glass).count();
+        let mirror = lens.surfaces[first..=last].iter().any(|row| row.medium == Medium::Mirror);
+        let open = gaps[first] || gaps[last + 1];
+        let make = match (mirror, open) {
+            (true, _) => Make::Mirror(pieces),
+            (false, true) => Make::Open(pieces),
+            (false, false) => Make::Glass(pieces),
+        };
+        if mirror || pieces > 0 {
+            found.push(Element { make, first, last });
+        }
+        first = last + 1;
+    }
+    found
+}
+
+/// How many pieces of glass a lens has.
+pub fn pieces(lens: &Lens) -> usize {
+    elements(lens).iter().map(Element::pieces).sum()
+}
+
+/// The pattern of glass and air: the pieces of each element, `stop` where it stands, `m` for a
+/// mirror, as `1|2|stop|2|1`. Signs and sizes of curvatures do not count, nor does which glass it is.
+pub fn topology(lens: &Lens) -> String {
+    let stop = lens.stop();
+    let mut text = String::new();
+    let mut passed = false;
+    for element in elements(lens) {
+        let before = stop.is_some_and(|stop| stop < element.last || stop == element.first);
+        if before && !passed {
+            text.push_str("stop|");
+            passed = true;
+        }
+        // Writing to a string does not fail.
+        let _ = match element.make {
+            Make::Glass(pieces) => write!(text, "{pieces}|"),
+            Make::Open(pieces) => write!(text, "o{pieces}|"),
+            Make::Mirror(0) => write!(text, "m|"),
+            Make::Mirror(pieces) => write!(text, "m{pieces}|"),
+        };
+    }
+    if stop.is_some() && !passed {
+        text.push_str("stop|");
+    }
+    text.pop();
+    text
+}

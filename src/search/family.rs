@@ -1,0 +1,123 @@
+//! The family tree: every point that a chain started from, where it came from and what became of it.
+
+use super::{Kind, Offer};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// Where a descent began, and what became of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Node<P> {
+    /// Its number; the start of the run is 0.
+    pub number: u64,
+    /// The point that it is a mutation of; none for the start and for what was drawn from anywhere.
+    pub parent: Option<u64>,
+    /// The chain, counted from 0.
+    pub chain: usize,
+    /// The mutation; none for the start.
+    pub kind: Option<Kind>,
+    /// The mutation in words.
+    pub what: String,
+    /// The loss of the point before the mutation; none where there was none.
+    pub before: Option<f64>,
+    /// The loss after the mutation.
+    pub mutated: f64,
+    /// The best loss of the descent so far.
+    pub descended: f64,
+    /// Local moves of the descent so far.
+    pub moves: u64,
+    /// Gradients of the descent so far.
+    pub gradients: u64,
+    /// What ended the descent; none while it goes on.
+    pub ended: Option<Ended>,
+    /// What the reservoir said to it; none while the descent goes on.
+    pub offer: Option<Offer>,
+    /// Where the descent began while it goes on, then the best point of it.
+    pub point: P,
+}
+
+/// What ended a descent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ended {
+    /// The clock of regenerations: chance.
+    Clock,
+    /// It was as long as a descent may be.
+    Longest,
+    /// It went where a loss is no number.
+    Lost,
+    /// A mutation was accepted: Metropolis and Hastings only.
+    Mutated,
+    /// Its part of the gradients was used up: brute force only.
+    Budget,
+}
+
+/// The generations of a run. However long it is, only the last ones are remembered, and the
+/// ancestors of those that matter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Tree<P> {
+    /// In the order of their numbers.
+    nodes: Vec<Node<P>>,
+    next: u64,
+    remembered: usize,
+}
+
+impl<P> Tree<P> {
+    /// A tree without nodes that remembers so many of those that are no ancestors.
+    pub(super) fn new(remembered: usize) -> Self {
+        Self { nodes: Vec::new(), next: 0, remembered }
+    }
+
+    /// The nodes that are remembered, in the order of their numbers.
+    pub fn nodes(&self) -> &[Node<P>] {
+        &self.nodes
+    }
+
+    /// How many there have been.
+    pub fn born(&self) -> u64 {
+        self.next
+    }
+
+    /// The node of a number, if it is remembered.
+    pub fn node(&self, number: u64) -> Option<&Node<P>> {
+        self.place(number).map(|place| &self.nodes[place])
+    }
+
+    /// A node and its ancestors, youngest first, as far as they are remembered.
+    pub fn line(&self, number: u64) -> impl Iterator<Item = &Node<P>> {
+        let first = self.node(number);
+        std::iter::successors(first, |node| node.parent.and_then(|parent| self.node(parent)))
+    }
+
+    pub(super) fn node_mut(&mut self, number: u64) -> Option<&mut Node<P>> {
+        self.place(number).map(|place| &mut self.nodes[place])
+    }
+
+    /// Adds a node, whose number is given here.
+    pub(super) fn add(&mut self, node: Node<P>) -> u64 {
+        let number = self.next;
+        self.nodes.push(Node { number, ..node });
+        self.next += 1;
+        number
+    }
+
+    /// Forgets the oldest of those that are neither these nor their ancestors. It works now and
+    /// then only: there may be twice as many as are wanted.
+    pub(super) fn forget(&mut self, kept: impl Iterator<Item = u64>) {
+        let kept: BTreeSet<u64> =
+            kept.flat_map(|number| self.line(number).map(|node| node.number)).collect();
+        let others = self.nodes.len().saturating_sub(kept.len());
+        if others <= 2 * self.remembered {
+            return;
+        }
+        let mut surplus = others - self.remembered;
+        self.nodes.retain(|node| {
+            let stays = surplus == 0 || kept.contains(&node.number);
+            surplus -= usize::from(!stays);
+            stays
+        });
+    }
+
+    fn place(&self, number: u64) -> Option<usize> {
+        self.nodes.binary_search_by_key(&number, |node| node.number).ok()
+    }
+}

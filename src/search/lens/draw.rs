@@ -1,0 +1,66 @@
+//! A lens from anywhere: `p_global` of (4.14).
+
+use super::goal::focal_length_of;
+use super::open::with_open_rims;
+use crate::lens::{Lens, Medium, Parameter, Quantity, focus_gap};
+use crate::search::{Random, Rules};
+use rand::RngExt as _;
+
+/// No gap is drawn longer than this part of the focal length.
+const LONGEST: f64 = 0.2;
+/// Curvatures are drawn up to this over the focal length.
+const STEEPEST: f64 = 4.0;
+/// A drawn lens is scaled to its focal length by no more than this.
+const SCALED: f64 = 4.0;
+
+/// A lens of the structure of `lens`, whose variables are those that are free: curvatures and gaps
+/// drawn uniformly, all of it scaled to a focal length in mm, the image at the focus, rims as open
+/// as it leaves room for. None where it does not focus.
+pub(super) fn drawn(
+    lens: &Lens,
+    rules: &Rules,
+    focal_length: f64,
+    random: &mut Random,
+) -> Option<Lens> {
+    let mut drawn = lens.clone();
+    let widest = lens.surfaces.iter().filter_map(|row| row.semi_diameter).fold(0.0, f64::max);
+    let scattered: Vec<Parameter> = lens.variables.iter().map(|v| v.parameter).collect();
+    for parameter in &scattered {
+        let range = match parameter.quantity {
+            Quantity::Curvature => [-STEEPEST / focal_length, STEEPEST / focal_length],
+            Quantity::Thickness | Quantity::ZoomThickness(_) => {
+                let is_glass = lens.surfaces[parameter.surface].medium != Medium::Air;
+                let [min, _] = if is_glass { rules.glass_center } else { rules.air_center };
+                [min, min.max(LONGEST * focal_length)]
+            }
+            _ => continue,
+        };
+        drawn.set(*parameter, range[0] + (range[1] - range[0]) * random.random::<f64>());
+    }
+    let drawn = drawn.with_pickups().ok()?;
+    let factor = focal_length / focal_length_of(&drawn)?;
+    if !(1.0 / SCALED..=SCALED).contains(&factor) {
+        return None;
+    }
+    let mut scaled = drawn.clone();
+    for parameter in &scattered {
+        let value = drawn.get(*parameter)?;
+        match parameter.quantity {
+            Quantity::Curvature => scaled.set(*parameter, value / factor),
+            Quantity::Thickness | Quantity::ZoomThickness(_) => {
+                scaled.set(*parameter, value * factor)
+            }
+            _ => continue,
+        };
+    }
+    let system = scaled.system(0, scaled.wavelengths[scaled.primary()].um).ok()?;
+    let last = Parameter::new(scaled.surfaces.len() - 1, Quantity::Thickness);
+    let gap = focus_gap(&system, scaled.object);
+    if !(gap > 0.0) {
+        return None;
+    }
+    if scattered.contains(&last) {
+        scaled.set(last, gap);
+    }
+    Some(with_open_rims(scaled, rules.semi_diameter.unwrap_or(widest)))
+}

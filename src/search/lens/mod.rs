@@ -1,0 +1,286 @@
+//! Lenses as a landscape: what a lens is worth (4.6), how it descends, how it is drawn.
+//!
+//! The objective is a [`Goal`] of [`merit`](crate::merit): sharpness, light at every field compared
+//! with the lens at the start, focal length, and the limits of a factory as penalties. A local move
+//! looks for the pupils of the lens anew and takes some steps with derivatives that know that the
+//! pupils move. It is judged by the pupils where it ends; one that has led to something worse is
+//! taken back.
+
+mod draw;
+mod free;
+mod goal;
+mod open;
+mod walk;
+
+pub use goal::goal;
+pub use open::opened;
+
+use super::{
+    Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation,
+};
+use crate::lens::{Lens, LensError};
+use crate::merit::{Goal, Merit, MeritError};
+use crate::optimize::{Memory, Method, Stretch, stretch};
+use crate::pupil::{BenchError, limited_by_stop};
+use free::Freedom;
+use serde::{Deserialize, Serialize};
+
+/// How a lens descends.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Local {
+    /// What takes the steps.
+    pub method: Method,
+    /// Gradient steps of a local move.
+    pub steps: usize,
+    /// The rate of Adam when a descent begins: a step of one alters the residuals by as much as
+    /// they are.
+    pub rate: f64,
+    /// The error allowed of the radius of a spot, relatively.
+    pub tolerance: f64,
+    /// The same for the first steps of a descent.
+    pub coarse: f64,
+    /// For how many steps.
+    pub coarse_steps: usize,
+    /// Whether rims are free.
+    pub rims: bool,
+    /// Whether the indices of model glasses are free.
+    pub indices: bool,
+}
+
+impl Default for Local {
+    fn default() -> Self {
+        Self {
+            method: Method::Adam,
+            steps: 20,
+            rate: 0.03,
+            tolerance: 1e-2,
+            coarse: 1e-2,
+            coarse_steps: 0,
+            rims: true,
+            indices: false,
+        }
+    }
+}
+
+/// Why a lens cannot be searched from.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoLandscape {
+    /// The prescription.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// The beam.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
+    /// Its merit.
+    #[error(transparent)]
+    Merit(#[from] MeritError),
+    /// A setting or rule without meaning.
+    #[error("{what} is {found}; expected {expected}")]
+    Setting {
+        /// Which one.
+        what: &'static str,
+        /// Its value.
+        found: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+}
+
+/// Lenses, each worth what a goal says.
+#[derive(Debug, Clone)]
+pub struct LensLandscape {
+    start: Lens,
+    goal: Goal,
+    rules: Rules,
+    local: Local,
+    freedom: Freedom,
+    /// The areas of the pupils of the start, by zoom position.
+    light: Vec<Vec<f64>>,
+    /// The focal length that is asked for, or that of the start, in mm.
+    focal_length: f64,
+}
+
+impl LensLandscape {
+    /// Lenses like this one. It is limited by its stop from now on: an aperture that is a pupil or a
+    /// cone becomes the semi-diameter of the stop. Of the numbers that a person has flagged as
+    /// variables, the bounds hold; where curvatures or gaps are among them, those that are not
+    /// flagged are held.
+    ///
+    /// # Errors
+    /// A lens without merit, or settings without meaning.
+    pub fn new(lens: &Lens, goal: &Goal, rules: &Rules, local: &Local) -> Result<Self, NoLandscape> {
+        local.check()?;
+        let mut start = limited_by_stop(lens)?;
+        free::hold_the_rest(&mut start);
+        start.check()?;
+        let size = goal::size(&start);
+        let asked = goal.terms.iter().find_map(|w| match w.term {
+            crate::merit::Term::FocalLength(focal) => Some(focal),
+            _ => None,
+        });
+        let freedom = Freedom { size, rims: local.rims, indices: local.indices };
+        let merit = Merit::new(&free::freed(&start, rules, freedom), goal, local.tolerance)?;
+        if merit.variables().is_empty() {
+            return Err(MeritError::NoVariables.into());
+        }
+        Ok(Self {
+            light: merit.light_at_start().to_vec(),
+            start,
+            goal: goal.clone(),
+            rules: rules.clone(),
+            local: local.clone(),
+            freedom,
+            focal_length: asked.unwrap_or(size),
+        })
+    }
+
+    /// The lens at the start: limited by its stop, held numbers marked by bounds that coincide.
+    pub fn start(&self) -> &Lens {
+        &self.start
+    }
+
+    /// What is asked for.
+    pub fn goal(&self) -> &Goal {
+        &self.goal
+    }
+
+    /// What may be done.
+    pub fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// The lens with every number flagged that may change.
+    pub fn freed(&self, lens: &Lens) -> Lens {
+        free::freed(&free::within_bounds(lens), &self.rules, self.freedom)
+    }
+
+    /// The merit of a lens of any structure, spots good to a tolerance, light compared with that of
+    /// the start.
+    ///
+    /// # Errors
+    /// A lens without merit.
+    pub fn merit(&self, lens: &Lens, tolerance: f64) -> Result<Merit, MeritError> {
+        let merit = Merit::new(&self.freed(lens), &self.goal, tolerance)?;
+        Ok(merit.compared_with(&self.light))
+    }
+
+    /// What a lens is worth, by its own pupils.
+    fn judge(&self, lens: &Lens) -> Result<f64, MeritError> {
+        let merit = self.merit(lens, self.local.tolerance)?;
+        merit.value(&merit.values(lens))
+    }
+
+    /// A local move: where it leads, and what that is worth.
+    fn moved(&self, lens: &Lens, memory: &mut Memory) -> Result<(Lens, f64), MeritError> {
+        let Local { method, steps, rate, tolerance, coarse, coarse_steps, .. } = self.local;
+        let is_coarse = memory.steps < coarse_steps;
+        let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
+        let freed = self.freed(lens);
+        let before = merit.value(&merit.values(&freed))?;
+        let asked = Stretch { method, steps, rate };
+        let mut there = stretch(merit, &freed, asked, memory)?;
+        there.variables.clone_from(&lens.variables);
+        match self.judge(&there) {
+            Ok(after) if after < before || is_coarse => {
+                memory.encourage();
+                Ok((there, after))
+            }
+            Ok(_) | Err(_) => {
+                memory.discourage();
+                let before = if is_coarse { self.judge(lens)? } else { before };
+                Ok((lens.clone(), before))
+            }
+        }
+    }
+}
+
+impl Local {
+    fn check(&self) -> Result<(), NoLandscape> {
+        let positive = [("the rate", self.rate), ("the tolerance", self.tolerance)];
+        let positive = positive.into_iter().chain([("the coarse tolerance", self.coarse)]);
+        for (what, value) in positive {
+            if !(value > 0.0 && value < 1.0) {
+                let expected = "more than 0 and less than 1";
+                return Err(NoLandscape::Setting { what, found: value.to_string(), expected });
+            }
+        }
+        if self.steps == 0 {
+            let what = "the number of steps of a move";
+            let expected = "1 or more";
+            return Err(NoLandscape::Setting { what, found: "0".into(), expected });
+        }
+        Ok(())
+    }
+}
+
+/// How often a lens is drawn before it is given up.
+const DRAWS: usize = 200;
+
+impl Landscape for LensLandscape {
+    type Point = Lens;
+    type Memory = Memory;
+
+    fn loss(&self, lens: &Lens) -> f64 {
+        self.judge(lens).unwrap_or(f64::INFINITY)
+    }
+
+    fn descend(&self, lens: &Lens, memory: &mut Memory) -> (Lens, f64, usize) {
+        match self.moved(lens, memory) {
+            Ok((there, loss)) => (there, loss, self.local.steps),
+            Err(_) => (lens.clone(), f64::INFINITY, 0),
+        }
+    }
+
+    fn draw(&self, random: &mut Random) -> Result<Lens, Refusal> {
+        let free = self.freed(&self.start);
+        for _ in 0..DRAWS {
+            let Some(mut lens) = draw::drawn(&free, &self.rules, self.focal_length, random) else {
+                continue;
+            };
+            lens.variables.clone_from(&self.start.variables);
+            let lens = free::within_bounds(&lens);
+            if self.loss(&lens).is_finite() {
+                return Ok(lens);
+            }
+        }
+        let why = format!("none of {DRAWS} lenses that were drawn passes light");
+        Err(Refusal { kind: Kind::Global, why })
+    }
+
+    fn mutate(
+        &self,
+        lens: &Lens,
+        weights: &Weights,
+        random: &mut Random,
+    ) -> Result<Mutated<Lens>, Refusal> {
+        let own = Kind::MUTATIONS.map(|kind| (kind, self.rules.weight(kind) * weights.of(kind)));
+        let rules = Rules { weights: own.to_vec(), ..self.rules.clone() };
+        mutation::propose(lens, &rules, random).map(Into::into)
+    }
+
+    fn topology(&self, lens: &Lens) -> String {
+        element::topology(lens)
+    }
+
+    fn about(&self) -> serde_json::Value {
+        serde_json::json!({
+            "start": self.start,
+            "goal": self.goal,
+            "rules": self.rules,
+            "local": self.local,
+        })
+    }
+
+    fn elements(&self, lens: &Lens) -> usize {
+        element::elements(lens).len()
+    }
+
+    fn slope(&self, lens: &Lens) -> Option<Slope> {
+        walk::slope(self, lens)
+    }
+
+    fn with_values(&self, lens: &Lens, values: &[f64]) -> Option<Lens> {
+        walk::with_values(self, lens, values)
+    }
+}

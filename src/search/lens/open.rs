@@ -1,0 +1,137 @@
+//! Rims as far open as the lens has room for them: the start of a search that is to find out where
+//! light should be clipped.
+
+use crate::lens::{Aperture, Lens, Medium, Parameter, Quantity, Row, Variable};
+
+/// The lens without its diaphragm, every rim as large as its neighbours, the edge of its own sphere
+/// and `limit` leave room for, in mm. Aspheres and mirrors keep their rims: nothing is known about
+/// them farther out. The stop goes to the narrowest surface next to where it stood.
+///
+/// Its light is what the rims let through.
+#[must_use]
+pub fn opened(lens: &Lens, limit: f64) -> Lens {
+    let mut open = lens.clone();
+    let stop = open.stop().unwrap_or(0);
+    let plane = is_diaphragm(lens, stop);
+    if plane {
+        remove_diaphragm(&mut open, stop);
+    }
+    let mut open = with_open_rims(open, limit);
+    let rim = |i: usize| open.surfaces[i].semi_diameter.unwrap_or(limit);
+    let stop = if plane && rim(stop - 1) <= rim(stop) { stop - 1 } else { stop };
+    for (i, row) in open.surfaces.iter_mut().enumerate() {
+        row.stop = i == stop;
+    }
+    let radius = *open.surfaces[stop].semi_diameter.get_or_insert(limit);
+    open.aperture = Aperture::StopSemiDiameter(radius);
+    open.zoom.iter_mut().for_each(|position| position.aperture = None);
+    open
+}
+
+/// Whether a surface is a plane in one medium with surfaces on both sides.
+fn is_diaphragm(lens: &Lens, i: usize) -> bool {
+    let row = &lens.surfaces[i];
+    let inside = i > 0 && i + 1 < lens.surfaces.len();
+    inside
+        && row.curvature == 0.0
+        && row.asphere.is_empty()
+        && row.medium == lens.surfaces[i - 1].medium
+        && row.medium != Medium::Mirror
+}
+
+/// Joins the gaps on both sides of a surface that does nothing.
+fn remove_diaphragm(lens: &mut Lens, i: usize) {
+    let gap = |lens: &Lens, row: usize| {
+        lens.variable(Parameter::new(row, Quantity::Thickness)).map(|v| (v.min, v.max))
+    };
+    let bounds = (gap(lens, i - 1), gap(lens, i));
+    for zoom in 0..lens.zoom.len() {
+        let sum = [i - 1, i].map(|row| lens.thickness_at(row, zoom).unwrap_or(0.0));
+        lens.set(Parameter::new(i - 1, Quantity::ZoomThickness(zoom)), sum[0] + sum[1]);
+    }
+    lens.surfaces[i - 1].thickness += lens.surfaces[i].thickness;
+    lens.surfaces.remove(i);
+    lens.renumber_rows(|row| match row.cmp(&i) {
+        std::cmp::Ordering::Less => Some(row),
+        std::cmp::Ordering::Equal => None,
+        std::cmp::Ordering::Greater => Some(row - 1),
+    });
+    let joined = Parameter::new(i - 1, Quantity::Thickness);
+    lens.variables.retain(|v| v.parameter != joined);
+    if let (Some(a), Some(b)) = bounds {
+        let add = |a: Option<f64>, b: Option<f64>| Some(a? + b?);
+        lens.variables.push(Variable { parameter: joined, min: add(a.0, b.0), max: add(a.1, b.1) });
+    }
+}
+
+/// The lens with every rim as large as its neighbours, its own sphere and `limit` allow. Where the
+/// stop is a surface that bends light, the aperture follows its rim; a diaphragm stays as it is.
+pub(super) fn with_open_rims(mut lens: Lens, limit: f64) -> Lens {
+    let stop = lens.stop().unwrap_or(0);
+    let diaphragm = is_diaphragm(&lens, stop).then(|| lens.surfaces[stop].semi_diameter);
+    open_rims(&mut lens, limit);
+    if let Some(rim) = diaphragm {
+        lens.surfaces[stop].semi_diameter = rim;
+    } else if let Aperture::StopSemiDiameter(radius) = &mut lens.aperture {
+        *radius = lens.surfaces[stop].semi_diameter.unwrap_or(*radius);
+    }
+    lens
+}
+
+fn open_rims(lens: &mut Lens, limit: f64) {
+    let fixed = |row: &Row| !row.asphere.is_empty() || row.medium == Medium::Mirror;
+    for row in lens.surfaces.iter_mut().filter(|row| !fixed(row)) {
+        row.semi_diameter = Some(limit.min(edge_of(row)));
+    }
+    for i in 0..lens.surfaces.len() - 1 {
+        let positions = 0..lens.zoom_positions();
+        let gaps = positions.map(|zoom| lens.thickness_at(i, zoom).unwrap_or(0.0));
+        let gap = gaps.fold(f64::INFINITY, f64::min);
+        let meet = where_they_meet(&lens.surfaces[i], &lens.surfaces[i + 1], gap);
+        for row in &mut lens.surfaces[i..=i + 1] {
+            if !fixed(row) {
+                row.semi_diameter = row.semi_diameter.map(|rim| rim.min(meet));
+            }
+        }
+    }
+    let sizes: Vec<Option<f64>> = lens.surfaces.iter().map(|row| row.semi_diameter).collect();
+    for variable in &mut lens.variables {
+        let size = sizes.get(variable.parameter.surface).copied().flatten();
+        if let (Quantity::SemiDiameter, Some(size)) = (variable.parameter.quantity, size) {
+            variable.min = variable.min.map(|min| min.min(size));
+            variable.max = variable.max.map(|max| max.max(size));
+        }
+    }
+}
+
+/// Where a sphere or ellipsoid ends, in mm from the axis.
+fn edge_of(row: &Row) -> f64 {
+    let square = (1.0 + row.conic) * row.curvature * row.curvature;
+    if square > 0.0 { 1.0 / square.sqrt() } else { f64::INFINITY }
+}
+
+/// How far from the axis two surfaces touch; the end of the smaller one where they do not.
+fn where_they_meet(before: &Row, behind: &Row, gap: f64) -> f64 {
+    let end = edge_of(before).min(edge_of(behind)).min(FAR);
+    let room = |height: f64| gap + sag(behind, height) - sag(before, height);
+    if room(end) >= 0.0 {
+        return f64::INFINITY;
+    }
+    let (mut open, mut shut) = (0.0, end);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (open + shut);
+        *(if room(middle) > 0.0 { &mut open } else { &mut shut }) = middle;
+    }
+    open
+}
+
+/// Farther than this from the axis no surface reaches, in mm.
+const FAR: f64 = 1e6;
+/// Halvings until a rim is known to rounding.
+const BISECTIONS: usize = 60;
+
+fn sag(row: &Row, height: f64) -> f64 {
+    let (c, square) = (row.curvature, height * height);
+    let root = (1.0 - (1.0 + row.conic) * c * c * square).max(0.0).sqrt();
+    c * square / (1.0 + root)
+}

@@ -1,0 +1,102 @@
+//! The best points that a search has found, at most one of each topology where that is asked for.
+
+use serde::{Deserialize, Serialize};
+
+/// The best points so far, in no particular order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reservoir<P> {
+    size: usize,
+    one_per_topology: bool,
+    entries: Vec<Entry<P>>,
+}
+
+/// A point of the reservoir.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Entry<P> {
+    /// Its number in the family tree.
+    pub number: u64,
+    /// What it is worth.
+    pub loss: f64,
+    /// What it has in common with points of the same structure.
+    pub topology: String,
+    /// The point.
+    pub point: P,
+}
+
+/// What became of a point that was offered to the reservoir.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Offer {
+    /// It is in, and there was room.
+    Entered,
+    /// It is in, in place of this one.
+    Replaced(u64),
+    /// The same point is in already, under this number.
+    Same(u64),
+    /// A point of its topology is in that is no worse.
+    BehindTwin(u64),
+    /// All are no worse.
+    BehindAll,
+    /// Its loss is no number.
+    Worthless,
+}
+
+impl Offer {
+    /// Whether the point is in.
+    pub fn entered(self) -> bool {
+        matches!(self, Self::Entered | Self::Replaced(_))
+    }
+}
+
+impl<P: Clone + PartialEq> Reservoir<P> {
+    /// A reservoir without points, for at least one.
+    pub fn new(size: usize, one_per_topology: bool) -> Self {
+        Self { size: size.max(1), one_per_topology, entries: Vec::new() }
+    }
+
+    /// Its points.
+    pub fn entries(&self) -> &[Entry<P>] {
+        &self.entries
+    }
+
+    /// The best of them, the first of equals; none before the first one entered.
+    pub fn best(&self) -> Option<&Entry<P>> {
+        self.entries.iter().min_by(|a, b| a.loss.total_cmp(&b.loss))
+    }
+
+    /// Whether a point of this number is in.
+    pub fn holds(&self, number: u64) -> bool {
+        self.entries.iter().any(|entry| entry.number == number)
+    }
+
+    /// Takes a point in where it is good enough: one of a topology that is in replaces its twin if
+    /// it is better; another one takes the free place, or that of the worst if it is better.
+    pub fn offer(&mut self, entry: Entry<P>) -> Offer {
+        if !entry.loss.is_finite() {
+            return Offer::Worthless;
+        }
+        if let Some(same) = self.entries.iter().find(|old| old.point == entry.point) {
+            return Offer::Same(same.number);
+        }
+        let twin = self.entries.iter_mut().find(|old| old.topology == entry.topology);
+        if let Some(twin) = twin.filter(|_| self.one_per_topology) {
+            return put_if_better(twin, entry, Offer::BehindTwin);
+        }
+        if self.entries.len() < self.size {
+            self.entries.push(entry);
+            return Offer::Entered;
+        }
+        let worst = self.entries.iter_mut().max_by(|a, b| a.loss.total_cmp(&b.loss));
+        worst.map_or(Offer::BehindAll, |worst| put_if_better(worst, entry, |_| Offer::BehindAll))
+    }
+}
+
+fn put_if_better<P>(old: &mut Entry<P>, new: Entry<P>, refused: fn(u64) -> Offer) -> Offer {
+    let number = old.number;
+    if new.loss < old.loss {
+        *old = new;
+        Offer::Replaced(number)
+    } else {
+        refused(number)
+    }
+}

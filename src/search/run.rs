@@ -1,0 +1,379 @@
+//! A search that goes on: chains over a shared reservoir, a round at a time.
+//!
+//! In a round every chain takes its turn, at the same time as the others, reading the reservoir as
+//! it was before; then what happened is written down in the order of the chains. So a run is a
+//! function of its landscape, start and settings, on any number of threads.
+
+use super::chain::{Birth, Chain, Happening, Moved, Shared, Task, Tour};
+use super::family::{Node, Tree};
+use super::reservoir::{Entry, Reservoir};
+use super::{
+    Ended, Kind, Landscape, Method, Point, Random, SearchError, Settings, Statistics, Temperature,
+    Weights,
+};
+use rand::SeedableRng as _;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// So many rounds in a row without a move end a run.
+const IDLE: u64 = 100;
+
+/// The run of a search on some landscape.
+pub type RunOf<L> = Run<<L as Landscape>::Point, <L as Landscape>::Memory>;
+
+/// A search that goes on, with everything that it depends on besides its landscape.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Run<P, M> {
+    pub(super) settings: Settings,
+    pub(super) temperature: Temperature,
+    pub(super) weights: Weights,
+    pub(super) pinned: Option<Entry<P>>,
+    pub(super) stopped: bool,
+    pub(super) chains: Vec<Chain<P, M>>,
+    pub(super) tree: Tree<P>,
+    start: Entry<P>,
+    best: Entry<P>,
+    reservoir: Reservoir<P>,
+    statistics: Statistics,
+    tasks: VecDeque<Task>,
+}
+
+/// Something that happened in a round.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Event {
+    /// This generation began.
+    Born(u64),
+    /// The descent of this generation ended.
+    Ended(u64),
+    /// This generation came to the best loss so far.
+    Best(u64),
+}
+
+/// Why a run is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Over {
+    /// It was stopped.
+    Stopped,
+    /// It has made as many local moves as its settings say.
+    Moves,
+    /// It has taken as many gradients as its settings say.
+    Gradients,
+    /// Brute force has tried everything.
+    Done,
+    /// For a hundred rounds nothing was found to begin from.
+    Stuck,
+}
+
+impl<P: Point, M: Point + Default> Run<P, M> {
+    /// A run from a start.
+    ///
+    /// The first chain descends from the start, and every other one from a mutation of it; all
+    /// chains of Metropolis and Hastings begin at the start.
+    ///
+    /// # Errors
+    /// A setting makes no sense, or the start is worth nothing.
+    pub fn new<L>(landscape: &L, start: P, settings: &Settings) -> Result<Self, SearchError>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        settings.check()?;
+        let loss = landscape.loss(&start);
+        if !loss.is_finite() {
+            return Err(SearchError::Start { loss });
+        }
+        let topology = landscape.topology(&start);
+        let tasks = tasks(landscape.elements(&start), settings);
+        let start = Entry { number: 0, loss, topology, point: start };
+        let mut reservoir = Reservoir::new(settings.reservoir, settings.one_per_topology);
+        let offer = reservoir.offer(start.clone());
+        let mut run = Self {
+            temperature: settings.temperature.unwrap_or(Temperature::halving(loss)),
+            weights: Weights::default(),
+            pinned: None,
+            stopped: false,
+            chains: chains(settings),
+            tree: Tree::new(settings.remembered),
+            best: start.clone(),
+            reservoir,
+            statistics: Statistics::default(),
+            tasks,
+            settings: settings.clone(),
+            start,
+        };
+        run.tree.add(Node { offer: Some(offer), ..run.node(0, run.first()) });
+        run.set_out();
+        Ok(run)
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The present temperature.
+    pub fn temperature(&self) -> Temperature {
+        self.temperature
+    }
+
+    /// How often each kind of mutation is tried, relatively to the rules of the landscape.
+    pub fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// The point that all regenerations begin from; none where they begin from the reservoir.
+    pub fn pinned(&self) -> Option<&Entry<P>> {
+        self.pinned.as_ref()
+    }
+
+    /// The start.
+    pub fn start(&self) -> &Entry<P> {
+        &self.start
+    }
+
+    /// The best point so far, those of descents that go on included.
+    pub fn best(&self) -> &Entry<P> {
+        &self.best
+    }
+
+    /// The best points at which descents ended.
+    pub fn reservoir(&self) -> &Reservoir<P> {
+        &self.reservoir
+    }
+
+    /// The family tree.
+    pub fn tree(&self) -> &Tree<P> {
+        &self.tree
+    }
+
+    /// The chains.
+    pub fn chains(&self) -> &[Chain<P, M>] {
+        &self.chains
+    }
+
+    /// What the run has done so far.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Whether the run is over, and why.
+    pub fn over(&self) -> Option<Over> {
+        let reached = |limit: Option<u64>, count| limit.is_some_and(|limit| count >= limit);
+        let Settings { method, moves, gradients, .. } = self.settings;
+        let waits = |chain: &Chain<P, M>| chain.tour.is_none() && chain.task.is_none();
+        if self.stopped {
+            Some(Over::Stopped)
+        } else if method == Method::Brute && self.tasks.is_empty() && self.chains.iter().all(waits)
+        {
+            Some(Over::Done)
+        } else if reached(moves, self.statistics.moves) {
+            Some(Over::Moves)
+        } else if method != Method::Brute && reached(gradients, self.statistics.gradients) {
+            Some(Over::Gradients)
+        } else {
+            (self.statistics.idle >= IDLE).then_some(Over::Stuck)
+        }
+    }
+
+    /// One turn of every chain; nothing where the run is over.
+    pub fn round<L>(&mut self, landscape: &L) -> Vec<Event>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        if self.over().is_some() {
+            return Vec::new();
+        }
+        self.give_tasks();
+        let shared = Shared {
+            landscape,
+            settings: &self.settings,
+            temperature: self.temperature,
+            weights: &self.weights,
+            reservoir: &self.reservoir,
+            pinned: self.pinned.as_ref(),
+        };
+        let turns: Vec<_> = self.chains.par_iter_mut().map(|chain| shared.turn(chain)).collect();
+        let moves = self.statistics.moves;
+        let mut events = Vec::new();
+        for (chain, turn) in turns.into_iter().enumerate() {
+            for happening in turn {
+                self.write_down(chain, happening, landscape, &mut events);
+            }
+            self.compare(chain, landscape, &mut events);
+        }
+        self.statistics.rounds += 1;
+        let moved = self.statistics.moves > moves;
+        self.statistics.idle = if moved { 0 } else { self.statistics.idle + 1 };
+        self.forget();
+        events
+    }
+
+    /// A node that begins.
+    fn node(&self, chain: usize, birth: Birth<P>) -> Node<P> {
+        let Birth { parent, kind, what, before, loss, point } = birth;
+        Node {
+            number: self.tree.born(),
+            parent,
+            chain,
+            kind,
+            what,
+            before,
+            mutated: loss,
+            descended: loss,
+            moves: 0,
+            gradients: 0,
+            ended: None,
+            offer: None,
+            point,
+        }
+    }
+
+    fn first(&self) -> Birth<P> {
+        let (loss, point) = (self.start.loss, self.start.point.clone());
+        Birth { parent: None, kind: None, what: "the start".to_owned(), before: None, loss, point }
+    }
+
+    /// Lets those chains begin that begin at the start.
+    fn set_out(&mut self) {
+        let count = match self.settings.method {
+            Method::Restore => 1,
+            Method::Metropolis => self.chains.len(),
+            Method::Brute => 0,
+        };
+        for i in 0..count {
+            if i > 0 {
+                self.chains[i].number = self.tree.add(self.node(i, self.first()));
+            }
+            self.chains[i].tour = Some(Tour::new(self.start.point.clone(), self.start.loss));
+        }
+    }
+
+    fn give_tasks(&mut self) {
+        for chain in &mut self.chains {
+            if chain.tour.is_none() && chain.task.is_none() {
+                chain.task = self.tasks.pop_front();
+            }
+        }
+    }
+
+    fn write_down<L>(
+        &mut self,
+        chain: usize,
+        happening: Happening<P>,
+        landscape: &L,
+        events: &mut Vec<Event>,
+    ) where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        match happening {
+            Happening::Refused(refusal) => self.statistics.refuse(&refusal),
+            Happening::Rejected(kind) => {
+                let tally = self.statistics.kind(kind);
+                tally.tried += 1;
+                tally.rejected += 1;
+            }
+            Happening::Born(birth) => {
+                if let Some(kind) = birth.kind {
+                    self.statistics.kind(kind).tried += 1;
+                }
+                let number = self.tree.add(self.node(chain, birth));
+                self.chains[chain].number = number;
+                events.push(Event::Born(number));
+            }
+            Happening::Moved(moved) => self.count(self.chains[chain].number, moved),
+            Happening::Ended { ended, point, loss } => {
+                let number = self.chains[chain].number;
+                let topology = landscape.topology(&point);
+                self.close(Entry { number, loss, topology, point }, ended);
+                events.push(Event::Ended(number));
+            }
+        }
+    }
+
+    fn count(&mut self, number: u64, moved: Moved) {
+        self.statistics.moves += 1;
+        self.statistics.gradients += moved.gradients;
+        self.statistics.better += u64::from(moved.loss < self.start.loss);
+        self.statistics.rejected += u64::from(moved.rejected);
+        if let Some(node) = self.tree.node_mut(number) {
+            node.moves += 1;
+            node.gradients += moved.gradients;
+            node.descended = moved.best;
+        }
+    }
+
+    /// Offers the best point of a descent to the reservoir, and writes down how it went.
+    fn close(&mut self, entry: Entry<P>, ended: Ended) {
+        *self.statistics.ended.entry(ended).or_default() += 1;
+        let (number, loss, point) = (entry.number, entry.loss, entry.point.clone());
+        self.improve(&entry);
+        let offer = self.reservoir.offer(entry);
+        let Some(node) = self.tree.node_mut(number) else { return };
+        node.ended = Some(ended);
+        node.offer = Some(offer);
+        node.descended = loss;
+        node.point = point;
+        if let Some(kind) = node.kind {
+            let (moves, improved) = (node.moves, node.before.is_some_and(|before| loss < before));
+            let tally = self.statistics.kind(kind);
+            tally.ended += 1;
+            tally.moves += moves;
+            tally.improved += u64::from(improved);
+            tally.entered += u64::from(offer.entered());
+        }
+    }
+
+    /// Takes a better point as the best.
+    fn improve(&mut self, entry: &Entry<P>) -> bool {
+        let better = entry.loss < self.best.loss;
+        if better {
+            self.best = entry.clone();
+        }
+        better
+    }
+
+    /// Whether a descent that goes on has come to the best point so far.
+    fn compare<L>(&mut self, chain: usize, landscape: &L, events: &mut Vec<Event>)
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let number = self.chains[chain].number;
+        let best = self.chains[chain].best().filter(|(_, loss)| *loss < self.best.loss);
+        let entry = best.map(|(point, loss)| {
+            let topology = landscape.topology(point);
+            Entry { number, loss, topology, point: point.clone() }
+        });
+        if entry.is_some_and(|entry| self.improve(&entry)) {
+            events.push(Event::Best(number));
+        }
+    }
+
+    fn forget(&mut self) {
+        let held = self.reservoir.entries().iter().chain(&self.pinned).chain([&self.best]);
+        let held = held.map(|entry| entry.number);
+        let living = self.chains.iter().map(|chain| chain.number);
+        self.tree.forget(held.chain(living));
+    }
+}
+
+/// Chains with a source of chance each, far apart in one sequence.
+fn chains<P, M>(settings: &Settings) -> Vec<Chain<P, M>> {
+    let mut random = Random::seed_from_u64(settings.seed);
+    let mut next = || {
+        random.long_jump();
+        Chain { random: random.clone(), number: 0, tour: None, task: None }
+    };
+    (0..settings.chains).map(|_| next()).collect()
+}
+
+/// What brute force tries: the gradients divided by twice the number of elements.
+fn tasks(elements: usize, settings: &Settings) -> VecDeque<Task> {
+    let Some(gradients) = settings.gradients.filter(|_| settings.method == Method::Brute) else {
+        return VecDeque::new();
+    };
+    let budget = (gradients / (2 * elements.max(1) as u64)).max(1);
+    let kinds = [Kind::AddSinglet, Kind::RemoveSinglet];
+    let each = |element| kinds.map(|kind| Task { element, kind, budget });
+    (0..elements).flat_map(each).collect()
+}

@@ -1,0 +1,144 @@
+//! From a loss to a density (4.7), and from densities to the chance that a descent ends.
+//!
+//! Everything is computed from logarithms, so that densities far below the smallest number still
+//! compare. At temperature 0 only the order of two losses is left, at infinite temperature nothing.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt::{self, Display};
+
+/// The temperature of (4.7): 0 or more, infinity included; written as a number or `"infinite"`.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct Temperature(f64);
+
+impl Temperature {
+    /// What is no less than 0; none for what is less, or no number.
+    pub fn new(value: f64) -> Option<Self> {
+        (value >= 0.0).then_some(Self(value))
+    }
+
+    /// The temperature at which a loss has a density of one half, `|L| / ln 2`; 1 where the loss
+    /// is 0, which no temperature can halve.
+    pub fn halving(loss: f64) -> Self {
+        let value = loss.abs() / std::f64::consts::LN_2;
+        Self(if value > 0.0 && value.is_finite() { value } else { 1.0 })
+    }
+
+    /// The number.
+    pub fn value(self) -> f64 {
+        self.0
+    }
+
+    /// So many times as hot, as far as numbers go.
+    pub(super) fn times(self, factor: f64) -> Self {
+        Self::new(self.0 * factor).unwrap_or(self)
+    }
+
+    /// The density (4.7) of a loss, 0 for one that is not finite.
+    pub fn density(self, loss: f64) -> f64 {
+        self.log_density(loss).exp()
+    }
+
+    /// The logarithm of the density. At temperature 0 it is minus infinity for any loss above 0.
+    pub fn log_density(self, loss: f64) -> f64 {
+        if !loss.is_finite() {
+            f64::NEG_INFINITY
+        } else if loss == 0.0 || self.0.is_infinite() {
+            0.0
+        } else {
+            -loss / self.0
+        }
+    }
+
+    /// The logarithm of the ratio of the densities of two losses, `after` over `before`; at
+    /// temperature 0 it is infinite unless they are the same.
+    pub fn log_ratio(self, before: f64, after: f64) -> f64 {
+        if !after.is_finite() {
+            f64::NEG_INFINITY
+        } else if !before.is_finite() {
+            f64::INFINITY
+        } else if before == after || self.0.is_infinite() {
+            0.0
+        } else {
+            (before - after) / self.0
+        }
+    }
+}
+
+impl Display for Temperature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_finite() { write!(f, "{}", self.0) } else { f.write_str("infinite") }
+    }
+}
+
+impl Serialize for Temperature {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0.is_finite() {
+            serializer.serialize_f64(self.0)
+        } else {
+            serializer.serialize_str("infinite")
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Temperature {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Written {
+            Number(f64),
+            Word(String),
+        }
+        let found = match Written::deserialize(deserializer)? {
+            Written::Number(value) => Self::new(value).ok_or_else(|| value.to_string()),
+            Written::Word(word) if word == "infinite" => Ok(Self(f64::INFINITY)),
+            Written::Word(word) => Err(format!("`{word}`")),
+        };
+        let expected = "expected a temperature, 0 or more, or \"infinite\"";
+        found.map_err(|found| serde::de::Error::custom(format!("found {found}; {expected}")))
+    }
+}
+
+/// How a descent ends: three readings of the thesis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Termination {
+    /// Algorithm 1, (4.17): after each move with the chance
+    /// `max(0, (π(θ) − π(θ') + C) / (π(θ) + C)) = max(0, 1 − π(θ') / (π(θ) + C))`. A descent whose
+    /// density is far below `C` ends unless a move multiplies it: bad starts are given up soon.
+    Ratio,
+    /// The same with `C π(θ)` in place of `C`: `max(0, 1 − π(θ') / π(θ) / (1 + C))`. How long a
+    /// descent lasts depends on how fast it improves, and not on where it began.
+    Relative,
+    /// The two clocks of section 4.4.1, of rates 1 and `κ = max(0, 1 − π(θ') / π(θ) + C)` (4.16):
+    /// the chance `κ / (1 + κ)`. Even a move into nothing ends a descent half of the time only.
+    Clocks,
+}
+
+impl Termination {
+    /// The chance that a descent ends after a move from one loss to another.
+    ///
+    /// At temperature 0, where densities are gone, all rules only see whether the move improved.
+    pub fn chance(self, temperature: Temperature, c: f64, before: f64, after: f64) -> f64 {
+        let ratio = temperature.log_ratio(before, after).exp();
+        match self {
+            Self::Ratio if temperature.value() > 0.0 => {
+                let old = temperature.log_density(before);
+                let kept = temperature.log_density(after) - log_sum(old, c.ln());
+                // Both are nothing only without any `C`: then nothing was lost.
+                let kept = if kept.is_nan() { 1.0 } else { kept.exp() };
+                (1.0 - kept).max(0.0)
+            }
+            Self::Ratio | Self::Relative => (1.0 - ratio / (1.0 + c)).max(0.0),
+            Self::Clocks => {
+                let rate = (1.0 - ratio + c).max(0.0);
+                rate / (1.0 + rate)
+            }
+        }
+    }
+}
+
+/// The logarithm of the sum of two numbers that are given as logarithms.
+fn log_sum(a: f64, b: f64) -> f64 {
+    let (high, low) = if a > b { (a, b) } else { (b, a) };
+    if high == f64::NEG_INFINITY { high } else { high + (low - high).exp().ln_1p() }
+}
