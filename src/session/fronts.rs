@@ -1,6 +1,7 @@
 //! The fronts of a session: the one that is swept, those before it, and where the design stands.
 
-use super::sweeper::{FrontRun, Job, Judged, Sweeper, Told};
+use super::judged::Judged;
+use super::sweeper::{FrontRun, Job, Sweeper, Told};
 use super::worker::Standing;
 use crate::lens::Lens;
 use crate::optimize::pareto::Settings;

@@ -11,12 +11,14 @@
 //!   something new is in one.
 
 mod analyst;
+mod background;
 mod clock;
 mod command;
 mod desk;
 mod edit;
 mod fronts;
 mod history;
+mod judged;
 mod laboratory;
 mod layout;
 mod pupils;
@@ -36,13 +38,14 @@ pub use command::{Command, Edit};
 pub use desk::{Event, Session};
 pub use edit::{EditError, edited};
 pub use fronts::Fronts;
+pub use judged::Judged;
 pub use laboratory::{Stage, Trial};
 pub use layout::{DrawnRay, Layout, layout};
 pub use pupils::Pupils;
 pub use saving::timed_plan;
 pub use scatter::{Scatter, scatter};
 pub use slot::Slot;
-pub use sweeper::{FrontRun, Judged, Leg};
+pub use sweeper::{FrontRun, Leg};
 pub use typed::{NoNumber, evaluate};
 pub use view::{Message, Settings, Severity, View, blank};
 pub use worker::{HistoryPoint, Search, Standing, Starter, Task};

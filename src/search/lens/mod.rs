@@ -15,9 +15,7 @@ mod walk;
 pub use goal::goal;
 pub use open::opened;
 
-use super::{
-    Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation,
-};
+use super::{Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation};
 use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
 use crate::optimize::{Memory, Method, Stretch, stretch};
@@ -109,7 +107,12 @@ impl LensLandscape {
     ///
     /// # Errors
     /// A lens without merit, or settings without meaning.
-    pub fn new(lens: &Lens, goal: &Goal, rules: &Rules, local: &Local) -> Result<Self, NoLandscape> {
+    pub fn new(
+        lens: &Lens,
+        goal: &Goal,
+        rules: &Rules,
+        local: &Local,
+    ) -> Result<Self, NoLandscape> {
         local.check()?;
         let mut start = limited_by_stop(lens)?;
         free::hold_the_rest(&mut start);
