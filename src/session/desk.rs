@@ -1,8 +1,10 @@
 //! The session itself: what each command does.
 
 use super::analyst::{Analyst, Request, Results, Savings};
-use super::command::{Command, Edit};
+use super::command::{Command, Edit, Explore};
 use super::edit::edited;
+use super::explorations::ExplorationDesk;
+use super::explorer;
 use super::fronts::FrontDesk;
 use super::history::History;
 use super::laboratory::{Laboratory, Stage};
@@ -40,10 +42,14 @@ pub enum Event {
     SearchFinished,
     /// The sweep of a front stands so.
     Front(Standing),
+    /// The search over structure stands so.
+    Explored(Standing),
     /// Something to tell the person.
     Said(Message),
 }
 
+/// What tells the numbers of searches over structure from those of other searches.
+const EXPLORED: u64 = 1 << 63;
 /// How many messages are kept.
 const MESSAGES: usize = 200;
 
@@ -63,6 +69,7 @@ pub struct Session {
     analyst: Analyst,
     worker: Worker,
     fronts: FrontDesk,
+    explorations: ExplorationDesk,
     /// A lens that is shown in place of the design.
     candidate: Option<Arc<Lens>>,
     /// Computes the numbers of that lens, or of the one that the search shows.
@@ -115,7 +122,8 @@ impl Session {
             followed: None,
             laboratory: Laboratory::spawn(wake.clone())?,
             worker: Worker::spawn(start, wake.clone())?,
-            fronts: FrontDesk::spawn(wake)?,
+            fronts: FrontDesk::spawn(wake.clone())?,
+            explorations: ExplorationDesk::spawn(wake)?,
             candidate: None,
             searches: 0,
             search: None,
@@ -151,6 +159,7 @@ impl Session {
             Command::StopFront => self.fronts.stand(Standing::Stopped),
             Command::ClearFronts => self.fronts.clear(),
             Command::ExportFront(folder) => self.export_front(folder),
+            Command::Explore(wish) => self.explore(wish),
             Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),
             Command::TakePreview => self.take_preview(),
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
@@ -180,6 +189,10 @@ impl Session {
             self.hear_front(told);
         }
         self.fronts.keep_up(&self.lens);
+        for told in self.explorations.told() {
+            self.hear_exploration(told);
+        }
+        self.explorations.keep_up(&self.lens);
         self.follow();
         std::mem::take(&mut self.events)
     }
@@ -192,6 +205,7 @@ impl Session {
             results: self.analyst.results(),
             search: self.search(),
             fronts: self.fronts.view(),
+            explorations: self.explorations.view(),
             candidate: self.candidate.clone(),
             preview: self.preview(),
             trial: self.laboratory.trial(),
@@ -227,8 +241,9 @@ impl Session {
     /// The lens that is shown in place of the design, and what numbers of it are known by: the
     /// number of the search that it belongs to, or 0.
     fn followed(&self) -> Option<(u64, Arc<Lens>)> {
+        let explored = || self.explorations.shown().map(|(number, lens)| (EXPLORED | number, lens));
         let search = || self.search().map(|search| (search.number, Arc::clone(search.shown())));
-        self.candidate.clone().map(|lens| (0, lens)).or_else(search)
+        self.candidate.clone().map(|lens| (0, lens)).or_else(explored).or_else(search)
     }
 
     /// Asks for the numbers of that lens, if it is another one by now.
@@ -446,6 +461,61 @@ impl Session {
         }
     }
 
+    /// Saves searches over structure in a folder from now on, where they have no other place, and
+    /// offers to go on with the one that was left there.
+    pub fn keep_searches_in(&mut self, folder: impl Into<PathBuf>) {
+        self.explorations.keep_in(folder.into());
+    }
+
+    fn explore(&mut self, wish: Explore) {
+        if let Explore::Take(number) = wish {
+            return self.take_found(number);
+        }
+        if matches!(wish, Explore::Start(_) | Explore::GoOn(_)) {
+            self.candidate = None;
+        }
+        if let Err(why) = self.explorations.obey(wish, &self.lens) {
+            self.say(Severity::Warning, why);
+        }
+    }
+
+    /// Makes a lens of the search over structure the design, as one step.
+    fn take_found(&mut self, number: u64) {
+        let taken = self.explorations.lens_of(number).and_then(|lens| {
+            let own = released(&lens);
+            own.check().map(|()| own).map_err(|why| why.to_string())
+        });
+        match taken {
+            Ok(lens) => {
+                let title = format!("take lens {number} of the search");
+                self.history.note(Arc::clone(&self.lens), title, None);
+                self.explorations.stop_following();
+                self.show(Arc::new(lens));
+            }
+            Err(why) => self.say(Severity::Warning, why),
+        }
+    }
+
+    fn hear_exploration(&mut self, told: explorer::Told) {
+        use explorer::Told;
+        match told {
+            Told::Now(_, standing) => self.events.push(Event::Explored(standing)),
+            Told::Failed(_, why) => {
+                self.say(Severity::Error, why);
+                self.events.push(Event::Explored(Standing::Stopped));
+            }
+            Told::Refused(why) => self.say(Severity::Warning, why),
+            Told::Written(path, what) => {
+                let text = format!("exported to {}", path.display());
+                let parts = [text, what].map(|part| part.trim_end().to_owned());
+                let parts: Vec<String> = parts.into_iter().filter(|p| !p.is_empty()).collect();
+                self.say(Severity::Note, parts.join("\n"));
+                self.events.push(Event::Saved(path));
+            }
+            Told::NotWritten(why) => self.say(Severity::Error, why),
+        }
+    }
+
     fn discard(&mut self) {
         self.worker.stop();
         self.search = None;
@@ -528,6 +598,14 @@ impl Session {
 /// More rays of a field than this are a solid area.
 const MOST_RAYS: usize = 2000;
 
+/// A lens of a search over structure as a person wants it: without the bounds that hold numbers,
+/// which were never variables of theirs.
+fn released(lens: &Lens) -> Lens {
+    let mut own = lens.clone();
+    own.variables.retain(|v| v.min.is_none() || v.min != v.max);
+    own
+}
+
 /// The best lens of a search; where the design was edited meanwhile, the design with the numbers
 /// that the search changed.
 fn carried(search: &Search, design: &Arc<Lens>) -> Result<Lens, String> {
@@ -558,6 +636,6 @@ impl Search {
 
     /// Whether it takes steps or can go on.
     pub fn is_under_way(&self) -> bool {
-        matches!(self.standing, Standing::Running | Standing::Paused)
+        self.standing.can_go_on()
     }
 }

@@ -107,7 +107,7 @@ impl FrontDesk {
                     self.pending = None;
                 }
                 // What it stands as now may be older than what it was told since.
-                Told::Now(_, now) if Some(*now) == self.pending || !goes_on(*now) => {
+                Told::Now(_, now) if Some(*now) == self.pending || !now.can_go_on() => {
                     self.pending = None;
                 }
                 _ => {}
@@ -140,8 +140,4 @@ impl FrontDesk {
     fn run(&self) -> Option<Arc<FrontRun>> {
         self.sweeper.run().filter(|run| Some(run.number) == self.number)
     }
-}
-
-const fn goes_on(standing: Standing) -> bool {
-    matches!(standing, Standing::Running | Standing::Paused)
 }

@@ -65,7 +65,7 @@ pub struct Leg {
 impl FrontRun {
     /// Whether it goes on or can.
     pub fn is_under_way(&self) -> bool {
-        matches!(self.standing, Standing::Running | Standing::Paused)
+        self.standing.can_go_on()
     }
 
     /// The sweep that runs, or ran last.

@@ -48,6 +48,13 @@ pub enum Standing {
     Finished,
 }
 
+impl Standing {
+    /// Whether it goes on or can.
+    pub const fn can_go_on(self) -> bool {
+        matches!(self, Self::Running | Self::Paused)
+    }
+}
+
 /// How far a search is.
 #[derive(Debug, Clone)]
 pub struct Search {
