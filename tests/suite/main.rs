@@ -21,4 +21,5 @@ mod reference;
 mod rims;
 mod session;
 mod session_front;
+mod session_search;
 mod trace;
