@@ -18,6 +18,7 @@ mod measure;
 mod optimize;
 mod output;
 mod pareto;
+mod search;
 mod trace;
 mod vary;
 mod window;
@@ -56,6 +57,7 @@ enum Command {
     Gradient(gradient::Gradient),
     Optimize(optimize::Optimize),
     Pareto(pareto::Pareto),
+    Search(Box<search::Search>),
     Convert(convert::Convert),
     Experiment(experiment::Experiment),
     Measure(measure::Measure),
@@ -70,6 +72,7 @@ impl Command {
             Self::Gradient(gradient) => gradient.run(output),
             Self::Optimize(optimize) => optimize.run(output),
             Self::Pareto(pareto) => pareto.run(output),
+            Self::Search(search) => search.run(output),
             Self::Convert(convert) => convert.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),

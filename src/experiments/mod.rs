@@ -10,9 +10,11 @@ mod aperture_stop;
 mod entrance_pupil;
 mod front;
 mod gradient_image;
+mod histogram;
 mod motion;
 mod outcome;
 mod report;
+mod sampling;
 mod section;
 mod trade;
 mod vignetting;
@@ -35,6 +37,7 @@ pub const ALL: &[Experiment] = &[
     motion::EXPERIMENT,
     vignetting::EXPERIMENT,
     zoom::EXPERIMENT,
+    sampling::EXPERIMENT,
 ];
 
 /// A figure or table of the thesis.

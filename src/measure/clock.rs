@@ -4,15 +4,17 @@ use std::time::Instant;
 
 /// When something began.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stopwatch(Instant);
+pub struct Stopwatch(Instant);
 
 impl Stopwatch {
+    /// Now.
     #[expect(clippy::disallowed_methods, reason = "measuring is what this floor is for")]
-    pub(super) fn start() -> Self {
+    pub fn start() -> Self {
         Self(Instant::now())
     }
 
-    pub(super) fn seconds(self) -> f64 {
+    /// Seconds since then.
+    pub fn seconds(self) -> f64 {
         self.0.elapsed().as_secs_f64()
     }
 }

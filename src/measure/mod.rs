@@ -16,7 +16,7 @@ mod rounding;
 mod spot;
 mod trace;
 
-pub use clock::timed;
+pub use clock::{Stopwatch, timed};
 pub use double_gauss::double_gauss;
 pub use gradient::{
     GradientCost, GradientCurves, GradientRow, Gradients, Integral, NoGradients, Numbers, gradients,

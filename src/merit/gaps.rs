@@ -8,51 +8,106 @@ use super::sum::Sum;
 use super::{Along, MeritError, Scene, Term};
 use crate::lens::{Lens, System};
 use crate::math::Real;
+use serde::Serialize;
 
 /// Adds one of the terms about gaps.
 pub(super) fn gaps(scene: &Scene<'_>, term: Term, sum: &mut Sum) {
-    let last = scene.zoom.glass.len() - 1;
+    for Limited { of, min, max } in limited(scene.zoom, scene.systems, term) {
+        let number = Number { of, scene };
+        min.into_iter().for_each(|min| number.at_least(min, sum));
+        max.into_iter().for_each(|max| number.at_most(max, sum));
+    }
+}
+
+/// A number of a lens and what it may be.
+struct Limited {
+    of: Of,
+    min: Option<f64>,
+    max: Option<f64>,
+}
+
+/// Everything that a term limits.
+fn limited(zoom: &Zoom, systems: &Systems, term: Term) -> Vec<Limited> {
+    let last = zoom.glass.len() - 1;
+    let both = |of, min, max| Limited { of, min: Some(min), max: Some(max) };
+    let least = |of, min| Limited { of, min: Some(min), max: None };
+    let most = |of, max| Limited { of, min: None, max: Some(max) };
+    let gaps = |glass| zoom.inner_gaps(glass);
     match term {
-        Term::GlassCenter { min, max } => centers(scene, true, (min, max), sum),
-        Term::AirCenter { min, max } => centers(scene, false, (min, max), sum),
-        Term::GlassEdge(min) => edges(scene, true, min, sum),
-        Term::AirEdge(min) => edges(scene, false, min, sum),
-        Term::TotalTrack(max) => {
-            let number = Number { of: Of::Track, scene };
-            number.at_most(max, sum);
+        Term::GlassCenter { min, max } => {
+            gaps(true).map(|gap| both(Of::Center(gap), min, max)).collect()
         }
-        Term::BackFocus(min) => {
-            let number = Number { of: Of::Center(last), scene };
-            number.at_least(min, sum);
+        Term::AirCenter { min, max } => {
+            gaps(false).map(|gap| both(Of::Center(gap), min, max)).collect()
         }
-        Term::Steepness(max) => {
-            for surface in 0..=last {
-                Number { of: Of::Steepness(surface), scene }.at_most(max, sum);
-            }
+        Term::GlassEdge(min) => {
+            gaps(true).map(|gap| least(Of::Edge { gap, glass: true }, min)).collect()
         }
+        Term::AirEdge(min) => {
+            gaps(false).map(|gap| least(Of::Edge { gap, glass: false }, min)).collect()
+        }
+        Term::TotalTrack(max) => vec![most(Of::Track, max)],
+        Term::BackFocus(min) => vec![least(Of::Center(last), min)],
+        Term::Steepness(max) => (0..=last).map(|i| most(Of::Steepness(i), max)).collect(),
         Term::SemiDiameter { min, max } => {
-            for surface in scene.zoom.rims(scene.systems) {
-                let number = Number { of: Of::Rim(surface), scene };
-                number.at_least(min, sum);
-                number.at_most(max, sum);
-            }
+            zoom.rims(systems).into_iter().map(|i| both(Of::Rim(i), min, max)).collect()
         }
-        _ => {}
+        _ => Vec::new(),
     }
 }
 
-fn centers(scene: &Scene<'_>, glass: bool, (min, max): (f64, f64), sum: &mut Sum) {
-    for gap in scene.zoom.inner_gaps(glass) {
-        let number = Number { of: Of::Center(gap), scene };
-        number.at_least(min, sum);
-        number.at_most(max, sum);
+/// A number of a lens that a term limits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Margin {
+    /// Which term.
+    pub term: &'static str,
+    /// The surface, or the one in front of the gap; none for the whole lens.
+    pub surface: Option<usize>,
+    /// The zoom position.
+    pub zoom: usize,
+    /// What it is: mm, or a ratio for a steepness.
+    pub value: f64,
+    /// Not less than this.
+    pub min: Option<f64>,
+    /// Not more than this.
+    pub max: Option<f64>,
+}
+
+impl Margin {
+    /// By how much it is inside of what it may be, less than 0 outside.
+    pub fn room(&self) -> f64 {
+        let below = self.min.map_or(f64::INFINITY, |min| self.value - min);
+        below.min(self.max.map_or(f64::INFINITY, |max| max - self.value))
     }
 }
 
-fn edges(scene: &Scene<'_>, glass: bool, min: f64, sum: &mut Sum) {
-    for gap in scene.zoom.inner_gaps(glass) {
-        Number { of: Of::Edge { gap, glass }, scene }.at_least(min, sum);
+/// Every number of a lens that one of these terms limits, with what it may be.
+///
+/// # Errors
+/// A lens that cannot be resolved.
+pub fn margins(lens: &Lens, terms: impl Iterator<Item = Term>) -> Result<Vec<Margin>, MeritError> {
+    let terms: Vec<Term> = terms.collect();
+    let mut found = Vec::new();
+    for number in 0..lens.zoom_positions() {
+        let zoom = Zoom::new(lens, number)?;
+        let values: Vec<f64> =
+            lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
+        let systems = zoom.at(&values);
+        for term in &terms {
+            let margin = |Limited { of, min, max }: Limited| Margin {
+                term: term.name(),
+                surface: of.surface(),
+                zoom: number,
+                value: of.length(&systems.rimmed[zoom.primary]),
+                min,
+                max,
+            };
+            // What nothing limits, like the edge of a gap without rims, has no number.
+            let all = limited(&zoom, &systems, *term).into_iter().map(margin);
+            found.extend(all.filter(|margin| margin.value.is_finite()));
+        }
     }
+    Ok(found)
 }
 
 impl Zoom {
@@ -121,6 +176,15 @@ enum Of {
 }
 
 impl Of {
+    fn surface(self) -> Option<usize> {
+        match self {
+            Self::Center(at) | Self::Edge { gap: at, .. } | Self::Steepness(at) | Self::Rim(at) => {
+                Some(at)
+            }
+            Self::Track => None,
+        }
+    }
+
     /// In mm, lengths counted along the light.
     fn length<R: Real>(self, system: &System<R>) -> R {
         match self {

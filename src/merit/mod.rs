@@ -20,6 +20,7 @@ mod sampling;
 mod spot;
 mod sum;
 
+pub use gaps::{Margin, margins};
 pub use goal::{Goal, PupilEdge, Term, Weighted};
 pub use sampling::Sampled;
 

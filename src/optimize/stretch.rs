@@ -36,15 +36,22 @@ pub struct Memory {
 }
 
 /// The pace may not fall below this part of the first one.
-const SLOWEST: f64 = 1e-3;
+const SLOWEST: f64 = 0.02;
 /// A stretch that went well is followed by a faster one, up to this part of the first pace.
 const FASTEST: f64 = 2.0;
 const FASTER: f64 = 1.2;
+/// One that led to nothing better, by a slower one.
+const SLOWER: f64 = 0.8;
 
 impl Memory {
     /// The stretch has led to something better: the next one may be bolder.
     pub fn encourage(&mut self) {
         self.pace = Some((FASTER * self.pace.unwrap_or(1.0)).min(FASTEST));
+    }
+
+    /// The stretch has led to nothing better: the next one is more cautious.
+    pub fn slow_down(&mut self) {
+        self.pace = Some((SLOWER * self.pace.unwrap_or(1.0)).max(SLOWEST));
     }
 
     /// The stretch has led to something worse: the next one is more cautious and begins afresh.

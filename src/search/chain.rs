@@ -90,6 +90,7 @@ pub(super) struct Shared<'a, L: Landscape> {
     pub(super) settings: &'a Settings,
     pub(super) temperature: Temperature,
     pub(super) weights: &'a Weights,
+    pub(super) start: &'a Entry<L::Point>,
     pub(super) reservoir: &'a Reservoir<L::Point>,
     pub(super) pinned: Option<&'a Entry<L::Point>>,
 }
@@ -201,8 +202,7 @@ impl<L: Landscape> Shared<'_, L> {
         random: &mut Random,
         turn: &mut Turn<L>,
     ) -> Option<Birth<L::Point>> {
-        let start = self.reservoir.entries().iter().find(|entry| entry.number == 0);
-        let start = self.pinned.or(start)?;
+        let start = self.start;
         let mutated = self.landscape.mutate_at(&start.point, task.element, task.kind, random);
         let birth = mutated.and_then(|new| self.birth(Some((start.number, start.loss)), new));
         birth.map_err(|refusal| turn.push(Happening::Refused(refusal))).ok()

@@ -47,7 +47,7 @@ impl Element {
 
 /// Which gaps are glass, the space in front of the first surface first; behind a mirror stands what
 /// stood before it. An index of less than 1.05 is a kind of air.
-fn filled(lens: &Lens) -> Vec<bool> {
+pub(super) fn filled(lens: &Lens) -> Vec<bool> {
     let is_glass = |medium: &Medium, before: bool| match medium {
         Medium::Air => false,
         Medium::Mirror => before,
@@ -59,6 +59,12 @@ fn filled(lens: &Lens) -> Vec<bool> {
         gaps.push(is_glass(&row.medium, gaps[i]));
     }
     gaps
+}
+
+/// Whether light runs towards −z in the gap behind a surface.
+pub(super) fn is_backwards(lens: &Lens, surface: usize) -> bool {
+    let mirrors = lens.surfaces[..=surface].iter().filter(|row| row.medium == Medium::Mirror);
+    mirrors.count() % 2 == 1
 }
 
 /// The elements of a lens in the order of its rows; a stop in air is none.

@@ -103,6 +103,9 @@ impl<P> Tree<P> {
     /// Forgets the oldest of those that are neither these nor their ancestors. It works now and
     /// then only: there may be twice as many as are wanted.
     pub(super) fn forget(&mut self, kept: impl Iterator<Item = u64>) {
+        if self.nodes.len() <= 2 * self.remembered {
+            return;
+        }
         let kept: BTreeSet<u64> =
             kept.flat_map(|number| self.line(number).map(|node| node.number)).collect();
         let others = self.nodes.len().saturating_sub(kept.len());

@@ -21,9 +21,12 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    fn new(slope: Slope) -> Self {
-        let square = slope.gradient.iter().map(|g| g * g).collect();
-        Self { values: slope.values, gradient: slope.gradient, square, count: 1 }
+    /// None where the gradient is no number.
+    fn new(slope: Slope) -> Option<Self> {
+        let square: Vec<f64> = slope.gradient.iter().map(|g| g * g).collect();
+        let finite = square.iter().chain(&slope.values).all(|number| number.is_finite());
+        let Slope { values, gradient, .. } = slope;
+        finite.then_some(Self { values, gradient, square, count: 1 })
     }
 
     /// `ε M` of every variable.
@@ -73,8 +76,8 @@ impl<L: Landscape> Shared<'_, L> {
     fn step(&self, tour: &mut Tour<L::Point, L::Memory>, random: &mut Random) -> (bool, u64) {
         let (walk, first) = match tour.walk.take() {
             Some(walk) => (walk, 0),
-            None => match self.landscape.slope(&tour.point) {
-                Some(slope) => (Walk::new(slope), 1),
+            None => match self.landscape.slope(&tour.point).and_then(Walk::new) {
+                Some(walk) => (walk, 1),
                 None => return (false, 1),
             },
         };
@@ -91,7 +94,8 @@ impl<L: Landscape> Shared<'_, L> {
             let way = log_step(&walk.values, &walk.gradient, &values, &variances);
             let back = log_step(&values, &slope.gradient, &walk.values, &variances);
             let chance = self.temperature.log_ratio(tour.loss, slope.loss) + back - way;
-            accepted = random.random::<f64>().ln() < chance;
+            let squares = slope.gradient.iter().all(|g| (g * g).is_finite());
+            accepted = squares && random.random::<f64>().ln() < chance;
             if accepted {
                 (walk.values, walk.gradient) = (values, slope.gradient);
                 tour.go(point, slope.loss);

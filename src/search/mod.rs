@@ -9,6 +9,7 @@
 
 mod chain;
 mod checkpoint;
+pub mod clocks;
 pub mod element;
 mod error;
 mod family;
@@ -17,6 +18,8 @@ pub mod lens;
 mod metropolis;
 pub mod mutation;
 mod projection;
+mod record;
+mod repair;
 mod reservoir;
 mod rules;
 mod run;
@@ -24,6 +27,7 @@ mod settings;
 mod statistics;
 mod steer;
 mod temperature;
+pub mod toy;
 mod weights;
 
 pub use chain::{Chain, Tour};
@@ -31,7 +35,7 @@ pub use error::SearchError;
 pub use family::{Ended, Node, Tree};
 pub use landscape::{Landscape, Mutated, Point, Slope};
 pub use mutation::{Kind, Mutant, Refusal, mutate, propose};
-pub use projection::Projection;
+pub use projection::{Projection, Unprojectable};
 pub use reservoir::{Entry, Offer, Reservoir};
 pub use rules::Rules;
 pub use run::{Event, Over, Run, RunOf};

@@ -4,12 +4,11 @@
 //! it was before; then what happened is written down in the order of the chains. So a run is a
 //! function of its landscape, start and settings, on any number of threads.
 
-use super::chain::{Birth, Chain, Happening, Moved, Shared, Task, Tour};
+use super::chain::{Birth, Chain, Shared, Task, Tour};
 use super::family::{Node, Tree};
 use super::reservoir::{Entry, Reservoir};
 use super::{
-    Ended, Kind, Landscape, Method, Point, Random, SearchError, Settings, Statistics, Temperature,
-    Weights,
+    Kind, Landscape, Method, Point, Random, SearchError, Settings, Statistics, Temperature, Weights,
 };
 use rand::SeedableRng as _;
 use rayon::prelude::*;
@@ -32,10 +31,10 @@ pub struct Run<P, M> {
     pub(super) stopped: bool,
     pub(super) chains: Vec<Chain<P, M>>,
     pub(super) tree: Tree<P>,
-    start: Entry<P>,
-    best: Entry<P>,
-    reservoir: Reservoir<P>,
-    statistics: Statistics,
+    pub(super) start: Entry<P>,
+    pub(super) best: Entry<P>,
+    pub(super) reservoir: Reservoir<P>,
+    pub(super) statistics: Statistics,
     tasks: VecDeque<Task>,
 }
 
@@ -190,6 +189,7 @@ impl<P: Point, M: Point + Default> Run<P, M> {
             settings: &self.settings,
             temperature: self.temperature,
             weights: &self.weights,
+            start: &self.start,
             reservoir: &self.reservoir,
             pinned: self.pinned.as_ref(),
         };
@@ -210,7 +210,7 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     }
 
     /// A node that begins.
-    fn node(&self, chain: usize, birth: Birth<P>) -> Node<P> {
+    pub(super) fn node(&self, chain: usize, birth: Birth<P>) -> Node<P> {
         let Birth { parent, kind, what, before, loss, point } = birth;
         Node {
             number: self.tree.born(),
@@ -255,105 +255,6 @@ impl<P: Point, M: Point + Default> Run<P, M> {
                 chain.task = self.tasks.pop_front();
             }
         }
-    }
-
-    fn write_down<L>(
-        &mut self,
-        chain: usize,
-        happening: Happening<P>,
-        landscape: &L,
-        events: &mut Vec<Event>,
-    ) where
-        L: Landscape<Point = P, Memory = M>,
-    {
-        match happening {
-            Happening::Refused(refusal) => self.statistics.refuse(&refusal),
-            Happening::Rejected(kind) => {
-                let tally = self.statistics.kind(kind);
-                tally.tried += 1;
-                tally.rejected += 1;
-            }
-            Happening::Born(birth) => {
-                if let Some(kind) = birth.kind {
-                    self.statistics.kind(kind).tried += 1;
-                }
-                let number = self.tree.add(self.node(chain, birth));
-                self.chains[chain].number = number;
-                events.push(Event::Born(number));
-            }
-            Happening::Moved(moved) => self.count(self.chains[chain].number, moved),
-            Happening::Ended { ended, point, loss } => {
-                let number = self.chains[chain].number;
-                let topology = landscape.topology(&point);
-                self.close(Entry { number, loss, topology, point }, ended);
-                events.push(Event::Ended(number));
-            }
-        }
-    }
-
-    fn count(&mut self, number: u64, moved: Moved) {
-        self.statistics.moves += 1;
-        self.statistics.gradients += moved.gradients;
-        self.statistics.better += u64::from(moved.loss < self.start.loss);
-        self.statistics.rejected += u64::from(moved.rejected);
-        if let Some(node) = self.tree.node_mut(number) {
-            node.moves += 1;
-            node.gradients += moved.gradients;
-            node.descended = moved.best;
-        }
-    }
-
-    /// Offers the best point of a descent to the reservoir, and writes down how it went.
-    fn close(&mut self, entry: Entry<P>, ended: Ended) {
-        *self.statistics.ended.entry(ended).or_default() += 1;
-        let (number, loss, point) = (entry.number, entry.loss, entry.point.clone());
-        self.improve(&entry);
-        let offer = self.reservoir.offer(entry);
-        let Some(node) = self.tree.node_mut(number) else { return };
-        node.ended = Some(ended);
-        node.offer = Some(offer);
-        node.descended = loss;
-        node.point = point;
-        if let Some(kind) = node.kind {
-            let (moves, improved) = (node.moves, node.before.is_some_and(|before| loss < before));
-            let tally = self.statistics.kind(kind);
-            tally.ended += 1;
-            tally.moves += moves;
-            tally.improved += u64::from(improved);
-            tally.entered += u64::from(offer.entered());
-        }
-    }
-
-    /// Takes a better point as the best.
-    fn improve(&mut self, entry: &Entry<P>) -> bool {
-        let better = entry.loss < self.best.loss;
-        if better {
-            self.best = entry.clone();
-        }
-        better
-    }
-
-    /// Whether a descent that goes on has come to the best point so far.
-    fn compare<L>(&mut self, chain: usize, landscape: &L, events: &mut Vec<Event>)
-    where
-        L: Landscape<Point = P, Memory = M>,
-    {
-        let number = self.chains[chain].number;
-        let best = self.chains[chain].best().filter(|(_, loss)| *loss < self.best.loss);
-        let entry = best.map(|(point, loss)| {
-            let topology = landscape.topology(point);
-            Entry { number, loss, topology, point: point.clone() }
-        });
-        if entry.is_some_and(|entry| self.improve(&entry)) {
-            events.push(Event::Best(number));
-        }
-    }
-
-    fn forget(&mut self) {
-        let held = self.reservoir.entries().iter().chain(&self.pinned).chain([&self.best]);
-        let held = held.map(|entry| entry.number);
-        let living = self.chains.iter().map(|chain| chain.number);
-        self.tree.forget(held.chain(living));
     }
 }
 

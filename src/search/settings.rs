@@ -122,8 +122,9 @@ pub enum Method {
 /// `θ' = θ − ε M ∇L + √(ε M) ξ`, `M = 1 / (√v + floor)`, `v` the mean square of all gradients so
 /// far of this structure.
 ///
-/// A gradient changes that mean by its part of all, so that adaptation ends by itself, which
-/// convergence asks for.
+/// A gradient changes that mean by its part of all, so that adaptation fades, which convergence
+/// asks for. Dividing `√v` by the number of gradients would fade too, but let `M` grow to 1/floor
+/// whatever the slope is: steps of `√(ε/floor)`, 3 units of every variable, which nothing accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Langevin {

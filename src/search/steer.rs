@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Steer {
-    /// Every regeneration begins with a mutation of this generation's best point.
+    /// Every regeneration begins with a mutation of this generation's best point; Metropolis and
+    /// Hastings, and brute force, have no regenerations.
     Pin(u64),
     /// Regenerations begin from the reservoir again.
     Unpin,

@@ -19,6 +19,7 @@ mod pareto;
 mod pupil;
 mod reference;
 mod rims;
+mod search;
 mod session;
 mod session_front;
 mod session_search;

@@ -7,13 +7,19 @@
 //! taken back.
 
 mod draw;
+mod figures;
+mod finish;
 mod free;
 mod goal;
 mod open;
+mod plan;
 mod walk;
 
+pub use figures::{FieldFigures, Figures};
+pub use finish::{Confirmed, Exchanged, Finished, finish};
 pub use goal::goal;
 pub use open::opened;
+pub use plan::{NoSearch, Plan, run};
 
 use super::{Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation};
 use crate::lens::{Lens, LensError};
@@ -168,6 +174,26 @@ impl LensLandscape {
         Ok(merit.compared_with(&self.light))
     }
 
+    /// Rays of one gradient at a lens; none where it has no merit.
+    pub fn rays(&self, lens: &Lens) -> usize {
+        let merit = self.merit(lens, self.local.tolerance);
+        merit.map_or(0, |merit| merit.sampled().iter().map(|spot| spot.rays).sum())
+    }
+
+    /// What losses are compared with: that of the start without the penalties of what no factory
+    /// can make, which a search repairs first of all.
+    pub fn scale(&self) -> f64 {
+        let worth = || {
+            let merit = self.merit(&self.start, self.local.tolerance).ok()?;
+            let terms = merit.terms(&merit.values(&self.freed(&self.start))).ok()?;
+            let optical = |name: &str| ["spot", "spot_integral", "light"].contains(&name);
+            let sum: f64 =
+                terms.iter().filter(|t| optical(t.term)).map(|t| t.weight * t.value).sum();
+            (sum > 0.0).then_some(sum)
+        };
+        worth().unwrap_or_else(|| self.loss(&self.start))
+    }
+
     /// What a lens is worth, by its own pupils.
     fn judge(&self, lens: &Lens) -> Result<f64, MeritError> {
         let merit = self.merit(lens, self.local.tolerance)?;
@@ -187,6 +213,10 @@ impl LensLandscape {
         match self.judge(&there) {
             Ok(after) if after < before || is_coarse => {
                 memory.encourage();
+                Ok((there, after))
+            }
+            Ok(after) if after < (1.0 + SLACK) * before => {
+                memory.slow_down();
                 Ok((there, after))
             }
             Ok(_) | Err(_) => {
@@ -216,6 +246,9 @@ impl Local {
         Ok(())
     }
 }
+
+/// A move may lead to something worse by this part, since the rays of two lenses differ.
+const SLACK: f64 = 0.05;
 
 /// How often a lens is drawn before it is given up.
 const DRAWS: usize = 200;
@@ -277,6 +310,27 @@ impl Landscape for LensLandscape {
 
     fn elements(&self, lens: &Lens) -> usize {
         element::elements(lens).len()
+    }
+
+    fn mutate_at(
+        &self,
+        lens: &Lens,
+        element: usize,
+        kind: Kind,
+        random: &mut Random,
+    ) -> Result<Mutated<Lens>, Refusal> {
+        let rows = lens.surfaces.len();
+        let Some(element) = element::elements(lens).get(element).copied() else {
+            return Err(Refusal::new(kind, "there is no such element"));
+        };
+        // Only what lies between these surfaces may change, and it must be allowed anyway.
+        let (first, last) = match kind {
+            Kind::AddSinglet => (element.last, element.last + 1),
+            _ => (element.first.saturating_sub(1), element.last + 1),
+        };
+        let mut rules = self.rules.clone().touching(first, last.min(rows - 1), rows);
+        rules.kept = [0, 1].map(|end| rules.kept[end].max(self.rules.kept[end]));
+        mutation::mutate(kind, lens, &rules, random).map(Into::into)
     }
 
     fn slope(&self, lens: &Lens) -> Option<Slope> {

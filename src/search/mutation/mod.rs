@@ -1,7 +1,28 @@
 //! Changes of the structure of a lens, one file each, and the list of them.
+//!
+//! A mutation draws a place uniformly and new numbers at random, then the rest of the lens is
+//! projected so that it focuses as before, and at last it is repaired. Where another mutation leads
+//! back, the two are a reversible pair in the sense of Green ("Reversible jump Markov chain Monte
+//! Carlo", Biometrika 82, 1995): the numbers of an element that comes or goes are drawn or
+//! forgotten, all others are mapped one to one, and semi-diameters count as following from them.
 
+mod add;
+mod bend;
+mod chance;
+mod draft;
+mod drop_layer;
+mod exchange;
+mod flip;
+mod glue;
+mod remove;
+mod split;
+mod stop;
+
+use super::projection::{Unprojectable, project, scale};
+use super::repair::repair;
 use super::{Mutated, Projection, Random, Rules};
 use crate::lens::Lens;
+use draft::{Back, Draft, Room, Scene};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
@@ -132,6 +153,95 @@ pub fn mutate(
     rules: &Rules,
     random: &mut Random,
 ) -> Result<Mutant, Refusal> {
-    let _ = (lens, rules, random);
-    Err(Refusal::new(kind, "is not made yet"))
+    let refuse = |why: String| Refusal { kind, why };
+    let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
+    let Some(mutation) = mutation else { return Err(refuse("is no change of a lens".into())) };
+    if lens.surfaces.is_empty() {
+        return Err(refuse("the lens has no surfaces".into()));
+    }
+    let resolved = lens.with_pickups().map_err(|error| refuse(error.to_string()))?;
+    let size = match scale(&resolved) {
+        Ok(size) => size,
+        Err(Unprojectable::Afocal(_)) if !rules.projection => length(&resolved),
+        Err(why) => return Err(refuse(why.to_string())),
+    };
+    let scene = Scene::new(resolved, rules, size);
+    let draft = (mutation.draw)(&scene, random).map_err(refuse)?;
+    finished(&scene, kind, draft).map_err(refuse)
+}
+
+/// What a kind of mutation does.
+struct Mutation {
+    kind: Kind,
+    /// In how many places of a lens it could be made.
+    places: fn(&Lens, &Rules) -> Result<usize, String>,
+    draw: fn(&Scene<'_>, &mut Random) -> Result<Draft, String>,
+}
+
+macro_rules! mutations {
+    ($($kind:ident: $module:ident,)*) => {
+        [$(Mutation {
+            kind: Kind::$kind,
+            places: |lens, rules| $module::places(lens, rules).map(|places| places.len()),
+            draw: $module::draw,
+        },)*]
+    };
+}
+
+/// Every mutation, in the order of [`Kind::MUTATIONS`].
+const MUTATIONS: [Mutation; 9] = mutations! {
+    AddSinglet: add,
+    RemoveSinglet: remove,
+    Glue: glue,
+    Split: split,
+    DropLayer: drop_layer,
+    Bend: bend,
+    Flip: flip,
+    ExchangeGlass: exchange,
+    MoveStop: stop,
+};
+
+/// Half the length of a lens: what stands in for the focal length of an afocal one.
+fn length(lens: &Lens) -> f64 {
+    let track: f64 = lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
+    (0.5 * track).max(1.0)
+}
+
+/// Projects and repairs a draft.
+fn finished(scene: &Scene<'_>, kind: Kind, draft: Draft) -> Result<Mutant, String> {
+    let Draft { lens, origins, what, fresh, rimless, map, places, back } = draft;
+    let (mut lens, projection, stretch) = if scene.rules.projection {
+        let found = project(&scene.lens, &lens, &origins, scene.rules, map);
+        let found = found.map_err(|why| format!("{what}, but {why}"))?;
+        (found.lens, Some(found.report), found.log_determinant)
+    } else {
+        (lens, None, Some(0.0))
+    };
+    repair(&scene.lens, &mut lens, &rimless, scene.rules)
+        .map_err(|why| format!("{what}, but {why}"))?;
+    let log_ratio = back.zip(stretch).and_then(|(back, stretch)| {
+        log_ratio(scene.rules, &lens, kind, places, back).map(|log| log + stretch)
+    });
+    Ok(Mutant { lens, kind, what, fresh, projection, log_ratio })
+}
+
+/// The logarithm of the density of the way back over that of the way there, without the projection.
+fn log_ratio(rules: &Rules, lens: &Lens, kind: Kind, places: usize, back: Back) -> Option<f64> {
+    let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == back.kind)?;
+    let places_back = (mutation.places)(lens, rules).ok()?;
+    let choice = match back.room {
+        None => 1.0,
+        Some(room) => chance_of(room, lens, rules)?,
+    };
+    let kinds = rules.weight(back.kind) / rules.weight(kind);
+    let log = kinds.ln() + (places as f64 / places_back as f64).ln() + choice.ln() + back.log;
+    log.is_finite().then_some(log)
+}
+
+/// How likely the way back would make the same choice of keeping the rest of the lens in its place;
+/// none where it could not.
+fn chance_of(room: Room, lens: &Lens, rules: &Rules) -> Option<f64> {
+    let keeps = add::keeps(lens, Some(room.gap), rules, room.length);
+    let chance = if room.kept { keeps } else { 1.0 - keeps };
+    (chance > 0.0).then_some(chance)
 }

@@ -1,0 +1,253 @@
+//! What a search may do and aims at, as arguments.
+
+use crate::cli::failure::Failure;
+use crate::cli::input::{self, Tolerance};
+use crate::lens::{Field, FieldKind, Fields, Lens, Object, Wavelength, glass};
+use crate::optimize;
+use crate::search::lens::{Local, Plan, opened};
+use crate::search::{Kind, Rules, Temperature};
+use clap::ValueEnum;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// What a search may do and aims at.
+#[derive(Debug, clap::Args)]
+pub(super) struct Asked {
+    /// What to aim at, as JSON; sharp spots with the light it has, at its focal length, where absent
+    #[arg(long, value_name = "FILE")]
+    goal: Option<PathBuf>,
+
+    /// The focal length to aim at, in mm; the one it has where it is absent
+    #[arg(long, value_name = "MM", conflicts_with = "goal")]
+    focal_length: Option<f64>,
+
+    /// How much of its light every field keeps
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, conflicts_with = "goal")]
+    light: f64,
+
+    /// What the search may do and a factory can make, as JSON
+    #[arg(long, value_name = "FILE")]
+    rules: Option<PathBuf>,
+
+    /// The smallest and the largest number of elements: `4..8`
+    #[arg(long, value_name = "RANGE")]
+    elements: Option<Range>,
+
+    /// No surface is larger than this, in mm
+    #[arg(long, value_name = "MM")]
+    max_diameter: Option<f64>,
+
+    /// The longest track in mm; a fifth longer than it is where it is absent
+    #[arg(long, value_name = "MM")]
+    max_track: Option<f64>,
+
+    /// The shortest back focus in mm; four fifths of what it is where it is absent
+    #[arg(long, value_name = "MM")]
+    min_back_focus: Option<f64>,
+
+    /// Mutations without paraxial projection
+    #[arg(long)]
+    no_projection: bool,
+
+    /// Kinds of mutations that are not tried
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    forbid: Vec<Mutation>,
+
+    /// Opens every rim as far as its neighbours allow, at most to this semi-diameter in mm; the
+    /// diaphragm goes
+    #[arg(long, value_name = "MM")]
+    open: Option<f64>,
+
+    /// Frees every curvature and gap, whatever the file says
+    #[arg(long)]
+    free: bool,
+
+    /// Image heights in mm in place of the fields: angles `atan(h / focal length)`
+    #[arg(long, value_name = "HEIGHTS", value_delimiter = ',')]
+    heights: Vec<f64>,
+
+    /// One wavelength in um in place of those of the lens
+    #[arg(long, value_name = "UM")]
+    wavelength: Option<f64>,
+
+    /// How many chains share the reservoir
+    #[arg(long, value_name = "N")]
+    chains: Option<usize>,
+
+    /// How many lenses the reservoir holds
+    #[arg(long, value_name = "N")]
+    reservoir: Option<usize>,
+
+    /// 0 or more, or `infinite`; the start has a density of one half where it is absent
+    #[arg(long, value_name = "T")]
+    temperature: Option<Heat>,
+
+    /// The larger, the shorter descents are
+    #[arg(long, value_name = "C")]
+    c: Option<f64>,
+
+    /// How often a regeneration draws a lens from anywhere
+    #[arg(long, value_name = "SHARE")]
+    gamma: Option<f64>,
+
+    /// What takes the local steps
+    #[arg(long, value_enum, default_value_t = Descent::Adam)]
+    descent: Descent,
+
+    /// Gradient steps of a local move
+    #[arg(long, value_name = "N", default_value_t = Local::default().steps)]
+    steps: usize,
+
+    /// The error allowed of the radius of each spot while searching: `1%` or `1e-2`
+    #[arg(long, default_value = "1e-2", value_name = "TOLERANCE")]
+    error: Tolerance,
+}
+
+/// What takes the local steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Descent {
+    /// First order, with moments
+    Adam,
+    /// Damped least squares
+    Dls,
+}
+
+/// Two numbers, `4..8`.
+#[derive(Debug, Clone, Copy)]
+struct Range([usize; 2]);
+
+impl FromStr for Range {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let ends = text.split_once("..").map(|(low, high)| (low.parse(), high.parse()));
+        match ends {
+            Some((Ok(low), Ok(high))) if 0 < low && low <= high => Ok(Self([low, high])),
+            _ => Err("expected two numbers of 1 or more, the smaller one first, as `4..8`".into()),
+        }
+    }
+}
+
+/// A temperature.
+#[derive(Debug, Clone, Copy)]
+struct Heat(Temperature);
+
+impl FromStr for Heat {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let value = if text == "infinite" { Ok(f64::INFINITY) } else { text.parse() };
+        let found = value.ok().and_then(Temperature::new);
+        found.map(Self).ok_or_else(|| "expected 0 or more, or `infinite`".to_owned())
+    }
+}
+
+/// A kind of mutation by its name.
+#[derive(Debug, Clone, Copy)]
+struct Mutation(Kind);
+
+impl FromStr for Mutation {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let name = |kind: Kind| kind.name().replace(' ', "-");
+        let all = Kind::MUTATIONS.into_iter().chain([Kind::Global]);
+        let found = all.clone().find(|kind| name(*kind) == text.replace('_', "-"));
+        let known: Vec<String> = all.map(name).collect();
+        found.map(Self).ok_or_else(|| format!("expected one of {}", known.join(", ")))
+    }
+}
+
+fn positive(name: &str, value: Option<f64>) -> Result<Option<f64>, Failure> {
+    match value {
+        Some(v) if !(v > 0.0 && v.is_finite()) => {
+            Err(Failure::Input(format!("{name}: found {v}; expected more than 0")))
+        }
+        value => Ok(value),
+    }
+}
+
+impl Asked {
+    pub(super) fn plan(&self) -> Result<Plan, Failure> {
+        let mut plan = Plan { rules: self.rules()?, light: self.light, ..Plan::default() };
+        positive("--light", Some(self.light))?;
+        plan.focal_length = match self.focal_length {
+            Some(focal) if focal == 0.0 || !focal.is_finite() => {
+                let text = format!("--focal-length: found {focal}; expected a number other than 0");
+                return Err(Failure::Input(text));
+            }
+            focal => focal,
+        };
+        plan.goal = self.goal.as_deref().map(input::read_json).transpose()?;
+        plan.local.tolerance = self.error.0;
+        plan.local.coarse = self.error.0;
+        plan.local.steps = self.steps;
+        plan.local.method = match self.descent {
+            Descent::Adam => optimize::Method::Adam,
+            Descent::Dls => optimize::Method::DampedLeastSquares,
+        };
+        let settings = &mut plan.settings;
+        settings.chains = self.chains.unwrap_or(settings.chains);
+        settings.reservoir = self.reservoir.unwrap_or(settings.reservoir);
+        settings.temperature = self.temperature.map(|heat| heat.0);
+        settings.c = self.c.unwrap_or(settings.c);
+        settings.gamma = self.gamma.unwrap_or(settings.gamma);
+        if self.forbid.iter().any(|mutation| mutation.0 == Kind::Global) {
+            settings.gamma = 0.0;
+        }
+        Ok(plan)
+    }
+
+    fn rules(&self) -> Result<Rules, Failure> {
+        let read = self.rules.as_deref().map(input::read_json).transpose()?;
+        let mut rules: Rules = read.unwrap_or_default();
+        if let Some(Range(elements)) = self.elements {
+            rules.elements = elements;
+        }
+        let widest = positive("--max-diameter", self.max_diameter)?.map(|d| 0.5 * d);
+        let open = positive("--open", self.open)?;
+        rules.semi_diameter = widest.or(rules.semi_diameter).or(open);
+        rules.track = positive("--max-track", self.max_track)?.or(rules.track);
+        let room = positive("--min-back-focus", self.min_back_focus)?;
+        rules.back_focus = room.or(rules.back_focus);
+        rules.projection &= !self.no_projection;
+        rules.weights.retain(|(kind, _)| !self.forbid.iter().any(|Mutation(f)| f == kind));
+        rules.weights.extend(self.forbid.iter().map(|Mutation(kind)| (*kind, 0.0)));
+        for name in &rules.glasses {
+            if glass::find(name).is_none() {
+                let similar = glass::similar(name).join(", ");
+                let text = format!("rules: unknown glass `{name}`; similar names: {similar}");
+                return Err(Failure::Input(text));
+            }
+        }
+        Ok(rules)
+    }
+
+    /// The lens that the search starts from.
+    pub(super) fn start(&self, lens: &Lens) -> Result<Lens, Failure> {
+        let mut start = lens.clone();
+        if self.free {
+            start.variables.clear();
+        }
+        if !self.heights.is_empty() {
+            start.fields = self.fields(&start)?;
+            start.zoom.iter_mut().for_each(|position| position.fields = None);
+        }
+        if let Some(um) = positive("--wavelength", self.wavelength)? {
+            start.wavelengths = vec![Wavelength { um, weight: 1.0, primary: true }];
+        }
+        Ok(self.open.map_or_else(|| start.clone(), |limit| opened(&start, limit)))
+    }
+
+    fn fields(&self, lens: &Lens) -> Result<Fields, Failure> {
+        let Some(focal) = self.focal_length.filter(|_| lens.object == Object::Infinity) else {
+            let text = "--heights: expected --focal-length beside it, and an object at infinity";
+            return Err(Failure::Input(text.into()));
+        };
+        if let Some(height) = self.heights.iter().find(|h| !h.is_finite()) {
+            return Err(Failure::Input(format!("--heights: found {height}; expected mm")));
+        }
+        let angle = |h: &f64| Field { x: 0.0, y: (h / focal).atan().to_degrees(), weight: 1.0 };
+        Ok(Fields { kind: FieldKind::Angle, values: self.heights.iter().map(angle).collect() })
+    }
+}

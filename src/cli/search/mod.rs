@@ -1,0 +1,276 @@
+//! The search over structure: a run that can be stopped, killed and taken up again.
+
+mod asked;
+mod report;
+
+use super::failure::Failure;
+use super::input::{self, LensFile};
+use super::optimize::{progress_bar, stop_flag};
+use super::output::{Number, Output, remark};
+use crate::files;
+use crate::lens::Lens;
+use crate::measure::Stopwatch;
+use crate::search::lens::{Figures, LensLandscape, NoLandscape, Plan, finish};
+use crate::search::{Method, Over, Run, RunOf, SearchError};
+use clap::ValueEnum;
+use report::Report;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Searches over structure: adds, removes, glues and splits elements while it descends; Ctrl-C ends
+/// it and saves what was found
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("../help/search.txt"))]
+pub(super) struct Search {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// Where the best lens is saved: .json or .zmx
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// The sampler
+    #[arg(long, value_enum, default_value_t = Sampler::Restore)]
+    method: Sampler,
+
+    /// All chance follows from it
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+
+    /// Ends after so many minutes
+    #[arg(long, value_name = "MINUTES")]
+    minutes: Option<f64>,
+
+    /// Ends after so many gradients of all chains; 12000 where --minutes is absent too
+    #[arg(long, value_name = "N")]
+    iterations: Option<u64>,
+
+    /// Where the run is saved every few seconds; goes on where it was, if the file exists
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+
+    /// The folder into which every lens of the reservoir is written
+    #[arg(long, value_name = "FOLDER")]
+    reservoir_dir: Option<PathBuf>,
+
+    /// Makes the best lens one that can be made: glasses of the catalogue, every limit kept
+    #[arg(long)]
+    finish: bool,
+
+    #[command(flatten)]
+    asked: asked::Asked,
+}
+
+/// The samplers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Sampler {
+    /// Descents that end by chance and begin again from the reservoir
+    Restore,
+    /// Metropolis and Hastings, Langevin steps
+    Metropolis,
+    /// Each element once more and once less
+    Brute,
+}
+
+impl Sampler {
+    fn method(self) -> Method {
+        match self {
+            Self::Restore => Method::Restore,
+            Self::Metropolis => Method::Metropolis,
+            Self::Brute => Method::Brute,
+        }
+    }
+}
+
+/// Gradients of a search that nothing else ends.
+const ITERATIONS: u64 = 12_000;
+/// Seconds between two checkpoints.
+const SAVED: f64 = 3.0;
+/// The tolerance of the numbers that are printed.
+const PRINTED: f64 = 1e-4;
+
+/// What ended a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Ended {
+    /// The run says so.
+    Run(Over),
+    /// The minutes are used up.
+    Time,
+    /// The person stopped it.
+    Interrupted,
+}
+
+impl Search {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let opened = self.lens.open()?;
+        self.check()?;
+        let plan = self.plan()?;
+        let lens = self.asked.start(&opened.lens)?;
+        let refused = |cause: NoLandscape| Failure::Input(format!("{}: {cause}", opened.file));
+        let landscape = plan.landscape(&lens).map_err(refused)?;
+        let (mut run, resumed) = self.begin(&landscape, &plan, &opened.file)?;
+        let watch = Stopwatch::start();
+        let before = run.statistics().gradients;
+        let ended = self.go_on(&landscape, &mut run, watch)?;
+        let ms = 1e3 * watch.seconds();
+        let best = written(&run.best().point, &opened.lens);
+        if let Some(path) = &self.out {
+            files::save(&best, path)?;
+        }
+        let stored = self.store(&run, &opened.lens)?;
+        let finished = if self.finish {
+            Some(finish(&landscape, &run.best().point).map_err(refused)?)
+        } else {
+            None
+        };
+        if let (Some(path), Some(finished)) = (&self.out, &finished) {
+            files::save(&written(&finished.lens, &opened.lens), path)?;
+        }
+        let figures =
+            |lens: &Lens| Figures::of(lens, PRINTED).map_err(|cause| refused(cause.into()));
+        let printed = Stopwatch::start();
+        let both = [figures(landscape.start())?, figures(&run.best().point)?];
+        let report = Report::new(report::Found {
+            landscape: &landscape,
+            run: &run,
+            ended,
+            resumed,
+            ms,
+            gradients: run.statistics().gradients - before,
+            figures: both,
+            figures_ms: 1e3 * printed.seconds(),
+            stored,
+            out: self.out.as_deref(),
+            finished,
+        });
+        output.print(&report)?;
+        report.verdict()
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        if let Some(minutes) = self.minutes
+            && !(minutes > 0.0 && minutes.is_finite())
+        {
+            let text = format!("--minutes: found {minutes}; expected more than 0");
+            return Err(Failure::Input(text));
+        }
+        if self.iterations == Some(0) {
+            return Err(Failure::Input("--iterations: found 0; expected 1 or more".into()));
+        }
+        self.out.iter().try_for_each(|path| input::check_target(path, &["json", "zmx"]))?;
+        self.checkpoint.iter().try_for_each(|path| input::check_target(path, &["json"]))?;
+        self.reservoir_dir.iter().try_for_each(|folder| {
+            std::fs::create_dir_all(folder).map_err(|error| {
+                Failure::Input(format!("{}: {error}; expected a folder", folder.display()))
+            })
+        })
+    }
+
+    fn plan(&self) -> Result<Plan, Failure> {
+        let mut plan = self.asked.plan()?;
+        plan.settings.method = self.method.method();
+        plan.settings.seed = self.seed;
+        let usual = if self.minutes.is_none() { Some(ITERATIONS) } else { None };
+        plan.settings.gradients = self.iterations.or(usual);
+        Ok(plan)
+    }
+
+    /// A new run, or the one of the checkpoint.
+    fn begin(
+        &self,
+        landscape: &LensLandscape,
+        plan: &Plan,
+        file: &str,
+    ) -> Result<(RunOf<LensLandscape>, bool), Failure> {
+        let settings = plan.settings(landscape);
+        if let Some(path) = self.checkpoint.as_deref().filter(|path| path.exists()) {
+            let run: RunOf<LensLandscape> =
+                Run::load(landscape, &settings, path).map_err(refused)?;
+            let done = run.statistics().gradients;
+            remark(format!("{}: goes on after {done} gradients", path.display()));
+            return Ok((run, true));
+        }
+        let start = landscape.start().clone();
+        let run = Run::new(landscape, start, &settings).map_err(|cause| match cause {
+            SearchError::Start { .. } => Failure::Input(format!("{file}: {cause}")),
+            cause => refused(cause),
+        })?;
+        Ok((run, false))
+    }
+
+    /// Rounds until the run is over, the time is used up, or the person has had enough.
+    fn go_on(
+        &self,
+        landscape: &LensLandscape,
+        run: &mut RunOf<LensLandscape>,
+        watch: Stopwatch,
+    ) -> Result<Ended, Failure> {
+        let stop = stop_flag();
+        let bar = progress_bar(run.settings().gradients.unwrap_or(0) as usize);
+        let mut saved = 0.0;
+        let ended = loop {
+            if let Some(over) = run.over() {
+                break Ended::Run(over);
+            }
+            if is_raised(&stop) {
+                break Ended::Interrupted;
+            }
+            if self.minutes.is_some_and(|minutes| watch.seconds() >= 60.0 * minutes) {
+                break Ended::Time;
+            }
+            run.round(landscape);
+            bar.set_position(run.statistics().gradients);
+            bar.set_message(format!("merit {}", Number(run.best().loss)));
+            if watch.seconds() - saved >= SAVED {
+                self.save(landscape, run)?;
+                saved = watch.seconds();
+            }
+        };
+        bar.finish_and_clear();
+        self.save(landscape, run)?;
+        Ok(ended)
+    }
+
+    fn save(&self, landscape: &LensLandscape, run: &RunOf<LensLandscape>) -> Result<(), Failure> {
+        let Some(path) = &self.checkpoint else { return Ok(()) };
+        run.save(landscape, path).map_err(refused)
+    }
+
+    /// Writes the reservoir, best lens first; the files.
+    fn store(&self, run: &RunOf<LensLandscape>, opened: &Lens) -> Result<Vec<String>, Failure> {
+        let Some(folder) = &self.reservoir_dir else { return Ok(Vec::new()) };
+        let mut entries: Vec<_> = run.reservoir().entries().iter().collect();
+        entries.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+        let mut files = Vec::new();
+        for (i, entry) in entries.into_iter().enumerate() {
+            let path = folder.join(format!("{:02}_generation_{}.json", i + 1, entry.number));
+            files::save(&written(&entry.point, opened), &path)?;
+            files.push(path.display().to_string());
+        }
+        Ok(files)
+    }
+}
+
+/// A lens as a file has it: what was held or free only for the search is not written.
+fn written(lens: &Lens, opened: &Lens) -> Lens {
+    let same = lens.surfaces.len() == opened.surfaces.len();
+    let variables = if same { opened.variables.clone() } else { Vec::new() };
+    let written = Lens { variables, ..lens.clone() };
+    if written.check().is_ok() { written } else { Lens { variables: Vec::new(), ..written } }
+}
+
+fn is_raised(flag: &AtomicBool) -> bool {
+    flag.load(Ordering::Relaxed)
+}
+
+/// What the search itself refuses: its settings, or a checkpoint.
+fn refused(cause: SearchError) -> Failure {
+    match cause {
+        SearchError::File(error) => Failure::File(error),
+        SearchError::NotProven { .. } => Failure::Failed(cause.to_string()),
+        cause => Failure::Input(cause.to_string()),
+    }
+}

@@ -1,0 +1,341 @@
+//! Figure 4.1: whether gradient descents that end by a clock sample the density they descend on.
+//!
+//! One thin singlet with its distance from the sensor, and two with both distances. Independent
+//! chains of whole descents are held against the target, by the time spent and by the count of
+//! places, with the exact rate of regenerations (4.11) and with the approximate ones. The exact
+//! rate samples the target if its samples are weighted by time. The approximate rate (4.16), of
+//! which the figure says the same, does not: neither with regenerations from anywhere nor with
+//! those from a reservoir of the best, for which it was made. It comes close, within a few
+//! hundredths of the time, only with `C` about 1 and regenerations drawn from the target itself.
+
+use super::histogram::{Grid, distance, surprise, together};
+use super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report};
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke, grey};
+use crate::search::clocks::{Clocks, Rate, Regeneration};
+use crate::search::toy::Toy;
+use crate::search::{Landscape as _, Random, Temperature};
+use rand::SeedableRng as _;
+use rayon::prelude::*;
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "4.1",
+    title: "Whether RESTORE samples its target, on a toy of one and of two singlets",
+    claim: "Weighted by time, it does with the exact rate; with the printed one it does not",
+    seconds: 10.0,
+    run,
+};
+
+/// The temperature, in mm².
+const TEMPERATURE: f64 = 4.0;
+/// Bins in each direction, for one singlet and for two.
+const BINS: [usize; 2] = [20, 8];
+/// Independent chains, and descents of each.
+const CHAINS: usize = 1500;
+const FEW_CHAINS: usize = 400;
+const DESCENTS: usize = 200;
+const FEW_DESCENTS: usize = 100;
+/// No chain is longer: a rate of 0 would never end one.
+const LONGEST: usize = 100_000;
+/// `C` of (4.11), so large that the rate is positive everywhere, for one singlet and for two.
+const EXACT: [f64; 2] = [6.0, 3000.0];
+/// `C` of (4.16); the thesis gives none.
+const PRINTED: [f64; 2] = [0.1, 1.0];
+/// (4.14) as the searches have it.
+const RESERVOIR: Regeneration = Regeneration::Reservoir { gamma: 0.02, size: 5 };
+/// The surprise that one in a thousand tests of the truth has, in standard deviations.
+const LIKELY: f64 = 3.1;
+/// One that no test of the truth has.
+const UNLIKELY: f64 = 10.0;
+
+/// A process under test.
+#[derive(Debug, Clone, Copy)]
+struct Process {
+    rate: Rate,
+    regeneration: Regeneration,
+}
+
+impl Process {
+    /// All of them for so many singlets, the exact one first and the printed one last.
+    fn all(singlets: usize) -> Vec<Self> {
+        let exact = EXACT[singlets - 1];
+        let [low, high] = PRINTED.map(Rate::Printed);
+        let draw = Regeneration::Draw;
+        let list = [
+            (Rate::Exact(exact), draw),
+            (Rate::Undetermined(exact), draw),
+            (low, draw),
+            (high, draw),
+            (low, Regeneration::Target),
+            (high, Regeneration::Target),
+            (Rate::Behind(PRINTED[1]), RESERVOIR),
+            (low, RESERVOIR),
+            (high, RESERVOIR),
+        ];
+        list.map(|(rate, regeneration)| Self { rate, regeneration }).to_vec()
+    }
+
+    fn is_printed(self) -> bool {
+        matches!(self.rate, Rate::Printed(_) | Rate::Behind(_))
+    }
+
+    /// The rate in words, and `C`.
+    fn rate(self) -> (&'static str, f64) {
+        match self.rate {
+            Rate::Exact(c) => ("exact (4.11)", c),
+            Rate::Undetermined(c) => ("no determinant (4.13)", c),
+            Rate::Printed(c) => ("printed (4.16)", c),
+            Rate::Behind(c) => ("printed, a step behind", c),
+        }
+    }
+
+    fn regeneration(self) -> &'static str {
+        match self.regeneration {
+            Regeneration::Draw => "anywhere",
+            Regeneration::Target => "target",
+            Regeneration::Reservoir { .. } => "reservoir",
+        }
+    }
+}
+
+/// A toy, its bins, and their shares under the target.
+#[derive(Debug)]
+struct Study {
+    singlets: usize,
+    toy: Toy,
+    temperature: Temperature,
+    grid: Grid,
+    target: Vec<f64>,
+}
+
+impl Study {
+    fn new(singlets: usize) -> Result<Self, Ended> {
+        let toy = if singlets == 1 { Toy::one() } else { Toy::two() };
+        let cold = || Ended::Failed(format!("no temperature is {TEMPERATURE}"));
+        let temperature = Temperature::new(TEMPERATURE).ok_or_else(cold)?;
+        let grid = Grid { ranges: toy.ranges(singlets), bins: BINS[singlets - 1] };
+        let target = grid.shares(|point| temperature.density(toy.loss(point)));
+        Ok(Self { singlets, toy, temperature, grid, target })
+    }
+
+    /// So many independent chains of so many descents.
+    fn sampled(&self, process: Process, [chains, descents]: [usize; 2]) -> Result<Sampled, Ended> {
+        let chain = |seed: usize| self.chain(process, seed as u64, descents);
+        let chains: Result<Vec<Chain>, Ended> = (0..chains).into_par_iter().map(chain).collect();
+        let chains = chains?;
+        let times: Vec<Vec<f64>> = chains.iter().map(|chain| chain.times.clone()).collect();
+        let counts: Vec<Vec<f64>> = chains.iter().map(|chain| chain.counts.clone()).collect();
+        Ok(Sampled {
+            process,
+            steps: chains.iter().map(|chain| chain.steps).sum(),
+            clamped: chains.iter().map(|chain| chain.clamped).sum(),
+            by_time: Judged::new(&times, &self.target),
+            by_count: Judged::new(&counts, &self.target),
+        })
+    }
+
+    fn chain(&self, process: Process, seed: u64, descents: usize) -> Result<Chain, Ended> {
+        let random = Random::seed_from_u64(seed);
+        let Process { rate, regeneration } = process;
+        let clocks = Clocks::new(&self.toy, self.temperature, rate, regeneration, random);
+        let mut clocks = clocks.map_err(Ended::from_error)?;
+        let nothing = || vec![0.0; self.grid.count()];
+        let mut chain = Chain { times: nothing(), counts: nothing(), steps: 0, clamped: 0 };
+        let mut ended = 0;
+        for sample in clocks.by_ref().take(LONGEST) {
+            let bin = self.grid.bin(&sample.point);
+            chain.times[bin] += sample.weight;
+            chain.counts[bin] += 1.0;
+            chain.steps += 1;
+            ended += usize::from(sample.regenerates);
+            if ended == descents {
+                break;
+            }
+        }
+        chain.clamped = clocks.clamped();
+        Ok(chain)
+    }
+}
+
+/// What a chain gave the bins: time and counts.
+#[derive(Debug)]
+struct Chain {
+    times: Vec<f64>,
+    counts: Vec<f64>,
+    steps: usize,
+    clamped: u64,
+}
+
+/// What all chains of a process gave the bins.
+#[derive(Debug)]
+struct Sampled {
+    process: Process,
+    steps: usize,
+    /// How often the rate would have been negative.
+    clamped: u64,
+    by_time: Judged,
+    by_count: Judged,
+}
+
+/// Samples against the target.
+#[derive(Debug)]
+struct Judged {
+    shares: Vec<f64>,
+    /// How unlikely they are, in standard deviations.
+    surprise: f64,
+    /// Total variation.
+    distance: f64,
+}
+
+impl Judged {
+    fn new(chains: &[Vec<f64>], target: &[f64]) -> Self {
+        let shares = together(chains);
+        let distance = distance(&shares, target);
+        Self { surprise: surprise(chains, target), distance, shares }
+    }
+}
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let work = effort.pick([CHAINS, DESCENTS], [FEW_CHAINS, FEW_DESCENTS]);
+    let mut outcome = Outcome::default();
+    let mut table = Table::new("processes", &COLUMNS);
+    for singlets in [1, 2] {
+        let study = Study::new(singlets)?;
+        let processes = Process::all(singlets);
+        let mut found = Vec::new();
+        for (i, process) in processes.iter().enumerate() {
+            let done = 0.5 * (singlets as f64 - 1.0 + i as f64 / processes.len() as f64);
+            report(watch, done, process.rate().0)?;
+            let sampled = study.sampled(*process, work)?;
+            table.row(row(singlets, &sampled));
+            // A paraxial ray for every place.
+            outcome.rays += sampled.steps;
+            found.push(sampled);
+        }
+        outcome.claims.extend(claims(&study, &found));
+        outcome.tables.push(histogram(&study, &found));
+        let canvas = if singlets == 1 { curves(&study, &found) } else { maps(&study, &found) };
+        let name = if singlets == 1 { "one_singlet" } else { "two_singlets" };
+        outcome.pictures.push(Picture { name, canvas });
+    }
+    outcome.tables.insert(0, table);
+    Ok(outcome)
+}
+
+const COLUMNS: [&str; 10] = [
+    "singlets",
+    "rate",
+    "constant",
+    "regenerations",
+    "steps",
+    "negative_rates",
+    "surprise_by_time",
+    "distance_by_time",
+    "surprise_by_count",
+    "distance_by_count",
+];
+
+fn row(singlets: usize, sampled: &Sampled) -> Vec<Cell> {
+    let Sampled { process, steps, clamped, by_time, by_count } = sampled;
+    let (rate, constant) = process.rate();
+    let mut cells: Vec<Cell> = vec![
+        singlets.into(),
+        rate.into(),
+        constant.into(),
+        process.regeneration().into(),
+        (*steps).into(),
+        (*clamped as f64).into(),
+    ];
+    for judged in [by_time, by_count] {
+        cells.extend([judged.surprise.into(), judged.distance.into()]);
+    }
+    cells
+}
+
+fn claims(study: &Study, found: &[Sampled]) -> Vec<Claim> {
+    let says = |what: &str| format!("{} singlets: {what}", study.singlets);
+    let exact = &found[0];
+    let printed = found.iter().filter(|sampled| sampled.process.is_printed());
+    let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
+    let surprise = least(&mut printed.clone().map(|sampled| sampled.by_time.surprise));
+    let reservoir = printed.filter(|sampled| sampled.process.regeneration == RESERVOIR);
+    let distance = least(&mut reservoir.map(|sampled| sampled.by_time.distance));
+    vec![
+        Claim::exactly(
+            says("exact rate, steps on which it is negative"),
+            exact.clamped as f64,
+            0.0,
+        ),
+        Claim::at_most(says("exact rate, surprise by time"), exact.by_time.surprise, LIKELY),
+        Claim::at_least(says("exact rate, surprise by count"), exact.by_count.surprise, UNLIKELY),
+        Claim::at_least(
+            says("without the determinant, surprise by time"),
+            found[1].by_time.surprise,
+            UNLIKELY,
+        ),
+        Claim::at_least(says("printed rate, least surprise by time"), surprise, UNLIKELY),
+        Claim::at_least(
+            says("printed rate, reservoir: least part of the time in the wrong place"),
+            distance,
+            0.2,
+        ),
+    ]
+}
+
+/// The histograms that the pictures show: the target, and three samplings of it.
+fn shown<'a>(study: &'a Study, found: &'a [Sampled]) -> [(&'static str, &'a [f64]); 4] {
+    let printed = &found[found.len() - 1];
+    [
+        ("target", &study.target),
+        ("exact rate, by time", &found[0].by_time.shares),
+        ("exact rate, by count", &found[0].by_count.shares),
+        ("printed rate, reservoir, by time", &printed.by_time.shares),
+    ]
+}
+
+fn histogram(study: &Study, found: &[Sampled]) -> Table {
+    let shares = ["target", "exact_by_time", "exact_by_count", "printed_by_time"];
+    let places: &[&str] = if study.singlets == 1 { &["gap_mm"] } else { &["gap_mm", "back_mm"] };
+    let name = if study.singlets == 1 { "one_singlet" } else { "two_singlets" };
+    let mut table = Table::new(name, &[places, &shares].concat());
+    let shown = shown(study, found);
+    for bin in 0..study.grid.count() {
+        let shares = shown.iter().map(|(_, shares)| shares[bin]);
+        table.row(study.grid.middle(bin).into_iter().chain(shares).map(Into::into));
+    }
+    table
+}
+
+fn curves(study: &Study, found: &[Sampled]) -> Canvas {
+    let mut canvas = Canvas::new([1000, 760]);
+    let shown = shown(study, found);
+    let x = Axis::linear("distance from the sensor, mm", study.toy.alone);
+    let shares = shown.iter().flat_map(|(_, shares)| shares.iter().copied());
+    let chart =
+        Chart::new([130.0, 170.0], [940.0, 640.0], x, Axis::linear("", shares.chain([0.0])));
+    chart.draw(&mut canvas, "share of each bin");
+    for (i, (name, shares)) in shown.into_iter().enumerate() {
+        let color = if i == 0 { BLACK } else { PALETTE[i - 1] };
+        let stroke = if i == 0 { Stroke::Solid } else { Stroke::Dashed };
+        let place = |bin: usize| [study.grid.middle(bin)[0], shares[bin]];
+        let points: Vec<[f64; 2]> = (0..shares.len()).map(place).collect();
+        canvas.curve(&chart.places(&points), color, stroke);
+        let y = 20.0 + 26.0 * i as f64;
+        canvas.curve(&[[130.0, y + 7.0], [190.0, y + 7.0]], color, stroke);
+        canvas.text([200.0, y], name, BLACK, Align::Left);
+    }
+    canvas
+}
+
+fn maps(study: &Study, found: &[Sampled]) -> Canvas {
+    let cell = 48;
+    let size = (cell * study.grid.bins) as f64;
+    let mut canvas = Canvas::new([2 * (size as u32 + 80), 2 * (size as u32 + 80)]);
+    let darkest = study.target.iter().copied().fold(0.0, f64::max);
+    for (i, (name, shares)) in shown(study, found).into_iter().enumerate() {
+        let corner = [i % 2, i / 2].map(|k| 40.0 + k as f64 * (size + 80.0));
+        canvas.text([corner[0], corner[1] - 24.0], name, BLACK, Align::Left);
+        let tones: Vec<_> = shares.iter().map(|share| grey(1.0 - share / darkest)).collect();
+        canvas.raster(corner, study.grid.bins, cell, &tones);
+    }
+    canvas
+}

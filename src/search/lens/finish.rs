@@ -1,0 +1,261 @@
+//! From a lens that a search has found to one that a factory can make: glasses of the catalogue,
+//! every limit kept and not only penalised, sharpness and light confirmed by other rays.
+//!
+//! A penalty stops short of its limit where the rest of the goal pulls the other way. So the limits
+//! are drawn tighter by a margin that grows until all of them are kept.
+
+use super::{Figures, LensLandscape, NoLandscape};
+use crate::lens::{Lens, Medium, glass};
+use crate::merit::{Margin, Term, Weighted, margins};
+use crate::optimize::Memory;
+use crate::pupil::{Bench, Pattern, Region};
+use crate::search::element::{Make, elements};
+use crate::search::{Landscape as _, Rules};
+use serde::Serialize;
+
+/// How often the limits are drawn tighter.
+const ROUNDS: i32 = 6;
+/// Local moves of a round.
+const MOVES: usize = 40;
+/// How much tighter a limit is drawn in the first round: mm, or parts of a share or ratio.
+const TIGHTER: [f64; 2] = [2e-3, 2e-3];
+/// The weight of a limit grows by this factor each round.
+const HARDER: f64 = 4.0;
+/// Two samplings of a spot or a pupil that agree to this share confirm each other.
+const CONFIRMED: f64 = 0.02;
+/// Rays of the second sampling, for every field and colour.
+const SECOND: Pattern = Pattern::Sobol { count: 1 << 14, seed: 1 };
+/// The tolerance of the first one.
+const FIRST: f64 = 1e-4;
+
+/// A lens that was finished, as far as that went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finished {
+    /// The lens.
+    pub lens: Lens,
+    /// Glasses that were exchanged.
+    pub glasses: Vec<Exchanged>,
+    /// Everything that is limited.
+    pub limits: Vec<Margin>,
+    /// The light of every field, in mm², and what it may not be less than.
+    pub light: Vec<Margin>,
+    /// Sharpness and light.
+    pub figures: Figures,
+    /// The same by other rays.
+    pub confirmed: Vec<Confirmed>,
+}
+
+/// A glass that no catalogue has, and what is used in its place.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Exchanged {
+    /// The surface in front of it.
+    pub surface: usize,
+    /// Index and Abbe number that it had; no Abbe number for a constant index.
+    pub was: (f64, Option<f64>),
+    /// The glass of the catalogue.
+    pub glass: String,
+    /// Its index and Abbe number.
+    pub is: (f64, f64),
+}
+
+/// A field by two samplings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Confirmed {
+    /// The zoom position.
+    pub zoom: usize,
+    /// The field.
+    pub field: usize,
+    /// The RMS radius of its spot by the second sampling, in mm.
+    pub spot: f64,
+    /// The clear area of its pupil by the second sampling, in mm².
+    pub light: f64,
+    /// Whether both agree with the first.
+    pub agrees: bool,
+}
+
+impl Finished {
+    /// What fails, in words; nothing where the lens can be made.
+    pub fn failures(&self) -> Vec<String> {
+        let limits = self.limits.iter().chain(&self.light).filter(|limit| limit.room() < 0.0);
+        let limit = |limit: &Margin| {
+            let place = limit.surface.map_or(String::new(), |i| format!(" {i}"));
+            let zoom = limit.zoom;
+            let (value, missing) = (limit.value, -limit.room());
+            let name = limit.term.replace('_', " ");
+            format!("{name}{place} at zoom {zoom} is {value:.4}, off its limit by {missing:.1e}")
+        };
+        let doubts = self.confirmed.iter().filter(|field| !field.agrees);
+        let doubt = |field: &Confirmed| {
+            let Confirmed { zoom, field, .. } = field;
+            format!("field {field} at zoom {zoom}: two samplings of the pupil disagree")
+        };
+        limits.map(limit).chain(doubts.map(doubt)).collect()
+    }
+}
+
+/// Makes a lens that can be made of one that a search on this landscape has found.
+///
+/// # Errors
+/// A lens without merit, or one for which no glass is allowed.
+pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLandscape> {
+    let (mut lens, glasses) = with_real_glasses(lens, &landscape.rules)?;
+    for round in 0..ROUNDS {
+        let tight = landscape.tightened(round);
+        let (mut memory, mut at) = (Memory::default(), lens.clone());
+        let mut best = tight.loss(&at);
+        for _ in 0..MOVES {
+            let (there, loss, _) = tight.descend(&at, &mut memory);
+            if loss < best {
+                best = loss;
+                lens.clone_from(&there);
+            }
+            at = there;
+        }
+        let light = landscape.light_margins(&lens)?;
+        let limits = landscape.limits(&lens)?;
+        if limits.iter().chain(&light).all(|limit| limit.room() >= 0.0) {
+            break;
+        }
+    }
+    let figures = Figures::of(&lens, FIRST)?;
+    Ok(Finished {
+        limits: landscape.limits(&lens)?,
+        light: landscape.light_margins(&lens)?,
+        confirmed: confirmed(&lens, &figures)?,
+        glasses,
+        figures,
+        lens,
+    })
+}
+
+impl LensLandscape {
+    /// Everything that the goal limits.
+    fn limits(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
+        Ok(margins(lens, self.goal.terms.iter().map(|w| w.term))?)
+    }
+
+    /// The light of every field and colour against what the goal says that it keeps.
+    fn light_margins(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
+        let share = self.goal.terms.iter().find_map(|w| match w.term {
+            Term::Light(share) => Some(share),
+            _ => None,
+        });
+        let Some(share) = share else { return Ok(Vec::new()) };
+        let areas = self.merit(lens, FIRST)?.sampled();
+        let before = self.light.iter().flatten();
+        let margin = |(spot, before): (&crate::merit::Sampled, &f64)| Margin {
+            term: "light",
+            surface: Some(spot.field),
+            zoom: spot.zoom,
+            value: spot.area,
+            min: Some(share * before),
+            max: None,
+        };
+        Ok(areas.iter().zip(before).map(margin).collect())
+    }
+
+    /// The same landscape with its limits drawn tighter, and weighted more.
+    fn tightened(&self, round: i32) -> Self {
+        let [mm, part] = TIGHTER.map(|first| first * f64::from(round + 1));
+        let harder = HARDER.powi(round);
+        let tighter = |w: &Weighted| {
+            let term = match w.term {
+                Term::GlassCenter { min, max } => {
+                    Term::GlassCenter { min: min + mm, max: max - mm }
+                }
+                Term::AirCenter { min, max } => Term::AirCenter { min: min + mm, max: max - mm },
+                Term::SemiDiameter { min, max } => Term::SemiDiameter { min, max: max - mm },
+                Term::GlassEdge(min) => Term::GlassEdge(min + mm),
+                Term::AirEdge(min) => Term::AirEdge(min + mm),
+                Term::TotalTrack(max) => Term::TotalTrack(max - mm),
+                Term::BackFocus(min) => Term::BackFocus(min + mm),
+                Term::Steepness(max) => Term::Steepness(max * (1.0 - part)),
+                Term::Light(share) => Term::Light(share * (1.0 + part)),
+                other => return Weighted { term: other, ..*w },
+            };
+            Weighted { term, weight: w.weight * harder }
+        };
+        let mut tight = self.clone();
+        tight.goal.terms = self.goal.terms.iter().map(tighter).collect();
+        tight
+    }
+}
+
+/// The lens with every model glass replaced by the one of the catalogue that is nearest to it.
+fn with_real_glasses(lens: &Lens, rules: &Rules) -> Result<(Lens, Vec<Exchanged>), NoLandscape> {
+    let mut real = lens.clone();
+    let mut exchanged = Vec::new();
+    for element in elements(lens).iter().filter(|e| matches!(e.make, Make::Glass(_))) {
+        for surface in element.first..element.last {
+            let was = match lens.surfaces[surface].medium {
+                Medium::Model { nd, vd } => (nd, (vd > 0.0).then_some(vd)),
+                Medium::Index(n) => (n, None),
+                Medium::Air | Medium::Glass(_) | Medium::Mirror => continue,
+            };
+            let found = nearest(was, lens, rules).ok_or_else(|| NoLandscape::Setting {
+                what: "the list of glasses",
+                found: rules.glasses.join(", "),
+                expected: "one with data at every wavelength of the lens",
+            })?;
+            let glass = found.full_name();
+            real.surfaces[surface].medium = Medium::Glass(glass.clone());
+            exchanged.push(Exchanged { surface, was, glass, is: (found.nd, found.vd) });
+        }
+    }
+    // An index that came from a catalogue is no variable any more.
+    let exists = |v: &crate::lens::Variable| real.get(v.parameter).is_some();
+    let variables = lens.variables.iter().filter(|v| exists(v)).copied().collect();
+    real.variables = variables;
+    Ok((real, exchanged))
+}
+
+/// Glasses that differ by this much in index and Abbe number are about equally unlike.
+const ALIKE: [f64; 2] = [0.01, 1.0];
+
+fn nearest(
+    (nd, vd): (f64, Option<f64>),
+    lens: &Lens,
+    rules: &Rules,
+) -> Option<&'static glass::Glass> {
+    let allowed = |glass: &&glass::Glass| {
+        let named = rules.glasses.is_empty() || rules.glasses.contains(&glass.full_name());
+        named && lens.wavelengths.iter().all(|w| glass.index(w.um).is_some())
+    };
+    let distance = |glass: &glass::Glass| {
+        let off = vd.map_or(0.0, |vd| (glass.vd - vd) / ALIKE[1]);
+        ((glass.nd - nd) / ALIKE[0]).hypot(off)
+    };
+    let all = glass::catalogue().iter().filter(allowed);
+    all.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+/// Every field by Sobol points over a disc that holds its pupil, rays of their own.
+fn confirmed(lens: &Lens, figures: &Figures) -> Result<Vec<Confirmed>, NoLandscape> {
+    let mut all = Vec::new();
+    for first in &figures.fields {
+        let bench = Bench::of(lens, first.zoom)?;
+        let field = bench.fields[first.field];
+        let total: f64 = bench.colors.iter().map(|color| color.weight).sum();
+        let (mut light, mut sum, mut mean, mut square) = (0.0, 0.0, [0.0; 2], 0.0);
+        for (i, color) in bench.colors.iter().enumerate() {
+            let Ok(launch) = bench.launch(field, i) else { continue };
+            let region = Region::new(launch);
+            let moments = region.moments(&region.sampled(SECOND));
+            let share = color.weight / total;
+            light += share * moments.area;
+            if moments.area > 0.0 {
+                let [x, y] = moments.centroid;
+                sum += share;
+                mean = [mean[0] + share * x, mean[1] + share * y];
+                square += share * (moments.spread / moments.area + x * x + y * y);
+            }
+        }
+        let [x, y] = mean.map(|m| m / sum);
+        let spot = (square / sum - x * x - y * y).max(0.0).sqrt();
+        let close = |a: f64, b: f64| (a - b).abs() <= CONFIRMED * b.abs();
+        let sharp = first.spot.is_none_or(|first| close(spot, first.value));
+        let agrees = sharp && close(light, first.light.value);
+        all.push(Confirmed { zoom: first.zoom, field: first.field, spot, light, agrees });
+    }
+    Ok(all)
+}

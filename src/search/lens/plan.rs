@@ -1,0 +1,91 @@
+//! A whole search of a lens, in one call.
+
+use super::{LensLandscape, Local, NoLandscape, goal};
+use crate::lens::Lens;
+use crate::merit::Goal;
+use crate::search::{Event, Rules, Run, RunOf, SearchError, Settings, Temperature};
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+/// Everything that a search of a lens depends on besides the lens.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Plan {
+    /// What is asked for; none asks for what [`goal`] does.
+    pub goal: Option<Goal>,
+    /// The focal length in mm that the usual goal asks for; none for what the lens has.
+    pub focal_length: Option<f64>,
+    /// How much of its light every field keeps by the usual goal.
+    pub light: f64,
+    /// What may be done, and what a factory can make.
+    pub rules: Rules,
+    /// How lenses descend.
+    pub local: Local,
+    /// How the search goes.
+    pub settings: Settings,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            goal: None,
+            focal_length: None,
+            light: 1.0,
+            rules: Rules::default(),
+            local: Local::default(),
+            settings: Settings { c: 0.02, ..Settings::default() },
+        }
+    }
+}
+
+/// Why there is no search.
+#[derive(Debug, thiserror::Error)]
+pub enum NoSearch {
+    /// The lens, the goal or the rules.
+    #[error(transparent)]
+    Landscape(#[from] NoLandscape),
+    /// The settings, or a checkpoint.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+}
+
+impl Plan {
+    /// The landscape that is searched.
+    ///
+    /// # Errors
+    /// A lens without merit, rules or settings without meaning.
+    pub fn landscape(&self, lens: &Lens) -> Result<LensLandscape, NoLandscape> {
+        let usual = || goal(lens, &self.rules, self.focal_length, self.light);
+        let goal = self.goal.clone().map_or_else(usual, Ok)?;
+        LensLandscape::new(lens, &goal, &self.rules, &self.local)
+    }
+
+    /// The settings, with the temperature that this landscape calls for where none is given.
+    pub fn settings(&self, landscape: &LensLandscape) -> Settings {
+        let usual = || Temperature::halving(landscape.scale());
+        let temperature = self.settings.temperature.unwrap_or_else(usual);
+        Settings { temperature: Some(temperature), ..self.settings.clone() }
+    }
+}
+
+/// Searches from a lens until the settings say that it is over, or `watch` does, which is shown the
+/// run after every round.
+///
+/// # Errors
+/// A lens without merit, rules or settings without meaning.
+pub fn run(
+    lens: &Lens,
+    plan: &Plan,
+    mut watch: impl FnMut(&RunOf<LensLandscape>, &[Event]) -> ControlFlow<()>,
+) -> Result<RunOf<LensLandscape>, NoSearch> {
+    let landscape = plan.landscape(lens)?;
+    let start = landscape.start().clone();
+    let mut run = Run::new(&landscape, start, &plan.settings(&landscape))?;
+    while run.over().is_none() {
+        let events = run.round(&landscape);
+        if watch(&run, &events).is_break() {
+            break;
+        }
+    }
+    Ok(run)
+}

@@ -1,0 +1,73 @@
+//! What new numbers are drawn from, each with its density.
+
+use super::super::{Random, Rules};
+use crate::lens::Lens;
+use crate::lens::glass::{self, Glass};
+use rand::RngExt as _;
+use rand_distr::StandardNormal;
+
+/// `least` and more, falling off with a mean excess, up to `most`: every length that the rules allow
+/// can be drawn, so that every element could have been added.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Length {
+    least: f64,
+    range: f64,
+    mean: f64,
+}
+
+impl Length {
+    pub(super) fn new([least, most]: [f64; 2], mean: f64) -> Self {
+        Self { least, range: (most - least).max(0.0), mean }
+    }
+
+    /// The share of the exponential that lies within the range.
+    fn share(self) -> f64 {
+        -(-self.range / self.mean).exp_m1()
+    }
+
+    pub(super) fn draw(self, random: &mut Random) -> f64 {
+        let excess = -self.mean * (-random.random::<f64>() * self.share()).ln_1p();
+        self.least + excess.min(self.range)
+    }
+
+    /// The logarithm of its density; none where it cannot be drawn.
+    pub(super) fn log_density(self, length: f64) -> Option<f64> {
+        let excess = length - self.least;
+        let possible = (0.0..=self.range).contains(&excess) && self.range > 0.0;
+        possible.then(|| -excess / self.mean - self.mean.ln() - self.share().ln())
+    }
+}
+
+/// A normally distributed number around 0.
+pub(super) fn normal(deviation: f64, random: &mut Random) -> f64 {
+    deviation * random.sample::<f64, _>(StandardNormal)
+}
+
+/// The logarithm of its density.
+pub(super) fn log_normal(value: f64, deviation: f64) -> f64 {
+    let t = value / deviation;
+    -0.5 * t * t - deviation.ln() - 0.5 * std::f64::consts::TAU.ln()
+}
+
+/// True as often as said.
+pub(super) fn coin(chance: f64, random: &mut Random) -> bool {
+    random.random::<f64>() < chance
+}
+
+/// One of several, all alike; none of none.
+pub(super) fn pick<'a, T>(all: &'a [T], random: &mut Random) -> Option<&'a T> {
+    if all.is_empty() { None } else { all.get(random.random_range(0..all.len())) }
+}
+
+/// The glasses that new elements may be made of: those of the rules that have an index at every
+/// wavelength of the lens.
+pub(super) fn allowed(lens: &Lens, rules: &Rules) -> Vec<&'static Glass> {
+    let reaches = |glass: &&'static Glass| {
+        let [low, high] = glass.range_um;
+        lens.wavelengths.iter().all(|w| (low..=high).contains(&w.um))
+    };
+    if rules.glasses.is_empty() {
+        return glass::catalogue().iter().filter(reaches).collect();
+    }
+    rules.glasses.iter().filter_map(|name| glass::find(name)).filter(reaches).collect()
+}

@@ -1,0 +1,84 @@
+//! A piece of glass of the catalogue is made of another one with nearly the same index and Abbe
+//! number.
+
+use super::super::element::{Make, elements};
+use super::super::{Random, Rules};
+use super::Kind;
+use super::bend::either;
+use super::chance::{allowed, pick};
+use super::draft::{Back, Draft, Scene};
+use crate::lens::glass::{self, Glass};
+use crate::lens::{Lens, Medium};
+use rand::RngExt as _;
+
+/// How far neighbours are in index.
+const INDEX: f64 = 0.02;
+
+/// How far neighbours are in Abbe number.
+const ABBE: f64 = 3.0;
+
+/// Rows with a glass of the catalogue behind them.
+pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
+    let rows = lens.surfaces.len();
+    let elements = elements(lens).into_iter().filter(|e| matches!(e.make, Make::Glass(_)));
+    let found: Vec<usize> = elements
+        .flat_map(|e| e.first..e.last)
+        .filter(|row| matches!(lens.surfaces[*row].medium, Medium::Glass(_)))
+        .filter(|row| rules.allow(*row, rows) && rules.allow(row + 1, rows))
+        .collect();
+    if found.is_empty() {
+        return Err("no glass of the catalogue that may be exchanged".to_owned());
+    }
+    Ok(found)
+}
+
+/// How readily one glass becomes the other.
+fn nearness(a: &Glass, b: &Glass) -> f64 {
+    let (index, abbe) = ((a.nd - b.nd) / INDEX, (a.vd - b.vd) / ABBE);
+    (-0.5 * (index * index + abbe * abbe)).exp()
+}
+
+fn is_same(a: &Glass, b: &Glass) -> bool {
+    std::ptr::eq(a, b)
+}
+
+/// Makes a piece of another glass.
+pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+    let places = places(&scene.lens, scene.rules)?;
+    let row = pick(&places, random).copied().ok_or("no place")?;
+    let Medium::Glass(name) = &scene.lens.surfaces[row].medium else {
+        return Err("no glass of the catalogue".to_owned());
+    };
+    let old = glass::find(name).ok_or("an unknown glass")?;
+    let all = allowed(&scene.lens, scene.rules);
+    let choice: Vec<_> =
+        all.into_iter().filter(|glass| !touches(&scene.lens, row, glass)).collect();
+    let weight =
+        |from: &Glass, to: &Glass| if is_same(from, to) { 0.0 } else { nearness(from, to) };
+    let sum = |from: &Glass| choice.iter().map(|to| weight(from, to)).sum::<f64>();
+    let mut left = random.random::<f64>() * sum(old);
+    let chosen = choice.iter().find(|to| {
+        left -= weight(old, to);
+        left < 0.0
+    });
+    let new = *chosen.ok_or_else(|| format!("no other glass of the rules is near {name}"))?;
+    let mut draft = scene.draft(places.len());
+    draft.lens.surfaces[row].medium = Medium::Glass(new.full_name());
+    draft.fresh = vec![row];
+    draft.map = either(random);
+    let known = choice.iter().any(|glass| is_same(glass, old));
+    // The nearness is the same in both directions, what it is compared with is not.
+    let log = sum(old).ln() - sum(new).ln();
+    draft.back = known.then_some(Back { kind: Kind::ExchangeGlass, log, room: None });
+    draft.what = format!("exchanged {name} behind surface {row} for {}", new.full_name());
+    Ok(draft)
+}
+
+/// Whether a glass is cemented to this piece: an interface between the two would do nothing.
+fn touches(lens: &Lens, row: usize, glass: &Glass) -> bool {
+    let beside = [row.checked_sub(1), Some(row + 1)];
+    beside.into_iter().flatten().any(|near| match &lens.surfaces[near].medium {
+        Medium::Glass(name) => glass::find(name).is_some_and(|found| is_same(found, glass)),
+        _ => false,
+    })
+}

@@ -1,0 +1,285 @@
+//! Paraxial projection (Teh, *Computational Lens Design*, section 4.5): after a mutation the numbers
+//! of the rest of the lens move as little as possible so that it focuses as it did before.
+//!
+//! What is kept is (4.22) in full: height and slope of the marginal ray at the image, at every zoom
+//! position; only the slope where the last gap is solved for the focus. Numbers are measured in steps
+//! of `0.3/f` for curvatures and `0.01 f` for distances, else only curvatures would move.
+//!
+//! Two maps lead to such a lens, and each is the inverse of the other: [`Map::Closest`] goes to the
+//! nearest one, along the normals of the constraint where it arrives; [`Map::Along`] goes along the
+//! normals of the constraint of the lens from which it starts. That is what makes a mutation and
+//! the one that undoes it a reversible pair. A Jacobian of (4.30), with its factors put right, is in
+//! [`density`].
+
+mod density;
+mod model;
+mod solve;
+
+use super::Rules;
+use super::element::filled;
+use crate::lens::{Lens, LensError, NumberKind, Parameter, Quantity, vary};
+pub(super) use model::scale;
+use model::{Coordinate, Model};
+use serde::Serialize;
+use solve::{Bounds, Solution};
+
+/// What a projection did.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Projection {
+    /// How many Newton steps it took.
+    pub steps: usize,
+    /// By how much the marginal ray at the image still differs: its height relative to that at the
+    /// first surface, its slope relative to what it was.
+    pub error: f64,
+    /// The largest change of a curvature, in 1/mm.
+    pub curvature: f64,
+    /// The largest change of a distance, in mm.
+    pub distance: f64,
+}
+
+/// Why a lens cannot be made to focus as another one does.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unprojectable {
+    /// Nothing to keep.
+    #[error("the lens is afocal at zoom position {0}: it has no focal length to keep")]
+    Afocal(usize),
+    /// No number that may move has an effect of its own on every kept one.
+    #[error("the numbers that may move cannot keep focal length and focus apart")]
+    Singular,
+    /// Numbers would have to leave what is allowed.
+    #[error("numbers would have to pass their bounds ({0} of {1} have reached them)")]
+    Bounds(usize, usize),
+    /// Not near enough after as many steps as there may be.
+    #[error("it needs more than {0} steps")]
+    Steps(usize),
+    /// A lens that cannot be resolved.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+}
+
+/// Which way leads to a lens with the same focus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Map {
+    /// To the nearest one.
+    Closest,
+    /// Along the normals of the lens before the mutation.
+    Along,
+}
+
+impl Map {
+    fn inverse(self) -> Self {
+        match self {
+            Self::Closest => Self::Along,
+            Self::Along => Self::Closest,
+        }
+    }
+}
+
+/// Where the numbers of a row come from.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Origin {
+    /// The row of the lens before the mutation whose curvature it has, and the sign with which;
+    /// none for one that the mutation made and that is kept.
+    pub(super) curvature: Option<(usize, f64)>,
+    /// The row whose gap it has.
+    pub(super) gap: Option<usize>,
+}
+
+/// A projected lens.
+#[derive(Debug)]
+pub(super) struct Projected {
+    pub(super) lens: Lens,
+    pub(super) report: Projection,
+    /// The logarithm of the determinant of the map; none where the way back does not lead back.
+    pub(super) log_determinant: Option<f64>,
+}
+
+/// Moves the numbers of `mutated` that were in `before` until it focuses as `before` does. The map
+/// that is asked for is tried first; where bounds stop it, the other numbers move on without those
+/// at their bounds, and there is no way back.
+pub(super) fn project(
+    before: &Lens,
+    mutated: &Lens,
+    origins: &[Origin],
+    rules: &Rules,
+    map: Map,
+) -> Result<Projected, Unprojectable> {
+    let pair = Pair::new(before, mutated, origins, rules)?;
+    let exact = pair.solved(map);
+    let solution = match exact {
+        Ok(solution) => solution,
+        Err(_) => solve::nearest(&pair.new, &pair.zero(), &pair.target, &pair.bounds)?,
+    };
+    let log_determinant = if solution.exact { pair.log_determinant(map, &solution) } else { None };
+    Ok(Projected {
+        lens: pair.lens(mutated, &solution),
+        report: pair.report(&solution),
+        log_determinant,
+    })
+}
+
+/// A lens before and after a mutation, as functions of the numbers that both have, counted from
+/// what they are right after the mutation and in their own steps.
+struct Pair {
+    coordinates: Vec<Coordinate>,
+    old: Model,
+    new: Model,
+    target: Vec<f64>,
+    bounds: Bounds,
+}
+
+impl Pair {
+    fn new(
+        before: &Lens,
+        mutated: &Lens,
+        origins: &[Origin],
+        rules: &Rules,
+    ) -> Result<Self, Unprojectable> {
+        let scale = scale(before)?;
+        let coordinates = coordinates(before, mutated, origins, rules, scale);
+        let old = Model::new(before, before, &coordinates, scale, |c| (c.old, c.sign))?;
+        let new = Model::new(mutated, before, &coordinates, scale, |c| (c.new, 1.0))?;
+        let target = old.values(&vec![0.0; coordinates.len()]);
+        let bounds = bounds(mutated, &coordinates, rules);
+        Ok(Self { coordinates, old, new, target, bounds })
+    }
+
+    fn zero(&self) -> Vec<f64> {
+        vec![0.0; self.coordinates.len()]
+    }
+
+    fn solved(&self, map: Map) -> Result<Solution, Unprojectable> {
+        let zero = self.zero();
+        let found = match map {
+            Map::Closest => solve::nearest(&self.new, &zero, &self.target, &self.bounds),
+            Map::Along => {
+                let normals = self.old.jacobian(&zero);
+                solve::along(&self.new, &normals, &zero, &self.target, &self.bounds)
+            }
+        };
+        found
+    }
+
+    /// The way back starts where the way there ended, with the other map and the lenses exchanged.
+    fn leads_back(&self, map: Map, there: &Solution) -> bool {
+        let free = Bounds::none(there.at.len());
+        let target = self.new.values(&there.at);
+        let back = match map.inverse() {
+            Map::Closest => solve::nearest(&self.old, &there.at, &target, &free),
+            Map::Along => {
+                let normals = self.new.jacobian(&there.at);
+                solve::along(&self.old, &normals, &there.at, &target, &free)
+            }
+        };
+        back.is_ok_and(|back| back.exact && back.at.iter().all(|z| z.abs() < 1e-6))
+    }
+
+    fn log_determinant(&self, map: Map, there: &Solution) -> Option<f64> {
+        if !self.leads_back(map, there) {
+            return None;
+        }
+        let zero = self.zero();
+        let (old, new) = (self.old.jacobian(&zero), self.new.jacobian(&there.at));
+        match map {
+            Map::Closest => {
+                density::log_determinant(&old, &self.new, &there.at, &there.multipliers)
+            }
+            Map::Along => {
+                let multipliers = -&there.multipliers;
+                density::log_determinant(&new, &self.old, &zero, &multipliers).map(|log| -log)
+            }
+        }
+    }
+
+    fn lens(&self, mutated: &Lens, solution: &Solution) -> Lens {
+        let mut lens = mutated.clone();
+        for (coordinate, z) in self.coordinates.iter().zip(&solution.at) {
+            if *z != 0.0 {
+                lens.set(coordinate.new, coordinate.value + coordinate.step * z);
+            }
+        }
+        // A lens that has a model has pickups that can be followed.
+        if lens.pickups.is_empty() { lens } else { lens.with_pickups().unwrap_or(lens) }
+    }
+
+    fn report(&self, solution: &Solution) -> Projection {
+        let (mut curvature, mut distance) = (0.0f64, 0.0f64);
+        for (coordinate, z) in self.coordinates.iter().zip(&solution.at) {
+            let of_kind = match coordinate.new.quantity {
+                Quantity::Curvature => &mut curvature,
+                _ => &mut distance,
+            };
+            *of_kind = of_kind.max((coordinate.step * z).abs());
+        }
+        Projection { steps: solution.steps, error: solution.error, curvature, distance }
+    }
+}
+
+/// Every curvature and distance of a lens that does not follow another number.
+fn numbers(lens: &Lens) -> Vec<Parameter> {
+    let mut freed = lens.clone();
+    freed.variables.clear();
+    vary(&mut freed, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
+    freed.variables.iter().map(|variable| variable.parameter).collect()
+}
+
+/// The numbers that both lenses have and the rules allow to move.
+fn coordinates(
+    before: &Lens,
+    mutated: &Lens,
+    origins: &[Origin],
+    rules: &Rules,
+    scale: f64,
+) -> Vec<Coordinate> {
+    let known = numbers(before);
+    let rows = mutated.surfaces.len();
+    let mut found = Vec::new();
+    for new in numbers(mutated) {
+        let origin = origins[new.surface];
+        let (from, step) = match new.quantity {
+            Quantity::Curvature => (origin.curvature, 0.3 / scale),
+            _ => (origin.gap.map(|row| (row, 1.0)), 0.01 * scale),
+        };
+        let Some((row, sign)) = from else { continue };
+        let old = Parameter::new(row, new.quantity);
+        let value = mutated.get(new).unwrap_or(0.0);
+        if known.contains(&old) && rules.allow(new.surface, rows) {
+            found.push(Coordinate { old, new, sign, value, step });
+        }
+    }
+    found
+}
+
+/// How far each number may move, in its own steps; one that is outside of the rules already may not
+/// go farther.
+fn bounds(lens: &Lens, coordinates: &[Coordinate], rules: &Rules) -> Bounds {
+    let glass = filled(lens);
+    let range = |c: &Coordinate| {
+        let (mut low, mut high) = match c.new.quantity {
+            Quantity::Curvature => curvatures(lens, c.new.surface, rules),
+            _ => distances(lens, c.new.surface, glass[c.new.surface + 1], rules),
+        };
+        if let Some(variable) = lens.variable(c.new) {
+            low = variable.min.map_or(low, |min| low.max(min));
+            high = variable.max.map_or(high, |max| high.min(max));
+        }
+        [(low.min(c.value) - c.value) / c.step, (high.max(c.value) - c.value) / c.step]
+    };
+    Bounds::new(coordinates.iter().map(range).collect())
+}
+
+fn curvatures(lens: &Lens, surface: usize, rules: &Rules) -> (f64, f64) {
+    let rim = lens.surfaces[surface].semi_diameter.unwrap_or(0.0);
+    let most = if rim > 0.0 { rules.steepness / rim } else { f64::INFINITY };
+    (-most, most)
+}
+
+fn distances(lens: &Lens, surface: usize, glass: bool, rules: &Rules) -> (f64, f64) {
+    let last = surface + 1 == lens.surfaces.len();
+    let (low, high) = match (last, glass) {
+        (true, _) => (rules.back_focus.unwrap_or(0.0), f64::INFINITY),
+        (false, true) => (rules.glass_center[0], rules.glass_center[1]),
+        (false, false) => (rules.air_center[0], rules.air_center[1]),
+    };
+    if super::element::is_backwards(lens, surface) { (-high, -low) } else { (low, high) }
+}

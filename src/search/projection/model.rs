@@ -1,0 +1,280 @@
+//! The marginal ray of a lens as a function of numbers, by y-nu trace: forwards for its value,
+//! backwards for its derivatives by all numbers at once.
+//!
+//! Backwards, `∂/∂d = ȳ nu/n'` and `∂/∂c = −n̄u y (n' − n)`.
+
+use super::Unprojectable;
+use crate::lens::{Lens, LensError, Object, Parameter, Quantity};
+use crate::math::Real;
+use crate::paraxial::signed_indices;
+use nalgebra::DMatrix;
+
+/// A number that the lenses before and after a mutation share.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Coordinate {
+    pub(super) old: Parameter,
+    pub(super) new: Parameter,
+    /// The sign of the new number over the old one: a turned surface has the other one.
+    pub(super) sign: f64,
+    /// Its value right after the mutation.
+    pub(super) value: f64,
+    /// The step in which it is measured.
+    pub(super) step: f64,
+}
+
+/// What a coordinate moves, and by how much.
+#[derive(Debug, Clone, Copy)]
+enum Reach {
+    Curvature { row: usize, factor: f64 },
+    Gap { zoom: usize, row: usize, factor: f64 },
+}
+
+/// A lens at one zoom position and the start of its marginal ray.
+#[derive(Debug, Clone)]
+struct Position {
+    indices: Vec<f64>,
+    gaps: Vec<f64>,
+    height: f64,
+    slope: f64,
+}
+
+/// Height and slope of the marginal ray at the image, as functions of coordinates.
+#[derive(Debug, Clone)]
+pub(super) struct Model {
+    positions: Vec<Position>,
+    curvatures: Vec<f64>,
+    reaches: Vec<Vec<Reach>>,
+    /// Whether the last gap follows the focus, so that the height at the image says nothing.
+    solved: bool,
+    /// What a slope is multiplied with.
+    scale: f64,
+}
+
+/// The paraxial ray at each surface, with the image behind.
+struct Ray<R> {
+    heights: Vec<R>,
+    slopes: Vec<R>,
+}
+
+fn positions(lens: &Lens, reference: &Lens) -> Result<Vec<Position>, LensError> {
+    let um = lens.wavelengths[lens.primary()].um;
+    let position = |zoom: usize| {
+        let system = lens.system(zoom, um)?;
+        let rows = lens.surfaces.len();
+        let mut indices = signed_indices(&system);
+        indices.truncate(rows + 1);
+        let gaps = system.surfaces[..rows].iter().map(|surface| surface.thickness).collect();
+        let (height, slope) = match (lens.object, reference.object) {
+            (Object::Finite(here), Object::Finite(there)) => {
+                (here / there.abs(), indices[0] / there.abs())
+            }
+            _ => (1.0, 0.0),
+        };
+        Ok(Position { indices, gaps, height, slope })
+    };
+    (0..lens.zoom_positions()).map(position).collect()
+}
+
+/// A length of the order of the focal length that paraxially equal lenses share: the focal length,
+/// or for a finite object the one that a thin lens of the same magnification would have; the
+/// smallest over the zoom positions.
+pub(in crate::search) fn scale(lens: &Lens) -> Result<f64, Unprojectable> {
+    let model = Model::new(lens, lens, &[], 1.0, |c| (c.new, 1.0))?;
+    let mut smallest = f64::INFINITY;
+    for (zoom, position) in model.positions.iter().enumerate() {
+        let ray = model.ray(zoom, &model.curvatures, &position.gaps);
+        let slope = ray.slopes.last().map_or(0.0, |nu| nu.abs());
+        let length = match lens.object {
+            Object::Infinity => 1.0 / slope,
+            Object::Finite(distance) => distance.abs() / (1.0 + slope * distance.abs()),
+        };
+        let track: f64 = position.gaps.iter().map(|gap| gap.abs()).sum();
+        let power = slope * track.max(1e-3);
+        if !(power > 1e-7 && length.is_finite() && length > 0.0) {
+            return Err(Unprojectable::Afocal(zoom));
+        }
+        smallest = smallest.min(length);
+    }
+    Ok(smallest)
+}
+
+impl Model {
+    /// A lens as a function of coordinates; `which` says what a coordinate is called in it and
+    /// with which sign. The marginal ray starts from the object with the slope that reaches 1 mm at
+    /// the first vertex of the `reference`.
+    pub(super) fn new(
+        lens: &Lens,
+        reference: &Lens,
+        coordinates: &[Coordinate],
+        scale: f64,
+        which: impl Fn(&Coordinate) -> (Parameter, f64),
+    ) -> Result<Self, LensError> {
+        let reach = |coordinate: &Coordinate| {
+            let (parameter, sign) = which(coordinate);
+            reaches(lens, parameter, sign * coordinate.step)
+        };
+        Ok(Self {
+            positions: positions(lens, reference)?,
+            curvatures: lens.surfaces.iter().map(|row| row.curvature).collect(),
+            reaches: coordinates.iter().map(reach).collect(),
+            solved: lens.focus.is_some(),
+            scale,
+        })
+    }
+
+    /// How many numbers are kept.
+    pub(super) fn constraints(&self) -> usize {
+        self.positions.len() * self.kept()
+    }
+
+    fn kept(&self) -> usize {
+        if self.solved { 1 } else { 2 }
+    }
+
+    /// The kept numbers: for every zoom position the slope, and the height unless it is solved.
+    pub(super) fn values(&self, at: &[f64]) -> Vec<f64> {
+        let (curvatures, gaps) = self.moved(at);
+        let mut values = Vec::with_capacity(self.constraints());
+        for (zoom, gaps) in gaps.iter().enumerate() {
+            let ray = self.ray(zoom, &curvatures, gaps);
+            let rows = curvatures.len();
+            values.push(ray.slopes[rows - 1] * self.scale);
+            if !self.solved {
+                values.push(ray.heights[rows]);
+            }
+        }
+        values
+    }
+
+    /// Their derivatives by the coordinates, a row for each kept number.
+    pub(super) fn jacobian(&self, at: &[f64]) -> DMatrix<f64> {
+        let (curvatures, gaps) = self.moved(at);
+        let mut jacobian = DMatrix::zeros(self.constraints(), at.len());
+        for (zoom, gaps) in gaps.iter().enumerate() {
+            let ray = self.ray(zoom, &curvatures, gaps);
+            for kept in 0..self.kept() {
+                let seed = if kept == 0 { (0.0, self.scale) } else { (1.0, 0.0) };
+                let (by_curvature, by_gap) = self.adjoint(zoom, &ray, &curvatures, gaps, seed);
+                let row = zoom * self.kept() + kept;
+                for (column, reaches) in self.reaches.iter().enumerate() {
+                    jacobian[(row, column)] = gathered(reaches, zoom, &by_curvature, &by_gap);
+                }
+            }
+        }
+        jacobian
+    }
+
+    /// The gradient of the kept numbers, each times its multiplier, over any number type.
+    pub(super) fn weighted_gradient<R: Real>(&self, at: &[R], multipliers: &[f64]) -> Vec<R> {
+        let (curvatures, gaps) = self.moved(at);
+        let mut gradient = vec![R::ZERO; at.len()];
+        for (zoom, gaps) in gaps.iter().enumerate() {
+            let ray = self.ray(zoom, &curvatures, gaps);
+            let first = zoom * self.kept();
+            let slope = R::from_f64(multipliers[first] * self.scale);
+            let height = if self.solved { 0.0 } else { multipliers[first + 1] };
+            let seed = (R::from_f64(height), slope);
+            let (by_curvature, by_gap) = self.adjoint(zoom, &ray, &curvatures, gaps, seed);
+            for (sum, reaches) in gradient.iter_mut().zip(&self.reaches) {
+                *sum += gathered(reaches, zoom, &by_curvature, &by_gap);
+            }
+        }
+        gradient
+    }
+
+    /// Curvatures, and gaps by zoom position.
+    fn moved<R: Real>(&self, at: &[R]) -> (Vec<R>, Vec<Vec<R>>) {
+        let lifted = |numbers: &[f64]| numbers.iter().map(|v| R::from_f64(*v)).collect::<Vec<R>>();
+        let mut curvatures = lifted(&self.curvatures);
+        let mut gaps: Vec<_> = self.positions.iter().map(|p| lifted(&p.gaps)).collect();
+        for (reaches, z) in self.reaches.iter().zip(at) {
+            for reach in reaches {
+                match *reach {
+                    Reach::Curvature { row, factor } => curvatures[row] += *z * R::from_f64(factor),
+                    Reach::Gap { zoom, row, factor } => gaps[zoom][row] += *z * R::from_f64(factor),
+                }
+            }
+        }
+        (curvatures, gaps)
+    }
+
+    fn ray<R: Real>(&self, zoom: usize, curvatures: &[R], gaps: &[R]) -> Ray<R> {
+        let position = &self.positions[zoom];
+        let (mut heights, mut slopes) =
+            (Vec::with_capacity(gaps.len() + 1), Vec::with_capacity(gaps.len()));
+        let (mut y, mut nu) = (R::from_f64(position.height), R::from_f64(position.slope));
+        for (i, (c, d)) in curvatures.iter().zip(gaps).enumerate() {
+            heights.push(y);
+            let (n, behind) = (position.indices[i], position.indices[i + 1]);
+            nu -= y * *c * R::from_f64(behind - n);
+            slopes.push(nu);
+            y += *d * nu * R::from_f64(1.0 / behind);
+        }
+        heights.push(y);
+        Ray { heights, slopes }
+    }
+
+    /// The derivatives of `seed · (height, slope)` at the image by every curvature and gap.
+    fn adjoint<R: Real>(
+        &self,
+        zoom: usize,
+        ray: &Ray<R>,
+        curvatures: &[R],
+        gaps: &[R],
+        (mut height, mut slope): (R, R),
+    ) -> (Vec<R>, Vec<R>) {
+        let indices = &self.positions[zoom].indices;
+        let mut by_curvature = vec![R::ZERO; gaps.len()];
+        let mut by_gap = vec![R::ZERO; gaps.len()];
+        for i in (0..gaps.len()).rev() {
+            let reduced = height * R::from_f64(1.0 / indices[i + 1]);
+            by_gap[i] = reduced * ray.slopes[i];
+            slope += reduced * gaps[i];
+            let bent = slope * R::from_f64(indices[i + 1] - indices[i]);
+            by_curvature[i] = -(bent * ray.heights[i]);
+            height -= bent * curvatures[i];
+        }
+        (by_curvature, by_gap)
+    }
+}
+
+/// The derivative along one coordinate at a zoom position.
+fn gathered<R: Real>(reaches: &[Reach], at_zoom: usize, by_curvature: &[R], by_gap: &[R]) -> R {
+    let mut sum = R::ZERO;
+    for reach in reaches {
+        match *reach {
+            Reach::Curvature { row, factor } => sum += by_curvature[row] * R::from_f64(factor),
+            Reach::Gap { zoom, row, factor } if zoom == at_zoom => {
+                sum += by_gap[row] * R::from_f64(factor);
+            }
+            Reach::Gap { .. } => {}
+        }
+    }
+    sum
+}
+
+/// What a number moves, itself and what follows it.
+fn reaches(lens: &Lens, parameter: Parameter, factor: f64) -> Vec<Reach> {
+    let moving =
+        if lens.pickups.is_empty() { vec![(parameter, 1.0)] } else { lens.followers(parameter) };
+    let mut found = Vec::with_capacity(moving.len());
+    for (moved, share) in moving {
+        let (row, factor) = (moved.surface, factor * share);
+        match moved.quantity {
+            Quantity::Curvature => found.push(Reach::Curvature { row, factor }),
+            Quantity::ZoomThickness(zoom) => found.push(Reach::Gap { zoom, row, factor }),
+            Quantity::Thickness => {
+                let shared = |zoom: &usize| !has_own(lens, *zoom, row);
+                let zooms = (0..lens.zoom_positions()).filter(shared);
+                found.extend(zooms.map(|zoom| Reach::Gap { zoom, row, factor }));
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+fn has_own(lens: &Lens, zoom: usize, row: usize) -> bool {
+    let position = lens.zoom.get(zoom);
+    position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == row))
+}

@@ -1,0 +1,230 @@
+//! Newton's method on the few kept numbers: to the nearest lens, or along given directions.
+
+use super::Unprojectable;
+use super::model::Model;
+use nalgebra::{DMatrix, DVector};
+
+/// More steps than this are a failure.
+const STEPS: usize = 15;
+
+/// What counts as kept.
+const TOLERANCE: f64 = 1e-12;
+
+/// Steps that turn a lens on the constraint into the nearest one; each costs about a microsecond.
+const POLISHING: usize = 60;
+
+/// How far coordinates may move.
+#[derive(Debug, Clone)]
+pub(super) struct Bounds(Vec<[f64; 2]>);
+
+impl Bounds {
+    pub(super) fn new(ranges: Vec<[f64; 2]>) -> Self {
+        Self(ranges)
+    }
+
+    pub(super) fn none(count: usize) -> Self {
+        Self(vec![[f64::NEG_INFINITY, f64::INFINITY]; count])
+    }
+
+    fn hold(&self, at: &DVector<f64>) -> bool {
+        at.iter().zip(&self.0).all(|(z, [low, high])| (*low..=*high).contains(z))
+    }
+
+    /// Brings every coordinate inside and marks those that had left.
+    fn clamp(&self, at: &mut DVector<f64>) -> Vec<usize> {
+        let mut stopped = Vec::new();
+        for (i, (z, [low, high])) in at.iter_mut().zip(&self.0).enumerate() {
+            if !(*low..=*high).contains(z) {
+                *z = z.clamp(*low, *high);
+                stopped.push(i);
+            }
+        }
+        stopped
+    }
+}
+
+/// Coordinates at which the kept numbers have their target.
+#[derive(Debug, Clone)]
+pub(super) struct Solution {
+    pub(super) at: Vec<f64>,
+    /// How much of each direction was needed.
+    pub(super) multipliers: DVector<f64>,
+    pub(super) steps: usize,
+    /// The largest difference from a target.
+    pub(super) error: f64,
+    /// Whether it lies where the map says, no bound in its way.
+    pub(super) exact: bool,
+}
+
+struct Problem<'a> {
+    model: &'a Model,
+    target: &'a [f64],
+}
+
+impl Problem<'_> {
+    fn missing(&self, at: &DVector<f64>) -> DVector<f64> {
+        let values = self.model.values(at.as_slice());
+        DVector::from_iterator(values.len(), self.target.iter().zip(&values).map(|(t, v)| t - v))
+    }
+
+    /// What rounding leaves of the differences.
+    fn tolerance(&self) -> f64 {
+        TOLERANCE * self.target.iter().fold(1.0, |most: f64, t| most.max(t.abs()))
+    }
+}
+
+fn largest(vector: &DVector<f64>) -> f64 {
+    // Not a number counts as infinitely far.
+    vector
+        .iter()
+        .fold(0.0, |most: f64, v| if v.is_nan() { f64::INFINITY } else { most.max(v.abs()) })
+}
+
+/// Solves `J Jᵀ λ = c`; none where the rows of `J` are nearly dependent.
+fn multipliers(jacobian: &DMatrix<f64>, missing: &DVector<f64>) -> Option<DVector<f64>> {
+    let normal = jacobian * jacobian.transpose();
+    let largest = normal.diagonal().max();
+    let factor = normal.cholesky()?;
+    let smallest = factor.l_dirty().diagonal().min();
+    let sound = smallest * smallest > 1e-13 * largest;
+    sound.then(|| factor.solve(missing))
+}
+
+/// The nearest coordinates to `start` at which the kept numbers have their target: steps of
+/// least length `z ← z + Jᵀ (J Jᵀ)⁻¹ c`, halved while the differences grow, coordinates that reach a
+/// bound left there; then, where none did, `z ← z₀ + Jᵀ (J Jᵀ)⁻¹ (c + J (z − z₀))` until the way is
+/// along the normals, which is where (4.22) has its solution.
+pub(super) fn nearest(
+    model: &Model,
+    start: &[f64],
+    target: &[f64],
+    bounds: &Bounds,
+) -> Result<Solution, Unprojectable> {
+    let problem = Problem { model, target };
+    let mut reached = feasible(&problem, DVector::from_column_slice(start), bounds)?;
+    let start = DVector::from_column_slice(start);
+    if !reached.exact {
+        return Ok(reached);
+    }
+    match polished(&problem, &start, &reached) {
+        Some((at, multipliers)) if bounds.hold(&at) => {
+            reached.error = largest(&problem.missing(&at));
+            reached.at = at.as_slice().to_vec();
+            reached.multipliers = multipliers;
+        }
+        _ => reached.exact = false,
+    }
+    Ok(reached)
+}
+
+fn feasible(
+    problem: &Problem<'_>,
+    mut at: DVector<f64>,
+    bounds: &Bounds,
+) -> Result<Solution, Unprojectable> {
+    let count = at.len();
+    let mut stopped = vec![false; count];
+    let mut missing = problem.missing(&at);
+    for steps in 0..=STEPS {
+        let error = largest(&missing);
+        if error <= problem.tolerance() {
+            let exact = !stopped.iter().any(|s| *s);
+            let at = at.as_slice().to_vec();
+            let multipliers = DVector::zeros(missing.len());
+            return Ok(Solution { at, multipliers, steps, error, exact });
+        }
+        let mut jacobian = problem.model.jacobian(at.as_slice());
+        for i in (0..count).filter(|i| stopped[*i]) {
+            jacobian.column_mut(i).fill(0.0);
+        }
+        let held = stopped.iter().filter(|s| **s).count();
+        let cause =
+            if held > 0 { Unprojectable::Bounds(held, count) } else { Unprojectable::Singular };
+        let Some(multipliers) = multipliers(&jacobian, &missing) else { return Err(cause) };
+        let step = jacobian.transpose() * multipliers;
+        let Some((next, left)) = shortened(problem, &at, &step, error, bounds) else {
+            return Err(cause);
+        };
+        left.into_iter().for_each(|i| stopped[i] = true);
+        at = next;
+        missing = problem.missing(&at);
+    }
+    Err(Unprojectable::Steps(STEPS))
+}
+
+/// The longest of the step and its halves that brings the differences down, or that reaches a
+/// bound first.
+fn shortened(
+    problem: &Problem<'_>,
+    at: &DVector<f64>,
+    step: &DVector<f64>,
+    error: f64,
+    bounds: &Bounds,
+) -> Option<(DVector<f64>, Vec<usize>)> {
+    let mut length = 1.0;
+    for _ in 0..10 {
+        let mut next = at + step * length;
+        let left = bounds.clamp(&mut next);
+        let found = largest(&problem.missing(&next));
+        if found < error || !left.is_empty() && found.is_finite() {
+            return Some((next, left));
+        }
+        length *= 0.5;
+    }
+    None
+}
+
+fn polished(
+    problem: &Problem<'_>,
+    start: &DVector<f64>,
+    reached: &Solution,
+) -> Option<(DVector<f64>, DVector<f64>)> {
+    let mut at = DVector::from_column_slice(&reached.at);
+    for _ in 0..POLISHING {
+        let jacobian = problem.model.jacobian(at.as_slice());
+        let wanted = problem.missing(&at) + &jacobian * (&at - start);
+        let multipliers = multipliers(&jacobian, &wanted)?;
+        let next = start + jacobian.transpose() * &multipliers;
+        let change = largest(&(&next - &at));
+        at = next;
+        if change <= 1e-13 * (1.0 + largest(&at)) {
+            let kept = largest(&problem.missing(&at)) <= 1e2 * problem.tolerance();
+            return kept.then_some((at, multipliers));
+        }
+    }
+    None
+}
+
+/// The coordinates `start + Nᵀ λ` at which the kept numbers have their target, with the rows of
+/// `N` as directions.
+pub(super) fn along(
+    model: &Model,
+    normals: &DMatrix<f64>,
+    start: &[f64],
+    target: &[f64],
+    bounds: &Bounds,
+) -> Result<Solution, Unprojectable> {
+    let problem = Problem { model, target };
+    let start = DVector::from_column_slice(start);
+    let place = |multipliers: &DVector<f64>| &start + normals.transpose() * multipliers;
+    let mut multipliers = DVector::zeros(normals.nrows());
+    let mut at = place(&multipliers);
+    for steps in 0..=STEPS {
+        let missing = problem.missing(&at);
+        let error = largest(&missing);
+        if error <= problem.tolerance() {
+            if !bounds.hold(&at) {
+                return Err(Unprojectable::Bounds(0, at.len()));
+            }
+            let at = at.as_slice().to_vec();
+            return Ok(Solution { at, multipliers, steps, error, exact: true });
+        }
+        let square = model.jacobian(at.as_slice()) * normals.transpose();
+        let step = square.lu().solve(&missing).ok_or(Unprojectable::Singular)?;
+        let halves = (0..10).map(|halvings| &multipliers + &step * 0.5f64.powi(halvings));
+        let better = |tried: &DVector<f64>| largest(&problem.missing(&place(tried))) < error;
+        multipliers = halves.into_iter().find(better).ok_or(Unprojectable::Singular)?;
+        at = place(&multipliers);
+    }
+    Err(Unprojectable::Steps(STEPS))
+}

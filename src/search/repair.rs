@@ -1,0 +1,211 @@
+//! After a mutation: rims where there are none, rims no wider than surfaces allow, and a refusal of
+//! what is no lens.
+//!
+//! The rim of a new surface is as wide as the rays are that pass it, and as the edge of its glass and
+//! of the air beside it allow. Old rims become smaller only where their surfaces would cross.
+
+use super::Rules;
+use super::element::{filled, is_backwards};
+use crate::lens::{Lens, Shape, System};
+use crate::paraxial::Beam;
+use crate::pupil::{Aiming, Bench, MISS};
+use crate::trace::{Ray, Tracer};
+
+/// Pupil points whose rays say how wide a beam is; some lie beyond the paraxial pupil, which the
+/// stop clips where it is the limit.
+const FAN: [[f64; 2]; 13] = [
+    [0.0, 0.0],
+    [0.0, 0.3],
+    [0.0, -0.3],
+    [0.0, 0.6],
+    [0.0, -0.6],
+    [0.0, 0.85],
+    [0.0, -0.85],
+    [0.0, 1.0],
+    [0.0, -1.0],
+    [0.0, 1.15],
+    [0.0, -1.15],
+    [0.6, 0.0],
+    [1.0, 0.0],
+];
+
+/// What is added to the height of the outermost ray, so that it does not end at the rim by rounding.
+const MARGIN: f64 = 1.01;
+
+/// Finds the semi-diameters of the `rimless` rows and trims those of the others.
+///
+/// # Errors
+/// Why it is no lens: surfaces that cross on the axis, no light, numbers that cannot be traced, a
+/// limit of the rules that the lens `before` had kept, or had broken by less.
+pub(super) fn repair(
+    before: &Lens,
+    lens: &mut Lens,
+    rimless: &[usize],
+    rules: &Rules,
+) -> Result<(), String> {
+    in_order(lens)?;
+    within(before, lens, rules)?;
+    for row in rimless {
+        lens.surfaces[*row].semi_diameter = Some(widest(lens, *row, rules));
+    }
+    trim(lens, rimless, rules);
+    let extents = extents(lens)?;
+    let found: Vec<f64> = rimless.iter().map(|row| MARGIN * extents[*row]).collect();
+    let common = found.iter().fold(0.0, |most: f64, found| most.max(*found));
+    for row in rimless {
+        let rim = &mut lens.surfaces[*row].semi_diameter;
+        *rim = rim.map(|most| most.min(common));
+    }
+    Ok(())
+}
+
+/// No vertex stands in front of the one before it.
+fn in_order(lens: &Lens) -> Result<(), String> {
+    for row in 0..lens.surfaces.len() - 1 {
+        let sense = if is_backwards(lens, row) { -1.0 } else { 1.0 };
+        for zoom in 0..lens.zoom_positions() {
+            let gap = sense * lens.thickness_at(row, zoom).unwrap_or(0.0);
+            if !(gap >= 0.0) {
+                return Err(format!("surfaces {row} and {} would cross on the axis", row + 1));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The limits of the rules that concern the whole lens.
+fn within(before: &Lens, lens: &Lens, rules: &Rules) -> Result<(), String> {
+    let last = |lens: &Lens, zoom| lens.thickness_at(lens.surfaces.len() - 1, zoom).unwrap_or(0.0);
+    let track = |lens: &Lens, zoom| {
+        let rows = 0..lens.surfaces.len();
+        rows.filter_map(|row| lens.thickness_at(row, zoom)).map(f64::abs).sum::<f64>()
+    };
+    for zoom in 0..lens.zoom_positions() {
+        let (long, was) = (track(lens, zoom), track(before, zoom));
+        if let Some(most) = rules.track.filter(|most| long > most.max(was)) {
+            return Err(format!("the lens would be {long:.3} mm long, the rules allow {most}"));
+        }
+        if lens.focus.is_some() {
+            continue;
+        }
+        let (back, was) = (last(lens, zoom).abs(), last(before, zoom).abs());
+        if let Some(least) = rules.back_focus.filter(|least| back < least.min(was)) {
+            return Err(format!("the back focus would be {back:.3} mm, the rules ask for {least}"));
+        }
+    }
+    Ok(())
+}
+
+/// The widest that the rules let a surface be by itself.
+fn widest(lens: &Lens, row: usize, rules: &Rules) -> f64 {
+    let curvature = lens.surfaces[row].curvature.abs();
+    let steep = if curvature > 0.0 { rules.steepness / curvature } else { f64::INFINITY };
+    let rims = lens.surfaces.iter().filter_map(|row| row.semi_diameter);
+    // A beam is no wider than twice the widest surface, wherever in the lens.
+    let most = rims.fold(0.0, f64::max);
+    let natural = if most > 0.0 { 2.0 * most } else { f64::INFINITY };
+    steep.min(rules.semi_diameter.unwrap_or(f64::INFINITY)).min(natural)
+}
+
+/// A surface as a form with a rim.
+fn shape(lens: &Lens, row: usize) -> Shape<f64> {
+    let row = &lens.surfaces[row];
+    let mut terms = [0.0; crate::lens::ASPHERE_TERMS];
+    terms.iter_mut().zip(&row.asphere).for_each(|(to, from)| *to = *from);
+    Shape::simplest(row.curvature, row.conic, terms)
+}
+
+/// Makes rims smaller until every gap has its least thickness at the rim: that of the rules beside
+/// new surfaces, none elsewhere.
+fn trim(lens: &mut Lens, rimless: &[usize], rules: &Rules) {
+    let glass = filled(lens);
+    for gap in 0..lens.surfaces.len() - 1 {
+        let new = [gap, gap + 1].map(|row| rimless.contains(&row));
+        let floor = match (new.contains(&true), glass[gap + 1]) {
+            (false, _) => 0.0,
+            (true, true) => rules.glass_edge,
+            (true, false) => rules.air_edge,
+        };
+        let Some(most) = clear_height(lens, gap, floor) else { continue };
+        for (row, new_row) in [gap, gap + 1].into_iter().zip(new) {
+            // The size of the stop is the aperture; beside a new surface only that one gives way.
+            let stays = lens.surfaces[row].stop && !new_row || new.contains(&true) && !new_row;
+            let rim = &mut lens.surfaces[row].semi_diameter;
+            if !stays && rim.is_none_or(|rim| rim > most) {
+                *rim = Some(most);
+            }
+        }
+    }
+}
+
+/// The height up to which a gap is at least as long as the floor; none where it is up to its rim.
+fn clear_height(lens: &Lens, gap: usize, floor: f64) -> Option<f64> {
+    let rim = |row: usize| lens.surfaces[row].semi_diameter.unwrap_or(f64::INFINITY);
+    let rim = rim(gap).min(rim(gap + 1));
+    if rim == f64::INFINITY {
+        return None;
+    }
+    let sense = if is_backwards(lens, gap) { -1.0 } else { 1.0 };
+    let zooms = (0..lens.zoom_positions()).filter_map(|zoom| lens.thickness_at(gap, zoom));
+    let center = zooms.fold(f64::INFINITY, |least, length| least.min(sense * length));
+    let (front, rear) = (shape(lens, gap), shape(lens, gap + 1));
+    let floor = floor.min(center);
+    let is_clear = |height: f64| {
+        let square = height * height;
+        match (front.sag(square), rear.sag(square)) {
+            (Some((a, _)), Some((b, _))) => center + sense * (b - a) >= floor - 1e-12 * rim,
+            _ => false,
+        }
+    };
+    let heights = (1..=8).map(|i| rim * f64::from(i) / 8.0);
+    let high = heights.into_iter().find(|height| !is_clear(*height))?;
+    let (mut low, mut high) = (high - rim / 8.0, high);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        *(if is_clear(middle) { &mut low } else { &mut high }) = middle;
+    }
+    Some(low.max(0.0))
+}
+
+/// How far from the axis rays that arrive meet each surface, at any zoom position and field.
+fn extents(lens: &Lens) -> Result<Vec<f64>, String> {
+    let mut extents = vec![0.0; lens.surfaces.len() + 1];
+    let mut heights = extents.clone();
+    let mut lit = false;
+    for zoom in 0..lens.zoom_positions() {
+        let bench = bench(lens, zoom)?;
+        for field in &lens.fields_at(zoom).values {
+            let Ok(launch) = bench.launch(*field, 0) else { continue };
+            let rays = FAN.iter().filter_map(|point| launch.ray(*point));
+            for ray in rays {
+                lit |= widen(&mut extents, &mut heights, &launch.color().tracer, ray);
+            }
+        }
+    }
+    if lit { Ok(extents) } else { Err("no light would get through".to_owned()) }
+}
+
+/// Traces a ray, and widens the extents where it arrives without going backwards.
+fn widen(extents: &mut [f64], heights: &mut [f64], tracer: &Tracer<f64>, ray: Ray<f64>) -> bool {
+    let landing = tracer.visit(ray, |surface, point| heights[surface] = point.x.hypot(point.y));
+    let arrived = landing.fate.is_imaged() && landing.backwards.is_none();
+    if arrived {
+        for (extent, height) in extents.iter_mut().zip(heights) {
+            *extent = extent.max(*height);
+        }
+    }
+    arrived
+}
+
+/// The lens at its primary wavelength, aimed as wide fields need it.
+fn bench(lens: &Lens, zoom: usize) -> Result<Bench, String> {
+    let um = lens.wavelengths[lens.primary()].um;
+    let system: System<f64> = lens.system(zoom, um).map_err(|error| error.to_string())?;
+    let beam = Beam::of(lens, zoom);
+    let bench = Bench::new(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial);
+    let mut bench = bench.map_err(|error| error.to_string())?;
+    if bench.stop_miss().is_none_or(|miss| miss > MISS) {
+        bench.aiming = Aiming::Chief;
+    }
+    Ok(bench)
+}

@@ -1,0 +1,257 @@
+//! The toy of figure 4.1: one or two thin singlets before a sensor, and only the gaps are free.
+//!
+//! A parallel beam comes in, and its marginal ray meets the sensor at a height `y` from the axis:
+//! `y = a (1 − d/f)` behind one singlet, and `y = a (1 − d₁/f − d₂ (2/f − d₁/f²))` behind two. The
+//! loss is `y²`. Everything that theory speaks of can be computed: the target, the way back of a
+//! gradient step, and the determinant of that way.
+
+use super::clocks::Traceable;
+use super::{Kind, Landscape, Mutated, Random, Refusal, Slope, Temperature, Weights};
+use rand::RngExt as _;
+use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
+
+/// What a fixed point may still move by, relatively to the box.
+const SETTLED: f64 = 1e-14;
+const ROUNDS: usize = 400;
+
+/// One or two thin singlets before a sensor; a point is the list of their gaps, in mm, the last one
+/// to the sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Toy {
+    /// Smallest and largest number of singlets, 1 or 2.
+    pub singlets: [usize; 2],
+    /// The focal length of each, in mm.
+    pub focal_length: f64,
+    /// The height of the marginal ray, in mm.
+    pub height: f64,
+    /// The smallest and largest gap behind a lone singlet.
+    pub alone: [f64; 2],
+    /// Those behind the first and behind the second of two.
+    pub pair: [[f64; 2]; 2],
+    /// η of (4.12), in mm² by mm².
+    pub rate: f64,
+    /// The standard deviation of a mutation that changes no number of singlets, in mm.
+    pub shift: f64,
+}
+
+impl Toy {
+    /// One singlet, whose distance from the sensor is free.
+    pub fn one() -> Self {
+        Self {
+            singlets: [1, 1],
+            focal_length: 50.0,
+            height: 10.0,
+            alone: [30.0, 70.0],
+            pair: [[5.0, 45.0], [0.0, 60.0]],
+            rate: 2.5,
+            shift: 2.0,
+        }
+    }
+
+    /// Two singlets, whose distances from each other and from the sensor are free.
+    pub fn two() -> Self {
+        Self { singlets: [2, 2], rate: 1.5, ..Self::one() }
+    }
+
+    /// One singlet or two.
+    pub fn either() -> Self {
+        Self { singlets: [1, 2], ..Self::two() }
+    }
+
+    /// The ranges of the gaps of so many singlets, in mm.
+    pub fn ranges(&self, singlets: usize) -> Vec<[f64; 2]> {
+        if singlets == 1 { vec![self.alone] } else { self.pair.to_vec() }
+    }
+
+    /// Where the marginal ray meets the sensor, in mm, and the derivatives by the gaps.
+    fn ray(&self, gaps: &[f64]) -> (f64, Vec<f64>) {
+        let (a, f) = (self.height, self.focal_length);
+        match gaps {
+            [d] => (a * (1.0 - d / f), vec![-a / f]),
+            [first, second] => {
+                let steepness = 2.0 / f - first / (f * f);
+                let by_first = a * (second / (f * f) - 1.0 / f);
+                (a * (1.0 - first / f - second * steepness), vec![by_first, -a * steepness])
+            }
+            _ => (f64::NAN, vec![f64::NAN; gaps.len()]),
+        }
+    }
+
+    fn holds(&self, gaps: &[f64]) -> bool {
+        let ranges = self.ranges(gaps.len());
+        gaps.iter().zip(&ranges).all(|(gap, range)| (range[0]..=range[1]).contains(gap))
+    }
+
+    fn gradient(&self, gaps: &[f64]) -> Vec<f64> {
+        let (y, slopes) = self.ray(gaps);
+        slopes.into_iter().map(|slope| 2.0 * y * slope).collect()
+    }
+
+    /// Where a gradient step leads, bounds aside.
+    fn step(&self, gaps: &[f64]) -> Vec<f64> {
+        gaps.iter().zip(self.gradient(gaps)).map(|(gap, g)| gap - self.rate * g).collect()
+    }
+
+    /// Where a gradient step came from: the fixed point of `x = y + η ∇L(x)`, the only one where
+    /// the step contracts; none where it does not settle.
+    fn back(&self, gaps: &[f64]) -> Option<Vec<f64>> {
+        let mut place = gaps.to_vec();
+        let settled = SETTLED * self.focal_length;
+        for _ in 0..ROUNDS {
+            let gradient = self.gradient(&place);
+            let next: Vec<f64> =
+                gaps.iter().zip(gradient).map(|(gap, g)| gap + self.rate * g).collect();
+            let moved = next.iter().zip(&place).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            place = next;
+            if moved <= settled {
+                return Some(place);
+            }
+            if !moved.is_finite() {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// The determinant of a gradient step, `det(1 − η ∇²L)`.
+    fn determinant(&self, gaps: &[f64]) -> f64 {
+        let (y, slopes) = self.ray(gaps);
+        let curved = |i: usize, j: usize| {
+            let mixed = self.height / (self.focal_length * self.focal_length);
+            2.0 * (slopes[i] * slopes[j] + if i == j { 0.0 } else { y * mixed })
+        };
+        let along = |i: usize| 1.0 - self.rate * curved(i, i);
+        if slopes.len() == 1 {
+            along(0)
+        } else {
+            along(0) * along(1) - (self.rate * curved(0, 1)).powi(2)
+        }
+    }
+
+    fn uniform(&self, singlets: usize, random: &mut Random) -> Vec<f64> {
+        let ranges = self.ranges(singlets);
+        ranges.iter().map(|range| random.random_range(range[0]..=range[1])).collect()
+    }
+
+    /// One singlet more, in front: the logarithm of the ratio is that of the range of its gap.
+    fn add(&self, gaps: &[f64], random: &mut Random) -> Mutated<Vec<f64>> {
+        let range = self.pair[0];
+        let point = vec![random.random_range(range[0]..=range[1]), gaps[0]];
+        let log_ratio = Some((range[1] - range[0]).ln());
+        Mutated { point, kind: Kind::AddSinglet, what: "one more in front".to_owned(), log_ratio }
+    }
+
+    fn remove(&self, gaps: &[f64]) -> Mutated<Vec<f64>> {
+        let range = self.pair[0];
+        let log_ratio = Some(-(range[1] - range[0]).ln());
+        let (point, what) = (vec![gaps[1]], "the first one gone".to_owned());
+        Mutated { point, kind: Kind::RemoveSinglet, what, log_ratio }
+    }
+
+    fn shifted(&self, gaps: &[f64], random: &mut Random) -> Mutated<Vec<f64>> {
+        let mut noise = || self.shift * random.sample::<f64, _>(StandardNormal);
+        let point = gaps.iter().map(|gap| gap + noise()).collect();
+        Mutated { point, kind: Kind::Bend, what: "shifted".to_owned(), log_ratio: Some(0.0) }
+    }
+}
+
+impl Landscape for Toy {
+    type Point = Vec<f64>;
+    type Memory = ();
+
+    fn loss(&self, gaps: &Vec<f64>) -> f64 {
+        if self.holds(gaps) { self.ray(gaps).0.powi(2) } else { f64::INFINITY }
+    }
+
+    /// A step of plain gradient descent; one that would leave the bounds is not made.
+    fn descend(&self, gaps: &Vec<f64>, _memory: &mut ()) -> (Vec<f64>, f64, usize) {
+        let next = self.step(gaps);
+        let next = if self.holds(&next) { next } else { gaps.clone() };
+        let loss = self.loss(&next);
+        (next, loss, 1)
+    }
+
+    fn draw(&self, random: &mut Random) -> Result<Vec<f64>, Refusal> {
+        let singlets = random.random_range(self.singlets[0]..=self.singlets[1]);
+        Ok(self.uniform(singlets, random))
+    }
+
+    fn mutate(
+        &self,
+        gaps: &Vec<f64>,
+        weights: &Weights,
+        random: &mut Random,
+    ) -> Result<Mutated<Vec<f64>>, Refusal> {
+        let mutated = if self.singlets[0] == self.singlets[1] {
+            self.shifted(gaps, random)
+        } else if gaps.len() == 1 {
+            self.add(gaps, random)
+        } else {
+            self.remove(gaps)
+        };
+        let kind = mutated.kind;
+        let refused = |why: &str| Refusal { kind, why: why.to_owned() };
+        if weights.of(kind) == 0.0 {
+            Err(refused("it is forbidden"))
+        } else if self.holds(&mutated.point) {
+            Ok(mutated)
+        } else {
+            Err(refused("a gap would be out of its range"))
+        }
+    }
+
+    fn topology(&self, gaps: &Vec<f64>) -> String {
+        gaps.len().to_string()
+    }
+
+    fn about(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    fn elements(&self, gaps: &Vec<f64>) -> usize {
+        gaps.len()
+    }
+
+    fn mutate_at(
+        &self,
+        gaps: &Vec<f64>,
+        _element: usize,
+        kind: Kind,
+        random: &mut Random,
+    ) -> Result<Mutated<Vec<f64>>, Refusal> {
+        match (kind, gaps.len()) {
+            (Kind::AddSinglet, 1) => Ok(self.add(gaps, random)),
+            (Kind::RemoveSinglet, 2) => Ok(self.remove(gaps)),
+            _ => Err(Refusal { kind, why: format!("there are {} singlets", gaps.len()) }),
+        }
+    }
+
+    fn slope(&self, gaps: &Vec<f64>) -> Option<Slope> {
+        let (loss, gradient) = (self.loss(gaps), self.gradient(gaps));
+        loss.is_finite().then(|| Slope { loss, values: gaps.clone(), gradient })
+    }
+
+    fn with_values(&self, _gaps: &Vec<f64>, values: &[f64]) -> Option<Vec<f64>> {
+        self.holds(values).then(|| values.to_vec())
+    }
+}
+
+impl Traceable for Toy {
+    fn density_of_draw(&self, gaps: &Vec<f64>) -> f64 {
+        let numbers = (self.singlets[1] - self.singlets[0] + 1) as f64;
+        let ranges = self.ranges(gaps.len());
+        let volume: f64 = ranges.iter().map(|range| range[1] - range[0]).product();
+        1.0 / (numbers * volume)
+    }
+
+    fn arriving(&self, gaps: &Vec<f64>, temperature: Temperature) -> f64 {
+        let stays = !self.holds(&self.step(gaps));
+        let staying = if stays { temperature.density(self.loss(gaps)) } else { 0.0 };
+        let source = self.back(gaps).filter(|source| self.holds(source));
+        let coming = source.map(|source| {
+            temperature.density(self.loss(&source)) / self.determinant(&source).abs()
+        });
+        staying + coming.unwrap_or(0.0)
+    }
+}

@@ -1,0 +1,4 @@
+//! Search over structure: mutations and their paraxial projection.
+
+mod mutations;
+mod projection;
