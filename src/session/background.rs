@@ -8,6 +8,7 @@ use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// What a thread in the background does.
@@ -39,7 +40,13 @@ pub(super) struct Background<O, N> {
 /// Where a thread leaves its news; `wake` says that there is something new to look at.
 pub(super) struct Outbox<N> {
     news: Sender<N>,
-    wake: Box<dyn Fn() + Send>,
+    wake: Arc<Mutex<dyn Fn() + Send>>,
+}
+
+impl<N> Clone for Outbox<N> {
+    fn clone(&self) -> Self {
+        Self { news: self.news.clone(), wake: Arc::clone(&self.wake) }
+    }
 }
 
 impl<N> Outbox<N> {
@@ -51,7 +58,7 @@ impl<N> Outbox<N> {
     }
 
     pub(super) fn wake(&self) {
-        (self.wake)();
+        self.wake.lock().unwrap_or_else(PoisonError::into_inner)();
     }
 }
 
@@ -71,7 +78,7 @@ where
     {
         let (orders, inbox) = mpsc::channel();
         let (sender, news) = mpsc::channel();
-        let work = work(Outbox { news: sender, wake: Box::new(wake) });
+        let work = work(Outbox { news: sender, wake: Arc::new(Mutex::new(wake)) });
         let thread = thread::Builder::new().name(name.into()).spawn(move || serve(work, &inbox))?;
         Ok(Self { orders: Some(orders), news, thread: Some(thread) })
     }

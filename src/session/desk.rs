@@ -505,14 +505,12 @@ impl Session {
                 self.events.push(Event::Explored(Standing::Stopped));
             }
             Told::Refused(why) => self.say(Severity::Warning, why),
-            Told::Written(path, what) => {
-                let text = format!("exported to {}", path.display());
-                let parts = [text, what].map(|part| part.trim_end().to_owned());
-                let parts: Vec<String> = parts.into_iter().filter(|p| !p.is_empty()).collect();
-                self.say(Severity::Note, parts.join("\n"));
+            Told::Written(number, path, report) => {
+                let text = format!("lens {number} finished and exported to {}", path.display());
+                self.say(Severity::Note, format!("{text}\n{report}"));
                 self.events.push(Event::Saved(path));
             }
-            Told::NotWritten(why) => self.say(Severity::Error, why),
+            Told::NotWritten(_, why) | Told::NotSaved(why) => self.say(Severity::Error, why),
         }
     }
 

@@ -51,6 +51,8 @@ pub struct Exploration {
     pub seconds: f64,
     /// The same for gradients of this session: a search may have gone on from a file.
     pub gradients: u64,
+    /// The rays of a gradient of the best lens.
+    pub rays: usize,
     /// Where it is saved.
     pub checkpoint: Checkpoint,
 }
@@ -170,6 +172,7 @@ impl Exploration {
             over: None,
             seconds: 0.0,
             gradients: 0,
+            rays: 0,
             checkpoint: Checkpoint { path, ..Checkpoint::default() },
         };
         exploration.look(run);
@@ -183,7 +186,7 @@ impl Exploration {
 
     /// The part that is done, 0 to 1, where there is a limit.
     pub fn done(&self) -> Option<f64> {
-        let settings = &self.quest.settings;
+        let settings = &self.quest.plan.settings;
         let part = |limit: Option<u64>, count: u64| Some(count as f64 / limit?.max(1) as f64);
         let parts = [
             part(settings.moves, self.statistics.moves),

@@ -30,6 +30,8 @@ pub struct Explorations {
     pub here: Option<Arc<Judged>>,
     /// Why the last search could not begin or go on.
     pub failed: Option<String>,
+    /// Generations whose lenses are being finished.
+    pub exporting: Vec<u64>,
     /// Where the next search will be saved, where a person has chosen.
     pub place: Option<PathBuf>,
     /// A search that was left when the program was closed.
@@ -46,6 +48,7 @@ pub(super) struct ExplorationDesk {
     number: Option<u64>,
     pending: Option<Standing>,
     failed: Option<String>,
+    exporting: Vec<u64>,
     followed: Option<usize>,
     /// Where searches are saved that have no place of their own.
     folder: Option<PathBuf>,
@@ -63,6 +66,7 @@ impl ExplorationDesk {
             number: None,
             pending: None,
             failed: None,
+            exporting: Vec::new(),
             followed: None,
             folder: None,
             place: None,
@@ -99,7 +103,8 @@ impl ExplorationDesk {
                 None => self.place = Some(path),
             },
             Explore::Export { number, path: Some(path) } => {
-                self.explorer.export(self.lens_of(number)?, path);
+                self.explorer.export(number, self.lens_of(number)?, path);
+                self.exporting.push(number);
             }
             Explore::Clear => self.clear(),
             Explore::ForgetLeft => self.forget_left()?,
@@ -168,7 +173,7 @@ impl ExplorationDesk {
         let mut told = self.explorer.told();
         told.retain(|told| match told {
             Told::Now(number, _) | Told::Failed(number, _) => Some(*number) == self.number,
-            Told::Refused(_) | Told::Written(..) | Told::NotWritten(_) => true,
+            Told::Refused(_) | Told::Written(..) | Told::NotWritten(..) | Told::NotSaved(_) => true,
         });
         for told in &told {
             match told {
@@ -179,6 +184,9 @@ impl ExplorationDesk {
                 // What it stands as now may be older than what it was told since.
                 Told::Now(_, now) if Some(*now) == self.pending || !now.can_go_on() => {
                     self.pending = None;
+                }
+                Told::Written(number, ..) | Told::NotWritten(number, _) => {
+                    self.exporting.retain(|exporting| exporting != number);
                 }
                 _ => {}
             }
@@ -204,6 +212,7 @@ impl ExplorationDesk {
             followed: self.followed,
             here: self.explorer.judged().filter(|_| self.asked.is_some()),
             failed: self.failed.clone(),
+            exporting: self.exporting.clone(),
             place: self.place.clone(),
             left: self.left.clone(),
         }

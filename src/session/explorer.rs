@@ -10,13 +10,13 @@ use super::judged::Judged;
 use super::quest::{Engine, Explores, Quest};
 use super::slot::Slot;
 use super::worker::Standing;
-use crate::files;
 use crate::lens::Lens;
 use crate::search::{Event, Steer};
 use rayon::ThreadPool;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::thread;
 use std::time::Duration;
 
 /// The time between two looks of the window, at least.
@@ -30,8 +30,12 @@ pub(super) enum Told {
     Now(u64, Standing),
     Failed(u64, String),
     Refused(String),
-    Written(PathBuf, String),
-    NotWritten(String),
+    /// The lens of a generation was finished and written.
+    Written(u64, PathBuf, String),
+    /// It was not.
+    NotWritten(u64, String),
+    /// The search itself could not be saved.
+    NotSaved(String),
 }
 
 /// What the thread is told.
@@ -44,7 +48,7 @@ enum Order {
     SaveTo(PathBuf),
     Clear,
     Judge(Arc<Lens>),
-    Export(Arc<Lens>, PathBuf),
+    Export { generation: u64, lens: Arc<Lens>, path: PathBuf },
 }
 
 type Begin = dyn Fn(&Lens, &Quest) -> Result<Box<dyn Explores>, String> + Send;
@@ -124,9 +128,9 @@ impl Explorer {
         self.thread.tell(Order::Judge(lens));
     }
 
-    /// Writes a lens that was found.
-    pub(super) fn export(&self, lens: Arc<Lens>, path: PathBuf) {
-        self.thread.tell(Order::Export(lens, path));
+    /// Finishes and writes a lens that was found, while the search goes on.
+    pub(super) fn export(&self, generation: u64, lens: Arc<Lens>, path: PathBuf) {
+        self.thread.tell(Order::Export { generation, lens, path });
     }
 
     /// How far the search is.
@@ -198,7 +202,7 @@ impl Work for Desk {
                 self.judged.set(Judged::of(lens));
                 self.outbox.wake();
             }
-            Order::Export(lens, path) => self.outbox.emit(export(&lens, &path)),
+            Order::Export { generation, lens, path } => self.export(generation, lens, path),
         }
     }
 
@@ -216,6 +220,9 @@ impl Work for Desk {
         }
         if self.saves.is_due() {
             self.save();
+            if let Some(run) = &mut self.run {
+                run.count_rays();
+            }
         }
     }
 
@@ -256,6 +263,7 @@ impl Desk {
     fn stand(&mut self, standing: Standing) {
         let Some(run) = &mut self.run else { return };
         run.state.standing = standing;
+        run.count_rays();
         let number = run.state.number;
         if standing != Standing::Running {
             self.save();
@@ -287,9 +295,22 @@ impl Desk {
         let failed = guarded(|| Ok(run.save())).unwrap_or_else(Some);
         if failed.is_some() && run.state.checkpoint.failed != failed {
             let why = failed.clone().unwrap_or_default();
-            self.outbox.emit(Told::NotWritten(format!("the search is not saved: {why}")));
+            self.outbox.emit(Told::NotSaved(format!("the search is not saved: {why}")));
         }
         run.state.checkpoint.failed = failed;
+    }
+
+    /// Finishes a lens in a thread of its own, which the end of the program does not wait for.
+    fn export(&self, generation: u64, lens: Arc<Lens>, path: PathBuf) {
+        let Some(run) = &self.run else { return };
+        let (finishing, outbox) = (run.engine.finishing(), self.outbox.clone());
+        let work = move || match finishing.write(&lens, &path) {
+            Ok(report) => outbox.emit(Told::Written(generation, path, report)),
+            Err(why) => outbox.emit(Told::NotWritten(generation, why)),
+        };
+        if let Err(why) = thread::Builder::new().name("finish".into()).spawn(work) {
+            self.outbox.emit(Told::NotWritten(generation, why.to_string()));
+        }
     }
 
     fn show(&mut self) {
@@ -329,6 +350,13 @@ impl Run {
         over.or_else(|| late.then_some(Ending::Time))
     }
 
+    /// Counts the rays of a gradient, which change with the lens.
+    fn count_rays(&mut self) {
+        let engine = &self.engine;
+        let rays = guarded(|| Ok(engine.rays()));
+        self.state.rays = rays.unwrap_or(self.state.rays);
+    }
+
     /// Takes over what the search has found.
     fn look(&mut self) -> Exploration {
         self.state.look(self.engine.run());
@@ -348,18 +376,5 @@ impl Run {
             self.state.checkpoint.moves = Some(moves);
         }
         saved.err()
-    }
-}
-
-/// Writes a lens in the format of the extension; says what the file holds.
-fn export(lens: &Lens, path: &Path) -> Told {
-    match guarded(|| files::save(lens, path).map_err(|why| why.to_string())) {
-        Ok(saved) => {
-            let proof = saved.proof.map(|proof| proof.to_string());
-            let parts = [proof, saved.report.map(|report| report.to_string())];
-            let text: Vec<String> = parts.into_iter().flatten().collect();
-            Told::Written(path.to_owned(), text.join("\n"))
-        }
-        Err(why) => Told::NotWritten(why),
     }
 }

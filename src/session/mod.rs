@@ -19,6 +19,7 @@ mod edit;
 mod exploration;
 mod explorations;
 mod explorer;
+mod finishing;
 mod fresh;
 mod fronts;
 mod history;

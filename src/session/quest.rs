@@ -1,46 +1,28 @@
-//! A search over structure as a person asks for it: what it may do, how it goes, how long.
+//! A search over structure as a person asks for it, and the engine that does it.
 
+use super::finishing::Finishing;
 use crate::files::FileError;
 use crate::lens::Lens;
-use crate::merit::{Goal, Term};
-use crate::search::lens::{LensLandscape, Local, NoLandscape, goal, opened};
+use crate::merit::Goal;
+use crate::search::lens::{LensLandscape, Local, NoLandscape, Plan, opened};
 use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 
 /// What a search over structure is asked for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Quest {
-    /// The sampler, its chains, its chance and its end.
-    pub settings: Settings,
-    /// What may become of a lens, and what a factory can make.
-    pub rules: Rules,
-    /// How a lens descends.
-    pub local: Local,
-    /// The focal length that is asked for, in mm; none for that of the lens.
-    pub focal_length: Option<f64>,
-    /// The least share of the light at the start, at every field.
-    pub light: f64,
-    /// Rims are opened up to this semi-diameter first, in mm; none leaves them.
+    /// What it may do, what it aims at, how it goes.
+    pub plan: Plan,
+    /// Whether every curvature and gap is free, whatever the design says.
+    pub free: bool,
+    /// Rims are opened up to this semi-diameter first, in mm; none leaves them. No rim grows beyond
+    /// it afterwards, where the rules do not say otherwise.
     pub open: Option<f64>,
     /// The search ends after so many minutes of work; none for no limit.
     pub minutes: Option<f64>,
-}
-
-impl Default for Quest {
-    fn default() -> Self {
-        Self {
-            settings: Settings { gradients: None, ..Settings::default() },
-            rules: Rules::default(),
-            local: Local::default(),
-            focal_length: None,
-            light: 1.0,
-            open: None,
-            minutes: None,
-        }
-    }
 }
 
 /// What searches: the engine, or what a test puts in its place.
@@ -49,6 +31,10 @@ pub(super) trait Explores: Send {
     fn round(&mut self) -> Vec<search::Event>;
     fn steer(&mut self, steer: Steer) -> Result<(), SearchError>;
     fn save(&self, path: &Path) -> Result<(), SearchError>;
+    /// What makes a lens that can be made of one that was found.
+    fn finishing(&self) -> Finishing;
+    /// The rays of a gradient of the best lens.
+    fn rays(&self) -> usize;
 }
 
 /// A run on its landscape.
@@ -93,32 +79,29 @@ struct KeptRun {
 impl Engine {
     /// A search from a lens.
     pub(super) fn begin(lens: &Lens, quest: &Quest) -> Result<Self, NoQuest> {
-        let Quest { settings, rules, local, focal_length, light, open, .. } = quest;
-        let opened = open.map(|limit| opened(lens, limit));
-        let lens = opened.as_ref().unwrap_or(lens);
-        let goal = goal(lens, rules, *focal_length, *light)?;
-        let landscape = LensLandscape::new(lens, &goal, rules, local)?;
-        let run = Run::new(&landscape, landscape.start().clone(), settings)?;
+        let mut start = lens.clone();
+        let mut plan = quest.plan.clone();
+        if quest.free {
+            start.variables.clear();
+        }
+        if let Some(limit) = quest.open {
+            start = opened(&start, limit);
+            plan.rules.semi_diameter = plan.rules.semi_diameter.or(quest.open);
+        }
+        let landscape = plan.landscape(&start)?;
+        let settings = plan.settings(&landscape);
+        let run = Run::new(&landscape, landscape.start().clone(), &settings)?;
         Ok(Self { landscape, run })
     }
 
     /// The search that a checkpoint holds, and what it was asked for.
     pub(super) fn go_on(path: &Path) -> Result<(Self, Quest), NoQuest> {
         let Kept { landscape: kept, run: KeptRun { settings } } = read(path)?;
-        let landscape = LensLandscape::new(&kept.start, &kept.goal, &kept.rules, &kept.local)?;
+        let KeptLandscape { start, goal, rules, local } = kept;
+        let landscape = LensLandscape::new(&start, &goal, &rules, &local)?;
         let run = Run::load(&landscape, &settings, path)?;
-        let light = kept.goal.terms.iter().find_map(|weighted| match weighted.term {
-            Term::Light(share) => Some(share),
-            _ => None,
-        });
-        let quest = Quest {
-            settings,
-            rules: kept.rules,
-            local: kept.local,
-            light: light.unwrap_or(0.0),
-            ..Quest::default()
-        };
-        Ok((Self { landscape, run }, quest))
+        let plan = Plan { goal: Some(goal), rules, local, settings, ..Plan::default() };
+        Ok((Self { landscape, run }, Quest { plan, ..Quest::default() }))
     }
 }
 
@@ -145,5 +128,13 @@ impl Explores for Engine {
 
     fn save(&self, path: &Path) -> Result<(), SearchError> {
         self.run.save(&self.landscape, path)
+    }
+
+    fn finishing(&self) -> Finishing {
+        Finishing::on(self.landscape.clone())
+    }
+
+    fn rays(&self) -> usize {
+        self.landscape.rays(&self.run.best().point)
     }
 }

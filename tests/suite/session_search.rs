@@ -21,9 +21,9 @@ fn double_gauss() -> Lens {
 /// A search by two chains with short moves that ends after some of them, or not by itself.
 fn quest(moves: Option<u64>) -> Quest {
     let mut quest = Quest::default();
-    quest.settings =
-        Settings { chains: 2, moves, gradients: None, remembered: 8, ..Settings::default() };
-    quest.local.steps = 2;
+    let settings = quest.plan.settings;
+    quest.plan.settings = Settings { chains: 2, moves, gradients: None, remembered: 8, ..settings };
+    quest.plan.local.steps = 2;
     quest
 }
 
@@ -245,7 +245,7 @@ fn a_person_chooses_where_a_search_is_saved() {
 fn a_search_that_cannot_begin_says_why() {
     let mut session = session(double_gauss());
     let mut wrong = quest(None);
-    wrong.settings.chains = 0;
+    wrong.plan.settings.chains = 0;
     explore(&mut session, Explore::Start(Box::new(wrong)));
     stands(&mut session, Standing::Stopped);
     let view = session.view();

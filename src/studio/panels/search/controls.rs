@@ -124,15 +124,16 @@ fn temperature(ui: &mut Ui, run: &Exploration, wishes: &mut Vec<Command>) {
          merit its density is 1/e. Hotter is more patient with bad lenses",
     );
     let mut value = run.temperature.value();
+    let speed = 0.01 * value.max(f64::MIN_POSITIVE);
     let drag = DragValue::new(&mut value)
         .range(0.0..=f64::MAX)
-        .speed(0.01 * value.max(f64::MIN_POSITIVE))
+        .speed(speed)
         .custom_formatter(|value, _| format!("{value:.2e}"));
     let drag = ui.add_enabled(run.is_under_way(), drag).accessible_name("Temperature");
     if let Some(temperature) = Temperature::new(value).filter(|_| drag.changed()) {
         wishes.push(wish(Explore::Steer(Steer::Temperature(temperature))));
     }
-    let factor = run.quest.settings.reheat;
+    let factor = run.quest.plan.settings.reheat;
     let hint = format!("Multiply the temperature by {factor}");
     let reheat = ui.add_enabled(run.is_under_way(), Button::new("Reheat")).on_hover_text(hint);
     if reheat.clicked() {

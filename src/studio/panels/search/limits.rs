@@ -3,8 +3,8 @@
 use eframe::egui::{ComboBox, Grid, Ui};
 
 use super::setup::{drag, length, optional};
+use crate::search::lens::Plan;
 use crate::search::{Rules, Termination};
-use crate::session::Quest;
 
 /// The limits of the factory.
 pub(super) fn factory(ui: &mut Ui, rules: &mut Rules) {
@@ -65,8 +65,8 @@ const ENDS: [(Termination, &str, &str); 3] = [
 ];
 
 /// How the sampler goes.
-pub(super) fn sampler(ui: &mut Ui, quest: &mut Quest) {
-    let (settings, local) = (&mut quest.settings, &mut quest.local);
+pub(super) fn sampler(ui: &mut Ui, plan: &mut Plan) {
+    let (settings, local) = (&mut plan.settings, &mut plan.local);
     ui.collapsing("How it samples", |ui| {
         Grid::new("sampler").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
             ui.weak("Descents end");

@@ -83,7 +83,7 @@ impl Panel for StructureSearch {
         self.pages(ui, run.is_some());
         let scroll = ScrollArea::vertical().id_salt(self.page as u8).auto_shrink([false, false]);
         scroll.show(ui, |ui| match (self.page, run.as_deref()) {
-            (Page::Setup, _) | (_, None) => self.ask(ui, view, wishes),
+            (Page::Setup, _) | (_, None) => self.ask(ui, view),
             (Page::Run, Some(run)) => self.lenses(ui, view, run, wishes),
             (Page::Moves, Some(run)) => moves::table(ui, run, wishes),
             (Page::Family, Some(run)) => self.family(ui, view, run, wishes),
@@ -120,14 +120,14 @@ impl StructureSearch {
         ui.separator();
     }
 
-    fn ask(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    fn ask(&mut self, ui: &mut Ui, view: &View) {
         let under_way = view.explorations.run.as_ref().is_some_and(|run| run.is_under_way());
         if under_way {
             ui.label(RichText::new("The next search will begin with these.").small().weak());
         } else if view.explorations.run.is_none() {
             ui.label(WHAT);
         }
-        self.setup.ui(ui, view, wishes);
+        self.setup.ui(ui, view);
     }
 
     /// The merit, the lenses that are kept, and the one that was clicked.

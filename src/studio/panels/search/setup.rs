@@ -3,14 +3,13 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::emath::Numeric;
-use eframe::egui::{ComboBox, DragValue, Grid, RichText, Ui};
+use eframe::egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
 
 use super::{limits, marks};
-use crate::lens::{Lens, Medium, NumberKind};
+use crate::lens::{Lens, Medium};
 use crate::search::element::pieces;
-use crate::search::{Kind, Method};
-use crate::session::{Command, Quest, View};
-use crate::studio::panels::freed;
+use crate::search::{Kind, Method, Settings};
+use crate::session::{Quest, View};
 
 /// The settings that a person sees.
 #[derive(Debug)]
@@ -36,7 +35,9 @@ struct Asleep {
 impl Default for Setup {
     fn default() -> Self {
         let asleep = Asleep { minutes: 10.0, moves: 1000, open: 30.0, focal_length: 50.0 };
-        Self { quest: Quest::default(), own_glasses: false, gradients: 10_000, asleep }
+        let mut quest = Quest::default();
+        quest.plan.settings = Settings { gradients: None, ..quest.plan.settings };
+        Self { quest, own_glasses: false, gradients: 10_000, asleep }
     }
 }
 
@@ -63,32 +64,29 @@ impl Setup {
     pub(super) fn quest(&self, view: &View) -> Quest {
         let mut quest = self.quest.clone();
         if self.own_glasses {
-            quest.rules.glasses = glasses(&view.lens);
+            quest.plan.rules.glasses = glasses(&view.lens);
         }
-        if quest.settings.method == Method::Brute {
-            quest.settings.gradients = Some(self.gradients);
+        if quest.plan.settings.method == Method::Brute {
+            quest.plan.settings.gradients = Some(self.gradients);
         }
-        let last = view.lens.surfaces.len().saturating_sub(1);
-        quest.rules.surfaces =
-            quest.rules.surfaces.map(|[first, end]| [first.min(last), end.min(last)]);
         quest
     }
 
-    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        free(ui, view, wishes);
+    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View) {
+        free(ui, &view.lens, &mut self.quest.free);
         Grid::new("search setup").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
             self.sampler(ui);
             self.structure(ui, view);
             self.aims(ui);
             self.end(ui);
         });
-        limits::factory(ui, &mut self.quest.rules);
+        limits::factory(ui, &mut self.quest.plan.rules);
         self.weights(ui);
-        limits::sampler(ui, &mut self.quest);
+        limits::sampler(ui, &mut self.quest.plan);
     }
 
     fn sampler(&mut self, ui: &mut Ui) {
-        let settings = &mut self.quest.settings;
+        let settings = &mut self.quest.plan.settings;
         ui.weak("Method");
         let name = METHODS.iter().find(|(method, ..)| *method == settings.method);
         let combo = ComboBox::from_id_salt("search method").width(150.0);
@@ -111,7 +109,7 @@ impl Setup {
     }
 
     fn structure(&mut self, ui: &mut Ui, view: &View) {
-        let rules = &mut self.quest.rules;
+        let rules = &mut self.quest.plan.rules;
         ui.weak("Elements").on_hover_text("How many pieces of glass a lens may have");
         ui.horizontal(|ui| {
             let [min, max] = &mut rules.elements;
@@ -121,8 +119,8 @@ impl Setup {
             ui.weak(format!("({} now)", pieces(&view.lens)));
         });
         ui.end_row();
-        ui.weak("Surfaces").on_hover_text("Which surfaces mutations may touch");
-        surfaces(ui, &mut rules.surfaces, view.lens.surfaces.len());
+        ui.weak("Untouched").on_hover_text("Surfaces that mutations leave alone");
+        untouched(ui, &mut rules.kept, view.lens.surfaces.len());
         ui.end_row();
         ui.weak("New glass");
         ui.horizontal(|ui| {
@@ -144,13 +142,13 @@ impl Setup {
         let quest = &mut self.quest;
         ui.weak("Light");
         ui.horizontal(|ui| {
-            let mut percent = 100.0 * quest.light;
+            let mut percent = 100.0 * quest.plan.light;
             let hint =
                 "Every field keeps at least this share of the light that it has at the start";
             let drag = DragValue::new(&mut percent).range(0.0..=1000.0).speed(0.5).suffix(" %");
             let drag = ui.add(drag.max_decimals(1)).on_hover_text(hint);
             if drag.accessible_name("Least light").changed() {
-                quest.light = percent / 100.0;
+                quest.plan.light = percent / 100.0;
             }
             ui.weak("of the light at the start");
         });
@@ -161,7 +159,7 @@ impl Setup {
         optional(
             ui,
             "Another focal length",
-            &mut quest.focal_length,
+            &mut quest.plan.focal_length,
             &mut asleep.focal_length,
             hint,
             |ui, value| {
@@ -180,7 +178,7 @@ impl Setup {
 
     fn end(&mut self, ui: &mut Ui) {
         let Self { quest, asleep, gradients, .. } = self;
-        if quest.settings.method == Method::Brute {
+        if quest.plan.settings.method == Method::Brute {
             ui.weak("Gradients");
             let hint = "They are divided among all mutations";
             drag(ui, "Gradients of brute force", gradients, 1..=u64::MAX, 100.0, hint);
@@ -194,14 +192,21 @@ impl Setup {
         ui.end_row();
         ui.label("");
         let hint = "The search ends after so many moves of all chains together";
-        optional(ui, "moves", &mut quest.settings.moves, &mut asleep.moves, hint, |ui, value| {
-            drag(ui, "Moves of the search", value, 1..=u64::MAX, 10.0, hint);
-        });
+        optional(
+            ui,
+            "moves",
+            &mut quest.plan.settings.moves,
+            &mut asleep.moves,
+            hint,
+            |ui, value| {
+                drag(ui, "Moves of the search", value, 1..=u64::MAX, 10.0, hint);
+            },
+        );
         ui.end_row();
     }
 
     fn weights(&mut self, ui: &mut Ui) {
-        let weights = &mut self.quest.rules.weights;
+        let weights = &mut self.quest.plan.rules.weights;
         ui.collapsing("How often each mutation is tried", |ui| {
             Grid::new("weights").num_columns(4).spacing([8.0, 3.0]).show(ui, |ui| {
                 for (i, kind) in Kind::MUTATIONS.into_iter().enumerate() {
@@ -226,28 +231,24 @@ impl Setup {
 }
 
 /// What a search may change, and what it takes as it is.
-fn free(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-    let lens = &view.lens;
+fn free(ui: &mut Ui, lens: &Lens, free: &mut bool) {
     let count = lens.variables.len();
-    let text = if count == 0 {
-        "Free: all curvatures, gaps and rims, and the structure.".to_owned()
+    if count > 0 {
+        ui.checkbox(free, "Free every curvature and gap").on_hover_text(
+            "Also those that are no variables of the design; their bounds do not count then",
+        );
+    }
+    let text = if count == 0 || *free {
+        "Free: structure, curvatures, gaps and rims. Limits: those of the factory below.".to_owned()
     } else {
         format!(
-            "Free: the {count} variables of the design, and all that is new. Curvatures and gaps \
-             that are no variables are held where some are."
+            "Free: structure, rims, the {count} variables of the design and all that is new; \
+             other curvatures and gaps are held."
         )
     };
-    ui.label(RichText::new(text).small().weak());
-    let held = Lens { variables: Vec::new(), ..Lens::clone(lens) };
-    if count > 0 {
-        let hint = "Flags no number as variable: one undo step. The search then frees all of them";
-        if ui.small_button("Free everything").on_hover_text(hint).clicked() {
-            wishes.push(freed(&held, &[NumberKind::Curvatures, NumberKind::Thicknesses]).into());
-        }
-    }
+    ui.add(Label::new(RichText::new(text).small().weak()).wrap());
     if lens.zoom_positions() > 1 {
-        let text = "A zoom lens: gaps that differ between positions keep their number, and some \
-            mutations do not apply.";
+        let text = "A zoom lens: gaps that move are never joined, so some mutations do not apply.";
         ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color));
     }
 }
@@ -265,25 +266,14 @@ fn glasses(lens: &Lens) -> Vec<String> {
     names
 }
 
-/// Which surfaces mutations may touch: all, or from one to another, counted from 1.
-fn surfaces(ui: &mut Ui, range: &mut Option<[usize; 2]>, count: usize) {
+/// How many surfaces at both ends mutations leave alone.
+fn untouched(ui: &mut Ui, [front, rear]: &mut [usize; 2], count: usize) {
     ui.horizontal(|ui| {
-        let mut all = range.is_none();
-        let hint = "Mutations may touch every surface";
-        if ui.checkbox(&mut all, "all may change").on_hover_text(hint).changed() {
-            *range = (!all).then_some([0, count.saturating_sub(1)]);
-        }
-        if let Some([first, last]) = range {
-            let (mut from, mut to) = (*first + 1, *last + 1);
-            let hint = "Mutations touch no surface outside: a front or rear group stays what it is";
-            let changed = [
-                drag(ui, "First surface that may change", &mut from, 1..=to, 0.05, hint),
-                drag(ui, "Last surface that may change", &mut to, from..=count.max(1), 0.05, hint),
-            ];
-            if changed.contains(&true) {
-                (*first, *last) = (from - 1, to - 1);
-            }
-        }
+        let hint = "Mutations leave so many surfaces at this end alone: a group stays what it is";
+        drag(ui, "Untouched at the front", front, 0..=count, 0.05, hint);
+        ui.weak("surfaces at the front,");
+        drag(ui, "Untouched at the rear", rear, 0..=count, 0.05, hint);
+        ui.weak("at the rear");
     });
 }
 

@@ -52,10 +52,13 @@ pub(super) fn speed(run: &Exploration) -> String {
     } else {
         String::new()
     };
-    let rays = run.best.judged.as_ref().or(run.start.judged.as_ref());
-    let rays = rays.and_then(|judged| judged.found.as_ref().ok()).map(|found| found.rays);
-    let rays = rays.map(|rays| format!(", {rays} rays judge a lens")).unwrap_or_default();
-    format!("{} moves, {} gradients{rate}, {}{rays}", done.moves, done.gradients, time(run.seconds))
+    format!(
+        "{} moves, {} gradients of {} rays{rate}, {}",
+        done.moves,
+        done.gradients,
+        run.rays,
+        time(run.seconds)
+    )
 }
 
 fn time(seconds: f64) -> String {
