@@ -1,10 +1,11 @@
 //! The session itself: what each command does.
 
+mod exploring;
+
 use super::analyst::{Analyst, Request, Results, Savings};
-use super::command::{Command, Edit, Explore};
+use super::command::{Command, Edit};
 use super::edit::edited;
 use super::explorations::ExplorationDesk;
-use super::explorer;
 use super::fronts::FrontDesk;
 use super::history::History;
 use super::laboratory::{Laboratory, Stage};
@@ -467,53 +468,6 @@ impl Session {
         self.explorations.keep_in(folder.into());
     }
 
-    fn explore(&mut self, wish: Explore) {
-        if let Explore::Take(number) = wish {
-            return self.take_found(number);
-        }
-        if matches!(wish, Explore::Start(_) | Explore::GoOn(_)) {
-            self.candidate = None;
-        }
-        if let Err(why) = self.explorations.obey(wish, &self.lens) {
-            self.say(Severity::Warning, why);
-        }
-    }
-
-    /// Makes a lens of the search over structure the design, as one step.
-    fn take_found(&mut self, number: u64) {
-        let taken = self.explorations.lens_of(number).and_then(|lens| {
-            let own = released(&lens);
-            own.check().map(|()| own).map_err(|why| why.to_string())
-        });
-        match taken {
-            Ok(lens) => {
-                let title = format!("take lens {number} of the search");
-                self.history.note(Arc::clone(&self.lens), title, None);
-                self.explorations.stop_following();
-                self.show(Arc::new(lens));
-            }
-            Err(why) => self.say(Severity::Warning, why),
-        }
-    }
-
-    fn hear_exploration(&mut self, told: explorer::Told) {
-        use explorer::Told;
-        match told {
-            Told::Now(_, standing) => self.events.push(Event::Explored(standing)),
-            Told::Failed(_, why) => {
-                self.say(Severity::Error, why);
-                self.events.push(Event::Explored(Standing::Stopped));
-            }
-            Told::Refused(why) => self.say(Severity::Warning, why),
-            Told::Written(number, path, report) => {
-                let text = format!("lens {number} finished and exported to {}", path.display());
-                self.say(Severity::Note, format!("{text}\n{report}"));
-                self.events.push(Event::Saved(path));
-            }
-            Told::NotWritten(_, why) | Told::NotSaved(why) => self.say(Severity::Error, why),
-        }
-    }
-
     fn discard(&mut self) {
         self.worker.stop();
         self.search = None;
@@ -595,14 +549,6 @@ impl Session {
 
 /// More rays of a field than this are a solid area.
 const MOST_RAYS: usize = 2000;
-
-/// A lens of a search over structure as a person wants it: without the bounds that hold numbers,
-/// which were never variables of theirs.
-fn released(lens: &Lens) -> Lens {
-    let mut own = lens.clone();
-    own.variables.retain(|v| v.min.is_none() || v.min != v.max);
-    own
-}
 
 /// The best lens of a search; where the design was edited meanwhile, the design with the numbers
 /// that the search changed.

@@ -14,6 +14,8 @@ use std::sync::Arc;
 
 /// How a file of a search ends.
 const ENDING: &str = "search.json";
+/// How many letters of the name of a lens the name of its file has.
+const LONGEST: usize = 32;
 
 /// What is known about searches over structure.
 #[derive(Debug, Clone, Default)]
@@ -236,7 +238,8 @@ fn free(folder: &Path, name: &str) -> Option<PathBuf> {
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { ' ' };
     let words: String = name.chars().map(plain).collect();
     let words: Vec<&str> = words.split_whitespace().collect();
-    let stem = if words.is_empty() { "lens".to_owned() } else { words.join("_") };
+    let stem: String = words.join("_").chars().take(LONGEST).collect();
+    let stem = if stem.is_empty() { "lens".to_owned() } else { stem };
     let path = |number: usize| folder.join(format!("{stem}_{number}.{ENDING}"));
     (1..).map(path).find(|path| !path.exists())
 }

@@ -2,11 +2,11 @@
 
 use super::merit::bundled;
 use aplanat::lens::Lens;
-use aplanat::search::{Kind, Settings, Steer, Temperature};
+use aplanat::search::{Kind, Rules, Settings, Steer, Temperature};
 use aplanat::session::{
     Command, Ending, Event, Exploration, Explore, Quest, Session, Severity, Standing, View,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -217,6 +217,7 @@ fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
     third.keep_searches_in(&folder);
     explore(third, Explore::ForgetLeft);
     assert!(!left.exists() && third.view().explorations.left.is_none());
+    drop(second);
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
@@ -238,6 +239,7 @@ fn a_person_chooses_where_a_search_is_saved() {
         view.messages.last().is_some_and(|said| said.text.starts_with("the search is not saved"))
     });
     assert_eq!(run(&session).standing, Standing::Paused, "the search is not lost");
+    drop(session);
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
@@ -265,4 +267,43 @@ fn a_search_that_cannot_begin_says_why() {
     start(&mut session, Some(4));
     assert!(session.view().explorations.failed.is_none());
     stands(&mut session, Standing::Finished);
+}
+
+/// Has the start of a search finished and exported.
+fn export(rules: impl Fn(&mut Rules), path: &Path) -> Session {
+    let mut session = session(double_gauss());
+    let mut asked = quest(Some(2));
+    rules(&mut asked.plan.rules);
+    explore(&mut session, Explore::Start(Box::new(asked)));
+    stands(&mut session, Standing::Finished);
+    explore(&mut session, Explore::Export { number: 0, path: Some(path.to_owned()) });
+    assert_eq!(session.view().explorations.exporting, [0]);
+    wait(&mut session, "the end of it", |view, _| view.explorations.exporting.is_empty());
+    session
+}
+
+#[test]
+fn a_lens_is_exported_once_every_limit_is_kept() {
+    let folder = folder("export");
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("made.json");
+    let session = export(|_| {}, &path);
+    let said = session.view().messages.last().unwrap().clone();
+    assert_eq!(said.severity, Severity::Note, "{}", said.text);
+    assert!(said.text.starts_with("lens 0 finished and exported to "), "{}", said.text);
+    let made = aplanat::files::open(&path).unwrap().lens;
+    assert!(made.surfaces.len() == double_gauss().surfaces.len() && made.variables.is_empty());
+    assert!(!session.is_dirty());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_lens_that_cannot_be_made_is_refused_by_name() {
+    let path = folder("refused.json");
+    let session = export(|rules| rules.track = Some(10.0), &path);
+    let said = session.view().messages.last().unwrap().clone();
+    assert_eq!(said.severity, Severity::Error);
+    let first = "nothing is written: the lens cannot be made within its limits\n";
+    assert!(said.text.starts_with(first) && said.text.contains("total track"), "{}", said.text);
+    assert!(!path.exists());
 }

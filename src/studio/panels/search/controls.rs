@@ -1,11 +1,12 @@
 //! What begins, holds and ends a search, how far it is, and the hand on it while it goes on.
 
-use eframe::egui::{Button, Checkbox, DragValue, ProgressBar, RichText, Ui};
+use eframe::egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui};
 
 use super::setup::Setup;
 use super::{wish, words};
 use crate::search::{Steer, Temperature};
 use crate::session::{Command, Exploration, Explore, Standing, View};
+use crate::studio::number;
 use crate::studio::panels::numbers;
 
 /// Start, pause, stop, open, forget.
@@ -87,6 +88,9 @@ pub(super) fn left(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
     });
 }
 
+const GRADIENT: &str = "A move of a chain is some gradient steps; a gradient is that of all spots, \
+    pupils and limits by every free number of the lens, with the rays of the best lens";
+
 /// How far the search is, in numbers.
 pub(super) fn progress(ui: &mut Ui, view: &View, run: &Exploration) {
     let text = words::standing(run, view.explorations.pending);
@@ -99,15 +103,15 @@ pub(super) fn progress(ui: &mut Ui, view: &View, run: &Exploration) {
             ui.label(text);
         }
     }
-    ui.label(RichText::new(words::speed(run)).small().weak()).on_hover_text(
-        "A move of a chain is some gradient steps; a gradient is that of all spots, pupils and \
-         limits by every free number of the lens",
-    );
+    let speed = words::speed(run);
+    let label = Label::new(RichText::new(&speed).small().weak()).truncate();
+    ui.add(label).on_hover_text(format!("{speed}\n{GRADIENT}"));
     let (text, failed) = words::saved(&run.checkpoint);
     let visuals = ui.visuals();
     let color = if failed { visuals.error_fg_color } else { visuals.weak_text_color() };
     let path = run.checkpoint.path.as_ref().map(|path| path.display().to_string());
-    ui.label(RichText::new(text).small().color(color)).on_hover_text(path.unwrap_or_default());
+    let label = Label::new(RichText::new(text).small().color(color)).truncate();
+    ui.add(label).on_hover_text(path.unwrap_or_default());
 }
 
 /// What can be changed while it goes on: the temperature, and the chain that is followed.
@@ -128,7 +132,7 @@ fn temperature(ui: &mut Ui, run: &Exploration, wishes: &mut Vec<Command>) {
     let drag = DragValue::new(&mut value)
         .range(0.0..=f64::MAX)
         .speed(speed)
-        .custom_formatter(|value, _| format!("{value:.2e}"));
+        .custom_formatter(|value, _| number::show_digits(value, 3));
     let drag = ui.add_enabled(run.is_under_way(), drag).accessible_name("Temperature");
     if let Some(temperature) = Temperature::new(value).filter(|_| drag.changed()) {
         wishes.push(wish(Explore::Steer(Steer::Temperature(temperature))));

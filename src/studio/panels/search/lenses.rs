@@ -114,14 +114,14 @@ pub(super) fn paint(
     }
 }
 
-/// Take, pin, export.
+/// Take, pin, export; whether the design is shown again.
 pub(super) fn actions(
     ui: &mut Ui,
     view: &View,
     run: &Exploration,
     number: u64,
     wishes: &mut Vec<Command>,
-) {
+) -> bool {
     let pinned = run.pinned == Some(number);
     let pin = if pinned {
         ("Unpin", Explore::Steer(Steer::Unpin), "Mutate any of the lenses that are kept again")
@@ -132,18 +132,21 @@ pub(super) fn actions(
             "Let every new descent begin from this lens from now on",
         )
     };
+    let exporting = view.explorations.exporting.contains(&number);
     let take =
         format!("Make lens {number} the design in place of {}, one undo step", view.lens.name);
     let buttons = [
         ("Take", true, Explore::Take(number), take.as_str()),
         (pin.0, run.is_under_way(), pin.1, pin.2),
         (
-            "Export…",
-            true,
+            if exporting { "Finishing…" } else { "Export…" },
+            !exporting,
             Explore::Export { number, path: None },
-            "Write this lens with glasses of the catalogue and within the limits of the factory",
+            "Write this lens with glasses of the catalogue, every limit of the factory kept; one \
+             that does not get there is refused with the limit that fails",
         ),
     ];
+    let mut back = false;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         for (text, enabled, explore, hint) in buttons {
@@ -151,5 +154,12 @@ pub(super) fn actions(
                 wishes.push(wish(explore));
             }
         }
+        let shown = view.candidate.is_some();
+        let button = ui.add_enabled(shown, Button::new("Back to the design"));
+        back = button.on_hover_text("Show the design again in all panels").clicked();
     });
+    if back {
+        wishes.push(Command::Preview(None));
+    }
+    back
 }

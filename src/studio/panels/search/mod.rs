@@ -14,7 +14,7 @@ mod setup;
 mod thumbnail;
 mod words;
 
-use eframe::egui::{RichText, ScrollArea, Ui};
+use eframe::egui::{Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::Panel;
 use crate::session::{Command, Exploration, Explore, View};
@@ -27,6 +27,11 @@ const WHAT: &str = "Which lens of another structure is better? Chains descend fr
     remove, glue, split, bend, flip and exchange elements, and keep the best lens of every \
     pattern of glass and air.\n\
     The design stays what it is until one of their lenses is taken.";
+
+/// The height of what is said about the lens that was clicked: buttons and two lines.
+const CHOICE: f32 = 62.0;
+/// With less height than this, it stands above the page and moves with it.
+const ROOMY: f32 = 240.0;
 
 /// A part of the panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -81,6 +86,9 @@ impl Panel for StructureSearch {
             ui.weak("Looking at the lens…");
         }
         self.pages(ui, run.is_some());
+        if let (Page::Run | Page::Family, Some(run)) = (self.page, run.as_deref()) {
+            self.choice(ui, view, run, wishes);
+        }
         let scroll = ScrollArea::vertical().id_salt(self.page as u8).auto_shrink([false, false]);
         scroll.show(ui, |ui| match (self.page, run.as_deref()) {
             (Page::Setup, _) | (_, None) => self.ask(ui, view),
@@ -130,20 +138,19 @@ impl StructureSearch {
         self.setup.ui(ui, view);
     }
 
-    /// The merit, the lenses that are kept, and the one that was clicked.
+    /// The merit, and the lenses that are kept.
     fn lenses(&mut self, ui: &mut Ui, view: &View, run: &Exploration, wishes: &mut Vec<Command>) {
         controls::hand(ui, view, run, wishes);
         let clicked = plot::plots(ui, view, run, self.number());
+        let chosen = self.number();
         let clicked =
-            clicked.or_else(|| lenses::cards(ui, view, run, self.number(), &mut self.thumbnails));
+            clicked.or_else(|| lenses::cards(ui, view, run, chosen, &mut self.thumbnails));
         self.choose(run, clicked, wishes);
-        self.choice(ui, view, run, wishes);
     }
 
     /// The line of the lens that was clicked, or of the best one.
     fn family(&mut self, ui: &mut Ui, view: &View, run: &Exploration, wishes: &mut Vec<Command>) {
         let number = self.number().unwrap_or(run.best.number);
-        self.choice(ui, view, run, wishes);
         let clicked = family::picture(ui, run, number);
         let clicked = clicked.or_else(|| family::line(ui, view, run, number, &mut self.thumbnails));
         self.choose(run, clicked, wishes);
@@ -163,19 +170,26 @@ impl StructureSearch {
         }
     }
 
-    /// What to do with the lens that was clicked, and how it stands beside the design.
+    /// What to do with the lens that was clicked, and how it stands beside the design: below the
+    /// page, or above it where there is little room.
     fn choice(&mut self, ui: &mut Ui, view: &View, run: &Exploration, wishes: &mut Vec<Command>) {
+        if ui.available_height() < ROOMY {
+            return self.chosen(ui, view, run, wishes);
+        }
+        let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
+        let side = Side::bottom("chosen lens of the search").frame(frame);
+        let side = side.show_separator_line(false).exact_size(CHOICE);
+        side.show(ui, |ui| self.chosen(ui, view, run, wishes));
+    }
+
+    fn chosen(&mut self, ui: &mut Ui, view: &View, run: &Exploration, wishes: &mut Vec<Command>) {
         let number = self.number();
         let lens = number.and_then(|number| run.lens_of(number));
         let (Some(number), Some(_)) = (number, lens) else {
             ui.weak("Click a lens or a mark to see it beside the design.");
             return;
         };
-        lenses::actions(ui, view, run, number, wishes);
-        let shown = view.candidate.is_some();
-        let back = ui.add_enabled(shown, eframe::egui::Button::new("Back to the design"));
-        if back.on_hover_text("Show the design again in all panels").clicked() {
-            wishes.push(Command::Preview(None));
+        if lenses::actions(ui, view, run, number, wishes) {
             self.chosen = None;
         }
         words::compared(ui, view, run, number);

@@ -5,7 +5,7 @@ use eframe::egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points};
 
 use super::{marks, words};
-use crate::session::{Exploration, Mark, View};
+use crate::session::{Exploration, Mark, Moment, View};
 use crate::studio::panels::decade_name;
 
 /// How near the pointer must be to a mark to mean it, in points of the screen.
@@ -97,12 +97,11 @@ fn start(plot: &mut PlotUi<'_>, run: &Exploration, color: eframe::egui::Color32)
 }
 
 fn of_chain(run: &Exploration, chain: usize) -> PlotPoints<'static> {
-    let moments = run.history.moments.iter();
-    let points = moments.map(|moment| {
-        let merit = moment.chains.get(chain).copied().flatten().and_then(|(m, _)| decade(m));
-        [moment.round as f64, merit.unwrap_or(f64::NAN)]
-    });
-    points.collect()
+    let merit = |moment: &Moment| {
+        let (merit, _) = moment.chains.get(chain).copied().flatten()?;
+        Some([moment.round as f64, decade(merit)?])
+    };
+    run.history.moments.iter().filter_map(merit).collect()
 }
 
 fn at(mark: &Mark) -> Option<[f64; 2]> {

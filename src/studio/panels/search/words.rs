@@ -14,9 +14,14 @@ fn short(value: f64) -> String {
     number::show_digits(value, 4)
 }
 
-/// A merit as it is read: three digits.
+/// A merit as it is read.
 pub(super) fn merit(value: f64) -> String {
-    if value.is_finite() { format!("{value:.3e}") } else { "worthless".to_owned() }
+    if value.is_finite() { short(value) } else { "worthless".to_owned() }
+}
+
+/// So many of something.
+fn counted(count: u64, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// How the search stands, and what it has come to.
@@ -81,7 +86,7 @@ pub(super) fn saved(checkpoint: &Checkpoint) -> (String, bool) {
         (None, _) => ("Not saved: no file was chosen".to_owned(), false),
         (Some(name), None) => (format!("Will be saved to {}", name.to_string_lossy()), false),
         (Some(name), Some(moves)) => {
-            (format!("Saved to {} up to move {moves}", name.to_string_lossy()), false)
+            (format!("Saved up to move {moves} to {}", name.to_string_lossy()), false)
         }
     }
 }
@@ -172,6 +177,7 @@ pub(super) fn fate<P>(node: &Node<P>) -> String {
         Some(Offer::BehindAll) => "; not kept: all that are kept are no worse".to_owned(),
         Some(Offer::Worthless) => "; not kept: it is worth nothing".to_owned(),
     };
-    let (moves, gradients, chain) = (node.moves, node.gradients, node.chain + 1);
-    format!("{merits}\n{moves} moves, {gradients} gradients in chain {chain}: {end}{kept}")
+    let (moves, gradients) = (counted(node.moves, "move"), counted(node.gradients, "gradient"));
+    let chain = node.chain + 1;
+    format!("{merits}\n{moves}, {gradients} in chain {chain}: {end}{kept}")
 }
