@@ -9,7 +9,7 @@ pub mod pareto;
 mod state;
 mod stretch;
 
-pub use stretch::{Memory, Stretch, stretch};
+pub use stretch::{Memory, Stretch, Stretched, stretch};
 
 use crate::lens::Lens;
 use crate::merit::{Goal, Merit, MeritError, TermValue};

@@ -35,6 +35,15 @@ pub struct Memory {
     pub steps: usize,
 }
 
+/// Where a stretch has led.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretched {
+    /// The lens where it ends.
+    pub lens: Lens,
+    /// The merit where it began.
+    pub before: f64,
+}
+
 /// The pace may not fall below this part of the first one.
 const SLOWEST: f64 = 0.02;
 /// A stretch that went well is followed by a faster one, up to this part of the first pace.
@@ -61,7 +70,7 @@ impl Memory {
     }
 }
 
-/// Takes steps from a lens, whose merit has its own rays; the lens where they end. A step that
+/// Takes steps from a lens, whose merit has its own rays. A step that
 /// would make the lens invalid is shortened; where none is left, the stretch ends early.
 ///
 /// # Errors
@@ -71,13 +80,14 @@ pub fn stretch(
     lens: &Lens,
     asked: Stretch,
     memory: &mut Memory,
-) -> Result<Lens, MeritError> {
+) -> Result<Stretched, MeritError> {
     let (mut state, sum) = State::with_sum(merit, lens, Detail::Normal)?;
     memory.steps += asked.steps;
-    match asked.method {
+    let before = sum.value;
+    let lens = match asked.method {
         Method::Adam => {
             state.rescale(&sum);
-            Ok(adam(state, sum.gradient.as_slice(), asked, memory))
+            adam(state, sum.gradient.as_slice(), asked, memory)
         }
         Method::DampedLeastSquares => {
             let mut search = LeastSquares::resumed(state, sum, memory.damping);
@@ -85,9 +95,10 @@ pub fn stretch(
                 search.descend();
             }
             memory.damping = Some(search.damping());
-            Ok(search.into_current())
+            search.into_current()
         }
-    }
+    };
+    Ok(Stretched { lens, before })
 }
 
 fn adam(mut state: State, gradient: &[f64], asked: Stretch, memory: &mut Memory) -> Lens {

@@ -1,7 +1,6 @@
 //! Glass rows seen as elements: singlets, cemented groups, mirrors, and what stands between them.
 
 use crate::lens::{Lens, Medium};
-use std::fmt::Write as _;
 
 /// What an element is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,25 +101,23 @@ pub fn pieces(lens: &Lens) -> usize {
 /// mirror, as `1|2|stop|2|1`. Signs and sizes of curvatures do not count, nor does which glass it is.
 pub fn topology(lens: &Lens) -> String {
     let stop = lens.stop();
-    let mut text = String::new();
-    let mut passed = false;
+    let mut parts: Vec<String> = Vec::new();
+    let mut passed = stop.is_none();
     for element in elements(lens) {
-        let before = stop.is_some_and(|stop| stop < element.last || stop == element.first);
-        if before && !passed {
-            text.push_str("stop|");
+        let is_before = stop.is_some_and(|stop| stop < element.last || stop == element.first);
+        if is_before && !passed {
+            parts.push("stop".to_owned());
             passed = true;
         }
-        // Writing to a string does not fail.
-        let _ = match element.make {
-            Make::Glass(pieces) => write!(text, "{pieces}|"),
-            Make::Open(pieces) => write!(text, "o{pieces}|"),
-            Make::Mirror(0) => write!(text, "m|"),
-            Make::Mirror(pieces) => write!(text, "m{pieces}|"),
-        };
+        parts.push(match element.make {
+            Make::Glass(pieces) => pieces.to_string(),
+            Make::Open(pieces) => format!("o{pieces}"),
+            Make::Mirror(0) => "m".to_owned(),
+            Make::Mirror(pieces) => format!("m{pieces}"),
+        });
     }
-    if stop.is_some() && !passed {
-        text.push_str("stop|");
+    if !passed {
+        parts.push("stop".to_owned());
     }
-    text.pop();
-    text
+    parts.join("|")
 }

@@ -129,7 +129,7 @@ fn trim(lens: &mut Lens, rimless: &[usize], rules: &Rules) {
         let Some(most) = clear_height(lens, gap, floor) else { continue };
         for (row, new_row) in [gap, gap + 1].into_iter().zip(new) {
             // The size of the stop is the aperture; beside a new surface only that one gives way.
-            let stays = lens.surfaces[row].stop && !new_row || new.contains(&true) && !new_row;
+            let stays = !new_row && (lens.surfaces[row].stop || new.contains(&true));
             let rim = &mut lens.surfaces[row].semi_diameter;
             if !stays && rim.is_none_or(|rim| rim > most) {
                 *rim = Some(most);

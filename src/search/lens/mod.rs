@@ -24,7 +24,7 @@ pub use plan::{NoSearch, Plan, run};
 use super::{Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation};
 use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
-use crate::optimize::{Memory, Method, Stretch, stretch};
+use crate::optimize::{Memory, Method, Stretch, Stretched, stretch};
 use crate::pupil::{BenchError, limited_by_stop};
 use free::Freedom;
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,9 @@ pub struct Local {
     pub method: Method,
     /// Gradient steps of a local move.
     pub steps: usize,
+    /// For so many steps a descent goes by damped least squares, whatever the method: they find the
+    /// way down from a lens that has just mutated, and slow down where Adam does not.
+    pub rough_steps: usize,
     /// The rate of Adam when a descent begins: a step of one alters the residuals by as much as
     /// they are.
     pub rate: f64,
@@ -57,7 +60,8 @@ impl Default for Local {
         Self {
             method: Method::Adam,
             steps: 20,
-            rate: 0.03,
+            rough_steps: 200,
+            rate: 0.015,
             tolerance: 1e-2,
             coarse: 1e-2,
             coarse_steps: 0,
@@ -202,13 +206,14 @@ impl LensLandscape {
 
     /// A local move: where it leads, and what that is worth.
     fn moved(&self, lens: &Lens, memory: &mut Memory) -> Result<(Lens, f64), MeritError> {
-        let Local { method, steps, rate, tolerance, coarse, coarse_steps, .. } = self.local;
-        let is_coarse = memory.steps < coarse_steps;
+        let Local { steps, rate, tolerance, coarse, .. } = self.local;
+        let is_coarse = memory.steps < self.local.coarse_steps;
+        let is_rough = memory.steps < self.local.rough_steps;
+        let method = if is_rough { Method::DampedLeastSquares } else { self.local.method };
         let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
-        let freed = self.freed(lens);
-        let before = merit.value(&merit.values(&freed))?;
         let asked = Stretch { method, steps, rate };
-        let mut there = stretch(merit, &freed, asked, memory)?;
+        let Stretched { lens: mut there, before } =
+            stretch(merit, &self.freed(lens), asked, memory)?;
         there.variables.clone_from(&lens.variables);
         match self.judge(&there) {
             Ok(after) if after < before || is_coarse => {

@@ -88,16 +88,8 @@ fn lengths(rules: &Rules, size: f64) -> (Length, Length) {
 
 /// How likely the rest of the lens keeps its place: never where there is no room.
 pub(super) fn keeps(lens: &Lens, gap: Option<usize>, rules: &Rules, length: f64) -> f64 {
-    match gap {
-        Some(gap) if has_choice(lens, gap) => {
-            if has_room(lens, gap, rules, length) {
-                KEEPS
-            } else {
-                0.0
-            }
-        }
-        _ => 0.0,
-    }
+    let room = |gap: usize| has_choice(lens, gap) && has_room(lens, gap, rules, length);
+    if gap.is_some_and(room) { KEEPS } else { 0.0 }
 }
 
 /// Whether a gap could take a length in and still be one.

@@ -156,9 +156,7 @@ pub fn mutate(
     let refuse = |why: String| Refusal { kind, why };
     let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
     let Some(mutation) = mutation else { return Err(refuse("is no change of a lens".into())) };
-    if lens.surfaces.is_empty() {
-        return Err(refuse("the lens has no surfaces".into()));
-    }
+    lens.check().map_err(|error| refuse(error.to_string()))?;
     let resolved = lens.with_pickups().map_err(|error| refuse(error.to_string()))?;
     let size = match scale(&resolved) {
         Ok(size) => size,
@@ -211,7 +209,7 @@ fn length(lens: &Lens) -> f64 {
 fn finished(scene: &Scene<'_>, kind: Kind, draft: Draft) -> Result<Mutant, String> {
     let Draft { lens, origins, what, fresh, rimless, map, places, back } = draft;
     let (mut lens, projection, stretch) = if scene.rules.projection {
-        let found = project(&scene.lens, &lens, &origins, scene.rules, map);
+        let found = project(&scene.lens, &lens, &origins, scene.rules, map, back.is_some());
         let found = found.map_err(|why| format!("{what}, but {why}"))?;
         (found.lens, Some(found.report), found.log_determinant)
     } else {

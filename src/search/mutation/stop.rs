@@ -6,7 +6,7 @@ use super::super::{Random, Rules};
 use super::Kind;
 use super::chance::pick;
 use super::draft::{Back, Draft, Scene, filling, hangs, is_gap, sense, shortest, zooms};
-use crate::lens::{Aperture, Lens, Medium, Row};
+use crate::lens::{Aperture, Lens, Medium, Object, Row};
 use crate::paraxial::{Beam, first_order};
 use rand::RngExt as _;
 
@@ -51,8 +51,10 @@ fn without(scene: &Scene<'_>) -> Result<Draft, String> {
     if plane + 1 == scene.lens.surfaces.len() {
         return Err("the stop is the last surface".to_owned());
     }
-    if let Some(before) = plane.checked_sub(1) {
-        draft.add_gap(before, plane);
+    match (plane.checked_sub(1), &mut draft.lens.object) {
+        (Some(before), _) => draft.add_gap(before, plane),
+        (None, Object::Finite(distance)) => *distance += scene.lens.surfaces[plane].thickness,
+        (None, Object::Infinity) => {}
     }
     draft.remove(plane);
     Ok(draft)

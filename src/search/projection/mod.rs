@@ -3,13 +3,13 @@
 //!
 //! What is kept is (4.22) in full: height and slope of the marginal ray at the image, at every zoom
 //! position; only the slope where the last gap is solved for the focus. Numbers are measured in steps
-//! of `0.3/f` for curvatures and `0.01 f` for distances, else only curvatures would move.
+//! of `0.3/f` for curvatures and `0.01 f` for distances, else only curvatures would move; `f` is
+//! rounded to a power of two, so that the steps do not change with the lens.
 //!
-//! Two maps lead to such a lens, and each is the inverse of the other: [`Map::Closest`] goes to the
-//! nearest one, along the normals of the constraint where it arrives; [`Map::Along`] goes along the
-//! normals of the constraint of the lens from which it starts. That is what makes a mutation and
-//! the one that undoes it a reversible pair. A Jacobian of (4.30), with its factors put right, is in
-//! [`density`].
+//! Two maps lead to such a lens, and each is the inverse of the other: one goes to the nearest, along
+//! the normals of the constraint where it arrives; one goes along the normals of the constraint of
+//! the lens from which it starts. That is what makes a mutation and the one that undoes it a
+//! reversible pair. By how much they stretch volumes follows from (4.30), with its factors put right.
 
 mod density;
 mod model;
@@ -66,15 +66,6 @@ pub(super) enum Map {
     Along,
 }
 
-impl Map {
-    fn inverse(self) -> Self {
-        match self {
-            Self::Closest => Self::Along,
-            Self::Along => Self::Closest,
-        }
-    }
-}
-
 /// Where the numbers of a row come from.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Origin {
@@ -103,14 +94,13 @@ pub(super) fn project(
     origins: &[Origin],
     rules: &Rules,
     map: Map,
+    reversible: bool,
 ) -> Result<Projected, Unprojectable> {
     let pair = Pair::new(before, mutated, origins, rules)?;
-    let exact = pair.solved(map);
-    let solution = match exact {
-        Ok(solution) => solution,
-        Err(_) => solve::nearest(&pair.new, &pair.zero(), &pair.target, &pair.bounds)?,
-    };
-    let log_determinant = if solution.exact { pair.log_determinant(map, &solution) } else { None };
+    let mapped = if map == Map::Along && reversible { pair.along().ok() } else { None };
+    let solution = mapped.map_or_else(|| pair.nearest(map), Ok)?;
+    let exact = reversible && solution.exact;
+    let log_determinant = if exact { pair.log_determinant(map, &solution) } else { None };
     Ok(Projected {
         lens: pair.lens(mutated, &solution),
         report: pair.report(&solution),
@@ -125,7 +115,8 @@ struct Pair {
     old: Model,
     new: Model,
     target: Vec<f64>,
-    bounds: Bounds,
+    /// What the rules allow.
+    limits: Bounds,
 }
 
 impl Pair {
@@ -135,40 +126,44 @@ impl Pair {
         origins: &[Origin],
         rules: &Rules,
     ) -> Result<Self, Unprojectable> {
-        let scale = scale(before)?;
+        let scale = scale(before)?.log2().round().exp2();
         let coordinates = coordinates(before, mutated, origins, rules, scale);
         let old = Model::new(before, before, &coordinates, scale, |c| (c.old, c.sign))?;
         let new = Model::new(mutated, before, &coordinates, scale, |c| (c.new, 1.0))?;
         let target = old.values(&vec![0.0; coordinates.len()]);
-        let bounds = bounds(mutated, &coordinates, rules);
-        Ok(Self { coordinates, old, new, target, bounds })
+        let limits = limits(mutated, &coordinates, rules);
+        Ok(Self { coordinates, old, new, target, limits })
     }
 
     fn zero(&self) -> Vec<f64> {
         vec![0.0; self.coordinates.len()]
     }
 
-    fn solved(&self, map: Map) -> Result<Solution, Unprojectable> {
-        let zero = self.zero();
-        let found = match map {
-            Map::Closest => solve::nearest(&self.new, &zero, &self.target, &self.bounds),
-            Map::Along => {
-                let normals = self.old.jacobian(&zero);
-                solve::along(&self.new, &normals, &zero, &self.target, &self.bounds)
-            }
-        };
-        found
+    /// The nearest lens; where another one was asked for, it is not exact.
+    fn nearest(&self, map: Map) -> Result<Solution, Unprojectable> {
+        let found = solve::nearest(&self.new, &self.zero(), &self.target, &self.bounds())?;
+        Ok(Solution { exact: found.exact && map == Map::Closest, ..found })
+    }
+
+    fn along(&self) -> Result<Solution, Unprojectable> {
+        let normals = self.old.jacobian(&self.zero());
+        solve::along(&self.new, &normals, &self.zero(), &self.target, &self.bounds())
+    }
+
+    /// How far the numbers may move; one that is outside of the rules may not go farther.
+    fn bounds(&self) -> Bounds {
+        self.limits.around(&self.zero())
     }
 
     /// The way back starts where the way there ended, with the other map and the lenses exchanged.
     fn leads_back(&self, map: Map, there: &Solution) -> bool {
-        let free = Bounds::none(there.at.len());
+        let bounds = self.limits.around(&there.at);
         let target = self.new.values(&there.at);
-        let back = match map.inverse() {
-            Map::Closest => solve::nearest(&self.old, &there.at, &target, &free),
-            Map::Along => {
+        let back = match map {
+            Map::Along => solve::nearest(&self.old, &there.at, &target, &bounds),
+            Map::Closest => {
                 let normals = self.new.jacobian(&there.at);
-                solve::along(&self.old, &normals, &there.at, &target, &free)
+                solve::along(&self.old, &normals, &there.at, &target, &bounds)
             }
         };
         back.is_ok_and(|back| back.exact && back.at.iter().all(|z| z.abs() < 1e-6))
@@ -195,7 +190,8 @@ impl Pair {
         let mut lens = mutated.clone();
         for (coordinate, z) in self.coordinates.iter().zip(&solution.at) {
             if *z != 0.0 {
-                lens.set(coordinate.new, coordinate.value + coordinate.step * z);
+                let value = coordinate.value + coordinate.step * z;
+                lens.set(coordinate.new, rounded_into(mutated, coordinate.new, value));
             }
         }
         // A lens that has a model has pickups that can be followed.
@@ -213,6 +209,13 @@ impl Pair {
         }
         Projection { steps: solution.steps, error: solution.error, curvature, distance }
     }
+}
+
+/// A value that rounding may have brought out of the bounds of its variable.
+fn rounded_into(lens: &Lens, parameter: Parameter, value: f64) -> f64 {
+    let Some(variable) = lens.variable(parameter) else { return value };
+    let value = variable.min.map_or(value, |min| value.max(min));
+    variable.max.map_or(value, |max| value.min(max))
 }
 
 /// Every curvature and distance of a lens that does not follow another number.
@@ -250,9 +253,8 @@ fn coordinates(
     found
 }
 
-/// How far each number may move, in its own steps; one that is outside of the rules already may not
-/// go farther.
-fn bounds(lens: &Lens, coordinates: &[Coordinate], rules: &Rules) -> Bounds {
+/// What the rules and the variables of the lens allow each number, in its own steps.
+fn limits(lens: &Lens, coordinates: &[Coordinate], rules: &Rules) -> Bounds {
     let glass = filled(lens);
     let range = |c: &Coordinate| {
         let (mut low, mut high) = match c.new.quantity {
@@ -263,7 +265,7 @@ fn bounds(lens: &Lens, coordinates: &[Coordinate], rules: &Rules) -> Bounds {
             low = variable.min.map_or(low, |min| low.max(min));
             high = variable.max.map_or(high, |max| high.min(max));
         }
-        [(low.min(c.value) - c.value) / c.step, (high.max(c.value) - c.value) / c.step]
+        [(low - c.value) / c.step, (high - c.value) / c.step]
     };
     Bounds::new(coordinates.iter().map(range).collect())
 }

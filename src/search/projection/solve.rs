@@ -22,8 +22,10 @@ impl Bounds {
         Self(ranges)
     }
 
-    pub(super) fn none(count: usize) -> Self {
-        Self(vec![[f64::NEG_INFINITY, f64::INFINITY]; count])
+    /// The same, but for numbers that are outside already: those may stay where they are.
+    pub(super) fn around(&self, at: &[f64]) -> Self {
+        let widened = |([low, high], z): (&[f64; 2], &f64)| [low.min(*z), high.max(*z)];
+        Self(self.0.iter().zip(at).map(widened).collect())
     }
 
     fn hold(&self, at: &DVector<f64>) -> bool {

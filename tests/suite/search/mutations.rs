@@ -1,47 +1,326 @@
-//! Every kind of mutation on every lens that comes with the program.
+//! Every kind of mutation on every lens that comes with the program: what it does, when it does not
+//! apply, and that nothing but a lens comes out of it.
 
+use super::{generous, seeded};
 use crate::merit::bundled;
 use aplanat::files;
-use aplanat::lens::Lens;
-use aplanat::search::{Kind, Random, Rules, mutate, propose};
-use rand::SeedableRng as _;
-use std::collections::BTreeMap;
+use aplanat::lens::{Lens, Medium, NumberKind, Parameter, Pickup, Quantity, System, vary};
+use aplanat::search::element::{elements, pieces, topology};
+use aplanat::search::{Kind, Mutant, Rules, mutate, propose};
 
-#[test]
-fn explore() {
-    let rules = Rules { elements: [1, 24], ..Rules::default() };
-    for entry in files::library() {
-        let lens = bundled(entry.name);
-        let mut random = Random::seed_from_u64(1);
-        for kind in Kind::MUTATIONS {
-            let (mut ok, mut ratio, mut steps, mut spread) =
-                (0, 0, 0, [f64::INFINITY, f64::NEG_INFINITY]);
-            let mut why: BTreeMap<String, usize> = BTreeMap::new();
-            let start = std::time::Instant::now();
-            for _ in 0..50 {
-                match mutate(kind, &lens, &rules, &mut random) {
-                    Ok(m) => {
-                        ok += 1;
-                        m.lens.check().unwrap();
-                        if let Some(log) = m.log_ratio {
-                            ratio += 1;
-                            spread = [spread[0].min(log), spread[1].max(log)];
-                        }
-                        steps = steps.max(m.projection.unwrap().steps);
-                    }
-                    Err(e) => {
-                        let text: String =
-                            e.to_string().chars().filter(|c| !c.is_ascii_digit()).collect();
-                        *why.entry(text).or_default() += 1;
-                    }
-                }
-            }
-            let us = start.elapsed().as_secs_f64() / 50.0 * 1e6;
-            println!(
-                "{:32} {:15} ok {ok} ratio {ratio} {spread:.1?} steps {steps} {us:.0} us {why:?}",
-                entry.name,
-                kind.name()
-            );
+/// A lens is one at every zoom position: it can be resolved, and no surfaces cross within the rims of
+/// both.
+fn assert_lens(lens: &Lens) {
+    lens.check().unwrap();
+    let um = lens.wavelengths[lens.primary()].um;
+    for zoom in 0..lens.zoom_positions() {
+        let system = lens.system(zoom, um).unwrap();
+        for gap in 0..lens.surfaces.len() - 1 {
+            assert_apart(&system, gap);
         }
     }
+}
+
+fn assert_apart(system: &System<f64>, gap: usize) {
+    let mirrors = system.surfaces[..=gap].iter().filter(|s| s.mirror).count();
+    let sense = if mirrors % 2 == 1 { -1.0 } else { 1.0 };
+    let (front, rear) = (&system.surfaces[gap], &system.surfaces[gap + 1]);
+    let center = sense * front.thickness;
+    assert!(center >= 0.0, "gap {gap}: {center}");
+    let rim = front.semi_diameter.min(rear.semi_diameter);
+    // The size of a stop is the aperture, and no mutation makes it smaller.
+    if rim.is_finite() && system.stop != Some(gap) && system.stop != Some(gap + 1) {
+        let sag = |surface: &aplanat::lens::Surface<f64>| surface.shape.sag(rim * rim).unwrap().0;
+        let edge = center + sense * (sag(rear) - sag(front));
+        assert!(edge > -1e-9 * rim.max(1.0), "gap {gap}: {edge} at {rim}");
+    }
+}
+
+#[test]
+fn every_kind_on_every_lens_leaves_a_lens_or_a_reason() {
+    for entry in files::library() {
+        let lens = bundled(entry.name);
+        let mut random = seeded(1);
+        for kind in Kind::MUTATIONS.repeat(8) {
+            match mutate(kind, &lens, &generous(), &mut random) {
+                Ok(mutant) => {
+                    assert_lens(&mutant.lens);
+                    assert_eq!(mutant.kind, kind);
+                    assert!(mutant.log_ratio.is_none_or(f64::is_finite));
+                    assert!(!mutant.what.is_empty());
+                }
+                Err(refusal) => assert!(refusal.kind == kind && !refusal.why.is_empty()),
+            }
+        }
+    }
+}
+
+#[test]
+fn the_pattern_of_glass_and_air_is_read_from_the_rows() {
+    let pattern = |name: &str| topology(&bundled(name));
+    assert_eq!(pattern("double_gauss_nikkor_s_50"), "1|2|stop|2|1|1");
+    assert_eq!(pattern("achromat_ac254_100"), "stop|2");
+    assert_eq!(pattern("telescope_rc_f8"), "stop|m|m");
+    assert_eq!(pattern("telephoto_nikkor_135_f28"), "1|1|stop|2|1");
+    assert_eq!(pieces(&bundled("heliar_100_f45")), 5);
+}
+
+#[test]
+fn each_kind_changes_the_pattern_as_it_says() {
+    let lens = bundled("double_gauss_nikkor_s_50");
+    let after = |kind: Kind, seed: u64| {
+        let mutant = mutate(kind, &lens, &generous(), &mut seeded(seed)).unwrap();
+        (topology(&mutant.lens), pieces(&mutant.lens), mutant)
+    };
+    for seed in 0..12 {
+        let (_, count, mutant) = after(Kind::AddSinglet, seed);
+        assert_eq!((count, mutant.fresh.len()), (8, 1));
+        assert_eq!(mutant.lens.surfaces.len(), lens.surfaces.len() + 2);
+        let (_, count, _) = after(Kind::RemoveSinglet, seed);
+        assert_eq!(count, 6);
+        let (pattern, count, _) = after(Kind::Glue, seed);
+        assert_eq!(count, 7);
+        assert!(["3|stop|2|1|1", "1|2|stop|3|1", "1|2|stop|2|2"].contains(&&*pattern));
+        let (pattern, count, _) = after(Kind::Split, seed);
+        assert_eq!(count, 7);
+        assert!(["1|1|1|stop|2|1|1", "1|2|stop|1|1|1|1"].contains(&&*pattern), "{pattern}");
+        let (_, count, _) = after(Kind::DropLayer, seed);
+        assert_eq!(count, 6);
+        for kind in [Kind::Bend, Kind::Flip, Kind::ExchangeGlass] {
+            assert_eq!(after(kind, seed).0, "1|2|stop|2|1|1");
+        }
+        assert_eq!(after(Kind::MoveStop, seed).2.lens.surfaces.len(), lens.surfaces.len());
+    }
+}
+
+#[test]
+fn limits_of_the_rules_are_reasons() {
+    let lens = bundled("double_gauss_nikkor_s_50");
+    let refused = |kind: Kind, rules: Rules| {
+        mutate(kind, &lens, &rules, &mut seeded(1)).unwrap_err().to_string()
+    };
+    let full = Rules { elements: [2, 7], ..Rules::default() };
+    assert_eq!(
+        refused(Kind::AddSinglet, full),
+        "add singlet: the lens has 7 elements, the rules allow 7"
+    );
+    let least = Rules { elements: [7, 9], ..Rules::default() };
+    assert!(refused(Kind::RemoveSinglet, least.clone()).contains("the rules ask for 7"));
+    assert!(refused(Kind::DropLayer, least).contains("the rules ask for 7"));
+    let held = Rules { kept: [13, 0], ..Rules::default() };
+    for kind in Kind::MUTATIONS {
+        assert!(mutate(kind, &lens, &held, &mut seeded(1)).is_err(), "{kind:?}");
+    }
+    let short = Rules { track: Some(10.0), ..Rules::default() };
+    let longer =
+        (0..20).filter_map(|seed| mutate(Kind::AddSinglet, &lens, &short, &mut seeded(seed)).err());
+    assert!(longer.into_iter().all(|refusal| refusal.why.contains("mm long")));
+}
+
+#[test]
+fn the_only_element_stays() {
+    let lens = bundled("singlet_la1131");
+    let rules = Rules { elements: [0, 8], ..Rules::default() };
+    let refusal = mutate(Kind::RemoveSinglet, &lens, &rules, &mut seeded(1)).unwrap_err();
+    assert!(refusal.why.contains("no singlet that may go"), "{refusal}");
+}
+
+#[test]
+fn a_forbidden_kind_is_not_proposed() {
+    let lens = bundled("double_gauss_nikkor_s_50");
+    let weights = Kind::MUTATIONS.map(|kind| (kind, f64::from(u8::from(kind == Kind::Flip))));
+    let only = Rules { weights: weights.to_vec(), ..generous() };
+    let mut random = seeded(2);
+    for _ in 0..20 {
+        assert_eq!(propose(&lens, &only, &mut random).unwrap().kind, Kind::Flip);
+    }
+    let none = Rules { weights: Kind::MUTATIONS.map(|kind| (kind, 0.0)).to_vec(), ..generous() };
+    assert!(propose(&lens, &none, &mut random).is_err());
+}
+
+#[test]
+fn elements_of_the_same_glass_are_not_glued() {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    lens.surfaces.remove(4);
+    lens.surfaces[0].stop = true;
+    let glass = Medium::Glass("SCHOTT N-BK7".to_owned());
+    for row in [0, 2, 4] {
+        lens.surfaces[row].medium = glass.clone();
+    }
+    let refusal = mutate(Kind::Glue, &lens, &generous(), &mut seeded(1)).unwrap_err();
+    assert!(refusal.why.contains("different glass"), "{refusal}");
+    // An index that is the same by chance makes an interface without effect, and still a lens.
+    lens.surfaces[2].medium = Medium::Model { nd: 1.5168, vd: 64.17 };
+    let mutant = mutate(Kind::Glue, &lens, &generous(), &mut seeded(1));
+    mutant.into_iter().for_each(|mutant| assert_lens(&mutant.lens));
+}
+
+#[test]
+fn only_listed_glasses_are_used() {
+    let lens = bundled("double_gauss_nikkor_s_50");
+    let glasses = vec!["SCHOTT N-BK7".to_owned(), "SCHOTT N-SF6".to_owned()];
+    let rules = Rules { glasses: glasses.clone(), ..generous() };
+    let mut random = seeded(3);
+    for _ in 0..20 {
+        let mutant = mutate(Kind::AddSinglet, &lens, &rules, &mut random).unwrap();
+        let Medium::Glass(name) = &mutant.lens.surfaces[mutant.fresh[0]].medium else { panic!() };
+        assert!(glasses.contains(name), "{name}");
+    }
+    let unknown = Rules { glasses: vec!["NO SUCH".to_owned()], ..generous() };
+    assert!(mutate(Kind::AddSinglet, &lens, &unknown, &mut random).is_err());
+}
+
+#[test]
+fn aspheres_and_mirrors_survive() {
+    let figured = |lens: &Lens| {
+        let figures = lens.surfaces.iter().map(|row| (row.conic, row.asphere.clone()));
+        figures.filter(|(conic, terms)| *conic != 0.0 || !terms.is_empty()).count()
+    };
+    for (name, count) in [("phone_us7558005_1", 8), ("double_gauss_canon_fd50_f12", 1)] {
+        let lens = bundled(name);
+        assert_eq!(figured(&lens), count);
+        for kind in [Kind::AddSinglet, Kind::Bend, Kind::Flip, Kind::MoveStop] {
+            let mutant = mutate(kind, &lens, &generous(), &mut seeded(4)).unwrap();
+            assert_eq!(figured(&mutant.lens), count, "{name}: {}", mutant.what);
+        }
+    }
+    let telescope = bundled("telescope_rc_f8");
+    let rules = Rules { elements: [0, 4], ..Rules::default() };
+    let mut random = seeded(5);
+    for _ in 0..30 {
+        let mutant = mutate(Kind::AddSinglet, &telescope, &rules, &mut random).unwrap();
+        assert_lens(&mutant.lens);
+        assert_eq!(elements(&mutant.lens).len(), 3);
+        let mirrors = mutant.lens.surfaces.iter().filter(|row| row.medium == Medium::Mirror);
+        assert_eq!(mirrors.count(), 2);
+    }
+}
+
+#[test]
+fn what_follows_another_number_goes_on_following_it() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.variables.clear();
+    vary(&mut lens, &[NumberKind::Curvatures]);
+    let follows = |surface, source| Pickup {
+        parameter: Parameter::new(surface, Quantity::Curvature),
+        source: Parameter::new(source, Quantity::Curvature),
+        scale: -1.0,
+        offset: 0.0,
+    };
+    lens.variables.retain(|v| v.parameter.surface < 9);
+    lens.pickups = vec![follows(9, 1), follows(10, 0)];
+    let mut random = seeded(6);
+    for kind in Kind::MUTATIONS.repeat(10) {
+        let Ok(mutant) = mutate(kind, &lens, &generous(), &mut random) else { continue };
+        assert_lens(&mutant.lens);
+        assert_eq!(mutant.lens.pickups.len(), 2, "{}", mutant.what);
+        for pickup in &mutant.lens.pickups {
+            let [follower, source] = [pickup.parameter, pickup.source].map(|p| mutant.lens.get(p));
+            assert_eq!(follower.unwrap(), pickup.scale * source.unwrap(), "{}", mutant.what);
+        }
+    }
+}
+
+/// The numbers of a lens, for comparison.
+fn same(a: &Lens, b: &Lens) -> bool {
+    let near = |x: f64, y: f64, scale: f64| (x - y).abs() < 1e-7 * scale;
+    a.surfaces.len() == b.surfaces.len()
+        && a.surfaces.iter().zip(&b.surfaces).all(|(a, b)| {
+            let curved = near(a.curvature, b.curvature, 0.1);
+            curved && near(a.thickness, b.thickness, 10.0) && a.medium == b.medium
+        })
+}
+
+/// Some draw of the mutation that undoes it leads back with a ratio that cancels. Other draws may
+/// lead to the same lens on other ways, as an element that goes with the air behind it.
+fn assert_undone(lens: &Lens, there: &Mutant, back: Kind, rules: &Rules) -> bool {
+    let Some(log) = there.log_ratio else { return false };
+    let mut others = Vec::new();
+    for seed in 0..400 {
+        let Ok(mutant) = mutate(back, &there.lens, rules, &mut seeded(seed)) else { continue };
+        if same(lens, &mutant.lens) {
+            let other = mutant.log_ratio;
+            if other.is_some_and(|other| (log + other).abs() < 1e-6) {
+                return true;
+            }
+            others.push(other);
+        }
+    }
+    panic!("{} with {log} is not undone: {others:?}", there.what);
+}
+
+#[test]
+fn a_mutation_and_the_one_that_undoes_it_are_a_reversible_pair() {
+    let rules = Rules { weights: vec![(Kind::AddSinglet, 3.0), (Kind::Split, 0.5)], ..generous() };
+    for name in ["heliar_100_f45", "achromat_ac254_100", "tessar_50_f28"] {
+        let mut lens = bundled(name);
+        lens.variables.clear();
+        for (there, back) in [
+            (Kind::AddSinglet, Kind::RemoveSinglet),
+            (Kind::Split, Kind::Glue),
+            (Kind::Flip, Kind::Flip),
+        ] {
+            let undone = (0..10).filter(|seed| {
+                let mutant = mutate(there, &lens, &rules, &mut seeded(*seed)).unwrap();
+                assert_undone(&lens, &mutant, back, &rules)
+            });
+            let undone = undone.count();
+            println!("{name}: {} of 10 undone by {}", undone, back.name());
+            assert!(undone >= 5, "{name}: {} {undone}", there.name());
+        }
+    }
+}
+
+#[test]
+fn without_projection_numbers_stay() {
+    let lens = bundled("heliar_100_f45");
+    let rules = Rules { projection: false, ..generous() };
+    let mutant = mutate(Kind::Bend, &lens, &rules, &mut seeded(1)).unwrap();
+    assert_eq!((mutant.projection, mutant.log_ratio), (None, Some(0.0)));
+    let mutant = mutate(Kind::AddSinglet, &lens, &rules, &mut seeded(1)).unwrap();
+    assert!(mutant.log_ratio.is_some());
+    for seed in 0..10 {
+        let mutant = mutate(Kind::Split, &lens, &rules, &mut seeded(seed)).unwrap();
+        assert!(assert_undone(&lens, &mutant, Kind::Glue, &rules));
+    }
+}
+
+/// What a lens takes in memory, roughly: everything in it that could grow.
+fn size(lens: &Lens) -> usize {
+    let zoom: usize = lens.zoom.iter().map(|position| position.thicknesses.len()).sum();
+    let text: usize = lens.surfaces.iter().map(|row| row.comment.len()).sum();
+    lens.surfaces.len() + lens.variables.len() + lens.pickups.len() + zoom + text
+}
+
+fn chain(name: &str, moves: usize) {
+    let start = bundled(name);
+    let rules = Rules { elements: [2, 10], ..Rules::default() };
+    let mut random = seeded(2026);
+    let (mut lens, mut refused, mut made, mut most) = (start.clone(), 0, 0, 0);
+    for number in 0..moves {
+        match propose(&lens, &rules, &mut random) {
+            Ok(mutant) => {
+                (lens, refused, made) = (mutant.lens, 0, made + 1);
+                lens.check().unwrap();
+                most = most.max(size(&lens));
+            }
+            Err(_) => refused += 1,
+        }
+        if number % 100 == 0 {
+            assert_lens(&lens);
+        }
+        if refused > 20 {
+            (lens, refused) = (start.clone(), 0);
+        }
+    }
+    println!("{name}: {made} of {moves} mutations made, at most {most} numbers");
+    assert!(made > moves / 5, "{name}: {made}");
+    assert!(most < 40 + 4 * size(&start), "{name}: {most}");
+}
+
+#[test]
+fn a_hundred_thousand_mutations_leave_a_lens() {
+    chain("double_gauss_nikkor_s_50", 40_000);
+    chain("cooke_triplet_100_f27", 40_000);
+    chain("achromat_ac254_100", 20_000);
 }

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{Color32, CursorIcon, PointerButton, Pos2, Role, Ui, WidgetInfo};
 use egui_plot::{
-    Corner, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform,
-    PlotUi, Points,
+    AxisHints, Corner, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints,
+    PlotTransform, PlotUi, Points,
 };
 
 use super::words;
@@ -43,10 +43,11 @@ pub(super) fn plot(
 ) -> Option<Clicked> {
     let colors = Colors::of(ui);
     let bounds = bounds(view, run);
+    let light = AxisHints::new_x().label("light, mm²").label_spacing(24.0..=44.0);
     let plot = Plot::new("front")
         .height(ui.available_height())
         .legend(Legend::default().position(Corner::LeftTop).background_alpha(0.6))
-        .x_axis_label("light, mm²")
+        .custom_x_axes(vec![light])
         .y_axis_label("RMS spot, µm")
         .y_axis_min_width(36.0)
         .allow_scroll(false)
