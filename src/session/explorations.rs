@@ -2,6 +2,7 @@
 //! what was left from before, and where the design stands beside it.
 
 use super::command::Explore;
+use super::course::Course;
 use super::exploration::Exploration;
 use super::explorer::{Explorer, Told};
 use super::judged::Judged;
@@ -44,12 +45,7 @@ pub struct Explorations {
 #[derive(Debug)]
 pub(super) struct ExplorationDesk {
     explorer: Explorer,
-    /// How many were begun.
-    count: u64,
-    /// The last one, if it is not forgotten.
-    number: Option<u64>,
-    pending: Option<Standing>,
-    failed: Option<String>,
+    course: Course,
     exporting: Vec<u64>,
     followed: Option<usize>,
     /// Where searches are saved that have no place of their own.
@@ -64,10 +60,7 @@ impl ExplorationDesk {
     pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         Ok(Self {
             explorer: Explorer::spawn(wake)?,
-            count: 0,
-            number: None,
-            pending: None,
-            failed: None,
+            course: Course::default(),
             exporting: Vec::new(),
             followed: None,
             folder: None,
@@ -120,28 +113,21 @@ impl ExplorationDesk {
     }
 
     fn next(&mut self) -> u64 {
-        self.count += 1;
-        self.number = Some(self.count);
-        self.failed = None;
-        self.pending = None;
         self.left = None;
-        self.count
+        self.course.begin()
     }
 
     /// Lets the search stand otherwise once its round is done; one that has ended stays so.
     fn stand(&mut self, standing: Standing) {
         let ended = self.run().is_some_and(|run| !run.is_under_way());
-        if self.number.is_some() && self.failed.is_none() && !ended {
-            self.pending = Some(standing);
+        if self.course.turn(standing, ended) {
             self.explorer.stand(standing);
         }
     }
 
     fn clear(&mut self) {
         self.explorer.clear();
-        self.number = None;
-        self.pending = None;
-        self.failed = None;
+        self.course.forget();
         self.followed = None;
         self.asked = None;
     }
@@ -174,19 +160,13 @@ impl ExplorationDesk {
     pub(super) fn told(&mut self) -> Vec<Told> {
         let mut told = self.explorer.told();
         told.retain(|told| match told {
-            Told::Now(number, _) | Told::Failed(number, _) => Some(*number) == self.number,
+            Told::Now(number, _) | Told::Failed(number, _) => self.course.is(*number),
             Told::Refused(_) | Told::Written(..) | Told::NotWritten(..) | Told::NotSaved(_) => true,
         });
         for told in &told {
             match told {
-                Told::Failed(_, why) => {
-                    self.failed = Some(why.clone());
-                    self.pending = None;
-                }
-                // What it stands as now may be older than what it was told since.
-                Told::Now(_, now) if Some(*now) == self.pending || !now.can_go_on() => {
-                    self.pending = None;
-                }
+                Told::Failed(_, why) => self.course.fails(why),
+                Told::Now(_, now) => self.course.stands(*now),
                 Told::Written(number, ..) | Told::NotWritten(number, _) => {
                     self.exporting.retain(|exporting| exporting != number);
                 }
@@ -199,7 +179,7 @@ impl ExplorationDesk {
     /// Has the design judged, once for each, as long as there is something to compare it with.
     pub(super) fn keep_up(&mut self, lens: &Arc<Lens>) {
         let known = self.asked.as_ref().is_some_and(|asked| Arc::ptr_eq(asked, lens));
-        if self.number.is_some() && !known {
+        if self.course.is_there() && !known {
             self.asked = Some(Arc::clone(lens));
             self.explorer.judge(Arc::clone(lens));
         }
@@ -208,12 +188,12 @@ impl ExplorationDesk {
     pub(super) fn view(&self) -> Explorations {
         let run = self.run();
         Explorations {
-            starting: self.number.is_some() && run.is_none() && self.failed.is_none(),
+            starting: self.course.is_starting(run.is_some()),
             run,
-            pending: self.pending,
+            pending: self.course.pending(),
             followed: self.followed,
             here: self.explorer.judged().filter(|_| self.asked.is_some()),
-            failed: self.failed.clone(),
+            failed: self.course.failed(),
             exporting: self.exporting.clone(),
             place: self.place.clone(),
             left: self.left.clone(),
@@ -221,7 +201,7 @@ impl ExplorationDesk {
     }
 
     fn run(&self) -> Option<Arc<Exploration>> {
-        self.explorer.run().filter(|run| Some(run.number) == self.number)
+        self.explorer.run().filter(|run| self.course.is(run.number))
     }
 }
 

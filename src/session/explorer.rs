@@ -5,8 +5,9 @@
 
 use super::background::{Background, Outbox, Work, guarded, pool};
 use super::clock::{Pace, Timed, timed};
-use super::exploration::{Ending, Exploration, History};
+use super::exploration::{Ending, Exploration};
 use super::judged::Judged;
+use super::moments::History;
 use super::quest::{Engine, Explores, Quest};
 use super::slot::Slot;
 use super::worker::Standing;

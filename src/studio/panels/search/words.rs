@@ -8,7 +8,7 @@ use crate::search::{Ended, Node, Offer, Over};
 use crate::session::{Checkpoint, Ending, Exploration, Found, Judged, Standing, View};
 use crate::studio::number;
 use crate::studio::panels::optimizer::changes;
-use crate::studio::wording::counted_from_one;
+use crate::studio::wording::{self, counted_from_one};
 
 fn short(value: f64) -> String {
     number::show_digits(value, 4)
@@ -26,22 +26,16 @@ fn counted(count: u64, what: &str) -> String {
 
 /// How the search stands, and what it has come to.
 pub(super) fn standing(run: &Exploration, pending: Option<Standing>) -> String {
-    let standing = match run.standing {
-        _ if pending == Some(Standing::Paused) => "Pausing…",
-        _ if pending == Some(Standing::Stopped) => "Stopping…",
-        Standing::Running => "Running",
-        Standing::Paused => "Paused",
-        Standing::Stopped => "Stopped",
-        Standing::Finished => match run.over {
-            Some(Ending::Time) => "Finished: its time is up",
-            Some(Ending::Over(Over::Moves | Over::Gradients)) => "Finished: its limit is reached",
-            Some(Ending::Over(Over::Done)) => "Finished: everything is tried",
-            Some(Ending::Over(Over::Stuck)) => "Finished: no mutation applies any more",
-            Some(Ending::Over(Over::Stopped)) | None => "Finished",
-        },
+    let why = match run.over {
+        Some(Ending::Time) => ": its time is up",
+        Some(Ending::Over(Over::Moves | Over::Gradients)) => ": its limit is reached",
+        Some(Ending::Over(Over::Done)) => ": everything is tried",
+        Some(Ending::Over(Over::Stuck)) => ": no mutation applies any more",
+        Some(Ending::Over(Over::Stopped)) | None => "",
     };
+    let standing = wording::standing(run.standing, pending);
     let (from, to) = (merit(run.start.merit), merit(run.best.merit));
-    format!("{standing}, merit {from} to {to}")
+    format!("{standing}{why}, merit {from} to {to}")
 }
 
 /// How much it has done, and how fast.
