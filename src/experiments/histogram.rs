@@ -131,7 +131,7 @@ mod tests {
             let mut bins = vec![0.0; 10];
             for _ in 0..30 {
                 let bin = grid.bin(&[random.random::<f64>().powf(power)]);
-                bins[bin] += random.random_range(1..5) as f64;
+                bins[bin] += f64::from(random.random_range(1..5));
             }
             bins
         };

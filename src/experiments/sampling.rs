@@ -44,8 +44,8 @@ const PRINTED: [f64; 2] = [0.1, 1.0];
 const RESERVOIR: Regeneration = Regeneration::Reservoir { gamma: 0.02, size: 5 };
 /// The surprise that one in a thousand tests of the truth has, in standard deviations.
 const LIKELY: f64 = 3.1;
-/// One that no test of the truth has.
-const UNLIKELY: f64 = 10.0;
+/// One that no test of the truth has: one in three millions.
+const UNLIKELY: f64 = 5.0;
 
 /// A process under test.
 #[derive(Debug, Clone, Copy)]
@@ -329,6 +329,7 @@ fn curves(study: &Study, found: &[Sampled]) -> Canvas {
 fn maps(study: &Study, found: &[Sampled]) -> Canvas {
     let cell = 48;
     let size = (cell * study.grid.bins) as f64;
+    let [gap, back] = study.toy.pair;
     let mut canvas = Canvas::new([2 * (size as u32 + 80), 2 * (size as u32 + 80)]);
     let darkest = study.target.iter().copied().fold(0.0, f64::max);
     for (i, (name, shares)) in shown(study, found).into_iter().enumerate() {
@@ -336,6 +337,8 @@ fn maps(study: &Study, found: &[Sampled]) -> Canvas {
         canvas.text([corner[0], corner[1] - 24.0], name, BLACK, Align::Left);
         let tones: Vec<_> = shares.iter().map(|share| grey(1.0 - share / darkest)).collect();
         canvas.raster(corner, study.grid.bins, cell, &tones);
+        let ends = format!("gap {} to {} mm, down {} to {} mm", gap[0], gap[1], back[0], back[1]);
+        canvas.text([corner[0], corner[1] + size + 6.0], &ends, BLACK, Align::Left);
     }
     canvas
 }

@@ -13,6 +13,7 @@ mod optimize;
 mod process;
 mod rates;
 mod rounding;
+mod search;
 mod spot;
 mod trace;
 
@@ -27,5 +28,6 @@ pub use optimize::{StepCosts, StepRow, step_costs};
 pub use process::{age_ms, processor_ms};
 pub use rates::Rate;
 pub use rounding::{Rounding, rounding};
+pub use search::{Mark, Race, SearchRow, Searches, searches};
 pub use spot::{NoCurves, Precision, Pupil, Sampling, SpotCurves, SpotRow, spot_curves};
 pub use trace::{Throughput, TraceRow, Unmeasured, throughput};

@@ -4,7 +4,7 @@
 //! back as a list. So chains take their turns at the same time, and the lists are read in the order
 //! of the chains.
 
-use super::metropolis::Walk;
+use super::metropolis::{Scale, Walk};
 use super::reservoir::Entry;
 use super::{
     Ended, Kind, Landscape, Method, Mutated, Random, Refusal, Reservoir, Settings, Temperature,
@@ -12,6 +12,7 @@ use super::{
 };
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// How often a turn tries to find a point to begin from.
 const ATTEMPTS: usize = 16;
@@ -24,6 +25,7 @@ pub struct Chain<P, M> {
     pub(super) number: u64,
     pub(super) tour: Option<Tour<P, M>>,
     pub(super) task: Option<Task>,
+    pub(super) scales: BTreeMap<String, Scale>,
 }
 
 /// A descent that goes on.

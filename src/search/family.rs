@@ -4,6 +4,9 @@ use super::{Kind, Offer};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
+/// No line of ancestors is remembered further back.
+const LINE: usize = 1000;
+
 /// Where a descent began, and what became of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Node<P> {
@@ -59,12 +62,14 @@ pub struct Tree<P> {
     nodes: Vec<Node<P>>,
     next: u64,
     remembered: usize,
+    /// How many there had been when the last ones were forgotten.
+    tidied: u64,
 }
 
 impl<P> Tree<P> {
     /// A tree without nodes that remembers so many of those that are no ancestors.
     pub(super) fn new(remembered: usize) -> Self {
-        Self { nodes: Vec::new(), next: 0, remembered }
+        Self { nodes: Vec::new(), next: 0, remembered, tidied: 0 }
     }
 
     /// The nodes that are remembered, in the order of their numbers.
@@ -100,19 +105,21 @@ impl<P> Tree<P> {
         number
     }
 
-    /// Forgets the oldest of those that are neither these nor their ancestors. It works now and
-    /// then only: there may be twice as many as are wanted.
-    pub(super) fn forget(&mut self, kept: impl Iterator<Item = u64>) {
-        if self.nodes.len() <= 2 * self.remembered {
+    /// Forgets the oldest generations but those that are held with their ancestors, and those that
+    /// live. It works now and then only: there may be twice as many as are wanted.
+    pub(super) fn forget(
+        &mut self,
+        held: impl Iterator<Item = u64>,
+        living: impl Iterator<Item = u64>,
+    ) {
+        if self.next - self.tidied <= self.remembered as u64 {
             return;
         }
-        let kept: BTreeSet<u64> =
-            kept.flat_map(|number| self.line(number).map(|node| node.number)).collect();
-        let others = self.nodes.len().saturating_sub(kept.len());
-        if others <= 2 * self.remembered {
-            return;
-        }
-        let mut surplus = others - self.remembered;
+        self.tidied = self.next;
+        let lines = held.flat_map(|number| self.line(number).take(LINE).map(|node| node.number));
+        let kept: BTreeSet<u64> = lines.chain(living).collect();
+        let others = self.nodes.iter().filter(|node| !kept.contains(&node.number)).count();
+        let mut surplus = others.saturating_sub(self.remembered);
         self.nodes.retain(|node| {
             let stays = surplus == 0 || kept.contains(&node.number);
             surplus -= usize::from(!stays);

@@ -11,57 +11,81 @@ use rand::RngExt as _;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// Where a walk stands: variables and gradient, and the mean square of all gradients so far.
+/// Where a walk stands: the structure, variables and gradient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Walk {
+    topology: String,
     values: Vec<f64>,
     gradient: Vec<f64>,
+}
+
+/// The mean square of all gradients that a chain took of a structure. It outlives the visits: one
+/// that began anew with each would depend on where the visit began, for ever.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Scale {
     square: Vec<f64>,
     count: u64,
 }
 
-impl Walk {
-    /// None where the gradient is no number.
-    fn new(slope: Slope) -> Option<Self> {
-        let square: Vec<f64> = slope.gradient.iter().map(|g| g * g).collect();
-        let finite = square.iter().chain(&slope.values).all(|number| number.is_finite());
-        let Slope { values, gradient, .. } = slope;
-        finite.then_some(Self { values, gradient, square, count: 1 })
+impl Scale {
+    /// Counts a gradient.
+    fn adapt(&mut self, gradient: &[f64]) {
+        if self.square.len() != gradient.len() {
+            *self = Self { square: vec![0.0; gradient.len()], count: 0 };
+        }
+        self.count += 1;
+        let part = 1.0 / self.count as f64;
+        for (v, g) in self.square.iter_mut().zip(gradient) {
+            *v += (g * g - *v) * part;
+        }
     }
 
     /// `ε M` of every variable.
     fn variances(&self, settings: &Langevin) -> Vec<f64> {
         self.square.iter().map(|v| settings.epsilon / (v.sqrt() + settings.floor)).collect()
     }
-
-    /// Counts the gradient at the present place, whether the walk moved or not.
-    fn adapt(&mut self) {
-        self.count += 1;
-        let part = 1.0 / self.count as f64;
-        for (v, g) in self.square.iter_mut().zip(&self.gradient) {
-            *v += (g * g - *v) * part;
-        }
-    }
 }
 
-/// The logarithm of the density of a step from one place to another, up to what both ways share.
-fn log_step(from: &[f64], gradient: &[f64], to: &[f64], variances: &[f64]) -> f64 {
-    let each = |i: usize| {
-        let off = to[i] - from[i] + variances[i] * gradient[i];
-        off * off / variances[i]
-    };
-    -0.5 * (0..from.len()).map(each).sum::<f64>()
+/// Langevin steps of these variances, which drift down by a part of variance times gradient.
+struct Steps {
+    variances: Vec<f64>,
+    drift: f64,
+}
+
+impl Steps {
+    /// Where a step leads without noise.
+    fn mean(&self, from: &[f64], gradient: &[f64]) -> Vec<f64> {
+        let place = |i: usize| from[i] - self.drift * self.variances[i] * gradient[i];
+        (0..from.len()).map(place).collect()
+    }
+
+    fn step(&self, from: &[f64], gradient: &[f64], random: &mut Random) -> Vec<f64> {
+        let mut noise = |v: &f64| v.sqrt() * random.sample::<f64, _>(StandardNormal);
+        let mean = self.mean(from, gradient).into_iter().zip(&self.variances);
+        mean.map(|(place, variance)| place + noise(variance)).collect()
+    }
+
+    /// The logarithm of the density of a step from one place to another, up to what both ways
+    /// share.
+    fn log_density(&self, from: &[f64], gradient: &[f64], to: &[f64]) -> f64 {
+        let mean = self.mean(from, gradient);
+        let each = |i: usize| (to[i] - mean[i]).powi(2) / self.variances[i];
+        -0.5 * (0..from.len()).map(each).sum::<f64>()
+    }
 }
 
 impl<L: Landscape> Shared<'_, L> {
     /// A mutation or a Langevin step, accepted or not.
     pub(super) fn walk(&self, chain: &mut Chain<L::Point, L::Memory>, turn: &mut Turn<L>) {
-        let Some(tour) = &mut chain.tour else { return };
+        if chain.tour.is_none() {
+            return;
+        }
         if chain.random.random::<f64>() < self.settings.metropolis.mutation {
             self.jump(chain, turn);
             return;
         }
-        let (accepted, gradients) = self.step(tour, &mut chain.random);
+        let (accepted, gradients) = self.step(chain);
+        let Some(tour) = &mut chain.tour else { return };
         tour.moves += 1;
         tour.gradients += gradients;
         let (loss, best) = (tour.loss, tour.best_loss);
@@ -72,38 +96,44 @@ impl<L: Landscape> Shared<'_, L> {
         }
     }
 
+    /// Where a walk begins; none where there is no gradient.
+    fn set_out(&self, point: &L::Point) -> Option<Walk> {
+        let Slope { values, gradient, .. } = self.landscape.slope(point)?;
+        let topology = self.landscape.topology(point);
+        is_small(&gradient).then_some(Walk { topology, values, gradient })
+    }
+
     /// A Langevin step; whether it was accepted, and the gradients it took.
-    fn step(&self, tour: &mut Tour<L::Point, L::Memory>, random: &mut Random) -> (bool, u64) {
-        let (walk, first) = match tour.walk.take() {
-            Some(walk) => (walk, 0),
-            None => match self.landscape.slope(&tour.point).and_then(Walk::new) {
-                Some(walk) => (walk, 1),
-                None => return (false, 1),
-            },
+    fn step(&self, chain: &mut Chain<L::Point, L::Memory>) -> (bool, u64) {
+        let Chain { tour: Some(tour), random, scales, .. } = chain else { return (false, 0) };
+        let first = u64::from(tour.walk.is_none());
+        let Some(mut walk) = tour.walk.take().or_else(|| self.set_out(&tour.point)) else {
+            return (false, 1);
         };
-        let walk = tour.walk.insert(walk);
-        let variances = walk.variances(&self.settings.metropolis);
-        let noise = |variance: &f64| variance.sqrt() * random.sample::<f64, _>(StandardNormal);
-        let noise: Vec<f64> = variances.iter().map(noise).collect();
-        let place = |i: usize| walk.values[i] - variances[i] * walk.gradient[i] + noise[i];
-        let values: Vec<f64> = (0..walk.values.len()).map(place).collect();
+        let scale = scales.entry(walk.topology.clone()).or_default();
+        if scale.square.len() != walk.gradient.len() {
+            scale.adapt(&walk.gradient);
+        }
+        let steps = Steps {
+            variances: scale.variances(&self.settings.metropolis),
+            drift: (0.5 / self.temperature.value()).min(1.0),
+        };
+        let values = steps.step(&walk.values, &walk.gradient, random);
         let point = self.landscape.with_values(&tour.point, &values);
         let next = point.and_then(|point| Some((self.landscape.slope(&point)?, point)));
         let mut accepted = false;
-        if let Some((slope, point)) = next {
-            let way = log_step(&walk.values, &walk.gradient, &values, &variances);
-            let back = log_step(&values, &slope.gradient, &walk.values, &variances);
+        if let Some((slope, point)) = next.filter(|(slope, _)| is_small(&slope.gradient)) {
+            let way = steps.log_density(&walk.values, &walk.gradient, &values);
+            let back = steps.log_density(&values, &slope.gradient, &walk.values);
             let chance = self.temperature.log_ratio(tour.loss, slope.loss) + back - way;
-            let squares = slope.gradient.iter().all(|g| (g * g).is_finite());
-            accepted = squares && random.random::<f64>().ln() < chance;
+            accepted = random.random::<f64>().ln() < chance;
             if accepted {
                 (walk.values, walk.gradient) = (values, slope.gradient);
                 tour.go(point, slope.loss);
             }
         }
-        if let Some(walk) = &mut tour.walk {
-            walk.adapt();
-        }
+        scale.adapt(&walk.gradient);
+        tour.walk = Some(walk);
         (accepted, first + 1)
     }
 
@@ -137,4 +167,9 @@ fn pass_on<P: Clone, M>(chain: &mut Chain<P, M>, next: Tour<P, M>, turn: &mut Ve
     let birth = Birth { parent, kind: None, what, before: Some(loss), loss, point };
     turn.push(Happening::Born(birth));
     chain.tour = Some(next);
+}
+
+/// Whether the squares of a gradient are numbers.
+fn is_small(gradient: &[f64]) -> bool {
+    gradient.iter().all(|g| (g * g).is_finite())
 }

@@ -108,6 +108,6 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         let held = self.reservoir.entries().iter().chain(&self.pinned).chain([&self.best]);
         let held = held.map(|entry| entry.number);
         let living = self.chains.iter().map(|chain| chain.number);
-        self.tree.forget(held.chain(living));
+        self.tree.forget(held, living);
     }
 }

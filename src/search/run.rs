@@ -13,7 +13,7 @@ use super::{
 use rand::SeedableRng as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// So many rounds in a row without a move end a run.
 const IDLE: u64 = 100;
@@ -263,7 +263,7 @@ fn chains<P, M>(settings: &Settings) -> Vec<Chain<P, M>> {
     let mut random = Random::seed_from_u64(settings.seed);
     let mut next = || {
         random.long_jump();
-        Chain { random: random.clone(), number: 0, tour: None, task: None }
+        Chain { random: random.clone(), number: 0, tour: None, task: None, scales: BTreeMap::new() }
     };
     (0..settings.chains).map(|_| next()).collect()
 }

@@ -119,8 +119,11 @@ pub enum Method {
 }
 
 /// Langevin steps: (4.10) with a diagonal preconditioner `M`,
-/// `θ' = θ − ε M ∇L + √(ε M) ξ`, `M = 1 / (√v + floor)`, `v` the mean square of all gradients so
-/// far of this structure.
+/// `θ' = θ − ε M ∇L min(1, 1/(2 T)) + √(ε M) ξ`, `M = 1 / (√v + floor)`, `v` the mean square of all
+/// gradients so far of this structure.
+///
+/// The printed step is the Langevin step of temperature ½; any drift samples the target, but one of
+/// a lower temperature than the target's hardly ever leaves its slopes.
 ///
 /// A gradient changes that mean by its part of all, so that adaptation fades, which convergence
 /// asks for. Dividing `√v` by the number of gradients would fade too, but let `M` grow to 1/floor

@@ -27,20 +27,20 @@ fn text(bytes: &[u8]) -> String {
 }
 
 /// What it prints when it does its work.
-fn done(arguments: &[&str], input: &str) -> String {
+pub(super) fn done(arguments: &[&str], input: &str) -> String {
     let output = aplanat(arguments, input);
     let errors = text(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {errors}");
     text(&output.stdout)
 }
 
-fn done_json(arguments: &[&str], input: &str) -> Value {
+pub(super) fn done_json(arguments: &[&str], input: &str) -> Value {
     let out = done(&[arguments, &["--json"]].concat(), input);
     serde_json::from_str(&out).unwrap_or_else(|e| panic!("{arguments:?}: {e} in {out}"))
 }
 
 /// What it says when it ends with this status, which must contain these words.
-fn refused(status: i32, arguments: &[&str], input: &str, words: &[&str]) {
+pub(super) fn refused(status: i32, arguments: &[&str], input: &str, words: &[&str]) {
     let output = aplanat(arguments, input);
     let errors = text(&output.stderr);
     assert_eq!(output.status.code(), Some(status), "{arguments:?}: {errors}");
@@ -51,7 +51,7 @@ fn refused(status: i32, arguments: &[&str], input: &str, words: &[&str]) {
     assert!(!errors.contains("panicked"), "{errors}");
 }
 
-fn has_keys(value: &Value, keys: &[&str]) {
+pub(super) fn has_keys(value: &Value, keys: &[&str]) {
     for key in keys {
         assert!(value.get(key).is_some(), "no key `{key}` in {value}");
     }
@@ -63,20 +63,20 @@ fn temporary(name: &str) -> PathBuf {
 }
 
 /// A file that is gone when the test ends.
-struct Scratch(PathBuf);
+pub(super) struct Scratch(pub(super) PathBuf);
 
 impl Scratch {
-    fn new(name: &str) -> Self {
+    pub(super) fn new(name: &str) -> Self {
         Self(temporary(name))
     }
 
-    fn with(name: &str, text: &str) -> Self {
+    pub(super) fn with(name: &str, text: &str) -> Self {
         let scratch = Self::new(name);
         std::fs::write(&scratch.0, text).unwrap();
         scratch
     }
 
-    fn path(&self) -> &str {
+    pub(super) fn path(&self) -> &str {
         self.0.to_str().unwrap()
     }
 }

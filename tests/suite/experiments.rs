@@ -120,3 +120,15 @@ fn zoom_lenses_get_better_between_their_positions_too() {
     let [start, now] = ["start_blur_mm", "blur_mm"].map(|name| column(&outcome.tables[0], name));
     assert!(start.iter().zip(&now).all(|(start, now)| now < start));
 }
+
+#[test]
+fn the_exact_rate_samples_the_target_and_the_printed_one_does_not() {
+    let outcome = outcome("4.1");
+    let [time, count] =
+        ["distance_by_time", "distance_by_count"].map(|name| column(&outcome.tables[0], name));
+    // The exact rate is the first process on each toy.
+    for first in [0, time.len() / 2] {
+        assert!(time[first] < 0.02 && count[first] > 0.04, "{} {}", time[first], count[first]);
+        assert!(time[first + 1..time.len() / 2 + first].iter().all(|other| *other > time[first]));
+    }
+}

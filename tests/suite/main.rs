@@ -20,6 +20,7 @@ mod pupil;
 mod reference;
 mod rims;
 mod search;
+mod search_cli;
 mod session;
 mod session_front;
 mod session_search;

@@ -3,6 +3,7 @@
 mod gradient;
 mod optimize;
 mod plot;
+mod search;
 mod spot;
 mod trace;
 mod window;
@@ -25,6 +26,7 @@ enum What {
     Spot(spot::Spot),
     Gradient(gradient::Gradient),
     Optimize(optimize::Optimize),
+    Search(Box<search::Search>),
     Window(window::Window),
 }
 
@@ -35,6 +37,7 @@ impl Measure {
             What::Spot(spot) => spot.run(output),
             What::Gradient(gradient) => gradient.run(output),
             What::Optimize(optimize) => optimize.run(output),
+            What::Search(search) => search.run(output),
             What::Window(window) => window.run(output),
         }
     }

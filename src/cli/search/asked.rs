@@ -12,7 +12,7 @@ use std::str::FromStr;
 
 /// What a search may do and aims at.
 #[derive(Debug, clap::Args)]
-pub(super) struct Asked {
+pub(in crate::cli) struct Asked {
     /// What to aim at, as JSON; sharp spots with the light it has, at its focal length, where absent
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
@@ -21,9 +21,15 @@ pub(super) struct Asked {
     #[arg(long, value_name = "MM", conflicts_with = "goal")]
     focal_length: Option<f64>,
 
-    /// How much of its light every field keeps
-    #[arg(long, value_name = "SHARE", default_value_t = 1.0, conflicts_with = "goal")]
-    light: f64,
+    /// How much of its light every field keeps: one share, or one for each field
+    #[arg(
+        long,
+        value_name = "SHARES",
+        default_value = "1",
+        value_delimiter = ',',
+        conflicts_with = "goal"
+    )]
+    light: Vec<f64>,
 
     /// What the search may do and a factory can make, as JSON
     #[arg(long, value_name = "FILE")]
@@ -168,9 +174,10 @@ fn positive(name: &str, value: Option<f64>) -> Result<Option<f64>, Failure> {
 }
 
 impl Asked {
-    pub(super) fn plan(&self) -> Result<Plan, Failure> {
-        let mut plan = Plan { rules: self.rules()?, light: self.light, ..Plan::default() };
-        positive("--light", Some(self.light))?;
+    pub(in crate::cli) fn plan(&self) -> Result<Plan, Failure> {
+        let rules = self.rules()?;
+        let mut plan = Plan { rules, light: self.light.clone(), ..Plan::default() };
+        self.light.iter().try_for_each(|share| positive("--light", Some(*share)).map(drop))?;
         plan.focal_length = match self.focal_length {
             Some(focal) if focal == 0.0 || !focal.is_finite() => {
                 let text = format!("--focal-length: found {focal}; expected a number other than 0");
@@ -224,7 +231,7 @@ impl Asked {
     }
 
     /// The lens that the search starts from.
-    pub(super) fn start(&self, lens: &Lens) -> Result<Lens, Failure> {
+    pub(in crate::cli) fn start(&self, lens: &Lens) -> Result<Lens, Failure> {
         let mut start = lens.clone();
         if self.free {
             start.variables.clear();

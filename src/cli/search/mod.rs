@@ -3,6 +3,8 @@
 mod asked;
 mod report;
 
+pub(super) use asked::Asked;
+
 use super::failure::Failure;
 use super::input::{self, LensFile};
 use super::optimize::{progress_bar, stop_flag};
@@ -50,6 +52,10 @@ pub(super) struct Search {
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
 
+    /// Seconds between two savings
+    #[arg(long, value_name = "SECONDS", default_value_t = SAVED, requires = "checkpoint")]
+    checkpoint_every: f64,
+
     /// The folder into which every lens of the reservoir is written
     #[arg(long, value_name = "FOLDER")]
     reservoir_dir: Option<PathBuf>,
@@ -59,7 +65,7 @@ pub(super) struct Search {
     finish: bool,
 
     #[command(flatten)]
-    asked: asked::Asked,
+    asked: Asked,
 }
 
 /// The samplers.
@@ -157,6 +163,11 @@ impl Search {
             let text = format!("--minutes: found {minutes}; expected more than 0");
             return Err(Failure::Input(text));
         }
+        if !(self.checkpoint_every >= 0.0) {
+            let text =
+                format!("--checkpoint-every: found {}; expected 0 or more", self.checkpoint_every);
+            return Err(Failure::Input(text));
+        }
         if self.iterations == Some(0) {
             return Err(Failure::Input("--iterations: found 0; expected 1 or more".into()));
         }
@@ -224,7 +235,7 @@ impl Search {
             run.round(landscape);
             bar.set_position(run.statistics().gradients);
             bar.set_message(format!("merit {}", Number(run.best().loss)));
-            if watch.seconds() - saved >= SAVED {
+            if watch.seconds() - saved >= self.checkpoint_every {
                 self.save(landscape, run)?;
                 saved = watch.seconds();
             }

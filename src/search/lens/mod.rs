@@ -148,6 +148,29 @@ impl LensLandscape {
         })
     }
 
+    /// The same landscape, in which what every field had at the start counts as so many times as
+    /// much; no shares leave it as it is.
+    ///
+    /// # Errors
+    /// Not as many shares as fields, or one that is not positive.
+    pub fn asking_each(mut self, shares: &[f64]) -> Result<Self, NoLandscape> {
+        if shares.is_empty() {
+            return Ok(self);
+        }
+        let fields = (0..self.start.zoom_positions()).map(|z| self.start.fields_at(z).values.len());
+        let fits = fields.into_iter().all(|count| count == shares.len());
+        if !fits || shares.iter().any(|share| !(*share > 0.0 && share.is_finite())) {
+            let found = format!("{shares:?}");
+            let expected = "a share above 0 for each field";
+            return Err(NoLandscape::Setting { what: "the light", found, expected });
+        }
+        let sampled = self.merit(&self.start, self.local.tolerance)?.sampled();
+        for (light, pupil) in self.light.iter_mut().flatten().zip(sampled) {
+            *light *= shares[pupil.field];
+        }
+        Ok(self)
+    }
+
     /// The lens at the start: limited by its stop, held numbers marked by bounds that coincide.
     pub fn start(&self) -> &Lens {
         &self.start
@@ -310,6 +333,7 @@ impl Landscape for LensLandscape {
             "goal": self.goal,
             "rules": self.rules,
             "local": self.local,
+            "light": self.light,
         })
     }
 

@@ -15,8 +15,9 @@ pub struct Plan {
     pub goal: Option<Goal>,
     /// The focal length in mm that the usual goal asks for; none for what the lens has.
     pub focal_length: Option<f64>,
-    /// How much of its light every field keeps by the usual goal.
-    pub light: f64,
+    /// How much of its light every field keeps by the usual goal: one share for all, or one for
+    /// each field.
+    pub light: Vec<f64>,
     /// What may be done, and what a factory can make.
     pub rules: Rules,
     /// How lenses descend.
@@ -30,10 +31,10 @@ impl Default for Plan {
         Self {
             goal: None,
             focal_length: None,
-            light: 1.0,
+            light: vec![1.0],
             rules: Rules::default(),
             local: Local::default(),
-            settings: Settings { c: 0.02, ..Settings::default() },
+            settings: Settings { c: 0.005, ..Settings::default() },
         }
     }
 }
@@ -55,9 +56,13 @@ impl Plan {
     /// # Errors
     /// A lens without merit, rules or settings without meaning.
     pub fn landscape(&self, lens: &Lens) -> Result<LensLandscape, NoLandscape> {
-        let usual = || goal(lens, &self.rules, self.focal_length, self.light);
+        let (common, each) = match self.light[..] {
+            [share] => (share, &[][..]),
+            _ => (1.0, &self.light[..]),
+        };
+        let usual = || goal(lens, &self.rules, self.focal_length, common);
         let goal = self.goal.clone().map_or_else(usual, Ok)?;
-        LensLandscape::new(lens, &goal, &self.rules, &self.local)
+        LensLandscape::new(lens, &goal, &self.rules, &self.local)?.asking_each(each)
     }
 
     /// The settings, with the temperature that this landscape calls for where none is given.

@@ -1,14 +1,14 @@
 //! A new singlet in an air gap: close to the surface in front of it or behind it, in random glass,
 //! with little power.
 
-use super::super::element::{filled, pieces};
-use super::super::projection::Map;
-use super::super::{Random, Rules};
 use super::chance::{Length, allowed, coin, log_normal, normal, pick};
 use super::draft::{Back, Draft, Scene, filling, hangs, is_gap, is_solved, sense, shortest};
 use super::{Kind, remove};
 use crate::lens::glass::Glass;
 use crate::lens::{Lens, Medium, Object, Row};
+use crate::search::element::{filled, pieces};
+use crate::search::projection::Map;
+use crate::search::{Random, Rules};
 
 /// How often the rest of the lens keeps its place where the gap has room; else it makes way.
 pub(super) const KEEPS: f64 = 0.9;

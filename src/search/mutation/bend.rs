@@ -1,12 +1,12 @@
 //! Every curvature of an element changes by as much: a thin one keeps its power.
 
-use super::super::element::{Element, Make, elements};
-use super::super::projection::Map;
-use super::super::{Random, Rules};
 use super::Kind;
 use super::chance::{coin, normal, pick};
 use super::draft::{Back, Draft, Scene, hangs};
 use crate::lens::{Lens, Parameter, Quantity};
+use crate::search::element::{Element, Make, elements};
+use crate::search::projection::Map;
+use crate::search::{Random, Rules};
 
 /// Which elements may be bent.
 pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String> {

@@ -1,8 +1,8 @@
 //! What new numbers are drawn from, each with its density.
 
-use super::super::{Random, Rules};
 use crate::lens::Lens;
 use crate::lens::glass::{self, Glass};
+use crate::search::{Random, Rules};
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
 

@@ -1,9 +1,9 @@
 //! A lens while it is being changed: where each number came from travels with the rows.
 
-use super::super::Rules;
-use super::super::projection::{Map, Origin, scale};
 use super::Kind;
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row, ZoomThickness, free};
+use crate::search::Rules;
+use crate::search::projection::{Map, Origin, scale};
 
 /// What a mutation is drawn from.
 #[derive(Debug)]
@@ -119,7 +119,7 @@ pub(super) fn shortest(lens: &Lens, row: usize) -> f64 {
 
 /// The sign of lengths behind a row: −1 where light runs back.
 pub(super) fn sense(lens: &Lens, row: usize) -> f64 {
-    if super::super::element::is_backwards(lens, row) { -1.0 } else { 1.0 }
+    if crate::search::element::is_backwards(lens, row) { -1.0 } else { 1.0 }
 }
 
 /// Whether the focus decides a gap.

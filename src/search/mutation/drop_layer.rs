@@ -1,10 +1,10 @@
 //! A cemented group loses its first or last piece; the air takes its place.
 
-use super::super::element::{Element, Make, elements, pieces};
-use super::super::{Random, Rules};
 use super::chance::pick;
 use super::draft::{Draft, Scene, hangs, is_gap, is_solved, sense};
 use crate::lens::{Lens, Quantity};
+use crate::search::element::{Element, Make, elements, pieces};
+use crate::search::{Random, Rules};
 
 /// A group and whether its first or its last piece goes.
 #[derive(Debug, Clone, Copy)]

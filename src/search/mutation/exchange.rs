@@ -1,14 +1,14 @@
 //! A piece of glass of the catalogue is made of another one with nearly the same index and Abbe
 //! number.
 
-use super::super::element::{Make, elements};
-use super::super::{Random, Rules};
 use super::Kind;
 use super::bend::either;
 use super::chance::{allowed, pick};
 use super::draft::{Back, Draft, Scene};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Lens, Medium};
+use crate::search::element::{Make, elements};
+use crate::search::{Random, Rules};
 use rand::RngExt as _;
 
 /// How far neighbours are in index.

@@ -1,13 +1,13 @@
 //! An element is turned around.
 
-use super::super::element::{Element, Make, elements};
-use super::super::projection::Origin;
-use super::super::{Random, Rules};
 use super::Kind;
 use super::bend::either;
 use super::chance::pick;
 use super::draft::{Back, Draft, Scene};
 use crate::lens::Lens;
+use crate::search::element::{Element, Make, elements};
+use crate::search::projection::Origin;
+use crate::search::{Random, Rules};
 
 /// Which elements may be turned.
 pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String> {

@@ -1,13 +1,13 @@
 //! Two neighbours become one cemented group: their facing surfaces become one of the mean curvature,
 //! and the air between them goes.
 
-use super::super::element::{Make, elements};
-use super::super::{Random, Rules};
 use super::Kind;
 use super::chance::pick;
 use super::draft::{Back, Draft, Scene, hangs, is_gap, is_plain, sense, zooms};
 use super::split::Cut;
 use crate::lens::{Lens, Parameter, Quantity};
+use crate::search::element::{Make, elements};
+use crate::search::{Random, Rules};
 
 /// More pieces than this are not cemented together.
 pub(super) const PIECES: usize = 3;

@@ -1,13 +1,13 @@
 //! An element less: what was glass becomes air, or what stood behind moves forward.
 
-use super::super::element::{Element, elements, pieces};
-use super::super::{Random, Rules};
 use super::Kind;
 use super::add::{self, KEEPS, Singlet};
 use super::chance::{allowed, coin, pick};
 use super::draft::{Back, Draft, Room, Scene, hangs, is_gap, is_plain, is_solved, sense, zooms};
 use crate::lens::glass;
 use crate::lens::{Lens, Medium, Object};
+use crate::search::element::{Element, elements, pieces};
+use crate::search::{Random, Rules};
 
 /// Which singlets may go.
 pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String> {

@@ -1,13 +1,13 @@
 //! A cemented interface becomes an air gap between two surfaces of nearly its curvature.
 
-use super::super::element::{Make, elements};
-use super::super::projection::Map;
-use super::super::{Random, Rules};
 use super::Kind;
 use super::chance::{Length, log_normal, normal, pick};
 use super::draft::{Back, Draft, Scene, hangs, is_plain, sense};
 use super::glue;
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row};
+use crate::search::element::{Make, elements};
+use crate::search::projection::Map;
+use crate::search::{Random, Rules};
 
 /// The random numbers of a new air gap.
 #[derive(Debug, Clone, Copy)]

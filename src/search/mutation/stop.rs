@@ -1,13 +1,13 @@
 //! The stop goes to another place in the air: along its gap, or to another one. What passes it on
 //! the axis stays what it was.
 
-use super::super::element::filled;
-use super::super::{Random, Rules};
 use super::Kind;
 use super::chance::pick;
 use super::draft::{Back, Draft, Scene, filling, hangs, is_gap, sense, shortest, zooms};
 use crate::lens::{Aperture, Lens, Medium, Object, Row};
 use crate::paraxial::{Beam, first_order};
+use crate::search::element::filled;
+use crate::search::{Random, Rules};
 use rand::RngExt as _;
 
 /// The row of a stop that is a plane in air and nothing else.

@@ -1,7 +1,15 @@
-//! Search over structure: mutations and their paraxial projection.
+//! Search over structure: mutations and their paraxial projection; chains, their reservoir, family
+//! tree and checkpoints, and what they sample; lenses as what is searched.
 
+mod chain;
+mod checkpoint;
+mod density;
+mod lens;
 mod mutations;
 mod projection;
+mod reservoir;
+mod rugged;
+mod sampling;
 
 use aplanat::search::{Random, Rules};
 use rand::SeedableRng as _;

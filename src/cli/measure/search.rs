@@ -1,0 +1,96 @@
+//! What searches come to in the same time.
+
+use crate::cli::failure::Failure;
+use crate::cli::input::LensFile;
+use crate::cli::output::{Number, Output, Table};
+use crate::cli::search::Asked;
+use crate::measure::{Machine, Race, SearchRow, Searches, searches};
+use crate::search::Method;
+use serde::Serialize;
+use std::fmt::{self, Display};
+
+/// Best merit against seconds: RESTORE, Metropolis and Hastings, brute force, several seeds; and what
+/// the tolerance of the spots does to it
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("../help/measure_search.txt"))]
+pub(super) struct Search {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// Seconds of each search
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    seconds: f64,
+
+    /// How many seeds
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    seeds: u64,
+
+    #[command(flatten)]
+    asked: Asked,
+}
+
+impl Search {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let Self { seconds, seeds, .. } = *self;
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            let text = format!("--seconds: found {seconds}; expected more than 0");
+            return Err(Failure::Input(text));
+        }
+        if seeds == 0 {
+            return Err(Failure::Input("--seeds: found 0; expected 1 or more".into()));
+        }
+        let opened = self.lens.open()?;
+        let plan = self.asked.plan()?;
+        let lens = self.asked.start(&opened.lens)?;
+        let found = searches(&lens, &plan, Race { seconds, seeds })
+            .map_err(|cause| Failure::Input(format!("{}: {cause}", opened.file)))?;
+        output.print(&Report { machine: Machine::here(), found })
+    }
+}
+
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    #[serde(flatten)]
+    found: Searches,
+}
+
+fn name(method: Method) -> &'static str {
+    match method {
+        Method::Restore => "RESTORE",
+        Method::Metropolis => "Metropolis-Hastings",
+        Method::Brute => "brute force",
+    }
+}
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Searches { race, start, methods, tolerances } = &self.found;
+        writeln!(f, "{}", self.machine)?;
+        let Race { seconds, seeds } = race;
+        writeln!(f, "{seeds} seeds of {seconds} s each; merit of the start {}", Number(*start))?;
+        writeln!(f, "merit of the best lens: median of the seeds, best to worst\n")?;
+        for (title, rows) in [("sampler", methods), ("RESTORE", tolerances)] {
+            let marks = rows.first().map_or(&[][..], |row| &row.marks);
+            let after = marks.iter().map(|mark| format!("after {} s", mark.seconds));
+            let head: Vec<String> = [title, "tolerance", "gradients"]
+                .map(str::to_owned)
+                .into_iter()
+                .chain(after)
+                .collect();
+            let head: Vec<&str> = head.iter().map(String::as_str).collect();
+            let mut table = Table::new(&head);
+            for SearchRow { method, tolerance, gradients, marks } in rows {
+                let start =
+                    [name(*method).to_owned(), tolerance.to_string(), gradients.to_string()];
+                let cells = marks.iter().map(|mark| {
+                    let [median, best, worst] = [mark.median, mark.best, mark.worst];
+                    format!("{median:.2e} ({best:.1e}..{worst:.1e})")
+                });
+                table.row(start.into_iter().chain(cells));
+            }
+            writeln!(f, "{table}")?;
+        }
+        Ok(())
+    }
+}

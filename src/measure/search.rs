@@ -1,0 +1,144 @@
+//! What a search has come to after how many seconds: its samplers, and the tolerance of the spots
+//! that it rests on.
+//!
+//! Every lens that is compared is judged anew by the same fine sampling, so that a search that sees
+//! less does not look better for it.
+
+use super::clock::Stopwatch;
+use crate::lens::Lens;
+use crate::merit::MeritError;
+use crate::search::lens::{LensLandscape, NoSearch, Plan};
+use crate::search::{Method, Run, SearchError, Settings};
+use serde::Serialize;
+
+/// The parts of the time after which a search is looked at.
+const MARKS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
+/// Tolerances that are compared.
+const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
+/// The tolerance by which lenses are compared.
+const JUDGED: f64 = 1e-4;
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Race {
+    /// Seconds of each search.
+    pub seconds: f64,
+    /// How many seeds, from 1 on.
+    pub seeds: u64,
+}
+
+/// A way to search.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SearchRow {
+    /// The sampler.
+    pub method: Method,
+    /// The tolerance of the spots that it rests on.
+    pub tolerance: f64,
+    /// Gradients of all seeds.
+    pub gradients: u64,
+    /// The merit after parts of the time.
+    pub marks: Vec<Mark>,
+}
+
+/// The merit of the best lens after some time, over the seeds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mark {
+    /// Seconds since the start.
+    pub seconds: f64,
+    /// The best of all seeds.
+    pub best: f64,
+    /// The median.
+    pub median: f64,
+    /// The worst.
+    pub worst: f64,
+}
+
+/// The race of the samplers, and of the tolerances.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Searches {
+    /// How long and how often.
+    pub race: Race,
+    /// The merit of the start.
+    pub start: f64,
+    /// The samplers at the tolerance that was asked for.
+    pub methods: Vec<SearchRow>,
+    /// RESTORE at other tolerances.
+    pub tolerances: Vec<SearchRow>,
+}
+
+/// Searches from a lens by every sampler and at every tolerance, for as many seconds each.
+///
+/// # Errors
+/// A lens that cannot be searched from.
+pub fn searches(lens: &Lens, plan: &Plan, race: Race) -> Result<Searches, NoSearch> {
+    let landscape = plan.landscape(lens)?;
+    let row = |method, tolerance, gradients| {
+        let mut plan = plan.clone();
+        (plan.local.tolerance, plan.local.coarse) = (tolerance, tolerance);
+        plan.settings = Settings { method, gradients, moves: None, ..plan.settings };
+        time(lens, &plan, race)
+    };
+    let usual = plan.local.tolerance;
+    let restore = row(Method::Restore, usual, None)?;
+    // Brute force divides what another method has needed for as long.
+    let share = restore.gradients / race.seeds.max(1);
+    let methods = vec![
+        restore,
+        row(Method::Metropolis, usual, None)?,
+        row(Method::Brute, usual, Some(share.max(1)))?,
+    ];
+    let tolerances = TOLERANCES.map(|tolerance| row(Method::Restore, tolerance, None));
+    let tolerances = tolerances.into_iter().collect::<Result<_, _>>()?;
+    let start = worth(&landscape, landscape.start()).unwrap_or(f64::INFINITY);
+    Ok(Searches { race, start, methods, tolerances })
+}
+
+fn worth(landscape: &LensLandscape, lens: &Lens) -> Result<f64, MeritError> {
+    let merit = landscape.merit(lens, JUDGED)?;
+    merit.value(&merit.values(&landscape.freed(lens)))
+}
+
+fn time(lens: &Lens, plan: &Plan, race: Race) -> Result<SearchRow, NoSearch> {
+    let mut gradients = 0;
+    let mut found: Vec<Vec<f64>> = vec![Vec::new(); MARKS.len()];
+    for seed in 1..=race.seeds {
+        let mut plan = plan.clone();
+        plan.settings.seed = seed;
+        gradients += one(lens, &plan, race.seconds, &mut found)?;
+    }
+    let mark = |(part, merits): (f64, &mut Vec<f64>)| {
+        merits.sort_by(f64::total_cmp);
+        let at = |i: usize| merits.get(i).copied().unwrap_or(f64::INFINITY);
+        Mark {
+            seconds: part * race.seconds,
+            best: at(0),
+            median: at(merits.len() / 2),
+            worst: at(merits.len().saturating_sub(1)),
+        }
+    };
+    let marks = MARKS.into_iter().zip(&mut found).map(mark).collect();
+    let (method, tolerance) = (plan.settings.method, plan.local.tolerance);
+    Ok(SearchRow { method, tolerance, gradients, marks })
+}
+
+/// One run; adds the merit of its best lens at every mark, and returns its gradients.
+fn one(lens: &Lens, plan: &Plan, seconds: f64, found: &mut [Vec<f64>]) -> Result<u64, NoSearch> {
+    let landscape = plan.landscape(lens)?;
+    let settings = plan.settings(&landscape);
+    let mut run = Run::new(&landscape, landscape.start().clone(), &settings)
+        .map_err(|cause: SearchError| NoSearch::from(cause))?;
+    let watch = Stopwatch::start();
+    let mut best: Vec<Lens> = Vec::new();
+    while best.len() < MARKS.len() {
+        let over = run.over().is_some();
+        if over || watch.seconds() >= MARKS[best.len()] * seconds {
+            best.push(run.best().point.clone());
+        } else {
+            run.round(&landscape);
+        }
+    }
+    for (merits, lens) in found.iter_mut().zip(&best) {
+        merits.push(worth(&landscape, lens).unwrap_or(f64::INFINITY));
+    }
+    Ok(run.statistics().gradients)
+}

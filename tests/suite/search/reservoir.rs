@@ -1,0 +1,77 @@
+//! The best points, at most one of each topology, no point twice.
+
+use aplanat::search::{Entry, Offer, Reservoir};
+
+fn entry(number: u64, loss: f64, topology: &str) -> Entry<u64> {
+    Entry { number, loss, topology: topology.to_owned(), point: number }
+}
+
+fn numbers(reservoir: &Reservoir<u64>) -> Vec<u64> {
+    let mut numbers: Vec<u64> = reservoir.entries().iter().map(|entry| entry.number).collect();
+    numbers.sort_unstable();
+    numbers
+}
+
+#[test]
+fn a_full_reservoir_gives_up_its_worst() {
+    let mut reservoir = Reservoir::new(3, true);
+    for (i, topology) in ["a", "b", "c"].into_iter().enumerate() {
+        assert_eq!(reservoir.offer(entry(i as u64, 3.0 - i as f64, topology)), Offer::Entered);
+    }
+    assert_eq!(reservoir.offer(entry(3, 3.0, "d")), Offer::BehindAll);
+    assert_eq!(reservoir.offer(entry(4, 2.5, "e")), Offer::Replaced(0));
+    assert_eq!(reservoir.offer(entry(5, 0.5, "f")), Offer::Replaced(4));
+    assert_eq!(numbers(&reservoir), [1, 2, 5]);
+    assert_eq!(reservoir.best().unwrap().number, 5);
+}
+
+#[test]
+fn a_twin_replaces_only_its_twin_and_only_if_it_is_better() {
+    let mut reservoir = Reservoir::new(3, true);
+    reservoir.offer(entry(0, 1.0, "a"));
+    reservoir.offer(entry(1, 9.0, "b"));
+    assert_eq!(reservoir.offer(entry(2, 1.0, "a")), Offer::BehindTwin(0));
+    assert_eq!(reservoir.offer(entry(3, 0.9, "a")), Offer::Replaced(0));
+    assert_eq!(reservoir.offer(entry(4, 5.0, "a")), Offer::BehindTwin(3));
+    assert_eq!(numbers(&reservoir), [1, 3]);
+}
+
+#[test]
+fn topologies_may_not_matter() {
+    let mut reservoir = Reservoir::new(2, false);
+    assert_eq!(reservoir.offer(entry(0, 1.0, "a")), Offer::Entered);
+    assert_eq!(reservoir.offer(entry(1, 2.0, "a")), Offer::Entered);
+    assert_eq!(reservoir.offer(entry(2, 1.5, "a")), Offer::Replaced(1));
+}
+
+#[test]
+fn the_same_point_is_never_in_twice() {
+    for one_per_topology in [true, false] {
+        let mut reservoir = Reservoir::new(4, one_per_topology);
+        reservoir.offer(entry(0, 1.0, "a"));
+        let same = Entry { number: 7, loss: 0.5, ..entry(0, 1.0, "b") };
+        assert_eq!(reservoir.offer(same), Offer::Same(0));
+        assert_eq!(reservoir.entries().len(), 1);
+    }
+}
+
+#[test]
+fn a_reservoir_of_one_holds_the_best() {
+    for size in [0, 1] {
+        let mut reservoir = Reservoir::new(size, true);
+        assert!(reservoir.best().is_none());
+        reservoir.offer(entry(0, 2.0, "a"));
+        assert_eq!(reservoir.offer(entry(1, 3.0, "b")), Offer::BehindAll);
+        assert_eq!(reservoir.offer(entry(2, 1.0, "b")), Offer::Replaced(0));
+        assert_eq!(numbers(&reservoir), [2]);
+    }
+}
+
+#[test]
+fn what_is_worth_nothing_does_not_enter() {
+    let mut reservoir = Reservoir::new(2, true);
+    for loss in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        assert_eq!(reservoir.offer(entry(0, loss, "a")), Offer::Worthless);
+    }
+    assert!(reservoir.entries().is_empty());
+}

@@ -1,0 +1,164 @@
+//! A landscape of several structures with several minima each, and what can go wrong in one.
+
+use aplanat::search::{Kind, Landscape, Mutated, Random, Refusal, Slope, Weights};
+use rand::RngExt as _;
+use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
+
+/// A structure and a place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Spot {
+    pub(super) elements: usize,
+    pub(super) x: f64,
+}
+
+/// The running mean of the slope, like the moments of Adam.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Momentum(f64);
+
+/// What is wrong with a landscape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub(super) enum Fault {
+    #[default]
+    Nothing,
+    /// Everything is worth nothing.
+    NotANumber,
+    Infinite,
+    /// A descent leads to what is worth nothing.
+    DescentLost,
+    DescentInfinite,
+    /// No mutation and no draw applies.
+    AllRefused,
+    /// All mutations lead to what is worth nothing.
+    AllWorthless,
+    /// Nothing is different from anything.
+    Flat,
+    /// Losses at both ends of what a number can be.
+    Huge,
+}
+
+/// Best with six elements.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct Rugged {
+    pub(super) fault: Fault,
+}
+
+pub(super) const START: Spot = Spot { elements: 2, x: 3.0 };
+const STEPS: usize = 5;
+
+impl Rugged {
+    pub(super) fn with(fault: Fault) -> Self {
+        Self { fault }
+    }
+
+    fn sound(spot: &Spot) -> f64 {
+        let off = spot.elements as f64 - 6.0;
+        0.3 * off * off + spot.x * spot.x + 0.5 * (1.0 - (4.0 * spot.x).cos()) + 0.05
+    }
+
+    fn slope_at(x: f64) -> f64 {
+        2.0 * x + 2.0 * (4.0 * x).sin()
+    }
+
+    fn mutated(&self, spot: &Spot, kind: Kind, noise: f64) -> Result<Mutated<Spot>, Refusal> {
+        let refused = |why: &str| Err(Refusal { kind, why: why.to_owned() });
+        let elements = match kind {
+            Kind::AddSinglet if spot.elements < 8 => spot.elements + 1,
+            Kind::RemoveSinglet if spot.elements > 1 => spot.elements - 1,
+            Kind::Bend => spot.elements,
+            _ => return refused("there are too many or too few"),
+        };
+        if self.fault == Fault::AllRefused {
+            return refused("nothing applies");
+        }
+        let x = if self.fault == Fault::AllWorthless { f64::INFINITY } else { spot.x + noise };
+        let what = format!("{} at {elements}", kind.name());
+        Ok(Mutated { point: Spot { elements, x }, kind, what, log_ratio: Some(0.0) })
+    }
+}
+
+impl Landscape for Rugged {
+    type Point = Spot;
+    type Memory = Momentum;
+
+    fn loss(&self, spot: &Spot) -> f64 {
+        match self.fault {
+            Fault::NotANumber => f64::NAN,
+            Fault::Infinite => f64::INFINITY,
+            Fault::Flat => 1.0,
+            Fault::Huge => 1e308 * if spot.x > 1.0 { 1.0 } else { -1.0 },
+            _ => Self::sound(spot),
+        }
+    }
+
+    fn descend(&self, spot: &Spot, memory: &mut Momentum) -> (Spot, f64, usize) {
+        let mut x = spot.x;
+        for _ in 0..STEPS {
+            memory.0 = 0.8 * memory.0 + 0.2 * Self::slope_at(x);
+            x -= 0.03 * memory.0;
+        }
+        let next = Spot { x, ..*spot };
+        let loss = match self.fault {
+            Fault::DescentLost => f64::NAN,
+            Fault::DescentInfinite => f64::INFINITY,
+            _ => self.loss(&next),
+        };
+        (next, loss, STEPS)
+    }
+
+    fn draw(&self, random: &mut Random) -> Result<Spot, Refusal> {
+        if self.fault == Fault::AllRefused {
+            return Err(Refusal { kind: Kind::Global, why: "nothing to draw".to_owned() });
+        }
+        Ok(Spot { elements: random.random_range(1..=8), x: random.random_range(-4.0..4.0) })
+    }
+
+    fn mutate(
+        &self,
+        spot: &Spot,
+        weights: &Weights,
+        random: &mut Random,
+    ) -> Result<Mutated<Spot>, Refusal> {
+        let kinds = [Kind::AddSinglet, Kind::RemoveSinglet, Kind::Bend];
+        let sum: f64 = kinds.iter().map(|kind| weights.of(*kind)).sum();
+        let mut left = random.random::<f64>() * sum;
+        let drawn = kinds.into_iter().find(|kind| {
+            left -= weights.of(*kind);
+            left < 0.0
+        });
+        let noise = random.sample::<f64, _>(StandardNormal);
+        let forbidden = Refusal { kind: Kind::Bend, why: "all are forbidden".to_owned() };
+        self.mutated(spot, drawn.ok_or(forbidden)?, noise)
+    }
+
+    fn topology(&self, spot: &Spot) -> String {
+        format!("{} elements", spot.elements)
+    }
+
+    fn about(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap()
+    }
+
+    fn elements(&self, spot: &Spot) -> usize {
+        spot.elements
+    }
+
+    fn mutate_at(
+        &self,
+        spot: &Spot,
+        element: usize,
+        kind: Kind,
+        _random: &mut Random,
+    ) -> Result<Mutated<Spot>, Refusal> {
+        self.mutated(spot, kind, 0.1 * element as f64)
+    }
+
+    fn slope(&self, spot: &Spot) -> Option<Slope> {
+        let gradient = vec![Self::slope_at(spot.x)];
+        Some(Slope { loss: self.loss(spot), values: vec![spot.x], gradient })
+    }
+
+    fn with_values(&self, spot: &Spot, values: &[f64]) -> Option<Spot> {
+        Some(Spot { x: values[0], ..*spot })
+    }
+}
