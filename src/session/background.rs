@@ -105,26 +105,32 @@ impl<O, N> Drop for Background<O, N> {
     }
 }
 
-/// Works until the handle is dropped.
-fn serve<W: Work>(mut work: W, inbox: &Receiver<W::Order>) {
-    while let Some(order) = next(&work, inbox) {
-        match order {
-            Some(order) => work.obey(order),
-            None => work.advance(),
-        }
-    }
-    work.close();
+/// What comes next.
+enum Next<O> {
+    Obey(O),
+    Advance,
+    End,
 }
 
-/// The next order, or none to go on; nothing where no more orders come.
-fn next<W: Work>(work: &W, inbox: &Receiver<W::Order>) -> Option<Option<W::Order>> {
+/// Works until the handle is dropped.
+fn serve<W: Work>(mut work: W, inbox: &Receiver<W::Order>) {
+    loop {
+        match next(&work, inbox) {
+            Next::Obey(order) => work.obey(order),
+            Next::Advance => work.advance(),
+            Next::End => return work.close(),
+        }
+    }
+}
+
+fn next<W: Work>(work: &W, inbox: &Receiver<W::Order>) -> Next<W::Order> {
     if !work.is_running() {
-        return inbox.recv().ok().map(Some);
+        return inbox.recv().map_or(Next::End, Next::Obey);
     }
     match inbox.try_recv() {
-        Ok(order) => Some(Some(order)),
-        Err(TryRecvError::Empty) => Some(None),
-        Err(TryRecvError::Disconnected) => None,
+        Ok(order) => Next::Obey(order),
+        Err(TryRecvError::Empty) => Next::Advance,
+        Err(TryRecvError::Disconnected) => Next::End,
     }
 }
 

@@ -17,6 +17,8 @@ use std::sync::Arc;
 const ENDING: &str = "search.json";
 /// How many letters of the name of a lens the name of its file has.
 const LONGEST: usize = 32;
+/// So many searches from lenses of one name are saved, and no more.
+const MOST: usize = 10_000;
 
 /// What is known about searches over structure.
 #[derive(Debug, Clone, Default)]
@@ -221,7 +223,7 @@ fn free(folder: &Path, name: &str) -> Option<PathBuf> {
     let stem: String = words.join("_").chars().take(LONGEST).collect();
     let stem = if stem.is_empty() { "lens".to_owned() } else { stem };
     let path = |number: usize| folder.join(format!("{stem}_{number}.{ENDING}"));
-    (1..).map(path).find(|path| !path.exists())
+    (1..=MOST).map(path).find(|path| !path.exists())
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::quest::{Engine, Explores, Quest};
 use super::slot::Slot;
 use super::worker::Standing;
 use crate::lens::Lens;
-use crate::search::{Event, Steer};
+use crate::search::Steer;
 use rayon::ThreadPool;
 use std::io;
 use std::path::PathBuf;
@@ -210,10 +210,10 @@ impl Work for Desk {
     /// One turn of every chain.
     fn advance(&mut self) {
         let (Some(run), Some(pool)) = (&mut self.run, &self.pool) else { return };
-        if let Err(why) = guarded(|| Ok(run.round(pool))) {
-            return self.give_up(why);
+        match guarded(|| Ok(run.round(pool))) {
+            Ok(over) => run.state.over = over,
+            Err(why) => return self.give_up(why),
         }
-        run.state.over = run.over();
         if run.state.over.is_some() {
             self.stand(Standing::Finished);
         } else if self.looks.is_due() {
@@ -331,17 +331,15 @@ impl Desk {
 }
 
 impl Run {
-    fn round(&mut self, pool: &ThreadPool) {
+    /// One turn of every chain; why the search is over, where it is.
+    fn round(&mut self, pool: &ThreadPool) -> Option<Ending> {
         let before = self.engine.run().statistics().gradients;
         let engine = &mut self.engine;
         let Timed { value: events, ms } = timed(|| pool.install(|| engine.round()));
         self.state.seconds += 1e-3 * ms;
         self.state.gradients += self.engine.run().statistics().gradients - before;
-        self.note(&events);
-    }
-
-    fn note(&mut self, events: &[Event]) {
-        self.history.note(self.engine.run(), events);
+        self.history.note(self.engine.run(), &events);
+        self.over()
     }
 
     fn over(&self) -> Option<Ending> {

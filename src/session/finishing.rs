@@ -5,8 +5,7 @@ use super::background::guarded;
 use crate::files;
 use crate::lens::Lens;
 use crate::merit::Margin;
-use crate::search::lens::{Finished, LensLandscape, finish};
-use std::fmt::Write as _;
+use crate::search::lens::{Confirmed, Exchanged, FieldFigures, Finished, LensLandscape, finish};
 use std::path::Path;
 
 /// What makes a lens that can be made.
@@ -46,29 +45,25 @@ fn refusal(failures: &[String], finished: &Finished) -> String {
 
 /// Glasses, sharpness and light, and every limit with the room that is left.
 fn report(finished: &Finished) -> String {
-    let mut text = String::new();
-    for change in &finished.glasses {
+    let glass = |change: &Exchanged| {
         let ((nd, _), (is, vd)) = (change.was, change.is);
         let (surface, glass) = (change.surface, &change.glass);
-        // Writing to a string does not fail.
-        let _ = writeln!(
-            text,
-            "glass behind surface {surface} : {glass} ({is:.4}, {vd:.1}) for index {nd:.4}"
-        );
-    }
-    let _ =
-        writeln!(text, "{:>6} {:>12} {:>14} {:>12}", "field", "spot, µm", "other rays, µm", "mm²");
-    for (field, other) in finished.figures.fields.iter().zip(&finished.confirmed) {
+        format!("glass behind surface {surface} : {glass} ({is:.4}, {vd:.1}) for index {nd:.4}")
+    };
+    let field = |(field, other): (&FieldFigures, &Confirmed)| {
         let spot = field.spot.map_or(f64::NAN, |spot| 1e3 * spot.value);
-        let (again, light) = (1e3 * other.spot, field.light.value);
-        let _ = writeln!(text, "{:>6} {spot:>12.3} {again:>14.3} {light:>12.2}", field.field + 1);
-    }
-    let _ = writeln!(text, "{:<16} {:>8} {:>12} {:>12}", "limit", "surface", "is", "room");
-    for limit in finished.limits.iter().chain(&finished.light) {
-        let Margin { term, surface, value, .. } = limit;
-        let (name, room) = (term.replace('_', " "), limit.room());
-        let surface = surface.map_or_else(|| "-".to_owned(), |i| (i + 1).to_string());
-        let _ = writeln!(text, "{name:<16} {surface:>8} {value:>12.4} {room:>12.4}");
-    }
-    text
+        let (number, again, light) = (field.field + 1, 1e3 * other.spot, field.light.value);
+        format!("{number:>6} {spot:>12.3} {again:>14.3} {light:>12.2}")
+    };
+    let limit = |limit: &Margin| {
+        let (name, value, room) = (limit.term.replace('_', " "), limit.value, limit.room());
+        let surface = limit.surface.map_or_else(|| "-".to_owned(), |i| (i + 1).to_string());
+        format!("{name:<16} {surface:>8} {value:>12.4} {room:>12.4}")
+    };
+    let mut lines: Vec<String> = finished.glasses.iter().map(glass).collect();
+    lines.push(format!("{:>6} {:>12} {:>14} {:>12}", "field", "spot, µm", "other rays, µm", "mm²"));
+    lines.extend(finished.figures.fields.iter().zip(&finished.confirmed).map(field));
+    lines.push(format!("{:<16} {:>8} {:>12} {:>12}", "limit", "surface", "is", "room"));
+    lines.extend(finished.limits.iter().chain(&finished.light).map(limit));
+    lines.join("\n")
 }

@@ -109,15 +109,15 @@ mod tests {
     #[test]
     fn what_is_not_found_again_is_new() {
         let own = lens(&[("A", 0.02), ("B", 0.01), ("A", -0.03)]);
-        let cases: [(&[(&str, f64)], &[usize]); 5] = [
-            (&[("A", 0.02), ("B", 0.01), ("A", -0.03)], &[]),
-            (&[("A", 0.04), ("B", -0.01), ("A", -0.01)], &[]),
-            (&[("A", 0.02), ("A", -0.03)], &[]),
-            (&[("A", 0.02), ("C", 0.05), ("B", 0.01), ("A", -0.03)], &[2]),
-            (&[("A", 0.3), ("A", 0.02), ("B", 0.01), ("D", 0.0)], &[0, 6]),
+        let cases = [
+            (vec![("A", 0.02), ("B", 0.01), ("A", -0.03)], vec![]),
+            (vec![("A", 0.04), ("B", -0.01), ("A", -0.01)], vec![]),
+            (vec![("A", 0.02), ("A", -0.03)], vec![]),
+            (vec![("A", 0.02), ("C", 0.05), ("B", 0.01), ("A", -0.03)], vec![2]),
+            (vec![("A", 0.3), ("A", 0.02), ("B", 0.01), ("D", 0.0)], vec![0, 6]),
         ];
         for (glasses, fresh) in cases {
-            assert_eq!(fresh_glass(&lens(glasses), &own), fresh, "{glasses:?}");
+            assert_eq!(fresh_glass(&lens(&glasses), &own), fresh, "{glasses:?}");
         }
         assert_eq!(fresh_glass(&lens(&[]), &own), [0; 0]);
         assert_eq!(fresh_glass(&own, &lens(&[])), [0, 2, 4]);

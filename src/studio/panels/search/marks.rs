@@ -39,6 +39,10 @@ pub(super) fn shape(kind: Kind) -> MarkerShape {
     SHAPES[index(kind) % SHAPES.len()]
 }
 
+/// The lines of two marks.
+const PLUS: [[f32; 4]; 2] = [[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]];
+const CROSS: [[f32; 4]; 2] = [[-0.8, -0.8, 0.8, 0.8], [-0.8, 0.8, 0.8, -0.8]];
+
 /// The mark of a kind, in a line of text.
 pub(super) fn sign(ui: &mut Ui, kind: Kind) {
     let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), Sense::hover());
@@ -52,8 +56,6 @@ pub(super) fn sign(ui: &mut Ui, kind: Kind) {
         };
         Shape::Vec(lines.iter().map(line).collect())
     };
-    const PLUS: [[f32; 4]; 2] = [[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]];
-    const CROSS: [[f32; 4]; 2] = [[-0.8, -0.8, 0.8, 0.8], [-0.8, 0.8, 0.8, -0.8]];
     let shape = match shape(kind) {
         MarkerShape::Up => filled(vec![corner(0.0, -1.0), corner(0.9, 0.8), corner(-0.9, 0.8)]),
         MarkerShape::Down => filled(vec![corner(0.0, 1.0), corner(0.9, -0.8), corner(-0.9, -0.8)]),

@@ -14,7 +14,7 @@ mod setup;
 mod thumbnail;
 mod words;
 
-use eframe::egui::{Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
+use eframe::egui::{Button, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::Panel;
 use crate::session::{Command, Exploration, Explore, View};
@@ -117,12 +117,10 @@ impl StructureSearch {
             ui.spacing_mut().item_spacing.x = 2.0;
             for (page, name, hint) in PAGES {
                 let enabled = has_run || page == Page::Setup;
-                ui.add_enabled_ui(enabled, |ui| {
-                    let label = ui.selectable_label(self.page == page, name).on_hover_text(hint);
-                    if label.clicked() {
-                        self.page = page;
-                    }
-                });
+                let label = Button::selectable(self.page == page, name);
+                if ui.add_enabled(enabled, label).on_hover_text(hint).clicked() {
+                    self.page = page;
+                }
             }
         });
         ui.separator();

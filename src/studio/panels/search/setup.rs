@@ -142,13 +142,13 @@ impl Setup {
         let quest = &mut self.quest;
         ui.weak("Light");
         ui.horizontal(|ui| {
-            let mut percent = 100.0 * quest.plan.light;
+            let mut percent = 100.0 * quest.plan.light.first().copied().unwrap_or(1.0);
             let hint =
                 "Every field keeps at least this share of the light that it has at the start";
             let drag = DragValue::new(&mut percent).range(0.0..=1000.0).speed(0.5).suffix(" %");
             let drag = ui.add(drag.max_decimals(1)).on_hover_text(hint);
             if drag.accessible_name("Least light").changed() {
-                quest.plan.light = percent / 100.0;
+                quest.plan.light = vec![percent / 100.0];
             }
             ui.weak("of the light at the start");
         });
@@ -210,23 +210,26 @@ impl Setup {
         ui.collapsing("How often each mutation is tried", |ui| {
             Grid::new("weights").num_columns(4).spacing([8.0, 3.0]).show(ui, |ui| {
                 for (i, kind) in Kind::MUTATIONS.into_iter().enumerate() {
-                    ui.horizontal(|ui| {
-                        marks::sign(ui, kind);
-                        ui.label(kind.name());
-                    });
-                    let listed = weights.iter().position(|(other, _)| *other == kind);
-                    let mut weight = listed.map_or(1.0, |place| weights[place].1);
-                    let name = format!("Weight of {} at the start", kind.name());
-                    if drag(ui, &name, &mut weight, 0.0..=100.0, 0.02, "0 forbids it") {
-                        weights.retain(|(other, _)| *other != kind);
-                        weights.push((kind, weight));
-                    }
-                    if i % 2 == 1 {
-                        ui.end_row();
-                    }
+                    weight(ui, weights, kind);
+                    (i % 2 == 1).then(|| ui.end_row());
                 }
             });
         });
+    }
+}
+
+/// How often a kind is tried.
+fn weight(ui: &mut Ui, weights: &mut Vec<(Kind, f64)>, kind: Kind) {
+    ui.horizontal(|ui| {
+        marks::sign(ui, kind);
+        ui.label(kind.name());
+    });
+    let listed = weights.iter().find(|(other, _)| *other == kind);
+    let mut weight = listed.map_or(1.0, |(_, weight)| *weight);
+    let name = format!("Weight of {} at the start", kind.name());
+    if drag(ui, &name, &mut weight, 0.0..=100.0, 0.02, "0 forbids it") {
+        weights.retain(|(other, _)| *other != kind);
+        weights.push((kind, weight));
     }
 }
 
