@@ -186,7 +186,7 @@ fn a_search_over_structure_shows_its_lenses_and_one_is_taken_as_one_step() {
         harness.query_by_label_contains("Stopped, merit").is_some()
     });
     let card = harness.get_all_by_label_contains(" elements, ").next().unwrap();
-    card.click();
+    card.click_accesskit();
     harness.run_steps(3);
     harness.get_by_label("Take").click();
     harness.run_steps(3);

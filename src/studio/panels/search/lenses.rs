@@ -26,7 +26,9 @@ pub(super) fn cards(
     chosen: Option<u64>,
     thumbnails: &mut Thumbnails,
 ) -> Option<u64> {
-    let is_kept = run.reservoir.iter().any(|found| Arc::ptr_eq(found, &run.best));
+    let same =
+        |found: &Arc<Found>| (found.number, found.merit) == (run.best.number, run.best.merit);
+    let is_kept = run.reservoir.iter().any(same);
     let best = (!is_kept).then_some(&run.best);
     let shown: Vec<&Arc<Found>> = best.into_iter().chain(&run.reservoir).collect();
     let room = ui.available_width();

@@ -23,7 +23,7 @@ pub(super) fn plots(
     chosen: Option<u64>,
 ) -> Option<u64> {
     let chain = view.explorations.followed.unwrap_or(0);
-    let height = (0.3 * ui.available_height()).clamp(110.0, 260.0);
+    let height = (0.3 * ui.available_height()).clamp(80.0, 260.0);
     let clicked = merit(ui, run, chain, chosen, height);
     elements(ui, run, chain);
     legend(ui, run);
