@@ -24,4 +24,5 @@ mod search;
 mod search_cli;
 mod session;
 mod session_front;
+mod session_search;
 mod trace;
