@@ -33,6 +33,9 @@ pub mod trace;
 // Reading and writing lenses: the native JSON, Zemax; an export proves itself.
 pub mod files;
 
+// Design tasks in one gradient-index field: what light shall do, and the search for the field.
+pub mod grin_task;
+
 // The set of rays that get through: where they start, their boundary, quadrature over them, and
 // derivatives of integrals over it that know that it moves.
 pub mod pupil;

@@ -51,7 +51,7 @@ fn failure(study: &Study, ended: &Ended) -> Failure {
 }
 
 /// Refuses a folder that cannot be made, before the work and not after it.
-fn check_folder(folder: &Path) -> Result<(), Failure> {
+pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| {
         Failure::Input(format!("{}: {error}; expected a folder", folder.display()))
     })

@@ -12,6 +12,7 @@ mod convert;
 mod experiment;
 mod failure;
 mod gradient;
+mod grin;
 mod info;
 mod input;
 mod measure;
@@ -58,6 +59,7 @@ enum Command {
     Optimize(optimize::Optimize),
     Pareto(pareto::Pareto),
     Search(Box<search::Search>),
+    Grin(grin::Grin),
     Convert(convert::Convert),
     Experiment(experiment::Experiment),
     Measure(measure::Measure),
@@ -73,6 +75,7 @@ impl Command {
             Self::Optimize(optimize) => optimize.run(output),
             Self::Pareto(pareto) => pareto.run(output),
             Self::Search(search) => search.run(output),
+            Self::Grin(grin) => grin.run(output),
             Self::Convert(convert) => convert.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),

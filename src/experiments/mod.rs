@@ -6,11 +6,15 @@
 //! [`Outcome`] in which one of them fails is a failed experiment. After Teh, *Computational Lens
 //! Design* (thesis, Carnegie Mellon University), whose figure numbers name the experiments.
 
+mod adjoint_memory;
 mod aperture_stop;
 mod entrance_pupil;
+mod fibre;
 mod front;
 mod gradient_image;
 mod histogram;
+mod known_lenses;
+mod medium;
 mod motion;
 mod outcome;
 mod report;
@@ -21,6 +25,7 @@ mod trade;
 mod vignetting;
 mod zoom;
 
+pub use medium::medium_pictures;
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
 pub use report::Report;
 
@@ -44,6 +49,9 @@ pub const ALL: &[Experiment] = &[
     structure::projection::EXPERIMENT,
     structure::beyond::EXPERIMENT,
     structure::teaser::EXPERIMENT,
+    adjoint_memory::EXPERIMENT,
+    known_lenses::EXPERIMENT,
+    fibre::EXPERIMENT,
 ];
 
 /// A figure or table of the thesis.

@@ -14,23 +14,26 @@ const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: usize = 20;
 
 /// What parameters may do.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
-    /// Smallest value: 1 for an index in air.
-    pub low: f64,
-    /// Largest value.
-    pub high: f64,
+    /// Smallest and largest value of each parameter; one that may not change has both alike.
+    pub ranges: Vec<[f64; 2]>,
     /// Largest change of a parameter in one step.
     pub change: f64,
 }
 
 impl Limits {
-    /// Puts parameters back into their range; how many were outside.
+    /// The same range for so many parameters.
+    pub fn even(count: usize, range: [f64; 2], change: f64) -> Self {
+        Self { ranges: vec![range; count], change }
+    }
+
+    /// Puts parameters back into their ranges; how many were outside.
     pub fn project(&self, parameters: &mut [f64]) -> usize {
         let mut outside = 0;
-        for value in parameters {
-            if !(*value >= self.low && *value <= self.high) {
-                *value = if *value > self.high { self.high } else { self.low };
+        for (value, [low, high]) in parameters.iter_mut().zip(&self.ranges) {
+            if !(*value >= *low && *value <= *high) {
+                *value = if *value > *high { *high } else { *low };
                 outside += 1;
             }
         }
@@ -38,16 +41,19 @@ impl Limits {
     }
 
     /// Scales a step down to the largest change.
-    fn shorten(&self, step: &mut [f64]) {
+    pub fn shorten(&self, step: &mut [f64]) {
         let largest = step.iter().fold(0.0, |max: f64, s| max.max(s.abs()));
         if largest > self.change {
             step.iter_mut().for_each(|s| *s *= self.change / largest);
         }
     }
 
-    /// Whether descent would push a parameter out of its range.
-    fn holds(&self, value: f64, gradient: f64) -> bool {
-        (value <= self.low && gradient > 0.0) || (value >= self.high && gradient < 0.0)
+    /// Which parameters stay where they are: descent would push them out of their range.
+    pub fn held(&self, parameters: &[f64], gradient: &[f64]) -> Vec<bool> {
+        let held = |((value, g), [low, high]): ((&f64, &f64), &[f64; 2])| {
+            (*value <= *low && *g > 0.0) || (*value >= *high && *g < 0.0)
+        };
+        parameters.iter().zip(gradient).zip(&self.ranges).map(held).collect()
     }
 }
 
@@ -75,9 +81,10 @@ impl Adam {
         self.square.resize(parameters.len(), 0.0);
         self.age += 1;
         let (c1, c2) = (1.0 - f64::powi(b1, self.age), 1.0 - f64::powi(b2, self.age));
+        let held = limits.held(parameters, gradient);
         for (i, value) in parameters.iter_mut().enumerate() {
             // What its limit holds must not gather momentum.
-            let g = if limits.holds(*value, gradient[i]) { 0.0 } else { gradient[i] };
+            let g = if held[i] { 0.0 } else { gradient[i] };
             self.mean[i] = b1 * self.mean[i] + (1.0 - b1) * g;
             self.square[i] = b2 * self.square[i] + (1.0 - b2) * g * g;
             let size = (self.square[i] / c2).sqrt();
@@ -163,8 +170,7 @@ impl Lbfgs {
 
     /// The step by the two-loop recursion, with what a limit holds left out.
     fn direction(&self, parameters: &[f64], gradient: &[f64], limits: &Limits) -> Vec<f64> {
-        let held: Vec<bool> =
-            parameters.iter().zip(gradient).map(|(x, g)| limits.holds(*x, *g)).collect();
+        let held = limits.held(parameters, gradient);
         let free = |v: &mut [f64]| {
             v.iter_mut().zip(&held).filter(|(_, held)| **held).for_each(|(v, _)| *v = 0.0);
         };

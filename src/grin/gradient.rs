@@ -118,6 +118,14 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
         }
     }
 
+    /// The bytes that [`Self::gradient`] works with: what it keeps of the rays, and the private
+    /// gradients. Neither depends on the number of steps.
+    pub fn gradient_bytes(&self, rays: usize) -> [usize; 2] {
+        let each = size_of::<Ray<R>>() + size_of::<Exit<R>>() + 2 * size_of::<Seed<R>>();
+        let parts = rays.div_ceil(self.rays_per_part(rays));
+        [rays * each, parts * self.field.parameters().len() * size_of::<R>()]
+    }
+
     /// How many rays share a private gradient.
     fn rays_per_part(&self, rays: usize) -> usize {
         let worth = rays * PARAMETERS_PER_RAY / self.field.parameters().len().max(1);

@@ -22,6 +22,8 @@ const TRIES: usize = 24;
 const LONGEST: f64 = 32.0;
 /// Most steps a straight way may take before the plan gives up on a tolerance.
 const MOST_STEPS: f64 = 1e6;
+/// Most steps a voxel where the force jumps.
+const FINEST: f64 = 16.0;
 /// Steps that are a simple fraction of a voxel would meet the same place of every voxel, and on a
 /// ray along the grid its faces, where rounding decides which voxel counts.
 const INCOMMENSURATE: f64 = 0.974;
@@ -69,14 +71,17 @@ pub fn plan<F: Field<f64> + ?Sized>(
         },
         screen: None,
     };
+    // Where the force jumps, the error falls no further once a voxel has some steps.
+    let finest = if field.grain().continuous_force { way / MOST_STEPS } else { longest / FINEST };
     let order = if field.grain().continuous_force { integrator.order() } else { 1 };
     let (mut step, mut error) = (longest, f64::INFINITY);
     for _ in 0..TRIES {
         error = change(field, &setup(step), &setup(0.5 * step), &sample)?;
-        if error <= tolerance || step < way / MOST_STEPS {
+        if error <= tolerance || step <= finest {
             break;
         }
         step *= (0.8 * tolerance / error).powf(1.0 / f64::from(order)).clamp(0.2, 0.7);
+        step = step.max(finest);
     }
     let reached = error <= tolerance;
     let verdict = if reached { "within" } else { "not within" };

@@ -119,6 +119,18 @@ impl<R: Real> Region<R> {
         rod
     }
 
+    /// The same region in another number type.
+    pub fn lift<S: Real>(&self) -> Region<S> {
+        let vector = |v: Vec3<R>| Vec3::from_f64(v.value());
+        let face = |face: &Face<R>| Face {
+            square: vector(face.square),
+            linear: vector(face.linear),
+            constant: S::from_f64(face.constant.value()),
+        };
+        let faces = self.faces.iter().map(face).collect();
+        Region { low: vector(self.low), high: vector(self.high), faces }
+    }
+
     /// The largest `φ` of all faces: negative inside.
     #[inline(always)]
     pub fn height(&self, p: Vec3<R>) -> R {

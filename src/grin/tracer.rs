@@ -29,6 +29,13 @@ pub struct Ray<R> {
     pub v: Vec3<R>,
 }
 
+impl<R: Real> Ray<R> {
+    /// The same ray in another number type.
+    pub fn lift<S: Real>(&self) -> Ray<S> {
+        Ray { x: Vec3::from_f64(self.x.value()), v: Vec3::from_f64(self.v.value()) }
+    }
+}
+
 /// A ray on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct State<R> {

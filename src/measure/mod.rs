@@ -7,6 +7,7 @@
 mod clock;
 mod double_gauss;
 mod gradient;
+mod grin;
 mod machine;
 mod memory;
 mod optimize;
@@ -22,6 +23,7 @@ pub use double_gauss::double_gauss;
 pub use gradient::{
     GradientCost, GradientCurves, GradientRow, Gradients, Integral, NoGradients, Numbers, gradients,
 };
+pub use grin::{GrinCost, GrinCurves, GrinMeasured, GrinMemory, GrinRow, NoGrin, grin};
 pub use machine::Machine;
 pub use memory::{Memory, peak_megabytes};
 pub use optimize::{StepCosts, StepRow, step_costs};

@@ -4,6 +4,7 @@
 //! the design and can be undone, every other [`Command`] opens, saves, searches or sets up what is
 //! shown.
 
+use super::quest::Quest;
 use crate::effects::{Choice, Effect};
 use crate::experiments::Effort;
 use crate::lens::{
@@ -12,6 +13,7 @@ use crate::lens::{
 };
 use crate::merit::Goal;
 use crate::optimize::{Method, pareto};
+use crate::search::Steer;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -71,6 +73,8 @@ pub enum Command {
     ClearFronts,
     /// Write the front into this folder: table, picture and every lens.
     ExportFront(Option<PathBuf>),
+    /// Search over structure.
+    Explore(Explore),
     /// Show another lens in place of the design, which stays what it is; `None` for the design.
     Preview(Option<Box<Lens>>),
     /// Make the lens that is shown in place of the design the design, as one undo step.
@@ -104,6 +108,41 @@ pub enum Command {
     Select(Option<usize>),
     /// Forget the messages so far.
     ClearMessages,
+}
+
+/// What a person asks of a search over structure. It works on its own copy of the design.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Explore {
+    /// Begin one from the design, in place of the one before.
+    Start(Box<Quest>),
+    /// Go on with the one that a file holds.
+    GoOn(Option<PathBuf>),
+    /// Hold it after its present round.
+    Pause,
+    /// Let it go on.
+    Resume,
+    /// End it; what it has found stays.
+    Stop,
+    /// Pin a lens, forbid a mutation, change the temperature.
+    Steer(Steer),
+    /// Show the lens of a chain, counted from 0, in place of the design as it changes; or no more.
+    Follow(Option<usize>),
+    /// Save it to this file from now on, or the next one where none goes on.
+    SaveTo(Option<PathBuf>),
+    /// Make the lens of a generation the design, as one undo step.
+    Take(u64),
+    /// Write the lens of a generation.
+    Export {
+        /// Its number.
+        number: u64,
+        /// The file.
+        path: Option<PathBuf>,
+    },
+    /// End it and forget it; its file stays.
+    Clear,
+    /// Remove the file of the one that was left when the program was closed.
+    ForgetLeft,
 }
 
 /// One change of the design.

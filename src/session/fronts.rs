@@ -1,6 +1,8 @@
 //! The fronts of a session: the one that is swept, those before it, and where the design stands.
 
-use super::sweeper::{FrontRun, Job, Judged, Sweeper, Told};
+use super::course::Course;
+use super::judged::Judged;
+use super::sweeper::{FrontRun, Job, Sweeper, Told};
 use super::worker::Standing;
 use crate::lens::Lens;
 use crate::optimize::pareto::Settings;
@@ -31,13 +33,8 @@ pub struct Fronts {
 #[derive(Debug)]
 pub(super) struct FrontDesk {
     sweeper: Sweeper,
-    /// How many runs were begun.
-    count: u64,
-    /// The last run, if it is not forgotten.
-    number: Option<u64>,
+    course: Course,
     earlier: Vec<Arc<FrontRun>>,
-    failed: Option<String>,
-    pending: Option<Standing>,
     /// The design that was judged last.
     asked: Option<Arc<Lens>>,
 }
@@ -46,11 +43,8 @@ impl FrontDesk {
     pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         Ok(Self {
             sweeper: Sweeper::spawn(wake)?,
-            count: 0,
-            number: None,
+            course: Course::default(),
             earlier: Vec::new(),
-            failed: None,
-            pending: None,
             asked: None,
         })
     }
@@ -65,19 +59,14 @@ impl FrontDesk {
         self.earlier.extend(self.run().filter(worth));
         let surplus = self.earlier.len().saturating_sub(EARLIER);
         self.earlier.drain(..surplus);
-        self.count += 1;
-        self.number = Some(self.count);
-        self.failed = None;
-        self.pending = None;
-        let lens = Arc::clone(lens);
-        self.sweeper.start(Job { number: self.count, lens, settings, compare });
+        let (number, lens) = (self.course.begin(), Arc::clone(lens));
+        self.sweeper.start(Job { number, lens, settings, compare });
     }
 
     /// Lets the run stand otherwise once its slice is done; a run that has ended stays so.
     pub(super) fn stand(&mut self, standing: Standing) {
         let ended = self.run().is_some_and(|run| !run.is_under_way());
-        if self.number.is_some() && self.failed.is_none() && !ended {
-            self.pending = Some(standing);
+        if self.course.turn(standing, ended) {
             self.sweeper.stand(standing);
         }
     }
@@ -85,10 +74,8 @@ impl FrontDesk {
     /// Ends the run and forgets all of them.
     pub(super) fn clear(&mut self) {
         self.sweeper.clear();
-        self.number = None;
+        self.course.forget();
         self.earlier.clear();
-        self.pending = None;
-        self.failed = None;
         self.asked = None;
     }
 
@@ -96,19 +83,13 @@ impl FrontDesk {
     pub(super) fn told(&mut self) -> Vec<Told> {
         let mut told = self.sweeper.told();
         told.retain(|told| match told {
-            Told::Now(number, _) | Told::Failed(number, _) => Some(*number) == self.number,
+            Told::Now(number, _) | Told::Failed(number, _) => self.course.is(*number),
             Told::Written(..) | Told::NotWritten(_) => true,
         });
         for told in &told {
             match told {
-                Told::Failed(_, why) => {
-                    self.failed = Some(why.clone());
-                    self.pending = None;
-                }
-                // What it stands as now may be older than what it was told since.
-                Told::Now(_, now) if Some(*now) == self.pending || !goes_on(*now) => {
-                    self.pending = None;
-                }
+                Told::Failed(_, why) => self.course.fails(why),
+                Told::Now(_, now) => self.course.stands(*now),
                 _ => {}
             }
         }
@@ -118,7 +99,7 @@ impl FrontDesk {
     /// Has the design judged, once for each, as long as there is a front to stand beside.
     pub(super) fn keep_up(&mut self, lens: &Arc<Lens>) {
         let known = self.asked.as_ref().is_some_and(|asked| Arc::ptr_eq(asked, lens));
-        if self.number.is_some() && !known {
+        if self.course.is_there() && !known {
             self.asked = Some(Arc::clone(lens));
             self.sweeper.judge(Arc::clone(lens));
         }
@@ -127,20 +108,16 @@ impl FrontDesk {
     pub(super) fn view(&self) -> Fronts {
         let run = self.run();
         Fronts {
-            starting: self.number.is_some() && run.is_none() && self.failed.is_none(),
+            starting: self.course.is_starting(run.is_some()),
             run,
-            pending: self.pending,
+            pending: self.course.pending(),
             earlier: self.earlier.clone(),
             here: self.sweeper.judged().filter(|_| self.asked.is_some()),
-            failed: self.failed.clone(),
+            failed: self.course.failed(),
         }
     }
 
     fn run(&self) -> Option<Arc<FrontRun>> {
-        self.sweeper.run().filter(|run| Some(run.number) == self.number)
+        self.sweeper.run().filter(|run| self.course.is(run.number))
     }
-}
-
-const fn goes_on(standing: Standing) -> bool {
-    matches!(standing, Standing::Running | Standing::Paused)
 }

@@ -4,9 +4,9 @@
 //! A new request takes the place of the experiment that runs. An experiment is told to stop between
 //! two of its steps.
 
+use super::background::said;
 use super::clock::{Pace, Timed, timed};
 use super::slot::{Mailbox, Slot};
-use super::worker::said;
 use crate::experiments::{Effort, Ended, Experiment, Outcome, Progress, Report};
 use std::io;
 use std::ops::ControlFlow;

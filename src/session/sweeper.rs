@@ -4,27 +4,23 @@
 //! The sweep works on its own copy of the lens and never touches the design. What it has found sits
 //! in a newest-value slot; a panic inside ends the sweep and not the session.
 
+use super::background::{Background, Outbox, Work, guarded, pool};
 use super::clock::{Pace, Timed, timed};
+use super::judged::Judged;
 use super::slot::Slot;
-use super::worker::{Standing, said};
+use super::worker::Standing;
 use crate::front::{Survey, hypervolume, write};
 use crate::lens::Lens;
 use crate::merit::PupilEdge;
 use crate::optimize::pareto::{Design, Front, Settings, Slice, Sweep};
-use crate::pupil::limited_by_stop;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 /// The time between two looks of the window, at least.
 const BETWEEN: Duration = Duration::from_millis(100);
-/// The relative error of the numbers of the design, as a sweep judges its own lenses.
-const JUDGED: f64 = 1e-4;
 
 /// A front on its way, or as it was left.
 #[derive(Debug, Clone)]
@@ -69,7 +65,7 @@ pub struct Leg {
 impl FrontRun {
     /// Whether it goes on or can.
     pub fn is_under_way(&self) -> bool {
-        matches!(self.standing, Standing::Running | Standing::Paused)
+        self.standing.can_go_on()
     }
 
     /// The sweep that runs, or ran last.
@@ -127,15 +123,6 @@ impl Leg {
     }
 }
 
-/// A design as a sweep judges lenses.
-#[derive(Debug, Clone)]
-pub struct Judged {
-    /// The design.
-    pub lens: Arc<Lens>,
-    /// What it is worth, or why nothing.
-    pub found: Result<Design, String>,
-}
-
 /// What happened to a sweep; each carries its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Told {
@@ -155,6 +142,7 @@ pub(super) struct Job {
 }
 
 /// What a sweep is told.
+#[derive(Debug)]
 enum Order {
     Start(Job),
     Stand(Standing),
@@ -194,11 +182,9 @@ type Begin = dyn Fn(&Lens, &Settings) -> Result<Box<dyn Sweeps>, String> + Send;
 /// The handle of the thread that sweeps.
 #[derive(Debug)]
 pub(super) struct Sweeper {
-    orders: Option<Sender<Order>>,
-    told: Receiver<Told>,
+    thread: Background<Order, Told>,
     run: Slot<FrontRun>,
     judged: Slot<Judged>,
-    thread: Option<JoinHandle<()>>,
 }
 
 impl Sweeper {
@@ -212,48 +198,38 @@ impl Sweeper {
     }
 
     fn with(begin: Box<Begin>, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
-        let (orders, inbox) = mpsc::channel();
-        let (outbox, told) = mpsc::channel();
-        let (shown, judged) = (Slot::default(), Slot::default());
-        let name = |i: usize| format!("front {i}");
-        let pool = ThreadPoolBuilder::new().thread_name(name).build().map_err(io::Error::other)?;
-        let desk = Desk {
-            inbox,
-            outbox,
-            shown: shown.clone(),
-            judged: judged.clone(),
-            begin,
-            pool,
-            wake: Box::new(wake),
-            pace: Pace::new(BETWEEN),
-            run: None,
+        let (run, judged) = (Slot::default(), Slot::default());
+        let pool = pool("front")?;
+        let (shown, judgements) = (run.clone(), judged.clone());
+        let desk = |outbox| {
+            let pace = Pace::new(BETWEEN);
+            Desk { outbox, shown, judged: judgements, begin, pool, pace, run: None }
         };
-        let thread = thread::Builder::new().name("front".into()).spawn(move || desk.serve())?;
-        Ok(Self { orders: Some(orders), told, run: shown, judged, thread: Some(thread) })
+        Ok(Self { thread: Background::spawn("front", wake, desk)?, run, judged })
     }
 
     pub(super) fn start(&self, job: Job) {
-        self.tell(Order::Start(job));
+        self.thread.tell(Order::Start(job));
     }
 
     /// Holds the sweep, lets it go on or ends it, after its slice.
     pub(super) fn stand(&self, standing: Standing) {
-        self.tell(Order::Stand(standing));
+        self.thread.tell(Order::Stand(standing));
     }
 
     /// Ends the sweep and forgets it.
     pub(super) fn clear(&self) {
-        self.tell(Order::Clear);
+        self.thread.tell(Order::Clear);
     }
 
     /// Writes the front as it is into a folder.
     pub(super) fn write(&self, folder: PathBuf) {
-        self.tell(Order::Write(folder));
+        self.thread.tell(Order::Write(folder));
     }
 
     /// Asks what a design is worth beside the front.
     pub(super) fn judge(&self, lens: Arc<Lens>) {
-        self.tell(Order::Judge(lens));
+        self.thread.tell(Order::Judge(lens));
     }
 
     /// How far the sweep is.
@@ -268,36 +244,18 @@ impl Sweeper {
 
     /// What happened since the last look.
     pub(super) fn told(&self) -> Vec<Told> {
-        self.told.try_iter().collect()
-    }
-
-    /// The thread outlives every panic of a sweep, so it hears every order.
-    fn tell(&self, order: Order) {
-        if let Some(orders) = &self.orders {
-            orders.send(order).unwrap_or_default();
-        }
-    }
-}
-
-impl Drop for Sweeper {
-    fn drop(&mut self) {
-        self.orders = None;
-        if let Some(thread) = self.thread.take() {
-            thread.join().unwrap_or_default();
-        }
+        self.thread.news()
     }
 }
 
 /// What the thread works with.
 struct Desk {
-    inbox: Receiver<Order>,
-    outbox: Sender<Told>,
+    outbox: Outbox<Told>,
     shown: Slot<FrontRun>,
     judged: Slot<Judged>,
     begin: Box<Begin>,
     /// Threads of its own: numbers of panels do not queue behind a slice.
     pool: ThreadPool,
-    wake: Box<dyn Fn() + Send>,
     pace: Pace,
     run: Option<Run>,
 }
@@ -308,29 +266,11 @@ struct Run {
     state: FrontRun,
 }
 
-impl Desk {
-    /// Works until the handle is dropped.
-    fn serve(mut self) {
-        loop {
-            let running =
-                self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running);
-            let order = if running {
-                match self.inbox.try_recv() {
-                    Ok(order) => Some(order),
-                    Err(TryRecvError::Empty) => None,
-                    Err(TryRecvError::Disconnected) => return,
-                }
-            } else {
-                match self.inbox.recv() {
-                    Ok(order) => Some(order),
-                    Err(_) => return,
-                }
-            };
-            match order {
-                Some(order) => self.obey(order),
-                None => self.advance(),
-            }
-        }
+impl Work for Desk {
+    type Order = Order;
+
+    fn is_running(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running)
     }
 
     fn obey(&mut self, order: Order) {
@@ -344,48 +284,10 @@ impl Desk {
             Order::Clear => self.run = None,
             Order::Write(folder) => self.write(&folder),
             Order::Judge(lens) => {
-                let found = guarded(|| judge(&lens));
-                self.judged.set(Judged { lens, found });
-                (self.wake)();
+                self.judged.set(Judged::of(lens));
+                self.outbox.wake();
             }
         }
-    }
-
-    fn start(&mut self, job: Job) {
-        let Job { number, lens, settings, compare } = job;
-        match guarded(|| (self.begin)(&lens, &settings)) {
-            Ok(sweep) => {
-                let start = Arc::new(sweep.start().clone());
-                let main = Leg::new(sweep.as_ref());
-                let standing = Standing::Running;
-                let compare = compare && settings.pupil != PupilEdge::Kept;
-                let state = FrontRun {
-                    number,
-                    standing,
-                    settings,
-                    compare,
-                    lens,
-                    start,
-                    main,
-                    biased: None,
-                };
-                self.run = Some(Run { sweep, state });
-                self.stand(standing);
-            }
-            Err(why) => {
-                self.run = None;
-                self.emit(Told::Failed(number, why));
-            }
-        }
-    }
-
-    /// Lets the sweep stand otherwise, shows it and says so.
-    fn stand(&mut self, standing: Standing) {
-        let Some(run) = &mut self.run else { return };
-        run.state.standing = standing;
-        let number = run.state.number;
-        self.shown.set(run.look());
-        self.emit(Told::Now(number, standing));
     }
 
     /// Goes on for a slice; then the next leg follows, or the end.
@@ -409,8 +311,47 @@ impl Desk {
             self.stand(Standing::Finished);
         } else if self.pace.is_due() {
             self.shown.set(run.look());
-            (self.wake)();
+            self.outbox.wake();
         }
+    }
+}
+
+impl Desk {
+    fn start(&mut self, job: Job) {
+        let Job { number, lens, settings, compare } = job;
+        match guarded(|| (self.begin)(&lens, &settings)) {
+            Ok(sweep) => {
+                let start = Arc::new(sweep.start().clone());
+                let main = Leg::new(sweep.as_ref());
+                let standing = Standing::Running;
+                let compare = compare && settings.pupil != PupilEdge::Kept;
+                let state = FrontRun {
+                    number,
+                    standing,
+                    settings,
+                    compare,
+                    lens,
+                    start,
+                    main,
+                    biased: None,
+                };
+                self.run = Some(Run { sweep, state });
+                self.stand(standing);
+            }
+            Err(why) => {
+                self.run = None;
+                self.outbox.emit(Told::Failed(number, why));
+            }
+        }
+    }
+
+    /// Lets the sweep stand otherwise, shows it and says so.
+    fn stand(&mut self, standing: Standing) {
+        let Some(run) = &mut self.run else { return };
+        run.state.standing = standing;
+        let number = run.state.number;
+        self.shown.set(run.look());
+        self.outbox.emit(Told::Now(number, standing));
     }
 
     fn give_up(&mut self, why: String) {
@@ -418,25 +359,20 @@ impl Desk {
         run.state.standing = Standing::Stopped;
         let number = run.state.number;
         self.shown.set(run.state.clone());
-        self.emit(Told::Failed(number, why));
+        self.outbox.emit(Told::Failed(number, why));
     }
 
     fn write(&mut self, folder: &Path) {
         let Some(run) = &mut self.run else {
-            return self.emit(Told::NotWritten("there is no front to export yet".to_owned()));
+            return self
+                .outbox
+                .emit(Told::NotWritten("there is no front to export yet".to_owned()));
         };
         let told = match write(&run.look().survey(), folder) {
             Ok(files) => Told::Written(folder.to_owned(), files.len()),
             Err(why) => Told::NotWritten(why.to_string()),
         };
-        self.emit(told);
-    }
-
-    /// Nobody listens any more when the handle is being dropped; the next look at the inbox ends
-    /// the thread then.
-    fn emit(&self, told: Told) {
-        self.outbox.send(told).unwrap_or_default();
-        (self.wake)();
+        self.outbox.emit(told);
     }
 }
 
@@ -463,20 +399,11 @@ impl Run {
     }
 }
 
-fn judge(lens: &Lens) -> Result<Design, String> {
-    let lens = limited_by_stop(lens).map_err(|why| why.to_string())?;
-    Design::of(&lens, None, JUDGED).map_err(|why| why.to_string())
-}
-
-/// Does something; a panic becomes its words.
-fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(said(panic.as_ref())))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::session::blank;
+    use crate::session::judged::judge;
 
     /// Breaks at its third step.
     struct Breaks {
@@ -517,7 +444,7 @@ mod tests {
         for number in 1..3 {
             let (lens, settings) = (Arc::new(blank()), Settings::default());
             sweeper.start(Job { number, lens, settings, compare: false });
-            let told: Vec<Told> = sweeper.told.iter().take(2).collect();
+            let told: Vec<Told> = sweeper.thread.news.iter().take(2).collect();
             let failed = Told::Failed(number, "the search failed: the toy breaks".to_owned());
             assert_eq!(told, [Told::Now(number, Standing::Running), failed]);
             let run = sweeper.run().map(|run| (run.number, run.standing, run.main.done));

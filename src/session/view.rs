@@ -1,6 +1,7 @@
 //! What a panel reads: a snapshot of the session that nothing changes.
 
 use super::analyst::Results;
+use super::explorations::Explorations;
 use super::fronts::Fronts;
 use super::laboratory::Trial;
 use super::worker::Search;
@@ -24,6 +25,8 @@ pub struct View {
     pub search: Option<Arc<Search>>,
     /// The fronts of sharpness against light.
     pub fronts: Fronts,
+    /// The search over structure.
+    pub explorations: Explorations,
     /// A lens that is shown in place of the design.
     pub candidate: Option<Arc<Lens>>,
     /// The numbers of that lens, or of the one that the search shows, maybe of a step before.
@@ -54,6 +57,7 @@ impl Default for View {
             results: None,
             search: None,
             fronts: Fronts::default(),
+            explorations: Explorations::default(),
             candidate: None,
             preview: None,
             trial: None,

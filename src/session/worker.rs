@@ -4,17 +4,14 @@
 //! slow window never holds it up; small news travels as events. The window is woken at most
 //! thirty times a second, and at once where something ends.
 
+use super::background::{Background, Outbox, Work, guarded};
 use super::clock::Pace;
 use super::slot::Slot;
 use crate::lens::Lens;
 use crate::merit::{Goal, TermValue};
 use crate::optimize::{Method, Optimizer, Progress};
-use std::any::Any;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 /// The time between two looks of the window, at least.
@@ -49,6 +46,13 @@ pub enum Standing {
     Stopped,
     /// Further steps would change nothing.
     Finished,
+}
+
+impl Standing {
+    /// Whether it goes on or can.
+    pub const fn can_go_on(self) -> bool {
+        matches!(self, Self::Running | Self::Paused)
+    }
 }
 
 /// How far a search is.
@@ -97,6 +101,7 @@ pub(super) enum News {
 }
 
 /// What a search is told.
+#[derive(Debug)]
 enum Order {
     Start { number: u64, task: Task },
     Pause,
@@ -108,48 +113,38 @@ enum Order {
 /// The handle of the thread that searches.
 #[derive(Debug)]
 pub(super) struct Worker {
-    orders: Option<Sender<Order>>,
-    news: Receiver<News>,
+    thread: Background<Order, News>,
     search: Slot<Search>,
-    thread: Option<JoinHandle<()>>,
 }
 
 impl Worker {
     /// Starts the thread. `wake` is called from it when there is something new to look at.
     pub(super) fn spawn(start: Box<Starter>, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
-        let (orders, inbox) = mpsc::channel();
-        let (outbox, news) = mpsc::channel();
         let search = Slot::default();
-        let desk = Desk {
-            inbox,
-            outbox,
-            search: search.clone(),
-            start,
-            wake: Box::new(wake),
-            pace: Pace::new(BETWEEN),
-        };
-        let thread = thread::Builder::new().name("optimizer".into()).spawn(move || desk.serve())?;
-        Ok(Self { orders: Some(orders), news, search, thread: Some(thread) })
+        let shown = search.clone();
+        let desk =
+            |outbox| Desk { outbox, search: shown, start, pace: Pace::new(BETWEEN), run: None };
+        Ok(Self { thread: Background::spawn("optimizer", wake, desk)?, search })
     }
 
     pub(super) fn start(&self, number: u64, task: Task) {
-        self.tell(Order::Start { number, task });
+        self.thread.tell(Order::Start { number, task });
     }
 
     pub(super) fn pause(&self) {
-        self.tell(Order::Pause);
+        self.thread.tell(Order::Pause);
     }
 
     pub(super) fn resume(&self) {
-        self.tell(Order::Resume);
+        self.thread.tell(Order::Resume);
     }
 
     pub(super) fn step(&self) {
-        self.tell(Order::Step);
+        self.thread.tell(Order::Step);
     }
 
     pub(super) fn stop(&self) {
-        self.tell(Order::Stop);
+        self.thread.tell(Order::Stop);
     }
 
     /// How far the search is.
@@ -159,34 +154,17 @@ impl Worker {
 
     /// What happened since the last look.
     pub(super) fn news(&self) -> Vec<News> {
-        self.news.try_iter().collect()
-    }
-
-    /// The thread outlives every panic of a search, so it hears every order.
-    fn tell(&self, order: Order) {
-        if let Some(orders) = &self.orders {
-            orders.send(order).unwrap_or_default();
-        }
-    }
-}
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        self.orders = None;
-        if let Some(thread) = self.thread.take() {
-            thread.join().unwrap_or_default();
-        }
+        self.thread.news()
     }
 }
 
 /// What the thread works with.
 struct Desk {
-    inbox: Receiver<Order>,
-    outbox: Sender<News>,
+    outbox: Outbox<News>,
     search: Slot<Search>,
     start: Box<Starter>,
-    wake: Box<dyn Fn() + Send>,
     pace: Pace,
+    run: Option<Run>,
 }
 
 /// A search under way.
@@ -196,36 +174,29 @@ struct Run {
     stride: usize,
 }
 
-impl Desk {
-    /// Works until the handle is dropped.
-    fn serve(mut self) {
-        let mut run: Option<Run> = None;
-        loop {
-            let running = run.as_ref().is_some_and(|r| r.state.standing == Standing::Running);
-            let order = if running {
-                match self.inbox.try_recv() {
-                    Ok(order) => Some(order),
-                    Err(TryRecvError::Empty) => None,
-                    Err(TryRecvError::Disconnected) => return,
-                }
-            } else {
-                match self.inbox.recv() {
-                    Ok(order) => Some(order),
-                    Err(_) => return,
-                }
-            };
-            run = match (order, run) {
-                (Some(Order::Start { number, task }), _) => self.begin(number, task),
-                (Some(order), Some(run)) => self.obey(&order, run),
-                (None, Some(run)) => self.advance(run),
-                (_, None) => None,
-            };
-        }
+impl Work for Desk {
+    type Order = Order;
+
+    fn is_running(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running)
     }
 
+    fn obey(&mut self, order: Order) {
+        self.run = match (order, self.run.take()) {
+            (Order::Start { number, task }, _) => self.begin(number, task),
+            (order, Some(run)) => self.steer(&order, run),
+            (_, None) => None,
+        };
+    }
+
+    fn advance(&mut self) {
+        self.run = self.run.take().and_then(|run| self.step(run));
+    }
+}
+
+impl Desk {
     fn begin(&self, number: u64, task: Task) -> Option<Run> {
-        let start = AssertUnwindSafe(|| (self.start)(&task));
-        match catch_unwind(start).unwrap_or_else(|panic| Err(said(panic.as_ref()))) {
+        match guarded(|| (self.start)(&task)) {
             Ok(optimizer) => {
                 let before = optimizer.terms().unwrap_or_default();
                 let merit = before.iter().map(|term| term.weight * term.value).sum();
@@ -246,13 +217,13 @@ impl Desk {
                 Some(run)
             }
             Err(why) => {
-                self.emit(News::Failed(number, why));
+                self.outbox.emit(News::Failed(number, why));
                 None
             }
         }
     }
 
-    fn obey(&mut self, order: &Order, mut run: Run) -> Option<Run> {
+    fn steer(&mut self, order: &Order, mut run: Run) -> Option<Run> {
         let number = run.state.number;
         match (order, run.state.standing) {
             (Order::Pause, Standing::Running) => {
@@ -264,7 +235,7 @@ impl Desk {
                 self.tell(&run, News::Resumed(number));
             }
             (Order::Step, Standing::Paused) => {
-                run = self.advance(run)?;
+                run = self.step(run)?;
                 self.publish(&run);
             }
             (Order::Stop, Standing::Running | Standing::Paused) => {
@@ -279,12 +250,15 @@ impl Desk {
     }
 
     /// Takes one step; `None` where the search is over.
-    fn advance(&mut self, mut run: Run) -> Option<Run> {
+    fn step(&mut self, mut run: Run) -> Option<Run> {
         let number = run.state.number;
-        let stepped = catch_unwind(AssertUnwindSafe(|| run.step()));
-        if let Err(panic) = stepped {
+        let stepped = guarded(|| {
+            run.step();
+            Ok(())
+        });
+        if let Err(why) = stepped {
             run.state.standing = Standing::Stopped;
-            self.tell(&run, News::Failed(number, said(panic.as_ref())));
+            self.tell(&run, News::Failed(number, why));
             return None;
         }
         if run.state.progress.as_ref().is_some_and(|progress| progress.finished) {
@@ -301,19 +275,12 @@ impl Desk {
     /// Shows how far the search is, then says what happened.
     fn tell(&self, run: &Run, news: News) {
         self.search.set(run.snapshot());
-        self.emit(news);
+        self.outbox.emit(news);
     }
 
     fn publish(&self, run: &Run) {
         self.search.set(run.snapshot());
-        (self.wake)();
-    }
-
-    /// Nobody listens any more when the handle is being dropped; the next look at the inbox ends
-    /// the thread then.
-    fn emit(&self, news: News) {
-        self.outbox.send(news).unwrap_or_default();
-        (self.wake)();
+        self.outbox.wake();
     }
 }
 
@@ -339,11 +306,4 @@ impl Run {
             ..self.state.clone()
         }
     }
-}
-
-/// The words of a panic.
-pub(super) fn said(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-    format!("the search failed: {}", text.unwrap_or_else(|| "for an unknown reason".to_owned()))
 }

@@ -17,7 +17,7 @@ use super::menu::{self, Wish};
 use super::shell::Memory;
 use super::wording::{capital, counted_from_one};
 use crate::files;
-use crate::session::{Command, Event, Message, Session, Severity, View};
+use crate::session::{Command, Event, Explore, Message, Session, Severity, View};
 
 /// Under which name the arrangement of the panels is remembered.
 const DOCK: &str = "dock";
@@ -119,6 +119,7 @@ impl Studio {
                 let folder = folder.unwrap_or_else(|| PathBuf::from("front"));
                 self.chooser.ask(context, Purpose::ExportFront, Some(&folder));
             }
+            Wish::Do(Command::Explore(wish)) => self.explore(context, view, wish),
             Wish::Choose(purpose) => self.chooser.ask(context, purpose, view.path.as_deref()),
             Wish::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name) {
                 Ok(opened) => self.replace(context, Command::New(Box::new(opened.lens))),
@@ -126,6 +127,27 @@ impl Studio {
             },
             Wish::Do(command @ Command::New(_)) => self.replace(context, command),
             Wish::Do(command) => self.apply(context, command),
+        }
+    }
+
+    /// Does what is asked of a search, a file being chosen first where one is needed.
+    fn explore(&mut self, context: &Context, view: &View, wish: Explore) {
+        let known = &view.explorations;
+        let saved = known.run.as_ref().and_then(|run| run.checkpoint.path.as_deref());
+        match wish {
+            Explore::GoOn(None) => {
+                let near = saved.or(known.left.as_deref());
+                self.chooser.ask(context, Purpose::OpenSearch, near);
+            }
+            Explore::SaveTo(None) => {
+                let near = saved.or(known.place.as_deref());
+                self.chooser.ask(context, Purpose::SaveSearch, near);
+            }
+            Explore::Export { number, path: None } => {
+                let near = view.path.as_deref();
+                self.chooser.ask(context, Purpose::ExportFound(number), near);
+            }
+            wish => self.apply(context, Command::Explore(wish)),
         }
     }
 
@@ -158,6 +180,16 @@ impl Studio {
             Purpose::ExperimentFolder => self.apply(context, Command::SaveExperiment(path)),
             Purpose::Save => self.apply(context, Command::Save(Some(path))),
             Purpose::ExportFront => self.apply(context, Command::ExportFront(Some(path))),
+            Purpose::OpenSearch => {
+                self.apply(context, Command::Explore(Explore::GoOn(Some(path))));
+            }
+            Purpose::SaveSearch => {
+                self.apply(context, Command::Explore(Explore::SaveTo(Some(path))));
+            }
+            Purpose::ExportFound(number) => {
+                let path = Some(path);
+                self.apply(context, Command::Explore(Explore::Export { number, path }));
+            }
             Purpose::ExportZemax | Purpose::ExportJson => {
                 self.apply(context, Command::Export(path));
             }

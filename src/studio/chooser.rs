@@ -22,6 +22,12 @@ pub enum Purpose {
     ExportFront,
     /// To write the data and pictures of an experiment into it.
     ExperimentFolder,
+    /// To go on with a search over structure.
+    OpenSearch,
+    /// To save a search over structure to it.
+    SaveSearch,
+    /// To write the lens of a generation of a search.
+    ExportFound(u64),
 }
 
 impl Purpose {
@@ -33,13 +39,17 @@ impl Purpose {
             Self::ExportJson => "Export a copy of the lens",
             Self::ExportFront => "Export the front into a folder",
             Self::ExperimentFolder => "Save the experiment into a folder",
+            Self::OpenSearch => "Go on with a search",
+            Self::SaveSearch => "Save the search",
+            Self::ExportFound(_) => "Export the lens of the search",
         }
     }
 
     const fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Open => &["json", "zmx", "ZMX"],
-            Self::Save | Self::ExportJson => &["json"],
+            Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
+            Self::ExportFound(_) => &["json", "zmx"],
             Self::ExportZemax => &["zmx"],
             Self::ExportFront | Self::ExperimentFolder => &[],
         }
@@ -47,13 +57,18 @@ impl Purpose {
 
     /// Whether the name of a new file is asked for.
     fn names_a_file(self) -> bool {
-        !matches!(self, Self::Open | Self::ExportFront | Self::ExperimentFolder)
+        !matches!(self, Self::Open | Self::OpenSearch | Self::ExportFront | Self::ExperimentFolder)
+    }
+
+    /// Whether the file is written.
+    fn is_written(self) -> bool {
+        !matches!(self, Self::Open | Self::OpenSearch)
     }
 
     /// The path with the extension that it needs, if it has none.
     fn complete(self, path: PathBuf) -> PathBuf {
         match self.extensions().first() {
-            Some(extension) if self != Self::Open && path.extension().is_none() => {
+            Some(extension) if self.is_written() && path.extension().is_none() => {
                 path.with_extension(extension)
             }
             _ => path,
@@ -163,7 +178,7 @@ fn open_dialog(
     let context = context.clone();
     thread::Builder::new().name("file dialog".into()).spawn(move || {
         let path = match purpose {
-            Purpose::Open => dialog.pick_file(),
+            Purpose::Open | Purpose::OpenSearch => dialog.pick_file(),
             Purpose::ExportFront | Purpose::ExperimentFolder => dialog.pick_folder(),
             _ => dialog.save_file(),
         };

@@ -88,23 +88,24 @@ impl Dock {
 fn usual() -> Tree<Kind> {
     let mut tiles = Tiles::default();
     let mut pane = |kind: Kind| tiles.insert_pane(kind);
-    let [layout, spot, pupil, table, optimizer, pareto, first, effects] = [
+    let [layout, spot, pupil, table, optimizer, pareto, search, first, effects] = [
         Kind::Layout,
         Kind::Spot,
         Kind::Pupil,
         Kind::Prescription,
         Kind::Optimizer,
         Kind::Pareto,
+        Kind::Search,
         Kind::FirstOrder,
         Kind::Effects,
     ]
     .map(&mut pane);
     let facts = tiles.insert_tab_tile(vec![first, effects]);
     let light = tiles.insert_tab_tile(vec![spot, pupil]);
-    let search = tiles.insert_tab_tile(vec![optimizer, pareto]);
+    let better = tiles.insert_tab_tile(vec![optimizer, pareto, search]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(layout, 0.52), (table, 0.48)]);
-    let right = column(&mut tiles, &[(light, 0.44), (search, 0.56)]);
+    let right = column(&mut tiles, &[(light, 0.44), (better, 0.56)]);
     let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
     Tree::new(Id::unique("dock"), root, tiles)
 }

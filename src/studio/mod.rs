@@ -37,7 +37,10 @@ use crate::session::{Command, Session, blank};
 pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
     shell::open(Memory::Kept, |context, backing| {
         let wake = context.egui_ctx.clone();
-        let session = Session::new(first_lens(), move || wake.request_repaint())?;
+        let mut session = Session::new(first_lens(), move || wake.request_repaint())?;
+        if let Some(folder) = eframe::storage_dir("aplanat") {
+            session.keep_searches_in(folder.join("searches"));
+        }
         let mut studio = Studio::new(session, backing, Memory::Kept, context.storage);
         if let Some(path) = path {
             studio.apply(&context.egui_ctx, Command::Open(path.to_owned()));

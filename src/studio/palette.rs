@@ -57,6 +57,8 @@ pub struct Palette {
     pub background: Colour,
     /// Inside a lens; a denser glass is drawn less transparent.
     pub glass: Colour,
+    /// The same for glass that the design does not have.
+    pub fresh: Colour,
     /// The rim of a lens.
     pub outline: Colour,
     /// A mirror.
@@ -84,6 +86,7 @@ impl Palette {
         dark: true,
         background: [22, 24, 28, 255],
         glass: [110, 165, 225, 70],
+        fresh: [250, 190, 80, 95],
         outline: [160, 190, 220, 255],
         mirror: [120, 210, 140, 255],
         strong: [235, 235, 235, 255],
@@ -98,6 +101,7 @@ impl Palette {
         dark: false,
         background: [252, 252, 252, 255],
         glass: [90, 150, 215, 60],
+        fresh: [235, 140, 0, 80],
         outline: [60, 95, 135, 255],
         mirror: [30, 130, 60, 255],
         strong: [25, 25, 25, 255],
@@ -119,6 +123,13 @@ impl Palette {
         let set = if self.dark { LIMITS_DARK } else { LIMITS_LIGHT };
         let [r, g, b] = set[index % set.len()];
         [r, g, b, 255]
+    }
+
+    /// The colour of a kind of mutation, by its place among them; those beyond the set start again
+    /// in the colours of fields.
+    pub fn mutation(&self, index: usize) -> Colour {
+        let count = LIMITS_DARK.len();
+        if index < count { self.limit(index) } else { self.field(index - count) }
     }
 
     /// About the hue that a wavelength has to the eye, violet below 0.4 µm and red above 0.7 µm.

@@ -36,11 +36,11 @@ impl<'a> Section<'a> {
         Bounds::around(corners.flat_map(|(&z, h)| [DVec2::new(z, h), DVec2::new(z, -h)]))
     }
 
-    /// Draws glass, to lie below the rays.
-    pub fn draw_glass(&self, scene: &mut Scene, palette: &Palette) {
+    /// Draws glass, to lie below the rays; that behind the surfaces of `fresh` is tinted.
+    pub fn draw_glass(&self, scene: &mut Scene, palette: &Palette, fresh: &[usize]) {
         for (left, medium) in self.elements() {
             let height = self.heights[left].max(self.heights[left + 1]);
-            let mut colour = palette.glass;
+            let mut colour = if fresh.contains(&left) { palette.fresh } else { palette.glass };
             colour[3] = glass_alpha(colour[3], medium);
             scene.strip(&self.curve(left, height), &self.curve(left + 1, height), colour);
         }
@@ -241,7 +241,7 @@ mod tests {
     fn only_glass_is_filled() {
         let system = singlet();
         let mut scene = Scene::default();
-        Section::new(&system, &[]).draw_glass(&mut scene, &Palette::DARK);
+        Section::new(&system, &[]).draw_glass(&mut scene, &Palette::DARK, &[]);
         let behind = scene.corners.iter().map(|corner| corner.at.x).fold(0.0, f32::max);
         assert!(behind <= 5.01, "nothing is filled behind the singlet");
     }
@@ -251,7 +251,7 @@ mod tests {
         let system = System { index_before: 1.0, surfaces: Vec::new(), stop: Some(3) };
         let section = Section::new(&system, &[]);
         let mut scene = Scene::default();
-        section.draw_glass(&mut scene, &Palette::DARK);
+        section.draw_glass(&mut scene, &Palette::DARK, &[]);
         section.draw_outlines(&mut scene, &Palette::DARK);
         assert_eq!((scene.bounds(), section.bounds()), (None, None));
     }

@@ -1,5 +1,7 @@
 //! Messages as a designer reads them: surfaces are counted from 1 in the window, from 0 in files.
 
+use crate::session::Standing;
+
 /// A message with every `surface 3` and `surfaces 3 to 5` counted one further.
 pub fn counted_from_one(message: &str) -> String {
     let mut words: Vec<String> = message.split(' ').map(str::to_owned).collect();
@@ -26,6 +28,18 @@ pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     first + letters.as_str()
+}
+
+/// How a run stands, or will as soon as its present work is done.
+pub fn standing(now: Standing, pending: Option<Standing>) -> &'static str {
+    match now {
+        _ if pending == Some(Standing::Paused) => "Pausing…",
+        _ if pending == Some(Standing::Stopped) => "Stopping…",
+        Standing::Running => "Running",
+        Standing::Paused => "Paused",
+        Standing::Stopped => "Stopped",
+        Standing::Finished => "Finished",
+    }
 }
 
 #[cfg(test)]

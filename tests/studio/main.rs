@@ -7,5 +7,6 @@ mod bench;
 mod chooser;
 mod drawing;
 mod panels;
+mod search;
 mod shaders;
 mod window;

@@ -165,6 +165,39 @@ fn a_search_bends_the_shown_lens_and_its_result_is_one_step() {
 }
 
 #[test]
+fn a_search_over_structure_shows_its_lenses_and_one_is_taken_as_one_step() {
+    let mut harness = window();
+    harness.get_by_label("Search").click();
+    harness.run_steps(3);
+    let button = harness.get_all_by_label("Search").last().unwrap();
+    button.click();
+    wait(&mut harness, "a card", |harness| {
+        let cards = harness.query_all_by_label_contains(" elements, ");
+        let moves = harness.state().session().view().explorations.run;
+        cards.count() > 0 && moves.is_some_and(|run| run.statistics.moves > 8)
+    });
+    harness.get_by_label("Follow the search").click();
+    wait(&mut harness, "the lens of the chain", |harness| {
+        harness.state().session().view().preview.is_some()
+    });
+    assert!(!harness.state().session().is_dirty());
+    harness.get_by_label("Stop").click();
+    wait(&mut harness, "the end", |harness| {
+        harness.query_by_label_contains("Stopped, merit").is_some()
+    });
+    let card = harness.get_all_by_label_contains(" elements, ").next().unwrap();
+    card.click_accesskit();
+    harness.run_steps(3);
+    harness.get_by_label("Take").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    assert!(harness.state().session().is_dirty());
+    harness.get_by_label("Undo").click();
+    harness.run_steps(3);
+    assert_eq!(*harness.state().session().lens().as_ref(), double_gauss());
+}
+
+#[test]
 fn bundled_lenses_open_from_the_menu() {
     let mut harness = window();
     harness.get_by_label("File").click();

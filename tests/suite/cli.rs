@@ -96,10 +96,12 @@ fn every_subcommand_has_long_help_with_its_json() {
         "gradient",
         "optimize",
         "convert",
+        "grin",
         "experiment",
         "measure trace",
         "measure spot",
         "measure gradient",
+        "measure grin",
         "measure optimize",
         "measure window",
     ];
@@ -650,4 +652,56 @@ fn a_closed_pipe_is_no_failure() {
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
+}
+
+#[test]
+fn a_grin_task_is_worked_on_and_written_as_a_volume() {
+    let volume = Scratch::new("fibre.npz");
+    let report = done_json(&["grin", "fibre", "--out", volume.path(), "--nodes", "9"], "");
+    has_keys(&report, &["loss", "views", "error", "index", "rays", "steps", "ms", "memory"]);
+    assert!(report["views"][0]["spot"].as_f64().unwrap() < 1e-4);
+    assert!(report["error"]["without_offset"].as_f64().unwrap() < 1e-4);
+    let read = aplanat::files::read_volume(&volume.0).unwrap();
+    assert_eq!(read.grid.counts(), [9; 3]);
+    let task = done(&["grin", "luneburg-radial", "--show"], "");
+    let file = Scratch::with("task.json", &task);
+    let stopped = done_json(&["grin", file.path(), "--iterations", "2"], "");
+    assert_eq!(stopped["steps"], 2);
+    assert_eq!(stopped["stopped"], true);
+    assert!(done(&["grin"], "").contains("luneburg-radial"));
+    // What goes into the task comes out of its volume.
+    let task = task.replace("0.995", "-0.995");
+    refused(2, &["grin", "-"], &task, &["source, radius", "-0.995", "above 0"]);
+}
+
+#[test]
+fn wrong_grin_tasks_are_refused_with_their_place() {
+    let task = done(&["grin", "luneburg", "--show"], "");
+    let with = |from: &str, to: &str| {
+        assert!(task.contains(from), "no {from} in {task}");
+        task.replacen(from, to, 1)
+    };
+    let thin = with("\"low\": 1.0", "\"low\": 0.9");
+    refused(2, &["grin", "-"], &thin, &["limits, low", "0.9", "1 or more"]);
+    let unknown = with("\"tolerance\"", "\"tolerence\"");
+    refused(2, &["grin", "-"], &unknown, &["tolerence"]);
+    refused(2, &["grin", "no-such-task"], "", &["no-such-task", "luneburg"]);
+    refused(2, &["grin", "fibre", "--out", "a.txt"], "", &["a.txt", ".npz"]);
+    refused(2, &["grin", "fibre", "--minutes", "0"], "", &["--minutes"]);
+    refused(2, &["grin", "fibre", "--nodes", "1"], "", &["--nodes"]);
+    // Volumes without nodes and with a single one.
+    for (name, count) in [("empty", 0), ("voxel", 1)] {
+        let raw = Scratch::new(&format!("{name}.raw"));
+        std::fs::write(&raw.0, 1.5_f64.to_le_bytes().repeat(count)).unwrap();
+        let data = raw.0.file_name().unwrap().to_str().unwrap();
+        let header = format!(
+            r#"{{"aplanat_volume": 1, "counts": [{count}, {count}, {count}], "low": [0, 0, 0],
+                "spacing": [1, 1, 1], "numbers": "f64", "data": "{data}"}}"#
+        );
+        let header = Scratch::with(&format!("{name}.json"), &header);
+        let mut task: Value = serde_json::from_str(&task).unwrap();
+        task["start"] = json!({"volume": header.path()});
+        let words = if count == 0 { ["start", "values"] } else { ["start", "1 nodes along x"] };
+        refused(2, &["grin", "-"], &task.to_string(), &words);
+    }
 }

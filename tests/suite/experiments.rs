@@ -180,3 +180,39 @@ fn the_exact_rate_samples_the_target_and_the_printed_one_does_not() {
         assert!(time[first + 1..time.len() / 2 + first].iter().all(|other| *other > time[first]));
     }
 }
+
+#[test]
+fn the_adjoint_keeps_as_much_for_many_steps_as_for_few() {
+    let outcome = outcome("5.3");
+    let [tape, rays, steps] =
+        ["tape_bytes", "ray_bytes", "steps"].map(|name| column(&outcome.tables[0], name));
+    assert!(tape[3] > 7.0 * tape[0] && steps[3] > 7.0 * steps[0]);
+    assert!(rays.iter().all(|bytes| *bytes == rays[0]));
+}
+
+#[test]
+fn known_lenses_are_found_again() {
+    let outcome = outcome("5.8");
+    let relative = column(&outcome.tables[0], "relative");
+    let shape = column(&outcome.tables[0], "without_offset");
+    assert!(relative[0] < 1e-4 && shape.iter().zip(&relative).all(|(a, b)| a <= b));
+}
+
+#[test]
+fn a_fibre_focuses_better_than_the_parabolic_one() {
+    let outcome = outcome("5.9");
+    let [ours, theirs] =
+        ["spot_mm", "parabola_spot_mm"].map(|name| column(&outcome.tables[0], name));
+    // In the parabolic fibre a ray at height h is h cos(z/η(h)) away from the axis.
+    let blur = |z: f64| {
+        let heights = (0..40).map(|i| 0.95 * (f64::from(i) + 0.5) / 40.0);
+        let squares = heights.map(|h| (h * (z / (2.0 - h * h).sqrt()).cos()).powi(2));
+        (squares.sum::<f64>() / 40.0).sqrt()
+    };
+    for (k, theirs) in theirs.iter().enumerate() {
+        let planes = (0..3000).map(|i| (2 * k + 1) as f64 * (1.4 + 3e-4 * f64::from(i)));
+        let best = planes.map(blur).fold(f64::INFINITY, f64::min);
+        assert!((theirs / best - 1.0).abs() < 1e-3, "{theirs} {best}");
+    }
+    assert!(ours.iter().zip(&theirs).all(|(ours, theirs)| 1000.0 * ours < *theirs));
+}

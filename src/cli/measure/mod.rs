@@ -1,6 +1,7 @@
 //! Accuracy against time, throughput, memory.
 
 mod gradient;
+mod grin;
 mod optimize;
 mod plot;
 mod search;
@@ -25,6 +26,7 @@ enum What {
     Trace(trace::Trace),
     Spot(spot::Spot),
     Gradient(gradient::Gradient),
+    Grin(grin::Grin),
     Optimize(optimize::Optimize),
     Search(Box<search::Search>),
     Window(window::Window),
@@ -36,6 +38,7 @@ impl Measure {
             What::Trace(trace) => trace.run(output),
             What::Spot(spot) => spot.run(output),
             What::Gradient(gradient) => gradient.run(output),
+            What::Grin(grin) => grin.run(output),
             What::Optimize(optimize) => optimize.run(output),
             What::Search(search) => search.run(output),
             What::Window(window) => window.run(output),

@@ -4,12 +4,12 @@
 //! it, each with the weight and the objective that it was found with, two searches go on for as many
 //! gradients: one mutates, one descends only. The best lens of each joins the front of its side.
 
-use super::super::front::lens_and_spots;
-use super::super::trade::{self, Part};
-use super::super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Watch, report};
 use super::course::{Course, finish};
 use super::race::Runner;
 use super::{at_heights, rules};
+use crate::experiments::front::lens_and_spots;
+use crate::experiments::trade::{self, Part};
+use crate::experiments::{Claim, Effort, Ended, Experiment, Outcome, Picture, Watch, report};
 use crate::lens::Lens;
 use crate::merit::{PupilEdge, Term, Weighted};
 use crate::optimize::pareto::{Design, Front, Settings, Sweep, composite};

@@ -4,8 +4,8 @@
 //! Metropolis and Hastings stand beside them, and a descent from the start that never mutates: what
 //! lies below it is what mutations are worth.
 
-use super::super::{Effort, Ended, Experiment, Outcome, Watch};
 use super::race::{Race, Runner};
+use crate::experiments::{Effort, Ended, Experiment, Outcome, Watch};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.5",

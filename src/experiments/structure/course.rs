@@ -1,7 +1,7 @@
 //! Searches that are watched: after every round it is written down how far they are.
 
-use super::super::trade::Part;
-use super::super::{Ended, Watch, report};
+use crate::experiments::trade::Part;
+use crate::experiments::{Ended, Watch, report};
 use crate::lens::Lens;
 use crate::search::lens::{LensLandscape, Plan};
 use crate::search::{Kind, Run, RunOf};

@@ -26,8 +26,8 @@ fn loosened(term: Term, found: &[Margin]) -> Term {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{SUBJECTS, at_heights, rules};
     use super::*;
+    use crate::experiments::structure::{SUBJECTS, at_heights, rules};
     use crate::search::lens::goal;
 
     #[test]

@@ -5,8 +5,8 @@
 //! A Langevin step looks for the pupils of the lens anew, a step of a descent only every twentieth
 //! time: by the clock Metropolis and Hastings are farther behind than here.
 
-use super::super::{Effort, Ended, Experiment, Outcome, Watch};
 use super::race::{Race, Runner};
+use crate::experiments::{Effort, Ended, Experiment, Outcome, Watch};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.4",

@@ -7,12 +7,12 @@
 //! with which every search begins. The thesis's shares stand beside ours; its lenses and steps are
 //! others, so that only the order of the two is compared.
 
-use super::super::trade::Part;
-use super::super::{
-    Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report,
-};
 use super::course::{Course, Mark, finish};
 use super::{SUBJECTS, Subject, at_heights, plan, rules};
+use crate::experiments::trade::Part;
+use crate::experiments::{
+    Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report,
+};
 use crate::lens::Lens;
 use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke};
 use crate::search::{Kind, Landscape as _, Rules};

@@ -1,9 +1,9 @@
 //! Samplers side by side: the same lenses, the same objective, as many gradients, several seeds.
 
-use super::super::trade::Part;
-use super::super::{Cell, Claim, Effort, Ended, Outcome, Picture, Table, Watch};
 use super::course::{Course, finish};
 use super::{SUBJECTS, Subject, at_heights, plan, rules};
+use crate::experiments::trade::Part;
+use crate::experiments::{Cell, Claim, Effort, Ended, Outcome, Picture, Table, Watch};
 use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke};
 use crate::search::lens::Plan;
 use crate::search::{Method, Settings, Temperature, Termination};

@@ -6,11 +6,11 @@
 //! radius of each spot about its centroid, the clear area of each pupil. The search asks for sharp
 //! spots with at every field as much light as the mark has there.
 
-use super::super::section::Section;
-use super::super::trade::Part;
-use super::super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
 use super::course::{Course, finish};
 use super::{at_heights, rules};
+use crate::experiments::section::Section;
+use crate::experiments::trade::Part;
+use crate::experiments::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
 use crate::lens::Lens;
 use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE};
 use crate::pupil::Bench;

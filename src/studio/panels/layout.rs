@@ -1,6 +1,7 @@
 //! The lens in section, with its rays.
 //!
-//! While a search runs, its current lens is shown as it bends, over the outlines of the design.
+//! While a search runs, its current lens is shown as it bends, over the outlines of the design; glass
+//! that the design does not have is tinted.
 
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use glam::DVec2;
 use super::{Panel, field_name, no_numbers, shown, swatch, zoom_name};
 use crate::lens::System;
 use crate::math::Vec3;
-use crate::session::{Command, DrawnRay, Layout, Numbers, Results, View};
+use crate::session::{Command, DrawnRay, Layout, Numbers, Results, View, fresh_glass};
 use crate::studio::draw::{Backing, Bounds, Colour, Scene, Shown, Stage};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -39,6 +40,8 @@ struct Drawing {
     fates: Fates,
     /// Fields without rays, and why.
     dark: Vec<(usize, String)>,
+    /// How many pieces of glass the design does not have.
+    fresh: usize,
 }
 
 /// All on which a drawing depends.
@@ -129,6 +132,10 @@ impl LensLayout {
             ui.label(RichText::new(text).color(color))
                 .on_hover_text("Rays are drawn to the place where they are lost, with a dot there");
         }
+        if drawing.fresh > 0 {
+            swatch(ui, color32(palette.fresh).to_opaque());
+            ui.label("new glass").on_hover_text("Glass that the design does not have");
+        }
         for (field, why) in &drawing.dark {
             ui.colored_label(ui.visuals().warn_fg_color, format!("Field {}: {why}", field + 1));
         }
@@ -194,7 +201,10 @@ impl Drawing {
         if let Some(Ok(design)) = source.ghost.as_ref().map(|ghost| &ghost.numbers) {
             draw_ghost(&mut scene, design, &palette);
         }
-        section.draw_glass(&mut scene, &palette);
+        let fresh =
+            source.ghost.as_ref().map(|design| fresh_glass(&source.shown.lens, &design.lens));
+        let fresh = fresh.unwrap_or_default();
+        section.draw_glass(&mut scene, &palette, &fresh);
         layout.rays.iter().for_each(|ray| draw_ray(&mut scene, ray, &palette));
         section.draw_outlines(&mut scene, &palette);
         draw_image(&mut scene, &section, layout, &palette);
@@ -204,6 +214,7 @@ impl Drawing {
             reached: layout.reached.clone(),
             fates: layout.fates,
             dark: layout.dark.clone(),
+            fresh: fresh.len(),
             system,
             source,
         })

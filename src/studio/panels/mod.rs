@@ -8,6 +8,7 @@ mod optimizer;
 mod pareto;
 mod prescription;
 mod pupil;
+mod search;
 mod spot;
 
 pub use effects::Effects;
@@ -18,6 +19,7 @@ pub use pareto::ParetoFront;
 pub use prescription::Prescription;
 pub(super) use prescription::first_field;
 pub use pupil::Pupils;
+pub use search::StructureSearch;
 pub use spot::SpotDiagram;
 
 use std::sync::Arc;
@@ -62,6 +64,8 @@ pub enum Kind {
     Optimizer,
     /// What the lens can have of sharpness for how much light.
     Pareto,
+    /// The search over structure.
+    Search,
     /// Focal lengths, pupils, third-order sums.
     FirstOrder,
     /// Which physics is computed, and why.
@@ -70,13 +74,14 @@ pub enum Kind {
 
 impl Kind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Layout,
         Self::Prescription,
         Self::Spot,
         Self::Pupil,
         Self::Optimizer,
         Self::Pareto,
+        Self::Search,
         Self::FirstOrder,
         Self::Effects,
     ];
@@ -90,6 +95,7 @@ impl Kind {
             Self::Pupil => Box::new(Pupils::default()),
             Self::Optimizer => Box::new(Optimizer::default()),
             Self::Pareto => Box::new(ParetoFront::default()),
+            Self::Search => Box::new(StructureSearch::default()),
             Self::FirstOrder => Box::new(FirstOrderData),
             Self::Effects => Box::new(Effects),
         }
@@ -178,4 +184,13 @@ fn field_name(kind: FieldKind, field: Field) -> String {
         return format!("{y}{unit}");
     }
     format!("({}, {y}){unit}", number::show_digits(field.x, 4))
+}
+
+/// A mark of an axis that shows decades.
+fn decade_name(exponent: f64) -> String {
+    if exponent.fract() == 0.0 {
+        format!("1e{exponent}")
+    } else {
+        format!("{:.1e}", 10_f64.powf(exponent))
+    }
 }

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use std::f64::consts::FRAC_PI_2;
 
 /// The last coefficient of a spline stands beyond the rim, where the index would fall below 1.
-const LIMITS: Limits = Limits { low: 0.7, high: 2.0, change: 0.05 };
+const RANGE: [f64; 2] = [0.7, 2.0];
 
 fn ball(coefficients: Vec<f64>) -> Layered<BSpline<f64>> {
     Layered::sphere(BSpline::new(0.0, 1.0, coefficients).unwrap())
@@ -109,9 +109,10 @@ fn grin_the_best_fibre_is_the_hyperbolic_secant() {
     let rays = fan(40, 0.95, 0.0);
     let sech = |r: f64| 1f64.cosh() / r.cosh(); // a = π / (2 focus) = 1, and 1 at the rim
     let mut parameters = vec![1.2; 7];
+    let limits = Limits::even(7, RANGE, 0.05);
     let (mut descent, mut last, mut evaluations) = (Lbfgs::default(), f64::INFINITY, 0);
     for _ in 0..600 {
-        let done = descent.step(&mut parameters, &LIMITS, |p| {
+        let done = descent.step(&mut parameters, &limits, |p| {
             let field = fibre(p.to_vec());
             let tracer = Tracer::new(&field, setup.clone()).unwrap();
             let outcome = tracer.loss_and_gradient(&rays, |_, exit| {
@@ -146,7 +147,7 @@ fn grin_descent_keeps_to_its_limits_and_says_when_it_ends() {
         let (a, b) = (p[0] + p[1] - 1.0, p[0] - p[1]);
         (a * a + 100.0 * b * b, vec![2.0 * a + 200.0 * b, 2.0 * a - 200.0 * b])
     };
-    let limits = Limits { low: 1.0, high: 1.5, change: 0.05 };
+    let limits = Limits::even(2, [1.0, 1.5], 0.05);
     let (mut lbfgs, mut p) = (Lbfgs::default(), vec![1.4, 1.2]);
     let mut before = p.clone();
     let ended = (0..100).any(|_| {
@@ -164,6 +165,7 @@ fn grin_descent_keeps_to_its_limits_and_says_when_it_ends() {
     });
     assert!(p.iter().all(|v| *v < 1.01), "{p:?}");
     let mut asked = vec![0.3, f64::NAN, 9.0, 1.2];
+    let limits = Limits::even(4, [1.0, 1.5], 0.05);
     assert_eq!(limits.project(&mut asked), 3);
     assert_eq!(asked, [1.0, 1.0, 1.5, 1.2]);
 }

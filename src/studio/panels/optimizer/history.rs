@@ -4,6 +4,7 @@ use eframe::egui::{Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, Plot, PlotPoints};
 
 use crate::session::{HistoryPoint, Search};
+use crate::studio::panels::decade_name;
 
 /// Plots the merit of the current and of the best lens, decades up and steps across.
 pub(super) fn plot(ui: &mut Ui, search: &Search) {
@@ -25,19 +26,11 @@ pub(super) fn plot(ui: &mut Ui, search: &Search) {
         .grid_color(visuals.widgets.noninteractive.bg_stroke.color)
         .grid_spacing(18.0..=120.0)
         .set_margin_fraction(vec2(0.01, 0.08))
-        .y_axis_formatter(|mark, _| power_of_ten(mark.value));
+        .y_axis_formatter(|mark, _| decade_name(mark.value));
     let shown = plot.show(ui, |plot| {
         plot.line(Line::new("current", current).color(weak).width(1.0));
         plot.line(Line::new("best", best).color(strong).width(2.0));
     });
     let text = "Merit against steps";
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));
-}
-
-fn power_of_ten(exponent: f64) -> String {
-    if exponent.fract() == 0.0 {
-        format!("1e{exponent}")
-    } else {
-        format!("{:.1e}", 10_f64.powf(exponent))
-    }
 }

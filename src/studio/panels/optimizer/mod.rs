@@ -160,7 +160,7 @@ fn progress(ui: &mut Ui, view: &View, search: &Search) {
 }
 
 /// Spots and focal length of the design and of the lens that the search shows.
-fn changes(view: &View) -> Vec<String> {
+pub(super) fn changes(view: &View) -> Vec<String> {
     let short = |value: f64| number::show_digits(value, 4);
     let mut texts = Vec::new();
     let before = view.results.as_ref().and_then(|results| results.numbers.as_ref().ok());

@@ -6,7 +6,7 @@ use crate::lens::{Lens, Quantity};
 use crate::optimize::pareto::Design;
 use crate::session::{FrontRun, Standing, View};
 use crate::studio::number;
-use crate::studio::wording::{capital, counted_from_one};
+use crate::studio::wording::{capital, counted_from_one, standing};
 
 /// What a sweep may change, and what it takes as it is.
 pub(super) fn free(ui: &mut Ui, view: &View) {
@@ -48,14 +48,7 @@ fn counted(lens: &Lens) -> String {
 
 /// How far the run is.
 pub(super) fn progress(run: &FrontRun, pending: Option<Standing>) -> String {
-    let standing = match run.standing {
-        _ if pending == Some(Standing::Paused) => "Pausing…",
-        _ if pending == Some(Standing::Stopped) => "Stopping…",
-        Standing::Running => "Running",
-        Standing::Paused => "Paused",
-        Standing::Stopped => "Stopped",
-        Standing::Finished => "Finished",
-    };
+    let standing = standing(run.standing, pending);
     let leg = run.leg();
     let kept = if run.biased.is_some() { ", pupils kept" } else { "" };
     let rate = leg.done as f64 / leg.seconds;

@@ -1,8 +1,11 @@
 //! The session itself: what each command does.
 
+mod exploring;
+
 use super::analyst::{Analyst, Request, Results, Savings};
 use super::command::{Command, Edit};
 use super::edit::edited;
+use super::explorations::ExplorationDesk;
 use super::fronts::FrontDesk;
 use super::history::History;
 use super::laboratory::{Laboratory, Stage};
@@ -40,10 +43,14 @@ pub enum Event {
     SearchFinished,
     /// The sweep of a front stands so.
     Front(Standing),
+    /// The search over structure stands so.
+    Explored(Standing),
     /// Something to tell the person.
     Said(Message),
 }
 
+/// What tells the numbers of searches over structure from those of other searches.
+const EXPLORED: u64 = 1 << 63;
 /// How many messages are kept.
 const MESSAGES: usize = 200;
 
@@ -63,6 +70,7 @@ pub struct Session {
     analyst: Analyst,
     worker: Worker,
     fronts: FrontDesk,
+    explorations: ExplorationDesk,
     /// A lens that is shown in place of the design.
     candidate: Option<Arc<Lens>>,
     /// Computes the numbers of that lens, or of the one that the search shows.
@@ -115,7 +123,8 @@ impl Session {
             followed: None,
             laboratory: Laboratory::spawn(wake.clone())?,
             worker: Worker::spawn(start, wake.clone())?,
-            fronts: FrontDesk::spawn(wake)?,
+            fronts: FrontDesk::spawn(wake.clone())?,
+            explorations: ExplorationDesk::spawn(wake)?,
             candidate: None,
             searches: 0,
             search: None,
@@ -151,6 +160,7 @@ impl Session {
             Command::StopFront => self.fronts.stand(Standing::Stopped),
             Command::ClearFronts => self.fronts.clear(),
             Command::ExportFront(folder) => self.export_front(folder),
+            Command::Explore(wish) => self.explore(wish),
             Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),
             Command::TakePreview => self.take_preview(),
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
@@ -180,6 +190,10 @@ impl Session {
             self.hear_front(told);
         }
         self.fronts.keep_up(&self.lens);
+        for told in self.explorations.told() {
+            self.hear_exploration(told);
+        }
+        self.explorations.keep_up(&self.lens);
         self.follow();
         std::mem::take(&mut self.events)
     }
@@ -192,6 +206,7 @@ impl Session {
             results: self.analyst.results(),
             search: self.search(),
             fronts: self.fronts.view(),
+            explorations: self.explorations.view(),
             candidate: self.candidate.clone(),
             preview: self.preview(),
             trial: self.laboratory.trial(),
@@ -227,8 +242,9 @@ impl Session {
     /// The lens that is shown in place of the design, and what numbers of it are known by: the
     /// number of the search that it belongs to, or 0.
     fn followed(&self) -> Option<(u64, Arc<Lens>)> {
+        let explored = || self.explorations.shown().map(|(number, lens)| (EXPLORED | number, lens));
         let search = || self.search().map(|search| (search.number, Arc::clone(search.shown())));
-        self.candidate.clone().map(|lens| (0, lens)).or_else(search)
+        self.candidate.clone().map(|lens| (0, lens)).or_else(explored).or_else(search)
     }
 
     /// Asks for the numbers of that lens, if it is another one by now.
@@ -446,6 +462,12 @@ impl Session {
         }
     }
 
+    /// Saves searches over structure in a folder from now on, where they have no other place, and
+    /// offers to go on with the one that was left there.
+    pub fn keep_searches_in(&mut self, folder: impl Into<PathBuf>) {
+        self.explorations.keep_in(folder.into());
+    }
+
     fn discard(&mut self) {
         self.worker.stop();
         self.search = None;
@@ -558,6 +580,6 @@ impl Search {
 
     /// Whether it takes steps or can go on.
     pub fn is_under_way(&self) -> bool {
-        matches!(self.standing, Standing::Running | Standing::Paused)
+        self.standing.can_go_on()
     }
 }

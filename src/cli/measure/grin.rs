@@ -1,0 +1,183 @@
+//! Light in gradient-index fields: accuracy against time, cost, memory.
+
+use super::plot::{self, Chart, Color, Curve, Label, Stroke};
+use crate::cli::failure::Failure;
+use crate::cli::grin::task_of;
+use crate::cli::input::check_target;
+use crate::cli::optimize::progress_bar;
+use crate::cli::output::{Output, Table};
+use crate::files;
+use crate::grin::Integrator;
+use crate::measure::{
+    GrinCost, GrinCurves, GrinMeasured, GrinMemory, GrinRow, Machine, Memory, Precision, grin,
+};
+use crate::picture::PALETTE;
+use image::ImageError;
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+/// Error of exits and gradients against milliseconds for every integrator, and what a gradient
+/// costs in time and memory
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("../help/measure_grin.txt"))]
+pub(super) struct Grin {
+    /// A task whose exact field is known: a name that comes with the program, or a file .json
+    #[arg(value_name = "TASK", default_value = "luneburg")]
+    task: String,
+
+    /// Draws the errors of exits of the exact field and of the first grid
+    #[arg(long, value_name = "FILE.png")]
+    plot: Option<PathBuf>,
+}
+
+impl Grin {
+    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+        let task = task_of(&self.task)?;
+        self.plot.iter().try_for_each(|path| check_target(path, &["png"]))?;
+        let bar = progress_bar(0);
+        let measured = grin(&task, |done, all| {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+        });
+        bar.finish_and_clear();
+        let measured = measured.map_err(|e| Failure::Input(format!("{}: {e}", self.task)))?;
+        if let Some(path) = &self.plot {
+            let png = picture(&measured, &task.name);
+            files::replace(path, &png.map_err(|e| Failure::Failed(e.to_string()))?)?;
+        }
+        output.print(&Report { machine: Machine::here(), task: task.name, measured })
+    }
+}
+
+const STROKES: [(Precision, Stroke); 2] =
+    [(Precision::F64, Stroke::Solid), (Precision::F32, Stroke::Dashed)];
+
+fn color(integrator: Integrator) -> Color {
+    let place = Integrator::ALL.iter().position(|other| *other == integrator).unwrap_or(0);
+    PALETTE[place % PALETTE.len()]
+}
+
+/// A chart for each of the first two fields.
+fn picture(measured: &GrinMeasured, title: &str) -> Result<Vec<u8>, ImageError> {
+    let chart = |curves: &GrinCurves| {
+        let curve = |integrator: Integrator, (precision, stroke)| {
+            let mine = |row: &&GrinRow| row.integrator == integrator && row.precision == precision;
+            let points = curves.rows.iter().filter(mine).map(|row| [row.ms, row.exit_error]);
+            Curve { color: color(integrator), stroke, points: points.collect() }
+        };
+        let all = Integrator::ALL.into_iter().flat_map(|i| STROKES.map(|s| curve(i, s)));
+        Chart { name: format!("{}, error of exits, mm", curves.field), curves: all.collect() }
+    };
+    let charts: Vec<Chart> = measured.fields.iter().take(2).map(chart).collect();
+    let named = Integrator::ALL.into_iter().map(|i| Label::of(i.name(), color(i)));
+    let strokes = [("f64", Stroke::Solid), ("f32", Stroke::Dashed)];
+    let strokes = strokes.map(|(name, stroke)| Label::drawn(name, stroke));
+    let labels: Vec<Label> = named.chain(strokes).collect();
+    plot::draw(&charts, &labels, title)
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    task: String,
+    #[serde(flatten)]
+    measured: GrinMeasured,
+}
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { machine, task, measured } = self;
+        writeln!(f, "{machine}\n{task}: {} rays, one thread", measured.rays)?;
+        for curves in &measured.fields {
+            let GrinCurves { field, parameters, floor, .. } = curves;
+            writeln!(
+                f,
+                "\n{field}, {parameters} numbers; off the exact field by {floor:.1e} mm\n"
+            )?;
+            write!(f, "{}", table(curves))?;
+        }
+        writeln!(f, "\nfor each time that a ray asks the field, in batches:\n")?;
+        write!(f, "{}", costs(&measured.costs))?;
+        writeln!(f, "\nthe adjoint against a stored path:\n")?;
+        write!(f, "{}", memory(&measured.memory))
+    }
+}
+
+fn table(curves: &GrinCurves) -> Table {
+    let mut table = Table::new(&[
+        "integrator",
+        "kicks",
+        "ms",
+        "with gradient",
+        "exit error, mm",
+        "gradient error",
+        "retrace, steps",
+        "lost",
+    ]);
+    for row in &curves.rows {
+        let precision = if row.precision == Precision::F32 { " f32" } else { "" };
+        table.row([
+            format!("{}{precision}", row.integrator.name()),
+            format!("{:.0}", row.kicks),
+            format!("{:.3}", row.ms),
+            format!("{:.3}", row.gradient_ms),
+            format!("{:.1e}", row.exit_error),
+            format!("{:.1e}", row.gradient_error),
+            format!("{:.0e}", row.retrace_error),
+            row.lost.to_string(),
+        ]);
+    }
+    table
+}
+
+fn costs(costs: &[GrinCost]) -> Table {
+    let mut table = Table::new(&["field", "ns forwards", "ns back", "both in times of forwards"]);
+    for cost in costs {
+        let precision = if cost.precision == Precision::F32 { " f32" } else { "" };
+        table.row([
+            format!("{}{precision}", cost.field),
+            format!("{:.2}", cost.forward_ns),
+            format!("{:.2}", cost.back_ns),
+            format!("{:.2}", cost.ratio),
+        ]);
+    }
+    table
+}
+
+fn memory(rows: &[GrinMemory]) -> Table {
+    let mut table = Table::new(&[
+        "nodes",
+        "rays",
+        "steps",
+        "rays kB",
+        "gradients kB",
+        "tape kB",
+        "peak MB",
+        "with tape",
+        "ms",
+        "with tape",
+        "difference",
+    ]);
+    let kb = |bytes: usize| format!("{:.0}", bytes as f64 / 1024.0);
+    let mb = |memory: Option<Memory>| {
+        memory.map_or("-".to_owned(), |m| format!("{:.1}", m.peak_mb - m.before_mb))
+    };
+    for row in rows {
+        table.row([
+            row.nodes.to_string(),
+            row.rays.to_string(),
+            format!("{:.0}", row.steps),
+            kb(row.adjoint_bytes),
+            kb(row.volume_bytes),
+            kb(row.tape_bytes),
+            mb(row.adjoint_memory),
+            mb(row.tape_memory),
+            format!("{:.2}", row.adjoint_ms),
+            format!("{:.2}", row.tape_ms),
+            format!("{:.0e}", row.difference),
+        ]);
+    }
+    table
+}

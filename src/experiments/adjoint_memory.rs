@@ -1,0 +1,172 @@
+//! Figure 5.3: the memory of a gradient through a grid. Reverse mode keeps a path that grows with
+//! the steps, the adjoint traces rays back and keeps none; both give the same numbers.
+//!
+//! The stored path is the least that reverse mode can do with, 24 bytes for each step: programs
+//! that record every operation keep about ten times as much. Bytes are counted; what both take in
+//! time is measured by `aplanat measure grin`.
+
+use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report};
+use crate::grin::field::{Diagonal, Grid, Layered, Luneburg, Trilinear};
+use crate::grin::{
+    End, Exit, Field as _, Integrator, LastStep, Launch, Ray, Region, Seed, Setup, Tracer,
+};
+use crate::math::Vec3;
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke};
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "5.3",
+    title: "Memory of a gradient through a grid",
+    claim: "The memory of the adjoint does not grow with the steps, that of reverse mode does",
+    seconds: 3.0,
+    run,
+};
+
+/// Steps a voxel.
+const FINENESS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// A difference that rounding explains.
+const ROUNDING: f64 = 1e-10;
+
+/// What one gradient keeps, in bytes.
+struct Row {
+    nodes: usize,
+    steps: f64,
+    tape: usize,
+    rays: usize,
+    gradients: usize,
+    difference: f64,
+}
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let nodes = effort.pick([17, 33, 65, 129].as_slice(), &[17, 33]);
+    let side = effort.pick(64, 16);
+    let (mut outcome, mut rows) = (Outcome::default(), Vec::new());
+    let all = nodes.len() * FINENESS.len();
+    for nodes in nodes {
+        for fineness in FINENESS {
+            let done = rows.len() as f64 / all as f64;
+            report(watch, done, &format!("{nodes} nodes a side, {fineness} steps a voxel"))?;
+            rows.push(measure(*nodes, fineness, side)?);
+            outcome.rays += 2 * side * side;
+        }
+    }
+    outcome.claims = claims(&rows);
+    outcome.tables.push(table(&rows, side * side));
+    outcome.pictures.push(Picture { name: "memory", canvas: draw(&rows) });
+    Ok(outcome)
+}
+
+fn measure(nodes: usize, fineness: f64, side: usize) -> Result<Row, Ended> {
+    let lens = Layered::sphere(Luneburg::new(1.0));
+    let grid = Grid::cube(nodes, 1.1).map_err(Ended::from_error)?;
+    let sampled = Trilinear::sampled(grid, |p| lens.sample(p).index);
+    let mut field = sampled.map_err(Ended::from_error)?;
+    field.diagonal = Diagonal::Exact;
+    let tracer = Tracer::new(&field, setup(0.974 * grid.spacing().x / fineness));
+    let tracer = tracer.map_err(Ended::from_error)?;
+    let at = |i: usize| 0.6 * (2.0 * (i as f64 + 0.5137) / side as f64 - 1.0);
+    let ray = |n: usize| Ray {
+        x: Vec3::new(at(n % side), at(n / side), -1.5),
+        v: Vec3::new(0.0, 0.0, 1.0),
+    };
+    let rays: Vec<Ray<f64>> = (0..side * side).map(ray).collect();
+    let mut exits = tracer.rays(&rays);
+    let focus = Vec3::new(0.1, 0.2, 1.0);
+    let seed = |exit: &Exit<f64>| Seed { x: (exit.x - focus) * 2.0, ..Seed::default() };
+    let seeds: Vec<Seed<f64>> = exits.iter().map(seed).collect();
+    let adjoint = tracer.gradient(&rays, &mut exits, &seeds).parameters;
+    let taped = tracer.taped_gradient(&rays, &exits, &seeds);
+    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|v| v * v).sum::<f64>().sqrt();
+    let off = norm(&mut adjoint.iter().zip(&taped.parameters).map(|(a, b)| a - b));
+    let [kept, gradients] = tracer.gradient_bytes(rays.len());
+    let steps: f64 = exits.iter().map(|exit| f64::from(exit.steps)).sum();
+    Ok(Row {
+        nodes,
+        steps: steps / rays.len() as f64,
+        tape: taped.bytes,
+        rays: kept,
+        gradients,
+        difference: off / norm(&mut adjoint.iter().copied()),
+    })
+}
+
+fn setup(step: f64) -> Setup<f64> {
+    let region = Region::ball(1.0);
+    let end = End::Boundary { region, last: LastStep::BrokenLine, limit: 100_000 };
+    let (integrator, launch) = (Integrator::LeapfrogDkd, Launch::AsGiven);
+    Setup { integrator, step, launch, end, screen: None }
+}
+
+fn claims(rows: &[Row]) -> Vec<Claim> {
+    let mut claims = Vec::new();
+    for rows in rows.chunks(FINENESS.len()) {
+        let (first, last) = (&rows[0], &rows[rows.len() - 1]);
+        let nodes = first.nodes;
+        let growth = last.steps / first.steps;
+        claims.push(Claim::exactly(
+            format!("{nodes} nodes: bytes of the adjoint with {growth:.1} times the steps, more"),
+            (last.rays + last.gradients) as f64 - (first.rays + first.gradients) as f64,
+            0.0,
+        ));
+        claims.push(Claim::at_least(
+            format!("{nodes} nodes: bytes of the stored path, in times of those with fewer steps"),
+            last.tape as f64 / first.tape as f64,
+            0.99 * growth,
+        ));
+        claims.push(Claim::at_least(
+            format!("{nodes} nodes: bytes of the longest stored path, in times of the adjoint's"),
+            last.tape as f64 / last.rays as f64,
+            last.steps * 0.03,
+        ));
+    }
+    let worst = rows.iter().map(|row| row.difference).fold(0.0, f64::max);
+    claims.push(Claim::at_most("relative difference of the two gradients", worst, ROUNDING));
+    claims
+}
+
+fn table(rows: &[Row], rays: usize) -> Table {
+    let mut table = Table::new(
+        "memory",
+        &["nodes", "rays", "steps", "tape_bytes", "ray_bytes", "gradient_bytes", "difference"],
+    );
+    for row in rows {
+        table.row([
+            row.nodes.into(),
+            rays.into(),
+            row.steps.into(),
+            row.tape.into(),
+            row.rays.into(),
+            row.gradients.into(),
+            row.difference.into(),
+        ]);
+    }
+    table
+}
+
+fn draw(rows: &[Row]) -> Canvas {
+    let mb = |bytes: usize| bytes as f64 / 1e6;
+    let mut canvas = Canvas::new([1500, 860]);
+    let tape = |row: &Row| [row.steps, mb(row.tape)];
+    let adjoint = |row: &Row| [row.steps, mb(row.rays + row.gradients)];
+    let all = || rows.iter().flat_map(|row| [tape(row), adjoint(row)]);
+    let x = Axis::logarithmic("steps of a ray", all().map(|p| p[0]), 1.0);
+    let y = Axis::logarithmic("megabytes", all().map(|p| p[1]), 1e-3);
+    let chart = Chart::new([140.0, 110.0], [960.0, 760.0], x, y);
+    chart.draw(&mut canvas, "memory of a gradient");
+    for (i, rows) in rows.chunks(FINENESS.len()).enumerate() {
+        let color = PALETTE[i % PALETTE.len()];
+        let top = 130.0 + 76.0 * i as f64;
+        let curves: [(&str, Vec<[f64; 2]>, Stroke); 2] = [
+            ("stored path", rows.iter().map(tape).collect(), Stroke::Dashed),
+            ("adjoint", rows.iter().map(adjoint).collect(), Stroke::Solid),
+        ];
+        for (k, (name, points, stroke)) in curves.into_iter().enumerate() {
+            canvas.curve(&chart.places(&points), color, stroke);
+            canvas.marks(&chart.places(&points), color);
+            let y = top + 32.0 * k as f64;
+            canvas.curve(&[[1000.0, y], [1050.0, y]], color, stroke);
+            let text = format!("{name}, {} nodes", rows[0].nodes);
+            canvas.text([1064.0, y - 7.0], &text, BLACK, Align::Left);
+        }
+    }
+    canvas
+}

@@ -1,0 +1,146 @@
+//! Figure 5.9: a fibre that focuses parallel light again and again, beside the parabolic one.
+//!
+//! The field is sought by its first focus alone. For meridional rays the exact answer is the
+//! hyperbolic secant, which refocuses at one, three and five times that distance; the parabolic
+//! profile has no focus, so it is compared at those planes where its own blur is smallest.
+
+use super::medium::{medium_pictures, solve};
+use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
+use crate::grin::field::{Layered, Parabolic};
+use crate::grin::{End, Integrator, LastStep, Launch, Ray, Region, Setup, Tracer};
+use crate::grin_task::{self, Medium, Task};
+use crate::math::Vec3;
+use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
+
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    id: "5.9",
+    title: "A fibre that focuses, beside the parabolic one",
+    claim: "The optimised profile focuses better than the parabolic one, and keeps its focus farther",
+    seconds: 1.0,
+    run,
+};
+
+/// By how much the foci must be better.
+const BETTER: f64 = 1000.0;
+/// The index must be so near to the secant.
+const NEAR: f64 = 1e-4;
+/// Planes that are tried for the focus of the parabolic fibre, and how often that is refined.
+const PLANES: usize = 40;
+const REFINED: usize = 4;
+/// Steps of a ray from focus to focus.
+const STEPS: f64 = 40.0;
+
+fn run(_: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let builtin = grin_task::find("fibre");
+    let task = builtin.ok_or_else(|| Ended::Failed("no task `fibre`".to_owned()))?.task();
+    let task = task.map_err(Ended::from_error)?;
+    let runner = solve(&task, [0.0, 1.0], watch)?;
+    let best = runner.best();
+    let spots = runner.judge(best).map_err(Ended::from_error)?.views;
+    let (_, rays) = task.judging_rays(&task.views[0]);
+    let mut outcome = Outcome { rays: runner.rays() as usize, ..Outcome::default() };
+    let columns = ["focus", "plane_mm", "spot_mm", "parabola_plane_mm", "parabola_spot_mm"];
+    let mut table = Table::new("foci", &columns);
+    for (i, view) in spots.iter().enumerate() {
+        let order = (2 * i + 1) as f64;
+        let (plane, spot) = parabola(&rays, order)?;
+        outcome.rays += PLANES * REFINED * rays.len();
+        table.row([
+            (i + 1).into(),
+            (order * FRAC_PI_2).into(),
+            view.spot.into(),
+            plane.into(),
+            spot.into(),
+        ]);
+        let says = format!("focus {}: blur of the parabolic fibre, in times of ours", i + 1);
+        outcome.claims.push(Claim::at_least(says, spot / view.spot, BETTER));
+    }
+    let difference = task.difference(best).map_err(Ended::from_error)?;
+    let relative = difference.map_or(f64::NAN, |difference| difference.relative);
+    let says = "relative difference from the hyperbolic secant";
+    outcome.claims.push(Claim::at_most(says, relative, NEAR));
+    outcome.tables.push(table);
+    outcome.pictures = medium_pictures(&task, best);
+    outcome.pictures.push(Picture { name: "misses", canvas: misses(&task, best, &rays)? });
+    Ok(outcome)
+}
+
+/// `√(2 - r²)`, the parabolic fibre (5.42).
+fn parabolic() -> Layered<Parabolic<f64>> {
+    Layered::cylinder(Parabolic::new(SQRT_2, FRAC_1_SQRT_2))
+}
+
+/// How far each ray is from the axis of the parabolic fibre at a plane.
+fn heights(rays: &[Ray<f64>], plane: f64) -> Result<Vec<f64>, Ended> {
+    let region = Region::rod(1.5, -1.0, plane);
+    let setup = Setup {
+        integrator: Integrator::BlanesMoan,
+        step: FRAC_PI_2 / STEPS,
+        launch: Launch::Scaled,
+        end: End::Boundary { region, last: LastStep::Fractional, limit: 100_000 },
+        screen: None,
+    };
+    let field = parabolic();
+    let tracer = Tracer::new(&field, setup).map_err(Ended::from_error)?;
+    Ok(tracer.rays(rays).iter().map(|exit| exit.x.x).collect())
+}
+
+/// The plane near a focus of the parabolic fibre where its blur is smallest, and that blur.
+fn parabola(rays: &[Ray<f64>], order: f64) -> Result<(f64, f64), Ended> {
+    // Its rays cross the axis at η(r) π/2 times an odd number, r the height where they start.
+    let (mut from, mut to) = (0.9 * FRAC_PI_2 * order, SQRT_2 * FRAC_PI_2 * order);
+    let mut best = (from, f64::INFINITY);
+    for _ in 0..REFINED {
+        let gap = (to - from) / PLANES as f64;
+        for i in 0..=PLANES {
+            let plane = from + gap * i as f64;
+            let squares = heights(rays, plane)?.iter().map(|x| x * x).sum::<f64>();
+            let blur = (squares / rays.len() as f64).sqrt();
+            if blur < best.1 {
+                best = (plane, blur);
+            }
+        }
+        (from, to) = (best.0 - gap, best.0 + gap);
+    }
+    Ok(best)
+}
+
+/// How far the rays of each height are from the axis at the foci.
+fn misses(task: &Task, best: &Medium, rays: &[Ray<f64>]) -> Result<Canvas, Ended> {
+    let mut curves = Vec::new();
+    for (i, view) in task.views.iter().enumerate() {
+        let order = (2 * i + 1) as f64;
+        let (plane, _) = parabola(rays, order)?;
+        let color = PALETTE[i % PALETTE.len()];
+        let points = |heights: Vec<f64>| -> Vec<[f64; 2]> {
+            rays.iter().zip(heights).map(|(ray, x)| [ray.x.x, x.abs()]).collect()
+        };
+        curves.push((format!("parabolic, focus {}", i + 1), points(heights(rays, plane)?), color));
+        let space = view.space.unwrap_or(task.space);
+        let plan =
+            crate::grin::plan(best.field(), &space.region(), task.launch, rays, task.tolerance);
+        let setup = plan.map_err(Ended::from_error)?.setup;
+        let tracer = Tracer::new(best.field(), setup).map_err(Ended::from_error)?;
+        let found = tracer.rays(rays).iter().map(|exit| radius(exit.x)).collect();
+        curves.push((format!("found, focus {}", i + 1), points(found), color));
+    }
+    let mut canvas = Canvas::new([1500, 860]);
+    let all = || curves.iter().flat_map(|curve| &curve.1);
+    let x = Axis::linear("height of the ray, mm", all().map(|p| p[0]).chain([0.0]));
+    let y = Axis::logarithmic("distance from the axis, mm", all().map(|p| p[1]), 1e-8);
+    let chart = Chart::new([140.0, 110.0], [960.0, 760.0], x, y);
+    chart.draw(&mut canvas, "misses at the foci");
+    for (i, (name, points, color)) in curves.iter().enumerate() {
+        let stroke = if i % 2 == 0 { Stroke::Dashed } else { Stroke::Solid };
+        canvas.curve(&chart.places(points), *color, stroke);
+        let y = 130.0 + 34.0 * i as f64;
+        canvas.curve(&[[1000.0, y], [1050.0, y]], *color, stroke);
+        canvas.text([1064.0, y - 7.0], name, BLACK, Align::Left);
+    }
+    Ok(canvas)
+}
+
+fn radius(p: Vec3<f64>) -> f64 {
+    p.x.hypot(p.y)
+}

@@ -1,0 +1,268 @@
+//! What is wrong with a task, told before any ray is traced.
+
+use super::medium::NoField;
+use super::task::{
+    Directions, Exact, FieldKind, Goal, Method, Source, Space, Start, Task, VERSION, View,
+};
+use crate::grin::SetupError;
+use crate::grin::field::GridError;
+use std::fmt::Display;
+
+/// Most numbers that least squares are worth while for.
+const FEW: usize = 400;
+/// Most rays in a step, and most nodes along a side.
+const MANY_RAYS: usize = 10_000_000;
+const MANY_NODES: usize = 513;
+
+/// Why a task cannot be worked on.
+#[derive(Debug, thiserror::Error)]
+pub enum TaskError {
+    /// A number that makes no sense.
+    #[error("{place}: found {found}; expected {expected}")]
+    Value {
+        /// Where it stands in the task.
+        place: String,
+        /// What stands there.
+        found: String,
+        /// What should.
+        expected: String,
+    },
+    /// The field to begin with, or one that is given, cannot be had.
+    #[error("{place}: {source}")]
+    Field {
+        /// Where it stands in the task.
+        place: String,
+        /// Why not.
+        source: NoField,
+    },
+    /// A field cannot be made of so many numbers.
+    #[error("levels: {0}")]
+    Level(#[from] GridError),
+    /// Nothing can be traced.
+    #[error("space: {0}")]
+    Setup(#[from] SetupError),
+    /// Every number of the field is fixed.
+    #[error(
+        "levels: a field of {nodes} nodes has none that may change; expected more nodes, or an edge \
+         that is not fixed"
+    )]
+    NothingFree {
+        /// Nodes along a side.
+        nodes: usize,
+    },
+}
+
+/// An error at a place.
+fn wrong<T: Display>(place: impl Into<String>, found: T, expected: impl Into<String>) -> TaskError {
+    let found = format!("{found}");
+    TaskError::Value { place: place.into(), found, expected: expected.into() }
+}
+
+/// Refuses a number that is not above zero.
+fn positive(place: impl Into<String>, value: f64) -> Result<(), TaskError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(wrong(place, value, "a length above 0"))
+}
+
+/// Refuses what is not between two numbers.
+fn within(place: impl Into<String>, value: f64, low: f64, high: f64) -> Result<(), TaskError> {
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    Err(wrong(place, value, format!("a number from {low} to {high}")))
+}
+
+impl Task {
+    /// Refuses what cannot be worked on.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place.
+    pub fn check(&self) -> Result<(), TaskError> {
+        if self.aplanat_grin != VERSION {
+            return Err(wrong("aplanat_grin", self.aplanat_grin, VERSION.to_string()));
+        }
+        positive("field", self.field.size())?;
+        self.space.check("space")?;
+        positive("tolerance", self.tolerance)?;
+        if let Some(tracing) = self.tracing {
+            within("tracing, per_voxel", tracing.per_voxel, 0.25, 1000.0)?;
+        }
+        self.check_limits()?;
+        self.check_levels()?;
+        if self.views.is_empty() {
+            return Err(wrong("views", "none", "at least one"));
+        }
+        for (i, view) in self.views.iter().enumerate() {
+            view.check(&format!("views, number {i}"))?;
+        }
+        if !self.views.iter().any(|view| view.weight > 0.0) {
+            return Err(wrong("views", "no weight above 0", "something to search for"));
+        }
+        self.check_method()?;
+        self.exact.iter().try_for_each(|exact| exact.check("exact"))
+    }
+
+    fn check_limits(&self) -> Result<(), TaskError> {
+        let limits = self.limits;
+        if !(limits.low >= 1.0 && limits.low.is_finite()) {
+            let expected = "1 or more: light is nowhere faster than in vacuum";
+            return Err(wrong("limits, low", limits.low, expected));
+        }
+        if !(limits.high >= limits.low && limits.high.is_finite()) {
+            let expected = format!("no less than {}, the smallest index", limits.low);
+            return Err(wrong("limits, high", limits.high, expected));
+        }
+        positive("limits, change", limits.change)?;
+        limits.slope.map_or(Ok(()), |slope| positive("limits, slope", slope))?;
+        if let Some(edge) = self.edge {
+            within("edge, index", edge.index, limits.low, limits.high)?;
+            within("edge, weight", edge.weight, 0.0, f64::MAX)?;
+            if edge.fixed && !matches!(self.field, FieldKind::Trilinear { .. }) {
+                let expected = "a weight: only nodes of a trilinear grid are values of the index";
+                return Err(wrong("edge", "fixed", expected));
+            }
+        }
+        match &self.start {
+            Start::Uniform(index) => within("start", *index, limits.low, limits.high),
+            Start::Volume(_) if self.field.is_radial() => {
+                Err(wrong("start", "a volume", "a uniform index for a spline in the radius"))
+            }
+            Start::Volume(_) => Ok(()),
+        }
+    }
+
+    fn check_levels(&self) -> Result<(), TaskError> {
+        let fewest = self.field.fewest();
+        if self.levels.is_empty() {
+            return Err(wrong("levels", "none", "at least one"));
+        }
+        for (i, level) in self.levels.iter().enumerate() {
+            let place = format!("levels, number {i}");
+            if level.nodes < fewest || level.nodes > MANY_NODES {
+                let expected = format!("{fewest} to {MANY_NODES} nodes along a side");
+                return Err(wrong(place, level.nodes, expected));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_method(&self) -> Result<(), TaskError> {
+        let fresh = self.views.iter().any(|view| view.source.is_fresh());
+        let most = self.levels.iter().map(|level| self.field.parameters(level.nodes)).max();
+        match self.method {
+            Method::Adam { rate, fall } => {
+                positive("method, rate", rate)?;
+                positive("method, fall", fall)
+            }
+            Method::Lbfgs | Method::LeastSquares if fresh => {
+                let expected = "`given` or `even` ones: only adam may see new rays in every step";
+                Err(wrong("views, directions", "fresh", expected))
+            }
+            Method::LeastSquares
+                if self.views.iter().any(|v| matches!(v.goal, Goal::Image { .. })) =>
+            {
+                Err(wrong("method", "least_squares", "adam or lbfgs for an image"))
+            }
+            Method::LeastSquares if most > Some(FEW) => {
+                let found = format!("{} numbers", most.unwrap_or(0));
+                Err(wrong("method", found, format!("at most {FEW} for least_squares; or lbfgs")))
+            }
+            Method::Lbfgs | Method::LeastSquares => Ok(()),
+        }
+    }
+}
+
+impl Space {
+    fn check(self, place: &str) -> Result<(), TaskError> {
+        match self {
+            Self::Ball { radius: size } | Self::Cube { half: size } => positive(place, size),
+            Self::Rod { radius, from, to } => {
+                positive(format!("{place}, radius"), radius)?;
+                if from < to && from.is_finite() && to.is_finite() {
+                    return Ok(());
+                }
+                Err(wrong(place, format!("from {from} to {to}"), "an end behind the beginning"))
+            }
+        }
+    }
+}
+
+impl View {
+    fn check(&self, place: &str) -> Result<(), TaskError> {
+        within(format!("{place}, weight"), self.weight, 0.0, f64::MAX)?;
+        self.space.map_or(Ok(()), |space| space.check(&format!("{place}, space")))?;
+        self.source.check(&format!("{place}, source"))?;
+        let goal = format!("{place}, goal");
+        match &self.goal {
+            Goal::Point(p) if !p.iter().all(|v| v.is_finite()) => {
+                Err(wrong(goal, format!("{p:?}"), "three finite numbers"))
+            }
+            Goal::Antipode if self.source.directions().is_none() => {
+                Err(wrong(goal, "antipode", "a source of `parallel` light or `points`"))
+            }
+            Goal::Like { field, direction } => {
+                within(format!("{goal}, direction"), *direction, 0.0, f64::MAX)?;
+                field.check(&goal)
+            }
+            Goal::Image { .. } if !matches!(self.source, Source::Beam { .. }) => {
+                Err(wrong(goal, "image", "a source that is a `beam`"))
+            }
+            Goal::Image { half, distance, pixels, .. } => {
+                within(format!("{goal}, pixels"), *pixels as f64, 4.0, 2048.0)?;
+                within(format!("{goal}, distance"), *distance, 0.0, f64::MAX)?;
+                positive(format!("{goal}, half"), *half)
+            }
+            Goal::Point(_) | Goal::Antipode => Ok(()),
+        }
+    }
+}
+
+impl Source {
+    fn check(&self, place: &str) -> Result<(), TaskError> {
+        let count = self.count();
+        if count == 0 || count > MANY_RAYS {
+            return Err(wrong(place, format!("{count} rays"), format!("1 to {MANY_RAYS}")));
+        }
+        let directions = format!("{place}, directions");
+        if let Some(Directions::Given(list)) = self.directions() {
+            list.iter().try_for_each(|d| direction(&directions, *d))?;
+        }
+        match self {
+            Self::Parallel { radius, .. } => positive(format!("{place}, radius"), *radius),
+            Self::Points { radius, cone, .. } => {
+                positive(format!("{place}, radius"), *radius)?;
+                within(format!("{place}, cone"), *cone, 0.0, 89.0)
+            }
+            Self::Fan { height, z, .. } => {
+                within(format!("{place}, z"), *z, f64::MIN, f64::MAX)?;
+                positive(format!("{place}, height"), *height)
+            }
+            Self::Beam { direction: d, half, .. } => {
+                direction(place, *d)?;
+                positive(format!("{place}, half"), *half)
+            }
+        }
+    }
+}
+
+fn direction(place: &str, [x, y, z]: [f64; 3]) -> Result<(), TaskError> {
+    let square = x * x + y * y + z * z;
+    if square > 0.0 && square.is_finite() {
+        return Ok(());
+    }
+    Err(wrong(place, format!("[{x}, {y}, {z}]"), "a direction"))
+}
+
+impl Exact {
+    fn check(&self, place: &str) -> Result<(), TaskError> {
+        match self {
+            Self::Luneburg { radius } => positive(place, *radius),
+            Self::Maxwell { centre: a, radius: b }
+            | Self::Secant { axis: a, a: b }
+            | Self::Parabolic { axis: a, g: b } => positive(place, *a).and(positive(place, *b)),
+            Self::Volume(_) => Ok(()),
+        }
+    }
+}

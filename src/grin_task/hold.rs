@@ -1,0 +1,106 @@
+//! What is asked of a field itself: its index at the edge, a limit of its slope, and for splines the
+//! smallest index; each a penalty that vanishes where it is kept.
+
+use super::space::length;
+use super::task::{Edge, FieldKind, MakerLimits, Task};
+use crate::grin::Field;
+use crate::math::Vec3;
+
+/// Points along a side of the box at which a slope is held.
+const LATTICE: usize = 24;
+/// Points of a radius at which an index is held, and how firmly.
+const SPOKE: usize = 100;
+const FIRM: f64 = 10.0;
+/// Points of the surface at which the index is held.
+const SURFACE: usize = 2000;
+
+/// What is asked of the field itself: its index at the edge, and a limit of its slope.
+#[derive(Debug, Clone)]
+pub(super) struct Hold {
+    edge: Option<(Edge, Vec<Vec3<f64>>)>,
+    slope: Option<(f64, f64, Vec<Vec3<f64>>)>,
+    /// The smallest index, of a spline: its coefficients alone do not keep it.
+    floor: Option<(f64, f64, Vec<Vec3<f64>>)>,
+}
+
+impl Hold {
+    pub(super) fn new(task: &Task) -> Self {
+        let MakerLimits { slope, .. } = task.limits;
+        let radius = task.field.size();
+        let along = |x: f64| Vec3::new(x, 0.0, 0.0);
+        let is_radial = task.field.is_radial();
+        let surface = || if is_radial { vec![along(radius)] } else { task.space.surface(SURFACE) };
+        let size = task.space.diameter();
+        let inside = || {
+            if is_radial {
+                (0..=SPOKE).map(|i| along(radius * i as f64 / SPOKE as f64)).collect()
+            } else {
+                [task.space.lattice(LATTICE), surface()].concat()
+            }
+        };
+        let is_spline = !matches!(task.field, FieldKind::Trilinear { .. });
+        Self {
+            floor: is_spline.then(|| (task.limits.low, size, inside())),
+            edge: task.edge.filter(|edge| edge.weight > 0.0).map(|edge| (edge, surface())),
+            slope: slope.map(|slope| (slope, size * size, inside())),
+        }
+    }
+
+    /// What each place counts: the residual, and its derivative by the index and its gradient.
+    fn each(&self, field: &dyn Field<f64>, mut visit: impl FnMut(Vec3<f64>, f64, f64, Vec3<f64>)) {
+        if let Some((edge, places)) = &self.edge {
+            let scale = (edge.weight / places.len() as f64).sqrt();
+            for p in places {
+                let off = field.sample(*p).index - edge.index;
+                visit(*p, scale * off, scale, Vec3::default());
+            }
+        }
+        if let Some((low, size, places)) = &self.floor {
+            let scale = FIRM * size / (places.len() as f64).sqrt();
+            for p in places {
+                let under = low - field.sample(*p).index;
+                if under > 0.0 {
+                    visit(*p, scale * under, -scale, Vec3::default());
+                }
+            }
+        }
+        if let Some((limit, square, places)) = &self.slope {
+            let scale = FIRM * square / (places.len() as f64).sqrt();
+            for p in places {
+                let gradient = field.sample(*p).gradient;
+                let over = length(gradient) - limit;
+                if over > 0.0 {
+                    let outwards = gradient * (scale / (over + limit));
+                    visit(*p, scale * over, 0.0, outwards);
+                }
+            }
+        }
+    }
+
+    /// The sum of squares, and its gradient added.
+    pub(super) fn descend(&self, field: &dyn Field<f64>, gradient: &mut [f64]) -> f64 {
+        let mut sum = 0.0;
+        self.each(field, |p, residual, by_index, by_slope| {
+            sum += residual * residual;
+            field.deposit(p, 2.0 * residual * by_index, by_slope * (2.0 * residual), gradient);
+        });
+        sum
+    }
+
+    pub(super) fn rows(&self, field: &dyn Field<f64>) -> Vec<(f64, Vec<f64>)> {
+        let mut rows = Vec::new();
+        self.each(field, |p, residual, by_index, by_slope| {
+            let mut row = vec![0.0; field.parameters().len()];
+            field.deposit(p, by_index, by_slope, &mut row);
+            rows.push((residual, row));
+        });
+        rows
+    }
+
+    /// The sum of squares alone.
+    pub(super) fn look(&self, field: &dyn Field<f64>) -> f64 {
+        let mut sum = 0.0;
+        self.each(field, |_, residual, _, _| sum += residual * residual);
+        sum
+    }
+}

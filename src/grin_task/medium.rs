@@ -1,0 +1,259 @@
+//! A field on its way: how it begins, what its numbers may do, how it becomes finer, and how it is
+//! written as a volume.
+
+use super::task::{Edge, Exact, FieldKind, MakerLimits, Space};
+use crate::files::{self, FileError, Volume};
+use crate::grin::Field;
+use crate::grin::field::{
+    BSpline, Coordinate, Grid, GridError, Layered, Luneburg, Maxwell, Parabolic, Profile as _,
+    Sech, Tricubic, Trilinear,
+};
+use crate::math::{Real, Vec3};
+use std::path::Path;
+
+/// Fewest coefficients of a spline.
+const FEWEST: usize = 4;
+
+/// A field that a search works on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Medium {
+    /// Nodes on a cube.
+    Trilinear(Trilinear<f64>),
+    /// Tricubic B-splines on a cube.
+    Tricubic(Tricubic<f64>),
+    /// A spline in the square of a radius, which ends at that radius.
+    Radial(Layered<BSpline<f64>>, f64),
+}
+
+impl FieldKind {
+    /// The fewest nodes or coefficients that make a field.
+    pub(super) fn fewest(self) -> usize {
+        match self {
+            Self::Trilinear { .. } | Self::Tricubic { .. } => 2,
+            Self::Sphere { .. } | Self::Cylinder { .. } => FEWEST,
+        }
+    }
+
+    /// How many numbers make a field with so many nodes along a side.
+    pub(super) fn parameters(self, nodes: usize) -> usize {
+        match self {
+            Self::Trilinear { .. } => nodes.saturating_pow(3),
+            Self::Tricubic { .. } => (nodes + 2).saturating_pow(3),
+            Self::Sphere { .. } | Self::Cylinder { .. } => nodes,
+        }
+    }
+
+    /// Its size: half a side, or a radius.
+    pub(super) fn size(self) -> f64 {
+        let (Self::Trilinear { half: size }
+        | Self::Tricubic { half: size }
+        | Self::Sphere { radius: size }
+        | Self::Cylinder { radius: size }) = self;
+        size
+    }
+
+    /// Whether it is a spline in one coordinate.
+    pub(super) fn is_radial(self) -> bool {
+        matches!(self, Self::Sphere { .. } | Self::Cylinder { .. })
+    }
+}
+
+impl Medium {
+    /// The field of a kind that takes given values.
+    ///
+    /// # Errors
+    /// Too few nodes, no extent, or values that are no numbers.
+    pub(super) fn of(
+        kind: FieldKind,
+        nodes: usize,
+        value: impl Fn(Vec3<f64>) -> f64,
+    ) -> Result<Self, GridError> {
+        Ok(match kind {
+            FieldKind::Trilinear { half } => {
+                Self::Trilinear(Trilinear::sampled(Grid::cube(nodes, half)?, value)?)
+            }
+            FieldKind::Tricubic { half } => {
+                Self::Tricubic(Tricubic::near(nodes.saturating_sub(1), half, value)?)
+            }
+            FieldKind::Sphere { radius } | FieldKind::Cylinder { radius } => {
+                let coordinate = match kind {
+                    FieldKind::Cylinder { .. } => Coordinate::Cylinder,
+                    _ => Coordinate::Sphere,
+                };
+                let coefficients = vec![value(Vec3::default()); nodes];
+                let found = nodes;
+                let profile = BSpline::new(0.0, radius * radius, coefficients)
+                    .ok_or(GridError::TooFew { axis: 'r', found, least: FEWEST })?;
+                Self::Radial(Layered { coordinate, profile }, radius)
+            }
+        })
+    }
+
+    /// The same field with other numbers of nodes or coefficients.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(super) fn refined(&self, kind: FieldKind, nodes: usize) -> Result<Self, GridError> {
+        let mut finer = Self::of(kind, nodes, |p| self.field().sample(p).index)?;
+        if let (Self::Radial(coarse, _), Self::Radial(fine, _)) = (self, &mut finer) {
+            let spacing = fine.profile.knots().unwrap_or(1.0);
+            for (i, c) in fine.parameters_mut().iter_mut().enumerate() {
+                let there = coarse.profile.at(spacing * (i as f64 - 1.0));
+                *c = there.value - spacing * spacing / 6.0 * there.bend;
+            }
+        }
+        Ok(finer)
+    }
+
+    /// What rays are traced through.
+    pub fn field(&self) -> &dyn Field<f64> {
+        match self {
+            Self::Trilinear(field) => field,
+            Self::Tricubic(field) => field,
+            Self::Radial(field, _) => field,
+        }
+    }
+
+    /// Its numbers, to be changed.
+    pub(super) fn parameters_mut(&mut self) -> &mut [f64] {
+        match self {
+            Self::Trilinear(field) => field.parameters_mut(),
+            Self::Tricubic(field) => field.parameters_mut(),
+            Self::Radial(field, _) => field.parameters_mut(),
+        }
+    }
+
+    /// The range of each of its numbers. A coefficient of a spline that stands outside the space is
+    /// no index of it and has more room; a penalty holds the index itself.
+    pub(super) fn ranges(
+        &self,
+        space: Space,
+        limits: MakerLimits,
+        edge: Option<Edge>,
+    ) -> Vec<[f64; 2]> {
+        let MakerLimits { low, high, .. } = limits;
+        let wide = [low - (high - low), high + (high - low)];
+        let region = space.region();
+        let is_inside = |p: Vec3<f64>| region.height(p) < 0.0;
+        let range = |inside: bool, outside: [f64; 2]| if inside { [low, high] } else { outside };
+        match self {
+            Self::Trilinear(field) => {
+                let fixed = edge.filter(|edge| edge.fixed).map(|edge| [edge.index; 2]);
+                let outside = fixed.unwrap_or([low, high]);
+                let grid = field.grid();
+                (0..grid.nodes()).map(|n| range(is_inside(grid.node(n)), outside)).collect()
+            }
+            Self::Tricubic(field) => {
+                let grid = field.grid();
+                // The first coefficient stands one spacing before the domain.
+                let place = |n: usize| grid.node(n) - grid.spacing();
+                (0..grid.nodes()).map(|n| range(is_inside(place(n)), wide)).collect()
+            }
+            Self::Radial(field, radius) => {
+                let spacing = field.profile.knots().unwrap_or(1.0);
+                let count = field.parameters().len();
+                let inside = |i: usize| i >= 1 && spacing * (i as f64 - 0.5) < radius * radius;
+                (0..count).map(|i| range(inside(i), wide)).collect()
+            }
+        }
+    }
+
+    /// Nodes along a side, or coefficients of the spline.
+    pub fn nodes(&self) -> usize {
+        match self {
+            Self::Trilinear(field) => field.grid().counts()[0],
+            Self::Tricubic(field) => field.grid().counts()[0] - 2,
+            Self::Radial(field, _) => field.parameters().len(),
+        }
+    }
+
+    /// Its values on a grid: those of its own nodes, or of a spline in one coordinate on so many
+    /// nodes along each side of the box around the space.
+    ///
+    /// # Errors
+    /// A space without extent.
+    pub fn volume(&self, space: Space, nodes: usize) -> Result<Volume, GridError> {
+        let grid = match self {
+            Self::Trilinear(field) => *field.grid(),
+            Self::Tricubic(field) => {
+                let grid = field.grid();
+                Grid::new(grid.counts().map(|n| n - 2), grid.low(), grid.spacing())?
+            }
+            Self::Radial(..) => {
+                let [low, high] = space.corners();
+                let nodes = nodes.max(2);
+                Grid::new([nodes; 3], low, (high - low) * (1.0 / (nodes - 1) as f64))?
+            }
+        };
+        let values = (0..grid.nodes()).map(|n| self.field().sample(grid.node(n)).index).collect();
+        Ok(Volume { grid, values })
+    }
+}
+
+/// Why a given field cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum NoField {
+    /// Its file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Its values.
+    #[error("{file}: {source}")]
+    Values {
+        /// The file.
+        file: String,
+        /// What is wrong with it.
+        source: GridError,
+    },
+}
+
+/// The trilinear field of a volume in a file.
+pub(super) fn from_file<R: Real>(path: &Path) -> Result<Trilinear<R>, NoField> {
+    let Volume { grid, values } = files::read_volume(path)?;
+    let wrong = |source| NoField::Values { file: path.display().to_string(), source };
+    let (low, spacing) = (Vec3::from_f64(grid.low()), Vec3::from_f64(grid.spacing()));
+    let grid = Grid::new(grid.counts(), low, spacing).map_err(wrong)?;
+    Trilinear::new(grid, values.into_iter().map(R::from_f64).collect()).map_err(wrong)
+}
+
+impl Exact {
+    /// The same sampled on a grid.
+    ///
+    /// # Errors
+    /// A volume that cannot be read, or a grid that cannot be made.
+    pub fn sampled<R: Real>(
+        &self,
+        cubic: bool,
+        nodes: usize,
+        half: f64,
+    ) -> Result<Box<dyn Field<R>>, NoField> {
+        let exact = self.field::<R>()?;
+        let value = |p: Vec3<R>| exact.sample(p).index;
+        let wrong = |source| NoField::Values { file: format!("{nodes} nodes"), source };
+        let half = R::from_f64(half);
+        if cubic {
+            let cells = nodes.saturating_sub(1);
+            return Ok(Box::new(Tricubic::near(cells, half, value).map_err(wrong)?));
+        }
+        let grid = Grid::cube(nodes, half).map_err(wrong)?;
+        Ok(Box::new(Trilinear::sampled(grid, value).map_err(wrong)?))
+    }
+
+    /// The field.
+    ///
+    /// # Errors
+    /// A volume that cannot be read.
+    pub fn field<R: Real>(&self) -> Result<Box<dyn Field<R>>, NoField> {
+        let c = R::from_f64;
+        Ok(match self {
+            Self::Luneburg { radius } => Box::new(Layered::sphere(Luneburg::new(c(*radius)))),
+            Self::Maxwell { centre, radius } => {
+                Box::new(Layered::sphere(Maxwell::new(c(*centre), c(*radius))))
+            }
+            Self::Secant { axis, a } => Box::new(Layered::cylinder(Sech::new(c(*axis), c(*a)))),
+            Self::Parabolic { axis, g } => {
+                Box::new(Layered::cylinder(Parabolic::new(c(*axis), c(*g))))
+            }
+            Self::Volume(path) => Box::new(from_file(path)?),
+        })
+    }
+}

@@ -1,0 +1,35 @@
+//! Design tasks in one gradient-index field: which light shall go where, what a maker can make, and
+//! the search for the field.
+//!
+//! A [`Task`] is what a person writes, as JSON: the kind of field and its resolutions, the
+//! sources, the goals, the limits. A [`Runner`] works on it one step at a time, by the exact adjoint
+//! of [`grin`](crate::grin): it knows no clock, no file and no window, draws nothing by chance and
+//! comes to the same field on any number of threads. Rays are traced as well as the tolerance of
+//! the task asks, chosen anew as the field takes shape; a ray that cannot count is left out, at a
+//! constant price, and told with its reason. After chapter 5 of Teh, *Computational Lens Design*,
+//! whose equation numbers are given.
+
+mod builtin;
+mod check;
+mod compare;
+mod descent;
+mod hold;
+mod image;
+mod least_squares;
+mod medium;
+mod runner;
+mod scene;
+mod source;
+mod space;
+mod task;
+
+pub use builtin::{BUILTIN, Builtin, find, read};
+pub use check::TaskError;
+pub use compare::{Difference, Extremes};
+pub use medium::{Medium, NoField};
+pub use runner::{Judgement, Progress, Runner};
+pub use scene::{Counts, ViewResult};
+pub use task::{
+    Directions, Drawing, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Source, Space,
+    Start, Task, Tracing, VERSION, View,
+};

@@ -1,0 +1,363 @@
+//! What a person asks of a field of refractive index: the task as it is written in a file.
+
+use crate::grin::{Integrator, Launch};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// The version of the format.
+pub const VERSION: u32 = 1;
+
+/// A task: which field is to be found, what it shall do to light, and what a maker can make.
+///
+/// Lengths are in mm and angles in degrees, as in every file. `η` is the refractive index.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Task {
+    /// The version of this format: 1.
+    pub aplanat_grin: u32,
+    /// What it is called.
+    pub name: String,
+    /// What a reader should know.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub notes: String,
+    /// How the field is made up.
+    pub field: FieldKind,
+    /// Where light bends.
+    pub space: Space,
+    /// How the speed of a ray is made to fit the index where it starts.
+    #[serde(default)]
+    pub launch: Launch,
+    /// Light and where it shall go.
+    pub views: Vec<View>,
+    /// The field to begin with.
+    #[serde(default)]
+    pub start: Start,
+    /// Exit positions are good to this length, where the field allows it.
+    pub tolerance: f64,
+    /// The step of rays in a grid, where it is not to be chosen by the tolerance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracing: Option<Tracing>,
+    /// What a maker can make.
+    #[serde(default)]
+    pub limits: MakerLimits,
+    /// What holds at the boundary of the space; nothing where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edge: Option<Edge>,
+    /// How the field is found.
+    pub method: Method,
+    /// Resolutions from coarse to fine.
+    pub levels: Vec<Level>,
+    /// The field that is known to be the answer, for comparison; the search does not see it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact: Option<Exact>,
+}
+
+/// How a field is made up of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum FieldKind {
+    /// Nodes on a cube, trilinear between them.
+    Trilinear {
+        /// Half the side of the cube.
+        half: f64,
+    },
+    /// Tricubic B-splines on a cube.
+    Tricubic {
+        /// Half the side of the cube.
+        half: f64,
+    },
+    /// A cubic B-spline in the square of the distance from the centre.
+    Sphere {
+        /// Where the spline ends.
+        radius: f64,
+    },
+    /// A cubic B-spline in the square of the distance from the z axis.
+    Cylinder {
+        /// Where the spline ends.
+        radius: f64,
+    },
+}
+
+/// Where light bends; outside there is air.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Space {
+    /// A ball about the origin.
+    Ball {
+        /// Its radius.
+        radius: f64,
+    },
+    /// A rod about the z axis.
+    Rod {
+        /// Its radius.
+        radius: f64,
+        /// The z at which it begins.
+        from: f64,
+        /// The z at which it ends.
+        to: f64,
+    },
+    /// A cube about the origin.
+    Cube {
+        /// Half its side.
+        half: f64,
+    },
+}
+
+/// Light from one source and what shall become of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct View {
+    /// What it is called.
+    pub name: String,
+    /// Where the rays come from.
+    pub source: Source,
+    /// Where they shall go.
+    pub goal: Goal,
+    /// How much it counts; a view of weight 0 is only looked at.
+    #[serde(default = "one")]
+    pub weight: f64,
+    /// The space of this view, where it is another one: a rod cut elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub space: Option<Space>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Where rays come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Source {
+    /// Parallel light: even discs of rays about the lines through the origin.
+    Parallel {
+        /// The directions in which light goes.
+        directions: Directions,
+        /// The radius of each disc.
+        radius: f64,
+        /// Rays a direction.
+        rays: usize,
+    },
+    /// Points on a sphere about the origin that send even cones of rays towards it.
+    Points {
+        /// From the points to the centre.
+        directions: Directions,
+        /// The radius of the sphere.
+        radius: f64,
+        /// The angle between the outermost rays and the axis of the cone.
+        cone: f64,
+        /// Rays a point.
+        rays: usize,
+    },
+    /// Parallel rays along +z in the plane of z and x, at even heights on one side of the axis.
+    Fan {
+        /// The height of the outermost ray.
+        height: f64,
+        /// The z at which they start.
+        z: f64,
+        /// How many.
+        rays: usize,
+    },
+    /// A square beam from outside the space: a ray somewhere in each square of a grid.
+    Beam {
+        /// The direction in which light goes.
+        direction: [f64; 3],
+        /// Half the side of the square.
+        half: f64,
+        /// Rays along a side.
+        rays: usize,
+        /// Whether they stand elsewhere in their squares in every step; for Adam.
+        #[serde(default)]
+        fresh: bool,
+    },
+}
+
+/// Directions in space.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Directions {
+    /// These, of any length.
+    Given(Vec<[f64; 3]>),
+    /// So many, evenly all around, the same in every step.
+    Even(usize),
+    /// So many new ones in every step; for Adam.
+    Fresh(usize),
+}
+
+/// What shall become of light.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Goal {
+    /// It leaves through this point. The loss is the mean square distance, in mm².
+    Point([f64; 3]),
+    /// It leaves through the point of the space's surface opposite to its source. Likewise.
+    Antipode,
+    /// It makes a picture on a square screen across a beam. The loss is the mean square difference
+    /// from the picture of mean 1, without a unit.
+    Image {
+        /// The picture.
+        drawing: Drawing,
+        /// Half the side of the screen.
+        half: f64,
+        /// How far it stands behind the space.
+        distance: f64,
+        /// Pixels along its side.
+        pixels: usize,
+    },
+    /// It leaves as it does from another field, which a measurement of rays would give.
+    Like {
+        /// That field.
+        field: Exact,
+        /// What the square of a difference in direction counts against that of one in mm.
+        #[serde(default)]
+        direction: f64,
+    },
+}
+
+/// A picture that is drawn by formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drawing {
+    /// A smiling face.
+    Face,
+    /// A letter A in a frame.
+    Letter,
+}
+
+/// The field to begin with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Start {
+    /// The same index everywhere.
+    Uniform(f64),
+    /// A volume from a file, `NumPy`'s .npz or raw numbers with a header.
+    Volume(PathBuf),
+}
+
+impl Default for Start {
+    fn default() -> Self {
+        Self::Uniform(1.0)
+    }
+}
+
+/// Steps that are tied to the voxels of a grid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tracing {
+    /// The kind of step.
+    pub integrator: Integrator,
+    /// About how many steps a voxel has.
+    pub per_voxel: f64,
+}
+
+/// What a maker can make.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MakerLimits {
+    /// Smallest index: 1 or more.
+    #[serde(default = "one")]
+    pub low: f64,
+    /// Largest index.
+    #[serde(default = "two")]
+    pub high: f64,
+    /// Steepest index, in 1/mm, held by a penalty; any where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slope: Option<f64>,
+    /// Largest change of the index in one step of the search.
+    #[serde(default = "small")]
+    pub change: f64,
+}
+
+impl Default for MakerLimits {
+    fn default() -> Self {
+        Self { low: one(), high: two(), slope: None, change: small() }
+    }
+}
+
+fn two() -> f64 {
+    2.0
+}
+
+fn small() -> f64 {
+    0.05
+}
+
+/// What holds at the boundary of the space.
+///
+/// Rays depend on the gradient of `η²` alone: what they leave open, the level of the index, must be
+/// fixed here, or by refraction (`"launch": "refracted"`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Edge {
+    /// The index there.
+    pub index: f64,
+    /// Whether all nodes of a trilinear grid outside the space have it.
+    #[serde(default)]
+    pub fixed: bool,
+    /// The weight, in mm², of its mean square deviation on the surface of the space; for a spline,
+    /// at its end.
+    #[serde(default)]
+    pub weight: f64,
+}
+
+/// How a field is found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Method {
+    /// First order, with moments: for rays that are new in every step.
+    Adam {
+        /// The size of a step of the index at the first level.
+        rate: f64,
+        /// What it is multiplied by at each further level.
+        #[serde(default = "one")]
+        fall: f64,
+    },
+    /// Limited-memory BFGS: for many numbers and the same rays in every step.
+    Lbfgs,
+    /// Levenberg and Marquardt: for few numbers and the same rays in every step.
+    LeastSquares,
+}
+
+/// A resolution and how long it is worked at.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Level {
+    /// Nodes along a side of the cube, or coefficients of the spline.
+    pub nodes: usize,
+    /// No more steps than this.
+    pub steps: usize,
+}
+
+/// A field that is given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Exact {
+    /// Luneburg's lens, `η = √(2 - r²/R²)` (5.38).
+    Luneburg {
+        /// `R`.
+        radius: f64,
+    },
+    /// Maxwell's fish-eye, `η = n₀/(1 + r²/R²)` (5.39).
+    Maxwell {
+        /// `n₀`.
+        centre: f64,
+        /// `R`.
+        radius: f64,
+    },
+    /// The fibre `η = n₀/cosh(a r)` about the z axis.
+    Secant {
+        /// `n₀`.
+        axis: f64,
+        /// `a`.
+        a: f64,
+    },
+    /// The fibre `η² = n₀² (1 - g² r²)` about the z axis (5.42).
+    Parabolic {
+        /// `n₀`.
+        axis: f64,
+        /// `g`.
+        g: f64,
+    },
+    /// A volume from a file, trilinear between its nodes.
+    Volume(PathBuf),
+}

@@ -1,0 +1,379 @@
+//! A search over structure in the background: orders in, news out.
+//!
+//! The search works on its own copy of the lens and is saved every few seconds, where there is a
+//! place for it. A panic inside ends the search and not the session: what was found stays.
+
+use super::background::{Background, Outbox, Work, guarded, pool};
+use super::clock::{Pace, Timed, timed};
+use super::exploration::{Ending, Exploration};
+use super::judged::Judged;
+use super::moments::History;
+use super::quest::{Engine, Explores, Quest};
+use super::slot::Slot;
+use super::worker::Standing;
+use crate::lens::Lens;
+use crate::search::Steer;
+use rayon::ThreadPool;
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+/// The time between two looks of the window, at least.
+const BETWEEN: Duration = Duration::from_millis(100);
+/// The time between two checkpoints, at least.
+const SAVED: Duration = Duration::from_secs(5);
+
+/// What happened to a search; each carries its number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Told {
+    Now(u64, Standing),
+    Failed(u64, String),
+    Refused(String),
+    /// The lens of a generation was finished and written.
+    Written(u64, PathBuf, String),
+    /// It was not.
+    NotWritten(u64, String),
+    /// The search itself could not be saved.
+    NotSaved(String),
+}
+
+/// What the thread is told.
+#[derive(Debug)]
+enum Order {
+    Start { number: u64, lens: Arc<Lens>, quest: Box<Quest>, path: Option<PathBuf> },
+    GoOn { number: u64, path: PathBuf },
+    Stand(Standing),
+    Steer(Steer),
+    SaveTo(PathBuf),
+    Clear,
+    Judge(Arc<Lens>),
+    Export { generation: u64, lens: Arc<Lens>, path: PathBuf },
+}
+
+type Begin = dyn Fn(&Lens, &Quest) -> Result<Box<dyn Explores>, String> + Send;
+
+/// The handle of the thread that searches over structure.
+#[derive(Debug)]
+pub(super) struct Explorer {
+    thread: Background<Order, Told>,
+    run: Slot<Exploration>,
+    judged: Slot<Judged>,
+}
+
+impl Explorer {
+    /// Starts the thread. `wake` is called from it when there is something new to look at.
+    pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+        let begin = |lens: &Lens, quest: &Quest| {
+            let engine = Engine::begin(lens, quest).map_err(|why| why.to_string())?;
+            Ok(Box::new(engine) as Box<dyn Explores>)
+        };
+        Self::with(Box::new(begin), wake)
+    }
+
+    fn with(begin: Box<Begin>, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+        let (run, judged) = (Slot::default(), Slot::default());
+        let (shown, judgements) = (run.clone(), judged.clone());
+        let desk = |outbox| Desk {
+            outbox,
+            shown,
+            judged: judgements,
+            begin,
+            pool: None,
+            looks: Pace::new(BETWEEN),
+            saves: Pace::new(SAVED),
+            run: None,
+        };
+        Ok(Self { thread: Background::spawn("search", wake, desk)?, run, judged })
+    }
+
+    /// Begins a search, saved to a file where there is one.
+    pub(super) fn start(
+        &self,
+        number: u64,
+        lens: Arc<Lens>,
+        quest: Box<Quest>,
+        path: Option<PathBuf>,
+    ) {
+        self.thread.tell(Order::Start { number, lens, quest, path });
+    }
+
+    /// Goes on with the search that a file holds.
+    pub(super) fn go_on(&self, number: u64, path: PathBuf) {
+        self.thread.tell(Order::GoOn { number, path });
+    }
+
+    /// Holds the search, lets it go on or ends it, after its round.
+    pub(super) fn stand(&self, standing: Standing) {
+        self.thread.tell(Order::Stand(standing));
+    }
+
+    /// Steers the search between two rounds.
+    pub(super) fn steer(&self, steer: Steer) {
+        self.thread.tell(Order::Steer(steer));
+    }
+
+    /// Saves the search to another file from now on.
+    pub(super) fn save_to(&self, path: PathBuf) {
+        self.thread.tell(Order::SaveTo(path));
+    }
+
+    /// Ends the search and forgets it; its file stays.
+    pub(super) fn clear(&self) {
+        self.thread.tell(Order::Clear);
+    }
+
+    /// Asks what a design is worth beside what was found.
+    pub(super) fn judge(&self, lens: Arc<Lens>) {
+        self.thread.tell(Order::Judge(lens));
+    }
+
+    /// Finishes and writes a lens that was found, while the search goes on.
+    pub(super) fn export(&self, generation: u64, lens: Arc<Lens>, path: PathBuf) {
+        self.thread.tell(Order::Export { generation, lens, path });
+    }
+
+    /// How far the search is.
+    pub(super) fn run(&self) -> Option<Arc<Exploration>> {
+        self.run.latest()
+    }
+
+    /// The design that was judged last.
+    pub(super) fn judged(&self) -> Option<Arc<Judged>> {
+        self.judged.latest()
+    }
+
+    /// What happened since the last look.
+    pub(super) fn told(&self) -> Vec<Told> {
+        self.thread.news()
+    }
+}
+
+/// What the thread works with.
+struct Desk {
+    outbox: Outbox<Told>,
+    shown: Slot<Exploration>,
+    judged: Slot<Judged>,
+    begin: Box<Begin>,
+    /// Threads of its own, from the first search on.
+    pool: Option<ThreadPool>,
+    looks: Pace,
+    saves: Pace,
+    run: Option<Run>,
+}
+
+/// A search under way or ended.
+struct Run {
+    engine: Box<dyn Explores>,
+    state: Exploration,
+    history: History,
+}
+
+impl Work for Desk {
+    type Order = Order;
+
+    fn is_running(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running)
+    }
+
+    fn obey(&mut self, order: Order) {
+        match order {
+            Order::Start { number, lens, quest, path } => {
+                let begun = guarded(|| (self.begin)(&lens, &quest));
+                self.begin(number, begun.map(|engine| (engine, *quest)), path);
+            }
+            Order::GoOn { number, path } => {
+                let begun = guarded(|| Engine::go_on(&path).map_err(|why| why.to_string()));
+                let begun = begun.map(|(e, quest)| (Box::new(e) as Box<dyn Explores>, quest));
+                self.begin(number, begun, Some(path));
+            }
+            Order::Stand(standing) => {
+                if self.run.as_ref().is_some_and(|run| run.state.is_under_way()) {
+                    self.stand(standing);
+                }
+            }
+            Order::Steer(steer) => self.steer(steer),
+            Order::SaveTo(path) => self.save_to(path),
+            Order::Clear => {
+                self.save();
+                self.run = None;
+            }
+            Order::Judge(lens) => {
+                self.judged.set(Judged::of(lens));
+                self.outbox.wake();
+            }
+            Order::Export { generation, lens, path } => self.export(generation, lens, path),
+        }
+    }
+
+    /// One turn of every chain.
+    fn advance(&mut self) {
+        let (Some(run), Some(pool)) = (&mut self.run, &self.pool) else { return };
+        match guarded(|| Ok(run.round(pool))) {
+            Ok(over) => run.state.over = over,
+            Err(why) => return self.give_up(why),
+        }
+        if run.state.over.is_some() {
+            self.stand(Standing::Finished);
+        } else if self.looks.is_due() {
+            self.show();
+        }
+        if self.saves.is_due() {
+            self.save();
+            if let Some(run) = &mut self.run {
+                run.count_rays();
+            }
+        }
+    }
+
+    fn close(&mut self) {
+        self.save();
+    }
+}
+
+impl Desk {
+    fn begin(
+        &mut self,
+        number: u64,
+        begun: Result<(Box<dyn Explores>, Quest), String>,
+        path: Option<PathBuf>,
+    ) {
+        self.save();
+        self.run = None;
+        let ready = begun.and_then(|begun| {
+            if self.pool.is_none() {
+                self.pool = Some(pool("search").map_err(|why| why.to_string())?);
+            }
+            Ok(begun)
+        });
+        match ready {
+            Ok((engine, quest)) => {
+                let state = Exploration::new(number, quest, engine.run(), path);
+                let mut history = History::default();
+                history.note(engine.run(), &[]);
+                self.run = Some(Run { engine, state, history });
+                self.saves.is_due();
+                self.stand(Standing::Running);
+            }
+            Err(why) => self.outbox.emit(Told::Failed(number, why)),
+        }
+    }
+
+    /// Lets the search stand otherwise, saves it, shows it and says so.
+    fn stand(&mut self, standing: Standing) {
+        let Some(run) = &mut self.run else { return };
+        run.state.standing = standing;
+        run.count_rays();
+        let number = run.state.number;
+        if standing != Standing::Running {
+            self.save();
+        }
+        self.show();
+        self.outbox.emit(Told::Now(number, standing));
+    }
+
+    fn steer(&mut self, steer: Steer) {
+        let Some(run) = &mut self.run else { return };
+        if let Err(why) = run.engine.steer(steer) {
+            self.outbox.emit(Told::Refused(why.to_string()));
+        }
+        self.show();
+    }
+
+    fn save_to(&mut self, path: PathBuf) {
+        if let Some(run) = &mut self.run {
+            run.state.checkpoint.path = Some(path);
+            run.state.checkpoint.moves = None;
+        }
+        self.save();
+        self.show();
+    }
+
+    /// Writes the checkpoint, unless the file holds all of the search.
+    fn save(&mut self) {
+        let Some(run) = &mut self.run else { return };
+        let failed = guarded(|| Ok(run.save())).unwrap_or_else(Some);
+        if failed.is_some() && run.state.checkpoint.failed != failed {
+            let why = failed.clone().unwrap_or_default();
+            self.outbox.emit(Told::NotSaved(format!("the search is not saved: {why}")));
+        }
+        run.state.checkpoint.failed = failed;
+    }
+
+    /// Finishes a lens in a thread of its own, which the end of the program does not wait for.
+    fn export(&self, generation: u64, lens: Arc<Lens>, path: PathBuf) {
+        let Some(run) = &self.run else { return };
+        let (finishing, outbox) = (run.engine.finishing(), self.outbox.clone());
+        let work = move || match finishing.write(&lens, &path) {
+            Ok(report) => outbox.emit(Told::Written(generation, path, report)),
+            Err(why) => outbox.emit(Told::NotWritten(generation, why)),
+        };
+        if let Err(why) = thread::Builder::new().name("finish".into()).spawn(work) {
+            self.outbox.emit(Told::NotWritten(generation, why.to_string()));
+        }
+    }
+
+    fn show(&mut self) {
+        if let Some(run) = &mut self.run {
+            self.shown.set(run.look());
+            self.outbox.wake();
+        }
+    }
+
+    fn give_up(&mut self, why: String) {
+        let Some(run) = &mut self.run else { return };
+        run.state.standing = Standing::Stopped;
+        let number = run.state.number;
+        self.shown.set(run.state.clone());
+        self.outbox.emit(Told::Failed(number, why));
+    }
+}
+
+impl Run {
+    /// One turn of every chain; why the search is over, where it is.
+    fn round(&mut self, pool: &ThreadPool) -> Option<Ending> {
+        let before = self.engine.run().statistics().gradients;
+        let engine = &mut self.engine;
+        let Timed { value: events, ms } = timed(|| pool.install(|| engine.round()));
+        self.state.seconds += 1e-3 * ms;
+        self.state.gradients += self.engine.run().statistics().gradients - before;
+        self.history.note(self.engine.run(), &events);
+        self.over()
+    }
+
+    fn over(&self) -> Option<Ending> {
+        let minutes = self.state.quest.minutes;
+        let late = minutes.is_some_and(|minutes| self.state.seconds >= 60.0 * minutes);
+        let over = self.engine.run().over().map(Ending::Over);
+        over.or_else(|| late.then_some(Ending::Time))
+    }
+
+    /// Counts the rays of a gradient, which change with the lens.
+    fn count_rays(&mut self) {
+        let engine = &self.engine;
+        let rays = guarded(|| Ok(engine.rays()));
+        self.state.rays = rays.unwrap_or(self.state.rays);
+    }
+
+    /// Takes over what the search has found.
+    fn look(&mut self) -> Exploration {
+        self.state.look(self.engine.run());
+        self.state.history = Arc::new(self.history.clone());
+        self.state.clone()
+    }
+
+    /// Writes the checkpoint; why that failed, where it did.
+    fn save(&mut self) -> Option<String> {
+        let moves = self.engine.run().statistics().moves;
+        let path = self.state.checkpoint.path.as_ref()?;
+        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        let saved = made
+            .map_err(|why| format!("{}: {why}", path.display()))
+            .and_then(|()| self.engine.save(path).map_err(|why| why.to_string()));
+        if saved.is_ok() {
+            self.state.checkpoint.moves = Some(moves);
+        }
+        saved.err()
+    }
+}

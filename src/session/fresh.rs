@@ -1,0 +1,125 @@
+//! Which glass of a lens is new beside another lens.
+
+use crate::lens::{Lens, Medium, Row};
+
+/// What it costs to call a piece of glass new, or gone.
+const NEW: f64 = 1.0;
+/// Two pieces of one glass are the same piece however they have bent: their shapes only tell which
+/// of several it is.
+const BENT: f64 = 0.9;
+/// Model glasses whose indices differ by this much are as different as glasses can be.
+const INDEX: f64 = 0.2;
+
+/// The rows of a lens, counted from 0, behind which there is glass that `own` does not have: what
+/// is left where as many pieces as possible are found again in the same order.
+pub fn fresh_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
+    let (rows, old) = (pieces(lens), pieces(own));
+    let size = own.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>();
+    let costs = costs(&rows, &old, size);
+    let (mut i, mut j) = (rows.len(), old.len());
+    let mut fresh = Vec::new();
+    while i > 0 {
+        if costs[i][j] == costs[i - 1][j] + NEW {
+            i -= 1;
+            fresh.push(rows[i].at);
+        } else if j > 0 && costs[i][j] == costs[i][j - 1] + NEW {
+            j -= 1;
+        } else {
+            i -= 1;
+            j = j.saturating_sub(1);
+        }
+    }
+    fresh.reverse();
+    fresh
+}
+
+/// A piece of glass.
+struct Piece<'a> {
+    at: usize,
+    medium: &'a Medium,
+    curvatures: [f64; 2],
+}
+
+fn pieces(lens: &Lens) -> Vec<Piece<'_>> {
+    let is_glass = |row: &Row| match row.medium {
+        Medium::Air | Medium::Mirror => false,
+        Medium::Index(n) => n >= 1.05,
+        Medium::Glass(_) | Medium::Model { .. } => true,
+    };
+    let pairs = lens.surfaces.windows(2).enumerate();
+    let glass = pairs.filter(|(_, pair)| is_glass(&pair[0]));
+    let piece = |(at, pair): (usize, &'_ [Row])| (at, [pair[0].curvature, pair[1].curvature]);
+    glass
+        .map(piece)
+        .map(|(at, curvatures)| Piece { at, medium: &lens.surfaces[at].medium, curvatures })
+        .collect()
+}
+
+/// The least cost of turning the first `j` old pieces into the first `i` new ones.
+fn costs(rows: &[Piece<'_>], old: &[Piece<'_>], size: f64) -> Vec<Vec<f64>> {
+    let mut costs = vec![vec![0.0; old.len() + 1]; rows.len() + 1];
+    for i in 0..=rows.len() {
+        for j in 0..=old.len() {
+            let gone = if j > 0 { costs[i][j - 1] + NEW } else { f64::INFINITY };
+            let new = if i > 0 { costs[i - 1][j] + NEW } else { f64::INFINITY };
+            let same = if i > 0 && j > 0 {
+                costs[i - 1][j - 1] + difference(&rows[i - 1], &old[j - 1], size)
+            } else {
+                f64::INFINITY
+            };
+            let least = gone.min(new).min(same);
+            costs[i][j] = if least.is_finite() { least } else { 0.0 };
+        }
+    }
+    costs
+}
+
+/// How different two pieces are: 0 to 1 for the same glass, infinite for another one.
+fn difference(a: &Piece<'_>, b: &Piece<'_>, size: f64) -> f64 {
+    let glass = match (a.medium, b.medium) {
+        (Medium::Model { nd: a, .. }, Medium::Model { nd: b, .. }) => {
+            let off = (a - b).abs() / INDEX;
+            if off < 1.0 { 0.1 * off } else { f64::INFINITY }
+        }
+        (a, b) if a == b => 0.0,
+        _ => f64::INFINITY,
+    };
+    let bend: f64 = a.curvatures.iter().zip(b.curvatures).map(|(a, b)| (a - b).abs()).sum();
+    let bend = size * bend;
+    glass + BENT * bend / (1.0 + bend)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::blank;
+
+    fn lens(glasses: &[(&str, f64)]) -> Lens {
+        let mut lens = blank();
+        let row = lens.surfaces[1].clone();
+        lens.surfaces.clear();
+        for (name, curvature) in glasses {
+            let medium = Medium::Glass((*name).to_owned());
+            lens.surfaces.push(Row { medium, curvature: *curvature, ..row.clone() });
+            lens.surfaces.push(Row { curvature: -curvature, ..row.clone() });
+        }
+        lens
+    }
+
+    #[test]
+    fn what_is_not_found_again_is_new() {
+        let own = lens(&[("A", 0.02), ("B", 0.01), ("A", -0.03)]);
+        let cases = [
+            (vec![("A", 0.02), ("B", 0.01), ("A", -0.03)], vec![]),
+            (vec![("A", 0.04), ("B", -0.01), ("A", -0.01)], vec![]),
+            (vec![("A", 0.02), ("A", -0.03)], vec![]),
+            (vec![("A", 0.02), ("C", 0.05), ("B", 0.01), ("A", -0.03)], vec![2]),
+            (vec![("A", 0.3), ("A", 0.02), ("B", 0.01), ("D", 0.0)], vec![0, 6]),
+        ];
+        for (glasses, fresh) in cases {
+            assert_eq!(fresh_glass(&lens(&glasses), &own), fresh, "{glasses:?}");
+        }
+        assert_eq!(fresh_glass(&lens(&[]), &own), [0; 0]);
+        assert_eq!(fresh_glass(&own, &lens(&[])), [0, 2, 4]);
+    }
+}

@@ -1,0 +1,140 @@
+//! A search over structure as a person asks for it, and the engine that does it.
+
+use super::finishing::Finishing;
+use crate::files::FileError;
+use crate::lens::Lens;
+use crate::merit::Goal;
+use crate::search::lens::{LensLandscape, Local, NoLandscape, Plan, opened};
+use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::Path;
+
+/// What a search over structure is asked for.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Quest {
+    /// What it may do, what it aims at, how it goes.
+    pub plan: Plan,
+    /// Whether every curvature and gap is free, whatever the design says.
+    pub free: bool,
+    /// Rims are opened up to this semi-diameter first, in mm; none leaves them. No rim grows beyond
+    /// it afterwards, where the rules do not say otherwise.
+    pub open: Option<f64>,
+    /// The search ends after so many minutes of work; none for no limit.
+    pub minutes: Option<f64>,
+}
+
+/// What searches: the engine, or what a test puts in its place.
+pub(super) trait Explores: Send {
+    fn run(&self) -> &RunOf<LensLandscape>;
+    fn round(&mut self) -> Vec<search::Event>;
+    fn steer(&mut self, steer: Steer) -> Result<(), SearchError>;
+    fn save(&self, path: &Path) -> Result<(), SearchError>;
+    /// What makes a lens that can be made of one that was found.
+    fn finishing(&self) -> Finishing;
+    /// The rays of a gradient of the best lens.
+    fn rays(&self) -> usize;
+}
+
+/// A run on its landscape.
+pub(super) struct Engine {
+    landscape: LensLandscape,
+    run: RunOf<LensLandscape>,
+}
+
+/// Why a search cannot begin or go on.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum NoQuest {
+    #[error(transparent)]
+    Landscape(#[from] NoLandscape),
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error("{file}: no checkpoint of a search over lenses: {what}")]
+    Foreign { file: String, what: String },
+}
+
+/// What a checkpoint says about the search that it belongs to.
+#[derive(Deserialize)]
+struct Kept {
+    landscape: KeptLandscape,
+    run: KeptRun,
+}
+
+#[derive(Deserialize)]
+struct KeptLandscape {
+    start: Lens,
+    goal: Goal,
+    rules: Rules,
+    local: Local,
+}
+
+#[derive(Deserialize)]
+struct KeptRun {
+    settings: Settings,
+}
+
+impl Engine {
+    /// A search from a lens.
+    pub(super) fn begin(lens: &Lens, quest: &Quest) -> Result<Self, NoQuest> {
+        let mut start = lens.clone();
+        let mut plan = quest.plan.clone();
+        if quest.free {
+            start.variables.clear();
+        }
+        if let Some(limit) = quest.open {
+            start = opened(&start, limit);
+            plan.rules.semi_diameter = plan.rules.semi_diameter.or(quest.open);
+        }
+        let landscape = plan.landscape(&start)?;
+        let settings = plan.settings(&landscape);
+        let run = Run::new(&landscape, landscape.start().clone(), &settings)?;
+        Ok(Self { landscape, run })
+    }
+
+    /// The search that a checkpoint holds, and what it was asked for.
+    pub(super) fn go_on(path: &Path) -> Result<(Self, Quest), NoQuest> {
+        let Kept { landscape: kept, run: KeptRun { settings } } = read(path)?;
+        let KeptLandscape { start, goal, rules, local } = kept;
+        let landscape = LensLandscape::new(&start, &goal, &rules, &local)?;
+        let run = Run::load(&landscape, &settings, path)?;
+        let plan = Plan { goal: Some(goal), rules, local, settings, ..Plan::default() };
+        Ok((Self { landscape, run }, Quest { plan, ..Quest::default() }))
+    }
+}
+
+fn read(path: &Path) -> Result<Kept, NoQuest> {
+    let file = path.display().to_string();
+    let bytes =
+        fs::read(path).map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
+    serde_json::from_slice(&bytes)
+        .map_err(|error| NoQuest::Foreign { file, what: error.to_string() })
+}
+
+impl Explores for Engine {
+    fn run(&self) -> &RunOf<LensLandscape> {
+        &self.run
+    }
+
+    fn round(&mut self) -> Vec<search::Event> {
+        self.run.round(&self.landscape)
+    }
+
+    fn steer(&mut self, steer: Steer) -> Result<(), SearchError> {
+        self.run.steer(&self.landscape, steer)
+    }
+
+    fn save(&self, path: &Path) -> Result<(), SearchError> {
+        self.run.save(&self.landscape, path)
+    }
+
+    fn finishing(&self) -> Finishing {
+        Finishing::on(self.landscape.clone())
+    }
+
+    fn rays(&self) -> usize {
+        self.landscape.rays(&self.run.best().point)
+    }
+}

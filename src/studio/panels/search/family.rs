@@ -1,0 +1,145 @@
+//! Where a lens came from: the last generations as a tree, merit downwards and time to the right,
+//! and the line of one of them in words.
+
+use std::sync::Arc;
+
+use eframe::egui::{
+    Color32, CursorIcon, Label, Pos2, Rect, RichText, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
+    vec2,
+};
+
+use super::thumbnail::Thumbnails;
+use super::{lenses, marks, words};
+use crate::lens::Lens;
+use crate::search::{Node, Offer};
+use crate::session::{Exploration, View};
+
+/// How many of the last generations the tree shows, besides the line of the one that is chosen.
+const SHOWN: usize = 80;
+/// How near the pointer must be to a generation to mean it.
+const NEAR: f32 = 10.0;
+/// How high the tree is.
+const HEIGHT: f32 = 120.0;
+
+type Generation = Arc<Node<Arc<Lens>>>;
+
+/// Shows the tree; the generation that was clicked, if one was.
+pub(super) fn picture(ui: &mut Ui, run: &Exploration, number: u64) -> Option<u64> {
+    let line: Vec<u64> = run.line(number).map(|node| node.number).collect();
+    let first = run.family.len().saturating_sub(SHOWN);
+    let shown: Vec<&Generation> = run
+        .family
+        .iter()
+        .enumerate()
+        .filter(|(i, node)| *i >= first || line.contains(&node.number))
+        .map(|(_, node)| node)
+        .collect();
+    let size = vec2(ui.available_width(), HEIGHT);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let label = format!("Family tree of {} generations", shown.len());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
+    let places = places(&shown, rect.shrink2(vec2(8.0, 8.0)));
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+    let place_of = |wanted: u64| {
+        let place = shown.iter().position(|node| node.number == wanted)?;
+        Some(places[place])
+    };
+    for (node, at) in shown.iter().zip(&places) {
+        let on_line = line.contains(&node.number);
+        if let Some(from) = node.parent.and_then(place_of) {
+            let color = if on_line { ui.visuals().hyperlink_color } else { faint(ui) };
+            let stroke = Stroke::new(if on_line { 1.8 } else { 0.7 }, color);
+            painter.line_segment([from, *at], stroke);
+        }
+    }
+    for (node, at) in shown.iter().zip(&places) {
+        let kept = node.offer.is_some_and(Offer::entered);
+        let radius = if kept { 4.2 } else { 2.4 };
+        painter.circle_filled(*at, radius, marks::color(ui.visuals(), node.kind));
+    }
+    if let Some(at) = place_of(number) {
+        painter.circle_stroke(at, 6.5, Stroke::new(1.5, ui.visuals().strong_text_color()));
+    }
+    let pointer = response.hover_pos()?;
+    let near = shown
+        .iter()
+        .zip(&places)
+        .min_by(|(_, a), (_, b)| a.distance(pointer).total_cmp(&b.distance(pointer)));
+    let (node, at) = near.filter(|(_, at)| at.distance(pointer) < NEAR)?;
+    painter.circle_stroke(*at, 6.5, ui.visuals().selection.stroke);
+    let text = format!("Lens {}\n{}\n{}", node.number, words::what(node), words::fate(node));
+    let response =
+        response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text_at_pointer(text);
+    response.clicked().then_some(node.number)
+}
+
+fn faint(ui: &Ui) -> Color32 {
+    ui.visuals().weak_text_color().gamma_multiply(0.6)
+}
+
+/// Where each generation stands: in the order of birth, the better the lower.
+fn places(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
+    let height = |node: &Generation| {
+        let merit = node.descended;
+        if merit > 0.0 && merit.is_finite() { Some(merit.log10()) } else { None }
+    };
+    let heights = shown.iter().filter_map(|node| height(node));
+    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
+    let range = (high - low).max(1e-9);
+    let count = shown.len().saturating_sub(1).max(1) as f32;
+    let place = |(i, node): (usize, &&Generation)| {
+        let share = height(node).map_or(0.0, |y| ((high - y) / range) as f32);
+        let x = rect.left() + rect.width() * i as f32 / count;
+        pos2(x, rect.top() + rect.height() * share)
+    };
+    shown.iter().enumerate().map(place).collect()
+}
+
+/// The ancestors of a lens in words, the youngest first; the one that was clicked.
+pub(super) fn line(
+    ui: &mut Ui,
+    view: &View,
+    run: &Exploration,
+    number: u64,
+    thumbnails: &mut Thumbnails,
+) -> Option<u64> {
+    let mut clicked = None;
+    let generations: Vec<&Generation> = run.line(number).collect();
+    if generations.is_empty() {
+        ui.weak(format!("Lens {number} is not remembered any more."));
+    }
+    for node in &generations {
+        ui.horizontal(|ui| {
+            let (rect, response) = ui.allocate_exact_size(vec2(86.0, 52.0), Sense::click());
+            let label = format!("Show lens {}", node.number);
+            response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
+            ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+            lenses::paint(ui, &node.point, &view.lens, rect.shrink(2.0), thumbnails);
+            if response.on_hover_cursor(CursorIcon::PointingHand).clicked() {
+                clicked = Some(node.number);
+            }
+            ui.vertical(|ui| generation(ui, node));
+        });
+    }
+    let oldest = generations.last();
+    if let Some(parent) = oldest.and_then(|node| node.parent) {
+        ui.weak(format!("Before that came lens {parent}, which is not remembered any more."));
+    }
+    clicked
+}
+
+fn generation(ui: &mut Ui, node: &Generation) {
+    ui.spacing_mut().item_spacing.y = 1.0;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        if let Some(kind) = node.kind {
+            marks::sign(ui, kind);
+        }
+        ui.add(Label::new(RichText::new(format!("Lens {}", node.number)).strong()));
+        ui.add(Label::new(words::what(node)).wrap());
+    });
+    for text in words::fate(node).lines() {
+        ui.add(Label::new(RichText::new(text).small().weak()).wrap());
+    }
+}

@@ -1,0 +1,167 @@
+//! The lenses that the search keeps, as cards, and what can be done with the one that was clicked.
+
+use std::sync::Arc;
+
+use eframe::egui::{
+    Align2, Button, Color32, CursorIcon, FontId, Pos2, Rect, Response, Role, Sense, Stroke,
+    StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2,
+};
+
+use super::thumbnail::Thumbnails;
+use super::{wish, words};
+use crate::lens::Lens;
+use crate::search::Steer;
+use crate::session::{Command, Exploration, Explore, Found, View};
+
+/// The smallest card.
+const CARD: Vec2 = vec2(148.0, 112.0);
+/// The part of a card for its words.
+const WORDS: f32 = 30.0;
+
+/// Shows the lenses that are kept, best first, the best one first of all; the one that was clicked.
+pub(super) fn cards(
+    ui: &mut Ui,
+    view: &View,
+    run: &Exploration,
+    chosen: Option<u64>,
+    thumbnails: &mut Thumbnails,
+) -> Option<u64> {
+    let same =
+        |found: &Arc<Found>| (found.number, found.merit) == (run.best.number, run.best.merit);
+    let is_kept = run.reservoir.iter().any(same);
+    let best = (!is_kept).then_some(&run.best);
+    let shown: Vec<&Arc<Found>> = best.into_iter().chain(&run.reservoir).collect();
+    let room = ui.available_width();
+    let gap = 4.0;
+    let columns = ((room + gap) / (CARD.x + gap)).floor().max(1.0);
+    let size = vec2((room - gap * (columns - 1.0)) / columns, CARD.y);
+    let mut clicked = None;
+    ui.spacing_mut().item_spacing = vec2(gap, gap);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
+    for row in shown.chunks(columns as usize) {
+        ui.horizontal(|ui| {
+            for found in row {
+                let number = found.number;
+                let look =
+                    Look { strong: Some(number) == chosen, pinned: run.pinned == Some(number) };
+                if card(ui, view, found, size, look, thumbnails).clicked() {
+                    clicked = Some(number);
+                }
+            }
+        });
+    }
+    clicked
+}
+
+/// How a card stands out.
+#[derive(Clone, Copy)]
+struct Look {
+    strong: bool,
+    pinned: bool,
+}
+
+fn card(
+    ui: &mut Ui,
+    view: &View,
+    found: &Found,
+    size: Vec2,
+    look: Look,
+    thumbnails: &mut Thumbnails,
+) -> Response {
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let text = words::worth(found);
+    let pinned = if look.pinned { ", pinned" } else { "" };
+    let label = format!("Lens {}{pinned}: {}", found.number, text.replace('\n', ", "));
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
+    let visuals = ui.visuals();
+    let stroke = if look.strong {
+        Stroke::new(2.0, visuals.selection.stroke.color)
+    } else if response.hovered() || response.has_focus() {
+        visuals.widgets.hovered.bg_stroke
+    } else {
+        Stroke::new(1.0, visuals.widgets.noninteractive.bg_stroke.color)
+    };
+    ui.painter().rect(rect, 3.0, visuals.extreme_bg_color, stroke, StrokeKind::Inside);
+    let drawing = Rect::from_min_max(rect.min, pos2(rect.right(), rect.bottom() - WORDS));
+    paint(ui, &found.lens, &view.lens, drawing.shrink(4.0), thumbnails);
+    let colors = [ui.visuals().text_color(), ui.visuals().weak_text_color()];
+    caption(ui, rect, &text, colors);
+    let corner = if look.pinned { "pinned".to_owned() } else { found.number.to_string() };
+    let font = FontId::proportional(10.0);
+    let color = ui.visuals().weak_text_color();
+    ui.painter().text(rect.min + vec2(5.0, 3.0), Align2::LEFT_TOP, corner, font, color);
+    response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(label)
+}
+
+/// The first two lines of a text, at the bottom of a card.
+fn caption(ui: &Ui, rect: Rect, text: &str, colors: [Color32; 2]) {
+    let painter = ui.painter_at(rect.shrink(3.0));
+    for (i, (line, color)) in text.lines().zip(colors).enumerate() {
+        let at = pos2(rect.left() + 6.0, rect.bottom() - WORDS + 13.0 * i as f32);
+        painter.text(at, Align2::LEFT_TOP, line, FontId::proportional(11.0), color);
+    }
+}
+
+/// Draws a lens into a part of the window.
+pub(super) fn paint(
+    ui: &Ui,
+    lens: &Arc<Lens>,
+    design: &Arc<Lens>,
+    rect: Rect,
+    thumbnails: &mut Thumbnails,
+) {
+    let all = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+    if let Some(texture) = thumbnails.of(ui, lens, design, rect.size()) {
+        ui.painter().image(texture.id(), rect, all, Color32::WHITE);
+    }
+}
+
+/// Take, pin, export; whether the design is shown again.
+pub(super) fn actions(
+    ui: &mut Ui,
+    view: &View,
+    run: &Exploration,
+    number: u64,
+    wishes: &mut Vec<Command>,
+) -> bool {
+    let pinned = run.pinned == Some(number);
+    let pin = if pinned {
+        ("Unpin", Explore::Steer(Steer::Unpin), "Mutate any of the lenses that are kept again")
+    } else {
+        (
+            "Pin",
+            Explore::Steer(Steer::Pin(number)),
+            "Let every new descent begin from this lens from now on",
+        )
+    };
+    let exporting = view.explorations.exporting.contains(&number);
+    let take =
+        format!("Make lens {number} the design in place of {}, one undo step", view.lens.name);
+    let buttons = [
+        ("Take", true, Explore::Take(number), take.as_str()),
+        (pin.0, run.is_under_way(), pin.1, pin.2),
+        (
+            if exporting { "Finishing…" } else { "Export…" },
+            !exporting,
+            Explore::Export { number, path: None },
+            "Write this lens with glasses of the catalogue, every limit of the factory kept; one \
+             that does not get there is refused with the limit that fails",
+        ),
+    ];
+    let mut back = false;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for (text, enabled, explore, hint) in buttons {
+            if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
+                wishes.push(wish(explore));
+            }
+        }
+        let shown = view.candidate.is_some();
+        let button = ui.add_enabled(shown, Button::new("Back to the design"));
+        back = button.on_hover_text("Show the design again in all panels").clicked();
+    });
+    if back {
+        wishes.push(Command::Preview(None));
+    }
+    back
+}

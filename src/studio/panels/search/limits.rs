@@ -1,0 +1,139 @@
+//! What a factory can make, and how the sampler goes: what is seldom changed.
+
+use eframe::egui::{ComboBox, Grid, Ui};
+
+use super::setup::{drag, length, optional};
+use crate::search::lens::Plan;
+use crate::search::{Rules, Termination};
+
+/// The limits of the factory.
+pub(super) fn factory(ui: &mut Ui, rules: &mut Rules) {
+    ui.collapsing("What the factory can make", |ui| {
+        Grid::new("factory").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
+            let ranges = [
+                ("Glass on the axis", "glass on the axis", &mut rules.glass_center),
+                ("Air on the axis", "air on the axis", &mut rules.air_center),
+            ];
+            for (title, name, [min, max]) in ranges {
+                ui.weak(title);
+                ui.horizontal(|ui| {
+                    length(ui, &format!("Least {name}"), min, 0.0..=*max);
+                    ui.weak("to");
+                    length(ui, &format!("Most {name}"), max, *min..=10_000.0);
+                });
+                ui.end_row();
+            }
+            let edges = [
+                ("Glass at the rim", "Least glass at the rim", &mut rules.glass_edge),
+                ("Air at the rim", "Least air at the rim", &mut rules.air_edge),
+            ];
+            for (title, name, value) in edges {
+                ui.weak(title);
+                length(ui, name, value, 0.0..=1000.0);
+                ui.end_row();
+            }
+            ui.weak("Steepness");
+            let hint = "The largest curvature times semi-diameter; 1 is a hemisphere";
+            drag(ui, "Steepness", &mut rules.steepness, 0.01..=1.0, 0.005, hint);
+            ui.end_row();
+            optionals(ui, rules);
+        });
+    });
+}
+
+fn optionals(ui: &mut Ui, rules: &mut Rules) {
+    let limits = [
+        ("Semi-diameter", "Largest semi-diameter", &mut rules.semi_diameter, 50.0),
+        ("Total track", "Longest track", &mut rules.track, 200.0),
+        ("Back focus", "Shortest back focus", &mut rules.back_focus, 20.0),
+    ];
+    for (title, name, value, mut usual) in limits {
+        ui.weak(title);
+        let hint = "Without it what the lens has at the start is the measure";
+        let what = format!("{name} set");
+        optional(ui, "set", value, &mut usual, hint, |ui, value| {
+            length(ui, &what, value, 0.0..=100_000.0);
+        });
+        ui.end_row();
+    }
+}
+
+const ENDS: [(Termination, &str, &str); 3] = [
+    (Termination::Ratio, "by density", "Bad starts are given up soon: algorithm 1"),
+    (Termination::Relative, "by improvement", "How fast it improves counts, not where it began"),
+    (Termination::Clocks, "by two clocks", "The clocks of section 4.4.1"),
+];
+
+/// How the sampler goes.
+pub(super) fn sampler(ui: &mut Ui, plan: &mut Plan) {
+    let (settings, local) = (&mut plan.settings, &mut plan.local);
+    ui.collapsing("How it samples", |ui| {
+        Grid::new("sampler").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
+            ui.weak("Descents end");
+            let name = ENDS.iter().find(|(end, ..)| *end == settings.termination);
+            let combo =
+                ComboBox::from_id_salt("termination").selected_text(name.map_or("", |e| e.1));
+            let combo = combo.show_ui(ui, |ui| {
+                for (end, name, hint) in ENDS {
+                    ui.selectable_value(&mut settings.termination, end, name).on_hover_text(hint);
+                }
+            });
+            combo.response.accessible_name("How descents end");
+            ui.end_row();
+            ui.weak("C");
+            drag(
+                ui,
+                "C",
+                &mut settings.c,
+                0.0..=10.0,
+                0.002,
+                "The larger, the shorter descents are",
+            );
+            ui.end_row();
+            ui.weak("γ");
+            let hint = "How often a descent begins anywhere instead of from a lens that is kept";
+            drag(ui, "Gamma", &mut settings.gamma, 0.0..=1.0, 0.002, hint);
+            ui.end_row();
+            ui.weak("Longest descent");
+            let hint = "In moves: what ends a descent that no chance ends";
+            drag(ui, "Longest descent", &mut settings.longest, 1..=1_000_000, 1.0, hint);
+            ui.end_row();
+            ui.weak("Lenses kept");
+            ui.horizontal(|ui| {
+                let hint = "How many lenses are kept and mutated";
+                drag(ui, "Lenses kept", &mut settings.reservoir, 1..=100, 0.05, hint);
+                let hint = "At most one of each pattern of glass and air";
+                let one = &mut settings.one_per_topology;
+                ui.checkbox(one, "one of each pattern").on_hover_text(hint);
+            });
+            ui.end_row();
+            ui.weak("Steps of a move");
+            drag(
+                ui,
+                "Steps of a move",
+                &mut local.steps,
+                1..=1000,
+                0.1,
+                "Gradient steps of a move",
+            );
+            ui.end_row();
+            ui.weak("Spots good to");
+            ui.horizontal(|ui| {
+                let mut percent = 100.0 * local.tolerance;
+                let hint = "The relative error of the radius of a spot: smaller costs more rays";
+                if drag(ui, "Error of spots", &mut percent, 1e-3..=50.0, 0.01, hint) {
+                    local.tolerance = percent / 100.0;
+                }
+                ui.weak("%");
+            });
+            ui.end_row();
+            ui.weak("Free besides");
+            ui.horizontal(|ui| {
+                ui.checkbox(&mut local.rims, "rims").on_hover_text("Semi-diameters may change");
+                let hint = "Indices of model glasses may change; real glasses stay real";
+                ui.checkbox(&mut local.indices, "model glasses").on_hover_text(hint);
+            });
+            ui.end_row();
+        });
+    });
+}

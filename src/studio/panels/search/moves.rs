@@ -1,0 +1,88 @@
+//! What became of each kind of mutation, and how often it is tried from now on.
+
+use eframe::egui::{DragValue, Grid, RichText, Ui};
+
+use super::{marks, wish};
+use crate::search::{Kind, Steer, Tally};
+use crate::session::{Command, Exploration, Explore};
+use crate::studio::number;
+use crate::studio::wording::{capital, counted_from_one};
+
+const HEADINGS: [(&str, &str); 7] = [
+    ("Mutation", ""),
+    ("Weight", "How often it is tried, times the weight of the setup; 0 forbids it"),
+    ("Tried", "How often it was tried"),
+    ("Refused", "How often it did not apply; the commonest reason stands below the pointer"),
+    ("Better", "Descents that came below the lens before the mutation, of those that have ended"),
+    ("Kept", "Descents whose lens was kept"),
+    ("Life", "How many moves a descent lasts that began with it, on average"),
+];
+
+/// The table of all kinds.
+pub(super) fn table(ui: &mut Ui, run: &Exploration, wishes: &mut Vec<Command>) {
+    Grid::new("moves").num_columns(HEADINGS.len()).spacing([9.0, 3.0]).striped(true).show(
+        ui,
+        |ui| {
+            for (name, hint) in HEADINGS {
+                let label = ui.weak(name);
+                if !hint.is_empty() {
+                    label.on_hover_text(hint);
+                }
+            }
+            ui.end_row();
+            for kind in marks::kinds() {
+                row(ui, run, kind, wishes);
+                ui.end_row();
+            }
+        },
+    );
+    reasons(ui, run);
+}
+
+fn row(ui: &mut Ui, run: &Exploration, kind: Kind, wishes: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        marks::sign(ui, kind);
+        ui.label(kind.name());
+    });
+    let mut weight = run.weights.of(kind);
+    let drag = DragValue::new(&mut weight).range(0.0..=100.0).speed(0.02).max_decimals(2);
+    let name = format!("Weight of {}", kind.name());
+    let drag = ui.add_enabled(run.is_under_way(), drag).accessible_name(&name);
+    if drag.changed() {
+        wishes.push(wish(Explore::Steer(Steer::Weight(kind, weight))));
+    }
+    let tally = run.statistics.kinds.get(&kind).cloned().unwrap_or_default();
+    ui.label(tally.tried.to_string());
+    refusals(ui, kind, &tally);
+    ui.label(format!("{} of {}", tally.improved, tally.ended));
+    ui.label(tally.entered.to_string());
+    let life = tally.lifetime().map(|moves| number::show_digits(moves, 3));
+    ui.label(life.unwrap_or_else(|| "–".to_owned()));
+}
+
+fn refusals(ui: &mut Ui, kind: Kind, tally: &Tally) {
+    let refused: u64 = tally.refused.values().sum();
+    let label = ui.label((refused + tally.rejected).to_string());
+    if let Some((why, count)) = commonest(tally) {
+        let why = counted_from_one(why);
+        label.on_hover_text(format!("{} was refused {count} times: {why}", capital(kind.name())));
+    }
+}
+
+fn commonest(tally: &Tally) -> Option<(&str, u64)> {
+    let most = tally.refused.iter().max_by_key(|(_, count)| **count);
+    most.map(|(why, count)| (why.as_str(), *count))
+}
+
+/// The commonest reason of each kind, in words.
+fn reasons(ui: &mut Ui, run: &Exploration) {
+    ui.add_space(6.0);
+    for kind in marks::kinds() {
+        let tally = run.statistics.kinds.get(&kind);
+        if let Some((why, count)) = tally.and_then(commonest) {
+            let text = format!("{}, {count} × refused: {}", kind.name(), counted_from_one(why));
+            ui.label(RichText::new(capital(&text)).small().weak());
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! The merit against iterations with a mark for every mutation (figure 4.6 of Teh, *Computational
+//! Lens Design*), and below it how many elements the lens of the chain has.
+
+use eframe::egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
+use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points};
+
+use super::{marks, words};
+use crate::session::{Exploration, Mark, Moment, View};
+use crate::studio::panels::decade_name;
+
+/// How near the pointer must be to a mark to mean it, in points of the screen.
+const NEAR: f32 = 10.0;
+/// How high the strip of elements is.
+const STRIP: f32 = 44.0;
+/// The room for the numbers at the left.
+const AXIS: f32 = 40.0;
+
+/// Shows both; the generation of the mark that was clicked, if one was.
+pub(super) fn plots(
+    ui: &mut Ui,
+    view: &View,
+    run: &Exploration,
+    chosen: Option<u64>,
+) -> Option<u64> {
+    let chain = view.explorations.followed.unwrap_or(0);
+    let height = (0.3 * ui.available_height()).clamp(80.0, 260.0);
+    let clicked = merit(ui, run, chain, chosen, height);
+    elements(ui, run, chain);
+    legend(ui, run);
+    clicked
+}
+
+fn plot(name: &str, height: f32) -> Plot<'_> {
+    Plot::new(name)
+        .height(height)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .show_crosshair(false)
+        .label_formatter(|_| None)
+        .y_axis_min_width(AXIS)
+        .link_axis(Id::unique("search history"), [true, false])
+        .set_margin_fraction(vec2(0.01, 0.08))
+}
+
+fn decade(merit: f64) -> Option<f64> {
+    (merit > 0.0 && merit.is_finite()).then(|| merit.log10())
+}
+
+fn merit(
+    ui: &mut Ui,
+    run: &Exploration,
+    chain: usize,
+    chosen: Option<u64>,
+    height: f32,
+) -> Option<u64> {
+    let plot = plot("merit of the search", height)
+        .show_axes([false, true])
+        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
+        .grid_spacing(16.0..=110.0)
+        .y_axis_formatter(|mark, _| decade_name(mark.value));
+    let visuals = ui.visuals().clone();
+    let shown = plot.show(ui, |plot| {
+        let faint = visuals.weak_text_color().gamma_multiply(0.4);
+        for other in (0..run.chains.len()).filter(|other| *other != chain) {
+            plot.line(Line::new("chain", of_chain(run, other)).color(faint).width(0.8));
+        }
+        let weak = visuals.weak_text_color();
+        plot.line(Line::new("followed chain", of_chain(run, chain)).color(weak).width(1.2));
+        start(plot, run, visuals.warn_fg_color);
+        let best = run.history.moments.iter();
+        let best: PlotPoints<'_> =
+            best.filter_map(|m| Some([m.round as f64, decade(m.best)?])).collect();
+        plot.line(Line::new("best", best).color(visuals.hyperlink_color).width(2.0));
+        mutations(plot, run, &visuals);
+        if let Some(mark) = run.history.marks.iter().find(|mark| Some(mark.number) == chosen) {
+            let ring = Points::new("chosen", at(mark).into_iter().collect::<PlotPoints<'_>>());
+            plot.points(ring.radius(7.0).filled(false).color(visuals.strong_text_color()));
+        }
+    });
+    let history = &run.history;
+    let (moments, mutations) = (history.moments.len(), history.marks.len());
+    let label = format!("Merit against iterations: {moments} moments, {mutations} descents");
+    shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
+    pick(ui, run, &shown)
+}
+
+/// The merit of the start across all iterations.
+fn start(plot: &mut PlotUi<'_>, run: &Exploration, color: eframe::egui::Color32) {
+    let (first, last) = (run.history.moments.first(), run.history.moments.last());
+    if let (Some(first), Some(last), Some(y)) = (first, last, decade(run.start.merit)) {
+        let ends = vec![[first.round as f64, y], [last.round as f64, y]];
+        let line = Line::new("start", ends).color(color).style(LineStyle::dashed_dense());
+        plot.line(line.width(1.0));
+    }
+}
+
+fn of_chain(run: &Exploration, chain: usize) -> PlotPoints<'static> {
+    let merit = |moment: &Moment| {
+        let (merit, _) = moment.chains.get(chain).copied().flatten()?;
+        Some([moment.round as f64, decade(merit)?])
+    };
+    run.history.moments.iter().filter_map(merit).collect()
+}
+
+fn at(mark: &Mark) -> Option<[f64; 2]> {
+    Some([mark.round as f64, decade(mark.merit)?])
+}
+
+/// Every mutation where it led; what was kept in the end is larger.
+fn mutations(plot: &mut PlotUi<'_>, run: &Exploration, visuals: &eframe::egui::Visuals) {
+    for kind in marks::kinds() {
+        for (entered, radius) in [(false, 2.6), (true, 4.8)] {
+            let of_kind = run.history.marks.iter();
+            let of_kind = of_kind.filter(|m| m.kind == Some(kind) && m.entered == entered);
+            let places: Vec<[f64; 2]> = of_kind.filter_map(at).collect();
+            if !places.is_empty() {
+                let color = marks::color(visuals, Some(kind));
+                let points = Points::new(kind.name(), places).shape(marks::shape(kind));
+                plot.points(points.radius(radius).color(color));
+            }
+        }
+    }
+}
+
+/// Tells what the mark under the pointer is; its generation where it was clicked.
+fn pick(ui: &Ui, run: &Exploration, shown: &PlotResponse<()>) -> Option<u64> {
+    let pointer = shown.response.hover_pos()?;
+    let on_screen = |mark: &Mark| {
+        let [x, y] = at(mark)?;
+        Some(shown.transform.position_from_point(&PlotPoint::new(x, y)))
+    };
+    let distance = |mark: &&Mark| on_screen(mark).map_or(f32::INFINITY, |p| p.distance(pointer));
+    let marks = run.history.marks.iter();
+    let mark = marks.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    if distance(&mark) > NEAR {
+        return None;
+    }
+    if let Some(place) = on_screen(mark) {
+        let ring = ui.visuals().selection.stroke;
+        ui.painter_at(shown.response.rect).circle_stroke(place, 7.0, ring);
+    }
+    let text = match run.node(mark.number) {
+        Some(node) => format!("Lens {}\n{}\n{}", node.number, words::what(node), words::fate(node)),
+        None => {
+            format!("Lens {}, forgotten since; merit {}", mark.number, words::merit(mark.merit))
+        }
+    };
+    let response = shown.response.clone().on_hover_text_at_pointer(text);
+    let clicked = response.clicked_by(PointerButton::Primary);
+    clicked.then_some(mark.number).filter(|number| run.lens_of(*number).is_some())
+}
+
+/// How many elements the lens of the chain has.
+fn elements(ui: &mut Ui, run: &Exploration, chain: usize) {
+    let steps: Vec<[f64; 2]> = run
+        .history
+        .moments
+        .iter()
+        .filter_map(|moment| {
+            let (_, elements) = moment.chains.get(chain).copied().flatten()?;
+            Some([moment.round as f64, elements as f64])
+        })
+        .collect();
+    let counts = steps.iter().map(|[_, count]| *count);
+    let (low, high) = counts.fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c), h.max(c)));
+    let visuals = ui.visuals();
+    let (line, grid) =
+        (visuals.strong_text_color(), visuals.widgets.noninteractive.bg_stroke.color);
+    let plot = plot("elements of the search", STRIP)
+        .grid_color(grid)
+        .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
+        .grid_spacing(9.0..=60.0)
+        .y_axis_formatter(|mark, _| format!("{:.0}", mark.value));
+    let shown = plot.show(ui, |plot| {
+        if low <= high {
+            plot.set_plot_bounds_y(low - 0.7..=high + 0.7);
+        }
+        plot.line(Line::new("elements", stairs(&steps)).color(line).width(1.5));
+    });
+    let now = steps.last().map_or(0.0, |[_, count]| *count);
+    let label = format!("Elements of chain {} against iterations: {now} now", chain + 1);
+    shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
+}
+
+/// A number stays what it was until the next moment.
+fn stairs(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut stairs: Vec<[f64; 2]> = Vec::with_capacity(2 * steps.len());
+    for step in steps {
+        if let Some([_, count]) = stairs.last().copied()
+            && count != step[1]
+        {
+            stairs.push([step[0], count]);
+        }
+        stairs.push(*step);
+    }
+    stairs
+}
+
+/// The marks of the kinds that have occurred.
+fn legend(ui: &mut Ui, run: &Exploration) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for kind in marks::kinds() {
+            if run.history.marks.iter().any(|mark| mark.kind == Some(kind)) {
+                marks::sign(ui, kind);
+                ui.label(RichText::new(kind.name()).small());
+                ui.add_space(4.0);
+            }
+        }
+    });
+}

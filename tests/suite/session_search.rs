@@ -1,0 +1,309 @@
+//! A search over structure behind a session: held, steered, saved, gone on with, taken, ended.
+
+use super::merit::bundled;
+use aplanat::lens::Lens;
+use aplanat::search::{Kind, Rules, Settings, Steer, Temperature};
+use aplanat::session::{
+    Command, Ending, Event, Exploration, Explore, Quest, Session, Severity, Standing, View,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+fn session(lens: Lens) -> Session {
+    Session::new(lens, || {}).unwrap()
+}
+
+fn double_gauss() -> Lens {
+    bundled("double_gauss_rudolph_50")
+}
+
+/// A search by two chains with short moves that ends after some of them, or not by itself.
+fn quest(moves: Option<u64>) -> Quest {
+    let mut quest = Quest::default();
+    let settings = quest.plan.settings;
+    quest.plan.settings = Settings { chains: 2, moves, gradients: None, remembered: 8, ..settings };
+    quest.plan.local.steps = 2;
+    quest
+}
+
+fn explore(session: &mut Session, wish: Explore) -> Vec<Event> {
+    session.apply(Command::Explore(wish))
+}
+
+fn start(session: &mut Session, moves: Option<u64>) {
+    explore(session, Explore::Start(Box::new(quest(moves))));
+}
+
+/// Waits until something has happened in the background.
+fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
+    let mut events = Vec::new();
+    for _ in 0..30_000 {
+        events.extend(session.poll());
+        if happened(&session.view(), &events) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    panic!("{what} never happened");
+}
+
+fn stands(session: &mut Session, standing: Standing) {
+    wait(session, "the standing", |_, events| events.contains(&Event::Explored(standing)));
+}
+
+fn run(session: &Session) -> Arc<Exploration> {
+    session.view().explorations.run.unwrap()
+}
+
+fn moves(view: &View) -> u64 {
+    view.explorations.run.as_ref().map_or(0, |run| run.statistics.moves)
+}
+
+fn folder(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("aplanat-search-{name}-{}", std::process::id()))
+}
+
+#[test]
+fn a_search_goes_on_is_held_and_ends_while_the_design_stays() {
+    let mut session = session(double_gauss());
+    start(&mut session, None);
+    assert!(session.view().explorations.starting);
+    wait(&mut session, "some moves", |view, _| moves(view) > 6);
+    explore(&mut session, Explore::Pause);
+    assert_eq!(session.view().explorations.pending, Some(Standing::Paused));
+    stands(&mut session, Standing::Paused);
+    let held = run(&session);
+    assert!(held.seconds > 0.0 && held.gradients > 0 && held.best.merit < held.start.merit);
+    let moment = held.history.moments.last().unwrap();
+    assert_eq!((moment.round, moment.chains.len()), (held.statistics.rounds, 2));
+    assert_eq!(moment.best, held.best.merit);
+    std::thread::sleep(Duration::from_millis(150));
+    session.poll();
+    assert_eq!(run(&session).statistics.moves, held.statistics.moves, "it is held");
+    explore(&mut session, Explore::Resume);
+    wait(&mut session, "more moves", |view, _| moves(view) > held.statistics.moves);
+    explore(&mut session, Explore::Stop);
+    stands(&mut session, Standing::Stopped);
+    assert!(run(&session).best.merit <= held.best.merit, "what was found stays");
+    assert!(!session.is_dirty());
+    explore(&mut session, Explore::Clear);
+    assert!(session.view().explorations.run.is_none());
+    // The handle of a search that runs ends its thread.
+    start(&mut session, None);
+    drop(session);
+}
+
+#[test]
+fn the_same_seed_finds_the_same_and_every_lens_has_its_line() {
+    let [first, second] = [(), ()].map(|()| {
+        let mut session = session(double_gauss());
+        start(&mut session, Some(60));
+        stands(&mut session, Standing::Finished);
+        run(&session)
+    });
+    assert_eq!(first.over, Some(Ending::Over(aplanat::search::Over::Moves)));
+    assert_eq!(first.done(), Some(1.0));
+    assert_eq!(first.best.merit, second.best.merit);
+    assert_eq!(first.best.lens, second.best.lens);
+    assert_eq!(first.statistics, second.statistics);
+    assert_eq!(first.history.marks, second.history.marks);
+    let merits: Vec<f64> = first.reservoir.iter().map(|found| found.merit).collect();
+    assert!(merits.is_sorted() && !merits.is_empty(), "{merits:?}");
+    for found in &first.reservoir {
+        let judged = found.judged.as_ref().unwrap().found.as_ref().unwrap();
+        assert!(judged.spot > 0.0 && judged.light > 0.0 && found.elements >= 2);
+        let line: Vec<u64> = first.line(found.number).map(|node| node.number).collect();
+        assert!(line.first() == Some(&found.number) && line.is_sorted_by(|a, b| a > b), "{line:?}");
+        assert_eq!(first.lens_of(found.number).unwrap(), &found.lens);
+    }
+}
+
+#[test]
+fn a_person_steers_a_search_between_two_rounds() {
+    let mut session = session(double_gauss());
+    start(&mut session, None);
+    wait(&mut session, "some moves", |view, _| moves(view) > 2);
+    let cold = run(&session).temperature;
+    explore(&mut session, Explore::Steer(Steer::Pin(0)));
+    explore(&mut session, Explore::Steer(Steer::Reheat));
+    explore(&mut session, Explore::Steer(Steer::Weight(Kind::AddSinglet, 0.0)));
+    wait(&mut session, "the weight", |view, _| {
+        let run = view.explorations.run.as_ref().unwrap();
+        run.weights.of(Kind::AddSinglet) == 0.0
+    });
+    let steered = run(&session);
+    assert_eq!(steered.pinned, Some(0));
+    assert_eq!(steered.temperature.value(), 2.0 * cold.value());
+    explore(&mut session, Explore::Steer(Steer::Unpin));
+    explore(&mut session, Explore::Steer(Steer::Temperature(Temperature::new(0.5).unwrap())));
+    wait(&mut session, "the temperature", |view, _| {
+        let run = view.explorations.run.as_ref().unwrap();
+        run.temperature.value() == 0.5 && run.pinned.is_none()
+    });
+    explore(&mut session, Explore::Steer(Steer::Pin(1_000_000)));
+    wait(&mut session, "a refusal", |view, _| {
+        let refused = "generation 1000000 is not remembered";
+        view.messages.last().is_some_and(|said| said.text.starts_with(refused))
+    });
+    assert_eq!(run(&session).standing, Standing::Running);
+}
+
+#[test]
+fn the_layout_follows_a_chain() {
+    let mut session = session(double_gauss());
+    start(&mut session, None);
+    explore(&mut session, Explore::Follow(Some(0)));
+    wait(&mut session, "numbers of the chain's lens", |view, _| {
+        let shown = view.preview.as_ref();
+        shown.is_some_and(|results| results.lens.surfaces != double_gauss().surfaces)
+    });
+    assert!(!session.is_dirty());
+    explore(&mut session, Explore::Follow(None));
+    assert!(session.view().preview.is_none());
+}
+
+#[test]
+fn a_lens_that_was_found_is_taken_as_one_step() {
+    let mut session = session(double_gauss());
+    start(&mut session, Some(20));
+    stands(&mut session, Standing::Finished);
+    let best = Arc::clone(&run(&session).reservoir[0]);
+    explore(&mut session, Explore::Take(best.number));
+    let view = session.view();
+    let title = format!("take lens {} of the search", best.number);
+    assert_eq!(view.undo.as_deref(), Some(title.as_str()));
+    assert_eq!(view.lens.surfaces, best.lens.surfaces);
+    let is_held = |v: &aplanat::lens::Variable| v.min.is_some() && v.min == v.max;
+    assert!(!view.lens.variables.iter().any(is_held), "what was held is no variable");
+    wait(&mut session, "the design beside it", |view, _| {
+        let here = view.explorations.here.as_ref();
+        here.is_some_and(|here| Arc::ptr_eq(&here.lens, &view.lens))
+    });
+    session.apply(Command::Undo);
+    assert_eq!(**session.lens(), double_gauss());
+    explore(&mut session, Explore::Take(1_000_000));
+    assert_eq!(session.view().messages.last().unwrap().severity, Severity::Warning);
+}
+
+#[test]
+fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
+    let folder = folder("left");
+    let mut whole = session(double_gauss());
+    start(&mut whole, Some(60));
+    stands(&mut whole, Standing::Finished);
+
+    let mut first = session(double_gauss());
+    first.keep_searches_in(&folder);
+    assert_eq!(first.view().explorations.left, None);
+    start(&mut first, Some(60));
+    wait(&mut first, "some moves", |view, _| moves(view) > 10);
+    drop(first);
+
+    let mut second = session(double_gauss());
+    second.keep_searches_in(&folder);
+    let left = second.view().explorations.left.unwrap();
+    assert!(left.starts_with(&folder), "{}", left.display());
+    explore(&mut second, Explore::GoOn(Some(left.clone())));
+    assert_eq!(second.view().explorations.left, None);
+    stands(&mut second, Standing::Finished);
+    let (whole, found) = (run(&whole), run(&second));
+    assert_eq!(found.best.lens, whole.best.lens);
+    assert_eq!(found.statistics, whole.statistics);
+    assert_eq!(found.checkpoint.moves, Some(60));
+    assert_eq!(found.checkpoint.path.as_ref(), Some(&left));
+
+    let third = &mut session(double_gauss());
+    third.keep_searches_in(&folder);
+    explore(third, Explore::ForgetLeft);
+    assert!(!left.exists() && third.view().explorations.left.is_none());
+    drop(second);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_person_chooses_where_a_search_is_saved() {
+    let folder = folder("place");
+    let mut session = session(double_gauss());
+    let [before, behind] = ["a.json", "b.json"].map(|name| folder.join(name));
+    explore(&mut session, Explore::SaveTo(Some(before.clone())));
+    assert_eq!(session.view().explorations.place.as_ref(), Some(&before));
+    start(&mut session, None);
+    explore(&mut session, Explore::Pause);
+    stands(&mut session, Standing::Paused);
+    assert!(before.exists());
+    explore(&mut session, Explore::SaveTo(Some(behind.clone())));
+    wait(&mut session, "the other file", |_, _| behind.exists());
+    explore(&mut session, Explore::SaveTo(Some(before.join("under a file"))));
+    wait(&mut session, "a refusal", |view, _| {
+        view.messages.last().is_some_and(|said| said.text.starts_with("the search is not saved"))
+    });
+    assert_eq!(run(&session).standing, Standing::Paused, "the search is not lost");
+    drop(session);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_search_that_cannot_begin_says_why() {
+    let mut session = session(double_gauss());
+    let mut wrong = quest(None);
+    wrong.plan.settings.chains = 0;
+    explore(&mut session, Explore::Start(Box::new(wrong)));
+    stands(&mut session, Standing::Stopped);
+    let view = session.view();
+    let why = "setting chains: found 0; expected 1 or more";
+    assert_eq!(view.explorations.failed.as_deref(), Some(why));
+    assert!(!view.explorations.starting && view.explorations.run.is_none());
+    assert_eq!(view.messages.last().unwrap().severity, Severity::Error);
+
+    let file = folder("foreign");
+    std::fs::write(&file, "{\"aplanat\": 1}").unwrap();
+    explore(&mut session, Explore::GoOn(Some(file.clone())));
+    stands(&mut session, Standing::Stopped);
+    let failed = session.view().explorations.failed.unwrap();
+    assert!(failed.contains("no checkpoint of a search over lenses"), "{failed}");
+    std::fs::remove_file(&file).unwrap();
+
+    start(&mut session, Some(4));
+    assert!(session.view().explorations.failed.is_none());
+    stands(&mut session, Standing::Finished);
+}
+
+/// Has the start of a search finished and exported.
+fn export(rules: impl Fn(&mut Rules), path: &Path) -> Session {
+    let mut session = session(double_gauss());
+    let mut asked = quest(Some(2));
+    rules(&mut asked.plan.rules);
+    explore(&mut session, Explore::Start(Box::new(asked)));
+    stands(&mut session, Standing::Finished);
+    explore(&mut session, Explore::Export { number: 0, path: Some(path.to_owned()) });
+    assert_eq!(session.view().explorations.exporting, [0]);
+    wait(&mut session, "the end of it", |view, _| view.explorations.exporting.is_empty());
+    session
+}
+
+#[test]
+fn a_lens_is_exported_once_every_limit_is_kept() {
+    let folder = folder("export");
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("made.json");
+    let session = export(|_| {}, &path);
+    let said = session.view().messages.last().unwrap().clone();
+    assert_eq!(said.severity, Severity::Note, "{}", said.text);
+    assert!(said.text.starts_with("lens 0 finished and exported to "), "{}", said.text);
+    let made = aplanat::files::open(&path).unwrap().lens;
+    assert!(made.surfaces.len() == double_gauss().surfaces.len() && made.variables.is_empty());
+    assert!(!session.is_dirty());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_lens_that_cannot_be_made_is_refused_by_name() {
+    let path = folder("refused.json");
+    let session = export(|rules| rules.track = Some(10.0), &path);
+    let said = session.view().messages.last().unwrap().clone();
+    assert_eq!(said.severity, Severity::Error);
+    let first = "nothing is written: the lens cannot be made within its limits\n";
+    assert!(said.text.starts_with(first) && said.text.contains("total track"), "{}", said.text);
+    assert!(!path.exists());
+}
