@@ -21,7 +21,7 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.7",
     title: "The front of sharpness against light with mutations and without",
     claim: "Mutations find lenses beyond the front that one structure can reach",
-    seconds: 120.0,
+    seconds: 40.0,
     run,
 };
 
