@@ -102,6 +102,8 @@ fn plus(a: Fates, b: Fates) -> Fates {
         missed: a.missed + b.missed,
         clipped: a.clipped + b.clipped,
         total_reflection: a.total_reflection + b.total_reflection,
+        turned: a.turned + b.turned,
+        trapped: a.trapped + b.trapped,
     }
 }
 

@@ -97,7 +97,7 @@ fn step(quantity: Quantity) -> f64 {
         | Quantity::Thickness
         | Quantity::ZoomThickness(_)
         | Quantity::SemiDiameter => 1e-2,
-        Quantity::Index => 1e-4,
+        Quantity::Index | Quantity::Gradient(_) => 1e-4,
     }
 }
 

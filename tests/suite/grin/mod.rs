@@ -4,6 +4,7 @@ mod descent;
 mod fields;
 mod gradient;
 mod hard;
+mod lens;
 mod lenses;
 mod plan;
 mod reference;

@@ -133,6 +133,11 @@ impl Export {
                 self.note(Outcome::Approximated, format!("model glass {place}"), note);
             }
             Medium::Glass(name) => self.catalogue_glass(name, place),
+            Medium::Gradient(gradient) => {
+                self.glass(&gradient.base, place, variable);
+                let note = "its coefficients are left out: only the glass on its axis is written";
+                self.note(Outcome::Dropped, format!("gradient {place}"), note);
+            }
         }
     }
 
