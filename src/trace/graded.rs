@@ -8,9 +8,9 @@
 //!
 //! The steps of a gap all have the same length, which a plan chooses (see [`super::step`]).
 
-use super::Tracer;
 use super::fate::{CLIPPED, MISSED, TOTAL_REFLECTION, TRAPPED, TURNED};
 use super::interface::{Crossing, Form, Interface, Meeting};
+use super::{Ray, Tracer};
 use crate::grin::field::GradeSlopes;
 use crate::grin::{Op, State};
 use crate::lens::Graded;
@@ -345,6 +345,29 @@ impl<R: Real> Gap<R> {
 
 /// Where `|v|² = n²` is less than this the polynomial means no glass any more.
 const LEAST_SQUARE: f64 = 0.04;
+
+/// Points of a drawn ray inside a gradient.
+const DRAWN: u32 = 24;
+
+impl Gap<f64> {
+    /// Points of a ray that starts behind the surface before, between its ends.
+    pub(super) fn between(
+        &self,
+        surface: &Interface<f64>,
+        ray: Ray<f64>,
+    ) -> impl Iterator<Item = Vec3<f64>> {
+        let index = self.field.index(ray.point);
+        let start = State { x: ray.point, v: ray.direction * index, path: 0.0 };
+        let length = self.cross(surface, None, start).map_or(0.0, |crossed| crossed.length);
+        let pieces = (length.abs() / self.step).ceil().clamp(1.0, 4096.0) as u32;
+        let pieces = pieces.max(DRAWN);
+        let mut state = start;
+        (1..pieces).map(move |_| {
+            state = self.advance(state, length / f64::from(pieces));
+            state.x
+        })
+    }
+}
 
 /// Rays that stay below this part of the square of the radius of the glass are not looked at more
 /// closely.

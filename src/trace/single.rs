@@ -52,8 +52,11 @@ pub struct Landing<R> {
 /// The corners of a ray's way and how it ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
-    /// The start and every point of incidence, in the frame of the first vertex.
+    /// The start, every point of incidence, and points between on the curve through a gradient, in
+    /// the frame of the first vertex.
     pub points: Vec<Vec3<f64>>,
+    /// How far from the axis it meets each surface, as far as it gets.
+    pub heights: Vec<f64>,
     /// How it ended.
     pub fate: Fate,
 }
@@ -170,7 +173,16 @@ impl Tracer<f64> {
             z += interface.gap;
             vertices.push(z);
         }
-        let landing = self.visit(ray, |i, p| points.push(Vec3::new(p.x, p.y, p.z + vertices[i])));
+        let mut heights = Vec::with_capacity(self.interfaces.len());
+        let landing = self.visit(ray, |i, p| {
+            if let Some(gap) = self.gap_before(i) {
+                let before = self.trace_to(ray, i - 1).ray;
+                let inside = gap.between(&self.interfaces[i], before);
+                points.extend(inside.map(|p| Vec3::new(p.x, p.y, p.z + vertices[i - 1])));
+            }
+            heights.push(p.x.hypot(p.y));
+            points.push(Vec3::new(p.x, p.y, p.z + vertices[i]));
+        });
         if let Fate::Missed(surface) = landing.fate {
             let (p, d) = (landing.ray.point, landing.ray.direction);
             let s = -p.z / d.z;
@@ -179,7 +191,7 @@ impl Tracer<f64> {
                 points.push(Vec3::new(end.x, end.y, vertices[surface as usize]));
             }
         }
-        Path { points, fate: landing.fate }
+        Path { points, heights, fate: landing.fate }
     }
 }
 

@@ -219,7 +219,8 @@ fn grin_lens_layers_keep_the_sine_times_the_index() {
         let data = first_order(&system(&lens), &Beam::of(&lens, 0)).unwrap();
         let reduced = integral(length, |z| 1.0 / index(z));
         let slanted = aplanat::paraxial::paraxial_ray(&system(&lens), 0.0, 1.0);
-        assert!((slanted.heights[1] - reduced).abs() < 1e-12, "{law}");
+        let off = slanted.heights[1] - reduced;
+        assert!(off.abs() < 1e-11, "{law}: {off:e}");
         assert_eq!(data.efl, None, "{law}: {:?}", data.power);
     }
 }
@@ -235,7 +236,8 @@ fn numbers(surface: &Surface<f64>) -> Vec<(Slot, f64)> {
     }
     for k in (0..GRADE_TERMS).filter(|k| Slot::Grade(*k).is_of(surface)) {
         let power = if k < RADIAL_TERMS { 2 * k as i32 + 2 } else { (k - RADIAL_TERMS) as i32 + 1 };
-        all.push((Slot::Grade(k), 1e-3 * 0.5_f64.powi(power)));
+        // Short enough that the plan of the steps stays the same.
+        all.push((Slot::Grade(k), 1e-4 * 0.5_f64.powi(power)));
     }
     all
 }

@@ -5,6 +5,7 @@ mod fields;
 mod gradient;
 mod hard;
 mod lens;
+mod lens_hard;
 mod lenses;
 mod plan;
 mod reference;
