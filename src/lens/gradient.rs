@@ -147,7 +147,7 @@ fn on_axis<R: Real>(field: &Graded<R>, z: R) -> (R, R) {
 
 /// Slabs of a gap in which the paraxial equations are solved: enough for twelve digits of whatever
 /// a rod of a few pitches does. A gradient across the axis alone is exact in one.
-const SLABS: usize = 64;
+const SLABS: usize = 128;
 
 /// A gap filled with a gradient, for paraxial rays.
 #[derive(Debug, Clone, Copy)]

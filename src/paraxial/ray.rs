@@ -55,15 +55,12 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
         nu -= y * (indices[i + 1] - before) * surface.shape.curvature();
         let u = nu / indices[i + 1];
         slopes.push(u);
-        match slabs.get(i) {
-            Some(Some(slab)) => {
-                (y, nu) = slab.pass(y, nu);
-                before = slab.index_behind;
-            }
-            _ => {
-                y += surface.thickness * u;
-                before = indices[i + 1];
-            }
+        if let Some(Some(slab)) = slabs.get(i) {
+            (y, nu) = slab.pass(y, nu);
+            before = slab.index_behind;
+        } else {
+            y += surface.thickness * u;
+            before = indices[i + 1];
         }
     }
     ParaxialRay { start_slope: slope, heights, slopes }

@@ -22,7 +22,7 @@ impl<R: Real> Tracer<R> {
     /// it does not get there.
     pub fn margin(&self, ray: Ray<R>, surface: usize, hurdle: Hurdle) -> Option<R> {
         let (start, k) = self.arrive(ray, surface)?;
-        self.margin_from(surface, hurdle, start, k)
+        Some(self.margin_from(surface, hurdle, start, k))
     }
 
     /// Where a ray of the edge lands: one that takes a hurdle with no margin at all. The cosine

@@ -7,7 +7,7 @@
 use super::Tracer;
 use super::backward::{Harvest, Homeward, Normal, Refracted, Sag, unrefract};
 use super::batch::BLOCK;
-use super::graded::Pull;
+use super::gap::Pull;
 use super::slot::Slot;
 use crate::grin::State;
 use crate::grin::field::GradeSlopes;

@@ -9,7 +9,8 @@
 
 use super::Tracer;
 use super::fate::CLIPPED;
-use super::graded::{Arrival, Gap};
+use super::gap::Gap;
+use super::graded::Arrival;
 use super::interface::{Form, Interface};
 use super::margin::Hurdle;
 use super::{Gradient, Seed};
@@ -77,20 +78,20 @@ impl<R: Real> Arrival<R> {
 }
 
 impl<R: Real> Tracer<R> {
-    /// The margin at a surface of a ray that comes to its frame; `None` where it is lost before.
+    /// The margin at a surface of a ray that comes to its frame.
     pub(super) fn margin_from(
         &self,
         surface: usize,
         hurdle: Hurdle,
         start: Vec3<R>,
         k: Vec3<R>,
-    ) -> Option<R> {
+    ) -> R {
         let own = &self.interfaces[surface];
         if !self.touches_gradient(surface) {
-            return Some(own.margin(hurdle, start, k));
+            return own.margin(hurdle, start, k);
         }
         let p = Vec3::new(start.x, start.y, start.z + own.gap);
-        Some(self.arrive_at(surface, p, k).margin(hurdle))
+        self.arrive_at(surface, p, k).margin(hurdle)
     }
 
     /// The surface whose rim a hurdle is.
@@ -123,15 +124,16 @@ impl Tracer<f64> {
         let k = Vec3::new(input(k.x, 3), input(k.y, 4), input(k.z, 5));
         let [before, behind] =
             [(own.index_before, BEFORE), (own.index_behind, BEHIND)].map(|(n, i)| input(n, i));
-        let lifted = |gap: Option<&Gap<f64>>, base: Local, first: usize| {
+        let lifted = |gap: Option<&Gap<f64>>, base: &Local, first: usize| {
             gap.map(|gap| gap.with_inputs(base, first))
         };
-        let front = lifted(self.gap_before(surface), before, GRADES);
-        let own_gap = lifted(self.gap_behind(surface), behind, GRADES + GRADE_TERMS);
-        let own = Interface { gap, ..own.with_inputs(before, behind) };
+        let front = lifted(self.gap_before(surface), &before, GRADES);
+        let own_gap = lifted(self.gap_behind(surface), &behind, GRADES + GRADE_TERMS);
+        let own = Interface { gap, ..own.with_inputs(&before, &behind) };
         // The surface before stands for where the ray came from.
-        let entry =
-            surface.checked_sub(1).map_or(own, |i| self.interfaces[i].with_inputs(before, before));
+        let entry = surface
+            .checked_sub(1)
+            .map_or(own, |i| self.interfaces[i].with_inputs(&before, &before));
         let local = Tracer {
             interfaces: vec![entry.fixed(), own],
             index_before: before,
@@ -184,14 +186,14 @@ impl Tracer<f64> {
 
 impl Gap<f64> {
     /// The same gap with its numbers as inputs.
-    fn with_inputs(&self, base: Local, first: usize) -> Gap<Local> {
+    fn with_inputs(&self, base: &Local, first: usize) -> Gap<Local> {
         let mut grade = self.field.grade.map(Local::constant);
         grade.used = [crate::lens::RADIAL_TERMS, crate::lens::AXIAL_TERMS];
         for (k, term) in grade.terms.iter_mut().enumerate() {
             *term = Local::variable(term.value, first + k);
         }
         Gap {
-            field: Graded { base, grade },
+            field: Graded { base: *base, grade },
             ops: crate::grin::Integrator::BlanesMoan.ops(),
             step: Local::constant(self.step),
             limit: self.limit,
@@ -202,7 +204,8 @@ impl Gap<f64> {
 
 impl Interface<f64> {
     /// The same surface with its numbers as inputs; a plane as the sphere that it may become.
-    fn with_inputs(&self, before: Local, behind: Local) -> Interface<Local> {
+    fn with_inputs(&self, before: &Local, behind: &Local) -> Interface<Local> {
+        let (before, behind) = (*before, *behind);
         let constant = Local::constant;
         let terms = std::array::from_fn(|j| Local::variable(self.terms[j], TERMS + j));
         Interface {

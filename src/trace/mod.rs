@@ -14,6 +14,7 @@ mod backward;
 mod batch;
 mod edge;
 mod fate;
+mod gap;
 mod graded;
 mod graded_back;
 mod graded_edge;
@@ -37,7 +38,7 @@ pub use step::GapPlan;
 use crate::lens::Invalid;
 use crate::lens::System;
 use crate::math::Real;
-use graded::Gap;
+use gap::Gap;
 use interface::Interface;
 
 /// A system made ready for tracing: checked, with every constant of a surface worked out once.

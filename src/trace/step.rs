@@ -5,15 +5,15 @@
 //! while a search moves the lens; it depends on nothing but the gap and its two faces, so that every
 //! number type takes the same steps.
 
-use super::graded::Gap;
+use super::gap::Gap;
 use super::interface::Interface;
 use crate::grin::{Integrator, State};
-use crate::lens::{Graded, Invalid};
+use crate::lens::{Graded, Invalid, Law, RADIAL_TERMS};
 use crate::math::{Real, Vec3};
 use serde::Serialize;
 
 /// How exact a ray is behind a gap, of its length.
-const TOLERANCE: f64 = 1e-10;
+const TOLERANCE: f64 = 1e-11;
 /// More steps than this are not tried.
 const MOST_STEPS: u32 = 4096;
 /// A ray may be so many times longer than the axis.
@@ -51,7 +51,7 @@ impl<R: Real> Gap<R> {
     ) -> Result<(Self, GapPlan), Invalid> {
         let side2 = R::select(faces[0].rim2 > faces[1].rim2, faces[0].rim2, faces[1].rim2);
         let plain = Graded { base: field.base.value(), grade: field.grade.map(Real::value) };
-        let plan = plan(&plain, number, faces.map(Interface::value))?;
+        let plan = plan(&plain, number, &faces.map(Interface::value))?;
         let gap = Self {
             field,
             ops: INTEGRATOR.ops(),
@@ -67,10 +67,10 @@ impl<R: Real> Gap<R> {
 fn plan(
     field: &Graded<f64>,
     surface: usize,
-    faces: [Interface<f64>; 2],
+    faces: &[Interface<f64>; 2],
 ) -> Result<GapPlan, Invalid> {
     let reach = reach(field, faces[1].gap.abs());
-    let length = length(&faces, reach);
+    let length = length(faces, reach);
     let whole = length / field.base;
     let trial = |steps: u32| Gap {
         field: *field,
@@ -81,24 +81,66 @@ fn plan(
     };
     let starts = starts(field, &faces[0], reach, faces[1].sense);
     let allowed = TOLERANCE * length;
-    let mut steps = 1;
+    let mut steps = fewest(field, reach, whole);
     let mut error = f64::INFINITY;
     while steps <= MOST_STEPS {
-        let (coarse, fine) = (trial(steps), trial(2 * steps));
-        let moved = starts.iter().map(|start| difference(start, &coarse, &fine, reach, length));
-        error = moved.fold(0.0, f64::max);
-        if error <= allowed {
+        let tried = [*field, raised(field, reach, length)].map(|field| {
+            let gaps = [steps, 2 * steps].map(|steps| Gap { field, ..trial(steps) });
+            let moved = starts.iter().map(|s| difference(s, &gaps[0], &gaps[1], reach, length));
+            moved.fold(0.0, f64::max)
+        });
+        error = tried[0];
+        if error <= allowed && tried[1] <= allowed / RAISED {
             let kicks = steps * INTEGRATOR.kicks() as u32;
             let step = whole / f64::from(steps);
             return Ok(GapPlan { surface, steps, error, tolerance: allowed, kicks, step });
         }
         steps *= 2;
     }
-    let why = format!(
-        "is too strong: with {MOST_STEPS} steps rays still move by {error:.1e} mm when they are \
-         halved, and {allowed:.1e} mm is allowed"
-    );
+    let why = if error.is_finite() {
+        format!(
+            "is too strong: with {MOST_STEPS} steps rays still move by {error:.1e} mm when they are \
+             halved, and {allowed:.1e} mm is allowed"
+        )
+    } else {
+        format!("is too strong for {MOST_STEPS} steps")
+    };
     Err(Invalid::Gradient { surface, why })
+}
+
+/// The fewest steps that are worth a trial: light may turn by a third of a right angle or so in one,
+/// else rays that leave would hide what happens.
+fn fewest(field: &Graded<f64>, reach: f64, whole: f64) -> u32 {
+    let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
+    let places = [0.0, 0.5, 1.0].map(|share| Vec3::new(0.0, share * reach, 0.0));
+    let bends = places.iter().flat_map(|at| axes.map(|along| field.bend(*at, along).dot(along)));
+    let strongest = bends.fold(0.0, |most: f64, bend| most.max(bend.abs()));
+    let turns = whole * strongest.sqrt();
+    // Beyond all steps that are tried, whatever it is.
+    if turns < f64::from(MOST_STEPS) {
+        (turns.ceil() as u32).max(1).next_power_of_two()
+    } else {
+        2 * MOST_STEPS
+    }
+}
+
+/// A coefficient that counts though it is zero is tried where it changes the index by this.
+const RAISED: f64 = 1e-3;
+
+/// The same gradient with those coefficients raised that count though they are zero: a search is about
+/// to move them.
+fn raised(field: &Graded<f64>, reach: f64, length: f64) -> Graded<f64> {
+    let mut field = *field;
+    let [radial, axial] = field.grade.used;
+    let across = (0..radial).map(|i| (i, reach.powi(2 * i as i32 + 2)));
+    let along = (0..axial).map(|j| (RADIAL_TERMS + j, length.powi(j as i32 + 1)));
+    for (k, power) in across.chain(along) {
+        let term = &mut field.grade.terms[k];
+        if *term == 0.0 && field.grade.law != Law::Sech {
+            *term = RAISED * field.base / power;
+        }
+    }
+    field
 }
 
 /// How far from the axis rays are tried: to the rim, or where nobody says to where the index has

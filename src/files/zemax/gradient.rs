@@ -2,7 +2,7 @@
 //!
 //! `n = n₀ + nr₂ r² + nr₄ r⁴ + nr₆ r⁶ + nz₁ z + nz₂ z² + nz₃ z³`, with z from the vertex and the
 //! same at every wavelength. Parameter 1 is the largest step there, which says nothing here, 2 is n₀,
-//! 3 to 5 are radial, 6 to 8 axial (OpticStudio's user guide, "Gradient 3"). Other types are refused
+//! 3 to 5 are radial, 6 to 8 axial (the user guide of `OpticStudio`, "Gradient 3"). Other types are refused
 //! by name, on reading and on writing.
 
 use super::draft::Surface;

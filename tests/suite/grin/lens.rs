@@ -220,7 +220,7 @@ fn grin_lens_layers_keep_the_sine_times_the_index() {
         let reduced = integral(length, |z| 1.0 / index(z));
         let slanted = aplanat::paraxial::paraxial_ray(&system(&lens), 0.0, 1.0);
         let off = slanted.heights[1] - reduced;
-        assert!(off.abs() < 1e-11, "{law}: {off:e}");
+        assert!(off.abs() < 2e-12, "{law}: {off:e}");
         assert_eq!(data.efl, None, "{law}: {:?}", data.power);
     }
 }
@@ -298,6 +298,15 @@ fn grin_lens_every_derivative_of_a_ray_is_that_of_differences_and_of_duals() {
                     *slot.of(&mut system, surface) += h;
                     value(&system)
                 };
+                // The plan is made for the coefficients that count.
+                if let (Slot::Grade(k), Some(grade)) = (slot, system.surfaces[surface].graded)
+                    && grade.terms[k] == 0.0
+                {
+                    let by = found.surfaces[surface].by(slot);
+                    let exact = by_dual(&system, surface, slot, &rays);
+                    assert!((by - exact).abs() < 1e-3 * exact.abs().max(1e-3 * size.min(1.0)));
+                    continue;
+                }
                 let difference = (8.0 * (moved(step) - moved(-step)) - moved(2.0 * step)
                     + moved(-2.0 * step))
                     / (12.0 * step);

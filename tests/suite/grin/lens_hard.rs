@@ -127,7 +127,7 @@ fn grin_lens_an_index_below_one_and_gradients_too_strong_are_refused_by_name() {
         r#"{"entrance_pupil_diameter": 0.001}"#,
     );
     let message = Tracer::new(&system(&strong)).unwrap_err().to_string();
-    assert!(message.contains("after surface 0 is too strong: with 4096 steps"), "{message}");
+    assert!(message.contains("after surface 0 is too strong for 4096 steps"), "{message}");
     let mut bad = system(&half_pitch(1.0));
     bad.surfaces[0].graded = Some(Grade::new(Law::Index, [f64::NAN; GRADE_TERMS]));
     assert!(Tracer::new(&bad).unwrap_err().to_string().contains("gradient coefficient"));
@@ -138,8 +138,11 @@ fn grin_lens_gaps_without_length_and_crossing_faces_are_traced() {
     let mut lens = busy("index", &[-0.01], &[0.01]);
     // No length at all: a plane against a plane.
     lens.surfaces[0].asphere.clear();
+    for row in &mut lens.surfaces[..3] {
+        (row.curvature, row.conic) = (0.0, 0.0);
+    }
     for row in &mut lens.surfaces[..2] {
-        (row.curvature, row.conic, row.thickness) = (0.0, 0.0, 0.0);
+        row.thickness = 0.0;
     }
     let mut without = lens.clone();
     without.surfaces[0].medium = Medium::Air;
@@ -245,7 +248,10 @@ fn grin_lens_the_side_of_a_rod_limits_its_pupil() {
     ] {
         let (a, b) = (edge.by.surfaces[i].by(slot), found.by.surfaces[i].by(slot));
         let scale = found.by.largest(slot);
-        assert!((a - b).abs() <= 1e-6 * scale + 1e-12, "{slot:?} of {i}: {a} {b} of {scale}");
+        let known = found.error.surfaces[i].by(slot) + edge.error.surfaces[i].by(slot);
+        let off = (a - b).abs();
+        println!("{slot:?} of {i}: {a:.6e}, {:.1e} of it, known to {known:.1e}", off / scale);
+        assert!(off <= 1e-6 * scale + known, "{slot:?} of {i}: {a} {b} ± {known}");
     }
     // It is the side that clips, and a wider rod lets more light through.
     assert!(edge.by.surfaces[0].semi_diameter < -0.1, "{}", edge.by.surfaces[0].semi_diameter);
@@ -254,8 +260,8 @@ fn grin_lens_the_side_of_a_rod_limits_its_pupil() {
 fn step(quantity: Quantity) -> f64 {
     match quantity {
         Quantity::Curvature | Quantity::Index => 1e-4,
-        Quantity::Gradient(0) => 1e-5,
-        Quantity::Gradient(_) => 1e-6,
+        Quantity::Gradient(1) => 1e-6,
+        Quantity::Gradient(_) => 1e-5,
         _ => 1e-3,
     }
 }
