@@ -422,6 +422,7 @@ impl<R: Real> Block<R> {
     }
 
     /// Crosses a surface that a gradient touches, ray by ray.
+    #[inline(never)]
     pub(super) fn pass_gradient(
         &mut self,
         tracer: &Tracer<R>,

@@ -76,7 +76,9 @@ impl<R: Real> Tracer<R> {
             && (self.gap_before(surface).is_some() || self.gap_behind(surface).is_some())
     }
 
-    /// Brings a ray from the frame of the surface before to a surface.
+    /// Brings a ray from the frame of the surface before to a surface. Never part of the loops that
+    /// trace glass, whose registers it would take.
+    #[inline(never)]
     pub(super) fn arrive_at(&self, i: usize, p: Vec3<R>, k: Vec3<R>) -> Arrival<R> {
         let surface = &self.interfaces[i];
         let start = Vec3::new(p.x, p.y, p.z - surface.gap);

@@ -127,6 +127,8 @@ impl<R: Real> Tracer<R> {
 impl<R: Real> Landing<R> {
     /// Takes a ray that comes from `p` through a surface that a gradient touches; its direction
     /// behind, if it gets through.
+    #[cold]
+    #[inline(never)]
     fn pass(
         &mut self,
         i: usize,

@@ -26,8 +26,8 @@ fn show_gradient(gradient: &Gradient) -> String {
         Law::Sech => "sech ",
     };
     let list = |name: &str, terms: &[f64]| {
-        let numbers: String = terms.iter().map(|term| format!(" {term}")).collect();
-        if terms.is_empty() { String::new() } else { format!(" {name}{numbers}") }
+        let words = terms.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+        if terms.is_empty() { String::new() } else { format!(" {name} {words}") }
     };
     let base = show(&gradient.base);
     format!("gradient {law}{base}{}{}", list("r", &gradient.radial), list("z", &gradient.axial))
