@@ -201,20 +201,29 @@ impl Interface<f64> {
         local.margin(hurdle, start, k).slope
     }
 
-    /// The same surface with its numbers as inputs; a plane as the sphere that it may become.
+    /// The same surface with its numbers as inputs.
     fn local(&self) -> Interface<Local> {
-        let constant = Local::constant;
-        let [before, behind] =
-            [Local::variable(self.index_before, 6), Local::variable(self.index_behind, 7)];
-        let terms = std::array::from_fn(|j| Local::variable(self.terms[j], 10 + j));
+        let indices = [(self.index_before, 6), (self.index_behind, 7)];
+        self.with_inputs(&indices.map(|(n, i)| Local::variable(n, i)), 8)
+    }
+
+    /// The same surface between these indices, its curvature, conic constant and coefficients as
+    /// inputs from number `first` on; a plane as the sphere that it may become.
+    pub(super) fn with_inputs<const N: usize>(
+        &self,
+        [before, behind]: &[Dual<f64, N>; 2],
+        first: usize,
+    ) -> Interface<Dual<f64, N>> {
+        let (before, behind, constant) = (*before, *behind, Dual::constant);
+        let terms = std::array::from_fn(|j| Dual::variable(self.terms[j], first + 2 + j));
         Interface {
             form: if self.form == Form::Plane { Form::Sphere } else { self.form },
             mirror: self.mirror,
             far: self.far,
             sense: constant(self.sense),
             gap: constant(self.gap),
-            curvature: Local::variable(self.curvature, 8),
-            conic: Local::variable(self.conic, 9),
+            curvature: Dual::variable(self.curvature, first),
+            conic: Dual::variable(self.conic, first + 1),
             terms,
             medium: self.medium,
             index_before: before,

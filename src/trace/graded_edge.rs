@@ -129,11 +129,11 @@ impl Tracer<f64> {
         };
         let front = lifted(self.gap_before(surface), &before, GRADES);
         let own_gap = lifted(self.gap_behind(surface), &behind, GRADES + GRADE_TERMS);
-        let own = Interface { gap, ..own.with_inputs(&before, &behind) };
+        let own = Interface { gap, ..own.with_inputs(&[before, behind], CURVATURE) };
         // The surface before stands for where the ray came from.
         let entry = surface
             .checked_sub(1)
-            .map_or(own, |i| self.interfaces[i].with_inputs(&before, &before));
+            .map_or(own, |i| self.interfaces[i].with_inputs(&[before, before], CURVATURE));
         let local = Tracer {
             interfaces: vec![entry.fixed(), own],
             index_before: before,
@@ -198,35 +198,6 @@ impl Gap<f64> {
             step: Local::constant(self.step),
             limit: self.limit,
             side2: Local::constant(self.side2),
-        }
-    }
-}
-
-impl Interface<f64> {
-    /// The same surface with its numbers as inputs; a plane as the sphere that it may become.
-    fn with_inputs(&self, before: &Local, behind: &Local) -> Interface<Local> {
-        let (before, behind) = (*before, *behind);
-        let constant = Local::constant;
-        let terms = std::array::from_fn(|j| Local::variable(self.terms[j], TERMS + j));
-        Interface {
-            form: if self.form == Form::Plane { Form::Sphere } else { self.form },
-            mirror: self.mirror,
-            far: self.far,
-            sense: constant(self.sense),
-            gap: constant(self.gap),
-            curvature: Local::variable(self.curvature, CURVATURE),
-            conic: Local::variable(self.conic, CONIC),
-            terms,
-            medium: self.medium,
-            index_before: before,
-            n2: before * before,
-            index_behind: behind,
-            dn2: (behind - before) * (behind + before),
-            rim2: constant(self.rim2),
-            obstruction2: constant(self.obstruction2),
-            sheet: constant(self.sheet),
-            steepest: self.steepest,
-            span: self.span,
         }
     }
 }
