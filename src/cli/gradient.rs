@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::input::{LensFile, Opened, Tolerance};
 use super::output::{Number, Output, Table};
-use crate::lens::{Fields, Lens, at_zoom};
+use crate::lens::{Fields, Lens, Medium, at_zoom};
 use crate::measure::timed;
 use crate::pupil::{
     Accuracy, Bench, Cost, Derivative, Estimator, NoDerivative, Region, differentiate,
@@ -203,6 +203,13 @@ struct Columns {
     conic: Vec<Option<f64>>,
     index: Vec<f64>,
     asphere: Vec<Option<Vec<f64>>>,
+    /// The ten coefficients of a gradient; only where the lens has one.
+    #[serde(skip_serializing_if = "are_none")]
+    gradient: Vec<Option<Vec<f64>>>,
+}
+
+fn are_none(column: &[Option<Vec<f64>>]) -> bool {
+    column.iter().all(Option::is_none)
 }
 
 impl Columns {
@@ -210,6 +217,9 @@ impl Columns {
         let rows = || lens.surfaces.iter().zip(&slopes.surfaces);
         let column = |of: fn(&SurfaceGradient<f64>) -> f64| rows().map(|(_, s)| of(s)).collect();
         let asphere = |count: usize, terms: &[f64]| (count > 0).then(|| terms[..count].to_vec());
+        let gradient = |medium: &Medium, s: &SurfaceGradient<f64>| {
+            matches!(medium, Medium::Gradient(_)).then(|| s.grade.to_vec())
+        };
         Self {
             curvature: column(|s| s.curvature),
             thickness: column(|s| s.thickness),
@@ -217,6 +227,7 @@ impl Columns {
             conic: rows().map(|(r, s)| (r.conic != 0.0).then_some(s.conic)).collect(),
             index: column(|s| s.index),
             asphere: rows().map(|(r, s)| asphere(r.asphere.len(), &s.terms)).collect(),
+            gradient: rows().map(|(r, s)| gradient(&r.medium, s)).collect(),
         }
     }
 }

@@ -169,12 +169,16 @@ impl Display for Traced {
             let numbers = numbers.iter().map(|value| Number(*value).to_string());
             table.row(start.into_iter().chain(numbers).chain([remark.unwrap_or_default()]));
         }
-        let Fates { imaged, missed, clipped, total_reflection } = self.fates;
+        let Fates { imaged, missed, clipped, total_reflection, turned, trapped } = self.fates;
+        let kept = match turned + trapped {
+            0 => String::new(),
+            _ => format!(", {turned} turned back and {trapped} trapped by a gradient"),
+        };
         write!(f, "{table}")?;
         writeln!(
             f,
             "{} um, zoom position {}: {imaged} imaged, {clipped} clipped, {missed} missed, \
-             {total_reflection} totally reflected",
+             {total_reflection} totally reflected{kept}",
             self.wavelength_um, self.zoom
         )
     }

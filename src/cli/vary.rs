@@ -18,6 +18,8 @@ pub(super) enum KindName {
     Indices,
     /// Every semi-diameter that is written
     SemiDiameters,
+    /// Every coefficient of a gradient-index medium that is written
+    Gradients,
 }
 
 impl KindName {
@@ -34,6 +36,7 @@ impl KindName {
             Self::Aspheres => NumberKind::Aspheres,
             Self::Indices => NumberKind::Indices,
             Self::SemiDiameters => NumberKind::SemiDiameters,
+            Self::Gradients => NumberKind::Gradients,
         }
     }
 }

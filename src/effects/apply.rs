@@ -39,13 +39,16 @@ pub fn bench(lens: &Lens, zoom: usize, plan: &Plan) -> Result<Bench, BenchError>
     Ok(bench)
 }
 
-/// Takes out of a resolved lens what a plan leaves out: figuring, rims and obstructions.
+/// Takes out of a resolved lens what a plan leaves out: figuring, rims and obstructions, gradients.
 pub fn simplify(system: &mut System<f64>, plan: &Plan) {
     for surface in &plan.plain {
         drop_terms(&mut system.surfaces[*surface]);
     }
     for surface in &plan.open {
         system.surfaces[*surface].clear();
+    }
+    for surface in &plan.even {
+        system.surfaces[*surface].graded = None;
     }
 }
 

@@ -33,17 +33,20 @@ pub enum Effect {
     Aiming,
     /// The object is so near that its rays are not parallel.
     FiniteObject,
+    /// A gap is filled with a gradient, through which rays go step by step.
+    Gradient,
 }
 
 impl Effect {
     /// Every effect, in the order of a table.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Dispersion,
         Self::Asphere,
         Self::Clipping,
         Self::TotalReflection,
         Self::Aiming,
         Self::FiniteObject,
+        Self::Gradient,
     ];
 
     /// What it is called in reports and menus.
@@ -55,6 +58,7 @@ impl Effect {
             Self::TotalReflection => "total reflection",
             Self::Aiming => "ray aiming",
             Self::FiniteObject => "finite object",
+            Self::Gradient => "gradient index",
         }
     }
 }

@@ -87,6 +87,8 @@ pub struct Plan {
     pub plain: Vec<usize>,
     /// Surfaces whose rim, and obstruction, is left out.
     pub open: Vec<usize>,
+    /// Surfaces whose gap is taken as glass without its gradient.
+    pub even: Vec<usize>,
 }
 
 impl Plan {
@@ -105,6 +107,7 @@ impl Plan {
 pub fn plan(facts: &Facts, task: Task, choices: &Choices) -> Plan {
     let allowed = task.allows(facts);
     let (asphere, plain) = asphere(facts, allowed, choices.of(Effect::Asphere));
+    let (gradient, even) = gradient(facts, allowed, choices.of(Effect::Gradient));
     let (clipping, open) = clipping(facts, choices.of(Effect::Clipping));
     let decisions = vec![
         dispersion(facts, allowed, choices.of(Effect::Dispersion)),
@@ -113,8 +116,9 @@ pub fn plan(facts: &Facts, task: Task, choices: &Choices) -> Plan {
         reflection(facts, choices.of(Effect::TotalReflection)),
         aiming(facts, choices.of(Effect::Aiming)),
         object(facts, allowed, choices.of(Effect::FiniteObject)),
+        gradient,
     ];
-    Plan { decisions, plain, open }
+    Plan { decisions, plain, open, even }
 }
 
 /// A decision that rests on one number and belongs to the lens as a whole.
@@ -236,6 +240,36 @@ fn clipping(facts: &Facts, choice: Choice) -> (Decision, Vec<usize>) {
     let computed = !surfaces.is_empty();
     let needed = decision.needed || obstructed > 0;
     (Decision { needed, computed, surfaces, left, reason, ..decision }, open)
+}
+
+/// Keeps as few gradients as are needed, and says in how many steps.
+fn gradient(facts: &Facts, allowed: f64, choice: Choice) -> (Decision, Vec<usize>) {
+    let total = facts.gradients.iter().fold(0.0, |sum, (_, moved)| sum + moved);
+    let decision = whole(Effect::Gradient, choice, total, allowed, "mm");
+    let goes = !decision.computed;
+    let all: Vec<usize> = facts.gradients.iter().map(|(plan, _)| plan.surface).collect();
+    let (even, surfaces) = if goes { (all, Vec::new()) } else { (Vec::new(), all) };
+    let reason = if facts.gradients.is_empty() {
+        "no gap is filled with a gradient that varies".to_owned()
+    } else {
+        format!("without it {}; {}", way(total, allowed), steps(facts))
+    };
+    let kicks: u32 = facts.gradients.iter().map(|(plan, _)| plan.kicks).sum();
+    let saves = f64::from(kicks) / (facts.surfaces as f64 + f64::from(kicks));
+    let computed = !surfaces.is_empty();
+    let left = if goes { total } else { 0.0 };
+    (Decision { computed, surfaces, left, reason, saves, ..decision }, even)
+}
+
+/// The steps of every gap with a gradient, in words.
+fn steps(facts: &Facts) -> String {
+    let of = |(plan, _): &(crate::trace::GapPlan, f64)| {
+        format!(
+            "behind surface {} in {} steps ({} times the index is asked), good to {:.0e} mm",
+            plan.surface, plan.steps, plan.kicks, plan.error
+        )
+    };
+    facts.gradients.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 /// The test is the sign of the number whose root refraction takes anyway: it cannot be left out

@@ -9,7 +9,7 @@ use crate::lens::{Field, Lens, Object, Shape, System};
 use crate::math::Vec3;
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, Bench, BenchError, Launch, Pattern, pattern};
-use crate::trace::{Fate, Fates, Ray, Tracer};
+use crate::trace::{Fate, Fates, GapPlan, Ray, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -44,6 +44,8 @@ pub struct Facts {
     /// The distance of a finite object, and how far rays move if it is taken to be at infinity, in
     /// mm.
     pub object: Option<(f64, f64)>,
+    /// The gaps with a gradient, the steps in each, and how far rays move if it is left out, in mm.
+    pub gradients: Vec<(GapPlan, f64)>,
 }
 
 /// How near rays come to a rim.
@@ -93,6 +95,7 @@ pub fn survey(lens: &Lens, zoom: usize) -> Result<Facts, BenchError> {
         critical: sights.iter().filter_map(|sight| sight.grazing).reduce(f64::min),
         miss,
         object: object(lens, zoom, &bench, &sights),
+        gradients: gradients(&bench, &sights)?,
     })
 }
 
@@ -102,6 +105,8 @@ fn plus(a: Fates, b: Fates) -> Fates {
         missed: a.missed + b.missed,
         clipped: a.clipped + b.clipped,
         total_reflection: a.total_reflection + b.total_reflection,
+        turned: a.turned + b.turned,
+        trapped: a.trapped + b.trapped,
     }
 }
 
@@ -238,6 +243,16 @@ fn aspheres(bench: &Bench, sights: &[Sight]) -> Result<Vec<(usize, f64)>, BenchE
         Ok((i, moves(bench, sights, &plain)?))
     };
     figured.map(moved).collect()
+}
+
+/// The gradients, each with what leaving it out does.
+fn gradients(bench: &Bench, sights: &[Sight]) -> Result<Vec<(GapPlan, f64)>, BenchError> {
+    let moved = |plan: &GapPlan| {
+        let mut glass = without_rims(bench);
+        glass.surfaces[plan.surface].graded = None;
+        Ok((*plan, moves(bench, sights, &glass)?))
+    };
+    bench.colors[bench.primary].tracer.gap_plans().iter().map(moved).collect()
 }
 
 fn is_figured(system: &System<f64>, surface: usize) -> bool {

@@ -48,4 +48,5 @@ const LENSES: &[Bundled] = lenses! {
     "phone_us7558005_1": "Phone lens 4.6 mm f/3 (aspheres)",
     "microscope_us5000548_1": "Microscope objective NA 0.25",
     "telescope_rc_f8": "Ritchey-Chretien telescope f/8",
+    "grin_rod_melles_griot": "Gradient-index rod 1.9 mm (Melles Griot)",
 };

@@ -130,8 +130,29 @@ impl Lens {
                 number(what, inner, inner >= 0.0 && leaves_light, expected)?;
             }
             check_medium(i, &row.medium)?;
+            self.check_gradient(i)?;
+        }
+        if let Medium::Gradient(_) = self.object_medium {
+            let text = "the space of the object is a gradient; expected air, a glass or an index";
+            return Err(LensError::Contradiction(text.into()));
         }
         check_medium(0, &self.object_medium)
+    }
+
+    /// A gradient needs a face at either end, whether it varies or not.
+    fn check_gradient(&self, i: usize) -> Result<(), LensError> {
+        let Medium::Gradient(gradient) = &self.surfaces[i].medium else { return Ok(()) };
+        let why = gradient.fault().or_else(|| match self.surfaces.get(i + 1) {
+            None => Some("leads to the image; expected a surface behind it".to_owned()),
+            Some(next) if next.medium == Medium::Mirror => {
+                Some("ends at a mirror, which is not supported".to_owned())
+            }
+            Some(next) if next.hyper || self.surfaces[i].hyper => {
+                Some("touches a hyper-hemisphere, which is not supported".to_owned())
+            }
+            Some(_) => None,
+        });
+        why.map_or(Ok(()), |why| Err(Invalid::Gradient { surface: i, why }.into()))
     }
 
     fn check_object(&self) -> Result<(), LensError> {
@@ -273,6 +294,7 @@ fn check_medium(surface: usize, medium: &Medium) -> Result<(), LensError> {
         Medium::Index(n) => {
             number(format!("index after surface {surface}"), *n, *n > 0.0, "a positive number")
         }
+        Medium::Gradient(gradient) => check_medium(surface, &gradient.base),
     }
 }
 

@@ -8,6 +8,7 @@
 
 mod check;
 pub mod glass;
+mod gradient;
 mod parameter;
 mod resolve;
 mod reversed;
@@ -16,10 +17,13 @@ mod system;
 mod vary;
 
 pub use check::LensError;
+pub use gradient::{Gradient, Slab};
 pub use parameter::{Parameter, Quantity};
 pub use resolve::focus_gap;
 pub use system::{Invalid, Shape, Surface, System};
 pub use vary::{NumberKind, at_zoom, free, vary};
+
+pub use crate::grin::field::{AXIAL_TERMS, GRADE_TERMS, Grade, Graded, Law, RADIAL_TERMS};
 
 use serde::{Deserialize, Serialize};
 
@@ -177,6 +181,8 @@ pub enum Medium {
     Index(f64),
     /// The surface is a mirror; the gap is filled with what was before it.
     Mirror,
+    /// An index that varies from place to place.
+    Gradient(Box<Gradient>),
 }
 
 /// One position of a zoom lens: what differs from the prescription.

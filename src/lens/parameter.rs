@@ -1,6 +1,6 @@
 //! Naming one number of a lens.
 
-use super::{ASPHERE_TERMS, Aperture, Lens, Medium, ZoomThickness};
+use super::{ASPHERE_TERMS, Aperture, Lens, Medium, RADIAL_TERMS, ZoomThickness};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -18,8 +18,11 @@ pub enum Quantity {
     Thickness,
     /// The gap behind the row at one zoom position, in mm.
     ZoomThickness(usize),
-    /// The index of a model glass or constant medium behind the row.
+    /// The index of a model glass or constant medium behind the row; of a gradient that of its
+    /// base.
     Index,
+    /// The coefficient of the gradient behind the row: number 0 (r²) to 5 (r¹²), 6 (z) to 9 (z⁴).
+    Gradient(usize),
     /// The semi-diameter, in mm.
     SemiDiameter,
 }
@@ -48,6 +51,10 @@ impl fmt::Display for Parameter {
                 write!(f, "thickness after surface {surface} at zoom position {zoom}")
             }
             Quantity::Index => write!(f, "index after surface {surface}"),
+            Quantity::Gradient(k) => match k.checked_sub(RADIAL_TERMS) {
+                None => write!(f, "gradient coefficient {} of r after surface {surface}", k + 1),
+                Some(j) => write!(f, "gradient coefficient {} of z after surface {surface}", j + 1),
+            },
             Quantity::SemiDiameter => write!(f, "semi-diameter of surface {surface}"),
         }
     }
@@ -57,6 +64,25 @@ impl Parameter {
     /// The parameter of a row.
     pub const fn new(surface: usize, quantity: Quantity) -> Self {
         Self { surface, quantity }
+    }
+}
+
+impl Medium {
+    /// The index that can be changed: of a model glass that at the d line; `None` where it is fixed.
+    fn index(&self) -> Option<f64> {
+        match self {
+            Self::Model { nd: n, .. } | Self::Index(n) => Some(*n),
+            Self::Gradient(gradient) => gradient.base.index(),
+            Self::Air | Self::Glass(_) | Self::Mirror => None,
+        }
+    }
+
+    fn index_mut(&mut self) -> Option<&mut f64> {
+        match self {
+            Self::Model { nd: n, .. } | Self::Index(n) => Some(n),
+            Self::Gradient(gradient) => gradient.base.index_mut(),
+            Self::Air | Self::Glass(_) | Self::Mirror => None,
+        }
     }
 }
 
@@ -73,10 +99,10 @@ impl Lens {
             }
             Quantity::Thickness => Some(row.thickness),
             Quantity::ZoomThickness(zoom) => self.thickness_at(parameter.surface, zoom),
-            Quantity::Index => match row.medium {
-                Medium::Model { nd, .. } => Some(nd),
-                Medium::Index(n) => Some(n),
-                Medium::Air | Medium::Glass(_) | Medium::Mirror => None,
+            Quantity::Index => row.medium.index(),
+            Quantity::Gradient(k) => match &row.medium {
+                Medium::Gradient(gradient) => gradient.term(k),
+                _ => None,
             },
             Quantity::SemiDiameter => row.semi_diameter,
         }
@@ -101,9 +127,13 @@ impl Lens {
                 self.set_zoom_thickness(parameter.surface, zoom, value);
             }
             Quantity::Asphere(_) | Quantity::ZoomThickness(_) => return false,
-            Quantity::Index => match &mut row.medium {
-                Medium::Model { nd: n, .. } | Medium::Index(n) => *n = value,
-                Medium::Air | Medium::Glass(_) | Medium::Mirror => return false,
+            Quantity::Index => match row.medium.index_mut() {
+                Some(n) => *n = value,
+                None => return false,
+            },
+            Quantity::Gradient(k) => match &mut row.medium {
+                Medium::Gradient(gradient) => return gradient.set_term(k, value),
+                _ => return false,
             },
             Quantity::SemiDiameter => {
                 row.semi_diameter = Some(value);

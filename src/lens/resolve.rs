@@ -1,8 +1,8 @@
 //! From what was written to plain numbers: pickups, glasses, the focus solve.
 
-use super::glass;
 use super::system::{Shape, Surface, System};
-use super::{ASPHERE_TERMS, Lens, LensError, Medium, Object, Parameter, Pickup, Row};
+use super::{ASPHERE_TERMS, Invalid, Lens, LensError, Medium, Object, Parameter, Pickup, Row};
+use super::{glass, gradient};
 use crate::math::Real;
 
 impl Lens {
@@ -75,7 +75,11 @@ impl Lens {
         for (i, row) in self.surfaces.iter().enumerate() {
             current = index(&row.medium, i, um, current)?;
             let thickness = self.thickness_at(i, zoom).unwrap_or(row.thickness);
-            surfaces.push(row.surface(thickness, current));
+            let mut surface = row.surface(thickness, current);
+            // A gradient that varies nowhere is glass.
+            surface.graded = self.grade(i).filter(|grade| !grade.is_constant());
+            check_lowest(i, &surface)?;
+            surfaces.push(surface);
         }
         surfaces.push(image_plane(current));
         Ok(System { index_before, surfaces, stop: self.stop() })
@@ -90,12 +94,24 @@ impl Row {
             shape: Shape::simplest(self.curvature, self.conic, terms),
             thickness,
             index,
+            graded: None,
             semi_diameter: self.semi_diameter.unwrap_or(f64::INFINITY),
             obstruction: self.obstruction.unwrap_or(0.0),
             mirror: self.medium == Medium::Mirror,
             hyper: self.hyper,
         }
     }
+}
+
+/// No glass has an index below 1 where light goes.
+fn check_lowest(surface: usize, face: &Surface<f64>) -> Result<(), LensError> {
+    let Some(field) = face.gradient() else { return Ok(()) };
+    let lowest = gradient::lowest(&field, face.thickness);
+    if lowest >= 1.0 {
+        return Ok(());
+    }
+    let why = format!("falls to the index {lowest:.4} inside; expected 1 or more everywhere");
+    Err(Invalid::Gradient { surface, why }.into())
 }
 
 /// A plane that clips nothing and refracts nothing.
@@ -108,6 +124,7 @@ fn image_plane(index: f64) -> Surface<f64> {
         obstruction: 0.0,
         mirror: false,
         hyper: false,
+        graded: None,
     }
 }
 
@@ -117,6 +134,7 @@ fn index(medium: &Medium, surface: usize, um: f64, before: f64) -> Result<f64, L
         Medium::Mirror => Ok(before),
         Medium::Index(n) => Ok(*n),
         Medium::Model { nd, vd } => Ok(glass::model_index(*nd, *vd, um)),
+        Medium::Gradient(gradient) => index(&gradient.base, surface, um, before),
         Medium::Glass(name) => {
             let Some(found) = glass::find(name) else {
                 let similar = glass::similar(name);
@@ -150,8 +168,16 @@ pub fn focus_gap<R: Real>(system: &System<R>, object: Object) -> R {
         let behind = sense * surface.index;
         nu -= y * (behind - n) * surface.shape.curvature();
         n = behind;
-        if i < last {
-            y += surface.thickness * nu / n;
+        if i == last {
+            break;
+        }
+        match surface.gradient() {
+            None => y += surface.thickness * nu / n,
+            Some(field) => {
+                let slab = gradient::Slab::new(&field, surface.thickness);
+                (y, nu) = slab.pass(y, nu);
+                n = slab.index_behind;
+            }
         }
     }
     if nu.value() == 0.0 { system.surfaces[last].thickness } else { -(y * n / nu) }

@@ -1,4 +1,5 @@
-//! A lens met by the light from its other end.
+//! A lens met by the light from its other end. What varies along the axis varies the other way, about
+//! the place where its vertex was: derivatives by the thickness of that gap do not know it.
 
 use super::system::{Shape, Surface, System};
 use crate::math::Real;
@@ -20,6 +21,9 @@ impl<R: Real> System<R> {
             shape: surfaces[i].shape.turned(turn),
             thickness: gap(i),
             index: self.index_before(i),
+            graded: i
+                .checked_sub(1)
+                .and_then(|i| surfaces[i].graded.map(|grade| grade.turned(surfaces[i].thickness))),
             ..surfaces[i]
         });
         let plane = Surface { index: self.index_before, thickness: R::ZERO, ..*image };

@@ -28,7 +28,8 @@ impl Lens {
     }
 
     /// Turns the rows `first` to `last` around: surfaces and the gaps between them in reverse order,
-    /// every curvature and asphere coefficient with the other sign. The gap behind the group stays.
+    /// every curvature and asphere coefficient with the other sign. The gap behind the group stays. A
+    /// gradient along the axis keeps its coefficients, which count from the new surface in front.
     ///
     /// # Panics
     /// If the rows are no group: `first` behind `last`, or `last` behind the lens.
@@ -78,9 +79,10 @@ impl Turn {
 
     fn parameter(self, parameter: Parameter) -> Parameter {
         let surface = match parameter.quantity {
-            Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::Index => {
-                self.gap(parameter.surface)
-            }
+            Quantity::Thickness
+            | Quantity::ZoomThickness(_)
+            | Quantity::Index
+            | Quantity::Gradient(_) => self.gap(parameter.surface),
             Quantity::Curvature
             | Quantity::Conic
             | Quantity::Asphere(_)

@@ -1,6 +1,6 @@
 //! A lens resolved to plain numbers: one wavelength, one zoom position.
 
-use super::ASPHERE_TERMS;
+use super::{ASPHERE_TERMS, Grade, Graded};
 use crate::math::Real;
 
 /// The form of a surface: `z = c r² / (1 + √(1 − (1+k) c² r²)) + Σ aⱼ r^(2j+4)`.
@@ -125,8 +125,11 @@ pub struct Surface<R> {
     pub shape: Shape<R>,
     /// The distance along the axis to the next vertex, in mm; unused at the last surface.
     pub thickness: R,
-    /// The index behind the surface, positive after mirrors too.
+    /// The index behind the surface, positive after mirrors too; of a gradient that on the axis at
+    /// the vertex.
     pub index: R,
+    /// How the index of the gap varies; `None` for glass.
+    pub graded: Option<Grade<R>>,
     /// Rays farther from the axis are clipped, the rim itself passes; infinite where nothing is.
     pub semi_diameter: R,
     /// Rays nearer to the axis are clipped, the edge itself passes; 0 where nothing is obstructed.
@@ -202,6 +205,14 @@ pub enum Invalid {
         /// How many there are.
         found: usize,
     },
+    /// A gradient where none can be traced.
+    #[error("the gradient after surface {surface} {why}")]
+    Gradient {
+        /// The surface, counted from 0.
+        surface: usize,
+        /// Why not.
+        why: String,
+    },
     /// A ray that starts nowhere or goes nowhere.
     #[error("ray {ray}: {found}; expected a finite start and a direction of length 1 within 1e-9")]
     Ray {
@@ -234,7 +245,35 @@ impl<R: Real> System<R> {
             return Err(Invalid::NoSurfaces);
         }
         positive(|| "before surface 0".to_owned(), self.index_before.value())?;
-        self.surfaces.iter().enumerate().try_for_each(|(i, surface)| surface.check(i))
+        self.surfaces.iter().enumerate().try_for_each(|(i, surface)| surface.check(i))?;
+        let mut graded = (0..self.surfaces.len()).filter(|i| self.surfaces[*i].graded.is_some());
+        graded.try_for_each(|i| self.check_gradient(i))
+    }
+
+    /// A gradient needs two faces: refracting ones that no ray meets from behind their equator.
+    fn check_gradient(&self, i: usize) -> Result<(), Invalid> {
+        let refuse = |why: &str| Err(Invalid::Gradient { surface: i, why: why.to_owned() });
+        match (&self.surfaces[i], self.surfaces.get(i + 1)) {
+            (_, None) => refuse("has no surface behind it"),
+            (face, Some(next)) if face.mirror || next.mirror => {
+                refuse("touches a mirror, which is not supported; expected refracting faces")
+            }
+            (face, Some(next)) if face.hyper || next.hyper => refuse(
+                "touches a hyper-hemisphere, which is not supported; expected faces on this side \
+                 of their equator",
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// The gradient in the gap behind a surface, if there is one.
+    pub fn gradient(&self, surface: usize) -> Option<Graded<R>> {
+        self.surfaces.get(surface)?.gradient()
+    }
+
+    /// Whether any gap is filled with a gradient.
+    pub fn is_graded(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.graded.is_some())
     }
 
     /// The same numbers as another number type, without derivatives.
@@ -261,6 +300,9 @@ impl<R: Real> Surface<R> {
         terms.iter().try_for_each(|a| finite("asphere coefficient", i, a.value()))?;
         finite("thickness", i, self.thickness.value())?;
         positive(|| format!("after surface {i}"), self.index.value())?;
+        if let Some(grade) = &self.graded {
+            grade.terms.iter().try_for_each(|a| finite("gradient coefficient", i, a.value()))?;
+        }
         let (semi_diameter, obstruction) = (self.semi_diameter.value(), self.obstruction.value());
         if !(semi_diameter >= 0.0) {
             return Err(Invalid::SemiDiameter { surface: i, found: semi_diameter });
@@ -271,6 +313,11 @@ impl<R: Real> Surface<R> {
         } else {
             Err(Invalid::Obstruction { surface: i, found: obstruction, semi_diameter })
         }
+    }
+
+    /// The gradient in the gap behind, if there is one.
+    pub fn gradient(&self) -> Option<Graded<R>> {
+        self.graded.map(|grade| Graded { base: self.index, grade })
     }
 
     /// Takes away what clips: rim and obstruction.
@@ -295,6 +342,7 @@ impl<R: Real> Surface<R> {
             shape,
             thickness: f(self.thickness),
             index: f(self.index),
+            graded: self.graded.map(|grade| grade.map(&f)),
             semi_diameter: f(self.semi_diameter),
             obstruction: f(self.obstruction),
             mirror: self.mirror,

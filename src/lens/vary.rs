@@ -17,6 +17,8 @@ pub enum NumberKind {
     Indices,
     /// Every semi-diameter that is written.
     SemiDiameters,
+    /// Every coefficient of a gradient that is written.
+    Gradients,
 }
 
 /// Frees every number of some kinds that does not follow another one; what is a variable already
@@ -63,6 +65,7 @@ fn parameters(lens: &Lens, kind: NumberKind) -> Vec<Parameter> {
             .collect(),
         NumberKind::Indices => all(Quantity::Index).collect(),
         NumberKind::SemiDiameters => all(Quantity::SemiDiameter).collect(),
+        NumberKind::Gradients => rows.flat_map(|surface| gradients(lens, surface)).collect(),
     }
 }
 
@@ -74,6 +77,12 @@ fn bends(lens: &Lens, surface: usize) -> bool {
     };
     let behind = &lens.surfaces[surface].medium;
     *behind == Medium::Mirror || before != behind
+}
+
+/// The coefficients of the gradient behind a surface.
+fn gradients(lens: &Lens, surface: usize) -> Vec<Parameter> {
+    let Medium::Gradient(gradient) = &lens.surfaces[surface].medium else { return Vec::new() };
+    gradient.written().map(|k| Parameter::new(surface, Quantity::Gradient(k))).collect()
 }
 
 /// The numbers that say how wide a gap is: one, or one for each zoom position.

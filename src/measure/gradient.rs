@@ -314,7 +314,7 @@ fn with_planes(mut system: System<f64>, planes: usize) -> System<f64> {
 fn numbers(system: &System<f64>) -> usize {
     let of = |surface: &Surface<f64>| {
         let has = |slot: &Slot| {
-            slot.is_of(&surface.shape)
+            slot.is_of(surface)
                 && (*slot != Slot::SemiDiameter || surface.semi_diameter.is_finite())
         };
         Slot::all().filter(has).count()

@@ -72,7 +72,10 @@ impl Zoom {
             match row.medium {
                 Medium::Mirror => systems[0].surfaces[i].index != 1.0,
                 Medium::Air => false,
-                Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) => true,
+                Medium::Glass(_)
+                | Medium::Model { .. }
+                | Medium::Index(_)
+                | Medium::Gradient(_) => true,
             }
         };
         Ok(Self {
@@ -172,6 +175,7 @@ impl Zoom {
                 Slot::Thickness => surface.thickness,
                 Slot::Index => surface.index,
                 Slot::SemiDiameter => surface.semi_diameter,
+                Slot::Grade(k) => surface.grade[k],
             };
             by_variable[line.variable] += line.factor * by_number;
         }
@@ -251,6 +255,7 @@ fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<
                 Quantity::Thickness if !own_gap => Slot::Thickness,
                 Quantity::ZoomThickness(z) if z == zoom => Slot::Thickness,
                 Quantity::Index => Slot::Index,
+                Quantity::Gradient(k) => Slot::Grade(k),
                 Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
                     Slot::SemiDiameter
                 }
@@ -261,6 +266,10 @@ fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<
             let growth = if slot == Slot::Index { index_growth(lens, surface, um) } else { 1.0 };
             let factor = factor * growth;
             for surface in followers_of_index(lens, surface, slot) {
+                if let Slot::Grade(_) = slot {
+                    let graded = &mut system.surfaces[surface].graded;
+                    *graded = graded.or_else(|| lens.grade(surface));
+                }
                 slot.widen(system, surface);
                 let now = *slot.of(system, surface);
                 let offset = if factor == 1.0 && now == start { 0.0 } else { now - factor * start };
@@ -283,9 +292,13 @@ fn has_own_aperture(lens: &Lens, zoom: usize, surface: usize) -> bool {
 
 /// How fast the index of a gap grows with its nd.
 fn index_growth(lens: &Lens, surface: usize, um: f64) -> f64 {
-    match lens.surfaces[surface].medium {
+    let medium = match &lens.surfaces[surface].medium {
+        Medium::Gradient(gradient) => &gradient.base,
+        medium => medium,
+    };
+    match *medium {
         Medium::Model { vd, .. } => model_index(2.0, vd, um) - model_index(1.0, vd, um),
-        Medium::Air | Medium::Glass(_) | Medium::Index(_) | Medium::Mirror => 1.0,
+        _ => 1.0,
     }
 }
 

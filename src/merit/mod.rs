@@ -274,6 +274,11 @@ impl Merit {
                 let bench = zoom.bench(&systems, &self.lens, sampling.aiming)?;
                 let light = sampling.lit(&bench, true);
                 sampling.check_light(&light)?;
+                if bench.is_graded() && light.iter().any(Lit::is_ragged) {
+                    let why = "the pupil is in pieces or not star-shaped, and nothing tells how \
+                               its edge moves with a gradient; expected a goal that keeps its pupils";
+                    return Err(MeritError::DoesNotApply { term: "pupil", why });
+                }
                 let sampling = &sampling.with_light(&bench, &light);
                 let light = &light[..];
                 let scene = Scene { zoom, sampling, systems: &systems, values, start, light };

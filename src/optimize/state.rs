@@ -2,7 +2,7 @@
 //! no step may make the lens invalid.
 
 use super::Progress;
-use crate::lens::{ASPHERE_TERMS, Lens, Quantity, Variable};
+use crate::lens::{ASPHERE_TERMS, Lens, Medium, Quantity, RADIAL_TERMS, Variable};
 use crate::merit::{Detail, Merit, MeritError, Sum, TermValue};
 
 /// How often a step is halved before it is given up.
@@ -259,5 +259,13 @@ fn scale(lens: &Lens, variable: &Variable) -> f64 {
         }
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.1 * rim,
         Quantity::Index => 0.1,
+        // As much index at the rim, or at the other face.
+        Quantity::Gradient(k) => match &lens.surfaces[variable.parameter.surface].medium {
+            Medium::Gradient(gradient) => {
+                let length = if k < RADIAL_TERMS { rim } else { size };
+                0.02 * length.powi(gradient.power(k))
+            }
+            _ => 1.0,
+        },
     }
 }

@@ -4,7 +4,7 @@
 //! (Welford 1986, section 3.6). A ray that vanishes at the stop gives both pupils, and no case
 //! needs a special path: a pupil at infinity is a ray that leaves parallel to the axis.
 
-use super::ray::{ParaxialRay, paraxial_ray, signed_indices};
+use super::ray::{ParaxialRay, paraxial_ray, signed_indices, slabs};
 use crate::lens::{Aperture, FieldKind, Lens, Object, System};
 use crate::math::Real;
 
@@ -107,7 +107,8 @@ pub struct FirstOrder<R> {
     pub magnification: Option<R>,
     /// The Lagrange invariant `n (ū y − u ȳ)`, in mm.
     pub lagrange: Option<R>,
-    /// The Petzval sum `Σ (n' − n) c / (n n')`, in 1/mm.
+    /// The Petzval sum `Σ (n' − n) c / (n n')`, less `∫ 2 n₁/n² dz` where a gradient
+    /// `n = n₀ + n₁ r²` fills a gap (Marchand 1978, chapter 9), in 1/mm.
     pub petzval_sum: R,
     /// The ray from the axial object point past the rim of the stop.
     pub marginal: ParaxialRay<R>,
@@ -333,10 +334,16 @@ fn exit_pupil<R: Real>(
 
 fn petzval_sum<R: Real>(system: &System<R>) -> R {
     let indices = signed_indices(system);
-    let mut sum = R::ZERO;
+    let slabs = slabs(system);
+    let (mut sum, mut n) = (R::ZERO, indices[0]);
     for (i, surface) in system.surfaces.iter().enumerate() {
-        let (n, behind) = (indices[i], indices[i + 1]);
+        let behind = indices[i + 1];
         sum += (behind - n) * surface.shape.curvature() / (n * behind);
+        n = behind;
+        if let Some(Some(slab)) = slabs.get(i) {
+            sum += slab.petzval;
+            n = slab.index_behind;
+        }
     }
     sum
 }
@@ -357,6 +364,7 @@ mod tests {
             obstruction: R::ZERO,
             mirror: false,
             hyper: false,
+            graded: None,
         }
     }
 

@@ -1,7 +1,8 @@
 //! A ray close to the axis: refraction `n'u' = nu − y (n' − n) c`, transfer `y⁺ = y + t u'`
-//! (Welford 1986, equations 3.11 and 3.12).
+//! (Welford 1986, equations 3.11 and 3.12), or the matrix of the [`Slab`] of a gradient, whose
+//! indices are those on the axis at the two faces.
 
-use crate::lens::System;
+use crate::lens::{Slab, System};
 use crate::math::Real;
 
 /// The heights of a paraxial ray at every surface, and its slopes behind every surface.
@@ -30,18 +31,37 @@ pub fn signed_indices<R: Real>(system: &System<R>) -> Vec<R> {
     indices
 }
 
+/// The gradients of the gaps, for paraxial rays; none for a lens of glass.
+pub(super) fn slabs<R: Real>(system: &System<R>) -> Vec<Option<Slab<R>>> {
+    if !system.is_graded() {
+        return Vec::new();
+    }
+    let slab = |surface: &crate::lens::Surface<R>| {
+        surface.gradient().map(|field| Slab::new(&field, surface.thickness))
+    };
+    system.surfaces.iter().map(slab).collect()
+}
+
 /// The paraxial ray that meets the vertex plane of the first surface at `height` with `slope`.
 pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> ParaxialRay<R> {
     let indices = signed_indices(system);
+    let slabs = slabs(system);
+    let mut before = indices[0];
     let count = system.surfaces.len();
     let (mut heights, mut slopes) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let (mut y, mut nu) = (height, indices[0] * slope);
     for (i, surface) in system.surfaces.iter().enumerate() {
         heights.push(y);
-        nu -= y * (indices[i + 1] - indices[i]) * surface.shape.curvature();
+        nu -= y * (indices[i + 1] - before) * surface.shape.curvature();
         let u = nu / indices[i + 1];
         slopes.push(u);
-        y += surface.thickness * u;
+        if let Some(Some(slab)) = slabs.get(i) {
+            (y, nu) = slab.pass(y, nu);
+            before = slab.index_behind;
+        } else {
+            y += surface.thickness * u;
+            before = indices[i + 1];
+        }
     }
     ParaxialRay { start_slope: slope, heights, slopes }
 }

@@ -57,12 +57,16 @@ pub struct Seidel<R> {
 
 /// The third-order sums along the marginal and chief ray of `data`, which belongs to `system`.
 /// `outer` is the same lens at the shortest and the longest wavelength; without it the chromatic
-/// sums are zero. `None` where there is no chief ray.
+/// sums are zero. `None` where there is no chief ray, and for a lens with a gradient, whose own
+/// third-order sums are not known here.
 pub fn seidel<R: Real>(
     system: &System<R>,
     data: &FirstOrder<R>,
     outer: Option<(&System<R>, &System<R>)>,
 ) -> Option<Seidel<R>> {
+    if system.is_graded() {
+        return None;
+    }
     let (chief, lagrange) = (data.chief.as_ref()?, data.lagrange?);
     let indices = signed_indices(system);
     let spread = spreads(system, &indices, outer);

@@ -130,7 +130,7 @@ impl Bench {
     }
 
     /// The third-order sums, chromatic ones between the shortest and the longest wavelength where
-    /// there are two; `None` where there is no chief ray.
+    /// there are two; `None` where there is no chief ray or a gradient fills a gap.
     pub fn seidel(&self) -> Option<Seidel<f64>> {
         let by_length = |a: &&Color, b: &&Color| a.um.total_cmp(&b.um);
         let short = self.colors.iter().min_by(by_length)?;
@@ -176,6 +176,11 @@ impl Bench {
     /// limit it, the stop among them.
     pub fn ends_at_disc(&self) -> bool {
         self.aiming == Aiming::Stop || !matches!(self.beam.aperture, Aperture::StopSemiDiameter(_))
+    }
+
+    /// Whether a gradient fills a gap.
+    pub fn is_graded(&self) -> bool {
+        self.colors[self.primary].system.is_graded()
     }
 
     /// The radius of the stop in mm: as given, or the height of the paraxial marginal ray there.

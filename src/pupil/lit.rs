@@ -4,7 +4,7 @@
 use super::boundary::Limit;
 use super::moments::{Moments, moments};
 use super::quadrature::{Landed, Nodes, Spoke};
-use super::region::Region;
+use super::region::{Kind, Region};
 use super::shadow::Shadow;
 use crate::trace::{Points, Rays, Sink};
 
@@ -63,6 +63,11 @@ impl<'a> Region<'a> {
 }
 
 impl Lit<'_> {
+    /// Whether the pupil is neither star-shaped nor a ring, so that its edge has no integral along it.
+    pub fn is_ragged(&self) -> bool {
+        matches!(self.region.kind, Kind::Ragged { ring: None, .. })
+    }
+
     /// The limits at the ends of the spokes, each once.
     pub(super) fn limits(&self) -> Vec<Limit> {
         let mut found: Vec<Limit> = Vec::new();

@@ -91,6 +91,7 @@ impl Bench {
             Limit::Surface(i, Hurdle::Miss) => format!("missed surface {i}"),
             Limit::Surface(i, Hurdle::Equator) => format!("equator of surface {i}"),
             Limit::Surface(i, Hurdle::Reflection) => format!("critical angle at surface {i}"),
+            Limit::Surface(i, Hurdle::Side) => format!("side of the gradient before surface {i}"),
             Limit::Unaimed => "no ray to the stop".to_owned(),
         }
     }

@@ -84,6 +84,11 @@ fn depth(
         Hurdle::Obstruction => {
             length(at.obstruction, (at.obstruction.powi(2) + margin).max(0.0).sqrt(), -1.0)
         }
+        Hurdle::Side => {
+            let before = surface.checked_sub(1).map_or(0.0, |i| system.surfaces[i].semi_diameter);
+            let radius = at.semi_diameter.max(before);
+            length(radius, (radius.powi(2) - margin).max(0.0).sqrt(), 1.0)
+        }
         Hurdle::Miss | Hurdle::Equator | Hurdle::Reflection => {
             let square = system.index_before(surface).powi(2);
             (-margin / square, -1.0 / square)

@@ -51,7 +51,7 @@ pub(super) fn filled(lens: &Lens) -> Vec<bool> {
         Medium::Air => false,
         Medium::Mirror => before,
         Medium::Index(n) => *n >= 1.05,
-        Medium::Glass(_) | Medium::Model { .. } => true,
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Gradient(_) => true,
     };
     let mut gaps = vec![is_glass(&lens.object_medium, false)];
     for (i, row) in lens.surfaces.iter().enumerate() {

@@ -67,6 +67,12 @@ pub enum EditError {
     /// A mirror has no other side.
     #[error("surface {0} is a mirror; a group with a mirror cannot be turned around")]
     Mirror(usize),
+    /// What varies along the axis would count from the other vertex.
+    #[error(
+        "the gradient after surface {0} varies along the axis; a group with it cannot be turned \
+         around"
+    )]
+    AxialGradient(usize),
     /// A scale that leaves no lens.
     #[error("the scale is {0}; expected a number above 0")]
     Scale(f64),

@@ -44,7 +44,7 @@ fn pieces(lens: &Lens) -> Vec<Piece<'_>> {
     let is_glass = |row: &Row| match row.medium {
         Medium::Air | Medium::Mirror => false,
         Medium::Index(n) => n >= 1.05,
-        Medium::Glass(_) | Medium::Model { .. } => true,
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Gradient(_) => true,
     };
     let pairs = lens.surfaces.windows(2).enumerate();
     let glass = pairs.filter(|(_, pair)| is_glass(&pair[0]));

@@ -72,9 +72,8 @@ impl Layout {
     fn count(&mut self, path: &Path) {
         self.fates.count(path.fate);
         let met = path.fate.surface().unwrap_or(self.reached.len());
-        let points = &path.points;
-        for (reached, point) in self.reached.iter_mut().zip(&points[1..]).take(met) {
-            *reached = reached.max(point.x.hypot(point.y));
+        for (reached, height) in self.reached.iter_mut().zip(&path.heights).take(met) {
+            *reached = reached.max(*height);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Rows come, go and turn around; everything that names a row by its number follows.
 
 use super::edit::EditError;
-use crate::lens::{Lens, Medium, Parameter, Quantity, Row};
+use crate::lens::{GRADE_TERMS, Lens, Medium, Parameter, Quantity, Row};
 
 /// Puts a row in front of row `at`. A solved last gap stays with the last row.
 pub(super) fn insert(lens: &mut Lens, at: usize, row: &Row) -> Result<(), EditError> {
@@ -40,7 +40,8 @@ pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
 /// Replaces a row; variables and pickups of numbers that it does not have go.
 pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), EditError> {
     lens.row(surface)?.clone_from(row);
-    for quantity in [Quantity::Index, Quantity::SemiDiameter] {
+    let gradient = (0..GRADE_TERMS).map(Quantity::Gradient);
+    for quantity in [Quantity::Index, Quantity::SemiDiameter].into_iter().chain(gradient) {
         let parameter = Parameter::new(surface, quantity);
         if lens.get(parameter).is_none() {
             lens.forget(parameter);
@@ -58,6 +59,13 @@ pub(super) fn flip(lens: &mut Lens, first: usize, last: usize) -> Result<(), Edi
     }
     if let Some(i) = (first..=last).find(|i| lens.surfaces[*i].medium == Medium::Mirror) {
         return Err(EditError::Mirror(i));
+    }
+    let along = |i: &usize| match &lens.surfaces[*i].medium {
+        Medium::Gradient(gradient) => gradient.axial.iter().any(|term| *term != 0.0),
+        _ => false,
+    };
+    if let Some(i) = (first..last).find(along) {
+        return Err(EditError::AxialGradient(i));
     }
     lens.turn_rows(first, last);
     Ok(())

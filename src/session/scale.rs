@@ -1,15 +1,19 @@
 //! Every length of a lens, multiplied.
 
 use super::edit::EditError;
-use crate::lens::{Aperture, FieldKind, Fields, Lens, Object, Parameter, Quantity};
+use crate::lens::{Aperture, FieldKind, Fields, Lens, Medium, Object, Parameter, Quantity, Row};
 
 /// The power of a length that a number is measured in: mm⁻¹ for a curvature, mm⁻³ for r⁴.
-fn power(parameter: Parameter) -> i32 {
+fn power(rows: &[Row], parameter: Parameter) -> i32 {
     match parameter.quantity {
         Quantity::Curvature => -1,
         Quantity::Conic | Quantity::Index => 0,
         Quantity::Asphere(term) => -(2 * term as i32 + 3),
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 1,
+        Quantity::Gradient(k) => match &rows[parameter.surface].medium {
+            Medium::Gradient(gradient) => gradient.power(k),
+            _ => 0,
+        },
     }
 }
 
@@ -25,6 +29,12 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         row.obstruction = row.obstruction.map(|inner| inner * factor);
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
+        }
+        if let Medium::Gradient(gradient) = &mut row.medium {
+            for k in gradient.written().collect::<Vec<_>>() {
+                let term = gradient.term(k).unwrap_or(0.0);
+                gradient.set_term(k, term * factor.powi(gradient.power(k)));
+            }
         }
     }
     if let Object::Finite(distance) = &mut lens.object {
@@ -62,14 +72,16 @@ fn scale_fields(fields: &mut Fields, factor: f64) {
 
 /// Bounds and pickups.
 fn scale_rules(lens: &mut Lens, factor: f64) {
+    let rows = &lens.surfaces;
+    let powers = |parameter| power(rows, parameter);
     for variable in &mut lens.variables {
-        let by = factor.powi(power(variable.parameter));
+        let by = factor.powi(powers(variable.parameter));
         variable.min = variable.min.map(|min| min * by);
         variable.max = variable.max.map(|max| max * by);
     }
     for pickup in &mut lens.pickups {
-        let by = factor.powi(power(pickup.parameter));
+        let by = factor.powi(powers(pickup.parameter));
         pickup.offset *= by;
-        pickup.scale *= by / factor.powi(power(pickup.source));
+        pickup.scale *= by / factor.powi(powers(pickup.source));
     }
 }

@@ -18,7 +18,7 @@ use super::Tracer;
 use super::batch::{BLOCK, Block, CHUNK, Hits, Rays};
 use super::interface::{Form, Interface};
 use super::slot::Slot;
-use crate::lens::ASPHERE_TERMS;
+use crate::lens::{ASPHERE_TERMS, GRADE_TERMS};
 use crate::math::Real;
 use crate::math::Vec3;
 use crate::math::{Width, widest};
@@ -50,6 +50,8 @@ pub struct SurfaceGradient<R> {
     pub index: R,
     /// By the semi-diameter: zero for rays that are kept, something for the edge of a pupil.
     pub semi_diameter: R,
+    /// By the coefficients of the gradient behind it; only where there is one.
+    pub grade: [R; GRADE_TERMS],
 }
 
 /// Derivatives by every number of a system.
@@ -70,8 +72,9 @@ impl<R: Real> Gradient<R> {
     /// All numbers, in a fixed order.
     pub fn numbers(&self) -> impl Iterator<Item = R> {
         let of = |s: &SurfaceGradient<R>| {
-            let SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter } = *s;
-            [curvature, conic, thickness, index, semi_diameter].into_iter().chain(terms)
+            let SurfaceGradient { curvature, conic, terms, thickness, index, .. } = *s;
+            let plain = [curvature, conic, thickness, index, s.semi_diameter];
+            plain.into_iter().chain(terms).chain(s.grade)
         };
         std::iter::once(self.index_before).chain(self.surfaces.iter().flat_map(of))
     }
@@ -85,7 +88,8 @@ impl<R: Real> Gradient<R> {
         let surface = |_| {
             let [curvature, conic, thickness, index, semi_diameter] = [(); 5].map(|()| next());
             let terms = [(); ASPHERE_TERMS].map(|()| next());
-            SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter }
+            let grade = [(); GRADE_TERMS].map(|()| next());
+            SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter, grade }
         };
         Self { index_before, surfaces: (0..surfaces).map(surface).collect() }
     }
@@ -100,6 +104,7 @@ impl<R: Real> Gradient<R> {
             to.index += from.index * factor;
             to.semi_diameter += from.semi_diameter * factor;
             to.terms.iter_mut().zip(from.terms).for_each(|(t, f)| *t += f * factor);
+            to.grade.iter_mut().zip(from.grade).for_each(|(t, f)| *t += f * factor);
         }
     }
 }
@@ -158,6 +163,7 @@ impl<R: Real> Harvest<R> for Gradient<R> {
             Slot::Thickness => surface.thickness += sum,
             Slot::Index => surface.index += sum,
             Slot::SemiDiameter => surface.semi_diameter += sum,
+            Slot::Grade(k) => surface.grade[k] += sum,
         }
     }
 }
@@ -289,8 +295,13 @@ impl<R: Real> Tracer<R> {
     ) -> Block<R> {
         let mut block = Block::new();
         block.load(rays.slice(from, from + count), 0, count, self.index_before);
+        self.leave_out(&mut block, count);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate() {
-            block.cross_keeping(interface, i as u32, distance);
+            if self.touches_gradient(i) {
+                block.pass_gradient(self, i, |j, arrival| distance[j] = arrival.met.s);
+            } else {
+                block.cross_keeping(interface, i as u32, distance);
+            }
         }
         block
     }
@@ -309,6 +320,10 @@ impl<R: Real> Tracer<R> {
         self.sow(&mut way, count, sowing, harvest);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
             way.s = *distance;
+            if self.touches_gradient(i) {
+                self.pass_back(&mut way, i, harvest);
+                continue;
+            }
             let pulls = sowing.pulls(i);
             // A factor that is known to be one costs nothing.
             if interface.sense > R::ZERO {
@@ -325,7 +340,8 @@ impl<R: Real> Tracer<R> {
         self.launch_index(&way, harvest);
     }
 
-    /// The adjoint of the landing; the direction cosines are `k / n'`.
+    /// The adjoint of the landing; the direction cosines are `k / n'`. In front of a gap with a
+    /// gradient, where a lens never ends but a part of one may, the seed is by `k` itself.
     #[inline(always)]
     fn sow(
         &self,
@@ -335,7 +351,8 @@ impl<R: Real> Tracer<R> {
         harvest: &mut impl Harvest<R>,
     ) {
         let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
-        let inverse = R::ONE / index;
+        let last = self.interfaces.len().checked_sub(1).and_then(|i| self.gap_behind(i));
+        let inverse = if last.is_some() { R::ONE } else { R::ONE / index };
         let mut by_index = [R::ZERO; BLOCK];
         for (j, by_index) in by_index.iter_mut().enumerate().take(count) {
             if way.block.code[j] > R::ZERO {
@@ -346,7 +363,9 @@ impl<R: Real> Tracer<R> {
             let direction = seed.direction * inverse;
             way.set(j, seed.point, direction);
             way.by_opl[j] = seed.opl;
-            *by_index = -(direction.dot(k) * inverse);
+            if last.is_none() {
+                *by_index = -(direction.dot(k) * inverse);
+            }
         }
         let behind = self.interfaces.iter().rposition(|interface| !interface.mirror);
         harvest.take(behind, Slot::Index, &by_index);
@@ -368,34 +387,34 @@ impl<R: Real> Tracer<R> {
 /// A block of rays on its way back: where it is, the derivatives by its state, and those by the
 /// numbers of the surface it has just passed. One value, so that the compiler sees that no column
 /// overlaps another.
-struct Homeward<R> {
-    block: Block<R>,
+pub(super) struct Homeward<R> {
+    pub(super) block: Block<R>,
     /// The distance to the surface.
-    s: [R; BLOCK],
-    by_x: [R; BLOCK],
-    by_y: [R; BLOCK],
-    by_z: [R; BLOCK],
-    by_kx: [R; BLOCK],
-    by_ky: [R; BLOCK],
-    by_kz: [R; BLOCK],
-    by_opl: [R; BLOCK],
-    by_curvature: [R; BLOCK],
-    by_conic: [R; BLOCK],
-    by_gap: [R; BLOCK],
-    by_semi_diameter: [R; BLOCK],
-    by_index_before: [R; BLOCK],
-    by_index_behind: [R; BLOCK],
-    by_terms: [[R; BLOCK]; ASPHERE_TERMS],
+    pub(super) s: [R; BLOCK],
+    pub(super) by_x: [R; BLOCK],
+    pub(super) by_y: [R; BLOCK],
+    pub(super) by_z: [R; BLOCK],
+    pub(super) by_kx: [R; BLOCK],
+    pub(super) by_ky: [R; BLOCK],
+    pub(super) by_kz: [R; BLOCK],
+    pub(super) by_opl: [R; BLOCK],
+    pub(super) by_curvature: [R; BLOCK],
+    pub(super) by_conic: [R; BLOCK],
+    pub(super) by_gap: [R; BLOCK],
+    pub(super) by_semi_diameter: [R; BLOCK],
+    pub(super) by_index_before: [R; BLOCK],
+    pub(super) by_index_behind: [R; BLOCK],
+    pub(super) by_terms: [[R; BLOCK]; ASPHERE_TERMS],
 }
 
 /// The normal of a surface and everything about it that the adjoint needs.
 #[derive(Clone, Copy)]
-struct Normal<R> {
-    vector: Vec3<R>,
+pub(super) struct Normal<R> {
+    pub(super) vector: Vec3<R>,
     /// `N·N`.
-    m: R,
+    pub(super) m: R,
     /// Whether `m` is one wherever a ray meets the surface.
-    unit: bool,
+    pub(super) unit: bool,
 }
 
 #[inline(always)]
@@ -434,18 +453,18 @@ impl<R: Real> Interface<R> {
 
 /// What refraction read backwards gives.
 #[derive(Clone, Copy)]
-struct Refracted<R> {
+pub(super) struct Refracted<R> {
     /// The direction in front.
-    k: Vec3<R>,
+    pub(super) k: Vec3<R>,
     /// `k·N`.
-    a: R,
-    by_k: Vec3<R>,
-    by_normal: Vec3<R>,
-    by_dn2: R,
+    pub(super) a: R,
+    pub(super) by_k: Vec3<R>,
+    pub(super) by_normal: Vec3<R>,
+    pub(super) by_dn2: R,
 }
 
 #[inline(always)]
-fn unrefract<R: Real>(
+pub(super) fn unrefract<R: Real>(
     surface: &Interface<R>,
     normal: Normal<R>,
     behind: Vec3<R>,
@@ -503,17 +522,17 @@ impl<R: Real> Homeward<R> {
     }
 
     #[inline(always)]
-    fn by_point(&self, j: usize) -> Vec3<R> {
+    pub(super) fn by_point(&self, j: usize) -> Vec3<R> {
         Vec3::new(self.by_x[j], self.by_y[j], self.by_z[j])
     }
 
     #[inline(always)]
-    fn by_k(&self, j: usize) -> Vec3<R> {
+    pub(super) fn by_k(&self, j: usize) -> Vec3<R> {
         Vec3::new(self.by_kx[j], self.by_ky[j], self.by_kz[j])
     }
 
     #[inline(always)]
-    fn set(&mut self, j: usize, by_point: Vec3<R>, by_k: Vec3<R>) {
+    pub(super) fn set(&mut self, j: usize, by_point: Vec3<R>, by_k: Vec3<R>) {
         (self.by_x[j], self.by_y[j], self.by_z[j]) = (by_point.x, by_point.y, by_point.z);
         (self.by_kx[j], self.by_ky[j], self.by_kz[j]) = (by_k.x, by_k.y, by_k.z);
     }
@@ -654,7 +673,7 @@ impl<R: Real> Homeward<R> {
 
     /// From the surface to the one before: the adjoint of the way between and of the gap.
     #[inline(always)]
-    fn step_back(
+    pub(super) fn step_back(
         &mut self,
         surface: &Interface<R>,
         j: usize,
@@ -675,13 +694,13 @@ impl<R: Real> Homeward<R> {
 
     /// A lost ray counts nothing, whatever its numbers have become.
     #[inline(always)]
-    fn arrived(&self, lanes: &[R; BLOCK]) -> [R; BLOCK] {
+    pub(super) fn arrived(&self, lanes: &[R; BLOCK]) -> [R; BLOCK] {
         std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
     }
 
     /// Hands over the derivatives by the numbers of a surface.
     #[inline(always)]
-    fn harvest(&self, surface: &Interface<R>, i: usize, harvest: &mut impl Harvest<R>) {
+    pub(super) fn harvest(&self, surface: &Interface<R>, i: usize, harvest: &mut impl Harvest<R>) {
         let arrived = |lanes: &[R; BLOCK]| self.arrived(lanes);
         harvest.take(Some(i), Slot::Curvature, &arrived(&self.by_curvature));
         if matches!(surface.form, Form::Conic | Form::Asphere) {
@@ -702,20 +721,20 @@ impl<R: Real> Homeward<R> {
 }
 
 /// An asphere at a distance from the axis: `w = dz/dr²` and every derivative of z and w.
-struct Sag<R> {
+pub(super) struct Sag<R> {
     r2: R,
     curvature: R,
     /// `√(1 − (1+κ) c² r²)`.
     root: R,
     /// `w`.
-    slope: R,
+    pub(super) slope: R,
     /// `dw/dr²`.
-    bend: R,
+    pub(super) bend: R,
 }
 
 impl<R: Real> Sag<R> {
     #[inline(always)]
-    fn new(surface: &Interface<R>, r2: R) -> Self {
+    pub(super) fn new(surface: &Interface<R>, r2: R) -> Self {
         let c = surface.curvature;
         let square = (R::ONE + surface.conic) * c * c;
         let root = (R::ONE - square * r2).sqrt();
@@ -736,7 +755,7 @@ impl<R: Real> Sag<R> {
 
     /// Derivatives by curvature and conic constant, from those by z and by w.
     #[inline(always)]
-    fn by_conic(&self, by_z: R, by_w: R) -> (R, R) {
+    pub(super) fn by_conic(&self, by_z: R, by_w: R) -> (R, R) {
         let (c, q, r2) = (self.curvature, self.root, self.r2);
         let (one_q, cube) = (R::ONE + q, q * q * q);
         let by_curvature = by_z * r2 / (q * one_q) + by_w / (cube + cube);
@@ -748,7 +767,7 @@ impl<R: Real> Sag<R> {
 
     /// Derivatives by the coefficients, from those by z and by w.
     #[inline(always)]
-    fn by_terms(&self, by_z: R, by_w: R) -> [R; ASPHERE_TERMS] {
+    pub(super) fn by_terms(&self, by_z: R, by_w: R) -> [R; ASPHERE_TERMS] {
         let mut power = self.r2;
         std::array::from_fn(|term| {
             let by_term = power * (by_z * self.r2 + by_w * R::from_f64(term as f64 + 2.0));

@@ -7,7 +7,8 @@
 //! same bits.
 
 use super::asphere;
-use super::fate::{CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
+use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
+use super::graded::Arrival;
 use super::interface::{Crossing, Form, Interface, Meeting};
 use super::single::{Ray, launch};
 use super::{Fates, Tracer};
@@ -285,6 +286,14 @@ impl<R: Real> Tracer<R> {
         );
     }
 
+    /// What only fills a block up counts as lost where every ray costs time of its own.
+    #[inline(always)]
+    pub(super) fn leave_out(&self, block: &mut Block<R>, count: usize) {
+        if !self.gaps.is_empty() {
+            block.code[count..].fill(R::ONE);
+        }
+    }
+
     #[inline(always)]
     fn blocks<S: Sink<R>>(&self, rays: Columns<'_, R>, part: &mut SinkPart<'_, R>) {
         let mut block = Block::new();
@@ -292,8 +301,13 @@ impl<R: Real> Tracer<R> {
         while from < rays.x.len() {
             let count = BLOCK.min(rays.x.len() - from);
             block.load(rays, from, count, self.index_before);
+            self.leave_out(&mut block, count);
             for (i, interface) in self.interfaces.iter().enumerate() {
-                block.cross::<S>(interface, i as u32);
+                if self.touches_gradient(i) {
+                    block.step_through::<S>(self, i);
+                } else {
+                    block.cross::<S>(interface, i as u32);
+                }
             }
             let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
             block.store::<S>(part, from, count, index);
@@ -396,6 +410,40 @@ impl<R: Real> Block<R> {
         }
     }
 
+    #[inline(never)]
+    fn step_through<S: Sink<R>>(&mut self, tracer: &Tracer<R>, number: usize) {
+        let mut opl = self.opl;
+        self.pass_gradient(tracer, number, |j, arrival| {
+            if S::PATH {
+                opl[j] += arrival.path;
+            }
+        });
+        self.opl = opl;
+    }
+
+    /// Crosses a surface that a gradient touches, ray by ray.
+    #[inline(never)]
+    pub(super) fn pass_gradient(
+        &mut self,
+        tracer: &Tracer<R>,
+        number: usize,
+        mut keep: impl FnMut(usize, &Arrival<R>),
+    ) {
+        for j in 0..BLOCK {
+            if self.code[j] > R::ZERO {
+                continue;
+            }
+            let (p, k) = self.state(j);
+            let arrival = tracer.arrive_at(number, p, k);
+            keep(j, &arrival);
+            let crossing = arrival.go_on();
+            self.set(j, crossing.point, crossing.k);
+            if let Some(cause) = arrival.cause(&crossing) {
+                self.code[j] = R::from_f64(f64::from(fate::code(number as u32, cause)));
+            }
+        }
+    }
+
     /// Crosses a surface and keeps the distance to it.
     #[inline(always)]
     pub(super) fn cross_keeping(
@@ -429,7 +477,7 @@ impl<R: Real> Block<R> {
     /// Clips the rays that met a surface inside its obstruction.
     #[inline(always)]
     fn obstruct(&mut self, interface: &Interface<R>, number: u32) {
-        let lost = |cause: u32| R::from_f64(f64::from(4 * number + cause));
+        let lost = |cause: u32| R::from_f64(f64::from(fate::code(number, cause)));
         let (clipped, reflected) = (lost(CLIPPED), lost(TOTAL_REFLECTION));
         for j in 0..BLOCK {
             let (p, _) = self.state(j);
@@ -521,7 +569,7 @@ impl<R: Real> Block<R> {
         mut keep: impl FnMut(usize, &Meeting<R>),
     ) {
         let interface = *interface;
-        let lost = |cause: u32| R::from_f64(f64::from(4 * number + cause));
+        let lost = |cause: u32| R::from_f64(f64::from(fate::code(number, cause)));
         let (missed, clipped) = (lost(MISSED), lost(CLIPPED));
         let reflected = lost(TOTAL_REFLECTION);
         for j in 0..BLOCK {

@@ -22,7 +22,7 @@ impl<R: Real> Tracer<R> {
     /// it does not get there.
     pub fn margin(&self, ray: Ray<R>, surface: usize, hurdle: Hurdle) -> Option<R> {
         let (start, k) = self.arrive(ray, surface)?;
-        Some(self.interfaces[surface].margin(hurdle, start, k))
+        Some(self.margin_from(surface, hurdle, start, k))
     }
 
     /// Where a ray of the edge lands: one that takes a hurdle with no margin at all. The cosine
@@ -34,7 +34,11 @@ impl<R: Real> Tracer<R> {
         for (i, interface) in self.interfaces.iter().enumerate() {
             let start = Vec3::new(point.x, point.y, point.z - interface.gap);
             let limit = (i == surface).then_some(hurdle);
-            (point, k) = interface.pass_edge(start, k, limit)?;
+            (point, k) = if self.touches_gradient(i) {
+                self.arrive_at(i, point, k).pass_edge(limit)?
+            } else {
+                interface.pass_edge(start, k, limit)?
+            };
         }
         point.is_finite().then_some(point)
     }
@@ -43,9 +47,13 @@ impl<R: Real> Tracer<R> {
     fn arrive(&self, ray: Ray<R>, surface: usize) -> Option<(Vec3<R>, Vec3<R>)> {
         let mut k = launch(ray.direction, self.index_before);
         let mut point = ray.point;
-        for interface in &self.interfaces[..surface] {
+        for (i, interface) in self.interfaces[..surface].iter().enumerate() {
             let start = Vec3::new(point.x, point.y, point.z - interface.gap);
-            (point, k) = interface.pass_edge(start, k, None)?;
+            (point, k) = if self.touches_gradient(i) {
+                self.arrive_at(i, point, k).pass_edge(None)?
+            } else {
+                interface.pass_edge(start, k, None)?
+            };
         }
         let gap = self.interfaces[surface].gap;
         Some((Vec3::new(point.x, point.y, point.z - gap), k))
@@ -90,7 +98,7 @@ impl<R: Real> Interface<R> {
     }
 
     /// The margin of a ray at a hurdle of this surface; see [`Tracer::margins`].
-    fn margin(&self, hurdle: Hurdle, start: Vec3<R>, k: Vec3<R>) -> R {
+    pub(super) fn margin(&self, hurdle: Hurdle, start: Vec3<R>, k: Vec3<R>) -> R {
         let met = self.meeting(start, k);
         match hurdle {
             Hurdle::Rim => self.rim_margin(met.point),
@@ -102,6 +110,8 @@ impl<R: Real> Interface<R> {
                 Form::Sphere | Form::Conic => self.discriminant(start, k),
             },
             Hurdle::Equator => self.equator_margin(&met),
+            // Glass has no side.
+            Hurdle::Side => R::ONE,
         }
     }
 }
@@ -120,11 +130,16 @@ impl Tracer<f64> {
         let mut seeds = vec![Seed::default(); rays.len()];
         for (i, (seed, weight)) in seeds.iter_mut().zip(weights).enumerate() {
             if let Some((start, k)) = self.arrive(rays.get(i), surface) {
-                let slopes = self.interfaces[surface].margin_slopes(hurdle, start, k);
-                *seed = self.sow_margin(surface, k, &slopes, *weight, &mut total);
-                if hurdle == Hurdle::Rim {
-                    let radius = self.interfaces[surface].rim2.sqrt();
-                    total.surfaces[surface].semi_diameter += weight * 2.0 * radius;
+                *seed = if self.touches_gradient(surface) {
+                    let slopes = self.graded_margin_slopes(surface, hurdle, start, k);
+                    self.sow_graded_margin(surface, k, &slopes, *weight, &mut total)
+                } else {
+                    let slopes = self.interfaces[surface].margin_slopes(hurdle, start, k);
+                    self.sow_margin(surface, k, &slopes, *weight, &mut total)
+                };
+                if let Some(rim) = self.limiting(surface, hurdle) {
+                    let radius = self.interfaces[rim].rim2.sqrt();
+                    total.surfaces[rim].semi_diameter += weight * 2.0 * radius;
                 }
             }
         }
@@ -170,7 +185,9 @@ impl Tracer<f64> {
     /// The surfaces in front of one, with nothing that clips.
     fn front(&self, surface: usize) -> Self {
         let interfaces = self.interfaces[..surface].to_vec();
-        Self { interfaces, index_before: self.index_before }.opened()
+        let gaps = self.gaps.iter().take(surface).cloned().collect();
+        let plans = Vec::new();
+        Self { interfaces, index_before: self.index_before, gaps, plans }.opened()
     }
 }
 
@@ -184,20 +201,29 @@ impl Interface<f64> {
         local.margin(hurdle, start, k).slope
     }
 
-    /// The same surface with its numbers as inputs; a plane as the sphere that it may become.
+    /// The same surface with its numbers as inputs.
     fn local(&self) -> Interface<Local> {
-        let constant = Local::constant;
-        let [before, behind] =
-            [Local::variable(self.index_before, 6), Local::variable(self.index_behind, 7)];
-        let terms = std::array::from_fn(|j| Local::variable(self.terms[j], 10 + j));
+        let indices = [(self.index_before, 6), (self.index_behind, 7)];
+        self.with_inputs(&indices.map(|(n, i)| Local::variable(n, i)), 8)
+    }
+
+    /// The same surface between these indices, its curvature, conic constant and coefficients as
+    /// inputs from number `first` on; a plane as the sphere that it may become.
+    pub(super) fn with_inputs<const N: usize>(
+        &self,
+        [before, behind]: &[Dual<f64, N>; 2],
+        first: usize,
+    ) -> Interface<Dual<f64, N>> {
+        let (before, behind, constant) = (*before, *behind, Dual::constant);
+        let terms = std::array::from_fn(|j| Dual::variable(self.terms[j], first + 2 + j));
         Interface {
             form: if self.form == Form::Plane { Form::Sphere } else { self.form },
             mirror: self.mirror,
             far: self.far,
             sense: constant(self.sense),
             gap: constant(self.gap),
-            curvature: Local::variable(self.curvature, 8),
-            conic: Local::variable(self.conic, 9),
+            curvature: Dual::variable(self.curvature, first),
+            conic: Dual::variable(self.conic, first + 1),
             terms,
             medium: self.medium,
             index_before: before,

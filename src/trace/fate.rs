@@ -9,10 +9,16 @@ pub enum Fate {
     Imaged,
     /// It does not meet the surface.
     Missed(u32),
-    /// It meets the surface outside the semi-diameter or inside the obstruction.
+    /// It meets the surface outside the semi-diameter or inside the obstruction, or it leaves the
+    /// gradient in front of it through its side.
     Clipped(u32),
     /// It is totally reflected.
     TotalReflection(u32),
+    /// The gradient in front of the surface turns it back to where it came from.
+    Turned(u32),
+    /// It is still in the gradient in front of the surface after the largest number of steps, or
+    /// where that has no index.
+    Trapped(u32),
 }
 
 impl Fate {
@@ -23,6 +29,8 @@ impl Fate {
             Self::Missed(_) => "missed",
             Self::Clipped(_) => "clipped",
             Self::TotalReflection(_) => "total_reflection",
+            Self::Turned(_) => "turned",
+            Self::Trapped(_) => "trapped",
         }
     }
 
@@ -30,7 +38,11 @@ impl Fate {
     pub fn surface(self) -> Option<usize> {
         match self {
             Self::Imaged => None,
-            Self::Missed(i) | Self::Clipped(i) | Self::TotalReflection(i) => Some(i as usize),
+            Self::Missed(i)
+            | Self::Clipped(i)
+            | Self::TotalReflection(i)
+            | Self::Turned(i)
+            | Self::Trapped(i) => Some(i as usize),
         }
     }
 
@@ -40,13 +52,15 @@ impl Fate {
     }
 
     /// The number that stands for a cause at a surface inside the kernels: 0 for a ray on its way,
-    /// else `4 surface + cause`.
+    /// else `CAUSES surface + cause`.
     pub(super) fn from_code(code: u32) -> Self {
-        let surface = code / 4;
-        match code % 4 {
+        let surface = code / CAUSES;
+        match code % CAUSES {
             MISSED => Self::Missed(surface),
             CLIPPED => Self::Clipped(surface),
             TOTAL_REFLECTION => Self::TotalReflection(surface),
+            TURNED => Self::Turned(surface),
+            TRAPPED => Self::Trapped(surface),
             _ => Self::Imaged,
         }
     }
@@ -55,6 +69,20 @@ impl Fate {
 pub(super) const MISSED: u32 = 1;
 pub(super) const CLIPPED: u32 = 2;
 pub(super) const TOTAL_REFLECTION: u32 = 3;
+pub(super) const TURNED: u32 = 4;
+pub(super) const TRAPPED: u32 = 5;
+/// Room for causes at each surface.
+const CAUSES: u32 = 8;
+
+/// The number that stands for a cause at a surface.
+pub(super) fn code(surface: u32, cause: u32) -> u32 {
+    CAUSES * surface + cause
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+fn is_none(count: &usize) -> bool {
+    *count == 0
+}
 
 /// How many rays ended how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -67,6 +95,12 @@ pub struct Fates {
     pub clipped: usize,
     /// Totally reflected.
     pub total_reflection: usize,
+    /// Turned back by a gradient.
+    #[serde(skip_serializing_if = "is_none")]
+    pub turned: usize,
+    /// Kept by a gradient.
+    #[serde(skip_serializing_if = "is_none")]
+    pub trapped: usize,
 }
 
 impl Fates {
@@ -77,11 +111,14 @@ impl Fates {
             Fate::Missed(_) => self.missed += 1,
             Fate::Clipped(_) => self.clipped += 1,
             Fate::TotalReflection(_) => self.total_reflection += 1,
+            Fate::Turned(_) => self.turned += 1,
+            Fate::Trapped(_) => self.trapped += 1,
         }
     }
 
     /// How many rays there are.
     pub fn total(self) -> usize {
-        self.imaged + self.missed + self.clipped + self.total_reflection
+        let lost = self.missed + self.clipped + self.total_reflection;
+        self.imaged + lost + self.turned + self.trapped
     }
 }

@@ -162,8 +162,13 @@ impl<R: Real> PupilTracer<R> {
     /// Prepares a system.
     ///
     /// # Errors
-    /// Numbers that no ray can be traced with: see [`System::check`].
+    /// Numbers that no ray can be traced with: see [`System::check`]. A gradient, whose steps would
+    /// have to carry second derivatives.
     pub fn new(system: &System<f64>) -> Result<Self, Invalid> {
+        if let Some(surface) = system.surfaces.iter().position(|s| s.graded.is_some()) {
+            let why = "has no warp field; expected `boundary` or `difference`".to_owned();
+            return Err(Invalid::Gradient { surface, why });
+        }
         let outward = Tracer::new(&system.lift::<Jet<R>>())?;
         let kinds = [Limit::Rim, Limit::Obstruction, Limit::Angle, Limit::Sheet];
         let all = |i: usize| kinds.map(|limit| (i, limit));

@@ -23,6 +23,8 @@ pub enum Hurdle {
     Obstruction,
     /// The ray is totally reflected.
     Reflection,
+    /// The ray leaves the gradient in front of the surface through its side.
+    Side,
 }
 
 impl<R: Real> Tracer<R> {
@@ -33,11 +35,19 @@ impl<R: Real> Tracer<R> {
     ///
     /// The margin is `sd² − r²` in mm² at a rim and `r² − h²` at an obstruction, the square of the
     /// optical direction's component along the normal at a miss and at a total reflection, −1 at an
-    /// asphere that is missed, and the normal's component along the axis at an equator.
+    /// asphere that is missed, and the normal's component along the axis at an equator. Where a
+    /// gradient touches a surface it is treated like an asphere, and the side of the glass like a rim.
     pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, Hurdle, R)) {
         let mut k = launch(ray.direction, self.index_before);
         let mut point = ray.point;
         for (i, interface) in self.interfaces.iter().enumerate() {
+            if self.touches_gradient(i) {
+                let arrival = self.arrive_at(i, point, k);
+                arrival.margins(i, &mut visit);
+                let Some(passed) = arrival.pass_edge(None) else { return };
+                (point, k) = passed;
+                continue;
+            }
             let start = Vec3::new(point.x, point.y, point.z - interface.gap);
             let met = interface.meeting(start, k);
             let passes_by = met.missed && !interface.is_behind_equator(&met);

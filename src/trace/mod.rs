@@ -14,11 +14,16 @@ mod backward;
 mod batch;
 mod edge;
 mod fate;
+mod gap;
+mod graded;
+mod graded_back;
+mod graded_edge;
 mod interface;
 mod limit;
 mod margin;
 mod single;
 mod slot;
+mod step;
 
 pub use crate::math::Width;
 pub use backward::{Gradient, Seed, SurfaceGradient};
@@ -28,10 +33,12 @@ pub use limit::{Abreast, LANES, PupilTracer};
 pub use margin::Hurdle;
 pub use single::{Landing, Path, Ray};
 pub use slot::Slot;
+pub use step::GapPlan;
 
 use crate::lens::Invalid;
 use crate::lens::System;
 use crate::math::Real;
+use gap::Gap;
 use interface::Interface;
 
 /// A system made ready for tracing: checked, with every constant of a surface worked out once.
@@ -39,6 +46,9 @@ use interface::Interface;
 pub struct Tracer<R> {
     interfaces: Vec<Interface<R>>,
     index_before: R,
+    /// The gradients of the gaps; empty for a lens of glass.
+    gaps: Vec<Option<Gap<R>>>,
+    plans: Vec<GapPlan>,
 }
 
 impl<R: Real> Tracer<R> {
@@ -49,7 +59,34 @@ impl<R: Real> Tracer<R> {
     pub fn new(system: &System<R>) -> Result<Self, Invalid> {
         system.check()?;
         let interfaces = interface::interfaces(system);
-        Ok(Self { interfaces, index_before: system.index_before })
+        let index_before = system.index_before;
+        let mut tracer = Self { interfaces, index_before, gaps: Vec::new(), plans: Vec::new() };
+        if system.is_graded() {
+            tracer.fill(system)?;
+        }
+        Ok(tracer)
+    }
+
+    /// Fills the gaps of a system that have a gradient.
+    fn fill(&mut self, system: &System<R>) -> Result<(), Invalid> {
+        for (i, surface) in system.surfaces.iter().enumerate() {
+            let faces = self.interfaces.get(i).zip(self.interfaces.get(i + 1));
+            let gap = match (surface.gradient(), faces) {
+                (Some(field), Some((front, back))) => {
+                    let (gap, plan) = Gap::new(field, i, [front, back])?;
+                    self.plans.push(plan);
+                    Some(gap)
+                }
+                _ => None,
+            };
+            self.gaps.push(gap);
+        }
+        Ok(())
+    }
+
+    /// The steps in every gap with a gradient.
+    pub fn gap_plans(&self) -> &[GapPlan] {
+        &self.plans
     }
 
     /// The same surfaces with no rim that clips. An asphere still ends where it was said to end:
@@ -58,6 +95,9 @@ impl<R: Real> Tracer<R> {
     pub fn opened(mut self) -> Self {
         for interface in &mut self.interfaces {
             (interface.rim2, interface.obstruction2) = (R::from_f64(f64::INFINITY), R::ZERO);
+        }
+        for gap in self.gaps.iter_mut().flatten() {
+            gap.side2 = R::from_f64(f64::INFINITY);
         }
         self
     }

@@ -1,7 +1,8 @@
 //! One ray at a time, over any number type, with everything about its way.
 
 use super::Tracer;
-use super::fate::{CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
+use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
+use super::graded::Arrival;
 use crate::lens::Invalid;
 use crate::math::Real;
 use crate::math::Vec3;
@@ -51,8 +52,11 @@ pub struct Landing<R> {
 /// The corners of a ray's way and how it ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
-    /// The start and every point of incidence, in the frame of the first vertex.
+    /// The start, every point of incidence, and points between on the curve through a gradient, in
+    /// the frame of the first vertex.
     pub points: Vec<Vec3<f64>>,
+    /// How far from the axis it meets each surface, as far as it gets.
+    pub heights: Vec<f64>,
     /// How it ended.
     pub fate: Fate,
 }
@@ -84,11 +88,21 @@ impl<R: Real> Tracer<R> {
         let mut index = self.index_before;
         for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
             let p = landing.ray.point;
+            if self.touches_gradient(i) {
+                let arrival = self.arrive_at(i, p, k);
+                let passed = landing.pass(i, p, &arrival, &mut visit);
+                let Some(behind) = passed else {
+                    (k, index) = (arrival.k, arrival.surface.index_before);
+                    break;
+                };
+                (k, index) = (behind, arrival.surface.index_behind);
+                continue;
+            }
             let crossing = interface.cross(p, k);
-            let code = i as u32 * 4;
+            let code = |cause| fate::code(i as u32, cause);
             if crossing.missed {
                 landing.ray.point.z = p.z - interface.gap;
-                landing.fate = Fate::from_code(code + MISSED);
+                landing.fate = Fate::from_code(code(MISSED));
                 break;
             }
             landing.ray.point = crossing.point;
@@ -99,7 +113,7 @@ impl<R: Real> Tracer<R> {
             visit(i, crossing.point);
             if crossing.clipped || crossing.reflected {
                 let cause = if crossing.clipped { CLIPPED } else { TOTAL_REFLECTION };
-                landing.fate = Fate::from_code(code + cause);
+                landing.fate = Fate::from_code(code(cause));
                 break;
             }
             k = crossing.k;
@@ -107,6 +121,39 @@ impl<R: Real> Tracer<R> {
         }
         landing.ray.direction = k * (R::ONE / index);
         landing
+    }
+}
+
+impl<R: Real> Landing<R> {
+    /// Takes a ray that comes from `p` through a surface that a gradient touches; its direction
+    /// behind, if it gets through.
+    #[cold]
+    #[inline(never)]
+    fn pass(
+        &mut self,
+        i: usize,
+        p: Vec3<R>,
+        arrival: &Arrival<R>,
+        visit: &mut impl FnMut(usize, Vec3<R>),
+    ) -> Option<Vec3<R>> {
+        let crossing = arrival.go_on();
+        if arrival.met.missed {
+            self.ray.point = arrival.stand(p);
+        } else {
+            self.ray.point = crossing.point;
+            self.opl += arrival.path;
+            if self.backwards.is_none() && is_backwards(crossing.s, p, arrival.surface.n2) {
+                self.backwards = Some(i);
+            }
+            visit(i, crossing.point);
+        }
+        match arrival.cause(&crossing) {
+            None => Some(crossing.k),
+            Some(cause) => {
+                self.fate = Fate::from_code(fate::code(i as u32, cause));
+                None
+            }
+        }
     }
 }
 
@@ -128,7 +175,16 @@ impl Tracer<f64> {
             z += interface.gap;
             vertices.push(z);
         }
-        let landing = self.visit(ray, |i, p| points.push(Vec3::new(p.x, p.y, p.z + vertices[i])));
+        let mut heights = Vec::with_capacity(self.interfaces.len());
+        let landing = self.visit(ray, |i, p| {
+            if let Some(gap) = self.gap_before(i) {
+                let before = self.trace_to(ray, i - 1).ray;
+                let inside = gap.between(&self.interfaces[i], before);
+                points.extend(inside.map(|p| Vec3::new(p.x, p.y, p.z + vertices[i - 1])));
+            }
+            heights.push(p.x.hypot(p.y));
+            points.push(Vec3::new(p.x, p.y, p.z + vertices[i]));
+        });
         if let Fate::Missed(surface) = landing.fate {
             let (p, d) = (landing.ray.point, landing.ray.direction);
             let s = -p.z / d.z;
@@ -137,7 +193,7 @@ impl Tracer<f64> {
                 points.push(Vec3::new(end.x, end.y, vertices[surface as usize]));
             }
         }
-        Path { points, fate: landing.fate }
+        Path { points, heights, fate: landing.fate }
     }
 }
 

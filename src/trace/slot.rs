@@ -1,7 +1,7 @@
 //! Naming one number of a resolved system.
 
 use super::backward::{Gradient, SurfaceGradient};
-use crate::lens::{ASPHERE_TERMS, Shape, System};
+use crate::lens::{ASPHERE_TERMS, GRADE_TERMS, Grade, Law, RADIAL_TERMS, Shape, Surface, System};
 use crate::math::Real;
 
 /// A number of a surface that a ray depends on.
@@ -19,6 +19,8 @@ pub enum Slot {
     Index,
     /// The semi-diameter, on which no ray depends but the edge of a pupil does.
     SemiDiameter,
+    /// A coefficient of the gradient behind the surface.
+    Grade(usize),
 }
 
 impl Slot {
@@ -26,12 +28,18 @@ impl Slot {
     pub fn all() -> impl Iterator<Item = Self> {
         let plain =
             [Self::Curvature, Self::Conic, Self::Thickness, Self::Index, Self::SemiDiameter];
-        plain.into_iter().chain((0..ASPHERE_TERMS).map(Self::Term))
+        let figured = plain.into_iter().chain((0..ASPHERE_TERMS).map(Self::Term));
+        figured.chain((0..GRADE_TERMS).map(Self::Grade))
     }
 
-    /// Whether a surface of this form has such a number; a plane has the curvature zero.
-    pub fn is_of<R>(self, shape: &Shape<R>) -> bool {
+    /// Whether a surface has such a number; a plane has the curvature zero.
+    pub fn is_of<R>(self, surface: &Surface<R>) -> bool {
+        let shape = &surface.shape;
         match self {
+            Self::Grade(k) => match &surface.graded {
+                Some(grade) => grade.law != Law::Sech || k == 0 || k >= RADIAL_TERMS,
+                None => false,
+            },
             Self::Curvature | Self::Thickness | Self::Index | Self::SemiDiameter => true,
             Self::Conic => matches!(shape, Shape::Conic { .. } | Shape::Asphere { .. }),
             Self::Term(_) => matches!(shape, Shape::Asphere { .. }),
@@ -40,6 +48,11 @@ impl Slot {
 
     /// Writes a surface in a form that has this number, even where it is zero.
     pub fn widen<R: Real>(self, system: &mut System<R>, surface: usize) {
+        if let Self::Grade(k) = self {
+            let plain = Grade::new(Law::Index, [R::ZERO; GRADE_TERMS]);
+            let graded = &mut system.surfaces[surface].graded;
+            *graded = Some(graded.unwrap_or(plain).using(k));
+        }
         let shape = &mut system.surfaces[surface].shape;
         *shape = match (self, *shape) {
             (Self::Curvature, Shape::Plane) => Shape::Sphere { curvature: R::ZERO },
@@ -63,6 +76,10 @@ impl Slot {
             ) => curvature,
             (Self::Conic, Shape::Conic { conic, .. } | Shape::Asphere { conic, .. }) => conic,
             (Self::Term(term), Shape::Asphere { terms, .. }) => &mut terms[term],
+            (Self::Grade(k), _) => match &mut surface.graded {
+                Some(grade) => &mut grade.terms[k],
+                None => &mut surface.index,
+            },
             // An index is always there.
             _ => &mut surface.index,
         }
@@ -79,6 +96,7 @@ impl<R: Real> SurfaceGradient<R> {
             Slot::Thickness => self.thickness,
             Slot::Index => self.index,
             Slot::SemiDiameter => self.semi_diameter,
+            Slot::Grade(k) => self.grade[k],
         }
     }
 
@@ -91,6 +109,7 @@ impl<R: Real> SurfaceGradient<R> {
             Slot::Thickness => &mut self.thickness,
             Slot::Index => &mut self.index,
             Slot::SemiDiameter => &mut self.semi_diameter,
+            Slot::Grade(k) => &mut self.grade[k],
         }
     }
 }

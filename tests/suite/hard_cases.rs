@@ -74,6 +74,7 @@ impl<R: Real> Lift<'_, R> {
                 obstruction: R::ZERO,
                 mirror: s["mirror"] == true,
                 hyper: s["hyper"] == true,
+                graded: None,
             });
         }
         let index_before = self.number("n0", get(input, "n0", 1.0));
@@ -97,6 +98,7 @@ fn status(fate: Fate) -> &'static str {
         Fate::Missed(_) => "miss",
         Fate::Clipped(_) => "clipped",
         Fate::TotalReflection(_) => "tir",
+        Fate::Turned(_) | Fate::Trapped(_) => "kept",
     }
 }
 

@@ -2,7 +2,7 @@
 //! and survives being written and read.
 
 use aplanat::files::{self, Bundled, native};
-use aplanat::lens::{Aperture, Lens, Object, System};
+use aplanat::lens::{Aperture, Graded, Lens, Object, System};
 use aplanat::math::Vec3;
 use aplanat::trace::{Ray, Tracer};
 use serde::Deserialize;
@@ -55,9 +55,36 @@ fn focal_lengths(system: &System<f64>) -> (f64, f64) {
         nu -= y * (behind - n) * surface.shape.curvature();
         n = behind;
         last_height = y;
-        y += surface.thickness * nu / n;
+        if let Some(field) = surface.gradient() {
+            (y, nu) = through(&field, surface.thickness, y, nu);
+            n = sense * field.index(Vec3::new(0.0, 0.0, surface.thickness));
+        } else {
+            y += surface.thickness * nu / n;
+        }
     }
     (-sense / nu, -last_height * n / nu)
+}
+
+/// A paraxial ray through a gradient, `dy/dz = p/n` and `dp/dz = y ∂n/∂r / r`, by the classical
+/// method of fourth order.
+fn through(field: &Graded<f64>, length: f64, mut y: f64, mut p: f64) -> (f64, f64) {
+    const STEPS: u32 = 1000;
+    let near = 1e-4;
+    let slope = |z: f64, y: f64, p: f64| {
+        let [n, beside] = [0.0, near].map(|r| field.index(Vec3::new(0.0, r, z)));
+        (p / n, 2.0 * (beside - n) / (near * near) * y)
+    };
+    let h = length / f64::from(STEPS);
+    for i in 0..STEPS {
+        let z = f64::from(i) * h;
+        let (a, b) = slope(z, y, p);
+        let (c, d) = slope(z + 0.5 * h, y + 0.5 * h * a, p + 0.5 * h * b);
+        let (e, f) = slope(z + 0.5 * h, y + 0.5 * h * c, p + 0.5 * h * d);
+        let (g, k) = slope(z + h, y + h * e, p + h * f);
+        y += h / 6.0 * (a + 2.0 * c + 2.0 * e + g);
+        p += h / 6.0 * (b + 2.0 * d + 2.0 * f + k);
+    }
+    (y, p)
 }
 
 fn at_primary(lens: &Lens, zoom: usize) -> System<f64> {

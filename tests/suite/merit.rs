@@ -56,7 +56,7 @@ fn terms() -> Vec<Term> {
     ]
 }
 
-fn check(lens: &Lens, term: Term, pupil: PupilEdge, steps: impl Fn(Quantity) -> f64) {
+pub(crate) fn check(lens: &Lens, term: Term, pupil: PupilEdge, steps: impl Fn(Quantity) -> f64) {
     let goal = Goal { terms: vec![Weighted { term, weight: 1.0 }], zoom_ratios: Vec::new(), pupil };
     // The motion of the edge is exact in the limit of many rays only.
     let tolerance = if pupil == PupilEdge::Moving { 1e-11 } else { 1e-4 };
@@ -97,7 +97,7 @@ fn step(quantity: Quantity) -> f64 {
         | Quantity::Thickness
         | Quantity::ZoomThickness(_)
         | Quantity::SemiDiameter => 1e-2,
-        Quantity::Index => 1e-4,
+        Quantity::Index | Quantity::Gradient(_) => 1e-4,
     }
 }
 

@@ -154,6 +154,7 @@ fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
         obstruction: 0.0,
         mirror: false,
         hyper: false,
+        graded: None,
     };
     let image = surface((0.0, 0.0, 1.0, f64::INFINITY));
     let surfaces = rows.iter().copied().map(surface).chain([image]).collect();

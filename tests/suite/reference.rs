@@ -161,6 +161,7 @@ fn surface(row: &Value, wavelength: usize) -> Surface<f64> {
         obstruction: 0.0,
         mirror: row["mirror"].as_bool().unwrap_or(false),
         hyper: false,
+        graded: None,
     }
 }
 

@@ -165,6 +165,7 @@ fn an_obstruction_clips_inside_and_its_edge_passes() {
         obstruction,
         mirror: false,
         hyper: false,
+        graded: None,
     };
     let surfaces = vec![plane(0.0), plane(2.0), plane(0.0)];
     let tracer = Tracer::new(&System { index_before: 1.0, surfaces, stop: None }).unwrap();
@@ -343,6 +344,7 @@ fn reversed(system: &System<f64>) -> System<f64> {
         obstruction: 0.0,
         mirror: false,
         hyper: false,
+        graded: None,
     };
     let image_index = system.surfaces[count - 1].index;
     let mut surfaces = vec![plane(system.surfaces[count - 2].thickness, image_index)];

@@ -101,6 +101,8 @@ struct Position {
     lagrange: Option<f64>,
     petzval_sum: f64,
     seidel: Option<SeidelKeys>,
+    #[serde(skip)]
+    no_seidel: &'static str,
     checks: Vec<Check>,
     effects: Vec<Decision>,
 }
@@ -176,6 +178,11 @@ impl Position {
             lagrange: data.lagrange,
             petzval_sum: data.petzval_sum,
             seidel: seidel_keys(opened, zoom, &data)?,
+            no_seidel: if system.is_graded() {
+                "those of a gradient-index medium are not implemented"
+            } else {
+                "there is no chief ray"
+            },
             checks: checks(&system, &media, facts.fates),
             effects,
         })
@@ -279,7 +286,7 @@ impl Position {
         let columns =
             ["spherical", "coma", "astigm.", "Petzval", "distort.", "axial c.", "lateral c."];
         let Some(seidel) = &self.seidel else {
-            return Table::new(&[&format!("{title}: none, since there is no chief ray")]);
+            return Table::new(&[&format!("{title}: none, since {}", self.no_seidel)]);
         };
         let mut table = Table::new(&[[title.as_str()].as_slice(), &columns].concat());
         for (i, sums) in seidel.surfaces.iter().enumerate() {

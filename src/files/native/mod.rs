@@ -19,7 +19,8 @@ pub use layout::pretty;
 
 use super::error::{FileError, Malformed};
 use crate::lens::{
-    Aperture, Fields, Lens, Medium, Object, Pickup, Row, Variable, Wavelength, ZoomPosition,
+    Aperture, Fields, Gradient, Law, Lens, Medium, Object, Pickup, Row, Variable, Wavelength,
+    ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, Error as _, IgnoredAny, MapAccess, Visitor};
@@ -369,6 +370,38 @@ struct MediumKeys {
     nd: Option<f64>,
     vd: Option<f64>,
     index: Option<f64>,
+    gradient: Option<GradientKeys>,
+}
+
+/// The keys of a gradient.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GradientKeys {
+    base: Medium,
+    #[serde(default, skip_serializing_if = "is_index")]
+    of: Law,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    radial: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    axial: Vec<f64>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+fn is_index(law: &Law) -> bool {
+    *law == Law::Index
+}
+
+impl From<&Gradient> for GradientKeys {
+    fn from(gradient: &Gradient) -> Self {
+        let Gradient { base, law, radial, axial } = gradient.clone();
+        Self { base, of: law, radial, axial }
+    }
+}
+
+impl From<GradientKeys> for Gradient {
+    fn from(GradientKeys { base, of, radial, axial }: GradientKeys) -> Self {
+        Self { base, law: of, radial, axial }
+    }
 }
 
 impl Serialize for Medium {
@@ -379,6 +412,11 @@ impl Serialize for Medium {
             Self::Glass(name) => to.serialize_str(name),
             Self::Model { nd, vd } => entries(to, &[("nd", *nd), ("vd", *vd)]),
             Self::Index(index) => entries(to, &[("index", *index)]),
+            Self::Gradient(gradient) => {
+                let mut map = to.serialize_map(Some(1))?;
+                map.serialize_entry("gradient", &GradientKeys::from(&**gradient))?;
+                map.end()
+            }
         }
     }
 }
@@ -402,7 +440,7 @@ impl<'de> Visitor<'de> for MediumText {
     type Value = Medium;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a catalogue name, {\"nd\", \"vd\"}, {\"index\"} or \"mirror\"")
+        f.write_str("a catalogue name, {\"nd\", \"vd\"}, {\"index\"}, {\"gradient\"} or \"mirror\"")
     }
 
     fn visit_unit<E>(self) -> Result<Medium, E> {
@@ -418,11 +456,13 @@ impl<'de> Visitor<'de> for MediumText {
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Medium, A::Error> {
         let keys = MediumKeys::deserialize(MapAccessDeserializer::new(map))?;
-        match (keys.nd, keys.vd, keys.index) {
-            (Some(nd), Some(vd), None) => Ok(Medium::Model { nd, vd }),
-            (None, None, Some(index)) => Ok(Medium::Index(index)),
+        match (keys.nd, keys.vd, keys.index, keys.gradient) {
+            (Some(nd), Some(vd), None, None) => Ok(Medium::Model { nd, vd }),
+            (None, None, Some(index), None) => Ok(Medium::Index(index)),
+            (None, None, None, Some(keys)) => Ok(Medium::Gradient(Box::new(keys.into()))),
             _ => Err(A::Error::custom(
-                "a glass with other keys, expected {\"nd\", \"vd\"} or {\"index\"}",
+                "a glass with other keys, expected {\"nd\", \"vd\"}, {\"index\"} or \
+                 {\"gradient\"}",
             )),
         }
     }

@@ -7,6 +7,7 @@ mod breaks;
 mod build;
 mod draft;
 mod glass;
+mod gradient;
 mod line;
 mod parse;
 mod shape;

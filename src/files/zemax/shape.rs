@@ -29,7 +29,7 @@ pub(super) fn form(surface: &Surface, number: usize) -> Result<Form, Malformed> 
         Err(Malformed { place: format!("line {line}"), found, expected })
     };
     let result = match surface.kind.0.as_str() {
-        "" | "STANDARD" => Ok(form),
+        "" | "STANDARD" | super::gradient::KIND => Ok(form),
         "EVENASPH" => with_terms(form, &powers(&surface.parameters, |i| 2 * i)),
         "ODDASPHE" => with_terms(form, &powers(&surface.parameters, |i| i)),
         "XASPHERE" => with_terms(form, &extended(&surface.extra, |i| 2 * i)),

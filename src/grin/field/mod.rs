@@ -5,6 +5,7 @@
 
 mod bspline;
 mod cell;
+mod graded;
 mod grid;
 mod layered;
 mod luneburg;
@@ -16,6 +17,7 @@ mod tricubic;
 mod trilinear;
 
 pub use bspline::BSpline;
+pub use graded::{AXIAL_TERMS, Force, GRADE_TERMS, Grade, GradeSlopes, Graded, Law, RADIAL_TERMS};
 pub use grid::{Grid, GridError};
 pub use layered::{Coordinate, Layered, Profile, Profiled, ProfiledColumns};
 pub use luneburg::Luneburg;

@@ -12,7 +12,7 @@
 //! and four quadratures a number.
 
 use super::{Cost, Derivative};
-use crate::lens::{Invalid, System};
+use crate::lens::{Grade, Invalid, Law, RADIAL_TERMS, System};
 use crate::pupil::lit::Lit;
 use crate::pupil::region::{Kind, Region};
 use crate::trace::{Gradient, Slot};
@@ -42,7 +42,7 @@ impl Region<'_> {
         [found.by.index_before, found.error.index_before] =
             moved.derivative(STEP * system.index_before, of_index);
         for (i, surface) in system.surfaces.iter().enumerate() {
-            for slot in Slot::all().filter(|slot| slot.is_of(&surface.shape)) {
+            for slot in Slot::all().filter(|slot| slot.is_of(surface)) {
                 let Some(step) = scales.step(system, i, slot) else { continue };
                 let by_slot = |system: &mut System<f64>, step: f64| {
                     slot.widen(system, i);
@@ -92,10 +92,26 @@ impl Scales {
             Slot::Thickness => self.widest,
             Slot::Index => row.index,
             Slot::SemiDiameter => row.semi_diameter,
+            // A change of the index that turns rays by about the same angle.
+            Slot::Grade(k) => {
+                let length = row.thickness.abs().max(r);
+                grade_scale(row.graded.as_ref()?, k, r, length)
+            }
         };
         let step = STEP * scale;
         (step.is_finite() && step > 0.0).then_some(step)
     }
+}
+
+/// What a coefficient of a gradient has to change for the index to change by one part in ten at a
+/// distance from the axis, or from the vertex.
+fn grade_scale(grade: &Grade<f64>, k: usize, r: f64, length: f64) -> f64 {
+    let power = match k.checked_sub(RADIAL_TERMS) {
+        None if grade.law == Law::Sech => return 0.1 / r,
+        None => return 0.1 * r.powi(-2 * (k as i32 + 1)),
+        Some(j) => j as i32 + 1,
+    };
+    0.1 * length.powi(-power)
 }
 
 /// The integral while the lens moves.

@@ -2,13 +2,13 @@
 //! error is what was asked for, and a plan says which estimator a pupil calls for.
 
 use super::{Cost, Derivative, Warp};
-use crate::lens::Invalid;
+use crate::lens::{Invalid, RADIAL_TERMS};
 use crate::pupil::bench::Aiming;
 use crate::pupil::launch::LaunchError;
 use crate::pupil::moments::Moments;
 use crate::pupil::quadrature::Accuracy;
 use crate::pupil::region::{Kind, Region};
-use crate::trace::{Fate, Gradient, Slot};
+use crate::trace::{Fate, Gradient, PupilTracer, Slot};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::fmt::{self, Display};
@@ -103,7 +103,7 @@ const MOST: f64 = 16.0;
 ///
 /// # Errors
 /// A pupil without light or edge; `Boundary` for a pupil that is neither star-shaped nor a ring,
-/// `Warp` for a lens with an obstruction.
+/// `Warp` for a lens with an obstruction or a gradient.
 pub fn differentiate(
     region: &Region<'_>,
     cost: &Cost,
@@ -121,7 +121,10 @@ pub fn differentiate(
         (Estimator::Boundary, Kind::Ragged { pieces, ring: None, .. }) => {
             Err(NoDerivative::NotStarShaped(shape(*pieces)))
         }
-        (Estimator::Warp, _) => region.sampled_derivative(cost, asked),
+        (Estimator::Warp, _) => {
+            PupilTracer::<f64>::new(&launch.color().system)?;
+            region.sampled_derivative(cost, asked)
+        }
         (Estimator::Biased | Estimator::Boundary | Estimator::Difference, _) => {
             region.ordered_derivative(cost, estimator, asked)
         }
@@ -143,6 +146,10 @@ pub fn plan(region: &Region<'_>, asked: Accuracy) -> Result<(Estimator, String),
         }
         Kind::Ragged { ring: Some(_), .. } => {
             Ok((Estimator::Boundary, "the pupil is a ring around a shadow".to_owned()))
+        }
+        Kind::Ragged { pieces, .. } if region.launch.color().system.is_graded() => {
+            let reason = format!("{}, and a gradient has no warp field", shape(*pieces));
+            Ok((Estimator::Difference, reason))
         }
         Kind::Ragged { pieces, .. } => {
             let shape = shape(*pieces);
@@ -212,6 +219,12 @@ impl Region<'_> {
                 let found =
                     format!("the ray through the centre is totally reflected at surface {i}");
                 (found, "flatten it or take a field nearer to the axis")
+            }
+            Fate::Turned(i) | Fate::Trapped(i) => {
+                let found = format!(
+                    "the gradient in front of surface {i} keeps the ray through the centre"
+                );
+                (found, "weaken it or take a field nearer to the axis")
             }
         }
     }
@@ -350,6 +363,10 @@ fn natural(cost: &Cost, light: &Moments) -> impl Fn(Slot) -> f64 + use<> {
             Slot::Conic | Slot::Index => 0,
             Slot::Term(term) => 2 * term as i32 + 3,
             Slot::Thickness | Slot::SemiDiameter => -1,
+            Slot::Grade(k) => match k.checked_sub(RADIAL_TERMS) {
+                None => 2 * (k as i32 + 1),
+                Some(j) => j as i32 + 1,
+            },
         };
         integral * size.powi(power)
     }

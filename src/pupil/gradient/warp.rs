@@ -387,7 +387,8 @@ mod tests {
     fn system() -> System<f64> {
         let surface = |shape, thickness, index, semi_diameter| {
             let (obstruction, mirror, hyper) = (0.0, false, false);
-            Surface { shape, thickness, index, semi_diameter, obstruction, mirror, hyper }
+            let graded = None;
+            Surface { shape, thickness, index, graded, semi_diameter, obstruction, mirror, hyper }
         };
         let terms = [1e-5, -3e-8, 0.0, 1e-12, 0.0, 0.0, 0.0];
         let mut surfaces = vec![

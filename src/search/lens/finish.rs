@@ -190,7 +190,7 @@ fn with_real_glasses(lens: &Lens, rules: &Rules) -> Result<(Lens, Vec<Exchanged>
             let was = match lens.surfaces[surface].medium {
                 Medium::Model { nd, vd } => (nd, (vd > 0.0).then_some(vd)),
                 Medium::Index(n) => (n, None),
-                Medium::Air | Medium::Glass(_) | Medium::Mirror => continue,
+                Medium::Air | Medium::Glass(_) | Medium::Mirror | Medium::Gradient(_) => continue,
             };
             let found = nearest(was, lens, rules).ok_or_else(|| NoLandscape::Setting {
                 what: "the list of glasses",

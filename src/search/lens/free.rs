@@ -93,7 +93,7 @@ fn bounds(lens: &Lens, rules: &Rules, size: f64, parameter: Parameter) -> [Optio
         Quantity::Thickness | Quantity::ZoomThickness(_) => gap(lens, rules, parameter.surface),
         Quantity::SemiDiameter => [Some(NARROWEST * size), rules.semi_diameter],
         Quantity::Index => both(INDICES),
-        Quantity::Conic | Quantity::Asphere(_) => [None, None],
+        Quantity::Conic | Quantity::Asphere(_) | Quantity::Gradient(_) => [None, None],
     }
 }
 
@@ -107,7 +107,9 @@ fn gap(lens: &Lens, rules: &Rules, surface: usize) -> [Option<f64>; 2] {
         Medium::Air if last => [rules.back_focus, None],
         Medium::Air => rules.air_center.map(Some),
         Medium::Mirror => [None, None],
-        Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) => rules.glass_center.map(Some),
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) | Medium::Gradient(_) => {
+            rules.glass_center.map(Some)
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 //! its way back are measured alike.
 
 use super::LensLandscape;
-use crate::lens::{Lens, Parameter, Quantity};
+use crate::lens::{Lens, Parameter, Quantity, RADIAL_TERMS};
 use crate::merit::Detail;
 use crate::search::Slope;
 
@@ -14,6 +14,10 @@ fn unit(parameter: Parameter, size: f64) -> f64 {
         Quantity::Conic => 1.0,
         Quantity::Asphere(term) => 0.05 / (0.2 * size).powi(2 * term as i32 + 3),
         Quantity::Index => 0.1,
+        Quantity::Gradient(k) => {
+            let power = if k < RADIAL_TERMS { 2 * k + 2 } else { k - RADIAL_TERMS + 1 };
+            0.02 / (0.2 * size).powi(power as i32)
+        }
     }
 }
 

@@ -26,6 +26,9 @@ impl Panel for FirstOrderData {
             ui.add_space(6.0);
             ScrollArea::horizontal().show(ui, |ui| match &numbers.seidel.value {
                 Some(seidel) => sums(ui, &results.lens, seidel),
+                None if numbers.bench.value.is_graded() => drop(ui.weak(
+                    "No third-order sums: those of a gradient-index medium are not implemented",
+                )),
                 None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
             });
         });

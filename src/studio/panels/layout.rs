@@ -148,6 +148,7 @@ fn losses(fates: Fates) -> Option<String> {
         (fates.clipped, "clipped"),
         (fates.missed, "missed a surface"),
         (fates.total_reflection, "totally reflected"),
+        (fates.turned + fates.trapped, "kept by a gradient"),
     ];
     let parts: Vec<String> =
         causes.iter().filter(|(n, _)| *n > 0).map(|(n, how)| format!("{n} {how}")).collect();

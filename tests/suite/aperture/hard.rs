@@ -32,6 +32,7 @@ fn system(rows: &[Row], stop: usize) -> System<f64> {
         obstruction: 0.0,
         mirror: false,
         hyper: false,
+        graded: None,
     };
     let image = (0.0, 0.0, 1.0, f64::INFINITY);
     let surfaces = rows.iter().copied().chain([image]).map(surface).collect();

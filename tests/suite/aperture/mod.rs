@@ -118,5 +118,6 @@ pub(crate) fn image() -> Surface<f64> {
         obstruction: 0.0,
         mirror: false,
         hyper: false,
+        graded: None,
     }
 }

@@ -4,6 +4,8 @@ mod descent;
 mod fields;
 mod gradient;
 mod hard;
+mod lens;
+mod lens_hard;
 mod lenses;
 mod plan;
 mod reference;

@@ -58,6 +58,7 @@ fn index(medium: &Medium) -> f64 {
         Medium::Air | Medium::Mirror => 1.0,
         Medium::Index(n) | Medium::Model { nd: n, .. } => *n,
         Medium::Glass(name) => glass::find(name).map_or(1.0, |glass| glass.nd),
+        Medium::Gradient(gradient) => index(&gradient.base),
     }
 }
 

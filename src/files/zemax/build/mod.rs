@@ -9,7 +9,7 @@ mod solve;
 mod zoom;
 
 use super::draft::Draft;
-use super::{breaks, glass};
+use super::{breaks, glass, gradient};
 use crate::files::error::Malformed;
 use crate::files::report::{Outcome, Report};
 use crate::lens::{Lens, Medium, Object, Row};
@@ -137,6 +137,7 @@ fn rows(draft: &Draft, stop: usize, report: &mut Report) -> Result<Vec<Row>, Mal
             report.amend(glass.line, outcome, note);
         }
         let medium = if breaks::is_break(&draft.surfaces[number]) { gap.clone() } else { medium };
+        let medium = gradient::medium(&draft.surfaces[number], draft.unit).unwrap_or(medium);
         if medium != Medium::Mirror {
             gap = medium.clone();
         }

@@ -2,6 +2,7 @@
 
 use crate::files::report::{Outcome, Report};
 use crate::files::zemax::draft::{CurvatureSolve, Draft, PickupLine, Surface};
+use crate::files::zemax::gradient;
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 
 /// Gives the lens what its numbers follow.
@@ -78,11 +79,14 @@ fn thickness(draft: &Draft, row: usize, lens: &mut Lens, report: &mut Report) {
     }
 }
 
-/// Parameter i of an even asphere is the coefficient of r^(2i).
+/// Parameter i of an even asphere is the coefficient of r^(2i); those of a gradient have places of
+/// their own.
 fn terms(surface: &Surface, row: usize, lens: &mut Lens, report: &mut Report) {
     for &(index, line) in &surface.variable_parameters {
         if surface.kind.0 == "EVENASPH" && (2..=8).contains(&index) {
             free(lens, row, Quantity::Asphere(index - 2));
+        } else if let Some(quantity) = gradient::variable(&surface.kind.0, index) {
+            free(lens, row, quantity);
         } else {
             report.amend(line, Outcome::Dropped, "this parameter cannot vary here");
         }

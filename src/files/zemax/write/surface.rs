@@ -3,6 +3,7 @@
 use super::{Export, number, numbers, one_line};
 use crate::files::report::Outcome;
 use crate::files::zemax::glass as there;
+use crate::files::zemax::gradient;
 use crate::lens::glass;
 use crate::lens::{Aperture, Medium, Object, Parameter, Pickup, Quantity, Row};
 
@@ -42,7 +43,12 @@ impl Export {
             self.inner("STOP");
         }
         let aspheric = row.asphere.iter().any(|a| *a != 0.0);
-        self.inner(if aspheric { "TYPE EVENASPH" } else { "TYPE STANDARD" });
+        let graded = self.gradient(i, aspheric);
+        self.inner(match (aspheric, graded.is_some()) {
+            (true, _) => "TYPE EVENASPH".to_owned(),
+            (false, true) => format!("TYPE {}", gradient::KIND),
+            (false, false) => "TYPE STANDARD".to_owned(),
+        });
         if !row.comment.is_empty() {
             self.inner(format!("COMM {}", one_line(&row.comment)));
         }
@@ -56,13 +62,34 @@ impl Export {
         if aspheric {
             self.terms(i, &row.asphere);
         }
+        let mut varying = Vec::new();
+        for (number, value) in graded.iter().flatten() {
+            self.inner(format!("PARM {number} {}", super::number(*value)));
+            let quantity = gradient::variable(gradient::KIND, *number);
+            if quantity.is_some_and(|quantity| self.is_variable(i, quantity)) {
+                varying.push(*number);
+            }
+        }
+        for number in varying {
+            self.inner(format!("VPAR {number}"));
+        }
         self.thickness(i, row.thickness);
         let variable = self.is_variable(i, Quantity::Index);
-        self.glass(&row.medium, &format!("after surface {i}"), variable);
+        if graded.is_none() {
+            self.glass(&row.medium, &format!("after surface {i}"), variable);
+        }
         self.semi_diameter(&row);
         if row.hyper {
             let note = "the far half of the surface counts there or not, as the program decides";
             self.note(Outcome::Dropped, format!("hyper of surface {i}"), note);
+        }
+    }
+
+    /// The parameters of a surface whose gap is a gradient that the format can say.
+    fn gradient(&self, i: usize, aspheric: bool) -> Option<Vec<(usize, f64)>> {
+        match &self.lens.surfaces[i].medium {
+            Medium::Gradient(gradient) if !aspheric => gradient::parameters(gradient),
+            _ => None,
         }
     }
 
@@ -133,6 +160,12 @@ impl Export {
                 self.note(Outcome::Approximated, format!("model glass {place}"), note);
             }
             Medium::Glass(name) => self.catalogue_glass(name, place),
+            Medium::Gradient(gradient) => {
+                self.glass(&gradient.base, place, variable);
+                let note = "only r^2 to r^6 and z to z^3 of an index without dispersion behind a conic \
+                            can be written: its coefficients are left out";
+                self.note(Outcome::Dropped, format!("gradient {place}"), note);
+            }
         }
     }
 

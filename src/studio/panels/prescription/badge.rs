@@ -194,7 +194,9 @@ impl Menu<'_> {
         let unit = match self.parameter.quantity {
             Quantity::Curvature => "curvature, 1/mm",
             Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => "mm",
-            Quantity::Conic | Quantity::Asphere(_) | Quantity::Index => "number",
+            Quantity::Conic | Quantity::Asphere(_) | Quantity::Index | Quantity::Gradient(_) => {
+                "number"
+            }
         };
         ui.weak(format!("Bounds, {unit}; empty for none"));
         let limit =

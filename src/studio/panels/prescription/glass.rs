@@ -1,6 +1,6 @@
 //! A medium as text: a catalogue name, `nd vd`, an index, `mirror`, or nothing for air.
 
-use crate::lens::{Medium, glass};
+use crate::lens::{Gradient, Law, Medium, glass};
 use crate::studio::number;
 
 /// How many glasses are proposed while one types.
@@ -14,7 +14,49 @@ pub(super) fn show(medium: &Medium) -> String {
         Medium::Model { nd, vd } => format!("{} {}", number::show(*nd), number::show(*vd)),
         Medium::Index(n) => number::show(*n),
         Medium::Mirror => "MIRROR".to_owned(),
+        Medium::Gradient(gradient) => show_gradient(gradient),
     }
+}
+
+/// `gradient 1.6 r -0.01 0.0002 z 0.01`, with `square` or `sech` in front of the glass.
+fn show_gradient(gradient: &Gradient) -> String {
+    let law = match gradient.law {
+        Law::Index => "",
+        Law::Square => "square ",
+        Law::Sech => "sech ",
+    };
+    let list = |name: &str, terms: &[f64]| {
+        let words = terms.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+        if terms.is_empty() { String::new() } else { format!(" {name} {words}") }
+    };
+    let base = show(&gradient.base);
+    format!("gradient {law}{base}{}{}", list("r", &gradient.radial), list("z", &gradient.axial))
+}
+
+/// What such a text means; `None` where it is none.
+fn parse_gradient(text: &str) -> Option<Medium> {
+    let mut words = text.strip_prefix("gradient ")?.split_whitespace().peekable();
+    let law = match words.peek() {
+        Some(&"square") => Law::Square,
+        Some(&"sech") => Law::Sech,
+        _ => Law::Index,
+    };
+    if law != Law::Index {
+        words.next();
+    }
+    let mut parts: [Vec<&str>; 3] = Default::default();
+    let mut part = 0;
+    for word in words {
+        match word {
+            "r" => part = 1,
+            "z" => part = 2,
+            _ => parts[part].push(word),
+        }
+    }
+    let numbers = |words: &[&str]| words.iter().map(|word| word.parse().ok()).collect();
+    let (radial, axial): (Option<Vec<f64>>, _) = (numbers(&parts[1]), numbers(&parts[2]));
+    let base = parse(&parts[0].join(" "));
+    Some(Medium::Gradient(Box::new(Gradient { base, law, radial: radial?, axial: axial? })))
 }
 
 /// What a cell means. A name that is in no catalogue is kept, so that the lens can say so.
@@ -25,6 +67,9 @@ pub(super) fn parse(text: &str) -> Medium {
     }
     if text.eq_ignore_ascii_case("mirror") {
         return Medium::Mirror;
+    }
+    if let Some(gradient) = parse_gradient(text) {
+        return gradient;
     }
     let numbers: Vec<Option<f64>> = text
         .split([' ', '/', ':', ';'])
@@ -68,12 +113,27 @@ pub(super) fn describe(medium: &Medium) -> String {
         Medium::Model { nd, vd } => format!("Model glass: nd {nd}, vd {vd}"),
         Medium::Index(n) => format!("Index {n} at every wavelength"),
         Medium::Mirror => "A mirror: the gap behind it is filled like the one before it".to_owned(),
+        Medium::Gradient(gradient) => format!(
+            "A gradient of the {} on this glass: coefficients of r^2, r^4, ... after `r`, of z, z^2, \
+             ... after `z`, which counts from this surface. {}",
+            match gradient.law {
+                Law::Index => "index",
+                Law::Square => "square of the index",
+                Law::Sech => "index as a hyperbolic secant, its constant after `r`,",
+            },
+            describe(&gradient.base)
+        ),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn gradient(law: Law, base: Medium, radial: &[f64], axial: &[f64]) -> Medium {
+        let (radial, axial) = (radial.to_vec(), axial.to_vec());
+        Medium::Gradient(Box::new(Gradient { base, law, radial, axial }))
+    }
 
     #[test]
     fn a_medium_is_read_as_it_is_shown() {
@@ -83,6 +143,9 @@ mod tests {
             Medium::Index(1.5),
             Medium::Model { nd: 1.62, vd: 36.4 },
             Medium::Glass("SCHOTT N-BK7".into()),
+            gradient(Law::Index, Medium::Index(1.6), &[-0.01, 2e-7], &[0.1 + 0.2]),
+            gradient(Law::Sech, Medium::Glass("SCHOTT N-BK7".into()), &[0.3], &[]),
+            gradient(Law::Square, Medium::Model { nd: 1.62, vd: 36.4 }, &[], &[-0.5]),
         ];
         for medium in media {
             assert_eq!(parse(&show(&medium)), medium);

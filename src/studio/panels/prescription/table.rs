@@ -116,6 +116,7 @@ pub(super) fn name_of(parameter: Parameter) -> String {
         Quantity::SemiDiameter => "Semi-diameter",
         Quantity::Conic => "Conic",
         Quantity::Index => "Index",
+        Quantity::Gradient(_) => "Gradient",
         Quantity::Asphere(term) => Column::Asphere(term).title(),
     };
     format!("{what} of surface {}", parameter.surface + 1)
@@ -504,7 +505,9 @@ fn tint(ui: &Ui, medium: &Medium) -> Option<Color32> {
     let [r, g, b, _] = match medium {
         Medium::Air => return None,
         Medium::Mirror => palette.mirror,
-        Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) => palette.glass,
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) | Medium::Gradient(_) => {
+            palette.glass
+        }
     };
     Some(color32([r, g, b, 30]))
 }

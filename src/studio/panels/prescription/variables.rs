@@ -7,13 +7,14 @@ use crate::session::{Command, Edit};
 use crate::studio::panels::freed;
 
 /// What can be freed at once.
-const KINDS: [(&str, NumberKind); 6] = [
+const KINDS: [(&str, NumberKind); 7] = [
     ("Free every radius", NumberKind::Curvatures),
     ("Free every thickness", NumberKind::Thicknesses),
     ("Free every semi-diameter", NumberKind::SemiDiameters),
     ("Free every conic constant that is not 0", NumberKind::Conics),
     ("Free every asphere coefficient", NumberKind::Aspheres),
     ("Free every index that is no catalogue glass's", NumberKind::Indices),
+    ("Free every gradient coefficient", NumberKind::Gradients),
 ];
 
 /// How many numbers are variable, with a menu to free or fix many at once, as one undo step.

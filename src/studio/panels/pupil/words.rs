@@ -37,6 +37,9 @@ pub(super) const fn hint(limit: Limit) -> &'static str {
         Limit::Surface(_, Hurdle::Reflection) => {
             "Rays beyond are totally reflected at this surface. Click to point it out."
         }
+        Limit::Surface(_, Hurdle::Side) => {
+            "Rays beyond leave the gradient in front of this surface through its side."
+        }
         Limit::Unaimed => "No ray is found beyond that crosses the stop.",
     }
 }
@@ -127,6 +130,7 @@ impl Shown<'_> {
             Limit::Surface(i, Hurdle::Obstruction) => format!("{} obstructs", i + 1),
             Limit::Surface(i, Hurdle::Miss | Hurdle::Equator) => format!("{} missed", i + 1),
             Limit::Surface(i, Hurdle::Reflection) => format!("{} TIR", i + 1),
+            Limit::Surface(i, Hurdle::Side) => format!("side before {}", i + 1),
             Limit::Unaimed => "unaimed".to_owned(),
         };
         format!("{who} {:.0} %", 100.0 * share)
@@ -160,6 +164,9 @@ impl Shown<'_> {
         let (what, repair) = match fate {
             Fate::Clipped(_) => ("clips", "Make its semi-diameter larger or the field smaller."),
             Fate::Missed(_) => ("is missed by", "Bend it less or make the field smaller."),
+            Fate::Turned(_) | Fate::Trapped(_) => {
+                ("is not reached through the gradient by", "Weaken the gradient.")
+            }
             Fate::TotalReflection(_) | Fate::Imaged => {
                 ("totally reflects", "Bend it less or make the field smaller.")
             }

@@ -1,0 +1,305 @@
+//! The profile of a gradient-index lens: a polynomial in r², a polynomial in z, added.
+//!
+//! What the standard profiles of lens design have in common (Marchand, *Gradient Index Optics*,
+//! 1978, chapter 4): `u(r, z) = B + Σ aᵢ r²ⁱ + Σ bⱼ zʲ`, where `u` is the index or its square, or
+//! the hyperbolic secant in place of the radial polynomial. A ray needs `η²` and the force
+//! `η ∇η = ∇(η²)/2` only, so that the square costs no root.
+
+use super::{Profile, Sech};
+use crate::math::{Real, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// How many coefficients of even powers of r there may be: r² to r¹².
+pub const RADIAL_TERMS: usize = 6;
+/// How many coefficients of powers of z there may be: z to z⁴.
+pub const AXIAL_TERMS: usize = 4;
+/// All of them, the radial ones first.
+pub const GRADE_TERMS: usize = RADIAL_TERMS + AXIAL_TERMS;
+
+/// What the coefficients build.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Law {
+    /// The index: `n = n₀ + Σ aᵢ r²ⁱ + Σ bⱼ zʲ`.
+    #[default]
+    Index,
+    /// Its square: `n² = n₀² + Σ aᵢ r²ⁱ + Σ bⱼ zʲ`.
+    Square,
+    /// `n = n₀ / cosh(a₁ r) + Σ bⱼ zʲ`; the other radial coefficients mean nothing.
+    Sech,
+}
+
+/// Coefficients of a gradient, without the index to which they are added.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grade<R> {
+    /// What they build.
+    pub law: Law,
+    /// The radial ones, r² to r¹², then the axial ones, z to z⁴.
+    pub terms: [R; GRADE_TERMS],
+    /// Where z = 0 of the polynomial lies, and whether it counts towards +z or −z (±1): the
+    /// polynomial is one in `origin + sense z`.
+    pub origin: R,
+    /// See there.
+    pub sense: R,
+    /// How many radial and how many axial coefficients count; those behind are zero and cost
+    /// nothing.
+    pub used: [usize; 2],
+    /// How far from the axis it is used, for the plan of the step; infinite where nobody says.
+    pub reach: f64,
+}
+
+impl<R: Real> Grade<R> {
+    /// Coefficients that count from the vertex in front.
+    pub fn new(law: Law, terms: [R; GRADE_TERMS]) -> Self {
+        let count = |part: &[R]| part.iter().rposition(|a| a.value() != 0.0).map_or(0, |i| i + 1);
+        let (radial, axial) = terms.split_at(RADIAL_TERMS);
+        let used = [count(radial), count(axial)];
+        Self { law, terms, origin: R::ZERO, sense: R::ONE, used, reach: f64::INFINITY }
+    }
+
+    /// The same with a coefficient that counts even where it is zero.
+    #[must_use]
+    pub fn using(mut self, k: usize) -> Self {
+        let (part, count) = if k < RADIAL_TERMS { (0, k + 1) } else { (1, k + 1 - RADIAL_TERMS) };
+        self.used[part] = self.used[part].max(count);
+        self
+    }
+
+    /// Whether the index is the same everywhere.
+    pub fn is_constant(&self) -> bool {
+        self.terms.iter().all(|term| term.value() == 0.0)
+    }
+
+    /// The same with every number mapped.
+    pub fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Grade<S> {
+        let Self { law, terms, origin, sense, used, reach } = *self;
+        Grade { law, terms: terms.map(&f), origin: f(origin), sense: f(sense), used, reach }
+    }
+
+    /// The same gradient met from the other end of a gap of this thickness.
+    #[must_use]
+    pub fn turned(self, thickness: R) -> Self {
+        Self { origin: self.origin + self.sense * thickness, sense: -self.sense, ..self }
+    }
+}
+
+/// `η²` at a point and the force `η ∇η`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Force<R> {
+    /// `η²`.
+    pub square: R,
+    /// `η ∇η`.
+    pub force: Vec3<R>,
+}
+
+/// A gradient with the index to which it is added.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Graded<R> {
+    /// The index on the axis at z = 0.
+    pub base: R,
+    /// Everything else.
+    pub grade: Grade<R>,
+}
+
+/// A polynomial without a constant term and its first two derivatives.
+#[inline(always)]
+fn polynomial<R: Real>(terms: &[R], s: R) -> [R; 3] {
+    let (mut value, mut slope, mut half_bend) = (R::ZERO, R::ZERO, R::ZERO);
+    for term in terms.iter().rev().copied().chain([R::ZERO]) {
+        half_bend = half_bend * s + slope;
+        slope = slope * s + value;
+        value = value * s + term;
+    }
+    [value, slope, half_bend + half_bend]
+}
+
+/// `u`, its derivatives by r² and by z, and the second ones.
+struct Built<R> {
+    value: R,
+    by_s: R,
+    by_z: R,
+    by_ss: R,
+    by_zz: R,
+}
+
+impl<R: Real> Graded<R> {
+    fn coordinates(&self, at: Vec3<R>) -> (R, R) {
+        (at.x * at.x + at.y * at.y, self.grade.origin + self.grade.sense * at.z)
+    }
+
+    fn secant(&self) -> Sech<R> {
+        Sech::new(self.base, self.grade.terms[0])
+    }
+
+    #[inline(always)]
+    fn build(&self, at: Vec3<R>) -> Built<R> {
+        let (s, z) = self.coordinates(at);
+        let (radial, axial) = self.grade.terms.split_at(RADIAL_TERMS);
+        let (radial, axial) = (&radial[..self.grade.used[0]], &axial[..self.grade.used[1]]);
+        let [base, by_s, by_ss] = match self.grade.law {
+            Law::Index => add(self.base, polynomial(radial, s)),
+            Law::Square => add(self.base * self.base, polynomial(radial, s)),
+            Law::Sech => {
+                let f = self.secant().at(s);
+                [f.value, f.slope, f.bend]
+            }
+        };
+        let [along, by_z, by_zz] = polynomial(axial, z);
+        Built { value: base + along, by_s, by_z: by_z * self.grade.sense, by_ss, by_zz }
+    }
+
+    #[inline(always)]
+    fn climb(at: Vec3<R>, built: &Built<R>) -> Vec3<R> {
+        let across = built.by_s + built.by_s;
+        Vec3::new(at.x * across, at.y * across, built.by_z)
+    }
+
+    /// `η²` and `η ∇η` at a point.
+    #[inline(always)]
+    pub fn force(&self, at: Vec3<R>) -> Force<R> {
+        let built = self.build(at);
+        let climb = Self::climb(at, &built);
+        match self.grade.law {
+            Law::Square => Force { square: built.value, force: climb * R::from_f64(0.5) },
+            Law::Index | Law::Sech => {
+                Force { square: built.value * built.value, force: climb * built.value }
+            }
+        }
+    }
+
+    /// The index at a point; not a number where its square is negative.
+    pub fn index(&self, at: Vec3<R>) -> R {
+        let value = self.build(at).value;
+        if self.grade.law == Law::Square { value.sqrt() } else { value }
+    }
+
+    /// The derivative of the force along a direction, which is also its transpose.
+    #[inline(always)]
+    pub fn bend(&self, at: Vec3<R>, along: Vec3<R>) -> Vec3<R> {
+        let built = self.build(at);
+        let outward = at.x * along.x + at.y * along.y;
+        let four = R::from_f64(4.0);
+        let (across, radial) = (built.by_s + built.by_s, built.by_ss * outward * four);
+        let curved = Vec3::new(
+            along.x * across + at.x * radial,
+            along.y * across + at.y * radial,
+            along.z * built.by_zz,
+        );
+        match self.grade.law {
+            Law::Square => curved * R::from_f64(0.5),
+            Law::Index | Law::Sech => {
+                let climb = Self::climb(at, &built);
+                curved * built.value + climb * climb.dot(along)
+            }
+        }
+    }
+
+    /// Adds the derivatives of `weight η² + pull · η ∇η` by the index on the axis and by every
+    /// coefficient.
+    #[inline(always)]
+    pub fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, by: &mut GradeSlopes<R>) {
+        let (s, z) = self.coordinates(at);
+        let built = self.build(at);
+        // By the value and by the gradient of u.
+        let (by_value, by_climb) = match self.grade.law {
+            Law::Square => (weight, pull * R::from_f64(0.5)),
+            Law::Index | Law::Sech => {
+                let climb = Self::climb(at, &built);
+                (R::TWO * weight * built.value + pull.dot(climb), pull * built.value)
+            }
+        };
+        let by_slope = R::TWO * (by_climb.x * at.x + by_climb.y * at.y);
+        let (radial, axial) = by.terms.split_at_mut(RADIAL_TERMS);
+        match self.grade.law {
+            Law::Index => by.base += by_value,
+            Law::Square => by.base += R::TWO * self.base * by_value,
+            Law::Sech => {
+                let mut pair = [R::ZERO; 2];
+                self.secant().deposit(s, by_value, by_slope, &mut pair);
+                by.base += pair[0];
+                radial[0] += pair[1];
+            }
+        }
+        if self.grade.law != Law::Sech {
+            powers(s, by_value, by_slope, radial);
+        }
+        powers(z, by_value, by_climb.z * self.grade.sense, axial);
+    }
+}
+
+/// Derivatives by the numbers of a gradient.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct GradeSlopes<R> {
+    /// By the index on the axis at z = 0.
+    pub base: R,
+    /// By the coefficients.
+    pub terms: [R; GRADE_TERMS],
+}
+
+fn add<R: Real>(base: R, [value, slope, bend]: [R; 3]) -> [R; 3] {
+    [base + value, slope, bend]
+}
+
+/// Adds `value sᵏ + slope k sᵏ⁻¹` for the powers from the first on.
+#[inline(always)]
+fn powers<R: Real>(s: R, value: R, slope: R, by: &mut [R]) {
+    let (mut power, mut derived) = (s, R::ONE);
+    for g in by {
+        *g += value * power + slope * derived;
+        derived = derived * s + power;
+        power = power * s;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Dual;
+
+    /// Derivatives by three coordinates, the base and every coefficient.
+    type All = Dual<f64, { 4 + GRADE_TERMS }>;
+
+    fn graded(law: Law) -> Graded<f64> {
+        let radial = [-0.09, 0.004, -3e-4, 1e-4, -2e-5, 1e-5];
+        let axial = [0.03, -0.02, 0.005, 1e-3];
+        let terms = std::array::from_fn(|i| if i < 6 { radial[i] } else { axial[i - 6] });
+        Graded { base: 1.6, grade: Grade::new(law, terms).turned(0.7) }
+    }
+
+    #[test]
+    fn grin_every_derivative_of_a_graded_profile_is_that_of_dual_numbers() {
+        let at = Vec3::new(0.4, -0.7, 1.1);
+        for law in [Law::Index, Law::Square, Law::Sech] {
+            let plain = graded(law);
+            let mut dual: Graded<All> =
+                Graded { base: All::variable(1.6, 3), grade: plain.grade.map(All::constant) };
+            for (i, term) in dual.grade.terms.iter_mut().enumerate() {
+                *term = All::variable(term.value, 4 + i);
+            }
+            let x =
+                Vec3::new(All::variable(at.x, 0), All::variable(at.y, 1), All::variable(at.z, 2));
+            let Force { square, force } = dual.force(x);
+            let here = plain.force(at);
+            assert!((here.square.sqrt() - plain.index(at)).abs() < 1e-15);
+            let half = Vec3::new(square.slope[0], square.slope[1], square.slope[2]) * 0.5;
+            let off = half - here.force;
+            assert!(off.dot(off).sqrt() < 1e-14, "{law:?} {off:?}");
+            let (weight, pull) = (0.3, Vec3::new(0.7, -0.2, 0.9));
+            let bent = plain.bend(at, pull);
+            let rows = [force.x, force.y, force.z];
+            let expected = |i: usize| {
+                pull.x * rows[0].slope[i] + pull.y * rows[1].slope[i] + pull.z * rows[2].slope[i]
+            };
+            for (i, found) in [bent.x, bent.y, bent.z].into_iter().enumerate() {
+                assert!((found - expected(i)).abs() < 1e-13, "{law:?} {i}: {found}");
+            }
+            let mut by = GradeSlopes::default();
+            plain.deposit(at, weight, pull, &mut by);
+            let all = std::iter::once(by.base).chain(by.terms);
+            for (i, found) in all.enumerate() {
+                let expected = weight * square.slope[3 + i] + expected(3 + i);
+                assert!((found - expected).abs() < 1e-13, "{law:?} {i}: {found} {expected}");
+            }
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! A gradient-index medium as it is written: a glass and how its index varies from place to place.
+
+use super::{Lens, Medium, Row};
+use crate::grin::field::{AXIAL_TERMS, GRADE_TERMS, Grade, Graded, Law, RADIAL_TERMS};
+use crate::math::{Real, Vec3};
+
+/// A gradient: the index of a glass on the axis at the vertex in front, plus polynomials in r² and
+/// in z, which counts from that vertex (see [`Law`] for what they build).
+///
+/// The glass has its dispersion; the coefficients are the same at every wavelength.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gradient {
+    /// The glass on the axis at z = 0: a catalogue glass, a model glass or an index.
+    pub base: Medium,
+    /// What the coefficients build.
+    pub law: Law,
+    /// Coefficients of r², r⁴, … r¹²; of the secant its constant alone, in 1/mm.
+    pub radial: Vec<f64>,
+    /// Coefficients of z, z², z³, z⁴.
+    pub axial: Vec<f64>,
+}
+
+impl Gradient {
+    /// All coefficients, zero where none is written.
+    pub fn terms(&self) -> [f64; GRADE_TERMS] {
+        std::array::from_fn(|k| self.term(k).unwrap_or(0.0))
+    }
+
+    /// Coefficient number `k`: 0 (r²) to 5 (r¹²), 6 (z) to 9 (z⁴); `None` where the law has none.
+    pub fn term(&self, k: usize) -> Option<f64> {
+        let (list, place) = self.place(k)?;
+        Some([&self.radial, &self.axial][list].get(place).copied().unwrap_or(0.0))
+    }
+
+    /// Writes a coefficient; `false` where the law has none.
+    pub fn set_term(&mut self, k: usize, value: f64) -> bool {
+        let Some((list, place)) = self.place(k) else { return false };
+        let terms = if list == 0 { &mut self.radial } else { &mut self.axial };
+        if terms.len() <= place {
+            terms.resize(place + 1, 0.0);
+        }
+        terms[place] = value;
+        true
+    }
+
+    /// Which of the two lists holds a coefficient, and where.
+    fn place(&self, k: usize) -> Option<(usize, usize)> {
+        let radial = if self.law == Law::Sech { 1 } else { RADIAL_TERMS };
+        match k {
+            _ if k < radial => Some((0, k)),
+            RADIAL_TERMS..GRADE_TERMS => Some((1, k - RADIAL_TERMS)),
+            _ => None,
+        }
+    }
+
+    /// The coefficients that are written, by number.
+    pub fn written(&self) -> impl Iterator<Item = usize> {
+        (0..self.radial.len()).chain((0..self.axial.len()).map(|j| RADIAL_TERMS + j))
+    }
+
+    /// The power of a length that coefficient number `k` is measured in: −2 for that of r².
+    pub fn power(&self, k: usize) -> i32 {
+        match k {
+            0 if self.law == Law::Sech => -1,
+            _ if k < RADIAL_TERMS => -2 * (k as i32 + 1),
+            _ => -(k.min(GRADE_TERMS) as i32 - RADIAL_TERMS as i32 + 1),
+        }
+    }
+
+    /// Whether the index is the same everywhere: then it is glass.
+    pub fn is_constant(&self) -> bool {
+        self.terms().iter().all(|term| *term == 0.0)
+    }
+
+    /// What is wrong with it, if anything.
+    pub(super) fn fault(&self) -> Option<String> {
+        let radial = if self.law == Law::Sech { 1 } else { RADIAL_TERMS };
+        if self.radial.len() > radial {
+            let found = self.radial.len();
+            return Some(format!("has {found} radial coefficients; expected at most {radial}"));
+        }
+        if self.axial.len() > AXIAL_TERMS {
+            let found = self.axial.len();
+            return Some(format!("has {found} axial coefficients; expected at most {AXIAL_TERMS}"));
+        }
+        if let Some(a) = self.terms().iter().find(|a| !a.is_finite()) {
+            return Some(format!("has the coefficient {a}; expected finite numbers"));
+        }
+        match self.base {
+            Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) => None,
+            Medium::Air | Medium::Mirror | Medium::Gradient(_) => {
+                Some("has no glass as its base; expected a catalogue name or an index".to_owned())
+            }
+        }
+    }
+
+    /// What a system is traced with where it varies; `reach` is how far from the axis it is used.
+    pub(super) fn grade(&self, reach: f64) -> Grade<f64> {
+        Grade { reach, ..Grade::new(self.law, self.terms()) }
+    }
+}
+
+impl Lens {
+    /// The coefficients of the gradient behind a row, even where all are zero.
+    pub fn grade(&self, surface: usize) -> Option<Grade<f64>> {
+        let row = self.surfaces.get(surface)?;
+        let Medium::Gradient(gradient) = &row.medium else { return None };
+        Some(gradient.grade(reach(row, self.surfaces.get(surface + 1))))
+    }
+}
+
+/// How far from the axis the gap between two rows is used: the wider of the two rims.
+pub(super) fn reach(front: &Row, back: Option<&Row>) -> f64 {
+    let of = |row: &Row| row.semi_diameter.unwrap_or(f64::INFINITY);
+    back.map_or(f64::INFINITY, |back| of(front).max(of(back)))
+}
+
+/// Places at which the index is looked at, from the axis to the rim and from face to face.
+const LOOKS: usize = 17;
+
+/// The lowest index of a gradient between z = 0 and `length`, up to its reach or, where that is not
+/// known, on the axis.
+pub(super) fn lowest(field: &Graded<f64>, length: f64) -> f64 {
+    let reach = if field.grade.reach.is_finite() { field.grade.reach } else { 0.0 };
+    let share = |i: usize| i as f64 / (LOOKS - 1) as f64;
+    let place = |i: usize| Vec3::new(reach * share(i % LOOKS), 0.0, length * share(i / LOOKS));
+    let all = (0..LOOKS * LOOKS).map(|i| field.index(place(i)));
+    // Not a number is lower than any.
+    all.fold(f64::INFINITY, |low, n| {
+        if n >= low {
+            low
+        } else if n.is_nan() {
+            0.0
+        } else {
+            n
+        }
+    })
+}
+
+/// What paraxial rays need to know of a gradient at a place on its axis: the index `n` there, and
+/// `c` of the force `n ∂n/∂r = c r` across the axis.
+fn on_axis<R: Real>(field: &Graded<R>, z: R) -> (R, R) {
+    let at = Vec3::new(R::ZERO, R::ZERO, z);
+    let across = Vec3::new(R::ONE, R::ZERO, R::ZERO);
+    (field.index(at), field.bend(at, across).x)
+}
+
+/// Slabs of a gap in which the paraxial equations are solved: enough for twelve digits of whatever
+/// a rod of a few pitches does. A gradient across the axis alone is exact in one.
+const SLABS: usize = 128;
+
+/// A gap filled with a gradient, for paraxial rays.
+#[derive(Debug, Clone, Copy)]
+pub struct Slab<R> {
+    /// The index on the axis at its end.
+    pub index_behind: R,
+    /// From height and optical slope `n u` at its beginning to those at its end: `[[A, B], [C, D]]`.
+    pub matrix: [[R; 2]; 2],
+    /// What it adds to the Petzval sum, `−∫ 2 n₁/n² dz` where `n = n₀ + n₁ r²`.
+    pub petzval: R,
+}
+
+impl<R: Real> Slab<R> {
+    /// Solves `dy/dz = p/n`, `dp/dz = (c/n) y` through a gap of this thickness: Magnus's series to
+    /// fourth order with two Gauss points a slab (Blanes, Casas, Oteo and Ros, Phys. Rep. 470, 2009,
+    /// eq. 253), which for constant coefficients is the matrix of cosines and sines itself.
+    pub fn new(field: &Graded<R>, thickness: R) -> Self {
+        let h = thickness * R::from_f64(1.0 / SLABS as f64);
+        let half = R::from_f64(0.5);
+        let off = h * R::from_f64(3f64.sqrt() / 6.0);
+        let mut slab = Self {
+            index_behind: on_axis(field, thickness).0,
+            matrix: [[R::ONE, R::ZERO], [R::ZERO, R::ONE]],
+            petzval: R::ZERO,
+        };
+        let mut middle = h * half;
+        for _ in 0..SLABS {
+            let [(n1, c1), (n2, c2)] = [middle - off, middle + off].map(|z| on_axis(field, z));
+            let [(b1, g1), (b2, g2)] = [(n1, c1), (n2, c2)].map(|(n, c)| (R::ONE / n, c / n));
+            let mixed = h * off * half * (b2 * g1 - b1 * g2);
+            let step = exponential(mixed, (b1 + b2) * h * half, (g1 + g2) * h * half);
+            slab.matrix = times(step, slab.matrix);
+            slab.petzval -= (c1 * b1 * b1 * b1 + c2 * b2 * b2 * b2) * h * half;
+            middle += h;
+        }
+        slab
+    }
+
+    /// Height and optical slope at its end.
+    pub fn pass(&self, y: R, nu: R) -> (R, R) {
+        let [[a, b], [c, d]] = self.matrix;
+        (a * y + b * nu, c * y + d * nu)
+    }
+}
+
+/// `exp [[m, b], [c, −m]]` by its series, which needs few terms for the short slabs it is for.
+fn exponential<R: Real>(m: R, b: R, c: R) -> [[R; 2]; 2] {
+    let q = m * m + b * c;
+    // cosh √q and sinh √q / √q.
+    let (mut even, mut odd) = (R::ONE, R::ONE);
+    let (mut even_term, mut odd_term) = (R::ONE, R::ONE);
+    for k in 1..24_u32 {
+        let k = f64::from(k);
+        even_term = even_term * q * R::from_f64(1.0 / (2.0 * k * (2.0 * k - 1.0)));
+        odd_term = odd_term * q * R::from_f64(1.0 / (2.0 * k * (2.0 * k + 1.0)));
+        even += even_term;
+        odd += odd_term;
+        if even_term.value().abs() < 1e-3 * R::EPSILON && k > 4.0 {
+            break;
+        }
+    }
+    [[even + odd * m, odd * b], [odd * c, even - odd * m]]
+}
+
+fn times<R: Real>(a: [[R; 2]; 2], b: [[R; 2]; 2]) -> [[R; 2]; 2] {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
+}
