@@ -21,7 +21,7 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.6",
     title: "Mutations with paraxial projection and without, with table 4.1",
     claim: "With projection a search is more often at a lens that is better than its start",
-    seconds: 150.0,
+    seconds: 400.0,
     run,
 };
 
