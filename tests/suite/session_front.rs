@@ -24,7 +24,7 @@ const SOON: usize = 4;
 const NEVER: usize = 10_000_000;
 
 /// Waits until something has happened in the background.
-fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
+pub(crate) fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
     let mut events = Vec::new();
     for _ in 0..30_000 {
         events.extend(session.poll());

@@ -1,6 +1,7 @@
 //! A search over structure behind a session: held, steered, saved, gone on with, taken, ended.
 
 use super::merit::bundled;
+use super::session_front::wait;
 use aplanat::lens::Lens;
 use aplanat::search::{Kind, Rules, Settings, Steer, Temperature};
 use aplanat::session::{
@@ -33,19 +34,6 @@ fn explore(session: &mut Session, wish: Explore) -> Vec<Event> {
 
 fn start(session: &mut Session, moves: Option<u64>) {
     explore(session, Explore::Start(Box::new(quest(moves))));
-}
-
-/// Waits until something has happened in the background.
-fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
-    let mut events = Vec::new();
-    for _ in 0..30_000 {
-        events.extend(session.poll());
-        if happened(&session.view(), &events) {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    panic!("{what} never happened");
 }
 
 fn stands(session: &mut Session, standing: Standing) {
