@@ -29,7 +29,8 @@ pub(super) fn contours(
     (first..=last).map(of).filter(|contour| !contour.pieces.is_empty()).collect()
 }
 
-fn pieces(
+/// Straight pieces of where a raster has a value.
+pub(super) fn pieces(
     values: &[f64],
     [width, height]: [usize; 2],
     frame: [[f64; 2]; 2],

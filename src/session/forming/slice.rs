@@ -1,6 +1,6 @@
 //! A slice through a field: a quantity on a raster, its contours, the rays near it, and a profile.
 
-use super::contour::{Contour, contours};
+use super::contour::{Contour, contours, pieces};
 use super::sight::{Quantity, Sight};
 use super::subject::Subject;
 use crate::grin::Field;
@@ -53,6 +53,8 @@ pub struct Slice {
     pub contours: Vec<Contour>,
     /// The difference between two contours.
     pub spacing: f64,
+    /// Straight pieces of the boundary between the space and air, in mm, apart from the frame.
+    pub rim: Vec<[[f64; 2]; 2]>,
     /// Rays near the slice; empty for a volume.
     pub ways: Vec<Ways>,
     /// Why there are none.
@@ -91,7 +93,7 @@ pub(super) fn slice(wanted: Wanted) -> Slice {
         let (task, exact) = (subject.task.as_ref()?, subject.exact.as_ref()?);
         Some(task.difference_from(&medium, &**exact))
     });
-    let Raster { frame, size, values, range, contours, spacing, profile } = drawn.value;
+    let Raster { frame, size, values, range, contours, spacing, rim, profile } = drawn.value;
     let no_ways = ways.value.as_ref().err().map(ToString::to_string);
     Slice {
         subject,
@@ -103,6 +105,7 @@ pub(super) fn slice(wanted: Wanted) -> Slice {
         range,
         contours,
         spacing,
+        rim,
         ways: ways.value.unwrap_or_default(),
         no_ways,
         profile,
@@ -119,6 +122,7 @@ struct Raster {
     range: [f64; 2],
     contours: Vec<Contour>,
     spacing: f64,
+    rim: Vec<[[f64; 2]; 2]>,
     profile: Profile,
 }
 
@@ -135,14 +139,16 @@ impl Raster {
             sight.plane.at([share(n % size[0], 0), share(n / size[0], 1)])
         };
         let seen = |p: Vec3<f64>| if subject.contains(p) { quantity(p) } else { f64::NAN };
-        let values: Vec<f64> =
-            (0..size[0] * size[1]).into_par_iter().map(|n| seen(at(n))).collect();
+        let count = size[0] * size[1];
+        let values: Vec<f64> = (0..count).into_par_iter().map(|n| seen(at(n))).collect();
+        let heights: Vec<f64> = (0..count).map(|n| subject.height(at(n))).collect();
         let everywhere: Vec<f64> = lattice(subject.corners).into_par_iter().map(seen).collect();
         let range = range(values.iter().chain(&everywhere), sight.quantity.is_difference());
         let spacing = round((range[1] - range[0]) / CONTOURS);
         let contours = contours(&values, size, frame, range, spacing);
+        let rim = pieces(&heights, size, frame, 0.0);
         let profile = profile(subject, medium, sight.plane);
-        Self { frame, size, values, range, contours, spacing, profile }
+        Self { frame, size, values, range, contours, spacing, rim, profile }
     }
 }
 

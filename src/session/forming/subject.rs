@@ -137,8 +137,13 @@ impl Subject {
             let at = axis.of(point);
             at >= axis.of(low) && at <= axis.of(high)
         });
-        let regions = &self.regions;
-        within && (regions.is_empty() || regions.iter().any(|region| region.height(point) < 0.0))
+        within && self.height(point) < 0.0
+    }
+
+    /// Negative where light bends, whatever the corners.
+    pub(super) fn height(&self, point: Vec3<f64>) -> f64 {
+        let heights = self.regions.iter().map(|region| region.height(point));
+        heights.reduce(f64::min).unwrap_or(-1.0)
     }
 
     /// The slice through the middle across the axis that most of the light crosses least.
