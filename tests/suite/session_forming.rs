@@ -114,7 +114,9 @@ fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
     let stopped = run(&session);
     let steps = stopped.progress.as_ref().unwrap().step;
     let mut headless = Runner::new(&task).unwrap();
-    (0..steps).for_each(|_| drop(headless.step().unwrap()));
+    for _ in 0..steps {
+        headless.step().unwrap();
+    }
     headless.settle().unwrap();
     assert_eq!(*stopped.medium, *headless.best(), "after {steps} steps");
     assert_eq!(stopped.rays, headless.rays());

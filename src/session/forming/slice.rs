@@ -18,7 +18,7 @@ const LATTICE: usize = 20;
 /// Points of a profile.
 const POINTS: usize = 200;
 /// About how many contours a slice has.
-const CONTOURS: f64 = 8.0;
+const CONTOURS: f64 = 10.0;
 /// A range narrower than this part of its values is none.
 const FLAT: f64 = 1e-12;
 

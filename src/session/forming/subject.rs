@@ -4,7 +4,7 @@ use super::sight::{MOST_RAYS, Quantity, Sight};
 use crate::files;
 use crate::grin::field::Trilinear;
 use crate::grin::{Field, Region};
-use crate::grin_task::{self, Axis, Exact, Medium, Plane, Runner, Space, Task};
+use crate::grin_task::{self, Axis, Exact, FieldKind, Medium, Plane, Runner, Space, Task};
 use crate::math::Vec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -77,13 +77,14 @@ impl Subject {
         let exact = task.exact.as_ref().map(Exact::field::<f64>).transpose();
         let exact = exact.map_err(|why| format!("{file}, exact: {why}"))?;
         let spaces = || task.views.iter().map(|view| view.space.unwrap_or(task.space));
-        let corners = spaces().map(Space::corners).fold(task.space.corners(), around);
-        let regions = spaces().chain([task.space]).map(Space::region).collect();
+        let all = spaces().map(Space::corners).fold(task.space.corners(), around);
+        let end = end(task.field);
+        let regions = spaces().chain([task.space]).map(|space| cut(space, end)).collect();
         let subject = Self {
             name: task.name.clone(),
             origin: origin.clone(),
             start: runner.current().clone(),
-            corners,
+            corners: within(all, end.corners()),
             regions,
             exact,
             task: Some(task),
@@ -182,10 +183,35 @@ impl Subject {
     }
 }
 
+/// Where a field ends: beyond it, it is only continued so that a step of a ray may end there.
+fn end(kind: FieldKind) -> Space {
+    match kind {
+        FieldKind::Trilinear { half } | FieldKind::Tricubic { half } => Space::Cube { half },
+        FieldKind::Sphere { radius } => Space::Ball { radius },
+        FieldKind::Cylinder { radius } => {
+            Space::Rod { radius, from: f64::NEG_INFINITY, to: f64::INFINITY }
+        }
+    }
+}
+
+/// What is in both spaces.
+fn cut(space: Space, end: Space) -> Region<f64> {
+    let (mut both, other) = (space.region(), end.region());
+    [both.low, both.high] = within([both.low, both.high], [other.low, other.high]);
+    both.faces.extend(other.faces);
+    both
+}
+
+fn each(of: fn(f64, f64) -> f64, a: Vec3<f64>, b: Vec3<f64>) -> Vec3<f64> {
+    Vec3::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
+}
+
 /// The corners of the box around two boxes.
 fn around(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
-    let each = |of: fn(f64, f64) -> f64, a: Vec3<f64>, b: Vec3<f64>| {
-        Vec3::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
-    };
     [each(f64::min, a[0], b[0]), each(f64::max, a[1], b[1])]
+}
+
+/// The corners of what is in both boxes.
+fn within(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
+    [each(f64::max, a[0], b[0]), each(f64::min, a[1], b[1])]
 }

@@ -1,7 +1,7 @@
 //! What the colours of a slice mean: numbers beside a strip, and the rays of each view.
 
 use eframe::egui::{Align2, Color32, Mesh, Rect, RichText, Role, Sense, Shape, TextStyle, Ui};
-use eframe::egui::{WidgetInfo, pos2, vec2};
+use eframe::egui::{WidgetInfo, pos2};
 
 use super::words;
 use crate::session::Slice;
@@ -18,13 +18,12 @@ const STRIP: f32 = 14.0;
 const MARKS: usize = 5;
 const PIECES: usize = 64;
 
-/// Contours, the rim of rays, and what labels stand on: seen on every colour of a slice.
+/// Contours, and what labels stand on: seen on every colour of a slice.
 pub(super) const CONTOUR: Colour = [0, 0, 0, 120];
-pub(super) const RIM: Colour = [0, 0, 0, 150];
 pub(super) const PLATE: Color32 = Color32::from_black_alpha(150);
 
-/// Rays of views in their order: bright, and told apart by colour-blind eyes.
-const RAYS: [Colour; 6] = [
+/// Rays of views in their order, on dark and on light, and told apart by colour-blind eyes.
+const BRIGHT: [Colour; 6] = [
     [255, 255, 255, 255],
     [255, 170, 60, 255],
     [120, 215, 255, 255],
@@ -32,10 +31,23 @@ const RAYS: [Colour; 6] = [
     [170, 255, 150, 255],
     [255, 235, 130, 255],
 ];
+const DEEP: [Colour; 6] = [
+    [20, 20, 20, 255],
+    [190, 60, 0, 255],
+    [0, 70, 190, 255],
+    [150, 20, 110, 255],
+    [0, 95, 60, 255],
+    [110, 85, 0, 255],
+];
 
 /// The colour of the rays of a view.
-pub(super) const fn ray(view: usize) -> Colour {
-    RAYS[view % RAYS.len()]
+pub(super) const fn ray(view: usize, dark: bool) -> Colour {
+    if dark { BRIGHT[view % BRIGHT.len()] } else { DEEP[view % DEEP.len()] }
+}
+
+/// The rim of a ray, by which it is seen on every colour of a slice.
+pub(super) const fn rim(dark: bool) -> Colour {
+    if dark { [0, 0, 0, 150] } else { [255, 255, 255, 170] }
 }
 
 /// The colour of a value of a slice.
@@ -86,7 +98,7 @@ pub(super) fn colors(ui: &mut Ui, rect: Rect, slice: &Slice) {
 pub(super) fn rays(ui: &mut Ui, slice: &Slice) {
     let visuals = ui.visuals();
     let (weak, error) = (visuals.weak_text_color(), visuals.error_fg_color);
-    let lost = color32(Palette::of(visuals).lost);
+    let (dark, lost) = (visuals.dark_mode, color32(Palette::of(visuals).lost));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(RichText::new(words::shown(slice)).small().color(weak));
@@ -94,7 +106,7 @@ pub(super) fn rays(ui: &mut Ui, slice: &Slice) {
         for ways in slice.ways.iter().filter(|ways| !ways.ways.is_empty()) {
             let name = task.and_then(|task| task.views.get(ways.view)).map(|view| &view.name);
             ui.add_space(4.0);
-            plate(ui, color32(ray(ways.view)));
+            swatch(ui, color32(ray(ways.view, dark)));
             let text = words::rays(name.map_or("", String::as_str), ways);
             ui.label(RichText::new(text).small()).on_hover_text(words::off(ways));
             if let Some(text) = words::left_out(ways) {
@@ -108,11 +120,4 @@ pub(super) fn rays(ui: &mut Ui, slice: &Slice) {
             ui.colored_label(error, why);
         }
     });
-}
-
-/// The colour of rays on the dark that they have for a rim.
-fn plate(ui: &mut Ui, color: Color32) {
-    let (rect, _) = ui.allocate_exact_size(vec2(14.0, 9.0), Sense::hover());
-    ui.painter().rect_filled(rect, 1.0, Color32::from_gray(60));
-    ui.painter().rect_filled(rect.shrink2(vec2(1.5, 3.2)), 0.0, color);
 }

@@ -14,6 +14,7 @@ mod words;
 use eframe::egui::{Button, Frame, Margin, Panel as Side, ScrollArea, Ui};
 
 use super::Panel;
+use crate::grin_task::{Goal, View as TaskView};
 use crate::math::Vec3;
 use crate::session::{Command, Form, Formation, View};
 use crate::studio::draw::Backing;
@@ -145,11 +146,20 @@ impl GrinSlice {
     }
 
     fn pages(&mut self, ui: &mut Ui, run: &Formation) {
-        let has_task = run.subject.task.is_some();
+        let task = run.subject.task.as_ref();
+        let is_image = |view: &TaskView| matches!(view.goal, Goal::Image { .. });
+        let has_images = task.is_some_and(|task| task.views.iter().any(is_image));
+        if self.page == Page::Images && !has_images {
+            self.page = Page::Light;
+        }
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             for (page, name, hint) in PAGES {
-                let enabled = has_task || page == Page::Profile;
+                let enabled = match page {
+                    Page::Profile => true,
+                    Page::Light | Page::Loss => task.is_some(),
+                    Page::Images => has_images,
+                };
                 let button = Button::selectable(self.page == page, name);
                 if ui.add_enabled(enabled, button).on_hover_text(hint).clicked() {
                     self.page = page;

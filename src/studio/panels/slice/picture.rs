@@ -88,7 +88,7 @@ impl Picture {
 impl Drawing {
     fn new(ui: &Ui, source: Arc<Result<Slice, String>>, slice: &Slice) -> Self {
         let dark = ui.visuals().dark_mode;
-        let scene = scene(slice, &Palette::of(ui.visuals()));
+        let scene = scene(slice, &Palette::of(ui.visuals()), dark);
         let colors = ui.ctx().load_texture("slice", image(slice, dark), TextureOptions::LINEAR);
         let whole = whole(slice);
         Self { slice: source, dark, scene: Arc::new(scene), whole, colors }
@@ -133,7 +133,7 @@ fn whole(slice: &Slice) -> Bounds {
 }
 
 /// Contours, the boundary of the space, and rays.
-fn scene(slice: &Slice, palette: &Palette) -> Scene {
+fn scene(slice: &Slice, palette: &Palette, dark: bool) -> Scene {
     let mut scene = Scene::on([0; 4]);
     let line = |scene: &mut Scene, pieces: &[[[f64; 2]; 2]], width: f32, colour: Colour| {
         pieces.iter().for_each(|[a, b]| scene.line((*a).into(), (*b).into(), width, colour));
@@ -146,18 +146,19 @@ fn scene(slice: &Slice, palette: &Palette) -> Scene {
     let corners = [[left, low], [right, low], [right, high], [left, high]].map(DVec2::from);
     scene.outline(&corners, 1.0, palette.faint);
     for ways in &slice.ways {
-        ways.ways.iter().for_each(|way| draw_way(&mut scene, slice, (ways.view, way), palette));
+        let colours = [legend::ray(ways.view, dark), palette.lost, legend::rim(dark)];
+        ways.ways.iter().for_each(|way| draw_way(&mut scene, slice, way, colours));
     }
     scene
 }
 
-/// A ray with a dark rim, legible on every colour; an excluded one in red to the dot where it ends.
-fn draw_way(scene: &mut Scene, slice: &Slice, (view, way): (usize, &Way), palette: &Palette) {
+/// A ray with a rim, legible on every colour; an excluded one in red to the dot where it ends.
+fn draw_way(scene: &mut Scene, slice: &Slice, way: &Way, [ray, lost, rim]: [Colour; 3]) {
     let seen = |point: &Vec3<f64>| DVec2::from(slice.sight.plane.seen(*point));
     let points: Vec<DVec2> = way.points.iter().map(seen).collect();
     let counts = way.excluded().is_none();
-    let colour = if counts { legend::ray(view) } else { palette.lost };
-    scene.polyline(&points, 2.8, legend::RIM);
+    let colour = if counts { ray } else { lost };
+    scene.polyline(&points, 2.8, rim);
     scene.polyline(&points, 1.3, colour);
     if let Some(end) = points.last() {
         scene.dot(*end, if counts { 3.5 } else { 6.0 }, colour);
@@ -198,7 +199,7 @@ fn tidy(level: f64, spacing: f64) -> f64 {
     if level.abs() < 1e-6 * spacing { 0.0 } else { level }
 }
 
-/// Reads the field under the pointer; a click pins the place, a click on it lets it go.
+/// Reads the field under the pointer; a click pins the place.
 fn probe(ui: &Ui, shown: &Shown, slice: &Slice, pinned: &mut Option<Vec3<f64>>) {
     let painter = ui.painter_at(shown.response.rect);
     let strong = Stroke::new(1.5, Color32::WHITE);
@@ -206,16 +207,16 @@ fn probe(ui: &Ui, shown: &Shown, slice: &Slice, pinned: &mut Option<Vec3<f64>>) 
         let at = shown.on_screen(slice.sight.plane.seen(point).into());
         painter.circle(at, 4.5, legend::PLATE, strong);
     }
-    let Some((at, mm)) = shown.pointer() else { return };
+    let Some((at, _)) = shown.pointer() else { return };
     let point = slice.sight.plane.at(at.into());
-    let response = shown.response.clone().on_hover_cursor(CursorIcon::Crosshair);
-    if response.clicked() {
-        let seen = |pin: &Vec3<f64>| DVec2::from(slice.sight.plane.seen(*pin)).distance(at);
-        *pinned = if pinned.as_ref().is_some_and(|pin| seen(pin) < 6.0 * mm) {
-            None
-        } else {
-            Some(point)
-        };
+    if shown.response.clone().on_hover_cursor(CursorIcon::Crosshair).clicked() {
+        *pinned = Some(point);
     }
-    response.on_hover_text_at_pointer(words::probe(&slice.subject, &slice.medium, point));
+    let text = words::probe(&slice.subject, &slice.medium, point);
+    let font = TextStyle::Small.resolve(ui.style());
+    let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
+    let corner = shown.response.rect.right_bottom() - egui::vec2(8.0, 8.0);
+    let place = Align2::RIGHT_BOTTOM.anchor_size(corner, galley.size());
+    painter.rect_filled(place.expand(4.0), 3.0, legend::PLATE);
+    painter.galley(place.min, galley, Color32::WHITE);
 }

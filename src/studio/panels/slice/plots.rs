@@ -67,8 +67,9 @@ pub(super) fn profile(ui: &mut Ui, view: &View) {
     let now = visuals.hyperlink_color;
     let plot = plot(ui, "profile of the field")
         .x_axis_label(format!("{}, mm", profile.along))
-        .y_axis_formatter(|mark, _| {
-            let digits = (1.0 - mark.step_size.log10().floor()).clamp(0.0, 8.0) as usize;
+        .y_axis_formatter(|mark, range| {
+            let width = (range.end() - range.start()).max(1e-9);
+            let digits = (1.0 - width.log10().floor()).clamp(1.0, 10.0) as usize;
             format!("{:.digits$}", mark.value)
         });
     let shown = plot.show(ui, |plot| {

@@ -24,7 +24,7 @@ pub(super) fn standing(run: &Formation, pending: Option<Standing>) -> String {
         progress.level + 1,
         task.levels.len(),
         progress.nodes,
-        show_digits(progress.best, 3),
+        small(progress.best),
         unit(run),
     )
 }
@@ -75,7 +75,7 @@ pub(super) fn light(ui: &mut Ui, view: &View, run: &Formation) {
     search(ui, run);
     if let Some(Slice { ms: [raster, rays, exact], .. }) = slice {
         let exact = if run.subject.has_exact() {
-            format!(", exact field {exact:.1}")
+            format!(", exact field {}", show_digits(*exact, 2))
         } else {
             String::new()
         };
@@ -97,9 +97,10 @@ fn search(ui: &mut Ui, run: &Formation) {
             ui,
             "Search",
             &format!(
-                "{} rays and back in {:.1} s, {each:.2} µs each with all else",
+                "{} rays and back in {:.1} s, {} µs a ray with all else",
                 count(run.rays),
-                run.seconds
+                run.seconds,
+                show_digits(each, 3)
             ),
             "Rays traced for the loss and its gradient; the time of all steps, pauses apart",
         );
@@ -143,7 +144,7 @@ fn worth(seen: &Seen) -> String {
     match seen.result.quality {
         Some(quality) => format!("image {quality:.1} dB PSNR"),
         None if seen.result.spot.is_finite() => {
-            format!("RMS miss {} mm", show_digits(seen.result.spot, 3))
+            format!("RMS miss {} mm", small(seen.result.spot))
         }
         None => "no ray counts".to_owned(),
     }
@@ -151,7 +152,7 @@ fn worth(seen: &Seen) -> String {
 
 /// How the rays of a view are traced, and how good that is.
 fn tracing(seen: &Seen) -> String {
-    let how = format!("{}, step {} mm", seen.integrator.name(), show_digits(seen.step, 3));
+    let how = format!("{}, step {} mm", seen.integrator.name(), small(seen.step));
     match seen.error {
         Some(error) => {
             format!("{how}; halving it moves {} exits by at most {error:.1e} mm", seen.sample)
@@ -198,7 +199,7 @@ fn row(ui: &mut Ui, name: &str, text: &str, hint: &str) {
 /// The losses in one line.
 pub(super) fn losses(run: &Formation) -> String {
     let Some(progress) = &run.progress else { return String::new() };
-    let digits = |loss: f64| if loss.is_finite() { show_digits(loss, 3) } else { "-".to_owned() };
+    let digits = |loss: f64| if loss.is_finite() { small(loss) } else { "-".to_owned() };
     format!(
         "Loss {}{} in the last step, {} the best",
         digits(progress.loss),
@@ -261,7 +262,7 @@ pub(super) fn shown(slice: &Slice) -> String {
 
 /// The rays of a view that are drawn.
 pub(super) fn rays(name: &str, ways: &Ways) -> String {
-    format!("{name}: {} rays", ways.ways.len())
+    format!("{name}: {}", several(ways.ways.len(), "ray"))
 }
 
 /// How near they are to the slice.
@@ -291,7 +292,7 @@ pub(super) fn probe(subject: &Subject, medium: &Medium, point: Vec3<f64>) -> Str
     let place = [point.x, point.y, point.z].map(|v| show_digits(v, 4));
     let place = format!("x {}  y {}  z {} mm", place[0], place[1], place[2]);
     if !subject.contains(point) {
-        return format!("{place}\nair");
+        return format!("{place}\noutside of the field");
     }
     let sample = medium.field().sample(point);
     let g = sample.gradient;
@@ -302,12 +303,27 @@ pub(super) fn probe(subject: &Subject, medium: &Medium, point: Vec3<f64>) -> Str
 
 /// The place that was clicked, live while the field forms.
 pub(super) fn pinned(ui: &mut Ui, run: &Formation, pinned: &mut Option<Vec3<f64>>) {
-    let Some(point) = *pinned else { return };
     ui.horizontal(|ui| {
+        let Some(point) = *pinned else {
+            let hint = "The pointer reads the field; a click pins a place, to watch it there";
+            ui.label(RichText::new(hint).small().weak());
+            return;
+        };
+        let text = probe(&run.subject, &run.medium, point).replace('\n', "   ");
+        ui.label(RichText::new("Pinned").small().weak());
+        ui.label(RichText::new(text).small());
         if ui.small_button("Unpin").clicked() {
             *pinned = None;
         }
-        let text = probe(&run.subject, &run.medium, point).replace('\n', "   ");
-        ui.add(Label::new(RichText::new(text).small().monospace()).truncate());
     });
+}
+
+/// A number that may be very small.
+fn small(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 { format!("{value:.2e}") } else { show_digits(value, 3) }
+}
+
+/// So many of something.
+fn several(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
