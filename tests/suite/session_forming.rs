@@ -247,6 +247,37 @@ fn images_of_a_display_stand_beside_their_pictures() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
+#[test]
+fn rays_that_do_not_count_are_drawn_and_counted_with_their_reason() {
+    let folder = folder("excluded");
+    let path = folder.join("task.json");
+    let mut task = coarse("display", &[Level { nodes: 4, steps: 2 }]);
+    for view in &mut task.views {
+        if let grin_task::Source::Beam { rays, half, .. } = &mut view.source {
+            (*rays, *half) = (32, 1.5);
+        }
+    }
+    write_task(&path, &task);
+    let mut session = session();
+    form(&mut session, Form::Watch(true));
+    open(&mut session, &path);
+    for ways in slice(&mut session).ways {
+        let (lost, there): (Vec<_>, Vec<_>) =
+            ways.ways.iter().partition(|way| way.excluded().is_some());
+        assert!(lost.len() >= 2 && there.len() >= 4, "{} and {}", lost.len(), there.len());
+        assert!(lost.iter().all(|way| way.excluded() == Some("never_entered")));
+        assert!(ways.ways.iter().all(|way| way.points.len() >= 2));
+    }
+    wait(&mut session, "all light", |view, _| view.forming.sighting.is_some());
+    let sighting = forming(&session).sighting.unwrap();
+    for seen in &sighting.as_ref().as_ref().unwrap().views.value {
+        let excluded: Vec<_> = seen.result.counts.excluded().collect();
+        let [("never_entered", count)] = excluded[..] else { panic!("{excluded:?}") };
+        assert_eq!(seen.result.counts.counted() + count, 32 * 32);
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
 /// A volume of so many nodes along each axis.
 fn volume(counts: [usize; 3], value: impl Fn(usize) -> f64) -> Volume {
     let grid = Grid::new(counts, Vec3::default(), Vec3::new(0.5, 0.5, 0.5)).unwrap();

@@ -9,6 +9,9 @@ use crate::math::Vec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+/// Two planes hold the same light where the sines of its angles to them differ by less.
+const ROUGH: f64 = 0.1;
+
 /// Where something open comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
@@ -161,7 +164,9 @@ impl Subject {
         };
         // In this order where several will do: a drawing with the light to the right comes first.
         let order = [Axis::Y, Axis::X, Axis::Z];
-        let axis = order.into_iter().min_by(|a, b| share(*a).total_cmp(&share(*b)));
+        // Beams of even directions are in no plane quite as much as in another.
+        let rough = |axis: &Axis| (share(*axis) / ROUGH).round();
+        let axis = order.into_iter().min_by(|a, b| rough(a).total_cmp(&rough(b)));
         let axis = axis.unwrap_or(Axis::Y);
         self.held(Sight { plane: Plane { axis, depth: self.middle(axis) }, ..Sight::default() })
     }

@@ -29,9 +29,10 @@ const WHAT: &str = "Which field of refractive index bends light as a task wants 
     from a file is shown alike. Nothing is computed before something is open.";
 
 /// The width of the numbers beside the picture; with less room than the second number they stand
-/// below it.
+/// below it, and with less height than the third there are none.
 const NUMBERS: f32 = 330.0;
 const ROOMY: f32 = 640.0;
+const HIGH: f32 = 240.0;
 
 /// A page of the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -123,14 +124,16 @@ impl GrinSlice {
         }
     }
 
-    /// The numbers, beside the picture or below it.
+    /// The numbers, beside the picture or below it, where there is room.
     fn beside(&mut self, ui: &mut Ui, view: &View, run: &Formation) {
         let frame = Frame::new().inner_margin(Margin { left: 8, top: 2, ..Margin::ZERO });
         let side = if ui.available_width() >= ROOMY {
             Side::right("numbers of the field").default_size(NUMBERS).size_range(240.0..=560.0)
-        } else {
+        } else if ui.available_height() >= HIGH {
             let half = 0.45 * ui.available_height();
             Side::bottom("numbers below the field").exact_size(half)
+        } else {
+            return;
         };
         side.frame(frame).show(ui, |ui| {
             self.pages(ui, run);
