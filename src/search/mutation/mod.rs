@@ -121,7 +121,11 @@ pub struct Mutant {
 
 impl From<Mutant> for Mutated<Lens> {
     fn from(mutant: Mutant) -> Self {
-        let Mutant { lens, kind, what, log_ratio, .. } = mutant;
+        let Mutant { lens, kind, what, projection, log_ratio, .. } = mutant;
+        let what = match projection {
+            Some(projection) => format!("{what}; {projection}"),
+            None => what,
+        };
         Self { point: lens, kind, what, log_ratio }
     }
 }

@@ -22,6 +22,7 @@ pub(super) use model::scale;
 use model::{Coordinate, Model};
 use serde::Serialize;
 use solve::{Bounds, Solution};
+use std::fmt::{self, Display};
 
 /// What a projection did.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -35,6 +36,16 @@ pub struct Projection {
     pub curvature: f64,
     /// The largest change of a distance, in mm.
     pub distance: f64,
+}
+
+impl Display for Projection {
+    /// What it took, in words.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { steps, curvature, distance, .. } = self;
+        let ending = if *steps == 1 { "" } else { "s" };
+        write!(f, "kept in focus in {steps} step{ending}, ")?;
+        write!(f, "curvatures by {curvature:.1e}/mm, gaps by {distance:.1e} mm at most")
+    }
 }
 
 /// Why a lens cannot be made to focus as another one does.

@@ -7,7 +7,7 @@ use aplanat::files;
 use aplanat::lens::{Lens, NumberKind, Parameter, Quantity, Row, Variable, vary};
 use aplanat::lens::{Medium, Object};
 use aplanat::paraxial::{paraxial_ray, signed_indices};
-use aplanat::search::{Kind, Mutant, Rules, mutate};
+use aplanat::search::{Kind, Mutant, Mutated, Rules, mutate};
 use nalgebra::DMatrix;
 
 /// Height and `nu` of the marginal ray at the image, at every zoom position.
@@ -210,4 +210,17 @@ fn a_zoom_lens_keeps_every_position() {
         made += usize::from(glass);
     }
     assert_eq!(made, 20);
+}
+
+#[test]
+fn the_family_tells_how_a_lens_was_projected() {
+    let lens = bundled("double_gauss_nikkor_s_50");
+    let mut random = seeded(3);
+    let new = mutate(Kind::AddSinglet, &lens, &Rules::default(), &mut random);
+    let told: Mutated<Lens> = new.unwrap().into();
+    assert!(told.what.contains("; kept in focus in"), "{}", told.what);
+    let rules = Rules { projection: false, ..Rules::default() };
+    let new = mutate(Kind::AddSinglet, &lens, &rules, &mut random);
+    let told: Mutated<Lens> = new.unwrap().into();
+    assert!(!told.what.contains("kept in focus"), "{}", told.what);
 }
