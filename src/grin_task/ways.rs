@@ -77,12 +77,7 @@ impl Task {
 }
 
 /// Some rays of one beam or point nearest to a plane, well apart; and how far off it they are.
-fn handful(
-    rays: &[Ray<f64>],
-    plane: Plane,
-    space: Space,
-    count: usize,
-) -> (Vec<Ray<f64>>, f64) {
+fn handful(rays: &[Ray<f64>], plane: Plane, space: Space, count: usize) -> (Vec<Ray<f64>>, f64) {
     let [low, high] = space.corners();
     let (centre, reach) = ((low + high) * 0.5, 0.5 * space.diameter());
     let nearest = |ray: &Ray<f64>| {
@@ -152,12 +147,7 @@ fn apart(places: &[[f64; 4]], count: usize) -> Vec<usize> {
 }
 
 /// The points of a way, from shortly before the space on.
-fn points(
-    ray: &Ray<f64>,
-    states: &[State<f64>],
-    exit: &Exit<f64>,
-    space: Space,
-) -> Vec<Vec3<f64>> {
+fn points(ray: &Ray<f64>, states: &[State<f64>], exit: &Exit<f64>, space: Space) -> Vec<Vec3<f64>> {
     let size = space.diameter();
     let direction = ray.v * (1.0 / length(ray.v));
     let Some(first) = states.first() else {
@@ -195,9 +185,7 @@ fn hermite(pair: &[State<f64>], t: f64) -> Vec3<f64> {
     // The ray moves by |v| times the step.
     let step = 2.0 * length(b.x - a.x) / (length(a.v) + length(b.v));
     let s = 1.0 - t;
-    a.x * (s * s * (1.0 + 2.0 * t))
-        + a.v * (step * t * s * s)
-        + b.x * (t * t * (1.0 + 2.0 * s))
+    a.x * (s * s * (1.0 + 2.0 * t)) + a.v * (step * t * s * s) + b.x * (t * t * (1.0 + 2.0 * s))
         - b.v * (step * t * t * s)
 }
 
@@ -209,12 +197,10 @@ mod tests {
     /// Two beams, one in the plane across y and one out of it.
     fn beams() -> Vec<Ray<f64>> {
         let at = |i: usize| 0.1 * (i as f64 - 5.0);
-        let within = (0..11).map(|i| Ray {
-            x: Vec3::new(at(i), 0.01 * at(i), -2.0),
-            v: Vec3::new(0.0, 0.0, 1.0),
-        });
-        let without = (0..11)
-            .map(|i| Ray { x: Vec3::new(at(i), -2.0, 0.0), v: Vec3::new(0.0, 1.0, 0.0) });
+        let within = (0..11)
+            .map(|i| Ray { x: Vec3::new(at(i), 0.01 * at(i), -2.0), v: Vec3::new(0.0, 0.0, 1.0) });
+        let without =
+            (0..11).map(|i| Ray { x: Vec3::new(at(i), -2.0, 0.0), v: Vec3::new(0.0, 1.0, 0.0) });
         within.chain(without).collect()
     }
 
