@@ -104,17 +104,19 @@ impl Drawing {
     fn pixel(&self, n: usize, pixels: usize) -> f64 {
         let fine = (pixels * FINE) as f64;
         let at = |pixel: usize, k: usize| 2.0 * ((pixel * FINE + k) as f64 + 0.5) / fine - 1.0;
-        let lit = |k: usize| self.light(at(n % pixels, k % FINE), at(n / pixels, k / FINE));
+        let lit =
+            |k: usize| self.light(at(n % pixels, k % FINE), at(n / pixels, k / FINE), k as f64);
         (0..FINE * FINE).map(lit).sum::<f64>() / (FINE * FINE) as f64
     }
 
-    /// The light at a point of the square from -1 to 1: soft edges on a dim ground.
-    fn light(&self, x: f64, y: f64) -> f64 {
+    /// The light at a point of the square from -1 to 1: soft edges on a dim ground. Points of a pixel
+    /// have circles of confusion that are turned against each other.
+    fn light(&self, x: f64, y: f64, turn: f64) -> f64 {
         let drawn = match self {
             Self::Face => face(x, y),
             Self::Letter => letter(x, y),
             Self::Ring => edge((x.hypot(y) - 0.6).abs() - 0.08),
-            Self::Scene(focus) => scene(x, y, *focus),
+            Self::Scene(focus) => scene([x, y], *focus, turn),
             Self::File(_) => 0.0,
         };
         DIM + (1.0 - DIM) * drawn
@@ -142,30 +144,27 @@ fn letter(x: f64, y: f64) -> f64 {
 }
 
 /// Three things at three depths, each as blurred as its depth is off the focus.
-fn scene(x: f64, y: f64, focus: f64) -> f64 {
+fn scene(place: [f64; 2], focus: f64, turn: f64) -> f64 {
     let ring = |x: f64, y: f64| edge(((x + 0.36).hypot(y - 0.3) - 0.22).abs() - 0.06);
     let cross = |x: f64, y: f64| {
         let (x, y) = ((x - 0.38).abs(), (y - 0.3).abs());
         edge(x.min(y) - 0.06) * edge(x.max(y) - 0.26)
     };
     let square = |x: f64, y: f64| edge((x.abs().max((y + 0.36).abs()) - 0.2).abs() - 0.06);
-    blurred(x, y, focus, ring).max(blurred(x, y, focus - 0.5, cross)).max(blurred(
-        x,
-        y,
-        focus - 1.0,
-        square,
-    ))
+    let front = blurred(place, focus, turn, ring);
+    let middle = blurred(place, focus - 0.5, turn, cross);
+    front.max(middle).max(blurred(place, focus - 1.0, turn, square))
 }
 
 /// The mean over a circle of confusion.
-fn blurred(x: f64, y: f64, off: f64, light: impl Fn(f64, f64) -> f64) -> f64 {
+fn blurred([x, y]: [f64; 2], off: f64, turn: f64, light: impl Fn(f64, f64) -> f64) -> f64 {
     let radius = CONFUSION * off.abs();
     if radius < SOFT / 4.0 {
         return light(x, y);
     }
     let lit = |k: usize| {
         let r = radius * ((k as f64 + 0.5) / CONFUSED as f64).sqrt();
-        let (sin, cos) = (GOLDEN * k as f64).sin_cos();
+        let (sin, cos) = (GOLDEN * k as f64 + turn).sin_cos();
         light(x + r * cos, y + r * sin)
     };
     (0..CONFUSED).map(lit).sum::<f64>() / CONFUSED as f64
@@ -219,8 +218,8 @@ mod tests {
     fn a_scene_is_sharp_where_it_is_in_focus() {
         // In the middle of the strokes of the ring, the cross and the square.
         let strokes = [[-0.14, 0.3], [0.38, 0.45], [0.0, -0.16]];
-        for (i, [x, y]) in strokes.into_iter().enumerate() {
-            let by_depth = [0.0, 0.5, 1.0].map(|depth| scene(x, y, depth));
+        for (i, place) in strokes.into_iter().enumerate() {
+            let by_depth = [0.0, 0.5, 1.0].map(|depth| scene(place, depth, 0.0));
             assert!(by_depth[i] > 0.75, "{by_depth:?}");
             assert!((0..3).all(|k| k == i || by_depth[k] < by_depth[i] - 0.1), "{by_depth:?}");
         }
