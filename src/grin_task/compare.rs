@@ -41,8 +41,12 @@ impl Task {
     /// A volume that cannot be read.
     pub fn difference(&self, medium: &Medium) -> Result<Option<Difference>, NoField> {
         let Some(exact) = &self.exact else { return Ok(None) };
-        let exact = exact.field::<f64>()?;
-        Ok(Some(difference(medium.field(), &*exact, &self.places())))
+        Ok(Some(self.difference_from(medium, &*exact.field::<f64>()?)))
+    }
+
+    /// How a field differs from another one.
+    pub fn difference_from(&self, medium: &Medium, exact: &dyn Field<f64>) -> Difference {
+        difference(medium.field(), exact, &self.places())
     }
 
     /// The range of the index over the space, and how steep it is.

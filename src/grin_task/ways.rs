@@ -16,8 +16,10 @@ const BEFORE: f64 = 0.12;
 /// the second number without some of them.
 const BETWEEN: usize = 6;
 const MANY: usize = 300;
-/// Rays to choose from, for each that is drawn.
+/// Rays to choose from: so many for two that are drawn, and all that are hardly farther off the
+/// plane than the best, as a part of the size of the space.
 const CHOICE: usize = 3;
+const HARDLY: f64 = 0.02;
 
 /// The way of a ray.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,7 +94,9 @@ fn handful(rays: &[Ray<f64>], plane: Plane, space: Space, count: usize) -> (Vec<
         let mut by_off: Vec<(f64, Ray<f64>)> =
             bundle.into_iter().map(|n| (off(&rays[n]), rays[n])).collect();
         by_off.sort_by(|a, b| a.0.total_cmp(&b.0));
-        by_off.truncate(CHOICE * count);
+        let near = by_off.first().map_or(0.0, |(off, _)| off + 2.0 * HARDLY * reach);
+        let hardly = by_off.partition_point(|(off, _)| *off <= near);
+        by_off.truncate((CHOICE * count).div_ceil(2).max(hardly));
         by_off
     });
     let mean = |bundle: &Vec<(f64, Ray<f64>)>| {
@@ -105,7 +109,7 @@ fn handful(rays: &[Ray<f64>], plane: Plane, space: Space, count: usize) -> (Vec<
         [right, up, along, above]
     };
     let places: Vec<[f64; 4]> = best.iter().map(|(_, ray)| place(ray)).collect();
-    let chosen = apart(&places, count);
+    let chosen = spread(&places, count);
     let farthest = chosen.iter().map(|n| best[*n].0).fold(0.0, f64::max);
     (chosen.into_iter().map(|n| best[n].1).collect(), farthest)
 }
@@ -128,22 +132,26 @@ fn bundles(rays: &[Ray<f64>]) -> Vec<Vec<usize>> {
     if points.len() < rays.len() { points } else { vec![(0..rays.len()).collect()] }
 }
 
-/// The numbers of so many places, each as far as can be from those before it.
-fn apart(places: &[[f64; 4]], count: usize) -> Vec<usize> {
-    let square = |a: usize, b: usize| -> f64 {
-        places[a].iter().zip(&places[b]).map(|(a, b)| (a - b) * (a - b)).sum()
+/// The numbers of at most so many places, spread evenly along the coordinate in which they differ
+/// most.
+fn spread(places: &[[f64; 4]], count: usize) -> Vec<usize> {
+    let range = |axis: usize| {
+        let values = places.iter().map(|place| place[axis]);
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        values.fold(none, |(low, high), value| (low.min(value), high.max(value)))
     };
-    let first = (0..places.len()).min_by(|a, b| places[*a][1].total_cmp(&places[*b][1]));
-    let mut chosen: Vec<usize> = first.into_iter().collect();
-    let mut gap: Vec<f64> = (0..places.len()).map(|_| f64::INFINITY).collect();
-    while let Some(&last) = chosen.last().filter(|_| chosen.len() < count.min(places.len())) {
-        (0..places.len()).for_each(|n| gap[n] = gap[n].min(square(n, last)));
-        let next = (0..places.len()).max_by(|a, b| gap[*a].total_cmp(&gap[*b]));
-        let fresh = next.filter(|n| gap[*n] > 0.0);
-        let Some(next) = fresh else { break };
-        chosen.push(next);
+    let width = |axis: usize| range(axis).1 - range(axis).0;
+    let axis = (0..4).max_by(|a, b| width(*a).total_cmp(&width(*b))).unwrap_or(0);
+    let (low, high) = range(axis);
+    let mut left: Vec<usize> = (0..places.len()).collect();
+    let mut chosen = Vec::new();
+    for i in 0..count.min(places.len()) {
+        let wanted = low + (high - low) * (i as f64 + 0.5) / count as f64;
+        let off = |n: &usize| (places[*n][axis] - wanted).abs();
+        let nearest = (0..left.len()).min_by(|a, b| off(&left[*a]).total_cmp(&off(&left[*b])));
+        chosen.extend(nearest.map(|n| left.remove(n)));
     }
-    if count == 0 { Vec::new() } else { chosen }
+    chosen
 }
 
 /// The points of a way, from shortly before the space on.
@@ -211,7 +219,7 @@ mod tests {
         let mut heights: Vec<f64> = rays.iter().map(|ray| ray.x.x).collect();
         heights.sort_by(f64::total_cmp);
         assert!(rays.iter().all(|ray| ray.v.z == 1.0) && off < 0.01, "{rays:?}, {off}");
-        assert!(heights.len() == 3 && heights[2] - heights[0] > 0.7, "{heights:?}");
+        assert!(heights.len() == 3 && heights[2] - heights[0] > 0.55, "{heights:?}");
         assert_eq!(handful(&beams(), plane, Space::Ball { radius: 1.0 }, 0).0.len(), 0);
         assert_eq!(handful(&[], plane, Space::Ball { radius: 1.0 }, 3).0.len(), 0);
     }
