@@ -224,8 +224,8 @@ impl View {
 }
 
 impl Goal {
-    /// Whether it is a picture.
-    fn is_image(&self) -> bool {
+    /// Whether it is a picture, on a screen or at infinity: its loss has no unit.
+    pub fn is_image(&self) -> bool {
         matches!(self, Self::Image { .. } | Self::Far { .. })
     }
 
