@@ -2,8 +2,8 @@
 
 use super::failure::Failure;
 use super::output::{Number, Output, Table};
-use crate::experiments::{self, Claim, Effort, Ended, Experiment as Study, Progress, Report};
-use crate::measure::timed;
+use crate::experiments::{self, Claim, Effort, Ended, Experiment as Study, Lap, Progress, Report};
+use crate::measure::{Stopwatch, timed};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -31,8 +31,10 @@ impl Experiment {
         let Some(id) = &self.id else { return output.print(&List(experiments::ALL)) };
         let study = experiments::find(id).ok_or_else(|| unknown(id))?;
         self.out.iter().try_for_each(|folder| check_folder(folder))?;
-        let (outcome, ms) = timed(|| (study.run)(Effort::Full, &mut watched()));
+        let mut laps = Laps::default();
+        let (outcome, ms) = timed(|| (study.run)(Effort::Full, &mut watched(&mut laps)));
         let mut report = Report::new(study, outcome.map_err(|ended| failure(study, &ended))?, ms);
+        report.laps = laps.ended();
         if let Some(folder) = &self.out {
             report.write(folder)?;
         }
@@ -57,8 +59,32 @@ pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
+/// How long each part of the work takes.
+#[derive(Default)]
+struct Laps {
+    ended: Vec<Lap>,
+    begun: Option<(String, Stopwatch)>,
+}
+
+impl Laps {
+    /// Another part begins.
+    fn begin(&mut self, doing: &str) {
+        let before = self.begun.replace((doing.to_owned(), Stopwatch::start()));
+        self.ended.extend(before.map(lap));
+    }
+
+    /// All parts, the last one as well.
+    fn ended(self) -> Vec<Lap> {
+        self.ended.into_iter().chain(self.begun.map(lap)).collect()
+    }
+}
+
+fn lap((doing, clock): (String, Stopwatch)) -> Lap {
+    Lap { doing, seconds: clock.seconds() }
+}
+
 /// Shows how far the work is.
-fn watched() -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
+fn watched(laps: &mut Laps) -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
     let bar = ProgressBar::new(STEPS as u64);
     let style = ProgressStyle::with_template("{wide_bar} {percent} %  {msg}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -67,6 +93,7 @@ fn watched() -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
         if doing != progress.doing {
             progress.doing.clone_into(&mut doing);
             bar.set_message(doing.clone());
+            laps.begin(&doing);
         }
         bar.set_position((STEPS * progress.done) as u64);
         ControlFlow::Continue(())
@@ -117,13 +144,16 @@ fn judge(report: &Report) -> Result<(), Failure> {
 
 impl Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { id, title, claim, ms, outcome, files, .. } = self;
+        let Self { id, title, claim, ms, laps, outcome, files, .. } = self;
         writeln!(f, "{id}: {title}\n{claim}.\n")?;
         let mut table = Table::new(&["claim", "found", "error", "expected", ""]);
         for claim in &outcome.claims {
             table.row(cells(claim));
         }
         writeln!(f, "{table}\n{} rays, {ms:.0} ms", outcome.rays)?;
+        for Lap { doing, seconds } in laps {
+            writeln!(f, "{seconds:8.2} s  {doing}")?;
+        }
         files.iter().try_for_each(|file| writeln!(f, "written: {file}"))
     }
 }

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::input::{check_target, read_json};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::{Number, Output, Table};
-use crate::experiments::medium_pictures;
+use crate::experiments::{medium_pictures, view_picture};
 use crate::files;
 use crate::grin_task::{self, Judgement, Medium, Runner, Task, ViewResult};
 use crate::measure::{Memory, Stopwatch, peak_megabytes, processor_ms};
@@ -87,6 +87,14 @@ impl Grin {
             for picture in medium_pictures(task, best) {
                 let path = folder.join(format!("{}.png", picture.name));
                 files::replace(&path, &picture.canvas.png().map_err(|error| failed(&error))?)?;
+                written.push(path.display().to_string());
+            }
+            let seen = task.seen(best).map_err(|error| failed(&error))?;
+            for (i, (view, seen)) in task.views.iter().zip(&seen).enumerate() {
+                let Some(image) = &seen.image else { continue };
+                let canvas = view_picture(&view.name, image, seen.result.quality.unwrap_or(0.0));
+                let path = folder.join(format!("view-{}.png", i + 1));
+                files::replace(&path, &canvas.png().map_err(|error| failed(&error))?)?;
                 written.push(path.display().to_string());
             }
         }

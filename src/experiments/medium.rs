@@ -21,13 +21,23 @@ pub(super) fn solve(
     watch: &mut Watch<'_>,
 ) -> Result<Runner, Ended> {
     report(watch, from, &task.name)?;
-    let mut runner = Runner::new(task).map_err(Ended::from_error)?;
+    let runner = Runner::new(task).map_err(Ended::from_error)?;
+    work(runner, [from, to], watch)
+}
+
+/// The same for a search that was begun.
+pub(super) fn work(
+    mut runner: Runner,
+    [from, to]: [f64; 2],
+    watch: &mut Watch<'_>,
+) -> Result<Runner, Ended> {
+    let name = runner.task().name.clone();
     let mut done = from;
     loop {
         let progress = runner.step().map_err(Ended::from_error)?;
         let share = progress.step as f64 / progress.most.max(1) as f64;
         done = if progress.finished { to } else { done.max(from + share.min(1.0) * (to - from)) };
-        report(watch, done, &task.name)?;
+        report(watch, done, &name)?;
         if progress.finished {
             return Ok(runner);
         }

@@ -22,12 +22,14 @@ mod sampling;
 mod section;
 mod structure;
 mod trade;
+mod views;
 mod vignetting;
 mod zoom;
 
 pub use medium::medium_pictures;
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
-pub use report::Report;
+pub use report::{Lap, Report};
+pub use views::view_picture;
 
 use crate::files;
 use crate::lens::Lens;
@@ -50,6 +52,10 @@ pub const ALL: &[Experiment] = &[
     structure::beyond::EXPERIMENT,
     structure::teaser::EXPERIMENT,
     adjoint_memory::EXPERIMENT,
+    views::display::EXPERIMENT,
+    views::resolution::EXPERIMENT,
+    views::multifocal::EXPERIMENT,
+    views::caustic::EXPERIMENT,
     known_lenses::EXPERIMENT,
     fibre::EXPERIMENT,
 ];

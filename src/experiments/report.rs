@@ -17,6 +17,8 @@ pub struct Report {
     pub claim: &'static str,
     /// How long it took, in milliseconds.
     pub ms: f64,
+    /// How long its parts took, in order; empty where nobody looked at the clock.
+    pub laps: Vec<Lap>,
     /// Whether all claims hold.
     pub holds: bool,
     /// What it found.
@@ -26,12 +28,21 @@ pub struct Report {
     pub files: Vec<String>,
 }
 
+/// What an experiment did for how long.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Lap {
+    /// What it did, in its own words.
+    pub doing: String,
+    /// How long that took, in seconds.
+    pub seconds: f64,
+}
+
 impl Report {
     /// The report of an experiment that took so long.
     pub fn new(study: &Experiment, outcome: Outcome, ms: f64) -> Self {
         let Experiment { id, title, claim, .. } = *study;
         let holds = outcome.failed().next().is_none();
-        Self { id, title, claim, ms, holds, outcome, files: Vec::new() }
+        Self { id, title, claim, ms, laps: Vec::new(), holds, outcome, files: Vec::new() }
     }
 
     /// Writes everything into a folder: tables as CSV, pictures as PNG, lenses in our own form, all

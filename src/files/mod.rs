@@ -1,4 +1,4 @@
-//! Reading and writing lenses and volumes.
+//! Reading and writing lenses and volumes; reading pictures.
 //!
 //! A file is known by its content first and its extension second. An import reports what it used,
 //! approximated, preserved and dropped; an export is read back and traced before it counts as
@@ -8,6 +8,7 @@ mod convert;
 mod error;
 mod library;
 pub mod native;
+mod photo;
 mod probe;
 mod report;
 mod save;
@@ -18,6 +19,7 @@ pub mod zemax;
 pub use convert::{Conversion, convert};
 pub use error::FileError;
 pub use library::{Bundled, library};
+pub use photo::{Photo, read_photo};
 pub use probe::{Proof, SelfCheck};
 pub use report::{Outcome, Report, ReportRow};
 pub use save::replace;

@@ -22,6 +22,10 @@ pub const BUILTIN: &[Builtin] = &[
     Builtin { name: "maxwell", text: include_str!("../../assets/grin/maxwell.json") },
     Builtin { name: "maxwell-radial", text: include_str!("../../assets/grin/maxwell-radial.json") },
     Builtin { name: "display", text: include_str!("../../assets/grin/display.json") },
+    Builtin { name: "multifocal", text: include_str!("../../assets/grin/multifocal.json") },
+    Builtin { name: "caustic-near", text: include_str!("../../assets/grin/caustic-near.json") },
+    Builtin { name: "caustic-far", text: include_str!("../../assets/grin/caustic-far.json") },
+    Builtin { name: "caustic", text: include_str!("../../assets/grin/caustic.json") },
     Builtin { name: "fibre", text: include_str!("../../assets/grin/fibre.json") },
 ];
 

@@ -1,9 +1,11 @@
 //! What is wrong with a task, told before any ray is traced.
 
+use super::drawing::Drawing;
 use super::medium::NoField;
 use super::task::{
     Directions, Exact, FieldKind, Goal, Method, Source, Space, Start, Task, VERSION, View,
 };
+use crate::files::FileError;
 use crate::grin::SetupError;
 use crate::grin::field::GridError;
 use std::fmt::Display;
@@ -34,6 +36,14 @@ pub enum TaskError {
         place: String,
         /// Why not.
         source: NoField,
+    },
+    /// A picture cannot be had.
+    #[error("{place}: {source}")]
+    Picture {
+        /// Where it stands in the task.
+        place: String,
+        /// Why not.
+        source: FileError,
     },
     /// A field cannot be made of so many numbers.
     #[error("levels: {0}")]
@@ -160,9 +170,7 @@ impl Task {
                 let expected = "`given` or `even` ones: only adam may see new rays in every step";
                 Err(wrong("views, directions", "fresh", expected))
             }
-            Method::LeastSquares
-                if self.views.iter().any(|v| matches!(v.goal, Goal::Image { .. })) =>
-            {
+            Method::LeastSquares if self.views.iter().any(|view| view.goal.is_image()) => {
                 Err(wrong("method", "least_squares", "adam or lbfgs for an image"))
             }
             Method::LeastSquares if most > Some(FEW) => {
@@ -206,16 +214,57 @@ impl View {
                 within(format!("{goal}, direction"), *direction, 0.0, f64::MAX)?;
                 field.check(&goal)
             }
-            Goal::Image { .. } if !matches!(self.source, Source::Beam { .. }) => {
-                Err(wrong(goal, "image", "a source that is a `beam`"))
+            image if image.is_across_a_beam() && self.source.axis().is_none() => {
+                Err(wrong(goal, "image, far or ring", "a source that is a `beam`"))
             }
-            Goal::Image { half, distance, pixels, .. } => {
-                within(format!("{goal}, pixels"), *pixels as f64, 4.0, 2048.0)?;
-                within(format!("{goal}, distance"), *distance, 0.0, f64::MAX)?;
-                positive(format!("{goal}, half"), *half)
-            }
-            Goal::Point(_) | Goal::Antipode => Ok(()),
+            image if image.is_across_a_beam() => image.check_across(&goal),
+            _ => Ok(()),
         }
+    }
+}
+
+impl Goal {
+    /// Whether it is a picture, on a screen or at infinity: its loss has no unit.
+    pub fn is_image(&self) -> bool {
+        matches!(self, Self::Image { .. } | Self::Far { .. })
+    }
+
+    /// Whether it stands across the direction of a beam.
+    fn is_across_a_beam(&self) -> bool {
+        self.is_image() || matches!(self, Self::Ring { .. })
+    }
+
+    fn check_across(&self, goal: &str) -> Result<(), TaskError> {
+        let at = |name: &str| format!("{goal}, {name}");
+        match self {
+            Self::Image { half, distance, pixels, drawing } => {
+                within(at("distance"), *distance, 0.0, f64::MAX)?;
+                positive(at("half"), *half)?;
+                drawing.check(goal, *pixels)
+            }
+            Self::Far { angle, pixels, drawing } => {
+                within(at("angle"), *angle, 0.1, 80.0)?;
+                drawing.check(goal, *pixels)
+            }
+            Self::Ring { radius, distance, angle, far } => {
+                positive(at("radius"), *radius)?;
+                within(at("distance"), *distance, 0.0, f64::MAX)?;
+                within(at("angle"), *angle, 0.0, 80.0)?;
+                within(at("far"), *far, 0.0, f64::MAX)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Drawing {
+    fn check(&self, goal: &str, pixels: usize) -> Result<(), TaskError> {
+        within(format!("{goal}, pixels"), pixels as f64, 4.0, 2048.0)?;
+        if let Self::Scene(depth) = self {
+            within(format!("{goal}, scene"), *depth, 0.0, 1.0)?;
+        }
+        let refused = |source| TaskError::Picture { place: format!("{goal}, drawing"), source };
+        self.pixels(pixels).map(|_| ()).map_err(refused)
     }
 }
 

@@ -5,8 +5,8 @@ use super::task::{Edge, Exact, FieldKind, MakerLimits, Space};
 use crate::files::{self, FileError, Volume};
 use crate::grin::Field;
 use crate::grin::field::{
-    BSpline, Coordinate, Grid, GridError, Layered, Luneburg, Maxwell, Parabolic, Profile as _,
-    Sech, Tricubic, Trilinear,
+    BSpline, Coordinate, Diagonal, Grid, GridError, Layered, Luneburg, Maxwell, Parabolic,
+    Profile as _, Sech, Tricubic, Trilinear,
 };
 use crate::math::{Real, Vec3};
 use std::path::Path;
@@ -102,7 +102,17 @@ impl Medium {
                 *c = there.value - spacing * spacing / 6.0 * there.bend;
             }
         }
+        if let (Self::Trilinear(coarse), Self::Trilinear(fine)) = (self, &mut finer) {
+            fine.diagonal = coarse.diagonal;
+        }
         Ok(finer)
+    }
+
+    /// Chooses the Hessian of a trilinear field.
+    pub(super) fn set_diagonal(&mut self, diagonal: Diagonal) {
+        if let Self::Trilinear(field) = self {
+            field.diagonal = diagonal;
+        }
     }
 
     /// What rays are traced through.

@@ -13,29 +13,34 @@ mod builtin;
 mod check;
 mod compare;
 mod descent;
+mod drawing;
 mod hold;
 mod image;
 mod least_squares;
+mod likeness;
 mod medium;
 mod plane;
+mod ring;
 mod runner;
 mod scene;
 mod seen;
 mod source;
 mod space;
+mod stage;
 mod task;
 mod ways;
 
 pub use builtin::{BUILTIN, Builtin, find, read};
 pub use check::TaskError;
 pub use compare::{Difference, Extremes};
+pub use drawing::{Drawing, PictureFile};
 pub use medium::{Medium, NoField};
 pub use plane::{Axis, Plane};
 pub use runner::{Judgement, Progress, Runner};
 pub use scene::{Counts, ViewResult};
 pub use seen::{Image, Seen};
 pub use task::{
-    Directions, Drawing, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Source, Space,
-    Start, Task, Tracing, VERSION, View,
+    Directions, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Source, Space, Start,
+    Task, Tracing, VERSION, View,
 };
 pub use ways::{Way, Ways};

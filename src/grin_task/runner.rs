@@ -4,10 +4,10 @@ use super::check::TaskError;
 use super::descent::{Descent, Problem, Step};
 use super::hold::Hold;
 use super::medium::{Medium, from_file};
-use super::scene::{Counts, Shot, ViewResult, setups, shots};
+use super::scene::{Counts, Shot, ViewResult, redraw, setups, shots};
 use super::source::Draw;
 use super::task::{Start, Task};
-use crate::grin::field::Trilinear;
+use crate::grin::field::{Diagonal, Trilinear};
 use crate::grin::{Field as _, Integrator, Limits, Setup};
 
 /// Steps between two looks at how rays are traced, once the field has taken shape.
@@ -95,6 +95,14 @@ impl Runner {
         runner.begin_level()?;
         runner.keep_best()?;
         Ok(runner)
+    }
+
+    /// The same search by the Hessian that a trilinear field has between its nodes, which leaves out
+    /// what the jumps of its slope bring: for comparison. See [`Diagonal`].
+    #[must_use]
+    pub fn with_exact_hessian(mut self) -> Self {
+        self.current.set_diagonal(Diagonal::Exact);
+        self
     }
 
     /// The task.
@@ -219,7 +227,7 @@ impl Runner {
     /// One step of the method.
     fn descend(&mut self) -> Result<Step, TaskError> {
         if self.task.views.iter().any(|view| view.source.is_fresh()) {
-            self.shots = shots(&self.task, &self.setups, Draw::Step(self.steps))?;
+            redraw(&self.task, &mut self.shots, Draw::Step(self.steps))?;
         }
         let share = self.taken as f64 / self.task.levels[self.level].steps.max(1) as f64;
         let mut parameters = self.current.field().parameters().to_vec();

@@ -3,8 +3,10 @@
 use super::check::TaskError;
 use super::hold::Hold;
 use super::image::Screen;
+use super::ring::Ring;
 use super::source::{Draw, Sent};
-use super::task::{Goal, Source, Space, Task, Tracing, View};
+use super::stage::{face, ring, screen};
+use super::task::{Goal, Space, Task, Tracing, View};
 use crate::grin::{End, Exit, Fates, Field, LastStep, Ray, Seed, Setup, Tracer, plan};
 use crate::math::Vec3;
 use rayon::prelude::*;
@@ -40,6 +42,8 @@ pub(super) struct Shot {
     lost: f64,
     /// What an image is made on.
     pub(super) screen: Option<Screen>,
+    /// What rays shall go through, wherever they like.
+    ring: Option<Ring>,
 }
 
 /// Rays that are left out, by reason, and those that count.
@@ -122,7 +126,7 @@ pub(super) fn setups(
             Some(tracing) => tied(task, field, space, tracing),
             None => plan(field, &space.region(), task.launch, &rays, task.tolerance)?.setup,
         };
-        setup.screen = screen(view, space).map(|screen| screen.face);
+        setup.screen = face(view, space);
         Ok(setup)
     };
     task.views.iter().map(setup).collect()
@@ -138,16 +142,6 @@ fn tied(task: &Task, field: &dyn Field<f64>, space: Space, tracing: Tracing) -> 
     Setup { integrator, step, launch: task.launch, end, screen: None }
 }
 
-/// What a view makes its image on.
-fn screen(view: &View, space: Space) -> Option<Screen> {
-    match (&view.goal, &view.source) {
-        (Goal::Image { drawing, half, distance, pixels }, Source::Beam { direction, .. }) => {
-            Some(Screen::new(space, *direction, (*half, *distance, *pixels), *drawing))
-        }
-        _ => None,
-    }
-}
-
 /// The rays of every view with their aims.
 pub(super) fn shots(
     task: &Task,
@@ -160,18 +154,29 @@ pub(super) fn shots(
         let aims = aims(task, view, space, &sent)?;
         let rays = sent.into_iter().map(|sent| sent.ray).collect();
         let lost = space.diameter() * space.diameter();
-        let (setup, weight, screen) = (setup.clone(), view.weight, screen(view, space));
+        let (setup, weight, screen) = (setup.clone(), view.weight, screen(view, space)?);
         // The difference of an image has no unit.
         let lost = if screen.is_some() { 1.0 } else { lost };
-        Ok(Shot { rays, aims, setup, weight, lost, screen })
+        Ok(Shot { rays, aims, setup, weight, lost, screen, ring: ring(view) })
     };
     task.views.iter().zip(setups).map(shot).collect()
+}
+
+/// The same views with the rays of another step.
+pub(super) fn redraw(task: &Task, shots: &mut [Shot], draw: Draw) -> Result<(), TaskError> {
+    for (view, shot) in task.views.iter().zip(shots) {
+        let space = view.space.unwrap_or(task.space);
+        let sent = view.source.rays(space, draw);
+        shot.aims = aims(task, view, space, &sent)?;
+        shot.rays = sent.into_iter().map(|sent| sent.ray).collect();
+    }
+    Ok(())
 }
 
 fn aims(task: &Task, view: &View, space: Space, sent: &[Sent]) -> Result<Vec<Aim>, TaskError> {
     let at = |x| Aim { x, v: Vec3::default(), direction: 0.0 };
     Ok(match &view.goal {
-        Goal::Image { .. } => Vec::new(),
+        Goal::Image { .. } | Goal::Far { .. } | Goal::Ring { .. } => Vec::new(),
         Goal::Point([x, y, z]) => vec![at(Vec3::new(*x, *y, *z)); sent.len()],
         Goal::Antipode => {
             let reach = 0.5 * space.diameter();
@@ -224,15 +229,32 @@ impl Shot {
             return (self.lost, Seed::default());
         }
         let (dx, dv) = self.misses(ray, exit);
-        let direction = self.aims[ray].direction;
-        let seed = Seed { x: dx * 2.0, v: dv * (2.0 * direction), path: 0.0 };
+        let direction = self.direction(ray);
+        let seed = self.seed(exit, dx * 2.0, dv * (2.0 * direction));
         (dx.dot(dx) + direction * dv.dot(dv), seed)
     }
 
     /// By how much a ray misses its aim.
     fn misses(&self, ray: usize, exit: &Exit<f64>) -> (Vec3<f64>, Vec3<f64>) {
+        if let Some(ring) = &self.ring {
+            return ring.misses(exit);
+        }
         let aim = self.aims[ray];
         (exit.x - aim.x, exit.v - aim.v)
+    }
+
+    /// What the square of a miss in direction counts.
+    fn direction(&self, ray: usize) -> f64 {
+        self.ring.as_ref().map_or_else(|| self.aims[ray].direction, |ring| ring.far)
+    }
+
+    /// The derivative by the end of a ray of what has these by its misses.
+    fn seed(&self, exit: &Exit<f64>, x: Vec3<f64>, by_direction: Vec3<f64>) -> Seed<f64> {
+        let v = match self.ring {
+            Some(_) => Ring::by_velocity(exit.v, by_direction),
+            None => by_direction,
+        };
+        Seed { x, v, path: 0.0 }
     }
 
     /// What becomes of the light, without a gradient.
@@ -257,8 +279,8 @@ impl Shot {
             if !Self::counts(exit) {
                 return Seed::default();
             }
-            let seed = screen.seed(&image, exit.x, rays);
-            Seed { x: seed.x * rays as f64, ..seed }
+            let seed = screen.seed(&image, exit, rays);
+            Seed { x: seed.x * rays as f64, v: seed.v * rays as f64, ..seed }
         };
         exits.iter().map(seed).collect()
     }
@@ -329,14 +351,15 @@ impl Shot {
                 let taped = tracer.taped_gradient(&[*ray], &[exit], &[seed]);
                 (miss, taped.parameters)
             };
-            let root = scale * self.aims[i].direction.sqrt();
+            let root = scale * self.direction(i).sqrt();
             let axes = |scale: f64| {
                 [Vec3::new(scale, 0.0, 0.0), Vec3::new(0.0, scale, 0.0), Vec3::new(0.0, 0.0, scale)]
             };
-            let at = axes(scale).map(|x| row(x.dot(dx), Seed { x, ..Seed::default() }));
+            let none = Vec3::default();
+            let at = axes(scale).map(|x| row(x.dot(dx), self.seed(&exit, x, none)));
             let mut rows = at.to_vec();
             if root > 0.0 {
-                rows.extend(axes(root).map(|v| row(v.dot(dv), Seed { v, ..Seed::default() })));
+                rows.extend(axes(root).map(|v| row(v.dot(dv), self.seed(&exit, none, v))));
             }
             rows
         };

@@ -57,6 +57,12 @@ impl Source {
         }
     }
 
+    /// The direction of a beam, of length 1.
+    pub(super) fn axis(&self) -> Option<Vec3<f64>> {
+        let Self::Beam { direction: [x, y, z], .. } = self else { return None };
+        Some(unit(Vec3::new(*x, *y, *z)))
+    }
+
     /// Whether it has other rays in every step.
     pub(super) fn is_fresh(&self) -> bool {
         matches!(self.directions(), Some(Directions::Fresh(_)))

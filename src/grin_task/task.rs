@@ -1,5 +1,6 @@
 //! What a person asks of a field of refractive index: the task as it is written in a file.
 
+use super::drawing::Drawing;
 use crate::grin::{Integrator, Launch};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -204,6 +205,30 @@ pub enum Goal {
         /// Pixels along its side.
         pixels: usize,
     },
+    /// It makes a picture at infinity: where a ray shows is told by its direction alone, as in the
+    /// focal plane of a lens. Likewise.
+    Far {
+        /// The picture.
+        drawing: Drawing,
+        /// The angle between the middle of the picture, in the direction of the beam, and the
+        /// middle of a side.
+        angle: f64,
+        /// Pixels along its side.
+        pixels: usize,
+    },
+    /// It goes through a ring about the axis of a beam, and towards a ring at infinity (5.36 and
+    /// 5.37). The loss is the mean square distance from the former, in mm², and that of the
+    /// direction from the latter.
+    Ring {
+        /// The radius of the near ring.
+        radius: f64,
+        /// How far it stands behind the space.
+        distance: f64,
+        /// The angle between the axis and the far ring.
+        angle: f64,
+        /// What the square of a difference in direction counts against that of one in mm.
+        far: f64,
+    },
     /// It leaves as it does from another field, which a measurement of rays would give.
     Like {
         /// That field.
@@ -212,16 +237,6 @@ pub enum Goal {
         #[serde(default)]
         direction: f64,
     },
-}
-
-/// A picture that is drawn by formula.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Drawing {
-    /// A smiling face.
-    Face,
-    /// A letter A in a frame.
-    Letter,
 }
 
 /// The field to begin with.

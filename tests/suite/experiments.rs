@@ -191,6 +191,35 @@ fn the_adjoint_keeps_as_much_for_many_steps_as_for_few() {
 }
 
 #[test]
+fn a_display_shows_a_picture_to_each_of_two_beams() {
+    let outcome = outcome("5.4");
+    let [correlation, light] =
+        ["correlation", "light"].map(|name| column(&outcome.tables[0], name));
+    assert!(correlation.len() == 2 && light.iter().all(|light| *light > 0.9 && *light < 1.001));
+}
+
+#[test]
+fn finer_fields_show_sharper_pictures() {
+    let outcome = outcome("5.5");
+    let tricubic = rows_with(&outcome.tables[0], "field", "tricubic");
+    let quality = column(&tricubic, "quality_db");
+    assert!(quality.windows(2).all(|pair| pair[1] > pair[0]), "{quality:?}");
+}
+
+#[test]
+fn a_multifocal_display_has_its_own_picture_on_every_screen() {
+    let outcome = outcome("5.6");
+    assert_eq!(column(&outcome.tables[0], "quality_db").len(), 3);
+}
+
+#[test]
+fn caustics_are_rings_near_and_far() {
+    let outcome = outcome("5.7");
+    let radius = column(&outcome.tables[1], "radius_mm");
+    assert!(radius.windows(2).all(|pair| pair[1] > pair[0]), "{radius:?}");
+}
+
+#[test]
 fn known_lenses_are_found_again() {
     let outcome = outcome("5.8");
     let relative = column(&outcome.tables[0], "relative");

@@ -11,6 +11,7 @@ mod files;
 mod front;
 mod grin;
 mod grin_task;
+mod grin_views;
 mod hard_cases;
 mod library;
 mod merit;

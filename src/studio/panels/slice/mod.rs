@@ -14,7 +14,7 @@ mod words;
 use eframe::egui::{Button, Frame, Margin, Panel as Side, ScrollArea, Ui};
 
 use super::Panel;
-use crate::grin_task::{Goal, View as TaskView};
+use crate::grin_task::View as TaskView;
 use crate::math::Vec3;
 use crate::session::{Command, Form, Formation, View};
 use crate::studio::draw::Backing;
@@ -150,7 +150,7 @@ impl GrinSlice {
 
     fn pages(&mut self, ui: &mut Ui, run: &Formation) {
         let task = run.subject.task.as_ref();
-        let is_image = |view: &TaskView| matches!(view.goal, Goal::Image { .. });
+        let is_image = |view: &TaskView| view.goal.is_image();
         let has_images = task.is_some_and(|task| task.views.iter().any(is_image));
         if self.page == Page::Images && !has_images {
             self.page = Page::Light;

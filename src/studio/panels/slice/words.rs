@@ -41,7 +41,7 @@ fn volume(run: &Formation) -> String {
 fn unit(run: &Formation) -> &'static str {
     let task = run.subject.task.as_ref();
     let counted = task.into_iter().flat_map(|task| &task.views).filter(|view| view.weight > 0.0);
-    let is_length = |goal: &Goal| !matches!(goal, Goal::Image { .. });
+    let is_length = |goal: &Goal| !goal.is_image();
     if counted.into_iter().all(|view| is_length(&view.goal)) { " mm²" } else { "" }
 }
 

@@ -1,0 +1,178 @@
+//! Figures 5.4 to 5.7: what a field of refractive index can show, to one beam or to two.
+//!
+//! A search sees other rays in every step and has never seen those by which it is judged here: more
+//! of them, traced with half of its step.
+
+pub(super) mod caustic;
+pub(super) mod display;
+pub(super) mod multifocal;
+mod pictures;
+pub(super) mod resolution;
+
+pub use pictures::view_picture;
+
+use super::medium::{solve, work};
+use super::{Claim, Effort, Ended, Outcome, Picture, Table, Watch, medium_pictures};
+use crate::grin_task::{self, Goal, Medium, Runner, Seen, Source, Task};
+
+/// Rays along a side of a beam that judges, for each of one that is searched with.
+const FINER: f64 = 1.57;
+/// Rays that may be left out, as a share.
+const LEFT_OUT: f64 = 1e-3;
+
+/// A task that comes with the program.
+fn builtin(name: &str) -> Result<Task, Ended> {
+    let builtin =
+        grin_task::find(name).ok_or_else(|| Ended::Failed(format!("no task `{name}`")))?;
+    builtin.task().map_err(Ended::from_error)
+}
+
+/// The same task for a test: only its first levels, fewer rays, coarser pictures.
+fn small(mut task: Task, levels: usize) -> Task {
+    task.levels.truncate(levels);
+    for view in &mut task.views {
+        if let Source::Beam { rays, .. } = &mut view.source {
+            *rays = 64;
+        }
+        if let Goal::Image { pixels, .. } | Goal::Far { pixels, .. } = &mut view.goal {
+            *pixels = 32;
+        }
+    }
+    task
+}
+
+/// The same task with rays that no step of its search has, and half of its step.
+fn independent(task: &Task) -> Task {
+    let mut other = task.clone();
+    for view in &mut other.views {
+        if let Source::Beam { rays, .. } = &mut view.source {
+            *rays = (FINER * *rays as f64).round() as usize;
+        }
+    }
+    if let Some(tracing) = &mut other.tracing {
+        tracing.per_voxel *= 2.0;
+    }
+    other
+}
+
+/// A field that was found, and what other rays make of it.
+struct Shown {
+    runner: Runner,
+    seen: Vec<Seen>,
+}
+
+/// Works on a task; it is a part of the whole work.
+fn show(task: &Task, part: [f64; 2], watch: &mut Watch<'_>) -> Result<Shown, Ended> {
+    let runner = solve(task, part, watch)?;
+    let seen = look(task, runner.best())?;
+    Ok(Shown { runner, seen })
+}
+
+/// What rays that no search has seen make of a field.
+fn look(task: &Task, medium: &Medium) -> Result<Vec<Seen>, Ended> {
+    independent(task).seen(medium).map_err(Ended::from_error)
+}
+
+/// Columns of the table of views.
+const COLUMNS: [&str; 10] = [
+    "view",
+    "nodes",
+    "quality_db",
+    "correlation",
+    "light",
+    "rays",
+    "left_out",
+    "tracing_error_mm",
+    "index_low",
+    "index_high",
+];
+
+impl Shown {
+    /// Adds a row for every image.
+    fn rows(&self, table: &mut Table) {
+        let task = self.runner.task();
+        let extremes = task.extremes(self.runner.best());
+        for (view, seen) in task.views.iter().zip(&self.seen) {
+            let Some(image) = &seen.image else { continue };
+            let counts = seen.result.counts;
+            table.row([
+                view.name.clone().into(),
+                self.runner.best().nodes().into(),
+                seen.result.quality.unwrap_or(f64::NAN).into(),
+                image.correlation().into(),
+                image.light().into(),
+                counts.fates.total().into(),
+                (counts.fates.total() - counts.counted()).into(),
+                seen.error.unwrap_or(f64::NAN).into(),
+                extremes.low.into(),
+                extremes.high.into(),
+            ]);
+        }
+    }
+
+    /// What every image must be: so good, and of nearly all rays.
+    fn claims(&self, quality: f64, correlation: f64) -> Vec<Claim> {
+        let mut claims = Vec::new();
+        for (view, seen) in self.runner.task().views.iter().zip(&self.seen) {
+            let Some(image) = &seen.image else { continue };
+            let name = &view.name;
+            let found = seen.result.quality.unwrap_or(f64::NAN);
+            let says = format!("{name}: peak signal to noise, by rays of no step");
+            claims.push(Claim::at_least(says, found, quality).in_unit("dB"));
+            let says = format!("{name}: correlation with the picture");
+            claims.push(Claim::at_least(says, image.correlation(), correlation));
+            let counts = seen.result.counts;
+            let left_out = 1.0 - counts.counted() as f64 / counts.fates.total() as f64;
+            let says = format!("{name}: share of the rays that are left out");
+            claims.push(Claim::at_most(says, left_out, LEFT_OUT));
+        }
+        claims
+    }
+
+    /// What a maker can make holds for the field.
+    fn makeable(&self) -> [Claim; 2] {
+        let task = self.runner.task();
+        let extremes = task.extremes(self.runner.best());
+        let [low, high] = [task.limits.low, task.limits.high];
+        // A penalty holds the index of a spline between its coefficients.
+        let softly = 0.02 * (high - low);
+        [
+            Claim::at_least("smallest index", extremes.low, low - softly),
+            Claim::at_most("largest index", extremes.high, high),
+        ]
+    }
+
+    /// Its images beside the pictures that are wanted.
+    fn pictures(&self, names: &[&'static str]) -> Vec<Picture> {
+        let images = self.seen.iter().filter_map(|seen| Some((seen, seen.image.as_ref()?)));
+        let picture = |((seen, image), name): ((&Seen, _), &&'static str)| {
+            let quality = seen.result.quality.unwrap_or(f64::NAN);
+            let canvas = view_picture(name, image, quality);
+            Picture { name, canvas }
+        };
+        images.zip(names).map(picture).collect()
+    }
+
+    /// Rays that were traced, forwards.
+    fn rays(&self) -> usize {
+        let judging: usize = self.seen.iter().map(|seen| seen.result.counts.fates.total()).sum();
+        usize::try_from(self.runner.rays()).unwrap_or(usize::MAX).saturating_add(judging)
+    }
+}
+
+/// The outcome of one field that shows images.
+fn outcome_of(shown: &Shown, names: &[&'static str], [quality, correlation]: [f64; 2]) -> Outcome {
+    let mut table = Table::new("views", &COLUMNS);
+    shown.rows(&mut table);
+    let mut claims = shown.claims(quality, correlation);
+    claims.extend(shown.makeable());
+    let mut pictures = shown.pictures(names);
+    pictures.extend(medium_pictures(shown.runner.task(), shown.runner.best()));
+    Outcome { claims, tables: vec![table], pictures, rays: shown.rays(), ..Outcome::default() }
+}
+
+/// A built-in task at full effort; for a test its first levels.
+fn task(name: &str, effort: Effort, levels: usize) -> Result<Task, Ended> {
+    let task = builtin(name)?;
+    Ok(if effort == Effort::Full { task } else { small(task, levels) })
+}

@@ -1,0 +1,52 @@
+//! Figure 5.6: a display whose picture depends on where the screen stands, as a scene depends on
+//! where a camera is focused.
+//!
+//! The scene has a ring in front, a cross in the middle and a square behind, evenly spaced in
+//! dioptres; the light field of the thesis is replaced by it. Three planes ask more than a beam can
+//! give, since a ray that is in its place on two of them is where it must be on the third: the
+//! images are less exact than those of one plane.
+
+use super::{Shown, outcome_of, show, task};
+use crate::experiments::{Claim, Effort, Ended, Experiment, Outcome, Watch};
+
+pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
+    id: "5.6",
+    title: "A multifocal display",
+    claim: "One beam makes a focal stack: a scene in focus at another depth on each of three screens",
+    seconds: 30.0,
+    run,
+};
+
+/// The least quality in dB and the least correlation, in full and as a test.
+const LEAST: [[f64; 2]; 2] = [[23.0, 0.9], [16.0, 0.6]];
+
+/// A coarse field is too smooth for what is in focus.
+const BLURRED: f64 = 0.5;
+
+fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+    let task = task("multifocal", effort, 2)?;
+    let shown = show(&task, [0.0, 1.0], watch)?;
+    let [least, less] = LEAST;
+    let names = ["front", "middle", "back"];
+    let mut outcome = outcome_of(&shown, &names, effort.pick(least, less));
+    outcome.claims.extend(own(&shown, effort.pick(1.0, BLURRED)));
+    Ok(outcome)
+}
+
+/// Every image is more like the picture of its own plane than like that of any other.
+fn own(shown: &Shown, least: f64) -> Vec<Claim> {
+    let images: Vec<_> = shown.seen.iter().filter_map(|seen| seen.image.as_ref()).collect();
+    let views = &shown.runner.task().views;
+    let off = |a: usize, b: usize| {
+        let pairs = images[a].made.iter().zip(&images[b].wanted);
+        pairs.map(|(made, wanted)| (made - wanted) * (made - wanted)).sum::<f64>()
+    };
+    let claim = |i: usize| {
+        let others = (0..images.len()).filter(|k| *k != i).map(|k| off(i, k));
+        let nearest = others.fold(f64::INFINITY, f64::min);
+        let name = &views[i].name;
+        let says = format!("{name}: difference from another plane's picture, in times of its own");
+        Claim::at_least(says, nearest / off(i, i), least)
+    };
+    (0..images.len()).map(claim).collect()
+}

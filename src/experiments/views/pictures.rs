@@ -1,0 +1,41 @@
+//! Images that light makes, beside the pictures that are wanted.
+
+use crate::grin_task::Image;
+use crate::picture::{Align, BLACK, Canvas, Color, GREY, grey};
+
+/// About the side of an image, in pixels of the canvas.
+const SIDE: usize = 384;
+const MARGIN: f64 = 40.0;
+const TOP: f64 = 110.0;
+
+/// The picture that is wanted at the left, what light makes of it at the right, both with white for
+/// the brightest place of the former.
+pub fn view_picture(name: &str, image: &Image, quality: f64) -> Canvas {
+    let correlation = image.correlation();
+    let subtitle = format!("{quality:.1} dB, correlation {correlation:.3}");
+    let panels = [("wanted", &image.wanted), ("made", &image.made)];
+    let peak = image.wanted.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let panels = panels.map(|(title, light)| (title.to_owned(), shades(light, image.pixels, peak)));
+    row(&format!("{name}: {subtitle}"), image.pixels, &panels)
+}
+
+/// Light as shades of grey, rows from the top.
+pub(super) fn shades(light: &[f64], pixels: usize, peak: f64) -> Vec<Color> {
+    let rows = light.chunks(pixels.max(1)).rev();
+    rows.flatten().map(|value| grey(value / peak)).collect()
+}
+
+/// Square images side by side, each under its title.
+pub(super) fn row(title: &str, pixels: usize, panels: &[(String, Vec<Color>)]) -> Canvas {
+    let cell = (SIDE / pixels.max(1)).max(1);
+    let side = (cell * pixels) as f64;
+    let width = MARGIN + panels.len() as f64 * (side + MARGIN);
+    let mut canvas = Canvas::new([width.max(640.0) as u32, (TOP + side + MARGIN) as u32]);
+    canvas.text([MARGIN, 30.0], title, BLACK, Align::Left);
+    for (i, (title, colors)) in panels.iter().enumerate() {
+        let left = MARGIN + i as f64 * (side + MARGIN);
+        canvas.text([left + 0.5 * side, TOP - 36.0], title, GREY, Align::Middle);
+        canvas.raster([left, TOP], pixels, cell, colors);
+    }
+    canvas
+}

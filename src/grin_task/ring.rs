@@ -1,0 +1,43 @@
+//! A ring of light near a field and one far behind it: how far a ray is from both, without asking
+//! where on them it should be (5.36 and 5.37).
+
+use super::space::{length, radians, unit};
+use crate::grin::Exit;
+use crate::math::Vec3;
+
+/// What is shorter than this has no direction.
+const NOTHING: f64 = 1e-9;
+
+/// Two rings about the direction of a beam.
+#[derive(Debug, Clone)]
+pub(super) struct Ring {
+    direction: Vec3<f64>,
+    radius: f64,
+    /// The sine of the angle of the far one.
+    sine: f64,
+    /// What the square of a difference in direction counts.
+    pub(super) far: f64,
+}
+
+impl Ring {
+    /// `angle` in degrees.
+    pub(super) fn new(direction: Vec3<f64>, radius: f64, angle: f64, far: f64) -> Self {
+        Self { direction, radius, sine: radians(angle).sin(), far }
+    }
+
+    /// By how much a ray misses the nearest point of the near ring, and its direction, of length 1,
+    /// that of the far one. A ray on the axis has no nearest point: it goes on outwards.
+    pub(super) fn misses(&self, exit: &Exit<f64>) -> (Vec3<f64>, Vec3<f64>) {
+        let across = |v: Vec3<f64>| v - self.direction * v.dot(self.direction);
+        let (x, v) = (across(exit.x), across(unit(exit.v)));
+        let outwards = if length(x) > NOTHING { unit(x) } else { Vec3::default() };
+        let onwards = if length(v) > NOTHING { unit(v) } else { outwards };
+        (x - outwards * self.radius, v - onwards * self.sine)
+    }
+
+    /// The derivative by a velocity of what depends on its direction.
+    pub(super) fn by_velocity(v: Vec3<f64>, by_direction: Vec3<f64>) -> Vec3<f64> {
+        let d = unit(v);
+        (by_direction - d * d.dot(by_direction)) * (1.0 / length(v))
+    }
+}
