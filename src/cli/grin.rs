@@ -238,6 +238,7 @@ struct Error {
     relative: f64,
     without_offset: f64,
     offset: f64,
+    of_contrast: f64,
 }
 
 impl Report {
@@ -249,7 +250,7 @@ impl Report {
             weight: view.weight,
             spot: result.spot,
             quality_db: result.quality,
-            rays: result.counts.fates.total(),
+            rays: result.counts.sent(),
             excluded: result.counts.excluded().collect(),
             retrace_error: result.retrace_error,
         };
@@ -257,6 +258,7 @@ impl Report {
             relative: difference.relative,
             without_offset: difference.without_offset,
             offset: difference.offset,
+            of_contrast: difference.of_contrast,
         });
         let extremes = task.extremes(best);
         let (integrator, step) = runner.tracing();
@@ -291,9 +293,13 @@ impl Display for Report {
         writeln!(f, "{nodes} nodes, {parameters} numbers; {integrator}, step {step:.4} mm")?;
         let [low, high] = self.index.map(|index| format!("{index:.6}"));
         writeln!(f, "index {low} to {high}, at most {:.4} / mm steep", self.slope)?;
-        if let Some(Error { relative, without_offset, offset }) = &self.error {
+        if let Some(Error { relative, without_offset, offset, of_contrast }) = &self.error {
             write!(f, "off the exact field by {relative:.2e}, relative; by {without_offset:.2e} ")?;
             writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
+            writeln!(
+                f,
+                "which is {of_contrast:.4} of what the exact field differs from the start"
+            )?;
         }
         if let Some(Memory { before_mb, peak_mb }) = &self.memory {
             write!(f, "memory {:.1} MB more than the {before_mb:.1} before", peak_mb - before_mb)?;

@@ -17,6 +17,7 @@ mod known_lenses;
 mod medium;
 mod motion;
 mod outcome;
+mod plume;
 mod report;
 mod sampling;
 mod section;
@@ -27,7 +28,7 @@ mod zoom;
 
 pub use medium::medium_pictures;
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
-pub use report::Report;
+pub use report::{Part, Report};
 
 use crate::files;
 use crate::lens::Lens;
@@ -52,6 +53,7 @@ pub const ALL: &[Experiment] = &[
     adjoint_memory::EXPERIMENT,
     known_lenses::EXPERIMENT,
     fibre::EXPERIMENT,
+    plume::EXPERIMENT,
 ];
 
 /// A figure or table of the thesis.

@@ -17,6 +17,8 @@ pub struct Report {
     pub claim: &'static str,
     /// How long it took, in milliseconds.
     pub ms: f64,
+    /// How long its parts took, where that was measured.
+    pub parts: Vec<Part>,
     /// Whether all claims hold.
     pub holds: bool,
     /// What it found.
@@ -26,12 +28,23 @@ pub struct Report {
     pub files: Vec<String>,
 }
 
+/// A part of an experiment and how long it took.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Part {
+    /// What it did.
+    pub doing: String,
+    /// How long, in milliseconds.
+    pub ms: f64,
+    /// The time of all threads together, where the system tells it.
+    pub processor_ms: Option<f64>,
+}
+
 impl Report {
     /// The report of an experiment that took so long.
     pub fn new(study: &Experiment, outcome: Outcome, ms: f64) -> Self {
         let Experiment { id, title, claim, .. } = *study;
         let holds = outcome.failed().next().is_none();
-        Self { id, title, claim, ms, holds, outcome, files: Vec::new() }
+        Self { id, title, claim, ms, parts: Vec::new(), holds, outcome, files: Vec::new() }
     }
 
     /// Writes everything into a folder: tables as CSV, pictures as PNG, lenses in our own form, all

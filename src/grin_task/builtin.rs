@@ -1,4 +1,4 @@
-//! The tasks that come with the program: the lenses of the thesis.
+//! The tasks that come with the program: the lenses and the plume of the thesis.
 
 use super::task::Task;
 use crate::files::{FileError, native};
@@ -23,6 +23,10 @@ pub const BUILTIN: &[Builtin] = &[
     Builtin { name: "maxwell-radial", text: include_str!("../../assets/grin/maxwell-radial.json") },
     Builtin { name: "display", text: include_str!("../../assets/grin/display.json") },
     Builtin { name: "fibre", text: include_str!("../../assets/grin/fibre.json") },
+    Builtin { name: "plume", text: include_str!("../../assets/grin/plume.json") },
+    Builtin { name: "plume-10x", text: include_str!("../../assets/grin/plume-10x.json") },
+    Builtin { name: "plume-100x", text: include_str!("../../assets/grin/plume-100x.json") },
+    Builtin { name: "plume-1000x", text: include_str!("../../assets/grin/plume-1000x.json") },
 ];
 
 impl Builtin {

@@ -53,7 +53,11 @@ pub enum TaskError {
 }
 
 /// An error at a place.
-fn wrong<T: Display>(place: impl Into<String>, found: T, expected: impl Into<String>) -> TaskError {
+pub(super) fn wrong<T: Display>(
+    place: impl Into<String>,
+    found: T,
+    expected: impl Into<String>,
+) -> TaskError {
     let found = format!("{found}");
     TaskError::Value { place: place.into(), found, expected: expected.into() }
 }
@@ -262,6 +266,15 @@ impl Exact {
             Self::Maxwell { centre: a, radius: b }
             | Self::Secant { axis: a, a: b }
             | Self::Parabolic { axis: a, g: b } => positive(place, *a).and(positive(place, *b)),
+            Self::Plume { ambient, contrast, half } => {
+                positive(format!("{place}, half"), *half)?;
+                let least = ambient.min(ambient + contrast);
+                if least >= 1.0 && (ambient + contrast).is_finite() {
+                    return Ok(());
+                }
+                let found = format!("an index of {least}");
+                Err(wrong(place, found, "1 or more: light is nowhere faster than in vacuum"))
+            }
             Self::Volume(_) => Ok(()),
         }
     }

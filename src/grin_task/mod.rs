@@ -10,22 +10,28 @@
 //! whose equation numbers are given.
 
 mod builtin;
+mod cgls;
 mod check;
+mod chords;
 mod compare;
 mod descent;
 mod hold;
 mod image;
 mod least_squares;
+mod measured;
 mod medium;
 mod runner;
 mod scene;
+mod slope;
 mod source;
 mod space;
 mod task;
 
 pub use builtin::{BUILTIN, Builtin, find, read};
 pub use check::TaskError;
+pub use chords::Chords;
 pub use compare::{Difference, Extremes};
+pub use measured::Measurement;
 pub use medium::{Medium, NoField};
 pub use runner::{Judgement, Progress, Runner};
 pub use scene::{Counts, ViewResult};

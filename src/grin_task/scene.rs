@@ -3,6 +3,7 @@
 use super::check::TaskError;
 use super::hold::Hold;
 use super::image::Screen;
+use super::measured::{self, Known};
 use super::source::{Draw, Sent};
 use super::task::{Goal, Source, Space, Task, Tracing, View};
 use crate::grin::{End, Exit, Fates, Field, LastStep, Ray, Seed, Setup, Tracer, plan};
@@ -12,8 +13,6 @@ use rayon::prelude::*;
 /// A ray that leaves flatter than this, as a cosine, is left out: the derivative of its exit grows
 /// as the inverse.
 pub(super) const FLATTEST: f64 = 0.05;
-/// The field from which a measurement comes is traced so much better than the one that is sought.
-const FINER: f64 = 0.1;
 /// Steps that are tied to voxels are no simple fraction of one; without voxels they are tied to this
 /// part of the space; and a ray counts as trapped when it is so many times longer than the space.
 const INCOMMENSURATE: f64 = 0.974;
@@ -23,10 +22,12 @@ const LONGEST: f64 = 32.0;
 /// Where a ray shall go.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aim {
-    x: Vec3<f64>,
-    v: Vec3<f64>,
+    pub(super) x: Vec3<f64>,
+    pub(super) v: Vec3<f64>,
     /// What the square of a difference in `v` counts.
-    direction: f64,
+    pub(super) direction: f64,
+    /// Whether it is known at all.
+    pub(super) measured: bool,
 }
 
 /// The rays of a view, ready to be traced.
@@ -40,6 +41,8 @@ pub(super) struct Shot {
     lost: f64,
     /// What an image is made on.
     screen: Option<Screen>,
+    /// Rays that no aim is known for; they are not among the others.
+    unmeasured: usize,
 }
 
 /// Rays that are left out, by reason, and those that count.
@@ -49,9 +52,23 @@ pub struct Counts {
     pub fates: Fates,
     /// Rays that arrived, but so flat to the boundary that their derivative is worth nothing.
     pub flat: usize,
+    /// Rays that are not traced: what they should do could not be measured.
+    pub unmeasured: usize,
+}
+
+/// How rays ended, and how many of them left too flat.
+pub(super) fn counts(exits: &[Exit<f64>]) -> Counts {
+    let fates = exits.iter().map(|exit| exit.fate).collect();
+    let is_flat = |exit: &&Exit<f64>| exit.fate.arrived() && !Shot::counts(exit);
+    Counts { fates, flat: exits.iter().filter(is_flat).count(), unmeasured: 0 }
 }
 
 impl Counts {
+    /// All rays.
+    pub fn sent(self) -> usize {
+        self.fates.total() + self.unmeasured
+    }
+
     /// Rays that count.
     pub fn counted(self) -> usize {
         self.fates.arrived() - self.flat
@@ -59,9 +76,10 @@ impl Counts {
 
     /// Rays that are left out, by reason.
     pub fn excluded(self) -> impl Iterator<Item = (&'static str, usize)> {
-        let flat = (self.flat > 0).then_some(("flat", self.flat));
+        let more = [("flat", self.flat), ("unmeasured", self.unmeasured)];
         let lost = self.fates.iter().filter(|(fate, _)| !fate.arrived());
-        lost.map(|(fate, count)| (fate.name(), count)).chain(flat)
+        let lost = lost.map(|(fate, count)| (fate.name(), count));
+        lost.chain(more.into_iter().filter(|(_, count)| *count > 0))
     }
 
     /// Those of two sets of rays.
@@ -72,6 +90,7 @@ impl Counts {
             (0..count).for_each(|_| both.fates.count(fate));
         }
         both.flat += other.flat;
+        both.unmeasured += other.unmeasured;
         both
     }
 }
@@ -151,25 +170,33 @@ fn screen(view: &View, space: Space) -> Option<Screen> {
 /// The rays of every view with their aims.
 pub(super) fn shots(
     task: &Task,
+    known: &Known,
     setups: &[Setup<f64>],
     draw: Draw,
 ) -> Result<Vec<Shot>, TaskError> {
-    let shot = |(view, setup): (&View, &Setup<f64>)| {
+    let shot = |((view, setup), known): ((&View, &Setup<f64>), &Option<Vec<Aim>>)| {
         let space = view.space.unwrap_or(task.space);
         let sent = view.source.rays(space, draw);
-        let aims = aims(task, view, space, &sent)?;
-        let rays = sent.into_iter().map(|sent| sent.ray).collect();
+        let mut aims = match known {
+            Some(known) => known.clone(),
+            None => aims(task, view, space, &sent)?,
+        };
+        let is_measured = |i: usize| aims.get(i).is_none_or(|aim| aim.measured);
+        let measured = sent.iter().enumerate().filter(|(i, _)| is_measured(*i));
+        let rays: Vec<Ray<f64>> = measured.map(|(_, sent)| sent.ray).collect();
+        let unmeasured = sent.len() - rays.len();
+        aims.retain(|aim| aim.measured);
         let lost = space.diameter() * space.diameter();
         let (setup, weight, screen) = (setup.clone(), view.weight, screen(view, space));
         // The difference of an image has no unit.
         let lost = if screen.is_some() { 1.0 } else { lost };
-        Ok(Shot { rays, aims, setup, weight, lost, screen })
+        Ok(Shot { rays, aims, setup, weight, lost, screen, unmeasured })
     };
-    task.views.iter().zip(setups).map(shot).collect()
+    task.views.iter().zip(setups).zip(known).map(shot).collect()
 }
 
 fn aims(task: &Task, view: &View, space: Space, sent: &[Sent]) -> Result<Vec<Aim>, TaskError> {
-    let at = |x| Aim { x, v: Vec3::default(), direction: 0.0 };
+    let at = |x| Aim { x, v: Vec3::default(), direction: 0.0, measured: true };
     Ok(match &view.goal {
         Goal::Image { .. } => Vec::new(),
         Goal::Point([x, y, z]) => vec![at(Vec3::new(*x, *y, *z)); sent.len()],
@@ -177,16 +204,7 @@ fn aims(task: &Task, view: &View, space: Space, sent: &[Sent]) -> Result<Vec<Aim
             let reach = 0.5 * space.diameter();
             sent.iter().map(|sent| at(sent.opposite * reach)).collect()
         }
-        Goal::Like { field, direction } => {
-            let place = format!("view {}", view.name);
-            let field = field.field().map_err(|source| TaskError::Field { place, source })?;
-            let rays: Vec<Ray<f64>> = sent.iter().map(|sent| sent.ray).collect();
-            let finer = FINER * task.tolerance;
-            let plan = plan(&*field, &space.region(), task.launch, &rays, finer)?;
-            let exits = Tracer::new(&*field, plan.setup)?.rays(&rays);
-            let aim = |exit: &Exit<f64>| Aim { x: exit.x, v: exit.v, direction: *direction };
-            exits.iter().map(aim).collect()
-        }
+        Goal::Like { field, direction } => measured::aims(task, view, field, sent, *direction)?,
     })
 }
 
@@ -214,7 +232,7 @@ impl Shot {
     }
 
     /// Whether a ray counts.
-    fn counts(exit: &Exit<f64>) -> bool {
+    pub(super) fn counts(exit: &Exit<f64>) -> bool {
         exit.fate.arrived() && exit.cosine.abs() >= FLATTEST
     }
 
@@ -270,11 +288,14 @@ impl Shot {
         }
     }
 
+    /// How its rays ended.
+    fn counted(&self, exits: &[Exit<f64>]) -> Counts {
+        Counts { unmeasured: self.unmeasured, ..counts(exits) }
+    }
+
     fn image_result(&self, screen: &Screen, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
         let difference = screen.difference(&Self::image(screen, exits));
-        let fates = exits.iter().map(|exit| exit.fate).collect();
-        let is_flat = |exit: &&Exit<f64>| exit.fate.arrived() && !Self::counts(exit);
-        let counts = Counts { fates, flat: exits.iter().filter(is_flat).count() };
+        let counts = self.counted(exits);
         let lost = exits.len() - counts.counted();
         let loss = difference + self.lost * lost as f64 / exits.len() as f64;
         let quality = Some(screen.quality(difference));
@@ -282,18 +303,15 @@ impl Shot {
     }
 
     fn spot_result(&self, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
-        let (mut loss, mut square, mut flat) = (0.0, 0.0, 0);
+        let (mut loss, mut square) = (0.0, 0.0);
         for (i, exit) in exits.iter().enumerate() {
             loss += self.judge(i, exit).0;
             if Self::counts(exit) {
                 let dx = self.misses(i, exit).0;
                 square += dx.dot(dx);
-            } else if exit.fate.arrived() {
-                flat += 1;
             }
         }
-        let fates = exits.iter().map(|exit| exit.fate).collect();
-        let counts = Counts { fates, flat };
+        let counts = self.counted(exits);
         let spot = (square / counts.counted() as f64).sqrt();
         let loss = loss / exits.len() as f64;
         ViewResult { loss, spot, quality: None, counts, retrace_error }
