@@ -10,6 +10,8 @@ use std::fmt::Display;
 
 /// Most numbers that least squares are worth while for.
 const FEW: usize = 400;
+/// By how much an index may be below 1 that is the difference of two numbers.
+pub(super) const ROUNDING: f64 = 1e-9;
 /// Most rays in a step, and most nodes along a side.
 const MANY_RAYS: usize = 10_000_000;
 const MANY_NODES: usize = 513;
@@ -269,7 +271,7 @@ impl Exact {
             Self::Plume { ambient, contrast, half } => {
                 positive(format!("{place}, half"), *half)?;
                 let least = ambient.min(ambient + contrast);
-                if least >= 1.0 && (ambient + contrast).is_finite() {
+                if least >= 1.0 - ROUNDING && (ambient + contrast).is_finite() {
                     return Ok(());
                 }
                 let found = format!("an index of {least}");

@@ -48,7 +48,7 @@ struct Chord {
 /// The measurements of a task with the straight chords of their rays.
 #[derive(Debug, Clone)]
 pub struct Chords {
-    chords: Vec<Chord>,
+    list: Vec<Chord>,
     task: Task,
     /// The index around.
     ambient: f64,
@@ -108,6 +108,19 @@ impl Chord {
             field.deposit(p, 0.0, pull, gradient);
         }
     }
+
+    /// How a volume of one part of the gradient turns the ray.
+    fn turn(&self, part: &Trilinear<f64>) -> f64 {
+        let turns = self.places().map(|(p, _, share)| share * part.sample(p).index);
+        self.gains[0] * turns.sum::<f64>()
+    }
+
+    /// The transpose of [`Self::turn`].
+    fn turn_back(&self, part: &Trilinear<f64>, seed: f64, gradient: &mut [f64]) {
+        for (p, _, share) in self.places() {
+            part.deposit(p, self.gains[0] * share * seed, Vec3::default(), gradient);
+        }
+    }
 }
 
 impl Chords {
@@ -133,12 +146,12 @@ impl Chords {
                 (0..shot.rays.len()).filter_map(|ray| Chord::new(even.field(), shot, &tracer, ray)),
             );
         }
-        Ok(Self { chords, task: task.clone(), ambient })
+        Ok(Self { list: chords, task: task.clone(), ambient })
     }
 
     /// How many there are.
     pub fn count(&self) -> usize {
-        self.chords.len()
+        self.list.len()
     }
 
     /// The field of so many nodes that explains the measurement best by straight lines, within the
@@ -190,24 +203,16 @@ impl Chords {
         let grid = Grid::cube(nodes, half)?;
         let shape = Trilinear::new(grid, vec![0.0; grid.nodes()])?;
         let part = |axis: usize| -> Result<Trilinear<f64>, TaskError> {
-            let right: Vec<f64> = self.chords.iter().map(|c| along(c.measured[0], axis)).collect();
+            let right: Vec<f64> = self.list.iter().map(|c| along(c.measured[0], axis)).collect();
             let forward = |u: &[f64]| -> Vec<f64> {
                 let volume = filled(&shape, u);
-                let sum = |chord: &Chord| -> f64 {
-                    let places = chord.places();
-                    places
-                        .map(|(p, _, share)| chord.gains[0] * share * volume.sample(p).index)
-                        .sum()
-                };
-                self.chords.par_iter().map(sum).collect()
+                self.list.par_iter().map(|chord| chord.turn(&volume)).collect()
             };
             let back = |rows: &[f64]| {
-                self.deposit(grid.nodes(), |chord, ray, sum| {
-                    for (p, _, share) in chord.places() {
-                        let weight = chord.gains[0] * share * rows[ray];
-                        shape.deposit(p, weight, Vec3::default(), sum);
-                    }
-                })
+                let add = |chord: &Chord, ray: usize, sum: &mut [f64]| {
+                    chord.turn_back(&shape, rows[ray], sum);
+                };
+                self.deposit(grid.nodes(), add)
             };
             let go_on = |_: &[f64]| ControlFlow::Continue(());
             Ok(filled(&shape, &cgls(grid.nodes(), &right, steps, forward, back, go_on)))
@@ -224,7 +229,7 @@ impl Chords {
             let [a, b] = of(chord);
             [a.x, a.y, a.z, b.x, b.y, b.z]
         };
-        self.chords.par_iter().flat_map_iter(rows).collect()
+        self.list.par_iter().flat_map_iter(rows).collect()
     }
 
     /// The transpose of [`Self::rows`].
@@ -242,13 +247,13 @@ impl Chords {
 
     /// Sums over all chords, the same on any number of threads.
     fn deposit(&self, unknowns: usize, add: impl Fn(&Chord, usize, &mut [f64]) + Sync) -> Vec<f64> {
-        let size = self.chords.len().div_ceil(PARTS).max(1);
+        let size = self.list.len().div_ceil(PARTS).max(1);
         let part = |(first, chords): (usize, &[Chord])| {
             let mut sum = vec![0.0; unknowns];
             chords.iter().enumerate().for_each(|(i, c)| add(c, first * size + i, &mut sum));
             sum
         };
-        let parts: Vec<Vec<f64>> = self.chords.par_chunks(size).enumerate().map(part).collect();
+        let parts: Vec<Vec<f64>> = self.list.par_chunks(size).enumerate().map(part).collect();
         let mut sum = vec![0.0; unknowns];
         for part in parts {
             sum.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);

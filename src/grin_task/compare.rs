@@ -20,7 +20,8 @@ pub struct Difference {
     pub without_offset: f64,
     /// That mean.
     pub offset: f64,
-    /// `‖η - η*‖ / ‖η* - η₀‖` with `η₀` the field to begin with: 1 for a search that found nothing.
+    /// `‖η - η*‖ / ‖η* - η₀‖` with `η₀` the field to begin with: 1 for a search that found nothing,
+    /// infinite where there is nothing to find.
     pub of_contrast: f64,
 }
 
@@ -95,6 +96,6 @@ fn difference(
         relative: (plain / norm).sqrt(),
         without_offset: (shape / norm).sqrt(),
         offset,
-        of_contrast: (plain / contrast).sqrt(),
+        of_contrast: if plain == 0.0 { 0.0 } else { (plain / contrast).sqrt() },
     }
 }

@@ -1,7 +1,7 @@
 //! A field on its way: how it begins, what its numbers may do, how it becomes finer, and how it is
 //! written as a volume.
 
-use super::check::TaskError;
+use super::check::{ROUNDING, TaskError};
 use super::task::{Edge, Exact, FieldKind, MakerLimits, Space, Start, Task};
 use crate::files::{self, FileError, Volume};
 use crate::grin::Field;
@@ -248,7 +248,7 @@ pub enum NoField {
 pub(super) fn from_file<R: Real>(path: &Path) -> Result<Trilinear<R>, NoField> {
     let Volume { grid, values } = files::read_volume(path)?;
     let wrong = |source| NoField::Values { file: path.display().to_string(), source };
-    if let Some(n) = values.iter().position(|index| !(*index >= 1.0)) {
+    if let Some(n) = values.iter().position(|index| !(*index >= 1.0 - ROUNDING)) {
         let [nx, ny, _] = grid.counts();
         let (file, node) = (path.display().to_string(), [n % nx, n / nx % ny, n / nx / ny]);
         return Err(NoField::Index { file, node, found: values[n] });
@@ -258,9 +258,12 @@ pub(super) fn from_file<R: Real>(path: &Path) -> Result<Trilinear<R>, NoField> {
     Trilinear::new(grid, values.into_iter().map(R::from_f64).collect()).map_err(wrong)
 }
 
+/// The index at every point.
+type Index = Box<dyn Fn(Vec3<f64>) -> f64>;
+
 impl Start {
-    /// The index at a point of the field to begin with.
-    pub(super) fn index(&self) -> Result<Box<dyn Fn(Vec3<f64>) -> f64>, NoField> {
+    /// The index of the field to begin with.
+    pub(super) fn index(&self) -> Result<Index, NoField> {
         Ok(match self {
             Self::Uniform(index) => {
                 let index = *index;

@@ -17,7 +17,16 @@ const POINTS: usize = 2;
 const SPOKE: usize = 1000;
 /// How many of the steepest places are climbed from, and how often the step is halved there.
 const PEAKS: usize = 24;
-const HALVINGS: usize = 10;
+const HALVINGS: i32 = 10;
+/// Where a climb may lead.
+const AXES: [Vec3<f64>; 6] = [
+    Vec3 { x: 1.0, y: 0.0, z: 0.0 },
+    Vec3 { x: -1.0, y: 0.0, z: 0.0 },
+    Vec3 { x: 0.0, y: 1.0, z: 0.0 },
+    Vec3 { x: 0.0, y: -1.0, z: 0.0 },
+    Vec3 { x: 0.0, y: 0.0, z: 1.0 },
+    Vec3 { x: 0.0, y: 0.0, z: -1.0 },
+];
 /// How far below its limit a field is put, for rounding.
 const MARGIN: f64 = 1e-9;
 
@@ -65,19 +74,13 @@ impl Medium {
             _ => (high.x - low.x) / (POINTS * self.nodes().saturating_sub(1).max(1)) as f64,
         };
         let up = |(mut best, mut at): (f64, Vec3<f64>)| {
-            let mut step = 0.5 * gap;
-            for _ in 0..HALVINGS {
-                for axis in
-                    [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)]
-                {
-                    for side in [-step, step] {
-                        let there = at + axis * side;
-                        if region.height(there) <= 0.0 && slope(there) > best {
-                            (best, at) = (slope(there), there);
-                        }
-                    }
-                }
-                step *= 0.5;
+            for halved in 1..=HALVINGS {
+                let step = gap * 0.5_f64.powi(halved);
+                let there = AXES.map(|to| at + to * step).into_iter();
+                let inside = there.filter(|p| region.height(*p) <= 0.0).map(|p| (slope(p), p));
+                let higher =
+                    |a: (f64, Vec3<f64>), b: (f64, Vec3<f64>)| if b.0 > a.0 { b } else { a };
+                (best, at) = inside.fold((best, at), higher);
             }
             best
         };
