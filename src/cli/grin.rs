@@ -2,6 +2,7 @@
 
 use super::experiment::check_folder;
 use super::failure::Failure;
+use super::grin_lines::Lines;
 use super::input::{check_target, read_json};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::{Number, Output, Table};
@@ -45,6 +46,10 @@ pub(super) struct Grin {
     #[arg(long, value_name = "M")]
     minutes: Option<f64>,
 
+    /// Also solves for the field by straight lines, for comparison, where the light was measured
+    #[arg(long, requires = "task")]
+    lines: bool,
+
     /// Prints the task itself, as a file to begin with, and does nothing
     #[arg(long, requires = "task")]
     show: bool,
@@ -70,6 +75,9 @@ impl Grin {
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
         let mut report = Report::new(&runner, &Cost { ms, processor_ms, memory, stopped })
             .map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
+        if self.lines {
+            report.lines = Some(Lines::new(name, &task, runner.best().nodes())?);
+        }
         report.files = self.write(&task, runner.best())?;
         output.print(&report)
     }
@@ -207,6 +215,7 @@ struct Report {
     loss: f64,
     views: Vec<View>,
     error: Option<Error>,
+    lines: Option<Lines>,
     index: [f64; 2],
     slope: f64,
     nodes: usize,
@@ -268,6 +277,7 @@ impl Report {
             loss,
             views: task.views.iter().zip(&views).map(view).collect(),
             error,
+            lines: None,
             index: [extremes.low, extremes.high],
             slope: extremes.slope,
             nodes: best.nodes(),
@@ -301,6 +311,7 @@ impl Display for Report {
                 "which is {of_contrast:.4} of what the exact field differs from the start"
             )?;
         }
+        self.lines.iter().try_for_each(|lines| write!(f, "{lines}"))?;
         if let Some(Memory { before_mb, peak_mb }) = &self.memory {
             write!(f, "memory {:.1} MB more than the {before_mb:.1} before", peak_mb - before_mb)?;
         }

@@ -9,7 +9,7 @@
 //! integrate them: [`Chords::by_gradients`].
 
 use super::cgls::cgls;
-use super::check::TaskError;
+use super::check::{TaskError, wrong};
 use super::measured::known;
 use super::medium::Medium;
 use super::scene::{Aim, Shot, setups, shots};
@@ -24,6 +24,8 @@ use std::ops::ControlFlow;
 
 /// Chords are worked off in so many parts, which are added in order.
 const PARTS: usize = 16;
+/// Places of the surface at which the index is held.
+const SURFACE: usize = 2000;
 /// Steps that integrate a gradient, in times of the nodes along a side.
 const INTEGRATION: usize = 4;
 
@@ -52,6 +54,8 @@ pub struct Chords {
     task: Task,
     /// The index around.
     ambient: f64,
+    /// Where the task holds the index, and the root of the weight of each of these places.
+    edge: (Vec<Vec3<f64>>, f64),
 }
 
 impl Chord {
@@ -146,7 +150,14 @@ impl Chords {
                 (0..shot.rays.len()).filter_map(|ray| Chord::new(even.field(), shot, &tracer, ray)),
             );
         }
-        Ok(Self { list: chords, task: task.clone(), ambient })
+        if chords.is_empty() {
+            return Err(wrong("views", "none with the goal `like`", "light that was measured"));
+        }
+        let weight = task.edge.map_or(0.0, |edge| edge.weight);
+        let places = if weight > 0.0 { task.space.surface(SURFACE) } else { Vec::new() };
+        // The weight stands against the mean over the rays, here against their sum.
+        let firm = (weight * chords.len() as f64 / SURFACE as f64).sqrt();
+        Ok(Self { list: chords, task: task.clone(), ambient, edge: (places, firm) })
     }
 
     /// How many there are.
@@ -169,15 +180,22 @@ impl Chords {
         let shape = Medium::of(self.task.field, nodes, |_| 0.0)?;
         let ranges = shape.ranges(self.task.space, self.task.limits, self.task.edge);
         let limits = Limits { ranges, change: f64::INFINITY };
-        let right: Vec<f64> = self.rows(|chord| chord.measured.map(|m| chord.across(m)));
+        let (places, firm) = &self.edge;
+        let mut right: Vec<f64> = self.rows(|chord| chord.measured.map(|m| chord.across(m)));
+        right.resize(right.len() + places.len(), 0.0);
         let forward = |u: &[f64]| {
             let medium = with(&shape, u);
-            self.rows(|chord| chord.bend(medium.field()))
+            let mut rows = self.rows(|chord| chord.bend(medium.field()));
+            rows.extend(places.iter().map(|p| firm * medium.field().sample(*p).index));
+            rows
         };
         let back = |rows: &[f64]| {
             let mut sum = self.back(shape.field().parameters().len(), rows, |chord, seeds, sum| {
                 chord.bend_back(shape.field(), seeds, sum);
             });
+            for (p, row) in places.iter().zip(&rows[6 * self.list.len()..]) {
+                shape.field().deposit(*p, firm * row, Vec3::default(), &mut sum);
+            }
             let held = limits.ranges.iter().map(|[low, high]| low >= high);
             sum.iter_mut().zip(held).filter(|(_, held)| *held).for_each(|(g, _)| *g = 0.0);
             sum

@@ -15,9 +15,11 @@ use rayon::prelude::*;
 /// Points in a cell along each axis, and along a radius, at which a smooth field is looked at.
 const POINTS: usize = 2;
 const SPOKE: usize = 1000;
-/// How many of the steepest places are climbed from, and how often the step is halved there.
-const PEAKS: usize = 24;
-const HALVINGS: i32 = 10;
+/// How many of the steepest places are climbed from, how often the step is halved there, and how
+/// often one is taken before that.
+const PEAKS: usize = 64;
+const HALVINGS: i32 = 8;
+const MOVES: i32 = 4;
 /// Where a climb may lead.
 const AXES: [Vec3<f64>; 6] = [
     Vec3 { x: 1.0, y: 0.0, z: 0.0 },
@@ -27,8 +29,9 @@ const AXES: [Vec3<f64>; 6] = [
     Vec3 { x: 0.0, y: 0.0, z: 1.0 },
     Vec3 { x: 0.0, y: 0.0, z: -1.0 },
 ];
-/// How far below its limit a field is put, for rounding.
-const MARGIN: f64 = 1e-9;
+/// How far below its limit a field is put: a trilinear one for rounding, a smooth one for what a climb
+/// may miss.
+const MARGINS: [f64; 2] = [1e-9, 1e-3];
 
 impl Medium {
     /// Its steepest slope in the space, in 1/mm: of a trilinear field exactly, over all voxels that
@@ -52,8 +55,9 @@ impl Medium {
     pub(super) fn flattened(&self, space: Space, limit: f64, towards: f64) -> Self {
         let steepest = self.steepest(space);
         let mut flat = self.clone();
-        if steepest > limit {
-            let factor = (1.0 - MARGIN) * limit / steepest;
+        if !(steepest <= limit) {
+            let margin = MARGINS[usize::from(!matches!(self, Self::Trilinear(_)))];
+            let factor = (1.0 - margin) * limit / steepest;
             let draw = |value: &mut f64| *value = towards + factor * (*value - towards);
             flat.parameters_mut().iter_mut().for_each(draw);
         }
@@ -74,8 +78,8 @@ impl Medium {
             _ => (high.x - low.x) / (POINTS * self.nodes().saturating_sub(1).max(1)) as f64,
         };
         let up = |(mut best, mut at): (f64, Vec3<f64>)| {
-            for halved in 1..=HALVINGS {
-                let step = gap * 0.5_f64.powi(halved);
+            for taken in 0..HALVINGS * MOVES {
+                let step = gap * 0.5_f64.powi(1 + taken / MOVES);
                 let there = AXES.map(|to| at + to * step).into_iter();
                 let inside = there.filter(|p| region.height(*p) <= 0.0).map(|p| (slope(p), p));
                 let higher =
