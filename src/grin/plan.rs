@@ -16,10 +16,12 @@ use crate::math::Vec3;
 
 /// Rays that the step is tried on.
 const SAMPLE: usize = 64;
-/// Largest number of tries, and after how many that do not halve the error light counts as chaotic:
-/// finer steps tell no more about it, and become very many.
+/// Largest number of tries.
 const TRIES: usize = 24;
-const STALLED: usize = 5;
+/// After so many tries that do not halve an error of this part of the way, light counts as chaotic:
+/// finer steps tell no more about it, and become very many.
+const STALLED: usize = 3;
+const WILD: f64 = 0.1;
 /// A ray may be this many times longer than the longest straight way through the region.
 const LONGEST: f64 = 32.0;
 /// Most steps a straight way may take before the plan gives up on a tolerance.
@@ -80,7 +82,7 @@ pub fn plan<F: Field<f64> + ?Sized>(
     let (mut least, mut stalled) = (f64::INFINITY, 0);
     for _ in 0..TRIES {
         error = change(field, &setup(step), &setup(0.5 * step), &sample)?;
-        stalled = if error < 0.5 * least { 0 } else { stalled + 1 };
+        stalled = if error < (0.5 * least).max(WILD * way) { 0 } else { stalled + 1 };
         least = least.min(error);
         if error <= tolerance || step <= finest || stalled == STALLED {
             break;

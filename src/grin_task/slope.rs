@@ -8,7 +8,7 @@ use super::medium::Medium;
 use super::space::length;
 use super::task::Space;
 use crate::grin::Field as _;
-use crate::grin::field::Trilinear;
+use crate::grin::field::{Coordinate, Trilinear};
 use crate::math::Vec3;
 use rayon::prelude::*;
 
@@ -43,8 +43,15 @@ impl Medium {
                 let [cells, ..] = field.grid().counts().map(|count| count - 3);
                 self.climb(space, &lattice(space, POINTS * cells))
             }
-            Self::Radial(_, radius) => {
-                let at = |i: usize| Vec3::new(radius * i as f64 / SPOKE as f64, 0.0, 0.0);
+            Self::Radial(field, _) => {
+                // Towards a corner of the box around the space: the farthest place.
+                let [low, high] = space.corners();
+                let z = (low.z + high.z) * 0.5;
+                let (to, z) = match field.coordinate {
+                    Coordinate::Sphere => (high, 0.0),
+                    _ => (Vec3::new(high.x, high.y, 0.0), z),
+                };
+                let at = |i: usize| to * (i as f64 / SPOKE as f64) + Vec3::new(0.0, 0.0, z);
                 self.climb(space, &(0..=SPOKE).map(at).collect::<Vec<_>>())
             }
         }
@@ -55,7 +62,7 @@ impl Medium {
     pub(super) fn flattened(&self, space: Space, limit: f64, towards: f64) -> Self {
         let steepest = self.steepest(space);
         let mut flat = self.clone();
-        if !(steepest <= limit) {
+        if steepest > limit {
             let margin = MARGINS[usize::from(!matches!(self, Self::Trilinear(_)))];
             let factor = (1.0 - margin) * limit / steepest;
             let draw = |value: &mut f64| *value = towards + factor * (*value - towards);
@@ -74,7 +81,7 @@ impl Medium {
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let [low, high] = space.corners();
         let gap = match self {
-            Self::Radial(_, radius) => radius / SPOKE as f64,
+            Self::Radial(..) => (high.x - low.x) / SPOKE as f64,
             _ => (high.x - low.x) / (POINTS * self.nodes().saturating_sub(1).max(1)) as f64,
         };
         let up = |(mut best, mut at): (f64, Vec3<f64>)| {
