@@ -263,8 +263,8 @@ fn grin_rays_that_a_field_traps_are_told_as_trapped() {
     task.limits = MakerLimits { low: 1.0, high: 9.0, slope: None, change: 0.05 };
     task.levels = vec![Level { nodes: 65, steps: 1 }];
     task.method = Method::Lbfgs;
-    // Across the radius at 0.4 and at 1.2 mm: the far ends of their circles are at 2.5 and 0.83 mm.
-    task.views[0].source = Source::Fan { height: 1.6, z: 0.0, rays: 2 };
+    // Across the radius at 0.6 and at 1.8 mm: the far ends of their circles are at 1.7 and 0.56 mm.
+    task.views[0].source = Source::Fan { height: 2.4, z: 0.0, rays: 2 };
     task.views[0].goal = Goal::Point([4.0, 0.0, 0.0]);
     let runner = Runner::new(&task).unwrap();
     std::fs::remove_dir_all(folder).unwrap();
