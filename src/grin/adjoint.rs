@@ -40,8 +40,9 @@ impl<R: Real> Seed<R> {
     }
 }
 
-/// Rays side by side on their way back.
+/// Rays side by side on their way back; a column begins where a line of the cache does.
 #[derive(Clone, Default)]
+#[repr(C, align(64))]
 struct Block<R> {
     x: Columns<R>,
     v: Columns<R>,
@@ -59,6 +60,7 @@ struct Block<R> {
 }
 
 /// Room for what a kick needs.
+#[repr(C, align(64))]
 struct Scratch<R> {
     samples: Samples<R>,
     /// `Hess(η) μ`.
@@ -97,6 +99,17 @@ impl<R: Real> Block<R> {
         self.seat[lane] = None;
     }
 
+    /// Gives every ray on its way a whole step.
+    fn go_on(&mut self, step: R) {
+        for (h, due) in self.h.iter_mut().zip(&self.due) {
+            *h = R::select(*due == u64::MAX, R::ZERO, step);
+        }
+    }
+
+    fn earliest(&self) -> u64 {
+        self.due.into_iter().min().unwrap_or(u64::MAX)
+    }
+
     fn seed(&self, lane: usize) -> Seed<R> {
         Seed { x: get(&self.by_x, lane), v: get(&self.by_v, lane), path: self.by_path[lane] }
     }
@@ -129,16 +142,23 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
         for lane in 0..LANES {
             self.fill_back(&mut block, lane, (&mut queue, clock), chunk);
         }
-        while block.seat.iter().any(Option::is_some) {
+        let mut soonest = block.earliest();
+        let mut boarded = true;
+        // An empty seat is never due.
+        while soonest != u64::MAX {
             widest(
                 Width::Bits512,
                 #[inline(always)]
                 || self.undo_block(&mut block, &mut scratch, gradient),
             );
             clock += 1;
-            for (h, due) in block.h.iter_mut().zip(&block.due) {
+            if boarded {
                 // Only the first step on the way back may be a cut one.
-                *h = R::select(*due == u64::MAX, R::ZERO, self.setup.step);
+                block.go_on(self.setup.step);
+            }
+            boarded = clock >= soonest;
+            if !boarded {
+                continue;
             }
             for lane in 0..LANES {
                 let Some(ray) = block.seat[lane].filter(|_| clock >= block.due[lane]) else {
@@ -147,6 +167,7 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
                 self.arrive(&block, (lane, ray), chunk, gradient, &mut retraced);
                 self.fill_back(&mut block, lane, (&mut queue, clock), chunk);
             }
+            soonest = block.earliest();
         }
         retraced
     }

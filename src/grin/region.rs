@@ -1,6 +1,7 @@
 //! Where light is traced: a region bounded by planes and quadrics, and where a straight line
 //! crosses its boundary.
 
+use super::lanes::{Column, Columns, LANES, get};
 use crate::math::Real;
 use crate::math::Vec3;
 
@@ -142,6 +143,29 @@ impl<R: Real> Region<R> {
         self.faces.iter().fold(sides, |height, face| larger(height, face.height(p)))
     }
 
+    /// How many sides each ray of a block is not inside of; more than none for what is nowhere. Numbers
+    /// as wide as the places themselves, which lanes need not convert.
+    #[inline(always)]
+    pub(super) fn outside(&self, at: &Columns<R>) -> Column<R> {
+        let mut out = [R::ZERO; LANES];
+        let axes = [
+            (&at.x, self.low.x, self.high.x),
+            (&at.y, self.low.y, self.high.y),
+            (&at.z, self.low.z, self.high.z),
+        ];
+        for (column, low, high) in axes {
+            for (out, x) in out.iter_mut().zip(column) {
+                *out += R::select((low < *x) & (*x < high), R::ZERO, R::ONE);
+            }
+        }
+        for face in &self.faces {
+            for (lane, out) in out.iter_mut().enumerate() {
+                *out += R::select(face.height(get(at, lane)) < R::ZERO, R::ZERO, R::ONE);
+            }
+        }
+        out
+    }
+
     /// How many faces there are, those of the box included.
     pub fn face_count(&self) -> usize {
         SIDES + self.faces.len()
@@ -169,8 +193,8 @@ impl<R: Real> Region<R> {
     /// The face that a point is farthest outside of, in units of length, and how far.
     pub fn outermost(&self, p: Vec3<R>) -> (usize, R) {
         let mut found = (0, R::from_f64(f64::NEG_INFINITY));
-        for n in 0..self.face_count() {
-            let distance = self.distance(n, p);
+        let faces = self.faces.iter().map(|face| distance(face, p));
+        for (n, distance) in self.sides(p).into_iter().chain(faces).enumerate() {
             if distance > found.1 {
                 found = (n, distance);
             }
@@ -178,12 +202,12 @@ impl<R: Real> Region<R> {
         found
     }
 
-    /// The distance of a point from a face, to first order; negative inside.
-    fn distance(&self, n: usize, p: Vec3<R>) -> R {
-        let face = self.face(n);
-        let normal = face.normal(p);
-        let length = normal.dot(normal).sqrt();
-        if length > R::ZERO { face.height(p) / length } else { face.height(p) }
+    /// How far a point is outside each side of the box, in the order of [`Self::face`]: minus
+    /// infinity where there is none.
+    #[inline(always)]
+    fn sides(&self, p: Vec3<R>) -> [R; SIDES] {
+        let (low, high) = (self.low - p, p - self.high);
+        [low.x, high.x, low.y, high.y, low.z, high.z]
     }
 
     /// Where the line `x + t v` from a point outside first is inside every face: the `t ≥ 0`, and the
@@ -191,12 +215,12 @@ impl<R: Real> Region<R> {
     /// crossed the boundary.
     pub fn entry(&self, x: Vec3<R>, v: Vec3<R>) -> Option<(usize, R)> {
         let mut found: Option<(usize, R)> = None;
-        for n in 0..self.face_count() {
-            let face = self.face(n);
-            if !(face.height(x) >= R::ZERO) {
+        let faces = self.faces.iter().map(|face| face.height(x));
+        for (n, height) in self.sides(x).into_iter().chain(faces).enumerate() {
+            if !(height >= R::ZERO) {
                 continue;
             }
-            let [near, far] = face.crossings(x, v)?;
+            let [near, far] = self.face(n).crossings(x, v)?;
             let t = R::select(near >= R::ZERO, near, far);
             if !(t >= R::ZERO) {
                 return None;
@@ -210,6 +234,13 @@ impl<R: Real> Region<R> {
         let (_, distance) = self.outermost(at);
         (distance <= rounding(at, v * t)).then_some((face, t))
     }
+}
+
+/// The distance of a point from a face, to first order; negative inside.
+fn distance<R: Real>(face: &Face<R>, p: Vec3<R>) -> R {
+    let normal = face.normal(p);
+    let length = normal.dot(normal).sqrt();
+    if length > R::ZERO { face.height(p) / length } else { face.height(p) }
 }
 
 /// A distance that rounding may explain at a point that was reached over this way.

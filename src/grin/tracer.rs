@@ -61,8 +61,9 @@ pub struct Tracer<'a, R, F: ?Sized> {
     pub(super) ops: Vec<Op<R>>,
 }
 
-/// Rays side by side.
+/// Rays side by side; a column begins where a line of the cache does.
 #[derive(Clone, Default)]
+#[repr(C, align(64))]
 struct Block<R> {
     x: Columns<R>,
     v: Columns<R>,
@@ -71,6 +72,8 @@ struct Block<R> {
     h: Column<R>,
     /// After how many steps of the block the ray has used up its own.
     deadline: [u64; LANES],
+    /// The earliest of these.
+    soonest: u64,
     /// Which ray sits here.
     seat: [Option<usize>; LANES],
 }
@@ -85,6 +88,10 @@ impl<R: Real> Block<R> {
         put(&mut self.v, lane, state.v);
         self.path[lane] = state.path;
         self.seat[lane] = Some(ray);
+    }
+
+    fn earliest(&self) -> u64 {
+        self.deadline.into_iter().min().unwrap_or(u64::MAX)
     }
 
     /// Empties a seat; what was not finite must not stay, since it would survive a step of 0.
@@ -205,8 +212,10 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
         (0..LANES).for_each(|lane| block.leave(lane));
         let mut queue = 0..rays.len();
         (0..LANES).for_each(|lane| self.fill(&mut block, lane, (&mut queue, 0), rays, exits));
+        block.soonest = block.earliest();
         let (mut clock, mut before) = (0, block.clone());
-        while block.seat.iter().any(Option::is_some) {
+        // An empty seat is never due.
+        while block.soonest != u64::MAX {
             if self.setup.is_fractional() {
                 (before.x, before.v, before.path) = (block.x, block.v, block.path);
             }
@@ -232,6 +241,7 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
                 exits[ray] = self.land(&rays[ray], &before.state(lane), &state, steps);
                 self.fill(&mut block, lane, (&mut queue, clock), rays, exits);
             }
+            block.soonest = block.earliest();
         }
     }
 
@@ -270,17 +280,13 @@ impl<'a, R: Real, F: Field<R> + ?Sized> Tracer<'a, R, F> {
     /// Whether any ray has to be looked at.
     #[inline(always)]
     fn any_due(&self, block: &Block<R>, clock: u64) -> bool {
+        let Some(region) = self.setup.region() else { return clock >= block.soonest };
         let mut due = false;
-        for lane in 0..LANES {
-            due |= clock >= block.deadline[lane];
+        for (out, h) in region.outside(&block.x).into_iter().zip(block.h) {
+            // The step of an empty seat has no length.
+            due |= out * h > R::ZERO;
         }
-        if let Some(region) = self.setup.region() {
-            for lane in 0..LANES {
-                let out = !(region.height(get(&block.x, lane)) < R::ZERO);
-                due |= out & (block.deadline[lane] != u64::MAX);
-            }
-        }
-        due
+        due | (clock >= block.soonest)
     }
 
     /// One step of every ray of a block.

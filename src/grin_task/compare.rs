@@ -43,9 +43,20 @@ impl Task {
     /// A volume that cannot be read.
     pub fn difference(&self, medium: &Medium) -> Result<Option<Difference>, NoField> {
         let Some(exact) = &self.exact else { return Ok(None) };
-        let exact = exact.field::<f64>()?;
+        self.difference_from(medium, &*exact.field::<f64>()?).map(Some)
+    }
+
+    /// How a field differs from another one.
+    ///
+    /// # Errors
+    /// A field to begin with that cannot be read.
+    pub fn difference_from(
+        &self,
+        medium: &Medium,
+        exact: &dyn Field<f64>,
+    ) -> Result<Difference, NoField> {
         let start = self.start.index()?;
-        Ok(Some(difference(medium.field(), &*exact, &*start, &self.places())))
+        Ok(difference(medium.field(), exact, &*start, &self.places()))
     }
 
     /// The range of the index over the space, and how steep it is.

@@ -17,9 +17,9 @@ const FINE: usize = 4;
 pub(super) struct Screen {
     pub(super) face: Face<f64>,
     axes: [Vec3<f64>; 2],
-    half: f64,
-    pixels: usize,
-    wanted: Vec<f64>,
+    pub(super) half: f64,
+    pub(super) pixels: usize,
+    pub(super) wanted: Vec<f64>,
 }
 
 /// The pixels that a ray touches along one axis: the first, three weights and their slopes.

@@ -20,12 +20,15 @@ mod image;
 mod least_squares;
 mod measured;
 mod medium;
+mod plane;
 mod runner;
 mod scene;
+mod seen;
 mod slope;
 mod source;
 mod space;
 mod task;
+mod ways;
 
 pub use builtin::{BUILTIN, Builtin, find, read};
 pub use check::TaskError;
@@ -33,9 +36,12 @@ pub use chords::Chords;
 pub use compare::{Difference, Extremes};
 pub use measured::Measurement;
 pub use medium::{Medium, NoField};
+pub use plane::{Axis, Plane};
 pub use runner::{Judgement, Progress, Runner};
 pub use scene::{Counts, ViewResult};
+pub use seen::{Image, Seen};
 pub use task::{
     Directions, Drawing, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Source, Space,
     Start, Task, Tracing, VERSION, View,
 };
+pub use ways::{Way, Ways};

@@ -40,7 +40,7 @@ pub(super) struct Shot {
     /// What a ray that is left out counts, in mm²: more than any that is not.
     lost: f64,
     /// What an image is made on.
-    screen: Option<Screen>,
+    pub(super) screen: Option<Screen>,
     /// Rays that no aim is known for; they are not among the others.
     unmeasured: usize,
 }
@@ -260,7 +260,7 @@ impl Shot {
     }
 
     /// The image of the rays that count.
-    fn image(screen: &Screen, exits: &[Exit<f64>]) -> Vec<f64> {
+    pub(super) fn image(screen: &Screen, exits: &[Exit<f64>]) -> Vec<f64> {
         screen.image(exits.iter().filter(|exit| Self::counts(exit)), exits.len())
     }
 
@@ -281,7 +281,7 @@ impl Shot {
         exits.iter().map(seed).collect()
     }
 
-    fn result(&self, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
+    pub(super) fn result(&self, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
         match &self.screen {
             Some(screen) => self.image_result(screen, exits, retrace_error),
             None => self.spot_result(exits, retrace_error),

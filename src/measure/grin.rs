@@ -5,6 +5,7 @@
 //! error of its own, which no step takes away and which is told beside its curves.
 
 use super::clock::timed;
+use super::grin_starts::GrinStarts;
 use super::memory::{Memory, peak_megabytes};
 use super::spot::Precision;
 use crate::grin::field::{Diagonal, Grid, GridError, Trilinear};
@@ -102,6 +103,8 @@ pub struct GrinMeasured {
     pub rays: usize,
     /// A chart for each field.
     pub fields: Vec<GrinCurves>,
+    /// The derivative by the start of a ray.
+    pub starts: Vec<GrinStarts>,
     /// What a ray costs.
     pub costs: Vec<GrinCost>,
     /// What a gradient keeps.
@@ -159,14 +162,20 @@ const TRAPPED: f64 = 8.0;
 pub fn grin(task: &Task, mut report: impl FnMut(usize, usize)) -> Result<GrinMeasured, NoGrin> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     let stand = pool.install(|| Stand::new(task))?;
-    let all = 3 + COSTS.len() + MEMORY.len();
+    let all = 4 + COSTS.len() + MEMORY.len();
     let mut done = 0;
     let mut tell = || {
         done += 1;
         report(done, all);
     };
-    let mut measured =
-        GrinMeasured { rays: stand.rays.len(), fields: vec![], costs: vec![], memory: vec![] };
+    let mut measured = GrinMeasured {
+        rays: stand.rays.len(),
+        fields: vec![],
+        starts: pool.install(|| stand.starts())?,
+        costs: vec![],
+        memory: vec![],
+    };
+    tell();
     for made in [Made::Exact, Made::Tricubic(NODES), Made::Trilinear(NODES)] {
         measured.fields.push(pool.install(|| stand.curves(made))?);
         tell();
@@ -184,7 +193,7 @@ pub fn grin(task: &Task, mut report: impl FnMut(usize, usize)) -> Result<GrinMea
 
 /// How a field is made up.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Made {
+pub(super) enum Made {
     Exact,
     Tricubic(usize),
     /// With the smoothed diagonal.
@@ -201,10 +210,11 @@ const COSTS: [(Made, Precision); 6] = [
 ];
 
 impl Made {
-    fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact",
-            Self::Tricubic(_) => "tricubic 33",
+            Self::Tricubic(NODES) => "tricubic 33",
+            Self::Tricubic(_) => "tricubic 65",
             Self::Trilinear(NODES) => "trilinear 33",
             Self::Trilinear(_) => "trilinear 65",
         }
@@ -212,13 +222,13 @@ impl Made {
 }
 
 /// Light and a field to send it through.
-struct Stand<'a> {
+pub(super) struct Stand<'a> {
     task: &'a Task,
-    exact: &'a Exact,
+    pub(super) exact: &'a Exact,
     region: Region<f64>,
     /// Half the side of the cube of a grid.
-    half: f64,
-    rays: Vec<Ray<f64>>,
+    pub(super) half: f64,
+    pub(super) rays: Vec<Ray<f64>>,
     /// The way of the longest ray in σ.
     way: f64,
     /// Where the loss of the gradient has its bottom.
@@ -269,7 +279,7 @@ impl<'a> Stand<'a> {
     }
 
     /// How rays are traced with so many kicks on the longest way.
-    fn setup<R: Real>(&self, integrator: Integrator, kicks: f64) -> Setup<R> {
+    pub(super) fn setup<R: Real>(&self, integrator: Integrator, kicks: f64) -> Setup<R> {
         let steps = kicks / integrator.kicks() as f64;
         let limit = (TRAPPED * steps).max(64.0) as u32;
         Setup {
@@ -291,7 +301,7 @@ impl<'a> Stand<'a> {
         Setup { end, ..setup }
     }
 
-    fn field<R: Real>(&self, made: Made) -> Result<Box<dyn Field<R>>, NoField> {
+    pub(super) fn field<R: Real>(&self, made: Made) -> Result<Box<dyn Field<R>>, NoField> {
         match made {
             Made::Exact => self.exact.field(),
             Made::Tricubic(nodes) => self.exact.sampled(true, nodes, self.half),

@@ -8,6 +8,7 @@ mod clock;
 mod double_gauss;
 mod gradient;
 mod grin;
+mod grin_starts;
 mod machine;
 mod memory;
 mod optimize;
@@ -24,6 +25,7 @@ pub use gradient::{
     GradientCost, GradientCurves, GradientRow, Gradients, Integral, NoGradients, Numbers, gradients,
 };
 pub use grin::{GrinCost, GrinCurves, GrinMeasured, GrinMemory, GrinRow, NoGrin, grin};
+pub use grin_starts::GrinStarts;
 pub use machine::Machine;
 pub use memory::{Memory, peak_megabytes};
 pub use optimize::{StepCosts, StepRow, step_costs};

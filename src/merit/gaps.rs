@@ -12,7 +12,7 @@ use serde::Serialize;
 
 /// Adds one of the terms about gaps.
 pub(super) fn gaps(scene: &Scene<'_>, term: Term, sum: &mut Sum) {
-    for Limited { of, min, max } in limited(scene.zoom, scene.systems, term) {
+    for Limited { of, min, max } in smoothly_limited(scene.zoom, scene.systems, term) {
         let number = Number { of, scene };
         min.into_iter().for_each(|min| number.at_least(min, sum));
         max.into_iter().for_each(|max| number.at_most(max, sum));
@@ -24,6 +24,15 @@ struct Limited {
     of: Of,
     min: Option<f64>,
     max: Option<f64>,
+}
+
+/// What a term limits, with glass limited at each of its two rims in place of the larger one: which
+/// of them is larger may change, and no search would find its way along that edge.
+fn smoothly_limited(zoom: &Zoom, systems: &Systems, term: Term) -> Vec<Limited> {
+    let Term::GlassEdge(min) = term else { return limited(zoom, systems, term) };
+    let at = |gap, rim| Limited { of: Of::Edge { gap, rim }, min: Some(min), max: None };
+    let both = |gap| [at(gap, Rim::Front), at(gap, Rim::Rear)];
+    zoom.inner_gaps(true).flat_map(both).collect()
 }
 
 /// Everything that a term limits.
@@ -41,10 +50,10 @@ fn limited(zoom: &Zoom, systems: &Systems, term: Term) -> Vec<Limited> {
             gaps(false).map(|gap| both(Of::Center(gap), min, max)).collect()
         }
         Term::GlassEdge(min) => {
-            gaps(true).map(|gap| least(Of::Edge { gap, glass: true }, min)).collect()
+            gaps(true).map(|gap| least(Of::Edge { gap, rim: Rim::Larger }, min)).collect()
         }
         Term::AirEdge(min) => {
-            gaps(false).map(|gap| least(Of::Edge { gap, glass: false }, min)).collect()
+            gaps(false).map(|gap| least(Of::Edge { gap, rim: Rim::Smaller }, min)).collect()
         }
         Term::TotalTrack(max) => vec![most(Of::Track, max)],
         Term::BackFocus(min) => vec![least(Of::Center(last), min)],
@@ -145,7 +154,8 @@ impl Slimmest {
             let system = &zoom.at(&values).rimmed[zoom.primary];
             for gap in 0..zoom.glass.len() - 1 {
                 let center = Of::Center(gap).length(system);
-                let edge = Of::Edge { gap, glass: zoom.glass[gap] }.length(system);
+                let rim = if zoom.glass[gap] { Rim::Larger } else { Rim::Smaller };
+                let edge = Of::Edge { gap, rim }.length(system);
                 let (to_center, to_edge) = if zoom.glass[gap] {
                     (&mut found.glass_center, &mut found.glass_edge)
                 } else {
@@ -163,16 +173,42 @@ impl Slimmest {
 #[derive(Clone, Copy)]
 enum Of {
     Center(usize),
-    /// Glass reaches to the larger semi-diameter of its two surfaces, and elements can touch only
-    /// within the smaller one; infinite where neither is limited.
+    /// The thickness at a rim; infinite where that is not limited.
     Edge {
         gap: usize,
-        glass: bool,
+        rim: Rim,
     },
     Track,
     /// `|curvature| × semi-diameter`: 1 for a hemisphere; 0 where nothing limits the surface.
     Steepness(usize),
     Rim(usize),
+}
+
+/// Where a gap has its edge.
+#[derive(Clone, Copy)]
+enum Rim {
+    /// Glass reaches to the larger semi-diameter of its two surfaces.
+    Larger,
+    /// Elements can touch only within the smaller one.
+    Smaller,
+    /// That of the surface in front.
+    Front,
+    /// That of the one behind.
+    Rear,
+}
+
+impl Rim {
+    /// Its semi-diameter; none where nothing limits it.
+    fn height<R: Real>(self, front: R, rear: R) -> Option<R> {
+        let limited = |rim: &R| rim.value() < f64::INFINITY;
+        let both = [front, rear].into_iter().filter(limited);
+        match self {
+            Self::Larger => both.reduce(|a, b| if a > b { a } else { b }),
+            Self::Smaller => both.reduce(|a, b| if a > b { b } else { a }),
+            Self::Front => Some(front).filter(limited),
+            Self::Rear => Some(rear).filter(limited),
+        }
+    }
 }
 
 impl Of {
@@ -189,10 +225,9 @@ impl Of {
     fn length<R: Real>(self, system: &System<R>) -> R {
         match self {
             Self::Center(gap) => along_light(system, gap),
-            Self::Edge { gap, glass } => {
+            Self::Edge { gap, rim } => {
                 let (before, behind) = (&system.surfaces[gap], &system.surfaces[gap + 1]);
-                let Some(height) = edge_height(before.semi_diameter, behind.semi_diameter, glass)
-                else {
+                let Some(height) = rim.height(before.semi_diameter, behind.semi_diameter) else {
                     return R::from_f64(f64::INFINITY);
                 };
                 let sags = sag_at(behind, height) - sag_at(before, height);
@@ -215,13 +250,6 @@ impl Of {
             Self::Rim(surface) => system.surfaces[surface].semi_diameter,
         }
     }
-}
-
-/// The height at which a gap has its edge.
-fn edge_height<R: Real>(before: R, behind: R, glass: bool) -> Option<R> {
-    let limited = [before, behind].into_iter().filter(|rim| rim.value() < f64::INFINITY);
-    let outer = |a: R, b: R| if (a > b) == glass { a } else { b };
-    limited.reduce(outer)
 }
 
 /// The sag at a height, at the edge of the surface where it ends before.

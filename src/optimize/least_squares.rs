@@ -19,6 +19,8 @@ const LEAST_DAMPING: f64 = 1e-12;
 const MOST_DAMPING: f64 = 1e10;
 /// Relative improvement below which a step counts as none.
 const SMALLEST_GAIN: f64 = 1e-10;
+/// Relative improvement below which a step hardly gains anything.
+const SMALL_GAIN: f64 = 1e-4;
 /// As many steps without a gain end the search.
 const PATIENCE: usize = 3;
 
@@ -48,9 +50,23 @@ impl LeastSquares {
         [self.damping, self.growth]
     }
 
-    /// The lens where it stands.
-    pub(super) fn into_current(self) -> Lens {
-        self.state.current
+    /// Where it stands.
+    pub(super) fn into_state(self) -> State {
+        self.state
+    }
+
+    /// So many steps, or fewer where hardly anything is left to gain.
+    pub(super) fn take_steps(&mut self, steps: usize) {
+        let mut idle = 0;
+        for _ in 0..steps {
+            let before = self.state.value;
+            let accepted = self.descend();
+            let gain = (before - self.state.value) / before.max(f64::MIN_POSITIVE);
+            idle = if gain > SMALL_GAIN { 0 } else { idle + 1 };
+            if accepted == 0.0 || idle >= PATIENCE {
+                return;
+            }
+        }
     }
 
     /// The damped step in scaled variables, and the reduction of the merit that it promises.

@@ -34,6 +34,8 @@ pub(super) struct State {
     /// How often since then none better was found.
     stale: usize,
     pub(super) steps: usize,
+    /// How often the merit was taken, by whatever detail.
+    pub(super) evaluations: usize,
     pub(super) refused: Option<String>,
 }
 
@@ -68,6 +70,7 @@ impl State {
             verified_value: value,
             stale: 0,
             steps: 0,
+            evaluations: 1,
             refused: None,
         };
         Ok((state, sum))
@@ -84,6 +87,7 @@ impl State {
         let mut fraction = 1.0;
         for _ in 0..HALVINGS {
             let proposal = self.proposal(step, fraction);
+            self.evaluations += 1;
             match self.evaluate(&proposal, detail) {
                 Ok(sum) if accept(sum.value) => {
                     self.take(proposal, sum.value);

@@ -42,6 +42,8 @@ pub struct Stretched {
     pub lens: Lens,
     /// The merit where it began.
     pub before: f64,
+    /// How often the merit was taken with its derivatives, steps that were not accepted included.
+    pub gradients: usize,
 }
 
 /// The pace may not fall below this part of the first one.
@@ -84,24 +86,22 @@ pub fn stretch(
     let (mut state, sum) = State::with_sum(merit, lens, Detail::Normal)?;
     memory.steps += asked.steps;
     let before = sum.value;
-    let lens = match asked.method {
+    let state = match asked.method {
         Method::Adam => {
             state.rescale(&sum);
             adam(state, sum.gradient.as_slice(), asked, memory)
         }
         Method::DampedLeastSquares => {
             let mut search = LeastSquares::resumed(state, sum, memory.damping);
-            for _ in 0..asked.steps {
-                search.descend();
-            }
+            search.take_steps(asked.steps);
             memory.damping = Some(search.damping());
-            search.into_current()
+            search.into_state()
         }
     };
-    Ok(Stretched { lens, before })
+    Ok(Stretched { lens: state.current, before, gradients: state.evaluations })
 }
 
-fn adam(mut state: State, gradient: &[f64], asked: Stretch, memory: &mut Memory) -> Lens {
+fn adam(mut state: State, gradient: &[f64], asked: Stretch, memory: &mut Memory) -> State {
     let mut gradient = gradient.to_vec();
     for _ in 0..asked.steps {
         let rate = asked.rate * memory.pace.unwrap_or(1.0);
@@ -113,5 +113,5 @@ fn adam(mut state: State, gradient: &[f64], asked: Stretch, memory: &mut Memory)
         };
         gradient.copy_from_slice(sum.gradient.as_slice());
     }
-    state.current
+    state
 }

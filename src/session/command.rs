@@ -4,6 +4,7 @@
 //! the design and can be undone, every other [`Command`] opens, saves, searches or sets up what is
 //! shown.
 
+use super::forming::Form;
 use super::quest::Quest;
 use crate::effects::{Choice, Effect};
 use crate::experiments::Effort;
@@ -75,6 +76,8 @@ pub enum Command {
     ExportFront(Option<PathBuf>),
     /// Search over structure.
     Explore(Explore),
+    /// Form a gradient-index field, or look at one.
+    Form(Form),
     /// Show another lens in place of the design, which stays what it is; `None` for the design.
     Preview(Option<Box<Lens>>),
     /// Make the lens that is shown in place of the design the design, as one undo step.

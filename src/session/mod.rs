@@ -21,6 +21,7 @@ mod exploration;
 mod explorations;
 mod explorer;
 mod finishing;
+mod forming;
 mod fresh;
 mod fronts;
 mod history;
@@ -47,6 +48,10 @@ pub use desk::{Event, Session};
 pub use edit::{EditError, edited};
 pub use exploration::{Checkpoint, Ending, Exploration, Found, Place};
 pub use explorations::Explorations;
+pub use forming::{
+    Contour, Form, Formation, Forming, Loss, MOST_NODES, Origin, Profile, Quantity, Sight,
+    Sighting, Slice, Subject,
+};
 pub use fresh::fresh_glass;
 pub use fronts::Fronts;
 pub use judged::Judged;

@@ -2,6 +2,7 @@
 
 use super::analyst::Results;
 use super::explorations::Explorations;
+use super::forming::Forming;
 use super::fronts::Fronts;
 use super::laboratory::Trial;
 use super::worker::Search;
@@ -27,6 +28,8 @@ pub struct View {
     pub fronts: Fronts,
     /// The search over structure.
     pub explorations: Explorations,
+    /// The gradient-index field that is open.
+    pub forming: Forming,
     /// A lens that is shown in place of the design.
     pub candidate: Option<Arc<Lens>>,
     /// The numbers of that lens, or of the one that the search shows, maybe of a step before.
@@ -58,6 +61,7 @@ impl Default for View {
             search: None,
             fronts: Fronts::default(),
             explorations: Explorations::default(),
+            forming: Forming::default(),
             candidate: None,
             preview: None,
             trial: None,

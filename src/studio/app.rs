@@ -1,7 +1,7 @@
 //! The studio: one session, the panels that show it, the menu, and the questions before something
 //! would be lost.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use eframe::egui::{
     Align, CentralPanel, Context, Frame, Id, Label, Layout, Margin, Modal, Panel as Side, Response,
@@ -17,7 +17,7 @@ use super::menu::{self, Wish};
 use super::shell::Memory;
 use super::wording::{capital, counted_from_one};
 use crate::files;
-use crate::session::{Command, Event, Explore, Message, Session, Severity, View};
+use crate::session::{Command, Event, Explore, Form, Message, Origin, Session, Severity, View};
 
 /// Under which name the arrangement of the panels is remembered.
 const DOCK: &str = "dock";
@@ -120,6 +120,14 @@ impl Studio {
                 self.chooser.ask(context, Purpose::ExportFront, Some(&folder));
             }
             Wish::Do(Command::Explore(wish)) => self.explore(context, view, wish),
+            Wish::Do(Command::Form(Form::Open(None))) => {
+                self.chooser.ask(context, Purpose::OpenField, opened(view));
+            }
+            Wish::Do(Command::Form(Form::Save { path: None, nodes })) => {
+                let field = opened(view).map(|path| path.with_extension("npz"));
+                let field = field.unwrap_or_else(|| PathBuf::from("field.npz"));
+                self.chooser.ask(context, Purpose::SaveField(nodes), Some(&field));
+            }
             Wish::Choose(purpose) => self.chooser.ask(context, purpose, view.path.as_deref()),
             Wish::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name) {
                 Ok(opened) => self.replace(context, Command::New(Box::new(opened.lens))),
@@ -189,6 +197,11 @@ impl Studio {
             Purpose::ExportFound(number) => {
                 let path = Some(path);
                 self.apply(context, Command::Explore(Explore::Export { number, path }));
+            }
+            Purpose::OpenField => self.apply(context, Command::Form(Form::Open(Some(path)))),
+            Purpose::SaveField(nodes) => {
+                let path = Some(path);
+                self.apply(context, Command::Form(Form::Save { path, nodes }));
             }
             Purpose::ExportZemax | Purpose::ExportJson => {
                 self.apply(context, Command::Export(path));
@@ -316,6 +329,14 @@ impl App for Studio {
 
     fn persist_egui_memory(&self) -> bool {
         self.memory == Memory::Kept
+    }
+}
+
+/// The file of the gradient-index field that is open.
+fn opened(view: &View) -> Option<&Path> {
+    match &view.forming.run.as_ref()?.subject.origin {
+        Origin::File(path) => Some(path),
+        Origin::Builtin(_) => None,
     }
 }
 

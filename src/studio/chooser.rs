@@ -28,6 +28,10 @@ pub enum Purpose {
     SaveSearch,
     /// To write the lens of a generation of a search.
     ExportFound(u64),
+    /// To read a task or a volume from it, and look at the gradient-index field.
+    OpenField,
+    /// To write the gradient-index field, with so many nodes along a side.
+    SaveField(usize),
 }
 
 impl Purpose {
@@ -42,6 +46,8 @@ impl Purpose {
             Self::OpenSearch => "Go on with a search",
             Self::SaveSearch => "Save the search",
             Self::ExportFound(_) => "Export the lens of the search",
+            Self::OpenField => "Open a GRIN task or a volume",
+            Self::SaveField(_) => "Save the volume",
         }
     }
 
@@ -51,18 +57,25 @@ impl Purpose {
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportFound(_) => &["json", "zmx"],
             Self::ExportZemax => &["zmx"],
+            Self::OpenField => &["json", "npz"],
+            Self::SaveField(_) => &["npz", "json"],
             Self::ExportFront | Self::ExperimentFolder => &[],
         }
     }
 
+    /// What files of this kind are called.
+    const fn kind(self) -> &'static str {
+        if matches!(self, Self::OpenField | Self::SaveField(_)) { "GRIN fields" } else { "Lenses" }
+    }
+
     /// Whether the name of a new file is asked for.
     fn names_a_file(self) -> bool {
-        !matches!(self, Self::Open | Self::OpenSearch | Self::ExportFront | Self::ExperimentFolder)
+        self.is_written() && !matches!(self, Self::ExportFront | Self::ExperimentFolder)
     }
 
     /// Whether the file is written.
     fn is_written(self) -> bool {
-        !matches!(self, Self::Open | Self::OpenSearch)
+        !matches!(self, Self::Open | Self::OpenSearch | Self::OpenField)
     }
 
     /// The path with the extension that it needs, if it has none.
@@ -167,7 +180,7 @@ fn open_dialog(
     let (give, answer) = channel();
     let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
     if !purpose.extensions().is_empty() {
-        dialog = dialog.add_filter("Lenses", purpose.extensions());
+        dialog = dialog.add_filter(purpose.kind(), purpose.extensions());
     }
     if let Some(directory) = near.and_then(Path::parent).filter(|dir| dir.is_dir()) {
         dialog = dialog.set_directory(directory);
@@ -178,7 +191,7 @@ fn open_dialog(
     let context = context.clone();
     thread::Builder::new().name("file dialog".into()).spawn(move || {
         let path = match purpose {
-            Purpose::Open | Purpose::OpenSearch => dialog.pick_file(),
+            Purpose::Open | Purpose::OpenSearch | Purpose::OpenField => dialog.pick_file(),
             Purpose::ExportFront | Purpose::ExperimentFolder => dialog.pick_folder(),
             _ => dialog.save_file(),
         };

@@ -9,7 +9,7 @@ use egui_tiles::{
 
 use super::draw::Backing;
 use super::panels::{Kind, Panel};
-use crate::session::{Command, View};
+use crate::session::{Command, Form, View};
 
 /// The arranged panels.
 pub struct Dock {
@@ -81,15 +81,20 @@ impl Dock {
         if pupils != view.settings.pupils {
             wishes.push(Command::ShowPupils(pupils));
         }
+        let watched = self.is_shown(Kind::Slice);
+        if watched != view.forming.watched {
+            wishes.push(Command::Form(Form::Watch(watched)));
+        }
     }
 }
 
-/// The layout with the numbers of the lens below it; beside them how good it is and the search.
+/// The drawings with the numbers of the lens below it; beside them how good it is and the search.
 fn usual() -> Tree<Kind> {
     let mut tiles = Tiles::default();
     let mut pane = |kind: Kind| tiles.insert_pane(kind);
-    let [layout, spot, pupil, table, optimizer, pareto, search, first, effects] = [
+    let [layout, slice, spot, pupil, table, optimizer, pareto, search, first, effects] = [
         Kind::Layout,
+        Kind::Slice,
         Kind::Spot,
         Kind::Pupil,
         Kind::Prescription,
@@ -103,8 +108,9 @@ fn usual() -> Tree<Kind> {
     let facts = tiles.insert_tab_tile(vec![first, effects]);
     let light = tiles.insert_tab_tile(vec![spot, pupil]);
     let better = tiles.insert_tab_tile(vec![optimizer, pareto, search]);
+    let drawings = tiles.insert_tab_tile(vec![layout, slice]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
-    let left = column(&mut tiles, &[(layout, 0.52), (table, 0.48)]);
+    let left = column(&mut tiles, &[(drawings, 0.52), (table, 0.48)]);
     let right = column(&mut tiles, &[(light, 0.44), (better, 0.56)]);
     let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
     Tree::new(Id::unique("dock"), root, tiles)

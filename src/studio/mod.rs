@@ -13,6 +13,7 @@ mod menu;
 pub mod number;
 pub mod palette;
 pub mod panels;
+pub mod ramp;
 pub mod section;
 pub mod shell;
 pub mod theme;

@@ -3,6 +3,7 @@
 use super::Tracer;
 use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
 use super::graded::Arrival;
+use super::interface::Interface;
 use crate::lens::Invalid;
 use crate::math::Real;
 use crate::math::Vec3;
@@ -81,43 +82,58 @@ impl<R: Real> Tracer<R> {
         &self,
         ray: Ray<R>,
         surfaces: usize,
+        visit: impl FnMut(usize, Vec3<R>),
+    ) -> Landing<R> {
+        if self.gaps.is_empty() {
+            self.follow_through_glass(ray, surfaces, visit)
+        } else {
+            self.follow_through_gradients(ray, surfaces, visit)
+        }
+    }
+
+    fn follow_through_glass(
+        &self,
+        ray: Ray<R>,
+        surfaces: usize,
         mut visit: impl FnMut(usize, Vec3<R>),
     ) -> Landing<R> {
         let mut k = launch(ray.direction, self.index_before);
         let mut landing = Landing { fate: Fate::Imaged, ray, opl: R::ZERO, backwards: None };
         let mut index = self.index_before;
         for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
-            let p = landing.ray.point;
-            if self.touches_gradient(i) {
-                let arrival = self.arrive_at(i, p, k);
-                let passed = landing.pass(i, p, &arrival, &mut visit);
-                let Some(behind) = passed else {
-                    (k, index) = (arrival.k, arrival.surface.index_before);
-                    break;
-                };
-                (k, index) = (behind, arrival.surface.index_behind);
+            let Some(behind) = landing.cross(i, interface, k, &mut visit) else { break };
+            (k, index) = (behind, interface.index_behind);
+        }
+        landing.ray.direction = k * (R::ONE / index);
+        landing
+    }
+
+    /// The same where a gradient fills a gap: a loop of its own, since what it needs would take
+    /// registers from the other one.
+    #[cold]
+    #[inline(never)]
+    fn follow_through_gradients(
+        &self,
+        ray: Ray<R>,
+        surfaces: usize,
+        mut visit: impl FnMut(usize, Vec3<R>),
+    ) -> Landing<R> {
+        let mut k = launch(ray.direction, self.index_before);
+        let mut landing = Landing { fate: Fate::Imaged, ray, opl: R::ZERO, backwards: None };
+        let mut index = self.index_before;
+        for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
+            if !self.touches_gradient(i) {
+                let Some(behind) = landing.cross(i, interface, k, &mut visit) else { break };
+                (k, index) = (behind, interface.index_behind);
                 continue;
             }
-            let crossing = interface.cross(p, k);
-            let code = |cause| fate::code(i as u32, cause);
-            if crossing.missed {
-                landing.ray.point.z = p.z - interface.gap;
-                landing.fate = Fate::from_code(code(MISSED));
+            let p = landing.ray.point;
+            let arrival = self.arrive_at(i, p, k);
+            let Some(behind) = landing.pass(i, p, &arrival, &mut visit) else {
+                (k, index) = (arrival.k, arrival.surface.index_before);
                 break;
-            }
-            landing.ray.point = crossing.point;
-            landing.opl += crossing.s * interface.n2;
-            if landing.backwards.is_none() && is_backwards(crossing.s, p, interface.n2) {
-                landing.backwards = Some(i);
-            }
-            visit(i, crossing.point);
-            if crossing.clipped || crossing.reflected {
-                let cause = if crossing.clipped { CLIPPED } else { TOTAL_REFLECTION };
-                landing.fate = Fate::from_code(code(cause));
-                break;
-            }
-            k = crossing.k;
-            index = interface.index_behind;
+            };
+            (k, index) = (behind, arrival.surface.index_behind);
         }
         landing.ray.direction = k * (R::ONE / index);
         landing
@@ -125,10 +141,40 @@ impl<R: Real> Tracer<R> {
 }
 
 impl<R: Real> Landing<R> {
+    /// Takes a ray with the optical direction `k` through a surface between glasses; its direction
+    /// behind, if it gets through.
+    #[inline(always)]
+    fn cross(
+        &mut self,
+        i: usize,
+        interface: &Interface<R>,
+        k: Vec3<R>,
+        visit: &mut impl FnMut(usize, Vec3<R>),
+    ) -> Option<Vec3<R>> {
+        let p = self.ray.point;
+        let crossing = interface.cross(p, k);
+        let code = |cause| fate::code(i as u32, cause);
+        if crossing.missed {
+            self.ray.point.z = p.z - interface.gap;
+            self.fate = Fate::from_code(code(MISSED));
+            return None;
+        }
+        self.ray.point = crossing.point;
+        self.opl += crossing.s * interface.n2;
+        if self.backwards.is_none() && is_backwards(crossing.s, p, interface.n2) {
+            self.backwards = Some(i);
+        }
+        visit(i, crossing.point);
+        if crossing.clipped || crossing.reflected {
+            let cause = if crossing.clipped { CLIPPED } else { TOTAL_REFLECTION };
+            self.fate = Fate::from_code(code(cause));
+            return None;
+        }
+        Some(crossing.k)
+    }
+
     /// Takes a ray that comes from `p` through a surface that a gradient touches; its direction
     /// behind, if it gets through.
-    #[cold]
-    #[inline(never)]
     fn pass(
         &mut self,
         i: usize,

@@ -9,4 +9,5 @@ mod drawing;
 mod panels;
 mod search;
 mod shaders;
+mod slice;
 mod window;

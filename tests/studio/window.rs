@@ -274,3 +274,20 @@ fn nothing_repaints_while_nothing_changes() {
     let next = harness.output().viewport_output.values().next().unwrap().repaint_delay;
     assert_eq!(next, Duration::MAX, "a text cursor does not blink");
 }
+
+#[test]
+fn a_field_is_looked_at_only_while_its_panel_is_shown() {
+    let mut harness = window();
+    let forming = |harness: &Harness<'_, Studio>| harness.state().session().view().forming;
+    assert!(!forming(&harness).watched && forming(&harness).run.is_none());
+    harness.get_by_label("GRIN slice").click();
+    harness.run_steps(3);
+    assert!(forming(&harness).watched);
+    harness.get_by_label("Fibre that focuses parallel light again and again").click();
+    wait(&mut harness, "a slice", |harness| forming(harness).slice.is_some());
+    harness.run_steps(2);
+    harness.get_by_label_contains("Slice of Fibre");
+    harness.get_by_label("Layout").click();
+    harness.run_steps(3);
+    assert!(!forming(&harness).watched && forming(&harness).run.is_some(), "it stays open");
+}

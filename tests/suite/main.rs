@@ -24,6 +24,7 @@ mod rims;
 mod search;
 mod search_cli;
 mod session;
+mod session_forming;
 mod session_front;
 mod session_search;
 mod trace;

@@ -9,7 +9,8 @@ use crate::cli::output::{Output, Table};
 use crate::files;
 use crate::grin::Integrator;
 use crate::measure::{
-    GrinCost, GrinCurves, GrinMeasured, GrinMemory, GrinRow, Machine, Memory, Precision, grin,
+    GrinCost, GrinCurves, GrinMeasured, GrinMemory, GrinRow, GrinStarts, Machine, Memory,
+    Precision, grin,
 };
 use crate::picture::PALETTE;
 use image::ImageError;
@@ -98,6 +99,8 @@ impl Display for Report {
             )?;
             write!(f, "{}", table(curves))?;
         }
+        writeln!(f, "\nthe derivative of an exit by the start of its ray:\n")?;
+        write!(f, "{}", starts(&measured.starts))?;
         writeln!(f, "\nfor each time that a ray asks the field, in batches:\n")?;
         write!(f, "{}", costs(&measured.costs))?;
         writeln!(f, "\nthe adjoint against a stored path:\n")?;
@@ -127,6 +130,20 @@ fn table(curves: &GrinCurves) -> Table {
             format!("{:.1e}", row.gradient_error),
             format!("{:.0e}", row.retrace_error),
             row.lost.to_string(),
+        ]);
+    }
+    table
+}
+
+fn starts(rows: &[GrinStarts]) -> Table {
+    let mut table = Table::new(&["field", "size", "off the exact field", "worst ray", "rays"]);
+    for row in rows {
+        table.row([
+            row.field.to_owned(),
+            format!("{:.1e}", row.size),
+            format!("{:.1e}", row.error),
+            format!("{:.1e}", row.worst),
+            row.rays.to_string(),
         ]);
     }
     table

@@ -4,8 +4,8 @@
 //! frame. What a published lens does not keep of the usual limits, like the edge of an element, is
 //! limited to what it has: so a search begins with aberrations to correct, and not with limits to
 //! mend. Since nothing here reads a clock, methods are compared after as many gradients, each of
-//! which costs all of them the same: one merit with all its derivatives at one lens. Local steps by
-//! damped least squares count as one as well.
+//! which costs all of them the same: one merit with all its derivatives at one lens. A step of damped
+//! least squares costs as many as it tries.
 
 pub(super) mod beyond;
 pub(super) mod brute;

@@ -156,8 +156,9 @@ pub trait Field<R: Real>: Debug + Send + Sync {
     }
 }
 
-/// Indices and gradients for a block of rays.
+/// Indices and gradients for a block of rays; a column begins where a line of the cache does.
 #[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
 pub struct Samples<R> {
     /// Refractive index η.
     pub index: Column<R>,

@@ -35,11 +35,8 @@ use serde::{Deserialize, Serialize};
 pub struct Local {
     /// What takes the steps.
     pub method: Method,
-    /// Gradient steps of a local move.
+    /// Steps of a local move; least squares takes fewer where hardly anything is left to gain.
     pub steps: usize,
-    /// For so many steps a descent goes by damped least squares, whatever the method: they find the
-    /// way down from a lens that has just mutated, and slow down where Adam does not.
-    pub rough_steps: usize,
     /// The rate of Adam when a descent begins: a step of one alters the residuals by as much as
     /// they are.
     pub rate: f64,
@@ -58,9 +55,8 @@ pub struct Local {
 impl Default for Local {
     fn default() -> Self {
         Self {
-            method: Method::Adam,
+            method: Method::DampedLeastSquares,
             steps: 20,
-            rough_steps: 200,
             rate: 0.015,
             tolerance: 1e-2,
             coarse: 1e-2,
@@ -228,29 +224,27 @@ impl LensLandscape {
     }
 
     /// A local move: where it leads, and what that is worth.
-    fn moved(&self, lens: &Lens, memory: &mut Memory) -> Result<(Lens, f64), MeritError> {
-        let Local { steps, rate, tolerance, coarse, .. } = self.local;
+    fn moved(&self, lens: &Lens, memory: &mut Memory) -> Result<(Lens, f64, usize), MeritError> {
+        let Local { method, steps, rate, tolerance, coarse, .. } = self.local;
         let is_coarse = memory.steps < self.local.coarse_steps;
-        let is_rough = memory.steps < self.local.rough_steps;
-        let method = if is_rough { Method::DampedLeastSquares } else { self.local.method };
         let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
         let asked = Stretch { method, steps, rate };
-        let Stretched { lens: mut there, before } =
+        let Stretched { lens: mut there, before, gradients } =
             stretch(merit, &self.freed(lens), asked, memory)?;
         there.variables.clone_from(&lens.variables);
         match self.judge(&there) {
             Ok(after) if after < before || is_coarse => {
                 memory.encourage();
-                Ok((there, after))
+                Ok((there, after, gradients))
             }
             Ok(after) if after < (1.0 + SLACK) * before => {
                 memory.slow_down();
-                Ok((there, after))
+                Ok((there, after, gradients))
             }
             Ok(_) | Err(_) => {
                 memory.discourage();
                 let before = if is_coarse { self.judge(lens)? } else { before };
-                Ok((lens.clone(), before))
+                Ok((lens.clone(), before, gradients))
             }
         }
     }
@@ -291,7 +285,7 @@ impl Landscape for LensLandscape {
 
     fn descend(&self, lens: &Lens, memory: &mut Memory) -> (Lens, f64, usize) {
         match self.moved(lens, memory) {
-            Ok((there, loss)) => (there, loss, self.local.steps),
+            Ok(moved) => moved,
             Err(_) => (lens.clone(), f64::INFINITY, 0),
         }
     }

@@ -34,7 +34,7 @@ impl Default for Plan {
             light: vec![1.0],
             rules: Rules::default(),
             local: Local::default(),
-            settings: Settings { c: 0.005, ..Settings::default() },
+            settings: Settings::default(),
         }
     }
 }

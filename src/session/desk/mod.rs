@@ -1,11 +1,13 @@
 //! The session itself: what each command does.
 
 mod exploring;
+mod forming;
 
 use super::analyst::{Analyst, Request, Results, Savings};
 use super::command::{Command, Edit};
 use super::edit::edited;
 use super::explorations::ExplorationDesk;
+use super::forming::FormingDesk;
 use super::fronts::FrontDesk;
 use super::history::History;
 use super::laboratory::{Laboratory, Stage};
@@ -45,6 +47,8 @@ pub enum Event {
     Front(Standing),
     /// The search over structure stands so.
     Explored(Standing),
+    /// A gradient-index field was opened, or the search for it stands so.
+    Formed(Standing),
     /// Something to tell the person.
     Said(Message),
 }
@@ -71,6 +75,7 @@ pub struct Session {
     worker: Worker,
     fronts: FrontDesk,
     explorations: ExplorationDesk,
+    forming: FormingDesk,
     /// A lens that is shown in place of the design.
     candidate: Option<Arc<Lens>>,
     /// Computes the numbers of that lens, or of the one that the search shows.
@@ -124,7 +129,8 @@ impl Session {
             laboratory: Laboratory::spawn(wake.clone())?,
             worker: Worker::spawn(start, wake.clone())?,
             fronts: FrontDesk::spawn(wake.clone())?,
-            explorations: ExplorationDesk::spawn(wake)?,
+            explorations: ExplorationDesk::spawn(wake.clone())?,
+            forming: FormingDesk::spawn(wake)?,
             candidate: None,
             searches: 0,
             search: None,
@@ -161,6 +167,7 @@ impl Session {
             Command::ClearFronts => self.fronts.clear(),
             Command::ExportFront(folder) => self.export_front(folder),
             Command::Explore(wish) => self.explore(wish),
+            Command::Form(wish) => self.form(wish),
             Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),
             Command::TakePreview => self.take_preview(),
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
@@ -194,6 +201,10 @@ impl Session {
             self.hear_exploration(told);
         }
         self.explorations.keep_up(&self.lens);
+        for told in self.forming.told() {
+            self.hear_forming(told);
+        }
+        self.forming.keep_up();
         self.follow();
         std::mem::take(&mut self.events)
     }
@@ -207,6 +218,7 @@ impl Session {
             search: self.search(),
             fronts: self.fronts.view(),
             explorations: self.explorations.view(),
+            forming: self.forming.view(),
             candidate: self.candidate.clone(),
             preview: self.preview(),
             trial: self.laboratory.trial(),

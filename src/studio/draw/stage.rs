@@ -46,16 +46,31 @@ impl Stage {
         whole: Bounds,
         label: &str,
     ) -> Shown {
+        self.show_over(ui, backing, (scene, whole), label, |_, _| {})
+    }
+
+    /// The same over something else: `below` paints what lies under the scene, which then has no
+    /// background of its own.
+    pub fn show_over(
+        &mut self,
+        ui: &mut Ui,
+        backing: Backing,
+        (scene, whole): (&Arc<Scene>, Bounds),
+        label: &str,
+        below: impl FnOnce(&Ui, &Shown),
+    ) -> Shown {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, label));
         let per_point = f64::from(ui.ctx().pixels_per_point());
         let size = per_point * DVec2::new(rect.width().into(), rect.height().into());
         let fitted = Camera::fit(whole, size, MARGIN * per_point);
         let camera = self.look_around(ui, &response, fitted, size, per_point);
+        let shown = Shown { response, camera, per_point };
+        below(ui, &shown);
         self.canvas.show(ui, rect, backing, scene, camera);
         // The camera counts real pixels, the bar points.
         scale_bar(ui, rect, camera.scale / per_point);
-        Shown { response, camera, per_point }
+        shown
     }
 
     fn look_around(

@@ -9,6 +9,7 @@ mod pareto;
 mod prescription;
 mod pupil;
 mod search;
+mod slice;
 mod spot;
 
 pub use effects::Effects;
@@ -20,6 +21,7 @@ pub use prescription::Prescription;
 pub(super) use prescription::first_field;
 pub use pupil::Pupils;
 pub use search::StructureSearch;
+pub use slice::GrinSlice;
 pub use spot::SpotDiagram;
 
 use std::sync::Arc;
@@ -54,6 +56,8 @@ pub trait Panel {
 pub enum Kind {
     /// The lens in section, with its rays.
     Layout,
+    /// A slice through a gradient-index field, as it is formed.
+    Slice,
     /// The table of surfaces.
     Prescription,
     /// Where the rays of each field land.
@@ -74,8 +78,9 @@ pub enum Kind {
 
 impl Kind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Layout,
+        Self::Slice,
         Self::Prescription,
         Self::Spot,
         Self::Pupil,
@@ -90,6 +95,7 @@ impl Kind {
     pub fn panel(self, backing: Backing) -> Box<dyn Panel> {
         match self {
             Self::Layout => Box::new(LensLayout::new(backing)),
+            Self::Slice => Box::new(GrinSlice::new(backing)),
             Self::Prescription => Box::new(Prescription::default()),
             Self::Spot => Box::new(SpotDiagram::new(backing)),
             Self::Pupil => Box::new(Pupils::default()),

@@ -268,11 +268,10 @@ fn a_finished_lens_can_be_made() {
 }
 
 #[test]
-fn least_squares_and_coarse_beginnings_descend_too() {
+fn adam_and_coarse_beginnings_descend_too() {
     let lens = wide_open();
     for local in [
-        Local { method: Method::DampedLeastSquares, ..Local::default() },
-        Local { rough_steps: 0, ..Local::default() },
+        Local { method: Method::Adam, ..Local::default() },
         Local { coarse: 0.1, coarse_steps: 60, ..Local::default() },
         Local { rims: false, ..Local::default() },
     ] {

@@ -1,0 +1,239 @@
+//! The ways of a few rays through a field, for a drawing in a plane.
+
+use super::check::TaskError;
+use super::medium::Medium;
+use super::plane::Plane;
+use super::scene::{Shot, setups};
+use super::source::Draw;
+use super::space::length;
+use super::task::{Space, Task};
+use crate::grin::{Exit, Fate, Ray, Setup, State, Tracer};
+use crate::math::Vec3;
+
+/// A ray is drawn from so far before it enters on, as a part of the size of the space.
+const BEFORE: f64 = 0.12;
+/// A way of fewer steps is drawn with so many points between two of them, one of more steps than
+/// the second number without some of them.
+const BETWEEN: usize = 6;
+const MANY: usize = 300;
+/// Rays to choose from: so many for two that are drawn, and all that are hardly farther off the
+/// plane than the best, as a part of the size of the space.
+const CHOICE: usize = 3;
+const HARDLY: f64 = 0.02;
+
+/// The way of a ray.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Way {
+    /// From before it enters to where it ends: on the screen, else on the boundary.
+    pub points: Vec<Vec3<f64>>,
+    /// How it ends.
+    pub fate: Fate,
+    /// Whether it arrives so flat to the boundary that it does not count.
+    pub flat: bool,
+}
+
+impl Way {
+    /// Why it does not count; `None` for a ray that does.
+    pub fn excluded(&self) -> Option<&'static str> {
+        if self.flat { Some("flat") } else { (!self.fate.arrived()).then(|| self.fate.name()) }
+    }
+}
+
+/// The rays of a view that are drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ways {
+    /// The place of the view in the task.
+    pub view: usize,
+    /// The rays.
+    pub ways: Vec<Way>,
+    /// How far the farthest of them is off the plane, in mm, were it straight.
+    pub off: f64,
+}
+
+impl Task {
+    /// For each view the ways of at most `count` of the rays that all fields are judged by: of one
+    /// beam or point those that run nearest to a plane, well apart from each other.
+    ///
+    /// # Errors
+    /// A space of no extent.
+    pub fn ways(
+        &self,
+        medium: &Medium,
+        plane: Plane,
+        count: usize,
+    ) -> Result<Vec<Ways>, TaskError> {
+        let setups = setups(self, medium.field(), Draw::Judge)?;
+        let of_view = |(view, setup): (usize, Setup<f64>)| {
+            let (space, rays) = self.judging_rays(&self.views[view]);
+            let (rays, off) = handful(&rays, plane, space, count);
+            let tracer = Tracer::new(medium.field(), setup)?;
+            let way = |ray: &Ray<f64>| {
+                let (states, exit) = tracer.path(ray);
+                let flat = exit.fate.arrived() && !Shot::counts(&exit);
+                Way { points: points(ray, &states, &exit, space), fate: exit.fate, flat }
+            };
+            Ok(Ways { view, ways: rays.iter().map(way).collect(), off })
+        };
+        setups.into_iter().enumerate().map(of_view).collect()
+    }
+}
+
+/// Some rays of one beam or point nearest to a plane, well apart; and how far off it they are.
+fn handful(rays: &[Ray<f64>], plane: Plane, space: Space, count: usize) -> (Vec<Ray<f64>>, f64) {
+    let [low, high] = space.corners();
+    let (centre, reach) = ((low + high) * 0.5, 0.5 * space.diameter());
+    let nearest = |ray: &Ray<f64>| {
+        let way = ray.v * ((centre - ray.x).dot(ray.v) / ray.v.dot(ray.v));
+        ray.x + way
+    };
+    let off = |ray: &Ray<f64>| {
+        let slope = plane.axis.of(ray.v).abs() / length(ray.v);
+        (plane.axis.of(nearest(ray)) - plane.depth).abs() + reach * slope
+    };
+    let candidates = bundles(rays).into_iter().map(|bundle| {
+        let mut by_off: Vec<(f64, Ray<f64>)> =
+            bundle.into_iter().map(|n| (off(&rays[n]), rays[n])).collect();
+        by_off.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let near = by_off.first().map_or(0.0, |(off, _)| off + 2.0 * HARDLY * reach);
+        let hardly = by_off.partition_point(|(off, _)| *off <= near);
+        by_off.truncate((CHOICE * count).div_ceil(2).max(hardly));
+        by_off
+    });
+    let mean = |bundle: &Vec<(f64, Ray<f64>)>| {
+        bundle.iter().map(|(off, _)| off).sum::<f64>() / bundle.len().max(1) as f64
+    };
+    let best = candidates.min_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or_default();
+    let place = |ray: &Ray<f64>| {
+        let [right, up] = plane.seen(nearest(ray));
+        let [along, above] = plane.seen(ray.v * (reach / length(ray.v)));
+        [right, up, along, above]
+    };
+    let places: Vec<[f64; 4]> = best.iter().map(|(_, ray)| place(ray)).collect();
+    let chosen = spread(&places, count);
+    let farthest = chosen.iter().map(|n| best[*n].0).fold(0.0, f64::max);
+    (chosen.into_iter().map(|n| best[n].1).collect(), farthest)
+}
+
+/// The numbers of rays that go together: those of one direction, else those from one point, else
+/// all.
+fn bundles(rays: &[Ray<f64>]) -> Vec<Vec<usize>> {
+    let bits = |v: Vec3<f64>| [v.x, v.y, v.z].map(f64::to_bits);
+    let by = |key: &dyn Fn(&Ray<f64>) -> [u64; 3]| -> Vec<Vec<usize>> {
+        let mut order: Vec<usize> = (0..rays.len()).collect();
+        order.sort_by_key(|n| key(&rays[*n]));
+        let same = |a: &usize, b: &usize| key(&rays[*a]) == key(&rays[*b]);
+        order.chunk_by(same).map(<[usize]>::to_vec).collect()
+    };
+    let beams = by(&|ray| bits(ray.v));
+    if beams.len() < rays.len() {
+        return beams;
+    }
+    let points = by(&|ray| bits(ray.x));
+    if points.len() < rays.len() { points } else { vec![(0..rays.len()).collect()] }
+}
+
+/// The numbers of at most so many places, spread evenly along the coordinate in which they differ
+/// most.
+fn spread(places: &[[f64; 4]], count: usize) -> Vec<usize> {
+    let range = |axis: usize| {
+        let values = places.iter().map(|place| place[axis]);
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        values.fold(none, |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let width = |axis: usize| range(axis).1 - range(axis).0;
+    let axis = (0..4).max_by(|a, b| width(*a).total_cmp(&width(*b))).unwrap_or(0);
+    let (low, high) = range(axis);
+    let mut left: Vec<usize> = (0..places.len()).collect();
+    let mut chosen = Vec::new();
+    for i in 0..count.min(places.len()) {
+        let wanted = low + (high - low) * (i as f64 + 0.5) / count as f64;
+        let off = |n: &usize| (places[*n][axis] - wanted).abs();
+        let nearest = (0..left.len()).min_by(|a, b| off(&left[*a]).total_cmp(&off(&left[*b])));
+        chosen.extend(nearest.map(|n| left.remove(n)));
+    }
+    chosen
+}
+
+/// The points of a way, from shortly before the space on.
+fn points(ray: &Ray<f64>, states: &[State<f64>], exit: &Exit<f64>, space: Space) -> Vec<Vec3<f64>> {
+    let size = space.diameter();
+    let direction = ray.v * (1.0 / length(ray.v));
+    let Some(first) = states.first() else {
+        let way = (-ray.x.dot(direction)).max(0.0);
+        let ends = [way - 0.5 * size, way + 0.5 * size].map(|t| ray.x + direction * t.max(0.0));
+        return ends.into_iter().filter(|p| p.is_finite()).collect();
+    };
+    let before = length(first.x - ray.x).min(BEFORE * size);
+    let mut points = vec![first.x - direction * before];
+    let stride = states.len().div_ceil(MANY).max(1);
+    let kept: Vec<State<f64>> = states.iter().step_by(stride).copied().collect();
+    let between = if states.len() < MANY / BETWEEN { BETWEEN } else { 1 };
+    points.extend(kept.first().map(|state| state.x));
+    for pair in kept.windows(2) {
+        points.extend((1..=between).map(|i| hermite(pair, i as f64 / between as f64)));
+    }
+    points.extend(leaving(exit, space));
+    points.push(exit.x);
+    points.retain(|point| point.is_finite());
+    points
+}
+
+/// Where a ray that ends on a screen has left the space.
+fn leaving(exit: &Exit<f64>, space: Space) -> Option<Vec3<f64>> {
+    let region = space.region();
+    if !exit.fate.arrived() || region.height(exit.x) <= 1e-6 * space.diameter() {
+        return None;
+    }
+    region.entry(exit.x, -exit.v).map(|(_, t)| exit.x - exit.v * t)
+}
+
+/// A point between two states, by the cubic that has their places and velocities.
+fn hermite(pair: &[State<f64>], t: f64) -> Vec3<f64> {
+    let [a, b] = [&pair[0], &pair[1]];
+    // The ray moves by |v| times the step.
+    let step = 2.0 * length(b.x - a.x) / (length(a.v) + length(b.v));
+    let s = 1.0 - t;
+    a.x * (s * s * (1.0 + 2.0 * t)) + a.v * (step * t * s * s) + b.x * (t * t * (1.0 + 2.0 * s))
+        - b.v * (step * t * t * s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grin_task::Axis;
+
+    /// Two beams, one in the plane across y and one out of it.
+    fn beams() -> Vec<Ray<f64>> {
+        let at = |i: usize| 0.1 * (i as f64 - 5.0);
+        let within = (0..11)
+            .map(|i| Ray { x: Vec3::new(at(i), 0.01 * at(i), -2.0), v: Vec3::new(0.0, 0.0, 1.0) });
+        let without =
+            (0..11).map(|i| Ray { x: Vec3::new(at(i), -2.0, 0.0), v: Vec3::new(0.0, 1.0, 0.0) });
+        within.chain(without).collect()
+    }
+
+    #[test]
+    fn drawn_rays_lie_near_the_plane_and_apart() {
+        let plane = Plane { axis: Axis::Y, depth: 0.0 };
+        let (rays, off) = handful(&beams(), plane, Space::Ball { radius: 1.0 }, 3);
+        let mut heights: Vec<f64> = rays.iter().map(|ray| ray.x.x).collect();
+        heights.sort_by(f64::total_cmp);
+        assert!(rays.iter().all(|ray| ray.v.z == 1.0) && off < 0.01, "{rays:?}, {off}");
+        assert!(heights.len() == 3 && heights[2] - heights[0] > 0.55, "{heights:?}");
+        assert_eq!(handful(&beams(), plane, Space::Ball { radius: 1.0 }, 0).0.len(), 0);
+        assert_eq!(handful(&[], plane, Space::Ball { radius: 1.0 }, 3).0.len(), 0);
+    }
+
+    #[test]
+    fn the_curve_between_two_states_goes_through_both() {
+        let state = |x: f64, v: [f64; 2]| State {
+            x: Vec3::new(x, 0.0, 0.0),
+            v: Vec3::new(v[0], v[1], 0.0),
+            path: 0.0,
+        };
+        let pair = [state(0.0, [1.0, 1.0]), state(1.0, [1.0, -1.0])];
+        assert_eq!((hermite(&pair, 0.0), hermite(&pair, 1.0)), (pair[0].x, pair[1].x));
+        let middle = hermite(&pair, 0.5);
+        assert!((middle.x - 0.5).abs() < 1e-12 && middle.y > 0.1, "{middle:?}");
+    }
+}

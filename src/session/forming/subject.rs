@@ -1,0 +1,222 @@
+//! What is open: a design task in a gradient-index field, or a volume to look at.
+
+use super::sight::{MOST_RAYS, Quantity, Sight};
+use crate::files;
+use crate::grin::field::Trilinear;
+use crate::grin::{Field, Region};
+use crate::grin_task::{self, Axis, Exact, FieldKind, Medium, Plane, Runner, Space, Task};
+use crate::math::Vec3;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Two planes hold the same light where the sines of its angles to them differ by less.
+const ROUGH: f64 = 0.1;
+
+/// Where something open comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Origin {
+    /// It comes with the program, under this name.
+    Builtin(String),
+    /// This file.
+    File(PathBuf),
+}
+
+/// A task or a volume.
+#[derive(Debug)]
+pub struct Subject {
+    /// What it is called.
+    pub name: String,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// The task; `None` for a volume.
+    pub task: Option<Task>,
+    /// The field at the start, or that of the volume.
+    pub start: Medium,
+    /// The corners of the smallest box around all that light passes, or around the volume, in mm.
+    pub corners: [Vec3<f64>; 2],
+    /// Where light bends; everywhere where there is none.
+    pub(super) regions: Vec<Region<f64>>,
+    /// The field that is known to be the answer.
+    pub(super) exact: Option<Box<dyn Field<f64>>>,
+}
+
+impl Subject {
+    /// Reads a task or a volume and makes ready to search; why that cannot be done.
+    pub(super) fn open(origin: &Origin) -> Result<(Self, Option<Runner>), String> {
+        match origin {
+            Origin::Builtin(name) => {
+                let builtin = grin_task::find(name);
+                let builtin = builtin.ok_or_else(|| format!("there is no task `{name}`"))?;
+                let task = builtin.task().map_err(|why| why.to_string())?;
+                Self::of_task(task, origin, name)
+            }
+            Origin::File(path) => Self::from_file(path, origin),
+        }
+    }
+
+    /// A file is known by what is in it: a volume of `NumPy` is an archive, all else is JSON.
+    fn from_file(path: &Path, origin: &Origin) -> Result<(Self, Option<Runner>), String> {
+        let file = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|why| format!("{file}: cannot be read: {why}"))?;
+        let text = std::str::from_utf8(&bytes).ok().filter(|_| !bytes.starts_with(b"PK"));
+        let json: Option<Value> = text.and_then(|text| serde_json::from_str(text).ok());
+        let has = |key: &str| json.as_ref().is_some_and(|json| json.get(key).is_some());
+        if let Some(text) = text.filter(|_| has("aplanat_grin")) {
+            let task = grin_task::read(text, &file).map_err(|why| why.to_string())?;
+            return Self::of_task(task, origin, &file);
+        }
+        if bytes.starts_with(b"PK") || has("aplanat_volume") {
+            return Ok((Self::of_volume(path, origin)?, None));
+        }
+        let found = if has("aplanat") { "a lens" } else { "neither" };
+        Err(format!(
+            "{file}: found {found}; expected a task (JSON with \"aplanat_grin\"), NumPy's .npz, or \
+             the header of raw numbers (JSON with \"aplanat_volume\")"
+        ))
+    }
+
+    fn of_task(task: Task, origin: &Origin, file: &str) -> Result<(Self, Option<Runner>), String> {
+        let runner = Runner::new(&task).map_err(|why| format!("{file}: {why}"))?;
+        let exact = task.exact.as_ref().map(Exact::field::<f64>).transpose();
+        let exact = exact.map_err(|why| format!("{file}, exact: {why}"))?;
+        let spaces = || task.views.iter().map(|view| view.space.unwrap_or(task.space));
+        let all = spaces().map(Space::corners).fold(task.space.corners(), around);
+        let end = end(task.field);
+        let regions = spaces().chain([task.space]).map(|space| cut(space, end)).collect();
+        let subject = Self {
+            name: task.name.clone(),
+            origin: origin.clone(),
+            start: runner.current().clone(),
+            corners: within(all, end.corners()),
+            regions,
+            exact,
+            task: Some(task),
+        };
+        Ok((subject, Some(runner)))
+    }
+
+    fn of_volume(path: &Path, origin: &Origin) -> Result<Self, String> {
+        let files::Volume { grid, values } =
+            files::read_volume(path).map_err(|why| why.to_string())?;
+        let field = Trilinear::new(grid, values);
+        let field = field.map_err(|why| format!("{}: {why}", path.display()))?;
+        let (low, h) = (grid.low(), grid.spacing());
+        let [x, y, z] = grid.counts().map(|count| (count - 1) as f64);
+        let high = low + Vec3::new(x * h.x, y * h.y, z * h.z);
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        Ok(Self {
+            name: name.unwrap_or_default(),
+            origin: origin.clone(),
+            task: None,
+            start: Medium::Trilinear(field),
+            corners: [low, high],
+            regions: Vec::new(),
+            exact: None,
+        })
+    }
+
+    /// Whether the field that is known to be the answer stands in the task.
+    pub fn has_exact(&self) -> bool {
+        self.exact.is_some()
+    }
+
+    /// Whether a slice can show a quantity.
+    pub fn shows(&self, quantity: Quantity) -> bool {
+        match quantity {
+            Quantity::Index | Quantity::Slope => true,
+            Quantity::Change => self.task.is_some(),
+            Quantity::Error => self.has_exact(),
+        }
+    }
+
+    /// From where to where slices across an axis can be laid, in mm.
+    pub fn depths(&self, axis: Axis) -> [f64; 2] {
+        self.corners.map(|corner| axis.of(corner))
+    }
+
+    /// Whether a point belongs to what is looked at.
+    pub fn contains(&self, point: Vec3<f64>) -> bool {
+        let [low, high] = self.corners;
+        let within = Axis::ALL.iter().all(|axis| {
+            let at = axis.of(point);
+            at >= axis.of(low) && at <= axis.of(high)
+        });
+        within && self.height(point) < 0.0
+    }
+
+    /// Negative where light bends, whatever the corners.
+    pub(super) fn height(&self, point: Vec3<f64>) -> f64 {
+        let heights = self.regions.iter().map(|region| region.height(point));
+        heights.reduce(f64::min).unwrap_or(-1.0)
+    }
+
+    /// The slice through the middle across the axis that most of the light crosses least.
+    pub(super) fn first_sight(&self) -> Sight {
+        let share = |axis: Axis| -> f64 {
+            let Some(task) = &self.task else { return 0.0 };
+            let views = task.views.iter().filter(|view| view.weight > 0.0);
+            let nearest = views.map(|view| {
+                let rays = task.judging_rays(view).1;
+                let share = |v: Vec3<f64>| axis.of(v).abs() / v.dot(v).sqrt();
+                rays.iter().map(|ray| share(ray.v)).fold(f64::INFINITY, f64::min)
+            });
+            nearest.sum()
+        };
+        // In this order where several will do: a drawing with the light to the right comes first.
+        let order = [Axis::Y, Axis::X, Axis::Z];
+        // Beams of even directions are in no plane quite as much as in another.
+        let rough = |axis: &Axis| (share(*axis) / ROUGH).round();
+        let axis = order.into_iter().min_by(|a, b| rough(a).total_cmp(&rough(b)));
+        let axis = axis.unwrap_or(Axis::Y);
+        self.held(Sight { plane: Plane { axis, depth: self.middle(axis) }, ..Sight::default() })
+    }
+
+    /// The origin where it lies inside, else the middle.
+    pub fn middle(&self, axis: Axis) -> f64 {
+        let [low, high] = self.depths(axis);
+        if low < 0.0 && 0.0 < high { 0.0 } else { 0.5 * (low + high) }
+    }
+
+    /// The same sight within what there is to see.
+    pub(super) fn held(&self, sight: Sight) -> Sight {
+        let [low, high] = self.depths(sight.plane.axis);
+        let depth = sight.plane.depth;
+        let depth = if depth.is_finite() { depth.clamp(low, high) } else { 0.5 * (low + high) };
+        let quantity = if self.shows(sight.quantity) { sight.quantity } else { Quantity::Index };
+        let plane = Plane { depth, ..sight.plane };
+        Sight { plane, quantity, rays: sight.rays.min(MOST_RAYS) }
+    }
+}
+
+/// Where a field ends: beyond it, it is only continued so that a step of a ray may end there.
+fn end(kind: FieldKind) -> Space {
+    match kind {
+        FieldKind::Trilinear { half } | FieldKind::Tricubic { half } => Space::Cube { half },
+        FieldKind::Sphere { radius } => Space::Ball { radius },
+        FieldKind::Cylinder { radius } => {
+            Space::Rod { radius, from: f64::NEG_INFINITY, to: f64::INFINITY }
+        }
+    }
+}
+
+/// What is in both spaces.
+fn cut(space: Space, end: Space) -> Region<f64> {
+    let (mut both, other) = (space.region(), end.region());
+    [both.low, both.high] = within([both.low, both.high], [other.low, other.high]);
+    both.faces.extend(other.faces);
+    both
+}
+
+fn each(of: fn(f64, f64) -> f64, a: Vec3<f64>, b: Vec3<f64>) -> Vec3<f64> {
+    Vec3::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
+}
+
+/// The corners of the box around two boxes.
+fn around(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
+    [each(f64::min, a[0], b[0]), each(f64::max, a[1], b[1])]
+}
+
+/// The corners of what is in both boxes.
+fn within(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
+    [each(f64::max, a[0], b[0]), each(f64::min, a[1], b[1])]
+}

@@ -1,0 +1,226 @@
+//! What is open, the hand on its search, and how it is looked at.
+
+use eframe::egui::{
+    Align, Button, ComboBox, DragValue, Label, Layout as Arrange, ProgressBar, RichText,
+    ScrollArea, Slider, Ui,
+};
+
+use super::picture::Picture;
+use super::{wish, words};
+use crate::grin_task::{Axis, BUILTIN, FieldKind, Plane};
+use crate::session::{Command, Form, Formation, MOST_NODES, Quantity, Sight, Standing, View};
+
+/// Nodes along a side of a written volume, where the field is a spline, unless it is changed.
+const NODES: usize = 65;
+
+/// The tasks that come with the program, and how volumes are written.
+#[derive(Debug)]
+pub(super) struct Tasks {
+    known: Vec<Known>,
+    nodes: usize,
+}
+
+/// A task that comes with the program.
+#[derive(Debug)]
+struct Known {
+    key: &'static str,
+    title: String,
+    notes: String,
+}
+
+impl Tasks {
+    pub(super) fn new() -> Self {
+        let known = BUILTIN.iter().filter_map(|builtin| {
+            let task = builtin.task().ok()?;
+            Some(Known { key: builtin.name, title: task.name, notes: task.notes })
+        });
+        Self { known: known.collect(), nodes: NODES }
+    }
+
+    /// The list of all tasks, where nothing is open.
+    pub(super) fn list(&self, ui: &mut Ui, what: &str, wishes: &mut Vec<Command>) {
+        ui.label(what);
+        ui.add_space(6.0);
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            for Known { key, title, notes } in &self.known {
+                if ui.add(Button::new(title).min_size([280.0, 0.0].into())).clicked() {
+                    wishes.push(wish(Form::Builtin((*key).to_owned())));
+                }
+                ui.add(Label::new(RichText::new(notes).small().weak()).wrap());
+                ui.add_space(3.0);
+            }
+        });
+    }
+
+    /// The buttons.
+    pub(super) fn bar(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            self.open(ui, view, wishes);
+            let Some(run) = view.forming.run.as_deref() else { return };
+            if run.subject.task.is_some() {
+                hand(ui, view, run, wishes);
+            }
+            self.save(ui, run, wishes);
+            if ui.button("Close").on_hover_text("Close it; what is not saved is lost").clicked() {
+                wishes.push(wish(Form::Close));
+            }
+            name(ui, run);
+        });
+    }
+
+    fn open(&self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+        ui.add_enabled_ui(!view.forming.opening, |ui| {
+            ui.menu_button("Open task", |ui| self.menu(ui, wishes));
+            let hint = "Open a task (.json), a volume of NumPy (.npz), or one of raw numbers with \
+                a header (.json)";
+            if ui.button("Open file…").on_hover_text(hint).clicked() {
+                wishes.push(wish(Form::Open(None)));
+            }
+        });
+    }
+
+    fn menu(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
+        ui.set_min_width(250.0);
+        for Known { key, title, notes } in &self.known {
+            if ui.button(title).on_hover_text(notes).clicked() {
+                wishes.push(wish(Form::Builtin((*key).to_owned())));
+                ui.close();
+            }
+        }
+    }
+
+    fn save(&mut self, ui: &mut Ui, run: &Formation, wishes: &mut Vec<Command>) {
+        let hint = "Write the best field as a volume for a printer: .npz for Python, or .json with \
+            the numbers beside it in .raw";
+        if ui.button("Save volume…").on_hover_text(hint).clicked() {
+            wishes.push(wish(Form::Save { path: None, nodes: self.nodes }));
+        }
+        let kind = run.subject.task.as_ref().map(|task| task.field);
+        if matches!(kind, Some(FieldKind::Sphere { .. } | FieldKind::Cylinder { .. })) {
+            let drag = DragValue::new(&mut self.nodes).range(2..=MOST_NODES).suffix("³ nodes");
+            ui.add(drag.speed(0.3))
+                .on_hover_text("Nodes along a side of the saved volume")
+                .accessible_name("Nodes of the saved volume");
+        }
+    }
+}
+
+/// What is open, in the room that is left.
+fn name(ui: &mut Ui, run: &Formation) {
+    let name = &run.subject.name;
+    let notes = run.subject.task.as_ref().map_or("", |task| task.notes.as_str());
+    let label = ui.add(Label::new(RichText::new(name).strong()).truncate());
+    label.on_hover_text(if notes.is_empty() { name } else { notes });
+}
+
+/// Begins, holds and ends the search.
+fn hand(ui: &mut Ui, view: &View, run: &Formation, wishes: &mut Vec<Command>) {
+    let fill = ui.visuals().selection.bg_fill;
+    let (text, hint) = if run.is_under_way() {
+        ("Optimize", "Form the field in the background; watch it in the slice")
+    } else {
+        ("Start over", "Form the field again from the beginning; this one is lost unless saved")
+    };
+    let begins = run.is_ready() || !run.is_under_way();
+    let begins = begins && view.forming.pending.is_none() && !view.forming.opening;
+    let start = Button::new(RichText::new(text).strong()).fill(fill);
+    if ui.add_enabled(begins, start).on_hover_text(hint).clicked() {
+        wishes.push(wish(Form::Start));
+    }
+    let hold = if run.standing == Standing::Paused && !run.is_ready() {
+        ("Go on", Form::Resume, "Let the search go on")
+    } else {
+        ("Pause", Form::Pause, "Hold the search after its present step")
+    };
+    let under_way = run.is_under_way() && !run.is_ready();
+    let buttons = [hold, ("Stop", Form::Stop, "End the search and show its best field")];
+    for (text, form, hint) in buttons {
+        if ui.add_enabled(under_way, Button::new(text)).on_hover_text(hint).clicked() {
+            wishes.push(wish(form));
+        }
+    }
+}
+
+/// How far the search is.
+pub(super) fn progress(ui: &mut Ui, view: &View, run: &Formation) {
+    let text = words::standing(run, view.forming.pending);
+    match &run.progress {
+        Some(progress) => {
+            let share = if progress.finished {
+                1.0
+            } else {
+                progress.step as f32 / progress.most.max(1) as f32
+            };
+            ui.add(ProgressBar::new(share).desired_height(16.0).corner_radius(2).text(text));
+        }
+        None => {
+            ui.add(Label::new(RichText::new(text).weak()).truncate());
+        }
+    }
+}
+
+/// Which slice, what it shows, how many rays.
+pub(super) fn sight(
+    ui: &mut Ui,
+    view: &View,
+    run: &Formation,
+    picture: &mut Picture,
+    wishes: &mut Vec<Command>,
+) {
+    let old = view.forming.sight;
+    let mut sight = old;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        plane(ui, run, &mut sight);
+        quantity(ui, run, &mut sight);
+        if run.subject.task.is_some() {
+            let drag = DragValue::new(&mut sight.rays).range(0..=60).speed(0.1).suffix(" rays");
+            ui.add(drag)
+                .on_hover_text(
+                    "Rays of each view in the drawing: those that run nearest to the slice, \
+                     projected onto it",
+                )
+                .accessible_name("Rays of each view in the slice");
+        }
+        ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
+            if ui.button("Fit").on_hover_text("Show the whole slice (double click)").clicked() {
+                picture.fit();
+            }
+        });
+    });
+    if sight != old {
+        wishes.push(wish(Form::Look(sight)));
+    }
+}
+
+fn plane(ui: &mut Ui, run: &Formation, sight: &mut Sight) {
+    ui.weak("Slice across");
+    for axis in Axis::ALL {
+        let [right, up] = axis.across();
+        let hint =
+            format!("Across {}: {} points right, {} up", axis.name(), right.name(), up.name());
+        let button = Button::selectable(sight.plane.axis == axis, axis.name());
+        let button = ui.add(button).on_hover_text(hint);
+        if button.clicked() && sight.plane.axis != axis {
+            sight.plane = Plane { axis, depth: run.subject.middle(axis) };
+        }
+    }
+    let [low, high] = run.subject.depths(sight.plane.axis);
+    ui.spacing_mut().slider_width = 120.0;
+    let name = format!("{} =", sight.plane.axis.name());
+    ui.weak(name);
+    let slider = Slider::new(&mut sight.plane.depth, low..=high).suffix(" mm");
+    let slider = ui.add(slider.step_by((high - low) / 200.0).max_decimals(4));
+    slider.on_hover_text("Where the slice is laid").accessible_name("Depth of the slice");
+}
+
+fn quantity(ui: &mut Ui, run: &Formation, sight: &mut Sight) {
+    let combo = ComboBox::from_id_salt("quantity of the slice").width(180.0);
+    let combo = combo.selected_text(sight.quantity.name()).show_ui(ui, |ui| {
+        for quantity in Quantity::ALL.into_iter().filter(|of| run.subject.shows(*of)) {
+            ui.selectable_value(&mut sight.quantity, quantity, quantity.name());
+        }
+    });
+    combo.response.on_hover_text("What the colours show").accessible_name("Quantity of the slice");
+}

@@ -1,0 +1,102 @@
+//! The images of all views that make one, each beside the picture that is wanted.
+
+use std::sync::Arc;
+
+use eframe::egui::{
+    Color32, ColorImage, Image as Shown, RichText, TextureHandle, TextureOptions, Ui, vec2,
+};
+
+use super::words;
+use crate::grin_task::Image;
+use crate::session::{Formation, Sighting, View};
+
+/// The images as the graphics card has them.
+#[derive(Default)]
+pub(super) struct Images {
+    drawn: Option<Drawn>,
+}
+
+/// What is drawn, and from what it was.
+struct Drawn {
+    source: Arc<Result<Sighting, String>>,
+    pairs: Vec<Pair>,
+}
+
+/// A picture and what the light makes of it, of a view.
+struct Pair {
+    view: usize,
+    textures: [TextureHandle; 2],
+}
+
+impl std::fmt::Debug for Images {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Images").finish_non_exhaustive()
+    }
+}
+
+impl Images {
+    /// Shows them one above the other.
+    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View, run: &Formation) {
+        let Some(source) = &view.forming.sighting else {
+            ui.weak("Following all light…");
+            return;
+        };
+        let Ok(sighting) = source.as_ref() else { return };
+        if !self.drawn.as_ref().is_some_and(|old| Arc::ptr_eq(&old.source, source)) {
+            let pairs = pairs(ui, sighting);
+            self.drawn = Some(Drawn { source: Arc::clone(source), pairs });
+        }
+        let Some(Drawn { pairs, .. }) = &self.drawn else { return };
+        if pairs.is_empty() {
+            ui.weak("No view of this task makes an image.");
+            return;
+        }
+        for pair in pairs {
+            let name = run.subject.task.as_ref().and_then(|task| task.views.get(pair.view));
+            let name = name.map_or("", |view| view.name.as_str());
+            ui.label(words::image(name, &sighting.views.value[pair.view]));
+            pair.ui(ui, name);
+        }
+    }
+}
+
+impl Pair {
+    /// Shows both side by side.
+    fn ui(&self, ui: &mut Ui, name: &str) {
+        let side = (0.5 * (ui.available_width() - 10.0)).clamp(60.0, 320.0);
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 6.0;
+            for (texture, what) in self.textures.iter().zip(["wanted", "made"]) {
+                ui.vertical(|ui| {
+                    let image = Shown::new(texture).fit_to_exact_size(vec2(side, side));
+                    ui.add(image.alt_text(format!("Image of {name}: {what}")));
+                    ui.label(RichText::new(what).small().weak());
+                });
+            }
+        });
+    }
+}
+
+fn pairs(ui: &Ui, sighting: &Sighting) -> Vec<Pair> {
+    let views = sighting.views.value.iter().enumerate();
+    let images = views.filter_map(|(view, seen)| Some((view, seen.image.as_ref()?)));
+    let pair = |(view, image): (usize, &Image)| {
+        // Both to one scale: the brightest of the picture is white.
+        let white = image.wanted.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let texture = |what: &str, values: &[f64]| {
+            let name = format!("{what} {view}");
+            ui.ctx().load_texture(name, grey(values, image.pixels, white), TextureOptions::NEAREST)
+        };
+        Pair { view, textures: [texture("wanted", &image.wanted), texture("made", &image.made)] }
+    };
+    images.map(pair).collect()
+}
+
+/// Light in grey, rows from the top.
+fn grey(values: &[f64], pixels: usize, white: f64) -> ColorImage {
+    let pixel = |n: usize| {
+        let value = values[(pixels - 1 - n / pixels) * pixels + n % pixels];
+        Color32::from_gray((255.0 * (value / white).clamp(0.0, 1.0)).round() as u8)
+    };
+    ColorImage::new([pixels, pixels], (0..pixels * pixels).map(pixel).collect())
+}

@@ -1,0 +1,179 @@
+//! The panel of the gradient-index slice by what a screen reader calls its parts, on real sessions.
+
+use std::time::Duration;
+
+use aplanat::grin_task::{Axis, Plane};
+use aplanat::session::{Command, Form, Forming, Quantity, Session, Sight, Standing, View, blank};
+use aplanat::studio::draw::Backing;
+use aplanat::studio::panels::GrinSlice;
+use eframe::egui::accesskit::Role;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+
+use crate::bench::{Stand, stand};
+
+type Bench = Harness<'static, Stand<GrinSlice>>;
+
+fn panel(forming: Forming) -> Bench {
+    let view = View { forming, ..View::default() };
+    let mut harness = stand(GrinSlice::new(Backing::Software), view);
+    harness.run();
+    harness
+}
+
+fn press(harness: &mut Bench, name: &str) {
+    harness.get_by_label(name).click();
+    harness.run();
+}
+
+/// What was asked of the field.
+fn asked(harness: &Bench) -> Vec<Form> {
+    let wishes = harness.state().wishes.iter();
+    let asked = wishes.filter_map(|wish| match wish {
+        Command::Form(form) => Some(form.clone()),
+        _ => None,
+    });
+    asked.collect()
+}
+
+/// Waits until a session knows enough.
+fn wait(session: &mut Session, what: &str, enough: impl Fn(&Forming) -> bool) {
+    for _ in 0..30_000 {
+        session.poll();
+        if enough(&session.view().forming) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    panic!("{what} never happened");
+}
+
+/// Whether everything that can be seen of the field is there.
+fn is_seen(forming: &Forming) -> bool {
+    let Forming { run: Some(run), slice: Some(slice), sighting: Some(sighting), .. } = forming
+    else {
+        return false;
+    };
+    let (Ok(slice), Ok(sighting)) = (slice.as_ref(), sighting.as_ref()) else { return false };
+    let media = [&slice.medium, &sighting.medium];
+    media.into_iter().all(|medium| std::sync::Arc::ptr_eq(medium, &run.medium))
+}
+
+/// A task that is open, looked at, and maybe worked on to its end.
+fn opened(name: &str, to_its_end: bool) -> Forming {
+    let mut session = Session::new(blank(), || {}).unwrap();
+    session.apply(Command::Form(Form::Watch(true)));
+    session.apply(Command::Form(Form::Builtin(name.to_owned())));
+    wait(&mut session, "the opening", |forming| forming.run.is_some());
+    if to_its_end {
+        session.apply(Command::Form(Form::Start));
+        wait(&mut session, "the end", |forming| {
+            forming.run.as_ref().is_some_and(|run| run.standing == Standing::Finished)
+        });
+    }
+    wait(&mut session, "the view", is_seen);
+    session.view().forming
+}
+
+#[test]
+fn without_a_task_the_panel_says_what_to_do_and_asks_for_nothing() {
+    let mut harness = panel(Forming::default());
+    harness.get_by_label_contains("Open a task and press Optimize");
+    assert_eq!(harness.state().wishes, []);
+    assert!(harness.query_by_label("Optimize").is_none());
+    press(&mut harness, "Luneburg lens as a function of the radius");
+    press(&mut harness, "Open file…");
+    assert_eq!(asked(&harness), [Form::Builtin("luneburg-radial".into()), Form::Open(None)]);
+
+    let failed = Forming { failed: Some("a.json: found a lens".into()), ..Forming::default() };
+    panel(failed).get_by_label("A.json: found a lens");
+    let opening = Forming { opening: true, ..Forming::default() };
+    panel(opening).get_by_label("Opening…");
+}
+
+#[test]
+fn a_task_is_worked_on_turned_and_saved_by_buttons() {
+    let ready = opened("luneburg-radial", false);
+    let sight = ready.sight;
+    let mut harness = panel(ready.clone());
+    harness.get_by_label_contains("Ready: at most 120 steps, 6, 9 nodes");
+    harness.get_by_label_contains("at y = 0 mm: index");
+    harness.get_by_label("focus: 11 rays");
+    harness.get_by_label_contains("64 rays, none left out");
+    harness.get_by_label_contains("halving it moves 64 exits by at most");
+    for button in ["Optimize", "Save volume…", "x", "Close"] {
+        press(&mut harness, button);
+    }
+    let turned = Sight { plane: Plane { axis: Axis::X, depth: 0.0 }, ..sight };
+    let save = Form::Save { path: None, nodes: 65 };
+    assert_eq!(asked(&harness), [Form::Start, save, Form::Look(turned), Form::Close]);
+
+    let mut harness = panel(ready.clone());
+    harness.get_by_role_and_label(Role::Slider, "Depth of the slice").set_value_accesskit(0.25);
+    harness.run();
+    let moved = asked(&harness);
+    let [Form::Look(Sight { plane: Plane { axis: Axis::Y, depth }, .. })] = &moved[..] else {
+        panic!("{moved:?}");
+    };
+    assert!((depth - 0.25).abs() < 1e-9, "{depth}");
+
+    for (standing, buttons) in [
+        (Standing::Running, [("Pause", Form::Pause), ("Stop", Form::Stop)]),
+        (Standing::Paused, [("Go on", Form::Resume), ("Stop", Form::Stop)]),
+    ] {
+        let mut held = opened("luneburg-radial", true);
+        let mut run = held.run.as_deref().unwrap().clone();
+        run.standing = standing;
+        held.run = Some(run.into());
+        for (button, form) in buttons {
+            let mut harness = panel(held.clone());
+            press(&mut harness, "Optimize");
+            press(&mut harness, button);
+            assert_eq!(asked(&harness), [form], "it is under way already");
+        }
+    }
+}
+
+#[test]
+fn a_found_field_has_its_numbers_curves_and_places() {
+    let found = opened("luneburg-radial", true);
+    let mut harness = panel(found);
+    harness.get_by_label_contains("Finished: step ");
+    harness.get_by_label_contains("off by ");
+    harness.get_by_label_contains("rays and back in ");
+    harness.get_by_label("Start over");
+    press(&mut harness, "Loss");
+    harness.get_by_label_contains("Loss against ");
+    press(&mut harness, "Profile");
+    harness.get_by_label("Index along r");
+    press(&mut harness, "Images");
+    assert!(harness.query_by_label("Index along r").is_some(), "this task makes no image");
+
+    let slice = harness.get_by_label_contains("at y = 0 mm: index").rect();
+    harness.get_by_label_contains("The pointer reads the field");
+    harness.get_by_label_contains("at y = 0 mm: index").click();
+    harness.run();
+    harness.get_by_label_contains("index 1.40");
+    assert!(slice.width() > 300.0 && slice.height() > 300.0, "{slice}");
+    press(&mut harness, "Unpin");
+    assert!(harness.query_by_label("Unpin").is_none());
+
+    harness.get_by_label("Quantity of the slice").click();
+    harness.run();
+    press(&mut harness, Quantity::Error.name());
+    let [Form::Look(sight)] = asked(&harness)[..] else { panic!("{:?}", asked(&harness)) };
+    assert_eq!(sight.quantity, Quantity::Error);
+}
+
+#[test]
+fn images_stand_beside_their_pictures() {
+    let mut harness = panel(opened("display", false));
+    harness.get_by_label("face: 11 rays");
+    press(&mut harness, "Images");
+    assert_eq!(harness.get_all_by_label_contains("dB PSNR, 16384 rays, none left out").count(), 2);
+    for view in ["face", "letter"] {
+        for what in ["wanted", "made"] {
+            harness.get_by_label(&format!("Image of {view}: {what}"));
+        }
+    }
+}

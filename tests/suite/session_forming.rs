@@ -1,0 +1,349 @@
+//! A gradient-index field behind a session: opened, looked at, formed, held, stopped, written; the
+//! same field as without a window, and wrong files refused.
+
+use super::session_front::wait;
+use aplanat::files::{Volume, read_volume, write_volume};
+use aplanat::grin::field::Grid;
+use aplanat::grin_task::{self, Axis, Level, Medium, Plane, Runner, Task};
+use aplanat::math::Vec3;
+use aplanat::session::{
+    Command, Event, Form, Formation, Forming, Quantity, Session, Severity, Sight, Slice, Standing,
+    blank,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+fn session() -> Session {
+    Session::new(blank(), || {}).unwrap()
+}
+
+/// A folder of a test's own, empty.
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("aplanat-{name}-{}", std::process::id()));
+    std::fs::remove_dir_all(&folder).unwrap_or_default();
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// A built-in task with few steps at a coarse resolution.
+fn coarse(name: &str, levels: &[Level]) -> Task {
+    let task = grin_task::find(name).unwrap().task().unwrap();
+    Task { levels: levels.to_vec(), ..task }
+}
+
+fn write_task(path: &Path, task: &Task) {
+    std::fs::write(path, serde_json::to_string(task).unwrap()).unwrap();
+}
+
+fn form(session: &mut Session, wish: Form) {
+    session.apply(Command::Form(wish));
+}
+
+fn forming(session: &Session) -> Forming {
+    session.view().forming
+}
+
+fn run(session: &Session) -> Arc<Formation> {
+    forming(session).run.unwrap()
+}
+
+/// Waits until what is open stands so, whatever it stood like before.
+fn stands(session: &mut Session, standing: Standing) {
+    wait(session, "the standing", |view, _| {
+        let Forming { run, opening, pending, .. } = &view.forming;
+        let now = run.as_ref().map(|run| run.standing);
+        now == Some(standing) && !opening && pending.is_none()
+    });
+}
+
+fn open(session: &mut Session, path: &Path) {
+    form(session, Form::Open(Some(path.to_owned())));
+    wait(session, "the opening", |view, _| !view.forming.opening);
+}
+
+/// Waits for a slice of the field as it is, looked at as it is asked for.
+fn slice(session: &mut Session) -> Slice {
+    wait(session, "a slice", |view, _| {
+        let forming = &view.forming;
+        let run = forming.run.as_ref().unwrap();
+        forming.slice.as_ref().and_then(|slice| slice.as_ref().as_ref().ok()).is_some_and(|slice| {
+            Arc::ptr_eq(&slice.medium, &run.medium) && slice.sight == forming.sight
+        })
+    });
+    forming(session).slice.unwrap().as_ref().as_ref().unwrap().clone()
+}
+
+/// What the session refuses to open.
+fn refused(session: &mut Session, path: &Path) -> String {
+    open(session, path);
+    let said = session.view().messages.last().cloned().unwrap();
+    assert_eq!(said.severity, Severity::Error, "{}", said.text);
+    assert_eq!(forming(session).failed, Some(said.text.clone()));
+    said.text
+}
+
+#[test]
+fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
+    let folder = folder("forming");
+    let path = folder.join("task.json");
+    let task =
+        coarse("luneburg", &[Level { nodes: 3, steps: 12 }, Level { nodes: 5, steps: 100_000 }]);
+    write_task(&path, &task);
+    let mut session = session();
+    form(&mut session, Form::Watch(true));
+    open(&mut session, &path);
+    assert!(run(&session).is_ready());
+    form(&mut session, Form::Start);
+    wait(&mut session, "steps", |view, _| {
+        view.forming.run.as_ref().is_some_and(|run| {
+            run.progress.as_ref().is_some_and(|progress| progress.step > 15 && progress.level == 1)
+        })
+    });
+    form(&mut session, Form::Pause);
+    stands(&mut session, Standing::Paused);
+    let held = run(&session);
+    slice(&mut session);
+    std::thread::sleep(std::time::Duration::from_millis(60));
+    session.poll();
+    assert_eq!(run(&session).progress, held.progress, "it is held");
+    form(&mut session, Form::Resume);
+    stands(&mut session, Standing::Running);
+    form(&mut session, Form::Stop);
+    stands(&mut session, Standing::Stopped);
+
+    let stopped = run(&session);
+    let steps = stopped.progress.as_ref().unwrap().step;
+    let mut headless = Runner::new(&task).unwrap();
+    for _ in 0..steps {
+        headless.step().unwrap();
+    }
+    headless.settle().unwrap();
+    assert_eq!(*stopped.medium, *headless.best(), "after {steps} steps");
+    assert_eq!(stopped.rays, headless.rays());
+    assert!(stopped.history.len() > 10 && stopped.seconds > 0.0);
+
+    for name in ["field.npz", "field.json"] {
+        let file = folder.join(name);
+        form(&mut session, Form::Save { path: Some(file.clone()), nodes: 65 });
+        wait(&mut session, "the file", |_, events| events.contains(&Event::Saved(file.clone())));
+        assert_eq!(read_volume(&file).unwrap(), headless.best().volume(task.space, 65).unwrap());
+    }
+    form(&mut session, Form::Save { path: Some(folder.join("field.txt")), nodes: 65 });
+    wait(&mut session, "a refusal", |view, _| {
+        view.messages.last().is_some_and(|said| said.text.contains("ends in .npz or .json"))
+    });
+
+    form(&mut session, Form::Start);
+    stands(&mut session, Standing::Running);
+    assert!(run(&session).progress.as_ref().is_none_or(|progress| progress.step < steps), "anew");
+    form(&mut session, Form::Close);
+    assert!(forming(&session).run.is_none() && forming(&session).slice.is_none());
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn nothing_is_computed_before_something_is_open_and_looked_at() {
+    let mut session = session();
+    form(&mut session, Form::Watch(true));
+    form(&mut session, Form::Start);
+    assert_eq!(
+        session.view().messages.last().unwrap().text,
+        "there is no task to work on; open one first"
+    );
+    form(&mut session, Form::Save { path: Some("field.npz".into()), nodes: 65 });
+    wait(&mut session, "a refusal", |view, _| {
+        view.messages.last().is_some_and(|said| said.text.starts_with("there is no field to save"))
+    });
+    let Forming { run, slice, sighting, .. } = forming(&session);
+    assert!(run.is_none() && slice.is_none() && sighting.is_none());
+
+    form(&mut session, Form::Watch(false));
+    form(&mut session, Form::Builtin("luneburg-radial".into()));
+    stands(&mut session, Standing::Paused);
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    session.poll();
+    let Forming { slice, sighting, .. } = forming(&session);
+    assert!(slice.is_none() && sighting.is_none(), "nobody looks");
+    form(&mut session, Form::Watch(true));
+    super::session_forming::slice(&mut session);
+}
+
+#[test]
+fn slices_turn_and_show_every_quantity_with_rays_and_the_exact_field() {
+    let mut session = session();
+    form(&mut session, Form::Watch(true));
+    form(&mut session, Form::Builtin("luneburg-radial".into()));
+    stands(&mut session, Standing::Paused);
+    let first = slice(&mut session);
+    assert_eq!(first.sight.plane, Plane { axis: Axis::Y, depth: 0.0 });
+    let [low, high] = first.range;
+    assert!(low == high && (low - 1.0).abs() < 1e-12 && first.contours.is_empty(), "even");
+    assert_eq!((first.size, first.axes()), ([240, 240], [Axis::Z, Axis::X]));
+    let [rays] = &first.ways[..] else { panic!("one view") };
+    assert_eq!(rays.ways.len(), first.sight.rays);
+    assert!(rays.off < 0.3 && rays.ways.iter().all(|way| way.points.len() > 2));
+    assert_eq!((first.profile.along, first.profile.exact.len()), ("r", 201));
+    assert!(first.difference.unwrap().relative > 0.1);
+
+    form(&mut session, Form::Start);
+    stands(&mut session, Standing::Finished);
+    let found = slice(&mut session);
+    let difference = found.difference.unwrap();
+    assert!(difference.relative < 1e-4 && difference.without_offset <= difference.relative);
+    assert!((found.range[1] - 2.0_f64.sqrt()).abs() < 1e-3, "{:?}", found.range);
+    assert!(found.contours.len() >= 4 && found.spacing > 0.0);
+    for plane in [(Axis::X, 0.3), (Axis::Z, -0.2), (Axis::Y, 7.0)] {
+        for quantity in Quantity::ALL {
+            let plane = Plane { axis: plane.0, depth: plane.1 };
+            form(&mut session, Form::Look(Sight { plane, quantity, rays: 3 }));
+            let seen = slice(&mut session);
+            assert_eq!(seen.sight.plane.depth, plane.depth.min(1.0), "held within the ball");
+            let numbers = seen.values.iter().filter(|value| value.is_finite());
+            assert_eq!(numbers.count() > 0, plane.depth < 1.0);
+            let error = quantity == Quantity::Error;
+            assert!(!error || seen.range[1] < 2e-3 && seen.range[0] == -seen.range[1]);
+        }
+    }
+    wait(&mut session, "all light", |view, _| {
+        let sighting = view.forming.sighting.as_deref().and_then(|seen| seen.as_ref().ok());
+        let run = view.forming.run.as_ref().unwrap();
+        sighting.is_some_and(|seen| {
+            let view = &seen.views.value[0];
+            assert!(view.error.unwrap() < 1e-6 && view.image.is_none());
+            Arc::ptr_eq(&seen.medium, &run.medium) && view.result.spot < 1e-3
+        })
+    });
+}
+
+#[test]
+fn images_of_a_display_stand_beside_their_pictures() {
+    let folder = folder("display");
+    let path = folder.join("task.json");
+    let mut task = coarse("display", &[Level { nodes: 4, steps: 2 }]);
+    for view in &mut task.views {
+        if let grin_task::Source::Beam { rays, .. } = &mut view.source {
+            *rays = 32;
+        }
+    }
+    write_task(&path, &task);
+    let mut session = session();
+    form(&mut session, Form::Watch(true));
+    open(&mut session, &path);
+    assert_eq!(forming(&session).sight.plane.axis, Axis::Z, "both beams lie in it");
+    wait(&mut session, "images", |view, _| view.forming.sighting.is_some());
+    let sighting = forming(&session).sighting.unwrap();
+    let seen = sighting.as_ref().as_ref().unwrap();
+    let runner = Runner::new(&task).unwrap();
+    let judged = runner.judge(runner.current()).unwrap();
+    assert_eq!(seen.views.value.len(), judged.views.len());
+    for (seen, judged) in seen.views.value.iter().zip(&judged.views) {
+        let image = seen.image.as_ref().unwrap();
+        assert_eq!((image.wanted.len(), image.made.len()), (64 * 64, 64 * 64));
+        assert_eq!((seen.result.quality, seen.result.loss), (judged.quality, judged.loss));
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        assert!((mean(&image.wanted) - 1.0).abs() < 1e-12);
+        assert!((mean(&image.made) - 1.0).abs() < 0.02, "nearly all light arrives");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn rays_that_do_not_count_are_drawn_and_counted_with_their_reason() {
+    let folder = folder("excluded");
+    let path = folder.join("task.json");
+    let mut task = coarse("display", &[Level { nodes: 4, steps: 2 }]);
+    for view in &mut task.views {
+        if let grin_task::Source::Beam { rays, half, .. } = &mut view.source {
+            (*rays, *half) = (32, 1.5);
+        }
+    }
+    write_task(&path, &task);
+    let mut session = session();
+    form(&mut session, Form::Watch(true));
+    open(&mut session, &path);
+    for ways in slice(&mut session).ways {
+        let (lost, there): (Vec<_>, Vec<_>) =
+            ways.ways.iter().partition(|way| way.excluded().is_some());
+        assert!(lost.len() >= 2 && there.len() >= 4, "{} and {}", lost.len(), there.len());
+        assert!(lost.iter().all(|way| way.excluded() == Some("never_entered")));
+        assert!(ways.ways.iter().all(|way| way.points.len() >= 2));
+    }
+    wait(&mut session, "all light", |view, _| view.forming.sighting.is_some());
+    let sighting = forming(&session).sighting.unwrap();
+    for seen in &sighting.as_ref().as_ref().unwrap().views.value {
+        let excluded: Vec<_> = seen.result.counts.excluded().collect();
+        let [("never_entered", count)] = excluded[..] else { panic!("{excluded:?}") };
+        assert_eq!(seen.result.counts.counted() + count, 32 * 32);
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// A volume of so many nodes along each axis.
+fn volume(counts: [usize; 3], value: impl Fn(usize) -> f64) -> Volume {
+    let grid = Grid::new(counts, Vec3::default(), Vec3::new(0.5, 0.5, 0.5)).unwrap();
+    Volume { grid, values: (0..grid.nodes()).map(value).collect() }
+}
+
+#[test]
+fn a_volume_is_looked_at_and_written_in_the_other_format() {
+    let folder = folder("volume");
+    let path = folder.join("volume.npz");
+    let known = volume([3, 4, 5], |n| 1.0 + 0.01 * n as f64);
+    write_volume(&path, &known).unwrap();
+    let mut session = session();
+    form(&mut session, Form::Watch(true));
+    open(&mut session, &path);
+    let seen = run(&session);
+    assert_eq!((seen.subject.name.as_str(), seen.standing), ("volume.npz", Standing::Stopped));
+    let seen = slice(&mut session);
+    assert!(seen.ways.is_empty() && seen.difference.is_none() && seen.profile.start.is_empty());
+    assert!((seen.range[0] - 1.0).abs() < 1e-12 && (seen.range[1] - 1.59).abs() < 1e-12);
+    let Medium::Trilinear(field) = &*seen.medium else { panic!("a grid") };
+    assert_eq!(field.grid().counts(), [3, 4, 5]);
+    form(&mut session, Form::Start);
+    assert_eq!(session.view().messages.last().unwrap().text, "a volume has no task to work on");
+    let file = folder.join("copy.json");
+    form(&mut session, Form::Save { path: Some(file.clone()), nodes: 65 });
+    wait(&mut session, "the file", |_, events| events.contains(&Event::Saved(file.clone())));
+    assert_eq!(read_volume(&file).unwrap(), known);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn what_is_no_task_and_no_volume_is_refused_by_name_and_what_is_open_stays() {
+    let folder = folder("refused");
+    let mut session = session();
+    form(&mut session, Form::Builtin("fibre".into()));
+    stands(&mut session, Standing::Paused);
+    let file = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let task = grin_task::find("fibre").unwrap().text;
+    let cases = [
+        (file("lens.json", r#"{"aplanat": 1}"#), "found a lens; expected a task"),
+        (file("text.txt", "no field"), "found neither; expected a task"),
+        (file("empty.npz", ""), "found neither"),
+        (file("broken.npz", "PK no archive"), "the arrays index, low and spacing"),
+        (file("wrong.json", &task.replacen("tolerance", "tolerence", 1)), "tolerence"),
+        (file("none.json", &task.replacen("\"nodes\": 6", "\"nodes\": 1", 1)), "4 to 513"),
+        (folder.join("absent.json"), "cannot be read"),
+    ];
+    for (path, why) in cases {
+        let said = refused(&mut session, &path);
+        let named = said.contains(&path.display().to_string());
+        assert!(named && said.contains(why), "{said}");
+    }
+
+    let path = folder.join("volume.npz");
+    write_volume(&path, &volume([0, 0, 0], |_| 1.0)).unwrap();
+    assert!(refused(&mut session, &path).contains("0 values for [0, 0, 0] nodes"));
+    write_volume(&path, &volume([1, 1, 1], |_| 1.0)).unwrap();
+    assert!(refused(&mut session, &path).contains("1 nodes along x, expected at least 2"));
+    let hole = |n: usize| if n == 5 { f64::NAN } else { 1.0 };
+    write_volume(&path, &volume([2, 2, 2], hole)).unwrap();
+    assert!(refused(&mut session, &path).contains("one finite value for each node"));
+    assert_eq!(run(&session).subject.name, grin_task::find("fibre").unwrap().task().unwrap().name);
+    std::fs::remove_dir_all(folder).unwrap();
+}
