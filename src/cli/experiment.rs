@@ -2,8 +2,8 @@
 
 use super::failure::Failure;
 use super::output::{Number, Output, Table};
-use crate::experiments::{self, Claim, Effort, Ended, Experiment as Study, Lap, Progress, Report};
-use crate::measure::{Stopwatch, timed};
+use crate::experiments::{self, Claim, Effort, Ended, Experiment as Study, Part, Progress, Report};
+use crate::measure::{Stopwatch, processor_ms, timed};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -31,10 +31,15 @@ impl Experiment {
         let Some(id) = &self.id else { return output.print(&List(experiments::ALL)) };
         let study = experiments::find(id).ok_or_else(|| unknown(id))?;
         self.out.iter().try_for_each(|folder| check_folder(folder))?;
-        let mut laps = Laps::default();
-        let (outcome, ms) = timed(|| (study.run)(Effort::Full, &mut watched(&mut laps)));
+        let mut parts = Parts::new();
+        let mut bar = watched();
+        let mut watch = |progress: Progress<'_>| {
+            parts.mark(progress.doing);
+            bar(progress)
+        };
+        let (outcome, ms) = timed(|| (study.run)(Effort::Full, &mut watch));
         let mut report = Report::new(study, outcome.map_err(|ended| failure(study, &ended))?, ms);
-        report.laps = laps.ended();
+        report.parts = parts.end();
         if let Some(folder) = &self.out {
             report.write(folder)?;
         }
@@ -59,32 +64,8 @@ pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
-/// How long each part of the work takes.
-#[derive(Default)]
-struct Laps {
-    ended: Vec<Lap>,
-    begun: Option<(String, Stopwatch)>,
-}
-
-impl Laps {
-    /// Another part begins.
-    fn begin(&mut self, doing: &str) {
-        let before = self.begun.replace((doing.to_owned(), Stopwatch::start()));
-        self.ended.extend(before.map(lap));
-    }
-
-    /// All parts, the last one as well.
-    fn ended(self) -> Vec<Lap> {
-        self.ended.into_iter().chain(self.begun.map(lap)).collect()
-    }
-}
-
-fn lap((doing, clock): (String, Stopwatch)) -> Lap {
-    Lap { doing, seconds: clock.seconds() }
-}
-
 /// Shows how far the work is.
-fn watched(laps: &mut Laps) -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
+fn watched() -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
     let bar = ProgressBar::new(STEPS as u64);
     let style = ProgressStyle::with_template("{wide_bar} {percent} %  {msg}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -93,10 +74,52 @@ fn watched(laps: &mut Laps) -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
         if doing != progress.doing {
             progress.doing.clone_into(&mut doing);
             bar.set_message(doing.clone());
-            laps.begin(&doing);
         }
         bar.set_position((STEPS * progress.done) as u64);
         ControlFlow::Continue(())
+    }
+}
+
+/// How long each part of an experiment takes: from when it is named to when another one is.
+struct Parts {
+    clock: Stopwatch,
+    /// When the current part began, in seconds and in milliseconds of all threads.
+    since: (f64, Option<f64>),
+    doing: Option<String>,
+    list: Vec<Part>,
+}
+
+impl Parts {
+    fn new() -> Self {
+        let clock = Stopwatch::start();
+        Self { clock, since: (0.0, processor_ms()), doing: None, list: Vec::new() }
+    }
+
+    /// From now on it does this.
+    fn mark(&mut self, doing: &str) {
+        if self.doing.as_deref() != Some(doing) {
+            self.close();
+            self.doing = Some(doing.to_owned());
+        }
+    }
+
+    fn close(&mut self) {
+        let now = (self.clock.seconds(), processor_ms());
+        let (seconds, before) = std::mem::replace(&mut self.since, now);
+        let Some(doing) = self.doing.take() else { return };
+        let (ms, spent) = (1e3 * (now.0 - seconds), now.1.zip(before).map(|(now, b)| now - b));
+        match self.list.iter_mut().find(|part| part.doing == doing) {
+            Some(part) => {
+                part.ms += ms;
+                part.processor_ms = part.processor_ms.zip(spent).map(|(sum, more)| sum + more);
+            }
+            None => self.list.push(Part { doing, ms, processor_ms: spent }),
+        }
+    }
+
+    fn end(mut self) -> Vec<Part> {
+        self.close();
+        self.list
     }
 }
 
@@ -144,15 +167,19 @@ fn judge(report: &Report) -> Result<(), Failure> {
 
 impl Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { id, title, claim, ms, laps, outcome, files, .. } = self;
+        let Self { id, title, claim, ms, outcome, files, .. } = self;
         writeln!(f, "{id}: {title}\n{claim}.\n")?;
         let mut table = Table::new(&["claim", "found", "error", "expected", ""]);
         for claim in &outcome.claims {
             table.row(cells(claim));
         }
         writeln!(f, "{table}\n{} rays, {ms:.0} ms", outcome.rays)?;
-        for Lap { doing, seconds } in laps {
-            writeln!(f, "{seconds:8.2} s  {doing}")?;
+        for Part { doing, ms, processor_ms } in &self.parts {
+            write!(f, "{:9.2} s", 1e-3 * ms)?;
+            if let Some(ms) = processor_ms {
+                write!(f, ", {:9.2} s of all threads", 1e-3 * ms)?;
+            }
+            writeln!(f, ": {doing}")?;
         }
         files.iter().try_for_each(|file| writeln!(f, "written: {file}"))
     }

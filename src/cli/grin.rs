@@ -2,6 +2,7 @@
 
 use super::experiment::check_folder;
 use super::failure::Failure;
+use super::grin_lines::Lines;
 use super::input::{check_target, read_json};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::{Number, Output, Table};
@@ -45,6 +46,10 @@ pub(super) struct Grin {
     #[arg(long, value_name = "M")]
     minutes: Option<f64>,
 
+    /// Also solves for the field by straight lines, for comparison, where the light was measured
+    #[arg(long, requires = "task")]
+    lines: bool,
+
     /// Prints the task itself, as a file to begin with, and does nothing
     #[arg(long, requires = "task")]
     show: bool,
@@ -70,6 +75,9 @@ impl Grin {
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
         let mut report = Report::new(&runner, &Cost { ms, processor_ms, memory, stopped })
             .map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
+        if self.lines {
+            report.lines = Some(Lines::new(name, &task, runner.best().nodes())?);
+        }
         report.files = self.write(&task, runner.best())?;
         output.print(&report)
     }
@@ -215,6 +223,7 @@ struct Report {
     loss: f64,
     views: Vec<View>,
     error: Option<Error>,
+    lines: Option<Lines>,
     index: [f64; 2],
     slope: f64,
     nodes: usize,
@@ -246,6 +255,7 @@ struct Error {
     relative: f64,
     without_offset: f64,
     offset: f64,
+    of_contrast: f64,
 }
 
 impl Report {
@@ -257,7 +267,7 @@ impl Report {
             weight: view.weight,
             spot: result.spot,
             quality_db: result.quality,
-            rays: result.counts.fates.total(),
+            rays: result.counts.sent(),
             excluded: result.counts.excluded().collect(),
             retrace_error: result.retrace_error,
         };
@@ -265,6 +275,7 @@ impl Report {
             relative: difference.relative,
             without_offset: difference.without_offset,
             offset: difference.offset,
+            of_contrast: difference.of_contrast,
         });
         let extremes = task.extremes(best);
         let (integrator, step) = runner.tracing();
@@ -274,6 +285,7 @@ impl Report {
             loss,
             views: task.views.iter().zip(&views).map(view).collect(),
             error,
+            lines: None,
             index: [extremes.low, extremes.high],
             slope: extremes.slope,
             nodes: best.nodes(),
@@ -299,10 +311,15 @@ impl Display for Report {
         writeln!(f, "{nodes} nodes, {parameters} numbers; {integrator}, step {step:.4} mm")?;
         let [low, high] = self.index.map(|index| format!("{index:.6}"));
         writeln!(f, "index {low} to {high}, at most {:.4} / mm steep", self.slope)?;
-        if let Some(Error { relative, without_offset, offset }) = &self.error {
+        if let Some(Error { relative, without_offset, offset, of_contrast }) = &self.error {
             write!(f, "off the exact field by {relative:.2e}, relative; by {without_offset:.2e} ")?;
             writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
+            writeln!(
+                f,
+                "which is {of_contrast:.4} of what the exact field differs from the start"
+            )?;
         }
+        self.lines.iter().try_for_each(|lines| write!(f, "{lines}"))?;
         if let Some(Memory { before_mb, peak_mb }) = &self.memory {
             write!(f, "memory {:.1} MB more than the {before_mb:.1} before", peak_mb - before_mb)?;
         }

@@ -13,6 +13,7 @@ mod experiment;
 mod failure;
 mod gradient;
 mod grin;
+mod grin_lines;
 mod info;
 mod input;
 mod measure;

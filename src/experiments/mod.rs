@@ -17,6 +17,7 @@ mod known_lenses;
 mod medium;
 mod motion;
 mod outcome;
+mod plume;
 mod report;
 mod sampling;
 mod section;
@@ -28,7 +29,7 @@ mod zoom;
 
 pub use medium::medium_pictures;
 pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
-pub use report::{Lap, Report};
+pub use report::{Part, Report};
 pub use views::view_picture;
 
 use crate::files;
@@ -58,6 +59,7 @@ pub const ALL: &[Experiment] = &[
     views::caustic::EXPERIMENT,
     known_lenses::EXPERIMENT,
     fibre::EXPERIMENT,
+    plume::EXPERIMENT,
 ];
 
 /// A figure or table of the thesis.

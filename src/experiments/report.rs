@@ -17,8 +17,8 @@ pub struct Report {
     pub claim: &'static str,
     /// How long it took, in milliseconds.
     pub ms: f64,
-    /// How long its parts took, in order; empty where nobody looked at the clock.
-    pub laps: Vec<Lap>,
+    /// How long its parts took, where that was measured.
+    pub parts: Vec<Part>,
     /// Whether all claims hold.
     pub holds: bool,
     /// What it found.
@@ -28,13 +28,15 @@ pub struct Report {
     pub files: Vec<String>,
 }
 
-/// What an experiment did for how long.
+/// A part of an experiment and how long it took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Lap {
-    /// What it did, in its own words.
+pub struct Part {
+    /// What it did.
     pub doing: String,
-    /// How long that took, in seconds.
-    pub seconds: f64,
+    /// How long, in milliseconds.
+    pub ms: f64,
+    /// The time of all threads together, where the system tells it.
+    pub processor_ms: Option<f64>,
 }
 
 impl Report {
@@ -42,7 +44,7 @@ impl Report {
     pub fn new(study: &Experiment, outcome: Outcome, ms: f64) -> Self {
         let Experiment { id, title, claim, .. } = *study;
         let holds = outcome.failed().next().is_none();
-        Self { id, title, claim, ms, laps: Vec::new(), holds, outcome, files: Vec::new() }
+        Self { id, title, claim, ms, parts: Vec::new(), holds, outcome, files: Vec::new() }
     }
 
     /// Writes everything into a folder: tables as CSV, pictures as PNG, lenses in our own form, all

@@ -18,6 +18,10 @@ use crate::math::Vec3;
 const SAMPLE: usize = 64;
 /// Largest number of tries.
 const TRIES: usize = 24;
+/// After so many tries that do not halve an error of this part of the way, light counts as chaotic:
+/// finer steps tell no more about it, and become very many.
+const STALLED: usize = 3;
+const WILD: f64 = 0.1;
 /// A ray may be this many times longer than the longest straight way through the region.
 const LONGEST: f64 = 32.0;
 /// Most steps a straight way may take before the plan gives up on a tolerance.
@@ -75,9 +79,12 @@ pub fn plan<F: Field<f64> + ?Sized>(
     let finest = if field.grain().continuous_force { way / MOST_STEPS } else { longest / FINEST };
     let order = if field.grain().continuous_force { integrator.order() } else { 1 };
     let (mut step, mut error) = (longest, f64::INFINITY);
+    let (mut least, mut stalled) = (f64::INFINITY, 0);
     for _ in 0..TRIES {
         error = change(field, &setup(step), &setup(0.5 * step), &sample)?;
-        if error <= tolerance || step <= finest {
+        stalled = if error < (0.5 * least).max(WILD * way) { 0 } else { stalled + 1 };
+        least = least.min(error);
+        if error <= tolerance || step <= finest || stalled == STALLED {
             break;
         }
         step *= (0.8 * tolerance / error).powf(1.0 / f64::from(order)).clamp(0.2, 0.7);

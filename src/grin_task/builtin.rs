@@ -1,4 +1,4 @@
-//! The tasks that come with the program: the lenses of the thesis.
+//! The tasks that come with the program: the lenses and the plume of the thesis.
 
 use super::task::Task;
 use crate::files::{FileError, native};
@@ -27,6 +27,10 @@ pub const BUILTIN: &[Builtin] = &[
     Builtin { name: "caustic-far", text: include_str!("../../assets/grin/caustic-far.json") },
     Builtin { name: "caustic", text: include_str!("../../assets/grin/caustic.json") },
     Builtin { name: "fibre", text: include_str!("../../assets/grin/fibre.json") },
+    Builtin { name: "plume", text: include_str!("../../assets/grin/plume.json") },
+    Builtin { name: "plume-10x", text: include_str!("../../assets/grin/plume-10x.json") },
+    Builtin { name: "plume-100x", text: include_str!("../../assets/grin/plume-100x.json") },
+    Builtin { name: "plume-1000x", text: include_str!("../../assets/grin/plume-1000x.json") },
 ];
 
 impl Builtin {

@@ -12,6 +12,8 @@ use std::fmt::Display;
 
 /// Most numbers that least squares are worth while for.
 const FEW: usize = 400;
+/// By how much an index may be below 1 that is the difference of two numbers.
+pub(super) const ROUNDING: f64 = 1e-9;
 /// Most rays in a step, and most nodes along a side.
 const MANY_RAYS: usize = 10_000_000;
 const MANY_NODES: usize = 513;
@@ -63,7 +65,11 @@ pub enum TaskError {
 }
 
 /// An error at a place.
-fn wrong<T: Display>(place: impl Into<String>, found: T, expected: impl Into<String>) -> TaskError {
+pub(super) fn wrong<T: Display>(
+    place: impl Into<String>,
+    found: T,
+    expected: impl Into<String>,
+) -> TaskError {
     let found = format!("{found}");
     TaskError::Value { place: place.into(), found, expected: expected.into() }
 }
@@ -311,6 +317,15 @@ impl Exact {
             Self::Maxwell { centre: a, radius: b }
             | Self::Secant { axis: a, a: b }
             | Self::Parabolic { axis: a, g: b } => positive(place, *a).and(positive(place, *b)),
+            Self::Plume { ambient, contrast, half } => {
+                positive(format!("{place}, half"), *half)?;
+                let least = ambient.min(ambient + contrast);
+                if least >= 1.0 - ROUNDING && (ambient + contrast).is_finite() {
+                    return Ok(());
+                }
+                let found = format!("an index of {least}");
+                Err(wrong(place, found, "1 or more: light is nowhere faster than in vacuum"))
+            }
             Self::Volume(_) => Ok(()),
         }
     }

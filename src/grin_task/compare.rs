@@ -2,7 +2,6 @@
 //! maker can make it.
 
 use super::medium::{Medium, NoField};
-use super::space::length;
 use super::task::{FieldKind, Task};
 use crate::grin::Field;
 use crate::math::Vec3;
@@ -21,6 +20,9 @@ pub struct Difference {
     pub without_offset: f64,
     /// That mean.
     pub offset: f64,
+    /// `‖η - η*‖ / ‖η* - η₀‖` with `η₀` the field to begin with: 1 for a search that found nothing,
+    /// infinite where there is nothing to find.
+    pub of_contrast: f64,
 }
 
 /// What a field is like, over the space.
@@ -41,24 +43,29 @@ impl Task {
     /// A volume that cannot be read.
     pub fn difference(&self, medium: &Medium) -> Result<Option<Difference>, NoField> {
         let Some(exact) = &self.exact else { return Ok(None) };
-        Ok(Some(self.difference_from(medium, &*exact.field::<f64>()?)))
+        self.difference_from(medium, &*exact.field::<f64>()?).map(Some)
     }
 
     /// How a field differs from another one.
-    pub fn difference_from(&self, medium: &Medium, exact: &dyn Field<f64>) -> Difference {
-        difference(medium.field(), exact, &self.places())
+    ///
+    /// # Errors
+    /// A field to begin with that cannot be read.
+    pub fn difference_from(
+        &self,
+        medium: &Medium,
+        exact: &dyn Field<f64>,
+    ) -> Result<Difference, NoField> {
+        let start = self.start.index()?;
+        Ok(difference(medium.field(), exact, &*start, &self.places()))
     }
 
     /// The range of the index over the space, and how steep it is.
     pub fn extremes(&self, medium: &Medium) -> Extremes {
-        let none = Extremes { low: f64::INFINITY, high: f64::NEG_INFINITY, slope: 0.0 };
+        let slope = medium.steepest(self.space);
+        let none = Extremes { low: f64::INFINITY, high: f64::NEG_INFINITY, slope };
         self.places().into_iter().fold(none, |found, (p, _)| {
-            let sample = medium.field().sample(p);
-            Extremes {
-                low: found.low.min(sample.index),
-                high: found.high.max(sample.index),
-                slope: found.slope.max(length(sample.gradient)),
-            }
+            let index = medium.field().sample(p).index;
+            Extremes { low: found.low.min(index), high: found.high.max(index), ..found }
         })
     }
 
@@ -81,20 +88,25 @@ impl Task {
 fn difference(
     found: &dyn Field<f64>,
     exact: &dyn Field<f64>,
+    start: &dyn Fn(Vec3<f64>) -> f64,
     places: &[(Vec3<f64>, f64)],
 ) -> Difference {
-    let pairs: Vec<[f64; 3]> = places
-        .iter()
-        .map(|(p, share)| [found.sample(*p).index, exact.sample(*p).index, *share])
-        .collect();
+    let three = |p: Vec3<f64>| [found.sample(p).index, exact.sample(p).index, start(p)];
+    let all: Vec<([f64; 3], f64)> = places.iter().map(|(p, share)| (three(*p), *share)).collect();
     let mean = |of: &dyn Fn(&[f64; 3]) -> f64| {
-        let all: f64 = pairs.iter().map(|pair| pair[2]).sum();
-        pairs.iter().map(|pair| pair[2] * of(pair)).sum::<f64>() / all
+        let shares: f64 = all.iter().map(|(_, share)| share).sum();
+        all.iter().map(|(three, share)| share * of(three)).sum::<f64>() / shares
     };
     let offset = mean(&|[found, exact, _]| found * found - exact * exact);
     let norm = mean(&|[_, exact, _]| exact * exact);
     let plain = mean(&|[found, exact, _]| (found - exact).powi(2));
+    let contrast = mean(&|[_, exact, start]| (exact - start).powi(2));
     let level = |found: f64| (found * found - offset).max(0.0).sqrt();
     let shape = mean(&|[found, exact, _]| (level(*found) - exact).powi(2));
-    Difference { relative: (plain / norm).sqrt(), without_offset: (shape / norm).sqrt(), offset }
+    Difference {
+        relative: (plain / norm).sqrt(),
+        without_offset: (shape / norm).sqrt(),
+        offset,
+        of_contrast: if plain == 0.0 { 0.0 } else { (plain / contrast).sqrt() },
+    }
 }

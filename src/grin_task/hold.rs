@@ -1,13 +1,13 @@
 //! What is asked of a field itself: its index at the edge, a limit of its slope, and for splines the
-//! smallest index; each a penalty that vanishes where it is kept.
+//! range of the index; each a penalty that vanishes where it is kept.
 
 use super::space::length;
 use super::task::{Edge, FieldKind, MakerLimits, Task};
 use crate::grin::Field;
 use crate::math::Vec3;
 
-/// Points along a side of the box at which a slope is held.
-const LATTICE: usize = 24;
+/// Fewest and most points along a side of the box at which a slope is held; else one a voxel.
+const LATTICE: [usize; 2] = [24, 64];
 /// Points of a radius at which an index is held, and how firmly.
 const SPOKE: usize = 100;
 const FIRM: f64 = 10.0;
@@ -19,8 +19,8 @@ const SURFACE: usize = 2000;
 pub(super) struct Hold {
     edge: Option<(Edge, Vec<Vec3<f64>>)>,
     slope: Option<(f64, f64, Vec<Vec3<f64>>)>,
-    /// The smallest index, of a spline: its coefficients alone do not keep it.
-    floor: Option<(f64, f64, Vec<Vec3<f64>>)>,
+    /// The smallest and the largest index, of a spline: its coefficients alone do not keep them.
+    range: Option<([f64; 2], f64, Vec<Vec3<f64>>)>,
 }
 
 impl Hold {
@@ -31,16 +31,19 @@ impl Hold {
         let is_radial = task.field.is_radial();
         let surface = || if is_radial { vec![along(radius)] } else { task.space.surface(SURFACE) };
         let size = task.space.diameter();
+        let finest = task.levels.iter().map(|level| level.nodes - 1).max().unwrap_or(0);
+        let lattice =
+            if slope.is_some() { finest.clamp(LATTICE[0], LATTICE[1]) } else { LATTICE[0] };
         let inside = || {
             if is_radial {
                 (0..=SPOKE).map(|i| along(radius * i as f64 / SPOKE as f64)).collect()
             } else {
-                [task.space.lattice(LATTICE), surface()].concat()
+                [task.space.lattice(lattice), surface()].concat()
             }
         };
         let is_spline = !matches!(task.field, FieldKind::Trilinear { .. });
         Self {
-            floor: is_spline.then(|| (task.limits.low, size, inside())),
+            range: is_spline.then(|| ([task.limits.low, task.limits.high], size, inside())),
             edge: task.edge.filter(|edge| edge.weight > 0.0).map(|edge| (edge, surface())),
             slope: slope.map(|slope| (slope, size * size, inside())),
         }
@@ -55,12 +58,13 @@ impl Hold {
                 visit(*p, scale * off, scale, Vec3::default());
             }
         }
-        if let Some((low, size, places)) = &self.floor {
+        if let Some(([low, high], size, places)) = &self.range {
             let scale = FIRM * size / (places.len() as f64).sqrt();
             for p in places {
-                let under = low - field.sample(*p).index;
-                if under > 0.0 {
-                    visit(*p, scale * under, -scale, Vec3::default());
+                let index = field.sample(*p).index;
+                let over = (index - high).max(0.0) - (low - index).max(0.0);
+                if over != 0.0 {
+                    visit(*p, scale * over, scale, Vec3::default());
                 }
             }
         }

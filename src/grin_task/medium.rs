@@ -1,11 +1,12 @@
 //! A field on its way: how it begins, what its numbers may do, how it becomes finer, and how it is
 //! written as a volume.
 
-use super::task::{Edge, Exact, FieldKind, MakerLimits, Space};
+use super::check::{ROUNDING, TaskError};
+use super::task::{Edge, Exact, FieldKind, MakerLimits, Space, Start, Task};
 use crate::files::{self, FileError, Volume};
 use crate::grin::Field;
 use crate::grin::field::{
-    BSpline, Coordinate, Diagonal, Grid, GridError, Layered, Luneburg, Maxwell, Parabolic,
+    BSpline, Coordinate, Diagonal, Grid, GridError, Layered, Luneburg, Maxwell, Parabolic, Plume,
     Profile as _, Sech, Tricubic, Trilinear,
 };
 use crate::math::{Real, Vec3};
@@ -87,6 +88,16 @@ impl Medium {
                 Self::Radial(Layered { coordinate, profile }, radius)
             }
         })
+    }
+
+    /// The field that a task begins with, with so many nodes.
+    ///
+    /// # Errors
+    /// Too few nodes, or a volume that cannot be read.
+    pub fn first(task: &Task, nodes: usize) -> Result<Self, TaskError> {
+        let place = "start".to_owned();
+        let index = task.start.index().map_err(|source| TaskError::Field { place, source })?;
+        Ok(Self::of(task.field, nodes, index)?)
     }
 
     /// The same field with other numbers of nodes or coefficients.
@@ -214,15 +225,87 @@ pub enum NoField {
         /// What is wrong with it.
         source: GridError,
     },
+    /// An index in it.
+    #[error(
+        "{file}: node {node:?} has the index {found}; expected 1 or more: offset + scale * number, \
+         where the numbers are none"
+    )]
+    Index {
+        /// The file.
+        file: String,
+        /// The node, counted from 0 along x, y and z.
+        node: [usize; 3],
+        /// What stands there.
+        found: f64,
+    },
+    /// It ends before the space does.
+    #[error("{file}: reaches from {low} to {high} mm along {axis}; expected all of {expected:?}")]
+    Short {
+        /// The file.
+        file: String,
+        /// `x`, `y` or `z`.
+        axis: char,
+        /// Where it begins.
+        low: f64,
+        /// Where it ends.
+        high: f64,
+        /// From where to where the space reaches.
+        expected: [f64; 2],
+    },
 }
 
 /// The trilinear field of a volume in a file.
 pub(super) fn from_file<R: Real>(path: &Path) -> Result<Trilinear<R>, NoField> {
     let Volume { grid, values } = files::read_volume(path)?;
     let wrong = |source| NoField::Values { file: path.display().to_string(), source };
+    if let Some(n) = values.iter().position(|index| !(*index >= 1.0 - ROUNDING)) {
+        let [nx, ny, _] = grid.counts();
+        let (file, node) = (path.display().to_string(), [n % nx, n / nx % ny, n / nx / ny]);
+        return Err(NoField::Index { file, node, found: values[n] });
+    }
     let (low, spacing) = (Vec3::from_f64(grid.low()), Vec3::from_f64(grid.spacing()));
     let grid = Grid::new(grid.counts(), low, spacing).map_err(wrong)?;
     Trilinear::new(grid, values.into_iter().map(R::from_f64).collect()).map_err(wrong)
+}
+
+/// The index at every point.
+type Index = Box<dyn Fn(Vec3<f64>) -> f64>;
+
+impl Start {
+    /// The index of the field to begin with.
+    pub(super) fn index(&self) -> Result<Index, NoField> {
+        Ok(match self {
+            Self::Uniform(index) => {
+                let index = *index;
+                Box::new(move |_| index)
+            }
+            Self::Volume(path) => {
+                let volume = from_file::<f64>(path)?;
+                Box::new(move |p| volume.sample(p).index)
+            }
+        })
+    }
+}
+
+/// Refuses a volume that ends before a space does, by more than half a voxel: beyond its last nodes
+/// a field only continues.
+pub(super) fn check_reach(path: &Path, space: Space) -> Result<(), NoField> {
+    let grid = *from_file::<f64>(path)?.grid();
+    let (low, spacing, counts) = (grid.low(), grid.spacing(), grid.counts());
+    let [from, to] = space.corners();
+    let axes = [
+        ('x', low.x, spacing.x, counts[0], [from.x, to.x]),
+        ('y', low.y, spacing.y, counts[1], [from.y, to.y]),
+        ('z', low.z, spacing.z, counts[2], [from.z, to.z]),
+    ];
+    for (axis, low, spacing, count, expected) in axes {
+        let high = low + spacing * (count - 1) as f64;
+        if low > expected[0] + 0.5 * spacing || high < expected[1] - 0.5 * spacing {
+            let file = path.display().to_string();
+            return Err(NoField::Short { file, axis, low, high, expected });
+        }
+    }
+    Ok(())
 }
 
 impl Exact {
@@ -262,6 +345,9 @@ impl Exact {
             Self::Secant { axis, a } => Box::new(Layered::cylinder(Sech::new(c(*axis), c(*a)))),
             Self::Parabolic { axis, g } => {
                 Box::new(Layered::cylinder(Parabolic::new(c(*axis), c(*g))))
+            }
+            Self::Plume { ambient, contrast, half } => {
+                Box::new(Plume::new(c(*ambient), c(*contrast), c(*half)))
             }
             Self::Volume(path) => Box::new(from_file(path)?),
         })

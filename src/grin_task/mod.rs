@@ -10,7 +10,9 @@
 //! whose equation numbers are given.
 
 mod builtin;
+mod cgls;
 mod check;
+mod chords;
 mod compare;
 mod descent;
 mod drawing;
@@ -18,12 +20,14 @@ mod hold;
 mod image;
 mod least_squares;
 mod likeness;
+mod measured;
 mod medium;
 mod plane;
 mod ring;
 mod runner;
 mod scene;
 mod seen;
+mod slope;
 mod source;
 mod space;
 mod stage;
@@ -32,8 +36,10 @@ mod ways;
 
 pub use builtin::{BUILTIN, Builtin, find, read};
 pub use check::TaskError;
+pub use chords::Chords;
 pub use compare::{Difference, Extremes};
 pub use drawing::{Drawing, PictureFile};
+pub use measured::Measurement;
 pub use medium::{Medium, NoField};
 pub use plane::{Axis, Plane};
 pub use runner::{Judgement, Progress, Runner};

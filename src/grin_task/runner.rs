@@ -3,12 +3,13 @@
 use super::check::TaskError;
 use super::descent::{Descent, Problem, Step};
 use super::hold::Hold;
-use super::medium::{Medium, from_file};
+use super::measured::{Known, known};
+use super::medium::Medium;
 use super::scene::{Counts, Shot, ViewResult, redraw, setups, shots};
 use super::source::Draw;
 use super::task::{Start, Task};
-use crate::grin::field::{Diagonal, Trilinear};
-use crate::grin::{Field as _, Integrator, Limits, Setup};
+use crate::grin::field::Diagonal;
+use crate::grin::{Integrator, Limits, Setup};
 
 /// Steps between two looks at how rays are traced, once the field has taken shape.
 const REPLAN: usize = 16;
@@ -60,6 +61,8 @@ pub struct Runner {
     limits: Limits,
     descent: Descent,
     setups: Vec<Setup<f64>>,
+    /// Where rays shall go that are measured.
+    known: Known,
     /// The rays of the steps, where they are always the same.
     shots: Vec<Shot>,
     best: Medium,
@@ -74,7 +77,9 @@ impl Runner {
     /// A task that cannot be worked on.
     pub fn new(task: &Task) -> Result<Self, TaskError> {
         task.check()?;
-        let current = first(task)?;
+        task.check_volumes()?;
+        let known = known(task)?;
+        let current = Medium::first(task, task.levels[0].nodes)?;
         let setups = setups(task, current.field(), Draw::Step(0))?;
         let mut runner = Self {
             task: task.clone(),
@@ -87,12 +92,14 @@ impl Runner {
             best_loss: f64::INFINITY,
             limits: Limits::even(0, [0.0; 2], 0.0),
             descent: Descent::new(task.method, 0),
-            shots: shots(task, &setups, Draw::Step(0))?,
+            shots: shots(task, &known, &setups, Draw::Step(0))?,
+            known,
             current,
             setups,
             finished: false,
         };
         runner.begin_level()?;
+        runner.best = runner.makeable();
         runner.keep_best()?;
         Ok(runner)
     }
@@ -115,7 +122,7 @@ impl Runner {
         &self.current
     }
 
-    /// The best field so far.
+    /// The best field so far, of those that a maker can make: it keeps the limit of the slope.
     pub fn best(&self) -> &Medium {
         &self.best
     }
@@ -186,7 +193,7 @@ impl Runner {
         of: impl FnMut(&Shot) -> Result<ViewResult, TaskError>,
     ) -> Result<Judgement, TaskError> {
         let setups = setups(&self.task, medium.field(), Draw::Judge)?;
-        let shots = shots(&self.task, &setups, Draw::Judge)?;
+        let shots = shots(&self.task, &self.known, &setups, Draw::Judge)?;
         let views: Vec<ViewResult> = shots.iter().map(of).collect::<Result<_, _>>()?;
         let weighted = shots.iter().zip(&views).map(|(shot, view)| shot.share(view.loss));
         let loss = self.hold.look(medium.field()) + weighted.sum::<f64>();
@@ -214,7 +221,7 @@ impl Runner {
         let changed = new.iter().zip(&self.setups).any(is_finer);
         if changed {
             self.setups = new;
-            self.shots = shots(&self.task, &self.setups, draw)?;
+            self.shots = shots(&self.task, &self.known, &self.setups, draw)?;
             self.descent.restart();
         }
         Ok(changed)
@@ -227,7 +234,7 @@ impl Runner {
     /// One step of the method.
     fn descend(&mut self) -> Result<Step, TaskError> {
         if self.task.views.iter().any(|view| view.source.is_fresh()) {
-            redraw(&self.task, &mut self.shots, Draw::Step(self.steps))?;
+            redraw(&self.task, &self.known, &mut self.shots, Draw::Step(self.steps))?;
         }
         let share = self.taken as f64 / self.task.levels[self.level].steps.max(1) as f64;
         let mut parameters = self.current.field().parameters().to_vec();
@@ -241,13 +248,30 @@ impl Runner {
 
     /// Keeps the current field if it is better than the best one.
     fn keep_best(&mut self) -> Result<(), TaskError> {
-        let field = self.current.field();
-        let loss = self.judge_by(&self.current, |shot| shot.look(field))?.loss;
+        let medium = self.makeable();
+        let field = medium.field();
+        let loss = self.judge_by(&medium, |shot| shot.look(field))?.loss;
         if loss < self.best_loss {
             self.best_loss = loss;
-            self.best = self.current.clone();
+            self.best = medium;
         }
         Ok(())
+    }
+
+    /// The current field as a maker can make it.
+    fn makeable(&self) -> Medium {
+        let Task { space, limits, edge, .. } = self.task;
+        let Some(limit) = limits.slope else { return self.current.clone() };
+        let middle = || {
+            let extremes = self.task.extremes(&self.current);
+            0.5 * (extremes.low + extremes.high).clamp(2.0 * limits.low, 2.0 * limits.high)
+        };
+        let start = match self.task.start {
+            Start::Uniform(index) => Some(index),
+            Start::Volume(_) => None,
+        };
+        let towards = edge.map(|edge| edge.index).or(start).unwrap_or_else(middle);
+        self.current.flattened(space, limit, towards)
     }
 
     fn end_level(&mut self) -> Result<(), TaskError> {
@@ -260,7 +284,7 @@ impl Runner {
         self.begin_level()?;
         let draw = Draw::Step(self.steps);
         self.setups = setups(&self.task, self.current.field(), draw)?;
-        self.shots = shots(&self.task, &self.setups, draw)?;
+        self.shots = shots(&self.task, &self.known, &self.setups, draw)?;
         self.keep_best()
     }
 
@@ -277,18 +301,4 @@ impl Runner {
         self.taken = 0;
         Ok(())
     }
-}
-
-/// The field to begin with.
-fn first(task: &Task) -> Result<Medium, TaskError> {
-    let nodes = task.levels[0].nodes;
-    Ok(match &task.start {
-        Start::Uniform(index) => Medium::of(task.field, nodes, |_| *index)?,
-        Start::Volume(path) => {
-            let place = "start".to_owned();
-            let volume: Trilinear<f64> =
-                from_file(path).map_err(|source| TaskError::Field { place, source })?;
-            Medium::of(task.field, nodes, |p| volume.sample(p).index)?
-        }
-    })
 }

@@ -3,6 +3,7 @@
 use super::check::TaskError;
 use super::hold::Hold;
 use super::image::Screen;
+use super::measured::{self, Known};
 use super::ring::Ring;
 use super::source::{Draw, Sent};
 use super::stage::{face, ring, screen};
@@ -14,8 +15,6 @@ use rayon::prelude::*;
 /// A ray that leaves flatter than this, as a cosine, is left out: the derivative of its exit grows
 /// as the inverse.
 pub(super) const FLATTEST: f64 = 0.05;
-/// The field from which a measurement comes is traced so much better than the one that is sought.
-const FINER: f64 = 0.1;
 /// Steps that are tied to voxels are no simple fraction of one; without voxels they are tied to this
 /// part of the space; and a ray counts as trapped when it is so many times longer than the space.
 const INCOMMENSURATE: f64 = 0.974;
@@ -25,10 +24,12 @@ const LONGEST: f64 = 32.0;
 /// Where a ray shall go.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aim {
-    x: Vec3<f64>,
-    v: Vec3<f64>,
+    pub(super) x: Vec3<f64>,
+    pub(super) v: Vec3<f64>,
     /// What the square of a difference in `v` counts.
-    direction: f64,
+    pub(super) direction: f64,
+    /// Whether it is known at all.
+    pub(super) measured: bool,
 }
 
 /// The rays of a view, ready to be traced.
@@ -44,6 +45,8 @@ pub(super) struct Shot {
     pub(super) screen: Option<Screen>,
     /// What rays shall go through, wherever they like.
     ring: Option<Ring>,
+    /// Rays that no aim is known for; they are not among the others.
+    pub(super) unmeasured: usize,
 }
 
 /// Rays that are left out, by reason, and those that count.
@@ -53,9 +56,23 @@ pub struct Counts {
     pub fates: Fates,
     /// Rays that arrived, but so flat to the boundary that their derivative is worth nothing.
     pub flat: usize,
+    /// Rays that are not traced: what they should do could not be measured.
+    pub unmeasured: usize,
+}
+
+/// How rays ended, and how many of them left too flat.
+pub(super) fn counts(exits: &[Exit<f64>]) -> Counts {
+    let fates = exits.iter().map(|exit| exit.fate).collect();
+    let is_flat = |exit: &&Exit<f64>| exit.fate.arrived() && !Shot::counts(exit);
+    Counts { fates, flat: exits.iter().filter(is_flat).count(), unmeasured: 0 }
 }
 
 impl Counts {
+    /// All rays.
+    pub fn sent(self) -> usize {
+        self.fates.total() + self.unmeasured
+    }
+
     /// Rays that count.
     pub fn counted(self) -> usize {
         self.fates.arrived() - self.flat
@@ -63,9 +80,10 @@ impl Counts {
 
     /// Rays that are left out, by reason.
     pub fn excluded(self) -> impl Iterator<Item = (&'static str, usize)> {
-        let flat = (self.flat > 0).then_some(("flat", self.flat));
+        let more = [("flat", self.flat), ("unmeasured", self.unmeasured)];
         let lost = self.fates.iter().filter(|(fate, _)| !fate.arrived());
-        lost.map(|(fate, count)| (fate.name(), count)).chain(flat)
+        let lost = lost.map(|(fate, count)| (fate.name(), count));
+        lost.chain(more.into_iter().filter(|(_, count)| *count > 0))
     }
 
     /// Those of two sets of rays.
@@ -76,6 +94,7 @@ impl Counts {
             (0..count).for_each(|_| both.fates.count(fate));
         }
         both.flat += other.flat;
+        both.unmeasured += other.unmeasured;
         both
     }
 }
@@ -145,36 +164,60 @@ fn tied(task: &Task, field: &dyn Field<f64>, space: Space, tracing: Tracing) -> 
 /// The rays of every view with their aims.
 pub(super) fn shots(
     task: &Task,
+    known: &Known,
     setups: &[Setup<f64>],
     draw: Draw,
 ) -> Result<Vec<Shot>, TaskError> {
-    let shot = |(view, setup): (&View, &Setup<f64>)| {
+    let shot = |((view, setup), known): ((&View, &Setup<f64>), &Option<Vec<Aim>>)| {
         let space = view.space.unwrap_or(task.space);
-        let sent = view.source.rays(space, draw);
-        let aims = aims(task, view, space, &sent)?;
-        let rays = sent.into_iter().map(|sent| sent.ray).collect();
+        let Beam { rays, aims, unmeasured } = beam(task, view, known.as_deref(), draw)?;
         let lost = space.diameter() * space.diameter();
         let (setup, weight, screen) = (setup.clone(), view.weight, screen(view, space)?);
         // The difference of an image has no unit.
         let lost = if screen.is_some() { 1.0 } else { lost };
-        Ok(Shot { rays, aims, setup, weight, lost, screen, ring: ring(view) })
+        Ok(Shot { rays, aims, setup, weight, lost, screen, ring: ring(view), unmeasured })
     };
-    task.views.iter().zip(setups).map(shot).collect()
+    task.views.iter().zip(setups).zip(known).map(shot).collect()
 }
 
 /// The same views with the rays of another step.
-pub(super) fn redraw(task: &Task, shots: &mut [Shot], draw: Draw) -> Result<(), TaskError> {
-    for (view, shot) in task.views.iter().zip(shots) {
-        let space = view.space.unwrap_or(task.space);
-        let sent = view.source.rays(space, draw);
-        shot.aims = aims(task, view, space, &sent)?;
-        shot.rays = sent.into_iter().map(|sent| sent.ray).collect();
+pub(super) fn redraw(
+    task: &Task,
+    known: &Known,
+    shots: &mut [Shot],
+    draw: Draw,
+) -> Result<(), TaskError> {
+    for ((view, shot), known) in task.views.iter().zip(shots).zip(known) {
+        let beam = beam(task, view, known.as_deref(), draw)?;
+        (shot.rays, shot.aims, shot.unmeasured) = (beam.rays, beam.aims, beam.unmeasured);
     }
     Ok(())
 }
 
+/// The rays of a view that count, with their aims, and how many others there are.
+struct Beam {
+    rays: Vec<Ray<f64>>,
+    aims: Vec<Aim>,
+    unmeasured: usize,
+}
+
+fn beam(task: &Task, view: &View, known: Option<&[Aim]>, draw: Draw) -> Result<Beam, TaskError> {
+    let space = view.space.unwrap_or(task.space);
+    let sent = view.source.rays(space, draw);
+    let mut aims = match known {
+        Some(known) => known.to_vec(),
+        None => aims(task, view, space, &sent)?,
+    };
+    let is_measured = |i: usize| aims.get(i).is_none_or(|aim| aim.measured);
+    let measured = sent.iter().enumerate().filter(|(i, _)| is_measured(*i));
+    let rays: Vec<Ray<f64>> = measured.map(|(_, sent)| sent.ray).collect();
+    let unmeasured = sent.len() - rays.len();
+    aims.retain(|aim| aim.measured);
+    Ok(Beam { rays, aims, unmeasured })
+}
+
 fn aims(task: &Task, view: &View, space: Space, sent: &[Sent]) -> Result<Vec<Aim>, TaskError> {
-    let at = |x| Aim { x, v: Vec3::default(), direction: 0.0 };
+    let at = |x| Aim { x, v: Vec3::default(), direction: 0.0, measured: true };
     Ok(match &view.goal {
         Goal::Image { .. } | Goal::Far { .. } | Goal::Ring { .. } => Vec::new(),
         Goal::Point([x, y, z]) => vec![at(Vec3::new(*x, *y, *z)); sent.len()],
@@ -182,16 +225,7 @@ fn aims(task: &Task, view: &View, space: Space, sent: &[Sent]) -> Result<Vec<Aim
             let reach = 0.5 * space.diameter();
             sent.iter().map(|sent| at(sent.opposite * reach)).collect()
         }
-        Goal::Like { field, direction } => {
-            let place = format!("view {}", view.name);
-            let field = field.field().map_err(|source| TaskError::Field { place, source })?;
-            let rays: Vec<Ray<f64>> = sent.iter().map(|sent| sent.ray).collect();
-            let finer = FINER * task.tolerance;
-            let plan = plan(&*field, &space.region(), task.launch, &rays, finer)?;
-            let exits = Tracer::new(&*field, plan.setup)?.rays(&rays);
-            let aim = |exit: &Exit<f64>| Aim { x: exit.x, v: exit.v, direction: *direction };
-            exits.iter().map(aim).collect()
-        }
+        Goal::Like { field, direction } => measured::aims(task, view, field, sent, *direction)?,
     })
 }
 
@@ -292,11 +326,14 @@ impl Shot {
         }
     }
 
+    /// How its rays ended.
+    fn counted(&self, exits: &[Exit<f64>]) -> Counts {
+        Counts { unmeasured: self.unmeasured, ..counts(exits) }
+    }
+
     fn image_result(&self, screen: &Screen, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
         let difference = screen.difference(&Self::image(screen, exits));
-        let fates = exits.iter().map(|exit| exit.fate).collect();
-        let is_flat = |exit: &&Exit<f64>| exit.fate.arrived() && !Self::counts(exit);
-        let counts = Counts { fates, flat: exits.iter().filter(is_flat).count() };
+        let counts = self.counted(exits);
         let lost = exits.len() - counts.counted();
         let loss = difference + self.lost * lost as f64 / exits.len() as f64;
         let quality = Some(screen.quality(difference));
@@ -304,18 +341,15 @@ impl Shot {
     }
 
     fn spot_result(&self, exits: &[Exit<f64>], retrace_error: f64) -> ViewResult {
-        let (mut loss, mut square, mut flat) = (0.0, 0.0, 0);
+        let (mut loss, mut square) = (0.0, 0.0);
         for (i, exit) in exits.iter().enumerate() {
             loss += self.judge(i, exit).0;
             if Self::counts(exit) {
                 let dx = self.misses(i, exit).0;
                 square += dx.dot(dx);
-            } else if exit.fate.arrived() {
-                flat += 1;
             }
         }
-        let fates = exits.iter().map(|exit| exit.fate).collect();
-        let counts = Counts { fates, flat };
+        let counts = self.counted(exits);
         let spot = (square / counts.counted() as f64).sqrt();
         let loss = loss / exits.len() as f64;
         ViewResult { loss, spot, quality: None, counts, retrace_error }

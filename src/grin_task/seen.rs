@@ -2,6 +2,7 @@
 //! by, and its image beside the picture that is wanted. No gradient, and nothing of a search.
 
 use super::check::TaskError;
+use super::measured::known;
 use super::medium::Medium;
 use super::scene::{Shot, ViewResult, setups, shots};
 use super::source::Draw;
@@ -53,7 +54,10 @@ impl Task {
     pub fn seen(&self, medium: &Medium) -> Result<Vec<Seen>, TaskError> {
         let field = medium.field();
         let setups = setups(self, field, Draw::Judge)?;
-        shots(self, &setups, Draw::Judge)?.iter().map(|shot| seen(shot, field)).collect()
+        shots(self, &known(self)?, &setups, Draw::Judge)?
+            .iter()
+            .map(|shot| seen(shot, field))
+            .collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! The rays of a source. No chance is involved: the same step has the same rays everywhere.
 
-use super::space::{GOLDEN, across, even, fresh, radians, sphere, unit};
+use super::space::{GOLDEN, across, around, even, fresh, radians, sphere, unit};
 use super::task::{Directions, Source, Space};
 use crate::grin::Ray;
 use crate::math::Vec3;
@@ -32,6 +32,7 @@ impl Directions {
                 list.iter().map(|[x, y, z]| unit(Vec3::new(*x, *y, *z))).collect()
             }
             (Self::Even(count), _) => sphere(*count),
+            (Self::Around(count), _) => around(*count),
             (Self::Fresh(_), Draw::Judge) => sphere(JUDGED),
             (Self::Fresh(count), Draw::Step(step)) => {
                 (0..*count).map(|i| fresh(step * count + i)).collect()
@@ -43,7 +44,7 @@ impl Directions {
     pub(super) fn count(&self) -> usize {
         match self {
             Self::Given(list) => list.len(),
-            Self::Even(count) | Self::Fresh(count) => *count,
+            Self::Even(count) | Self::Around(count) | Self::Fresh(count) => *count,
         }
     }
 }

@@ -100,6 +100,16 @@ pub(super) fn sphere(count: usize) -> Vec<Vec3<f64>> {
     (0..count).map(at).collect()
 }
 
+/// So many directions across the z axis, evenly over half a turn; light that goes the other way would
+/// tell the same.
+pub(super) fn around(count: usize) -> Vec<Vec3<f64>> {
+    let at = |i: usize| {
+        let (sin, cos) = (PI * (i as f64 + 0.5) / count as f64).sin_cos();
+        Vec3::new(cos, sin, 0.0)
+    };
+    (0..count).map(at).collect()
+}
+
 /// A point of the unit sphere from an even share of its area and an angle about z.
 fn on_sphere(share: f64, angle: f64) -> Vec3<f64> {
     let z = 1.0 - 2.0 * share;

@@ -39,6 +39,7 @@ pub(super) fn ring(view: &View) -> Option<Ring> {
 #[cfg(test)]
 mod tests {
     use crate::grin_task::hold::Hold;
+    use crate::grin_task::measured::known;
     use crate::grin_task::medium::Medium;
     use crate::grin_task::scene::{evaluate, setups, shots};
     use crate::grin_task::source::Draw;
@@ -65,7 +66,7 @@ mod tests {
         let wave = |p: Vec3<f64>| 1.1 + 0.02 * (2.0 * p.x + p.y).sin() * (p.z - 0.4 * p.x).cos();
         let medium = Medium::of(task.field, 6, wave).ok()?;
         let setups = setups(task, medium.field(), Draw::Judge).ok()?;
-        let shots = shots(task, &setups, Draw::Judge).ok()?;
+        let shots = shots(task, &known(task).ok()?, &setups, Draw::Judge).ok()?;
         let hold = Hold::new(task);
         let count = medium.field().parameters().len();
         let change: Vec<f64> = (0..count).map(|i| (0.7 * i as f64).sin()).collect();

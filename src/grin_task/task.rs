@@ -181,6 +181,8 @@ pub enum Directions {
     Given(Vec<[f64; 3]>),
     /// So many, evenly all around, the same in every step.
     Even(usize),
+    /// So many across the z axis, evenly over half a turn.
+    Around(usize),
     /// So many new ones in every step; for Adam.
     Fresh(usize),
 }
@@ -275,7 +277,8 @@ pub struct MakerLimits {
     /// Largest index.
     #[serde(default = "two")]
     pub high: f64,
-    /// Steepest index, in 1/mm, held by a penalty; any where it is absent.
+    /// Steepest index, in 1/mm; any where it is absent. A penalty leads the search, and what is
+    /// found keeps it everywhere: a field that is too steep is drawn towards the index of the edge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
     /// Largest change of the index in one step of the search.
@@ -372,6 +375,16 @@ pub enum Exact {
         axis: f64,
         /// `g`.
         g: f64,
+    },
+    /// A synthetic plume of gas: `η = ambient + contrast q`, `q` from 0 to nearly 1, after
+    /// [`Plume`](crate::grin::field::Plume).
+    Plume {
+        /// The index around it.
+        ambient: f64,
+        /// What the index changes by where the plume is densest; below 0 for a thin one.
+        contrast: f64,
+        /// Half the side of the cube that it stands in.
+        half: f64,
     },
     /// A volume from a file, trilinear between its nodes.
     Volume(PathBuf),

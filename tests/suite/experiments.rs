@@ -245,3 +245,16 @@ fn a_fibre_focuses_better_than_the_parabolic_one() {
     }
     assert!(ours.iter().zip(&theirs).all(|(ours, theirs)| 1000.0 * ours < *theirs));
 }
+
+#[test]
+fn curved_rays_find_a_strong_plume_where_straight_lines_do_not() {
+    let outcome = outcome("5.10");
+    let column = |name| column(&outcome.tables[0], name);
+    let (adjoint, chords) = (column("adjoint_of_contrast"), column("chords_of_contrast"));
+    let (last, gradients) = (column("chords_last_of_contrast"), column("gradients_of_contrast"));
+    println!("5.10: {adjoint:?} {chords:?} {last:?} {gradients:?}");
+    // The best iterate of straight lines is no worse than their last one.
+    assert!((0..2).all(|i| chords[i] <= last[i] && gradients[i].is_finite()));
+    let deflection = column("deflection_deg");
+    assert!(deflection[0] < 0.1 && deflection[1] > 10.0, "{deflection:?}");
+}

@@ -18,6 +18,7 @@ mod merit;
 mod optimize;
 mod paraxial;
 mod pareto;
+mod plume;
 mod pupil;
 mod reference;
 mod rims;

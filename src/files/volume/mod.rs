@@ -57,18 +57,22 @@ fn volume(
     place: &str,
 ) -> Result<Volume, Malformed> {
     let vector = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
-    let sound = |grid: &Grid<f64>| {
-        counts.iter().all(|count| *count > 0)
-            && grid.nodes() == values.len()
-            && values.iter().all(|value| value.is_finite())
+    let wrong = |found: String| {
+        let expected = "one finite value for each node".to_owned();
+        Err(Malformed { place: place.to_owned(), found, expected })
     };
     match Grid::new(counts, vector(low), vector(spacing)) {
-        Ok(grid) if sound(&grid) => Ok(Volume { grid, values }),
-        Ok(_) => Err(Malformed {
-            place: place.to_owned(),
-            found: format!("{} values for {counts:?} nodes", values.len()),
-            expected: "one finite value for each node".to_owned(),
-        }),
+        Ok(grid) if counts.contains(&0) || grid.nodes() != values.len() => {
+            wrong(format!("{} values for {counts:?} nodes", values.len()))
+        }
+        Ok(grid) => match values.iter().position(|value| !value.is_finite()) {
+            Some(n) => {
+                let [nx, ny, _] = counts;
+                let node = [n % nx, n / nx % ny, n / nx / ny];
+                wrong(format!("{} at node {node:?}", values[n]))
+            }
+            None => Ok(Volume { grid, values }),
+        },
         Err(error) => Err(Malformed {
             place: place.to_owned(),
             found: error.to_string(),

@@ -91,7 +91,7 @@ pub(super) fn slice(wanted: Wanted) -> Slice {
     });
     let difference = timed(|| {
         let (task, exact) = (subject.task.as_ref()?, subject.exact.as_ref()?);
-        Some(task.difference_from(&medium, &**exact))
+        task.difference_from(&medium, &**exact).ok()
     });
     let Raster { frame, size, values, range, contours, spacing, rim, profile } = drawn.value;
     let no_ways = ways.value.as_ref().err().map(ToString::to_string);

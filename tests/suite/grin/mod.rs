@@ -12,8 +12,8 @@ mod reference;
 mod speed;
 
 use aplanat::grin::field::{
-    BSpline, Coordinate, Diagonal, Grid, Layered, Luneburg, Maxwell, Parabolic, Polynomial, Sech,
-    Tricubic, Trilinear,
+    BSpline, Coordinate, Diagonal, Grid, Layered, Luneburg, Maxwell, Parabolic, Plume, Polynomial,
+    Sech, Tricubic, Trilinear,
 };
 use aplanat::grin::{End, Exit, Field, Integrator, LastStep, Launch, Ray, Region, Seed, Setup};
 use aplanat::math::{Real, Vec3};
@@ -80,7 +80,8 @@ pub(crate) fn kinds() -> Vec<Kind> {
         kind("polynomial", Coordinate::Cylinder),
         kind("polynomial", Coordinate::Axial),
     ];
-    let spheres = ["b-spline", "luneburg", "maxwell", "parabolic", "sech", "trilinear", "tricubic"];
+    let spheres =
+        ["b-spline", "luneburg", "maxwell", "parabolic", "plume", "sech", "trilinear", "tricubic"];
     kinds.extend(spheres.map(|name| kind(name, Coordinate::Sphere)));
     kinds.push(kind("b-spline", Coordinate::Cylinder));
     kinds
@@ -103,6 +104,10 @@ impl Kind {
             "parabolic" => {
                 let profile = Parabolic::new(R::from_f64(1.5), R::from_f64(0.4));
                 Box::new(Layered { coordinate, profile })
+            }
+            "plume" => {
+                let c = R::from_f64;
+                Box::new(Plume::new(c(1.2), c(0.3), c(2.0)))
             }
             "sech" => {
                 let profile = Sech::new(R::from_f64(1.6), R::from_f64(0.5));

@@ -1,0 +1,336 @@
+//! What straight lines make of a measurement of light: the method that does without curved rays,
+//! for comparison.
+//!
+//! To the first order in the contrast of the index a ray is turned by `∫ ∇η ds` along the straight
+//! chord from where it comes in, and shifted by the same with the way that is left as a weight. Both
+//! are linear in the field, so its numbers follow from linear least squares. The chord takes as many
+//! steps as the ray tracer would, so that at weak contrast both see the same integrals. After the
+//! idea of Atcheson et al. (ACM TOG 27, 2008), who solve for the three parts of `∇η` one by one and
+//! integrate them: [`Chords::by_gradients`].
+
+use super::cgls::cgls;
+use super::check::{TaskError, wrong};
+use super::measured::known;
+use super::medium::Medium;
+use super::scene::{Aim, Shot, setups, shots};
+use super::source::Draw;
+use super::space::length;
+use super::task::{Start, Task};
+use crate::grin::field::{Grid, Trilinear};
+use crate::grin::{Field, Limits, Tracer};
+use crate::math::Vec3;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+
+/// Chords are worked off in so many parts, which are added in order.
+const PARTS: usize = 16;
+/// Places of the surface at which the index is held.
+const SURFACE: usize = 2000;
+/// Steps that integrate a gradient, in times of the nodes along a side.
+const INTEGRATION: usize = 4;
+
+/// Traces through a field without contrast.
+type Straight<'a> = Tracer<'a, f64, dyn Field<f64> + 'a>;
+
+/// The straight way of a ray, and by how much the true one differs.
+#[derive(Debug, Clone, Copy)]
+struct Chord {
+    from: Vec3<f64>,
+    /// Of length 1.
+    direction: Vec3<f64>,
+    length: f64,
+    /// Places along it at which the field is looked at.
+    steps: usize,
+    /// What an integral of the gradient turns `v` by, and what its moment shifts `x` by.
+    gains: [f64; 2],
+    /// By how much the ray is turned and shifted.
+    measured: [Vec3<f64>; 2],
+}
+
+/// The measurements of a task with the straight chords of their rays.
+#[derive(Debug, Clone)]
+pub struct Chords {
+    list: Vec<Chord>,
+    task: Task,
+    /// The index around.
+    ambient: f64,
+    /// Where the task holds the index, and the root of the weight of each of these places.
+    edge: (Vec<Vec3<f64>>, f64),
+}
+
+impl Chord {
+    fn new(field: &dyn Field<f64>, shot: &Shot, tracer: &Straight<'_>, ray: usize) -> Option<Self> {
+        let aim: Aim = *shot.aims.get(ray)?;
+        let (states, exit) = tracer.path(&shot.rays[ray]);
+        let entry = states.first()?;
+        let (way, speed) = (exit.x - entry.x, length(entry.v));
+        let whole = length(way);
+        if !(whole > 0.0 && Shot::counts(&exit)) {
+            return None;
+        }
+        let index = field.sample(entry.x).index;
+        let (turn, weight) = (index / speed, aim.direction.sqrt());
+        Some(Self {
+            from: entry.x,
+            direction: way * (1.0 / whole),
+            length: whole,
+            steps: states.len().max(1),
+            gains: [turn * weight, turn / speed],
+            measured: [(aim.v - exit.v) * weight, aim.x - exit.x],
+        })
+    }
+
+    /// Each place with the way that is left behind it and its share of the length.
+    fn places(&self) -> impl Iterator<Item = (Vec3<f64>, f64, f64)> {
+        let share = self.length / self.steps as f64;
+        let at = move |i: usize| share * (i as f64 + 0.5);
+        let Self { from, direction, length, steps, .. } = *self;
+        (0..steps).map(move |i| (from + direction * at(i), length - at(i), share))
+    }
+
+    /// The part across the chord: along it light does not turn, and slides on the boundary.
+    fn across(&self, v: Vec3<f64>) -> Vec3<f64> {
+        v - self.direction * self.direction.dot(v)
+    }
+
+    /// How a field of weak contrast turns and shifts the ray.
+    fn bend(&self, field: &dyn Field<f64>) -> [Vec3<f64>; 2] {
+        let mut sums = [Vec3::default(); 2];
+        for (p, left, share) in self.places() {
+            let pull = field.sample(p).gradient * share;
+            sums[0] = sums[0] + pull * self.gains[0];
+            sums[1] = sums[1] + pull * (self.gains[1] * left);
+        }
+        sums.map(|sum| self.across(sum))
+    }
+
+    /// The transpose of [`Self::bend`].
+    fn bend_back(&self, field: &dyn Field<f64>, seeds: [Vec3<f64>; 2], gradient: &mut [f64]) {
+        let [turn, shift] = seeds.map(|seed| self.across(seed));
+        for (p, left, share) in self.places() {
+            let pull = turn * (self.gains[0] * share) + shift * (self.gains[1] * left * share);
+            field.deposit(p, 0.0, pull, gradient);
+        }
+    }
+
+    /// How a volume of one part of the gradient turns the ray.
+    fn turn(&self, part: &Trilinear<f64>) -> f64 {
+        let turns = self.places().map(|(p, _, share)| share * part.sample(p).index);
+        self.gains[0] * turns.sum::<f64>()
+    }
+
+    /// The transpose of [`Self::turn`].
+    fn turn_back(&self, part: &Trilinear<f64>, seed: f64, gradient: &mut [f64]) {
+        for (p, _, share) in self.places() {
+            part.deposit(p, self.gains[0] * share * seed, Vec3::default(), gradient);
+        }
+    }
+}
+
+impl Chords {
+    /// The chords of a task, all of whose views ask for light as it leaves another field.
+    ///
+    /// # Errors
+    /// A task that cannot be worked on.
+    pub fn new(task: &Task) -> Result<Self, TaskError> {
+        task.check()?;
+        let ambient = match (task.edge, &task.start) {
+            (Some(edge), _) => edge.index,
+            (None, Start::Uniform(index)) => *index,
+            (None, Start::Volume(_)) => 1.0,
+        };
+        let nodes = task.levels.iter().map(|level| level.nodes).max().unwrap_or(2);
+        let even = Medium::of(task.field, nodes, |_| ambient)?;
+        let setups = setups(task, even.field(), Draw::Judge)?;
+        let shots = shots(task, &known(task)?, &setups, Draw::Judge)?;
+        let mut chords = Vec::new();
+        for shot in &shots {
+            let tracer = Tracer::new(even.field(), shot.setup.clone())?;
+            chords.extend(
+                (0..shot.rays.len()).filter_map(|ray| Chord::new(even.field(), shot, &tracer, ray)),
+            );
+        }
+        if chords.is_empty() {
+            return Err(wrong("views", "none with the goal `like`", "light that was measured"));
+        }
+        let weight = task.edge.map_or(0.0, |edge| edge.weight);
+        let places = if weight > 0.0 { task.space.surface(SURFACE) } else { Vec::new() };
+        // The weight stands against the mean over the rays, here against their sum.
+        let firm = (weight * chords.len() as f64 / SURFACE as f64).sqrt();
+        Ok(Self { list: chords, task: task.clone(), ambient, edge: (places, firm) })
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.list.len()
+    }
+
+    /// The field of so many nodes that explains the measurement best by straight lines, within the
+    /// limits of the task, after so many steps of conjugate gradients; `visit` sees the field after
+    /// each of them.
+    ///
+    /// # Errors
+    /// Too few nodes.
+    pub fn field(
+        &self,
+        nodes: usize,
+        steps: usize,
+        mut visit: impl FnMut(&Medium) -> ControlFlow<()>,
+    ) -> Result<Medium, TaskError> {
+        let shape = Medium::of(self.task.field, nodes, |_| 0.0)?;
+        let ranges = shape.ranges(self.task.space, self.task.limits, self.task.edge);
+        let limits = Limits { ranges, change: f64::INFINITY };
+        let (places, firm) = &self.edge;
+        let mut right: Vec<f64> = self.rows(|chord| chord.measured.map(|m| chord.across(m)));
+        right.resize(right.len() + places.len(), 0.0);
+        let forward = |u: &[f64]| {
+            let medium = with(&shape, u);
+            let mut rows = self.rows(|chord| chord.bend(medium.field()));
+            rows.extend(places.iter().map(|p| firm * medium.field().sample(*p).index));
+            rows
+        };
+        let back = |rows: &[f64]| {
+            let mut sum = self.back(shape.field().parameters().len(), rows, |chord, seeds, sum| {
+                chord.bend_back(shape.field(), seeds, sum);
+            });
+            for (p, row) in places.iter().zip(&rows[6 * self.list.len()..]) {
+                shape.field().deposit(*p, firm * row, Vec3::default(), &mut sum);
+            }
+            let held = limits.ranges.iter().map(|[low, high]| low >= high);
+            sum.iter_mut().zip(held).filter(|(_, held)| *held).for_each(|(g, _)| *g = 0.0);
+            sum
+        };
+        let field = |u: &[f64]| {
+            let mut medium = with(&shape, u);
+            medium.parameters_mut().iter_mut().for_each(|value| *value += self.ambient);
+            limits.project(medium.parameters_mut());
+            medium
+        };
+        let unknowns = shape.field().parameters().len();
+        let found = cgls(unknowns, &right, steps, forward, back, |u| visit(&field(u)));
+        Ok(field(&found))
+    }
+
+    /// The same by way of three volumes for the parts of `∇η`, each found from the turns of the rays
+    /// alone, which are then integrated with the index around at the boundary; on a trilinear grid.
+    ///
+    /// # Errors
+    /// Too few nodes.
+    pub fn by_gradients(&self, nodes: usize, steps: usize) -> Result<Medium, TaskError> {
+        let half = self.task.field.size();
+        let grid = Grid::cube(nodes, half)?;
+        let shape = Trilinear::new(grid, vec![0.0; grid.nodes()])?;
+        let part = |axis: usize| -> Result<Trilinear<f64>, TaskError> {
+            let right: Vec<f64> = self.list.iter().map(|c| along(c.measured[0], axis)).collect();
+            let forward = |u: &[f64]| -> Vec<f64> {
+                let volume = filled(&shape, u);
+                self.list.par_iter().map(|chord| chord.turn(&volume)).collect()
+            };
+            let back = |rows: &[f64]| {
+                let add = |chord: &Chord, ray: usize, sum: &mut [f64]| {
+                    chord.turn_back(&shape, rows[ray], sum);
+                };
+                self.deposit(grid.nodes(), add)
+            };
+            let go_on = |_: &[f64]| ControlFlow::Continue(());
+            Ok(filled(&shape, &cgls(grid.nodes(), &right, steps, forward, back, go_on)))
+        };
+        let parts = [part(0)?, part(1)?, part(2)?];
+        let mut values = integrated(&shape, &parts, INTEGRATION * nodes);
+        values.iter_mut().for_each(|value| *value += self.ambient);
+        Ok(Medium::Trilinear(Trilinear::new(grid, values)?))
+    }
+
+    /// Six numbers a chord.
+    fn rows(&self, of: impl Fn(&Chord) -> [Vec3<f64>; 2] + Sync) -> Vec<f64> {
+        let rows = |chord: &Chord| {
+            let [a, b] = of(chord);
+            [a.x, a.y, a.z, b.x, b.y, b.z]
+        };
+        self.list.par_iter().flat_map_iter(rows).collect()
+    }
+
+    /// The transpose of [`Self::rows`].
+    fn back(
+        &self,
+        unknowns: usize,
+        rows: &[f64],
+        add: impl Fn(&Chord, [Vec3<f64>; 2], &mut [f64]) + Sync,
+    ) -> Vec<f64> {
+        self.deposit(unknowns, |chord, ray, sum| {
+            let [a, b, c, d, e, f] = std::array::from_fn(|i| rows[6 * ray + i]);
+            add(chord, [Vec3::new(a, b, c), Vec3::new(d, e, f)], sum);
+        })
+    }
+
+    /// Sums over all chords, the same on any number of threads.
+    fn deposit(&self, unknowns: usize, add: impl Fn(&Chord, usize, &mut [f64]) + Sync) -> Vec<f64> {
+        let size = self.list.len().div_ceil(PARTS).max(1);
+        let part = |(first, chords): (usize, &[Chord])| {
+            let mut sum = vec![0.0; unknowns];
+            chords.iter().enumerate().for_each(|(i, c)| add(c, first * size + i, &mut sum));
+            sum
+        };
+        let parts: Vec<Vec<f64>> = self.list.par_chunks(size).enumerate().map(part).collect();
+        let mut sum = vec![0.0; unknowns];
+        for part in parts {
+            sum.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
+        }
+        sum
+    }
+}
+
+fn with(shape: &Medium, parameters: &[f64]) -> Medium {
+    let mut medium = shape.clone();
+    medium.parameters_mut().copy_from_slice(parameters);
+    medium
+}
+
+fn filled(shape: &Trilinear<f64>, values: &[f64]) -> Trilinear<f64> {
+    let mut filled = shape.clone();
+    filled.parameters_mut().copy_from_slice(values);
+    filled
+}
+
+fn along(v: Vec3<f64>, axis: usize) -> f64 {
+    [v.x, v.y, v.z][axis]
+}
+
+/// The values that vanish at the boundary and whose gradient is nearest to these volumes, in the
+/// middles of the voxels: Poisson's equation.
+fn integrated(shape: &Trilinear<f64>, parts: &[Trilinear<f64>; 3], steps: usize) -> Vec<f64> {
+    let grid = shape.grid();
+    let cells = grid.counts().map(|count| count - 1);
+    let h = grid.spacing();
+    let middle = |n: usize| {
+        let at = |i: usize| i as f64 + 0.5;
+        let [nx, ny, _] = cells;
+        grid.low() + Vec3::new(h.x * at(n % nx), h.y * at(n / nx % ny), h.z * at(n / nx / ny))
+    };
+    let all = cells.iter().product::<usize>();
+    let right = |n: usize| parts.each_ref().map(|part| part.sample(middle(n)).index);
+    let right: Vec<f64> = (0..all).into_par_iter().flat_map_iter(right).collect();
+    let forward = |u: &[f64]| {
+        let volume = filled(shape, u);
+        let slope = |n: usize| {
+            let Vec3 { x, y, z } = volume.sample(middle(n)).gradient;
+            [x, y, z]
+        };
+        (0..all).into_par_iter().flat_map_iter(slope).collect()
+    };
+    let counts = grid.counts();
+    let is_rim = |n: usize| {
+        let place = [n % counts[0], n / counts[0] % counts[1], n / counts[0] / counts[1]];
+        place.iter().zip(counts).any(|(i, count)| *i == 0 || i + 1 == count)
+    };
+    let back = |rows: &[f64]| {
+        let mut sum = vec![0.0; grid.nodes()];
+        for n in 0..all {
+            let pull = Vec3::new(rows[3 * n], rows[3 * n + 1], rows[3 * n + 2]);
+            shape.deposit(middle(n), 0.0, pull, &mut sum);
+        }
+        sum.iter_mut().enumerate().filter(|(n, _)| is_rim(*n)).for_each(|(_, g)| *g = 0.0);
+        sum
+    };
+    cgls(grid.nodes(), &right, steps, forward, back, |_| ControlFlow::Continue(()))
+}
