@@ -31,6 +31,8 @@ pub(super) struct LeastSquares {
     damping: f64,
     growth: f64,
     idle: usize,
+    /// When this often the merit was taken, no other damping is tried.
+    limit: usize,
 }
 
 impl LeastSquares {
@@ -42,7 +44,7 @@ impl LeastSquares {
     /// A search that goes on with the damping, and its growth, of one before.
     pub(super) fn resumed(state: State, sum: Sum, damping: Option<[f64; 2]>) -> Self {
         let [damping, growth] = damping.unwrap_or([DAMPING, GROWTH]);
-        Self { state, sum, damping, growth, idle: 0 }
+        Self { state, sum, damping, growth, idle: 0, limit: usize::MAX }
     }
 
     /// The damping, and how fast it grows.
@@ -55,10 +57,12 @@ impl LeastSquares {
         self.state
     }
 
-    /// So many steps, or fewer where hardly anything is left to gain.
+    /// So many steps, those that are tried and not taken included, or fewer where hardly anything is
+    /// left to gain.
     pub(super) fn take_steps(&mut self, steps: usize) {
+        self.limit = self.state.evaluations + steps;
         let mut idle = 0;
-        for _ in 0..steps {
+        while self.state.evaluations < self.limit {
             let before = self.state.value;
             let accepted = self.descend();
             let gain = (before - self.state.value) / before.max(f64::MIN_POSITIVE);
@@ -119,6 +123,9 @@ impl LeastSquares {
         let before = self.state.value;
         let mut first = None;
         while self.damping < MOST_DAMPING {
+            if self.state.evaluations >= self.limit {
+                return 0.0;
+            }
             let Some((step, promised)) = self.proposal() else {
                 self.tighten();
                 continue;

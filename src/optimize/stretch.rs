@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct Stretch {
     /// What descends.
     pub method: Method,
-    /// How many steps it takes.
+    /// How many steps it tries.
     pub steps: usize,
     /// The rate of Adam at the beginning of a descent, in scaled variables: a step of one alters
     /// the residuals by as much as they are.
@@ -42,7 +42,7 @@ pub struct Stretched {
     pub lens: Lens,
     /// The merit where it began.
     pub before: f64,
-    /// How often the merit was taken with its derivatives, steps that were not accepted included.
+    /// Steps, those that were tried and not taken included: each takes the merit and its derivatives.
     pub gradients: usize,
 }
 
@@ -98,7 +98,7 @@ pub fn stretch(
             search.into_state()
         }
     };
-    Ok(Stretched { lens: state.current, before, gradients: state.evaluations })
+    Ok(Stretched { lens: state.current, before, gradients: state.evaluations - 1 })
 }
 
 fn adam(mut state: State, gradient: &[f64], asked: Stretch, memory: &mut Memory) -> State {

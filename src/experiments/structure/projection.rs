@@ -44,7 +44,7 @@ const SIDES: [(bool, &str); 2] = [(true, "projection"), (false, "no projection")
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     // A test has room for the lens of the picture alone, and for one place.
     let lenses = effort.pick(0..SUBJECTS.len(), 3..SUBJECTS.len());
-    let (seeds, read) = (effort.pick(16, 1), effort.pick(&READ[..], &[200]));
+    let (seeds, read) = (effort.pick(8, 1), effort.pick(&READ[..], &[200]));
     let mut outcome = Outcome::default();
     let mut table = shares_table();
     let count = lenses.len() as f64;

@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 pub struct Local {
     /// What takes the steps.
     pub method: Method,
-    /// Steps of a local move; least squares takes fewer where hardly anything is left to gain.
+    /// Steps that a local move tries; least squares tries fewer where hardly anything is left to gain.
     pub steps: usize,
     /// The rate of Adam when a descent begins: a step of one alters the residuals by as much as
     /// they are.
