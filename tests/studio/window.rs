@@ -283,10 +283,10 @@ fn a_field_is_looked_at_only_while_its_panel_is_shown() {
     harness.get_by_label("GRIN slice").click();
     harness.run_steps(3);
     assert!(forming(&harness).watched);
-    harness.get_by_label("Fibre that focuses parallel light again and again").click();
+    harness.get_by_label("Luneburg lens as a function of the radius").click();
     wait(&mut harness, "a slice", |harness| forming(harness).slice.is_some());
     harness.run_steps(2);
-    harness.get_by_label_contains("Slice of Fibre");
+    harness.get_by_label_contains("Slice of Luneburg");
     harness.get_by_label("Layout").click();
     harness.run_steps(3);
     assert!(!forming(&harness).watched && forming(&harness).run.is_some(), "it stays open");
