@@ -189,7 +189,7 @@ impl Medium {
     }
 
     /// Its values on a grid: those of its own nodes, or of a spline in one coordinate on so many
-    /// nodes along each side of the box around the space.
+    /// nodes along each side of the box around the space, constant from where the spline ends.
     ///
     /// # Errors
     /// A space without extent.
@@ -206,8 +206,21 @@ impl Medium {
                 Grid::new([nodes; 3], low, (high - low) * (1.0 / (nodes - 1) as f64))?
             }
         };
-        let values = (0..grid.nodes()).map(|n| self.field().sample(grid.node(n)).index).collect();
-        Ok(Volume { grid, values })
+        let index = |n| self.field().sample(self.within(grid.node(n))).index;
+        Ok(Volume { grid, values: (0..grid.nodes()).map(index).collect() })
+    }
+
+    /// The nearest point at which the field is given: where a spline ends, a maker needs material of
+    /// the index at its end, and not what the spline would go on to.
+    fn within(&self, point: Vec3<f64>) -> Vec3<f64> {
+        let Self::Radial(Layered { coordinate, .. }, radius) = self else { return point };
+        let across = match coordinate {
+            Coordinate::Sphere => point,
+            Coordinate::Cylinder => Vec3::new(point.x, point.y, 0.0),
+            Coordinate::Axial => return point,
+        };
+        let size = across.dot(across).sqrt();
+        if size > *radius { point - across * (1.0 - radius / size) } else { point }
     }
 }
 
@@ -351,5 +364,23 @@ impl Exact {
             }
             Self::Volume(path) => Box::new(from_file(path)?),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_volume_goes_on_with_the_index_at_the_end_of_a_spline() {
+        let mut medium = Medium::of(FieldKind::Cylinder { radius: 1.0 }, 8, |_| 1.5).unwrap();
+        for (i, coefficient) in medium.parameters_mut().iter_mut().enumerate() {
+            *coefficient -= 0.05 * i as f64;
+        }
+        let edge = medium.field().sample(Vec3::new(1.0, 0.0, 0.0)).index;
+        let space = Space::Rod { radius: 1.5, from: 0.0, to: 4.0 };
+        let values = medium.volume(space, 9).unwrap().values;
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!((least - edge).abs() < 1e-12 && edge < 1.25, "{least} {edge}");
     }
 }

@@ -19,7 +19,7 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.6",
     title: "Mutations with paraxial projection and without, with table 4.1",
     claim: "With projection a search is more often at a lens that is better than its start",
-    seconds: 500.0,
+    seconds: 200.0,
     run,
 };
 
@@ -44,7 +44,7 @@ const SIDES: [(bool, &str); 2] = [(true, "projection"), (false, "no projection")
 fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     // A test has room for the lens of the picture alone, and for one place.
     let lenses = effort.pick(0..SUBJECTS.len(), 3..SUBJECTS.len());
-    let (seeds, read) = (effort.pick(24, 1), effort.pick(&READ[..], &[200]));
+    let (seeds, read) = (effort.pick(8, 1), effort.pick(&READ[..], &[200]));
     let mut outcome = Outcome::default();
     let mut table = shares_table();
     let count = lenses.len() as f64;
