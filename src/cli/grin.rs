@@ -13,6 +13,7 @@ use crate::measure::{Memory, Stopwatch, peak_megabytes, processor_ms};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -55,6 +56,17 @@ pub(super) struct Grin {
     show: bool,
 }
 
+/// Refuses to write the volume over the task.
+fn keep_task(task: &Path, out: &Path) -> Result<(), Failure> {
+    let places = [task, out].map(fs::canonicalize);
+    let same = matches!(places, [Ok(task), Ok(out)] if task == out);
+    if !same {
+        return Ok(());
+    }
+    let path = out.display();
+    Err(Failure::Input(format!("--out {path} is the task itself; expected another file")))
+}
+
 impl Grin {
     pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
         let Some(name) = &self.task else { return output.print(&List) };
@@ -64,6 +76,7 @@ impl Grin {
         }
         self.out.iter().try_for_each(|path| check_target(path, &["npz", "json"]))?;
         self.png.iter().try_for_each(|folder| check_folder(folder))?;
+        self.out.iter().try_for_each(|path| keep_task(Path::new(name), path))?;
         self.check()?;
         let refuse = |error| Failure::Input(format!("{name}: {error}"));
         let mut runner = Runner::new(&task).map_err(refuse)?;

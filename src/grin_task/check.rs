@@ -101,6 +101,7 @@ impl Task {
         }
         positive("field", self.field.size())?;
         self.space.check("space")?;
+        self.check_reach()?;
         positive("tolerance", self.tolerance)?;
         if let Some(tracing) = self.tracing {
             within("tracing, per_voxel", tracing.per_voxel, 0.25, 1000.0)?;
@@ -118,6 +119,18 @@ impl Task {
         }
         self.check_method()?;
         self.exact.iter().try_for_each(|exact| exact.check("exact"))
+    }
+
+    /// Refuses a space in which the field has no nodes.
+    fn check_reach(&self) -> Result<(), TaskError> {
+        let ends =
+            self.space.corners().into_iter().flat_map(|corner| [corner.x, corner.y, corner.z]);
+        let (reach, half) = (ends.fold(0.0, |most, end| end.abs().max(most)), self.field.size());
+        if self.field.is_radial() || reach <= half * (1.0 + ROUNDING) {
+            return Ok(());
+        }
+        let expected = format!("all of it within the {half} mm to each side that the field covers");
+        Err(wrong("space", format!("a reach of {reach} mm"), expected))
     }
 
     fn check_limits(&self) -> Result<(), TaskError> {

@@ -240,8 +240,8 @@ pub enum NoField {
     },
     /// An index in it.
     #[error(
-        "{file}: node {node:?} has the index {found}; expected 1 or more: offset + scale * number, \
-         where the numbers are none"
+        "{file}: node {node:?} has the index {found}; expected 1 or more; the index of a raw volume \
+         is offset + scale * number"
     )]
     Index {
         /// The file.

@@ -34,7 +34,7 @@ pub(super) struct State {
     /// How often since then none better was found.
     stale: usize,
     pub(super) steps: usize,
-    /// How often the merit was taken, by whatever detail.
+    /// How often a lens had a merit, in whatever detail: one that has none costs little.
     pub(super) evaluations: usize,
     pub(super) refused: Option<String>,
 }
@@ -87,8 +87,9 @@ impl State {
         let mut fraction = 1.0;
         for _ in 0..HALVINGS {
             let proposal = self.proposal(step, fraction);
-            self.evaluations += 1;
-            match self.evaluate(&proposal, detail) {
+            let found = self.evaluate(&proposal, detail);
+            self.evaluations += usize::from(found.is_ok());
+            match found {
                 Ok(sum) if accept(sum.value) => {
                     self.take(proposal, sum.value);
                     return (fraction, Some(sum));

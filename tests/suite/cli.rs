@@ -663,11 +663,13 @@ fn a_grin_task_is_worked_on_and_written_as_a_volume() {
     assert!(report["error"]["without_offset"].as_f64().unwrap() < 1e-4);
     let read = aplanat::files::read_volume(&volume.0).unwrap();
     assert_eq!(read.grid.counts(), [9; 3]);
+    assert!(read.values.iter().all(|index| *index >= 1.0), "also where the fibre ends");
     let task = done(&["grin", "luneburg-radial", "--show"], "");
     let file = Scratch::with("task.json", &task);
     let stopped = done_json(&["grin", file.path(), "--iterations", "2"], "");
     assert_eq!(stopped["steps"], 2);
     assert_eq!(stopped["stopped"], true);
+    refused(2, &["grin", file.path(), "--out", file.path()], "", &["--out", "the task itself"]);
     assert!(done(&["grin"], "").contains("luneburg-radial"));
     // What goes into the task comes out of its volume.
     let task = task.replace("0.995", "-0.995");

@@ -226,6 +226,8 @@ fn grin_tasks_that_make_no_sense_are_refused_by_name() {
     says(refused(|t| t.start = Start::Uniform(0.7)), &["start", "0.7", "from 1 to 2"]);
     says(refused(|t| t.levels[0].nodes = 1), &["levels, number 0", "found 1", "2 to"]);
     says(refused(|t| t.levels.clear()), &["levels", "none"]);
+    let far = |t: &mut Task| t.space = Space::Ball { radius: 3.0 };
+    says(refused(far), &["space", "a reach of 3 mm", "the field covers"]);
     says(refused(|t| t.views.clear()), &["views", "none"]);
     says(refused(|t| t.views[0].weight = 0.0), &["views", "weight"]);
     says(refused(|t| t.views[0].goal = Goal::Antipode), &["antipode", "parallel"]);
