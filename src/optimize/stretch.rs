@@ -43,6 +43,7 @@ pub struct Stretched {
     /// The merit where it began.
     pub before: f64,
     /// Steps, those that were tried and not taken included: each takes the merit and its derivatives.
+    /// At least the one with which it began.
     pub gradients: usize,
 }
 
@@ -98,7 +99,7 @@ pub fn stretch(
             search.into_state()
         }
     };
-    Ok(Stretched { lens: state.current, before, gradients: state.evaluations - 1 })
+    Ok(Stretched { lens: state.current, before, gradients: (state.evaluations - 1).max(1) })
 }
 
 fn adam(mut state: State, gradient: &[f64], asked: Stretch, memory: &mut Memory) -> State {

@@ -97,10 +97,10 @@ pub(in crate::cli) struct Asked {
     gamma: Option<f64>,
 
     /// What takes the local steps
-    #[arg(long, value_enum, default_value_t = Descent::Adam)]
+    #[arg(long, value_enum, default_value_t = Descent::usual())]
     descent: Descent,
 
-    /// Gradient steps of a local move
+    /// Steps that a local move tries
     #[arg(long, value_name = "N", default_value_t = Local::default().steps)]
     steps: usize,
 
@@ -116,6 +116,15 @@ enum Descent {
     Adam,
     /// Damped least squares
     Dls,
+}
+
+impl Descent {
+    fn usual() -> Self {
+        match Local::default().method {
+            optimize::Method::Adam => Self::Adam,
+            optimize::Method::DampedLeastSquares => Self::Dls,
+        }
+    }
 }
 
 /// Two numbers, `4..8`.

@@ -73,7 +73,7 @@ fn a_move_depends_on_lens_and_memory_alone() {
     let (mut at, mut memory) = (landscape.start().clone(), Memory::default());
     let before = landscape.loss(&at);
     let mut loss = before;
-    for _ in 0..24 {
+    for _ in 0..14 {
         let written = serde_json::to_string(&(&at, &memory)).unwrap();
         let (there, found, gradients) = landscape.descend(&at, &mut memory);
         let (read, mut remembered): (Lens, Memory) = serde_json::from_str(&written).unwrap();
@@ -219,6 +219,7 @@ fn a_merit_beyond_all_numbers_is_refused() {
 #[test]
 fn a_zoom_lens_in_three_colours_descends() {
     let lens = bundled("zoom_nikkor_28_80");
+    // A published zoom lies in a narrow valley: the first few dampings are too small for it.
     let local = Local { steps: 12, tolerance: 0.03, ..Local::default() };
     let landscape = Plan { local, ..Plan::default() }.landscape(&lens).unwrap();
     let mut memory = Memory::default();
