@@ -2,13 +2,13 @@
 
 use super::experiment::check_folder;
 use super::failure::Failure;
-use super::grin_lines::Lines;
+use super::grin_lines::{Found, Lines};
 use super::input::{check_target, read_json};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::{Number, Output, Table};
 use crate::experiments::{medium_pictures, view_picture};
 use crate::files;
-use crate::grin_task::{self, Judgement, Medium, Runner, Task, ViewResult};
+use crate::grin_task::{self, Judgement, Kept, Medium, Runner, Task, ViewResult};
 use crate::measure::{Memory, Stopwatch, peak_megabytes, processor_ms};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -78,7 +78,8 @@ impl Grin {
         self.png.iter().try_for_each(|folder| check_folder(folder))?;
         self.out.iter().try_for_each(|path| keep_task(Path::new(name), path))?;
         self.check()?;
-        let refuse = |error| Failure::Input(format!("{name}: {error}"));
+        let refuse = |error| Failure::Input(format!("{}: {error}", file(name)));
+        let lines = self.lines.then(|| Lines::new(name, &task)).transpose()?;
         let mut runner = Runner::new(&task).map_err(refuse)?;
         let (clock, before) = (Stopwatch::start(), processor_ms());
         let mut worked = Ok(true);
@@ -88,9 +89,8 @@ impl Grin {
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
         let mut report = Report::new(&runner, &Cost { ms, processor_ms, memory, stopped })
             .map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
-        if self.lines {
-            report.lines = Some(Lines::new(name, &task, runner.best().nodes())?);
-        }
+        let nodes = runner.best().nodes();
+        report.lines = lines.map(|lines| lines.found(name, &task, nodes)).transpose()?;
         report.files = self.write(&task, runner.best())?;
         output.print(&report)
     }
@@ -100,9 +100,9 @@ impl Grin {
         let failed = |error: &dyn std::error::Error| Failure::Failed(error.to_string());
         let mut written = Vec::new();
         if let Some(path) = &self.out {
-            let volume = best.volume(task.space, self.nodes).map_err(|error| failed(&error))?;
-            files::write_volume(path, &volume)?;
-            written.push(path.display().to_string());
+            let volume = task.volume(best, self.nodes).map_err(|error| failed(&error))?;
+            let files = files::write_volume(path, &volume)?;
+            written.extend(files.iter().map(|file| file.display().to_string()));
         }
         if let Some(folder) = &self.png {
             for picture in medium_pictures(task, best) {
@@ -173,8 +173,13 @@ pub(super) fn task_of(name: &str) -> Result<Task, Failure> {
             )));
         }
     };
-    task.check().map_err(|error| Failure::Input(format!("{name}: {error}")))?;
+    task.check().map_err(|error| Failure::Input(format!("{}: {error}", file(name))))?;
     Ok(task)
+}
+
+/// Where a task comes from, for a message.
+fn file(name: &str) -> &str {
+    if name == "-" { "standard input" } else { name }
 }
 
 /// The tasks that come with the program.
@@ -236,9 +241,10 @@ struct Report {
     loss: f64,
     views: Vec<View>,
     error: Option<Error>,
-    lines: Option<Lines>,
+    lines: Option<Found>,
     index: [f64; 2],
     slope: f64,
+    limits: Vec<Limit>,
     nodes: usize,
     parameters: usize,
     steps: usize,
@@ -268,7 +274,37 @@ struct Error {
     relative: f64,
     without_offset: f64,
     offset: f64,
-    of_contrast: f64,
+    of_contrast: Option<f64>,
+}
+
+/// A limit of a maker and what the field makes of it.
+#[derive(Serialize)]
+struct Limit {
+    name: &'static str,
+    value: f64,
+    limit: f64,
+    margin: f64,
+    kept: bool,
+    at: [f64; 3],
+}
+
+impl From<Kept> for Limit {
+    fn from(kept: Kept) -> Self {
+        let Kept { name, value, limit, margin, at } = kept;
+        Self { name, value, limit, margin, kept: kept.is_kept(), at: [at.x, at.y, at.z] }
+    }
+}
+
+impl Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, value, limit, margin, at: [x, y, z], .. } = self;
+        let unit = if *name == "slope" { " / mm" } else { "" };
+        write!(f, "{name} {value:.6}{unit}, limit {limit}: ")?;
+        let what = if self.kept { "kept, margin" } else { "broken by" };
+        // What rounding takes is nothing.
+        let margin = if self.kept { margin.max(0.0) } else { -margin };
+        write!(f, "{what} {margin:.2e} at ({x:.3}, {y:.3}, {z:.3}) mm")
+    }
 }
 
 impl Report {
@@ -288,7 +324,7 @@ impl Report {
             relative: difference.relative,
             without_offset: difference.without_offset,
             offset: difference.offset,
-            of_contrast: difference.of_contrast,
+            of_contrast: Some(difference.of_contrast).filter(|part| part.is_finite()),
         });
         let extremes = task.extremes(best);
         let (integrator, step) = runner.tracing();
@@ -301,6 +337,7 @@ impl Report {
             lines: None,
             index: [extremes.low, extremes.high],
             slope: extremes.slope,
+            limits: task.kept(best).into_iter().map(Limit::from).collect(),
             nodes: best.nodes(),
             parameters: best.field().parameters().len(),
             steps: runner.steps(),
@@ -324,13 +361,19 @@ impl Display for Report {
         writeln!(f, "{nodes} nodes, {parameters} numbers; {integrator}, step {step:.4} mm")?;
         let [low, high] = self.index.map(|index| format!("{index:.6}"));
         writeln!(f, "index {low} to {high}, at most {:.4} / mm steep", self.slope)?;
+        self.limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
         if let Some(Error { relative, without_offset, offset, of_contrast }) = &self.error {
             write!(f, "off the exact field by {relative:.2e}, relative; by {without_offset:.2e} ")?;
             writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
-            writeln!(
-                f,
-                "which is {of_contrast:.4} of what the exact field differs from the start"
-            )?;
+            match of_contrast {
+                Some(part) => {
+                    writeln!(
+                        f,
+                        "which is {part:.4} of what the exact field differs from the start"
+                    )?;
+                }
+                None => writeln!(f, "the exact field is the one at the start: nothing to find")?,
+            }
         }
         self.lines.iter().try_for_each(|lines| write!(f, "{lines}"))?;
         if let Some(Memory { before_mb, peak_mb }) = &self.memory {

@@ -1,7 +1,7 @@
 //! What straight lines make of the measurement of a task, beside what its search found.
 
 use super::failure::Failure;
-use crate::grin_task::{Chords, Medium, Task};
+use crate::grin_task::{Chords, Medium, Task, TaskError};
 use crate::measure::Stopwatch;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -12,7 +12,7 @@ const STEPS: usize = 60;
 
 /// The best field that straight lines found; their last one where the answer is not known.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Lines {
+pub(super) struct Found {
     /// Its error, as that of the search.
     of_contrast: Option<f64>,
     /// Which of the steps it is.
@@ -21,27 +21,44 @@ pub(super) struct Lines {
     ms: f64,
 }
 
+/// Straight lines, ready to be solved for; what that took, in milliseconds.
+#[derive(Debug)]
+pub(super) struct Lines {
+    chords: Chords,
+    ms: f64,
+}
+
 impl Lines {
-    pub(super) fn new(name: &str, task: &Task, nodes: usize) -> Result<Self, Failure> {
+    /// Refuses a task whose light was not measured.
+    pub(super) fn new(name: &str, task: &Task) -> Result<Self, Failure> {
         let clock = Stopwatch::start();
-        let refuse = |error| Failure::Input(format!("{name}, --lines: {error}"));
-        let chords = Chords::new(task).map_err(refuse)?;
+        let chords = Chords::new(task).map_err(|error| refused(name, &error))?;
+        Ok(Self { chords, ms: 1e3 * clock.seconds() })
+    }
+
+    pub(super) fn found(self, name: &str, task: &Task, nodes: usize) -> Result<Found, Failure> {
+        let clock = Stopwatch::start();
         let (mut best, mut step, mut steps) = (None, 0, 0);
         let visit = |medium: &Medium| {
             steps += 1;
             let difference = task.difference(medium).ok().flatten();
             let error = difference.map(|difference| difference.of_contrast);
+            let error = error.filter(|error| error.is_finite());
             if error.zip(best).is_none_or(|(error, best)| error < best) {
                 (best, step) = (error, steps);
             }
             ControlFlow::Continue(())
         };
-        chords.field(nodes, STEPS, visit).map_err(refuse)?;
-        Ok(Self { of_contrast: best, step, steps, ms: 1e3 * clock.seconds() })
+        self.chords.field(nodes, STEPS, visit).map_err(|error| refused(name, &error))?;
+        Ok(Found { of_contrast: best, step, steps, ms: self.ms + 1e3 * clock.seconds() })
     }
 }
 
-impl Display for Lines {
+fn refused(name: &str, error: &TaskError) -> Failure {
+    Failure::Input(format!("{name}, --lines: {error}"))
+}
+
+impl Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { of_contrast, step, steps, ms } = self;
         write!(f, "straight lines: {steps} steps of least squares, {:.2} s", 1e-3 * ms)?;

@@ -1,14 +1,14 @@
 //! What is wrong with a task, told before any ray is traced.
 
 use super::drawing::Drawing;
-use super::medium::NoField;
+use super::given::NoField;
+use super::refuse::{LONG, direction, extent, number, positive, reached, weight, within, wrong};
 use super::task::{
     Directions, Exact, FieldKind, Goal, Method, Source, Space, Start, Task, VERSION, View,
 };
 use crate::files::FileError;
 use crate::grin::SetupError;
 use crate::grin::field::GridError;
-use std::fmt::Display;
 
 /// Most numbers that least squares are worth while for.
 const FEW: usize = 400;
@@ -64,32 +64,6 @@ pub enum TaskError {
     },
 }
 
-/// An error at a place.
-pub(super) fn wrong<T: Display>(
-    place: impl Into<String>,
-    found: T,
-    expected: impl Into<String>,
-) -> TaskError {
-    let found = format!("{found}");
-    TaskError::Value { place: place.into(), found, expected: expected.into() }
-}
-
-/// Refuses a number that is not above zero.
-fn positive(place: impl Into<String>, value: f64) -> Result<(), TaskError> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(wrong(place, value, "a length above 0"))
-}
-
-/// Refuses what is not between two numbers.
-fn within(place: impl Into<String>, value: f64, low: f64, high: f64) -> Result<(), TaskError> {
-    if value >= low && value <= high {
-        return Ok(());
-    }
-    Err(wrong(place, value, format!("a number from {low} to {high}")))
-}
-
 impl Task {
     /// Refuses what cannot be worked on.
     ///
@@ -99,12 +73,13 @@ impl Task {
         if self.aplanat_grin != VERSION {
             return Err(wrong("aplanat_grin", self.aplanat_grin, VERSION.to_string()));
         }
-        positive("field", self.field.size())?;
+        extent("field", self.field.size())?;
         self.space.check("space")?;
         self.check_reach()?;
-        positive("tolerance", self.tolerance)?;
+        positive("tolerance", self.tolerance, "a length in mm")?;
         if let Some(tracing) = self.tracing {
-            within("tracing, per_voxel", tracing.per_voxel, 0.25, 1000.0)?;
+            let steps = [0.25, 1000.0];
+            within("tracing, per_voxel", tracing.per_voxel, steps, "steps a voxel")?;
         }
         self.check_limits()?;
         self.check_levels()?;
@@ -130,31 +105,35 @@ impl Task {
             return Ok(());
         }
         let expected = format!("all of it within the {half} mm to each side that the field covers");
-        Err(wrong("space", format!("a reach of {reach} mm"), expected))
+        Err(wrong("space", format!("a reach of {} mm", number(reach)), expected))
     }
 
     fn check_limits(&self) -> Result<(), TaskError> {
         let limits = self.limits;
         if !(limits.low >= 1.0 && limits.low.is_finite()) {
             let expected = "1 or more: light is nowhere faster than in vacuum";
-            return Err(wrong("limits, low", limits.low, expected));
+            return Err(wrong("limits, low", number(limits.low), expected));
         }
         if !(limits.high >= limits.low && limits.high.is_finite()) {
-            let expected = format!("no less than {}, the smallest index", limits.low);
-            return Err(wrong("limits, high", limits.high, expected));
+            let expected = format!("no less than {}, the smallest index", number(limits.low));
+            return Err(wrong("limits, high", number(limits.high), expected));
         }
-        positive("limits, change", limits.change)?;
-        limits.slope.map_or(Ok(()), |slope| positive("limits, slope", slope))?;
+        positive("limits, change", limits.change, "a change of the index")?;
+        let steep = |slope| positive("limits, slope", slope, "a slope of the index, in 1/mm,");
+        limits.slope.map_or(Ok(()), steep)?;
+        let range = [limits.low, limits.high];
         if let Some(edge) = self.edge {
-            within("edge, index", edge.index, limits.low, limits.high)?;
-            within("edge, weight", edge.weight, 0.0, f64::MAX)?;
+            within("edge, index", edge.index, range, "an index within the limits,")?;
+            weight("edge, weight", edge.weight)?;
             if edge.fixed && !matches!(self.field, FieldKind::Trilinear { .. }) {
                 let expected = "a weight: only nodes of a trilinear grid are values of the index";
                 return Err(wrong("edge", "fixed", expected));
             }
         }
         match &self.start {
-            Start::Uniform(index) => within("start", *index, limits.low, limits.high),
+            Start::Uniform(index) => {
+                within("start, uniform", *index, range, "an index within the limits,")
+            }
             Start::Volume(_) if self.field.is_radial() => {
                 Err(wrong("start", "a volume", "a uniform index for a spline in the radius"))
             }
@@ -171,7 +150,7 @@ impl Task {
             let place = format!("levels, number {i}");
             if level.nodes < fewest || level.nodes > MANY_NODES {
                 let expected = format!("{fewest} to {MANY_NODES} nodes along a side");
-                return Err(wrong(place, level.nodes, expected));
+                return Err(wrong(format!("{place}, nodes"), level.nodes, expected));
             }
         }
         Ok(())
@@ -182,12 +161,15 @@ impl Task {
         let most = self.levels.iter().map(|level| self.field.parameters(level.nodes)).max();
         match self.method {
             Method::Adam { rate, fall } => {
-                positive("method, rate", rate)?;
-                positive("method, fall", fall)
+                positive("method, adam, rate", rate, "a rate, the index of a step,")?;
+                positive("method, adam, fall", fall, "a factor")
             }
             Method::Lbfgs | Method::LeastSquares if fresh => {
-                let expected = "`given` or `even` ones: only adam may see new rays in every step";
-                Err(wrong("views, directions", "fresh", expected))
+                let expected = "rays that stay the same: only adam may see new ones in every step";
+                let i = self.views.iter().position(|view| view.source.is_fresh()).unwrap_or(0);
+                let part = if self.views[i].source.axis().is_some() { "" } else { ", directions" };
+                let place = format!("views, number {i}, source{part}, fresh");
+                Err(wrong(place, "new rays in every step", expected))
             }
             Method::LeastSquares if self.views.iter().any(|view| view.goal.is_image()) => {
                 Err(wrong("method", "least_squares", "adam or lbfgs for an image"))
@@ -204,13 +186,16 @@ impl Task {
 impl Space {
     fn check(self, place: &str) -> Result<(), TaskError> {
         match self {
-            Self::Ball { radius: size } | Self::Cube { half: size } => positive(place, size),
+            Self::Ball { radius: size } | Self::Cube { half: size } => extent(place, size),
             Self::Rod { radius, from, to } => {
-                positive(format!("{place}, radius"), radius)?;
-                if from < to && from.is_finite() && to.is_finite() {
+                extent(format!("{place}, radius"), radius)?;
+                reached(format!("{place}, from"), from, -LONG)?;
+                reached(format!("{place}, to"), to, -LONG)?;
+                if from < to {
                     return Ok(());
                 }
-                Err(wrong(place, format!("from {from} to {to}"), "an end behind the beginning"))
+                let expected = "an end beyond the beginning";
+                Err(wrong(place, format!("from {from} to {to} mm"), expected))
             }
         }
     }
@@ -218,23 +203,25 @@ impl Space {
 
 impl View {
     fn check(&self, place: &str) -> Result<(), TaskError> {
-        within(format!("{place}, weight"), self.weight, 0.0, f64::MAX)?;
+        weight(format!("{place}, weight"), self.weight)?;
         self.space.map_or(Ok(()), |space| space.check(&format!("{place}, space")))?;
         self.source.check(&format!("{place}, source"))?;
         let goal = format!("{place}, goal");
         match &self.goal {
-            Goal::Point(p) if !p.iter().all(|v| v.is_finite()) => {
-                Err(wrong(goal, format!("{p:?}"), "three finite numbers"))
+            Goal::Point(p) => {
+                p.iter().try_for_each(|v| reached(format!("{goal}, point"), *v, -LONG))
             }
             Goal::Antipode if self.source.directions().is_none() => {
-                Err(wrong(goal, "antipode", "a source of `parallel` light or `points`"))
+                let found = "`antipode` for a source that has no directions";
+                Err(wrong(goal, found, "a source of `parallel` light or `points`"))
             }
             Goal::Like { field, direction } => {
-                within(format!("{goal}, direction"), *direction, 0.0, f64::MAX)?;
+                weight(format!("{goal}, direction"), *direction)?;
                 field.check(&goal)
             }
             image if image.is_across_a_beam() && self.source.axis().is_none() => {
-                Err(wrong(goal, "image, far or ring", "a source that is a `beam`"))
+                let found = format!("`{}` for a source that is no beam", image.name());
+                Err(wrong(goal, found, "a source that is a `beam`; or another goal"))
             }
             image if image.is_across_a_beam() => image.check_across(&goal),
             _ => Ok(()),
@@ -248,6 +235,18 @@ impl Goal {
         matches!(self, Self::Image { .. } | Self::Far { .. })
     }
 
+    /// What it is called in a task.
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Point(_) => "point",
+            Self::Antipode => "antipode",
+            Self::Image { .. } => "image",
+            Self::Far { .. } => "far",
+            Self::Ring { .. } => "ring",
+            Self::Like { .. } => "like",
+        }
+    }
+
     /// Whether it stands across the direction of a beam.
     fn is_across_a_beam(&self) -> bool {
         self.is_image() || matches!(self, Self::Ring { .. })
@@ -257,19 +256,19 @@ impl Goal {
         let at = |name: &str| format!("{goal}, {name}");
         match self {
             Self::Image { half, distance, pixels, drawing } => {
-                within(at("distance"), *distance, 0.0, f64::MAX)?;
-                positive(at("half"), *half)?;
+                reached(at("distance"), *distance, 0.0)?;
+                extent(at("half"), *half)?;
                 drawing.check(goal, *pixels)
             }
             Self::Far { angle, pixels, drawing } => {
-                within(at("angle"), *angle, 0.1, 80.0)?;
+                within(at("angle"), *angle, [0.1, 80.0], "degrees")?;
                 drawing.check(goal, *pixels)
             }
             Self::Ring { radius, distance, angle, far } => {
-                positive(at("radius"), *radius)?;
-                within(at("distance"), *distance, 0.0, f64::MAX)?;
-                within(at("angle"), *angle, 0.0, 80.0)?;
-                within(at("far"), *far, 0.0, f64::MAX)
+                extent(at("radius"), *radius)?;
+                reached(at("distance"), *distance, 0.0)?;
+                within(at("angle"), *angle, [0.0, 80.0], "degrees")?;
+                weight(at("far"), *far)
             }
             _ => Ok(()),
         }
@@ -278,9 +277,9 @@ impl Goal {
 
 impl Drawing {
     fn check(&self, goal: &str, pixels: usize) -> Result<(), TaskError> {
-        within(format!("{goal}, pixels"), pixels as f64, 4.0, 2048.0)?;
+        within(format!("{goal}, pixels"), pixels as f64, [4.0, 2048.0], "pixels along a side,")?;
         if let Self::Scene(depth) = self {
-            within(format!("{goal}, scene"), *depth, 0.0, 1.0)?;
+            within(format!("{goal}, drawing, scene"), *depth, [0.0, 1.0], "a depth")?;
         }
         let refused = |source| TaskError::Picture { place: format!("{goal}, drawing"), source };
         self.pixels(pixels).map(|_| ()).map_err(refused)
@@ -291,53 +290,57 @@ impl Source {
     fn check(&self, place: &str) -> Result<(), TaskError> {
         let count = self.count();
         if count == 0 || count > MANY_RAYS {
-            return Err(wrong(place, format!("{count} rays"), format!("1 to {MANY_RAYS}")));
+            let expected = format!("1 to {MANY_RAYS} in all");
+            return Err(wrong(place, format!("{count} rays"), expected));
         }
         let directions = format!("{place}, directions");
         if let Some(Directions::Given(list)) = self.directions() {
             list.iter().try_for_each(|d| direction(&directions, *d))?;
         }
         match self {
-            Self::Parallel { radius, .. } => positive(format!("{place}, radius"), *radius),
+            Self::Parallel { radius, .. } => extent(format!("{place}, radius"), *radius),
             Self::Points { radius, cone, .. } => {
-                positive(format!("{place}, radius"), *radius)?;
-                within(format!("{place}, cone"), *cone, 0.0, 89.0)
+                extent(format!("{place}, radius"), *radius)?;
+                within(format!("{place}, cone"), *cone, [0.0, 89.0], "degrees")
             }
             Self::Fan { height, z, .. } => {
-                within(format!("{place}, z"), *z, f64::MIN, f64::MAX)?;
-                positive(format!("{place}, height"), *height)
+                reached(format!("{place}, z"), *z, -LONG)?;
+                extent(format!("{place}, height"), *height)
             }
             Self::Beam { direction: d, half, .. } => {
-                direction(place, *d)?;
-                positive(format!("{place}, half"), *half)
+                direction(&format!("{place}, direction"), *d)?;
+                extent(format!("{place}, half"), *half)
             }
         }
     }
 }
 
-fn direction(place: &str, [x, y, z]: [f64; 3]) -> Result<(), TaskError> {
-    let square = x * x + y * y + z * z;
-    if square > 0.0 && square.is_finite() {
-        return Ok(());
-    }
-    Err(wrong(place, format!("[{x}, {y}, {z}]"), "a direction"))
-}
-
 impl Exact {
     fn check(&self, place: &str) -> Result<(), TaskError> {
+        let at = |name: &str| format!("{place}, {name}");
+        let index = |place, value| positive(place, value, "an index");
         match self {
-            Self::Luneburg { radius } => positive(place, *radius),
-            Self::Maxwell { centre: a, radius: b }
-            | Self::Secant { axis: a, a: b }
-            | Self::Parabolic { axis: a, g: b } => positive(place, *a).and(positive(place, *b)),
+            Self::Luneburg { radius } => extent(at("luneburg, radius"), *radius),
+            Self::Maxwell { centre, radius } => {
+                index(at("maxwell, centre"), *centre)?;
+                extent(at("maxwell, radius"), *radius)
+            }
+            Self::Secant { axis, a } => {
+                index(at("secant, axis"), *axis)?;
+                positive(at("secant, a"), *a, "a number of 1/mm")
+            }
+            Self::Parabolic { axis, g } => {
+                index(at("parabolic, axis"), *axis)?;
+                positive(at("parabolic, g"), *g, "a number of 1/mm")
+            }
             Self::Plume { ambient, contrast, half } => {
-                positive(format!("{place}, half"), *half)?;
+                extent(at("plume, half"), *half)?;
                 let least = ambient.min(ambient + contrast);
                 if least >= 1.0 - ROUNDING && (ambient + contrast).is_finite() {
                     return Ok(());
                 }
-                let found = format!("an index of {least}");
-                Err(wrong(place, found, "1 or more: light is nowhere faster than in vacuum"))
+                let found = format!("an index of {}", number(least));
+                Err(wrong(at("plume"), found, "1 or more: light is nowhere faster than in vacuum"))
             }
             Self::Volume(_) => Ok(()),
         }

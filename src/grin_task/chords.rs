@@ -9,9 +9,10 @@
 //! integrate them: [`Chords::by_gradients`].
 
 use super::cgls::cgls;
-use super::check::{TaskError, wrong};
+use super::check::TaskError;
 use super::measured::known;
 use super::medium::Medium;
+use super::refuse::wrong;
 use super::scene::{Aim, Shot, setups, shots};
 use super::source::Draw;
 use super::space::length;

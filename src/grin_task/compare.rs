@@ -1,7 +1,9 @@
 //! How a field that was found differs from the one that is known to be the answer, and whether a
 //! maker can make it.
 
-use super::medium::{Medium, NoField};
+use super::given::NoField;
+use super::medium::Medium;
+use super::range::Bound;
 use super::task::{FieldKind, Task};
 use crate::grin::Field;
 use crate::math::Vec3;
@@ -10,6 +12,9 @@ use crate::math::Vec3;
 const LATTICE: usize = 40;
 /// Points along a radius.
 const RADIAL: usize = 400;
+
+/// Two fields are the same whose mean square difference is below this part of their square.
+const SAME: f64 = 1e-26;
 
 /// The difference between two fields over the space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +26,8 @@ pub struct Difference {
     /// That mean.
     pub offset: f64,
     /// `‖η - η*‖ / ‖η* - η₀‖` with `η₀` the field to begin with: 1 for a search that found nothing,
-    /// infinite where there is nothing to find.
+    /// infinite where the answer is the field to begin with, but for rounding: there is nothing to
+    /// find.
     pub of_contrast: f64,
 }
 
@@ -61,12 +67,9 @@ impl Task {
 
     /// The range of the index over the space, and how steep it is.
     pub fn extremes(&self, medium: &Medium) -> Extremes {
-        let slope = medium.steepest(self.space);
-        let none = Extremes { low: f64::INFINITY, high: f64::NEG_INFINITY, slope };
-        self.places().into_iter().fold(none, |found, (p, _)| {
-            let index = medium.field().sample(p).index;
-            Extremes { low: found.low.min(index), high: found.high.max(index), ..found }
-        })
+        let spaces = self.spaces();
+        let [low, high] = [Bound::Low, Bound::High].map(|bound| medium.extreme(&spaces, bound).0);
+        Extremes { low, high, slope: medium.steepest(self.space) }
     }
 
     /// Points all over the space, or along the radius that a spline depends on, each with its share.
@@ -107,6 +110,6 @@ fn difference(
         relative: (plain / norm).sqrt(),
         without_offset: (shape / norm).sqrt(),
         offset,
-        of_contrast: if plain == 0.0 { 0.0 } else { (plain / contrast).sqrt() },
+        of_contrast: if contrast > SAME * norm { (plain / contrast).sqrt() } else { f64::INFINITY },
     }
 }

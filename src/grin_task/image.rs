@@ -132,3 +132,22 @@ impl Screen {
         Seed { v, ..Seed::default() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_screen_is_upright_for_an_eye_that_looks_against_the_light() {
+        let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let [x, y, z] = [x, y, z].map(|[x, y, z]| Vec3::new(x, y, z));
+        // The direction of light, right and up.
+        for (d, right, up) in [(z, y, -x), (y, -z, -x), (x, z, -y), (-z, -y, -x)] {
+            let screen = Screen::new(None, d, 1.0, (&Drawing::Face, 8)).unwrap();
+            assert_eq!(screen.axes, [right, up], "{d:?}");
+            // The mouth of the face is below its eyes.
+            let light = |row: usize| screen.wanted[8 * row..][..8].iter().sum::<f64>();
+            assert!(light(2) > light(3), "rows from the bottom");
+        }
+    }
+}

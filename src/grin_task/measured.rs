@@ -4,8 +4,9 @@
 //! search does not find its own errors again. A ray that tells nothing, because it is trapped,
 //! chaotic or too flat there, is told by its reason and left out.
 
-use super::check::{TaskError, wrong};
-use super::medium::check_reach;
+use super::check::TaskError;
+use super::given::{check_range, check_reach};
+use super::refuse::wrong;
 use super::scene::{Aim, Counts, counts};
 use super::source::{Draw, Sent};
 use super::space::{length, unit};
@@ -52,13 +53,16 @@ impl Task {
         self.views.iter().filter_map(|view| measured(view).transpose()).collect()
     }
 
-    /// Refuses volumes that cannot be read or end before the space does.
+    /// Refuses volumes that cannot be read or end before the space does, and one to begin with that
+    /// is beyond the limits.
     pub(super) fn check_volumes(&self) -> Result<(), TaskError> {
         let check = |place: String, path: &std::path::Path, space: Space| {
             check_reach(path, space).map_err(|source| TaskError::Field { place, source })
         };
         if let Start::Volume(path) = &self.start {
             check("start".to_owned(), path, self.space)?;
+            check_range(path, &self.spaces(), [self.limits.low, self.limits.high])
+                .map_err(|source| TaskError::Field { place: "start".to_owned(), source })?;
         }
         if let Some(Exact::Volume(path)) = &self.exact {
             check("exact".to_owned(), path, self.space)?;

@@ -1,16 +1,14 @@
 //! A field on its way: how it begins, what its numbers may do, how it becomes finer, and how it is
 //! written as a volume.
 
-use super::check::{ROUNDING, TaskError};
-use super::task::{Edge, Exact, FieldKind, MakerLimits, Space, Start, Task};
-use crate::files::{self, FileError, Volume};
+use super::check::TaskError;
+use super::task::{Edge, FieldKind, MakerLimits, Space, Task};
+use crate::files::Volume;
 use crate::grin::Field;
 use crate::grin::field::{
-    BSpline, Coordinate, Diagonal, Grid, GridError, Layered, Luneburg, Maxwell, Parabolic, Plume,
-    Profile as _, Sech, Tricubic, Trilinear,
+    BSpline, Coordinate, Diagonal, Grid, GridError, Layered, Profile as _, Tricubic, Trilinear,
 };
-use crate::math::{Real, Vec3};
-use std::path::Path;
+use crate::math::Vec3;
 
 /// Fewest coefficients of a spline.
 const FEWEST: usize = 4;
@@ -221,149 +219,6 @@ impl Medium {
         };
         let size = across.dot(across).sqrt();
         if size > *radius { point - across * (1.0 - radius / size) } else { point }
-    }
-}
-
-/// Why a given field cannot be had.
-#[derive(Debug, thiserror::Error)]
-pub enum NoField {
-    /// Its file.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// Its values.
-    #[error("{file}: {source}")]
-    Values {
-        /// The file.
-        file: String,
-        /// What is wrong with it.
-        source: GridError,
-    },
-    /// An index in it.
-    #[error(
-        "{file}: node {node:?} has the index {found}; expected 1 or more; the index of a raw volume \
-         is offset + scale * number"
-    )]
-    Index {
-        /// The file.
-        file: String,
-        /// The node, counted from 0 along x, y and z.
-        node: [usize; 3],
-        /// What stands there.
-        found: f64,
-    },
-    /// It ends before the space does.
-    #[error("{file}: reaches from {low} to {high} mm along {axis}; expected all of {expected:?}")]
-    Short {
-        /// The file.
-        file: String,
-        /// `x`, `y` or `z`.
-        axis: char,
-        /// Where it begins.
-        low: f64,
-        /// Where it ends.
-        high: f64,
-        /// From where to where the space reaches.
-        expected: [f64; 2],
-    },
-}
-
-/// The trilinear field of a volume in a file.
-pub(super) fn from_file<R: Real>(path: &Path) -> Result<Trilinear<R>, NoField> {
-    let Volume { grid, values } = files::read_volume(path)?;
-    let wrong = |source| NoField::Values { file: path.display().to_string(), source };
-    if let Some(n) = values.iter().position(|index| !(*index >= 1.0 - ROUNDING)) {
-        let [nx, ny, _] = grid.counts();
-        let (file, node) = (path.display().to_string(), [n % nx, n / nx % ny, n / nx / ny]);
-        return Err(NoField::Index { file, node, found: values[n] });
-    }
-    let (low, spacing) = (Vec3::from_f64(grid.low()), Vec3::from_f64(grid.spacing()));
-    let grid = Grid::new(grid.counts(), low, spacing).map_err(wrong)?;
-    Trilinear::new(grid, values.into_iter().map(R::from_f64).collect()).map_err(wrong)
-}
-
-/// The index at every point.
-type Index = Box<dyn Fn(Vec3<f64>) -> f64>;
-
-impl Start {
-    /// The index of the field to begin with.
-    pub(super) fn index(&self) -> Result<Index, NoField> {
-        Ok(match self {
-            Self::Uniform(index) => {
-                let index = *index;
-                Box::new(move |_| index)
-            }
-            Self::Volume(path) => {
-                let volume = from_file::<f64>(path)?;
-                Box::new(move |p| volume.sample(p).index)
-            }
-        })
-    }
-}
-
-/// Refuses a volume that ends before a space does, by more than half a voxel: beyond its last nodes
-/// a field only continues.
-pub(super) fn check_reach(path: &Path, space: Space) -> Result<(), NoField> {
-    let grid = *from_file::<f64>(path)?.grid();
-    let (low, spacing, counts) = (grid.low(), grid.spacing(), grid.counts());
-    let [from, to] = space.corners();
-    let axes = [
-        ('x', low.x, spacing.x, counts[0], [from.x, to.x]),
-        ('y', low.y, spacing.y, counts[1], [from.y, to.y]),
-        ('z', low.z, spacing.z, counts[2], [from.z, to.z]),
-    ];
-    for (axis, low, spacing, count, expected) in axes {
-        let high = low + spacing * (count - 1) as f64;
-        if low > expected[0] + 0.5 * spacing || high < expected[1] - 0.5 * spacing {
-            let file = path.display().to_string();
-            return Err(NoField::Short { file, axis, low, high, expected });
-        }
-    }
-    Ok(())
-}
-
-impl Exact {
-    /// The same sampled on a grid.
-    ///
-    /// # Errors
-    /// A volume that cannot be read, or a grid that cannot be made.
-    pub fn sampled<R: Real>(
-        &self,
-        cubic: bool,
-        nodes: usize,
-        half: f64,
-    ) -> Result<Box<dyn Field<R>>, NoField> {
-        let exact = self.field::<R>()?;
-        let value = |p: Vec3<R>| exact.sample(p).index;
-        let wrong = |source| NoField::Values { file: format!("{nodes} nodes"), source };
-        let half = R::from_f64(half);
-        if cubic {
-            let cells = nodes.saturating_sub(1);
-            return Ok(Box::new(Tricubic::near(cells, half, value).map_err(wrong)?));
-        }
-        let grid = Grid::cube(nodes, half).map_err(wrong)?;
-        Ok(Box::new(Trilinear::sampled(grid, value).map_err(wrong)?))
-    }
-
-    /// The field.
-    ///
-    /// # Errors
-    /// A volume that cannot be read.
-    pub fn field<R: Real>(&self) -> Result<Box<dyn Field<R>>, NoField> {
-        let c = R::from_f64;
-        Ok(match self {
-            Self::Luneburg { radius } => Box::new(Layered::sphere(Luneburg::new(c(*radius)))),
-            Self::Maxwell { centre, radius } => {
-                Box::new(Layered::sphere(Maxwell::new(c(*centre), c(*radius))))
-            }
-            Self::Secant { axis, a } => Box::new(Layered::cylinder(Sech::new(c(*axis), c(*a)))),
-            Self::Parabolic { axis, g } => {
-                Box::new(Layered::cylinder(Parabolic::new(c(*axis), c(*g))))
-            }
-            Self::Plume { ambient, contrast, half } => {
-                Box::new(Plume::new(c(*ambient), c(*contrast), c(*half)))
-            }
-            Self::Volume(path) => Box::new(from_file(path)?),
-        })
     }
 }
 

@@ -122,7 +122,8 @@ impl Runner {
         &self.current
     }
 
-    /// The best field so far, of those that a maker can make: it keeps the limit of the slope.
+    /// The best field so far, of those that a maker can make: it keeps the limits of the index and
+    /// of the slope.
     pub fn best(&self) -> &Medium {
         &self.best
     }
@@ -261,9 +262,10 @@ impl Runner {
     /// The current field as a maker can make it.
     fn makeable(&self) -> Medium {
         let Task { space, limits, edge, .. } = self.task;
-        let Some(limit) = limits.slope else { return self.current.clone() };
+        let bounded = self.current.bounded(&self.task.spaces(), [limits.low, limits.high]);
+        let Some(limit) = limits.slope else { return bounded };
         let middle = || {
-            let extremes = self.task.extremes(&self.current);
+            let extremes = self.task.extremes(&bounded);
             0.5 * (extremes.low + extremes.high).clamp(2.0 * limits.low, 2.0 * limits.high)
         };
         let start = match self.task.start {
@@ -271,7 +273,7 @@ impl Runner {
             Start::Volume(_) => None,
         };
         let towards = edge.map(|edge| edge.index).or(start).unwrap_or_else(middle);
-        self.current.flattened(space, limit, towards)
+        bounded.flattened(space, limit, towards)
     }
 
     fn end_level(&mut self) -> Result<(), TaskError> {

@@ -4,31 +4,15 @@
 //! towards one index by the same factor therefore draws the gradient everywhere by that factor: the
 //! limit holds exactly, and a field within the range of the index stays there.
 
+use super::climb::{Hill, Spot, climb, higher};
 use super::medium::Medium;
 use super::space::length;
 use super::task::Space;
 use crate::grin::Field as _;
-use crate::grin::field::{Coordinate, Trilinear};
+use crate::grin::field::Trilinear;
 use crate::math::Vec3;
 use rayon::prelude::*;
 
-/// Points in a cell along each axis, and along a radius, at which a smooth field is looked at.
-const POINTS: usize = 2;
-const SPOKE: usize = 1000;
-/// How many of the steepest places are climbed from, how often the step is halved there, and how
-/// often one is taken before that.
-const PEAKS: usize = 64;
-const HALVINGS: i32 = 8;
-const MOVES: i32 = 4;
-/// Where a climb may lead.
-const AXES: [Vec3<f64>; 6] = [
-    Vec3 { x: 1.0, y: 0.0, z: 0.0 },
-    Vec3 { x: -1.0, y: 0.0, z: 0.0 },
-    Vec3 { x: 0.0, y: 1.0, z: 0.0 },
-    Vec3 { x: 0.0, y: -1.0, z: 0.0 },
-    Vec3 { x: 0.0, y: 0.0, z: 1.0 },
-    Vec3 { x: 0.0, y: 0.0, z: -1.0 },
-];
 /// How far below its limit a field is put: a trilinear one for rounding, a smooth one for what a climb
 /// may miss.
 const MARGINS: [f64; 2] = [1e-9, 1e-3];
@@ -37,22 +21,20 @@ impl Medium {
     /// Its steepest slope in the space, in 1/mm: of a trilinear field exactly, over all voxels that
     /// the space touches; of a smooth one to about a thousandth.
     pub fn steepest(&self, space: Space) -> f64 {
+        self.steepest_at(space).0
+    }
+
+    /// The same, and where that is.
+    pub(super) fn steepest_at(&self, space: Space) -> Spot {
         match self {
             Self::Trilinear(field) => steepest_voxel(field, space),
-            Self::Tricubic(field) => {
-                let [cells, ..] = field.grid().counts().map(|count| count - 3);
-                self.climb(space, &lattice(space, POINTS * cells))
-            }
-            Self::Radial(field, _) => {
-                // Towards a corner of the box around the space: the farthest place.
-                let [low, high] = space.corners();
-                let z = (low.z + high.z) * 0.5;
-                let (to, z) = match field.coordinate {
-                    Coordinate::Sphere => (high, 0.0),
-                    _ => (Vec3::new(high.x, high.y, 0.0), z),
-                };
-                let at = |i: usize| to * (i as f64 / SPOKE as f64) + Vec3::new(0.0, 0.0, z);
-                self.climb(space, &(0..=SPOKE).map(at).collect::<Vec<_>>())
+            _ => {
+                let region = space.region();
+                let inside = |p: Vec3<f64>| region.height(p) <= 0.0;
+                let slope = |p: Vec3<f64>| length(self.field().sample(p).gradient);
+                let hill = Hill { inside: &inside, value: &slope };
+                let (steepest, at) = climb(&self.looks(space), self.gap(space), &hill);
+                (steepest.max(0.0), at)
             }
         }
     }
@@ -70,53 +52,11 @@ impl Medium {
         }
         flat
     }
-
-    /// The steepest slope near the steepest of some places.
-    fn climb(&self, space: Space, places: &[Vec3<f64>]) -> f64 {
-        let field = self.field();
-        let region = space.region();
-        let slope = |p: Vec3<f64>| length(field.sample(p).gradient);
-        let inside = places.par_iter().filter(|p| region.height(**p) <= 0.0);
-        let mut found: Vec<(f64, Vec3<f64>)> = inside.map(|p| (slope(*p), *p)).collect();
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let [low, high] = space.corners();
-        let gap = match self {
-            Self::Radial(..) => (high.x - low.x) / SPOKE as f64,
-            _ => (high.x - low.x) / (POINTS * self.nodes().saturating_sub(1).max(1)) as f64,
-        };
-        let up = |(mut best, mut at): (f64, Vec3<f64>)| {
-            for taken in 0..HALVINGS * MOVES {
-                let step = gap * 0.5_f64.powi(1 + taken / MOVES);
-                let there = AXES.map(|to| at + to * step).into_iter();
-                let inside = there.filter(|p| region.height(*p) <= 0.0).map(|p| (slope(p), p));
-                let higher =
-                    |a: (f64, Vec3<f64>), b: (f64, Vec3<f64>)| if b.0 > a.0 { b } else { a };
-                (best, at) = inside.fold((best, at), higher);
-            }
-            best
-        };
-        found.into_iter().take(PEAKS).map(up).fold(0.0, f64::max)
-    }
-}
-
-/// Points of the box around a space, its faces included.
-fn lattice(space: Space, parts: usize) -> Vec<Vec3<f64>> {
-    let [low, high] = space.corners();
-    let side = parts.max(1) + 1;
-    let at = |low: f64, high: f64, i: usize| low + (high - low) * i as f64 / (side - 1) as f64;
-    let place = |n: usize| {
-        Vec3::new(
-            at(low.x, high.x, n % side),
-            at(low.y, high.y, n / side % side),
-            at(low.z, high.z, n / side / side),
-        )
-    };
-    (0..side.pow(3)).map(place).collect()
 }
 
 /// The square of the slope within a voxel is convex along each axis: it is largest in a corner,
 /// where it is made of the three edges that meet there.
-fn steepest_voxel(field: &Trilinear<f64>, space: Space) -> f64 {
+fn steepest_voxel(field: &Trilinear<f64>, space: Space) -> Spot {
     let grid = field.grid();
     let (region, [nx, ny, nz]) = (space.region(), grid.counts());
     let (values, h) = (field.parameters(), grid.spacing());
@@ -127,7 +67,7 @@ fn steepest_voxel(field: &Trilinear<f64>, space: Space) -> f64 {
         let middle = (grid.node(corner(0)) + grid.node(corner(7))) * 0.5;
         let touches = |p: Vec3<f64>| region.height(p) < 0.0;
         if !touches(middle) && !(0..8).any(|c| touches(grid.node(corner(c)))) {
-            return 0.0;
+            return (0.0, middle);
         }
         let edge = |c: usize, axis: usize| {
             let from = corner(c & !(1 << axis));
@@ -135,7 +75,8 @@ fn steepest_voxel(field: &Trilinear<f64>, space: Space) -> f64 {
         };
         let slope =
             |c: usize| length(Vec3::new(edge(c, 0) / h.x, edge(c, 1) / h.y, edge(c, 2) / h.z));
-        (0..8).map(slope).fold(0.0, f64::max)
+        (0..8).map(|c| (slope(c), grid.node(corner(c)))).fold((0.0, middle), higher)
     };
-    (0..(nx - 1) * (ny - 1) * (nz - 1)).into_par_iter().map(of_voxel).reduce(|| 0.0, f64::max)
+    let voxels = (0..(nx - 1) * (ny - 1) * (nz - 1)).into_par_iter();
+    voxels.map(of_voxel).reduce(|| (0.0, grid.low()), higher)
 }

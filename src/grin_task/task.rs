@@ -279,6 +279,8 @@ pub struct MakerLimits {
     pub high: f64,
     /// Steepest index, in 1/mm; any where it is absent. A penalty leads the search, and what is
     /// found keeps it everywhere: a field that is too steep is drawn towards the index of the edge.
+    /// The range of the index is likewise held by a penalty where coefficients alone do not hold it,
+    /// and kept by what is found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
     /// Largest change of the index in one step of the search.

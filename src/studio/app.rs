@@ -15,6 +15,7 @@ use super::draw::Backing;
 use super::experiment::Bench;
 use super::menu::{self, Wish};
 use super::shell::Memory;
+use super::unsaved::{Then, Waiting};
 use super::wording::{capital, counted_from_one};
 use crate::files;
 use crate::session::{Command, Event, Explore, Form, Message, Origin, Session, Severity, View};
@@ -25,27 +26,18 @@ const DOCK: &str = "dock";
 /// All of the window.
 #[derive(Debug)]
 pub struct Studio {
-    session: Session,
+    pub(super) session: Session,
     dock: Dock,
-    chooser: Chooser,
+    pub(super) chooser: Chooser,
     bench: Bench,
     memory: Memory,
     /// What waits for the answer to whether changes may be lost.
-    waiting: Option<Waiting>,
+    pub(super) waiting: Option<Waiting>,
     /// A message too long for the line at the bottom.
     report: Option<String>,
     title: String,
     /// The window closes although changes are lost.
-    leaving: bool,
-}
-
-/// What a person wants to do although changes would be lost.
-#[derive(Debug)]
-enum Waiting {
-    Do(Command),
-    Quit,
-    /// The same once the lens is saved.
-    Saving(Box<Self>),
+    pub(super) leaving: bool,
 }
 
 impl Studio {
@@ -124,18 +116,25 @@ impl Studio {
                 self.chooser.ask(context, Purpose::OpenField, opened(view));
             }
             Wish::Do(Command::Form(Form::Save { path: None, nodes })) => {
-                let field = opened(view).map(|path| path.with_extension("npz"));
-                let field = field.unwrap_or_else(|| PathBuf::from("field.npz"));
-                self.chooser.ask(context, Purpose::SaveField(nodes), Some(&field));
+                self.choose_field(context, view, nodes);
             }
             Wish::Choose(purpose) => self.chooser.ask(context, purpose, view.path.as_deref()),
             Wish::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name) {
-                Ok(opened) => self.replace(context, Command::New(Box::new(opened.lens))),
+                Ok(opened) => {
+                    let command = Command::New(Box::new(opened.lens));
+                    self.attempt(context, Then::Do(command), None);
+                }
                 Err(why) => self.report = Some(why.to_string()),
             },
-            Wish::Do(command @ Command::New(_)) => self.replace(context, command),
-            Wish::Do(command) => self.apply(context, command),
+            Wish::Do(command) => self.attempt(context, Then::Do(command), None),
         }
+    }
+
+    /// Asks for the file of the field.
+    pub(super) fn choose_field(&mut self, context: &Context, view: &View, nodes: usize) {
+        let field = opened(view).map(|path| path.with_extension("npz"));
+        let field = field.unwrap_or_else(|| PathBuf::from("field.npz"));
+        self.chooser.ask(context, Purpose::SaveField(nodes), Some(&field));
     }
 
     /// Does what is asked of a search, a file being chosen first where one is needed.
@@ -159,24 +158,14 @@ impl Studio {
         }
     }
 
-    /// Does what would throw the lens away, at once or after a question.
-    fn replace(&mut self, context: &Context, command: Command) {
-        if self.session.is_dirty() {
-            self.waiting = Some(Waiting::Do(command));
-            context.request_repaint();
-        } else {
-            self.apply(context, command);
-        }
-    }
-
     fn dialogs(&mut self, context: &Context, view: &View) {
         if let Some((purpose, path)) = self.chooser.ui(context) {
             self.chosen(context, purpose, path);
         }
         let closing = context.input(|input| input.viewport().close_requested());
-        if closing && self.session.is_dirty() && !self.leaving {
+        if closing && !self.leaving && self.loses(&Then::Quit) {
             context.send_viewport_cmd(ViewportCommand::CancelClose);
-            self.waiting = Some(Waiting::Quit);
+            self.attempt(context, Then::Quit, None);
         }
         self.question(context, view);
         self.show_report(context);
@@ -184,7 +173,7 @@ impl Studio {
 
     fn chosen(&mut self, context: &Context, purpose: Purpose, path: PathBuf) {
         match purpose {
-            Purpose::Open => self.replace(context, Command::Open(path)),
+            Purpose::Open => self.attempt(context, Then::Do(Command::Open(path)), None),
             Purpose::ExperimentFolder => self.apply(context, Command::SaveExperiment(path)),
             Purpose::Save => self.apply(context, Command::Save(Some(path))),
             Purpose::ExportFront => self.apply(context, Command::ExportFront(Some(path))),
@@ -198,60 +187,16 @@ impl Studio {
                 let path = Some(path);
                 self.apply(context, Command::Explore(Explore::Export { number, path }));
             }
-            Purpose::OpenField => self.apply(context, Command::Form(Form::Open(Some(path)))),
+            Purpose::OpenField => {
+                let command = Command::Form(Form::Open(Some(path)));
+                self.attempt(context, Then::Do(command), None);
+            }
             Purpose::SaveField(nodes) => {
                 let path = Some(path);
                 self.apply(context, Command::Form(Form::Save { path, nodes }));
             }
             Purpose::ExportZemax | Purpose::ExportJson => {
                 self.apply(context, Command::Export(path));
-            }
-        }
-    }
-
-    /// Asks before changes are lost.
-    fn question(&mut self, context: &Context, view: &View) {
-        match self.waiting.take() {
-            None => {}
-            Some(Waiting::Saving(then)) => self.go_on_when_saved(context, *then),
-            Some(waiting) => match ask(context, &view.lens.name) {
-                None => self.waiting = Some(waiting),
-                Some(answer) => self.answered(context, view, waiting, answer),
-            },
-        }
-    }
-
-    fn answered(&mut self, context: &Context, view: &View, waiting: Waiting, answer: Answer) {
-        context.request_repaint();
-        match answer {
-            Answer::Stay => {}
-            Answer::Lose => self.go_on(context, waiting),
-            Answer::Save => {
-                self.waiting = Some(Waiting::Saving(Box::new(waiting)));
-                match &view.path {
-                    Some(_) => self.apply(context, Command::Save(None)),
-                    None => self.chooser.ask(context, Purpose::Save, None),
-                }
-            }
-        }
-    }
-
-    /// Goes on once the lens is saved; gives up where no file was chosen or it could not be saved.
-    fn go_on_when_saved(&mut self, context: &Context, then: Waiting) {
-        if !self.session.is_dirty() {
-            self.go_on(context, then);
-        } else if self.chooser.is_open() {
-            self.waiting = Some(Waiting::Saving(Box::new(then)));
-        }
-    }
-
-    fn go_on(&mut self, context: &Context, waiting: Waiting) {
-        match waiting {
-            Waiting::Do(command) => self.apply(context, command),
-            Waiting::Saving(then) => self.go_on(context, *then),
-            Waiting::Quit => {
-                self.leaving = true;
-                context.send_viewport_cmd(ViewportCommand::Close);
             }
         }
     }
@@ -338,34 +283,6 @@ fn opened(view: &View) -> Option<&Path> {
         Origin::File(path) => Some(path),
         Origin::Builtin(_) => None,
     }
-}
-
-/// What a person answers to whether changes may be lost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Answer {
-    Save,
-    Lose,
-    Stay,
-}
-
-fn ask(context: &Context, name: &str) -> Option<Answer> {
-    let mut answer = None;
-    let modal = Modal::new(Id::unique("unsaved")).show(context, |ui| {
-        ui.set_width(340.0);
-        ui.heading("Save the changes first?");
-        ui.label(format!("{name} has changes that are in no file yet."));
-        ui.add_space(8.0);
-        let answers =
-            [("Save", Answer::Save), ("Don't save", Answer::Lose), ("Cancel", Answer::Stay)];
-        ui.horizontal(|ui| {
-            for (text, chosen) in answers {
-                if ui.button(text).clicked() {
-                    answer = Some(chosen);
-                }
-            }
-        });
-    });
-    answer.or_else(|| modal.should_close().then_some(Answer::Stay))
 }
 
 fn bar_frame(ui: &mut Ui, side: Side, show: impl FnOnce(&mut Ui)) {

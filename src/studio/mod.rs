@@ -17,6 +17,7 @@ pub mod ramp;
 pub mod section;
 pub mod shell;
 pub mod theme;
+mod unsaved;
 pub mod wording;
 
 pub use app::Studio;

@@ -14,6 +14,7 @@
 //! ```
 
 mod layout;
+mod place;
 
 pub use layout::pretty;
 
@@ -43,7 +44,12 @@ pub fn read(text: &str, file: &str) -> Result<Lens, FileError> {
 
 /// Reads any other JSON, with errors that name place, found and expected as those of a lens do.
 pub fn read_json<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, FileError> {
-    serde_json::from_str(text).map_err(|error| explain(&error, text).of(file))
+    serde_json::from_str(text).map_err(|error| {
+        let Malformed { place, found, expected } = explain(&error, text);
+        let keys = place::keys(text, error.line(), error.column());
+        let place = if keys.is_empty() { place } else { format!("{place}, {keys}") };
+        Malformed { place, found, expected }.of(file)
+    })
 }
 
 /// The text of the native file of a lens.
@@ -90,7 +96,14 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
     }
     if error.is_syntax() {
         let found = word_at(text, error.line(), error.column());
-        return Malformed { place, found, expected: format!("JSON ({message})") };
+        // Sound JSON that stands where one of several things is named.
+        let is_sound = serde_json::from_str::<IgnoredAny>(text).is_ok();
+        let expected = if is_sound {
+            "a name, or an object with one key".to_owned()
+        } else {
+            format!("JSON ({message})")
+        };
+        return Malformed { place, found, expected };
     }
     let plain = message.replace("expected f64", "expected a number");
     let plain = plain.strip_prefix("invalid type: ").unwrap_or(&plain);
@@ -99,7 +112,18 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
         Some(key) => format!("no key {key}"),
         None => found.replace("unknown field", "the unknown key"),
     };
-    Malformed { place, found, expected: expected.to_owned() }
+    Malformed { place, found, expected: in_words(expected) }
+}
+
+/// What the parser expects, without the words of the program's types.
+fn in_words(expected: &str) -> String {
+    match expected {
+        of if of.starts_with("struct ") => "an object with its keys: {\"key\": ...}",
+        "usize" | "u64" | "u32" => "a whole number, 0 or more",
+        "a sequence" => "a list",
+        other => other,
+    }
+    .to_owned()
 }
 
 /// Splits off the number that a list has put in front of the message about one of its elements:

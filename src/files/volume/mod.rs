@@ -13,7 +13,7 @@ use super::FileError;
 use super::error::Malformed;
 use crate::grin::field::Grid;
 use crate::math::Vec3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Values on a grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,17 +35,41 @@ pub fn read_volume(path: &Path) -> Result<Volume, FileError> {
     if bytes.starts_with(b"PK") {
         return npz::read(&bytes).map_err(|malformed| malformed.of(&file));
     }
+    let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+    if first != Some(&b'{') {
+        let (place, found) = ("its beginning".to_owned(), beginning(&bytes));
+        let expected = "NumPy's .npz, an archive that begins with `PK`, or a header of a volume, \
+            JSON that begins with `{`";
+        return Err(Malformed { place, found, expected: expected.to_owned() }.of(&file));
+    }
     raw::read(path, &bytes)
 }
 
+/// What a file seems to be that is no volume.
+fn beginning(bytes: &[u8]) -> String {
+    let start = &bytes[..bytes.len().min(16)];
+    match std::str::from_utf8(start) {
+        _ if bytes.is_empty() => "an empty file".to_owned(),
+        _ if bytes.starts_with(b"\x93NUMPY") => "a single array of NumPy, .npy".to_owned(),
+        Ok(text) if !text.contains(|c: char| c.is_control() && !c.is_whitespace()) => {
+            format!("the text `{}`", text.split_whitespace().collect::<Vec<_>>().join(" "))
+        }
+        _ => format!("the bytes {start:02x?}"),
+    }
+}
+
 /// Writes a volume: `NumPy`'s format to a file that ends in `.npz`, else a JSON header and the numbers
-/// beside it in a file that ends in `.raw`.
+/// beside it in a file that ends in `.raw`. Every file that was written.
 ///
 /// # Errors
 /// A file that cannot be written; what was there before is untouched.
-pub fn write_volume(path: &Path, volume: &Volume) -> Result<(), FileError> {
+pub fn write_volume(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
     let is_npz = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz"));
-    if is_npz { npz::write(path, volume) } else { raw::write(path, volume) }
+    if !is_npz {
+        return raw::write(path, volume);
+    }
+    npz::write(path, volume)?;
+    Ok(vec![path.to_owned()])
 }
 
 /// The volume of these numbers; `place` is where they stand.

@@ -115,7 +115,8 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Volume, FileError> {
         .map_err(|malformed| malformed.of(&file))
 }
 
-pub(super) fn write(path: &Path, volume: &Volume) -> Result<(), FileError> {
+/// Writes a header and the numbers beside it: both files.
+pub(super) fn write(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
     let data = path.with_extension("raw");
     let (low, spacing) = (volume.grid.low(), volume.grid.spacing());
     let header = Header {
@@ -134,5 +135,6 @@ pub(super) fn write(path: &Path, volume: &Volume) -> Result<(), FileError> {
     })?;
     let bytes: Vec<u8> = volume.values.iter().flat_map(|value| value.to_le_bytes()).collect();
     replace(&data, &bytes)?;
-    replace(path, format!("{text}\n").as_bytes())
+    replace(path, format!("{text}\n").as_bytes())?;
+    Ok(vec![path.to_owned(), data])
 }

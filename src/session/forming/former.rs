@@ -43,6 +43,8 @@ pub struct Formation {
     pub rays: u64,
     /// The time that the steps took, in seconds, pauses apart.
     pub seconds: f64,
+    /// Whether the best field is in a file as it is.
+    pub saved: bool,
     /// How rays of the first view are traced: the kind of step and its length in mm; `None` for a
     /// volume.
     pub tracing: Option<(Integrator, f64)>,
@@ -73,6 +75,7 @@ impl Formation {
             history: Arc::default(),
             rays: 0,
             seconds: 0.0,
+            saved: false,
             tracing: runner.map(Runner::tracing),
         }
     }
@@ -80,6 +83,11 @@ impl Formation {
     /// Whether it takes steps or can.
     pub fn is_under_way(&self) -> bool {
         self.standing.can_go_on()
+    }
+
+    /// Whether a field has been formed that is in no file as it is.
+    pub fn is_unsaved(&self) -> bool {
+        self.progress.is_some() && !self.saved
     }
 
     /// Whether there is a search that has not taken a step yet.
@@ -268,13 +276,17 @@ impl Desk {
         self.outbox.emit(Told::Failed(number, why));
     }
 
-    fn write(&self, path: PathBuf, nodes: usize) {
-        let Some(run) = &self.run else {
+    fn write(&mut self, path: PathBuf, nodes: usize) {
+        let Some(run) = &mut self.run else {
             let why = "there is no field to save; open a task first";
             return self.outbox.emit(Told::NotWritten(why.to_owned()));
         };
         let told = match guarded(|| run.write(&path, nodes)) {
-            Ok(report) => Told::Written(path, report),
+            Ok(report) => {
+                run.state.saved = true;
+                self.shown.set(run.look());
+                Told::Written(path, report)
+            }
             Err(why) => Told::NotWritten(why),
         };
         self.outbox.emit(told);
@@ -293,6 +305,7 @@ impl Run {
             self.runner = Some(runner);
             self.state.progress = None;
             self.state.history = Arc::default();
+            self.state.saved = false;
             (self.state.rays, self.state.seconds, self.stride) = (0, 0.0, 1);
         }
         Ok(())
@@ -307,6 +320,7 @@ impl Run {
         self.state.seconds += 1e-3 * ms;
         self.note(&progress);
         self.state.progress = Some(progress);
+        self.state.saved = false;
         Ok(finished)
     }
 
@@ -349,11 +363,15 @@ impl Run {
         }
         let subject = &self.state.subject;
         let medium = self.runner.as_ref().map_or(&subject.start, Runner::best);
-        // Of a volume the nodes are written as they are, whatever the space.
-        let space = subject.task.as_ref().map_or(Space::Cube { half: 1.0 }, |task| task.space);
-        let volume = medium.volume(space, nodes).map_err(|why| why.to_string())?;
-        files::write_volume(path, &volume).map_err(|why| why.to_string())?;
+        let volume = match &subject.task {
+            Some(task) => task.volume(medium, nodes),
+            // The nodes are written as they are, whatever the space.
+            None => medium.volume(Space::Cube { half: 1.0 }, nodes),
+        };
+        let volume = volume.map_err(|why| why.to_string())?;
+        let files = files::write_volume(path, &volume).map_err(|why| why.to_string())?;
+        let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         let [x, y, z] = volume.grid.counts();
-        Ok(format!("{x} × {y} × {z} nodes of the best field written to {}", path.display()))
+        Ok(format!("{x} × {y} × {z} nodes of the best field written to {}", files.join(" and ")))
     }
 }

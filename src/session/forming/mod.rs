@@ -51,6 +51,8 @@ pub struct Forming {
     pub run: Option<Arc<Formation>>,
     /// Whether something is being opened.
     pub opening: bool,
+    /// Whether a field is being written.
+    pub writing: bool,
     /// How the search will stand once its step is done, where it was told so.
     pub pending: Option<Standing>,
     /// Why the last thing could not be opened, or why its search broke.
@@ -77,6 +79,7 @@ pub(super) struct FormingDesk {
     number: Option<u64>,
     /// What was asked for and is not open yet.
     opening: Option<u64>,
+    writing: bool,
     pending: Option<Standing>,
     failed: Option<String>,
     sight: Sight,
@@ -96,6 +99,7 @@ impl FormingDesk {
             count: 0,
             number: None,
             opening: None,
+            writing: false,
             pending: None,
             failed: None,
             sight: Sight::default(),
@@ -115,7 +119,10 @@ impl FormingDesk {
             Form::Pause => self.stand(Standing::Paused),
             Form::Resume => self.stand(Standing::Running),
             Form::Stop => self.stand(Standing::Stopped),
-            Form::Save { path: Some(path), nodes } => self.former.write(path, nodes),
+            Form::Save { path: Some(path), nodes } => {
+                self.writing = true;
+                self.former.write(path, nodes);
+            }
             Form::Open(None) | Form::Save { path: None, .. } => {
                 return Err("no file was named".to_owned());
             }
@@ -196,7 +203,7 @@ impl FormingDesk {
                 self.pending = None;
                 self.failed = Some(why.clone());
             }
-            Told::Written(..) | Told::NotWritten(_) => {}
+            Told::Written(..) | Told::NotWritten(_) => self.writing = false,
         }
     }
 
@@ -250,6 +257,7 @@ impl FormingDesk {
         let slice = slice.filter(|slice| slice.as_ref().as_ref().map_or(true, is_of));
         Forming {
             opening: self.opening.is_some(),
+            writing: self.writing,
             pending: self.pending,
             failed: self.failed.clone(),
             sight: self.sight,
