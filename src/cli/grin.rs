@@ -2,16 +2,16 @@
 
 use super::experiment::check_folder;
 use super::failure::Failure;
-use super::grin_lines::{Found, Lines};
+use super::grin_lines::Lines;
+use super::grin_report::{Cost, Report};
 use super::input::{check_target, read_json};
 use super::optimize::{progress_bar, stop_flag};
-use super::output::{Number, Output, Table};
+use super::output::Output;
 use crate::experiments::{medium_pictures, view_picture};
 use crate::files;
-use crate::grin_task::{self, Judgement, Kept, Medium, Runner, Task, ViewResult};
-use crate::measure::{Memory, Stopwatch, peak_megabytes, processor_ms};
+use crate::grin_task::{self, Medium, Runner, Task};
+use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::fmt::{self, Display};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -222,184 +222,5 @@ struct Shown(Task);
 impl Display for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&files::native::pretty(&self.0))
-    }
-}
-
-/// What a search took.
-struct Cost {
-    ms: f64,
-    processor_ms: Option<f64>,
-    memory: Option<Memory>,
-    stopped: bool,
-}
-
-/// What is printed.
-#[derive(Serialize)]
-struct Report {
-    name: String,
-    stopped: bool,
-    loss: f64,
-    views: Vec<View>,
-    error: Option<Error>,
-    lines: Option<Found>,
-    index: [f64; 2],
-    slope: f64,
-    limits: Vec<Limit>,
-    nodes: usize,
-    parameters: usize,
-    steps: usize,
-    rays: u64,
-    integrator: &'static str,
-    step: f64,
-    ms: f64,
-    processor_ms: Option<f64>,
-    memory: Option<Memory>,
-    files: Vec<String>,
-}
-
-/// What became of the light of a view.
-#[derive(Serialize)]
-struct View {
-    name: String,
-    weight: f64,
-    spot: f64,
-    quality_db: Option<f64>,
-    rays: usize,
-    excluded: BTreeMap<&'static str, usize>,
-    retrace_error: f64,
-}
-
-#[derive(Serialize)]
-struct Error {
-    relative: f64,
-    without_offset: f64,
-    offset: f64,
-    of_contrast: Option<f64>,
-}
-
-/// A limit of a maker and what the field makes of it.
-#[derive(Serialize)]
-struct Limit {
-    name: &'static str,
-    value: f64,
-    limit: f64,
-    margin: f64,
-    kept: bool,
-    at: [f64; 3],
-}
-
-impl From<Kept> for Limit {
-    fn from(kept: Kept) -> Self {
-        let Kept { name, value, limit, margin, at } = kept;
-        Self { name, value, limit, margin, kept: kept.is_kept(), at: [at.x, at.y, at.z] }
-    }
-}
-
-impl Display for Limit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, value, limit, margin, at: [x, y, z], .. } = self;
-        let unit = if *name == "slope" { " / mm" } else { "" };
-        write!(f, "{name} {value:.6}{unit}, limit {limit}: ")?;
-        let what = if self.kept { "kept, margin" } else { "broken by" };
-        // What rounding takes is nothing.
-        let margin = if self.kept { margin.max(0.0) } else { -margin };
-        write!(f, "{what} {margin:.2e} at ({x:.3}, {y:.3}, {z:.3}) mm")
-    }
-}
-
-impl Report {
-    fn new(runner: &Runner, cost: &Cost) -> Result<Self, Box<dyn std::error::Error>> {
-        let (task, best) = (runner.task(), runner.best());
-        let Judgement { loss, views } = runner.judge(best)?;
-        let view = |(view, result): (&grin_task::View, &ViewResult)| View {
-            name: view.name.clone(),
-            weight: view.weight,
-            spot: result.spot,
-            quality_db: result.quality,
-            rays: result.counts.sent(),
-            excluded: result.counts.excluded().collect(),
-            retrace_error: result.retrace_error,
-        };
-        let error = task.difference(best)?.map(|difference| Error {
-            relative: difference.relative,
-            without_offset: difference.without_offset,
-            offset: difference.offset,
-            of_contrast: Some(difference.of_contrast).filter(|part| part.is_finite()),
-        });
-        let extremes = task.extremes(best);
-        let (integrator, step) = runner.tracing();
-        Ok(Self {
-            name: task.name.clone(),
-            stopped: cost.stopped,
-            loss,
-            views: task.views.iter().zip(&views).map(view).collect(),
-            error,
-            lines: None,
-            index: [extremes.low, extremes.high],
-            slope: extremes.slope,
-            limits: task.kept(best).into_iter().map(Limit::from).collect(),
-            nodes: best.nodes(),
-            parameters: best.field().parameters().len(),
-            steps: runner.steps(),
-            rays: runner.rays(),
-            integrator: integrator.name(),
-            step,
-            ms: cost.ms,
-            processor_ms: cost.processor_ms,
-            memory: cost.memory,
-            files: Vec::new(),
-        })
-    }
-}
-
-impl Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, steps, rays, ms, .. } = self;
-        let stopped = if self.stopped { ", stopped" } else { "" };
-        writeln!(f, "{name}: {steps} steps, {rays} rays and back, {:.2} s{stopped}", 1e-3 * ms)?;
-        let Self { nodes, parameters, integrator, step, .. } = self;
-        writeln!(f, "{nodes} nodes, {parameters} numbers; {integrator}, step {step:.4} mm")?;
-        let [low, high] = self.index.map(|index| format!("{index:.6}"));
-        writeln!(f, "index {low} to {high}, at most {:.4} / mm steep", self.slope)?;
-        self.limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
-        if let Some(Error { relative, without_offset, offset, of_contrast }) = &self.error {
-            write!(f, "off the exact field by {relative:.2e}, relative; by {without_offset:.2e} ")?;
-            writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
-            match of_contrast {
-                Some(part) => {
-                    writeln!(
-                        f,
-                        "which is {part:.4} of what the exact field differs from the start"
-                    )?;
-                }
-                None => writeln!(f, "the exact field is the one at the start: nothing to find")?,
-            }
-        }
-        self.lines.iter().try_for_each(|lines| write!(f, "{lines}"))?;
-        if let Some(Memory { before_mb, peak_mb }) = &self.memory {
-            write!(f, "memory {:.1} MB more than the {before_mb:.1} before", peak_mb - before_mb)?;
-        }
-        match self.processor_ms {
-            Some(ms) => writeln!(f, "; processor time {:.2} s, all threads", 1e-3 * ms)?,
-            None => writeln!(f)?,
-        }
-        writeln!(f, "loss {:.4e} mm^2\n", self.loss)?;
-        let mut table = Table::new(&["view", "weight", "rms spot, mm", "rays", "left out"]);
-        for view in &self.views {
-            let lost = view.excluded.iter().map(|(reason, count)| format!("{count} {reason}"));
-            let lost: Vec<String> = lost.collect();
-            table.row([
-                view.name.clone(),
-                Number(view.weight).to_string(),
-                match view.quality_db {
-                    Some(quality) => format!("{quality:.1} dB"),
-                    None => format!("{:.3e}", view.spot),
-                },
-                view.rays.to_string(),
-                if lost.is_empty() { "none".to_owned() } else { lost.join(", ") },
-            ]);
-        }
-        write!(f, "{table}")?;
-        self.files.iter().try_for_each(|file| writeln!(f, "written: {file}"))
     }
 }

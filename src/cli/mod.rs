@@ -14,6 +14,7 @@ mod failure;
 mod gradient;
 mod grin;
 mod grin_lines;
+mod grin_report;
 mod info;
 mod input;
 mod measure;

@@ -147,7 +147,7 @@ fn ask(context: &Context, view: &View, lost: Lost) -> Option<Answer> {
         }
         Lost::Field => {
             let name = view.forming.run.as_ref().map_or("", |run| run.subject.name.as_str());
-            ("Save the field first?", format!("What was formed for {name} is in no file yet."))
+            ("Save the field first?", format!("The field of “{name}” is in no file yet."))
         }
     };
     let mut answer = None;

@@ -10,4 +10,5 @@ mod panels;
 mod search;
 mod shaders;
 mod slice;
+mod unsaved;
 mod window;

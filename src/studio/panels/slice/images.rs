@@ -69,7 +69,8 @@ impl Pair {
             for (texture, what) in self.textures.iter().zip(["wanted", "made"]) {
                 ui.vertical(|ui| {
                     let image = Shown::new(texture).fit_to_exact_size(vec2(side, side));
-                    ui.add(image.alt_text(format!("Image of {name}: {what}")));
+                    ui.add(image.alt_text(format!("Image of {name}: {what}")))
+                        .on_hover_text("As an eye sees it that looks against the light");
                     ui.label(RichText::new(what).small().weak());
                 });
             }

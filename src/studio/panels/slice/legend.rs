@@ -86,10 +86,12 @@ pub(super) fn colors(ui: &mut Ui, rect: Rect, slice: &Slice) {
     painter.add(Shape::mesh(mesh));
     let font = TextStyle::Small.resolve(ui.style());
     let marks = if high > low { MARKS } else { 1 };
+    let step = (high - low) / (MARKS - 1) as f64;
+    let digits = number::digits_between(low.abs().max(high.abs()), step, 4);
     for i in 0..marks {
         let share = if marks > 1 { i as f32 / (marks - 1) as f32 } else { 0.5 };
         let at = pos2(strip.right() + 4.0, place(share));
-        let text = number::show_digits(value(share), 4);
+        let text = number::show_digits(value(share), digits);
         painter.text(at, Align2::LEFT_CENTER, text, font.clone(), ui.visuals().text_color());
     }
 }

@@ -184,7 +184,9 @@ fn contour_labels(ui: &Ui, shown: &Shown, slice: &Slice) {
         // Along the diagonal up to the right, so that the labels of circles stand in a row.
         let ahead = |at: &egui::Pos2| at.x - at.y;
         if let Some(at) = free.max_by(|a, b| ahead(a).total_cmp(&ahead(b))) {
-            let text = number::show_digits(tidy(contour.level, slice.spacing), 5);
+            let level = tidy(contour.level, slice.spacing);
+            let digits = number::digits_between(level, slice.spacing, 5);
+            let text = number::show_digits(level, digits);
             let galley = painter.layout_no_wrap(text, font.clone(), Color32::WHITE);
             let place = Align2::CENTER_CENTER.anchor_size(at, galley.size());
             painter.rect_filled(place.expand2(egui::vec2(2.0, 0.0)), 2.0, legend::PLATE);

@@ -1,14 +1,44 @@
 //! Two curves: the loss against the steps, and the index along a line beside the exact one.
 
 use eframe::egui::{Role, Ui, WidgetInfo, vec2};
-use egui_plot::{Corner, Legend, Line, LineStyle, Plot, PlotPoints, VLine};
+use egui_plot::{AxisHints, Corner, Legend, Line, LineStyle, Plot, VLine};
 
 use super::words;
 use crate::session::{Formation, Loss, View};
 use crate::studio::panels::decade_name;
 
+/// What lies in a corner: up to this part of the width and the height from it.
+const NEAR: f64 = 0.4;
+
+/// The corner with the fewest points of some curves in it, for a legend.
+fn free_corner<'a>(curves: impl Iterator<Item = &'a [[f64; 2]]>) -> Corner {
+    let points: Vec<[f64; 2]> = curves.flatten().copied().collect();
+    let range = |axis: usize| {
+        let all = || points.iter().map(|point| point[axis]);
+        (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max))
+    };
+    let [across, up] = [range(0), range(1)];
+    let share = |value: f64, (low, high): (f64, f64)| (value - low) / (high - low).max(1e-300);
+    let corners = [
+        (Corner::RightTop, [1.0, 1.0]),
+        (Corner::RightBottom, [1.0, 0.0]),
+        (Corner::LeftBottom, [0.0, 0.0]),
+        (Corner::LeftTop, [0.0, 1.0]),
+    ];
+    let crowd = |[x, y]: [f64; 2]| {
+        let is_near = |p: &&[f64; 2]| {
+            (share(p[0], across) - x).abs() < NEAR && (share(p[1], up) - y).abs() < NEAR
+        };
+        points.iter().filter(is_near).count()
+    };
+    corners
+        .into_iter()
+        .min_by_key(|(_, at)| crowd(*at))
+        .map_or(Corner::RightTop, |(corner, _)| corner)
+}
+
 /// A plot that only shows, in all the room that is left.
-fn plot(ui: &Ui, name: &str) -> Plot<'static> {
+fn plot(ui: &Ui, name: &str, legend: Corner) -> Plot<'static> {
     Plot::new(name.to_owned())
         .height(ui.available_height().max(120.0))
         .allow_drag(false)
@@ -19,7 +49,7 @@ fn plot(ui: &Ui, name: &str) -> Plot<'static> {
         .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
         .grid_spacing(18.0..=110.0)
         .set_margin_fraction(vec2(0.02, 0.06))
-        .legend(Legend::default().position(Corner::RightTop).background_alpha(0.6))
+        .legend(Legend::default().position(legend).background_alpha(0.6))
 }
 
 /// The loss of the current and of the best field, decades up and steps across; a line where the
@@ -31,7 +61,7 @@ pub(super) fn loss(ui: &mut Ui, run: &Formation) {
     }
     ui.label(words::losses(run));
     let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
-    let curve = |loss: fn(&Loss) -> f64| -> PlotPoints<'static> {
+    let curve = |loss: fn(&Loss) -> f64| -> Vec<[f64; 2]> {
         let points = run.history.iter().map(|point| [point.step as f64, decade(loss(point))]);
         points.filter(|[_, y]| y.is_finite()).collect()
     };
@@ -40,8 +70,10 @@ pub(super) fn loss(ui: &mut Ui, run: &Formation) {
     let levels: Vec<f64> = levels.map(|pair| pair[0].step as f64).collect();
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.hyperlink_color);
-    let plot = plot(ui, "loss of the field")
-        .x_axis_label("steps")
+    let corner = free_corner([&current, &best].into_iter().map(Vec::as_slice));
+    let steps = AxisHints::new_x().label("steps").label_spacing(24.0..=44.0);
+    let plot = plot(ui, "loss of the field", corner)
+        .custom_x_axes(vec![steps])
         .y_axis_formatter(|mark, _| decade_name(mark.value));
     let shown = plot.show(ui, |plot| {
         for step in levels {
@@ -65,8 +97,11 @@ pub(super) fn profile(ui: &mut Ui, view: &View) {
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.strong_text_color());
     let now = visuals.hyperlink_color;
-    let plot = plot(ui, "profile of the field")
-        .x_axis_label(format!("{}, mm", profile.along))
+    let curves = [&profile.start, &profile.now, &profile.exact];
+    let corner = free_corner(curves.into_iter().map(Vec::as_slice));
+    let along = AxisHints::new_x().label(format!("{}, mm", profile.along));
+    let plot = plot(ui, "profile of the field", corner)
+        .custom_x_axes(vec![along.label_spacing(24.0..=44.0)])
         .y_axis_formatter(|mark, range| {
             let width = (range.end() - range.start()).max(1e-9);
             let digits = (1.0 - width.log10().floor()).clamp(1.0, 10.0) as usize;

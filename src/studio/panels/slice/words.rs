@@ -152,7 +152,8 @@ fn worth(seen: &Seen) -> String {
 
 /// How the rays of a view are traced, and how good that is.
 fn tracing(seen: &Seen) -> String {
-    let how = format!("{}, step {} mm", seen.integrator.name(), small(seen.step));
+    let how = seen.integrator.name().replace('_', " ");
+    let how = format!("{how}, step {} mm", small(seen.step));
     match seen.error {
         Some(error) => {
             format!("{how}; halving it moves {} exits by at most {error:.1e} mm", seen.sample)
@@ -310,11 +311,10 @@ pub(super) fn pinned(ui: &mut Ui, run: &Formation, pinned: &mut Option<Vec3<f64>
             return;
         };
         let text = probe(&run.subject, &run.medium, point).replace('\n', "   ");
-        ui.label(RichText::new("Pinned").small().weak());
-        ui.label(RichText::new(text).small());
         if ui.small_button("Unpin").clicked() {
             *pinned = None;
         }
+        ui.add(Label::new(RichText::new(&text).small()).truncate()).on_hover_text(&text);
     });
 }
 

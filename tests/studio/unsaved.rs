@@ -1,0 +1,78 @@
+//! What was formed is not thrown away without a question.
+
+use std::time::Duration;
+
+use aplanat::session::{Command, Form, Formation, Session, Standing, blank};
+use aplanat::studio::Studio;
+use aplanat::studio::draw::Backing;
+use aplanat::studio::shell::Memory;
+use eframe::egui::accesskit::Role;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+
+type Window = Harness<'static, Studio>;
+
+fn run(harness: &Window) -> Option<std::sync::Arc<Formation>> {
+    harness.state().session().view().forming.run
+}
+
+fn wait(harness: &mut Window, what: &str, so: impl Fn(&Window) -> bool) {
+    for _ in 0..20_000 {
+        harness.step();
+        if so(harness) {
+            return harness.run_steps(2);
+        }
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    panic!("{what} never happened");
+}
+
+fn tell(harness: &mut Window, form: Form) {
+    harness.state_mut().session_mut().apply(Command::Form(form));
+}
+
+/// A window in which a field has been formed.
+fn formed() -> Window {
+    let session = Session::new(blank(), || {}).unwrap();
+    let studio = Studio::new(session, Backing::Software, Memory::None, None);
+    let builder = Harness::builder().with_size([1280.0, 800.0]);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
+    harness.get_by_label("GRIN slice").click();
+    tell(&mut harness, Form::Builtin("luneburg-radial".to_owned()));
+    wait(&mut harness, "the opening", |harness| run(harness).is_some());
+    assert!(!run(&harness).unwrap().is_unsaved(), "nothing has been formed yet");
+    tell(&mut harness, Form::Start);
+    let is_done = |harness: &Window| run(harness).unwrap().standing == Standing::Finished;
+    wait(&mut harness, "the end", is_done);
+    assert!(run(&harness).unwrap().is_unsaved());
+    harness
+}
+
+fn press(harness: &mut Window, name: &str) {
+    harness.get_by_role_and_label(Role::Button, name).click();
+    harness.run_steps(3);
+}
+
+#[test]
+fn a_field_is_not_lost_without_a_question() {
+    let mut harness = formed();
+    press(&mut harness, "Close");
+    harness.get_by_label("Save the field first?");
+    press(&mut harness, "Cancel");
+    assert!(harness.query_by_label("Save the field first?").is_none());
+    assert!(run(&harness).is_some(), "it is still there");
+    press(&mut harness, "Close");
+    press(&mut harness, "Don't save");
+    assert!(run(&harness).is_none());
+}
+
+#[test]
+fn a_field_that_is_in_a_file_is_closed_at_once() {
+    let mut harness = formed();
+    let path = std::env::temp_dir().join(format!("aplanat-{}-field.npz", std::process::id()));
+    tell(&mut harness, Form::Save { path: Some(path.clone()), nodes: 5 });
+    wait(&mut harness, "the file", |harness| !run(harness).unwrap().is_unsaved());
+    std::fs::remove_file(path).unwrap();
+    press(&mut harness, "Close");
+    assert!(run(&harness).is_none());
+}
