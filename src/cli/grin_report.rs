@@ -27,7 +27,7 @@ pub(super) struct Report {
     pub(super) lines: Option<Found>,
     index: [f64; 2],
     slope: f64,
-    limits: Vec<Limit>,
+    limits: Vec<Held>,
     nodes: usize,
     parameters: usize,
     steps: usize,
@@ -62,7 +62,7 @@ struct Error {
 
 /// A limit of a maker and what the field makes of it.
 #[derive(Serialize)]
-struct Limit {
+struct Held {
     name: &'static str,
     value: f64,
     limit: f64,
@@ -71,14 +71,14 @@ struct Limit {
     at: [f64; 3],
 }
 
-impl From<Kept> for Limit {
+impl From<Kept> for Held {
     fn from(kept: Kept) -> Self {
         let Kept { name, value, limit, margin, at } = kept;
         Self { name, value, limit, margin, kept: kept.is_kept(), at: [at.x, at.y, at.z] }
     }
 }
 
-impl Display for Limit {
+impl Display for Held {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, value, limit, margin, at: [x, y, z], .. } = self;
         let unit = if *name == "slope" { " / mm" } else { "" };
@@ -120,7 +120,7 @@ impl Report {
             lines: None,
             index: [extremes.low, extremes.high],
             slope: extremes.slope,
-            limits: task.kept(best).into_iter().map(Limit::from).collect(),
+            limits: task.kept(best).into_iter().map(Held::from).collect(),
             nodes: best.nodes(),
             parameters: best.field().parameters().len(),
             steps: runner.steps(),

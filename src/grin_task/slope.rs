@@ -26,17 +26,15 @@ impl Medium {
 
     /// The same, and where that is.
     pub(super) fn steepest_at(&self, space: Space) -> Spot {
-        match self {
-            Self::Trilinear(field) => steepest_voxel(field, space),
-            _ => {
-                let region = space.region();
-                let inside = |p: Vec3<f64>| region.height(p) <= 0.0;
-                let slope = |p: Vec3<f64>| length(self.field().sample(p).gradient);
-                let hill = Hill { inside: &inside, value: &slope };
-                let (steepest, at) = climb(&self.looks(space), self.gap(space), &hill);
-                (steepest.max(0.0), at)
-            }
+        if let Self::Trilinear(field) = self {
+            return steepest_voxel(field, space);
         }
+        let region = space.region();
+        let inside = |p: Vec3<f64>| region.height(p) <= 0.0;
+        let slope = |p: Vec3<f64>| length(self.field().sample(p).gradient);
+        let hill = Hill { inside: &inside, value: &slope };
+        let (steepest, at) = climb(&self.looks(space), self.gap(space), &hill);
+        (steepest.max(0.0), at)
     }
 
     /// The same field, drawn towards an index until it is nowhere steeper than the limit.

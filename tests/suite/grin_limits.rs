@@ -5,8 +5,8 @@ use aplanat::files::{Volume, write_volume};
 use aplanat::grin::Launch;
 use aplanat::grin::field::Grid;
 use aplanat::grin_task::{
-    Directions, FieldKind, Goal, Level, MakerLimits, Method, Runner, Source, Space, Start, Task,
-    View,
+    Directions, FieldKind, Goal, Kept, Level, MakerLimits, Method, Runner, Source, Space, Start,
+    Task, View,
 };
 use aplanat::math::Vec3;
 
@@ -75,7 +75,7 @@ fn grin_limits_of_the_index_are_kept_by_every_kind_of_field() {
         let kept = task.kept(best);
         let names: Vec<&str> = kept.iter().map(|kept| kept.name).collect();
         assert_eq!(names, ["lowest index", "highest index"]);
-        assert!(kept.iter().all(|kept| kept.is_kept()), "{field:?}: {kept:?}");
+        assert!(kept.iter().all(Kept::is_kept), "{field:?}: {kept:?}");
         assert!((kept[1].value - high).abs() < 2e-3 && kept[1].limit == 1.12, "{kept:?}");
         let [before, after] = [&first, &runner].map(|r| r.judge(r.best()).unwrap().loss);
         assert!(after < before, "{field:?}: {before} {after}");
@@ -91,7 +91,7 @@ fn grin_a_limit_of_the_slope_leaves_those_of_the_index_kept() {
         let mut task = greedy(field, method, nodes);
         task.limits.slope = Some(0.06);
         let kept = task.kept(solved(&task).best());
-        assert!(kept.len() == 3 && kept.iter().all(|kept| kept.is_kept()), "{field:?}: {kept:?}");
+        assert!(kept.len() == 3 && kept.iter().all(Kept::is_kept), "{field:?}: {kept:?}");
         assert!(kept[2].name == "slope" && kept[2].margin == 0.06 - kept[2].value, "{kept:?}");
     }
 }

@@ -10,12 +10,11 @@ use serde_json::{Value, json};
 fn refusal(name: &str, place: &str, value: Option<Value>) -> Option<String> {
     let task = grin_task::find(name).unwrap().task().unwrap();
     let mut task = serde_json::to_value(&task).unwrap();
-    match value {
-        Some(value) => *task.pointer_mut(place).unwrap() = value,
-        None => {
-            let (parent, key) = place.rsplit_once('/').unwrap();
-            task.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(key).unwrap();
-        }
+    if let Some(value) = value {
+        *task.pointer_mut(place).unwrap() = value;
+    } else {
+        let (parent, key) = place.rsplit_once('/').unwrap();
+        task.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(key).unwrap();
     }
     match grin_task::read(&task.to_string(), "task.json") {
         Err(error) => Some(error.to_string()),
@@ -23,10 +22,12 @@ fn refusal(name: &str, place: &str, value: Option<Value>) -> Option<String> {
     }
 }
 
-#[test]
-fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
-    let source = "/views/0/source";
-    let table: &[(&str, &str, Value, &[&str])] = &[
+/// A task, a place in it, what stands there instead, and the words that tell it.
+type Row = (&'static str, &'static str, Value, &'static [&'static str]);
+
+/// What is wrong with the field and its space.
+fn field() -> Vec<Row> {
+    vec![
         ("luneburg", "/aplanat_grin", json!(2), &["aplanat_grin: found 2; expected 1"]),
         ("luneburg", "/aplanat_grin", json!(1.5), &["aplanat_grin", "1.5", "a whole number"]),
         ("luneburg", "/name", json!(null), &["name", "null", "a string"]),
@@ -57,6 +58,12 @@ fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
         ),
         ("fibre", "/space/rod/to", json!(1e300), &["space, to", "1e300", "1000000 mm"]),
         ("luneburg", "/launch", json!(7), &["launch", "`7`"]),
+    ]
+}
+
+/// What is wrong with the light.
+fn light() -> Vec<Row> {
+    vec![
         ("luneburg", "/views", json!([]), &["views: found none", "at least one"]),
         ("luneburg", "/views", json!({}), &["views", "a list"]),
         ("luneburg", "/views/0", json!(1), &["views, 0", "an object with its keys"]),
@@ -67,7 +74,7 @@ fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
             &["number 0, weight: found -1", "a weight, 0 or more"],
         ),
         ("luneburg", "/views/0/weight", json!(0), &["no weight above 0"]),
-        ("luneburg", source, json!("beam"), &["views, 0, source"]),
+        ("luneburg", "/views/0/source", json!("beam"), &["views, 0, source"]),
         (
             "luneburg",
             "/views/0/source/parallel/rays",
@@ -106,8 +113,26 @@ fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
             &["goal", "`ring` for a source that is no beam"],
         ),
         (
+            "caustic-far",
+            "/views/0/goal/far/angle",
+            json!(90),
+            &["angle: found 90", "degrees from 0.1 to 80"],
+        ),
+        (
+            "maxwell",
+            "/views/0/source/points/cone",
+            json!(-1),
+            &["cone: found -1", "degrees from 0 to 89"],
+        ),
+    ]
+}
+
+/// What is wrong with pictures.
+fn pictures() -> Vec<Row> {
+    vec![
+        (
             "display",
-            source,
+            "/views/0/source",
             json!({"fan": {"height": 1, "z": -2, "rays": 3}}),
             &["`image` for a source that is no beam"],
         ),
@@ -147,24 +172,18 @@ fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
             json!([0, 0, 0]),
             &["source, direction", "not all 0"],
         ),
+    ]
+}
+
+/// What is wrong with the search.
+fn search() -> Vec<Row> {
+    vec![
         ("display", "/method", json!("lbfgs"), &["views, number 0, source, fresh", "only adam"]),
         (
             "luneburg",
             "/method",
             json!("lbfgs"),
             &["views, number 0, source, directions, fresh", "only adam"],
-        ),
-        (
-            "caustic-far",
-            "/views/0/goal/far/angle",
-            json!(90),
-            &["angle: found 90", "degrees from 0.1 to 80"],
-        ),
-        (
-            "maxwell",
-            "/views/0/source/points/cone",
-            json!(-1),
-            &["cone: found -1", "degrees from 0 to 89"],
         ),
         (
             "luneburg",
@@ -226,8 +245,12 @@ fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
             &["exact, maxwell, centre: found 0", "an index above 0"],
         ),
         ("fibre", "/exact/secant/a", json!(0), &["exact, secant, a: found 0", "1/mm above 0"]),
-    ];
-    for (name, place, value, words) in table {
+    ]
+}
+
+#[test]
+fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
+    for (name, place, value, words) in [field(), light(), pictures(), search()].concat() {
         let found = refusal(name, place, Some(value.clone())).unwrap_or_default();
         let all = words.iter().all(|word| found.contains(word));
         assert!(all && found.len() < 300, "{name} {place} {value}: `{found}`, not {words:?}");
