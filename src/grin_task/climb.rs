@@ -9,14 +9,14 @@ use rayon::prelude::*;
 
 /// Points in a cell along each axis, and along a radius, at which a smooth field is looked at.
 pub(super) const POINTS: usize = 2;
-const SPOKE: usize = 1000;
+pub(super) const SPOKE: usize = 1000;
 /// How many of the highest places are climbed from, how often the step is halved there, and how
 /// often one is taken before that.
 const PEAKS: usize = 64;
 const HALVINGS: i32 = 8;
 const MOVES: i32 = 4;
 /// Where a climb may lead.
-const AXES: [Vec3<f64>; 6] = [
+pub(super) const AXES: [Vec3<f64>; 6] = [
     Vec3 { x: 1.0, y: 0.0, z: 0.0 },
     Vec3 { x: -1.0, y: 0.0, z: 0.0 },
     Vec3 { x: 0.0, y: 1.0, z: 0.0 },

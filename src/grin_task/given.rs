@@ -2,6 +2,8 @@
 //! what the task needs.
 
 use super::check::ROUNDING;
+use super::medium::Medium;
+use super::range::Bound;
 use super::task::{Exact, Space, Start};
 use crate::files::{self, FileError, Volume};
 use crate::grin::Field;
@@ -43,16 +45,16 @@ pub enum NoField {
     },
     /// An index that the task does not allow.
     #[error(
-        "{file}: node {node:?} has the index {found}; expected {} to {}, the limits of the task",
+        "{file}: the index is {found} at {at:?} mm; expected {} to {}, the limits of the task",
         expected[0], expected[1]
     )]
     Beyond {
         /// The file.
         file: String,
-        /// The node, counted from 0 along x, y and z.
-        node: [usize; 3],
-        /// What stands there.
+        /// The index that is farthest off.
         found: f64,
+        /// Where, in mm.
+        at: [f64; 3],
         /// The smallest and the largest index.
         expected: [f64; 2],
     },
@@ -130,26 +132,22 @@ pub(super) fn check_reach(path: &Path, space: Space) -> Result<(), NoField> {
     Ok(())
 }
 
-/// Refuses a volume with an index beyond limits at a node within some spaces; what rounding to four
+/// Refuses a volume with an index beyond limits within some spaces; what rounding to four
 /// bytes takes is nothing.
 pub(super) fn check_range(
     path: &Path,
     spaces: &[Space],
     expected: [f64; 2],
 ) -> Result<(), NoField> {
-    let field = from_file::<f64>(path)?;
-    let grid = field.grid();
-    let [low, high] = [expected[0] - SINGLE, expected[1] + SINGLE];
-    let is_inside = |n: usize| spaces.iter().any(|s| s.region().height(grid.node(n)) < 0.0);
-    let mut indices = field.parameters().iter().enumerate();
-    match indices.find(|(n, index)| !(low..=high).contains(*index) && is_inside(*n)) {
+    let medium = Medium::Trilinear(from_file::<f64>(path)?);
+    let [low, high] = [Bound::Low, Bound::High].map(|bound| medium.extreme(spaces, bound));
+    let beyond = [(low, expected[0] - low.0), (high, high.0 - expected[1])];
+    match beyond.into_iter().find(|(_, by)| *by > SINGLE) {
         None => Ok(()),
-        Some((n, found)) => Err(NoField::Beyond {
-            file: path.display().to_string(),
-            node: place(grid.counts(), n),
-            found: *found,
-            expected,
-        }),
+        Some(((found, at), _)) => {
+            let file = path.display().to_string();
+            Err(NoField::Beyond { file, found, at: [at.x, at.y, at.z], expected })
+        }
     }
 }
 

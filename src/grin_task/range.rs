@@ -6,11 +6,11 @@
 //! Where that breaks the range within the space, what they have beyond the range is taken back:
 //! as much as the place needs, and of the coefficients that count there, no others.
 
-use super::climb::{Hill, Spot, climb, higher, peaks};
+use super::climb::{AXES, Hill, SPOKE, Spot, climb, higher, peaks};
 use super::medium::Medium;
 use super::task::Space;
 use crate::grin::Field as _;
-use crate::grin::field::Coordinate;
+use crate::grin::field::Grid;
 use crate::math::Vec3;
 use rayon::prelude::*;
 
@@ -19,8 +19,9 @@ use rayon::prelude::*;
 const LATTICE: usize = 40;
 /// Rounds of taking back, before all of it is taken back.
 const ROUNDS: usize = 40;
-/// How far within the range a broken place is put, in parts of it: what a climb may miss.
-const MARGIN: f64 = 1e-5;
+/// How far within the range a broken place is put, in parts of it: what a climb may miss along a
+/// radius, and in a cube.
+const MARGINS: [f64; 2] = [1e-9, 1e-5];
 
 /// One of the two ends of the index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,18 +47,15 @@ impl Medium {
     pub(super) fn extreme(&self, spaces: &[Space], bound: Bound) -> Spot {
         let value = |p: Vec3<f64>| bound.towards(self.field().sample(p).index);
         let of_space = |space: &Space| {
-            let region = space.region();
-            let inside = |p: Vec3<f64>| region.height(p) <= 0.0 && self.covers(p);
-            let hill = Hill { inside: &inside, value: &value };
-            match self {
-                Self::Trilinear(field) => {
-                    let grid = field.grid();
-                    let nodes = (0..grid.nodes()).map(|n| grid.node(n)).filter(|p| inside(*p));
-                    let places = nodes.chain(space.lattice(LATTICE));
-                    places.map(|p| (value(p), p)).fold((f64::NEG_INFINITY, grid.low()), higher)
-                }
-                _ => climb(&self.looks(*space), self.gap(*space), &hill),
+            if let Self::Trilinear(field) = self {
+                return highest_of(field.grid(), *space, &value);
             }
+            let region = space.region();
+            let is_inside = |p: Vec3<f64>| region.height(p) <= 0.0;
+            let inside =
+                |p: Vec3<f64>| if self.is_radial() { self.covers(p) } else { is_inside(p) };
+            let hill = Hill { inside: &inside, value: &value };
+            climb(&self.lookouts(*space), self.gap(*space), &hill)
         };
         let none = (f64::NEG_INFINITY, Vec3::default());
         let (most, at) = spaces.iter().map(of_space).fold(none, higher);
@@ -89,15 +87,21 @@ impl Medium {
         !matches!(self, Self::Trilinear(_)) && !self.field().parameters().iter().all(within)
     }
 
-    /// Whether it is given at a point: a spline in one coordinate ends.
+    fn is_radial(&self) -> bool {
+        matches!(self, Self::Radial(..))
+    }
+
+    /// Whether a place along x is one of a spline in one coordinate, which ends.
     fn covers(&self, p: Vec3<f64>) -> bool {
-        let Self::Radial(field, radius) = self else { return true };
-        let along = match field.coordinate {
-            Coordinate::Sphere => p.dot(p),
-            Coordinate::Cylinder => p.x * p.x + p.y * p.y,
-            Coordinate::Axial => return true,
-        };
-        along <= radius * radius
+        let Self::Radial(_, radius) = self else { return true };
+        (0.0..=*radius).contains(&p.x) && p.y == 0.0 && p.z == 0.0
+    }
+
+    /// Where the index is looked at: all over the space, or along x up to where a spline ends.
+    fn lookouts(&self, space: Space) -> Vec<Vec3<f64>> {
+        let Self::Radial(_, radius) = self else { return self.looks(space) };
+        let at = |i: usize| Vec3::new(radius * i as f64 / SPOKE as f64, 0.0, 0.0);
+        (0..=SPOKE).map(at).collect()
     }
 
     /// Places in some spaces where the index is beyond a range, and at which end.
@@ -109,9 +113,9 @@ impl Medium {
             _ => None,
         };
         let of_space = |space: &Space| {
-            let region = space.region();
-            let inside = |p: Vec3<f64>| region.height(p) <= 0.0 && self.covers(p);
-            let (looks, gap) = (self.looks(*space), self.gap(*space));
+            let (looks, gap) = (self.lookouts(*space), self.gap(*space));
+            let near = near(*space, gap);
+            let inside = |p: Vec3<f64>| if self.is_radial() { self.covers(p) } else { near(p) };
             let looked = looks.par_iter().filter(|p| inside(**p));
             let mut broken: Vec<_> = looked.filter_map(|p| is_broken(*p)).collect();
             for bound in [Bound::Low, Bound::High] {
@@ -128,7 +132,7 @@ impl Medium {
     /// Takes back what the coefficients that count at some places have beyond a range, until the
     /// places are within it.
     fn take_back(&mut self, broken: &[(Vec3<f64>, Bound)], [low, high]: [f64; 2]) {
-        let margin = MARGIN * (high - low);
+        let margin = MARGINS[usize::from(!matches!(self, Self::Radial(..)))] * (high - low);
         let beyond = |value: f64| value - value.clamp(low, high);
         let mut shares = vec![1.0_f64; self.field().parameters().len()];
         for (p, bound) in broken {
@@ -161,6 +165,27 @@ impl Medium {
                 weights.into_iter().enumerate().filter(|(_, weight)| *weight != 0.0).collect()
             }
         }
+    }
+}
+
+/// The highest value at the nodes of a grid in a space, and between them.
+fn highest_of(grid: &Grid<f64>, space: Space, value: &dyn Fn(Vec3<f64>) -> f64) -> Spot {
+    let region = space.region();
+    let nodes = (0..grid.nodes()).map(|n| grid.node(n)).filter(|p| region.height(*p) <= 0.0);
+    let places = nodes.chain(space.lattice(LATTICE));
+    places.map(|p| (value(p), p)).fold((f64::NEG_INFINITY, grid.low()), higher)
+}
+
+/// Whether a point of the box around a space is in it or nearly so: a climb that may leave a curved
+/// boundary a little goes along it.
+fn near(space: Space, gap: f64) -> impl Fn(Vec3<f64>) -> bool {
+    let (region, [low, high]) = (space.region(), space.corners());
+    move |p| {
+        let in_box = (low.x..=high.x).contains(&p.x)
+            && (low.y..=high.y).contains(&p.y)
+            && (low.z..=high.z).contains(&p.z);
+        let is_inside = |p: Vec3<f64>| region.height(p) <= 0.0;
+        in_box && (is_inside(p) || AXES.iter().any(|to| is_inside(p + *to * gap)))
     }
 }
 

@@ -56,23 +56,26 @@ fn press(harness: &mut Window, name: &str) {
 #[test]
 fn a_field_is_not_lost_without_a_question() {
     let mut harness = formed();
-    press(&mut harness, "Close");
+    press(&mut harness, "Start over");
     harness.get_by_label("Save the field first?");
     press(&mut harness, "Cancel");
     assert!(harness.query_by_label("Save the field first?").is_none());
-    assert!(run(&harness).is_some(), "it is still there");
-    press(&mut harness, "Close");
+    assert!(run(&harness).unwrap().is_unsaved(), "it is still there");
+    press(&mut harness, "Start over");
     press(&mut harness, "Don't save");
-    assert!(run(&harness).is_none());
+    assert!(harness.query_by_label("Save the field first?").is_none());
+    wait(&mut harness, "the beginning", |harness| {
+        harness.state().session().view().forming.pending.is_none()
+    });
 }
 
 #[test]
-fn a_field_that_is_in_a_file_is_closed_at_once() {
+fn a_field_that_is_in_a_file_is_replaced_at_once() {
     let mut harness = formed();
     let path = std::env::temp_dir().join(format!("aplanat-{}-field.npz", std::process::id()));
     tell(&mut harness, Form::Save { path: Some(path.clone()), nodes: 5 });
     wait(&mut harness, "the file", |harness| !run(harness).unwrap().is_unsaved());
     std::fs::remove_file(path).unwrap();
-    press(&mut harness, "Close");
-    assert!(run(&harness).is_none());
+    press(&mut harness, "Start over");
+    assert!(harness.query_by_label("Save the field first?").is_none());
 }

@@ -305,7 +305,7 @@ fn grin_options_that_cannot_be_are_refused_before_any_work() {
     refused(2, &["grin", "fibre", "--out", "no/such/folder/a.npz"], "", &["no/such/folder"]);
     refused(2, &["grin", "fibre", "--minutes", "nan"], "", &["--minutes", "more than 0"]);
     refused(2, &["grin", "fibre", "--iterations", "-1"], "", &["-1"]);
-    refused(2, &["grin", "fibre", "--lines"], "", &["fibre, --lines", "like"]);
+    refused(2, &["grin", "display", "--lines"], "", &["display, --lines", "like"]);
     refused(2, &["grin", "there-is-none.json"], "", &["there-is-none.json", "cannot be read"]);
     refused(2, &["grin", "-"], "a text", &["standard input", "line 1"]);
     refused(2, &["grin", "-"], "", &["standard input", "the end of the file"]);

@@ -110,7 +110,9 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
     let (found, expected) = plain.split_once(", expected ").unwrap_or((plain, "it"));
     let found = match found.strip_prefix("missing field ") {
         Some(key) => format!("no key {key}"),
-        None => found.replace("unknown field", "the unknown key"),
+        None => found
+            .replace("unknown field", "the unknown key")
+            .replace("unknown variant", "the unknown name"),
     };
     Malformed { place, found, expected: in_words(expected) }
 }
