@@ -16,7 +16,7 @@ const PEAKS: usize = 64;
 const HALVINGS: i32 = 8;
 const MOVES: i32 = 4;
 /// Where a climb may lead.
-pub(super) const AXES: [Vec3<f64>; 6] = [
+const AXES: [Vec3<f64>; 6] = [
     Vec3 { x: 1.0, y: 0.0, z: 0.0 },
     Vec3 { x: -1.0, y: 0.0, z: 0.0 },
     Vec3 { x: 0.0, y: 1.0, z: 0.0 },
@@ -47,7 +47,7 @@ pub(super) fn climb(places: &[Vec3<f64>], gap: f64, hill: &Hill<'_>) -> Spot {
 }
 
 /// Where climbs from the highest of some places lead.
-pub(super) fn peaks(places: &[Vec3<f64>], gap: f64, hill: &Hill<'_>) -> Vec<Spot> {
+fn peaks(places: &[Vec3<f64>], gap: f64, hill: &Hill<'_>) -> Vec<Spot> {
     let Hill { inside, value } = hill;
     let looked = places.par_iter().filter(|p| inside(**p));
     let mut found: Vec<Spot> = looked.map(|p| (value(*p), *p)).collect();

@@ -70,17 +70,6 @@ impl<R: Real> Tricubic<R> {
         (place.first, place.t)
     }
 
-    /// The coefficients that count at a point, each with its weight: the value there is the sum of
-    /// their products.
-    pub fn support(&self, at: Vec3<R>) -> impl Iterator<Item = (usize, R)> {
-        let (first, t) = self.locate(at);
-        let b = weights(t, basis);
-        (0..64).map(move |n| {
-            let (i, j, k) = (n % 4, n / 4 % 4, n / 16);
-            (self.row(first, j, k) + i, b.x[i] * b.y[j] * b.z[k])
-        })
-    }
-
     /// The number of the first of four coefficients in row `j` of layer `k`.
     #[inline(always)]
     fn row(&self, first: usize, j: usize, k: usize) -> usize {
