@@ -15,7 +15,7 @@ fn greedy(field: FieldKind, method: Method, nodes: usize) -> Task {
     let source = Source::Parallel {
         directions: Directions::Given(vec![[0.0, 0.0, 1.0]]),
         radius: 0.8,
-        rays: 60,
+        rays: 40,
     };
     let goal = Goal::Point([0.0, 0.0, 1.0]);
     let view = View { name: "focus".into(), source, goal, weight: 1.0, space: None };
@@ -33,7 +33,7 @@ fn greedy(field: FieldKind, method: Method, nodes: usize) -> Task {
         limits: MakerLimits { low: 1.05, high: 1.12, slope: None, change: 0.05 },
         edge: None,
         method,
-        levels: vec![Level { nodes, steps: 12 }],
+        levels: vec![Level { nodes, steps: 8 }],
         exact: None,
     }
 }
@@ -87,7 +87,7 @@ fn grin_limits_of_the_index_are_kept_by_every_kind_of_field() {
 
 #[test]
 fn grin_a_limit_of_the_slope_leaves_those_of_the_index_kept() {
-    for (field, method, nodes) in FIELDS {
+    for (field, method, nodes) in [FIELDS[0], FIELDS[3]] {
         let mut task = greedy(field, method, nodes);
         task.limits.slope = Some(0.06);
         let kept = task.kept(solved(&task).best());
@@ -114,12 +114,7 @@ fn grin_a_start_beyond_the_limits_is_refused_and_one_within_rounding_is_not() {
     let path = std::env::temp_dir().join(format!("aplanat-{}-start.npz", std::process::id()));
     let refused = |middle: f64| {
         let grid = Grid::cube(5, 1.0).unwrap();
-        // Nodes outside the space may be anything that light can cross.
-        let value = |n: usize| match grid.node(n) {
-            p if p.dot(p) > 1.0 => 1.0,
-            p if p.dot(p) == 0.0 => middle,
-            _ => 1.1,
-        };
+        let value = |n: usize| if n == grid.nodes() / 2 { middle } else { 1.1 };
         let values = (0..grid.nodes()).map(value).collect();
         write_volume(&path, &Volume { grid, values }).unwrap();
         let mut task = greedy(FieldKind::Trilinear { half: 1.0 }, Method::Lbfgs, 5);

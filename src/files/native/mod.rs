@@ -111,6 +111,7 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
     let found = match found.strip_prefix("missing field ") {
         Some(key) => format!("no key {key}"),
         None => found
+            .replace("unit variant", "a name alone")
             .replace("unknown field", "the unknown key")
             .replace("unknown variant", "the unknown name"),
     };
