@@ -231,7 +231,7 @@ fn search() -> Vec<Row> {
             json!(1),
             &["levels, number 0, nodes: found 1", "2 to 513"],
         ),
-        ("luneburg", "/levels/0/nodes", json!(1e9), &["levels, 0, nodes", "a whole number"]),
+        ("luneburg", "/levels/0/nodes", json!(2.5), &["levels, 0, nodes", "a whole number"]),
         (
             "luneburg",
             "/exact/luneburg/radius",
