@@ -70,7 +70,6 @@ fn no_gradient_is_taken_for_afocal() {
                     made += 1;
                 }
                 Err(refusal) => {
-                    println!("{name}: {refusal}");
                     assert!(!refusal.why.contains("afocal"), "{name}: {refusal}");
                 }
             }
@@ -251,14 +250,14 @@ fn flagged_coefficients_go_where_their_medium_goes() {
     // Of a group that loses the piece with the gradient nothing stays flagged; else everything.
     let mut lost = 0;
     for seed in 0..20 {
-        let Ok(mutant) =
-            mutate(Kind::DropLayer, &glued, &only(at - 2, at, &glued), &mut seeded(seed))
-        else {
-            continue;
-        };
-        let expected = if is_graded(&mutant.lens) { all.clone() } else { Vec::new() };
-        assert_eq!(flagged(&mutant.lens), expected, "{}", mutant.what);
-        lost += usize::from(expected.is_empty());
+        match mutate(Kind::DropLayer, &glued, &generous(), &mut seeded(seed)) {
+            Ok(mutant) => {
+                let expected = if is_graded(&mutant.lens) { all.clone() } else { Vec::new() };
+                assert_eq!(flagged(&mutant.lens), expected, "{}", mutant.what);
+                lost += usize::from(expected.is_empty());
+            }
+            Err(refusal) => println!("{refusal}"),
+        }
     }
     assert!((1..20).contains(&lost), "{lost}");
 }
@@ -298,12 +297,11 @@ fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
 
 #[test]
 fn a_finished_lens_keeps_its_gradients() {
-    let (mut lens, row) = triplet(&[-2e-4], &[-0.004]);
-    lens.surfaces[0].medium = Medium::Model { nd: 1.62, vd: 60.0 };
+    let (lens, row) = triplet(&[-2e-4], &[-0.004]);
     let landscape = Plan::default().landscape(&lens).unwrap();
     let done = finish(&landscape, landscape.start()).unwrap();
     assert_eq!(done.gradients, [row]);
     assert_eq!(done.lens.surfaces[row].medium, lens.surfaces[row].medium);
-    assert_eq!(done.glasses.len(), 1, "only the model glass is exchanged");
+    assert_eq!(done.glasses.len(), 2, "the model glasses are exchanged, and they alone");
     assert!(landscape.loss(&done.lens).is_finite());
 }
