@@ -228,9 +228,9 @@ impl<R: Real> Slab<R> {
             petzval: R::ZERO,
         };
         if field.grade.used[1] == 0 {
-            slab.across(thickness)
+            slab.across(thickness);
         } else {
-            slab.along(field, thickness)
+            slab.along(field, thickness);
         }
         slab
     }

@@ -271,8 +271,11 @@ fn whole(lens: &Lens, rules: Rules) -> RunOf<LensLandscape> {
 
 #[test]
 fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
+    // One field of the rod, which costs most, is enough.
+    let mut rod = bundled("grin_rod_melles_griot");
+    rod.fields.values.truncate(1);
     for (lens, rules) in [
-        (bundled("grin_rod_melles_griot"), Rules { elements: [1, 4], ..small() }),
+        (rod, Rules { elements: [1, 4], ..small() }),
         (bundled("wood_lens_60"), Rules { elements: [1, 4], ..Rules::default() }),
         (busy(), Rules::default()),
     ] {
