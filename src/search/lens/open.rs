@@ -4,8 +4,9 @@
 use crate::lens::{Aperture, Lens, Medium, Parameter, Quantity, Row, Variable};
 
 /// The lens without its diaphragm, every rim as large as its neighbours, the edge of its own sphere
-/// and `limit` leave room for, in mm. Aspheres, mirrors and the faces of gradients keep their rims:
-/// nothing is known about them farther out. The stop goes to the narrowest surface next to where it stood.
+/// and `limit` leave room for, in mm. Aspheres and mirrors keep their rims, and the faces of gradients
+/// grow no wider: nothing is known about them farther out. The stop goes to the narrowest surface
+/// next to where it stood.
 ///
 /// Its light is what the rims let through.
 #[must_use]
@@ -80,16 +81,15 @@ pub(super) fn with_open_rims(mut lens: Lens, limit: f64) -> Lens {
 }
 
 fn open_rims(lens: &mut Lens, limit: f64) {
-    let graded = |i: usize| matches!(lens.surfaces[i].medium, Medium::Gradient(_));
-    let fixed = |i: usize| {
-        let row = &lens.surfaces[i];
-        let figured = !row.asphere.is_empty() || row.medium == Medium::Mirror;
-        figured || graded(i) || i > 0 && graded(i - 1)
-    };
-    let fixed: Vec<bool> = (0..lens.surfaces.len()).map(fixed).collect();
-    for (row, fixed) in lens.surfaces.iter_mut().zip(&fixed) {
-        if !fixed {
-            row.semi_diameter = Some(limit.min(edge_of(row)));
+    let fixed = |row: &Row| !row.asphere.is_empty() || row.medium == Medium::Mirror;
+    let graded = |row: &Row| matches!(row.medium, Medium::Gradient(_));
+    let mut behind = false;
+    for row in &mut lens.surfaces {
+        let face = behind || graded(row);
+        behind = graded(row);
+        if !fixed(row) {
+            let known = row.semi_diameter.filter(|rim| face && *rim < limit);
+            row.semi_diameter = Some(known.unwrap_or(limit).min(edge_of(row)));
         }
     }
     for i in 0..lens.surfaces.len() - 1 {
@@ -97,8 +97,8 @@ fn open_rims(lens: &mut Lens, limit: f64) {
         let gaps = positions.map(|zoom| lens.thickness_at(i, zoom).unwrap_or(0.0));
         let gap = gaps.fold(f64::INFINITY, f64::min);
         let meet = where_they_meet(&lens.surfaces[i], &lens.surfaces[i + 1], gap);
-        for (row, fixed) in lens.surfaces[i..=i + 1].iter_mut().zip(&fixed[i..]) {
-            if !fixed {
+        for row in &mut lens.surfaces[i..=i + 1] {
+            if !fixed(row) {
                 row.semi_diameter = row.semi_diameter.map(|rim| rim.min(meet));
             }
         }

@@ -9,7 +9,7 @@ use aplanat::lens::{
     Gradient, Law, Lens, Medium, Parameter, Pickup, Quantity, RADIAL_TERMS, Variable,
 };
 use aplanat::math::Vec3;
-use aplanat::search::lens::{LensLandscape, Plan, finish, run};
+use aplanat::search::lens::{LensLandscape, Plan, finish, opened, run};
 use aplanat::search::{Kind, Landscape, Rules, RunOf, Settings, mutate, propose};
 use std::ops::ControlFlow;
 
@@ -307,4 +307,23 @@ fn a_finished_lens_keeps_its_gradients() {
     assert_eq!(done.lens.surfaces[row].medium, lens.surfaces[row].medium);
     assert_eq!(done.glasses.len(), 2, "the model glasses are exchanged, and they alone");
     assert!(landscape.loss(&done.lens).is_finite());
+}
+
+#[test]
+fn nothing_is_opened_where_a_gradient_is_not_known() {
+    let (lens, row) = triplet(&[-2e-4], &[-0.004]);
+    let open = opened(&lens, 30.0);
+    let rims = |lens: &Lens| -> Vec<f64> {
+        lens.surfaces.iter().filter_map(|row| row.semi_diameter).collect()
+    };
+    let (before, after) = (rims(&lens), rims(&open));
+    // The plane of the stop in front of the gradient has gone.
+    assert_eq!(open.surfaces.len() + 1, lens.surfaces.len());
+    assert!(after[0] > before[0], "{after:?}");
+    assert!(after[row - 1] <= before[row] && after[row] <= before[row + 1], "{after:?}");
+    assert_lens(&open);
+    // So no plate is opened to where its index would fall below 1.
+    let plate = opened(&bundled("wood_lens_60"), 40.0);
+    assert_eq!(rims(&plate), [7.5, 8.0]);
+    assert!(plate.system(0, 0.5875618).is_ok());
 }
