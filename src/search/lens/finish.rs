@@ -35,6 +35,8 @@ pub struct Finished {
     pub lens: Lens,
     /// Glasses that were exchanged.
     pub glasses: Vec<Exchanged>,
+    /// Surfaces in front of gradients: no catalogue has such a medium, and each stays what it was.
+    pub gradients: Vec<usize>,
     /// Everything that is limited.
     pub limits: Vec<Margin>,
     /// The light of every field, in mm², and what it may not be less than.
@@ -122,6 +124,7 @@ pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLand
         limits: landscape.limits(&lens)?,
         light: landscape.light_margins(&lens)?,
         confirmed: confirmed(&lens, &figures)?,
+        gradients: gradients(&lens),
         glasses,
         figures,
         lens,
@@ -179,6 +182,11 @@ impl LensLandscape {
         tight.goal.terms = self.goal.terms.iter().map(tighter).collect();
         tight
     }
+}
+
+fn gradients(lens: &Lens) -> Vec<usize> {
+    let is_one = |i: &usize| matches!(lens.surfaces[*i].medium, Medium::Gradient(_));
+    (0..lens.surfaces.len()).filter(is_one).collect()
 }
 
 /// The lens with every model glass replaced by the one of the catalogue that is nearest to it.

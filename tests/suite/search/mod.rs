@@ -4,6 +4,7 @@
 mod chain;
 mod checkpoint;
 mod density;
+mod gradients;
 mod lens;
 mod mutations;
 mod projection;
