@@ -2,11 +2,11 @@
 //! limit is told with the value that stands against it.
 
 use aplanat::files::{Volume, write_volume};
-use aplanat::grin::Launch;
 use aplanat::grin::field::Grid;
+use aplanat::grin::{Integrator, Launch};
 use aplanat::grin_task::{
     Directions, FieldKind, Goal, Kept, Level, MakerLimits, Method, Runner, Source, Space, Start,
-    Task, View,
+    Task, Tracing, View,
 };
 use aplanat::math::Vec3;
 
@@ -29,7 +29,7 @@ fn greedy(field: FieldKind, method: Method, nodes: usize) -> Task {
         views: vec![view],
         start: Start::Uniform(1.1),
         tolerance: 0.01,
-        tracing: None,
+        tracing: Some(Tracing { integrator: Integrator::LeapfrogDkd, per_voxel: 1.0 }),
         limits: MakerLimits { low: 1.05, high: 1.12, slope: None, change: 0.05 },
         edge: None,
         method,
