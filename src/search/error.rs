@@ -58,6 +58,21 @@ pub enum SearchError {
         /// The version that can be read.
         expected: u32,
     },
+    /// A checkpoint belongs to a search from another start.
+    #[error(
+        "{file}: a checkpoint of another search, from another lens: {name} is {found} there and \
+         {expected} here"
+    )]
+    OtherStart {
+        /// The file.
+        file: String,
+        /// What differs: the names on the way to it.
+        name: String,
+        /// What it is in the file.
+        found: String,
+        /// What it is here.
+        expected: String,
+    },
     /// A checkpoint belongs to another search.
     #[error("{file}: a checkpoint of another search: {name} is {found} there and {expected} here")]
     Differs {
@@ -70,4 +85,11 @@ pub enum SearchError {
         /// What it is here.
         expected: String,
     },
+}
+
+/// A number in a message: one that is very large or small by its exponent, not by hundreds of
+/// digits.
+pub(super) fn brief(value: f64) -> String {
+    let plain = value == 0.0 || (1e-4..1e9).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
 }

@@ -11,17 +11,22 @@ mod figures;
 mod finish;
 mod free;
 mod goal;
+mod limits;
 mod open;
 mod plan;
 mod walk;
 
 pub use figures::{FieldFigures, Figures};
-pub use finish::{Confirmed, Exchanged, Finished, finish};
+pub use finish::{Confirmed, Exchanged, Finished, Unlisted, finish};
 pub use goal::goal;
+pub use limits::missed;
 pub use open::opened;
 pub use plan::{NoSearch, Plan, run};
 
-use super::{Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation};
+use super::error::brief;
+use super::{
+    BadRule, Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation,
+};
 use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
 use crate::optimize::{Memory, Method, Stretch, Stretched, stretch};
@@ -79,7 +84,13 @@ pub enum NoLandscape {
     /// Its merit.
     #[error(transparent)]
     Merit(#[from] MeritError),
-    /// A setting or rule without meaning.
+    /// A rule without meaning.
+    #[error(transparent)]
+    Rule(#[from] BadRule),
+    /// Limits that no lens keeps.
+    #[error("no lens keeps these limits: {0}")]
+    Impossible(String),
+    /// A setting without meaning.
     #[error("{what} is {found}; expected {expected}")]
     Setting {
         /// Which one.
@@ -120,6 +131,9 @@ impl LensLandscape {
         local: &Local,
     ) -> Result<Self, NoLandscape> {
         local.check()?;
+        let rules = rules.checked()?;
+        rules.check_kept(lens.surfaces.len())?;
+        limits::check_glasses(lens, &rules)?;
         let mut start = limited_by_stop(lens)?;
         free::hold_the_rest(&mut start);
         start.check()?;
@@ -129,7 +143,7 @@ impl LensLandscape {
             _ => None,
         });
         let freedom = Freedom { size, rims: local.rims, indices: local.indices };
-        let merit = Merit::new(&free::freed(&start, rules, freedom), goal, local.tolerance)?;
+        let merit = Merit::new(&free::freed(&start, &rules, freedom), goal, local.tolerance)?;
         if merit.variables().is_empty() {
             return Err(MeritError::NoVariables.into());
         }
@@ -137,7 +151,7 @@ impl LensLandscape {
             light: merit.light_at_start().to_vec(),
             start,
             goal: goal.clone(),
-            rules: rules.clone(),
+            rules,
             local: local.clone(),
             freedom,
             focal_length: asked.unwrap_or(size),
@@ -223,12 +237,17 @@ impl LensLandscape {
         merit.value(&merit.values(lens))
     }
 
-    /// A local move: where it leads, and what that is worth.
-    fn moved(&self, lens: &Lens, memory: &mut Memory) -> Result<(Lens, f64, usize), MeritError> {
+    /// A local move of no more than so many steps: where it leads, and what that is worth.
+    fn moved(
+        &self,
+        lens: &Lens,
+        memory: &mut Memory,
+        most: usize,
+    ) -> Result<(Lens, f64, usize), MeritError> {
         let Local { method, steps, rate, tolerance, coarse, .. } = self.local;
         let is_coarse = memory.steps < self.local.coarse_steps;
         let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
-        let asked = Stretch { method, steps, rate };
+        let asked = Stretch { method, steps: steps.min(most), rate };
         let Stretched { lens: mut there, before, gradients } =
             stretch(merit, &self.freed(lens), asked, memory)?;
         there.variables.clone_from(&lens.variables);
@@ -257,17 +276,20 @@ impl Local {
         for (what, value) in positive {
             if !(value > 0.0 && value < 1.0) {
                 let expected = "more than 0 and less than 1";
-                return Err(NoLandscape::Setting { what, found: value.to_string(), expected });
+                return Err(NoLandscape::Setting { what, found: brief(value), expected });
             }
         }
-        if self.steps == 0 {
+        if !(1..=MOST_STEPS).contains(&self.steps) {
             let what = "the number of steps of a move";
-            let expected = "1 or more";
-            return Err(NoLandscape::Setting { what, found: "0".into(), expected });
+            let (found, expected) = (self.steps.to_string(), "1 or more, at most 10000");
+            return Err(NoLandscape::Setting { what, found, expected });
         }
         Ok(())
     }
 }
+
+/// No more steps than this: nothing ends a search within a move.
+const MOST_STEPS: usize = 10_000;
 
 /// A move may lead to something worse by this part, since the rays of two lenses differ.
 const SLACK: f64 = 0.05;
@@ -284,7 +306,11 @@ impl Landscape for LensLandscape {
     }
 
     fn descend(&self, lens: &Lens, memory: &mut Memory) -> (Lens, f64, usize) {
-        match self.moved(lens, memory) {
+        self.descend_within(lens, memory, usize::MAX)
+    }
+
+    fn descend_within(&self, lens: &Lens, memory: &mut Memory, most: usize) -> (Lens, f64, usize) {
+        match self.moved(lens, memory, most) {
             Ok(moved) => moved,
             Err(_) => (lens.clone(), f64::INFINITY, 0),
         }
@@ -319,6 +345,12 @@ impl Landscape for LensLandscape {
 
     fn topology(&self, lens: &Lens) -> String {
         element::topology(lens)
+    }
+
+    fn outside(&self, lens: &Lens) -> u64 {
+        let [min, max] = self.rules.elements;
+        let pieces = element::pieces(lens);
+        (min.saturating_sub(pieces) + pieces.saturating_sub(max)) as u64
     }
 
     fn about(&self) -> serde_json::Value {
