@@ -27,6 +27,8 @@ struct Written<'a, R> {
     aplanat_search: u32,
     landscape: &'a Value,
     run: &'a R,
+    #[serde(skip_serializing_if = "Value::is_null")]
+    beside: &'a Value,
 }
 
 #[derive(Deserialize)]
@@ -36,6 +38,9 @@ struct Read<R> {
     _version: u32,
     landscape: Value,
     run: R,
+    /// What whoever saved it keeps there for himself.
+    #[serde(default, rename = "beside")]
+    _beside: Value,
 }
 
 impl<P: Point, M: Point + Default> Run<P, M> {
@@ -47,8 +52,24 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     where
         L: Landscape<Point = P, Memory = M>,
     {
+        self.save_beside(landscape, path, &Value::Null)
+    }
+
+    /// The same with something beside the run, under the name `beside`, on which it does not depend.
+    ///
+    /// # Errors
+    /// As those of [`Run::save`].
+    pub fn save_beside<L>(
+        &self,
+        landscape: &L,
+        path: &Path,
+        beside: &Value,
+    ) -> Result<(), SearchError>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
         let about = landscape.about();
-        let written = Written { aplanat_search: VERSION, landscape: &about, run: self };
+        let written = Written { aplanat_search: VERSION, landscape: &about, run: self, beside };
         let file = path.display().to_string();
         let unproven = |what: String| SearchError::NotProven { file: file.clone(), what };
         let bytes = serde_json::to_vec(&written).map_err(|error| unproven(error.to_string()))?;

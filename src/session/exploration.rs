@@ -43,9 +43,9 @@ pub struct Exploration {
     pub family: Vec<Arc<Node<Arc<Lens>>>>,
     /// Why it is over, where it ended by itself.
     pub over: Option<Ending>,
-    /// The time that it has worked, in seconds.
+    /// The time that it has worked in the window, in seconds.
     pub seconds: f64,
-    /// The same for gradients of this session: a search may have gone on from a file.
+    /// The gradients of that time: a search may have gone on from the file of another program.
     pub gradients: u64,
     /// The rays of a gradient of the best lens.
     pub rays: usize,

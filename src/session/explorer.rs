@@ -5,9 +5,9 @@
 
 use super::background::{Background, Outbox, Work, guarded, pool};
 use super::clock::{Pace, Timed, timed};
+use super::diary::Diary;
 use super::exploration::{Ending, Exploration};
 use super::judged::Judged;
-use super::moments::History;
 use super::quest::{Engine, Explores, Quest};
 use super::slot::Slot;
 use super::worker::Standing;
@@ -167,7 +167,7 @@ struct Desk {
 struct Run {
     engine: Box<dyn Explores>,
     state: Exploration,
-    history: History,
+    diary: Diary,
 }
 
 impl Work for Desk {
@@ -181,11 +181,13 @@ impl Work for Desk {
         match order {
             Order::Start { number, lens, quest, path } => {
                 let begun = guarded(|| (self.begin)(&lens, &quest));
-                self.begin(number, begun.map(|engine| (engine, *quest)), path);
+                let diary = Diary { minutes: quest.minutes, ..Diary::default() };
+                self.begin(number, begun.map(|engine| (engine, *quest, diary)), path);
             }
             Order::GoOn { number, path } => {
                 let begun = guarded(|| Engine::go_on(&path).map_err(|why| why.to_string()));
-                let begun = begun.map(|(e, quest)| (Box::new(e) as Box<dyn Explores>, quest));
+                let boxed = |engine| Box::new(engine) as Box<dyn Explores>;
+                let begun = begun.map(|(engine, quest, diary)| (boxed(engine), quest, diary));
                 self.begin(number, begun, Some(path));
             }
             Order::Stand(standing) => {
@@ -236,7 +238,7 @@ impl Desk {
     fn begin(
         &mut self,
         number: u64,
-        begun: Result<(Box<dyn Explores>, Quest), String>,
+        begun: Result<(Box<dyn Explores>, Quest, Diary), String>,
         path: Option<PathBuf>,
     ) {
         self.save();
@@ -248,11 +250,10 @@ impl Desk {
             Ok(begun)
         });
         match ready {
-            Ok((engine, quest)) => {
+            Ok((engine, quest, mut diary)) => {
                 let state = Exploration::new(number, quest, engine.run(), path);
-                let mut history = History::default();
-                history.note(engine.run(), &[]);
-                self.run = Some(Run { engine, state, history });
+                diary.history.begin(engine.run());
+                self.run = Some(Run { engine, state, diary });
                 self.saves.is_due();
                 self.stand(Standing::Running);
             }
@@ -336,15 +337,15 @@ impl Run {
         let before = self.engine.run().statistics().gradients;
         let engine = &mut self.engine;
         let Timed { value: events, ms } = timed(|| pool.install(|| engine.round()));
-        self.state.seconds += 1e-3 * ms;
-        self.state.gradients += self.engine.run().statistics().gradients - before;
-        self.history.note(self.engine.run(), &events);
+        self.diary.seconds += 1e-3 * ms;
+        self.diary.gradients += self.engine.run().statistics().gradients - before;
+        self.diary.history.note(self.engine.run(), &events);
         self.over()
     }
 
     fn over(&self) -> Option<Ending> {
         let minutes = self.state.quest.minutes;
-        let late = minutes.is_some_and(|minutes| self.state.seconds >= 60.0 * minutes);
+        let late = minutes.is_some_and(|minutes| self.diary.seconds >= 60.0 * minutes);
         let over = self.engine.run().over().map(Ending::Over);
         over.or_else(|| late.then_some(Ending::Time))
     }
@@ -359,7 +360,9 @@ impl Run {
     /// Takes over what the search has found.
     fn look(&mut self) -> Exploration {
         self.state.look(self.engine.run());
-        self.state.history = Arc::new(self.history.clone());
+        self.state.seconds = self.diary.seconds;
+        self.state.gradients = self.diary.gradients;
+        self.state.history = Arc::new(self.diary.history.clone());
         self.state.clone()
     }
 
@@ -370,7 +373,7 @@ impl Run {
         let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
         let saved = made
             .map_err(|why| format!("{}: {why}", path.display()))
-            .and_then(|()| self.engine.save(path).map_err(|why| why.to_string()));
+            .and_then(|()| self.engine.save(path, &self.diary).map_err(|why| why.to_string()));
         if saved.is_ok() {
             self.state.checkpoint.moves = Some(moves);
         }

@@ -16,6 +16,7 @@ mod clock;
 mod command;
 mod course;
 mod desk;
+mod diary;
 mod edit;
 mod exploration;
 mod explorations;

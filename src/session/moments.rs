@@ -4,6 +4,7 @@ use crate::lens::Lens;
 use crate::search::element::pieces;
 use crate::search::lens::LensLandscape;
 use crate::search::{Chain, Event, Kind, Node, RunOf};
+use serde::{Deserialize, Serialize};
 
 /// How many moments of the history are kept; beyond that every second one goes.
 const MOMENTS: usize = 1500;
@@ -11,7 +12,7 @@ const MOMENTS: usize = 1500;
 const MARKS: usize = 3000;
 
 /// The merit so far, and every mutation.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct History {
     /// What was seen after a round, the oldest first.
     pub moments: Vec<Moment>,
@@ -24,7 +25,7 @@ pub struct History {
 }
 
 /// What was seen after a round.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// Rounds of all chains so far.
     pub round: u64,
@@ -35,7 +36,7 @@ pub struct Moment {
 }
 
 /// Where a descent began.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
     /// In which round.
     pub round: u64,
@@ -52,6 +53,14 @@ pub struct Mark {
 }
 
 impl History {
+    /// Notes where a run stands that begins or goes on.
+    pub(super) fn begin(&mut self, run: &RunOf<LensLandscape>) {
+        let round = run.statistics().rounds;
+        if self.moments.last().is_none_or(|last| last.round < round) {
+            self.note(run, &[]);
+        }
+    }
+
     /// Notes what a round has brought.
     pub(super) fn note(&mut self, run: &RunOf<LensLandscape>, events: &[Event]) {
         let round = run.statistics().rounds;

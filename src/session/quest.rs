@@ -1,5 +1,6 @@
 //! A search over structure as a person asks for it, and the engine that does it.
 
+use super::diary::Diary;
 use super::finishing::Finishing;
 use crate::files::FileError;
 use crate::lens::Lens;
@@ -7,6 +8,7 @@ use crate::merit::Goal;
 use crate::search::lens::{LensLandscape, Local, NoLandscape, Plan, opened};
 use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer, element};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
@@ -30,7 +32,7 @@ pub(super) trait Explores: Send {
     fn run(&self) -> &RunOf<LensLandscape>;
     fn round(&mut self) -> Vec<search::Event>;
     fn steer(&mut self, steer: Steer) -> Result<(), SearchError>;
-    fn save(&self, path: &Path) -> Result<(), SearchError>;
+    fn save(&self, path: &Path, diary: &Diary) -> Result<(), SearchError>;
     /// What makes a lens that can be made of one that was found.
     fn finishing(&self) -> Finishing;
     /// The rays of a gradient of the best lens.
@@ -61,6 +63,9 @@ pub(super) enum NoQuest {
 struct Kept {
     landscape: KeptLandscape,
     run: KeptRun,
+    /// None where the search was saved by another program than the window.
+    #[serde(default)]
+    beside: Value,
 }
 
 #[derive(Deserialize)]
@@ -95,14 +100,17 @@ impl Engine {
         Ok(Self { landscape, run })
     }
 
-    /// The search that a checkpoint holds, and what it was asked for.
-    pub(super) fn go_on(path: &Path) -> Result<(Self, Quest), NoQuest> {
-        let Kept { landscape: kept, run: KeptRun { settings } } = read(path)?;
+    /// The search that a checkpoint holds, what it was asked for, and what was kept beside it.
+    pub(super) fn go_on(path: &Path) -> Result<(Self, Quest, Diary), NoQuest> {
+        let Kept { landscape: kept, run: KeptRun { settings }, beside } = read(path)?;
+        // A curve that cannot be read is no reason to lose the search.
+        let diary: Diary = serde_json::from_value(beside).unwrap_or_default();
         let KeptLandscape { start, goal, rules, local } = kept;
         let landscape = LensLandscape::new(&start, &goal, &rules, &local)?;
         let run = Run::load(&landscape, &settings, path)?;
         let plan = Plan { goal: Some(goal), rules, local, settings, ..Plan::default() };
-        Ok((Self { landscape, run }, Quest { plan, ..Quest::default() }))
+        let quest = Quest { plan, minutes: diary.minutes_left(), ..Quest::default() };
+        Ok((Self { landscape, run }, quest, diary))
     }
 }
 
@@ -127,8 +135,9 @@ impl Explores for Engine {
         self.run.steer(&self.landscape, steer)
     }
 
-    fn save(&self, path: &Path) -> Result<(), SearchError> {
-        self.run.save(&self.landscape, path)
+    fn save(&self, path: &Path, diary: &Diary) -> Result<(), SearchError> {
+        let beside = serde_json::to_value(diary).unwrap_or_default();
+        self.run.save_beside(&self.landscape, path, &beside)
     }
 
     fn finishing(&self) -> Finishing {

@@ -25,6 +25,7 @@ fn quest(moves: Option<u64>) -> Quest {
     let settings = quest.plan.settings;
     quest.plan.settings = Settings { chains: 2, moves, gradients: None, remembered: 8, ..settings };
     quest.plan.local.steps = 2;
+    quest.minutes = Some(10.0);
     quest
 }
 
@@ -198,6 +199,8 @@ fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
     let (whole, found) = (run(&whole), run(&second));
     assert_eq!(found.best.lens, whole.best.lens);
     assert_eq!(found.statistics, whole.statistics);
+    assert_eq!(found.history, whole.history, "the curve behind it is there too");
+    assert_eq!((found.gradients, found.quest.minutes), (whole.gradients, Some(10.0)));
     assert_eq!(found.checkpoint.moves, Some(60));
     assert_eq!(found.checkpoint.path.as_ref(), Some(&left));
 
