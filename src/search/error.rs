@@ -86,10 +86,3 @@ pub enum SearchError {
         expected: String,
     },
 }
-
-/// A number in a message: one that is very large or small by its exponent, not by hundreds of
-/// digits.
-pub(super) fn brief(value: f64) -> String {
-    let plain = value == 0.0 || (1e-4..1e9).contains(&value.abs());
-    if plain { value.to_string() } else { format!("{value:e}") }
-}

@@ -1,8 +1,8 @@
 //! What a search may do to a lens, and what a factory can make.
 
 use super::Kind;
-use super::error::brief;
 use crate::lens::glass;
+use crate::math::brief;
 use serde::{Deserialize, Serialize};
 
 /// The limits of a search.

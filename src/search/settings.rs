@@ -1,7 +1,7 @@
 //! How a search goes: everything that a run depends on besides its landscape and its start.
 
-use super::error::brief;
 use super::{SearchError, Temperature, Termination};
+use crate::math::brief;
 use serde::{Deserialize, Serialize};
 
 /// No more chains than this: each takes the memory of a descent, and a turn of every round.

@@ -1,8 +1,8 @@
 //! A hand on a run between two rounds.
 
-use super::error::brief;
 use super::reservoir::Entry;
 use super::{Kind, Landscape, Point, Run, SearchError, Temperature};
+use crate::math::brief;
 use serde::{Deserialize, Serialize};
 
 /// What a person tells a run between two rounds. All of it is part of the run's state, and so of

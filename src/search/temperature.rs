@@ -3,7 +3,7 @@
 //! Everything is computed from logarithms, so that densities far below the smallest number still
 //! compare. At temperature 0 only the order of two losses is left, at infinite temperature nothing.
 
-use super::error::brief;
+use crate::math::brief;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::{self, Display};
 

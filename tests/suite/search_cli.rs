@@ -115,6 +115,7 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--out", "lens.txt"], &[".txt", ".json"]);
     wrong(&["--checkpoint", "no/such/run.json"], &["no such folder"]);
     wrong(&["--wavelength", "0"], &["--wavelength", "more than 0"]);
+    wrong(&["--wavelength", "1e308"], &["wavelength is 1e308; expected"]);
     let rules = Scratch::with("rules.json", r#"{"glasses": ["SCHOTT N-BK77"]}"#);
     wrong(&["--rules", rules.path()], &["N-BK77"]);
     let rules = Scratch::with("rules-weight.json", r#"{"weights": [["bend", -2.0]]}"#);

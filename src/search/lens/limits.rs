@@ -3,8 +3,8 @@
 
 use super::{LensLandscape, NoLandscape};
 use crate::lens::{Lens, Medium, Object, glass};
+use crate::math::brief;
 use crate::merit::{Margin, MeritError, Term, TermValue};
-use crate::search::error::brief;
 use crate::search::{Rules, element};
 use std::f64::consts::PI;
 

@@ -12,6 +12,7 @@ mod finish;
 mod free;
 mod goal;
 mod limits;
+mod local;
 mod open;
 mod plan;
 mod walk;
@@ -20,57 +21,18 @@ pub use figures::{FieldFigures, Figures};
 pub use finish::{Confirmed, Exchanged, Finished, Unlisted, finish};
 pub use goal::goal;
 pub use limits::missed;
+pub use local::Local;
 pub use open::opened;
 pub use plan::{NoSearch, Plan, run};
 
-use super::error::brief;
 use super::{
     BadRule, Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation,
 };
 use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
-use crate::optimize::{Memory, Method, Stretch, Stretched, stretch};
+use crate::optimize::{Memory, Stretch, Stretched, stretch};
 use crate::pupil::{BenchError, limited_by_stop};
 use free::Freedom;
-use serde::{Deserialize, Serialize};
-
-/// How a lens descends.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Local {
-    /// What takes the steps.
-    pub method: Method,
-    /// Steps that a local move tries; least squares tries fewer where hardly anything is left to gain.
-    pub steps: usize,
-    /// The rate of Adam when a descent begins: a step of one alters the residuals by as much as
-    /// they are.
-    pub rate: f64,
-    /// The error allowed of the radius of a spot, relatively.
-    pub tolerance: f64,
-    /// The same for the first steps of a descent.
-    pub coarse: f64,
-    /// For how many steps.
-    pub coarse_steps: usize,
-    /// Whether rims are free.
-    pub rims: bool,
-    /// Whether the indices of model glasses are free.
-    pub indices: bool,
-}
-
-impl Default for Local {
-    fn default() -> Self {
-        Self {
-            method: Method::DampedLeastSquares,
-            steps: 20,
-            rate: 0.015,
-            tolerance: 1e-2,
-            coarse: 1e-2,
-            coarse_steps: 0,
-            rims: true,
-            indices: false,
-        }
-    }
-}
 
 /// Why a lens cannot be searched from.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -268,28 +230,6 @@ impl LensLandscape {
         }
     }
 }
-
-impl Local {
-    fn check(&self) -> Result<(), NoLandscape> {
-        let positive = [("the rate", self.rate), ("the tolerance", self.tolerance)];
-        let positive = positive.into_iter().chain([("the coarse tolerance", self.coarse)]);
-        for (what, value) in positive {
-            if !(value > 0.0 && value < 1.0) {
-                let expected = "more than 0 and less than 1";
-                return Err(NoLandscape::Setting { what, found: brief(value), expected });
-            }
-        }
-        if !(1..=MOST_STEPS).contains(&self.steps) {
-            let what = "the number of steps of a move";
-            let (found, expected) = (self.steps.to_string(), "1 or more, at most 10000");
-            return Err(NoLandscape::Setting { what, found, expected });
-        }
-        Ok(())
-    }
-}
-
-/// No more steps than this: nothing ends a search within a move.
-const MOST_STEPS: usize = 10_000;
 
 /// A move may lead to something worse by this part, since the rays of two lenses differ.
 const SLACK: f64 = 0.05;
