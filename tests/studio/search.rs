@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use aplanat::files;
-use aplanat::lens::{Lens, Medium};
+use aplanat::lens::{Fields, Lens, Medium};
 use aplanat::optimize::pareto::Design;
 use aplanat::search::{
     Ended, Kind, Method, Node, Offer, Statistics, Steer, Tally, Temperature, Weights,
@@ -146,6 +146,32 @@ fn a_search_is_wished_for_as_the_panel_says() {
     assert!(quest.plan.settings.gradients.is_none(), "nothing but a person ends it");
     let glasses = &quest.plan.rules.glasses;
     assert!(glasses.len() > 1 && glasses.iter().all(|name| name.contains(' ')), "{glasses:?}");
+}
+
+#[test]
+fn every_field_may_keep_a_share_of_its_own() {
+    let mut harness = panel(view());
+    assert!(harness.query_by_label("Least light").is_some());
+    press(&mut harness, "each field by itself");
+    assert!(harness.query_by_label("Least light").is_none());
+    let fields = double_gauss().fields.values.len();
+    assert_eq!(harness.query_all_by_label_contains("Least light at ").count(), fields);
+    press(&mut harness, "Search");
+    assert_eq!(started(&harness).plan.light, vec![1.0; fields]);
+
+    let mut harness = panel(view());
+    press(&mut harness, "each field by itself");
+    harness.state_mut().view = view_of(Lens { fields: one_field(), ..double_gauss() });
+    harness.run();
+    press(&mut harness, "Search");
+    assert_eq!(started(&harness).plan.light, [1.0], "another lens, other fields");
+}
+
+/// The axis alone.
+fn one_field() -> Fields {
+    let mut fields = double_gauss().fields;
+    fields.values.truncate(1);
+    fields
 }
 
 #[test]

@@ -254,6 +254,6 @@ fn ends(heats: &[Heat]) -> Table {
 impl Effort {
     /// How much a race is worth: lenses, seeds, gradients.
     pub(super) fn race(self) -> (usize, u64, u64) {
-        self.pick((SUBJECTS.len(), 5, 4000), (1, 2, 200))
+        self.pick((SUBJECTS.len(), 5, 12_000), (1, 2, 200))
     }
 }

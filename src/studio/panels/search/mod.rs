@@ -6,6 +6,7 @@
 mod controls;
 mod family;
 mod lenses;
+mod light;
 mod limits;
 mod marks;
 mod moves;

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use eframe::egui::emath::Numeric;
 use eframe::egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
 
-use super::{limits, marks};
+use super::{light, limits, marks};
 use crate::lens::{Lens, Medium};
 use crate::search::element::pieces;
 use crate::search::{Kind, Method, Settings};
@@ -63,6 +63,7 @@ impl Setup {
     /// What is asked for, for the design as it is.
     pub(super) fn quest(&self, view: &View) -> Quest {
         let mut quest = self.quest.clone();
+        quest.plan.light = light::fitting(quest.plan.light, &view.lens);
         if self.own_glasses {
             quest.plan.rules.glasses = glasses(&view.lens);
         }
@@ -77,7 +78,7 @@ impl Setup {
         Grid::new("search setup").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
             self.sampler(ui);
             self.structure(ui, view);
-            self.aims(ui);
+            self.aims(ui, &view.lens);
             self.end(ui);
         });
         limits::factory(ui, &mut self.quest.plan.rules);
@@ -138,20 +139,10 @@ impl Setup {
         ui.end_row();
     }
 
-    fn aims(&mut self, ui: &mut Ui) {
+    fn aims(&mut self, ui: &mut Ui, lens: &Lens) {
         let quest = &mut self.quest;
         ui.weak("Light");
-        ui.horizontal(|ui| {
-            let mut percent = 100.0 * quest.plan.light.first().copied().unwrap_or(1.0);
-            let hint =
-                "Every field keeps at least this share of the light that it has at the start";
-            let drag = DragValue::new(&mut percent).range(0.0..=1000.0).speed(0.5).suffix(" %");
-            let drag = ui.add(drag.max_decimals(1)).on_hover_text(hint);
-            if drag.accessible_name("Least light").changed() {
-                quest.plan.light = vec![percent / 100.0];
-            }
-            ui.weak("of the light at the start");
-        });
+        light::shares(ui, &mut quest.plan.light, lens);
         ui.end_row();
         ui.weak("Focal length");
         let hint = "Ask for another focal length than that of the design";

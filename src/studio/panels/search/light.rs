@@ -1,0 +1,71 @@
+//! How much of its light each field keeps: one share for all, or one for each.
+
+use eframe::egui::{DragValue, Ui};
+
+use super::super::field_name;
+use crate::lens::{Field, Lens};
+
+/// One share for all fields, or one for each of them; more than nothing, 1 for as much as at the start.
+pub(super) fn shares(ui: &mut Ui, light: &mut Vec<f64>, lens: &Lens) {
+    let fields = common_fields(lens);
+    fit(light, fields.len());
+    ui.vertical(|ui| {
+        ui.horizontal(|ui| {
+            if let [all] = &mut light[..] {
+                share(ui, "Least light", all, "Every field keeps at least this share");
+            }
+            ui.weak("of the light at the start");
+        });
+        if fields.len() > 1 {
+            let mut each = light.len() > 1;
+            let hint = "Ask for a share of its own of every field";
+            if ui.checkbox(&mut each, "each field by itself").on_hover_text(hint).changed() {
+                *light = if each { vec![light[0]; fields.len()] } else { vec![mean(light)] };
+            }
+        }
+        if light.len() > 1 {
+            ui.horizontal_wrapped(|ui| of_each(ui, light, &fields, lens));
+        }
+    });
+}
+
+/// As many shares as a lens has fields, or one, as a search wants them.
+pub(super) fn fitting(mut light: Vec<f64>, lens: &Lens) -> Vec<f64> {
+    fit(&mut light, common_fields(lens).len());
+    light
+}
+
+fn of_each(ui: &mut Ui, light: &mut [f64], fields: &[Field], lens: &Lens) {
+    for (value, field) in light.iter_mut().zip(fields) {
+        let name = field_name(lens.fields.kind, *field);
+        share(ui, &format!("Least light at {name}"), value, "This field keeps at least this share");
+        ui.weak(format!("at {name}"));
+    }
+}
+
+fn share(ui: &mut Ui, name: &str, value: &mut f64, hint: &str) {
+    let mut percent = 100.0 * *value;
+    let drag = DragValue::new(&mut percent).range(0.1..=1000.0).speed(0.5).suffix(" %");
+    let drag = ui.add(drag.max_decimals(1)).on_hover_text(hint);
+    if drag.accessible_name(name).changed() {
+        *value = percent / 100.0;
+    }
+}
+
+/// The fields of a lens that has the same ones at all zoom positions; none of any other.
+fn common_fields(lens: &Lens) -> Vec<Field> {
+    let own = &lens.fields;
+    let same = (0..lens.zoom_positions()).all(|zoom| lens.fields_at(zoom) == own);
+    if same { own.values.clone() } else { Vec::new() }
+}
+
+/// Shares of a lens with another number of fields count for all alike.
+fn fit(light: &mut Vec<f64>, fields: usize) {
+    if light.is_empty() || (light.len() > 1 && light.len() != fields) {
+        *light = vec![mean(light)];
+    }
+}
+
+fn mean(light: &[f64]) -> f64 {
+    if light.is_empty() { 1.0 } else { light.iter().sum::<f64>() / light.len() as f64 }
+}
