@@ -2,8 +2,8 @@
 
 use eframe::egui::{DragValue, Ui};
 
-use super::super::field_name;
 use crate::lens::{Field, Lens};
+use crate::studio::panels::field_name;
 
 /// One share for all fields, or one for each of them; more than nothing, 1 for as much as at the start.
 pub(super) fn shares(ui: &mut Ui, light: &mut Vec<f64>, lens: &Lens) {
