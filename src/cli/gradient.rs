@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::input::{LensFile, Opened, Tolerance};
 use super::output::{Number, Output, Table};
-use crate::lens::{Fields, Lens, Medium, at_zoom};
+use crate::lens::{Fields, Lens, Medium, RADIAL_TERMS, at_zoom};
 use crate::measure::timed;
 use crate::pupil::{
     Accuracy, Bench, Cost, Derivative, Estimator, NoDerivative, Region, differentiate,
@@ -268,6 +268,27 @@ impl Display for Report {
             ];
             table.row(std::iter::once(i.to_string()).chain(cells));
         }
-        write!(f, "{table}")
+        write!(f, "{table}")?;
+        self.write_gradients(f)
+    }
+}
+
+impl Report {
+    /// The coefficients of every gradient-index medium.
+    fn write_gradients(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, (by, error)) in self.d.gradient.iter().zip(&self.d_error.gradient).enumerate() {
+            let (Some(by), Some(error)) = (by, error) else { continue };
+            let title = format!("gradient after surface {i}, coefficient of");
+            let mut table = Table::new(&[&title, "derivative"]);
+            for (k, (by, error)) in by.iter().zip(error).enumerate() {
+                let power = match k.checked_sub(RADIAL_TERMS) {
+                    None => format!("r^{}", 2 * k + 2),
+                    Some(j) => format!("z^{}", j + 1),
+                };
+                table.row([power, format!("{by:.6e} ± {error:.0e}")]);
+            }
+            write!(f, "\n{table}")?;
+        }
+        Ok(())
     }
 }

@@ -49,4 +49,6 @@ const LENSES: &[Bundled] = lenses! {
     "microscope_us5000548_1": "Microscope objective NA 0.25",
     "telescope_rc_f8": "Ritchey-Chretien telescope f/8",
     "grin_rod_melles_griot": "Gradient-index rod 1.9 mm (Melles Griot)",
+    "wood_lens_60": "Wood lens 60 mm f/4 (gradient across)",
+    "axial_gradient_singlet_50": "Singlet 50 mm f/2.5 (gradient along)",
 };

@@ -72,6 +72,54 @@ impl Gradient {
         self.terms().iter().all(|term| *term == 0.0)
     }
 
+    /// Whether the index varies along the axis.
+    pub fn is_axial(&self) -> bool {
+        self.axial.iter().any(|term| *term != 0.0)
+    }
+
+    /// The same medium met from the other end of a gap of this length: with `s = length − z`,
+    /// `Σ bⱼ zʲ = Σ bⱼ lengthʲ + Σ b'ₖ sᵏ`, where `b'ₖ = (−1)ᵏ Σⱼ C(j, k) bⱼ lengthʲ⁻ᵏ`. The constant goes
+    /// into the index of the base; `None` where that has dispersion, which the sum does not share, or
+    /// where the law multiplies it by something else.
+    #[must_use]
+    pub fn turned(&self, length: f64) -> Option<Self> {
+        if !self.is_axial() {
+            return Some(self.clone());
+        }
+        // From Σ bⱼ zʲ to powers of z − length, by Horner's scheme, one division after the other.
+        let mut terms: Vec<f64> = std::iter::once(0.0).chain(self.axial.iter().copied()).collect();
+        let top = terms.len() - 1;
+        for first in 0..top {
+            for i in (first..top).rev() {
+                terms[i] += length * terms[i + 1];
+            }
+        }
+        terms.iter_mut().skip(1).step_by(2).for_each(|odd| *odd = -*odd);
+        let base = self.raised(terms.remove(0))?;
+        Some(Self { base, axial: terms, ..self.clone() })
+    }
+
+    /// The base with a constant added to what the coefficients build.
+    fn raised(&self, by: f64) -> Option<Medium> {
+        if by == 0.0 {
+            return Some(self.base.clone());
+        }
+        let radial = self.radial.iter().any(|term| *term != 0.0);
+        let index = match self.base {
+            Medium::Index(n) => n,
+            Medium::Model { nd, vd: 0.0 } => nd,
+            _ => return None,
+        };
+        match self.law {
+            Law::Sech if radial => None,
+            Law::Square => {
+                let square = index * index + by;
+                (square > 0.0).then(|| Medium::Index(square.sqrt()))
+            }
+            Law::Index | Law::Sech => Some(Medium::Index(index + by)),
+        }
+    }
+
     /// What is wrong with it, if anything.
     pub(super) fn fault(&self) -> Option<String> {
         let radial = if self.law == Law::Sech { 1 } else { RADIAL_TERMS };
@@ -149,11 +197,16 @@ fn on_axis<R: Real>(field: &Graded<R>, z: R) -> (R, R) {
 /// a rod of a few pitches does. A gradient across the axis alone is exact in one.
 const SLABS: usize = 128;
 
-/// A gap filled with a gradient, for paraxial rays.
+/// A gap filled with a gradient, for paraxial rays. Where light runs towards −z, its index and the
+/// optical slope count negative.
 #[derive(Debug, Clone, Copy)]
 pub struct Slab<R> {
     /// The index on the axis at its end.
     pub index_behind: R,
+    /// By how much that grows with the thickness, in 1/mm.
+    pub climb: R,
+    /// The derivative of the optical slope at its end by the thickness, for a height of 1.
+    pub pull: R,
     /// From height and optical slope `n u` at its beginning to those at its end: `[[A, B], [C, D]]`.
     pub matrix: [[R; 2]; 2],
     /// What it adds to the Petzval sum, `−∫ 2 n₁/n² dz` where `n = n₀ + n₁ r²`.
@@ -165,31 +218,80 @@ impl<R: Real> Slab<R> {
     /// fourth order with two Gauss points a slab (Blanes, Casas, Oteo and Ros, Phys. Rep. 470, 2009,
     /// eq. 253), which for constant coefficients is the matrix of cosines and sines itself.
     pub fn new(field: &Graded<R>, thickness: R) -> Self {
-        let h = thickness * R::from_f64(1.0 / SLABS as f64);
-        let half = R::from_f64(0.5);
-        let off = h * R::from_f64(3f64.sqrt() / 6.0);
+        let (index_behind, c) = on_axis(field, thickness);
+        let at_end = field.force(Vec3::new(R::ZERO, R::ZERO, thickness));
         let mut slab = Self {
-            index_behind: on_axis(field, thickness).0,
+            index_behind,
+            climb: at_end.force.z / index_behind,
+            pull: c / index_behind,
             matrix: [[R::ONE, R::ZERO], [R::ZERO, R::ONE]],
             petzval: R::ZERO,
         };
+        if field.grade.used[1] == 0 {
+            slab.across(thickness);
+        } else {
+            slab.along(field, thickness);
+        }
+        slab
+    }
+
+    /// The same for light that runs towards −z, through a gap whose thickness is negative.
+    #[must_use]
+    pub fn backwards(self) -> Self {
+        let [[a, b], [c, d]] = self.matrix;
+        Self {
+            index_behind: -self.index_behind,
+            climb: -self.climb,
+            pull: -self.pull,
+            matrix: [[a, -b], [-c, d]],
+            petzval: -self.petzval,
+        }
+    }
+
+    /// All of a gap along which nothing changes: the matrix of one slab, squared again and again.
+    fn across(&mut self, thickness: R) {
+        let (n, pull) = (self.index_behind, self.pull);
+        let h = thickness * R::from_f64(1.0 / SLABS as f64);
+        self.matrix = exponential(R::ZERO, h / n, h * pull);
+        for _ in 0..SLABS.ilog2() {
+            self.matrix = times(self.matrix, self.matrix);
+        }
+        self.petzval = -(pull / (n * n) * thickness);
+    }
+
+    fn along(&mut self, field: &Graded<R>, thickness: R) {
+        let h = thickness * R::from_f64(1.0 / SLABS as f64);
+        let half = R::from_f64(0.5);
+        let off = h * R::from_f64(3f64.sqrt() / 6.0);
         let mut middle = h * half;
         for _ in 0..SLABS {
             let [(n1, c1), (n2, c2)] = [middle - off, middle + off].map(|z| on_axis(field, z));
             let [(b1, g1), (b2, g2)] = [(n1, c1), (n2, c2)].map(|(n, c)| (R::ONE / n, c / n));
             let mixed = h * off * half * (b2 * g1 - b1 * g2);
             let step = exponential(mixed, (b1 + b2) * h * half, (g1 + g2) * h * half);
-            slab.matrix = times(step, slab.matrix);
-            slab.petzval -= (c1 * b1 * b1 * b1 + c2 * b2 * b2 * b2) * h * half;
+            self.matrix = times(step, self.matrix);
+            self.petzval -= (c1 * b1 * b1 * b1 + c2 * b2 * b2 * b2) * h * half;
             middle += h;
         }
-        slab
     }
 
     /// Height and optical slope at its end.
     pub fn pass(&self, y: R, nu: R) -> (R, R) {
         let [[a, b], [c, d]] = self.matrix;
         (a * y + b * nu, c * y + d * nu)
+    }
+
+    /// The transpose: from the derivatives by height and optical slope at its end to those by both
+    /// at its beginning.
+    pub fn pass_back(&self, by_y: R, by_nu: R) -> (R, R) {
+        let [[a, b], [c, d]] = self.matrix;
+        (a * by_y + c * by_nu, b * by_y + d * by_nu)
+    }
+
+    /// What height and optical slope at its end grow by with its thickness: `p/n` and `(c/n) y`, the
+    /// equations themselves.
+    pub fn growth(&self, y: R, nu: R) -> (R, R) {
+        (nu / self.index_behind, self.pull * y)
     }
 }
 

@@ -175,6 +175,7 @@ pub fn focus_gap<R: Real>(system: &System<R>, object: Object) -> R {
             None => y += surface.thickness * nu / n,
             Some(field) => {
                 let slab = gradient::Slab::new(&field, surface.thickness);
+                let slab = if sense < R::ZERO { slab.backwards() } else { slab };
                 (y, nu) = slab.pass(y, nu);
                 n = slab.index_behind;
             }

@@ -76,7 +76,9 @@ fn bends(lens: &Lens, surface: usize) -> bool {
         None => &lens.object_medium,
     };
     let behind = &lens.surfaces[surface].medium;
-    *behind == Medium::Mirror || before != behind
+    // A gradient along the axis begins anew behind each surface.
+    let starts = matches!(behind, Medium::Gradient(gradient) if gradient.is_axial());
+    *behind == Medium::Mirror || before != behind || starts
 }
 
 /// The coefficients of the gradient behind a surface.

@@ -185,6 +185,30 @@ fn info_gives_first_order_data() {
     assert!(done(&["info", LENS], "").contains("focal length"));
 }
 
+/// What is not known of a gradient-index medium is said, and everything else is there.
+#[test]
+fn a_lens_with_a_gradient_has_every_page() {
+    const WOOD: &str = "lenses/wood_lens_60.json";
+    let info = done_json(&["info", WOOD], "");
+    assert_eq!(info["seidel"], Value::Null);
+    has_keys(&info, &["efl", "bfl", "petzval_sum", "semi_diameters", "checks", "effects"]);
+    let page = done(&["info", WOOD], "");
+    let seidel = "Seidel sums, zoom 0: none, since those of a gradient-index medium are not";
+    for words in [seidel, "Petzval sum", "effects on spots", "semi-diameters"] {
+        assert!(page.contains(words), "no `{words}` in {page}");
+    }
+    for what in ["spot", "fan", "distortion", "field-curvature", "illumination", "through-focus"] {
+        let report = done_json(&["analyze", WOOD, what], "");
+        for field in report["fields"].as_array().unwrap() {
+            assert!(field.get("dark").is_none(), "{what}: {field}");
+        }
+    }
+    let derivatives = done(&["gradient", WOOD, "--field", "2"], "");
+    assert!(derivatives.contains("gradient after surface 0, coefficient of"), "{derivatives}");
+    assert!(derivatives.contains("r^12") && derivatives.contains("z^4"), "{derivatives}");
+    refused(1, &["gradient", WOOD, "--method", "warp"], "", &["surface 0 has no warp field"]);
+}
+
 #[test]
 fn info_gives_every_zoom_position() {
     let info = done_json(&["info", ZOOM], "");

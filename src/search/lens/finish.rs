@@ -37,6 +37,8 @@ pub struct Finished {
     pub glasses: Vec<Exchanged>,
     /// Glasses that the rules do not list, behind or in front of surfaces that are to be left alone.
     pub unlisted: Vec<Unlisted>,
+    /// Surfaces in front of gradients: no catalogue has such a medium, and each stays what it was.
+    pub gradients: Vec<usize>,
     /// Everything that is limited.
     pub limits: Vec<Margin>,
     /// The light of every field, in mm², and what it may not be less than.
@@ -126,6 +128,7 @@ pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLand
         limits: landscape.limits(&lens)?,
         light: landscape.light_margins(&lens)?,
         confirmed: confirmed(&lens, &figures)?,
+        gradients: gradients(&lens),
         glasses,
         unlisted,
         figures,
@@ -186,6 +189,11 @@ impl LensLandscape {
         tight.goal.terms = self.goal.terms.iter().map(tighter).collect();
         tight
     }
+}
+
+fn gradients(lens: &Lens) -> Vec<usize> {
+    let is_one = |i: &usize| matches!(lens.surfaces[*i].medium, Medium::Gradient(_));
+    (0..lens.surfaces.len()).filter(is_one).collect()
 }
 
 /// The lens with every model glass, and every glass that the rules do not list, replaced by the

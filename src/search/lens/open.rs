@@ -4,8 +4,9 @@
 use crate::lens::{Aperture, Lens, Medium, Parameter, Quantity, Row, Variable};
 
 /// The lens without its diaphragm, every rim as large as its neighbours, the edge of its own sphere
-/// and `limit` leave room for, in mm. Aspheres and mirrors keep their rims: nothing is known about
-/// them farther out. The stop goes to the narrowest surface next to where it stood.
+/// and `limit` leave room for, in mm. Aspheres and mirrors keep their rims, and the faces of gradients
+/// grow no wider: nothing is known about them farther out. The stop goes to the narrowest surface
+/// next to where it stood.
 ///
 /// Its light is what the rims let through.
 #[must_use]
@@ -37,6 +38,7 @@ fn is_diaphragm(lens: &Lens, i: usize) -> bool {
         && row.asphere.is_empty()
         && row.medium == lens.surfaces[i - 1].medium
         && row.medium != Medium::Mirror
+        && !matches!(&row.medium, Medium::Gradient(gradient) if gradient.is_axial())
 }
 
 /// Joins the gaps on both sides of a surface that does nothing.
@@ -80,8 +82,15 @@ pub(super) fn with_open_rims(mut lens: Lens, limit: f64) -> Lens {
 
 fn open_rims(lens: &mut Lens, limit: f64) {
     let fixed = |row: &Row| !row.asphere.is_empty() || row.medium == Medium::Mirror;
-    for row in lens.surfaces.iter_mut().filter(|row| !fixed(row)) {
-        row.semi_diameter = Some(limit.min(edge_of(row)));
+    let graded = |row: &Row| matches!(row.medium, Medium::Gradient(_));
+    let mut behind = false;
+    for row in &mut lens.surfaces {
+        let face = behind || graded(row);
+        behind = graded(row);
+        if !fixed(row) {
+            let known = row.semi_diameter.filter(|rim| face && *rim < limit);
+            row.semi_diameter = Some(known.unwrap_or(limit).min(edge_of(row)));
+        }
     }
     for i in 0..lens.surfaces.len() - 1 {
         let positions = 0..lens.zoom_positions();

@@ -111,6 +111,11 @@ pub(super) fn is_gap(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Thickness | Quantity::ZoomThickness(_))
 }
 
+/// Whether a quantity belongs to the medium behind a row: the index or a coefficient of a gradient.
+pub(super) fn is_of_medium(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Index | Quantity::Gradient(_))
+}
+
 /// Whether a pickup has to do with a quantity of a row.
 pub(super) fn hangs(lens: &Lens, row: usize, is_it: impl Fn(Quantity) -> bool) -> bool {
     let concerned = |p: Parameter| p.surface == row && is_it(p.quantity);

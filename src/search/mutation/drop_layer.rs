@@ -1,8 +1,8 @@
 //! A cemented group loses its first or last piece; the air takes its place.
 
 use super::chance::pick;
-use super::draft::{Draft, Scene, hangs, is_gap, is_solved, sense};
-use crate::lens::{Lens, Quantity};
+use super::draft::{Draft, Scene, hangs, is_gap, is_of_medium, is_solved, sense};
+use crate::lens::Lens;
 use crate::search::element::{Element, Make, elements, pieces};
 use crate::search::{Random, Rules};
 
@@ -47,7 +47,7 @@ fn may_go(lens: &Lens, layer: Layer, rules: &Rules) -> bool {
     let free = [layer.outer(), inner].iter().all(|row| rules.allow(*row, rows));
     let near = layer.gap().is_none_or(|gap| rules.allow(gap, rows) && !hangs(lens, gap, is_gap));
     let glass = if layer.front { first } else { last - 1 };
-    let of_glass = |q| is_gap(q) || q == Quantity::Index;
+    let of_glass = |q| is_gap(q) || is_of_medium(q);
     let followed = hangs(lens, layer.outer(), |_| true) || hangs(lens, glass, of_glass);
     free && near && !followed
 }
@@ -74,7 +74,7 @@ fn strip(draft: &mut Draft, layer: Layer) {
     let inner = if layer.front { outer + 1 } else { outer - 1 };
     let gone = draft.lens.surfaces[outer].clone();
     if !layer.front {
-        draft.forget(inner, |q| q == Quantity::Index);
+        draft.forget(inner, is_of_medium);
         draft.move_gap(outer, inner);
         draft.lens.surfaces[inner].medium = gone.medium;
     }

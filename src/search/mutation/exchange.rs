@@ -21,15 +21,24 @@ const ABBE: f64 = 3.0;
 pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
     let rows = lens.surfaces.len();
     let elements = elements(lens).into_iter().filter(|e| matches!(e.make, Make::Glass(_)));
-    let found: Vec<usize> = elements
+    let free: Vec<usize> = elements
         .flat_map(|e| e.first..e.last)
-        .filter(|row| matches!(lens.surfaces[*row].medium, Medium::Glass(_)))
         .filter(|row| rules.allow(*row, rows) && rules.allow(row + 1, rows))
         .collect();
-    if found.is_empty() {
-        return Err("no glass of the catalogue that may be exchanged".to_owned());
+    let of = |is_it: fn(&Medium) -> bool| {
+        free.iter().copied().filter(move |row| is_it(&lens.surfaces[*row].medium))
+    };
+    let found: Vec<usize> = of(|medium| matches!(medium, Medium::Glass(_))).collect();
+    if !found.is_empty() {
+        return Ok(found);
     }
-    Ok(found)
+    let none = "no glass of the catalogue that may be exchanged";
+    let graded = of(|medium| matches!(medium, Medium::Gradient(_))).next();
+    Err(graded.map_or(none.to_owned(), |row| {
+        format!(
+            "{none}: the medium behind surface {row} is a gradient, which has no neighbour there"
+        )
+    }))
 }
 
 /// How readily one glass becomes the other.

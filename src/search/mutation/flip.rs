@@ -1,10 +1,11 @@
-//! An element is turned around.
+//! An element is turned around, and what fills it with it: a gradient along the axis is written from
+//! its other end.
 
 use super::Kind;
 use super::bend::either;
 use super::chance::pick;
-use super::draft::{Back, Draft, Scene};
-use crate::lens::Lens;
+use super::draft::{Back, Draft, Scene, hangs, is_gap, is_of_medium, zooms};
+use crate::lens::{Gradient, Lens, Medium, Quantity, RADIAL_TERMS};
 use crate::search::element::{Element, Make, elements};
 use crate::search::projection::Origin;
 use crate::search::{Random, Rules};
@@ -16,8 +17,42 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String>
         let free = (e.first..=e.last).all(|row| rules.allow(row, rows));
         matches!(e.make, Make::Glass(_)) && free
     };
-    let found: Vec<_> = elements(lens).into_iter().filter(may).collect();
-    if found.is_empty() { Err("no element that may be turned".to_owned()) } else { Ok(found) }
+    let (mut found, mut graded) = (Vec::new(), None);
+    for element in elements(lens).into_iter().filter(may) {
+        match (element.first..element.last).find_map(|row| held(lens, row)) {
+            None => found.push(element),
+            why => graded = graded.or(why),
+        }
+    }
+    if found.is_empty() {
+        let none = "no element that may be turned".to_owned();
+        Err(graded.map_or(none.clone(), |why| format!("{none}: {why}")))
+    } else {
+        Ok(found)
+    }
+}
+
+/// The gradient behind a row, if it varies along the axis.
+fn along(lens: &Lens, row: usize) -> Option<&Gradient> {
+    match &lens.surfaces[row].medium {
+        Medium::Gradient(gradient) if gradient.is_axial() => Some(gradient),
+        _ => None,
+    }
+}
+
+/// Why what fills a gap cannot be turned, if so.
+fn held(lens: &Lens, row: usize) -> Option<String> {
+    let gradient = along(lens, row)?;
+    let medium = format!("the medium behind surface {row} is a gradient along the axis");
+    if zooms(lens, row) {
+        Some(format!("{medium} whose length moves with the zoom"))
+    } else if hangs(lens, row, |q| is_gap(q) || is_of_medium(q)) {
+        Some(format!("{medium}, and a pickup has to do with it"))
+    } else if gradient.turned(lens.surfaces[row].thickness).is_none() {
+        Some(format!("{medium}, which from its other end has no base that a glass has"))
+    } else {
+        None
+    }
 }
 
 /// Turns an element around.
@@ -31,8 +66,31 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
         let curvature = Some((first + last - row, -1.0));
         draft.origins[row] = Origin { curvature, gap: Some(gap) };
     }
+    let mirrored: Vec<usize> =
+        (first..last).filter(|row| along(&draft.lens, *row).is_some()).collect();
+    mirrored.iter().for_each(|row| mirror(&mut draft.lens, *row));
     draft.map = either(random);
-    draft.back = Some(Back::by(Kind::Flip, 0.0));
+    // The projection changes how long such a gap is, so that turning it back leads elsewhere.
+    draft.back = mirrored.is_empty().then_some(Back::by(Kind::Flip, 0.0));
     draft.what = format!("turned the element of surfaces {first} to {last} around");
     Ok(draft)
+}
+
+/// Writes a gradient along the axis from its other end. Its numbers that are held are held at what
+/// they are now, the bounds of the others make room.
+fn mirror(lens: &mut Lens, row: usize) {
+    let length = lens.surfaces[row].thickness;
+    let turned = along(lens, row).and_then(|gradient| gradient.turned(length));
+    let Some(turned) = turned else { return };
+    lens.surfaces[row].medium = Medium::Gradient(Box::new(turned));
+    let axial = |q| matches!(q, Quantity::Gradient(k) if k >= RADIAL_TERMS);
+    let values: Vec<_> = lens.variables.iter().map(|v| lens.get(v.parameter)).collect();
+    for (variable, value) in lens.variables.iter_mut().zip(values) {
+        let parameter = variable.parameter;
+        let changed = axial(parameter.quantity) || parameter.quantity == Quantity::Index;
+        let Some(value) = value.filter(|_| parameter.surface == row && changed) else { continue };
+        let held = variable.min.is_some() && variable.min == variable.max;
+        variable.min = variable.min.map(|min| if held { value } else { min.min(value) });
+        variable.max = variable.max.map(|max| if held { value } else { max.max(value) });
+    }
 }

@@ -3,9 +3,9 @@
 
 use super::Kind;
 use super::chance::pick;
-use super::draft::{Back, Draft, Scene, hangs, is_gap, is_plain, sense, zooms};
+use super::draft::{Back, Draft, Scene, hangs, is_gap, is_of_medium, is_plain, sense, zooms};
 use super::split::Cut;
-use crate::lens::{Lens, Parameter, Quantity};
+use crate::lens::{Lens, Parameter};
 use crate::search::element::{Make, elements};
 use crate::search::{Random, Rules};
 
@@ -62,10 +62,10 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
 /// Makes one surface of two.
 fn join(draft: &mut Draft, row: usize, curvature: f64) {
     let next = draft.lens.surfaces[row + 1].clone();
-    draft.forget(row + 1, |q| !is_gap(q) && q != Quantity::Index);
+    draft.forget(row + 1, |q| !is_gap(q) && !is_of_medium(q));
     draft.move_gap(row + 1, row);
     draft.lens.map_parameters(|p| {
-        let of_glass = p == Parameter::new(row + 1, Quantity::Index);
+        let of_glass = p.surface == row + 1 && is_of_medium(p.quantity);
         Some(if of_glass { Parameter { surface: row, ..p } } else { p })
     });
     let surface = &mut draft.lens.surfaces[row];

@@ -2,7 +2,7 @@
 
 use super::Kind;
 use super::chance::{Length, log_normal, normal, pick};
-use super::draft::{Back, Draft, Scene, hangs, is_plain, sense};
+use super::draft::{Back, Draft, Scene, hangs, is_of_medium, is_plain, sense};
 use super::glue;
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row};
 use crate::search::element::{Make, elements};
@@ -79,7 +79,7 @@ fn open(draft: &mut Draft, row: usize, cut: Cut) {
     draft.insert(row + 1, rear);
     draft.move_gap(row, row + 1);
     draft.lens.map_parameters(|p| {
-        let of_glass = p == Parameter::new(row, Quantity::Index);
+        let of_glass = p.surface == row && is_of_medium(p.quantity);
         Some(if of_glass { Parameter { surface: row + 1, ..p } } else { p })
     });
     let front = &mut draft.lens.surfaces[row];

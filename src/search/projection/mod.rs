@@ -11,6 +11,8 @@
 //! the lens from which it starts. That is what makes a mutation and the one that undoes it a
 //! reversible pair. By how much they stretch volumes follows from (4.30), with its factors put right.
 
+#[cfg(test)]
+mod checks;
 mod density;
 mod model;
 mod solve;

@@ -1,12 +1,15 @@
 //! The marginal ray of a lens as a function of numbers, by y-nu trace: forwards for its value,
 //! backwards for its derivatives by all numbers at once.
 //!
-//! Backwards, `∂/∂d = ȳ nu/n'` and `∂/∂c = −n̄u y (n' − n)`.
+//! Backwards, `∂/∂d = ȳ nu/n'` and `∂/∂c = −n̄u y (n' − n)`. Through a gradient the ray goes by the
+//! matrix of its [`Slab`], backwards by the transpose, and a longer gap lets both numbers grow as the
+//! equations say: `∂/∂d = ȳ nu/n + n̄u (c/n) y` at its end, and `n̄u y c dn/dz` where a gradient along
+//! the axis meets the next surface with another index.
 
 use super::Unprojectable;
-use crate::lens::{Lens, LensError, Object, Parameter, Quantity};
+use crate::lens::{Graded, Lens, LensError, Object, Parameter, Quantity, Slab};
 use crate::math::Real;
-use crate::paraxial::signed_indices;
+use crate::paraxial::{signed_indices, slab};
 use nalgebra::DMatrix;
 
 /// A number that the lenses before and after a mutation share.
@@ -33,6 +36,7 @@ enum Reach {
 #[derive(Debug, Clone)]
 struct Position {
     indices: Vec<f64>,
+    gradients: Vec<Option<Graded<f64>>>,
     gaps: Vec<f64>,
     height: f64,
     slope: f64,
@@ -53,7 +57,12 @@ pub(super) struct Model {
 /// The paraxial ray at each surface, with the image behind.
 struct Ray<R> {
     heights: Vec<R>,
+    /// Optical slopes behind each surface.
     slopes: Vec<R>,
+    /// The same in front of the next one, and the index there.
+    ends: Vec<(R, R)>,
+    /// What fills a gap that is no glass.
+    slabs: Vec<Option<Slab<R>>>,
 }
 
 fn positions(lens: &Lens, reference: &Lens) -> Result<Vec<Position>, LensError> {
@@ -64,13 +73,14 @@ fn positions(lens: &Lens, reference: &Lens) -> Result<Vec<Position>, LensError> 
         let mut indices = signed_indices(&system);
         indices.truncate(rows + 1);
         let gaps = system.surfaces[..rows].iter().map(|surface| surface.thickness).collect();
+        let gradients = (0..rows).map(|row| system.gradient(row)).collect();
         let (height, slope) = match (lens.object, reference.object) {
             (Object::Finite(here), Object::Finite(there)) => {
                 (here / there.abs(), indices[0] / there.abs())
             }
             _ => (1.0, 0.0),
         };
-        Ok(Position { indices, gaps, height, slope })
+        Ok(Position { indices, gradients, gaps, height, slope })
     };
     (0..lens.zoom_positions()).map(position).collect()
 }
@@ -202,16 +212,27 @@ impl Model {
         let position = &self.positions[zoom];
         let (mut heights, mut slopes) =
             (Vec::with_capacity(gaps.len() + 1), Vec::with_capacity(gaps.len()));
+        let (mut ends, mut slabs) = (Vec::with_capacity(gaps.len()), Vec::new());
         let (mut y, mut nu) = (R::from_f64(position.height), R::from_f64(position.slope));
+        let mut before = R::from_f64(position.indices[0]);
         for (i, (c, d)) in curvatures.iter().zip(gaps).enumerate() {
             heights.push(y);
-            let (n, behind) = (position.indices[i], position.indices[i + 1]);
-            nu -= y * *c * R::from_f64(behind - n);
+            let behind = R::from_f64(position.indices[i + 1]);
+            nu -= y * *c * (behind - before);
             slopes.push(nu);
-            y += *d * nu * R::from_f64(1.0 / behind);
+            let slab = position.slab(i, *d);
+            if let Some(slab) = &slab {
+                (y, nu) = slab.pass(y, nu);
+                before = slab.index_behind;
+            } else {
+                y += *d * nu / behind;
+                before = behind;
+            }
+            ends.push((nu, before));
+            slabs.push(slab);
         }
         heights.push(y);
-        Ray { heights, slopes }
+        Ray { heights, slopes, ends, slabs }
     }
 
     /// The derivatives of `seed · (height, slope)` at the image by every curvature and gap.
@@ -223,18 +244,41 @@ impl Model {
         gaps: &[R],
         (mut height, mut slope): (R, R),
     ) -> (Vec<R>, Vec<R>) {
-        let indices = &self.positions[zoom].indices;
+        let position = &self.positions[zoom];
         let mut by_curvature = vec![R::ZERO; gaps.len()];
         let mut by_gap = vec![R::ZERO; gaps.len()];
+        // By the index in front of the surface behind the gap.
+        let mut by_index = R::ZERO;
         for i in (0..gaps.len()).rev() {
-            let reduced = height * R::from_f64(1.0 / indices[i + 1]);
-            by_gap[i] = reduced * ray.slopes[i];
-            slope += reduced * gaps[i];
-            let bent = slope * R::from_f64(indices[i + 1] - indices[i]);
+            let behind = R::from_f64(position.indices[i + 1]);
+            if let Some(slab) = &ray.slabs[i] {
+                let (y, nu) = slab.growth(ray.heights[i + 1], ray.ends[i].0);
+                by_gap[i] = height * y + slope * nu + by_index * slab.climb;
+                (height, slope) = slab.pass_back(height, slope);
+            } else {
+                let reduced = height / behind;
+                by_gap[i] = reduced * ray.slopes[i];
+                slope += reduced * gaps[i];
+            }
+            let before = match i.checked_sub(1) {
+                Some(gap) => ray.ends[gap].1,
+                None => R::from_f64(position.indices[0]),
+            };
+            let bent = slope * (behind - before);
             by_curvature[i] = -(bent * ray.heights[i]);
+            by_index = slope * ray.heights[i] * curvatures[i];
             height -= bent * curvatures[i];
         }
         (by_curvature, by_gap)
+    }
+}
+
+impl Position {
+    /// What fills the gap behind a row, where that is a gradient.
+    fn slab<R: Real>(&self, row: usize, thickness: R) -> Option<Slab<R>> {
+        let Graded { base, grade } = self.gradients[row]?;
+        let field = Graded { base: R::from_f64(base), grade: grade.map(R::from_f64) };
+        Some(slab(&field, thickness, R::from_f64(self.indices[row + 1])))
     }
 }
 

@@ -1,6 +1,8 @@
 //! Light in gradient-index fields.
 
 mod descent;
+mod entries;
+mod examples;
 mod fields;
 mod gradient;
 mod hard;

@@ -5,6 +5,7 @@ mod budget;
 mod chain;
 mod checkpoint;
 mod density;
+mod gradients;
 mod lens;
 mod mutations;
 mod projection;

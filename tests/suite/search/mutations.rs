@@ -11,7 +11,7 @@ use aplanat::search::{Kind, Mutant, Rules, mutate, propose};
 
 /// A lens is one at every zoom position: it can be resolved, and no surfaces cross within the rims of
 /// both.
-fn assert_lens(lens: &Lens) {
+pub(super) fn assert_lens(lens: &Lens) {
     lens.check().unwrap();
     let um = lens.wavelengths[lens.primary()].um;
     for zoom in 0..lens.zoom_positions() {

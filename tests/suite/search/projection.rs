@@ -26,7 +26,7 @@ fn kept(lens: &Lens) -> Vec<[f64; 2]> {
     (0..lens.zoom_positions()).map(at).collect()
 }
 
-fn assert_equivalent(before: &Lens, mutant: &Mutant) {
+pub(super) fn assert_equivalent(before: &Lens, mutant: &Mutant) {
     for (was, is) in kept(before).iter().zip(kept(&mutant.lens)) {
         let start = match before.object {
             Object::Infinity => 1.0,

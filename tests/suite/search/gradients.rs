@@ -1,0 +1,329 @@
+//! Lenses with gradient-index media in the search over structure: every mutation keeps the focus and
+//! leaves a lens or an honest reason, and a search finds something better.
+
+use super::mutations::assert_lens;
+use super::projection::assert_equivalent;
+use super::{generous, seeded};
+use crate::merit::bundled;
+use aplanat::lens::{
+    Gradient, Law, Lens, Medium, Parameter, Pickup, Quantity, RADIAL_TERMS, Variable,
+};
+use aplanat::math::Vec3;
+use aplanat::search::lens::{LensLandscape, Plan, finish, opened, run};
+use aplanat::search::{Kind, Landscape, Rules, RunOf, Settings, mutate, propose};
+use std::ops::ControlFlow;
+
+const EXAMPLES: [&str; 3] = ["grin_rod_melles_griot", "wood_lens_60", "axial_gradient_singlet_50"];
+
+fn medium(radial: &[f64], axial: &[f64]) -> Medium {
+    Medium::Gradient(Box::new(Gradient {
+        base: Medium::Index(1.62),
+        law: Law::Index,
+        radial: radial.to_vec(),
+        axial: axial.to_vec(),
+    }))
+}
+
+/// A triplet whose last element has a gradient.
+fn triplet(radial: &[f64], axial: &[f64]) -> (Lens, usize) {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    lens.variables.clear();
+    let row = (0..lens.surfaces.len()).rfind(|i| lens.surfaces[*i].medium != Medium::Air).unwrap();
+    lens.surfaces[row].medium = medium(radial, axial);
+    (lens, row)
+}
+
+fn busy() -> Lens {
+    triplet(&[-2e-4], &[-0.004, 3e-4]).0
+}
+
+fn is_graded(lens: &Lens) -> bool {
+    lens.surfaces.iter().any(|row| matches!(row.medium, Medium::Gradient(_)))
+}
+
+/// A flagged number, bounded or not.
+fn flag(lens: &mut Lens, surface: usize, quantity: Quantity, bounds: [Option<f64>; 2]) {
+    let [min, max] = bounds;
+    lens.variables.push(Variable { parameter: Parameter::new(surface, quantity), min, max });
+}
+
+/// The rules of a lens of millimetres.
+fn small() -> Rules {
+    Rules { glass_center: [0.1, 10.0], glass_edge: 0.05, air_center: [0.01, 10.0], ..generous() }
+}
+
+fn rules(name: &str) -> Rules {
+    if name == EXAMPLES[0] { small() } else { generous() }
+}
+
+#[test]
+fn no_gradient_is_taken_for_afocal() {
+    for name in EXAMPLES {
+        let lens = bundled(name);
+        let mut random = seeded(21);
+        let mut made = 0;
+        for kind in Kind::MUTATIONS.repeat(8) {
+            match mutate(kind, &lens, &rules(name), &mut random) {
+                Ok(mutant) => {
+                    assert_equivalent(&lens, &mutant);
+                    assert_lens(&mutant.lens);
+                    made += 1;
+                }
+                Err(refusal) => {
+                    assert!(!refusal.why.contains("afocal"), "{name}: {refusal}");
+                }
+            }
+        }
+        assert!(made >= 12, "{name}: {made}");
+    }
+}
+
+#[test]
+fn a_hundred_mutations_in_a_row_keep_a_lens_with_gradients_a_lens() {
+    let mut starts: Vec<(Lens, Rules)> = EXAMPLES.map(|name| (bundled(name), rules(name))).into();
+    starts.push((busy(), generous()));
+    for (start, rules) in starts {
+        let rules = Rules { elements: [1, 6], ..rules };
+        let mut random = seeded(22);
+        let (mut lens, mut made, mut graded) = (start.clone(), 0, 0);
+        for _ in 0..2000 {
+            // What becomes too steep to go on begins anew.
+            if made % 20 == 0 {
+                lens.clone_from(&start);
+            }
+            let Ok(mutant) = propose(&lens, &rules, &mut random) else { continue };
+            assert_lens(&mutant.lens);
+            assert_equivalent(&lens, &mutant);
+            for variable in &mutant.lens.variables {
+                assert!(mutant.lens.get(variable.parameter).is_some(), "{}", mutant.what);
+            }
+            (lens, made) = (mutant.lens, made + 1);
+            graded += usize::from(is_graded(&lens));
+            if made == 100 {
+                break;
+            }
+        }
+        println!("{}: {made} mutations, {graded} of lenses with gradients", start.name);
+        assert!(made == 100 && graded > 40, "{}: {made} {graded}", start.name);
+    }
+}
+
+/// The index on the axis of the gradient behind a row, at places from its front vertex.
+fn along(lens: &Lens, row: usize) -> Vec<f64> {
+    let system = lens.system(0, lens.wavelengths[lens.primary()].um).unwrap();
+    let field = system.gradient(row).unwrap();
+    let at = |i: i32| f64::from(i) / 8.0 * lens.surfaces[row].thickness;
+    (0..=8).map(|i| field.index(Vec3::new(0.3, 0.1, at(i)))).collect()
+}
+
+/// Turns an element around without moving anything else.
+fn flipped(lens: &Lens, row: usize) -> Lens {
+    let rows = lens.surfaces.len();
+    let rules = Rules { projection: false, ..generous() }.touching(row, row + 1, rows);
+    mutate(Kind::Flip, lens, &rules, &mut seeded(1)).unwrap().lens
+}
+
+#[test]
+fn a_gradient_along_the_axis_is_turned_with_its_element() {
+    for (radial, axial) in [
+        (vec![-2e-4], vec![]),
+        (vec![], vec![-0.004]),
+        (vec![-2e-4, 1e-7], vec![-0.004, 3e-4, -2e-5, 1e-6]),
+    ] {
+        let (mut lens, row) = triplet(&radial, &axial);
+        let [first, second] = [0, 1].map(|k| Quantity::Gradient(RADIAL_TERMS + k));
+        flag(&mut lens, row, first, [Some(-0.01), Some(0.0)]);
+        let held = lens.get(Parameter::new(row, second));
+        flag(&mut lens, row, second, [held, held]);
+        let turned = flipped(&lens, row);
+        for (there, here) in along(&turned, row).iter().rev().zip(along(&lens, row)) {
+            assert!((there - here).abs() < 1e-14, "{there} {here}");
+        }
+        assert_eq!(turned.surfaces[row].curvature, -lens.surfaces[row + 1].curvature);
+        for variable in &turned.variables {
+            let value = turned.get(variable.parameter).unwrap();
+            let inside = variable.min.is_none_or(|min| min <= value)
+                && variable.max.is_none_or(|max| value <= max);
+            assert!(inside, "{}", variable.parameter);
+        }
+        // A number that is held is held at what it is now.
+        let held = turned.variable(Parameter::new(row, second)).unwrap();
+        assert!(held.min == held.max && held.min == turned.get(held.parameter));
+        let back = flipped(&turned, row);
+        for (again, here) in along(&back, row).iter().zip(along(&lens, row)) {
+            assert!((again - here).abs() < 1e-14, "{again} {here}");
+        }
+    }
+}
+
+#[test]
+fn what_turning_an_element_has_no_way_back_is_said_to_have_none() {
+    let ratio = |axial: &[f64]| {
+        let (lens, row) = triplet(&[-2e-4], axial);
+        let rules = generous().touching(row, row + 1, lens.surfaces.len());
+        let turned = |seed| mutate(Kind::Flip, &lens, &rules, &mut seeded(seed));
+        let ratios: Vec<_> = (0..20).filter_map(|seed| turned(seed).ok()).collect();
+        assert!(!ratios.is_empty());
+        ratios.into_iter().filter_map(|mutant| mutant.log_ratio).count()
+    };
+    assert!(ratio(&[]) > 0, "a gradient across the axis alone is turned back");
+    assert_eq!(ratio(&[-0.004]), 0, "the gap may have another length then");
+}
+
+fn refused(kind: Kind, lens: &Lens) -> String {
+    mutate(kind, lens, &generous(), &mut seeded(1)).unwrap_err().why
+}
+
+#[test]
+fn what_cannot_be_done_with_a_gradient_is_refused_by_name() {
+    let lens = bundled("axial_gradient_singlet_50");
+    let why = refused(Kind::ExchangeGlass, &lens);
+    assert!(why.contains("behind surface 0 is a gradient, which has no neighbour"), "{why}");
+    // The dispersion of a glass stays at its own end.
+    let dispersive = |axial: f64, base: &str| {
+        let mut lens = bundled("axial_gradient_singlet_50");
+        let Medium::Gradient(gradient) = &mut lens.surfaces[0].medium else { panic!() };
+        gradient.base = Medium::Glass(base.to_owned());
+        gradient.axial = vec![axial];
+        lens
+    };
+    let why = refused(Kind::Flip, &dispersive(-0.0122, "SCHOTT SF5"));
+    assert!(why.contains("is a gradient along the axis, which from its other end"), "{why}");
+    assert!(
+        mutate(Kind::Flip, &dispersive(0.0, "SCHOTT SF5"), &generous(), &mut seeded(1)).is_ok()
+    );
+    let mut followed = lens.clone();
+    followed.variables.clear();
+    followed.pickups.push(Pickup {
+        parameter: Parameter::new(0, Quantity::Gradient(RADIAL_TERMS)),
+        source: Parameter::new(0, Quantity::Curvature),
+        scale: -0.4,
+        offset: 0.0,
+    });
+    let why = refused(Kind::Flip, &followed);
+    assert!(why.contains("along the axis, and a pickup has to do with it"), "{why}");
+    // A secant with something added to it is no secant from its other end.
+    let mut secant = lens.clone();
+    let Medium::Gradient(gradient) = &mut secant.surfaces[0].medium else { panic!() };
+    (gradient.law, gradient.radial) = (Law::Sech, vec![0.01]);
+    assert!(refused(Kind::Flip, &secant).contains("from its other end"));
+    // Elsewhere in the lens the same is done.
+    let (mut lens, _) = triplet(&[], &[-0.004]);
+    lens.surfaces[0].medium = Medium::Glass("SCHOTT N-SK16".to_owned());
+    assert!(mutate(Kind::ExchangeGlass, &lens, &generous(), &mut seeded(1)).is_ok());
+}
+
+/// The flagged coefficients of gradients, with their values.
+fn flagged(lens: &Lens) -> Vec<(Quantity, f64)> {
+    let of_medium = |q| matches!(q, Quantity::Gradient(_) | Quantity::Index);
+    let flagged = lens.variables.iter().filter(|v| of_medium(v.parameter.quantity));
+    flagged.map(|v| (v.parameter.quantity, lens.get(v.parameter).unwrap())).collect()
+}
+
+#[test]
+fn flagged_coefficients_go_where_their_medium_goes() {
+    // Without the plane of the stop the second element faces the third.
+    let (mut lens, row) = triplet(&[-2e-4], &[-0.004]);
+    lens.surfaces.remove(row - 1);
+    (lens.surfaces[0].stop, lens.surfaces[row - 2].thickness) = (true, 3.0);
+    for quantity in [Quantity::Index, Quantity::Gradient(0), Quantity::Gradient(RADIAL_TERMS)] {
+        flag(&mut lens, row - 1, quantity, [None, None]);
+    }
+    let all = flagged(&lens);
+    let only = |first, last, lens: &Lens| generous().touching(first, last, lens.surfaces.len());
+    let graded = |lens: &Lens| {
+        let is_one = |i: &usize| matches!(lens.surfaces[*i].medium, Medium::Gradient(_));
+        (0..lens.surfaces.len()).find(is_one).unwrap()
+    };
+    let at = graded(&lens);
+    let glued = (0..40).find_map(|seed| {
+        mutate(Kind::Glue, &lens, &only(at - 2, at + 1, &lens), &mut seeded(seed)).ok()
+    });
+    let glued = glued.unwrap().lens;
+    assert_eq!(graded(&glued), at - 1);
+    assert_eq!(flagged(&glued), all);
+    let split = (0..40).find_map(|seed| {
+        mutate(Kind::Split, &glued, &only(at - 2, at, &glued), &mut seeded(seed)).ok()
+    });
+    let split = split.unwrap().lens;
+    assert_eq!((graded(&split), flagged(&split)), (at, all.clone()));
+    // Of a group that loses the piece with the gradient nothing stays flagged; else everything.
+    let mut lost = 0;
+    for seed in 0..20 {
+        match mutate(Kind::DropLayer, &glued, &generous(), &mut seeded(seed)) {
+            Ok(mutant) => {
+                let expected = if is_graded(&mutant.lens) { all.clone() } else { Vec::new() };
+                assert_eq!(flagged(&mutant.lens), expected, "{}", mutant.what);
+                lost += usize::from(expected.is_empty());
+            }
+            Err(refusal) => println!("{refusal}"),
+        }
+    }
+    assert!((1..20).contains(&lost), "{lost}");
+}
+
+fn whole(lens: &Lens, rules: Rules) -> RunOf<LensLandscape> {
+    let usual = Plan::default().settings;
+    let settings = Settings { gradients: Some(520), chains: 2, seed: 7, c: 0.3, ..usual };
+    let plan = Plan { settings, rules, ..Plan::default() };
+    run(lens, &plan, |_, _| ControlFlow::Continue(())).unwrap()
+}
+
+#[test]
+fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
+    // One field of the rod, which costs most, is enough.
+    let mut rod = bundled("grin_rod_melles_griot");
+    rod.fields.values.truncate(1);
+    for (lens, rules) in [
+        (rod, Rules { elements: [1, 4], ..small() }),
+        (bundled("wood_lens_60"), Rules { elements: [1, 4], ..Rules::default() }),
+        (busy(), Rules::default()),
+    ] {
+        let run = whole(&lens, rules);
+        let (start, best) = (run.start().loss, run.best().loss);
+        println!("{}: {start:.3e} to {best:.3e}, {} born", lens.name, run.tree().born());
+        assert!(best.is_finite() && best < start, "{}: {start} {best}", lens.name);
+        assert!(run.statistics().gradients >= 500);
+        for node in run.tree().nodes() {
+            assert_lens(&node.point);
+        }
+        let mut tried = 0;
+        for count in run.statistics().kinds.values() {
+            tried += count.tried;
+            for why in count.refused.keys() {
+                assert!(!why.contains("afocal"), "{}: {why}", lens.name);
+            }
+        }
+        assert!(tried > 5, "{}: {tried}", lens.name);
+    }
+}
+
+#[test]
+fn a_finished_lens_keeps_its_gradients() {
+    let (lens, row) = triplet(&[-2e-4], &[-0.004]);
+    let landscape = Plan::default().landscape(&lens).unwrap();
+    let done = finish(&landscape, landscape.start()).unwrap();
+    assert_eq!(done.gradients, [row]);
+    assert_eq!(done.lens.surfaces[row].medium, lens.surfaces[row].medium);
+    assert_eq!(done.glasses.len(), 2, "the model glasses are exchanged, and they alone");
+    assert!(landscape.loss(&done.lens).is_finite());
+}
+
+#[test]
+fn nothing_is_opened_where_a_gradient_is_not_known() {
+    let (lens, row) = triplet(&[-2e-4], &[-0.004]);
+    let open = opened(&lens, 30.0);
+    let rims = |lens: &Lens| -> Vec<f64> {
+        lens.surfaces.iter().filter_map(|row| row.semi_diameter).collect()
+    };
+    let (before, after) = (rims(&lens), rims(&open));
+    // The plane of the stop in front of the gradient has gone.
+    assert_eq!(open.surfaces.len() + 1, lens.surfaces.len());
+    assert!(after[0] > before[0], "{after:?}");
+    assert!(after[row - 1] <= before[row] && after[row] <= before[row + 1], "{after:?}");
+    assert_lens(&open);
+    // So no plate is opened to where its index would fall below 1.
+    let plate = opened(&bundled("wood_lens_60"), 40.0);
+    assert_eq!(rims(&plate), [7.5, 8.0]);
+    assert!(plate.system(0, 0.5875618).is_ok());
+}
