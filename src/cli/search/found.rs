@@ -95,8 +95,8 @@ impl Compared {
 
 impl FinishedKeys {
     pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Finished { glasses, unlisted, limits: kept, light, figures, confirmed, .. } =
-            &self.finished;
+        let Finished { glasses, unlisted, gradients, figures, confirmed, .. } = &self.finished;
+        let (kept, light) = (&self.finished.limits, &self.finished.light);
         let verdict = if self.failures.is_empty() { "every limit is kept" } else { "NOT finished" };
         writeln!(f, "\nfinished: {verdict}")?;
         for change in glasses {
@@ -112,6 +112,9 @@ impl FinishedKeys {
                 "  glass behind surface {surface}: {glass} stays: the rules do not list it, \
                 and keep the surface"
             )?;
+        }
+        for surface in gradients {
+            writeln!(f, "  medium behind surface {surface}: a gradient, kept as it is")?;
         }
         let head =
             ["field", "spot, um", "error", "other rays", "light, mm^2", "error", "other rays"];
