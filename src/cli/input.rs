@@ -26,6 +26,10 @@ pub(super) struct Opened {
 }
 
 impl LensFile {
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Reads the lens; what a foreign file says that we cannot is remarked on.
     pub(super) fn open(&self) -> Result<Opened, Failure> {
         let file = self.path.display().to_string();
@@ -131,7 +135,7 @@ pub(super) fn check_target(path: &Path, extensions: &[&str]) -> Result<(), Failu
         let text = format!("{file}: found {found}; expected a file in a folder that exists");
         return Err(Failure::Input(text));
     }
-    Ok(())
+    files::check_writable(path).map_err(|error| Failure::Input(error.to_string()))
 }
 
 /// What a message calls a file.

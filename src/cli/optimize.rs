@@ -234,8 +234,9 @@ struct Report {
     out: String,
 }
 
+/// A term before and after.
 #[derive(Serialize)]
-struct TermKeys {
+pub(super) struct TermKeys {
     term: &'static str,
     weight: f64,
     before: ValueKeys,
@@ -252,6 +253,33 @@ struct ValueKeys {
 impl ValueKeys {
     fn new(term: &TermValue) -> Self {
         Self { value: term.value, error: term.error, rays: term.rays }
+    }
+}
+
+impl TermKeys {
+    /// The terms of a goal at two lenses.
+    pub(super) fn all(before: &[TermValue], after: &[TermValue]) -> Vec<Self> {
+        let term = |(before, after): (&TermValue, &TermValue)| Self {
+            term: before.term,
+            weight: before.weight,
+            before: ValueKeys::new(before),
+            after: ValueKeys::new(after),
+        };
+        before.iter().zip(after).map(term).collect()
+    }
+
+    /// A row for each term.
+    pub(super) fn table(terms: &[Self]) -> Table {
+        let mut table =
+            Table::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
+        for Self { term, weight, before, after } in terms {
+            let numbers = [*weight, before.value].map(|v| Number(v).to_string());
+            let start = std::iter::once((*term).to_owned()).chain(numbers);
+            let error = |value: &ValueKeys| format!("{:.1e}", value.error);
+            let rest = [error(before), Number(after.value).to_string(), error(after)];
+            table.row(start.chain(rest).chain([after.rays.to_string()]));
+        }
+        table
     }
 }
 
@@ -272,12 +300,6 @@ impl Report {
             before: lens.get(v.parameter),
             after: best.get(v.parameter),
         };
-        let term = |(before, after): (&TermValue, &TermValue)| TermKeys {
-            term: before.term,
-            weight: before.weight,
-            before: ValueKeys::new(before),
-            after: ValueKeys::new(after),
-        };
         Self {
             method: asked.method,
             steps: search.steps.len(),
@@ -289,7 +311,7 @@ impl Report {
             light_after: light[1],
             refused_steps: refusals().count(),
             last_refusal: refusals().next_back().cloned(),
-            terms: before.iter().zip(&after).map(term).collect(),
+            terms: TermKeys::all(&before, &after),
             variables: lens.variables.iter().map(variable).collect(),
             out: asked.out.display().to_string(),
         }
@@ -326,15 +348,7 @@ impl Display for Report {
             writeln!(f, "  no term asks for light: some of the sharpness was bought by clipping")?;
         }
         writeln!(f)?;
-        let mut table =
-            Table::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
-        for TermKeys { term, weight, before, after } in &self.terms {
-            let numbers = [*weight, before.value].map(|v| Number(v).to_string());
-            let start = std::iter::once((*term).to_owned()).chain(numbers);
-            let error = |value: &ValueKeys| format!("{:.1e}", value.error);
-            let rest = [error(before), Number(after.value).to_string(), error(after)];
-            table.row(start.chain(rest).chain([after.rays.to_string()]));
-        }
+        let table = TermKeys::table(&self.terms);
         writeln!(f, "{table}\nsaved as {out}")
     }
 }

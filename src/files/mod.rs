@@ -22,7 +22,7 @@ pub use library::{Bundled, library};
 pub use photo::{Photo, read_photo};
 pub use probe::{Proof, SelfCheck};
 pub use report::{Outcome, Report, ReportRow};
-pub use save::replace;
+pub use save::{check_writable, replace};
 pub use volume::{Volume, read_volume, write_volume};
 
 use crate::lens::Lens;

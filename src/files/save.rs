@@ -21,6 +21,19 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     written.map_err(unwritable)
 }
 
+/// Refuses a file that could not be written, or replaced, before there is anything to write.
+///
+/// # Errors
+/// The system's.
+pub fn check_writable(path: &Path) -> Result<(), FileError> {
+    let unwritable = |source| FileError::Unwritable { file: path.display().to_string(), source };
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    refuse(&target).map_err(unwritable)?;
+    let beside = beside(&target).map_err(unwritable)?;
+    let made = OpenOptions::new().write(true).create_new(true).open(&beside);
+    made.and_then(|_| fs::remove_file(&beside)).map_err(unwritable)
+}
+
 /// Refuses what a rename would replace although it must not be written.
 fn refuse(target: &Path) -> io::Result<()> {
     match fs::metadata(target) {

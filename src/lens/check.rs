@@ -2,6 +2,7 @@
 
 use super::{Aperture, FieldKind, Invalid, Lens, Medium, Object, Parameter, Quantity};
 use crate::lens::glass;
+use crate::math::brief;
 
 /// Why a lens cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -47,7 +48,7 @@ pub enum LensError {
         high: f64,
     },
     /// A number that makes no sense where it stands.
-    #[error("{what} is {found}; expected {expected}")]
+    #[error("{what} is {}; expected {expected}", brief(*found))]
     Number {
         /// What it is.
         what: String,

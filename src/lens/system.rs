@@ -1,7 +1,7 @@
 //! A lens resolved to plain numbers: one wavelength, one zoom position.
 
 use super::{ASPHERE_TERMS, Grade, Graded};
-use crate::math::Real;
+use crate::math::{Real, brief};
 
 /// The form of a surface: `z = c r² / (1 + √(1 − (1+k) c² r²)) + Σ aⱼ r^(2j+4)`.
 ///
@@ -159,7 +159,10 @@ pub enum Invalid {
     #[error("the lens has no surfaces")]
     NoSurfaces,
     /// Not finite, or so large or small that its square is not.
-    #[error("{what} of surface {surface} is {found}; expected a finite number below 1e100")]
+    #[error(
+        "{what} of surface {surface} is {}; expected a finite number below 1e100",
+        brief(*found)
+    )]
     NotFinite {
         /// What about the surface.
         what: &'static str,
@@ -169,7 +172,7 @@ pub enum Invalid {
         found: f64,
     },
     /// An index that is not positive.
-    #[error("index {place} is {found}; expected a positive finite number")]
+    #[error("index {place} is {}; expected a positive finite number", brief(*found))]
     Index {
         /// `before surface 0` or `after surface 3`.
         place: String,

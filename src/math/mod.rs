@@ -10,6 +10,7 @@ mod jet;
 mod lanes;
 pub mod quadrature;
 mod real;
+mod shown;
 mod vec3;
 
 pub use double::Double;
@@ -18,4 +19,5 @@ pub use jet::Jet;
 pub use lanes::Width;
 pub(crate) use lanes::widest;
 pub use real::Real;
+pub(crate) use shown::brief;
 pub use vec3::Vec3;

@@ -137,15 +137,18 @@ pub(super) struct Moved {
 pub(super) type Turn<L> = Vec<Happening<<L as Landscape>::Point>>;
 
 impl<L: Landscape> Shared<'_, L> {
-    /// One turn of a chain.
-    pub(super) fn turn(&self, chain: &mut Chain<L::Point, L::Memory>) -> Turn<L> {
+    /// One turn of a chain, of no more than so many gradients; nothing where it has none.
+    pub(super) fn turn(&self, chain: &mut Chain<L::Point, L::Memory>, most: usize) -> Turn<L> {
         let mut turn = Vec::new();
+        if most == 0 {
+            return turn;
+        }
         if chain.tour.is_none() {
             self.begin(chain, &mut turn);
         }
         match self.settings.method {
-            Method::Metropolis => self.walk(chain, &mut turn),
-            Method::Restore | Method::Brute => self.descend(chain, &mut turn),
+            Method::Metropolis => self.walk(chain, most, &mut turn),
+            Method::Restore | Method::Brute => self.descend(chain, most, &mut turn),
         }
         turn
     }
@@ -226,10 +229,13 @@ impl<L: Landscape> Shared<'_, L> {
     }
 
     /// A local move, and whether the descent ends behind it: lines 2 to 8 of algorithm 1.
-    fn descend(&self, chain: &mut Chain<L::Point, L::Memory>, turn: &mut Turn<L>) {
+    fn descend(&self, chain: &mut Chain<L::Point, L::Memory>, most: usize, turn: &mut Turn<L>) {
         let Some(tour) = &mut chain.tour else { return };
         let before = tour.loss;
-        let (point, loss, gradients) = self.landscape.descend(&tour.point, &mut tour.memory);
+        let left = chain.task.map_or(u64::MAX, |task| task.budget.saturating_sub(tour.gradients));
+        let most = most.min(usize::try_from(left).unwrap_or(usize::MAX)).max(1);
+        let (point, loss, gradients) =
+            self.landscape.descend_within(&tour.point, &mut tour.memory, most);
         tour.moves += 1;
         tour.gradients += gradients as u64;
         tour.go(point, loss);

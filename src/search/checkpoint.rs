@@ -4,11 +4,17 @@ use super::{Landscape, Method, Point, Run, SearchError, Settings};
 use crate::files;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
 /// The version of the file; another one is not read.
 const VERSION: u32 = 1;
+
+/// The field of [`Landscape::about`] that says where a search begins, if there is one.
+const START: &str = "start";
+/// No more characters of a value that differs are shown.
+const SHOWN: usize = 60;
 
 /// What every version of the file begins with.
 #[derive(Deserialize)]
@@ -99,8 +105,14 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         let mut read: Read<Self> =
             serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
         read.run.is_sound().map_err(corrupt)?;
+        let about = landscape.about();
+        // What a search begins with is the first thing to compare: much else follows from it.
+        let (start, own_start) = (&read.landscape[START], &about[START]);
+        if let Some((name, found, expected)) = difference("landscape.start", start, own_start) {
+            return Err(SearchError::OtherStart { file, name, found, expected });
+        }
         let pairs = [
-            ("landscape", read.landscape, landscape.about()),
+            ("landscape", read.landscape, about),
             ("settings", fixed(read.run.settings())?, fixed(settings)?),
         ];
         for (name, found, expected) in pairs {
@@ -142,14 +154,41 @@ fn fixed(settings: &Settings) -> Result<Value, SearchError> {
     serde_json::to_value(fixed).map_err(unwritable)
 }
 
-/// The first thing in which two values differ: its name, and what it is in each.
+/// The first thing in which two values differ: its name, and what it is in each. Plain values are
+/// compared before lists, since they say it in fewer words.
 fn difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
-    if let (Value::Object(a), Value::Object(b)) = (a, b) {
-        let mut keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
-        let of = |map: &serde_json::Map<String, Value>, key: &String| {
-            map.get(key).cloned().unwrap_or_default()
-        };
-        return keys.find_map(|key| difference(&format!("{name}.{key}"), &of(a, key), &of(b, key)));
+    match (a, b) {
+        (Value::Object(a), Value::Object(b)) => {
+            let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+            let of = |map: &serde_json::Map<String, Value>, key: &String| {
+                map.get(key).cloned().unwrap_or_default()
+            };
+            let pairs = keys.into_iter().map(|key| (key, of(a, key), of(b, key)));
+            let (nested, plain): (Vec<_>, Vec<_>) =
+                pairs.partition(|(_, a, b)| is_nested(a) || is_nested(b));
+            let mut all = plain.into_iter().chain(nested);
+            all.find_map(|(key, a, b)| difference(&format!("{name}.{key}"), &a, &b))
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            let mut pairs = a.iter().zip(b).enumerate();
+            pairs.find_map(|(i, (a, b))| difference(&format!("{name}[{i}]"), a, b))
+        }
+        _ => (a != b).then(|| (name.to_owned(), shown(a), shown(b))),
     }
-    (a != b).then(|| (name.to_owned(), a.to_string(), b.to_string()))
+}
+
+fn is_nested(value: &Value) -> bool {
+    value.is_object() || value.is_array()
+}
+
+/// A value in a few words.
+fn shown(value: &Value) -> String {
+    if let Value::Array(entries) = value {
+        return format!("a list of {}", entries.len());
+    }
+    let text = value.to_string();
+    if text.chars().count() <= SHOWN {
+        return text;
+    }
+    text.chars().take(SHOWN).chain("...".chars()).collect()
 }

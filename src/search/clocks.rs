@@ -150,8 +150,7 @@ impl<'a, L: Traceable> Clocks<'a, L> {
 
     fn regenerate(&mut self) {
         if let Regeneration::Reservoir { gamma, .. } = self.regeneration {
-            let (number, topology) = (self.ended, self.landscape.topology(&self.point));
-            let entry = Entry { number, loss: self.loss, topology, point: self.point.clone() };
+            let entry = Entry::of(self.landscape, self.ended, self.loss, self.point.clone());
             self.reservoir.offer(entry);
             if self.random.random::<f64>() >= gamma && self.mutate() {
                 return;

@@ -58,6 +58,21 @@ pub enum SearchError {
         /// The version that can be read.
         expected: u32,
     },
+    /// A checkpoint belongs to a search from another start.
+    #[error(
+        "{file}: a checkpoint of another search, from another lens: {name} is {found} there and \
+         {expected} here"
+    )]
+    OtherStart {
+        /// The file.
+        file: String,
+        /// What differs: the names on the way to it.
+        name: String,
+        /// What it is in the file.
+        found: String,
+        /// What it is here.
+        expected: String,
+    },
     /// A checkpoint belongs to another search.
     #[error("{file}: a checkpoint of another search: {name} is {found} there and {expected} here")]
     Differs {

@@ -30,6 +30,17 @@ pub trait Landscape: Sync {
     /// where it leads, its loss there, and how many gradients it took.
     fn descend(&self, point: &Self::Point, memory: &mut Self::Memory) -> (Self::Point, f64, usize);
 
+    /// A local move of no more than so many gradients, at least one: what is left of a budget. A
+    /// landscape whose moves are all as long takes a whole one.
+    fn descend_within(
+        &self,
+        point: &Self::Point,
+        memory: &mut Self::Memory,
+        _most: usize,
+    ) -> (Self::Point, f64, usize) {
+        self.descend(point, memory)
+    }
+
     /// A point from anywhere: `p_global` of (4.14).
     fn draw(&self, random: &mut Random) -> Result<Self::Point, Refusal>;
 
@@ -45,8 +56,15 @@ pub trait Landscape: Sync {
     /// What two points of the same structure have in common: a reservoir may hold one of each.
     fn topology(&self, point: &Self::Point) -> String;
 
+    /// How far the structure of a point is from those that are asked for: 0 for one of them. A point
+    /// that is nearer to them is better than any that is farther away, whatever their losses.
+    fn outside(&self, _point: &Self::Point) -> u64 {
+        0
+    }
+
     /// What distinguishes this landscape from others, like its rules and its objective: a
-    /// checkpoint made on another one is refused, by the name of the first field that differs.
+    /// checkpoint made on another one is refused, by the name of the first field that differs. A
+    /// field `start` says where searches begin, and is compared first.
     fn about(&self) -> serde_json::Value {
         serde_json::Value::Null
     }

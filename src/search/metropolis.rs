@@ -76,7 +76,12 @@ impl Steps {
 
 impl<L: Landscape> Shared<'_, L> {
     /// A mutation or a Langevin step, accepted or not.
-    pub(super) fn walk(&self, chain: &mut Chain<L::Point, L::Memory>, turn: &mut Turn<L>) {
+    pub(super) fn walk(
+        &self,
+        chain: &mut Chain<L::Point, L::Memory>,
+        most: usize,
+        turn: &mut Turn<L>,
+    ) {
         if chain.tour.is_none() {
             return;
         }
@@ -84,7 +89,7 @@ impl<L: Landscape> Shared<'_, L> {
             self.jump(chain, turn);
             return;
         }
-        let (accepted, gradients) = self.step(chain);
+        let (accepted, gradients) = self.step(chain, most as u64);
         let Some(tour) = &mut chain.tour else { return };
         tour.moves += 1;
         tour.gradients += gradients;
@@ -103,13 +108,18 @@ impl<L: Landscape> Shared<'_, L> {
         is_small(&gradient).then_some(Walk { topology, values, gradient })
     }
 
-    /// A Langevin step; whether it was accepted, and the gradients it took.
-    fn step(&self, chain: &mut Chain<L::Point, L::Memory>) -> (bool, u64) {
+    /// A Langevin step; whether it was accepted, and the gradients it took. The first one of a walk
+    /// takes two; where only one is left, it stays where it is.
+    fn step(&self, chain: &mut Chain<L::Point, L::Memory>, most: u64) -> (bool, u64) {
         let Chain { tour: Some(tour), random, scales, .. } = chain else { return (false, 0) };
         let first = u64::from(tour.walk.is_none());
         let Some(mut walk) = tour.walk.take().or_else(|| self.set_out(&tour.point)) else {
             return (false, 1);
         };
+        if first >= most {
+            tour.walk = Some(walk);
+            return (false, first);
+        }
         let scale = scales.entry(walk.topology.clone()).or_default();
         if scale.square.len() != walk.gradient.len() {
             scale.adapt(&walk.gradient);

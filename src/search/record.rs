@@ -33,9 +33,8 @@ impl<P: Point, M: Point + Default> Run<P, M> {
             Happening::Moved(moved) => self.count(self.chains[chain].number, moved),
             Happening::Ended { ended, point, loss } => {
                 let number = self.chains[chain].number;
-                let topology = landscape.topology(&point);
                 events.push(Event::Ended(number));
-                if self.close(Entry { number, loss, topology, point }, ended) {
+                if self.close(Entry::of(landscape, number, loss, point), ended) {
                     events.push(Event::Best(number));
                 }
             }
@@ -80,7 +79,7 @@ impl<P: Point, M: Point + Default> Run<P, M> {
 
     /// Takes a better point as the best.
     fn improve(&mut self, entry: &Entry<P>) -> bool {
-        let better = entry.loss < self.best.loss;
+        let better = entry.beats(&self.best);
         if better {
             self.best = entry.clone();
         }
@@ -93,11 +92,9 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         L: Landscape<Point = P, Memory = M>,
     {
         let number = self.chains[chain].number;
-        let best = self.chains[chain].best().filter(|(_, loss)| *loss < self.best.loss);
-        let entry = best.map(|(point, loss)| {
-            let topology = landscape.topology(point);
-            Entry { number, loss, topology, point: point.clone() }
-        });
+        let may_be_better = |loss: f64| loss < self.best.loss || self.best.outside > 0;
+        let best = self.chains[chain].best().filter(|(_, loss)| may_be_better(*loss));
+        let entry = best.map(|(point, loss)| Entry::of(landscape, number, loss, point.clone()));
         if entry.is_some_and(|entry| self.improve(&entry)) {
             events.push(Event::Best(number));
         }

@@ -1,6 +1,8 @@
 //! The best points that a search has found, at most one of each topology where that is asked for.
 
+use super::Landscape;
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 
 /// The best points so far, in no particular order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,8 +21,30 @@ pub struct Entry<P> {
     pub loss: f64,
     /// What it has in common with points of the same structure.
     pub topology: String,
+    /// How far its structure is from those that are asked for; 0 for one of them.
+    #[serde(default)]
+    pub outside: u64,
     /// The point.
     pub point: P,
+}
+
+impl<P> Entry<P> {
+    /// A point of a landscape.
+    pub fn of<L: Landscape<Point = P>>(landscape: &L, number: u64, loss: f64, point: P) -> Self {
+        let (topology, outside) = (landscape.topology(&point), landscape.outside(&point));
+        Self { number, loss, topology, outside, point }
+    }
+
+    /// Which of two is better: first the one whose structure is nearer to what is asked for, then
+    /// the one of less loss.
+    pub fn rank(&self, other: &Self) -> Ordering {
+        self.outside.cmp(&other.outside).then(self.loss.total_cmp(&other.loss))
+    }
+
+    /// Whether it is better than another one.
+    pub fn beats(&self, other: &Self) -> bool {
+        (self.outside, self.loss) < (other.outside, other.loss)
+    }
 }
 
 /// What became of a point that was offered to the reservoir.
@@ -61,7 +85,7 @@ impl<P: Clone + PartialEq> Reservoir<P> {
 
     /// The best of them, the first of equals; none before the first one entered.
     pub fn best(&self) -> Option<&Entry<P>> {
-        self.entries.iter().min_by(|a, b| a.loss.total_cmp(&b.loss))
+        self.entries.iter().min_by(|a, b| a.rank(b))
     }
 
     /// Whether a point of this number is in.
@@ -86,14 +110,14 @@ impl<P: Clone + PartialEq> Reservoir<P> {
             self.entries.push(entry);
             return Offer::Entered;
         }
-        let worst = self.entries.iter_mut().max_by(|a, b| a.loss.total_cmp(&b.loss));
+        let worst = self.entries.iter_mut().max_by(|a, b| a.rank(b));
         worst.map_or(Offer::BehindAll, |worst| put_if_better(worst, entry, |_| Offer::BehindAll))
     }
 }
 
 fn put_if_better<P>(old: &mut Entry<P>, new: Entry<P>, refused: fn(u64) -> Offer) -> Offer {
     let number = old.number;
-    if new.loss < old.loss {
+    if new.beats(old) {
         *old = new;
         Offer::Replaced(number)
     } else {

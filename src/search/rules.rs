@@ -1,16 +1,19 @@
 //! What a search may do to a lens, and what a factory can make.
 
 use super::Kind;
+use crate::lens::glass;
+use crate::math::brief;
 use serde::{Deserialize, Serialize};
 
 /// The limits of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rules {
-    /// The smallest and the largest number of glass elements.
+    /// The smallest and the largest number of glass elements. From a lens with more or fewer a
+    /// search goes towards them: of two lenses the one that is nearer to them is better.
     pub elements: [usize; 2],
-    /// The glasses that new elements may be made of, by maker and name; none allows all of the
-    /// catalogue.
+    /// The glasses that new elements may be made of, and those of a finished lens; by maker and name,
+    /// or by name alone where one maker has it. None allows all of the catalogue.
     pub glasses: Vec<String>,
     /// How many surfaces at the front and at the rear mutations leave alone. They are counted from
     /// the ends, so that they stay the same ones while elements come and go between them.
@@ -76,5 +79,135 @@ impl Rules {
     /// Whether mutations may touch a surface of a lens of so many rows.
     pub fn allow(&self, surface: usize, rows: usize) -> bool {
         surface >= self.kept[0] && surface + self.kept[1] < rows
+    }
+
+    /// The same rules where nobody has said how many elements there may be: as many as a lens with
+    /// so many has are allowed too.
+    #[must_use]
+    pub fn holding(mut self, pieces: usize) -> Self {
+        if self.elements == Self::default().elements {
+            let [min, max] = self.elements;
+            self.elements = [min.min(pieces), max.max(pieces)];
+        }
+        self
+    }
+
+    /// Whether a glass of the catalogue, by its full name, is one of those that are allowed.
+    pub fn lists(&self, glass: &str) -> bool {
+        self.glasses.is_empty() || self.glasses.iter().any(|listed| listed == glass)
+    }
+
+    /// The same rules with every glass by its full name, each once.
+    ///
+    /// # Errors
+    /// The first rule that makes no sense.
+    pub fn checked(&self) -> Result<Self, BadRule> {
+        self.check_elements()?;
+        self.check_weights()?;
+        self.check_sizes()?;
+        let mut glasses: Vec<String> = Vec::new();
+        for (i, name) in self.glasses.iter().enumerate() {
+            let full = full_name(i, name)?;
+            if !glasses.contains(&full) {
+                glasses.push(full);
+            }
+        }
+        Ok(Self { glasses, ..self.clone() })
+    }
+
+    /// Refuses surfaces that a lens of so many rows does not have.
+    ///
+    /// # Errors
+    /// More surfaces are to be left alone than there are.
+    pub fn check_kept(&self, rows: usize) -> Result<(), BadRule> {
+        let [front, rear] = self.kept;
+        if front <= rows && rear <= rows - front {
+            return Ok(());
+        }
+        let expected = format!("no more surfaces than the {rows} of the lens, both ends together");
+        Err(BadRule::new("kept", format!("[{front}, {rear}]"), expected))
+    }
+
+    fn check_elements(&self) -> Result<(), BadRule> {
+        let [min, max] = self.elements;
+        if min <= max {
+            return Ok(());
+        }
+        let expected = "two numbers, the smaller one first";
+        Err(BadRule::new("elements", format!("[{min}, {max}]"), expected))
+    }
+
+    fn check_weights(&self) -> Result<(), BadRule> {
+        for (i, (kind, weight)) in self.weights.iter().enumerate() {
+            let name = format!("the weight of {}", kind.name());
+            if !(*weight >= 0.0 && weight.is_finite()) {
+                return Err(BadRule::new(name, brief(*weight), "0 or more"));
+            }
+            if *kind == Kind::Global && *weight != 0.0 {
+                let expected = "0, which forbids it; gamma says how often it is tried";
+                return Err(BadRule::new(name, brief(*weight), expected));
+            }
+            if self.weights[..i].iter().any(|(before, _)| before == kind) {
+                return Err(BadRule::new(name, "listed twice", "one weight for each kind"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_sizes(&self) -> Result<(), BadRule> {
+        for (name, [min, max]) in
+            [("glass_center", self.glass_center), ("air_center", self.air_center)]
+        {
+            if !(0.0 <= min && min <= max && max.is_finite()) {
+                let found = format!("[{}, {}]", brief(min), brief(max));
+                let expected = "two lengths of 0 or more in mm, the smaller one first";
+                return Err(BadRule::new(name, found, expected));
+            }
+        }
+        let least = [("glass_edge", Some(self.glass_edge)), ("air_edge", Some(self.air_edge))];
+        for (name, value) in least.into_iter().chain([("back_focus", self.back_focus)]) {
+            if let Some(value) = value.filter(|v| !(*v >= 0.0 && v.is_finite())) {
+                return Err(BadRule::new(name, brief(value), "a length of 0 or more in mm"));
+            }
+        }
+        let most = [("semi_diameter", self.semi_diameter), ("track", self.track)];
+        for (name, value) in most.into_iter().chain([("steepness", Some(self.steepness))]) {
+            if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+                return Err(BadRule::new(name, brief(value), "a number above 0"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The full name of a glass of the list.
+fn full_name(i: usize, name: &str) -> Result<String, BadRule> {
+    if let Some(found) = glass::find(name) {
+        return Ok(found.full_name());
+    }
+    let similar = glass::similar(name);
+    let expected = if similar.is_empty() {
+        "maker and name of a glass of the catalogue, like SCHOTT N-BK7".to_owned()
+    } else {
+        format!("maker and name of one glass of the catalogue, perhaps {}", similar.join(" or "))
+    };
+    Err(BadRule::new(format!("glasses[{i}]"), format!("`{name}`"), expected))
+}
+
+/// A rule that makes no sense.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("rules: {name} is {found}; expected {expected}")]
+pub struct BadRule {
+    /// Which one.
+    pub name: String,
+    /// What it is.
+    pub found: String,
+    /// What it could be.
+    pub expected: String,
+}
+
+impl BadRule {
+    fn new(name: impl Into<String>, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self { name: name.into(), found: found.into(), expected: expected.into() }
     }
 }

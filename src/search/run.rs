@@ -49,6 +49,15 @@ pub enum Event {
     Best(u64),
 }
 
+/// A point that a run has found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found<'a, P> {
+    /// The point, and what it is worth.
+    pub entry: &'a Entry<P>,
+    /// Whether its descent still goes on: only what has ended enters the reservoir.
+    pub running: bool,
+}
+
 /// Why a run is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -82,9 +91,8 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         if !loss.is_finite() {
             return Err(SearchError::Start { loss });
         }
-        let topology = landscape.topology(&start);
         let tasks = tasks(landscape.elements(&start), settings);
-        let start = Entry { number: 0, loss, topology, point: start };
+        let start = Entry::of(landscape, 0, loss, start);
         let mut reservoir = Reservoir::new(settings.reservoir, settings.one_per_topology);
         let offer = reservoir.offer(start.clone());
         let mut run = Self {
@@ -141,6 +149,19 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         &self.reservoir
     }
 
+    /// What was found, the best first: the reservoir, and the best point before it where the descent
+    /// that has come to it still goes on.
+    pub fn found(&self) -> Vec<Found<'_, P>> {
+        let kept = self.reservoir.entries();
+        let running = kept.iter().all(|entry| self.best.beats(entry));
+        let mut found: Vec<_> = kept.iter().map(|entry| Found { entry, running: false }).collect();
+        found.sort_by(|a, b| a.entry.rank(b.entry));
+        if running {
+            found.insert(0, Found { entry: &self.best, running });
+        }
+        found
+    }
+
     /// The family tree.
     pub fn tree(&self) -> &Tree<P> {
         &self.tree
@@ -193,7 +214,9 @@ impl<P: Point, M: Point + Default> Run<P, M> {
             reservoir: &self.reservoir,
             pinned: self.pinned.as_ref(),
         };
-        let turns: Vec<_> = self.chains.par_iter_mut().map(|chain| shared.turn(chain)).collect();
+        let shares = self.shares();
+        let chains = self.chains.par_iter_mut().zip(shares);
+        let turns: Vec<_> = chains.map(|(chain, most)| shared.turn(chain, most)).collect();
         let moves = self.statistics.moves;
         let mut events = Vec::new();
         for (chain, turn) in turns.into_iter().enumerate() {
@@ -207,6 +230,18 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         self.statistics.idle = if moved { 0 } else { self.statistics.idle + 1 };
         self.forget();
         events
+    }
+
+    /// How many gradients each chain may take in its turn: an equal part of those that are left,
+    /// far more than a turn takes but in the last rounds. Brute force has divided them among its
+    /// mutations.
+    fn shares(&self) -> Vec<usize> {
+        let Settings { method, gradients, .. } = self.settings;
+        let limit = gradients.filter(|_| method != Method::Brute);
+        let left = limit.map_or(u64::MAX, |limit| limit.saturating_sub(self.statistics.gradients));
+        let count = self.chains.len().max(1) as u64;
+        let share = |i: u64| left / count + u64::from(i < left % count);
+        (0..count).map(|i| usize::try_from(share(i)).unwrap_or(usize::MAX)).collect()
     }
 
     /// A node that begins.
@@ -276,5 +311,7 @@ fn tasks(elements: usize, settings: &Settings) -> VecDeque<Task> {
     let budget = (gradients / (2 * elements.max(1) as u64)).max(1);
     let kinds = [Kind::AddSinglet, Kind::RemoveSinglet];
     let each = |element| kinds.map(|kind| Task { element, kind, budget });
-    (0..elements).flat_map(each).collect()
+    // Where there is less than a gradient for each, the last mutations have none.
+    let most = usize::try_from(gradients).unwrap_or(usize::MAX);
+    (0..elements).flat_map(each).take(most).collect()
 }

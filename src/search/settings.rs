@@ -1,7 +1,11 @@
 //! How a search goes: everything that a run depends on besides its landscape and its start.
 
 use super::{SearchError, Temperature, Termination};
+use crate::math::brief;
 use serde::{Deserialize, Serialize};
+
+/// No more chains than this: each takes the memory of a descent, and a turn of every round.
+const MOST_CHAINS: usize = 1024;
 
 /// How a search goes; the defaults are the thesis's, or say where they are not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,8 +37,9 @@ pub struct Settings {
     pub longest: usize,
     /// The run is over after so many local moves of all chains together.
     pub moves: Option<u64>,
-    /// The run is over after so many gradients of all chains together; brute force divides them
-    /// among its mutations.
+    /// The run is over after so many gradients of all chains together, and takes no more: in its
+    /// last rounds the chains share what is left, which shortens their moves. Brute force divides
+    /// them among its mutations.
     pub gradients: Option<u64>,
     /// How many generations are remembered besides the ancestors of what is in the reservoir.
     pub remembered: usize,
@@ -77,17 +82,20 @@ impl Settings {
                 return wrong(name, "0".to_owned(), "1 or more");
             }
         }
+        if self.chains > MOST_CHAINS {
+            return wrong("chains", self.chains.to_string(), "1024 at most");
+        }
         if self.longest == 0 {
             return wrong("longest", "0".to_owned(), "1 or more");
         }
         let shares = [("gamma", self.gamma), ("metropolis.mutation", self.metropolis.mutation)];
         for (name, share) in shares {
             if !(0.0..=1.0).contains(&share) {
-                return wrong(name, share.to_string(), "0 to 1");
+                return wrong(name, brief(share), "0 to 1");
             }
         }
         if !(self.c >= 0.0 && self.c.is_finite()) {
-            return wrong("c", self.c.to_string(), "0 or more");
+            return wrong("c", brief(self.c), "0 or more");
         }
         let sizes = [
             ("reheat", self.reheat),
@@ -96,7 +104,7 @@ impl Settings {
         ];
         for (name, size) in sizes {
             if !(size > 0.0 && size.is_finite()) {
-                return wrong(name, size.to_string(), "more than 0");
+                return wrong(name, brief(size), "more than 0");
             }
         }
         if self.method == Method::Brute && self.gradients.is_none() {

@@ -2,6 +2,7 @@
 
 use super::reservoir::Entry;
 use super::{Kind, Landscape, Point, Run, SearchError, Temperature};
+use crate::math::brief;
 use serde::{Deserialize, Serialize};
 
 /// What a person tells a run between two rounds. All of it is part of the run's state, and so of
@@ -42,7 +43,7 @@ impl<P: Point, M: Point + Default> Run<P, M> {
             Steer::Unpin => self.pinned = None,
             Steer::Weight(kind, weight) => {
                 if !self.weights.set(kind, weight) {
-                    let (name, found) = ("weight", weight.to_string());
+                    let (name, found) = ("weight", brief(weight));
                     return Err(SearchError::Setting { name, found, expected: "0 or more" });
                 }
             }
@@ -64,7 +65,6 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         let node = self.tree.node(number).map(|node| (&node.point, node.descended));
         let forgotten = SearchError::Forgotten { number, born: self.tree.born() };
         let (point, loss) = living.or(node).ok_or(forgotten)?;
-        let topology = landscape.topology(point);
-        Ok(Entry { number, loss, topology, point: point.clone() })
+        Ok(Entry::of(landscape, number, loss, point.clone()))
     }
 }

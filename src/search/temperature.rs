@@ -3,6 +3,7 @@
 //! Everything is computed from logarithms, so that densities far below the smallest number still
 //! compare. At temperature 0 only the order of two losses is left, at infinite temperature nothing.
 
+use crate::math::brief;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::{self, Display};
 
@@ -66,7 +67,7 @@ impl Temperature {
 
 impl Display for Temperature {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_finite() { write!(f, "{}", self.0) } else { f.write_str("infinite") }
+        if self.0.is_finite() { f.write_str(&brief(self.0)) } else { f.write_str("infinite") }
     }
 }
 
@@ -89,7 +90,7 @@ impl<'de> Deserialize<'de> for Temperature {
             Word(String),
         }
         let found = match Written::deserialize(deserializer)? {
-            Written::Number(value) => Self::new(value).ok_or_else(|| value.to_string()),
+            Written::Number(value) => Self::new(value).ok_or_else(|| brief(value)),
             Written::Word(word) if word == "infinite" => Ok(Self(f64::INFINITY)),
             Written::Word(word) => Err(format!("`{word}`")),
         };

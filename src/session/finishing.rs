@@ -5,7 +5,9 @@ use super::background::guarded;
 use crate::files;
 use crate::lens::Lens;
 use crate::merit::Margin;
-use crate::search::lens::{Confirmed, Exchanged, FieldFigures, Finished, LensLandscape, finish};
+use crate::search::lens::{
+    Confirmed, Exchanged, FieldFigures, Finished, LensLandscape, Unlisted, finish,
+};
 use std::path::Path;
 
 /// What makes a lens that can be made.
@@ -50,6 +52,11 @@ fn report(finished: &Finished) -> String {
         let (surface, glass) = (change.surface, &change.glass);
         format!("glass behind surface {surface} : {glass} ({is:.4}, {vd:.1}) for index {nd:.4}")
     };
+    let unlisted = |Unlisted { surface, glass }: &Unlisted| {
+        format!(
+            "glass behind surface {surface} : {glass} is not listed, and stays: it is not to be touched"
+        )
+    };
     let field = |(field, other): (&FieldFigures, &Confirmed)| {
         let spot = field.spot.map_or(f64::NAN, |spot| 1e3 * spot.value);
         let (number, again, light) = (field.field + 1, 1e3 * other.spot, field.light.value);
@@ -61,6 +68,7 @@ fn report(finished: &Finished) -> String {
         format!("{name:<16} {surface:>8} {value:>12.4} {room:>12.4}")
     };
     let mut lines: Vec<String> = finished.glasses.iter().map(glass).collect();
+    lines.extend(finished.unlisted.iter().map(unlisted));
     lines.push(format!("{:>6} {:>12} {:>14} {:>12}", "field", "spot, µm", "other rays, µm", "mm²"));
     lines.extend(finished.figures.fields.iter().zip(&finished.confirmed).map(field));
     lines.push(format!("{:<16} {:>8} {:>12} {:>12}", "limit", "surface", "is", "room"));

@@ -6,7 +6,7 @@ use crate::files::FileError;
 use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::search::lens::{LensLandscape, Local, NoLandscape, Plan, opened};
-use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer};
+use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer, element};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
@@ -93,6 +93,7 @@ impl Engine {
             start = opened(&start, limit);
             plan.rules.semi_diameter = plan.rules.semi_diameter.or(quest.open);
         }
+        plan.rules = plan.rules.holding(element::pieces(&start));
         let landscape = plan.landscape(&start)?;
         let settings = plan.settings(&landscape);
         let run = Run::new(&landscape, landscape.start().clone(), &settings)?;

@@ -49,13 +49,27 @@ fn a_checkpoint_of_another_search_is_refused() {
     has_keys(&done_json(&base, ""), &["ended", "resumed", "best", "start", "reservoir"]);
     let again = done_json(&base, "");
     assert_eq!((again["resumed"].clone(), again["gradients"].clone()), (true.into(), 0.into()));
+    assert_eq!(
+        again["nothing_to_do"],
+        "nothing to do: 40 of 40 gradients are made; raise --iterations"
+    );
+    assert_eq!(again["gradients_in_all"], 40);
+    assert!(done(&base, "").contains("nothing to do: 40 of 40"));
     let more = [&base[..], &["--seed", "9"]].concat();
-    refused(2, &more, "", &["another search", "settings.seed"]);
+    refused(2, &more, "", &["another search", "settings.seed is 1 there and 9 here"]);
+    let chains = [&base[..], &["--chains", "2"]].concat();
+    refused(2, &chains, "", &["another search", "chains is 4 there and 2 here"]);
     let goal = [&base[..], &["--light", "0.9"]].concat();
-    refused(2, &goal, "", &["another search", "landscape.goal"]);
+    refused(2, &goal, "", &["another search", "landscape.goal", "light is 1.0 there and 0.9 here"]);
     let mut lens = base;
     lens[1] = "lenses/tessar_50_f28.json";
-    refused(2, &lens, "", &["another search", "landscape"]);
+    let names = ["from another lens", "landscape.start.name", "Triplet 100", "Tessar 50"];
+    refused(2, &lens, "", &[&["another search"][..], &names[..]].concat());
+    let raised = done_json(&[&base[..3], &["100"], &base[4..]].concat(), "");
+    assert_eq!(
+        (raised["gradients"].clone(), raised["nothing_to_do"].clone()),
+        (60.into(), Value::Null)
+    );
 }
 
 #[test]
@@ -68,6 +82,24 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--elements", "8..4"], &["smaller one first"]);
     wrong(&["--forbid", "paint"], &["add-singlet", "move-stop"]);
     wrong(&["--max-diameter=-3"], &["--max-diameter", "more than 0"]);
+    wrong(&["--max-diameter", "-3"], &["--max-diameter", "found -3", "more than 0"]);
+    wrong(&["--max-track", "-1e308"], &["--max-track", "found -1.0000e308"]);
+    wrong(&["--max-diameter", "1"], &["no lens keeps", "semi-diameters of 0.5 mm"]);
+    wrong(&["--max-track", "1"], &["no lens keeps", "a track of 1 mm"]);
+    wrong(&["--min-back-focus", "1000"], &["no lens keeps", "a back focus of 1000"]);
+    wrong(&["--focal-length", "1e308"], &["--focal-length", "1.0000e308"]);
+    wrong(&["--heights", "-7"], &["--heights", "--focal-length"]);
+    wrong(&["--minutes", "-1"], &["--minutes", "found -1", "more than 0"]);
+    wrong(&["--chains", "1000000"], &["chains", "1000000", "1024"]);
+    wrong(&["--steps", "1000000000"], &["steps", "1000000000", "10000"]);
+    wrong(&["--c", "-1"], &["setting c", "0 or more"]);
+    wrong(&["--gamma", "-1e300"], &["gamma", "-1e300", "0 to 1"]);
+    wrong(&["--temperature", "nan"], &["0 or more"]);
+    wrong(&["--temperature", "-1"], &["0 or more"]);
+    wrong(&["--error", "200%"], &["tolerance is 2", "less than 1"]);
+    wrong(&["--method", "brute", "--chains", "0"], &["chains", "1 or more"]);
+    wrong(&["--method", "metropolis", "--c", "-1"], &["setting c"]);
+    wrong(&["--light", "-1"], &["--light", "found -1"]);
     wrong(&["--open", "0"], &["--open", "more than 0"]);
     wrong(&["--heights", "0,7"], &["--heights", "--focal-length"]);
     wrong(&["--focal-length", "0"], &["--focal-length", "other than 0"]);
@@ -83,8 +115,13 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--out", "lens.txt"], &[".txt", ".json"]);
     wrong(&["--checkpoint", "no/such/run.json"], &["no such folder"]);
     wrong(&["--wavelength", "0"], &["--wavelength", "more than 0"]);
+    wrong(&["--wavelength", "1e308"], &["wavelength is 1e308; expected"]);
     let rules = Scratch::with("rules.json", r#"{"glasses": ["SCHOTT N-BK77"]}"#);
     wrong(&["--rules", rules.path()], &["N-BK77"]);
+    let rules = Scratch::with("rules-weight.json", r#"{"weights": [["bend", -2.0]]}"#);
+    wrong(&["--rules", rules.path()], &["rules: the weight of bend is -2; expected 0 or more"]);
+    let rules = Scratch::with("rules-kept.json", r#"{"kept": [5, 5]}"#);
+    wrong(&["--rules", rules.path()], &["rules: kept is [5, 5]; expected"]);
     let rules = Scratch::with("rules-key.json", r#"{"elephants": 3}"#);
     wrong(&["--rules", rules.path()], &["elephants"]);
 }
@@ -108,7 +145,8 @@ fn a_search_writes_its_lens_and_its_reservoir() {
         ],
         "",
     );
-    for word in ["focal length", "light, mm^2", "reservoir", "mutation", "generations"] {
+    let words = ["focal length", "light, mm^2", "reservoir", "mutation", "generations", "term"];
+    for word in words.into_iter().chain(["total_track", "the best lens"]) {
         assert!(text.contains(word), "{text}");
     }
     aplanat::files::open(&out.0).unwrap().lens.check().unwrap();
@@ -129,4 +167,57 @@ fn samplers_race() {
     }
     refused(2, &["measure", "search", LENS, "--seconds", "0"], "", &["--seconds"]);
     refused(2, &["measure", "search", LENS, "--seeds", "0"], "", &["--seeds"]);
+}
+
+/// No file that is read, or written by another argument, is written over.
+#[test]
+fn files_of_a_search_are_files_of_their_own() {
+    let copy = Scratch::with("own.json", &std::fs::read_to_string(LENS).unwrap());
+    let other = Scratch::new("other-own.json");
+    let wrong = |arguments: &[&str], words: &[&str]| {
+        refused(2, &[&["search", copy.path()], arguments].concat(), "", words);
+    };
+    wrong(&["--out", copy.path()], &["--out", "is the lens; expected another file"]);
+    wrong(&["--checkpoint", copy.path()], &["--checkpoint", "is the lens"]);
+    let both = ["--out", other.path(), "--checkpoint", other.path()];
+    wrong(&both, &["--checkpoint", "is --out"]);
+    let rules = Scratch::with("own-rules.json", "{}");
+    wrong(&["--rules", rules.path(), "--out", rules.path()], &["--out", "is --rules"]);
+    wrong(&["--reservoir-dir", copy.path()], &["is a file; expected a folder"]);
+    assert!(!other.0.exists());
+    if cfg!(target_os = "linux") {
+        wrong(&["--checkpoint", "/proc/run.json"], &["/proc/run.json"]);
+    }
+}
+
+#[test]
+fn a_search_says_what_is_not_kept() {
+    let base = ["search", LENS, "--iterations", "60", "--max-track", "90", "--elements", "4..5"];
+    let report = done_json(&base, "");
+    let start = report["start_breaks"].as_array().unwrap();
+    let names: Vec<&str> = start.iter().map(|limit| limit["term"].as_str().unwrap()).collect();
+    assert!(names.contains(&"total_track") && names.contains(&"elements"), "{names:?}");
+    let track = start.iter().find(|limit| limit["term"] == "total_track").unwrap();
+    assert!((track["off_by"].as_f64().unwrap() - 29.08).abs() < 0.01, "{track}");
+    has_keys(track, &["term", "surface", "zoom", "value", "min", "max", "off_by"]);
+    assert!(report["best_breaks"].is_array());
+    let terms = report["terms"].as_array().unwrap();
+    let part =
+        |term: &Value| term["weight"].as_f64().unwrap() * term["after"]["value"].as_f64().unwrap();
+    let sum: f64 = terms.iter().map(part).sum();
+    let best = report["merit_best"].as_f64().unwrap();
+    assert!((sum / best - 1.0).abs() < 1e-12, "{sum} {best}");
+    assert_eq!(report["gradients"], 60);
+    assert_eq!(report["reservoir"][0]["merit"], report["merit_best"]);
+    let said = Command::new(env!("CARGO_BIN_EXE_aplanat")).args(base).output().unwrap();
+    let said = String::from_utf8(said.stderr).unwrap();
+    assert!(said.contains("note: the start breaks a limit: total track"), "{said}");
+}
+
+/// A negative number is a number.
+#[test]
+fn signs_are_read() {
+    let base = ["search", LENS, "--iterations", "8", "--heights", "-7,0", "--focal-length", "-100"];
+    let report = done_json(&base, "");
+    assert!(report["start"]["fields"][0]["y"].as_f64().unwrap() > 4.0 - 1e-9);
 }

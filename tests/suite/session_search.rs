@@ -247,6 +247,13 @@ fn a_search_that_cannot_begin_says_why() {
     assert!(!view.explorations.starting && view.explorations.run.is_none());
     assert_eq!(view.messages.last().unwrap().severity, Severity::Error);
 
+    let mut impossible = quest(None);
+    impossible.plan.rules.track = Some(10.0);
+    explore(&mut session, Explore::Start(Box::new(impossible)));
+    stands(&mut session, Standing::Stopped);
+    let failed = session.view().explorations.failed.unwrap();
+    assert!(failed.starts_with("no lens keeps these limits: a track of 10 mm"), "{failed}");
+
     let file = folder("foreign");
     std::fs::write(&file, "{\"aplanat\": 1}").unwrap();
     explore(&mut session, Explore::GoOn(Some(file.clone())));
@@ -291,7 +298,7 @@ fn a_lens_is_exported_once_every_limit_is_kept() {
 #[test]
 fn a_lens_that_cannot_be_made_is_refused_by_name() {
     let path = folder("refused.json");
-    let session = export(|rules| rules.track = Some(10.0), &path);
+    let session = export(|rules| rules.track = Some(40.0), &path);
     let said = session.view().messages.last().unwrap().clone();
     assert_eq!(said.severity, Severity::Error);
     let first = "nothing is written: the lens cannot be made within its limits\n";

@@ -40,7 +40,7 @@ impl Search {
             return Err(Failure::Input("--seeds: found 0; expected 1 or more".into()));
         }
         let opened = self.lens.open()?;
-        let plan = self.asked.plan()?;
+        let plan = self.asked.plan(&opened.lens)?;
         let lens = self.asked.start(&opened.lens)?;
         let found = searches(&lens, &plan, Race { seconds, seeds })
             .map_err(|cause| Failure::Input(format!("{}: {cause}", opened.file)))?;

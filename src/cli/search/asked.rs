@@ -2,12 +2,13 @@
 
 use crate::cli::failure::Failure;
 use crate::cli::input::{self, Tolerance};
-use crate::lens::{Field, FieldKind, Fields, Lens, Object, Wavelength, glass};
+use crate::cli::output::Number;
+use crate::lens::{Field, FieldKind, Fields, Lens, Object, Wavelength};
 use crate::optimize;
 use crate::search::lens::{Local, Plan, opened};
-use crate::search::{Kind, Rules, Temperature};
+use crate::search::{Kind, Rules, Temperature, element};
 use clap::ValueEnum;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// What a search may do and aims at.
@@ -18,7 +19,7 @@ pub(in crate::cli) struct Asked {
     goal: Option<PathBuf>,
 
     /// The focal length to aim at, in mm; the one it has where it is absent
-    #[arg(long, value_name = "MM", conflicts_with = "goal")]
+    #[arg(long, value_name = "MM", conflicts_with = "goal", allow_negative_numbers = true)]
     focal_length: Option<f64>,
 
     /// How much of its light every field keeps: one share, or one for each field
@@ -27,6 +28,7 @@ pub(in crate::cli) struct Asked {
         value_name = "SHARES",
         default_value = "1",
         value_delimiter = ',',
+        allow_hyphen_values = true,
         conflicts_with = "goal"
     )]
     light: Vec<f64>,
@@ -40,15 +42,15 @@ pub(in crate::cli) struct Asked {
     elements: Option<Range>,
 
     /// No surface is larger than this, in mm
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     max_diameter: Option<f64>,
 
     /// The longest track in mm; a fifth longer than it is where it is absent
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     max_track: Option<f64>,
 
     /// The shortest back focus in mm; four fifths of what it is where it is absent
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     min_back_focus: Option<f64>,
 
     /// Mutations without paraxial projection
@@ -61,7 +63,7 @@ pub(in crate::cli) struct Asked {
 
     /// Opens every rim as far as its neighbours allow, at most to this semi-diameter in mm; the
     /// diaphragm goes
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     open: Option<f64>,
 
     /// Frees every curvature and gap, whatever the file says
@@ -69,11 +71,11 @@ pub(in crate::cli) struct Asked {
     free: bool,
 
     /// Image heights in mm in place of the fields: angles `atan(h / focal length)`
-    #[arg(long, value_name = "HEIGHTS", value_delimiter = ',')]
+    #[arg(long, value_name = "HEIGHTS", value_delimiter = ',', allow_hyphen_values = true)]
     heights: Vec<f64>,
 
     /// One wavelength in um in place of those of the lens
-    #[arg(long, value_name = "UM")]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
     wavelength: Option<f64>,
 
     /// How many chains share the reservoir
@@ -85,15 +87,15 @@ pub(in crate::cli) struct Asked {
     reservoir: Option<usize>,
 
     /// 0 or more, or `infinite`; the start has a density of one half where it is absent
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature: Option<Heat>,
 
     /// The larger, the shorter descents are
-    #[arg(long, value_name = "C")]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
     c: Option<f64>,
 
     /// How often a regeneration draws a lens from anywhere
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     gamma: Option<f64>,
 
     /// What takes the local steps
@@ -176,20 +178,31 @@ impl FromStr for Mutation {
 fn positive(name: &str, value: Option<f64>) -> Result<Option<f64>, Failure> {
     match value {
         Some(v) if !(v > 0.0 && v.is_finite()) => {
-            Err(Failure::Input(format!("{name}: found {v}; expected more than 0")))
+            Err(Failure::Input(format!("{name}: found {}; expected more than 0", Number(v))))
         }
         value => Ok(value),
     }
 }
 
+/// Focal lengths that can be asked for, in mm, whatever their sign.
+const LENGTHS: [f64; 2] = [1e-9, 1e9];
+
 impl Asked {
-    pub(in crate::cli) fn plan(&self) -> Result<Plan, Failure> {
-        let rules = self.rules()?;
+    /// The files that are read, each with its argument.
+    pub(in crate::cli) fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let goal = self.goal.as_deref().map(|path| ("--goal", path));
+        goal.into_iter().chain(self.rules.as_deref().map(|path| ("--rules", path)))
+    }
+
+    /// The search of a lens that is asked for.
+    pub(in crate::cli) fn plan(&self, lens: &Lens) -> Result<Plan, Failure> {
+        let rules = self.rules(lens)?;
         let mut plan = Plan { rules, light: self.light.clone(), ..Plan::default() };
         self.light.iter().try_for_each(|share| positive("--light", Some(*share)).map(drop))?;
         plan.focal_length = match self.focal_length {
-            Some(focal) if focal == 0.0 || !focal.is_finite() => {
-                let text = format!("--focal-length: found {focal}; expected a number other than 0");
+            Some(focal) if !(LENGTHS[0]..=LENGTHS[1]).contains(&focal.abs()) => {
+                let text = "expected a number other than 0, up to 1e9 mm";
+                let text = format!("--focal-length: found {}; {text}", Number(focal));
                 return Err(Failure::Input(text));
             }
             focal => focal,
@@ -214,12 +227,13 @@ impl Asked {
         Ok(plan)
     }
 
-    fn rules(&self) -> Result<Rules, Failure> {
+    fn rules(&self, lens: &Lens) -> Result<Rules, Failure> {
         let read = self.rules.as_deref().map(input::read_json).transpose()?;
         let mut rules: Rules = read.unwrap_or_default();
-        if let Some(Range(elements)) = self.elements {
-            rules.elements = elements;
-        }
+        rules = match self.elements {
+            Some(Range(elements)) => Rules { elements, ..rules },
+            None => rules.holding(element::pieces(lens)),
+        };
         let widest = positive("--max-diameter", self.max_diameter)?.map(|d| 0.5 * d);
         let open = positive("--open", self.open)?;
         rules.semi_diameter = widest.or(rules.semi_diameter).or(open);
@@ -229,14 +243,7 @@ impl Asked {
         rules.projection &= !self.no_projection;
         rules.weights.retain(|(kind, _)| !self.forbid.iter().any(|Mutation(f)| f == kind));
         rules.weights.extend(self.forbid.iter().map(|Mutation(kind)| (*kind, 0.0)));
-        for name in &rules.glasses {
-            if glass::find(name).is_none() {
-                let similar = glass::similar(name).join(", ");
-                let text = format!("rules: unknown glass `{name}`; similar names: {similar}");
-                return Err(Failure::Input(text));
-            }
-        }
-        Ok(rules)
+        rules.checked().map_err(|bad| Failure::Input(bad.to_string()))
     }
 
     /// The lens that the search starts from.
@@ -261,7 +268,8 @@ impl Asked {
             return Err(Failure::Input(text.into()));
         };
         if let Some(height) = self.heights.iter().find(|h| !h.is_finite()) {
-            return Err(Failure::Input(format!("--heights: found {height}; expected mm")));
+            let text = format!("--heights: found {}; expected mm", Number(*height));
+            return Err(Failure::Input(text));
         }
         let angle = |h: &f64| Field { x: 0.0, y: (h / focal).atan().to_degrees(), weight: 1.0 };
         Ok(Fields { kind: FieldKind::Angle, values: self.heights.iter().map(angle).collect() })

@@ -1,7 +1,10 @@
 //! The search over structure: a run that can be stopped, killed and taken up again.
 
 mod asked;
+mod found;
+mod limits;
 mod report;
+mod targets;
 
 pub(super) use asked::Asked;
 
@@ -12,9 +15,10 @@ use super::output::{Number, Output, remark};
 use crate::files;
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
-use crate::search::lens::{Figures, LensLandscape, NoLandscape, Plan, finish};
-use crate::search::{Method, Over, Run, RunOf, SearchError};
+use crate::search::lens::{LensLandscape, NoLandscape, Plan, finish};
+use crate::search::{Found, Method, Over, Run, RunOf, SearchError};
 use clap::ValueEnum;
+use found::Compared;
 use report::Report;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -41,10 +45,11 @@ pub(super) struct Search {
     seed: u64,
 
     /// Ends after so many minutes
-    #[arg(long, value_name = "MINUTES")]
+    #[arg(long, value_name = "MINUTES", allow_negative_numbers = true)]
     minutes: Option<f64>,
 
-    /// Ends after so many gradients of all chains; 12000 where --minutes is absent too
+    /// Ends after so many gradients of all chains, and takes no more; 12000 where --minutes is absent
+    /// too
     #[arg(long, value_name = "N")]
     iterations: Option<u64>,
 
@@ -53,10 +58,17 @@ pub(super) struct Search {
     checkpoint: Option<PathBuf>,
 
     /// Seconds between two savings
-    #[arg(long, value_name = "SECONDS", default_value_t = SAVED, requires = "checkpoint")]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = SAVED,
+        requires = "checkpoint",
+        allow_negative_numbers = true
+    )]
     checkpoint_every: f64,
 
-    /// The folder into which every lens of the reservoir is written
+    /// The folder into which every lens of the reservoir is written, and the best one where its
+    /// descent still goes on
     #[arg(long, value_name = "FOLDER")]
     reservoir_dir: Option<PathBuf>,
 
@@ -94,9 +106,6 @@ impl Sampler {
 const ITERATIONS: u64 = 12_000;
 /// Seconds between two checkpoints.
 const SAVED: f64 = 3.0;
-/// The tolerance of the numbers that are printed.
-const PRINTED: f64 = 1e-4;
-
 /// What ended a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -111,13 +120,18 @@ enum Ended {
 
 impl Search {
     pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
-        let opened = self.lens.open()?;
         self.check()?;
-        let plan = self.plan()?;
+        let opened = self.lens.open()?;
+        let plan = self.plan(&opened.lens)?;
         let lens = self.asked.start(&opened.lens)?;
-        let refused = |cause: NoLandscape| Failure::Input(format!("{}: {cause}", opened.file));
+        let refused = |cause: NoLandscape| refused_landscape(&opened.file, cause);
         let landscape = plan.landscape(&lens).map_err(refused)?;
+        let start_breaks = landscape.broken(landscape.start()).map_err(refused)?;
         let (mut run, resumed) = self.begin(&landscape, &plan, &opened.file)?;
+        self.make_folder()?;
+        limits::warn(&start_breaks);
+        let idle = resumed.then(|| nothing_to_do(&run)).flatten();
+        idle.iter().for_each(remark);
         let watch = Stopwatch::start();
         let before = run.statistics().gradients;
         let ended = self.go_on(&landscape, &mut run, watch)?;
@@ -135,19 +149,19 @@ impl Search {
         if let (Some(path), Some(finished)) = (&self.out, &finished) {
             files::save(&written(&finished.lens, &opened.lens), path)?;
         }
-        let figures =
-            |lens: &Lens| Figures::of(lens, PRINTED).map_err(|cause| refused(cause.into()));
         let printed = Stopwatch::start();
-        let both = [figures(landscape.start())?, figures(&run.best().point)?];
-        let report = Report::new(report::Found {
+        let compared = Compared::new(&landscape, &run.best().point).map_err(refused)?;
+        let report = Report::new(report::Searched {
             landscape: &landscape,
             run: &run,
             ended,
             resumed,
+            idle,
             ms,
             gradients: run.statistics().gradients - before,
-            figures: both,
-            figures_ms: 1e3 * printed.seconds(),
+            start_breaks,
+            compared,
+            compared_ms: 1e3 * printed.seconds(),
             stored,
             out: self.out.as_deref(),
             finished,
@@ -157,36 +171,44 @@ impl Search {
     }
 
     fn check(&self) -> Result<(), Failure> {
-        if let Some(minutes) = self.minutes
-            && !(minutes > 0.0 && minutes.is_finite())
-        {
-            let text = format!("--minutes: found {minutes}; expected more than 0");
-            return Err(Failure::Input(text));
+        let wrong = |name: &str, found: f64, expected: &str| {
+            let found = Number(found);
+            Err(Failure::Input(format!("{name}: found {found}; expected {expected}")))
+        };
+        if let Some(minutes) = self.minutes.filter(|m| !(*m > 0.0 && m.is_finite())) {
+            return wrong("--minutes", minutes, "more than 0");
         }
         if !(self.checkpoint_every >= 0.0) {
-            let text =
-                format!("--checkpoint-every: found {}; expected 0 or more", self.checkpoint_every);
-            return Err(Failure::Input(text));
+            return wrong("--checkpoint-every", self.checkpoint_every, "0 or more");
         }
         if self.iterations == Some(0) {
-            return Err(Failure::Input("--iterations: found 0; expected 1 or more".into()));
+            return wrong("--iterations", 0.0, "1 or more");
         }
         self.out.iter().try_for_each(|path| input::check_target(path, &["json", "zmx"]))?;
         self.checkpoint.iter().try_for_each(|path| input::check_target(path, &["json"]))?;
+        self.reservoir_dir.iter().try_for_each(|folder| targets::check_folder(folder))?;
+        let out = self.out.as_deref().map(|path| ("--out", path));
+        let checkpoint = self.checkpoint.as_deref().map(|path| ("--checkpoint", path));
+        let read = std::iter::once(("the lens", self.lens.path())).chain(self.asked.files());
+        targets::check_apart(&[out, checkpoint], read)
+    }
+
+    fn plan(&self, lens: &Lens) -> Result<Plan, Failure> {
+        let mut plan = self.asked.plan(lens)?;
+        plan.settings.method = self.method.method();
+        plan.settings.seed = self.seed;
+        let usual = if self.minutes.is_none() { Some(ITERATIONS) } else { None };
+        plan.settings.gradients = self.iterations.or(usual);
+        plan.settings.check().map_err(refused)?;
+        Ok(plan)
+    }
+
+    fn make_folder(&self) -> Result<(), Failure> {
         self.reservoir_dir.iter().try_for_each(|folder| {
             std::fs::create_dir_all(folder).map_err(|error| {
                 Failure::Input(format!("{}: {error}; expected a folder", folder.display()))
             })
         })
-    }
-
-    fn plan(&self) -> Result<Plan, Failure> {
-        let mut plan = self.asked.plan()?;
-        plan.settings.method = self.method.method();
-        plan.settings.seed = self.seed;
-        let usual = if self.minutes.is_none() { Some(ITERATIONS) } else { None };
-        plan.settings.gradients = self.iterations.or(usual);
-        Ok(plan)
     }
 
     /// A new run, or the one of the checkpoint.
@@ -250,14 +272,14 @@ impl Search {
         run.save(landscape, path).map_err(refused)
     }
 
-    /// Writes the reservoir, best lens first; the files.
+    /// Writes what was found, best lens first; the files.
     fn store(&self, run: &RunOf<LensLandscape>, opened: &Lens) -> Result<Vec<String>, Failure> {
         let Some(folder) = &self.reservoir_dir else { return Ok(Vec::new()) };
-        let mut entries: Vec<_> = run.reservoir().entries().iter().collect();
-        entries.sort_by(|a, b| a.loss.total_cmp(&b.loss));
         let mut files = Vec::new();
-        for (i, entry) in entries.into_iter().enumerate() {
-            let path = folder.join(format!("{:02}_generation_{}.json", i + 1, entry.number));
+        for (i, Found { entry, running }) in run.found().into_iter().enumerate() {
+            let running = if running { "_running" } else { "" };
+            let name = format!("{:02}_generation_{}{running}.json", i + 1, entry.number);
+            let path = folder.join(name);
             files::save(&written(&entry.point, opened), &path)?;
             files.push(path.display().to_string());
         }
@@ -275,6 +297,26 @@ fn written(lens: &Lens, opened: &Lens) -> Lens {
 
 fn is_raised(flag: &AtomicBool) -> bool {
     flag.load(Ordering::Relaxed)
+}
+
+/// What a run that was taken up again has no more to do; none where it goes on.
+fn nothing_to_do(run: &RunOf<LensLandscape>) -> Option<String> {
+    let (done, limit) = (run.statistics().gradients, run.settings().gradients);
+    Some(match (run.over()?, limit) {
+        (Over::Gradients, Some(limit)) => {
+            format!("nothing to do: {done} of {limit} gradients are made; raise --iterations")
+        }
+        (Over::Done, _) => "nothing to do: everything was tried".to_owned(),
+        (over, _) => format!("nothing to do: {}", report::why(Ended::Run(over))),
+    })
+}
+
+/// What a lens, or what is asked of it, makes impossible.
+fn refused_landscape(file: &str, cause: NoLandscape) -> Failure {
+    match cause {
+        NoLandscape::Setting { .. } | NoLandscape::Rule(_) => Failure::Input(cause.to_string()),
+        cause => Failure::Input(format!("{file}: {cause}")),
+    }
 }
 
 /// What the search itself refuses: its settings, or a checkpoint.

@@ -4,7 +4,7 @@
 //! A penalty stops short of its limit where the rest of the goal pulls the other way. So the limits
 //! are drawn tighter by a margin that grows until all of them are kept.
 
-use super::{Figures, LensLandscape, NoLandscape};
+use super::{Figures, LensLandscape, NoLandscape, missed};
 use crate::lens::{Lens, Medium, glass};
 use crate::merit::{Margin, Term, Weighted, margins};
 use crate::optimize::Memory;
@@ -35,6 +35,8 @@ pub struct Finished {
     pub lens: Lens,
     /// Glasses that were exchanged.
     pub glasses: Vec<Exchanged>,
+    /// Glasses that the rules do not list, behind or in front of surfaces that are to be left alone.
+    pub unlisted: Vec<Unlisted>,
     /// Surfaces in front of gradients: no catalogue has such a medium, and each stays what it was.
     pub gradients: Vec<usize>,
     /// Everything that is limited.
@@ -47,7 +49,16 @@ pub struct Finished {
     pub confirmed: Vec<Confirmed>,
 }
 
-/// A glass that no catalogue has, and what is used in its place.
+/// A glass that the rules do not list, and that stays.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unlisted {
+    /// The surface in front of it.
+    pub surface: usize,
+    /// The glass.
+    pub glass: String,
+}
+
+/// A glass that no catalogue has or the rules do not list, and what is used in its place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Exchanged {
     /// The surface in front of it.
@@ -79,19 +90,12 @@ impl Finished {
     /// What fails, in words; nothing where the lens can be made.
     pub fn failures(&self) -> Vec<String> {
         let limits = self.limits.iter().chain(&self.light).filter(|limit| limit.room() < 0.0);
-        let limit = |limit: &Margin| {
-            let place = limit.surface.map_or(String::new(), |i| format!(" {i}"));
-            let zoom = limit.zoom;
-            let (value, missing) = (limit.value, -limit.room());
-            let name = limit.term.replace('_', " ");
-            format!("{name}{place} at zoom {zoom} is {value:.4}, off its limit by {missing:.1e}")
-        };
         let doubts = self.confirmed.iter().filter(|field| !field.agrees);
         let doubt = |field: &Confirmed| {
             let Confirmed { zoom, field, .. } = field;
             format!("field {field} at zoom {zoom}: two samplings of the pupil disagree")
         };
-        limits.map(limit).chain(doubts.map(doubt)).collect()
+        limits.map(missed).chain(doubts.map(doubt)).collect()
     }
 }
 
@@ -100,7 +104,7 @@ impl Finished {
 /// # Errors
 /// A lens without merit, or one for which no glass is allowed.
 pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLandscape> {
-    let (mut lens, glasses) = with_real_glasses(lens, &landscape.rules)?;
+    let (mut lens, glasses, unlisted) = with_real_glasses(lens, &landscape.rules)?;
     for round in 0..ROUNDS {
         let tight = landscape.tightened(round);
         let (mut memory, mut at) = (Memory::default(), lens.clone());
@@ -126,19 +130,22 @@ pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLand
         confirmed: confirmed(&lens, &figures)?,
         gradients: gradients(&lens),
         glasses,
+        unlisted,
         figures,
         lens,
     })
 }
 
 impl LensLandscape {
-    /// Everything that the goal limits.
-    fn limits(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
-        Ok(margins(lens, self.goal.terms.iter().map(|w| w.term))?)
+    /// Everything that the goal limits, and the number of elements.
+    pub(super) fn limits(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
+        let mut limits = vec![self.count(lens)];
+        limits.extend(margins(lens, self.goal.terms.iter().map(|w| w.term))?);
+        Ok(limits)
     }
 
     /// The light of every field and colour against what the goal says that it keeps.
-    fn light_margins(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
+    pub(super) fn light_margins(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
         let share = self.goal.terms.iter().find_map(|w| match w.term {
             Term::Light(share) => Some(share),
             _ => None,
@@ -189,16 +196,31 @@ fn gradients(lens: &Lens) -> Vec<usize> {
     (0..lens.surfaces.len()).filter(is_one).collect()
 }
 
-/// The lens with every model glass replaced by the one of the catalogue that is nearest to it.
-fn with_real_glasses(lens: &Lens, rules: &Rules) -> Result<(Lens, Vec<Exchanged>), NoLandscape> {
+/// The lens with every model glass, and every glass that the rules do not list, replaced by the
+/// nearest one that they allow; those beside surfaces that are to be left alone stay.
+fn with_real_glasses(
+    lens: &Lens,
+    rules: &Rules,
+) -> Result<(Lens, Vec<Exchanged>, Vec<Unlisted>), NoLandscape> {
     let mut real = lens.clone();
-    let mut exchanged = Vec::new();
+    let (mut exchanged, mut unlisted) = (Vec::new(), Vec::new());
+    let rows = lens.surfaces.len();
     for element in elements(lens).iter().filter(|e| matches!(e.make, Make::Glass(_))) {
         for surface in element.first..element.last {
-            let was = match lens.surfaces[surface].medium {
-                Medium::Model { nd, vd } => (nd, (vd > 0.0).then_some(vd)),
-                Medium::Index(n) => (n, None),
-                Medium::Air | Medium::Glass(_) | Medium::Mirror | Medium::Gradient(_) => continue,
+            let was = match &lens.surfaces[surface].medium {
+                Medium::Model { nd, vd } => (*nd, (*vd > 0.0).then_some(*vd)),
+                Medium::Index(n) => (*n, None),
+                Medium::Glass(name) => match glass::find(name).filter(|g| !listed(g, rules)) {
+                    Some(glass) if rules.allow(surface, rows) && rules.allow(surface + 1, rows) => {
+                        (glass.nd, Some(glass.vd))
+                    }
+                    Some(glass) => {
+                        unlisted.push(Unlisted { surface, glass: glass.full_name() });
+                        continue;
+                    }
+                    None => continue,
+                },
+                Medium::Air | Medium::Mirror | Medium::Gradient(_) => continue,
             };
             let found = nearest(was, lens, rules).ok_or_else(|| NoLandscape::Setting {
                 what: "the list of glasses",
@@ -214,11 +236,15 @@ fn with_real_glasses(lens: &Lens, rules: &Rules) -> Result<(Lens, Vec<Exchanged>
     let exists = |v: &crate::lens::Variable| real.get(v.parameter).is_some();
     let variables = lens.variables.iter().filter(|v| exists(v)).copied().collect();
     real.variables = variables;
-    Ok((real, exchanged))
+    Ok((real, exchanged, unlisted))
 }
 
 /// Glasses that differ by this much in index and Abbe number are about equally unlike.
 const ALIKE: [f64; 2] = [0.01, 1.0];
+
+fn listed(glass: &glass::Glass, rules: &Rules) -> bool {
+    rules.lists(&glass.full_name())
+}
 
 fn nearest(
     (nd, vd): (f64, Option<f64>),
@@ -226,8 +252,7 @@ fn nearest(
     rules: &Rules,
 ) -> Option<&'static glass::Glass> {
     let allowed = |glass: &&glass::Glass| {
-        let named = rules.glasses.is_empty() || rules.glasses.contains(&glass.full_name());
-        named && lens.wavelengths.iter().all(|w| glass.index(w.um).is_some())
+        listed(glass, rules) && lens.wavelengths.iter().all(|w| glass.index(w.um).is_some())
     };
     let distance = |glass: &glass::Glass| {
         let off = vd.map_or(0.0, |vd| (glass.vd - vd) / ALIKE[1]);

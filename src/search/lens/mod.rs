@@ -11,61 +11,28 @@ mod figures;
 mod finish;
 mod free;
 mod goal;
+mod limits;
+mod local;
 mod open;
 mod plan;
 mod walk;
 
 pub use figures::{FieldFigures, Figures};
-pub use finish::{Confirmed, Exchanged, Finished, finish};
+pub use finish::{Confirmed, Exchanged, Finished, Unlisted, finish};
 pub use goal::goal;
+pub use limits::missed;
+pub use local::Local;
 pub use open::opened;
 pub use plan::{NoSearch, Plan, run};
 
-use super::{Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation};
+use super::{
+    BadRule, Kind, Landscape, Mutated, Random, Refusal, Rules, Slope, Weights, element, mutation,
+};
 use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
-use crate::optimize::{Memory, Method, Stretch, Stretched, stretch};
+use crate::optimize::{Memory, Stretch, Stretched, stretch};
 use crate::pupil::{BenchError, limited_by_stop};
 use free::Freedom;
-use serde::{Deserialize, Serialize};
-
-/// How a lens descends.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Local {
-    /// What takes the steps.
-    pub method: Method,
-    /// Steps that a local move tries; least squares tries fewer where hardly anything is left to gain.
-    pub steps: usize,
-    /// The rate of Adam when a descent begins: a step of one alters the residuals by as much as
-    /// they are.
-    pub rate: f64,
-    /// The error allowed of the radius of a spot, relatively.
-    pub tolerance: f64,
-    /// The same for the first steps of a descent.
-    pub coarse: f64,
-    /// For how many steps.
-    pub coarse_steps: usize,
-    /// Whether rims are free.
-    pub rims: bool,
-    /// Whether the indices of model glasses are free.
-    pub indices: bool,
-}
-
-impl Default for Local {
-    fn default() -> Self {
-        Self {
-            method: Method::DampedLeastSquares,
-            steps: 20,
-            rate: 0.015,
-            tolerance: 1e-2,
-            coarse: 1e-2,
-            coarse_steps: 0,
-            rims: true,
-            indices: false,
-        }
-    }
-}
 
 /// Why a lens cannot be searched from.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -79,7 +46,13 @@ pub enum NoLandscape {
     /// Its merit.
     #[error(transparent)]
     Merit(#[from] MeritError),
-    /// A setting or rule without meaning.
+    /// A rule without meaning.
+    #[error(transparent)]
+    Rule(#[from] BadRule),
+    /// Limits that no lens keeps.
+    #[error("no lens keeps these limits: {0}")]
+    Impossible(String),
+    /// A setting without meaning.
     #[error("{what} is {found}; expected {expected}")]
     Setting {
         /// Which one.
@@ -120,6 +93,9 @@ impl LensLandscape {
         local: &Local,
     ) -> Result<Self, NoLandscape> {
         local.check()?;
+        let rules = rules.checked()?;
+        rules.check_kept(lens.surfaces.len())?;
+        limits::check_glasses(lens, &rules)?;
         let mut start = limited_by_stop(lens)?;
         free::hold_the_rest(&mut start);
         start.check()?;
@@ -129,7 +105,7 @@ impl LensLandscape {
             _ => None,
         });
         let freedom = Freedom { size, rims: local.rims, indices: local.indices };
-        let merit = Merit::new(&free::freed(&start, rules, freedom), goal, local.tolerance)?;
+        let merit = Merit::new(&free::freed(&start, &rules, freedom), goal, local.tolerance)?;
         if merit.variables().is_empty() {
             return Err(MeritError::NoVariables.into());
         }
@@ -137,7 +113,7 @@ impl LensLandscape {
             light: merit.light_at_start().to_vec(),
             start,
             goal: goal.clone(),
-            rules: rules.clone(),
+            rules,
             local: local.clone(),
             freedom,
             focal_length: asked.unwrap_or(size),
@@ -223,12 +199,17 @@ impl LensLandscape {
         merit.value(&merit.values(lens))
     }
 
-    /// A local move: where it leads, and what that is worth.
-    fn moved(&self, lens: &Lens, memory: &mut Memory) -> Result<(Lens, f64, usize), MeritError> {
+    /// A local move of no more than so many steps: where it leads, and what that is worth.
+    fn moved(
+        &self,
+        lens: &Lens,
+        memory: &mut Memory,
+        most: usize,
+    ) -> Result<(Lens, f64, usize), MeritError> {
         let Local { method, steps, rate, tolerance, coarse, .. } = self.local;
         let is_coarse = memory.steps < self.local.coarse_steps;
         let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
-        let asked = Stretch { method, steps, rate };
+        let asked = Stretch { method, steps: steps.min(most), rate };
         let Stretched { lens: mut there, before, gradients } =
             stretch(merit, &self.freed(lens), asked, memory)?;
         there.variables.clone_from(&lens.variables);
@@ -250,25 +231,6 @@ impl LensLandscape {
     }
 }
 
-impl Local {
-    fn check(&self) -> Result<(), NoLandscape> {
-        let positive = [("the rate", self.rate), ("the tolerance", self.tolerance)];
-        let positive = positive.into_iter().chain([("the coarse tolerance", self.coarse)]);
-        for (what, value) in positive {
-            if !(value > 0.0 && value < 1.0) {
-                let expected = "more than 0 and less than 1";
-                return Err(NoLandscape::Setting { what, found: value.to_string(), expected });
-            }
-        }
-        if self.steps == 0 {
-            let what = "the number of steps of a move";
-            let expected = "1 or more";
-            return Err(NoLandscape::Setting { what, found: "0".into(), expected });
-        }
-        Ok(())
-    }
-}
-
 /// A move may lead to something worse by this part, since the rays of two lenses differ.
 const SLACK: f64 = 0.05;
 
@@ -284,7 +246,11 @@ impl Landscape for LensLandscape {
     }
 
     fn descend(&self, lens: &Lens, memory: &mut Memory) -> (Lens, f64, usize) {
-        match self.moved(lens, memory) {
+        self.descend_within(lens, memory, usize::MAX)
+    }
+
+    fn descend_within(&self, lens: &Lens, memory: &mut Memory, most: usize) -> (Lens, f64, usize) {
+        match self.moved(lens, memory, most) {
             Ok(moved) => moved,
             Err(_) => (lens.clone(), f64::INFINITY, 0),
         }
@@ -319,6 +285,12 @@ impl Landscape for LensLandscape {
 
     fn topology(&self, lens: &Lens) -> String {
         element::topology(lens)
+    }
+
+    fn outside(&self, lens: &Lens) -> u64 {
+        let [min, max] = self.rules.elements;
+        let pieces = element::pieces(lens);
+        (min.saturating_sub(pieces) + pieces.saturating_sub(max)) as u64
     }
 
     fn about(&self) -> serde_json::Value {

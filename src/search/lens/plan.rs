@@ -3,7 +3,7 @@
 use super::{LensLandscape, Local, NoLandscape, goal};
 use crate::lens::Lens;
 use crate::merit::Goal;
-use crate::search::{Event, Rules, Run, RunOf, SearchError, Settings, Temperature};
+use crate::search::{Event, Kind, Rules, Run, RunOf, SearchError, Settings, Temperature};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -54,22 +54,28 @@ impl Plan {
     /// The landscape that is searched.
     ///
     /// # Errors
-    /// A lens without merit, rules or settings without meaning.
+    /// A lens without merit, rules or settings without meaning, limits that no lens keeps.
     pub fn landscape(&self, lens: &Lens) -> Result<LensLandscape, NoLandscape> {
         let (common, each) = match self.light[..] {
             [share] => (share, &[][..]),
             _ => (1.0, &self.light[..]),
         };
-        let usual = || goal(lens, &self.rules, self.focal_length, common);
+        let rules = self.rules.checked()?;
+        let usual = || goal(lens, &rules, self.focal_length, common);
         let goal = self.goal.clone().map_or_else(usual, Ok)?;
-        LensLandscape::new(lens, &goal, &self.rules, &self.local)?.asking_each(each)
+        let landscape = LensLandscape::new(lens, &goal, &rules, &self.local)?.asking_each(each)?;
+        landscape.check_possible()?;
+        Ok(landscape)
     }
 
-    /// The settings, with the temperature that this landscape calls for where none is given.
+    /// The settings, with the temperature that this landscape calls for where none is given, and
+    /// without draws from anywhere where the rules forbid them.
     pub fn settings(&self, landscape: &LensLandscape) -> Settings {
         let usual = || Temperature::halving(landscape.scale());
         let temperature = self.settings.temperature.unwrap_or_else(usual);
-        Settings { temperature: Some(temperature), ..self.settings.clone() }
+        let forbidden = self.rules.weight(Kind::Global) == 0.0;
+        let gamma = if forbidden { 0.0 } else { self.settings.gamma };
+        Settings { temperature: Some(temperature), gamma, ..self.settings.clone() }
     }
 }
 

@@ -1,6 +1,7 @@
-//! Search over structure: mutations and their paraxial projection; chains, their reservoir, family
-//! tree and checkpoints, and what they sample; lenses as what is searched.
+//! Search over structure: mutations and their paraxial projection; chains, their budget, reservoir,
+//! family tree and checkpoints, and what they sample; lenses as what is searched, and their rules.
 
+mod budget;
 mod chain;
 mod checkpoint;
 mod density;
@@ -10,6 +11,7 @@ mod mutations;
 mod projection;
 mod reservoir;
 mod rugged;
+mod rules;
 mod sampling;
 
 use aplanat::search::{Random, Rules};

@@ -3,7 +3,7 @@
 use aplanat::search::{Entry, Offer, Reservoir};
 
 fn entry(number: u64, loss: f64, topology: &str) -> Entry<u64> {
-    Entry { number, loss, topology: topology.to_owned(), point: number }
+    Entry { number, loss, topology: topology.to_owned(), outside: 0, point: number }
 }
 
 fn numbers(reservoir: &Reservoir<u64>) -> Vec<u64> {
@@ -74,4 +74,17 @@ fn what_is_worth_nothing_does_not_enter() {
         assert_eq!(reservoir.offer(entry(0, loss, "a")), Offer::Worthless);
     }
     assert!(reservoir.entries().is_empty());
+}
+
+/// A structure that is asked for is better than one that is not, whatever the losses.
+#[test]
+fn the_nearer_structure_is_the_better_one() {
+    let far = |outside, entry| Entry { outside, ..entry };
+    let mut reservoir = Reservoir::new(2, true);
+    reservoir.offer(far(2, entry(0, 0.1, "a")));
+    reservoir.offer(far(1, entry(1, 5.0, "b")));
+    assert_eq!(reservoir.best().unwrap().number, 1);
+    assert_eq!(reservoir.offer(far(3, entry(2, 0.0, "c"))), Offer::BehindAll);
+    assert_eq!(reservoir.offer(far(0, entry(3, 9.0, "d"))), Offer::Replaced(0));
+    assert_eq!(reservoir.best().unwrap().number, 3);
 }

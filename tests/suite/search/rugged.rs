@@ -44,7 +44,7 @@ pub(super) struct Rugged {
 }
 
 pub(super) const START: Spot = Spot { elements: 2, x: 3.0 };
-const STEPS: usize = 5;
+pub(super) const STEPS: usize = 5;
 
 impl Rugged {
     pub(super) fn with(fault: Fault) -> Self {
@@ -92,8 +92,17 @@ impl Landscape for Rugged {
     }
 
     fn descend(&self, spot: &Spot, memory: &mut Momentum) -> (Spot, f64, usize) {
-        let mut x = spot.x;
-        for _ in 0..STEPS {
+        self.descend_within(spot, memory, STEPS)
+    }
+
+    fn descend_within(
+        &self,
+        spot: &Spot,
+        memory: &mut Momentum,
+        most: usize,
+    ) -> (Spot, f64, usize) {
+        let (mut x, steps) = (spot.x, STEPS.min(most));
+        for _ in 0..steps {
             memory.0 = 0.8 * memory.0 + 0.2 * Self::slope_at(x);
             x -= 0.03 * memory.0;
         }
@@ -103,7 +112,7 @@ impl Landscape for Rugged {
             Fault::DescentInfinite => f64::INFINITY,
             _ => self.loss(&next),
         };
-        (next, loss, STEPS)
+        (next, loss, steps)
     }
 
     fn draw(&self, random: &mut Random) -> Result<Spot, Refusal> {

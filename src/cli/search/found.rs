@@ -1,0 +1,145 @@
+//! What a search has found: the start against the best lens, and the lens that was finished.
+
+use super::limits::{self, Broken};
+use crate::cli::optimize::TermKeys;
+use crate::cli::output::{Number, Table, optional};
+use crate::lens::Lens;
+use crate::search::lens::{FieldFigures, Figures, Finished, LensLandscape, NoLandscape, Unlisted};
+use serde::Serialize;
+use std::fmt;
+
+/// The tolerance of the numbers that are printed.
+const PRINTED: f64 = 1e-4;
+
+/// The start against the best lens.
+#[derive(Serialize)]
+pub(super) struct Compared {
+    start: Figures,
+    best: Figures,
+    terms: Vec<TermKeys>,
+    best_breaks: Vec<Broken>,
+}
+
+/// A lens that was finished, and what is not kept.
+#[derive(Serialize)]
+pub(super) struct FinishedKeys {
+    pub(super) failures: Vec<String>,
+    #[serde(flatten)]
+    pub(super) finished: Finished,
+}
+
+impl Compared {
+    pub(super) fn new(landscape: &LensLandscape, best: &Lens) -> Result<Self, NoLandscape> {
+        let start = landscape.start();
+        let [before, after] = [landscape.terms(start)?, landscape.terms(best)?];
+        Ok(Self {
+            start: Figures::of(start, PRINTED)?,
+            best: Figures::of(best, PRINTED)?,
+            terms: TermKeys::all(&before, &after),
+            best_breaks: Broken::all(landscape.broken(best)?),
+        })
+    }
+
+    /// Rays of the figures.
+    pub(super) fn rays(&self) -> usize {
+        self.start.rays() + self.best.rays()
+    }
+
+    /// The start against the best lens.
+    pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (start, best) = (&self.start, &self.best);
+        let mut table = Table::new(&[
+            "field",
+            "spot, um",
+            "error",
+            "best",
+            "error",
+            "light, mm^2",
+            "error",
+            "best",
+            "error",
+        ]);
+        for (before, after) in start.fields.iter().zip(&best.fields) {
+            let zoom = if start.focal_lengths.len() > 1 {
+                format!(" zoom {}", before.zoom)
+            } else {
+                String::new()
+            };
+            let name = if before.x == 0.0 {
+                format!("{}{zoom}", Number(before.y))
+            } else {
+                format!("{}, {}{zoom}", Number(before.x), Number(before.y))
+            };
+            let light = |field: &FieldFigures| {
+                [format!("{:.2}", field.light.value), format!("{:.0e}", field.light.error)]
+            };
+            let cells = [spot(before), spot(after), light(before), light(after)];
+            table.row(std::iter::once(name).chain(cells.into_iter().flatten()));
+        }
+        write!(f, "{table}")?;
+        for (a, b) in start.focal_lengths.iter().zip(&best.focal_lengths) {
+            writeln!(f, "focal length {} -> {} mm", optional(*a), optional(*b))?;
+        }
+        writeln!(f, "track {} -> {} mm", Number(start.track), Number(best.track))?;
+        let [from, to] = [start, best].map(|lens| format!("{} ({})", lens.elements, lens.topology));
+        writeln!(f, "elements {from} -> {to}")?;
+        Ok(())
+    }
+
+    /// What each term is worth, and the limits that are not kept.
+    pub(super) fn write_terms(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", TermKeys::table(&self.terms))?;
+        limits::write(&self.best_breaks, f)
+    }
+}
+
+impl FinishedKeys {
+    pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Finished { glasses, unlisted, gradients, figures, confirmed, .. } = &self.finished;
+        let (kept, light) = (&self.finished.limits, &self.finished.light);
+        let verdict = if self.failures.is_empty() { "every limit is kept" } else { "NOT finished" };
+        writeln!(f, "\nfinished: {verdict}")?;
+        for change in glasses {
+            let (nd, vd) = change.was;
+            let was = format!("{} {}", Number(nd), optional(vd));
+            let (nd, vd) = change.is;
+            let is = format!("{} ({} {})", change.glass, Number(nd), Number(vd));
+            writeln!(f, "  glass behind surface {}: {was} -> {is}", change.surface)?;
+        }
+        for Unlisted { surface, glass } in unlisted {
+            writeln!(
+                f,
+                "  glass behind surface {surface}: {glass} stays: the rules do not list it, \
+                and keep the surface"
+            )?;
+        }
+        for surface in gradients {
+            writeln!(f, "  medium behind surface {surface}: a gradient, kept as it is")?;
+        }
+        let head =
+            ["field", "spot, um", "error", "other rays", "light, mm^2", "error", "other rays"];
+        let mut table = Table::new(&head);
+        for (field, other) in figures.fields.iter().zip(confirmed) {
+            let name = format!("{} zoom {}", Number(field.y), field.zoom);
+            let second = [format!("{:.3}", 1e3 * other.spot), format!("{:.2}", other.light)];
+            let light = [format!("{:.2}", field.light.value), format!("{:.0e}", field.light.error)];
+            let [spot_second, light_second] = second;
+            let cells = spot(field).into_iter().chain([spot_second]).chain(light);
+            table.row(std::iter::once(name).chain(cells).chain([light_second]));
+        }
+        writeln!(f, "{table}")?;
+        let mut table = Table::new(&["limit", "surface", "zoom", "value", "min", "max", "margin"]);
+        for limit in kept.iter().chain(light) {
+            table.row(limits::cells(limit).into_iter().chain([format!("{:.4}", limit.room())]));
+        }
+        write!(f, "{table}")
+    }
+}
+
+/// µm.
+fn spot(field: &FieldFigures) -> [String; 2] {
+    let both = |spot: crate::analysis::Estimate| {
+        [format!("{:.3}", 1e3 * spot.value), format!("{:.0e}", 1e3 * spot.error)]
+    };
+    field.spot.map_or(["-".to_owned(), "-".to_owned()], both)
+}

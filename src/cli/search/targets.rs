@@ -1,0 +1,42 @@
+//! The files that a search writes: none of them is one that it reads, or another one that it writes.
+
+use crate::cli::failure::Failure;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Refuses what is no folder, or cannot become one.
+pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
+    let there = folder.ancestors().find(|part| part.exists());
+    match there {
+        Some(part) if !part.is_dir() => {
+            let (folder, part) = (folder.display(), part.display());
+            Err(Failure::Input(format!("{folder}: {part} is a file; expected a folder")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses files that would be written over one that is read, or over each other.
+pub(super) fn check_apart<'a>(
+    targets: &[Option<(&'static str, &'a Path)>],
+    read: impl Iterator<Item = (&'static str, &'a Path)>,
+) -> Result<(), Failure> {
+    let mut taken: Vec<(&str, PathBuf)> = read.map(|(name, path)| (name, place(path))).collect();
+    for (name, path) in targets.iter().flatten() {
+        let place = place(path);
+        if let Some((other, _)) = taken.iter().find(|(_, taken)| *taken == place) {
+            let text = format!("{name}: {} is {other}; expected another file", path.display());
+            return Err(Failure::Input(text));
+        }
+        taken.push((name, place));
+    }
+    Ok(())
+}
+
+/// Where a file lies, whatever it is called on the way there.
+fn place(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = fs::canonicalize(folder.unwrap_or(Path::new(".")));
+    let new = || Some(folder.ok()?.join(path.file_name()?));
+    fs::canonicalize(path).ok().or_else(new).unwrap_or_else(|| path.to_owned())
+}

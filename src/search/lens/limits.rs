@@ -1,0 +1,142 @@
+//! What is asked for and not kept: by how much a lens breaks its limits, and limits that no lens
+//! keeps, which a search would chase in vain.
+
+use super::{LensLandscape, NoLandscape};
+use crate::lens::{Lens, Medium, Object, glass};
+use crate::math::brief;
+use crate::merit::{Margin, MeritError, Term, TermValue};
+use crate::search::{Rules, element};
+use std::f64::consts::PI;
+
+/// Light that is less than asked for by this part is as much, by two samplings of its pupil.
+const AS_BRIGHT: f64 = 1e-3;
+
+impl LensLandscape {
+    /// How many elements a lens has, and may have.
+    pub(super) fn count(&self, lens: &Lens) -> Margin {
+        let [min, max] = self.rules.elements.map(|count| Some(count as f64));
+        let value = element::pieces(lens) as f64;
+        Margin { term: "elements", surface: None, zoom: 0, value, min, max }
+    }
+
+    /// Every limit that a lens breaks, the number of its elements and the light of its fields among
+    /// them; nothing where it keeps all.
+    ///
+    /// # Errors
+    /// A lens that cannot be set up.
+    pub fn broken(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
+        let dark = |light: &Margin| -light.room() > AS_BRIGHT * light.min.unwrap_or(0.0);
+        let mut broken = self.limits(lens)?;
+        broken.retain(|limit| limit.room() < 0.0);
+        broken.extend(self.light_margins(lens)?.into_iter().filter(dark));
+        Ok(broken)
+    }
+
+    /// What each term of the goal is worth at a lens, by the rays that a search judges it by: weight
+    /// times value, summed, is its loss.
+    ///
+    /// # Errors
+    /// A lens without merit.
+    pub fn terms(&self, lens: &Lens) -> Result<Vec<TermValue>, MeritError> {
+        let merit = self.merit(lens, self.local.tolerance)?;
+        merit.terms(&merit.values(lens))
+    }
+
+    /// Refuses limits that no lens keeps.
+    pub(super) fn check_possible(&self) -> Result<(), NoLandscape> {
+        self.check_rims()?;
+        self.check_track()
+    }
+
+    /// A beam from infinity is as large at the first rim as at the first vertex plane.
+    fn check_rims(&self) -> Result<(), NoLandscape> {
+        let most = self.first(|term| match term {
+            Term::SemiDiameter { max, .. } => Some(max),
+            _ => None,
+        });
+        let share = self.first(|term| match term {
+            Term::Light(share) => Some(share),
+            _ => None,
+        });
+        let (Some(most), Some(share)) = (most, share) else { return Ok(()) };
+        let light = share * self.light.iter().flatten().copied().fold(0.0, f64::max);
+        let rim = (light / PI).sqrt();
+        if self.start.object != Object::Infinity || most >= (1.0 - AS_BRIGHT) * rim {
+            return Ok(());
+        }
+        let (most, light, rim) = (brief(most), short(light), short(rim));
+        Err(NoLandscape::Impossible(format!(
+            "semi-diameters of {most} mm at most; the light that is asked for, {light} mm^2, needs \
+             {rim} mm at the first surface"
+        )))
+    }
+
+    /// As few elements as there may be, as thin as they may be, and the room behind them.
+    fn check_track(&self) -> Result<(), NoLandscape> {
+        let most = self.first(|term| match term {
+            Term::TotalTrack(max) => Some(max),
+            _ => None,
+        });
+        let room = self.first(|term| match term {
+            Term::BackFocus(min) => Some(min.max(0.0)),
+            _ => None,
+        });
+        let thin = self.first(|term| match term {
+            Term::GlassCenter { min, .. } => Some(min),
+            _ => None,
+        });
+        let folded = self.start.surfaces.iter().any(|row| row.medium == Medium::Mirror);
+        let Some(most) = most.filter(|_| !folded) else { return Ok(()) };
+        let (room, thin, pieces) =
+            (room.unwrap_or(0.0), thin.unwrap_or(0.0), self.rules.elements[0]);
+        let least = pieces as f64 * thin + room;
+        if most >= least {
+            return Ok(());
+        }
+        let [most, least, room, thin] = [most, least, room, thin].map(short);
+        Err(NoLandscape::Impossible(format!(
+            "a track of {most} mm at most; {pieces} pieces of glass of {thin} mm and a back focus \
+             of {room} mm need {least} mm"
+        )))
+    }
+
+    /// What the first term of a kind asks for.
+    fn first(&self, number: impl Fn(Term) -> Option<f64>) -> Option<f64> {
+        self.goal.terms.iter().find_map(|weighted| number(weighted.term))
+    }
+}
+
+/// A limit that is not kept, in words.
+pub fn missed(limit: &Margin) -> String {
+    let place = limit.surface.map_or(String::new(), |i| format!(" {i}"));
+    let (value, missing) = (short(limit.value), -limit.room());
+    let (name, zoom) = (limit.term.replace('_', " "), limit.zoom);
+    format!("{name}{place} at zoom {zoom} is {value}, off its limit by {missing:.1e}")
+}
+
+/// Refuses a list of glasses of which none has an index at every wavelength of the lens.
+pub(super) fn check_glasses(lens: &Lens, rules: &Rules) -> Result<(), NoLandscape> {
+    let reaches =
+        |glass: &glass::Glass| lens.wavelengths.iter().all(|w| glass.index(w.um).is_some());
+    let mut listed = rules.glasses.iter().filter_map(|name| glass::find(name));
+    if rules.glasses.is_empty() || listed.any(reaches) {
+        return Ok(());
+    }
+    Err(NoLandscape::Setting {
+        what: "the list of glasses",
+        found: rules.glasses.join(", "),
+        expected: "one with data at every wavelength of the lens",
+    })
+}
+
+/// Four decimals, none for a whole number, or an exponent where they say nothing.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    if size < 1e9 && value.fract() == 0.0 {
+        format!("{value:.0}")
+    } else if (1e-3..1e9).contains(&size) {
+        format!("{value:.4}")
+    } else {
+        format!("{value:.4e}")
+    }
+}
