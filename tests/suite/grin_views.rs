@@ -196,7 +196,7 @@ fn wrong_pictures_are_refused_with_their_file() {
     let bytes = std::fs::read(&whole.0).unwrap();
     let torn = Scrap::new("torn.png", &bytes[..bytes.len() / 2]);
     says(refused(torn.drawing()), &["torn.png", "picture"]);
-    says(refused(Drawing::Scene(f64::NAN)), &["goal, scene", "NaN"]);
+    says(refused(Drawing::Scene(f64::NAN)), &["goal, drawing, scene", "NaN"]);
 }
 
 #[test]

@@ -97,7 +97,7 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
     if error.is_syntax() {
         let found = word_at(text, error.line(), error.column());
         // Sound JSON that stands where one of several things is named.
-        let is_sound = serde_json::from_str::<IgnoredAny>(text).is_ok();
+        let is_sound = serde_json::from_str::<serde_json::Value>(text).is_ok();
         let expected = if is_sound {
             "a name, or an object with one key".to_owned()
         } else {
