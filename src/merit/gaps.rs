@@ -70,7 +70,8 @@ fn limited(zoom: &Zoom, systems: &Systems, term: Term) -> Vec<Limited> {
 pub struct Margin {
     /// Which term.
     pub term: &'static str,
-    /// The surface, or the one in front of the gap; none for the whole lens.
+    /// The surface, or the one in front of the gap; the field where it is light that is limited; none
+    /// for the whole lens.
     pub surface: Option<usize>,
     /// The zoom position.
     pub zoom: usize,

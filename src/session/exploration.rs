@@ -6,6 +6,7 @@ use super::moments::History;
 use super::quest::Quest;
 use super::worker::Standing;
 use crate::lens::Lens;
+use crate::merit::Margin;
 use crate::search::element::pieces;
 use crate::search::lens::LensLandscape;
 use crate::search::{Chain, Entry, Node, Over, RunOf, Statistics, Temperature, Weights};
@@ -49,6 +50,10 @@ pub struct Exploration {
     pub gradients: u64,
     /// The rays of a gradient of the best lens.
     pub rays: usize,
+    /// The limits that the start breaks.
+    pub start_breaks: Vec<Margin>,
+    /// Those that the best lens breaks, as it was a few seconds ago.
+    pub best_breaks: Vec<Margin>,
     /// Where it is saved.
     pub checkpoint: Checkpoint,
 }
@@ -128,6 +133,8 @@ impl Exploration {
             seconds: 0.0,
             gradients: 0,
             rays: 0,
+            start_breaks: Vec::new(),
+            best_breaks: Vec::new(),
             checkpoint: Checkpoint { path, ..Checkpoint::default() },
         };
         exploration.look(run);

@@ -15,6 +15,8 @@ use std::sync::Arc;
 
 /// How a file of a search ends.
 const ENDING: &str = "search.json";
+/// The search that was forgotten last: `Open…` brings it back.
+const FORGOTTEN: &str = "forgotten.json";
 /// How many letters of the name of a lens the name of its file has.
 const LONGEST: usize = 32;
 /// So many searches from lenses of one name are saved, and no more.
@@ -134,9 +136,11 @@ impl ExplorationDesk {
         self.asked = None;
     }
 
+    /// Puts the file of the search that was left aside, in place of the one that was forgotten before.
     fn forget_left(&mut self) -> Result<(), String> {
         let Some(left) = self.left.take() else { return Ok(()) };
-        fs::remove_file(&left).map_err(|why| format!("{}: {why}", left.display()))
+        let aside = left.with_file_name(FORGOTTEN);
+        fs::rename(&left, aside).map_err(|why| format!("{}: {why}", left.display()))
     }
 
     /// The lens of a generation.

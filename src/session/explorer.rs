@@ -12,6 +12,7 @@ use super::quest::{Engine, Explores, Quest};
 use super::slot::Slot;
 use super::worker::Standing;
 use crate::lens::Lens;
+use crate::merit::Margin;
 use crate::search::Steer;
 use rayon::ThreadPool;
 use std::io;
@@ -224,7 +225,7 @@ impl Work for Desk {
         if self.saves.is_due() {
             self.save();
             if let Some(run) = &mut self.run {
-                run.count_rays();
+                run.appraise();
             }
         }
     }
@@ -251,7 +252,8 @@ impl Desk {
         });
         match ready {
             Ok((engine, quest, mut diary)) => {
-                let state = Exploration::new(number, quest, engine.run(), path);
+                let mut state = Exploration::new(number, quest, engine.run(), path);
+                state.start_breaks = broken(engine.as_ref(), &engine.run().start().point);
                 diary.history.begin(engine.run());
                 self.run = Some(Run { engine, state, diary });
                 self.saves.is_due();
@@ -265,7 +267,7 @@ impl Desk {
     fn stand(&mut self, standing: Standing) {
         let Some(run) = &mut self.run else { return };
         run.state.standing = standing;
-        run.count_rays();
+        run.appraise();
         let number = run.state.number;
         if standing != Standing::Running {
             self.save();
@@ -331,6 +333,11 @@ impl Desk {
     }
 }
 
+/// The limits that a lens breaks.
+fn broken(engine: &dyn Explores, lens: &Lens) -> Vec<Margin> {
+    guarded(|| Ok(engine.broken(lens))).unwrap_or_default()
+}
+
 impl Run {
     /// One turn of every chain; why the search is over, where it is.
     fn round(&mut self, pool: &ThreadPool) -> Option<Ending> {
@@ -350,11 +357,13 @@ impl Run {
         over.or_else(|| late.then_some(Ending::Time))
     }
 
-    /// Counts the rays of a gradient, which change with the lens.
-    fn count_rays(&mut self) {
+    /// Counts the rays of a gradient of the best lens, and looks which limits it breaks.
+    fn appraise(&mut self) {
         let engine = &self.engine;
-        let rays = guarded(|| Ok(engine.rays()));
-        self.state.rays = rays.unwrap_or(self.state.rays);
+        let best = &engine.run().best().point;
+        let state = &mut self.state;
+        state.rays = guarded(|| Ok(engine.rays())).unwrap_or(state.rays);
+        state.best_breaks = broken(engine.as_ref(), best);
     }
 
     /// Takes over what the search has found.

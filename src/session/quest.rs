@@ -4,7 +4,7 @@ use super::diary::Diary;
 use super::finishing::Finishing;
 use crate::files::FileError;
 use crate::lens::Lens;
-use crate::merit::Goal;
+use crate::merit::{Goal, Margin};
 use crate::search::lens::{LensLandscape, Local, NoLandscape, Plan, opened};
 use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer, element};
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,8 @@ pub(super) trait Explores: Send {
     fn finishing(&self) -> Finishing;
     /// The rays of a gradient of the best lens.
     fn rays(&self) -> usize;
+    /// The limits that a lens breaks.
+    fn broken(&self, lens: &Lens) -> Vec<Margin>;
 }
 
 /// A run on its landscape.
@@ -146,5 +148,10 @@ impl Explores for Engine {
 
     fn rays(&self) -> usize {
         self.landscape.rays(&self.run.best().point)
+    }
+
+    fn broken(&self, lens: &Lens) -> Vec<Margin> {
+        // A lens that cannot be set up is nowhere in a run.
+        self.landscape.broken(lens).unwrap_or_default()
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use aplanat::files;
 use aplanat::lens::{Fields, Lens, Medium};
+use aplanat::merit::Margin;
 use aplanat::optimize::pareto::Design;
 use aplanat::search::{
     Ended, Kind, Method, Node, Offer, Statistics, Steer, Tally, Temperature, Weights,
@@ -89,6 +90,11 @@ fn node(number: u64, kind: Option<Kind>) -> Arc<Node<Arc<Lens>>> {
     })
 }
 
+/// Glass that is thinner at its rim than it may be.
+fn thin(value: f64) -> Margin {
+    Margin { term: "glass_edge", surface: Some(2), zoom: 0, value, min: Some(0.8), max: None }
+}
+
 /// A search from the double Gauss that has found two lenses, and stands somehow.
 fn searching(standing: Standing) -> View {
     let mut view = view();
@@ -123,6 +129,8 @@ fn searching(standing: Standing) -> View {
         seconds: 12.0,
         gradients: 1200,
         rays: 300,
+        start_breaks: vec![thin(0.2), thin(0.3)],
+        best_breaks: vec![thin(0.79)],
         checkpoint: Checkpoint { path: Some("a/b.json".into()), moves: Some(50), failed: None },
     };
     view.explorations.here = Some(Arc::new(run.start.judged.clone().unwrap()));
@@ -213,6 +221,8 @@ fn a_search_can_be_held_ended_saved_and_forgotten() {
     harness.get_by_label_contains("merit 0.1 to 0.02");
     harness.get_by_label_contains("60 moves, 1200 gradients of 300 rays, 100 gradients/s (10 ms");
     harness.get_by_label("Saved up to move 50 to b.json");
+    harness.get_by_label_contains("The start breaks 2 limits");
+    harness.get_by_label_contains("The best lens breaks 1 limit:");
     harness.get_by_label_contains("Merit against iterations: 30 moments, 1 descents");
     harness.get_by_label("Elements of chain 1 against iterations: 6 now");
 }

@@ -128,7 +128,8 @@ impl FinishedKeys {
             table.row(std::iter::once(name).chain(cells).chain([light_second]));
         }
         writeln!(f, "{table}")?;
-        let mut table = Table::new(&["limit", "surface", "zoom", "value", "min", "max", "margin"]);
+        let mut table =
+            Table::new(&["limit", "surface or field", "zoom", "value", "min", "max", "margin"]);
         for limit in kept.iter().chain(light) {
             table.row(limits::cells(limit).into_iter().chain([format!("{:.4}", limit.room())]));
         }

@@ -40,7 +40,8 @@ pub(super) fn write(broken: &[Broken], f: &mut fmt::Formatter<'_>) -> fmt::Resul
         return writeln!(f, "the best lens keeps all limits\n");
     }
     writeln!(f, "the best lens breaks limits, which only --finish enforces:")?;
-    let mut table = Table::new(&["limit", "surface", "zoom", "value", "min", "max", "off by"]);
+    let mut table =
+        Table::new(&["limit", "surface or field", "zoom", "value", "min", "max", "off by"]);
     for Broken { limit, off_by } in broken {
         table.row(cells(limit).into_iter().chain([format!("{off_by:.1e}")]));
     }

@@ -108,10 +108,16 @@ impl LensLandscape {
 
 /// A limit that is not kept, in words.
 pub fn missed(limit: &Margin) -> String {
-    let place = limit.surface.map_or(String::new(), |i| format!(" {i}"));
-    let (value, missing) = (short(limit.value), -limit.room());
-    let (name, zoom) = (limit.term.replace('_', " "), limit.zoom);
-    format!("{name}{place} at zoom {zoom} is {value}, off its limit by {missing:.1e}")
+    let of = if limit.term == "light" { "field" } else { "surface" };
+    let place = limit.surface.map_or(String::new(), |i| format!(", {of} {i}"));
+    let zoom = if limit.zoom == 0 { String::new() } else { format!(", zoom {}", limit.zoom) };
+    let (name, value) = (limit.term.replace('_', " "), short(limit.value));
+    let bound = match (limit.min, limit.max) {
+        (Some(min), _) if limit.value < min => format!("at least {}", short(min)),
+        (_, Some(max)) => format!("at most {}", short(max)),
+        _ => "a number".to_owned(),
+    };
+    format!("{name}{place}{zoom}: {value} instead of {bound}")
 }
 
 /// Refuses a list of glasses of which none has an index at every wavelength of the lens.

@@ -4,6 +4,7 @@ use eframe::egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui
 
 use super::setup::Setup;
 use super::{wish, words};
+use crate::search::lens::missed;
 use crate::search::{Steer, Temperature};
 use crate::session::{Command, Exploration, Explore, Standing, View};
 use crate::studio::number;
@@ -82,7 +83,10 @@ pub(super) fn left(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
         if ui.button("Go on").on_hover_text("Go on where it was saved").clicked() {
             wishes.push(wish(Explore::GoOn(Some(left.clone()))));
         }
-        if ui.button("Forget it").on_hover_text("Remove its file").clicked() {
+        ui.add_space(12.0);
+        let hint =
+            "Put its file aside; Open… finds it as forgotten.json until another is forgotten";
+        if ui.button("Forget it").on_hover_text(hint).clicked() {
             wishes.push(wish(Explore::ForgetLeft));
         }
     });
@@ -90,6 +94,18 @@ pub(super) fn left(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
 
 const GRADIENT: &str = "A move of a chain is some gradient steps; a gradient is that of all spots, \
     pupils and limits by every free number of the lens, with the rays of the best lens";
+
+/// What the start and the best lens do not keep, which only what is exported has to.
+fn broken(ui: &mut Ui, run: &Exploration) {
+    for (lens, limits) in [("start", &run.start_breaks), ("best lens", &run.best_breaks)] {
+        if !limits.is_empty() {
+            let text = words::broken(lens, limits.len());
+            let all: Vec<String> = limits.iter().map(missed).collect();
+            let label = Label::new(RichText::new(text).small().color(ui.visuals().warn_fg_color));
+            ui.add(label).on_hover_text(all.join("\n"));
+        }
+    }
+}
 
 /// How far the search is, in numbers.
 pub(super) fn progress(ui: &mut Ui, view: &View, run: &Exploration) {
@@ -112,6 +128,7 @@ pub(super) fn progress(ui: &mut Ui, view: &View, run: &Exploration) {
     let path = run.checkpoint.path.as_ref().map(|path| path.display().to_string());
     let label = Label::new(RichText::new(text).small().color(color)).truncate();
     ui.add(label).on_hover_text(path.unwrap_or_default());
+    broken(ui, run);
 }
 
 /// What can be changed while it goes on: the temperature, and the chain that is followed.

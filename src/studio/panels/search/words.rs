@@ -70,6 +70,12 @@ fn time(seconds: f64) -> String {
     }
 }
 
+/// That a lens breaks so many limits.
+pub(super) fn broken(lens: &str, count: usize) -> String {
+    let limits = if count == 1 { "limit" } else { "limits" };
+    format!("The {lens} breaks {count} {limits}: what is exported has to keep them")
+}
+
 /// Where the search is saved; whether that failed.
 pub(super) fn saved(checkpoint: &Checkpoint) -> (String, bool) {
     if let Some(why) = &checkpoint.failed {
