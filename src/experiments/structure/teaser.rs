@@ -21,7 +21,7 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "teaser",
     title: "From a double Gauss of 1962 towards one of 1980",
     claim: "A search finds a spherical lens as bright as the later design, and sharper",
-    seconds: 40.0,
+    seconds: 600.0,
     run,
 };
 
@@ -40,7 +40,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     let mark = Design::of("mark, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
     let before = Design::of("start, opened", start.clone())?;
     let shares = mark.lights().zip(before.lights()).map(|(mark, before)| MORE * mark / before);
-    let plan = plan(shares.collect(), effort.pick(60_000, 400));
+    let plan = plan(shares.collect(), effort.pick(560_000, 400));
     let mut found = vec![Course::new(&start, &plan)?];
     let part = Part { from: 0.0, to: 1.0, name: "search" };
     finish(&mut found, part, watch)?;
