@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::input::{LensFile, Opened, Tolerance};
 use super::output::{Number, Output, Table};
-use crate::lens::{Fields, Lens, Medium, RADIAL_TERMS, at_zoom};
+use crate::lens::{Fields, GRADE_TERMS, Law, Lens, Medium, RADIAL_TERMS, at_zoom};
 use crate::measure::timed;
 use crate::pupil::{
     Accuracy, Bench, Cost, Derivative, Estimator, NoDerivative, Region, differentiate,
@@ -192,7 +192,13 @@ struct Report {
     d_error: Columns,
     #[serde(skip)]
     unit: &'static str,
+    /// What the coefficients of the gradient behind each surface belong to.
+    #[serde(skip)]
+    coefficients: Vec<Coefficients>,
 }
+
+/// What each coefficient of a gradient belongs to; nothing where its law has none.
+type Coefficients = [Option<String>; GRADE_TERMS];
 
 /// One entry a surface; nothing where the surface has no such number.
 #[derive(Serialize)]
@@ -246,6 +252,7 @@ impl Report {
             d: Columns::new(lens, &found.by),
             d_error: Columns::new(lens, &found.error),
             unit: if asked.term == TermName::Spot { "mm^4" } else { "mm^2" },
+            coefficients: lens.surfaces.iter().map(|row| coefficients(&row.medium)).collect(),
         }
     }
 }
@@ -273,6 +280,18 @@ impl Display for Report {
     }
 }
 
+fn coefficients(medium: &Medium) -> Coefficients {
+    let Medium::Gradient(gradient) = medium else { return Coefficients::default() };
+    std::array::from_fn(|k| {
+        gradient.term(k)?;
+        Some(match k.checked_sub(RADIAL_TERMS) {
+            None if gradient.law == Law::Sech => "g r".to_owned(),
+            None => format!("r^{}", 2 * k + 2),
+            Some(j) => format!("z^{}", j + 1),
+        })
+    })
+}
+
 impl Report {
     /// The coefficients of every gradient-index medium.
     fn write_gradients(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -280,12 +299,10 @@ impl Report {
             let (Some(by), Some(error)) = (by, error) else { continue };
             let title = format!("gradient after surface {i}, coefficient of");
             let mut table = Table::new(&[&title, "derivative"]);
-            for (k, (by, error)) in by.iter().zip(error).enumerate() {
-                let power = match k.checked_sub(RADIAL_TERMS) {
-                    None => format!("r^{}", 2 * k + 2),
-                    Some(j) => format!("z^{}", j + 1),
-                };
-                table.row([power, format!("{by:.6e} ± {error:.0e}")]);
+            for ((by, error), power) in by.iter().zip(error).zip(&self.coefficients[i]) {
+                if let Some(power) = power {
+                    table.row([power.clone(), format!("{by:.6e} ± {error:.0e}")]);
+                }
             }
             write!(f, "\n{table}")?;
         }

@@ -1,6 +1,7 @@
 //! Refusals of numbers that make no sense, in the words of what the number is.
 
 use super::check::TaskError;
+pub(super) use crate::math::brief as number;
 use std::fmt::Display;
 
 /// No length is longer, in mm.
@@ -14,16 +15,6 @@ pub(super) fn wrong<T: Display>(
 ) -> TaskError {
     let found = format!("{found}");
     TaskError::Value { place: place.into(), found, expected: expected.into() }
-}
-
-/// A number as a person writes it: a very large or small one by its power of ten.
-pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if size != 0.0 && !(1e-4..1e9).contains(&size) {
-        format!("{value:e}")
-    } else {
-        value.to_string()
-    }
 }
 
 /// Refuses a number that is not above zero.

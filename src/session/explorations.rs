@@ -89,6 +89,7 @@ impl ExplorationDesk {
                 self.explorer.start(number, Arc::clone(lens), quest, path);
             }
             Explore::GoOn(Some(path)) => {
+                let path = remembered(path)?;
                 let number = self.next();
                 self.explorer.go_on(number, path);
             }
@@ -217,6 +218,17 @@ fn newest(folder: &Path) -> Option<PathBuf> {
     let searches = files.filter(|file| file.file_name().to_string_lossy().ends_with(ENDING));
     let dated = searches.filter_map(|file| Some((file.metadata().ok()?.modified().ok()?, file)));
     dated.max_by_key(|(date, _)| *date).map(|(_, file)| file.path())
+}
+
+/// Where a search goes on: one that was forgotten has a file of its own again.
+fn remembered(path: PathBuf) -> Result<PathBuf, String> {
+    if path.file_name().is_none_or(|name| name != FORGOTTEN) {
+        return Ok(path);
+    }
+    let own = path.parent().and_then(|folder| free(folder, "remembered"));
+    let own = own.ok_or_else(|| format!("{}: no room beside it", path.display()))?;
+    fs::rename(&path, &own).map_err(|why| format!("{}: {why}", path.display()))?;
+    Ok(own)
 }
 
 /// A file for the search from a lens of this name that does not exist yet.

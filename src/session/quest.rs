@@ -6,7 +6,7 @@ use crate::files::FileError;
 use crate::lens::Lens;
 use crate::merit::{Goal, Margin};
 use crate::search::lens::{LensLandscape, Local, NoLandscape, Plan, opened};
-use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer, element};
+use crate::search::{self, Rules, Run, RunOf, SearchError, Settings, Steer};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
@@ -76,6 +76,7 @@ struct KeptLandscape {
     goal: Goal,
     rules: Rules,
     local: Local,
+    light: Vec<Vec<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -95,7 +96,6 @@ impl Engine {
             start = opened(&start, limit);
             plan.rules.semi_diameter = plan.rules.semi_diameter.or(quest.open);
         }
-        plan.rules = plan.rules.holding(element::pieces(&start));
         let landscape = plan.landscape(&start)?;
         let settings = plan.settings(&landscape);
         let run = Run::new(&landscape, landscape.start().clone(), &settings)?;
@@ -107,8 +107,8 @@ impl Engine {
         let Kept { landscape: kept, run: KeptRun { settings }, beside } = read(path)?;
         // A curve that cannot be read is no reason to lose the search.
         let diary: Diary = serde_json::from_value(beside).unwrap_or_default();
-        let KeptLandscape { start, goal, rules, local } = kept;
-        let landscape = LensLandscape::new(&start, &goal, &rules, &local)?;
+        let KeptLandscape { start, goal, rules, local, light } = kept;
+        let landscape = LensLandscape::new(&start, &goal, &rules, &local)?.comparing_with(light)?;
         let run = Run::load(&landscape, &settings, path)?;
         let plan = Plan { goal: Some(goal), rules, local, settings, ..Plan::default() };
         let quest = Quest { plan, minutes: diary.minutes_left(), ..Quest::default() };

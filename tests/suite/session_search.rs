@@ -213,6 +213,30 @@ fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
 }
 
 #[test]
+fn a_forgotten_search_with_light_of_its_own_for_each_field_goes_on() {
+    let folder = folder("forgotten");
+    let mut first = session(double_gauss());
+    first.keep_searches_in(&folder);
+    let mut asked = quest(Some(8));
+    asked.plan.light = vec![0.9, 0.8, 0.7];
+    explore(&mut first, Explore::Start(Box::new(asked)));
+    wait(&mut first, "a move", |view, _| moves(view) > 0);
+    drop(first);
+
+    let mut second = session(double_gauss());
+    second.keep_searches_in(&folder);
+    explore(&mut second, Explore::ForgetLeft);
+    let forgotten = folder.join("forgotten.json");
+    explore(&mut second, Explore::GoOn(Some(forgotten.clone())));
+    stands(&mut second, Standing::Finished);
+    assert_eq!(moves(&second.view()), 8);
+    let place = run(&second).checkpoint.path.clone().unwrap();
+    assert!(place != forgotten && place.exists() && !forgotten.exists(), "{}", place.display());
+    drop(second);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
 fn a_person_chooses_where_a_search_is_saved() {
     let folder = folder("place");
     let mut session = session(double_gauss());

@@ -221,9 +221,6 @@ impl Asked {
         settings.temperature = self.temperature.map(|heat| heat.0);
         settings.c = self.c.unwrap_or(settings.c);
         settings.gamma = self.gamma.unwrap_or(settings.gamma);
-        if self.forbid.iter().any(|mutation| mutation.0 == Kind::Global) {
-            settings.gamma = 0.0;
-        }
         Ok(plan)
     }
 
@@ -232,7 +229,8 @@ impl Asked {
         let mut rules: Rules = read.unwrap_or_default();
         rules = match self.elements {
             Some(Range(elements)) => Rules { elements, ..rules },
-            None => rules.holding(element::pieces(lens)),
+            None if self.rules.is_none() => rules.holding(element::pieces(lens)),
+            None => rules,
         };
         let widest = positive("--max-diameter", self.max_diameter)?.map(|d| 0.5 * d);
         let open = positive("--open", self.open)?;
@@ -241,8 +239,10 @@ impl Asked {
         let room = positive("--min-back-focus", self.min_back_focus)?;
         rules.back_focus = room.or(rules.back_focus);
         rules.projection &= !self.no_projection;
-        rules.weights.retain(|(kind, _)| !self.forbid.iter().any(|Mutation(f)| f == kind));
-        rules.weights.extend(self.forbid.iter().map(|Mutation(kind)| (*kind, 0.0)));
+        for Mutation(kind) in &self.forbid {
+            rules.weights.retain(|(other, _)| other != kind);
+            rules.weights.push((*kind, 0.0));
+        }
         rules.checked().map_err(|bad| Failure::Input(bad.to_string()))
     }
 

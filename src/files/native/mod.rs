@@ -46,7 +46,9 @@ pub fn read(text: &str, file: &str) -> Result<Lens, FileError> {
 pub fn read_json<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, FileError> {
     serde_json::from_str(text).map_err(|error| {
         let Malformed { place, found, expected } = explain(&error, text);
-        let keys = place::keys(text, error.line(), error.column());
+        // A parser looks at the next sign to find that something cannot be read, and has read all of
+        // what lacks a key.
+        let keys = place::keys(text, error.line(), error.column(), error.is_syntax());
         let place = if keys.is_empty() { place } else { format!("{place}, {keys}") };
         Malformed { place, found, expected }.of(file)
     })

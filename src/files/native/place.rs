@@ -1,15 +1,16 @@
 //! The keys that lead to a place in JSON.
 
 /// The keys and numbers of lists, counted from 0, that lead to the value at a line and a column, both
-/// counted from 1: `views, 0, source`. Nothing at the top.
-pub(super) fn keys(text: &str, line: usize, column: usize) -> String {
+/// counted from 1: `views, 0, source`. Nothing at the top. Where the place is a closing bracket, they
+/// lead to what is in front of it if that is meant, and else to what it closes.
+pub(super) fn keys(text: &str, line: usize, column: usize, in_front: bool) -> String {
     let before =
         text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
     let end = (before + column).min(text.len());
     let mut way = Way::default();
     text.as_bytes()[..end].iter().for_each(|byte| way.pass(*byte));
-    // What ends at the place itself has been left again.
-    let steps = way.left.filter(|(_, at)| *at == end).map_or(way.steps, |(steps, _)| steps);
+    let left = way.left.filter(|(_, at)| in_front && *at == end);
+    let steps = left.map_or(way.steps, |(steps, _)| steps);
     let names: Vec<String> = steps.into_iter().map(Step::name).filter(|s| !s.is_empty()).collect();
     names.join(", ")
 }
@@ -89,16 +90,18 @@ mod tests {
     #[test]
     fn keys_lead_to_a_value() {
         let text = "{\"a\": 1,\n \"views\": [{\"x\": 0}, {\"name, {\\\"\": \"]\", \"goal\": {\"p\": null}}]}";
-        let at = |word: &str| {
+        let keys_at = |word: &str, in_front: bool| {
             let before = &text[..text.find(word).unwrap() + word.len()];
             let line = before.matches('\n').count() + 1;
-            keys(text, line, before.len() - before.rfind('\n').map_or(0, |n| n + 1))
+            keys(text, line, before.len() - before.rfind('\n').map_or(0, |n| n + 1), in_front)
         };
+        let at = |word: &str| keys_at(word, true);
         assert_eq!(at("1"), "a");
         assert_eq!(at("0"), "views, 0, x");
         assert_eq!(at("null"), "views, 1, goal, p");
         assert_eq!(at("null}"), "views, 1, goal, p");
-        assert_eq!(keys(text, 1, 1), "");
-        assert_eq!(keys("", 3, 7), "");
+        assert_eq!(keys_at("null}", false), "views, 1, goal", "what lacks a key");
+        assert_eq!(keys(text, 1, 1, true), "");
+        assert_eq!(keys("", 3, 7, true), "");
     }
 }

@@ -143,6 +143,25 @@ impl LensLandscape {
         Ok(self)
     }
 
+    /// The same landscape with other areas of the pupils to compare with, in mm², by zoom position.
+    ///
+    /// # Errors
+    /// Not as many areas as pupils, or one that is not positive.
+    pub fn comparing_with(self, light: Vec<Vec<f64>>) -> Result<Self, NoLandscape> {
+        let same = |(own, other): (&Vec<f64>, &Vec<f64>)| own.len() == other.len();
+        let fits = self.light.len() == light.len() && self.light.iter().zip(&light).all(same);
+        if !fits || light.iter().flatten().any(|area| !(*area > 0.0 && area.is_finite())) {
+            let found = format!("{light:?}");
+            let expected = "an area above 0 for each field";
+            return Err(NoLandscape::Setting {
+                what: "the light to compare with",
+                found,
+                expected,
+            });
+        }
+        Ok(Self { light, ..self })
+    }
+
     /// The lens at the start: limited by its stop, held numbers marked by bounds that coincide.
     pub fn start(&self) -> &Lens {
         &self.start

@@ -8,13 +8,15 @@ use eframe::egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
 use super::{light, limits, marks};
 use crate::lens::{Lens, Medium};
 use crate::search::element::pieces;
-use crate::search::{Kind, Method, Settings};
+use crate::search::{Kind, Method, Rules, Settings};
 use crate::session::{Quest, View};
 
 /// The settings that a person sees.
 #[derive(Debug)]
 pub(super) struct Setup {
     quest: Quest,
+    /// Whether a person has said how many elements there may be.
+    counted: bool,
     /// Whether new glass is one of those that the design is made of.
     own_glasses: bool,
     /// The gradients that brute force divides among its mutations.
@@ -37,7 +39,7 @@ impl Default for Setup {
         let asleep = Asleep { minutes: 10.0, moves: 1000, open: 30.0, focal_length: 50.0 };
         let mut quest = Quest::default();
         quest.plan.settings = Settings { gradients: None, ..quest.plan.settings };
-        Self { quest, own_glasses: false, gradients: 10_000, asleep }
+        Self { quest, counted: false, own_glasses: false, gradients: 10_000, asleep }
     }
 }
 
@@ -111,12 +113,17 @@ impl Setup {
 
     fn structure(&mut self, ui: &mut Ui, view: &View) {
         let rules = &mut self.quest.plan.rules;
+        if !self.counted {
+            rules.elements = Rules::default().holding(pieces(&view.lens)).elements;
+        }
         ui.weak("Elements").on_hover_text("How many pieces of glass a lens may have");
         ui.horizontal(|ui| {
             let [min, max] = &mut rules.elements;
-            drag(ui, "Fewest elements", min, 1..=*max, 0.05, "The fewest pieces of glass");
+            let fewest =
+                drag(ui, "Fewest elements", min, 1..=*max, 0.05, "The fewest pieces of glass");
             ui.weak("to");
-            drag(ui, "Most elements", max, *min..=40, 0.05, "The most pieces of glass");
+            let most = drag(ui, "Most elements", max, *min..=40, 0.05, "The most pieces of glass");
+            self.counted |= fewest || most;
             ui.weak(format!("({} now)", pieces(&view.lens)));
         });
         ui.end_row();
