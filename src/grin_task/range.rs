@@ -62,10 +62,14 @@ impl Medium {
         (bound.towards(most), at)
     }
 
-    /// The same field with the index within a range everywhere in some spaces.
+    /// The same field with the index within a range everywhere in some spaces; one that keeps it is
+    /// not changed.
     #[must_use]
     pub(super) fn bounded(&self, spaces: &[Space], range: [f64; 2]) -> Self {
         let mut kept = self.clone();
+        if !self.is_loose(range) || self.keeps(spaces, range) {
+            return kept;
+        }
         for _ in 0..ROUNDS {
             if !kept.is_loose(range) {
                 return kept;
@@ -79,6 +83,13 @@ impl Medium {
         let clamp = |value: &mut f64| *value = value.clamp(range[0], range[1]);
         kept.parameters_mut().iter_mut().for_each(clamp);
         kept
+    }
+
+    /// Whether its index is within a range wherever it is looked at. Control points alone do not tell:
+    /// those of a cell at the surface lie outside, where a steep field may well be beyond the range.
+    fn keeps(&self, spaces: &[Space], [low, high]: [f64; 2]) -> bool {
+        self.extreme(spaces, Bound::Low).0 >= low - TINY
+            && self.extreme(spaces, Bound::High).0 <= high + TINY
     }
 
     /// Whether it is a spline with a coefficient beyond a range.
