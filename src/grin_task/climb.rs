@@ -51,7 +51,12 @@ fn peaks(places: &[Vec3<f64>], gap: f64, hill: &Hill<'_>) -> Vec<Spot> {
     let Hill { inside, value } = hill;
     let looked = places.par_iter().filter(|p| inside(**p));
     let mut found: Vec<Spot> = looked.map(|p| (value(*p), *p)).collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let by_height = |a: &Spot, b: &Spot| b.0.total_cmp(&a.0);
+    if found.len() > PEAKS {
+        found.select_nth_unstable_by(PEAKS, by_height);
+        found.truncate(PEAKS);
+    }
+    found.sort_by(by_height);
     let up = |mut best: Spot| {
         for taken in 0..HALVINGS * MOVES {
             let step = gap * 0.5_f64.powi(1 + taken / MOVES);
@@ -61,7 +66,7 @@ fn peaks(places: &[Vec3<f64>], gap: f64, hill: &Hill<'_>) -> Vec<Spot> {
         }
         best
     };
-    found.into_iter().take(PEAKS).map(up).collect()
+    found.into_iter().map(up).collect()
 }
 
 impl Medium {

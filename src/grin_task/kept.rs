@@ -64,8 +64,8 @@ impl Task {
         index.into_iter().map(kept).chain(slope).collect()
     }
 
-    /// The values of a field on a grid, as [`Medium::volume`] has them; nodes outside the space,
-    /// where a spline may be anything, are put within the limits of the index.
+    /// The values of a field on a grid, as [`Medium::volume`] has them, put within the limits
+    /// of the index: outside the space a spline may be anything.
     ///
     /// # Errors
     /// A space without extent.

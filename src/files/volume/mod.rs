@@ -62,7 +62,8 @@ fn beginning(bytes: &[u8]) -> String {
 /// beside it in a file that ends in `.raw`. Every file that was written.
 ///
 /// # Errors
-/// A file that cannot be written; what was there before is untouched.
+/// A file that cannot be written; what was there before is untouched, except that the numbers of a
+/// `.raw` file are replaced before its header.
 pub fn write_volume(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
     let is_npz = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz"));
     if !is_npz {
