@@ -271,6 +271,15 @@ mod tests {
     }
 
     #[test]
+    fn a_steep_field_that_keeps_its_range_in_the_space_is_left_alone() {
+        let fish_eye = |p: Vec3<f64>| 2.0 / (1.0 + p.dot(p));
+        let medium = Medium::of(FieldKind::Tricubic { half: 1.1 }, 17, fish_eye).unwrap();
+        let range = [0.999, 2.5];
+        assert!(medium.is_loose(range), "it is below it outside");
+        assert_eq!(medium.bounded(&[Space::Ball { radius: 1.0 }], range), medium);
+    }
+
+    #[test]
     fn only_what_counts_at_a_broken_place_is_taken_back() {
         let mut medium = Medium::of(FieldKind::Tricubic { half: 1.0 }, 9, |_| 1.5).unwrap();
         let last = medium.parameters_mut().len() - 1;
