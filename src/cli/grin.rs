@@ -7,13 +7,13 @@ use super::grin_report::{Cost, Report};
 use super::input::{check_target, read_json};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::Output;
+use super::targets::check_apart;
 use crate::experiments::{medium_pictures, view_picture};
 use crate::files;
 use crate::grin_task::{self, Medium, Runner, Task};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -56,17 +56,6 @@ pub(super) struct Grin {
     show: bool,
 }
 
-/// Refuses to write the volume over the task.
-fn keep_task(task: &Path, out: &Path) -> Result<(), Failure> {
-    let places = [task, out].map(fs::canonicalize);
-    let same = matches!(places, [Ok(task), Ok(out)] if task == out);
-    if !same {
-        return Ok(());
-    }
-    let path = out.display();
-    Err(Failure::Input(format!("--out {path} is the task itself; expected another file")))
-}
-
 impl Grin {
     pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
         let Some(name) = &self.task else { return output.print(&List) };
@@ -76,21 +65,23 @@ impl Grin {
         }
         self.out.iter().try_for_each(|path| check_target(path, &["npz", "json"]))?;
         self.png.iter().try_for_each(|folder| check_folder(folder))?;
-        self.out.iter().try_for_each(|path| keep_task(Path::new(name), path))?;
+        let out = self.out.as_deref().map(|path| ("--out", path));
+        check_apart(&[out], std::iter::once(("the task itself", Path::new(name))))?;
         self.check()?;
         let refuse = |error| Failure::Input(format!("{}: {error}", file(name)));
-        let lines = self.lines.then(|| Lines::new(name, &task)).transpose()?;
+        let lines = self.lines.then(|| Lines::new(file(name), &task)).transpose()?;
         let mut runner = Runner::new(&task).map_err(refuse)?;
         let (clock, before) = (Stopwatch::start(), processor_ms());
         let mut worked = Ok(true);
         let memory = peak_megabytes(|| worked = self.search(&mut runner, clock));
-        let stopped = !worked.map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
+        let stopped =
+            !worked.map_err(|error| Failure::Failed(format!("{}: {error}", file(name))))?;
         let ms = 1e3 * clock.seconds();
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
         let mut report = Report::new(&runner, &Cost { ms, processor_ms, memory, stopped })
-            .map_err(|error| Failure::Failed(format!("{name}: {error}")))?;
+            .map_err(|error| Failure::Failed(format!("{}: {error}", file(name))))?;
         let nodes = runner.best().nodes();
-        report.lines = lines.map(|lines| lines.found(name, &task, nodes)).transpose()?;
+        report.lines = lines.map(|lines| lines.found(file(name), &task, nodes)).transpose()?;
         report.files = self.write(&task, runner.best())?;
         output.print(&report)
     }

@@ -120,7 +120,7 @@ impl Report {
             lines: None,
             index: [extremes.low, extremes.high],
             slope: extremes.slope,
-            limits: task.kept(best).into_iter().map(Held::from).collect(),
+            limits: task.kept(&extremes).into_iter().map(Held::from).collect(),
             nodes: best.nodes(),
             parameters: best.field().parameters().len(),
             steps: runner.steps(),

@@ -22,6 +22,7 @@ mod optimize;
 mod output;
 mod pareto;
 mod search;
+mod targets;
 mod trace;
 mod vary;
 mod window;

@@ -40,6 +40,8 @@ pub struct Extremes {
     pub high: f64,
     /// Steepest index, in 1/mm.
     pub slope: f64,
+    /// Where these three are, in mm.
+    pub at: [Vec3<f64>; 3],
 }
 
 impl Task {
@@ -68,8 +70,9 @@ impl Task {
     /// The range of the index over the space, and how steep it is.
     pub fn extremes(&self, medium: &Medium) -> Extremes {
         let spaces = self.spaces();
-        let [low, high] = [Bound::Low, Bound::High].map(|bound| medium.extreme(&spaces, bound).0);
-        Extremes { low, high, slope: medium.steepest(self.space) }
+        let [low, high] = [Bound::Low, Bound::High].map(|bound| medium.extreme(&spaces, bound));
+        let slope = medium.steepest_at(self.space);
+        Extremes { low: low.0, high: high.0, slope: slope.0, at: [low.1, high.1, slope.1] }
     }
 
     /// Points all over the space, or along the radius that a spline depends on, each with its share.

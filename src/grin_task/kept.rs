@@ -1,8 +1,8 @@
 //! Whether a field keeps what a maker can make: every limit with the value that stands against it.
 
 use super::check::ROUNDING;
+use super::compare::Extremes;
 use super::medium::Medium;
-use super::range::Bound;
 use super::task::{Space, Task};
 use crate::files::Volume;
 use crate::grin::field::GridError;
@@ -42,26 +42,20 @@ impl Task {
         spaces
     }
 
-    /// Every limit of a maker that the task sets, and how a field keeps it.
-    pub fn kept(&self, medium: &Medium) -> Vec<Kept> {
-        let spaces = self.spaces();
-        let [low, high] = [Bound::Low, Bound::High].map(|bound| medium.extreme(&spaces, bound));
+    /// Every limit of a maker that the task sets, and how a field with these extremes keeps it.
+    pub fn kept(&self, found: &Extremes) -> Vec<Kept> {
         let limits = self.limits;
-        let index =
-            [("lowest index", low, limits.low, 1.0), ("highest index", high, limits.high, -1.0)];
-        let kept =
-            |(name, (value, at), limit, sign): (&'static str, (f64, Vec3<f64>), f64, f64)| Kept {
-                name,
-                value,
-                limit,
-                margin: sign * (value - limit),
-                at,
-            };
-        let slope = limits.slope.map(|slope| {
-            let steepest = medium.steepest_at(self.space);
-            kept(("slope", steepest, slope, -1.0))
-        });
-        index.into_iter().map(kept).chain(slope).collect()
+        let [low, high, steepest] = found.at;
+        let at_least =
+            |name, value, limit, at| Kept { name, value, limit, margin: value - limit, at };
+        let at_most =
+            |name, value, limit, at| Kept { name, value, limit, margin: limit - value, at };
+        let slope = limits.slope.map(|slope| at_most("slope", found.slope, slope, steepest));
+        let index = [
+            at_least("lowest index", found.low, limits.low, low),
+            at_most("highest index", found.high, limits.high, high),
+        ];
+        index.into_iter().chain(slope).collect()
     }
 
     /// The values of a field on a grid, as [`Medium::volume`] has them, put within the limits

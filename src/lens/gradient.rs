@@ -116,7 +116,10 @@ impl Gradient {
                 let square = index * index + by;
                 (square > 0.0).then(|| Medium::Index(square.sqrt()))
             }
-            Law::Index | Law::Sech => Some(Medium::Index(index + by)),
+            Law::Index | Law::Sech => {
+                let index = index + by;
+                (index > 0.0).then_some(Medium::Index(index))
+            }
         }
     }
 
@@ -235,9 +238,15 @@ impl<R: Real> Slab<R> {
         slab
     }
 
+    /// A gap filled with a gradient, passed by light that runs towards −z where `sense` is below 0.
+    pub fn passed(field: &Graded<R>, thickness: R, sense: R) -> Self {
+        let slab = Self::new(field, thickness);
+        if sense < R::ZERO { slab.backwards() } else { slab }
+    }
+
     /// The same for light that runs towards −z, through a gap whose thickness is negative.
     #[must_use]
-    pub fn backwards(self) -> Self {
+    fn backwards(self) -> Self {
         let [[a, b], [c, d]] = self.matrix;
         Self {
             index_behind: -self.index_behind,

@@ -174,8 +174,7 @@ pub fn focus_gap<R: Real>(system: &System<R>, object: Object) -> R {
         match surface.gradient() {
             None => y += surface.thickness * nu / n,
             Some(field) => {
-                let slab = gradient::Slab::new(&field, surface.thickness);
-                let slab = if sense < R::ZERO { slab.backwards() } else { slab };
+                let slab = gradient::Slab::passed(&field, surface.thickness, sense);
                 (y, nu) = slab.pass(y, nu);
                 n = slab.index_behind;
             }

@@ -14,5 +14,5 @@ mod ray;
 mod seidel;
 
 pub use first_order::{Beam, FirstOrder, Pupil, Undefined, first_order};
-pub use ray::{ParaxialRay, paraxial_ray, signed_indices, slab};
+pub use ray::{ParaxialRay, paraxial_ray, signed_indices};
 pub use seidel::{Seidel, SeidelSums, seidel};

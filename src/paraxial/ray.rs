@@ -2,7 +2,7 @@
 //! (Welford 1986, equations 3.11 and 3.12), or the matrix of the [`Slab`] of a gradient, whose
 //! indices are those on the axis at the two faces.
 
-use crate::lens::{Graded, Slab, System};
+use crate::lens::{Slab, System};
 use crate::math::Real;
 
 /// The heights of a paraxial ray at every surface, and its slopes behind every surface.
@@ -38,14 +38,10 @@ pub(super) fn slabs<R: Real>(system: &System<R>) -> Vec<Option<Slab<R>>> {
     }
     let indices = signed_indices(system);
     let gaps = system.surfaces.iter().zip(&indices[1..]);
-    gaps.map(|(surface, n)| surface.gradient().map(|field| slab(&field, surface.thickness, *n)))
-        .collect()
-}
-
-/// A gap filled with a gradient, whose signed index says which way the light runs.
-pub fn slab<R: Real>(field: &Graded<R>, thickness: R, index: R) -> Slab<R> {
-    let slab = Slab::new(field, thickness);
-    if index < R::ZERO { slab.backwards() } else { slab }
+    gaps.map(|(surface, n)| {
+        surface.gradient().map(|field| Slab::passed(&field, surface.thickness, *n))
+    })
+    .collect()
 }
 
 /// The paraxial ray that meets the vertex plane of the first surface at `height` with `slope`.

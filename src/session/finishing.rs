@@ -57,6 +57,8 @@ fn report(finished: &Finished) -> String {
             "glass behind surface {surface} : {glass} is not listed, and stays: it is not to be touched"
         )
     };
+    let graded =
+        |surface: &usize| format!("medium behind surface {surface} : a gradient, kept as it is");
     let field = |(field, other): (&FieldFigures, &Confirmed)| {
         let spot = field.spot.map_or(f64::NAN, |spot| 1e3 * spot.value);
         let (number, again, light) = (field.field + 1, 1e3 * other.spot, field.light.value);
@@ -69,6 +71,7 @@ fn report(finished: &Finished) -> String {
     };
     let mut lines: Vec<String> = finished.glasses.iter().map(glass).collect();
     lines.extend(finished.unlisted.iter().map(unlisted));
+    lines.extend(finished.gradients.iter().map(graded));
     lines.push(format!("{:>6} {:>12} {:>14} {:>12}", "field", "spot, µm", "other rays, µm", "mm²"));
     lines.extend(finished.figures.fields.iter().zip(&finished.confirmed).map(field));
     lines.push(format!("{:<16} {:>8} {:>12} {:>12}", "limit", "surface", "is", "room"));

@@ -2,12 +2,9 @@
 
 use super::app::Studio;
 use super::chooser::Purpose;
+use super::panels::slice::NODES;
 use crate::session::{Command, Form, Standing, View};
 use eframe::egui::{Context, Id, Modal, ViewportCommand};
-
-/// Nodes along a side of a volume that is saved on the way out, where the field is a spline in one
-/// coordinate.
-const NODES: usize = 65;
 
 /// What may be lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

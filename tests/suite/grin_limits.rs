@@ -72,7 +72,7 @@ fn grin_limits_of_the_index_are_kept_by_every_kind_of_field() {
         assert!(low >= 1.05 - 1e-9 && high <= 1.12 + 1e-9, "{field:?}: {low} {high}");
         // It goes to its limit, so that the limit has something to do.
         assert!(high > 1.118, "{field:?}: {high}");
-        let kept = task.kept(best);
+        let kept = task.kept(&task.extremes(best));
         let names: Vec<&str> = kept.iter().map(|kept| kept.name).collect();
         assert_eq!(names, ["lowest index", "highest index"]);
         assert!(kept.iter().all(Kept::is_kept), "{field:?}: {kept:?}");
@@ -90,7 +90,7 @@ fn grin_a_limit_of_the_slope_leaves_those_of_the_index_kept() {
     for (field, method, nodes) in [FIELDS[0], FIELDS[3]] {
         let mut task = greedy(field, method, nodes);
         task.limits.slope = Some(0.06);
-        let kept = task.kept(solved(&task).best());
+        let kept = task.kept(&task.extremes(solved(&task).best()));
         assert!(kept.len() == 3 && kept.iter().all(Kept::is_kept), "{field:?}: {kept:?}");
         assert!(kept[2].name == "slope" && kept[2].margin == 0.06 - kept[2].value, "{kept:?}");
     }
@@ -102,7 +102,7 @@ fn grin_a_broken_limit_is_told_with_its_place() {
     let found = solved(&task);
     // The same field by the eye of a maker who can make less.
     let poor = Task { limits: MakerLimits { high: 1.1, ..task.limits }, ..task.clone() };
-    let kept = poor.kept(found.best());
+    let kept = poor.kept(&poor.extremes(found.best()));
     let over = kept[1].value - 1.1;
     assert!(!kept[1].is_kept() && over > 0.01 && kept[1].margin == -over, "{kept:?}");
     let there = found.best().field().sample(kept[1].at).index;

@@ -243,7 +243,7 @@ impl Asked {
             rules.weights.retain(|(other, _)| other != kind);
             rules.weights.push((*kind, 0.0));
         }
-        rules.checked().map_err(|bad| Failure::Input(bad.to_string()))
+        Ok(rules)
     }
 
     /// The lens that the search starts from.

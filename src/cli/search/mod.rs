@@ -4,14 +4,15 @@ mod asked;
 mod found;
 mod limits;
 mod report;
-mod targets;
 
 pub(super) use asked::Asked;
 
+use super::experiment::check_folder;
 use super::failure::Failure;
 use super::input::{self, LensFile};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::{Number, Output, remark};
+use super::targets;
 use crate::files;
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
@@ -106,6 +107,7 @@ impl Sampler {
 const ITERATIONS: u64 = 12_000;
 /// Seconds between two checkpoints.
 const SAVED: f64 = 3.0;
+
 /// What ended a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -128,7 +130,7 @@ impl Search {
         let landscape = plan.landscape(&lens).map_err(refused)?;
         let start_breaks = landscape.broken(landscape.start()).map_err(refused)?;
         let (mut run, resumed) = self.begin(&landscape, &plan, &opened.file)?;
-        self.make_folder()?;
+        self.reservoir_dir.iter().try_for_each(|folder| check_folder(folder))?;
         limits::warn(&start_breaks);
         let idle = resumed.then(|| nothing_to_do(&run)).flatten();
         idle.iter().for_each(remark);
@@ -201,14 +203,6 @@ impl Search {
         plan.settings.gradients = self.iterations.or(usual);
         plan.settings.check().map_err(refused)?;
         Ok(plan)
-    }
-
-    fn make_folder(&self) -> Result<(), Failure> {
-        self.reservoir_dir.iter().try_for_each(|folder| {
-            std::fs::create_dir_all(folder).map_err(|error| {
-                Failure::Input(format!("{}: {error}; expected a folder", folder.display()))
-            })
-        })
     }
 
     /// A new run, or the one of the checkpoint.

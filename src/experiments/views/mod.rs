@@ -19,6 +19,8 @@ use crate::grin_task::{self, Goal, Medium, Runner, Seen, Source, Task};
 const FINER: f64 = 1.57;
 /// Rays that may be left out, as a share.
 const LEFT_OUT: f64 = 1e-3;
+/// What rounding may take of the lowest index.
+const ROUNDING: f64 = 1e-9;
 
 /// A task that comes with the program.
 fn builtin(name: &str) -> Result<Task, Ended> {
@@ -134,10 +136,8 @@ impl Shown {
         let task = self.runner.task();
         let extremes = task.extremes(self.runner.best());
         let [low, high] = [task.limits.low, task.limits.high];
-        // A penalty holds the index of a spline between its coefficients.
-        let softly = 0.02 * (high - low);
         [
-            Claim::at_least("smallest index", extremes.low, low - softly),
+            Claim::at_least("smallest index", extremes.low, low - ROUNDING),
             Claim::at_most("largest index", extremes.high, high),
         ]
     }

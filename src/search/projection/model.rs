@@ -9,7 +9,7 @@
 use super::Unprojectable;
 use crate::lens::{Graded, Lens, LensError, Object, Parameter, Quantity, Slab};
 use crate::math::Real;
-use crate::paraxial::{signed_indices, slab};
+use crate::paraxial::signed_indices;
 use nalgebra::DMatrix;
 
 /// A number that the lenses before and after a mutation share.
@@ -278,7 +278,7 @@ impl Position {
     fn slab<R: Real>(&self, row: usize, thickness: R) -> Option<Slab<R>> {
         let Graded { base, grade } = self.gradients[row]?;
         let field = Graded { base: R::from_f64(base), grade: grade.map(R::from_f64) };
-        Some(slab(&field, thickness, R::from_f64(self.indices[row + 1])))
+        Some(Slab::passed(&field, thickness, R::from_f64(self.indices[row + 1])))
     }
 }
 

@@ -9,7 +9,7 @@ mod pareto;
 mod prescription;
 mod pupil;
 mod search;
-mod slice;
+pub(super) mod slice;
 mod spot;
 
 pub use effects::Effects;

@@ -11,7 +11,7 @@ use crate::grin_task::{Axis, BUILTIN, FieldKind, Plane};
 use crate::session::{Command, Form, Formation, MOST_NODES, Quantity, Sight, Standing, View};
 
 /// Nodes along a side of a written volume, where the field is a spline, unless it is changed.
-const NODES: usize = 65;
+pub(in crate::studio) const NODES: usize = 65;
 
 /// The tasks that come with the program, and how volumes are written.
 #[derive(Debug)]

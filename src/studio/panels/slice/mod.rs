@@ -11,6 +11,8 @@ mod picture;
 mod plots;
 mod words;
 
+pub(in crate::studio) use controls::NODES;
+
 use eframe::egui::{Button, Frame, Margin, Panel as Side, ScrollArea, Ui};
 
 use super::Panel;

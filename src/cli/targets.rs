@@ -1,6 +1,6 @@
-//! The files that a search writes: none of them is one that it reads, or another one that it writes.
+//! The files that a command writes: none of them is one that it reads, or another one that it writes.
 
-use crate::cli::failure::Failure;
+use super::failure::Failure;
 use std::fs;
 use std::path::{Path, PathBuf};
 
