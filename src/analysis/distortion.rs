@@ -1,15 +1,15 @@
 //! Distortion and field curvature: what the chief ray and its closest neighbours say.
 
-use super::Dark;
-use crate::lens::{Field, FieldKind, Object};
+use super::AnalysisError;
+use crate::lens::{FieldKind, FieldPoint, Object};
 use crate::math::Vec3;
-use crate::pupil::Bench;
+use crate::pupil::RayModel;
 
 /// Where a chief ray lands against where it should.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distortion {
     /// The field.
-    pub field: Field,
+    pub field: FieldPoint,
     /// Where the real chief ray lands, along the field's direction, in mm.
     pub height: f64,
     /// Where it should land: `f tan θ`, or the magnified object height, in mm.
@@ -22,9 +22,9 @@ pub struct Distortion {
 
 /// The foci of a narrow beam about a chief ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Curvature {
+pub struct FieldCurvature {
     /// The field.
-    pub field: Field,
+    pub field: FieldPoint,
     /// How far behind the image plane rays in the plane of the field meet, in mm; `None` where
     /// they are parallel.
     pub tangential: Option<f64>,
@@ -32,27 +32,31 @@ pub struct Curvature {
     pub sagittal: Option<f64>,
 }
 
-impl Bench {
+impl RayModel {
     /// Where the chief ray of a field lands, clipped by nothing, in mm.
-    pub(super) fn chief_point(&self, field: Field, wavelength: usize) -> Result<[f64; 2], Dark> {
-        let launch = self.launch(field, wavelength).map_err(Dark::NoRays)?;
-        let landing = launch.open_landing([0.0, 0.0]).ok_or(Dark::NoChief)?;
+    pub(super) fn chief_point(
+        &self,
+        field: FieldPoint,
+        wavelength: usize,
+    ) -> Result<[f64; 2], AnalysisError> {
+        let launch = self.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+        let landing = launch.unclipped_landing([0.0, 0.0]).ok_or(AnalysisError::NoChief)?;
         Ok([landing.ray.point.x.value, landing.ray.point.y.value])
     }
 
     /// Where the chief ray of a field should land, along the field's direction, in mm.
-    fn ideal_height(&self, field: Field) -> Option<f64> {
+    fn ideal_height(&self, field: FieldPoint) -> Option<f64> {
         let size = field.x.hypot(field.y);
         match (self.beam.field, self.beam.object) {
             (FieldKind::ImageHeight, _) => Some(size),
-            (FieldKind::ObjectHeight, _) => Some(self.first.magnification? * size),
+            (FieldKind::ObjectHeight, _) => Some(self.first_order.magnification? * size),
             (FieldKind::Angle, Object::Infinity) => {
-                let index = self.colors[self.primary].system.index_before;
-                Some(self.first.efl? * index * size.to_radians().tan())
+                let index = self.channels[self.primary].system.index_before;
+                Some(self.first_order.efl? * index * size.to_radians().tan())
             }
             (FieldKind::Angle, Object::Finite(distance)) => {
-                let reach = distance + self.first.entrance_pupil.position?;
-                Some(-self.first.magnification? * reach * size.to_radians().tan())
+                let reach = distance + self.first_order.entrance_pupil.position?;
+                Some(-self.first_order.magnification? * reach * size.to_radians().tan())
             }
         }
     }
@@ -62,14 +66,19 @@ impl Bench {
 ///
 /// # Errors
 /// Where the chief ray does not reach the image, or the lens has no focal length to compare with.
-pub fn distortion(bench: &Bench, field: Field, wavelength: usize) -> Result<Distortion, Dark> {
+pub fn distortion(
+    bench: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+) -> Result<Distortion, AnalysisError> {
     let [x, y] = bench.chief_point(field, wavelength)?;
-    let ideal = bench.ideal_height(field).filter(|h| h.is_finite()).ok_or(Dark::NoChief)?;
+    let ideal =
+        bench.ideal_height(field).filter(|h| h.is_finite()).ok_or(AnalysisError::NoChief)?;
     let size = field.x.hypot(field.y);
     let height = if size == 0.0 { y } else { (x * field.x + y * field.y) / size };
     let against = |ideal: f64| (ideal != 0.0).then(|| height / ideal - 1.0);
     let collimated = bench.beam.object == Object::Infinity && bench.beam.field == FieldKind::Angle;
-    let efl = bench.first.efl.filter(|_| collimated);
+    let efl = bench.first_order.efl.filter(|_| collimated);
     let f_theta = efl.and_then(|f| against(f * size.to_radians()));
     Ok(Distortion { field, height, ideal, distortion: against(ideal), f_theta })
 }
@@ -79,9 +88,13 @@ pub fn distortion(bench: &Bench, field: Field, wavelength: usize) -> Result<Dist
 ///
 /// # Errors
 /// Where the chief ray does not reach the image.
-pub fn field_curvature(bench: &Bench, field: Field, wavelength: usize) -> Result<Curvature, Dark> {
-    let launch = bench.launch(field, wavelength).map_err(Dark::NoRays)?;
-    let landing = launch.open_landing([0.0, 0.0]).ok_or(Dark::NoChief)?;
+pub fn field_curvature(
+    bench: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+) -> Result<FieldCurvature, AnalysisError> {
+    let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+    let landing = launch.unclipped_landing([0.0, 0.0]).ok_or(AnalysisError::NoChief)?;
     let Vec3 { x, y, .. } = landing.ray.point;
     let d = landing.ray.direction;
     let slopes = [d.x / d.z, d.y / d.z];
@@ -96,5 +109,5 @@ pub fn field_curvature(bench: &Bench, field: Field, wavelength: usize) -> Result
         let turn = along(slopes);
         (turn != 0.0).then(|| -along([x, y]) / turn)
     };
-    Ok(Curvature { field, tangential: focus(tx, ty), sagittal: focus(-ty, tx) })
+    Ok(FieldCurvature { field, tangential: focus(tx, ty), sagittal: focus(-ty, tx) })
 }

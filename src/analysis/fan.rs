@@ -1,8 +1,8 @@
 //! Transverse ray fans: how far from the chief ray's image point the rays of a pupil section land.
 
-use super::Dark;
-use crate::lens::Field;
-use crate::pupil::Bench;
+use super::AnalysisError;
+use crate::lens::FieldPoint;
+use crate::pupil::RayModel;
 use crate::trace::Fate;
 
 /// A ray of a fan.
@@ -29,12 +29,12 @@ pub struct Fan {
 
 /// The fans of a field, one for each wavelength, measured from the chief ray of the primary one;
 /// `count` rays each.
-pub fn fan(bench: &Bench, field: Field, count: usize) -> Result<Vec<Fan>, Dark> {
+pub fn fan(bench: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>, AnalysisError> {
     let chief = bench.chief_point(field, bench.primary)?;
     let one = |wavelength: usize| {
-        let launch = bench.launch(field, wavelength).map_err(Dark::NoRays)?;
+        let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
         let point = |pupil: f64, p: [f64; 2]| {
-            let landing = launch.ray(p).map(|ray| launch.color().tracer.trace(ray));
+            let landing = launch.ray(p).map(|ray| launch.channel().tracer.trace(ray));
             let arrived = landing.filter(|landing| landing.fate.is_imaged());
             let error = |at: crate::math::Vec3<f64>| [at.x - chief[0], at.y - chief[1]];
             FanPoint {
@@ -50,5 +50,5 @@ pub fn fan(bench: &Bench, field: Field, count: usize) -> Result<Vec<Fan>, Dark> 
             sagittal: (0..count).map(|i| point(at(i), [at(i), 0.0])).collect(),
         })
     };
-    (0..bench.colors.len()).map(one).collect()
+    (0..bench.channels.len()).map(one).collect()
 }

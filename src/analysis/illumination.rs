@@ -4,59 +4,59 @@
 //! direction cosines, `∫ dL' dM'` (Rimmer, "Relative illumination calculations", Proc. SPIE 655,
 //! 1986), taken over the pupil that is really lit: `∫ |∂(L', M')/∂(px, py)| dpx dpy`.
 
-use super::{Dark, Estimate, region};
-use crate::lens::Field;
-use crate::pupil::{Accuracy, Bench, Nodes, Region, converged};
+use super::{AnalysisError, Estimate, lit_region};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, Nodes, RayModel, Region, converge};
 use rayon::prelude::*;
 
 /// The light of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Illumination {
     /// The field.
-    pub field: Field,
+    pub field: FieldPoint,
     /// The area of its cone in direction cosines: π sin² of a full cone's half angle; 0 where no
     /// light gets through.
     pub cone: Estimate,
     /// The same over that of the first field; `None` where that one is dark.
     pub relative: Option<Estimate>,
     /// Why there is no light, where there is none.
-    pub dark: Option<Dark>,
+    pub error: Option<AnalysisError>,
 }
 
 /// The illumination of all fields at a wavelength; a field without light has 0 and says why.
-pub fn illumination(bench: &Bench, wavelength: usize, accuracy: Accuracy) -> Vec<Illumination> {
+pub fn illumination(bench: &RayModel, wavelength: usize, accuracy: Accuracy) -> Vec<Illumination> {
     let cones: Vec<_> =
         bench.fields.par_iter().map(|field| cone(bench, *field, wavelength, accuracy)).collect();
     let first = cones.first().and_then(|cone| cone.ok());
-    let result = |(field, cone): (&Field, &Result<Estimate, Dark>)| {
+    let result = |(field, cone): (&FieldPoint, &Result<Estimate, AnalysisError>)| {
         let light = cone.unwrap_or(Estimate::new(0.0, 0.0, 0));
         let relative = first.map(|first| {
             let ratio = light.value / first.value;
             let error = (light.error + ratio * first.error) / first.value;
             Estimate::new(ratio, error, light.rays + first.rays)
         });
-        Illumination { field: *field, cone: light, relative, dark: cone.err() }
+        Illumination { field: *field, cone: light, relative, error: cone.err() }
     };
     bench.fields.iter().zip(&cones).map(result).collect()
 }
 
 fn cone(
-    bench: &Bench,
-    field: Field,
+    bench: &RayModel,
+    field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
-) -> Result<Estimate, Dark> {
-    let region = region(bench, field, wavelength)?;
-    let found = converged(&region, accuracy, |nodes| swept(&region, nodes), |cone| *cone);
-    let found = found.ok_or(Dark::NoLight)?;
+) -> Result<Estimate, AnalysisError> {
+    let region = lit_region(bench, field, wavelength)?;
+    let found = converge(&region, accuracy, |nodes| cone_area(&region, nodes), |cone| *cone);
+    let found = found.ok_or(AnalysisError::NoLight)?;
     Ok(Estimate::new(found.values[0], found.errors[0], found.rays))
 }
 
-fn swept(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 1]> {
+fn cone_area(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 1]> {
     let mut sum = 0.0;
     let mut lit = false;
     for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
-        if let Some([l, m]) = region.launch.slopes_of_directions(*p) {
+        if let Some([l, m]) = region.launch.direction_derivatives(*p) {
             sum += weight * (l[0] * m[1] - l[1] * m[0]).abs();
             lit = true;
         }

@@ -3,7 +3,7 @@
 //! Integrals over the pupil are asked for with a tolerance, never with a number of rays: the order
 //! of the quadrature is raised until two agree (see [`crate::pupil`]). Fields and wavelengths are
 //! worked on in parallel, and their results stand in the order of the lens, whatever the number of
-//! threads. A field without light is a [`Dark`], by name and reason, and never a number that is
+//! threads. A field without light is a [`AnalysisError`], by name and reason, and never a number that is
 //! none.
 
 mod distortion;
@@ -15,17 +15,17 @@ mod rims;
 mod spot;
 mod wavefront;
 
-pub use distortion::{Curvature, Distortion, distortion, field_curvature};
+pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, illumination};
-pub use mtf::{Contrast, contrast};
-pub use pupil::{Form, Light, Loss, Pupil, pupil};
-pub use rims::{RimEffect, Rims, rims, together};
-pub use spot::{ColorSpot, Spot, airy_radius, rounding, spot, spots};
+pub use mtf::{MtfPoint, mtf};
+pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
+pub use rims::{RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities};
+pub use spot::{MonochromaticSpot, Spot, airy_radius, rounding_error, spot, spots};
 pub use wavefront::{Wavefront, path_differences, wavefront};
 
-use crate::lens::Field;
-use crate::pupil::{Bench, Kind, LaunchError, Region};
+use crate::lens::FieldPoint;
+use crate::pupil::{LaunchError, RayModel, Region, RegionKind};
 use serde::Serialize;
 
 /// A number with its error, and what it cost.
@@ -51,7 +51,7 @@ impl Estimate {
 /// Why a field has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Dark {
+pub enum AnalysisError {
     /// No ray of the field gets through the lens.
     #[error("no light: no ray of this field gets through the lens")]
     NoLight,
@@ -67,12 +67,16 @@ pub enum Dark {
 }
 
 /// The rays of a field that get through, if any do.
-pub fn region(bench: &Bench, field: Field, wavelength: usize) -> Result<Region<'_>, Dark> {
-    let launch = bench.launch(field, wavelength).map_err(Dark::NoRays)?;
+pub fn lit_region(
+    bench: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+) -> Result<Region<'_>, AnalysisError> {
+    let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
     let region = Region::new(launch);
     match region.kind {
-        Kind::Dark => Err(Dark::NoLight),
-        Kind::Endless => Err(Dark::Endless),
-        Kind::Clear | Kind::Split(_) | Kind::Ragged { .. } => Ok(region),
+        RegionKind::Dark => Err(AnalysisError::NoLight),
+        RegionKind::Unbounded => Err(AnalysisError::Endless),
+        RegionKind::Clear | RegionKind::StarShaped(_) | RegionKind::Irregular { .. } => Ok(region),
     }
 }

@@ -1,15 +1,15 @@
 //! The geometric modulation transfer: the contrast of a grating imaged by rays alone,
 //! `|mean exp(−2πi ν y)|` (Hopkins and Yzuel, Optica Acta 17, 1970).
 
-use super::{Dark, Estimate, region};
-use crate::lens::Field;
-use crate::pupil::{Accuracy, Bench, Nodes, Region, converged};
-use crate::trace::Points;
+use super::{AnalysisError, Estimate, lit_region};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, Nodes, RayModel, Region, converge};
+use crate::trace::ImagePoints;
 use std::f64::consts::TAU;
 
 /// The contrast at one spatial frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contrast {
+pub struct MtfPoint {
     /// Line pairs per mm.
     pub frequency: f64,
     /// Of lines perpendicular to y: rays are spread along y.
@@ -23,31 +23,32 @@ pub struct Contrast {
 ///
 /// # Errors
 /// Where the field is dark.
-pub fn contrast(
-    bench: &Bench,
-    field: Field,
+pub fn mtf(
+    bench: &RayModel,
+    field: FieldPoint,
     wavelength: usize,
     frequencies: &[f64],
     accuracy: Accuracy,
-) -> Result<Vec<Contrast>, Dark> {
-    let region = region(bench, field, wavelength)?;
+) -> Result<Vec<MtfPoint>, AnalysisError> {
+    let region = lit_region(bench, field, wavelength)?;
     let at = |frequency: &f64| {
         let numbers = |nodes: &Nodes| modulation(&region, nodes, *frequency);
-        let found = converged(&region, accuracy, numbers, |_| [1.0; 2]).ok_or(Dark::NoLight)?;
+        let found =
+            converge(&region, accuracy, numbers, |_| [1.0; 2]).ok_or(AnalysisError::NoLight)?;
         let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
-        Ok(Contrast { frequency: *frequency, tangential: estimate(0), sagittal: estimate(1) })
+        Ok(MtfPoint { frequency: *frequency, tangential: estimate(0), sagittal: estimate(1) })
     };
     frequencies.iter().map(at).collect()
 }
 
 fn modulation(region: &Region<'_>, nodes: &Nodes, frequency: f64) -> Option<[f64; 2]> {
-    let landed = region.trace::<Points<f64>>(nodes);
+    let landed = region.trace::<ImagePoints<f64>>(nodes);
     let points = &landed.sink;
-    let area: f64 = landed.arrived().map(|(_, w)| w).sum();
-    let first = landed.arrived().next()?.0;
+    let area: f64 = landed.arrivals().map(|(_, w)| w).sum();
+    let first = landed.arrivals().next()?.0;
     let (x0, y0) = (points.x[first], points.y[first]);
     let mut sums = [0.0; 4];
-    for (i, w) in landed.arrived() {
+    for (i, w) in landed.arrivals() {
         let (sin, cos) = (TAU * frequency * (points.y[i] - y0)).sin_cos();
         sums[0] += w * cos;
         sums[1] += w * sin;

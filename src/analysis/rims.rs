@@ -12,42 +12,43 @@
 //! rim changes no ray, only which rays get through.
 
 use super::Estimate;
-use crate::lens::Field;
+use crate::lens::FieldPoint;
 use crate::pupil::{
-    Accuracy, Aiming, Bench, Cost, Derivative, Estimator, NoDerivative, Region, differentiate, plan,
+    Accuracy, Aiming, DerivativeError, DerivativeEstimator, PupilDerivative, QuadraticIntegrand,
+    RayModel, Region, choose_estimator, differentiate,
 };
 
 /// What the rims of a lens do to the light and the sharpness of a field, or of all fields.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rims {
+pub struct RimSensitivities {
     /// The area of the pupil, in mm² of the plane through the first vertex.
     pub area: f64,
     /// The RMS radius of the spot about its centroid, in mm.
     pub rms: f64,
     /// One entry a surface.
-    pub surfaces: Vec<RimEffect>,
+    pub surfaces: Vec<RimSensitivity>,
     /// Rays traced.
     pub rays: usize,
 }
 
 /// What the semi-diameter of a surface does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RimEffect {
+pub struct RimSensitivity {
     /// The change of the area of the pupil, in mm² for a mm.
     pub area: Estimate,
     /// The change of the RMS radius of the spot, in mm for a mm.
     pub rms: Estimate,
 }
 
-impl RimEffect {
+impl RimSensitivity {
     /// Whether the rim does anything, as far as is known.
-    pub fn is_felt(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         [self.area, self.rms].iter().any(|number| number.value.abs() > number.error)
     }
 }
 
 /// An edge that is not followed is sampled by no more rays than this, to this error.
-const SAMPLED: Accuracy = Accuracy { tolerance: 0.05, most_rays: 32_768 };
+const SAMPLED_ACCURACY: Accuracy = Accuracy { tolerance: 0.05, max_rays: 32_768 };
 /// The order of quadrature of area and spot.
 const ORDER: usize = 3;
 /// No sum over rays is more exact than this, relatively.
@@ -58,40 +59,47 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 ///
 /// # Errors
 /// A pupil without light or edge.
-pub fn rims(
-    bench: &Bench,
-    field: Field,
+pub fn rim_sensitivities(
+    bench: &RayModel,
+    field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
-) -> Result<Rims, NoDerivative> {
+) -> Result<RimSensitivities, DerivativeError> {
     if bench.aiming == Aiming::Stop {
-        return rims(&bench.limited_by_stop()?, field, wavelength, accuracy);
+        return rim_sensitivities(&bench.limited_by_stop()?, field, wavelength, accuracy);
     }
     let region = Region::new(bench.launch(field, wavelength)?);
-    let (estimator, _) = plan(&region, accuracy)?;
-    let accuracy = if estimator == Estimator::Warp { SAMPLED } else { accuracy };
-    let lit = region.lit(ORDER);
+    let (estimator, _) = choose_estimator(&region, accuracy)?;
+    let accuracy = if estimator == DerivativeEstimator::Warp { SAMPLED_ACCURACY } else { accuracy };
+    let lit = region.trace_pupil(ORDER);
     let (area, center) = (lit.moments.area, lit.moments.centroid);
-    let light = differentiate(&region, &Cost::throughput(), estimator, accuracy)?;
-    let spread = differentiate(&region, &Cost::spread(center), estimator, accuracy)?;
+    let light = differentiate(&region, &QuadraticIntegrand::throughput(), estimator, accuracy)?;
+    let spread = differentiate(&region, &QuadraticIntegrand::spread(center), estimator, accuracy)?;
     let rms = (lit.moments.spread / area).sqrt();
-    let rays = lit.traced + light.rays + spread.rays;
-    let effect = |i: usize| effect([area, rms], rim(&light, i), rim(&spread, i), rays);
-    let surfaces = (0..light.by.surfaces.len()).map(effect).collect();
-    Ok(Rims { area, rms, surfaces, rays })
+    let rays = lit.rays_traced + light.rays + spread.rays;
+    let effect = |i: usize| {
+        sensitivity(
+            [area, rms],
+            semi_diameter_derivative(&light, i),
+            semi_diameter_derivative(&spread, i),
+            rays,
+        )
+    };
+    let surfaces = (0..light.gradient.surfaces.len()).map(effect).collect();
+    Ok(RimSensitivities { area, rms, surfaces, rays })
 }
 
 /// The derivative by a semi-diameter, and its error.
-fn rim(of: &Derivative, surface: usize) -> [f64; 2] {
-    [&of.by, &of.error].map(|gradient| gradient.surfaces[surface].semi_diameter)
+fn semi_diameter_derivative(of: &PupilDerivative, surface: usize) -> [f64; 2] {
+    [&of.gradient, &of.error].map(|gradient| gradient.surfaces[surface].semi_diameter)
 }
 
-fn effect(
+fn sensitivity(
     [area, rms]: [f64; 2],
     [darkening, dark_error]: [f64; 2],
     [spread, spread_error]: [f64; 2],
     rays: usize,
-) -> RimEffect {
+) -> RimSensitivity {
     // The throughput is minus the area.
     let (brightening, square, scale) = (-darkening, rms * rms, 2.0 * area * rms);
     let over = |value: f64| if scale > 0.0 { value / scale } else { 0.0 };
@@ -99,30 +107,30 @@ fn effect(
     let blur_error = over(spread_error + square * dark_error);
     let number =
         |value: f64, error: f64| Estimate::new(value, error.max(ROUNDING * value.abs()), rays);
-    RimEffect { area: number(brightening, dark_error), rms: number(blur, blur_error) }
+    RimSensitivity { area: number(brightening, dark_error), rms: number(blur, blur_error) }
 }
 
 /// What the rims do to several fields together, each with its weight: to the mean of their areas,
 /// and to the root of the mean of their squared radii. `None` where none has a weight.
-pub fn together(fields: &[(f64, &Rims)]) -> Option<Rims> {
+pub fn mean_rim_sensitivities(fields: &[(f64, &RimSensitivities)]) -> Option<RimSensitivities> {
     let sum: f64 = fields.iter().map(|(weight, _)| weight).sum();
     let first = fields.first().filter(|_| sum > 0.0)?.1;
-    let mean = |of: &dyn Fn(&Rims) -> f64| {
+    let mean = |of: &dyn Fn(&RimSensitivities) -> f64| {
         fields.iter().map(|(weight, rims)| weight / sum * of(rims)).sum::<f64>()
     };
     let rms = mean(&|rims| rims.rms * rims.rms).sqrt();
     let rays = fields.iter().map(|(_, rims)| rims.rays).sum();
     // dr = Σ w rᵢ drᵢ / r.
-    let share = |rims: &Rims| if rms > 0.0 { rims.rms / rms } else { 0.0 };
+    let share = |rims: &RimSensitivities| if rms > 0.0 { rims.rms / rms } else { 0.0 };
     let effect = |i: usize| {
         let area = |of: fn(&Estimate) -> f64| mean(&|rims| of(&rims.surfaces[i].area));
         let blur = |of: fn(&Estimate) -> f64| mean(&|rims| share(rims) * of(&rims.surfaces[i].rms));
         let [value, error]: [fn(&Estimate) -> f64; 2] = [|e| e.value, |e| e.error];
-        RimEffect {
+        RimSensitivity {
             area: Estimate::new(area(value), area(error), rays),
             rms: Estimate::new(blur(value), blur(error), rays),
         }
     };
     let surfaces = (0..first.surfaces.len()).map(effect).collect();
-    Some(Rims { area: mean(&|rims| rims.area), rms, surfaces, rays })
+    Some(RimSensitivities { area: mean(&|rims| rims.area), rms, surfaces, rays })
 }

@@ -1,15 +1,15 @@
 //! The spot: where the rays of a field land.
 
-use super::{Dark, Estimate, region};
-use crate::lens::Field;
-use crate::pupil::{Accuracy, Bench, Kind, Nodes, Region, converged};
-use crate::trace::{Hits, Points, Rays, Sink};
+use super::{AnalysisError, Estimate, lit_region};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, Nodes, RayModel, Region, RegionKind, converge};
+use crate::trace::{ImagePoints, Landings, Rays, TraceSink};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 /// The spot of a field in one colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ColorSpot {
+pub struct MonochromaticSpot {
     /// RMS distance from its own centroid, in mm.
     pub rms: Estimate,
     /// The centroid, in mm.
@@ -19,18 +19,18 @@ pub struct ColorSpot {
     /// The same in mm² of the plane through the first vertex: how much light the spot has.
     pub light: Estimate,
     /// What the spot does out of focus.
-    blur: Blur,
+    slopes: ArrivalSlopes,
     /// Whether the tolerance was met.
-    pub reached: bool,
+    pub converged: bool,
 }
 
 /// The slopes with which the rays of a spot arrive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Blur {
+struct ArrivalSlopes {
     /// The mean slope.
-    drift: [f64; 2],
+    mean: [f64; 2],
     /// The mean square of the slope about its mean.
-    square: f64,
+    variance: f64,
     /// Its covariance with the place, in mm.
     covariance: f64,
 }
@@ -39,9 +39,9 @@ struct Blur {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spot {
     /// The field.
-    pub field: Field,
+    pub field: FieldPoint,
     /// One entry a wavelength; a colour may be dark by itself.
-    pub colors: Vec<Result<ColorSpot, Dark>>,
+    pub channels: Vec<Result<MonochromaticSpot, AnalysisError>>,
     /// RMS distance from the common centroid of all colours, in mm.
     pub rms: Estimate,
     /// The common centroid, in mm.
@@ -49,17 +49,18 @@ pub struct Spot {
     /// The largest distance of any ray from the common centroid, in mm.
     pub radius: Estimate,
     /// The lit colours with their shares in the light.
-    shares: Vec<(ColorSpot, f64)>,
+    shares: Vec<(MonochromaticSpot, f64)>,
 }
 
 impl Spot {
     /// The RMS radius with the image plane moved by `defocus` mm along the light.
     pub fn rms_at(&self, defocus: f64) -> f64 {
-        let place =
-            |color: &ColorSpot, i: usize| color.centroid[i].value + defocus * color.blur.drift[i];
+        let place = |color: &MonochromaticSpot, i: usize| {
+            color.centroid[i].value + defocus * color.slopes.mean[i]
+        };
         let colors = || self.shares.iter();
         let center: [f64; 2] = [0, 1].map(|i| colors().map(|(c, s)| s * place(c, i)).sum());
-        let square = |color: &ColorSpot| {
+        let square = |color: &MonochromaticSpot| {
             let off = [0, 1].map(|i| place(color, i) - center[i]);
             color.rms_at(defocus).powi(2) + off[0] * off[0] + off[1] * off[1]
         };
@@ -78,35 +79,39 @@ impl Spot {
 }
 
 /// The radius of the first dark ring of a perfect lens with this aperture, in mm.
-pub fn airy_radius(bench: &Bench) -> Option<f64> {
-    let um = bench.colors[bench.primary].um;
-    bench.first.working_f_number.map(|f| 1.22 * um * 1e-3 * f)
+pub fn airy_radius(bench: &RayModel) -> Option<f64> {
+    let um = bench.channels[bench.primary].um;
+    bench.first_order.working_f_number.map(|f| 1.22 * um * 1e-3 * f)
 }
 
 /// The spots of all fields, in order.
-pub fn spots(bench: &Bench, accuracy: Accuracy) -> Vec<Result<Spot, Dark>> {
+pub fn spots(bench: &RayModel, accuracy: Accuracy) -> Vec<Result<Spot, AnalysisError>> {
     bench.fields.par_iter().map(|field| spot(bench, *field, accuracy)).collect()
 }
 
 /// The spot of a field in all colours; errors are relative to the RMS radius.
 ///
 /// # Errors
-/// Where no colour of the field gets through: see [`Dark`].
-pub fn spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, Dark> {
-    let pairs: Vec<_> = (0..bench.colors.len())
+/// Where no colour of the field gets through: see [`AnalysisError`].
+pub fn spot(
+    bench: &RayModel,
+    field: FieldPoint,
+    accuracy: Accuracy,
+) -> Result<Spot, AnalysisError> {
+    let pairs: Vec<_> = (0..bench.channels.len())
         .into_par_iter()
         .map(|w| {
-            let region = region(bench, field, w)?;
-            let spot = color_spot(&region, accuracy).ok_or(Dark::NoLight)?;
+            let region = lit_region(bench, field, w)?;
+            let spot = monochromatic_spot(&region, accuracy).ok_or(AnalysisError::NoLight)?;
             Ok((region, spot))
         })
         .collect();
     let lit: Vec<_> = pairs.iter().filter_map(|pair| pair.as_ref().ok()).collect();
     let Some(shares) = shares(bench, &lit) else {
         let reason = pairs.iter().find_map(|pair| pair.as_ref().err().copied());
-        return Err(reason.unwrap_or(Dark::NoLight));
+        return Err(reason.unwrap_or(AnalysisError::NoLight));
     };
-    let pooled = pooled(&lit, &shares);
+    let pooled = combine_channels(&lit, &shares);
     let center = pooled.centroid.map(|e| e.value);
     Ok(Spot {
         field,
@@ -114,26 +119,26 @@ pub fn spot(bench: &Bench, field: Field, accuracy: Accuracy) -> Result<Spot, Dar
         centroid: pooled.centroid,
         radius: geometric_radius(&lit, center, pooled.rms.error),
         shares: lit.iter().map(|pair| pair.1).zip(shares).collect(),
-        colors: pairs.iter().map(|pair| pair.as_ref().map(|p| p.1).map_err(|e| *e)).collect(),
+        channels: pairs.iter().map(|pair| pair.as_ref().map(|p| p.1).map_err(|e| *e)).collect(),
     })
 }
 
 /// The share of each lit colour in the light: its weight times the area of its pupil.
-fn shares(bench: &Bench, lit: &[&(Region<'_>, ColorSpot)]) -> Option<Vec<f64>> {
-    let light = |(region, spot): &(Region<'_>, ColorSpot)| {
-        bench.colors[region.launch.wavelength].weight * spot.area.value
+fn shares(bench: &RayModel, lit: &[&(Region<'_>, MonochromaticSpot)]) -> Option<Vec<f64>> {
+    let light = |(region, spot): &(Region<'_>, MonochromaticSpot)| {
+        bench.channels[region.launch.wavelength].weight * spot.area.value
     };
     let sum: f64 = lit.iter().map(|pair| light(pair)).sum();
     (sum > 0.0).then(|| lit.iter().map(|pair| light(pair) / sum).collect())
 }
 
-struct Pooled {
+struct PolychromaticSpot {
     rms: Estimate,
     centroid: [Estimate; 2],
 }
 
 /// All colours together: `rms² = Σ share (rms_λ² + |c_λ − c|²)`.
-fn pooled(lit: &[&(Region<'_>, ColorSpot)], shares: &[f64]) -> Pooled {
+fn combine_channels(lit: &[&(Region<'_>, MonochromaticSpot)], shares: &[f64]) -> PolychromaticSpot {
     let rays = lit.iter().map(|(_, spot)| spot.rms.rays).sum();
     let colors = || lit.iter().map(|pair| &pair.1).zip(shares);
     let center = [0, 1].map(|i| colors().map(|(c, share)| share * c.centroid[i].value).sum());
@@ -147,7 +152,7 @@ fn pooled(lit: &[&(Region<'_>, ColorSpot)], shares: &[f64]) -> Pooled {
     }
     let rms = square.sqrt();
     let error = if rms > 0.0 { error / rms } else { 0.0 };
-    Pooled {
+    PolychromaticSpot {
         rms: Estimate::new(rms, error, rays),
         centroid: [0, 1].map(|i| Estimate::new(center[i], center_error[i], rays)),
     }
@@ -155,18 +160,19 @@ fn pooled(lit: &[&(Region<'_>, ColorSpot)], shares: &[f64]) -> Pooled {
 
 /// What rounding may do to the place of a ray, in mm: a few units of the last digit of the largest
 /// coordinate on its way. It is the error of whatever a single ray says.
-pub fn rounding(bench: &Bench) -> f64 {
-    let gaps = bench.colors[bench.primary].system.surfaces.iter().map(|surface| surface.thickness);
-    let heights = bench.first.marginal.heights.iter().copied();
+pub fn rounding_error(bench: &RayModel) -> f64 {
+    let gaps =
+        bench.channels[bench.primary].system.surfaces.iter().map(|surface| surface.thickness);
+    let heights = bench.first_order.marginal.heights.iter().copied();
     8.0 * f64::EPSILON * gaps.chain(heights).fold(0.0, |largest: f64, v| largest.max(v.abs()))
 }
 
-fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
-    let rounding = rounding(region.launch.bench);
-    let found = converged(
+fn monochromatic_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<MonochromaticSpot> {
+    let rounding = rounding_error(region.launch.bench);
+    let found = converge(
         region,
         accuracy,
-        |nodes| Moments::of(region, nodes).map(|m| m.numbers()),
+        |nodes| SpotMoments::of(region, nodes).map(|m| m.numbers()),
         |[rms, _, _, area, ..]| {
             // What rounding leaves of a perfect spot has no digits to ask for.
             let rms = rms.max(rounding / accuracy.tolerance);
@@ -179,24 +185,24 @@ fn color_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<ColorSpot> {
     };
     let area = estimate(3, f64::EPSILON);
     let scale = region.launch.area();
-    Some(ColorSpot {
+    Some(MonochromaticSpot {
         rms: estimate(0, rounding),
         centroid: [estimate(1, rounding), estimate(2, rounding)],
         area,
         light: Estimate::new(scale * area.value, scale * area.error, area.rays),
-        blur: Blur {
-            square: found.values[4],
+        slopes: ArrivalSlopes {
+            variance: found.values[4],
             covariance: found.values[5],
-            drift: [found.values[6], found.values[7]],
+            mean: [found.values[6], found.values[7]],
         },
-        reached: found.reached,
+        converged: found.converged,
     })
 }
 
-impl ColorSpot {
+impl MonochromaticSpot {
     /// The RMS radius with the image plane moved by `defocus` mm along the light.
     pub fn rms_at(&self, defocus: f64) -> f64 {
-        let Blur { square, covariance, .. } = self.blur;
+        let ArrivalSlopes { variance: square, covariance, .. } = self.slopes;
         let mean = self.rms.value.powi(2) + defocus * (2.0 * covariance + defocus * square);
         mean.max(0.0).sqrt()
     }
@@ -204,14 +210,14 @@ impl ColorSpot {
     /// By how much to move the image plane for the smallest RMS radius, in mm; `None` where all
     /// rays are parallel.
     pub fn best_focus(&self) -> Option<f64> {
-        let Blur { square, covariance, .. } = self.blur;
+        let ArrivalSlopes { variance: square, covariance, .. } = self.slopes;
         (square > 0.0).then(|| -covariance / square)
     }
 }
 
 /// Weighted sums over the rays that arrive.
 #[derive(Debug, Clone, Copy, Default)]
-struct Moments {
+struct SpotMoments {
     area: f64,
     x: f64,
     y: f64,
@@ -221,19 +227,19 @@ struct Moments {
     drift: [f64; 2],
 }
 
-impl Moments {
+impl SpotMoments {
     /// The means and central second moments over some nodes; `None` where no ray arrives.
     fn of(region: &Region<'_>, nodes: &Nodes) -> Option<Self> {
-        let landed = region.trace::<Hits<f64>>(nodes);
+        let landed = region.trace::<Landings<f64>>(nodes);
         let hits = &landed.sink;
-        let area: f64 = landed.arrived().map(|(_, w)| w).sum();
+        let area: f64 = landed.arrivals().map(|(_, w)| w).sum();
         if !(area > 0.0) {
             return None;
         }
         let mean = |of: &dyn Fn(usize) -> f64| {
             // About the first ray, so that a small spot far from the axis keeps its digits.
-            let first = landed.arrived().next().map_or(0.0, |(i, _)| of(i));
-            first + landed.arrived().map(|(i, w)| w * (of(i) - first)).sum::<f64>() / area
+            let first = landed.arrivals().next().map_or(0.0, |(i, _)| of(i));
+            first + landed.arrivals().map(|(i, w)| w * (of(i) - first)).sum::<f64>() / area
         };
         let slope_x = |i: usize| hits.l[i] / hits.n[i];
         let slope_y = |i: usize| hits.m[i] / hits.n[i];
@@ -241,7 +247,7 @@ impl Moments {
         let (x, y) = (across(&|i| hits.x[i]), mean(&|i| hits.y[i]));
         let (u, v) = (across(&slope_x), mean(&slope_y));
         let mut moments = Self { area, x, y, drift: [u, v], ..Self::default() };
-        for (i, w) in landed.arrived() {
+        for (i, w) in landed.arrivals() {
             let (dx, dy) = (hits.x[i] - x, hits.y[i] - y);
             let (du, dv) = (slope_x(i) - u, slope_y(i) - v);
             moments.square += w * (dx * dx + dy * dy) / area;
@@ -263,7 +269,7 @@ const EDGE_RAYS: usize = 128;
 /// The largest distance of a ray from a point: the rays at the edge, and those of a quadrature
 /// inside it. The error is what half of the edge rays would have missed.
 fn geometric_radius(
-    lit: &[&(Region<'_>, ColorSpot)],
+    lit: &[&(Region<'_>, MonochromaticSpot)],
     center: [f64; 2],
     rms_error: f64,
 ) -> Estimate {
@@ -272,13 +278,13 @@ fn geometric_radius(
         let inside = region.nodes(2.min(region.orders() - 1));
         let edge = edge_points(region);
         rays += spot.rms.rays + inside.points.len() + edge.len();
-        let far = farthest(region, &inside.points, center);
+        let far = farthest_ray(region, &inside.points, center);
         let (even, odd): (Vec<_>, Vec<_>) =
             edge.iter().copied().enumerate().partition(|(i, _)| i % 2 == 0);
         let strip = |list: Vec<(usize, [f64; 2])>| list.into_iter().map(|(_, p)| p).collect();
         let (even, odd): (Vec<[f64; 2]>, Vec<[f64; 2]>) = (strip(even), strip(odd));
-        let far_even = far.max(farthest(region, &even, center));
-        all = all.max(far_even).max(farthest(region, &odd, center));
+        let far_even = far.max(farthest_ray(region, &even, center));
+        all = all.max(far_even).max(farthest_ray(region, &odd, center));
         half = half.max(far_even);
     }
     Estimate::new(all, (all - half).max(rms_error), rays)
@@ -290,22 +296,22 @@ fn edge_points(region: &Region<'_>) -> Vec<[f64; 2]> {
     let at = |i: usize| turn * i as f64 / EDGE_RAYS as f64;
     let inside = 1.0 - 1e-9;
     match &region.kind {
-        Kind::Clear => (0..=EDGE_RAYS)
+        RegionKind::Clear => (0..=EDGE_RAYS)
             .map(|i| at(i).sin_cos())
             .map(|(s, c)| [inside * s, inside * c])
             .collect(),
-        Kind::Split(boundary) => boundary.points(&region.launch, EDGE_RAYS, inside),
-        Kind::Ragged { ring: Some(ring), .. } => {
+        RegionKind::StarShaped(boundary) => boundary.points(&region.launch, EDGE_RAYS, inside),
+        RegionKind::Irregular { annulus: Some(ring), .. } => {
             ring.outer.points(&region.launch, EDGE_RAYS, inside)
         }
-        Kind::Dark | Kind::Endless | Kind::Ragged { .. } => Vec::new(),
+        RegionKind::Dark | RegionKind::Unbounded | RegionKind::Irregular { .. } => Vec::new(),
     }
 }
 
-fn farthest(region: &Region<'_>, points: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+fn farthest_ray(region: &Region<'_>, points: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
     let rays: Rays<f64> = points.iter().filter_map(|p| region.launch.ray(*p)).collect();
-    let mut landed = Points::default();
-    region.launch.color().tracer.batch(&rays, &mut landed);
+    let mut landed = ImagePoints::default();
+    region.launch.channel().tracer.trace_batch(&rays, &mut landed);
     let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
     arrived.map(|i| (landed.x[i] - x).hypot(landed.y[i] - y)).fold(0.0, f64::max)
 }

@@ -5,11 +5,11 @@
 //! the paraxial exit pupil (Welford, *Aberrations of Optical Systems*, 1986, section 7.2). An
 //! undercorrected lens has positive differences.
 
-use super::{Dark, Estimate, region};
-use crate::lens::Field;
+use super::{AnalysisError, Estimate, lit_region};
+use crate::lens::FieldPoint;
 use crate::math::Vec3;
-use crate::pupil::{Accuracy, Bench, Launch, Nodes, Region, converged};
-use crate::trace::{Hits, Ray, Rays};
+use crate::pupil::{Accuracy, Launch, Nodes, RayModel, Region, converge};
+use crate::trace::{Landings, Ray, Rays};
 
 /// The wavefront of a field in one colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Wavefront {
     /// The mean path difference against the chief ray, in wavelengths.
     pub mean: Estimate,
     /// Whether the tolerance was met.
-    pub reached: bool,
+    pub converged: bool,
 }
 
 /// The wavefront of a field at a wavelength; errors are relative to its RMS.
@@ -27,20 +27,20 @@ pub struct Wavefront {
 /// # Errors
 /// Where the field is dark or its chief ray does not reach the image.
 pub fn wavefront(
-    bench: &Bench,
-    field: Field,
+    bench: &RayModel,
+    field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
-) -> Result<Wavefront, Dark> {
-    let region = region(bench, field, wavelength)?;
-    let sphere = Sphere::new(&region.launch).ok_or(Dark::NoChief)?;
+) -> Result<Wavefront, AnalysisError> {
+    let region = lit_region(bench, field, wavelength)?;
+    let sphere = ReferenceSphere::new(&region.launch).ok_or(AnalysisError::NoChief)?;
     let rounding = sphere.rounding();
     let scales = |[rms, _]: &[f64; 2]| [rms.max(rounding / accuracy.tolerance); 2];
-    let found = converged(&region, accuracy, |nodes| sphere.moments(&region, nodes), scales);
-    let found = found.ok_or(Dark::NoLight)?;
+    let found = converge(&region, accuracy, |nodes| sphere.moments(&region, nodes), scales);
+    let found = found.ok_or(AnalysisError::NoLight)?;
     let estimate =
         |k: usize| Estimate::new(found.values[k], found.errors[k].max(rounding), found.rays);
-    Ok(Wavefront { rms: estimate(0), mean: estimate(1), reached: found.reached })
+    Ok(Wavefront { rms: estimate(0), mean: estimate(1), converged: found.converged })
 }
 
 /// The path differences at some pupil points in wavelengths; `None` for a ray that is lost.
@@ -48,24 +48,24 @@ pub fn wavefront(
 /// # Errors
 /// Where the field has no rays or its chief ray does not reach the image.
 pub fn path_differences(
-    bench: &Bench,
-    field: Field,
+    bench: &RayModel,
+    field: FieldPoint,
     wavelength: usize,
     points: &[[f64; 2]],
-) -> Result<Vec<Option<f64>>, Dark> {
-    let launch = bench.launch(field, wavelength).map_err(Dark::NoRays)?;
-    let sphere = Sphere::new(&launch).ok_or(Dark::NoChief)?;
+) -> Result<Vec<Option<f64>>, AnalysisError> {
+    let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+    let sphere = ReferenceSphere::new(&launch).ok_or(AnalysisError::NoChief)?;
     let at = |p: &[f64; 2]| {
         let ray = launch.ray(*p)?;
-        let landing = launch.color().tracer.trace(ray);
-        let path = launch.path_to(ray) + landing.opl;
+        let landing = launch.channel().tracer.trace(ray);
+        let path = launch.optical_path_to(ray) + landing.opl;
         landing.fate.is_imaged().then(|| sphere.difference(landing.ray, path))
     };
     Ok(points.iter().map(at).collect())
 }
 
 /// The reference sphere with the chief ray that ends in its middle.
-struct Sphere {
+struct ReferenceSphere {
     middle: Vec3<f64>,
     direction: Vec3<f64>,
     path: f64,
@@ -77,21 +77,21 @@ struct Sphere {
     wavelength: f64,
 }
 
-impl Sphere {
+impl ReferenceSphere {
     fn new(launch: &Launch<'_>) -> Option<Self> {
-        let chief = launch.open_landing([0.0, 0.0])?;
-        let path = launch.path_to(launch.ray([0.0, 0.0])?) + chief.opl.value;
-        let system = &launch.color().system;
+        let chief = launch.unclipped_landing([0.0, 0.0])?;
+        let path = launch.optical_path_to(launch.ray([0.0, 0.0])?) + chief.opl.value;
+        let system = &launch.channel().system;
         let (middle, direction) = (chief.ray.point.value(), chief.ray.direction.value());
         let last = system.surfaces.len().checked_sub(2)?;
-        let radius = launch.bench.first.exit_pupil.position.map(|z| {
+        let radius = launch.bench.first_order.exit_pupil.position.map(|z| {
             let pupil = Vec3::new(0.0, 0.0, z - system.surfaces[last].thickness);
             let away = pupil - middle;
             let along = if away.z * direction.z > 0.0 { 1.0 } else { -1.0 };
             along * away.dot(away).sqrt()
         });
         let index = system.surfaces[last].index;
-        let wavelength = launch.color().um * 1e-3;
+        let wavelength = launch.channel().um * 1e-3;
         Some(Self { middle, direction, path, radius, index, wavelength })
     }
 
@@ -121,15 +121,15 @@ impl Sphere {
     /// Standard deviation and mean over some nodes; `None` where no ray arrives.
     fn moments(&self, region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 2]> {
         let rays: Rays<f64> = nodes.points.iter().filter_map(|p| region.launch.ray(*p)).collect();
-        let landed = region.trace::<Hits<f64>>(nodes);
+        let landed = region.trace::<Landings<f64>>(nodes);
         let hits = &landed.sink;
         let difference = |i: usize| {
             let point = Vec3::new(hits.x[i], hits.y[i], hits.z[i]);
             let direction = Vec3::new(hits.l[i], hits.m[i], hits.n[i]);
-            let path = region.launch.path_to(rays.get(i)) + hits.opl[i];
+            let path = region.launch.optical_path_to(rays.get(i)) + hits.opl[i];
             self.difference(Ray { point, direction }, path)
         };
-        let differences: Vec<_> = landed.arrived().map(|(i, w)| (difference(i), w)).collect();
+        let differences: Vec<_> = landed.arrivals().map(|(i, w)| (difference(i), w)).collect();
         let area: f64 = differences.iter().map(|(_, w)| w).sum();
         if !(area > 0.0) {
             return None;

@@ -1,7 +1,7 @@
 //! From one file format to another, with all that was lost on the way.
 
-use super::failure::Failure;
-use super::input::check_target;
+use super::failure::CliError;
+use super::input::check_output_file;
 use super::output::Output;
 use crate::files;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Converts a lens between formats; reports what was used, approximated, preserved and dropped
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/convert.txt"))]
-pub(super) struct Convert {
+pub(super) struct ConvertArgs {
     /// The lens that is read: .json or .zmx
     #[arg(value_name = "IN")]
     from: PathBuf,
@@ -19,9 +19,9 @@ pub(super) struct Convert {
     to: PathBuf,
 }
 
-impl Convert {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
-        check_target(&self.to, &["json", "zmx"])?;
+impl ConvertArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        check_output_file(&self.to, &["json", "zmx"])?;
         output.print(&files::convert(&self.from, &self.to)?)
     }
 }

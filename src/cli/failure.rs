@@ -1,15 +1,15 @@
 //! Why a subcommand did not do its work, and the exit status that says so.
 
 use crate::files::FileError;
-use crate::lens::{Invalid, LensError};
+use crate::lens::{LensError, SystemError};
 use crate::merit::MeritError;
-use crate::paraxial::Undefined;
-use crate::pupil::BenchError;
+use crate::paraxial::ParaxialError;
+use crate::pupil::RayModelError;
 use std::io;
 
 /// Why a subcommand did not do its work.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Failure {
+pub(super) enum CliError {
     /// A file that cannot be read, is not what it should be, or cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -23,19 +23,19 @@ pub(super) enum Failure {
     },
     /// A lens without the first-order data that are asked for.
     #[error("{file}: {source}")]
-    Undefined {
+    Paraxial {
         /// The lens.
         file: String,
         /// What is wrong.
-        source: Undefined,
+        source: ParaxialError,
     },
     /// A lens that cannot be set up for rays.
     #[error("{file}: {source}")]
-    Bench {
+    RayModel {
         /// The lens.
         file: String,
         /// What is wrong.
-        source: BenchError,
+        source: RayModelError,
     },
     /// A lens without the merit that is asked for.
     #[error("{file}: {source}")]
@@ -51,7 +51,7 @@ pub(super) enum Failure {
         /// The file of the rays.
         file: String,
         /// The ray and what is wrong with it.
-        source: Invalid,
+        source: SystemError,
     },
     /// Anything else that was asked for wrongly.
     #[error("{0}")]
@@ -64,17 +64,17 @@ pub(super) enum Failure {
     Output(#[from] io::Error),
 }
 
-impl Failure {
+impl CliError {
     /// The exit status: 0 done, 1 the work failed, 2 the input is wrong.
-    pub(super) fn status(&self) -> u8 {
+    pub(super) fn exit_status(&self) -> u8 {
         match self {
-            Self::File(FileError::Unwritable { .. } | FileError::NotProven { .. })
+            Self::File(FileError::Unwritable { .. } | FileError::RoundTripFailed { .. })
             | Self::Failed(_) => 1,
             Self::Output(_) => u8::from(!self.is_closed_pipe()),
             Self::File(_)
             | Self::Lens { .. }
-            | Self::Undefined { .. }
-            | Self::Bench { .. }
+            | Self::Paraxial { .. }
+            | Self::RayModel { .. }
             | Self::Merit { .. }
             | Self::Rays { .. }
             | Self::Input(_) => 2,

@@ -1,15 +1,15 @@
 //! The derivative of an integral over the pupil by every number of a lens.
 
-use super::failure::Failure;
-use super::input::{LensFile, Opened, Tolerance};
-use super::output::{Number, Output, Table};
-use crate::lens::{Fields, GRADE_TERMS, Law, Lens, Medium, RADIAL_TERMS, at_zoom};
-use crate::measure::timed;
+use super::failure::CliError;
+use super::input::{LensFile, LoadedLens, Tolerance};
+use super::output::{Output, ShortNumber, TextTable};
+use crate::lens::{Fields, Lens, Medium, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, at_zoom};
+use crate::measure::time_ms;
 use crate::pupil::{
-    Accuracy, Bench, Cost, Derivative, Estimator, NoDerivative, Region, differentiate,
-    limited_by_stop, plan,
+    Accuracy, DerivativeError, DerivativeEstimator, PupilDerivative, QuadraticIntegrand, RayModel,
+    Region, choose_estimator, differentiate, limited_by_stop,
 };
-use crate::trace::{Gradient as Slopes, SurfaceGradient};
+use crate::trace::{SurfaceGradient, SystemGradient as Slopes};
 use clap::ValueEnum;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -17,7 +17,7 @@ use std::fmt::{self, Display};
 /// An integral over the pupil and its derivative by every number of the lens
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/gradient.txt"))]
-pub(super) struct Gradient {
+pub(super) struct GradientArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -72,58 +72,58 @@ enum Method {
 }
 
 impl Method {
-    fn estimator(self) -> Option<Estimator> {
+    fn estimator(self) -> Option<DerivativeEstimator> {
         match self {
             Self::Auto => None,
-            Self::Biased => Some(Estimator::Biased),
-            Self::Boundary => Some(Estimator::Boundary),
-            Self::Warp => Some(Estimator::Warp),
-            Self::Difference => Some(Estimator::Difference),
+            Self::Biased => Some(DerivativeEstimator::Biased),
+            Self::Boundary => Some(DerivativeEstimator::Boundary),
+            Self::Warp => Some(DerivativeEstimator::Warp),
+            Self::Difference => Some(DerivativeEstimator::Difference),
         }
     }
 }
 
-impl Gradient {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl GradientArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
-        let refuse = |source| Failure::Bench { file: opened.file.clone(), source };
-        let lens = limited_by_stop(&self.one_position(&opened)?).map_err(refuse)?;
-        let bench = Bench::of(&lens, 0).map_err(refuse)?;
-        let (found, ms) = timed(|| self.differentiate(&bench));
-        let found = found.map_err(|cause| Failure::Failed(format!("{}: {cause}", opened.file)))?;
-        output.print(&Report::new(self, &lens, &found, ms))
+        let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
+        let lens = limited_by_stop(&self.selected_lens(&opened)?).map_err(refuse)?;
+        let bench = RayModel::from_lens(&lens, 0).map_err(refuse)?;
+        let (found, ms) = time_ms(|| self.differentiate(&bench));
+        let found = found.map_err(|cause| CliError::Failed(format!("{}: {cause}", opened.file)))?;
+        output.print(&GradientReport::new(self, &lens, &found, ms))
     }
 
     /// The lens at the zoom position and field that are asked for.
-    fn one_position(&self, opened: &Opened) -> Result<Lens, Failure> {
+    fn selected_lens(&self, opened: &LoadedLens) -> Result<Lens, CliError> {
         let mut lens = at_zoom(&opened.lens, self.zoom);
         if let Some(y) = self.field {
-            let values = vec![opened.field(y, self.zoom)?];
+            let values = vec![opened.field_at(y, self.zoom)?];
             lens.fields = Fields { kind: lens.fields.kind, values };
         }
         Ok(lens)
     }
 
     /// The sum over the fields, each with the mean over the wavelengths by weight.
-    fn differentiate(&self, bench: &Bench) -> Result<Found, NoDerivative> {
-        let accuracy = Accuracy { tolerance: self.error.0, most_rays: self.rays };
-        let mut found = Found::new(bench);
+    fn differentiate(&self, bench: &RayModel) -> Result<IntegralDerivative, DerivativeError> {
+        let accuracy = Accuracy { tolerance: self.error.0, max_rays: self.rays };
+        let mut found = IntegralDerivative::new(bench);
         for field in &bench.fields {
-            let regions: Result<Vec<_>, _> = (0..bench.colors.len())
+            let regions: Result<Vec<_>, _> = (0..bench.channels.len())
                 .map(|wavelength| bench.launch(*field, wavelength).map(Region::new))
                 .collect();
             let regions = regions?;
             let cost = self.cost(bench, &regions);
-            for (region, color) in regions.iter().zip(&bench.colors) {
+            for (region, color) in regions.iter().zip(&bench.channels) {
                 let (estimator, reason) = match self.method.estimator() {
                     Some(asked) => (asked, "asked for".to_owned()),
-                    None => plan(region, accuracy)?,
+                    None => choose_estimator(region, accuracy)?,
                 };
                 let derivative = differentiate(region, &cost, estimator, accuracy)?;
-                let light = region.lit(VALUE).moments;
-                let coarse = cost.over(&region.lit(VALUE - 1).moments);
-                let value = cost.over(&light);
+                let light = region.trace_pupil(VALUE_ORDER).moments;
+                let coarse = cost.integrate(&region.trace_pupil(VALUE_ORDER - 1).moments);
+                let value = cost.integrate(&light);
                 let share = field.weight * color.weight / found.weights;
                 found.add(&derivative, share, (value, (value - coarse).abs()));
                 found.planned = (estimator, reason);
@@ -133,46 +133,46 @@ impl Gradient {
     }
 
     /// The cost about the centroid of all wavelengths.
-    fn cost(&self, bench: &Bench, regions: &[Region<'_>]) -> Cost {
+    fn cost(&self, bench: &RayModel, regions: &[Region<'_>]) -> QuadraticIntegrand {
         if self.term == TermName::Throughput {
-            return Cost::throughput();
+            return QuadraticIntegrand::throughput();
         }
         let (mut area, mut sum) = (0.0, [0.0; 2]);
-        for (region, color) in regions.iter().zip(&bench.colors) {
-            let light = region.lit(VALUE).moments;
+        for (region, color) in regions.iter().zip(&bench.channels) {
+            let light = region.trace_pupil(VALUE_ORDER).moments;
             area += color.weight * light.area;
             sum = [0, 1].map(|i| sum[i] + color.weight * light.area * light.centroid[i]);
         }
-        Cost::spread(if area > 0.0 { sum.map(|s| s / area) } else { [0.0; 2] })
+        QuadraticIntegrand::spread(if area > 0.0 { sum.map(|s| s / area) } else { [0.0; 2] })
     }
 }
 
 /// The order of quadrature of the value.
-const VALUE: usize = 6;
+const VALUE_ORDER: usize = 6;
 
 /// What was found.
-struct Found {
+struct IntegralDerivative {
     value: f64,
     value_error: f64,
     by: Slopes<f64>,
     error: Slopes<f64>,
     rays: usize,
     weights: f64,
-    planned: (Estimator, String),
+    planned: (DerivativeEstimator, String),
 }
 
-impl Found {
-    fn new(bench: &Bench) -> Self {
-        let zero = || Slopes::zero(bench.colors[0].tracer.surfaces());
-        let weights = bench.colors.iter().map(|color| color.weight).sum();
-        let planned = (Estimator::Boundary, String::new());
+impl IntegralDerivative {
+    fn new(bench: &RayModel) -> Self {
+        let zero = || Slopes::zero(bench.channels[0].tracer.surfaces());
+        let weights = bench.channels.iter().map(|color| color.weight).sum();
+        let planned = (DerivativeEstimator::Boundary, String::new());
         Self { value: 0.0, value_error: 0.0, by: zero(), error: zero(), rays: 0, weights, planned }
     }
 
-    fn add(&mut self, derivative: &Derivative, share: f64, (value, error): (f64, f64)) {
+    fn add(&mut self, derivative: &PupilDerivative, share: f64, (value, error): (f64, f64)) {
         self.value += share * value;
         self.value_error += share * error;
-        self.by.add(&derivative.by, share);
+        self.by.add(&derivative.gradient, share);
         self.error.add(&derivative.error, share.abs());
         self.rays += derivative.rays;
     }
@@ -180,7 +180,7 @@ impl Found {
 
 /// What is printed.
 #[derive(Serialize)]
-struct Report {
+struct GradientReport {
     term: TermName,
     method: &'static str,
     reason: String,
@@ -188,21 +188,21 @@ struct Report {
     error: f64,
     rays: usize,
     ms: f64,
-    d: Columns,
-    d_error: Columns,
+    d: DerivativeColumns,
+    d_error: DerivativeColumns,
     #[serde(skip)]
     unit: &'static str,
     /// What the coefficients of the gradient behind each surface belong to.
     #[serde(skip)]
-    coefficients: Vec<Coefficients>,
+    coefficients: Vec<CoefficientLabels>,
 }
 
 /// What each coefficient of a gradient belongs to; nothing where its law has none.
-type Coefficients = [Option<String>; GRADE_TERMS];
+type CoefficientLabels = [Option<String>; PROFILE_TERMS];
 
 /// One entry a surface; nothing where the surface has no such number.
 #[derive(Serialize)]
-struct Columns {
+struct DerivativeColumns {
     curvature: Vec<f64>,
     thickness: Vec<f64>,
     semi_diameter: Vec<Option<f64>>,
@@ -218,13 +218,13 @@ fn are_none(column: &[Option<Vec<f64>>]) -> bool {
     column.iter().all(Option::is_none)
 }
 
-impl Columns {
+impl DerivativeColumns {
     fn new(lens: &Lens, slopes: &Slopes<f64>) -> Self {
         let rows = || lens.surfaces.iter().zip(&slopes.surfaces);
         let column = |of: fn(&SurfaceGradient<f64>) -> f64| rows().map(|(_, s)| of(s)).collect();
         let asphere = |count: usize, terms: &[f64]| (count > 0).then(|| terms[..count].to_vec());
         let gradient = |medium: &Medium, s: &SurfaceGradient<f64>| {
-            matches!(medium, Medium::Gradient(_)).then(|| s.grade.to_vec())
+            matches!(medium, Medium::Grin(_)).then(|| s.grin_terms.to_vec())
         };
         Self {
             curvature: column(|s| s.curvature),
@@ -238,8 +238,8 @@ impl Columns {
     }
 }
 
-impl Report {
-    fn new(asked: &Gradient, lens: &Lens, found: &Found, ms: f64) -> Self {
+impl GradientReport {
+    fn new(asked: &GradientArgs, lens: &Lens, found: &IntegralDerivative, ms: f64) -> Self {
         let (estimator, reason) = &found.planned;
         Self {
             term: asked.term,
@@ -249,21 +249,21 @@ impl Report {
             error: found.value_error,
             rays: found.rays,
             ms,
-            d: Columns::new(lens, &found.by),
-            d_error: Columns::new(lens, &found.error),
+            d: DerivativeColumns::new(lens, &found.by),
+            d_error: DerivativeColumns::new(lens, &found.error),
             unit: if asked.term == TermName::Spot { "mm^4" } else { "mm^2" },
-            coefficients: lens.surfaces.iter().map(|row| coefficients(&row.medium)).collect(),
+            coefficients: lens.surfaces.iter().map(|row| coefficient_labels(&row.medium)).collect(),
         }
     }
 }
 
-impl Display for Report {
+impl Display for GradientReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { value, error, rays, ms, d, d_error, method, reason, unit, .. } = self;
-        writeln!(f, "{} {unit} ± {error:.1e}   {rays} rays, {ms:.3} ms", Number(*value))?;
+        writeln!(f, "{} {unit} ± {error:.1e}   {rays} rays, {ms:.3} ms", ShortNumber(*value))?;
         writeln!(f, "{method}: {reason}\n")?;
         let names = ["surface", "d/d curvature", "d/d thickness", "d/d semi-diameter", "d/d index"];
-        let mut table = Table::new(&names);
+        let mut table = TextTable::new(&names);
         for i in 0..d.curvature.len() {
             let cell = |value: f64, error: f64| format!("{value:.6e} ± {error:.0e}");
             let rim = d.semi_diameter[i].zip(d_error.semi_diameter[i]);
@@ -280,25 +280,25 @@ impl Display for Report {
     }
 }
 
-fn coefficients(medium: &Medium) -> Coefficients {
-    let Medium::Gradient(gradient) = medium else { return Coefficients::default() };
+fn coefficient_labels(medium: &Medium) -> CoefficientLabels {
+    let Medium::Grin(gradient) = medium else { return CoefficientLabels::default() };
     std::array::from_fn(|k| {
         gradient.term(k)?;
         Some(match k.checked_sub(RADIAL_TERMS) {
-            None if gradient.law == Law::Sech => "g r".to_owned(),
+            None if gradient.law == ProfileLaw::Sech => "g r".to_owned(),
             None => format!("r^{}", 2 * k + 2),
             Some(j) => format!("z^{}", j + 1),
         })
     })
 }
 
-impl Report {
+impl GradientReport {
     /// The coefficients of every gradient-index medium.
     fn write_gradients(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, (by, error)) in self.d.gradient.iter().zip(&self.d_error.gradient).enumerate() {
             let (Some(by), Some(error)) = (by, error) else { continue };
             let title = format!("gradient after surface {i}, coefficient of");
-            let mut table = Table::new(&[&title, "derivative"]);
+            let mut table = TextTable::new(&[&title, "derivative"]);
             for ((by, error), power) in by.iter().zip(error).zip(&self.coefficients[i]) {
                 if let Some(power) = power {
                     table.row([power.clone(), format!("{by:.6e} ± {error:.0e}")]);

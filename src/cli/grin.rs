@@ -1,16 +1,16 @@
 //! A design task in a gradient-index field.
 
-use super::experiment::check_folder;
-use super::failure::Failure;
-use super::grin_lines::Lines;
-use super::grin_report::{Cost, Report};
-use super::input::{check_target, read_json};
+use super::experiment::create_folder;
+use super::failure::CliError;
+use super::grin_lines::StraightRaySolver;
+use super::grin_report::{GrinCostSummary, GrinReport};
+use super::input::{check_output_file, read_json};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::Output;
-use super::targets::check_apart;
-use crate::experiments::{medium_pictures, view_picture};
+use super::targets::check_distinct;
+use crate::experiments::{plot_medium, plot_view};
 use crate::files;
-use crate::grin_task::{self, Medium, Runner, Task};
+use crate::grin_task::{self, GrinField, GrinOptimizer, GrinTask};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -21,7 +21,7 @@ use std::sync::atomic::Ordering;
 /// search and writes the best field
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/grin.txt"))]
-pub(super) struct Grin {
+pub(super) struct GrinArgs {
     /// The task: a name that comes with the program, or a file .json; a list of names where it is
     /// absent
     #[arg(value_name = "TASK")]
@@ -56,39 +56,42 @@ pub(super) struct Grin {
     show: bool,
 }
 
-impl Grin {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
-        let Some(name) = &self.task else { return output.print(&List) };
-        let task = task_of(name)?;
+impl GrinArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let Some(name) = &self.task else { return output.print(&TaskList) };
+        let task = load_task(name)?;
         if self.show {
-            return output.print(&Shown(task));
+            return output.print(&TaskFile(task));
         }
-        self.out.iter().try_for_each(|path| check_target(path, &["npz", "json"]))?;
-        self.png.iter().try_for_each(|folder| check_folder(folder))?;
+        self.out.iter().try_for_each(|path| check_output_file(path, &["npz", "json"]))?;
+        self.png.iter().try_for_each(|folder| create_folder(folder))?;
         let out = self.out.as_deref().map(|path| ("--out", path));
-        check_apart(&[out], std::iter::once(("the task itself", Path::new(name))))?;
+        check_distinct(&[out], std::iter::once(("the task itself", Path::new(name))))?;
         self.check()?;
-        let refuse = |error| Failure::Input(format!("{}: {error}", file(name)));
-        let lines = self.lines.then(|| Lines::new(file(name), &task)).transpose()?;
-        let mut runner = Runner::new(&task).map_err(refuse)?;
+        let refuse = |error| CliError::Input(format!("{}: {error}", source_name(name)));
+        let lines =
+            self.lines.then(|| StraightRaySolver::new(source_name(name), &task)).transpose()?;
+        let mut runner = GrinOptimizer::new(&task).map_err(refuse)?;
         let (clock, before) = (Stopwatch::start(), processor_ms());
         let mut worked = Ok(true);
         let memory = peak_megabytes(|| worked = self.search(&mut runner, clock));
         let stopped =
-            !worked.map_err(|error| Failure::Failed(format!("{}: {error}", file(name))))?;
+            !worked.map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let ms = 1e3 * clock.seconds();
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
-        let mut report = Report::new(&runner, &Cost { ms, processor_ms, memory, stopped })
-            .map_err(|error| Failure::Failed(format!("{}: {error}", file(name))))?;
+        let mut report =
+            GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, stopped })
+                .map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let nodes = runner.best().nodes();
-        report.lines = lines.map(|lines| lines.found(file(name), &task, nodes)).transpose()?;
+        report.lines =
+            lines.map(|lines| lines.solve(source_name(name), &task, nodes)).transpose()?;
         report.files = self.write(&task, runner.best())?;
         output.print(&report)
     }
 
     /// Writes what is asked for.
-    fn write(&self, task: &Task, best: &Medium) -> Result<Vec<String>, Failure> {
-        let failed = |error: &dyn std::error::Error| Failure::Failed(error.to_string());
+    fn write(&self, task: &GrinTask, best: &GrinField) -> Result<Vec<String>, CliError> {
+        let failed = |error: &dyn std::error::Error| CliError::Failed(error.to_string());
         let mut written = Vec::new();
         if let Some(path) = &self.out {
             let volume = task.volume(best, self.nodes).map_err(|error| failed(&error))?;
@@ -96,36 +99,40 @@ impl Grin {
             written.extend(files.iter().map(|file| file.display().to_string()));
         }
         if let Some(folder) = &self.png {
-            for picture in medium_pictures(task, best) {
+            for picture in plot_medium(task, best) {
                 let path = folder.join(format!("{}.png", picture.name));
-                files::replace(&path, &picture.canvas.png().map_err(|error| failed(&error))?)?;
+                files::write_atomic(&path, &picture.canvas.png().map_err(|error| failed(&error))?)?;
                 written.push(path.display().to_string());
             }
-            let seen = task.seen(best).map_err(|error| failed(&error))?;
+            let seen = task.report_views(best).map_err(|error| failed(&error))?;
             for (i, (view, seen)) in task.views.iter().zip(&seen).enumerate() {
                 let Some(image) = &seen.image else { continue };
-                let canvas = view_picture(&view.name, image, seen.result.quality.unwrap_or(0.0));
+                let canvas = plot_view(&view.name, image, seen.result.psnr.unwrap_or(0.0));
                 let path = folder.join(format!("view-{}.png", i + 1));
-                files::replace(&path, &canvas.png().map_err(|error| failed(&error))?)?;
+                files::write_atomic(&path, &canvas.png().map_err(|error| failed(&error))?)?;
                 written.push(path.display().to_string());
             }
         }
         Ok(written)
     }
 
-    fn check(&self) -> Result<(), Failure> {
+    fn check(&self) -> Result<(), CliError> {
         if self.minutes.is_some_and(|minutes| !(minutes > 0.0)) {
-            return Err(Failure::Input("--minutes: expected more than 0".into()));
+            return Err(CliError::Input("--minutes: expected more than 0".into()));
         }
         if !(2..=513).contains(&self.nodes) {
             let text = format!("--nodes: found {}; expected 2 to 513", self.nodes);
-            return Err(Failure::Input(text));
+            return Err(CliError::Input(text));
         }
         Ok(())
     }
 
     /// Steps until the end, or until it is stopped; whether it came to its end.
-    fn search(&self, runner: &mut Runner, clock: Stopwatch) -> Result<bool, grin_task::TaskError> {
+    fn search(
+        &self,
+        runner: &mut GrinOptimizer,
+        clock: Stopwatch,
+    ) -> Result<bool, grin_task::GrinTaskError> {
         let stop = stop_flag();
         let bar = progress_bar(0);
         let most = self.iterations.unwrap_or(usize::MAX);
@@ -133,12 +140,12 @@ impl Grin {
         loop {
             let over = stop.load(Ordering::Relaxed) || self.minutes.is_some_and(late);
             if over || runner.steps() >= most {
-                runner.settle()?;
+                runner.finish()?;
                 bar.finish_and_clear();
                 return Ok(false);
             }
             let progress = runner.step()?;
-            bar.set_length(progress.most as u64);
+            bar.set_length(progress.max_steps as u64);
             bar.set_position(progress.step as u64);
             bar.set_message(format!("{} nodes, loss {:.2e} mm^2", progress.nodes, progress.loss));
             if progress.finished {
@@ -150,55 +157,55 @@ impl Grin {
 }
 
 /// A task by its name or from a file.
-pub(super) fn task_of(name: &str) -> Result<Task, Failure> {
-    let task = match grin_task::find(name) {
+pub(super) fn load_task(name: &str) -> Result<GrinTask, CliError> {
+    let task = match grin_task::find_builtin(name) {
         Some(builtin) => builtin.task()?,
         None if Path::new(name).extension().is_some_and(|e| e == "json") || name == "-" => {
             read_json(Path::new(name))?
         }
         None => {
-            let names: Vec<&str> = grin_task::BUILTIN.iter().map(|task| task.name).collect();
+            let names: Vec<&str> = grin_task::BUILTIN_TASKS.iter().map(|task| task.name).collect();
             let names = names.join(", ");
-            return Err(Failure::Input(format!(
+            return Err(CliError::Input(format!(
                 "no task `{name}`; expected a file .json, or one of {names}"
             )));
         }
     };
-    task.check().map_err(|error| Failure::Input(format!("{}: {error}", file(name))))?;
+    task.check().map_err(|error| CliError::Input(format!("{}: {error}", source_name(name))))?;
     Ok(task)
 }
 
 /// Where a task comes from, for a message.
-fn file(name: &str) -> &str {
+fn source_name(name: &str) -> &str {
     if name == "-" { "standard input" } else { name }
 }
 
 /// The tasks that come with the program.
-struct List;
+struct TaskList;
 
 #[derive(Serialize)]
-struct Entry {
+struct TaskEntry {
     name: &'static str,
     title: String,
     notes: String,
 }
 
-fn entries() -> impl Iterator<Item = Entry> {
-    grin_task::BUILTIN.iter().filter_map(|builtin| {
-        let Task { name: title, notes, .. } = builtin.task().ok()?;
-        Some(Entry { name: builtin.name, title, notes })
+fn task_entries() -> impl Iterator<Item = TaskEntry> {
+    grin_task::BUILTIN_TASKS.iter().filter_map(|builtin| {
+        let GrinTask { name: title, notes, .. } = builtin.task().ok()?;
+        Some(TaskEntry { name: builtin.name, title, notes })
     })
 }
 
-impl Serialize for List {
+impl Serialize for TaskList {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(entries())
+        serializer.collect_seq(task_entries())
     }
 }
 
-impl Display for List {
+impl Display for TaskList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for Entry { name, title, notes } in entries() {
+        for TaskEntry { name, title, notes } in task_entries() {
             writeln!(f, "{name:<16} {title}\n{:16} {notes}", "")?;
         }
         Ok(())
@@ -208,9 +215,9 @@ impl Display for List {
 /// A task as its file.
 #[derive(Serialize)]
 #[serde(transparent)]
-struct Shown(Task);
+struct TaskFile(GrinTask);
 
-impl Display for Shown {
+impl Display for TaskFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&files::native::pretty(&self.0))
     }

@@ -1,18 +1,18 @@
 //! What straight lines make of the measurement of a task, beside what its search found.
 
-use super::failure::Failure;
-use crate::grin_task::{Chords, Medium, Task, TaskError};
+use super::failure::CliError;
+use crate::grin_task::{GrinField, GrinTask, GrinTaskError, StraightRays};
 use crate::measure::Stopwatch;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
 
 /// Steps of conjugate gradients.
-const STEPS: usize = 60;
+const CGLS_STEPS: usize = 60;
 
 /// The best field that straight lines found; their last one where the answer is not known.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Found {
+pub(super) struct StraightRayResult {
     /// Its error, as that of the search.
     of_contrast: Option<f64>,
     /// Which of the steps it is.
@@ -23,42 +23,54 @@ pub(super) struct Found {
 
 /// Straight lines, ready to be solved for; what that took, in milliseconds.
 #[derive(Debug)]
-pub(super) struct Lines {
-    chords: Chords,
+pub(super) struct StraightRaySolver {
+    chords: StraightRays,
     ms: f64,
 }
 
-impl Lines {
+impl StraightRaySolver {
     /// Refuses a task whose light was not measured.
-    pub(super) fn new(name: &str, task: &Task) -> Result<Self, Failure> {
+    pub(super) fn new(name: &str, task: &GrinTask) -> Result<Self, CliError> {
         let clock = Stopwatch::start();
-        let chords = Chords::new(task).map_err(|error| refused(name, &error))?;
+        let chords = StraightRays::new(task).map_err(|error| straight_ray_error(name, &error))?;
         Ok(Self { chords, ms: 1e3 * clock.seconds() })
     }
 
-    pub(super) fn found(self, name: &str, task: &Task, nodes: usize) -> Result<Found, Failure> {
+    pub(super) fn solve(
+        self,
+        name: &str,
+        task: &GrinTask,
+        nodes: usize,
+    ) -> Result<StraightRayResult, CliError> {
         let clock = Stopwatch::start();
         let (mut best, mut step, mut steps) = (None, 0, 0);
-        let visit = |medium: &Medium| {
+        let visit = |medium: &GrinField| {
             steps += 1;
             let difference = task.difference(medium).ok().flatten();
-            let error = difference.map(|difference| difference.of_contrast);
+            let error = difference.map(|difference| difference.relative_to_contrast);
             let error = error.filter(|error| error.is_finite());
             if error.zip(best).is_none_or(|(error, best)| error < best) {
                 (best, step) = (error, steps);
             }
             ControlFlow::Continue(())
         };
-        self.chords.field(nodes, STEPS, visit).map_err(|error| refused(name, &error))?;
-        Ok(Found { of_contrast: best, step, steps, ms: self.ms + 1e3 * clock.seconds() })
+        self.chords
+            .reconstruct(nodes, CGLS_STEPS, visit)
+            .map_err(|error| straight_ray_error(name, &error))?;
+        Ok(StraightRayResult {
+            of_contrast: best,
+            step,
+            steps,
+            ms: self.ms + 1e3 * clock.seconds(),
+        })
     }
 }
 
-fn refused(name: &str, error: &TaskError) -> Failure {
-    Failure::Input(format!("{name}, --lines: {error}"))
+fn straight_ray_error(name: &str, error: &GrinTaskError) -> CliError {
+    CliError::Input(format!("{name}, --lines: {error}"))
 }
 
-impl Display for Found {
+impl Display for StraightRayResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { of_contrast, step, steps, ms } = self;
         write!(f, "straight lines: {steps} steps of least squares, {:.2} s", 1e-3 * ms)?;

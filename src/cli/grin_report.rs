@@ -1,33 +1,33 @@
 //! What a search for a gradient-index field prints: what it found, what it keeps, what it took.
 
-use super::grin_lines::Found;
-use super::output::{Number, Table};
-use crate::grin_task::{self, Judgement, Kept, Runner, ViewResult};
-use crate::measure::Memory;
+use super::grin_lines::StraightRayResult;
+use super::output::{ShortNumber, TextTable};
+use crate::grin_task::{self, FieldScore, GrinOptimizer, LimitCheck, ViewResult};
+use crate::measure::MemoryUse;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
 
 /// What a search took.
-pub(super) struct Cost {
+pub(super) struct GrinCostSummary {
     pub(super) ms: f64,
     pub(super) processor_ms: Option<f64>,
-    pub(super) memory: Option<Memory>,
+    pub(super) memory: Option<MemoryUse>,
     pub(super) stopped: bool,
 }
 
 /// What is printed.
 #[derive(Serialize)]
-pub(super) struct Report {
+pub(super) struct GrinReport {
     name: String,
     stopped: bool,
     loss: f64,
-    views: Vec<View>,
-    error: Option<Error>,
-    pub(super) lines: Option<Found>,
+    views: Vec<ViewSummary>,
+    error: Option<FieldErrorReport>,
+    pub(super) lines: Option<StraightRayResult>,
     index: [f64; 2],
     slope: f64,
-    limits: Vec<Held>,
+    limits: Vec<LimitReport>,
     nodes: usize,
     parameters: usize,
     steps: usize,
@@ -36,13 +36,13 @@ pub(super) struct Report {
     step: f64,
     ms: f64,
     processor_ms: Option<f64>,
-    memory: Option<Memory>,
+    memory: Option<MemoryUse>,
     pub(super) files: Vec<String>,
 }
 
 /// What became of the light of a view.
 #[derive(Serialize)]
-struct View {
+struct ViewSummary {
     name: String,
     weight: f64,
     spot: f64,
@@ -53,7 +53,7 @@ struct View {
 }
 
 #[derive(Serialize)]
-struct Error {
+struct FieldErrorReport {
     relative: f64,
     without_offset: f64,
     offset: f64,
@@ -62,7 +62,7 @@ struct Error {
 
 /// A limit of a maker and what the field makes of it.
 #[derive(Serialize)]
-struct Held {
+struct LimitReport {
     name: &'static str,
     value: f64,
     limit: f64,
@@ -71,14 +71,14 @@ struct Held {
     at: [f64; 3],
 }
 
-impl From<Kept> for Held {
-    fn from(kept: Kept) -> Self {
-        let Kept { name, value, limit, margin, at } = kept;
-        Self { name, value, limit, margin, kept: kept.is_kept(), at: [at.x, at.y, at.z] }
+impl From<LimitCheck> for LimitReport {
+    fn from(kept: LimitCheck) -> Self {
+        let LimitCheck { name, value, limit, margin, at } = kept;
+        Self { name, value, limit, margin, kept: kept.is_satisfied(), at: [at.x, at.y, at.z] }
     }
 }
 
-impl Display for Held {
+impl Display for LimitReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, value, limit, margin, at: [x, y, z], .. } = self;
         let unit = if *name == "slope" { " / mm" } else { "" };
@@ -90,24 +90,27 @@ impl Display for Held {
     }
 }
 
-impl Report {
-    pub(super) fn new(runner: &Runner, cost: &Cost) -> Result<Self, Box<dyn std::error::Error>> {
+impl GrinReport {
+    pub(super) fn new(
+        runner: &GrinOptimizer,
+        cost: &GrinCostSummary,
+    ) -> Result<Self, Box<dyn std::error::Error>> {
         let (task, best) = (runner.task(), runner.best());
-        let Judgement { loss, views } = runner.judge(best)?;
-        let view = |(view, result): (&grin_task::View, &ViewResult)| View {
+        let FieldScore { loss, views } = runner.score(best)?;
+        let view = |(view, result): (&grin_task::LightView, &ViewResult)| ViewSummary {
             name: view.name.clone(),
             weight: view.weight,
             spot: result.spot,
-            quality_db: result.quality,
-            rays: result.counts.sent(),
+            quality_db: result.psnr,
+            rays: result.counts.total(),
             excluded: result.counts.excluded().collect(),
             retrace_error: result.retrace_error,
         };
-        let error = task.difference(best)?.map(|difference| Error {
+        let error = task.difference(best)?.map(|difference| FieldErrorReport {
             relative: difference.relative,
             without_offset: difference.without_offset,
             offset: difference.offset,
-            of_contrast: Some(difference.of_contrast).filter(|part| part.is_finite()),
+            of_contrast: Some(difference.relative_to_contrast).filter(|part| part.is_finite()),
         });
         let extremes = task.extremes(best);
         let (integrator, step) = runner.tracing();
@@ -120,11 +123,11 @@ impl Report {
             lines: None,
             index: [extremes.low, extremes.high],
             slope: extremes.slope,
-            limits: task.kept(&extremes).into_iter().map(Held::from).collect(),
+            limits: task.limit_checks(&extremes).into_iter().map(LimitReport::from).collect(),
             nodes: best.nodes(),
             parameters: best.field().parameters().len(),
             steps: runner.steps(),
-            rays: runner.rays(),
+            rays: runner.rays_traced(),
             integrator: integrator.name(),
             step,
             ms: cost.ms,
@@ -135,7 +138,7 @@ impl Report {
     }
 }
 
-impl Display for Report {
+impl Display for GrinReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, steps, rays, ms, .. } = self;
         let stopped = if self.stopped { ", stopped" } else { "" };
@@ -145,7 +148,9 @@ impl Display for Report {
         let [low, high] = self.index.map(|index| format!("{index:.6}"));
         writeln!(f, "index {low} to {high}, at most {:.4} / mm steep", self.slope)?;
         self.limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
-        if let Some(Error { relative, without_offset, offset, of_contrast }) = &self.error {
+        if let Some(FieldErrorReport { relative, without_offset, offset, of_contrast }) =
+            &self.error
+        {
             write!(f, "off the exact field by {relative:.2e}, relative; by {without_offset:.2e} ")?;
             writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
             match of_contrast {
@@ -159,7 +164,7 @@ impl Display for Report {
             }
         }
         self.lines.iter().try_for_each(|lines| write!(f, "{lines}"))?;
-        if let Some(Memory { before_mb, peak_mb }) = &self.memory {
+        if let Some(MemoryUse { before_mb, peak_mb }) = &self.memory {
             write!(f, "memory {:.1} MB more than the {before_mb:.1} before", peak_mb - before_mb)?;
         }
         match self.processor_ms {
@@ -167,13 +172,13 @@ impl Display for Report {
             None => writeln!(f)?,
         }
         writeln!(f, "loss {:.4e} mm^2\n", self.loss)?;
-        let mut table = Table::new(&["view", "weight", "rms spot, mm", "rays", "left out"]);
+        let mut table = TextTable::new(&["view", "weight", "rms spot, mm", "rays", "left out"]);
         for view in &self.views {
             let lost = view.excluded.iter().map(|(reason, count)| format!("{count} {reason}"));
             let lost: Vec<String> = lost.collect();
             table.row([
                 view.name.clone(),
-                Number(view.weight).to_string(),
+                ShortNumber(view.weight).to_string(),
                 match view.quality_db {
                     Some(quality) => format!("{quality:.1} dB"),
                     None => format!("{:.3e}", view.spot),

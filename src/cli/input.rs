@@ -1,10 +1,10 @@
 //! Reading what a subcommand works on.
 
-use super::failure::Failure;
-use super::output::remark;
-use crate::files::{self, FileError, Outcome, native};
-use crate::lens::{Field, FieldKind, Lens, System};
-use crate::pupil::Bench;
+use super::failure::CliError;
+use super::output::print_note;
+use crate::files::{self, ConversionOutcome, FileError, native};
+use crate::lens::{FieldKind, FieldPoint, Lens, System};
+use crate::pupil::RayModel;
 use serde::de::DeserializeOwned;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ pub(super) struct LensFile {
 
 /// A lens that was read, and where from.
 #[derive(Debug, Clone)]
-pub(super) struct Opened {
+pub(super) struct LoadedLens {
     pub(super) lens: Lens,
     pub(super) file: String,
 }
@@ -31,26 +31,26 @@ impl LensFile {
     }
 
     /// Reads the lens; what a foreign file says that we cannot is remarked on.
-    pub(super) fn open(&self) -> Result<Opened, Failure> {
+    pub(super) fn open(&self) -> Result<LoadedLens, CliError> {
         let file = self.path.display().to_string();
         let opened = files::open(&self.path)?;
         let report = opened.report.unwrap_or_default();
-        let [dropped, changed] =
-            [Outcome::Dropped, Outcome::Approximated].map(|outcome| report.count(outcome));
+        let [dropped, changed] = [ConversionOutcome::Dropped, ConversionOutcome::Approximated]
+            .map(|outcome| report.count(outcome));
         if dropped + changed > 0 {
             let text = format!("{dropped} lines dropped, {changed} approximated");
-            remark(format!("note: {file}: {text}; `aplanat convert` lists them"));
+            print_note(format!("note: {file}: {text}; `aplanat convert` lists them"));
         }
-        Ok(Opened { lens: opened.lens, file })
+        Ok(LoadedLens { lens: opened.lens, file })
     }
 }
 
-impl Opened {
+impl LoadedLens {
     /// The lens in plain numbers, at its primary wavelength where no other is asked for.
-    pub(super) fn system(&self, zoom: usize, um: Option<f64>) -> Result<System<f64>, Failure> {
+    pub(super) fn system(&self, zoom: usize, um: Option<f64>) -> Result<System<f64>, CliError> {
         let um = um.unwrap_or_else(|| self.primary_um());
-        let system = self.lens.system(zoom, um);
-        system.map_err(|source| Failure::Lens { file: self.file.clone(), source })
+        let system = self.lens.resolve(zoom, um);
+        system.map_err(|source| CliError::Lens { file: self.file.clone(), source })
     }
 
     /// The primary wavelength.
@@ -59,30 +59,33 @@ impl Opened {
     }
 
     /// The lens with its beam at a zoom position.
-    pub(super) fn bench(&self, zoom: usize) -> Result<Bench, Failure> {
+    pub(super) fn bench(&self, zoom: usize) -> Result<RayModel, CliError> {
         self.check_zoom(zoom)?;
-        let bench = Bench::of(&self.lens, zoom);
-        bench.map_err(|source| Failure::Bench { file: self.file.clone(), source })
+        let bench = RayModel::from_lens(&self.lens, zoom);
+        bench.map_err(|source| CliError::RayModel { file: self.file.clone(), source })
     }
 
     /// A field at this height or angle, in the unit of the lens's fields.
-    pub(super) fn field(&self, y: f64, zoom: usize) -> Result<Field, Failure> {
+    pub(super) fn field_at(&self, y: f64, zoom: usize) -> Result<FieldPoint, CliError> {
         let angle = self.lens.fields_at(zoom).kind == FieldKind::Angle;
         if y.is_finite() && !(angle && y.abs() >= 180.0) {
-            return Ok(Field { x: 0.0, y, weight: 1.0 });
+            return Ok(FieldPoint { x: 0.0, y, weight: 1.0 });
         }
         let unit = if angle { "an angle below 180 degrees" } else { "a finite height in mm" };
-        Err(Failure::Input(format!("--field: found {y}; expected {unit}")))
+        Err(CliError::Input(format!("--field: found {y}; expected {unit}")))
     }
 
     /// Refuses a zoom position that the lens does not have.
-    pub(super) fn check_zoom(&self, zoom: usize) -> Result<(), Failure> {
+    pub(super) fn check_zoom(&self, zoom: usize) -> Result<(), CliError> {
         let count = self.lens.zoom_positions();
         if zoom < count {
             return Ok(());
         }
         let last = count - 1;
-        Err(Failure::Input(format!("{}: no zoom position {zoom}; expected 0 to {last}", self.file)))
+        Err(CliError::Input(format!(
+            "{}: no zoom position {zoom}; expected 0 to {last}",
+            self.file
+        )))
     }
 }
 
@@ -106,8 +109,8 @@ impl FromStr for Tolerance {
 }
 
 /// Reads JSON from a file, or from standard input for `-`.
-pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> {
-    let file = name(path);
+pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CliError> {
+    let file = display_name(path);
     let unreadable = |source| FileError::Unreadable { file: file.clone(), source };
     let text = if path == Path::new("-") {
         let mut text = String::new();
@@ -120,25 +123,25 @@ pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> 
 }
 
 /// Refuses a target that surely cannot be written, before the work and not after it.
-pub(super) fn check_target(path: &Path, extensions: &[&str]) -> Result<(), Failure> {
+pub(super) fn check_output_file(path: &Path, extensions: &[&str]) -> Result<(), CliError> {
     let file = path.display();
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     if !extensions.contains(&extension.to_ascii_lowercase().as_str()) {
         let expected = extensions.join("` or `.");
         let text = format!("{file}: found the extension `{extension}`; expected `.{expected}`");
-        return Err(Failure::Input(text));
+        return Err(CliError::Input(text));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     if path.is_dir() || !folder.is_dir() {
         let found = if path.is_dir() { "a folder of that name" } else { "no such folder" };
         let text = format!("{file}: found {found}; expected a file in a folder that exists");
-        return Err(Failure::Input(text));
+        return Err(CliError::Input(text));
     }
-    files::check_writable(path).map_err(|error| Failure::Input(error.to_string()))
+    files::check_writable(path).map_err(|error| CliError::Input(error.to_string()))
 }
 
 /// What a message calls a file.
-pub(super) fn name(path: &Path) -> String {
+pub(super) fn display_name(path: &Path) -> String {
     if path == Path::new("-") { "standard input".to_owned() } else { path.display().to_string() }
 }

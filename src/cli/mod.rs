@@ -4,7 +4,7 @@
 //! when the work is done, 1 when it failed, 2 when the input is wrong. An error names the file, the
 //! place in it, what was found and what was expected.
 //!
-//! A subcommand is a file of this folder, a line in `Command` and a line in its `run`. The JSON
+//! A subcommand is a file of this folder, a line in `CliCommand` and a line in its `run`. The JSON
 //! that it reads and writes stands in `help/`, which is its `--help` and a part of the README.
 
 mod analyze;
@@ -28,8 +28,8 @@ mod vary;
 mod window;
 
 use clap::{Parser, Subcommand};
-use failure::Failure;
-use output::{Output, remark};
+use failure::CliError;
+use output::{Output, print_note};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -37,7 +37,7 @@ use std::process::ExitCode;
 /// with a subcommand it works without a window or a display.
 #[derive(Debug, Parser)]
 #[command(version, after_help = EXIT)]
-struct Arguments {
+struct CliArgs {
     /// The lens that the studio opens: .json or .zmx
     lens: Option<PathBuf>,
 
@@ -46,7 +46,7 @@ struct Arguments {
     json: bool,
 
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Option<CliCommand>,
 }
 
 const EXIT: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong.\n\
@@ -54,22 +54,22 @@ const EXIT: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong
 
 /// Every subcommand.
 #[derive(Debug, Subcommand)]
-enum Command {
-    Info(info::Info),
-    Trace(trace::Trace),
-    Analyze(analyze::Analyze),
-    Gradient(gradient::Gradient),
-    Optimize(optimize::Optimize),
-    Pareto(pareto::Pareto),
-    Search(Box<search::Search>),
-    Grin(grin::Grin),
-    Convert(convert::Convert),
-    Experiment(experiment::Experiment),
-    Measure(measure::Measure),
+enum CliCommand {
+    Info(info::InfoArgs),
+    Trace(trace::TraceArgs),
+    Analyze(analyze::AnalyzeArgs),
+    Gradient(gradient::GradientArgs),
+    Optimize(optimize::OptimizeArgs),
+    Pareto(pareto::ParetoArgs),
+    Search(Box<search::SearchArgs>),
+    Grin(grin::GrinArgs),
+    Convert(convert::ConvertArgs),
+    Experiment(experiment::ExperimentArgs),
+    Measure(measure::MeasureArgs),
 }
 
-impl Command {
-    fn run(&self, output: &Output) -> Result<(), Failure> {
+impl CliCommand {
+    fn run(&self, output: &Output) -> Result<(), CliError> {
         match self {
             Self::Info(info) => info.run(output),
             Self::Trace(trace) => trace.run(output),
@@ -89,8 +89,8 @@ impl Command {
 /// Does what the arguments of the process ask for.
 pub fn run() -> ExitCode {
     env_logger::init();
-    match Arguments::try_parse() {
-        Ok(arguments) => finish(arguments.run()),
+    match CliArgs::try_parse() {
+        Ok(arguments) => exit_code(arguments.run()),
         Err(usage) => {
             // Help that nobody reads to its end is no failure.
             drop(usage.print());
@@ -99,11 +99,11 @@ pub fn run() -> ExitCode {
     }
 }
 
-impl Arguments {
-    fn run(&self) -> Result<(), Failure> {
+impl CliArgs {
+    fn run(&self) -> Result<(), CliError> {
         let output = Output::new(self.json);
         match &self.command {
-            Some(_) if self.lens.is_some() => Err(Failure::Input(
+            Some(_) if self.lens.is_some() => Err(CliError::Input(
                 "a lens in front of a subcommand; expected it behind: `aplanat info LENS`".into(),
             )),
             Some(command) => command.run(&output),
@@ -112,10 +112,10 @@ impl Arguments {
     }
 }
 
-fn finish(result: Result<(), Failure>) -> ExitCode {
+fn exit_code(result: Result<(), CliError>) -> ExitCode {
     let Err(failure) = result else { return ExitCode::SUCCESS };
     if !failure.is_closed_pipe() {
-        remark(format!("error: {failure}"));
+        print_note(format!("error: {failure}"));
     }
-    ExitCode::from(failure.status())
+    ExitCode::from(failure.exit_status())
 }

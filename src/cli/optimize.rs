@@ -1,14 +1,14 @@
 //! Local optimization: the loop, its progress bar, and saving the best lens whatever ends it.
 
-use super::failure::Failure;
-use super::input::{self, LensFile, Opened, Tolerance};
-use super::output::{Number, Output, Table};
+use super::failure::CliError;
+use super::input::{self, LensFile, LoadedLens, Tolerance};
+use super::output::{Output, ShortNumber, TextTable};
 use super::vary::KindName;
 use crate::files::{self, native};
-use crate::lens::{Lens, vary};
-use crate::measure::timed;
+use crate::lens::{Lens, add_variables};
+use crate::measure::time_ms;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
-use crate::optimize::{Method, Optimizer, Progress, start};
+use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer, start};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Optimizes the variables of a lens; Ctrl-C ends it and saves the best lens so far
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/optimize.txt"))]
-pub(super) struct Optimize {
+pub(super) struct OptimizeArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -64,10 +64,10 @@ enum MethodName {
 }
 
 impl MethodName {
-    fn method(self) -> Method {
+    fn method(self) -> DescentMethod {
         match self {
-            Self::Dls => Method::DampedLeastSquares,
-            Self::Adam => Method::Adam,
+            Self::Dls => DescentMethod::DampedLeastSquares,
+            Self::Adam => DescentMethod::Adam,
         }
     }
 
@@ -79,75 +79,78 @@ impl MethodName {
     }
 }
 
-impl Optimize {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl OptimizeArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        input::check_target(&self.out, &["json", "zmx"])?;
-        self.history.iter().try_for_each(|path| input::check_target(path, &["json"]))?;
+        input::check_output_file(&self.out, &["json", "zmx"])?;
+        self.history.iter().try_for_each(|path| input::check_output_file(path, &["json"]))?;
         let mut lens = opened.lens.clone();
-        vary(&mut lens, &KindName::kinds(&self.vary));
-        let refuse = |source| refused(&opened, source);
+        add_variables(&mut lens, &KindName::kinds(&self.vary));
+        let refuse = |source| merit_error(&opened, source);
         let goal = self.goal(&lens).map_err(|e| e.or_else(refuse))?;
         let started = start(self.method.method(), &lens, &goal, self.error.0);
         let mut optimizer = started.map_err(refuse)?;
         let before = optimizer.terms().map_err(refuse)?;
         let light = |lens: &Lens| Merit::new(lens, &goal, self.error.0).map(|m| m.light());
         let light_before = light(&lens).map_err(refuse)?;
-        let (search, ms) = timed(|| self.search(optimizer.as_mut()));
+        let (search, ms) = time_ms(|| self.search(optimizer.as_mut()));
         // The lens is safe before anything else is worked out about it.
         let best = Lens { variables: opened.lens.variables.clone(), ..optimizer.best().clone() };
         files::save(&best, &self.out)?;
         let after = optimizer.terms().map_err(refuse)?;
         let light = [light_before, light(optimizer.best()).map_err(refuse)?];
         if let Some(path) = &self.history {
-            files::replace(path, native::pretty(&History { steps: &search.steps }).as_bytes())?;
+            files::write_atomic(
+                path,
+                native::pretty(&StepHistory { steps: &search.steps }).as_bytes(),
+            )?;
         }
-        let found = Found { search: &search, ms, light, before, after };
-        output.print(&Report::new(self, &lens, &best, found))
+        let found = OptimizeOutcome { search: &search, ms, light, before, after };
+        output.print(&OptimizeReport::new(self, &lens, &best, found))
     }
 
-    fn goal(&self, lens: &Lens) -> Result<Goal, Trouble> {
+    fn goal(&self, lens: &Lens) -> Result<Goal, GoalError> {
         match &self.goal {
-            Some(path) => input::read_json(path).map_err(Trouble::Failure),
-            None => Goal::sensible(lens).map_err(Trouble::Merit),
+            Some(path) => input::read_json(path).map_err(GoalError::Failure),
+            None => Goal::default_for(lens).map_err(GoalError::Merit),
         }
     }
 
     /// Steps until nothing gets better, the steps are used up, or the person has had enough.
-    fn search(&self, optimizer: &mut dyn Optimizer) -> Search {
+    fn search(&self, optimizer: &mut dyn Optimizer) -> OptimizeRun {
         let most = self.steps.unwrap_or(self.method.usual_steps());
         let stop = stop_flag();
         let bar = progress_bar(most);
-        let mut search = Search { steps: Vec::new(), ended: Ended::Steps };
+        let mut search = OptimizeRun { steps: Vec::new(), ended: OptimizeEnd::Steps };
         while search.steps.len() < most {
             if stop.load(Ordering::Relaxed) {
-                search.ended = Ended::Stopped;
+                search.ended = OptimizeEnd::Stopped;
                 break;
             }
             let progress = optimizer.step();
             bar.inc(1);
-            bar.set_message(format!("merit {}", Number(progress.best)));
+            bar.set_message(format!("merit {}", ShortNumber(progress.best)));
             let finished = progress.finished;
             search.steps.push(progress);
             if finished {
-                search.ended = Ended::Finished;
+                search.ended = OptimizeEnd::Finished;
                 break;
             }
         }
-        optimizer.settle();
+        optimizer.verify_best();
         bar.finish_and_clear();
         search
     }
 }
 
 /// What can go wrong while the goal is made.
-enum Trouble {
-    Failure(Failure),
+enum GoalError {
+    Failure(CliError),
     Merit(MeritError),
 }
 
-impl Trouble {
-    fn or_else(self, refuse: impl FnOnce(MeritError) -> Failure) -> Failure {
+impl GoalError {
+    fn or_else(self, refuse: impl FnOnce(MeritError) -> CliError) -> CliError {
         match self {
             Self::Failure(failure) => failure,
             Self::Merit(source) => refuse(source),
@@ -155,14 +158,14 @@ impl Trouble {
     }
 }
 
-fn refused(opened: &Opened, source: MeritError) -> Failure {
+fn merit_error(opened: &LoadedLens, source: MeritError) -> CliError {
     let file = opened.file.clone();
     match source {
-        MeritError::NoVariables => Failure::Input(format!(
+        MeritError::NoVariables => CliError::Input(format!(
             "{file}: found no variables; expected some in the file (`\"variables\"`), or kinds of \
              numbers to vary: `--vary curvatures,thicknesses`"
         )),
-        source => Failure::Merit { file, source },
+        source => CliError::Merit { file, source },
     }
 }
 
@@ -184,15 +187,15 @@ pub(super) fn progress_bar(steps: usize) -> ProgressBar {
 }
 
 /// How a search went.
-struct Search {
-    steps: Vec<Progress>,
-    ended: Ended,
+struct OptimizeRun {
+    steps: Vec<OptimizationProgress>,
+    ended: OptimizeEnd,
 }
 
 /// What ended a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-enum Ended {
+enum OptimizeEnd {
     /// Nothing gets better.
     Finished,
     /// The steps are used up.
@@ -202,13 +205,13 @@ enum Ended {
 }
 
 #[derive(Serialize)]
-struct History<'a> {
-    steps: &'a [Progress],
+struct StepHistory<'a> {
+    steps: &'a [OptimizationProgress],
 }
 
 /// A search with the terms around it.
-struct Found<'a> {
-    search: &'a Search,
+struct OptimizeOutcome<'a> {
+    search: &'a OptimizeRun,
     ms: f64,
     /// Before and after.
     light: [f64; 2],
@@ -218,10 +221,10 @@ struct Found<'a> {
 
 /// What is printed.
 #[derive(Serialize)]
-struct Report {
+struct OptimizeReport {
     method: MethodName,
     steps: usize,
-    ended: Ended,
+    ended: OptimizeEnd,
     ms: f64,
     merit_before: f64,
     merit_after: f64,
@@ -229,54 +232,54 @@ struct Report {
     light_after: f64,
     refused_steps: usize,
     last_refusal: Option<String>,
-    terms: Vec<TermKeys>,
-    variables: Vec<VariableKeys>,
+    terms: Vec<TermComparison>,
+    variables: Vec<VariableComparison>,
     out: String,
 }
 
 /// A term before and after.
 #[derive(Serialize)]
-pub(super) struct TermKeys {
+pub(super) struct TermComparison {
     term: &'static str,
     weight: f64,
-    before: ValueKeys,
-    after: ValueKeys,
+    before: TermEstimate,
+    after: TermEstimate,
 }
 
 #[derive(Serialize)]
-struct ValueKeys {
+struct TermEstimate {
     value: f64,
     error: f64,
     rays: usize,
 }
 
-impl ValueKeys {
+impl TermEstimate {
     fn new(term: &TermValue) -> Self {
         Self { value: term.value, error: term.error, rays: term.rays }
     }
 }
 
-impl TermKeys {
+impl TermComparison {
     /// The terms of a goal at two lenses.
-    pub(super) fn all(before: &[TermValue], after: &[TermValue]) -> Vec<Self> {
+    pub(super) fn compare(before: &[TermValue], after: &[TermValue]) -> Vec<Self> {
         let term = |(before, after): (&TermValue, &TermValue)| Self {
             term: before.term,
             weight: before.weight,
-            before: ValueKeys::new(before),
-            after: ValueKeys::new(after),
+            before: TermEstimate::new(before),
+            after: TermEstimate::new(after),
         };
         before.iter().zip(after).map(term).collect()
     }
 
     /// A row for each term.
-    pub(super) fn table(terms: &[Self]) -> Table {
+    pub(super) fn table(terms: &[Self]) -> TextTable {
         let mut table =
-            Table::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
+            TextTable::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
         for Self { term, weight, before, after } in terms {
-            let numbers = [*weight, before.value].map(|v| Number(v).to_string());
+            let numbers = [*weight, before.value].map(|v| ShortNumber(v).to_string());
             let start = std::iter::once((*term).to_owned()).chain(numbers);
-            let error = |value: &ValueKeys| format!("{:.1e}", value.error);
-            let rest = [error(before), Number(after.value).to_string(), error(after)];
+            let error = |value: &TermEstimate| format!("{:.1e}", value.error);
+            let rest = [error(before), ShortNumber(after.value).to_string(), error(after)];
             table.row(start.chain(rest).chain([after.rays.to_string()]));
         }
         table
@@ -284,18 +287,18 @@ impl TermKeys {
 }
 
 #[derive(Serialize)]
-struct VariableKeys {
+struct VariableComparison {
     parameter: String,
     before: Option<f64>,
     after: Option<f64>,
 }
 
-impl Report {
-    fn new(asked: &Optimize, lens: &Lens, best: &Lens, found: Found<'_>) -> Self {
-        let Found { search, ms, light, before, after } = found;
+impl OptimizeReport {
+    fn new(asked: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
+        let OptimizeOutcome { search, ms, light, before, after } = found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
-        let variable = |v: &crate::lens::Variable| VariableKeys {
+        let variable = |v: &crate::lens::Variable| VariableComparison {
             parameter: v.parameter.to_string(),
             before: lens.get(v.parameter),
             after: best.get(v.parameter),
@@ -311,7 +314,7 @@ impl Report {
             light_after: light[1],
             refused_steps: refusals().count(),
             last_refusal: refusals().next_back().cloned(),
-            terms: TermKeys::all(&before, &after),
+            terms: TermComparison::compare(&before, &after),
             variables: lens.variables.iter().map(variable).collect(),
             out: asked.out.display().to_string(),
         }
@@ -319,36 +322,36 @@ impl Report {
 }
 
 /// The terms that ask for light.
-const ASKING: [&str; 5] =
+const LIGHT_TERMS: [&str; 5] =
     ["throughput", "throughput_loss", "light", "relative_illumination", "f_number"];
 
-impl Display for Report {
+impl Display for OptimizeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { steps, ms, merit_before, merit_after, out, .. } = self;
         let ended = match self.ended {
-            Ended::Finished => "nothing gets better any more",
-            Ended::Steps => "the steps are used up",
-            Ended::Stopped => "stopped",
+            OptimizeEnd::Finished => "nothing gets better any more",
+            OptimizeEnd::Steps => "the steps are used up",
+            OptimizeEnd::Stopped => "stopped",
         };
         writeln!(f, "{steps} steps in {:.3} s: {ended}", 1e-3 * ms)?;
         if let Some(refusal) = &self.last_refusal {
             writeln!(f, "{} steps refused or shortened, the last: {refusal}", self.refused_steps)?;
         }
-        writeln!(f, "merit {} -> {}", Number(*merit_before), Number(*merit_after))?;
+        writeln!(f, "merit {} -> {}", ShortNumber(*merit_before), ShortNumber(*merit_after))?;
         let [before, after] = [self.light_before, self.light_after];
         let change = 100.0 * (after / before - 1.0);
-        let light = [Number(before), Number(after)];
+        let light = [ShortNumber(before), ShortNumber(after)];
         writeln!(
             f,
             "light {} -> {} mm^2 ({change:+.1} %), mean over the spots",
             light[0], light[1]
         )?;
-        let asks = self.terms.iter().any(|term| ASKING.contains(&term.term));
+        let asks = self.terms.iter().any(|term| LIGHT_TERMS.contains(&term.term));
         if change < -1.0 && !asks {
             writeln!(f, "  no term asks for light: some of the sharpness was bought by clipping")?;
         }
         writeln!(f)?;
-        let table = TermKeys::table(&self.terms);
+        let table = TermComparison::table(&self.terms);
         writeln!(f, "{table}\nsaved as {out}")
     }
 }

@@ -1,6 +1,6 @@
 //! Printing a result: text for people, JSON for programs.
 
-use super::failure::Failure;
+use super::failure::CliError;
 use crate::files::native;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -18,7 +18,7 @@ impl Output {
     }
 
     /// Prints a result.
-    pub(super) fn print(&self, result: &(impl Serialize + Display)) -> Result<(), Failure> {
+    pub(super) fn print(&self, result: &(impl Serialize + Display)) -> Result<(), CliError> {
         let text = if self.json { native::pretty(result) } else { result.to_string() };
         let mut out = stdout().lock();
         out.write_all(text.as_bytes())?;
@@ -27,16 +27,16 @@ impl Output {
 }
 
 /// Tells the person something that is not the result.
-pub(super) fn remark(text: impl Display) {
+pub(super) fn print_note(text: impl Display) {
     // A remark that nobody can read is not worth failing for.
     drop(writeln!(stderr(), "{text}"));
 }
 
 /// A number with seven significant digits, and no more zeros than it needs.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Number(pub(super) f64);
+pub(super) struct ShortNumber(pub(super) f64);
 
-impl Display for Number {
+impl Display for ShortNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = self.0;
         let size = value.abs();
@@ -58,17 +58,17 @@ impl Display for Number {
 }
 
 /// A number that may not exist.
-pub(super) fn optional(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |value| Number(value).to_string())
+pub(super) fn or_dash(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |value| ShortNumber(value).to_string())
 }
 
 /// Rows of text in columns that line up: the first to the left, the others to the right.
 #[derive(Debug, Default)]
-pub(super) struct Table {
+pub(super) struct TextTable {
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
+impl TextTable {
     pub(super) fn new(head: &[&str]) -> Self {
         Self { rows: vec![head.iter().map(|cell| (*cell).to_owned()).collect()] }
     }
@@ -84,7 +84,7 @@ impl Table {
     }
 }
 
-impl Display for Table {
+impl Display for TextTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let widths = self.widths();
         for row in &self.rows {
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn numbers_have_seven_digits_and_no_idle_zeros() {
-        let shown = |value: f64| Number(value).to_string();
+        let shown = |value: f64| ShortNumber(value).to_string();
         assert_eq!(shown(50.0), "50");
         assert_eq!(shown(-99.499_874_37), "-99.49987");
         assert_eq!(shown(0.036_437_850_765), "0.03643785");
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn columns_line_up() {
-        let mut table = Table::new(&["row", "x"]);
+        let mut table = TextTable::new(&["row", "x"]);
         table.row(["a longer one".into(), "-1".into()]);
         assert_eq!(table.to_string(), "row            x\na longer one  -1\n");
     }

@@ -1,15 +1,15 @@
 //! The front of sharpness against light.
 
-use super::failure::Failure;
+use super::failure::CliError;
 use super::input::{LensFile, Tolerance};
 use super::optimize::{progress_bar, stop_flag};
-use super::output::{Number, Output, Table};
-use crate::front::{self, Survey};
+use super::output::{Output, ShortNumber, TextTable};
+use crate::front::{self, ParetoReport};
 use crate::lens::Lens;
-use crate::measure::timed;
+use crate::measure::time_ms;
 use crate::merit::PupilEdge;
-use crate::optimize::Method;
-use crate::optimize::pareto::{Design, Front, NoFront, Settings, Sweep};
+use crate::optimize::DescentMethod;
+use crate::optimize::pareto::{Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
 use clap::ValueEnum;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Sweeps the front of sharpness against light; Ctrl-C ends it and writes what was found
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/pareto.txt"))]
-pub(super) struct Pareto {
+pub(super) struct ParetoArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -28,7 +28,7 @@ pub(super) struct Pareto {
     out: Option<PathBuf>,
 
     /// How many weights
-    #[arg(long, default_value_t = Settings::default().points, value_name = "N")]
+    #[arg(long, default_value_t = ParetoSettings::default().points, value_name = "N")]
     points: usize,
 
     /// What descends
@@ -58,26 +58,27 @@ enum Descent {
     Adam,
 }
 
-impl Pareto {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl ParetoArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
         if let Some(folder) = &self.out {
             std::fs::create_dir_all(folder).map_err(|error| {
-                Failure::Input(format!("{}: {error}; expected a folder", folder.display()))
+                CliError::Input(format!("{}: {error}; expected a folder", folder.display()))
             })?;
         }
         let stop = stop_flag();
-        let refuse = |cause: NoFront| Failure::Input(format!("{}: {cause}", opened.file));
+        let refuse = |cause: ParetoError| CliError::Input(format!("{}: {cause}", opened.file));
         let search = |pupil| self.search(&opened.lens, pupil, &stop).map_err(refuse);
         let (sweep, ms) = search(PupilEdge::Moving)?;
         let biased = if self.no_biased { None } else { Some(search(PupilEdge::Kept)?) };
-        let mut report = Report::new(&sweep, ms, biased.as_ref(), stop.load(Ordering::Relaxed));
+        let mut report =
+            ParetoSweepReport::new(&sweep, ms, biased.as_ref(), stop.load(Ordering::Relaxed));
         if let Some(folder) = &self.out {
-            let survey = Survey {
+            let survey = ParetoReport {
                 name: &opened.lens.name,
                 start: &sweep.start,
                 front: sweep.front(),
-                tried: sweep.tried(),
+                tried: sweep.evaluated(),
                 biased: biased.as_ref().map(|(sweep, _)| sweep.front()),
             };
             let written = front::write(&survey, folder)?;
@@ -91,27 +92,27 @@ impl Pareto {
         lens: &Lens,
         pupil: PupilEdge,
         stop: &AtomicBool,
-    ) -> Result<(Sweep, f64), NoFront> {
+    ) -> Result<(ParetoSweep, f64), ParetoError> {
         let (method, steps) = match self.method {
-            Descent::Dls => (Method::DampedLeastSquares, 100),
-            Descent::Adam => (Method::Adam, 500),
+            Descent::Dls => (DescentMethod::DampedLeastSquares, 100),
+            Descent::Adam => (DescentMethod::Adam, 500),
         };
-        let settings = Settings {
+        let settings = ParetoSettings {
             points: self.points,
             method,
             steps: self.steps.unwrap_or(steps),
             pupil,
             tolerance: self.error.0,
-            ..Settings::default()
+            ..ParetoSettings::default()
         };
-        let (sweep, ms) = timed(|| -> Result<Sweep, NoFront> {
-            let mut sweep = Sweep::new(lens, &settings)?;
+        let (sweep, ms) = time_ms(|| -> Result<ParetoSweep, ParetoError> {
+            let mut sweep = ParetoSweep::new(lens, &settings)?;
             let bar = progress_bar(0);
             while !stop.load(Ordering::Relaxed) {
                 let slice = sweep.step();
                 bar.set_length(slice.total as u64);
                 bar.set_position(slice.done as u64);
-                bar.set_message(format!("hypervolume {}", Number(sweep.hypervolume())));
+                bar.set_message(format!("hypervolume {}", ShortNumber(sweep.hypervolume())));
                 if slice.finished {
                     break;
                 }
@@ -125,27 +126,27 @@ impl Pareto {
 
 /// What is printed.
 #[derive(Serialize)]
-struct Report {
+struct ParetoSweepReport {
     ms: f64,
     stopped: bool,
     hypervolume: f64,
     tried: usize,
-    start: Point,
-    front: Vec<Point>,
-    biased: Option<Biased>,
+    start: FrontPoint,
+    front: Vec<FrontPoint>,
+    biased: Option<BiasedSweep>,
     files: Vec<String>,
 }
 
 #[derive(Serialize)]
-struct Biased {
+struct BiasedSweep {
     ms: f64,
     hypervolume: f64,
     dominated: usize,
-    front: Vec<Point>,
+    front: Vec<FrontPoint>,
 }
 
 #[derive(Serialize)]
-struct Point {
+struct FrontPoint {
     spot: f64,
     spot_error: f64,
     light: f64,
@@ -154,34 +155,39 @@ struct Point {
     rays: usize,
 }
 
-impl Point {
-    fn of(design: &Design) -> Self {
-        let Design { spot, spot_error, light, light_error, weight, rays, .. } = *design;
+impl FrontPoint {
+    fn of(design: &ParetoPoint) -> Self {
+        let ParetoPoint { spot, spot_error, light, light_error, weight, rays, .. } = *design;
         Self { spot, spot_error, light, light_error, weight, rays }
     }
 
     fn all(front: &Front) -> Vec<Self> {
-        front.designs().iter().map(Self::of).collect()
+        front.points().iter().map(Self::of).collect()
     }
 }
 
-impl Report {
-    fn new(sweep: &Sweep, ms: f64, biased: Option<&(Sweep, f64)>, stopped: bool) -> Self {
-        let ours = sweep.front().designs();
-        let beaten = |design: &&Design| ours.iter().any(|ours| ours.dominates(design));
-        let biased = biased.map(|(other, ms)| Biased {
+impl ParetoSweepReport {
+    fn new(
+        sweep: &ParetoSweep,
+        ms: f64,
+        biased: Option<&(ParetoSweep, f64)>,
+        stopped: bool,
+    ) -> Self {
+        let ours = sweep.front().points();
+        let beaten = |design: &&ParetoPoint| ours.iter().any(|ours| ours.dominates(design));
+        let biased = biased.map(|(other, ms)| BiasedSweep {
             ms: *ms,
             hypervolume: other.hypervolume(),
-            dominated: other.front().designs().iter().filter(beaten).count(),
-            front: Point::all(other.front()),
+            dominated: other.front().points().iter().filter(beaten).count(),
+            front: FrontPoint::all(other.front()),
         });
         Self {
             ms,
             stopped,
             hypervolume: sweep.hypervolume(),
-            tried: sweep.tried().len(),
-            start: Point::of(&sweep.start),
-            front: Point::all(sweep.front()),
+            tried: sweep.evaluated().len(),
+            start: FrontPoint::of(&sweep.start),
+            front: FrontPoint::all(sweep.front()),
             biased,
             files: Vec::new(),
         }
@@ -189,23 +195,29 @@ impl Report {
 }
 
 /// No more lenses than this are listed; the files have all.
-const LISTED: usize = 20;
+const MAX_LISTED: usize = 20;
 
-impl Display for Report {
+impl Display for ParetoSweepReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { ms, hypervolume, tried, front, .. } = self;
         let stopped = if self.stopped { ", stopped" } else { "" };
         let count = front.len();
         writeln!(f, "{count} lenses of {tried} in {:.2} s{stopped}", 1e-3 * ms)?;
         writeln!(f, "hypervolume {hypervolume:.4} of twice the spot and the light at the start")?;
-        if let Some(Biased { ms, hypervolume, dominated, front }) = &self.biased {
+        if let Some(BiasedSweep { ms, hypervolume, dominated, front }) = &self.biased {
             write!(f, "biased: {} lenses in {:.2} s, hypervolume ", front.len(), 1e-3 * ms)?;
             writeln!(f, "{hypervolume:.4}; {dominated} of them are beaten in both")?;
         }
         writeln!(f)?;
-        let mut table =
-            Table::new(&["rms spot, um", "error", "light, mm^2", "error", "rim blur, um", "rays"]);
-        let every = count.div_ceil(LISTED).max(1);
+        let mut table = TextTable::new(&[
+            "rms spot, um",
+            "error",
+            "light, mm^2",
+            "error",
+            "rim blur, um",
+            "rays",
+        ]);
+        let every = count.div_ceil(MAX_LISTED).max(1);
         for point in std::iter::once(&self.start).chain(front.iter().step_by(every)) {
             let blur =
                 point.weight.map_or("start".to_owned(), |w| format!("{:.1}", 1e3 * w.sqrt()));

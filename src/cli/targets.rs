@@ -1,32 +1,33 @@
 //! The files that a command writes: none of them is one that it reads, or another one that it writes.
 
-use super::failure::Failure;
+use super::failure::CliError;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Refuses what is no folder, or cannot become one.
-pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
+pub(super) fn check_folder(folder: &Path) -> Result<(), CliError> {
     let there = folder.ancestors().find(|part| part.exists());
     match there {
         Some(part) if !part.is_dir() => {
             let (folder, part) = (folder.display(), part.display());
-            Err(Failure::Input(format!("{folder}: {part} is a file; expected a folder")))
+            Err(CliError::Input(format!("{folder}: {part} is a file; expected a folder")))
         }
         _ => Ok(()),
     }
 }
 
 /// Refuses files that would be written over one that is read, or over each other.
-pub(super) fn check_apart<'a>(
+pub(super) fn check_distinct<'a>(
     targets: &[Option<(&'static str, &'a Path)>],
     read: impl Iterator<Item = (&'static str, &'a Path)>,
-) -> Result<(), Failure> {
-    let mut taken: Vec<(&str, PathBuf)> = read.map(|(name, path)| (name, place(path))).collect();
+) -> Result<(), CliError> {
+    let mut taken: Vec<(&str, PathBuf)> =
+        read.map(|(name, path)| (name, canonical_path(path))).collect();
     for (name, path) in targets.iter().flatten() {
-        let place = place(path);
+        let place = canonical_path(path);
         if let Some((other, _)) = taken.iter().find(|(_, taken)| *taken == place) {
             let text = format!("{name}: {} is {other}; expected another file", path.display());
-            return Err(Failure::Input(text));
+            return Err(CliError::Input(text));
         }
         taken.push((name, place));
     }
@@ -34,7 +35,7 @@ pub(super) fn check_apart<'a>(
 }
 
 /// Where a file lies, whatever it is called on the way there.
-fn place(path: &Path) -> PathBuf {
+fn canonical_path(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = fs::canonicalize(folder.unwrap_or(Path::new(".")));
     let new = || Some(folder.ok()?.join(path.file_name()?));

@@ -1,10 +1,10 @@
 //! Tracing rays that are given as JSON.
 
-use super::failure::Failure;
+use super::failure::CliError;
 use super::input::{self, LensFile};
-use super::output::{Number, Output, Table};
+use super::output::{Output, ShortNumber, TextTable};
 use crate::math::Vec3;
-use crate::trace::{Fates, Landing, Ray, Tracer};
+use crate::trace::{Fates, Ray, TracedRay, Tracer};
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt::{self, Display};
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Traces rays given as JSON: how each one ends, where, and its optical path
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/trace.txt"))]
-pub(super) struct Trace {
+pub(super) struct TraceArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -22,29 +22,29 @@ pub(super) struct Trace {
     rays: PathBuf,
 }
 
-impl Trace {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl TraceArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        let request: Request = input::read_json(&self.rays)?;
+        let request: RayRequest = input::read_json(&self.rays)?;
         let wavelength_um = request.wavelength_um.unwrap_or_else(|| opened.primary_um());
         let zoom = request.zoom.unwrap_or(0);
         let system = opened.system(zoom, Some(wavelength_um))?;
-        let refuse = |source| Failure::Rays { file: input::name(&self.rays), source };
+        let refuse = |source| CliError::Rays { file: input::display_name(&self.rays), source };
         let tracer = Tracer::new(&system).map_err(refuse)?;
         let rays = request.rays.checked().map_err(refuse)?;
         let last = tracer.surfaces() - 1;
         let landings = rays.iter().map(|ray| tracer.trace(*ray));
         let mut fates = Fates::default();
         let landings = landings.inspect(|landing| fates.count(landing.fate));
-        let rays = landings.map(|landing| Line::new(&landing, last)).collect();
-        output.print(&Traced { wavelength_um, zoom, fates, rays })
+        let rays = landings.map(|landing| TracedRayJson::new(&landing, last)).collect();
+        output.print(&TraceReport { wavelength_um, zoom, fates, rays })
     }
 }
 
 /// What is read.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Request {
+struct RayRequest {
     wavelength_um: Option<f64>,
     zoom: Option<usize>,
     rays: RayList,
@@ -52,7 +52,7 @@ struct Request {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RayKeys {
+struct RayJson {
     x: f64,
     y: f64,
     z: f64,
@@ -69,7 +69,7 @@ struct RayList(Vec<Ray<f64>>);
 
 impl RayList {
     /// The rays, if every one of them can be traced.
-    fn checked(self) -> Result<Vec<Ray<f64>>, crate::lens::Invalid> {
+    fn checked(self) -> Result<Vec<Ray<f64>>, crate::lens::SystemError> {
         self.0.iter().enumerate().try_for_each(|(i, ray)| ray.check(i))?;
         Ok(self.0)
     }
@@ -77,13 +77,13 @@ impl RayList {
 
 impl<'de> Deserialize<'de> for RayList {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        from.deserialize_seq(RayListText)
+        from.deserialize_seq(RayListVisitor)
     }
 }
 
-struct RayListText;
+struct RayListVisitor;
 
-impl<'de> Visitor<'de> for RayListText {
+impl<'de> Visitor<'de> for RayListVisitor {
     type Value = RayList;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -93,9 +93,9 @@ impl<'de> Visitor<'de> for RayListText {
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<RayList, A::Error> {
         let mut rays = Vec::with_capacity(list.size_hint().unwrap_or(0));
         loop {
-            let next = list.next_element::<RayKeys>();
+            let next = list.next_element::<RayJson>();
             let next = next.map_err(|error| numbered(error, rays.len()))?;
-            let Some(RayKeys { x, y, z, l, m, n }) = next else { return Ok(RayList(rays)) };
+            let Some(RayJson { x, y, z, l, m, n }) = next else { return Ok(RayList(rays)) };
             rays.push(Ray { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n) });
         }
     }
@@ -115,15 +115,15 @@ fn numbered<E: serde::de::Error>(error: E, ray: usize) -> E {
 
 /// What is printed.
 #[derive(Serialize)]
-struct Traced {
+struct TraceReport {
     wavelength_um: f64,
     zoom: usize,
     fates: Fates,
-    rays: Vec<Line>,
+    rays: Vec<TracedRayJson>,
 }
 
 #[derive(Serialize)]
-struct Line {
+struct TracedRayJson {
     fate: &'static str,
     surface: usize,
     x: f64,
@@ -140,8 +140,8 @@ struct Line {
     backwards: Option<usize>,
 }
 
-impl Line {
-    fn new(landing: &Landing<f64>, last: usize) -> Self {
+impl TracedRayJson {
+    fn new(landing: &TracedRay<f64>, last: usize) -> Self {
         let (p, d) = (landing.ray.point, landing.ray.direction);
         Self {
             fate: landing.fate.name(),
@@ -153,20 +153,20 @@ impl Line {
             m: d.y,
             n: d.z,
             opl: landing.opl,
-            backwards: landing.backwards,
+            backwards: landing.first_backward_surface,
         }
     }
 }
 
-impl Display for Traced {
+impl Display for TraceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let head = ["ray", "fate", "surface", "x", "y", "z", "L", "M", "N", "opl", ""];
-        let mut table = Table::new(&head);
+        let mut table = TextTable::new(&head);
         for (i, ray) in self.rays.iter().enumerate() {
             let numbers = [ray.x, ray.y, ray.z, ray.l, ray.m, ray.n, ray.opl];
             let remark = ray.backwards.map(|i| format!("backwards to surface {i}"));
             let start = [i.to_string(), ray.fate.to_owned(), ray.surface.to_string()];
-            let numbers = numbers.iter().map(|value| Number(*value).to_string());
+            let numbers = numbers.iter().map(|value| ShortNumber(*value).to_string());
             table.row(start.into_iter().chain(numbers).chain([remark.unwrap_or_default()]));
         }
         let Fates { imaged, missed, clipped, total_reflection, turned, trapped } = self.fates;

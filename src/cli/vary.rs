@@ -1,6 +1,6 @@
 //! Naming kinds of numbers on the command line.
 
-use crate::lens::NumberKind;
+use crate::lens::ParameterKind;
 use clap::ValueEnum;
 
 /// A kind of number that an optimizer may change.
@@ -24,47 +24,47 @@ pub(super) enum KindName {
 
 impl KindName {
     /// The kinds that are meant.
-    pub(super) fn kinds(names: &[Self]) -> Vec<NumberKind> {
+    pub(super) fn kinds(names: &[Self]) -> Vec<ParameterKind> {
         names.iter().map(|name| name.kind()).collect()
     }
 
-    fn kind(self) -> NumberKind {
+    fn kind(self) -> ParameterKind {
         match self {
-            Self::Curvatures => NumberKind::Curvatures,
-            Self::Thicknesses => NumberKind::Thicknesses,
-            Self::Conics => NumberKind::Conics,
-            Self::Aspheres => NumberKind::Aspheres,
-            Self::Indices => NumberKind::Indices,
-            Self::SemiDiameters => NumberKind::SemiDiameters,
-            Self::Gradients => NumberKind::Gradients,
+            Self::Curvatures => ParameterKind::Curvatures,
+            Self::Thicknesses => ParameterKind::Thicknesses,
+            Self::Conics => ParameterKind::Conics,
+            Self::Aspheres => ParameterKind::Aspheres,
+            Self::Indices => ParameterKind::Indices,
+            Self::SemiDiameters => ParameterKind::SemiDiameters,
+            Self::Gradients => ParameterKind::GrinCoefficients,
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::files::{library, native};
-    use crate::lens::{NumberKind, at_zoom, vary};
+    use crate::files::{bundled_lenses, native};
+    use crate::lens::{ParameterKind, add_variables, at_zoom};
     use crate::measure::double_gauss;
 
     #[test]
     fn a_plane_stop_in_air_is_not_varied() {
         let mut lens = double_gauss();
-        vary(&mut lens, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
+        add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
         assert_eq!(lens.variables.len(), 10 + 11);
         assert!(lens.check().is_ok());
     }
 
     #[test]
     fn a_zoom_lens_at_a_position_is_that_lens() {
-        let zoom = library().iter().find(|b| b.name == "zoom_nikkor_28_80").unwrap();
+        let zoom = bundled_lenses().iter().find(|b| b.name == "zoom_nikkor_28_80").unwrap();
         let mut lens = native::read(zoom.text, zoom.name).unwrap();
         let um = lens.wavelengths[lens.primary()].um;
         for position in 0..lens.zoom.len() {
             let single = at_zoom(&lens, position);
-            assert_eq!(single.system(0, um).unwrap(), lens.system(position, um).unwrap());
+            assert_eq!(single.resolve(0, um).unwrap(), lens.resolve(position, um).unwrap());
         }
-        vary(&mut lens, &[NumberKind::Thicknesses]);
+        add_variables(&mut lens, &[ParameterKind::Thicknesses]);
         assert!(lens.check().is_ok());
         let moving = lens.zoom[0].thicknesses.len() * lens.zoom.len();
         let fixed = lens.surfaces.len() - lens.zoom[0].thicknesses.len();

@@ -1,23 +1,27 @@
 //! A lens resolved as a plan says: what is left out is not there.
 
-use super::plan::Plan;
-use super::{Choice, Effect};
+use super::plan::EffectPlan;
+use super::{Effect, EffectOverride};
 use crate::lens::{
-    ASPHERE_TERMS, Aperture, Field, FieldKind, Lens, LensError, Object, Shape, Surface, System,
+    ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Lens, LensError, Object, Shape, Surface, System,
 };
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, Bench, BenchError};
+use crate::pupil::{Aiming, RayModel, RayModelError};
 
 /// A lens at a zoom position with the effects that a plan computes, ready for rays.
 ///
 /// # Errors
 /// A lens or aperture through which nothing can be traced.
-pub fn bench(lens: &Lens, zoom: usize, plan: &Plan) -> Result<Bench, BenchError> {
+pub fn build_ray_model(
+    lens: &Lens,
+    zoom: usize,
+    plan: &EffectPlan,
+) -> Result<RayModel, RayModelError> {
     let primary = lens.primary();
     let one = !plan.computes(Effect::Dispersion);
     let wavelengths = if one { &lens.wavelengths[primary..=primary] } else { &lens.wavelengths };
     let resolve = |w: &crate::lens::Wavelength| {
-        let mut system = lens.system(zoom, w.um)?;
+        let mut system = lens.resolve(zoom, w.um)?;
         simplify(&mut system, plan);
         // One colour alone has all the weight, whatever its share of the light.
         Ok((w.um, if one { 1.0 } else { w.weight }, system))
@@ -25,58 +29,58 @@ pub fn bench(lens: &Lens, zoom: usize, plan: &Plan) -> Result<Bench, BenchError>
     let systems: Result<Vec<_>, LensError> = wavelengths.iter().map(resolve).collect();
     let primary = if one { 0 } else { primary };
     let aiming = if plan.computes(Effect::Aiming) { Aiming::Chief } else { Aiming::Paraxial };
-    let beam = Beam::of(lens, zoom);
-    let mut bench = Bench::new(systems?, primary, beam, aiming)?;
+    let beam = Beam::for_lens(lens, zoom);
+    let mut bench = RayModel::from_systems(systems?, primary, beam, aiming)?;
     bench.fields.clone_from(&lens.fields_at(zoom).values);
     if lens.object != Object::Infinity
         && !plan.computes(Effect::FiniteObject)
-        && let Some((beam, fields)) = collimated(&bench, &beam)
+        && let Some((beam, fields)) = collimate_fields(&bench, &beam)
     {
-        let systems = bench.colors.into_iter().map(|c| (c.um, c.weight, c.system)).collect();
-        bench = Bench::new(systems, primary, beam, aiming)?;
+        let systems = bench.channels.into_iter().map(|c| (c.um, c.weight, c.system)).collect();
+        bench = RayModel::from_systems(systems, primary, beam, aiming)?;
         bench.fields = fields;
     }
     Ok(bench)
 }
 
 /// Takes out of a resolved lens what a plan leaves out: figuring, rims and obstructions, gradients.
-pub fn simplify(system: &mut System<f64>, plan: &Plan) {
+pub fn simplify(system: &mut System<f64>, plan: &EffectPlan) {
     for surface in &plan.plain {
-        drop_terms(&mut system.surfaces[*surface]);
+        reduce_to_conic(&mut system.surfaces[*surface]);
     }
     for surface in &plan.open {
-        system.surfaces[*surface].clear();
+        system.surfaces[*surface].remove_apertures();
     }
     for surface in &plan.even {
-        system.surfaces[*surface].graded = None;
+        system.surfaces[*surface].grin = None;
     }
 }
 
 /// Makes a figured surface the conic that it is without figuring.
-pub(super) fn drop_terms(surface: &mut Surface<f64>) {
+pub(super) fn reduce_to_conic(surface: &mut Surface<f64>) {
     let (curvature, conic, _) = surface.shape.numbers();
     surface.shape = Shape::simplest(curvature, conic, [0.0; ASPHERE_TERMS]);
 }
 
 /// The beam of the same lens whose object points are moved to infinity along their chief rays;
 /// `None` where they lie in the pupil or where the pupil has no size.
-pub(super) fn collimated(bench: &Bench, beam: &Beam) -> Option<(Beam, Vec<Field>)> {
+pub(super) fn collimate_fields(bench: &RayModel, beam: &Beam) -> Option<(Beam, Vec<FieldPoint>)> {
     let Object::Finite(distance) = beam.object else { return None };
-    let pupil = bench.first.entrance_pupil;
+    let pupil = bench.first_order.entrance_pupil;
     let (reach, diameter) = (distance + pupil.position?, pupil.diameter?);
     let height = |value: f64| match beam.field {
         FieldKind::Angle => Some(value),
         FieldKind::ObjectHeight => Some(-(value / reach).atan().to_degrees()),
         FieldKind::ImageHeight => {
-            Some(-(value / bench.first.magnification? / reach).atan().to_degrees())
+            Some(-(value / bench.first_order.magnification? / reach).atan().to_degrees())
         }
     };
-    let turned = |field: &Field| {
+    let turned = |field: &FieldPoint| {
         let size = field.x.hypot(field.y);
         let angle = if size == 0.0 { 0.0 } else { height(size)? / size };
-        Some(Field { x: field.x * angle, y: field.y * angle, ..*field })
+        Some(FieldPoint { x: field.x * angle, y: field.y * angle, ..*field })
     };
-    let fields: Option<Vec<Field>> = bench.fields.iter().map(turned).collect();
+    let fields: Option<Vec<FieldPoint>> = bench.fields.iter().map(turned).collect();
     let far = Beam {
         object: Object::Infinity,
         aperture: match beam.aperture {
@@ -90,10 +94,10 @@ pub(super) fn collimated(bench: &Bench, beam: &Beam) -> Option<(Beam, Vec<Field>
 }
 
 /// Whether an effect is computed, as chosen or else as planned.
-pub(super) fn decided(choice: Choice, needed: bool) -> bool {
+pub(super) fn decided(choice: EffectOverride, needed: bool) -> bool {
     match choice {
-        Choice::Auto => needed,
-        Choice::On => true,
-        Choice::Off => false,
+        EffectOverride::Auto => needed,
+        EffectOverride::On => true,
+        EffectOverride::Off => false,
     }
 }

@@ -1,19 +1,19 @@
 //! Which physical effects a lens calls for, each decision with the number it rests on.
 //!
-//! [`survey()`] traces a few hundred rays and measures what each effect does; [`plan()`] is a pure
-//! function of these [`Facts`] and says for each effect whether it is computed, where and why;
-//! [`bench()`] resolves the lens accordingly. What is left out is not there: a surface whose figuring
+//! [`measure_effects()`] traces a few hundred rays and measures what each effect does; [`plan()`] is a pure
+//! function of these [`EffectMeasurements`] and says for each effect whether it is computed, where and why;
+//! [`build_ray_model()`] resolves the lens accordingly. What is left out is not there: a surface whose figuring
 //! does not matter *is* a conic, a lens without dispersion *has* one wavelength.
 //!
-//! Nobody has to agree: every effect can be forced on or off ([`Choices`]).
+//! Nobody has to agree: every effect can be forced on or off ([`EffectOverrides`]).
 
 mod apply;
 mod plan;
 mod survey;
 
-pub use apply::{bench, simplify};
-pub use plan::{AIMING, Decision, Plan, Task, plan};
-pub use survey::{Facts, Rim, survey};
+pub use apply::{build_ray_model, simplify};
+pub use plan::{AIMING, EffectDecision, EffectPlan, TracePurpose, plan};
+pub use survey::{EffectMeasurements, RimClearance, measure_effects};
 
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +66,7 @@ impl Effect {
 /// Whether an effect is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Choice {
+pub enum EffectOverride {
     /// As planned from the lens.
     #[default]
     Auto,
@@ -78,19 +78,19 @@ pub enum Choice {
 
 /// What a person decides about effects; what is not mentioned is left to the plan.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Choices(Vec<(Effect, Choice)>);
+pub struct EffectOverrides(Vec<(Effect, EffectOverride)>);
 
-impl Choices {
+impl EffectOverrides {
     /// Whether an effect is computed.
-    pub fn of(&self, effect: Effect) -> Choice {
+    pub fn get(&self, effect: Effect) -> EffectOverride {
         let chosen = self.0.iter().find(|(other, _)| *other == effect);
-        chosen.map_or(Choice::Auto, |(_, choice)| *choice)
+        chosen.map_or(EffectOverride::Auto, |(_, choice)| *choice)
     }
 
     /// Decides about an effect.
-    pub fn choose(&mut self, effect: Effect, choice: Choice) {
+    pub fn set(&mut self, effect: Effect, choice: EffectOverride) {
         self.0.retain(|(other, _)| *other != effect);
-        if choice != Choice::Auto {
+        if choice != EffectOverride::Auto {
             self.0.push((effect, choice));
             self.0.sort_unstable_by_key(|(effect, _)| *effect);
         }
@@ -98,8 +98,8 @@ impl Choices {
 
     /// The same with one more decision.
     #[must_use]
-    pub fn with(mut self, effect: Effect, choice: Choice) -> Self {
-        self.choose(effect, choice);
+    pub fn with(mut self, effect: Effect, choice: EffectOverride) -> Self {
+        self.set(effect, choice);
         self
     }
 }

@@ -1,13 +1,13 @@
 //! The decisions: a pure function of what was measured.
 
 use super::apply::decided;
-use super::survey::Facts;
-use super::{Choice, Choices, Effect};
+use super::survey::EffectMeasurements;
+use super::{Effect, EffectOverride, EffectOverrides};
 use serde::{Deserialize, Serialize};
 
 /// Rays are aimed at the real stop where the paraxial chief ray misses its centre by more than so
 /// many stop radii: paraxial coordinates would waste much of the beam.
-pub const AIMING: f64 = crate::pupil::MISS;
+pub const AIMING: f64 = crate::pupil::WIDE_AIMING_THRESHOLD;
 
 /// A rim that no ray comes nearer than this, in semi-diameters, clips nothing.
 const NEAR_RIM: f64 = 0.98;
@@ -15,14 +15,14 @@ const NEAR_RIM: f64 = 0.98;
 /// of the angle of refraction there.
 const NEAR_GRAZING: f64 = 0.9994;
 /// What a drawing of a lens shows: a thousandth of its length.
-const DRAWN: f64 = 1e-3;
+const DRAWING_TOLERANCE: f64 = 1e-3;
 /// What a traced ray is exact to, in mm.
-const EXACT: f64 = 1e-9;
+const TRACE_TOLERANCE: f64 = 1e-9;
 
 /// What a lens is resolved for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Task {
+pub enum TracePurpose {
     /// Rays as such: nothing that moves one of them may be left out.
     Trace,
     /// Spots, good to this share of the smallest one.
@@ -33,27 +33,27 @@ pub enum Task {
     Optimize(f64),
 }
 
-impl Task {
+impl TracePurpose {
     /// By how much rays may move, in mm.
-    fn allows(self, facts: &Facts) -> f64 {
+    fn tolerated_shift(self, facts: &EffectMeasurements) -> f64 {
         match self {
-            Self::Trace => EXACT,
-            Self::Spot(share) | Self::Optimize(share) if facts.spot.is_finite() => {
-                share * facts.spot
+            Self::Trace => TRACE_TOLERANCE,
+            Self::Spot(share) | Self::Optimize(share) if facts.smallest_spot.is_finite() => {
+                share * facts.smallest_spot
             }
             Self::Spot(_) | Self::Optimize(_) => 0.0,
-            Self::Layout => DRAWN * facts.length,
+            Self::Layout => DRAWING_TOLERANCE * facts.length,
         }
     }
 }
 
 /// What was decided about one effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Decision {
+pub struct EffectDecision {
     /// Which effect.
     pub effect: Effect,
     /// What the person said.
-    pub choice: Choice,
+    pub choice: EffectOverride,
     /// Whether the lens calls for it.
     pub needed: bool,
     /// Whether it is computed.
@@ -80,9 +80,9 @@ pub struct Decision {
 
 /// All decisions for a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Plan {
+pub struct EffectPlan {
     /// One decision an effect, in the order of [`Effect::ALL`].
-    pub decisions: Vec<Decision>,
+    pub decisions: Vec<EffectDecision>,
     /// Figured surfaces whose figuring is left out.
     pub plain: Vec<usize>,
     /// Surfaces whose rim, and obstruction, is left out.
@@ -91,41 +91,51 @@ pub struct Plan {
     pub even: Vec<usize>,
 }
 
-impl Plan {
+impl EffectPlan {
     /// What was decided about an effect.
-    pub fn of(&self, effect: Effect) -> Option<&Decision> {
+    pub fn decision(&self, effect: Effect) -> Option<&EffectDecision> {
         self.decisions.iter().find(|decision| decision.effect == effect)
     }
 
     /// Whether an effect is computed.
     pub fn computes(&self, effect: Effect) -> bool {
-        self.of(effect).is_none_or(|decision| decision.computed)
+        self.decision(effect).is_none_or(|decision| decision.computed)
     }
 }
 
 /// What to compute for a task, from what was measured and what a person chose.
-pub fn plan(facts: &Facts, task: Task, choices: &Choices) -> Plan {
-    let allowed = task.allows(facts);
-    let (asphere, plain) = asphere(facts, allowed, choices.of(Effect::Asphere));
-    let (gradient, even) = gradient(facts, allowed, choices.of(Effect::Gradient));
-    let (clipping, open) = clipping(facts, choices.of(Effect::Clipping));
+pub fn plan(
+    facts: &EffectMeasurements,
+    task: TracePurpose,
+    choices: &EffectOverrides,
+) -> EffectPlan {
+    let allowed = task.tolerated_shift(facts);
+    let (asphere, plain) = asphere(facts, allowed, choices.get(Effect::Asphere));
+    let (gradient, even) = grin(facts, allowed, choices.get(Effect::Gradient));
+    let (clipping, open) = clipping(facts, choices.get(Effect::Clipping));
     let decisions = vec![
-        dispersion(facts, allowed, choices.of(Effect::Dispersion)),
+        dispersion(facts, allowed, choices.get(Effect::Dispersion)),
         asphere,
         clipping,
-        reflection(facts, choices.of(Effect::TotalReflection)),
-        aiming(facts, choices.of(Effect::Aiming)),
-        object(facts, allowed, choices.of(Effect::FiniteObject)),
+        reflection(facts, choices.get(Effect::TotalReflection)),
+        aiming(facts, choices.get(Effect::Aiming)),
+        object(facts, allowed, choices.get(Effect::FiniteObject)),
         gradient,
     ];
-    Plan { decisions, plain, open, even }
+    EffectPlan { decisions, plain, open, even }
 }
 
 /// A decision that rests on one number and belongs to the lens as a whole.
-fn whole(effect: Effect, choice: Choice, error: f64, limit: f64, unit: &'static str) -> Decision {
+fn lens_decision(
+    effect: Effect,
+    choice: EffectOverride,
+    error: f64,
+    limit: f64,
+    unit: &'static str,
+) -> EffectDecision {
     let needed = !(error <= limit);
     let computed = decided(choice, needed);
-    Decision {
+    EffectDecision {
         effect,
         choice,
         needed,
@@ -141,9 +151,9 @@ fn whole(effect: Effect, choice: Choice, error: f64, limit: f64, unit: &'static 
     }
 }
 
-fn dispersion(facts: &Facts, allowed: f64, choice: Choice) -> Decision {
-    let decision = whole(Effect::Dispersion, choice, facts.dispersion, allowed, "mm");
-    let reason = match facts.colors {
+fn dispersion(facts: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
+    let decision = lens_decision(Effect::Dispersion, choice, facts.dispersion, allowed, "mm");
+    let reason = match facts.wavelengths {
         1 => "there is one wavelength".to_owned(),
         colors if facts.dispersion == 0.0 => {
             format!("all {colors} wavelengths take the same way")
@@ -154,22 +164,26 @@ fn dispersion(facts: &Facts, allowed: f64, choice: Choice) -> Decision {
             1e3 * allowed
         ),
     };
-    Decision { reason, saves: 1.0 - 1.0 / facts.colors as f64, ..decision }
+    EffectDecision { reason, saves: 1.0 - 1.0 / facts.wavelengths as f64, ..decision }
 }
 
 /// Keeps the figuring of as few surfaces as are needed: the weakest ones go first, as long as
 /// together they may be neglected.
-fn asphere(facts: &Facts, allowed: f64, choice: Choice) -> (Decision, Vec<usize>) {
+fn asphere(
+    facts: &EffectMeasurements,
+    allowed: f64,
+    choice: EffectOverride,
+) -> (EffectDecision, Vec<usize>) {
     let total = facts.aspheres.iter().fold(0.0, |sum, (_, moved)| sum + moved);
-    let decision = whole(Effect::Asphere, choice, total, allowed, "mm");
+    let decision = lens_decision(Effect::Asphere, choice, total, allowed, "mm");
     let mut weakest = facts.aspheres.clone();
     weakest.sort_by(|a, b| a.1.total_cmp(&b.1));
     let (mut plain, mut left) = (Vec::new(), 0.0);
     for (surface, moved) in weakest {
         let goes = match choice {
-            Choice::Auto => left + moved <= allowed,
-            Choice::On => false,
-            Choice::Off => true,
+            EffectOverride::Auto => left + moved <= allowed,
+            EffectOverride::On => false,
+            EffectOverride::Off => true,
         };
         if goes {
             left += moved;
@@ -181,18 +195,18 @@ fn asphere(facts: &Facts, allowed: f64, choice: Choice) -> (Decision, Vec<usize>
     let surfaces: Vec<usize> = kept.collect();
     let reason = match facts.aspheres.len() {
         0 => "no surface is figured".to_owned(),
-        1 => format!("without the figuring of a surface {}", way(total, allowed)),
-        all => format!("without the figuring of {all} surfaces {}", way(total, allowed)),
+        1 => format!("without the figuring of a surface {}", shift_text(total, allowed)),
+        all => format!("without the figuring of {all} surfaces {}", shift_text(total, allowed)),
     };
     let figured = facts.aspheres.len() as f64;
-    let work = facts.surfaces as f64 + figured * (ITERATION - 1.0);
-    let saves = figured * (ITERATION - 1.0) / work;
+    let work = facts.surfaces as f64 + figured * (ASPHERE_COST - 1.0);
+    let saves = figured * (ASPHERE_COST - 1.0) / work;
     let computed = !surfaces.is_empty();
-    (Decision { computed, surfaces, left, reason, saves, ..decision }, plain)
+    (EffectDecision { computed, surfaces, left, reason, saves, ..decision }, plain)
 }
 
 /// What rays would do, in words.
-fn way(moved: f64, allowed: f64) -> String {
+fn shift_text(moved: f64, allowed: f64) -> String {
     if !moved.is_finite() {
         return "rays would be lost".to_owned();
     }
@@ -201,20 +215,21 @@ fn way(moved: f64, allowed: f64) -> String {
 }
 
 /// What a crossing of a figured surface costs, in crossings of a sphere.
-const ITERATION: f64 = 15.0;
+const ASPHERE_COST: f64 = 15.0;
 
 /// Keeps the rims that a ray may reach, those that tell an iteration where to look, and whatever
 /// obstructs.
-fn clipping(facts: &Facts, choice: Choice) -> (Decision, Vec<usize>) {
-    let ratio = |rim: &super::Rim| {
-        if rim.reached == 0.0 { 0.0 } else { rim.reached / rim.semi_diameter }
+fn clipping(facts: &EffectMeasurements, choice: EffectOverride) -> (EffectDecision, Vec<usize>) {
+    let ratio = |rim: &super::RimClearance| {
+        if rim.ray_height == 0.0 { 0.0 } else { rim.ray_height / rim.semi_diameter }
     };
     let nearest = facts.rims.iter().map(ratio).fold(0.0, f64::max);
-    let decision = whole(Effect::Clipping, choice, nearest, NEAR_RIM, "of the semi-diameter");
-    let goes = |rim: &&super::Rim| match choice {
-        Choice::Auto => !rim.figured && !rim.obstructed && ratio(rim) <= NEAR_RIM,
-        Choice::On => false,
-        Choice::Off => true,
+    let decision =
+        lens_decision(Effect::Clipping, choice, nearest, NEAR_RIM, "of the semi-diameter");
+    let goes = |rim: &&super::RimClearance| match choice {
+        EffectOverride::Auto => !rim.aspheric && !rim.obstructed && ratio(rim) <= NEAR_RIM,
+        EffectOverride::On => false,
+        EffectOverride::Off => true,
     };
     let open: Vec<usize> = facts.rims.iter().filter(goes).map(|rim| rim.surface).collect();
     let left = facts.rims.iter().filter(goes).map(ratio).fold(0.0, f64::max);
@@ -239,58 +254,70 @@ fn clipping(facts: &Facts, choice: Choice) -> (Decision, Vec<usize>) {
     };
     let computed = !surfaces.is_empty();
     let needed = decision.needed || obstructed > 0;
-    (Decision { needed, computed, surfaces, left, reason, ..decision }, open)
+    (EffectDecision { needed, computed, surfaces, left, reason, ..decision }, open)
 }
 
 /// Keeps as few gradients as are needed, and says in how many steps.
-fn gradient(facts: &Facts, allowed: f64, choice: Choice) -> (Decision, Vec<usize>) {
-    let total = facts.gradients.iter().fold(0.0, |sum, (_, moved)| sum + moved);
-    let decision = whole(Effect::Gradient, choice, total, allowed, "mm");
+fn grin(
+    facts: &EffectMeasurements,
+    allowed: f64,
+    choice: EffectOverride,
+) -> (EffectDecision, Vec<usize>) {
+    let total = facts.grin_gaps.iter().fold(0.0, |sum, (_, moved)| sum + moved);
+    let decision = lens_decision(Effect::Gradient, choice, total, allowed, "mm");
     let goes = !decision.computed;
-    let all: Vec<usize> = facts.gradients.iter().map(|(plan, _)| plan.surface).collect();
+    let all: Vec<usize> = facts.grin_gaps.iter().map(|(plan, _)| plan.surface).collect();
     let (even, surfaces) = if goes { (all, Vec::new()) } else { (Vec::new(), all) };
-    let reason = if facts.gradients.is_empty() {
+    let reason = if facts.grin_gaps.is_empty() {
         "no gap is filled with a gradient that varies".to_owned()
     } else {
-        format!("without it {}; {}", way(total, allowed), steps(facts))
+        format!("without it {}; {}", shift_text(total, allowed), step_text(facts))
     };
-    let kicks: u32 = facts.gradients.iter().map(|(plan, _)| plan.kicks).sum();
+    let kicks: u32 = facts.grin_gaps.iter().map(|(plan, _)| plan.kicks).sum();
     let saves = f64::from(kicks) / (facts.surfaces as f64 + f64::from(kicks));
     let computed = !surfaces.is_empty();
     let left = if goes { total } else { 0.0 };
-    (Decision { computed, surfaces, left, reason, saves, ..decision }, even)
+    (EffectDecision { computed, surfaces, left, reason, saves, ..decision }, even)
 }
 
 /// The steps of every gap with a gradient, in words.
-fn steps(facts: &Facts) -> String {
-    let of = |(plan, _): &(crate::trace::GapPlan, f64)| {
+fn step_text(facts: &EffectMeasurements) -> String {
+    let of = |(plan, _): &(crate::trace::GrinStepPlan, f64)| {
         format!(
             "behind surface {} in {} steps ({} times the index is asked), good to {:.0e} mm",
             plan.surface, plan.steps, plan.kicks, plan.error
         )
     };
-    facts.gradients.iter().map(of).collect::<Vec<_>>().join(", ")
+    facts.grin_gaps.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 /// The test is the sign of the number whose root refraction takes anyway: it cannot be left out
 /// and would save nothing.
-fn reflection(facts: &Facts, choice: Choice) -> Decision {
-    let nearest = facts.critical.map_or(0.0, |angle| angle.to_radians().cos());
-    let decision =
-        whole(Effect::TotalReflection, choice, nearest, NEAR_GRAZING, "of the critical sine");
-    let reason = match facts.critical {
+fn reflection(facts: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
+    let nearest = facts.critical_angle.map_or(0.0, |angle| angle.to_radians().cos());
+    let decision = lens_decision(
+        Effect::TotalReflection,
+        choice,
+        nearest,
+        NEAR_GRAZING,
+        "of the critical sine",
+    );
+    let reason = match facts.critical_angle {
         None => "the index falls at no surface that rays leave".to_owned(),
         Some(_) if facts.fates.total_reflection > 0 => {
-            let Facts { fates, .. } = facts;
+            let EffectMeasurements { fates, .. } = facts;
             format!("{} of {} rays are totally reflected", fates.total_reflection, fates.total())
         }
         Some(angle) => format!("no ray leaves a surface at less than {angle:.1} degrees to it"),
     };
-    let kept =
-        if choice == Choice::Off { "; the test is part of refraction and stays" } else { "" };
+    let kept = if choice == EffectOverride::Off {
+        "; the test is part of refraction and stays"
+    } else {
+        ""
+    };
     let reason = reason + kept;
-    let computed = !facts.falls.is_empty();
-    Decision { computed, left: 0.0, surfaces: facts.falls.clone(), reason, ..decision }
+    let computed = !facts.index_drops.is_empty();
+    EffectDecision { computed, left: 0.0, surfaces: facts.index_drops.clone(), reason, ..decision }
 }
 
 /// What a search for the chief ray costs, in rays of a spot: some steps with derivatives.
@@ -298,10 +325,10 @@ const CHIEF_RAYS: f64 = 20.0;
 /// The rays of a spot.
 const SPOT_RAYS: f64 = 100.0;
 
-fn aiming(facts: &Facts, choice: Choice) -> Decision {
-    let miss = facts.miss.unwrap_or(f64::INFINITY);
-    let decision = whole(Effect::Aiming, choice, miss, AIMING, "stop radii");
-    let reason = match facts.miss {
+fn aiming(facts: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
+    let miss = facts.chief_ray_miss.unwrap_or(f64::INFINITY);
+    let decision = lens_decision(Effect::Aiming, choice, miss, AIMING, "stop radii");
+    let reason = match facts.chief_ray_miss {
         Some(miss) => format!(
             "the paraxial chief ray of the farthest field misses the centre of the stop by \
              {:.0} % of its radius",
@@ -310,18 +337,18 @@ fn aiming(facts: &Facts, choice: Choice) -> Decision {
         None => "the paraxial chief ray of the farthest field does not reach the stop".to_owned(),
     };
     let saves = CHIEF_RAYS / (CHIEF_RAYS + SPOT_RAYS);
-    Decision { reason, saves, ..decision }
+    EffectDecision { reason, saves, ..decision }
 }
 
-fn object(facts: &Facts, allowed: f64, choice: Choice) -> Decision {
-    let moved = facts.object.map_or(0.0, |(_, moved)| moved);
-    let decision = whole(Effect::FiniteObject, choice, moved, allowed, "mm");
-    let reason = match facts.object {
+fn object(facts: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
+    let moved = facts.finite_object.map_or(0.0, |(_, moved)| moved);
+    let decision = lens_decision(Effect::FiniteObject, choice, moved, allowed, "mm");
+    let reason = match facts.finite_object {
         None => "the object is at infinity".to_owned(),
         Some((distance, moved)) => {
-            format!("from infinity instead of {distance} mm {}", way(moved, allowed))
+            format!("from infinity instead of {distance} mm {}", shift_text(moved, allowed))
         }
     };
-    let computed = decision.computed && facts.object.is_some();
-    Decision { computed, reason, ..decision }
+    let computed = decision.computed && facts.finite_object.is_some();
+    EffectDecision { computed, reason, ..decision }
 }

@@ -4,61 +4,61 @@
 //! move and how near they come to a rim, both smooth over the pupil. The root mean square of a
 //! displacement bounds what it does to the RMS radius of a spot, by the triangle inequality.
 
-use super::apply::{collimated, drop_terms};
-use crate::lens::{Field, Lens, Object, Shape, System};
+use super::apply::{collimate_fields, reduce_to_conic};
+use crate::lens::{FieldPoint, Lens, Object, Shape, System};
 use crate::math::Vec3;
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, Bench, BenchError, Launch, Pattern, pattern};
-use crate::trace::{Fate, Fates, GapPlan, Ray, Tracer};
+use crate::pupil::{Aiming, Launch, PupilPattern, RayModel, RayModelError, pattern_points};
+use crate::trace::{Fate, Fates, GrinStepPlan, Ray, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// What was measured of a lens at one zoom position.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Facts {
+pub struct EffectMeasurements {
     /// How many wavelengths it has.
-    pub colors: usize,
+    pub wavelengths: usize,
     /// How many surfaces a ray crosses.
     pub surfaces: usize,
     /// From the first vertex to the image, in mm.
     pub length: f64,
     /// The smallest RMS radius of any field that has light, in mm.
-    pub spot: f64,
+    pub smallest_spot: f64,
     /// How far the colours lie from the primary one, root mean square over rays, in mm: of the
     /// field where that is most.
     pub dispersion: f64,
     /// The figured surfaces, and how far rays move without the figuring of each, in mm.
     pub aspheres: Vec<(usize, f64)>,
     /// Every rim that is written, and how near rays come to it.
-    pub rims: Vec<Rim>,
+    pub rims: Vec<RimClearance>,
     /// How the surveyed rays ended.
     pub fates: Fates,
     /// Surfaces at which the index falls, where alone total reflection is possible.
-    pub falls: Vec<usize>,
+    pub index_drops: Vec<usize>,
     /// The smallest distance of any ray from total reflection, in degrees of the refracted ray
     /// from grazing; `None` where no index falls.
-    pub critical: Option<f64>,
+    pub critical_angle: Option<f64>,
     /// By how many stop radii the paraxial chief ray of the farthest field misses the centre of the
     /// stop; `None` where it does not get there.
-    pub miss: Option<f64>,
+    pub chief_ray_miss: Option<f64>,
     /// The distance of a finite object, and how far rays move if it is taken to be at infinity, in
     /// mm.
-    pub object: Option<(f64, f64)>,
+    pub finite_object: Option<(f64, f64)>,
     /// The gaps with a gradient, the steps in each, and how far rays move if it is left out, in mm.
-    pub gradients: Vec<(GapPlan, f64)>,
+    pub grin_gaps: Vec<(GrinStepPlan, f64)>,
 }
 
 /// How near rays come to a rim.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rim {
+pub struct RimClearance {
     /// The surface.
     pub surface: usize,
     /// Its semi-diameter, in mm; infinite for a surface that has an obstruction alone.
     pub semi_diameter: f64,
     /// How far from the axis rays meet it that nothing else stops, in mm.
-    pub reached: f64,
+    pub ray_height: f64,
     /// Whether the surface is figured: its iteration needs the rim to know where to look.
-    pub figured: bool,
+    pub aspheric: bool,
     /// Whether the surface has an obstruction as well, with or without a rim.
     pub obstructed: bool,
 }
@@ -67,39 +67,42 @@ pub struct Rim {
 const RINGS: usize = 3;
 const ON_RIM: usize = 24;
 /// Where no disc limits the beam, rays up to so many times the paraxial pupil are tried.
-const BEYOND: f64 = 1.6;
+const REACH: f64 = 1.6;
 
 /// Measures a lens at a zoom position.
 ///
 /// # Errors
 /// A lens or aperture through which nothing can be traced.
-pub fn survey(lens: &Lens, zoom: usize) -> Result<Facts, BenchError> {
-    let mut bench = Bench::with_aiming(lens, zoom, Aiming::Paraxial)?;
+pub fn measure_effects(lens: &Lens, zoom: usize) -> Result<EffectMeasurements, RayModelError> {
+    let mut bench = RayModel::with_aiming(lens, zoom, Aiming::Paraxial)?;
     let miss = bench.stop_miss();
     if miss.is_none_or(|miss| miss > super::AIMING) {
         bench.aiming = Aiming::Chief;
     }
-    let system = &bench.colors[bench.primary].system;
-    let sights: Vec<Sight> =
-        bench.fields.par_iter().flat_map_iter(|field| Sight::of_field(&bench, *field)).collect();
-    Ok(Facts {
-        colors: bench.colors.len(),
+    let system = &bench.channels[bench.primary].system;
+    let sights: Vec<SampledBundle> = bench
+        .fields
+        .par_iter()
+        .flat_map_iter(|field| SampledBundle::of_field(&bench, *field))
+        .collect();
+    Ok(EffectMeasurements {
+        wavelengths: bench.channels.len(),
         surfaces: system.surfaces.len(),
         length: length(system),
-        spot: smallest_spot(&bench, &sights),
+        smallest_spot: smallest_spot(&bench, &sights),
         dispersion: dispersion(&bench, &sights),
         aspheres: aspheres(&bench, &sights)?,
         rims: rims(&bench)?,
-        fates: sights.iter().fold(Fates::default(), |sum, sight| plus(sum, sight.fates)),
-        falls: falls(system),
-        critical: sights.iter().filter_map(|sight| sight.grazing).reduce(f64::min),
-        miss,
-        object: object(lens, zoom, &bench, &sights),
-        gradients: gradients(&bench, &sights)?,
+        fates: sights.iter().fold(Fates::default(), |sum, sight| add_fates(sum, sight.fates)),
+        index_drops: index_drops(system),
+        critical_angle: sights.iter().filter_map(|sight| sight.grazing).reduce(f64::min),
+        chief_ray_miss: miss,
+        finite_object: object(lens, zoom, &bench, &sights),
+        grin_gaps: grin_gaps(&bench, &sights)?,
     })
 }
 
-fn plus(a: Fates, b: Fates) -> Fates {
+fn add_fates(a: Fates, b: Fates) -> Fates {
     Fates {
         imaged: a.imaged + b.imaged,
         missed: a.missed + b.missed,
@@ -116,16 +119,16 @@ fn length(system: &System<f64>) -> f64 {
 }
 
 /// The points of the pupil that are looked at; those inside come first.
-fn places(bench: &Bench) -> Vec<[f64; 2]> {
-    let reach = if bench.ends_at_disc() { 1.0 } else { BEYOND };
+fn sample_points(bench: &RayModel) -> Vec<[f64; 2]> {
+    let reach = if bench.ends_at_disc() { 1.0 } else { REACH };
     let rim = (0..ON_RIM).map(|i| (TAU * i as f64 / ON_RIM as f64).sin_cos().into());
-    let inside = pattern(Pattern::HexapolarInside(RINGS)).into_iter();
+    let inside = pattern_points(PupilPattern::HexapolarInside(RINGS)).into_iter();
     inside.map(|p| p.map(|v| v * reach)).chain(rim).collect()
 }
 
 /// The surveyed rays of one field at one wavelength.
-struct Sight {
-    field: Field,
+struct SampledBundle {
+    field: FieldPoint,
     wavelength: usize,
     rays: Vec<Option<Ray<f64>>>,
     /// Where they land; `None` for a ray that is lost.
@@ -136,11 +139,11 @@ struct Sight {
     grazing: Option<f64>,
 }
 
-impl Sight {
+impl SampledBundle {
     /// The rays of a field at all wavelengths; a field without rays is dark and has none.
-    fn of_field(bench: &Bench, field: Field) -> Vec<Self> {
-        let places = places(bench);
-        let launches = (0..bench.colors.len()).filter_map(|w| bench.launch(field, w).ok());
+    fn of_field(bench: &RayModel, field: FieldPoint) -> Vec<Self> {
+        let places = sample_points(bench);
+        let launches = (0..bench.channels.len()).filter_map(|w| bench.launch(field, w).ok());
         launches.map(|launch| Self::new(&launch, &places)).collect()
     }
 
@@ -153,8 +156,8 @@ impl Sight {
             fates: Fates::default(),
             grazing: None,
         };
-        let color = launch.color();
-        let falls = falls(&color.system);
+        let color = launch.channel();
+        let falls = index_drops(&color.system);
         let mut points = Vec::with_capacity(color.system.surfaces.len());
         for ray in &sight.rays {
             points.clear();
@@ -164,7 +167,7 @@ impl Sight {
             let Some(landing) = landing else { continue };
             sight.fates.count(landing.fate);
             let reflected = matches!(landing.fate, Fate::TotalReflection(_)).then_some(0.0);
-            let leaving = leaving(&color.system, &points).filter(|(i, _)| falls.contains(i));
+            let leaving = exit_angles(&color.system, &points).filter(|(i, _)| falls.contains(i));
             let angles = leaving.map(|(_, angle)| angle).chain(reflected);
             sight.grazing = angles.chain(sight.grazing).reduce(f64::min);
         }
@@ -178,7 +181,7 @@ impl Sight {
 
     /// The root mean square distance of the rays from where they land otherwise, both from the
     /// axis; infinite where a ray gets lost.
-    fn moved(&self, otherwise: impl Fn(usize, Ray<f64>) -> Option<Vec3<f64>>) -> f64 {
+    fn rms_shift(&self, otherwise: impl Fn(usize, Ray<f64>) -> Option<Vec3<f64>>) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for (i, (ray, landed)) in self.rays.iter().zip(&self.landed).enumerate() {
             let (Some(ray), Some(here)) = (ray, landed) else { continue };
@@ -194,10 +197,10 @@ impl Sight {
 const FEW: usize = 8;
 
 /// The smallest RMS radius of a field, all colours together.
-fn smallest_spot(bench: &Bench, sights: &[Sight]) -> f64 {
-    let spot = |field: &Field| {
+fn smallest_spot(bench: &RayModel, sights: &[SampledBundle]) -> f64 {
+    let spot = |field: &FieldPoint| {
         let of_field = || sights.iter().filter(|sight| sight.field == *field);
-        let points: Vec<_> = of_field().flat_map(Sight::inside).collect();
+        let points: Vec<_> = of_field().flat_map(SampledBundle::inside).collect();
         let share = 1.0 / points.len() as f64;
         let mean = points.iter().fold(Vec3::default(), |sum, p| sum + **p) * share;
         let off = |p: &&Vec3<f64>| (p.x - mean.x).powi(2) + (p.y - mean.y).powi(2);
@@ -208,15 +211,15 @@ fn smallest_spot(bench: &Bench, sights: &[Sight]) -> f64 {
 }
 
 /// `√(Σ share |p_λ − p|²)` over the rays that arrive in both colours, of the worst field.
-fn dispersion(bench: &Bench, sights: &[Sight]) -> f64 {
-    let weights: f64 = bench.colors.iter().map(|color| color.weight).sum();
-    let worst = |field: &Field| -> f64 {
-        let of_field = |sight: &&Sight| sight.field == *field;
+fn dispersion(bench: &RayModel, sights: &[SampledBundle]) -> f64 {
+    let weights: f64 = bench.channels.iter().map(|color| color.weight).sum();
+    let worst = |field: &FieldPoint| -> f64 {
+        let of_field = |sight: &&SampledBundle| sight.field == *field;
         let primary = sights.iter().filter(of_field).find(|s| s.wavelength == bench.primary);
-        let square = |sight: &Sight| {
-            let share = bench.colors[sight.wavelength].weight / weights;
+        let square = |sight: &SampledBundle| {
+            let share = bench.channels[sight.wavelength].weight / weights;
             let there = |i: usize, _| primary.and_then(|p| p.landed[i]).or(sight.landed[i]);
-            share * sight.moved(there).powi(2)
+            share * sight.rms_shift(there).powi(2)
         };
         sights.iter().filter(of_field).map(square).sum::<f64>().sqrt()
     };
@@ -224,49 +227,59 @@ fn dispersion(bench: &Bench, sights: &[Sight]) -> f64 {
 }
 
 /// The largest way that rays at the primary wavelength move in another system.
-fn moves(bench: &Bench, sights: &[Sight], other: &System<f64>) -> Result<f64, BenchError> {
+fn largest_shift(
+    bench: &RayModel,
+    sights: &[SampledBundle],
+    other: &System<f64>,
+) -> Result<f64, RayModelError> {
     let tracer = Tracer::new(other)?;
     let land = |_, ray| {
         let landing = tracer.trace(ray);
         landing.fate.is_imaged().then_some(landing.ray.point)
     };
     let primary = sights.iter().filter(|sight| sight.wavelength == bench.primary);
-    Ok(primary.map(|sight| sight.moved(land)).fold(0.0, f64::max))
+    Ok(primary.map(|sight| sight.rms_shift(land)).fold(0.0, f64::max))
 }
 
-fn aspheres(bench: &Bench, sights: &[Sight]) -> Result<Vec<(usize, f64)>, BenchError> {
-    let system = &bench.colors[bench.primary].system;
-    let figured = (0..system.surfaces.len()).into_par_iter().filter(|i| is_figured(system, *i));
+fn aspheres(
+    bench: &RayModel,
+    sights: &[SampledBundle],
+) -> Result<Vec<(usize, f64)>, RayModelError> {
+    let system = &bench.channels[bench.primary].system;
+    let figured = (0..system.surfaces.len()).into_par_iter().filter(|i| is_aspheric(system, *i));
     let moved = |i: usize| {
         let mut plain = without_rims(bench);
-        drop_terms(&mut plain.surfaces[i]);
-        Ok((i, moves(bench, sights, &plain)?))
+        reduce_to_conic(&mut plain.surfaces[i]);
+        Ok((i, largest_shift(bench, sights, &plain)?))
     };
     figured.map(moved).collect()
 }
 
 /// The gradients, each with what leaving it out does.
-fn gradients(bench: &Bench, sights: &[Sight]) -> Result<Vec<(GapPlan, f64)>, BenchError> {
-    let moved = |plan: &GapPlan| {
+fn grin_gaps(
+    bench: &RayModel,
+    sights: &[SampledBundle],
+) -> Result<Vec<(GrinStepPlan, f64)>, RayModelError> {
+    let moved = |plan: &GrinStepPlan| {
         let mut glass = without_rims(bench);
-        glass.surfaces[plan.surface].graded = None;
-        Ok((*plan, moves(bench, sights, &glass)?))
+        glass.surfaces[plan.surface].grin = None;
+        Ok((*plan, largest_shift(bench, sights, &glass)?))
     };
-    bench.colors[bench.primary].tracer.gap_plans().iter().map(moved).collect()
+    bench.channels[bench.primary].tracer.grin_step_plans().iter().map(moved).collect()
 }
 
-fn is_figured(system: &System<f64>, surface: usize) -> bool {
+fn is_aspheric(system: &System<f64>, surface: usize) -> bool {
     matches!(system.surfaces[surface].shape, Shape::Asphere { .. })
 }
 
 /// The lens at the primary wavelength with the rims of its figured surfaces alone, and that of the
 /// stop where it limits the beam.
-fn without_rims(bench: &Bench) -> System<f64> {
-    let mut system = bench.colors[bench.primary].system.clone();
+fn without_rims(bench: &RayModel) -> System<f64> {
+    let mut system = bench.channels[bench.primary].system.clone();
     for i in 0..system.surfaces.len() {
         system.surfaces[i].obstruction = 0.0;
         let limits = !bench.ends_at_disc() && i == bench.stop();
-        if !(is_figured(&system, i) || limits) {
+        if !(is_aspheric(&system, i) || limits) {
             system.surfaces[i].semi_diameter = f64::INFINITY;
         }
     }
@@ -275,13 +288,13 @@ fn without_rims(bench: &Bench) -> System<f64> {
 
 /// How far from the axis rays meet each surface that arrive where only those rims clip that have
 /// to.
-fn rims(bench: &Bench) -> Result<Vec<Rim>, BenchError> {
+fn rims(bench: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
     let tracer = Tracer::new(&without_rims(bench))?;
     let count = tracer.surfaces();
-    let reached = |field: &Field| -> Vec<f64> {
+    let reached = |field: &FieldPoint| -> Vec<f64> {
         let mut reached = vec![0.0; count];
-        for launch in (0..bench.colors.len()).filter_map(|w| bench.launch(*field, w).ok()) {
-            for ray in places(bench).into_iter().filter_map(|p| launch.ray(p)) {
+        for launch in (0..bench.channels.len()).filter_map(|w| bench.launch(*field, w).ok()) {
+            for ray in sample_points(bench).into_iter().filter_map(|p| launch.ray(p)) {
                 let mut heights = vec![0.0; count];
                 let landing = tracer.visit(ray, |i, p| heights[i] = p.x.hypot(p.y));
                 if landing.fate.is_imaged() {
@@ -292,19 +305,19 @@ fn rims(bench: &Bench) -> Result<Vec<Rim>, BenchError> {
         reached
     };
     let all: Vec<_> = bench.fields.par_iter().map(reached).collect();
-    let system = &bench.colors[bench.primary].system;
-    let rim = |surface: usize| Rim {
+    let system = &bench.channels[bench.primary].system;
+    let rim = |surface: usize| RimClearance {
         surface,
         semi_diameter: system.surfaces[surface].semi_diameter,
-        reached: all.iter().map(|field| field[surface]).fold(0.0, f64::max),
-        figured: is_figured(system, surface),
+        ray_height: all.iter().map(|field| field[surface]).fold(0.0, f64::max),
+        aspheric: is_aspheric(system, surface),
         obstructed: system.surfaces[surface].obstruction > 0.0,
     };
-    let clips = |rim: &Rim| rim.semi_diameter.is_finite() || rim.obstructed;
+    let clips = |rim: &RimClearance| rim.semi_diameter.is_finite() || rim.obstructed;
     Ok((0..count).map(rim).filter(clips).collect())
 }
 
-fn falls(system: &System<f64>) -> Vec<usize> {
+fn index_drops(system: &System<f64>) -> Vec<usize> {
     let falls = |i: &usize| {
         let surface = &system.surfaces[*i];
         !surface.mirror && surface.index < system.index_before(*i)
@@ -313,7 +326,7 @@ fn falls(system: &System<f64>) -> Vec<usize> {
 }
 
 /// The angle between a ray and each surface that it leaves, in degrees.
-fn leaving<'a>(
+fn exit_angles<'a>(
     system: &'a System<f64>,
     points: &'a [(usize, Vec3<f64>)],
 ) -> impl Iterator<Item = (usize, f64)> + 'a {
@@ -329,26 +342,31 @@ fn leaving<'a>(
     })
 }
 
-fn object(lens: &Lens, zoom: usize, bench: &Bench, sights: &[Sight]) -> Option<(f64, f64)> {
+fn object(
+    lens: &Lens,
+    zoom: usize,
+    bench: &RayModel,
+    sights: &[SampledBundle],
+) -> Option<(f64, f64)> {
     let Object::Finite(distance) = lens.object else { return None };
-    let Some((beam, fields)) = collimated(bench, &Beam::of(lens, zoom)) else {
+    let Some((beam, fields)) = collimate_fields(bench, &Beam::for_lens(lens, zoom)) else {
         return Some((distance, f64::INFINITY));
     };
     let systems =
-        bench.colors.iter().map(|color| (color.um, color.weight, color.system.clone())).collect();
+        bench.channels.iter().map(|color| (color.um, color.weight, color.system.clone())).collect();
     // What cannot be set up or launched from infinity calls for the finite object.
-    let Ok(far) = Bench::new(systems, bench.primary, beam, bench.aiming) else {
+    let Ok(far) = RayModel::from_systems(systems, bench.primary, beam, bench.aiming) else {
         return Some((distance, f64::INFINITY));
     };
-    let places = places(bench);
+    let places = sample_points(bench);
     let mut most: f64 = 0.0;
     for (field, parallel) in bench.fields.iter().zip(fields) {
         let mut here = sights.iter().filter(|s| s.field == *field && s.wavelength == bench.primary);
         let Some(here) = here.next() else { continue };
         most = match far.launch(parallel, bench.primary) {
             Ok(there) => {
-                let there = Sight::new(&there, &places);
-                most.max(here.moved(|i, _| there.landed[i]))
+                let there = SampledBundle::new(&there, &places);
+                most.max(here.rms_shift(|i, _| there.landed[i]))
             }
             Err(_) => f64::INFINITY,
         };

@@ -5,13 +5,17 @@
 //! that record every operation keep about ten times as much. Bytes are counted; what both take in
 //! time is measured by `aplanat measure grin`.
 
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report};
-use crate::grin::field::{Diagonal, Grid, Layered, Luneburg, Trilinear};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, report_progress,
+};
+use crate::grin::field::{HessianDiagonal, Luneburg, ProfileField, RegularGrid, Trilinear};
 use crate::grin::{
-    End, Exit, Field as _, Integrator, LastStep, Launch, Ray, Region, Seed, Setup, Tracer,
+    EndCondition, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField as _, Integrator,
+    LastStep, LaunchMode, RayAdjoint, RayExit,
 };
 use crate::math::Vec3;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke};
+use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.3",
@@ -27,7 +31,7 @@ const FINENESS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 const ROUNDING: f64 = 1e-10;
 
 /// What one gradient keeps, in bytes.
-struct Row {
+struct AdjointMemoryRow {
     nodes: usize,
     steps: f64,
     tape: usize,
@@ -36,50 +40,55 @@ struct Row {
     difference: f64,
 }
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let nodes = effort.pick([17, 33, 65, 129].as_slice(), &[17, 33]);
-    let side = effort.pick(64, 16);
-    let (mut outcome, mut rows) = (Outcome::default(), Vec::new());
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let nodes = effort.select([17, 33, 65, 129].as_slice(), &[17, 33]);
+    let side = effort.select(64, 16);
+    let (mut outcome, mut rows) = (ExperimentOutcome::default(), Vec::new());
     let all = nodes.len() * FINENESS.len();
     for nodes in nodes {
         for fineness in FINENESS {
             let done = rows.len() as f64 / all as f64;
-            report(watch, done, &format!("{nodes} nodes a side, {fineness} steps a voxel"))?;
+            report_progress(
+                watch,
+                done,
+                &format!("{nodes} nodes a side, {fineness} steps a voxel"),
+            )?;
             rows.push(measure(*nodes, fineness, side)?);
             outcome.rays += 2 * side * side;
         }
     }
     outcome.claims = claims(&rows);
     outcome.tables.push(table(&rows, side * side));
-    outcome.pictures.push(Picture { name: "memory", canvas: draw(&rows) });
+    outcome.pictures.push(NamedPlot { name: "memory", canvas: draw(&rows) });
     Ok(outcome)
 }
 
-fn measure(nodes: usize, fineness: f64, side: usize) -> Result<Row, Ended> {
-    let lens = Layered::sphere(Luneburg::new(1.0));
-    let grid = Grid::cube(nodes, 1.1).map_err(Ended::from_error)?;
-    let sampled = Trilinear::sampled(grid, |p| lens.sample(p).index);
-    let mut field = sampled.map_err(Ended::from_error)?;
-    field.diagonal = Diagonal::Exact;
-    let tracer = Tracer::new(&field, setup(0.974 * grid.spacing().x / fineness));
-    let tracer = tracer.map_err(Ended::from_error)?;
+fn measure(nodes: usize, fineness: f64, side: usize) -> Result<AdjointMemoryRow, ExperimentError> {
+    let lens = ProfileField::sphere(Luneburg::new(1.0));
+    let grid = RegularGrid::cube(nodes, 1.1).map_err(ExperimentError::from_error)?;
+    let sampled = Trilinear::from_function(grid, |p| lens.sample(p).index);
+    let mut field = sampled.map_err(ExperimentError::from_error)?;
+    field.diagonal = HessianDiagonal::Exact;
+    let tracer = GrinTracer::new(&field, setup(0.974 * grid.spacing().x / fineness));
+    let tracer = tracer.map_err(ExperimentError::from_error)?;
     let at = |i: usize| 0.6 * (2.0 * (i as f64 + 0.5137) / side as f64 - 1.0);
-    let ray = |n: usize| Ray {
+    let ray = |n: usize| GrinRay {
         x: Vec3::new(at(n % side), at(n / side), -1.5),
         v: Vec3::new(0.0, 0.0, 1.0),
     };
-    let rays: Vec<Ray<f64>> = (0..side * side).map(ray).collect();
-    let mut exits = tracer.rays(&rays);
+    let rays: Vec<GrinRay<f64>> = (0..side * side).map(ray).collect();
+    let mut exits = tracer.trace_batch(&rays);
     let focus = Vec3::new(0.1, 0.2, 1.0);
-    let seed = |exit: &Exit<f64>| Seed { x: (exit.x - focus) * 2.0, ..Seed::default() };
-    let seeds: Vec<Seed<f64>> = exits.iter().map(seed).collect();
+    let seed =
+        |exit: &RayExit<f64>| RayAdjoint { x: (exit.x - focus) * 2.0, ..RayAdjoint::default() };
+    let seeds: Vec<RayAdjoint<f64>> = exits.iter().map(seed).collect();
     let adjoint = tracer.gradient(&rays, &mut exits, &seeds).parameters;
-    let taped = tracer.taped_gradient(&rays, &exits, &seeds);
+    let taped = tracer.tape_gradient(&rays, &exits, &seeds);
     let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|v| v * v).sum::<f64>().sqrt();
     let off = norm(&mut adjoint.iter().zip(&taped.parameters).map(|(a, b)| a - b));
     let [kept, gradients] = tracer.gradient_bytes(rays.len());
     let steps: f64 = exits.iter().map(|exit| f64::from(exit.steps)).sum();
-    Ok(Row {
+    Ok(AdjointMemoryRow {
         nodes,
         steps: steps / rays.len() as f64,
         tape: taped.bytes,
@@ -89,14 +98,14 @@ fn measure(nodes: usize, fineness: f64, side: usize) -> Result<Row, Ended> {
     })
 }
 
-fn setup(step: f64) -> Setup<f64> {
-    let region = Region::ball(1.0);
-    let end = End::Boundary { region, last: LastStep::BrokenLine, limit: 100_000 };
-    let (integrator, launch) = (Integrator::LeapfrogDkd, Launch::AsGiven);
-    Setup { integrator, step, launch, end, screen: None }
+fn setup(step: f64) -> GrinSetup<f64> {
+    let region = GrinRegion::ball(1.0);
+    let end = EndCondition::Boundary { region, last: LastStep::BrokenLine, limit: 100_000 };
+    let (integrator, launch) = (Integrator::LeapfrogDkd, LaunchMode::AsGiven);
+    GrinSetup { integrator, step, launch, end, screen: None }
 }
 
-fn claims(rows: &[Row]) -> Vec<Claim> {
+fn claims(rows: &[AdjointMemoryRow]) -> Vec<Claim> {
     let mut claims = Vec::new();
     for rows in rows.chunks(FINENESS.len()) {
         let (first, last) = (&rows[0], &rows[rows.len() - 1]);
@@ -123,13 +132,13 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
     claims
 }
 
-fn table(rows: &[Row], rays: usize) -> Table {
-    let mut table = Table::new(
+fn table(rows: &[AdjointMemoryRow], rays: usize) -> DataTable {
+    let mut table = DataTable::new(
         "memory",
         &["nodes", "rays", "steps", "tape_bytes", "ray_bytes", "gradient_bytes", "difference"],
     );
     for row in rows {
-        table.row([
+        table.push_row([
             row.nodes.into(),
             rays.into(),
             row.steps.into(),
@@ -142,11 +151,11 @@ fn table(rows: &[Row], rays: usize) -> Table {
     table
 }
 
-fn draw(rows: &[Row]) -> Canvas {
+fn draw(rows: &[AdjointMemoryRow]) -> Canvas {
     let mb = |bytes: usize| bytes as f64 / 1e6;
     let mut canvas = Canvas::new([1500, 860]);
-    let tape = |row: &Row| [row.steps, mb(row.tape)];
-    let adjoint = |row: &Row| [row.steps, mb(row.rays + row.gradients)];
+    let tape = |row: &AdjointMemoryRow| [row.steps, mb(row.tape)];
+    let adjoint = |row: &AdjointMemoryRow| [row.steps, mb(row.rays + row.gradients)];
     let all = || rows.iter().flat_map(|row| [tape(row), adjoint(row)]);
     let x = Axis::logarithmic("steps of a ray", all().map(|p| p[0]), 1.0);
     let y = Axis::logarithmic("megabytes", all().map(|p| p[1]), 1e-3);
@@ -160,12 +169,12 @@ fn draw(rows: &[Row]) -> Canvas {
             ("adjoint", rows.iter().map(adjoint).collect(), Stroke::Solid),
         ];
         for (k, (name, points, stroke)) in curves.into_iter().enumerate() {
-            canvas.curve(&chart.places(&points), color, stroke);
-            canvas.marks(&chart.places(&points), color);
+            canvas.curve(&chart.to_pixels(&points), color, stroke);
+            canvas.markers(&chart.to_pixels(&points), color);
             let y = top + 32.0 * k as f64;
             canvas.curve(&[[1000.0, y], [1050.0, y]], color, stroke);
             let text = format!("{name}, {} nodes", rows[0].nodes);
-            canvas.text([1064.0, y - 7.0], &text, BLACK, Align::Left);
+            canvas.text([1064.0, y - 7.0], &text, BLACK, TextAlign::Left);
         }
     }
     canvas

@@ -9,13 +9,17 @@
 //! The image plane stands behind the paraxial focus. In front of it there is a zone that crosses the
 //! axis in the plane, where `C(rim) = 0` and descent would come to rest.
 
-use super::section::Section;
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report};
-use crate::lens::{
-    Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength, focus_gap,
+use super::section::SectionPlot;
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, report_progress,
 };
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke};
-use crate::pupil::{Bench, Cost, Region};
+use crate::lens::{
+    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength,
+    paraxial_image_distance,
+};
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::pupil::{QuadraticIntegrand, RayModel, Region};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.3",
@@ -38,7 +42,7 @@ const STOP: usize = 2;
 const START: f64 = 9.0;
 /// How far the image plane stands behind the paraxial focus, in mm.
 const BEHIND_FOCUS: f64 = 1.0;
-const AXIS: Field = Field { x: 0.0, y: 0.0, weight: 1.0 };
+const AXIS: FieldPoint = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
 
 /// Adam's rate in mm, and how often it steps.
 const RATE: f64 = 0.2;
@@ -52,32 +56,32 @@ const HIGH_ORDER: usize = 8;
 /// A pinhole is what is left when the stop has closed to this part.
 const PINHOLE: f64 = 0.1;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let steps = effort.pick(STEPS, FEW_STEPS);
-    let mut outcome = Outcome::default();
-    let start = Point::at(START, HIGH_ORDER)?;
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let steps = effort.select(STEPS, FEW_STEPS);
+    let mut outcome = ExperimentOutcome::default();
+    let start = StopObjective::at(START, HIGH_ORDER)?;
     let mut ways = Vec::new();
-    for gradient in [Gradient::Unbiased, Gradient::Biased] {
-        ways.push(Descent::run(gradient, steps, watch)?);
+    for gradient in [GradientKind::Unbiased, GradientKind::Biased] {
+        ways.push(StopDescent::run(gradient, steps, watch)?);
     }
     outcome.rays = start.rays + ways.iter().map(|way| way.rays).sum::<usize>();
     let [unbiased, biased] = [&ways[0], &ways[1]];
     outcome.claims = claims(&start, unbiased, biased, &mut outcome.rays)?;
     outcome.tables.push(table(unbiased, biased));
-    outcome.pictures.push(Picture { name: "radius", canvas: radii(unbiased, biased) });
-    outcome.pictures.push(Picture { name: "lens", canvas: lenses(unbiased, biased)? });
+    outcome.pictures.push(NamedPlot { name: "radius", canvas: radii(unbiased, biased) });
+    outcome.pictures.push(NamedPlot { name: "lens", canvas: lenses(unbiased, biased)? });
     Ok(outcome)
 }
 
 /// Which derivative by the radius is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Gradient {
+enum GradientKind {
     Unbiased,
     Biased,
 }
 
 /// The two singlets with a stop of this semi-diameter.
-fn lens(radius: f64) -> Result<Lens, Ended> {
+fn lens(radius: f64) -> Result<Lens, ExperimentError> {
     let row = |(i, [curvature, thickness, semi_diameter, index]): (usize, &[f64; 4])| Row {
         curvature: *curvature,
         thickness: *thickness,
@@ -99,20 +103,20 @@ fn lens(radius: f64) -> Result<Lens, Ended> {
         zoom: Vec::new(),
         variables: Vec::new(),
         pickups: Vec::new(),
-        focus: None,
+        image_solve: None,
     };
-    let system = lens.system(0, lens.wavelengths[0].um).map_err(Ended::from_error)?;
-    let gap = focus_gap(&system, Object::Infinity) + BEHIND_FOCUS;
+    let system = lens.resolve(0, lens.wavelengths[0].um).map_err(ExperimentError::from_error)?;
+    let gap = paraxial_image_distance(&system, Object::Infinity) + BEHIND_FOCUS;
     lens.surfaces[SURFACES.len() - 1].thickness = gap;
     Ok(lens)
 }
 
-fn bench(radius: f64) -> Result<Bench, Ended> {
-    Bench::of(&lens(radius)?, 0).map_err(Ended::from_error)
+fn bench(radius: f64) -> Result<RayModel, ExperimentError> {
+    RayModel::from_lens(&lens(radius)?, 0).map_err(ExperimentError::from_error)
 }
 
 /// The objective at a radius of the stop.
-struct Point {
+struct StopObjective {
     /// `L = ∫ |p − o|² dw`, in mm⁴.
     blur: f64,
     /// The area of the pupil, in mm².
@@ -123,22 +127,23 @@ struct Point {
     rays: usize,
 }
 
-impl Point {
-    fn at(radius: f64, order: usize) -> Result<Self, Ended> {
+impl StopObjective {
+    fn at(radius: f64, order: usize) -> Result<Self, ExperimentError> {
         let bench = bench(radius)?;
-        let region = Region::new(bench.launch(AXIS, 0).map_err(Ended::from_error)?);
-        let lit = region.lit(order);
-        let cost = Cost::spread([0.0; 2]);
-        let failed = || Ended::Failed(format!("the pupil of a stop of {radius} mm has no edge"));
+        let region = Region::new(bench.launch(AXIS, 0).map_err(ExperimentError::from_error)?);
+        let lit = region.trace_pupil(order);
+        let cost = QuadraticIntegrand::spread([0.0; 2]);
+        let failed =
+            || ExperimentError::Failed(format!("the pupil of a stop of {radius} mm has no edge"));
         let unbiased = lit.boundary_derivative(&cost).ok_or_else(failed)?;
         let biased = lit.biased_derivative(&cost);
-        let by_radius = |by: &crate::trace::Gradient<f64>| by.surfaces[STOP].semi_diameter;
+        let by_radius = |by: &crate::trace::SystemGradient<f64>| by.surfaces[STOP].semi_diameter;
         Ok(Self {
             blur: lit.moments.spread,
             area: lit.moments.area,
             unbiased: by_radius(&unbiased),
             biased: by_radius(&biased),
-            rays: region.rays + lit.traced,
+            rays: region.rays + lit.rays_traced,
         })
     }
 
@@ -149,30 +154,34 @@ impl Point {
 }
 
 /// What a descent went through: the radius and the objective at every step.
-struct Descent {
+struct StopDescent {
     radii: Vec<f64>,
     blurs: Vec<f64>,
     rms: Vec<f64>,
     rays: usize,
 }
 
-impl Descent {
+impl StopDescent {
     /// Adam in one variable (Kingma and Ba, ICLR 2015, algorithm 1).
-    fn run(gradient: Gradient, steps: usize, watch: &mut Watch<'_>) -> Result<Self, Ended> {
+    fn run(
+        gradient: GradientKind,
+        steps: usize,
+        watch: &mut ProgressFn<'_>,
+    ) -> Result<Self, ExperimentError> {
         let (name, done) = match gradient {
-            Gradient::Unbiased => ("descent by the unbiased gradient", 0.0),
-            Gradient::Biased => ("descent by the biased gradient", 0.5),
+            GradientKind::Unbiased => ("descent by the unbiased gradient", 0.0),
+            GradientKind::Biased => ("descent by the biased gradient", 0.5),
         };
         let mut way = Self { radii: Vec::new(), blurs: Vec::new(), rms: Vec::new(), rays: 0 };
         let (mut radius, mut mean, mut square) = (START, 0.0, 0.0);
         let [b1, b2]: [f64; 2] = [0.9, 0.999];
         for step in 0..=steps {
-            report(watch, done + 0.5 * step as f64 / steps as f64, name)?;
-            let point = Point::at(radius, ORDER)?;
-            way.note(radius, &point);
+            report_progress(watch, done + 0.5 * step as f64 / steps as f64, name)?;
+            let point = StopObjective::at(radius, ORDER)?;
+            way.record(radius, &point);
             let slope = match gradient {
-                Gradient::Unbiased => point.unbiased,
-                Gradient::Biased => point.biased,
+                GradientKind::Unbiased => point.unbiased,
+                GradientKind::Biased => point.biased,
             };
             let age = step as i32 + 1;
             mean = b1 * mean + (1.0 - b1) * slope;
@@ -184,27 +193,29 @@ impl Descent {
         Ok(way)
     }
 
-    fn note(&mut self, radius: f64, point: &Point) {
+    fn record(&mut self, radius: f64, point: &StopObjective) {
         self.radii.push(radius);
         self.blurs.push(point.blur);
         self.rms.push(point.rms());
         self.rays += point.rays;
     }
 
-    fn end(&self) -> f64 {
+    fn final_radius(&self) -> f64 {
         self.radii.last().copied().unwrap_or(START)
     }
 }
 
 fn claims(
-    start: &Point,
-    unbiased: &Descent,
-    biased: &Descent,
+    start: &StopObjective,
+    unbiased: &StopDescent,
+    biased: &StopDescent,
     rays: &mut usize,
-) -> Result<Vec<Claim>, Ended> {
+) -> Result<Vec<Claim>, ExperimentError> {
     let step = 1e-4 * START;
-    let [below, above] =
-        [Point::at(START - step, HIGH_ORDER)?, Point::at(START + step, HIGH_ORDER)?];
+    let [below, above] = [
+        StopObjective::at(START - step, HIGH_ORDER)?,
+        StopObjective::at(START + step, HIGH_ORDER)?,
+    ];
     *rays += below.rays + above.rays;
     let difference = (above.blur - below.blur) / (2.0 * step);
     let grown = unbiased.radii.windows(2).filter(|pair| pair[1] > pair[0]).count();
@@ -213,7 +224,7 @@ fn claims(
     Ok(vec![
         Claim::at_most(
             "unbiased: radius of the stop at the end over that at the start",
-            unbiased.end() / START,
+            unbiased.final_radius() / START,
             PINHOLE,
         ),
         Claim::at_most("unbiased: steps on which the stop opens", grown as f64, 0.0),
@@ -225,7 +236,8 @@ fn claims(
         Claim::exactly("biased: derivative by the radius at the start", start.biased, 0.0)
             .in_unit("mm^3"),
         Claim::exactly("biased: steps after which the radius is another", moved as f64, 0.0),
-        Claim::exactly("biased: radius of the stop at the end", biased.end(), START).in_unit("mm"),
+        Claim::exactly("biased: radius of the stop at the end", biased.final_radius(), START)
+            .in_unit("mm"),
         Claim::at_most(
             "unbiased derivative at the start against central differences, relative error",
             (start.unbiased / difference - 1.0).abs(),
@@ -234,7 +246,7 @@ fn claims(
     ])
 }
 
-fn table(unbiased: &Descent, biased: &Descent) -> Table {
+fn table(unbiased: &StopDescent, biased: &StopDescent) -> DataTable {
     let columns = [
         "step",
         "unbiased_radius_mm",
@@ -244,11 +256,11 @@ fn table(unbiased: &Descent, biased: &Descent) -> Table {
         "biased_blur_mm4",
         "biased_rms_mm",
     ];
-    let mut table = Table::new("radius", &columns);
+    let mut table = DataTable::new("radius", &columns);
     for step in 0..unbiased.radii.len() {
-        let of = |way: &Descent| [way.radii[step], way.blurs[step], way.rms[step]];
+        let of = |way: &StopDescent| [way.radii[step], way.blurs[step], way.rms[step]];
         let numbers = of(unbiased).into_iter().chain(of(biased));
-        table.row(std::iter::once(step.into()).chain(numbers.map(Into::into)));
+        table.push_row(std::iter::once(step.into()).chain(numbers.map(Into::into)));
     }
     table
 }
@@ -257,7 +269,7 @@ const UNBIASED: Color = PALETTE[0];
 const BIASED: Color = PALETTE[1];
 
 /// Radius and blur over the steps.
-fn radii(unbiased: &Descent, biased: &Descent) -> Canvas {
+fn radii(unbiased: &StopDescent, biased: &StopDescent) -> Canvas {
     let mut canvas = Canvas::new([1500, 700]);
     let ways = [("unbiased", unbiased, UNBIASED), ("biased", biased, BIASED)];
     let x = Axis::linear("step", [0.0, unbiased.radii.len() as f64 - 1.0]);
@@ -271,33 +283,34 @@ fn radii(unbiased: &Descent, biased: &Descent) -> Canvas {
     charts[1].draw(&mut canvas, "blur, root mean square");
     for (i, (name, way, color)) in ways.into_iter().enumerate() {
         for (chart, values) in charts.iter().zip([&way.radii, &way.rms]) {
-            let points = values.iter().enumerate().map(|(step, v)| chart.place([step as f64, *v]));
+            let points =
+                values.iter().enumerate().map(|(step, v)| chart.to_pixel([step as f64, *v]));
             canvas.curve(&points.collect::<Vec<_>>(), color, Stroke::Solid);
         }
         let y = 20.0 + 24.0 * i as f64;
         canvas.curve(&[[120.0, y + 7.0], [170.0, y + 7.0]], color, Stroke::Solid);
-        canvas.text([180.0, y], name, BLACK, Align::Left);
+        canvas.text([180.0, y], name, BLACK, TextAlign::Left);
     }
     canvas
 }
 
 /// The lens at the start and at both ends.
-fn lenses(unbiased: &Descent, biased: &Descent) -> Result<Canvas, Ended> {
+fn lenses(unbiased: &StopDescent, biased: &StopDescent) -> Result<Canvas, ExperimentError> {
     let mut canvas = Canvas::new([1800, 720]);
     let panels = [
         ("start", START, BLACK),
-        ("biased gradient", biased.end(), BIASED),
-        ("unbiased gradient", unbiased.end(), UNBIASED),
+        ("biased gradient", biased.final_radius(), BIASED),
+        ("unbiased gradient", unbiased.final_radius(), UNBIASED),
     ];
     for (i, (name, radius, color)) in panels.into_iter().enumerate() {
         let bench = bench(radius)?;
-        let section = Section::new(&bench.colors[0].system);
+        let section = SectionPlot::new(&bench.channels[0].system);
         let [z, y] = section.extent();
         let left = 90.0 + 600.0 * i as f64;
         let (x, y) = (Axis::linear("z, mm", z), Axis::linear("y, mm", y));
-        let chart = Chart::new([left, 110.0], [left + 480.0, 600.0], x, y).to_scale();
+        let chart = Chart::new([left, 110.0], [left + 480.0, 600.0], x, y).with_equal_scales();
         chart.draw(&mut canvas, &format!("{name}: stop {radius:.3} mm"));
-        let launch = bench.launch(AXIS, 0).map_err(Ended::from_error)?;
+        let launch = bench.launch(AXIS, 0).map_err(ExperimentError::from_error)?;
         for ray in -4..=4 {
             section.draw_ray(&mut canvas, &chart, &launch, [0.0, 0.24 * f64::from(ray)], color);
         }

@@ -6,12 +6,15 @@
 //! add up to the same area, and rays started close to the edge on both sides, which must arrive or
 //! end at the surface that is named.
 
-use super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens, report};
-use crate::lens::Field;
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, TableCell, lens, report_progress,
+};
+use crate::lens::FieldPoint;
 use crate::math::Vec3;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke};
-use crate::pupil::{Accuracy, Bench, Converged, Limit, Outline, Region};
-use crate::trace::{Fate, Points, Ray, Rays, Sink};
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::pupil::{Accuracy, ConvergedValues, PupilLimit, PupilOutline, RayModel, Region};
+use crate::trace::{Fate, ImagePoints, Ray, Rays, TraceSink};
 use std::f64::consts::PI;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -28,7 +31,7 @@ const EDGE: f64 = 24.0;
 /// Points of an outline.
 const POINTS: usize = 256;
 /// How exact its area is, relatively.
-const ACCURACY: Accuracy = Accuracy { tolerance: 1e-7, most_rays: 100_000 };
+const ACCURACY: Accuracy = Accuracy { tolerance: 1e-7, max_rays: 100_000 };
 /// How far from the edge, relatively, rays are started to see what ends them there.
 const BESIDE: f64 = 1e-6;
 /// The bitmap is this much larger than the pupil.
@@ -39,45 +42,45 @@ const ASKEW: [f64; 2] = [0.31, 0.17];
 /// Standard errors by which the area of a bitmap may be off.
 const SIGMAS: f64 = 4.0;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let (fields, cells): (usize, usize) = effort.pick((13, 400), (5, 150));
-    let bench = Bench::of(&lens(LENS)?, 0).map_err(Ended::from_error)?;
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let (fields, cells): (usize, usize) = effort.select((13, 400), (5, 150));
+    let bench = RayModel::from_lens(&lens(LENS)?, 0).map_err(ExperimentError::from_error)?;
     let mut pupils = Vec::new();
     for i in 0..fields {
         let angle = EDGE * i as f64 / (fields - 1) as f64;
-        report(watch, i as f64 / fields as f64, &format!("pupil at {angle} degrees"))?;
-        pupils.push(Pupil::at(&bench, angle, cells)?);
+        report_progress(watch, i as f64 / fields as f64, &format!("pupil at {angle} degrees"))?;
+        pupils.push(MappedPupil::at(&bench, angle, cells)?);
     }
-    Ok(Outcome {
+    Ok(ExperimentOutcome {
         claims: claims(&pupils),
         tables: vec![areas(&pupils), shares(&bench, &pupils), edges(&bench, &pupils)],
         lenses: Vec::new(),
         pictures: vec![
-            Picture { name: "pupils", canvas: maps(&bench, &pupils) },
-            Picture { name: "shares", canvas: curves(&bench, &pupils) },
+            NamedPlot { name: "pupils", canvas: maps(&bench, &pupils) },
+            NamedPlot { name: "shares", canvas: curves(&bench, &pupils) },
         ],
         rays: pupils.iter().map(|pupil| pupil.rays).sum(),
     })
 }
 
 /// The pupil of a field.
-struct Pupil {
+struct MappedPupil {
     /// In degrees.
     angle: f64,
-    outline: Outline,
-    area: Converged<3>,
+    outline: PupilOutline,
+    area: ConvergedValues<3>,
     bitmap: Bitmap,
     /// Rays beside the edge that do not end as the outline says.
     wrong: usize,
     rays: usize,
 }
 
-impl Pupil {
-    fn at(bench: &Bench, angle: f64, cells: usize) -> Result<Self, Ended> {
-        let field = Field { x: 0.0, y: angle, weight: 1.0 };
-        let launch = bench.launch(field, bench.primary).map_err(Ended::from_error)?;
+impl MappedPupil {
+    fn at(bench: &RayModel, angle: f64, cells: usize) -> Result<Self, ExperimentError> {
+        let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
+        let launch = bench.launch(field, bench.primary).map_err(ExperimentError::from_error)?;
         let region = Region::new(launch);
-        let dark = || Ended::Failed(format!("the pupil at {angle} degrees has no edge"));
+        let dark = || ExperimentError::Failed(format!("the pupil at {angle} degrees has no edge"));
         let outline = region.outline(POINTS).ok_or_else(dark)?;
         let area = region.extent(ACCURACY).ok_or_else(dark)?;
         let bitmap = Bitmap::of(bench, angle, &outline, cells);
@@ -124,10 +127,10 @@ fn ray(angle: f64, [x, y]: [f64; 2]) -> Ray<f64> {
 }
 
 /// How the rays through some points end.
-fn fates(bench: &Bench, angle: f64, points: impl Iterator<Item = [f64; 2]>) -> Vec<Fate> {
+fn fates(bench: &RayModel, angle: f64, points: impl Iterator<Item = [f64; 2]>) -> Vec<Fate> {
     let rays: Rays<f64> = points.map(|p| ray(angle, p)).collect();
-    let mut landed = Points::default();
-    bench.colors[bench.primary].tracer.batch(&rays, &mut landed);
+    let mut landed = ImagePoints::default();
+    bench.channels[bench.primary].tracer.trace_batch(&rays, &mut landed);
     (0..rays.len()).map(|i| landed.fate(i)).collect()
 }
 
@@ -141,7 +144,7 @@ struct Bitmap {
 }
 
 impl Bitmap {
-    fn of(bench: &Bench, angle: f64, outline: &Outline, cells: usize) -> Self {
+    fn of(bench: &RayModel, angle: f64, outline: &PupilOutline, cells: usize) -> Self {
         let points = || outline.sides.iter().flat_map(|side| &side.points);
         let ends = [0, 1].map(|k| {
             let values = || points().map(|p| p[k]);
@@ -166,7 +169,7 @@ impl Bitmap {
 
 /// Rays just inside the edge that do not arrive and rays just outside that do not end at the surface
 /// of its side, away from corners; and how many rays there are.
-fn wrong_fates(bench: &Bench, angle: f64, outline: &Outline) -> (usize, usize) {
+fn wrong_fates(bench: &RayModel, angle: f64, outline: &PupilOutline) -> (usize, usize) {
     let [x, y] = outline.center;
     let mut wrong = 0;
     let mut rays = 0;
@@ -188,10 +191,10 @@ fn wrong_fates(bench: &Bench, angle: f64, outline: &Outline) -> (usize, usize) {
     (wrong, rays)
 }
 
-fn claims(pupils: &[Pupil]) -> Vec<Claim> {
+fn claims(pupils: &[MappedPupil]) -> Vec<Claim> {
     let (first, last) = (&pupils[0], &pupils[pupils.len() - 1]);
     let fewer = pupils.windows(2).filter(|pair| pair[1].corners() < pair[0].corners()).count();
-    let off = pupils.iter().map(Pupil::deviation).fold(0.0, f64::max);
+    let off = pupils.iter().map(MappedPupil::deviation).fold(0.0, f64::max);
     let wrong: usize = pupils.iter().map(|pupil| pupil.wrong).sum();
     let share = last.area() / first.area();
     let error = share * (last.area.errors[0] / last.area() + first.area.errors[0] / first.area());
@@ -216,7 +219,7 @@ fn claims(pupils: &[Pupil]) -> Vec<Claim> {
     ]
 }
 
-fn areas(pupils: &[Pupil]) -> Table {
+fn areas(pupils: &[MappedPupil]) -> DataTable {
     let columns = [
         "field_deg",
         "corners",
@@ -227,9 +230,9 @@ fn areas(pupils: &[Pupil]) -> Table {
         "perimeter_mm",
         "roundness",
     ];
-    let mut table = Table::new("areas", &columns);
+    let mut table = DataTable::new("areas", &columns);
     for pupil in pupils {
-        table.row([
+        table.push_row([
             pupil.angle.into(),
             pupil.corners().into(),
             pupil.area().into(),
@@ -243,26 +246,26 @@ fn areas(pupils: &[Pupil]) -> Table {
     table
 }
 
-fn shares(bench: &Bench, pupils: &[Pupil]) -> Table {
-    let mut table = Table::new("shares", &["field_deg", "limit", "surface", "share_of_edge"]);
+fn shares(bench: &RayModel, pupils: &[MappedPupil]) -> DataTable {
+    let mut table = DataTable::new("shares", &["field_deg", "limit", "surface", "share_of_edge"]);
     for pupil in pupils {
-        for (limit, share) in pupil.outline.limits() {
-            let surface = limit.surface().map_or(Cell::Number(f64::NAN), Cell::from);
+        for (limit, share) in pupil.outline.limits_by_share() {
+            let surface = limit.surface().map_or(TableCell::Number(f64::NAN), TableCell::from);
             let name = bench.limit_name(limit);
-            table.row([pupil.angle.into(), name.into(), surface, share.into()]);
+            table.push_row([pupil.angle.into(), name.into(), surface, share.into()]);
         }
     }
     table
 }
 
-fn edges(bench: &Bench, pupils: &[Pupil]) -> Table {
-    let mut table = Table::new("edges", &["field_deg", "side", "limit", "x_mm", "y_mm"]);
+fn edges(bench: &RayModel, pupils: &[MappedPupil]) -> DataTable {
+    let mut table = DataTable::new("edges", &["field_deg", "side", "limit", "x_mm", "y_mm"]);
     for pupil in pupils {
         for (i, side) in pupil.outline.sides.iter().enumerate() {
             for [x, y] in &side.points {
                 let name = bench.limit_name(side.limit);
                 let angle = pupil.angle.into();
-                table.row([angle, i.into(), name.into(), (*x).into(), (*y).into()]);
+                table.push_row([angle, i.into(), name.into(), (*x).into(), (*y).into()]);
             }
         }
     }
@@ -270,9 +273,9 @@ fn edges(bench: &Bench, pupils: &[Pupil]) -> Table {
 }
 
 /// Every limit in the order in which the fields meet it, with its colour.
-fn colors(pupils: &[Pupil]) -> Vec<(Limit, Color)> {
-    let mut found: Vec<Limit> = Vec::new();
-    for (limit, _) in pupils.iter().flat_map(|pupil| pupil.outline.limits()) {
+fn colors(pupils: &[MappedPupil]) -> Vec<(PupilLimit, Color)> {
+    let mut found: Vec<PupilLimit> = Vec::new();
+    for (limit, _) in pupils.iter().flat_map(|pupil| pupil.outline.limits_by_share()) {
         if !found.contains(&limit) {
             found.push(limit);
         }
@@ -280,12 +283,12 @@ fn colors(pupils: &[Pupil]) -> Vec<(Limit, Color)> {
     found.into_iter().zip(PALETTE.into_iter().cycle()).collect()
 }
 
-fn color_of(colors: &[(Limit, Color)], limit: Limit) -> Color {
+fn color_of(colors: &[(PupilLimit, Color)], limit: PupilLimit) -> Color {
     colors.iter().find(|known| known.0 == limit).map_or(GREY, |known| known.1)
 }
 
 /// The colour of a fate in a bitmap: white for light, that of its surface's limit, else grey.
-fn fate_color(colors: &[(Limit, Color)], fate: Fate) -> Color {
+fn fate_color(colors: &[(PupilLimit, Color)], fate: Fate) -> Color {
     let of = |surface: usize| colors.iter().find(|known| known.0.surface() == Some(surface));
     match fate.surface() {
         None => [0xff; 3],
@@ -298,7 +301,7 @@ const DRAWN: usize = 5;
 const PANEL: f64 = 400.0;
 
 /// Outlines above, bitmaps below.
-fn maps(bench: &Bench, pupils: &[Pupil]) -> Canvas {
+fn maps(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     let mut canvas = Canvas::new([120 + DRAWN as u32 * 500, 1240]);
     let colors = colors(pupils);
     legend(&mut canvas, bench, &colors, [90.0, 20.0]);
@@ -310,51 +313,53 @@ fn maps(bench: &Bench, pupils: &[Pupil]) -> Canvas {
         let ends = corner.map(|low| [low, low + cell * (cells - 1) as f64]);
         let [x, y] =
             [("x, mm", ends[0]), ("y, mm", ends[1])].map(|(n, ends)| Axis::linear(n, ends));
-        let chart = Chart::new([left, 150.0], [left + PANEL, 150.0 + PANEL], x, y).to_scale();
+        let chart =
+            Chart::new([left, 150.0], [left + PANEL, 150.0 + PANEL], x, y).with_equal_scales();
         let title = format!("{} deg: {} corners", pupil.angle, pupil.corners());
         chart.draw(&mut canvas, &title);
         for side in &pupil.outline.sides {
             let color = color_of(&colors, side.limit);
-            canvas.curve(&chart.places(&side.points), color, Stroke::Solid);
+            canvas.curve(&chart.to_pixels(&side.points), color, Stroke::Solid);
         }
-        canvas.marks(&chart.places(&pupil.outline.corners().collect::<Vec<_>>()), BLACK);
+        canvas.markers(&chart.to_pixels(&pupil.outline.corners().collect::<Vec<_>>()), BLACK);
         // Rows go downwards in a picture and upwards in the pupil.
         let rows = fates.chunks_exact(*cells).rev();
         let raster: Vec<Color> = rows.flatten().map(|fate| fate_color(&colors, *fate)).collect();
         let size = ((PANEL / *cells as f64) as usize).max(1);
         canvas.raster([left, 700.0], *cells, size, &raster);
         let text = format!("bitmap {:.3} mm^2, edge {:.3} mm^2", pupil.bitmap.area(), pupil.area());
-        canvas.text([left + 0.5 * PANEL, 1150.0], &text, BLACK, Align::Middle);
+        canvas.text([left + 0.5 * PANEL, 1150.0], &text, BLACK, TextAlign::Middle);
     }
     canvas
 }
 
 /// Area and shares of the edge against the field.
-fn curves(bench: &Bench, pupils: &[Pupil]) -> Canvas {
+fn curves(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     let mut canvas = Canvas::new([1500, 800]);
     let colors = colors(pupils);
     legend(&mut canvas, bench, &colors, [120.0, 20.0]);
     let x = || Axis::linear("field, deg", pupils.iter().map(|pupil| pupil.angle));
-    let area = Axis::linear("mm^2", pupils.iter().map(Pupil::area).chain([0.0]));
+    let area = Axis::linear("mm^2", pupils.iter().map(MappedPupil::area).chain([0.0]));
     let share = Axis::linear("share", [0.0, 1.0]);
     let left = Chart::new([120.0, 190.0], [700.0, 690.0], x(), area);
     let right = Chart::new([860.0, 190.0], [1440.0, 690.0], x(), share);
     left.draw(&mut canvas, "area of the pupil");
     right.draw(&mut canvas, "share of the edge by limit");
-    let places = pupils.iter().map(|pupil| left.place([pupil.angle, pupil.area()]));
+    let places = pupils.iter().map(|pupil| left.to_pixel([pupil.angle, pupil.area()]));
     let places: Vec<_> = places.collect();
     canvas.curve(&places, BLACK, Stroke::Solid);
-    canvas.marks(&places, BLACK);
+    canvas.markers(&places, BLACK);
     for (limit, color) in &colors {
-        let share = |pupil: &Pupil| right.place([pupil.angle, pupil.outline.share(*limit)]);
+        let share =
+            |pupil: &MappedPupil| right.to_pixel([pupil.angle, pupil.outline.share(*limit)]);
         let places: Vec<_> = pupils.iter().map(share).collect();
         canvas.curve(&places, *color, Stroke::Solid);
-        canvas.marks(&places, *color);
+        canvas.markers(&places, *color);
     }
     canvas
 }
 
-fn legend(canvas: &mut Canvas, bench: &Bench, colors: &[(Limit, Color)], [x, y]: [f64; 2]) {
+fn legend(canvas: &mut Canvas, bench: &RayModel, colors: &[(PupilLimit, Color)], [x, y]: [f64; 2]) {
     for (i, (limit, color)) in colors.iter().enumerate() {
         let place = [x + 340.0 * (i % 4) as f64, y + 30.0 * (i / 4) as f64];
         canvas.curve(
@@ -362,6 +367,6 @@ fn legend(canvas: &mut Canvas, bench: &Bench, colors: &[(Limit, Color)], [x, y]:
             *color,
             Stroke::Solid,
         );
-        canvas.text([place[0] + 52.0, place[1]], &bench.limit_name(*limit), BLACK, Align::Left);
+        canvas.text([place[0] + 52.0, place[1]], &bench.limit_name(*limit), BLACK, TextAlign::Left);
     }
 }

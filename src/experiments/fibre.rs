@@ -4,13 +4,17 @@
 //! hyperbolic secant, which refocuses at one, three and five times that distance; the parabolic
 //! profile has no focus, so it is compared at those planes where its own blur is smallest.
 
-use super::medium::{medium_pictures, solve};
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
-use crate::grin::field::{Layered, Parabolic};
-use crate::grin::{End, Integrator, LastStep, Launch, Ray, Region, Setup, Tracer};
-use crate::grin_task::{self, Medium, Task};
+use super::medium::{plot_medium, solve};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
+};
+use crate::grin::field::{Parabolic, ProfileField};
+use crate::grin::{
+    EndCondition, GrinRay, GrinRegion, GrinSetup, GrinTracer, Integrator, LastStep, LaunchMode,
+};
+use crate::grin_task::{self, GrinField, GrinTask};
 use crate::math::Vec3;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke};
+use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -31,22 +35,23 @@ const REFINED: usize = 4;
 /// Steps of a ray from focus to focus.
 const STEPS: f64 = 40.0;
 
-fn run(_: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let builtin = grin_task::find("fibre");
-    let task = builtin.ok_or_else(|| Ended::Failed("no task `fibre`".to_owned()))?.task();
-    let task = task.map_err(Ended::from_error)?;
+fn run(_: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let builtin = grin_task::find_builtin("fibre");
+    let task = builtin.ok_or_else(|| ExperimentError::Failed("no task `fibre`".to_owned()))?.task();
+    let task = task.map_err(ExperimentError::from_error)?;
     let runner = solve(&task, [0.0, 1.0], watch)?;
     let best = runner.best();
-    let spots = runner.judge(best).map_err(Ended::from_error)?.views;
-    let (_, rays) = task.judging_rays(&task.views[0]);
-    let mut outcome = Outcome { rays: runner.rays() as usize, ..Outcome::default() };
+    let spots = runner.score(best).map_err(ExperimentError::from_error)?.views;
+    let (_, rays) = task.scoring_rays(&task.views[0]);
+    let mut outcome =
+        ExperimentOutcome { rays: runner.rays_traced() as usize, ..ExperimentOutcome::default() };
     let columns = ["focus", "plane_mm", "spot_mm", "parabola_plane_mm", "parabola_spot_mm"];
-    let mut table = Table::new("foci", &columns);
+    let mut table = DataTable::new("foci", &columns);
     for (i, view) in spots.iter().enumerate() {
         let order = (2 * i + 1) as f64;
         let (plane, spot) = parabola(&rays, order)?;
         outcome.rays += PLANES * REFINED * rays.len();
-        table.row([
+        table.push_row([
             (i + 1).into(),
             (order * FRAC_PI_2).into(),
             view.spot.into(),
@@ -56,38 +61,40 @@ fn run(_: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
         let says = format!("focus {}: blur of the parabolic fibre, in times of ours", i + 1);
         outcome.claims.push(Claim::at_least(says, spot / view.spot, BETTER));
     }
-    let difference = task.difference(best).map_err(Ended::from_error)?;
+    let difference = task.difference(best).map_err(ExperimentError::from_error)?;
     let relative = difference.map_or(f64::NAN, |difference| difference.relative);
     let says = "relative difference from the hyperbolic secant";
     outcome.claims.push(Claim::at_most(says, relative, NEAR));
     outcome.tables.push(table);
-    outcome.pictures = medium_pictures(&task, best);
-    outcome.pictures.push(Picture { name: "misses", canvas: misses(&task, best, &rays)? });
+    outcome.pictures = plot_medium(&task, best);
+    outcome
+        .pictures
+        .push(NamedPlot { name: "misses", canvas: draw_focus_errors(&task, best, &rays)? });
     Ok(outcome)
 }
 
 /// `√(2 - r²)`, the parabolic fibre (5.42).
-fn parabolic() -> Layered<Parabolic<f64>> {
-    Layered::cylinder(Parabolic::new(SQRT_2, FRAC_1_SQRT_2))
+fn parabolic() -> ProfileField<Parabolic<f64>> {
+    ProfileField::cylinder(Parabolic::new(SQRT_2, FRAC_1_SQRT_2))
 }
 
 /// How far each ray is from the axis of the parabolic fibre at a plane.
-fn heights(rays: &[Ray<f64>], plane: f64) -> Result<Vec<f64>, Ended> {
-    let region = Region::rod(1.5, -1.0, plane);
-    let setup = Setup {
+fn heights(rays: &[GrinRay<f64>], plane: f64) -> Result<Vec<f64>, ExperimentError> {
+    let region = GrinRegion::rod(1.5, -1.0, plane);
+    let setup = GrinSetup {
         integrator: Integrator::BlanesMoan,
         step: FRAC_PI_2 / STEPS,
-        launch: Launch::Scaled,
-        end: End::Boundary { region, last: LastStep::Fractional, limit: 100_000 },
+        launch: LaunchMode::Scaled,
+        end: EndCondition::Boundary { region, last: LastStep::Fractional, limit: 100_000 },
         screen: None,
     };
     let field = parabolic();
-    let tracer = Tracer::new(&field, setup).map_err(Ended::from_error)?;
-    Ok(tracer.rays(rays).iter().map(|exit| exit.x.x).collect())
+    let tracer = GrinTracer::new(&field, setup).map_err(ExperimentError::from_error)?;
+    Ok(tracer.trace_batch(rays).iter().map(|exit| exit.x.x).collect())
 }
 
 /// The plane near a focus of the parabolic fibre where its blur is smallest, and that blur.
-fn parabola(rays: &[Ray<f64>], order: f64) -> Result<(f64, f64), Ended> {
+fn parabola(rays: &[GrinRay<f64>], order: f64) -> Result<(f64, f64), ExperimentError> {
     // Its rays cross the axis at η(r) π/2 times an odd number, r the height where they start.
     let (mut from, mut to) = (0.9 * FRAC_PI_2 * order, SQRT_2 * FRAC_PI_2 * order);
     let mut best = (from, f64::INFINITY);
@@ -107,7 +114,11 @@ fn parabola(rays: &[Ray<f64>], order: f64) -> Result<(f64, f64), Ended> {
 }
 
 /// How far the rays of each height are from the axis at the foci.
-fn misses(task: &Task, best: &Medium, rays: &[Ray<f64>]) -> Result<Canvas, Ended> {
+fn draw_focus_errors(
+    task: &GrinTask,
+    best: &GrinField,
+    rays: &[GrinRay<f64>],
+) -> Result<Canvas, ExperimentError> {
     let mut curves = Vec::new();
     for (i, view) in task.views.iter().enumerate() {
         let order = (2 * i + 1) as f64;
@@ -118,11 +129,16 @@ fn misses(task: &Task, best: &Medium, rays: &[Ray<f64>]) -> Result<Canvas, Ended
         };
         curves.push((format!("parabolic, focus {}", i + 1), points(heights(rays, plane)?), color));
         let space = view.space.unwrap_or(task.space);
-        let plan =
-            crate::grin::plan(best.field(), &space.region(), task.launch, rays, task.tolerance);
-        let setup = plan.map_err(Ended::from_error)?.setup;
-        let tracer = Tracer::new(best.field(), setup).map_err(Ended::from_error)?;
-        let found = tracer.rays(rays).iter().map(|exit| radius(exit.x)).collect();
+        let plan = crate::grin::plan_tracing(
+            best.field(),
+            &space.region(),
+            task.launch,
+            rays,
+            task.tolerance,
+        );
+        let setup = plan.map_err(ExperimentError::from_error)?.setup;
+        let tracer = GrinTracer::new(best.field(), setup).map_err(ExperimentError::from_error)?;
+        let found = tracer.trace_batch(rays).iter().map(|exit| radius(exit.x)).collect();
         curves.push((format!("found, focus {}", i + 1), points(found), color));
     }
     let mut canvas = Canvas::new([1500, 860]);
@@ -133,10 +149,10 @@ fn misses(task: &Task, best: &Medium, rays: &[Ray<f64>]) -> Result<Canvas, Ended
     chart.draw(&mut canvas, "misses at the foci");
     for (i, (name, points, color)) in curves.iter().enumerate() {
         let stroke = if i % 2 == 0 { Stroke::Dashed } else { Stroke::Solid };
-        canvas.curve(&chart.places(points), *color, stroke);
+        canvas.curve(&chart.to_pixels(points), *color, stroke);
         let y = 130.0 + 34.0 * i as f64;
         canvas.curve(&[[1000.0, y], [1050.0, y]], *color, stroke);
-        canvas.text([1064.0, y - 7.0], name, BLACK, Align::Left);
+        canvas.text([1064.0, y - 7.0], name, BLACK, TextAlign::Left);
     }
     Ok(canvas)
 }

@@ -9,13 +9,18 @@
 //! program reaches from the same start in 1,000 steps, measured here by the areas and spots of
 //! two-dimensional pupils.
 
-use super::section::Section;
-use super::trade::{self, Part, Plan, View, at_angles, opened, searched, views};
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Watch, lens};
+use super::section::SectionPlot;
+use super::trade::{
+    self, FieldView, ProgressSpan, WeightSweep, field_views, run_sweep, with_field_angles,
+    with_scaled_aperture,
+};
+use super::{
+    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn, lens,
+};
 use crate::lens::Lens;
-use crate::optimize::pareto::{Design, Front};
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke};
-use crate::pupil::{Bench, Pattern, pattern};
+use crate::optimize::pareto::{Front, ParetoPoint};
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::pupil::{PupilPattern, RayModel, pattern_points};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.6",
@@ -31,61 +36,61 @@ pub(super) const ANGLES: [f64; 3] = [0.0, 10.0, 20.0];
 const OPENINGS: [f64; 5] = [0.6, 0.8, 1.0, 1.2, 1.3];
 const ONE_OPENING: [f64; 1] = [1.0];
 /// The share of the light at the start that a design needs to be compared.
-const LIT: f64 = 0.5;
+const MIN_LIGHT: f64 = 0.5;
 
 /// RMS radius in um and area of the pupil in mm² at the three fields.
-type Theirs = (&'static str, [f64; 3], [f64; 3]);
+type PublishedValues = (&'static str, [f64; 3], [f64; 3]);
 
 /// What the authors' program makes of `double_gauss_rudolph_50` at three β in mm².
-const AUTHORS: [Theirs; 3] = [
+const PUBLISHED: [PublishedValues; 3] = [
     ("authors, beta 0", [14.0, 18.0, 41.0], [90.9, 87.9, 64.3]),
     ("authors, beta 2e-4", [17.0, 19.0, 41.0], [92.0, 90.3, 66.3]),
     ("authors, beta 5e-4", [23.0, 19.0, 43.0], [93.9, 93.1, 70.3]),
 ];
 
 /// How the designs of a front are searched for.
-pub(super) fn plan(effort: Effort) -> Plan {
-    Plan::new(4.0, effort.pick(14, 8), 1200)
+pub(super) fn plan(effort: Effort) -> WeightSweep {
+    WeightSweep::new(4.0, effort.select(14, 8), 1200)
 }
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let mut outcome = Outcome::default();
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let mut outcome = ExperimentOutcome::default();
     let lenses = [
-        ("rudolph", "double_gauss_rudolph_50", AUTHORS.as_slice()),
+        ("rudolph", "double_gauss_rudolph_50", PUBLISHED.as_slice()),
         ("nikkor", "double_gauss_nikkor_s_50", &[]),
     ];
-    let count = effort.pick(lenses.len(), 1);
+    let count = effort.select(lenses.len(), 1);
     for (i, (name, file, authors)) in lenses.into_iter().take(count).enumerate() {
-        let start = at_angles(lens(file)?, &ANGLES);
+        let start = with_field_angles(lens(file)?, &ANGLES);
         let span = [i, i + 1].map(|part| part as f64 / count as f64);
-        let study = Study::of(&start, effort, span, watch)?;
+        let study = FrontStudy::of(&start, effort, span, watch)?;
         outcome.claims.extend(study.claims(name, authors, &mut outcome.rays)?);
         outcome.tables.push(trade::table(name, &study.designs(), &mut outcome.rays)?);
         outcome.lenses.extend(study.lenses(name));
-        outcome.pictures.push(Picture { name, canvas: study.draw(name, authors)? });
+        outcome.pictures.push(NamedPlot { name, canvas: study.draw(name, authors)? });
     }
     Ok(outcome)
 }
 
 /// The designs of one lens.
-struct Study {
-    start: Design,
+struct FrontStudy {
+    start: ParetoPoint,
     unbiased: Front,
     biased: Front,
 }
 
-impl Study {
+impl FrontStudy {
     fn of(
         start: &Lens,
         effort: Effort,
         [from, to]: [f64; 2],
-        watch: &mut Watch<'_>,
-    ) -> Result<Self, Ended> {
-        let openings = effort.pick(OPENINGS.as_slice(), &ONE_OPENING);
+        watch: &mut ProgressFn<'_>,
+    ) -> Result<Self, ExperimentError> {
+        let openings = effort.select(OPENINGS.as_slice(), &ONE_OPENING);
         let plan = plan(effort);
         let middle = from + 0.6 * (to - from);
-        let part = Part { from, to: middle, name: "unbiased gradient" };
-        let found = searched(start, &plan, part, watch)?;
+        let part = ProgressSpan { from, to: middle, name: "unbiased gradient" };
+        let found = run_sweep(start, &plan, part, watch)?;
         let start_design = found[0].clone();
         let unbiased = front(found);
         let mut biased = Vec::new();
@@ -93,22 +98,23 @@ impl Study {
         for (i, opening) in openings.iter().enumerate() {
             let from = middle + share * i as f64;
             let name = format!("biased gradient, opened {opening}");
-            let part = Part { from, to: from + share, name: &name };
-            let found = searched(&opened(start, *opening), &plan.biased(), part, watch)?;
+            let part = ProgressSpan { from, to: from + share, name: &name };
+            let found =
+                run_sweep(&with_scaled_aperture(start, *opening), &plan.biased(), part, watch)?;
             biased.extend(found.into_iter().next_back());
         }
         Ok(Self { start: start_design, unbiased, biased: front(biased) })
     }
 
-    fn designs(&self) -> Vec<(&'static str, &Design)> {
-        let unbiased = self.unbiased.designs().iter().map(|design| ("unbiased", design));
-        let biased = self.biased.designs().iter().map(|design| ("biased", design));
+    fn designs(&self) -> Vec<(&'static str, &ParetoPoint)> {
+        let unbiased = self.unbiased.points().iter().map(|design| ("unbiased", design));
+        let biased = self.biased.points().iter().map(|design| ("biased", design));
         std::iter::once(("start", &self.start)).chain(unbiased).chain(biased).collect()
     }
 
     /// Every design of the unbiased front, under its weight.
     fn lenses(&self, name: &str) -> impl Iterator<Item = (String, Lens)> {
-        let weighted = self.unbiased.designs().iter();
+        let weighted = self.unbiased.points().iter();
         weighted
             .filter_map(move |d| Some((format!("{name}-beta-{:.1e}", d.weight?), d.lens.clone())))
     }
@@ -116,14 +122,14 @@ impl Study {
     fn claims(
         &self,
         name: &str,
-        authors: &[Theirs],
+        authors: &[PublishedValues],
         rays: &mut usize,
-    ) -> Result<Vec<Claim>, Ended> {
+    ) -> Result<Vec<Claim>, ExperimentError> {
         let Self { start, unbiased, biased } = self;
         let [front, other] =
             [unbiased, biased].map(|front| front.hypervolume(2.0 * start.spot, start.light));
-        let beaten = |design: &&Design| unbiased.designs().iter().any(|u| u.dominates(design));
-        let lit = biased.designs().iter().filter(|design| design.light >= LIT * start.light);
+        let beaten = |design: &&ParetoPoint| unbiased.points().iter().any(|u| u.dominates(design));
+        let lit = biased.points().iter().filter(|design| design.light >= MIN_LIGHT * start.light);
         let left = lit.filter(|design| !beaten(design)).count();
         let mut claims = vec![
             Claim::at_least(
@@ -144,10 +150,10 @@ impl Study {
         if authors.is_empty() {
             return Ok(claims);
         }
-        let all = unbiased.designs().iter().map(|design| views(&design.lens, rays));
-        let all = all.collect::<Result<Vec<_>, Ended>>()?;
+        let all = unbiased.points().iter().map(|design| field_views(&design.lens, rays));
+        let all = all.collect::<Result<Vec<_>, ExperimentError>>()?;
         for theirs in authors {
-            let better = all.iter().filter(|views| beats(views, theirs)).count();
+            let better = all.iter().filter(|views| dominates_published(views, theirs)).count();
             let says = format!("{name}: designs better than `{}` at every field", theirs.0);
             claims.push(Claim::at_least(says, better as f64, 1.0));
         }
@@ -155,15 +161,15 @@ impl Study {
     }
 
     /// The plane of blur and light, and the lenses at its ends with their spots.
-    fn draw(&self, name: &str, authors: &[Theirs]) -> Result<Canvas, Ended> {
+    fn draw(&self, name: &str, authors: &[PublishedValues]) -> Result<Canvas, ExperimentError> {
         let mut canvas = Canvas::new([1900, 1000]);
-        let um = |design: &Design| [1e3 * design.spot, design.light];
-        let points = |front: &Front| front.designs().iter().map(um).collect::<Vec<_>>();
+        let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
+        let points = |front: &Front| front.points().iter().map(um).collect::<Vec<_>>();
         let sets: [(&str, Vec<[f64; 2]>, Color); 4] = [
             ("start", vec![um(&self.start)], BLACK),
             ("biased gradient", points(&self.biased), PALETTE[1]),
             ("unbiased gradient", points(&self.unbiased), PALETTE[0]),
-            ("the authors' program", authors.iter().map(their_means).collect(), GREY),
+            ("the authors' program", authors.iter().map(published_means).collect(), GREY),
         ];
         let all = || sets.iter().flat_map(|set| &set.1);
         let x = Axis::linear("blur (rms), um", all().map(|p| p[0]).chain([0.0]));
@@ -172,19 +178,19 @@ impl Study {
         chart.draw(&mut canvas, name);
         for (i, (label, points, color)) in sets.iter().filter(|s| !s.1.is_empty()).enumerate() {
             let place = [130.0, 20.0 + 28.0 * i as f64];
-            canvas.marks(&[[place[0], place[1] + 7.0]], *color);
-            canvas.text([place[0] + 20.0, place[1]], label, BLACK, Align::Left);
-            canvas.marks(&chart.places(points), *color);
+            canvas.markers(&[[place[0], place[1] + 7.0]], *color);
+            canvas.text([place[0] + 20.0, place[1]], label, BLACK, TextAlign::Left);
+            canvas.markers(&chart.to_pixels(points), *color);
         }
-        let front = self.unbiased.designs();
+        let front = self.unbiased.points();
         let shown = [
             ("sharpest", front.first()),
             ("brightest", front.last()),
-            ("biased, sharpest", self.biased.designs().first()),
+            ("biased, sharpest", self.biased.points().first()),
         ];
         for (i, (name, design)) in shown.into_iter().enumerate() {
             if let Some(design) = design {
-                lens_and_spots(&mut canvas, name, &design.lens, 90.0 + 310.0 * i as f64)?;
+                draw_lens_and_spots(&mut canvas, name, &design.lens, 90.0 + 310.0 * i as f64)?;
             }
         }
         Ok(canvas)
@@ -192,16 +198,16 @@ impl Study {
 }
 
 /// The front of some designs.
-fn front(designs: Vec<Design>) -> Front {
+fn front(designs: Vec<ParetoPoint>) -> Front {
     let mut front = Front::default();
     designs.into_iter().for_each(|design| {
-        front.offer(design);
+        front.insert(design);
     });
     front
 }
 
 /// Whether every field is no less sharp and no less bright.
-fn beats(views: &[View], (_, rms, area): &Theirs) -> bool {
+fn dominates_published(views: &[FieldView], (_, rms, area): &PublishedValues) -> bool {
     let fields = views.iter().zip(rms).zip(area);
     views.len() == rms.len()
         && fields.into_iter().all(|((view, rms), area)| {
@@ -210,7 +216,7 @@ fn beats(views: &[View], (_, rms, area): &Theirs) -> bool {
 }
 
 /// Blur in um and light in mm², as those of a design.
-fn their_means((_, rms, area): &Theirs) -> [f64; 2] {
+fn published_means((_, rms, area): &PublishedValues) -> [f64; 2] {
     let mean = |values: &[f64; 3]| values.iter().sum::<f64>() / 3.0;
     [mean(&rms.map(|um| um * um)).sqrt(), mean(area)]
 }
@@ -219,27 +225,27 @@ fn their_means((_, rms, area): &Theirs) -> [f64; 2] {
 const SPOT: f64 = 0.1;
 
 /// A lens with its rays, and the spots of its fields beside it.
-pub(super) fn lens_and_spots(
+pub(super) fn draw_lens_and_spots(
     canvas: &mut Canvas,
     name: &str,
     lens: &Lens,
     top: f64,
-) -> Result<(), Ended> {
-    let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
-    let section = Section::new(&bench.colors[0].system);
+) -> Result<(), ExperimentError> {
+    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    let section = SectionPlot::new(&bench.channels[0].system);
     let [z, y] = section.extent();
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
-    let chart = Chart::new([960.0, top], [1460.0, top + 220.0], x, y).to_scale();
-    canvas.text([960.0, top - 40.0], name, BLACK, Align::Left);
+    let chart = Chart::new([960.0, top], [1460.0, top + 220.0], x, y).with_equal_scales();
+    canvas.text([960.0, top - 40.0], name, BLACK, TextAlign::Left);
     for (i, field) in bench.fields.iter().enumerate() {
-        let launch = bench.launch(*field, bench.primary).map_err(Ended::from_error)?;
+        let launch = bench.launch(*field, bench.primary).map_err(ExperimentError::from_error)?;
         let color = PALETTE[i % PALETTE.len()];
         for ray in -2..=2 {
             section.draw_ray(canvas, &chart, &launch, [0.0, 0.45 * f64::from(ray)], color);
         }
         let middle = [1545.0 + 120.0 * i as f64, top + 110.0];
-        let tracer = &launch.color().tracer;
-        let rays = pattern(Pattern::Hexapolar(8));
+        let tracer = &launch.channel().tracer;
+        let rays = pattern_points(PupilPattern::Hexapolar(8));
         let landings = rays.iter().filter_map(|p| Some(tracer.trace(launch.ray(*p)?)));
         let lit: Vec<[f64; 2]> = landings
             .filter(|landing| landing.fate.is_imaged())
@@ -254,10 +260,10 @@ pub(super) fn lens_and_spots(
             }
         }
         let angle = format!("{} deg", (10.0 * field.y).round() / 10.0);
-        canvas.text([middle[0], top + 215.0], &angle, BLACK, Align::Middle);
+        canvas.text([middle[0], top + 215.0], &angle, BLACK, TextAlign::Middle);
     }
     section.draw(canvas, &chart);
     canvas.curve(&[[1600.0, top - 10.0], [1655.0, top - 10.0]], BLACK, Stroke::Solid);
-    canvas.text([1670.0, top - 17.0], "0.1 mm", BLACK, Align::Left);
+    canvas.text([1670.0, top - 17.0], "0.1 mm", BLACK, TextAlign::Left);
     Ok(())
 }

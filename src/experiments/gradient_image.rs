@@ -9,13 +9,19 @@
 //! The chart is a smooth function, so that pixels are integrals without noise and the three can be
 //! compared to many digits. Figure 3.5 of the thesis shows a trademark in its place.
 
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens, report};
-use crate::lens::{Aperture, Field, FieldKind, Object, System};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, lens, report_progress,
+};
+use crate::lens::{Aperture, FieldKind, FieldPoint, Object, System};
 use crate::math::Real;
 use crate::paraxial::Beam;
-use crate::picture::{Align, BLACK, Canvas, Color, GREY, diverging, grey};
-use crate::pupil::{Aiming, Anchor, Bench, Integrand, Kind, Lit, Pattern, Region, Warp};
-use crate::trace::{Gradient, Slot};
+use crate::picture::{BLACK, Canvas, Color, GREY, TextAlign, diverging, gray_level};
+use crate::pupil::{
+    Aiming, FixedLaunch, Integrand, PupilPattern, RayModel, Region, RegionKind, TracedPupil,
+    WarpSampling,
+};
+use crate::trace::{SurfaceParameter, SystemGradient};
 use rayon::prelude::*;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -49,24 +55,24 @@ const AGREEMENT: f64 = 1e-4;
 /// The front of the lens hardly limits these pixels, so that the biased derivative is nearly right.
 const NEARLY: f64 = 0.05;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let side = effort.pick(40, 10);
-    let camera = Camera::new(effort.pick(SAMPLES, FEW_SAMPLES))?;
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let side = effort.select(40, 10);
+    let camera = SensorView::new(effort.select(SAMPLES, FEW_SAMPLES))?;
     let mut pixels = Vec::with_capacity(side * side);
     for row in 0..side {
-        report(watch, row as f64 / side as f64, "pixels")?;
-        let line: Result<Vec<Pixel>, Ended> = (0..side)
+        report_progress(watch, row as f64 / side as f64, "pixels")?;
+        let line: Result<Vec<Pixel>, ExperimentError> = (0..side)
             .into_par_iter()
             .map(|column| camera.pixel(place(row, column, side)))
             .collect();
         pixels.extend(line?);
     }
-    let images = Images { side, pixels };
-    Ok(Outcome {
+    let images = GradientImages { side, pixels };
+    Ok(ExperimentOutcome {
         claims: images.claims(),
         tables: vec![images.table()],
         lenses: Vec::new(),
-        pictures: vec![Picture { name: "images", canvas: images.draw() }],
+        pictures: vec![NamedPlot { name: "images", canvas: images.draw() }],
         rays: images.pixels.iter().map(|pixel| pixel.rays).sum(),
     })
 }
@@ -79,7 +85,7 @@ fn place(row: usize, column: usize, side: usize) -> [f64; 2] {
 
 /// A capital A in soft strokes, bright on a darker ground.
 #[derive(Debug, Clone, Copy)]
-struct Chart {
+struct TestChart {
     /// How many mm on the chart belong to the side of the sensor.
     unit: f64,
 }
@@ -94,7 +100,7 @@ const SOFT: f64 = 0.03;
 const GROUND: f64 = 0.15;
 const BRIGHT: f64 = 0.9;
 
-impl Chart {
+impl TestChart {
     /// How much of a stroke is at a point, 0 to 1, and its slope: a logistic function of the square
     /// of the distance, which has no kink anywhere.
     fn stroke([from, to]: [[f64; 2]; 2], t: [f64; 2]) -> (f64, [f64; 2]) {
@@ -109,7 +115,7 @@ impl Chart {
     }
 
     /// What no stroke covers, and its slope.
-    fn bare(t: [f64; 2]) -> (f64, [f64; 2]) {
+    fn uncovered(t: [f64; 2]) -> (f64, [f64; 2]) {
         STROKES.into_iter().fold((1.0, [0.0; 2]), |(bare, slope), ends| {
             let (ink, by) = Self::stroke(ends, t);
             (bare * (1.0 - ink), [0, 1].map(|k| slope[k] * (1.0 - ink) - bare * by[k]))
@@ -117,26 +123,26 @@ impl Chart {
     }
 }
 
-impl Integrand for Chart {
-    fn of<R: Real>(&self, p: [R; 2]) -> R {
-        let (bare, _) = Self::bare(p.map(|v| v.value() / self.unit));
+impl Integrand for TestChart {
+    fn value<R: Real>(&self, p: [R; 2]) -> R {
+        let (bare, _) = Self::uncovered(p.map(|v| v.value() / self.unit));
         R::from_f64(BRIGHT - (BRIGHT - GROUND) * bare)
     }
 
     fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2] {
-        let (_, slope) = Self::bare(p.map(|v| v.value() / self.unit));
+        let (_, slope) = Self::uncovered(p.map(|v| v.value() / self.unit));
         slope.map(|v| R::from_f64(-(BRIGHT - GROUND) * v / self.unit))
     }
 }
 
 /// The lens as seen from the sensor, and the same with a number changed a little.
-struct Camera {
-    chart: Chart,
-    bench: Bench,
+struct SensorView {
+    chart: TestChart,
+    bench: RayModel,
     /// By the stop and by the curvature, each a step down and a step up.
-    moved: [[Bench; 2]; 2],
+    perturbed: [[RayModel; 2]; 2],
     /// How the warp field is sampled.
-    warp: Warp,
+    warp: WarpSampling,
     stop: usize,
     /// The first surface of the lens, which backwards is the last one.
     front: usize,
@@ -153,62 +159,65 @@ struct Pixel {
     rays: usize,
 }
 
-impl Camera {
-    fn new(samples: usize) -> Result<Self, Ended> {
+impl SensorView {
+    fn new(samples: usize) -> Result<Self, ExperimentError> {
         let lens = lens(LENS)?;
-        let forwards = lens.system(0, UM).map_err(Ended::from_error)?;
+        let forwards = lens.resolve(0, UM).map_err(ExperimentError::from_error)?;
         let rear = lens.surfaces.len() - 1;
         let object = Object::Finite(forwards.surfaces[rear].thickness);
-        let focal = Bench::of(&lens, 0).map_err(Ended::from_error)?.first.efl;
-        let focal = focal.ok_or_else(|| Ended::Failed("the lens is afocal".to_owned()))?;
+        let focal =
+            RayModel::from_lens(&lens, 0).map_err(ExperimentError::from_error)?.first_order.efl;
+        let focal =
+            focal.ok_or_else(|| ExperimentError::Failed("the lens is afocal".to_owned()))?;
         let system = forwards.reversed(DISTANCE);
         let stop = system.stop.unwrap_or(0);
         let radius = system.surfaces[stop].semi_diameter;
         let bench = |radius: f64, bend: f64| {
             let mut system = system.clone();
             // The curvature counts from the other side.
-            *Slot::Curvature.of(&mut system, rear) -= bend;
-            backwards(system, object, radius)
+            *SurfaceParameter::Curvature.value_mut(&mut system, rear) -= bend;
+            reversed_model(system, object, radius)
         };
         let [wider, bent] = STEPS;
         Ok(Self {
-            chart: Chart { unit: DISTANCE * HALF / focal },
+            chart: TestChart { unit: DISTANCE * HALF / focal },
             bench: bench(radius, 0.0)?,
-            moved: [
+            perturbed: [
                 [bench(radius - wider, 0.0)?, bench(radius + wider, 0.0)?],
                 [bench(radius, -bent)?, bench(radius, bent)?],
             ],
-            warp: Warp { count: samples, seed: 1 },
+            warp: WarpSampling { count: samples, seed: 1 },
             stop,
             front: rear,
         })
     }
 
-    fn pixel(&self, [x, y]: [f64; 2]) -> Result<Pixel, Ended> {
-        let field = Field { x, y, weight: 1.0 };
-        let launch = self.bench.launch(field, 0).map_err(Ended::from_error)?;
-        let anchor = launch.anchor();
+    fn pixel(&self, [x, y]: [f64; 2]) -> Result<Pixel, ExperimentError> {
+        let field = FieldPoint { x, y, weight: 1.0 };
+        let launch = self.bench.launch(field, 0).map_err(ExperimentError::from_error)?;
+        let anchor = launch.to_fixed();
         let region = Region::new(launch);
-        let lit = region.lit(ORDER);
-        let failed = || Ended::Failed(format!("the pupil of the pixel at {x}, {y} has no edge"));
+        let lit = region.trace_pupil(ORDER);
+        let failed =
+            || ExperimentError::Failed(format!("the pupil of the pixel at {x}, {y} has no edge"));
         let boundary = lit.boundary_derivative(&self.chart).ok_or_else(failed)?;
         let warp = region.warp_derivative(&self.chart, self.warp).ok_or_else(failed)?;
         let biased = lit.biased_derivative(&self.chart);
-        let nodes = region.sampled(Pattern::Sobol { count: SCATTERED, seed: 1 });
-        let mut rays = region.rays + lit.traced + warp.rays + nodes.points.len();
+        let nodes = region.pattern_nodes(PupilPattern::Sobol { count: SCATTERED, seed: 1 });
+        let mut rays = region.rays + lit.rays_traced + warp.rays + nodes.points.len();
         let mut difference = [0.0; 2];
-        for (i, benches) in self.moved.iter().enumerate() {
-            let ends = benches.each_ref().map(|bench| follow(&region.kind, anchor, bench));
-            rays += ends[0].traced + ends[1].traced;
+        for (i, benches) in self.perturbed.iter().enumerate() {
+            let ends = benches.each_ref().map(|bench| follow_pupil(&region.kind, anchor, bench));
+            rays += ends[0].rays_traced + ends[1].rays_traced;
             let [low, high] = ends.map(|lit| lit.integral(&self.chart));
             difference[i] = (high - low) / (2.0 * STEPS[i]);
         }
-        let scattered = region.at(&nodes).integral(&self.chart);
+        let scattered = region.trace_nodes(&nodes).integral(&self.chart);
         Ok(Pixel {
             value: lit.integral(&self.chart),
             scattered,
             boundary: self.numbers(&boundary),
-            warp: self.numbers(&warp.by),
+            warp: self.numbers(&warp.gradient),
             biased: self.numbers(&biased),
             difference,
             rays,
@@ -216,29 +225,38 @@ impl Camera {
     }
 
     /// By the semi-diameter of the stop and by the curvature of the first surface.
-    fn numbers(&self, by: &Gradient<f64>) -> [f64; 2] {
+    fn numbers(&self, by: &SystemGradient<f64>) -> [f64; 2] {
         [by.surfaces[self.stop].semi_diameter, -by.surfaces[self.front].curvature]
     }
 }
 
 /// A lens met from the sensor.
-fn backwards(system: System<f64>, object: Object, radius: f64) -> Result<Bench, Ended> {
+fn reversed_model(
+    system: System<f64>,
+    object: Object,
+    radius: f64,
+) -> Result<RayModel, ExperimentError> {
     let aperture = Aperture::StopSemiDiameter(radius);
     let edge = HALF * std::f64::consts::SQRT_2;
     let beam = Beam { object, aperture, field: FieldKind::ObjectHeight, edge };
-    Bench::new(vec![(UM, 1.0, system)], 0, beam, Aiming::Paraxial).map_err(Ended::from_error)
+    RayModel::from_systems(vec![(UM, 1.0, system)], 0, beam, Aiming::Paraxial)
+        .map_err(ExperimentError::from_error)
 }
 
 /// The light of the same pixel through a lens that was changed a little.
-fn follow<'a>(before: &Kind, anchor: Anchor, bench: &'a Bench) -> Lit<'a> {
-    Region::followed(before, anchor.launch(bench)).lit(ORDER)
+fn follow_pupil<'a>(
+    before: &RegionKind,
+    anchor: FixedLaunch,
+    bench: &'a RayModel,
+) -> TracedPupil<'a> {
+    Region::track(before, anchor.launch(bench)).trace_pupil(ORDER)
 }
 
 /// Two numbers of a pixel.
-type Numbers = fn(&Pixel) -> [f64; 2];
+type PixelPair = fn(&Pixel) -> [f64; 2];
 
 /// All pixels, row by row.
-struct Images {
+struct GradientImages {
     side: usize,
     pixels: Vec<Pixel>,
 }
@@ -254,7 +272,7 @@ fn relative(pixels: &[Pixel], of: impl Fn(&Pixel) -> f64, against: impl Fn(&Pixe
 /// By what the image is differentiated.
 const NAMES: [&str; 2] = ["semi-diameter of the stop", "curvature of the first surface"];
 
-impl Images {
+impl GradientImages {
     fn claims(&self) -> Vec<Claim> {
         let pixels = &self.pixels;
         let mut claims = vec![Claim::at_most(
@@ -304,7 +322,7 @@ impl Images {
         claims
     }
 
-    fn table(&self) -> Table {
+    fn table(&self) -> DataTable {
         let columns = [
             "row",
             "column",
@@ -319,13 +337,13 @@ impl Images {
             "by_curvature_difference_mm3",
             "by_curvature_biased_mm3",
         ];
-        let mut table = Table::new("images", &columns);
+        let mut table = DataTable::new("images", &columns);
         for (i, pixel) in self.pixels.iter().enumerate() {
             let place = [i / self.side, i % self.side];
             let derivatives = [0, 1]
                 .map(|k| [pixel.boundary[k], pixel.warp[k], pixel.difference[k], pixel.biased[k]]);
             let numbers = [pixel.value, pixel.scattered].into_iter().chain(derivatives.concat());
-            table.row(place.map(Into::into).into_iter().chain(numbers.map(Into::into)));
+            table.push_row(place.map(Into::into).into_iter().chain(numbers.map(Into::into)));
         }
         table
     }
@@ -346,14 +364,14 @@ impl Images {
                 canvas.line([x, y], end, GREY);
             }
             let middle = corner[0] + 0.5 * width as f64;
-            canvas.text([middle, corner[1] - 26.0], title, BLACK, Align::Middle);
+            canvas.text([middle, corner[1] - 26.0], title, BLACK, TextAlign::Middle);
         };
         let brightest = self.pixels.iter().map(|pixel| pixel.value).fold(0.0, f64::max);
-        let image = self.pixels.iter().map(|pixel| grey(pixel.value / brightest));
+        let image = self.pixels.iter().map(|pixel| gray_level(pixel.value / brightest));
         panel(0, 0, "image", image.collect());
         for i in 0..2 {
             let largest = self.pixels.iter().map(|p| p.difference[i].abs()).fold(0.0, f64::max);
-            let kinds: [(&str, Numbers); 4] = [
+            let kinds: [(&str, PixelPair); 4] = [
                 ("boundary", |pixel| pixel.boundary),
                 ("warp field", |pixel| pixel.warp),
                 ("differences", |pixel| pixel.difference),

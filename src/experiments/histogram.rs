@@ -19,15 +19,15 @@ const PLACES: usize = 24;
 
 /// Bins of equal size in one or two directions.
 #[derive(Debug, Clone)]
-pub(super) struct Grid {
+pub(super) struct HistogramGrid {
     pub(super) ranges: Vec<[f64; 2]>,
     /// Bins in each direction.
     pub(super) bins: usize,
 }
 
-impl Grid {
+impl HistogramGrid {
     /// How many bins there are.
-    pub(super) fn count(&self) -> usize {
+    pub(super) fn bin_count(&self) -> usize {
         self.bins.pow(self.ranges.len() as u32)
     }
 
@@ -42,7 +42,7 @@ impl Grid {
     }
 
     /// A place in a bin, from 0 to 1 in every direction.
-    fn place(&self, bin: usize, share: impl Fn(usize) -> f64) -> Vec<f64> {
+    fn point_in_bin(&self, bin: usize, share: impl Fn(usize) -> f64) -> Vec<f64> {
         let each = |(i, range): (usize, &[f64; 2])| {
             let index = (bin / self.bins.pow(i as u32)) % self.bins;
             range[0] + (range[1] - range[0]) * (index as f64 + share(i)) / self.bins as f64
@@ -51,19 +51,20 @@ impl Grid {
     }
 
     /// The middle of a bin.
-    pub(super) fn middle(&self, bin: usize) -> Vec<f64> {
-        self.place(bin, |_| 0.5)
+    pub(super) fn bin_center(&self, bin: usize) -> Vec<f64> {
+        self.point_in_bin(bin, |_| 0.5)
     }
 
     /// The share of every bin of a density, by the midpoint rule.
-    pub(super) fn shares(&self, density: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
+    pub(super) fn bin_shares(&self, density: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
         let places = PLACES.pow(self.ranges.len() as u32);
         let share = |index: usize, i: usize| {
             let place = (index / PLACES.pow(i as u32)) % PLACES;
             (place as f64 + 0.5) / PLACES as f64
         };
-        let sum = |bin| (0..places).map(|p| density(&self.place(bin, |i| share(p, i)))).sum();
-        normalized((0..self.count()).map(sum).collect())
+        let sum =
+            |bin| (0..places).map(|p| density(&self.point_in_bin(bin, |i| share(p, i)))).sum();
+        normalized((0..self.bin_count()).map(sum).collect())
     }
 }
 
@@ -75,19 +76,19 @@ fn normalized(mut values: Vec<f64>) -> Vec<f64> {
 }
 
 /// What all chains together gave the bins, with the sum 1.
-pub(super) fn together(chains: &[Vec<f64>]) -> Vec<f64> {
+pub(super) fn pool(chains: &[Vec<f64>]) -> Vec<f64> {
     let bins = chains.first().map_or(0, Vec::len);
     normalized((0..bins).map(|bin| chains.iter().map(|chain| chain[bin]).sum()).collect())
 }
 
 /// How much of one distribution would have to go elsewhere to be the other: total variation.
-pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn total_variation(a: &[f64], b: &[f64]) -> f64 {
     0.5 * a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>()
 }
 
 /// How surprising the chains are if these are the shares, in standard deviations. It cannot come
 /// above about twice the root of the number of chains.
-pub(super) fn surprise(chains: &[Vec<f64>], shares: &[f64]) -> f64 {
+pub(super) fn deviation_in_sigmas(chains: &[Vec<f64>], shares: &[f64]) -> f64 {
     // All but one bin, and those with a small share as one: the rest follows from their sum.
     let large: Vec<usize> = (0..shares.len()).filter(|bin| shares[*bin] >= SMALL).collect();
     let kept = if large.len() == shares.len() { &large[1..] } else { &large };
@@ -107,11 +108,11 @@ pub(super) fn surprise(chains: &[Vec<f64>], shares: &[f64]) -> f64 {
     let solved = covariance.cholesky().map(|cholesky| cholesky.solve(&mean));
     let square = solved.map_or(f64::NAN, |solved| n * mean.dot(&solved));
     let k = k as f64;
-    normal(square * (n - k) / (k * (n - 1.0)), k, n - k)
+    f_to_normal(square * (n - k) / (k * (n - 1.0)), k, n - k)
 }
 
 /// An `F` distributed number as a normal one.
-fn normal(f: f64, above: f64, below: f64) -> f64 {
+fn f_to_normal(f: f64, above: f64, below: f64) -> f64 {
     let [a, b] = [above, below].map(|freedom| 2.0 / (9.0 * freedom));
     let root = f.cbrt();
     ((1.0 - b) * root - (1.0 - a)) / (b * root * root + a).sqrt()
@@ -126,7 +127,7 @@ mod tests {
     /// Independent chains of correlated samples: each number is used several times.
     fn chains(power: f64, seed: u64) -> Vec<Vec<f64>> {
         let mut random = Random::seed_from_u64(seed);
-        let grid = Grid { ranges: vec![[0.0, 1.0]], bins: 10 };
+        let grid = HistogramGrid { ranges: vec![[0.0, 1.0]], bins: 10 };
         let mut chain = || {
             let mut bins = vec![0.0; 10];
             for _ in 0..30 {
@@ -140,7 +141,7 @@ mod tests {
 
     #[test]
     fn the_test_accepts_its_density_as_often_as_it_says() {
-        let surprises = (0..200).map(|seed| surprise(&chains(1.0, seed), &[0.1; 10]));
+        let surprises = (0..200).map(|seed| deviation_in_sigmas(&chains(1.0, seed), &[0.1; 10]));
         let surprises: Vec<f64> = surprises.collect();
         let above = |z: f64| surprises.iter().filter(|value| **value > z).count();
         // A sixth is above one standard deviation, a fortieth above two.
@@ -155,13 +156,13 @@ mod tests {
 
     #[test]
     fn the_test_sees_a_density_that_is_a_little_off() {
-        assert!(surprise(&chains(1.15, 1), &[0.1; 10]) > 5.0);
+        assert!(deviation_in_sigmas(&chains(1.15, 1), &[0.1; 10]) > 5.0);
     }
 
     #[test]
     fn published_quantiles_of_f_are_met() {
         // Upper tenth of a per cent of F(10, 120) and F(20, 60).
-        assert!((normal(3.24, 10.0, 120.0) - 3.09).abs() < 0.02);
-        assert!((normal(2.83, 20.0, 60.0) - 3.09).abs() < 0.03);
+        assert!((f_to_normal(3.24, 10.0, 120.0) - 3.09).abs() < 0.02);
+        assert!((f_to_normal(2.83, 20.0, 60.0) - 3.09).abs() < 0.03);
     }
 }

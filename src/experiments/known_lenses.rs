@@ -5,9 +5,9 @@
 //! jump in its outermost voxels: the shape is found ten times better than the level, and both errors
 //! are told. The figure's own remark, that the difference is largest at the boundary, is this.
 
-use super::medium::{medium_pictures, solve};
-use super::{Claim, Effort, Ended, Experiment, Outcome, Table, Watch};
-use crate::grin_task::{self, Difference, Level, Runner, Task};
+use super::medium::{plot_medium, solve};
+use super::{Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
+use crate::grin_task::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.8",
@@ -18,47 +18,49 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 };
 
 /// A lens and how well it must be found: as a whole, and without the offset of its square.
-struct Case {
+struct KnownLensCase {
     name: &'static str,
     /// At full effort, and as a test with a coarser grid.
     limits: [[f64; 2]; 2],
     /// Levels at small effort; those of the task where there are none.
-    small: &'static [Level],
+    small: &'static [RefinementLevel],
 }
 
-const COARSE: &[Level] = &[Level { nodes: 5, steps: 80 }, Level { nodes: 9, steps: 100 }];
+const COARSE: &[RefinementLevel] =
+    &[RefinementLevel { nodes: 5, steps: 80 }, RefinementLevel { nodes: 9, steps: 100 }];
 
-const CASES: [Case; 4] = [
-    Case { name: "luneburg-radial", limits: [[1e-4, 1e-4]; 2], small: &[] },
-    Case { name: "maxwell-radial", limits: [[1e-3, 5e-4]; 2], small: &[] },
-    Case { name: "luneburg", limits: [[1.5e-2, 2e-3], [6e-2, 1e-2]], small: COARSE },
-    Case { name: "maxwell", limits: [[1.5e-2, 5e-3]; 2], small: &[] },
+const CASES: [KnownLensCase; 4] = [
+    KnownLensCase { name: "luneburg-radial", limits: [[1e-4, 1e-4]; 2], small: &[] },
+    KnownLensCase { name: "maxwell-radial", limits: [[1e-3, 5e-4]; 2], small: &[] },
+    KnownLensCase { name: "luneburg", limits: [[1.5e-2, 2e-3], [6e-2, 1e-2]], small: COARSE },
+    KnownLensCase { name: "maxwell", limits: [[1.5e-2, 5e-3]; 2], small: &[] },
 ];
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let mut outcome = Outcome::default();
-    let mut table = Table::new(
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let mut outcome = ExperimentOutcome::default();
+    let mut table = DataTable::new(
         "lenses",
         &["task", "nodes", "relative", "without_offset", "offset", "spot_mm", "steps", "rays"],
     );
-    let cases = &CASES[..effort.pick(4, 3)];
+    let cases = &CASES[..effort.select(4, 3)];
     for (i, case) in cases.iter().enumerate() {
         let span = [i, i + 1].map(|part| part as f64 / cases.len() as f64);
         let task = task(case, effort)?;
         let runner = solve(&task, span, watch)?;
-        let found = task.difference(runner.best()).map_err(Ended::from_error)?;
-        let found = found.ok_or_else(|| Ended::Failed(format!("{}: no exact field", case.name)))?;
-        let judged = runner.judge(runner.best()).map_err(Ended::from_error)?;
+        let found = task.difference(runner.best()).map_err(ExperimentError::from_error)?;
+        let found = found
+            .ok_or_else(|| ExperimentError::Failed(format!("{}: no exact field", case.name)))?;
+        let judged = runner.score(runner.best()).map_err(ExperimentError::from_error)?;
         outcome.claims.extend(claims(case, effort, found));
-        let left_out = judged.views.iter().map(|v| v.counts.fates.total() - v.counts.counted());
+        let left_out = judged.views.iter().map(|v| v.counts.fates.total() - v.counts.valid());
         outcome.claims.push(Claim::at_most(
             format!("{}: rays that are left out", case.name),
             left_out.sum::<usize>() as f64,
             0.0,
         ));
-        outcome.rays += usize::try_from(runner.rays()).unwrap_or(usize::MAX);
-        table.row(row(case, &runner, found, judged.views[0].spot));
-        let pictures = medium_pictures(&task, runner.best());
+        outcome.rays += usize::try_from(runner.rays_traced()).unwrap_or(usize::MAX);
+        table.push_row(row(case, &runner, found, judged.views[0].spot));
+        let pictures = plot_medium(&task, runner.best());
         let names = PICTURES[i];
         outcome.pictures.extend(pictures.into_iter().zip(names).map(|(mut picture, name)| {
             picture.name = name;
@@ -76,18 +78,19 @@ const PICTURES: [[&str; 2]; 4] = [
     ["maxwell-profile", "maxwell-section"],
 ];
 
-fn task(case: &Case, effort: Effort) -> Result<Task, Ended> {
-    let builtin = grin_task::find(case.name);
-    let builtin = builtin.ok_or_else(|| Ended::Failed(format!("no task `{}`", case.name)))?;
-    let mut task = builtin.task().map_err(Ended::from_error)?;
+fn task(case: &KnownLensCase, effort: Effort) -> Result<GrinTask, ExperimentError> {
+    let builtin = grin_task::find_builtin(case.name);
+    let builtin =
+        builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.name)))?;
+    let mut task = builtin.task().map_err(ExperimentError::from_error)?;
     if effort == Effort::Small && !case.small.is_empty() {
         task.levels = case.small.to_vec();
     }
     Ok(task)
 }
 
-fn claims(case: &Case, effort: Effort, found: Difference) -> [Claim; 2] {
-    let [relative, shape] = effort.pick(case.limits[0], case.limits[1]);
+fn claims(case: &KnownLensCase, effort: Effort, found: FieldDifference) -> [Claim; 2] {
+    let [relative, shape] = effort.select(case.limits[0], case.limits[1]);
     let name = case.name;
     [
         Claim::at_most(format!("{name}: relative error"), found.relative, relative),
@@ -99,7 +102,12 @@ fn claims(case: &Case, effort: Effort, found: Difference) -> [Claim; 2] {
     ]
 }
 
-fn row(case: &Case, runner: &Runner, found: Difference, spot: f64) -> [super::Cell; 8] {
+fn row(
+    case: &KnownLensCase,
+    runner: &GrinOptimizer,
+    found: FieldDifference,
+    spot: f64,
+) -> [super::TableCell; 8] {
     [
         case.name.into(),
         runner.best().nodes().into(),
@@ -108,6 +116,6 @@ fn row(case: &Case, runner: &Runner, found: Difference, spot: f64) -> [super::Ce
         found.offset.into(),
         spot.into(),
         runner.steps().into(),
-        (runner.rays() as f64).into(),
+        (runner.rays_traced() as f64).into(),
     ]
 }

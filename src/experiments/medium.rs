@@ -1,11 +1,11 @@
 //! What experiments on gradient-index fields share: a search with its progress, and pictures of a
 //! field with light in it.
 
-use super::{Ended, Picture, Watch, report};
-use crate::grin::{Field, Ray, Tracer, plan};
-use crate::grin_task::{Medium, Runner, Source, Task};
+use super::{ExperimentError, NamedPlot, ProgressFn, report_progress};
+use crate::grin::{GrinRay, GrinTracer, IndexField, plan_tracing};
+use crate::grin_task::{GrinField, GrinOptimizer, GrinTask, LightSource};
 use crate::math::Vec3;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, GREY, PALETTE, Stroke, grey};
+use crate::picture::{Axis, BLACK, Canvas, Chart, GREY, PALETTE, Stroke, TextAlign, gray_level};
 
 /// Cells along a side of the picture of a section.
 const CELLS: usize = 200;
@@ -16,28 +16,28 @@ const RAYS: usize = 13;
 
 /// Works on a task to its end; it is `from` to `to` of the whole work.
 pub(super) fn solve(
-    task: &Task,
+    task: &GrinTask,
     [from, to]: [f64; 2],
-    watch: &mut Watch<'_>,
-) -> Result<Runner, Ended> {
-    report(watch, from, &task.name)?;
-    let runner = Runner::new(task).map_err(Ended::from_error)?;
-    work(runner, [from, to], watch)
+    watch: &mut ProgressFn<'_>,
+) -> Result<GrinOptimizer, ExperimentError> {
+    report_progress(watch, from, &task.name)?;
+    let runner = GrinOptimizer::new(task).map_err(ExperimentError::from_error)?;
+    solve_from(runner, [from, to], watch)
 }
 
 /// The same for a search that was begun.
-pub(super) fn work(
-    mut runner: Runner,
+pub(super) fn solve_from(
+    mut runner: GrinOptimizer,
     [from, to]: [f64; 2],
-    watch: &mut Watch<'_>,
-) -> Result<Runner, Ended> {
+    watch: &mut ProgressFn<'_>,
+) -> Result<GrinOptimizer, ExperimentError> {
     let name = runner.task().name.clone();
     let mut done = from;
     loop {
-        let progress = runner.step().map_err(Ended::from_error)?;
-        let share = progress.step as f64 / progress.most.max(1) as f64;
+        let progress = runner.step().map_err(ExperimentError::from_error)?;
+        let share = progress.step as f64 / progress.max_steps.max(1) as f64;
         done = if progress.finished { to } else { done.max(from + share.min(1.0) * (to - from)) };
-        report(watch, done, &name)?;
+        report_progress(watch, done, &name)?;
         if progress.finished {
             return Ok(runner);
         }
@@ -46,14 +46,14 @@ pub(super) fn work(
 
 /// A field that was found: its index along the x axis beside the exact one, and a section through
 /// the z axis with light in it.
-pub fn medium_pictures(task: &Task, medium: &Medium) -> Vec<Picture> {
-    let profile = Picture { name: "profile", canvas: profile(task, medium) };
-    vec![profile, Picture { name: "section", canvas: section(task, medium) }]
+pub fn plot_medium(task: &GrinTask, medium: &GrinField) -> Vec<NamedPlot> {
+    let profile = NamedPlot { name: "profile", canvas: plot_profile(task, medium) };
+    vec![profile, NamedPlot { name: "section", canvas: plot_section(task, medium) }]
 }
 
-fn profile(task: &Task, medium: &Medium) -> Canvas {
+fn plot_profile(task: &GrinTask, medium: &GrinField) -> Canvas {
     let size = task.space.corners()[1].x;
-    let along = |field: &dyn Field<f64>| -> Vec<[f64; 2]> {
+    let along = |field: &dyn IndexField<f64>| -> Vec<[f64; 2]> {
         let at = |i: usize| size * (2.0 * i as f64 / POINTS as f64 - 1.0);
         let index = |x: f64| field.sample(Vec3::new(x, 0.0, 0.0)).index;
         (0..=POINTS).map(|i| [at(i), index(at(i))]).collect()
@@ -66,12 +66,12 @@ fn profile(task: &Task, medium: &Medium) -> Canvas {
     let y = Axis::linear("index", found.iter().chain(&exact).map(|p| p[1]));
     let chart = Chart::new([120.0, 110.0], [940.0, 660.0], x, y);
     chart.draw(&mut canvas, &task.name);
-    canvas.curve(&chart.places(&found), PALETTE[0], Stroke::Solid);
-    canvas.curve(&chart.places(&exact), BLACK, Stroke::Dashed);
+    canvas.curve(&chart.to_pixels(&found), PALETTE[0], Stroke::Solid);
+    canvas.curve(&chart.to_pixels(&exact), BLACK, Stroke::Dashed);
     canvas
 }
 
-fn section(task: &Task, medium: &Medium) -> Canvas {
+fn plot_section(task: &GrinTask, medium: &GrinField) -> Canvas {
     let field = medium.field();
     let [low, high] = task.space.corners();
     let region = task.space.region();
@@ -81,10 +81,10 @@ fn section(task: &Task, medium: &Medium) -> Canvas {
     let part = |low: f64, high: f64, i: usize| low + (high - low) * (i as f64 + 0.5) / CELLS as f64;
     let shade = |n: usize| {
         let p = Vec3::new(part(high.x, low.x, n / CELLS), 0.0, part(low.z, high.z, n % CELLS));
-        if region.height(p) >= 0.0 {
+        if region.level(p) >= 0.0 {
             return [0xff; 3];
         }
-        grey(1.0 - 0.7 * (field.sample(p).index - extremes.low) / range)
+        gray_level(1.0 - 0.7 * (field.sample(p).index - extremes.low) / range)
     };
     let colors: Vec<_> = (0..CELLS * CELLS).map(shade).collect();
     let mut canvas = Canvas::new([900, 960]);
@@ -93,9 +93,9 @@ fn section(task: &Task, medium: &Medium) -> Canvas {
         let share = |v: f64, low: f64, high: f64| (v - low) / (high - low);
         [corner[0] + side * share(p.z, low.z, high.z), corner[1] + side * share(p.x, high.x, low.x)]
     };
-    canvas.text([450.0, 30.0], &task.name, BLACK, Align::Middle);
+    canvas.text([450.0, 30.0], &task.name, BLACK, TextAlign::Middle);
     let scale = format!("index {:.4} (light) to {:.4} (dark)", extremes.low, extremes.high);
-    canvas.text([450.0, 66.0], &scale, GREY, Align::Middle);
+    canvas.text([450.0, 66.0], &scale, GREY, TextAlign::Middle);
     canvas.raster(corner, CELLS, 4, &colors);
     for path in paths(task, field) {
         let points: Vec<[f64; 2]> = path.into_iter().map(place).collect();
@@ -105,34 +105,34 @@ fn section(task: &Task, medium: &Medium) -> Canvas {
 }
 
 /// Rays of the first view's kind in the plane of z and x, as points.
-fn paths(task: &Task, field: &dyn Field<f64>) -> Vec<Vec<Vec3<f64>>> {
+fn paths(task: &GrinTask, field: &dyn IndexField<f64>) -> Vec<Vec<Vec3<f64>>> {
     let rays = in_plane(&task.views[0].source, task.space.diameter());
     let region = task.space.region();
-    let Ok(plan) = plan(field, &region, task.launch, &rays, task.tolerance) else {
+    let Ok(plan) = plan_tracing(field, &region, task.launch, &rays, task.tolerance) else {
         return Vec::new();
     };
-    let Ok(tracer) = Tracer::new(field, plan.setup) else { return Vec::new() };
-    let path = |ray: &Ray<f64>| {
-        let (states, exit) = tracer.path(ray);
+    let Ok(tracer) = GrinTracer::new(field, plan.setup) else { return Vec::new() };
+    let path = |ray: &GrinRay<f64>| {
+        let (states, exit) = tracer.trace_path(ray);
         states.into_iter().map(|state| state.x).chain([exit.x]).collect()
     };
     rays.iter().map(path).collect()
 }
 
-fn in_plane(source: &Source, back: f64) -> Vec<Ray<f64>> {
+fn in_plane(source: &LightSource, back: f64) -> Vec<GrinRay<f64>> {
     let share = |i: usize| 2.0 * i as f64 / (RAYS - 1) as f64 - 1.0;
-    let parallel = |height: f64, z: f64| -> Vec<Ray<f64>> {
+    let parallel = |height: f64, z: f64| -> Vec<GrinRay<f64>> {
         let at = |i: usize| Vec3::new(height * share(i), 0.0, z);
-        (0..RAYS).map(|i| Ray { x: at(i), v: Vec3::new(0.0, 0.0, 1.0) }).collect()
+        (0..RAYS).map(|i| GrinRay { x: at(i), v: Vec3::new(0.0, 0.0, 1.0) }).collect()
     };
     match source {
-        Source::Parallel { radius, .. } => parallel(*radius, -back),
-        Source::Beam { half, .. } => parallel(*half, -back),
-        Source::Fan { height, z, .. } => parallel(*height, *z),
-        Source::Points { radius, cone, .. } => {
+        LightSource::Parallel { radius, .. } => parallel(*radius, -back),
+        LightSource::Beam { half, .. } => parallel(*half, -back),
+        LightSource::Fan { height, z, .. } => parallel(*height, *z),
+        LightSource::Points { radius, cone, .. } => {
             let ray = |i: usize| {
                 let (sin, cos) = (cone.to_radians() * share(i)).sin_cos();
-                Ray { x: Vec3::new(0.0, 0.0, -radius), v: Vec3::new(sin, 0.0, cos) }
+                GrinRay { x: Vec3::new(0.0, 0.0, -radius), v: Vec3::new(sin, 0.0, cos) }
             };
             (0..RAYS).map(ray).collect()
         }

@@ -3,7 +3,7 @@
 //!
 //! An [`Experiment`] is a file of this folder and a line in [`ALL`]; it reads no clock, draws its
 //! own pictures and can be stopped between two steps. What it claims are numbers against limits: an
-//! [`Outcome`] in which one of them fails is a failed experiment. After Teh, *Computational Lens
+//! [`ExperimentOutcome`] in which one of them fails is a failed experiment. After Teh, *Computational Lens
 //! Design* (thesis, Carnegie Mellon University), whose figure numbers name the experiments.
 
 mod adjoint_memory;
@@ -27,10 +27,10 @@ mod views;
 mod vignetting;
 mod zoom;
 
-pub use medium::medium_pictures;
-pub use outcome::{Cell, Claim, Outcome, Picture, Rule, Table};
-pub use report::{Part, Report};
-pub use views::view_picture;
+pub use medium::plot_medium;
+pub use outcome::{Claim, ClaimRelation, DataTable, ExperimentOutcome, NamedPlot, TableCell};
+pub use report::{ExperimentReport, PhaseTiming};
+pub use views::plot_view;
 
 use crate::files;
 use crate::lens::Lens;
@@ -77,7 +77,7 @@ pub struct Experiment {
     ///
     /// # Errors
     /// The callback asked it to stop, or there was nothing to work with.
-    pub run: fn(Effort, &mut Watch<'_>) -> Result<Outcome, Ended>,
+    pub run: fn(Effort, &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError>,
 }
 
 /// The experiment of a figure.
@@ -86,11 +86,11 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
 }
 
 /// Gets to know how far an experiment is, and says whether it shall go on.
-pub type Watch<'a> = dyn FnMut(Progress<'_>) -> ControlFlow<()> + 'a;
+pub type ProgressFn<'a> = dyn FnMut(ExperimentProgress<'_>) -> ControlFlow<()> + 'a;
 
 /// How far an experiment is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress<'a> {
+pub struct ExperimentProgress<'a> {
     /// The part that is done, 0 to 1.
     pub done: f64,
     /// What it is doing.
@@ -109,7 +109,7 @@ pub enum Effort {
 
 impl Effort {
     /// One of two numbers: for the figure, or for a test.
-    fn pick<T>(self, full: T, small: T) -> T {
+    fn select<T>(self, full: T, small: T) -> T {
         match self {
             Self::Full => full,
             Self::Small => small,
@@ -119,7 +119,7 @@ impl Effort {
 
 /// Why an experiment has no outcome.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Ended {
+pub enum ExperimentError {
     /// It was asked to stop.
     #[error("stopped")]
     Stopped,
@@ -128,7 +128,7 @@ pub enum Ended {
     Failed(String),
 }
 
-impl Ended {
+impl ExperimentError {
     /// An error of a lower floor.
     fn from_error(error: impl std::fmt::Display) -> Self {
         Self::Failed(error.to_string())
@@ -136,16 +136,21 @@ impl Ended {
 }
 
 /// Tells how far the work is, and ends it where that is wanted.
-fn report(watch: &mut Watch<'_>, done: f64, doing: &str) -> Result<(), Ended> {
-    match watch(Progress { done, doing }) {
+fn report_progress(
+    watch: &mut ProgressFn<'_>,
+    done: f64,
+    doing: &str,
+) -> Result<(), ExperimentError> {
+    match watch(ExperimentProgress { done, doing }) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(Ended::Stopped),
+        ControlFlow::Break(()) => Err(ExperimentError::Stopped),
     }
 }
 
 /// A lens of the library.
-fn lens(name: &str) -> Result<Lens, Ended> {
-    let bundled = files::library().iter().find(|bundled| bundled.name == name);
-    let bundled = bundled.ok_or_else(|| Ended::Failed(format!("no lens `{name}` is bundled")))?;
-    files::native::read(bundled.text, name).map_err(Ended::from_error)
+fn lens(name: &str) -> Result<Lens, ExperimentError> {
+    let bundled = files::bundled_lenses().iter().find(|bundled| bundled.name == name);
+    let bundled =
+        bundled.ok_or_else(|| ExperimentError::Failed(format!("no lens `{name}` is bundled")))?;
+    files::native::read(bundled.text, name).map_err(ExperimentError::from_error)
 }

@@ -7,12 +7,15 @@
 //! the way `s` that the image of the target goes meanwhile, `|sin(π ν s) / (π ν s)|`.
 
 use super::front::{ANGLES, plan};
-use super::trade::{Part, at_angles, focal_length, searched};
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
+use super::trade::{ProgressSpan, focal_length, run_sweep, with_field_angles};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, lens,
+};
 use crate::lens::Lens;
-use crate::optimize::pareto::Design;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke};
-use crate::pupil::{Bench, Region};
+use crate::optimize::pareto::ParetoPoint;
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::pupil::{RayModel, Region};
 use std::f64::consts::PI;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -37,21 +40,21 @@ const COMPARED: f64 = 4.0;
 /// How many times as long the dark lens must be exposed.
 const TIMES: f64 = 2.0;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let start = at_angles(lens(LENS)?, &ANGLES);
-    let part = Part { from: 0.0, to: 1.0, name: "front of sharpness and light" };
-    let designs = searched(&start, &plan(effort), part, watch)?;
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let start = with_field_angles(lens(LENS)?, &ANGLES);
+    let part = ProgressSpan { from: 0.0, to: 1.0, name: "front of sharpness and light" };
+    let designs = run_sweep(&start, &plan(effort), part, watch)?;
     let [Some(bright), Some(dark)] = [designs.get(1), designs.last()] else {
-        return Err(Ended::Failed("no design was found".to_owned()));
+        return Err(ExperimentError::Failed("no design was found".to_owned()));
     };
     let mut rays = 0;
-    let [dark, bright] = [Shot::of(dark, &mut rays)?, Shot::of(bright, &mut rays)?];
+    let [dark, bright] = [Exposure::of(dark, &mut rays)?, Exposure::of(bright, &mut rays)?];
     let times = bright.brightness / dark.brightness;
-    let pair = Pair { dark, bright, times };
-    Ok(Outcome {
+    let pair = ExposurePair { dark, bright, exposure_ratio: times };
+    Ok(ExperimentOutcome {
         claims: pair.claims(),
         tables: vec![pair.lenses(), pair.table()],
-        pictures: vec![Picture { name: "contrast", canvas: pair.draw() }],
+        pictures: vec![NamedPlot { name: "contrast", canvas: pair.draw() }],
         lenses: vec![
             ("darkest".to_owned(), pair.dark.design.lens.clone()),
             ("brightest".to_owned(), pair.bright.design.lens.clone()),
@@ -61,8 +64,8 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
 }
 
 /// A lens that takes a picture.
-struct Shot {
-    design: Design,
+struct Exposure {
+    design: ParetoPoint,
     /// Light per area of the image, in arbitrary units, and its relative error.
     brightness: f64,
     error: f64,
@@ -70,8 +73,8 @@ struct Shot {
     spot: Vec<[f64; 2]>,
 }
 
-impl Shot {
-    fn of(design: &Design, rays: &mut usize) -> Result<Self, Ended> {
+impl Exposure {
+    fn of(design: &ParetoPoint, rays: &mut usize) -> Result<Self, ExperimentError> {
         let focal = focal_length(&design.lens)?;
         let spot = spot(&design.lens, rays)?;
         *rays += design.rays;
@@ -97,19 +100,20 @@ impl Shot {
     }
 }
 
-fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, Ended> {
-    let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
-    let launch = bench.launch(bench.fields[0], bench.primary).map_err(Ended::from_error)?;
+fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, ExperimentError> {
+    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    let launch =
+        bench.launch(bench.fields[0], bench.primary).map_err(ExperimentError::from_error)?;
     let region = Region::new(launch);
     // All azimuths are alike on the axis, and the nodes of one may stand for them: each is turned
     // through half a turn.
-    let lit = region.lit(ORDER);
-    *rays += region.rays + lit.traced;
+    let lit = region.trace_pupil(ORDER);
+    *rays += region.rays + lit.rays_traced;
     let turn = |i: usize| {
         let radius = lit.landed.sink.x[i].hypot(lit.landed.sink.y[i]);
         (0..AZIMUTHS).map(move |k| radius * (PI * (k as f64 + 0.5) / AZIMUTHS as f64).cos())
     };
-    let places = lit.landed.arrived().flat_map(|(i, weight)| turn(i).map(move |x| [x, weight]));
+    let places = lit.landed.arrivals().flat_map(|(i, weight)| turn(i).map(move |x| [x, weight]));
     Ok(places.collect())
 }
 
@@ -117,32 +121,32 @@ fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, Ended> {
 const AZIMUTHS: usize = 32;
 
 /// Both lenses at equal brightness.
-struct Pair {
-    dark: Shot,
-    bright: Shot,
+struct ExposurePair {
+    dark: Exposure,
+    bright: Exposure,
     /// How many times as long the dark one is exposed.
-    times: f64,
+    exposure_ratio: f64,
 }
 
-impl Pair {
+impl ExposurePair {
     /// Contrast of the dark and of the bright lens, standing still and moving.
     fn contrasts(&self, frequency: f64) -> [f64; 4] {
         [
             self.dark.contrast(frequency, 0.0),
             self.bright.contrast(frequency, 0.0),
             self.dark.contrast(frequency, WAY),
-            self.bright.contrast(frequency, WAY / self.times),
+            self.bright.contrast(frequency, WAY / self.exposure_ratio),
         ]
     }
 
     fn claims(&self) -> Vec<Claim> {
         let [dark, bright, moving_dark, moving_bright] = self.contrasts(COMPARED);
-        let error = self.times * (self.dark.error + self.bright.error);
+        let error = self.exposure_ratio * (self.dark.error + self.bright.error);
         let sharper = self.dark.design.spot / self.bright.design.spot;
         vec![
             Claim::at_least(
                 "exposure of the darkest lens over that of the brightest at equal brightness",
-                self.times,
+                self.exposure_ratio,
                 TIMES,
             )
             .with_error(error),
@@ -160,24 +164,25 @@ impl Pair {
         ]
     }
 
-    fn lenses(&self) -> Table {
+    fn lenses(&self) -> DataTable {
         let columns = ["lens", "spot_mm", "light_mm2", "brightness", "exposure"];
-        let mut table = Table::new("lenses", &columns);
-        let shots = [("darkest", &self.dark, self.times), ("brightest", &self.bright, 1.0)];
+        let mut table = DataTable::new("lenses", &columns);
+        let shots =
+            [("darkest", &self.dark, self.exposure_ratio), ("brightest", &self.bright, 1.0)];
         for (name, shot, exposure) in shots {
             let numbers = [shot.design.spot, shot.design.light, shot.brightness, exposure];
-            table.row(std::iter::once(name.into()).chain(numbers.map(Into::into)));
+            table.push_row(std::iter::once(name.into()).chain(numbers.map(Into::into)));
         }
         table
     }
 
-    fn table(&self) -> Table {
+    fn table(&self) -> DataTable {
         let columns =
             ["line_pairs_per_mm", "dark_at_rest", "bright_at_rest", "dark_moving", "bright_moving"];
-        let mut table = Table::new("contrast", &columns);
+        let mut table = DataTable::new("contrast", &columns);
         for frequency in frequencies() {
             let numbers = self.contrasts(frequency);
-            table.row(std::iter::once(frequency.into()).chain(numbers.map(Into::into)));
+            table.push_row(std::iter::once(frequency.into()).chain(numbers.map(Into::into)));
         }
         table
     }
@@ -195,11 +200,11 @@ impl Pair {
             ("brightest, moving", PALETTE[0], Stroke::Solid),
         ];
         for (i, (name, color, stroke)) in kinds.into_iter().enumerate() {
-            let curve = frequencies().map(|f| chart.place([f, self.contrasts(f)[i]]));
+            let curve = frequencies().map(|f| chart.to_pixel([f, self.contrasts(f)[i]]));
             canvas.curve(&curve.collect::<Vec<_>>(), color, stroke);
             let y = 20.0 + 28.0 * i as f64;
             canvas.curve(&[[130.0, y + 7.0], [180.0, y + 7.0]], color, stroke);
-            canvas.text([195.0, y], name, BLACK, Align::Left);
+            canvas.text([195.0, y], name, BLACK, TextAlign::Left);
         }
         canvas
     }

@@ -7,14 +7,14 @@ use std::fmt::{self, Display};
 
 /// What an experiment found.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct Outcome {
+pub struct ExperimentOutcome {
     /// What the figure claims, each with its number.
     pub claims: Vec<Claim>,
     /// The data behind them.
-    pub tables: Vec<Table>,
+    pub tables: Vec<DataTable>,
     /// What they look like; not a part of the JSON.
     #[serde(skip)]
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<NamedPlot>,
     /// The lenses that were found, under names; not a part of the JSON.
     #[serde(skip)]
     pub lenses: Vec<(String, Lens)>,
@@ -22,7 +22,7 @@ pub struct Outcome {
     pub rays: usize,
 }
 
-impl Outcome {
+impl ExperimentOutcome {
     /// The claims that do not hold.
     pub fn failed(&self) -> impl Iterator<Item = &Claim> {
         self.claims.iter().filter(|claim| !claim.holds)
@@ -41,7 +41,7 @@ pub struct Claim {
     /// The unit of all three numbers; empty for a ratio or a count.
     pub unit: &'static str,
     /// How the number must stand to the limit.
-    pub rule: Rule,
+    pub rule: ClaimRelation,
     /// The limit.
     pub limit: f64,
     /// Whether it does, its error counted against it.
@@ -51,7 +51,7 @@ pub struct Claim {
 /// How a number must stand to its limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Rule {
+pub enum ClaimRelation {
     /// Not above it.
     AtMost,
     /// Not below it.
@@ -60,7 +60,7 @@ pub enum Rule {
     Exactly,
 }
 
-impl Display for Rule {
+impl Display for ClaimRelation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::AtMost => "at most",
@@ -73,22 +73,22 @@ impl Display for Rule {
 impl Claim {
     /// A number that may not be above a limit.
     pub fn at_most(says: impl Into<String>, value: f64, limit: f64) -> Self {
-        Self::new(says, value, Rule::AtMost, limit)
+        Self::new(says, value, ClaimRelation::AtMost, limit)
     }
 
     /// A number that may not be below a limit.
     pub fn at_least(says: impl Into<String>, value: f64, limit: f64) -> Self {
-        Self::new(says, value, Rule::AtLeast, limit)
+        Self::new(says, value, ClaimRelation::AtLeast, limit)
     }
 
     /// A number that must be exactly another one.
     pub fn exactly(says: impl Into<String>, value: f64, limit: f64) -> Self {
-        Self::new(says, value, Rule::Exactly, limit)
+        Self::new(says, value, ClaimRelation::Exactly, limit)
     }
 
-    fn new(says: impl Into<String>, value: f64, rule: Rule, limit: f64) -> Self {
+    fn new(says: impl Into<String>, value: f64, rule: ClaimRelation, limit: f64) -> Self {
         let says = says.into();
-        Self { says, value, error: 0.0, unit: "", rule, limit, holds: false }.judged()
+        Self { says, value, error: 0.0, unit: "", rule, limit, holds: false }.check()
     }
 
     /// The same in a unit.
@@ -102,15 +102,15 @@ impl Claim {
     #[must_use]
     pub fn with_error(mut self, error: f64) -> Self {
         self.error = error;
-        self.judged()
+        self.check()
     }
 
-    fn judged(mut self) -> Self {
+    fn check(mut self) -> Self {
         let Self { value, error, limit, .. } = self;
         self.holds = match self.rule {
-            Rule::AtMost => value + error <= limit,
-            Rule::AtLeast => value - error >= limit,
-            Rule::Exactly => value == limit,
+            ClaimRelation::AtMost => value + error <= limit,
+            ClaimRelation::AtLeast => value - error >= limit,
+            ClaimRelation::Exactly => value == limit,
         };
         self
     }
@@ -118,30 +118,30 @@ impl Claim {
 
 /// Rows of numbers and words under names.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Table {
+pub struct DataTable {
     /// What it is called, as a part of a file name.
     pub name: &'static str,
     /// What stands in each column, with its unit: `radius_mm`.
     pub columns: Vec<&'static str>,
     /// The rows, each as long as there are columns.
-    pub rows: Vec<Vec<Cell>>,
+    pub rows: Vec<Vec<TableCell>>,
 }
 
-impl Table {
+impl DataTable {
     /// A table without rows.
     pub fn new(name: &'static str, columns: &[&'static str]) -> Self {
         Self { name, columns: columns.to_vec(), rows: Vec::new() }
     }
 
     /// Adds a row.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub fn push_row(&mut self, cells: impl IntoIterator<Item = TableCell>) {
         self.rows.push(cells.into_iter().collect());
     }
 
     /// The text of a CSV file (RFC 4180).
     pub fn csv(&self) -> String {
         let head = self.columns.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(",");
-        let line = |row: &Vec<Cell>| {
+        let line = |row: &Vec<TableCell>| {
             let cells: Vec<String> = row.iter().map(|cell| quoted(&cell.to_string())).collect();
             cells.join(",")
         };
@@ -161,38 +161,38 @@ fn quoted(text: &str) -> String {
 /// A number or a word.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Cell {
+pub enum TableCell {
     /// A number; written as nothing where it is none.
     Number(f64),
     /// A word.
     Word(String),
 }
 
-impl From<f64> for Cell {
+impl From<f64> for TableCell {
     fn from(value: f64) -> Self {
         Self::Number(value)
     }
 }
 
-impl From<usize> for Cell {
+impl From<usize> for TableCell {
     fn from(value: usize) -> Self {
         Self::Number(value as f64)
     }
 }
 
-impl From<&str> for Cell {
+impl From<&str> for TableCell {
     fn from(text: &str) -> Self {
         Self::Word(text.to_owned())
     }
 }
 
-impl From<String> for Cell {
+impl From<String> for TableCell {
     fn from(text: String) -> Self {
         Self::Word(text)
     }
 }
 
-impl Display for Cell {
+impl Display for TableCell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(value) if value.is_finite() => write!(f, "{value:?}"),
@@ -204,7 +204,7 @@ impl Display for Cell {
 
 /// A picture with its name.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
+pub struct NamedPlot {
     /// What it is called, as a part of a file name.
     pub name: &'static str,
     /// What it looks like.
@@ -227,9 +227,9 @@ mod tests {
 
     #[test]
     fn a_table_becomes_csv() {
-        let mut table = Table::new("t", &["name", "mm"]);
-        table.row(["rim of 3, 4".into(), 0.5.into()]);
-        table.row(["a \"stop\"".into(), f64::NAN.into()]);
+        let mut table = DataTable::new("t", &["name", "mm"]);
+        table.push_row(["rim of 3, 4".into(), 0.5.into()]);
+        table.push_row(["a \"stop\"".into(), f64::NAN.into()]);
         assert_eq!(table.csv(), "name,mm\r\n\"rim of 3, 4\",0.5\r\n\"a \"\"stop\"\"\",\r\n");
     }
 }

@@ -15,12 +15,20 @@
 //! says more about the contrast than about the method: a constant index has 0.0088 of it on the
 //! data of the table at their own scale. Errors in parts of the contrast say what was found.
 
-use super::medium::{medium_pictures, solve};
-use super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report};
-use crate::grin::Field;
-use crate::grin_task::{self, Chords, Directions, Level, Measurement, Medium, Source, Task};
+use super::medium::{plot_medium, solve};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, TableCell, report_progress,
+};
+use crate::grin::IndexField;
+use crate::grin_task::{
+    self, GrinField, GrinTask, LightSource, RefinementLevel, SourceDirections, StraightRays,
+    ViewMeasurement,
+};
 use crate::math::Vec3;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, grey};
+use crate::picture::{
+    Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign, gray_level,
+};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -33,17 +41,17 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 };
 
 /// A task, how many times as strong its plume is, and what table 5.2 prints for other data.
-struct Case {
+struct PlumeCase {
     task: &'static str,
     times: f64,
     printed: [f64; 2],
 }
 
-const CASES: [Case; 4] = [
-    Case { task: "plume", times: 1.0, printed: [0.0014, 0.0110] },
-    Case { task: "plume-10x", times: 10.0, printed: [0.014, 0.113] },
-    Case { task: "plume-100x", times: 100.0, printed: [0.29, 1.28] },
-    Case { task: "plume-1000x", times: 1000.0, printed: [3.8, 19.3] },
+const CASES: [PlumeCase; 4] = [
+    PlumeCase { task: "plume", times: 1.0, printed: [0.0014, 0.0110] },
+    PlumeCase { task: "plume-10x", times: 10.0, printed: [0.014, 0.113] },
+    PlumeCase { task: "plume-100x", times: 100.0, printed: [0.29, 1.28] },
+    PlumeCase { task: "plume-1000x", times: 1000.0, printed: [3.8, 19.3] },
 ];
 
 /// What the error may be where the plume is weakest and strongest, in parts of the contrast.
@@ -60,73 +68,77 @@ const VOXELS: usize = 64;
 /// Cells along a side of the picture of a section.
 const CELLS: usize = 100;
 
-const FEW: &[Level] =
-    &[Level { nodes: 5, steps: 10 }, Level { nodes: 9, steps: 15 }, Level { nodes: 17, steps: 25 }];
+const FEW: &[RefinementLevel] = &[
+    RefinementLevel { nodes: 5, steps: 10 },
+    RefinementLevel { nodes: 9, steps: 15 },
+    RefinementLevel { nodes: 17, steps: 25 },
+];
 
 /// A field with its error.
-struct Found {
-    medium: Medium,
+struct ReconstructedPlume {
+    medium: GrinField,
     error: f64,
     frobenius: f64,
 }
 
 /// What was found at one strength.
-struct Row {
-    case: &'static Case,
-    task: Task,
-    measured: Measurement,
-    adjoint: Found,
-    chords: Found,
+struct PlumeRow {
+    case: &'static PlumeCase,
+    task: GrinTask,
+    measured: ViewMeasurement,
+    adjoint: ReconstructedPlume,
+    chords: ReconstructedPlume,
     /// The error of straight lines after their last step, and the step of the best.
     last: f64,
     step: usize,
-    gradients: Found,
+    gradients: ReconstructedPlume,
     /// What a constant index has.
     constant: f64,
     left_out: usize,
 }
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let cases: Vec<&'static Case> =
-        CASES.iter().filter(|case| effort == Effort::Full || ends(case)).collect();
-    let (mut outcome, mut rows) = (Outcome::default(), Vec::new());
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let cases: Vec<&'static PlumeCase> =
+        CASES.iter().filter(|case| effort == Effort::Full || is_extreme(case)).collect();
+    let (mut outcome, mut rows) = (ExperimentOutcome::default(), Vec::new());
     for (i, case) in cases.iter().enumerate() {
         let at = |part: f64| (i as f64 + part) / cases.len() as f64;
         let task = task(case, effort)?;
         let runner = solve(&task, [at(0.0), at(0.7)], watch)?;
-        outcome.rays += usize::try_from(runner.rays()).unwrap_or(usize::MAX);
-        let judged = runner.judge(runner.best()).map_err(Ended::from_error)?;
-        let left_out = judged.views.iter().map(|v| v.counts.sent() - v.counts.counted()).sum();
+        outcome.rays += usize::try_from(runner.rays_traced()).unwrap_or(usize::MAX);
+        let judged = runner.score(runner.best()).map_err(ExperimentError::from_error)?;
+        let left_out = judged.views.iter().map(|v| v.counts.total() - v.counts.valid()).sum();
         let adjoint = found(&task, runner.best().clone())?;
         rows.push(row(case, task, (adjoint, left_out), effort, at, watch)?);
     }
     outcome.claims = claims(&rows, effort);
     outcome.tables.push(table(&rows));
-    outcome.pictures.push(Picture { name: "errors", canvas: chart(&rows) });
-    outcome.pictures.push(Picture { name: "sections", canvas: sections(&rows) });
+    outcome.pictures.push(NamedPlot { name: "errors", canvas: chart(&rows) });
+    outcome.pictures.push(NamedPlot { name: "sections", canvas: sections(&rows) });
     if let Some(row) = rows.last() {
-        let light = medium_pictures(&row.task, &row.adjoint.medium).into_iter().nth(1);
+        let light = plot_medium(&row.task, &row.adjoint.medium).into_iter().nth(1);
         outcome
             .pictures
-            .extend(light.map(|Picture { canvas, .. }| Picture { name: "light", canvas }));
+            .extend(light.map(|NamedPlot { canvas, .. }| NamedPlot { name: "light", canvas }));
     }
     Ok(outcome)
 }
 
 /// The weakest and the strongest plume.
-fn ends(case: &Case) -> bool {
+fn is_extreme(case: &PlumeCase) -> bool {
     case.times == 1.0 || case.times == 1000.0
 }
 
-fn task(case: &Case, effort: Effort) -> Result<Task, Ended> {
-    let builtin = grin_task::find(case.task);
-    let builtin = builtin.ok_or_else(|| Ended::Failed(format!("no task `{}`", case.task)))?;
-    let mut task = builtin.task().map_err(Ended::from_error)?;
+fn task(case: &PlumeCase, effort: Effort) -> Result<GrinTask, ExperimentError> {
+    let builtin = grin_task::find_builtin(case.task);
+    let builtin =
+        builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.task)))?;
+    let mut task = builtin.task().map_err(ExperimentError::from_error)?;
     if effort == Effort::Small {
         task.levels = FEW.to_vec();
         for view in &mut task.views {
-            if let Source::Parallel { rays, directions, .. } = &mut view.source {
-                (*rays, *directions) = (300, Directions::Around(12));
+            if let LightSource::Parallel { rays, directions, .. } = &mut view.source {
+                (*rays, *directions) = (300, SourceDirections::Around(12));
             }
         }
     }
@@ -135,39 +147,41 @@ fn task(case: &Case, effort: Effort) -> Result<Task, Ended> {
 
 /// What straight lines find, beside what the adjoint found.
 fn row(
-    case: &'static Case,
-    task: Task,
-    (adjoint, left_out): (Found, usize),
+    case: &'static PlumeCase,
+    task: GrinTask,
+    (adjoint, left_out): (ReconstructedPlume, usize),
     effort: Effort,
     at: impl Fn(f64) -> f64,
-    watch: &mut Watch<'_>,
-) -> Result<Row, Ended> {
-    let (nodes, steps) = (adjoint.medium.nodes(), effort.pick(60, 25));
+    watch: &mut ProgressFn<'_>,
+) -> Result<PlumeRow, ExperimentError> {
+    let (nodes, steps) = (adjoint.medium.nodes(), effort.select(60, 25));
     let doing = format!("{}, by straight lines", task.name);
-    report(watch, at(0.7), &doing)?;
-    let chords = Chords::new(&task).map_err(Ended::from_error)?;
-    let (mut best, mut last, mut step): (Option<(f64, Medium)>, _, _) = (None, f64::NAN, 0);
+    report_progress(watch, at(0.7), &doing)?;
+    let chords = StraightRays::new(&task).map_err(ExperimentError::from_error)?;
+    let (mut best, mut last, mut step): (Option<(f64, GrinField)>, _, _) = (None, f64::NAN, 0);
     let (mut count, mut ended) = (0, Ok(()));
-    let visit = |medium: &Medium| {
+    let visit = |medium: &GrinField| {
         count += 1;
         last = error(&task, medium);
         if best.as_ref().is_none_or(|(least, _)| last < *least) {
             (best, step) = (Some((last, medium.clone())), count);
         }
-        ended = report(watch, at(0.7 + 0.2 * count as f64 / steps as f64), &doing);
+        ended = report_progress(watch, at(0.7 + 0.2 * count as f64 / steps as f64), &doing);
         if ended.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     };
-    let end = chords.field(nodes, steps, visit).map_err(Ended::from_error)?;
+    let end = chords.reconstruct(nodes, steps, visit).map_err(ExperimentError::from_error)?;
     ended?;
     let best = best.map_or(end, |(_, medium)| medium);
     let doing = format!("{}, by gradients of straight lines", task.name);
-    report(watch, at(0.9), &doing)?;
-    let gradients = chords.by_gradients(nodes, steps).map_err(Ended::from_error)?;
-    let measured = task.measurements().map_err(Ended::from_error)?.into_iter().next();
-    let even = Medium::first(&task, nodes).map_err(Ended::from_error)?;
-    Ok(Row {
+    report_progress(watch, at(0.9), &doing)?;
+    let gradients =
+        chords.reconstruct_by_gradients(nodes, steps).map_err(ExperimentError::from_error)?;
+    let measured = task.measurements().map_err(ExperimentError::from_error)?.into_iter().next();
+    let even = GrinField::initial(&task, nodes).map_err(ExperimentError::from_error)?;
+    Ok(PlumeRow {
         case,
-        measured: measured.ok_or_else(|| Ended::Failed("nothing is measured".to_owned()))?,
+        measured: measured
+            .ok_or_else(|| ExperimentError::Failed("nothing is measured".to_owned()))?,
         adjoint,
         chords: found(&task, best)?,
         last,
@@ -180,14 +194,15 @@ fn row(
 }
 
 /// The error in parts of the contrast.
-fn error(task: &Task, medium: &Medium) -> f64 {
+fn error(task: &GrinTask, medium: &GrinField) -> f64 {
     let difference = task.difference(medium).ok().flatten();
-    difference.map_or(f64::NAN, |difference| difference.of_contrast)
+    difference.map_or(f64::NAN, |difference| difference.relative_to_contrast)
 }
 
-fn found(task: &Task, medium: Medium) -> Result<Found, Ended> {
-    let exact = task.exact.as_ref().ok_or_else(|| Ended::Failed("no exact field".to_owned()))?;
-    let exact = exact.field::<f64>().map_err(Ended::from_error)?;
+fn found(task: &GrinTask, medium: GrinField) -> Result<ReconstructedPlume, ExperimentError> {
+    let exact =
+        task.exact.as_ref().ok_or_else(|| ExperimentError::Failed("no exact field".to_owned()))?;
+    let exact = exact.field::<f64>().map_err(ExperimentError::from_error)?;
     let [low, high] = task.space.corners();
     let at = |low: f64, high: f64, i: usize| low + (high - low) * i as f64 / (VOXELS - 1) as f64;
     let square = |n: usize| {
@@ -198,10 +213,10 @@ fn found(task: &Task, medium: Medium) -> Result<Found, Ended> {
     };
     let squares: Vec<f64> = (0..VOXELS.pow(3)).into_par_iter().map(square).collect();
     let frobenius = squares.iter().sum::<f64>().sqrt();
-    Ok(Found { error: error(task, &medium), medium, frobenius })
+    Ok(ReconstructedPlume { error: error(task, &medium), medium, frobenius })
 }
 
-fn claims(rows: &[Row], effort: Effort) -> Vec<Claim> {
+fn claims(rows: &[PlumeRow], effort: Effort) -> Vec<Claim> {
     let mut claims = Vec::new();
     for row in rows {
         let name = format!("{} times", row.case.times);
@@ -209,7 +224,7 @@ fn claims(rows: &[Row], effort: Effort) -> Vec<Claim> {
         claims.push(Claim::exactly(says, row.left_out as f64, 0.0));
         let limit = if row.case.times < 1000.0 { WEAK } else { STRONG };
         let says = format!("{name}: error by curved rays, in parts of the contrast");
-        claims.push(Claim::at_most(says, row.adjoint.error, effort.pick(limit, COARSE)));
+        claims.push(Claim::at_most(says, row.adjoint.error, effort.select(limit, COARSE)));
         let worse = row.chords.error.min(row.gradients.error) / row.adjoint.error;
         let says = format!(
             "{name}: error by straight lines, the better of both ways, in times of that by curved rays"
@@ -217,14 +232,14 @@ fn claims(rows: &[Row], effort: Effort) -> Vec<Claim> {
         if row.case.times == 1.0 {
             claims.push(Claim::at_most(says, worse.max(1.0 / worse), TIE));
         } else if row.case.times == 1000.0 {
-            claims.push(Claim::at_least(says, worse, effort.pick(BETTER[0], BETTER[1])));
+            claims.push(Claim::at_least(says, worse, effort.select(BETTER[0], BETTER[1])));
         }
     }
     claims
 }
 
-fn table(rows: &[Row]) -> Table {
-    let mut table = Table::new(
+fn table(rows: &[PlumeRow]) -> DataTable {
+    let mut table = DataTable::new(
         "errors",
         &[
             "times",
@@ -245,10 +260,10 @@ fn table(rows: &[Row]) -> Table {
         ],
     );
     for row in rows {
-        let numbers: [Cell; 15] = [
+        let numbers: [TableCell; 15] = [
             row.case.times.into(),
             row.measured.deflection.to_degrees().into(),
-            row.measured.counts.sent().into(),
+            row.measured.counts.total().into(),
             reasons(row).into(),
             row.adjoint.error.into(),
             row.chords.error.into(),
@@ -262,13 +277,13 @@ fn table(rows: &[Row]) -> Table {
             row.case.printed[0].into(),
             row.case.printed[1].into(),
         ];
-        table.row(numbers);
+        table.push_row(numbers);
     }
     table
 }
 
 /// Which rays are left out, and why.
-fn reasons(row: &Row) -> String {
+fn reasons(row: &PlumeRow) -> String {
     let measured = row.measured.counts.excluded();
     let mut reasons: Vec<String> =
         measured.map(|(reason, count)| format!("{count} {reason} in the measurement")).collect();
@@ -279,15 +294,15 @@ fn reasons(row: &Row) -> String {
 }
 
 /// Each method: its name, and its field of a row.
-type Method = (&'static str, fn(&Row) -> &Found);
+type PlumeMethod = (&'static str, fn(&PlumeRow) -> &ReconstructedPlume);
 
-const METHODS: [Method; 3] = [
+const METHODS: [PlumeMethod; 3] = [
     ("curved rays", |row| &row.adjoint),
     ("straight lines", |row| &row.chords),
     ("their gradients", |row| &row.gradients),
 ];
 
-fn chart(rows: &[Row]) -> Canvas {
+fn chart(rows: &[PlumeRow]) -> Canvas {
     let mut canvas = Canvas::new([1300, 800]);
     let x = Axis::logarithmic("strength, in times", rows.iter().map(|row| row.case.times), 0.1);
     let errors = METHODS.iter().flat_map(|(_, of)| rows.iter().map(|row| of(row).error));
@@ -297,18 +312,18 @@ fn chart(rows: &[Row]) -> Canvas {
     for (i, (name, of)) in METHODS.iter().enumerate() {
         let points: Vec<[f64; 2]> =
             rows.iter().map(|row| [row.case.times, of(row).error]).collect();
-        let places = chart.places(&points);
+        let places = chart.to_pixels(&points);
         canvas.curve(&places, PALETTE[i], Stroke::Solid);
-        canvas.marks(&places, PALETTE[i]);
+        canvas.markers(&places, PALETTE[i]);
         let y = 140.0 + 36.0 * i as f64;
         canvas.curve(&[[1000.0, y], [1050.0, y]], PALETTE[i], Stroke::Solid);
-        canvas.text([1064.0, y - 7.0], name, BLACK, Align::Left);
+        canvas.text([1064.0, y - 7.0], name, BLACK, TextAlign::Left);
     }
     canvas
 }
 
 /// The plume and what each method makes of it, in the plane of x and z.
-fn sections(rows: &[Row]) -> Canvas {
+fn sections(rows: &[PlumeRow]) -> Canvas {
     let (side, top) = (2.0 * CELLS as f64, 70.0);
     let (across, down) = (side + 30.0, side + 50.0);
     let size = [60.0 + 4.0 * across, top + 30.0 + down * rows.len() as f64];
@@ -316,33 +331,33 @@ fn sections(rows: &[Row]) -> Canvas {
     for (k, row) in rows.iter().enumerate() {
         let corner = |column: usize| [40.0 + across * column as f64, top + 34.0 + down * k as f64];
         let title = format!("{} times", row.case.times);
-        canvas.text([corner(0)[0], corner(0)[1] - 26.0], &title, GREY, Align::Left);
+        canvas.text([corner(0)[0], corner(0)[1] - 26.0], &title, GREY, TextAlign::Left);
         let exact = row.task.exact.as_ref().and_then(|exact| exact.field::<f64>().ok());
         let exact = exact.as_deref();
         let found = METHODS.iter().map(|(_, of)| Some(of(row).medium.field()));
         for (column, field) in [exact].into_iter().chain(found).enumerate() {
             if let Some(field) = field {
-                canvas.raster(corner(column), CELLS, 2, &shades(row, field));
+                canvas.raster(corner(column), CELLS, 2, &section_levels(row, field));
             }
         }
     }
     let names = ["the plume"].into_iter().chain(METHODS.iter().map(|(name, _)| *name));
     for (column, name) in names.enumerate() {
         let x = 40.0 + across * column as f64 + 0.5 * side;
-        canvas.text([x, 30.0], name, BLACK, Align::Middle);
+        canvas.text([x, 30.0], name, BLACK, TextAlign::Middle);
     }
     canvas
 }
 
 /// A section, darker where the index is lower: the range of the index allowed is that of the grey.
-fn shades(row: &Row, field: &dyn Field<f64>) -> Vec<Color> {
+fn section_levels(row: &PlumeRow, field: &dyn IndexField<f64>) -> Vec<Color> {
     let [low, high] = row.task.space.corners();
     let limits = row.task.limits;
     let at = |low: f64, high: f64, i: usize| low + (high - low) * (i as f64 + 0.5) / CELLS as f64;
     let shade = |n: usize| {
         let p = Vec3::new(at(low.x, high.x, n % CELLS), 0.0, at(high.z, low.z, n / CELLS));
         let share = (field.sample(p).index - limits.low) / (limits.high - limits.low);
-        grey(0.2 + 0.75 * share.clamp(-0.2, 1.05))
+        gray_level(0.2 + 0.75 * share.clamp(-0.2, 1.05))
     };
     (0..CELLS * CELLS).map(shade).collect()
 }

@@ -1,6 +1,6 @@
 //! An outcome with the experiment that it belongs to: what is printed, shown and written to files.
 
-use super::{Experiment, Outcome};
+use super::{Experiment, ExperimentOutcome};
 use crate::files::{self, FileError, native};
 use serde::Serialize;
 use std::io;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// What a run of an experiment has found.
 #[derive(Debug, Clone, Serialize)]
-pub struct Report {
+pub struct ExperimentReport {
     /// The number of the figure or table.
     pub id: &'static str,
     /// What it is about.
@@ -18,19 +18,19 @@ pub struct Report {
     /// How long it took, in milliseconds.
     pub ms: f64,
     /// How long its parts took, where that was measured.
-    pub parts: Vec<Part>,
+    pub parts: Vec<PhaseTiming>,
     /// Whether all claims hold.
     pub holds: bool,
     /// What it found.
     #[serde(flatten)]
-    pub outcome: Outcome,
+    pub outcome: ExperimentOutcome,
     /// The files that it was written to.
     pub files: Vec<String>,
 }
 
 /// A part of an experiment and how long it took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Part {
+pub struct PhaseTiming {
     /// What it did.
     pub doing: String,
     /// How long, in milliseconds.
@@ -39,9 +39,9 @@ pub struct Part {
     pub processor_ms: Option<f64>,
 }
 
-impl Report {
+impl ExperimentReport {
     /// The report of an experiment that took so long.
-    pub fn new(study: &Experiment, outcome: Outcome, ms: f64) -> Self {
+    pub fn new(study: &Experiment, outcome: ExperimentOutcome, ms: f64) -> Self {
         let Experiment { id, title, claim, .. } = *study;
         let holds = outcome.failed().next().is_none();
         Self { id, title, claim, ms, parts: Vec::new(), holds, outcome, files: Vec::new() }
@@ -57,7 +57,7 @@ impl Report {
         self.files.clear();
         for table in &self.outcome.tables {
             let name = format!("{id}-{}.csv", table.name);
-            files::replace(&folder.join(&name), table.csv().as_bytes())?;
+            files::write_atomic(&folder.join(&name), table.csv().as_bytes())?;
             self.files.push(name);
         }
         for picture in &self.outcome.pictures {
@@ -67,7 +67,7 @@ impl Report {
                 file: file.display().to_string(),
                 source: io::Error::other(error),
             })?;
-            files::replace(&file, &png)?;
+            files::write_atomic(&file, &png)?;
             self.files.push(name);
         }
         for (name, lens) in &self.outcome.lenses {
@@ -77,6 +77,6 @@ impl Report {
         }
         let name = format!("{id}.json");
         self.files.push(name.clone());
-        files::replace(&folder.join(name), native::pretty(self).as_bytes())
+        files::write_atomic(&folder.join(name), native::pretty(self).as_bytes())
     }
 }

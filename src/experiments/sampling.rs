@@ -8,11 +8,14 @@
 //! those from a reservoir of the best, for which it was made. It comes close, within a few
 //! hundredths of the time, only with `C` about 1 and regenerations drawn from the target itself.
 
-use super::histogram::{Grid, distance, surprise, together};
-use super::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, report};
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke, grey};
-use crate::search::clocks::{Clocks, Rate, Regeneration};
-use crate::search::toy::Toy;
+use super::histogram::{HistogramGrid, deviation_in_sigmas, pool, total_variation};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, TableCell, report_progress,
+};
+use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign, gray_level};
+use crate::search::clocks::{CompetingClocks, Regeneration, RegenerationRate};
+use crate::search::toy::ToyLandscape;
 use crate::search::{Landscape as _, Random, Temperature};
 use rand::SeedableRng as _;
 use rayon::prelude::*;
@@ -49,25 +52,25 @@ const UNLIKELY: f64 = 5.0;
 
 /// A process under test.
 #[derive(Debug, Clone, Copy)]
-struct Process {
-    rate: Rate,
+struct SamplingProcess {
+    rate: RegenerationRate,
     regeneration: Regeneration,
 }
 
-impl Process {
+impl SamplingProcess {
     /// All of them for so many singlets, the exact one first and the printed one last.
     fn all(singlets: usize) -> Vec<Self> {
         let exact = EXACT[singlets - 1];
-        let [low, high] = PRINTED.map(Rate::Printed);
+        let [low, high] = PRINTED.map(RegenerationRate::AsPrinted);
         let draw = Regeneration::Draw;
         let list = [
-            (Rate::Exact(exact), draw),
-            (Rate::Undetermined(exact), draw),
+            (RegenerationRate::Exact(exact), draw),
+            (RegenerationRate::WithoutDeterminant(exact), draw),
             (low, draw),
             (high, draw),
             (low, Regeneration::Target),
             (high, Regeneration::Target),
-            (Rate::Behind(PRINTED[1]), RESERVOIR),
+            (RegenerationRate::PreviousStep(PRINTED[1]), RESERVOIR),
             (low, RESERVOIR),
             (high, RESERVOIR),
         ];
@@ -75,16 +78,16 @@ impl Process {
     }
 
     fn is_printed(self) -> bool {
-        matches!(self.rate, Rate::Printed(_) | Rate::Behind(_))
+        matches!(self.rate, RegenerationRate::AsPrinted(_) | RegenerationRate::PreviousStep(_))
     }
 
     /// The rate in words, and `C`.
     fn rate(self) -> (&'static str, f64) {
         match self.rate {
-            Rate::Exact(c) => ("exact (4.11)", c),
-            Rate::Undetermined(c) => ("no determinant (4.13)", c),
-            Rate::Printed(c) => ("printed (4.16)", c),
-            Rate::Behind(c) => ("printed, a step behind", c),
+            RegenerationRate::Exact(c) => ("exact (4.11)", c),
+            RegenerationRate::WithoutDeterminant(c) => ("no determinant (4.13)", c),
+            RegenerationRate::AsPrinted(c) => ("printed (4.16)", c),
+            RegenerationRate::PreviousStep(c) => ("printed, a step behind", c),
         }
     }
 
@@ -99,47 +102,59 @@ impl Process {
 
 /// A toy, its bins, and their shares under the target.
 #[derive(Debug)]
-struct Study {
+struct ToyStudy {
     singlets: usize,
-    toy: Toy,
+    toy: ToyLandscape,
     temperature: Temperature,
-    grid: Grid,
+    grid: HistogramGrid,
     target: Vec<f64>,
 }
 
-impl Study {
-    fn new(singlets: usize) -> Result<Self, Ended> {
-        let toy = if singlets == 1 { Toy::one() } else { Toy::two() };
-        let cold = || Ended::Failed(format!("no temperature is {TEMPERATURE}"));
+impl ToyStudy {
+    fn new(singlets: usize) -> Result<Self, ExperimentError> {
+        let toy =
+            if singlets == 1 { ToyLandscape::one_singlet() } else { ToyLandscape::two_singlets() };
+        let cold = || ExperimentError::Failed(format!("no temperature is {TEMPERATURE}"));
         let temperature = Temperature::new(TEMPERATURE).ok_or_else(cold)?;
-        let grid = Grid { ranges: toy.ranges(singlets), bins: BINS[singlets - 1] };
-        let target = grid.shares(|point| temperature.density(toy.loss(point)));
+        let grid = HistogramGrid { ranges: toy.ranges(singlets), bins: BINS[singlets - 1] };
+        let target = grid.bin_shares(|point| temperature.density(toy.loss(point)));
         Ok(Self { singlets, toy, temperature, grid, target })
     }
 
     /// So many independent chains of so many descents.
-    fn sampled(&self, process: Process, [chains, descents]: [usize; 2]) -> Result<Sampled, Ended> {
+    fn sample(
+        &self,
+        process: SamplingProcess,
+        [chains, descents]: [usize; 2],
+    ) -> Result<ProcessSamples, ExperimentError> {
         let chain = |seed: usize| self.chain(process, seed as u64, descents);
-        let chains: Result<Vec<Chain>, Ended> = (0..chains).into_par_iter().map(chain).collect();
+        let chains: Result<Vec<ChainHistogram>, ExperimentError> =
+            (0..chains).into_par_iter().map(chain).collect();
         let chains = chains?;
         let times: Vec<Vec<f64>> = chains.iter().map(|chain| chain.times.clone()).collect();
         let counts: Vec<Vec<f64>> = chains.iter().map(|chain| chain.counts.clone()).collect();
-        Ok(Sampled {
+        Ok(ProcessSamples {
             process,
             steps: chains.iter().map(|chain| chain.steps).sum(),
             clamped: chains.iter().map(|chain| chain.clamped).sum(),
-            by_time: Judged::new(&times, &self.target),
-            by_count: Judged::new(&counts, &self.target),
+            by_time: TargetComparison::new(&times, &self.target),
+            by_count: TargetComparison::new(&counts, &self.target),
         })
     }
 
-    fn chain(&self, process: Process, seed: u64, descents: usize) -> Result<Chain, Ended> {
+    fn chain(
+        &self,
+        process: SamplingProcess,
+        seed: u64,
+        descents: usize,
+    ) -> Result<ChainHistogram, ExperimentError> {
         let random = Random::seed_from_u64(seed);
-        let Process { rate, regeneration } = process;
-        let clocks = Clocks::new(&self.toy, self.temperature, rate, regeneration, random);
-        let mut clocks = clocks.map_err(Ended::from_error)?;
-        let nothing = || vec![0.0; self.grid.count()];
-        let mut chain = Chain { times: nothing(), counts: nothing(), steps: 0, clamped: 0 };
+        let SamplingProcess { rate, regeneration } = process;
+        let clocks = CompetingClocks::new(&self.toy, self.temperature, rate, regeneration, random);
+        let mut clocks = clocks.map_err(ExperimentError::from_error)?;
+        let nothing = || vec![0.0; self.grid.bin_count()];
+        let mut chain =
+            ChainHistogram { times: nothing(), counts: nothing(), steps: 0, clamped: 0 };
         let mut ended = 0;
         for sample in clocks.by_ref().take(LONGEST) {
             let bin = self.grid.bin(&sample.point);
@@ -151,14 +166,14 @@ impl Study {
                 break;
             }
         }
-        chain.clamped = clocks.clamped();
+        chain.clamped = clocks.clipped_rates();
         Ok(chain)
     }
 }
 
 /// What a chain gave the bins: time and counts.
 #[derive(Debug)]
-struct Chain {
+struct ChainHistogram {
     times: Vec<f64>,
     counts: Vec<f64>,
     steps: usize,
@@ -167,46 +182,46 @@ struct Chain {
 
 /// What all chains of a process gave the bins.
 #[derive(Debug)]
-struct Sampled {
-    process: Process,
+struct ProcessSamples {
+    process: SamplingProcess,
     steps: usize,
     /// How often the rate would have been negative.
     clamped: u64,
-    by_time: Judged,
-    by_count: Judged,
+    by_time: TargetComparison,
+    by_count: TargetComparison,
 }
 
 /// Samples against the target.
 #[derive(Debug)]
-struct Judged {
+struct TargetComparison {
     shares: Vec<f64>,
     /// How unlikely they are, in standard deviations.
-    surprise: f64,
+    sigmas: f64,
     /// Total variation.
     distance: f64,
 }
 
-impl Judged {
+impl TargetComparison {
     fn new(chains: &[Vec<f64>], target: &[f64]) -> Self {
-        let shares = together(chains);
-        let distance = distance(&shares, target);
-        Self { surprise: surprise(chains, target), distance, shares }
+        let shares = pool(chains);
+        let distance = total_variation(&shares, target);
+        Self { sigmas: deviation_in_sigmas(chains, target), distance, shares }
     }
 }
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let work = effort.pick([CHAINS, DESCENTS], [FEW_CHAINS, FEW_DESCENTS]);
-    let mut outcome = Outcome::default();
-    let mut table = Table::new("processes", &COLUMNS);
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let work = effort.select([CHAINS, DESCENTS], [FEW_CHAINS, FEW_DESCENTS]);
+    let mut outcome = ExperimentOutcome::default();
+    let mut table = DataTable::new("processes", &COLUMNS);
     for singlets in [1, 2] {
-        let study = Study::new(singlets)?;
-        let processes = Process::all(singlets);
+        let study = ToyStudy::new(singlets)?;
+        let processes = SamplingProcess::all(singlets);
         let mut found = Vec::new();
         for (i, process) in processes.iter().enumerate() {
             let done = 0.5 * (singlets as f64 - 1.0 + i as f64 / processes.len() as f64);
-            report(watch, done, process.rate().0)?;
-            let sampled = study.sampled(*process, work)?;
-            table.row(row(singlets, &sampled));
+            report_progress(watch, done, process.rate().0)?;
+            let sampled = study.sample(*process, work)?;
+            table.push_row(row(singlets, &sampled));
             // A paraxial ray for every place.
             outcome.rays += sampled.steps;
             found.push(sampled);
@@ -215,7 +230,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
         outcome.tables.push(histogram(&study, &found));
         let canvas = if singlets == 1 { curves(&study, &found) } else { maps(&study, &found) };
         let name = if singlets == 1 { "one_singlet" } else { "two_singlets" };
-        outcome.pictures.push(Picture { name, canvas });
+        outcome.pictures.push(NamedPlot { name, canvas });
     }
     outcome.tables.insert(0, table);
     Ok(outcome)
@@ -234,10 +249,10 @@ const COLUMNS: [&str; 10] = [
     "distance_by_count",
 ];
 
-fn row(singlets: usize, sampled: &Sampled) -> Vec<Cell> {
-    let Sampled { process, steps, clamped, by_time, by_count } = sampled;
+fn row(singlets: usize, sampled: &ProcessSamples) -> Vec<TableCell> {
+    let ProcessSamples { process, steps, clamped, by_time, by_count } = sampled;
     let (rate, constant) = process.rate();
-    let mut cells: Vec<Cell> = vec![
+    let mut cells: Vec<TableCell> = vec![
         singlets.into(),
         rate.into(),
         constant.into(),
@@ -246,17 +261,17 @@ fn row(singlets: usize, sampled: &Sampled) -> Vec<Cell> {
         (*clamped as f64).into(),
     ];
     for judged in [by_time, by_count] {
-        cells.extend([judged.surprise.into(), judged.distance.into()]);
+        cells.extend([judged.sigmas.into(), judged.distance.into()]);
     }
     cells
 }
 
-fn claims(study: &Study, found: &[Sampled]) -> Vec<Claim> {
+fn claims(study: &ToyStudy, found: &[ProcessSamples]) -> Vec<Claim> {
     let says = |what: &str| format!("{} singlets: {what}", study.singlets);
     let exact = &found[0];
     let printed = found.iter().filter(|sampled| sampled.process.is_printed());
     let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
-    let surprise = least(&mut printed.clone().map(|sampled| sampled.by_time.surprise));
+    let surprise = least(&mut printed.clone().map(|sampled| sampled.by_time.sigmas));
     let reservoir = printed.filter(|sampled| sampled.process.regeneration == RESERVOIR);
     let distance = least(&mut reservoir.map(|sampled| sampled.by_time.distance));
     vec![
@@ -265,11 +280,11 @@ fn claims(study: &Study, found: &[Sampled]) -> Vec<Claim> {
             exact.clamped as f64,
             0.0,
         ),
-        Claim::at_most(says("exact rate, surprise by time"), exact.by_time.surprise, LIKELY),
-        Claim::at_least(says("exact rate, surprise by count"), exact.by_count.surprise, UNLIKELY),
+        Claim::at_most(says("exact rate, surprise by time"), exact.by_time.sigmas, LIKELY),
+        Claim::at_least(says("exact rate, surprise by count"), exact.by_count.sigmas, UNLIKELY),
         Claim::at_least(
             says("without the determinant, surprise by time"),
-            found[1].by_time.surprise,
+            found[1].by_time.sigmas,
             UNLIKELY,
         ),
         Claim::at_least(says("printed rate, least surprise by time"), surprise, UNLIKELY),
@@ -282,7 +297,10 @@ fn claims(study: &Study, found: &[Sampled]) -> Vec<Claim> {
 }
 
 /// The histograms that the pictures show: the target, and three samplings of it.
-fn shown<'a>(study: &'a Study, found: &'a [Sampled]) -> [(&'static str, &'a [f64]); 4] {
+fn plotted_histograms<'a>(
+    study: &'a ToyStudy,
+    found: &'a [ProcessSamples],
+) -> [(&'static str, &'a [f64]); 4] {
     let printed = &found[found.len() - 1];
     [
         ("target", &study.target),
@@ -292,22 +310,22 @@ fn shown<'a>(study: &'a Study, found: &'a [Sampled]) -> [(&'static str, &'a [f64
     ]
 }
 
-fn histogram(study: &Study, found: &[Sampled]) -> Table {
+fn histogram(study: &ToyStudy, found: &[ProcessSamples]) -> DataTable {
     let shares = ["target", "exact_by_time", "exact_by_count", "printed_by_time"];
     let places: &[&str] = if study.singlets == 1 { &["gap_mm"] } else { &["gap_mm", "back_mm"] };
     let name = if study.singlets == 1 { "one_singlet" } else { "two_singlets" };
-    let mut table = Table::new(name, &[places, &shares].concat());
-    let shown = shown(study, found);
-    for bin in 0..study.grid.count() {
+    let mut table = DataTable::new(name, &[places, &shares].concat());
+    let shown = plotted_histograms(study, found);
+    for bin in 0..study.grid.bin_count() {
         let shares = shown.iter().map(|(_, shares)| shares[bin]);
-        table.row(study.grid.middle(bin).into_iter().chain(shares).map(Into::into));
+        table.push_row(study.grid.bin_center(bin).into_iter().chain(shares).map(Into::into));
     }
     table
 }
 
-fn curves(study: &Study, found: &[Sampled]) -> Canvas {
+fn curves(study: &ToyStudy, found: &[ProcessSamples]) -> Canvas {
     let mut canvas = Canvas::new([1000, 760]);
-    let shown = shown(study, found);
+    let shown = plotted_histograms(study, found);
     let x = Axis::linear("distance from the sensor, mm", study.toy.alone);
     let shares = shown.iter().flat_map(|(_, shares)| shares.iter().copied());
     let chart =
@@ -316,29 +334,29 @@ fn curves(study: &Study, found: &[Sampled]) -> Canvas {
     for (i, (name, shares)) in shown.into_iter().enumerate() {
         let color = if i == 0 { BLACK } else { PALETTE[i - 1] };
         let stroke = if i == 0 { Stroke::Solid } else { Stroke::Dashed };
-        let place = |bin: usize| [study.grid.middle(bin)[0], shares[bin]];
+        let place = |bin: usize| [study.grid.bin_center(bin)[0], shares[bin]];
         let points: Vec<[f64; 2]> = (0..shares.len()).map(place).collect();
-        canvas.curve(&chart.places(&points), color, stroke);
+        canvas.curve(&chart.to_pixels(&points), color, stroke);
         let y = 20.0 + 26.0 * i as f64;
         canvas.curve(&[[130.0, y + 7.0], [190.0, y + 7.0]], color, stroke);
-        canvas.text([200.0, y], name, BLACK, Align::Left);
+        canvas.text([200.0, y], name, BLACK, TextAlign::Left);
     }
     canvas
 }
 
-fn maps(study: &Study, found: &[Sampled]) -> Canvas {
+fn maps(study: &ToyStudy, found: &[ProcessSamples]) -> Canvas {
     let cell = 48;
     let size = (cell * study.grid.bins) as f64;
     let [gap, back] = study.toy.pair;
     let mut canvas = Canvas::new([2 * (size as u32 + 80), 2 * (size as u32 + 80)]);
     let darkest = study.target.iter().copied().fold(0.0, f64::max);
-    for (i, (name, shares)) in shown(study, found).into_iter().enumerate() {
+    for (i, (name, shares)) in plotted_histograms(study, found).into_iter().enumerate() {
         let corner = [i % 2, i / 2].map(|k| 40.0 + k as f64 * (size + 80.0));
-        canvas.text([corner[0], corner[1] - 24.0], name, BLACK, Align::Left);
-        let tones: Vec<_> = shares.iter().map(|share| grey(1.0 - share / darkest)).collect();
+        canvas.text([corner[0], corner[1] - 24.0], name, BLACK, TextAlign::Left);
+        let tones: Vec<_> = shares.iter().map(|share| gray_level(1.0 - share / darkest)).collect();
         canvas.raster(corner, study.grid.bins, cell, &tones);
         let ends = format!("gap {} to {} mm, down {} to {} mm", gap[0], gap[1], back[0], back[1]);
-        canvas.text([corner[0], corner[1] + size + 6.0], &ends, BLACK, Align::Left);
+        canvas.text([corner[0], corner[1] + size + 6.0], &ends, BLACK, TextAlign::Left);
     }
     canvas
 }

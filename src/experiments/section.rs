@@ -10,13 +10,13 @@ const POINTS: i32 = 24;
 const BLADE: f64 = 1.1;
 
 /// A system in its section through the axis, `z` to the right and `y` upwards, in mm.
-pub(super) struct Section<'a> {
+pub(super) struct SectionPlot<'a> {
     system: &'a System<f64>,
     vertices: Vec<f64>,
     reach: f64,
 }
 
-impl<'a> Section<'a> {
+impl<'a> SectionPlot<'a> {
     pub(super) fn new(system: &'a System<f64>) -> Self {
         let mut z = 0.0;
         let vertices = system.surfaces.iter().map(|surface| {
@@ -45,14 +45,14 @@ impl<'a> Section<'a> {
                 self.draw_blades(canvas, chart, i);
                 continue;
             }
-            canvas.curve(&chart.places(&self.arc(i)), GREY, Stroke::Solid);
+            canvas.curve(&chart.to_pixels(&self.arc(i)), GREY, Stroke::Solid);
             if self.index_behind(i) != 1.0 {
                 self.draw_edges(canvas, chart, i);
             }
         }
         let image = self.vertices[last];
         let ends = [[image, -self.reach], [image, self.reach]];
-        canvas.curve(&chart.places(&ends), BLACK, Stroke::Dashed);
+        canvas.curve(&chart.to_pixels(&ends), BLACK, Stroke::Dashed);
     }
 
     /// Draws the way of a ray, as far as it gets.
@@ -65,12 +65,12 @@ impl<'a> Section<'a> {
         color: Color,
     ) {
         let Some(ray) = launch.ray(p) else { return };
-        let path = launch.color().tracer.path(ray);
+        let path = launch.channel().tracer.path(ray);
         let before = ray.point - ray.direction * self.reach;
         let start = [before.z, before.y];
         let corners = std::iter::once(start).chain(path.points.iter().map(|p| [p.z, p.y]));
         let corners: Vec<[f64; 2]> = corners.collect();
-        for pair in chart.places(&corners).windows(2) {
+        for pair in chart.to_pixels(&corners).windows(2) {
             canvas.line(pair[0], pair[1], color);
         }
     }
@@ -94,7 +94,7 @@ impl<'a> Section<'a> {
         let (left, right) = (self.arc(surface), self.arc(surface + 1));
         for (a, b) in [(left.first(), right.first()), (left.last(), right.last())] {
             if let (Some(a), Some(b)) = (a, b) {
-                canvas.curve(&chart.places(&[*a, *b]), GREY, Stroke::Solid);
+                canvas.curve(&chart.to_pixels(&[*a, *b]), GREY, Stroke::Solid);
             }
         }
     }
@@ -103,9 +103,9 @@ impl<'a> Section<'a> {
         let (opening, z) = (self.system.surfaces[surface].semi_diameter, self.vertices[surface]);
         for side in [-1.0, 1.0] {
             let blade = [[z, side * opening], [z, side * BLADE * self.reach]];
-            let blade = chart.places(&blade);
+            let blade = chart.to_pixels(&blade);
             canvas.curve(&blade, BLACK, Stroke::Solid);
-            canvas.marks(&blade[..1], BLACK);
+            canvas.markers(&blade[..1], BLACK);
         }
     }
 }

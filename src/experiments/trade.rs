@@ -1,33 +1,33 @@
 //! What figures 3.6 to 3.10 share: lenses optimised for sharpness and light at once (3.26), and how
 //! sharp and how bright each of their fields is.
 
-use super::{Cell, Ended, Table, Watch, report};
-use crate::lens::{Aperture, Field, FieldKind, Fields, Lens};
-use crate::merit::{PupilEdge, Term, Weighted};
-use crate::optimize::annealed;
-use crate::optimize::pareto::{Design, Settings, Sweep, composite};
-use crate::pupil::{Bench, Region};
+use super::{DataTable, ExperimentError, ProgressFn, TableCell, report_progress};
+use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens};
+use crate::merit::{PupilEdge, Term, WeightedTerm};
+use crate::optimize::pareto::{ParetoPoint, ParetoSettings, ParetoSweep, weighted_sum_goal};
+use crate::optimize::start_annealed;
+use crate::pupil::{RayModel, Region};
 
 /// Orders of quadrature of the numbers that are shown: the difference is the error.
 const ORDERS: [usize; 2] = [6, 8];
 
 /// The lens in one colour at some angles of field, in degrees.
-pub(super) fn at_angles(mut lens: Lens, angles: &[f64]) -> Lens {
-    lens = in_one_color(lens);
-    let values = angles.iter().map(|y| Field { x: 0.0, y: *y, weight: 1.0 }).collect();
+pub(super) fn with_field_angles(mut lens: Lens, angles: &[f64]) -> Lens {
+    lens = monochromatic(lens);
+    let values = angles.iter().map(|y| FieldPoint { x: 0.0, y: *y, weight: 1.0 }).collect();
     lens.fields = Fields { kind: FieldKind::Angle, values };
     lens
 }
 
 /// The lens at its primary wavelength alone, as the figures have it.
-pub(super) fn in_one_color(mut lens: Lens) -> Lens {
+pub(super) fn monochromatic(mut lens: Lens) -> Lens {
     lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
     lens
 }
 
 /// The same lens with its stop and its rims scaled: how an aperture is chosen for a search that
 /// cannot ask for light.
-pub(super) fn opened(lens: &Lens, factor: f64) -> Lens {
+pub(super) fn with_scaled_aperture(lens: &Lens, factor: f64) -> Lens {
     let mut lens = lens.clone();
     for row in &mut lens.surfaces {
         row.semi_diameter = row.semi_diameter.map(|size| factor * size);
@@ -40,7 +40,7 @@ pub(super) fn opened(lens: &Lens, factor: f64) -> Lens {
 
 /// A search for lenses of ever less weight on their light.
 #[derive(Debug, Clone)]
-pub(super) struct Plan {
+pub(super) struct WeightSweep {
     /// The weights β in mm², the largest first.
     pub(super) betas: Vec<f64>,
     /// Steps of Adam for each.
@@ -55,7 +55,7 @@ pub(super) struct Plan {
 /// clipped early does not come back.
 const LARGEST: f64 = 3e-2;
 
-impl Plan {
+impl WeightSweep {
     /// So many weights over some powers of ten, evenly on a logarithmic scale, by derivatives that
     /// follow the pupils.
     pub(super) fn new(decades: f64, weights: usize, steps: usize) -> Self {
@@ -74,52 +74,54 @@ impl Plan {
 
 /// The part of an experiment that a search is, from one share to another.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Part<'a> {
+pub(super) struct ProgressSpan<'a> {
     pub(super) from: f64,
     pub(super) to: f64,
     pub(super) name: &'a str,
 }
 
 /// How exact the spots of a search are, and those of its designs, relatively.
-const SEARCHED: f64 = 1e-3;
-const JUDGED: f64 = 1e-4;
+const SEARCH_TOLERANCE: f64 = 1e-3;
+const EVALUATION_TOLERANCE: f64 = 1e-4;
 
 /// The lens at the start, limited by its stop and with everything free, and a design for each
 /// weight, the search for each beginning where the one before has led.
-pub(super) fn searched(
+pub(super) fn run_sweep(
     lens: &Lens,
-    plan: &Plan,
-    part: Part<'_>,
-    watch: &mut Watch<'_>,
-) -> Result<Vec<Design>, Ended> {
-    let settings = Settings { rims: plan.rims, pupil: plan.pupil, ..Settings::default() };
-    let start = Sweep::new(lens, &settings).map_err(Ended::from_error)?.start;
-    let goal = composite(&start.lens, start.light, plan.pupil).map_err(Ended::from_error)?;
+    plan: &WeightSweep,
+    part: ProgressSpan<'_>,
+    watch: &mut ProgressFn<'_>,
+) -> Result<Vec<ParetoPoint>, ExperimentError> {
+    let settings =
+        ParetoSettings { rims: plan.rims, pupil: plan.pupil, ..ParetoSettings::default() };
+    let start = ParetoSweep::new(lens, &settings).map_err(ExperimentError::from_error)?.start;
+    let goal = weighted_sum_goal(&start.lens, start.light, plan.pupil)
+        .map_err(ExperimentError::from_error)?;
     let total = (plan.betas.len() * plan.steps) as f64;
     let mut designs = vec![start];
     for (i, beta) in plan.betas.iter().enumerate() {
         let mut goal = goal.clone();
-        goal.terms.push(Weighted { term: Term::Throughput, weight: *beta });
+        goal.terms.push(WeightedTerm { term: Term::Throughput, weight: *beta });
         let begin = &designs[designs.len() - 1].lens;
-        let search = annealed(begin, &goal, SEARCHED, plan.steps);
-        let mut search = search.map_err(Ended::from_error)?;
+        let search = start_annealed(begin, &goal, SEARCH_TOLERANCE, plan.steps);
+        let mut search = search.map_err(ExperimentError::from_error)?;
         for step in 0..plan.steps {
             let done = (i * plan.steps + step) as f64 / total;
-            report(watch, part.from + (part.to - part.from) * done, part.name)?;
+            report_progress(watch, part.from + (part.to - part.from) * done, part.name)?;
             if search.step().finished {
                 break;
             }
         }
-        search.settle();
-        let design = Design::of(search.best(), Some(*beta), JUDGED);
-        designs.push(design.map_err(Ended::from_error)?);
+        search.verify_best();
+        let design = ParetoPoint::evaluate(search.best(), Some(*beta), EVALUATION_TOLERANCE);
+        designs.push(design.map_err(ExperimentError::from_error)?);
     }
     Ok(designs)
 }
 
 /// A field of a lens.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct View {
+pub(super) struct FieldView {
     /// In degrees.
     pub(super) angle: f64,
     /// The area of the pupil in mm², and the root mean square radius of the spot in mm, each with
@@ -129,30 +131,37 @@ pub(super) struct View {
 }
 
 /// Every field of a lens; the rays traced are counted.
-pub(super) fn views(lens: &Lens, rays: &mut usize) -> Result<Vec<View>, Ended> {
-    let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
-    bench.fields.iter().map(|field| view_at(&bench, *field, rays)).collect()
+pub(super) fn field_views(
+    lens: &Lens,
+    rays: &mut usize,
+) -> Result<Vec<FieldView>, ExperimentError> {
+    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    bench.fields.iter().map(|field| field_view(&bench, *field, rays)).collect()
 }
 
 /// The spot and the pupil of a field.
-pub(super) fn view_at(bench: &Bench, field: Field, rays: &mut usize) -> Result<View, Ended> {
-    let launch = bench.launch(field, bench.primary).map_err(Ended::from_error)?;
+pub(super) fn field_view(
+    bench: &RayModel,
+    field: FieldPoint,
+    rays: &mut usize,
+) -> Result<FieldView, ExperimentError> {
+    let launch = bench.launch(field, bench.primary).map_err(ExperimentError::from_error)?;
     let region = Region::new(launch);
     *rays += region.rays;
     let [low, high] = ORDERS.map(|order| {
-        let lit = region.lit(order);
-        *rays += lit.traced;
+        let lit = region.trace_pupil(order);
+        *rays += lit.rays_traced;
         let moments = lit.moments;
         let rms = if moments.area > 0.0 { (moments.spread / moments.area).sqrt() } else { 0.0 };
         [moments.area, rms]
     });
     let number = |i: usize| [high[i], (high[i] - low[i]).abs()];
-    Ok(View { angle: field.y, area: number(0), rms: number(1) })
+    Ok(FieldView { angle: field.y, area: number(0), rms: number(1) })
 }
 
 /// The root of the mean square radius of some spots, in mm, and the mean area of their pupils in
 /// mm².
-pub(super) fn means(views: &[View]) -> [f64; 2] {
+pub(super) fn mean_blur_and_light(views: &[FieldView]) -> [f64; 2] {
     let count = views.len() as f64;
     let square: f64 = views.iter().map(|view| view.rms[0].powi(2)).sum();
     let area: f64 = views.iter().map(|view| view.area[0]).sum();
@@ -160,17 +169,17 @@ pub(super) fn means(views: &[View]) -> [f64; 2] {
 }
 
 /// The focal length of a lens, in mm.
-pub(super) fn focal_length(lens: &Lens) -> Result<f64, Ended> {
-    let bench = Bench::of(lens, 0).map_err(Ended::from_error)?;
-    bench.first.efl.ok_or_else(|| Ended::Failed(format!("{} is afocal", lens.name)))
+pub(super) fn focal_length(lens: &Lens) -> Result<f64, ExperimentError> {
+    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    bench.first_order.efl.ok_or_else(|| ExperimentError::Failed(format!("{} is afocal", lens.name)))
 }
 
 /// A row for each field of each design.
 pub(super) fn table(
     name: &'static str,
-    designs: &[(&str, &Design)],
+    designs: &[(&str, &ParetoPoint)],
     rays: &mut usize,
-) -> Result<Table, Ended> {
+) -> Result<DataTable, ExperimentError> {
     let columns = [
         "design",
         "beta_mm2",
@@ -181,14 +190,14 @@ pub(super) fn table(
         "rms_mm",
         "rms_error_mm",
     ];
-    let mut table = Table::new(name, &columns);
+    let mut table = DataTable::new(name, &columns);
     for (name, design) in designs {
         let beta = design.weight.unwrap_or(f64::NAN);
         let focal = focal_length(&design.lens)?;
-        for view in views(&design.lens, rays)? {
+        for view in field_views(&design.lens, rays)? {
             let numbers = [beta, focal, view.angle].into_iter();
-            let numbers = numbers.chain(view.area).chain(view.rms).map(Cell::from);
-            table.row(std::iter::once((*name).into()).chain(numbers));
+            let numbers = numbers.chain(view.area).chain(view.rms).map(TableCell::from);
+            table.push_row(std::iter::once((*name).into()).chain(numbers));
         }
     }
     Ok(table)

@@ -6,13 +6,19 @@
 //! those that are no less sharp than the biased one.
 
 use super::front::ANGLES;
-use super::trade::{Part, Plan, View, at_angles, means, searched, views};
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
+use super::trade::{
+    FieldView, ProgressSpan, WeightSweep, field_views, mean_blur_and_light, run_sweep,
+    with_field_angles,
+};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, lens,
+};
 use crate::analysis::{Illumination, illumination};
 use crate::lens::{Lens, Parameter, Quantity, Variable};
-use crate::optimize::pareto::Design;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, grey};
-use crate::pupil::{Accuracy, Bench};
+use crate::optimize::pareto::ParetoPoint;
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign, gray_level};
+use crate::pupil::{Accuracy, RayModel};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.9",
@@ -26,31 +32,32 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 const LENS: &str = "double_gauss_rudolph_50";
 /// Fields of the curves, from the axis to the corner.
 const FIELDS: usize = 21;
-const ACCURACY: Accuracy = Accuracy { tolerance: 1e-5, most_rays: 100_000 };
+const ACCURACY: Accuracy = Accuracy { tolerance: 1e-5, max_rays: 100_000 };
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let start = with_its_stop(at_angles(lens(LENS)?, &ANGLES));
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let start = with_fixed_stop(with_field_angles(lens(LENS)?, &ANGLES));
     // Weights near the sharpness of the biased design are enough.
-    let plan = Plan::new(2.0, effort.pick(14, 8), 1200);
-    let part = Part { from: 0.0, to: 0.2, name: "biased gradient" };
-    let without = searched(&start, &plan.biased(), part, watch)?;
-    let part = Part { from: 0.2, to: 1.0, name: "unbiased gradient" };
-    let with = searched(&start, &plan, part, watch)?;
+    let plan = WeightSweep::new(2.0, effort.select(14, 8), 1200);
+    let part = ProgressSpan { from: 0.0, to: 0.2, name: "biased gradient" };
+    let without = run_sweep(&start, &plan.biased(), part, watch)?;
+    let part = ProgressSpan { from: 0.2, to: 1.0, name: "unbiased gradient" };
+    let with = run_sweep(&start, &plan, part, watch)?;
     let mut rays = 0;
-    let biased = Lit::of(&without[without.len() - 1], &mut rays)?;
-    let mut unbiased: Option<Lit> = None;
+    let biased = IlluminatedLens::of(&without[without.len() - 1], &mut rays)?;
+    let mut unbiased: Option<IlluminatedLens> = None;
     for design in with.iter().filter(|design| design.spot <= biased.blur()) {
-        let lit = Lit::of(design, &mut rays)?;
+        let lit = IlluminatedLens::of(design, &mut rays)?;
         if unbiased.as_ref().is_none_or(|best| lit.corner()[0] > best.corner()[0]) {
             unbiased = Some(lit);
         }
     }
-    let none = || Ended::Failed("no unbiased design is as sharp as the biased one".to_owned());
+    let none =
+        || ExperimentError::Failed("no unbiased design is as sharp as the biased one".to_owned());
     let pair = [biased, unbiased.ok_or_else(none)?];
-    Ok(Outcome {
+    Ok(ExperimentOutcome {
         claims: claims(&pair),
         tables: vec![table(&pair)],
-        pictures: vec![Picture { name: "illumination", canvas: draw(&pair) }],
+        pictures: vec![NamedPlot { name: "illumination", canvas: draw(&pair) }],
         lenses: vec![
             ("biased".to_owned(), pair[0].lens.clone()),
             ("unbiased".to_owned(), pair[1].lens.clone()),
@@ -60,7 +67,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
 }
 
 /// The lens with a stop that cannot be opened or closed.
-fn with_its_stop(mut lens: Lens) -> Lens {
+fn with_fixed_stop(mut lens: Lens) -> Lens {
     let stop = lens.stop().and_then(|stop| Some((stop, lens.surfaces[stop].semi_diameter?)));
     if let Some((surface, radius)) = stop {
         let parameter = Parameter::new(surface, Quantity::SemiDiameter);
@@ -71,19 +78,19 @@ fn with_its_stop(mut lens: Lens) -> Lens {
 }
 
 /// A lens with its illumination from the axis to the corner.
-struct Lit {
+struct IlluminatedLens {
     lens: Lens,
-    views: Vec<View>,
+    views: Vec<FieldView>,
     light: Vec<Illumination>,
 }
 
-impl Lit {
-    fn of(design: &Design, rays: &mut usize) -> Result<Self, Ended> {
-        let views = views(&design.lens, rays)?;
+impl IlluminatedLens {
+    fn of(design: &ParetoPoint, rays: &mut usize) -> Result<Self, ExperimentError> {
+        let views = field_views(&design.lens, rays)?;
         let last = ANGLES[ANGLES.len() - 1];
         let angles: Vec<f64> = (0..FIELDS).map(|i| last * i as f64 / (FIELDS - 1) as f64).collect();
-        let bench = Bench::of(&at_angles(design.lens.clone(), &angles), 0);
-        let bench = bench.map_err(Ended::from_error)?;
+        let bench = RayModel::from_lens(&with_field_angles(design.lens.clone(), &angles), 0);
+        let bench = bench.map_err(ExperimentError::from_error)?;
         let light = illumination(&bench, bench.primary, ACCURACY);
         *rays += light.iter().map(|field| field.cone.rays).sum::<usize>();
         Ok(Self { lens: design.lens.clone(), views, light })
@@ -91,7 +98,7 @@ impl Lit {
 
     /// The root of the mean square radius of its spots, in mm.
     fn blur(&self) -> f64 {
-        means(&self.views)[0]
+        mean_blur_and_light(&self.views)[0]
     }
 
     /// The cone of light at a field, in direction cosines, and its error.
@@ -114,7 +121,7 @@ fn ratio([a, da]: [f64; 2], [b, db]: [f64; 2]) -> [f64; 2] {
     [a / b, (da + a / b * db) / b]
 }
 
-fn claims([biased, unbiased]: &[Lit; 2]) -> Vec<Claim> {
+fn claims([biased, unbiased]: &[IlluminatedLens; 2]) -> Vec<Claim> {
     let [sharp, _] = ratio([unbiased.blur(), 0.0], [biased.blur(), 0.0]);
     let [corner, corner_error] = ratio(unbiased.corner(), biased.corner());
     let [axis, axis_error] = ratio(unbiased.cone(0), biased.cone(0));
@@ -135,7 +142,7 @@ fn claims([biased, unbiased]: &[Lit; 2]) -> Vec<Claim> {
     ]
 }
 
-fn table(pair: &[Lit; 2]) -> Table {
+fn table(pair: &[IlluminatedLens; 2]) -> DataTable {
     let columns = [
         "field_deg",
         "biased_cone",
@@ -145,12 +152,12 @@ fn table(pair: &[Lit; 2]) -> Table {
         "biased_relative",
         "unbiased_relative",
     ];
-    let mut table = Table::new("illumination", &columns);
+    let mut table = DataTable::new("illumination", &columns);
     for field in 0..FIELDS {
         let cones = pair.each_ref().map(|lit| lit.cone(field));
         let relative = pair.each_ref().map(|lit| ratio(lit.cone(field), lit.cone(0))[0]);
         let numbers = [pair[0].light[field].field.y].into_iter().chain(cones.concat());
-        table.row(numbers.chain(relative).map(Into::into));
+        table.push_row(numbers.chain(relative).map(Into::into));
     }
     table
 }
@@ -159,7 +166,7 @@ const KINDS: [(&str, Color); 2] =
     [("biased gradient", PALETTE[1]), ("unbiased gradient", PALETTE[0])];
 
 /// Curves over the field, and a white target as both show it from the axis to the corner.
-fn draw(pair: &[Lit; 2]) -> Canvas {
+fn draw(pair: &[IlluminatedLens; 2]) -> Canvas {
     let mut canvas = Canvas::new([1200, 1000]);
     let brightest = pair.iter().map(|lit| lit.cone(0)[0]).fold(0.0, f64::max);
     let x = Axis::linear("field, deg", ANGLES);
@@ -169,17 +176,17 @@ fn draw(pair: &[Lit; 2]) -> Canvas {
     for (i, ((name, color), lit)) in KINDS.into_iter().zip(pair).enumerate() {
         let share = |field: usize| lit.cone(field)[0] / brightest;
         let curve: Vec<[f64; 2]> = (0..FIELDS)
-            .map(|field| chart.place([lit.light[field].field.y, share(field)]))
+            .map(|field| chart.to_pixel([lit.light[field].field.y, share(field)]))
             .collect();
         canvas.curve(&curve, color, Stroke::Solid);
-        canvas.marks(&curve, color);
+        canvas.markers(&curve, color);
         let y = 20.0 + 28.0 * i as f64;
         canvas.curve(&[[130.0, y + 7.0], [180.0, y + 7.0]], color, Stroke::Solid);
-        canvas.text([195.0, y], name, BLACK, Align::Left);
-        let strip: Vec<Color> = (0..FIELDS).map(|field| grey(share(field))).collect();
+        canvas.text([195.0, y], name, BLACK, TextAlign::Left);
+        let strip: Vec<Color> = (0..FIELDS).map(|field| gray_level(share(field))).collect();
         let top = 790.0 + 100.0 * i as f64;
         canvas.raster([120.0, top], FIELDS, 48, &strip);
-        canvas.text([120.0, top + 56.0], name, BLACK, Align::Left);
+        canvas.text([120.0, top + 56.0], name, BLACK, TextAlign::Left);
     }
     canvas
 }

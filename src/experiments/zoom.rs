@@ -5,12 +5,19 @@
 //! there the groups stand on parabolas through their three places, and the image plane in focus, for
 //! the lens at the start and for the better one alike.
 
-use super::trade::{Part, Plan, in_one_color, means, searched, view_at};
-use super::{Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, lens};
-use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, at_zoom, focus_gap};
-use crate::optimize::pareto::Design;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke};
-use crate::pupil::Bench;
+use super::trade::{
+    ProgressSpan, WeightSweep, field_view, mean_blur_and_light, monochromatic, run_sweep,
+};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, lens,
+};
+use crate::lens::{
+    Aperture, FieldKind, FieldPoint, Fields, Lens, at_zoom, paraxial_image_distance,
+};
+use crate::optimize::pareto::ParetoPoint;
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::pupil::RayModel;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.10",
@@ -21,77 +28,87 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 };
 
 /// The positions that are compared: those of the search, and one in the middle between two.
-const PLACES: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
+const POSITIONS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let mut outcome = Outcome::default();
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let mut outcome = ExperimentOutcome::default();
     let lenses = [("nikkor", "zoom_nikkor_28_80"), ("tamron", "zoom_tamron_28_75_f28")];
-    let count = effort.pick(lenses.len(), 1);
+    let count = effort.select(lenses.len(), 1);
     for (i, (name, file)) in lenses.into_iter().take(count).enumerate() {
-        let zoom = in_one_color(lens(file)?);
-        let weights = effort.pick(10, 4);
-        let plan = Plan { rims: [1.0, 1.0], ..Plan::new(4.0, weights, effort.pick(800, 60)) };
+        let zoom = monochromatic(lens(file)?);
+        let weights = effort.select(10, 4);
+        let plan = WeightSweep {
+            rims: [1.0, 1.0],
+            ..WeightSweep::new(4.0, weights, effort.select(800, 60))
+        };
         let [from, to] = [i, i + 1].map(|part| part as f64 / count as f64);
-        let part = Part { from, to, name };
-        let designs = searched(&zoom, &plan, part, watch)?;
-        let before = Range::of(&designs[0].lens, &mut outcome.rays)?;
-        let (lens, after) = best(&designs[1..], &before, &mut outcome.rays)?;
+        let part = ProgressSpan { from, to, name };
+        let designs = run_sweep(&zoom, &plan, part, watch)?;
+        let before = ZoomRange::of(&designs[0].lens, &mut outcome.rays)?;
+        let (lens, after) = best_design(&designs[1..], &before, &mut outcome.rays)?;
         outcome.lenses.push((format!("{name}-optimised"), lens));
         outcome.claims.extend(claims(name, &before, &after));
         outcome.tables.push(table(name, &before, &after));
-        outcome.pictures.push(Picture { name, canvas: draw(name, &before, &after) });
+        outcome.pictures.push(NamedPlot { name, canvas: draw(name, &before, &after) });
     }
     Ok(outcome)
 }
 
 /// A zoom lens at all places.
-struct Range {
+struct ZoomRange {
     /// Blur in mm and light in mm² at every place.
     points: Vec<[f64; 2]>,
     focal_lengths: Vec<f64>,
 }
 
-impl Range {
-    fn of(lens: &Lens, rays: &mut usize) -> Result<Self, Ended> {
+impl ZoomRange {
+    fn of(lens: &Lens, rays: &mut usize) -> Result<Self, ExperimentError> {
         let mut range = Self { points: Vec::new(), focal_lengths: Vec::new() };
-        for place in PLACES {
-            let bench = Bench::of(&between(lens, place)?, 0).map_err(Ended::from_error)?;
-            let views = bench.fields.iter().map(|field| view_at(&bench, *field, rays));
-            range.points.push(means(&views.collect::<Result<Vec<_>, Ended>>()?));
-            range.focal_lengths.push(bench.first.efl.unwrap_or(f64::NAN));
+        for place in POSITIONS {
+            let bench = RayModel::from_lens(&lens_between(lens, place)?, 0)
+                .map_err(ExperimentError::from_error)?;
+            let views = bench.fields.iter().map(|field| field_view(&bench, *field, rays));
+            range
+                .points
+                .push(mean_blur_and_light(&views.collect::<Result<Vec<_>, ExperimentError>>()?));
+            range.focal_lengths.push(bench.first_order.efl.unwrap_or(f64::NAN));
         }
         Ok(range)
     }
 
     /// Blur and light over those of another one, at a place.
-    fn over(&self, other: &Self, i: usize) -> [f64; 2] {
+    fn ratios(&self, other: &Self, i: usize) -> [f64; 2] {
         [0, 1].map(|k| self.points[i][k] / other.points[i][k])
     }
 
     /// How much better it is than another one where it is so least: above 1 where it is better
     /// everywhere.
     fn gain(&self, other: &Self) -> f64 {
-        let least = (0..PLACES.len()).map(|i| {
-            let [blur, light] = self.over(other, i);
-            (1.0 / blur).min(1.0 + GENTLY * (light - 1.0))
+        let least = (0..POSITIONS.len()).map(|i| {
+            let [blur, light] = self.ratios(other, i);
+            (1.0 / blur).min(1.0 + LIGHT_DAMPING * (light - 1.0))
         });
         least.fold(f64::INFINITY, f64::min)
     }
 }
 
 /// How much more a gain in light counts than one in sharpness, when one design is chosen.
-const GENTLY: f64 = 20.0;
+const LIGHT_DAMPING: f64 = 20.0;
 
 /// The design that is better at every place, by the largest margin.
-fn best(designs: &[Design], before: &Range, rays: &mut usize) -> Result<(Lens, Range), Ended> {
-    let mut best: Option<(Lens, Range)> = None;
+fn best_design(
+    designs: &[ParetoPoint],
+    before: &ZoomRange,
+    rays: &mut usize,
+) -> Result<(Lens, ZoomRange), ExperimentError> {
+    let mut best: Option<(Lens, ZoomRange)> = None;
     for design in designs {
-        let range = Range::of(&design.lens, rays)?;
+        let range = ZoomRange::of(&design.lens, rays)?;
         if best.as_ref().is_none_or(|(_, other)| range.gain(before) > other.gain(before)) {
             best = Some((design.lens.clone(), range));
         }
     }
-    best.ok_or_else(|| Ended::Failed("no design was found".to_owned()))
+    best.ok_or_else(|| ExperimentError::Failed("no design was found".to_owned()))
 }
 
 /// The parabola through three values at 0, 1 and 2.
@@ -101,9 +118,9 @@ fn parabola([a, b, c]: [f64; 3], t: f64) -> f64 {
 }
 
 /// The lens at a place of its range, whole numbers for its own positions, as a lens of one position.
-fn between(lens: &Lens, place: f64) -> Result<Lens, Ended> {
+fn lens_between(lens: &Lens, place: f64) -> Result<Lens, ExperimentError> {
     let positions = [0, 1, 2].map(|zoom| at_zoom(lens, zoom));
-    let benches = [0, 1, 2].map(|zoom| Bench::of(&positions[zoom], 0));
+    let benches = [0, 1, 2].map(|zoom| RayModel::from_lens(&positions[zoom], 0));
     let mut single = positions[0].clone();
     for i in 0..single.surfaces.len() {
         let gaps = [0, 1, 2].map(|zoom| positions[zoom].surfaces[i].thickness);
@@ -111,30 +128,32 @@ fn between(lens: &Lens, place: f64) -> Result<Lens, Ended> {
     }
     let (mut behind, mut radii, mut focal) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for (zoom, bench) in benches.into_iter().enumerate() {
-        let bench = bench.map_err(Ended::from_error)?;
-        let system = &bench.colors[bench.primary].system;
+        let bench = bench.map_err(ExperimentError::from_error)?;
+        let system = &bench.channels[bench.primary].system;
         let last = system.surfaces.len() - 2;
-        behind[zoom] = system.surfaces[last].thickness - focus_gap(system, lens.object);
+        behind[zoom] =
+            system.surfaces[last].thickness - paraxial_image_distance(system, lens.object);
         radii[zoom] = bench.stop_radius();
-        focal[zoom] = bench.first.efl.unwrap_or(f64::NAN);
+        focal[zoom] = bench.first_order.efl.unwrap_or(f64::NAN);
     }
     single.aperture = Aperture::StopSemiDiameter(parabola(radii, place));
-    single.focus = Some(parabola(behind, place));
+    single.image_solve = Some(parabola(behind, place));
     // The same corner of the image at every focal length.
-    let height = |field: &Field| focal[0] * field.y.to_radians().tan();
+    let height = |field: &FieldPoint| focal[0] * field.y.to_radians().tan();
     let heights: Vec<f64> = positions[0].fields.values.iter().map(height).collect();
-    let bench = Bench::of(&single, 0).map_err(Ended::from_error)?;
-    let now = bench.first.efl.unwrap_or(f64::NAN);
-    let field = |height: f64| Field { x: 0.0, y: (height / now).atan().to_degrees(), weight: 1.0 };
+    let bench = RayModel::from_lens(&single, 0).map_err(ExperimentError::from_error)?;
+    let now = bench.first_order.efl.unwrap_or(f64::NAN);
+    let field =
+        |height: f64| FieldPoint { x: 0.0, y: (height / now).atan().to_degrees(), weight: 1.0 };
     let values = heights.into_iter().map(field).collect();
     single.fields = Fields { kind: FieldKind::Angle, values };
     Ok(single)
 }
 
-fn claims(name: &str, before: &Range, after: &Range) -> Vec<Claim> {
+fn claims(name: &str, before: &ZoomRange, after: &ZoomRange) -> Vec<Claim> {
     let worst = |searched: bool, k: usize| {
-        let places = (0..PLACES.len()).filter(|i| (PLACES[*i].fract() == 0.0) == searched);
-        let ratios = places.map(|i| after.over(before, i)[k]);
+        let places = (0..POSITIONS.len()).filter(|i| (POSITIONS[*i].fract() == 0.0) == searched);
+        let ratios = places.map(|i| after.ratios(before, i)[k]);
         if k == 0 { ratios.fold(0.0, f64::max) } else { ratios.fold(f64::INFINITY, f64::min) }
     };
     let mut claims = Vec::new();
@@ -153,7 +172,7 @@ fn claims(name: &str, before: &Range, after: &Range) -> Vec<Claim> {
     claims
 }
 
-fn table(name: &'static str, before: &Range, after: &Range) -> Table {
+fn table(name: &'static str, before: &ZoomRange, after: &ZoomRange) -> DataTable {
     let columns = [
         "place",
         "start_focal_length_mm",
@@ -163,22 +182,22 @@ fn table(name: &'static str, before: &Range, after: &Range) -> Table {
         "blur_mm",
         "light_mm2",
     ];
-    let mut table = Table::new(name, &columns);
-    for (i, place) in PLACES.into_iter().enumerate() {
-        let of = |range: &Range| {
+    let mut table = DataTable::new(name, &columns);
+    for (i, place) in POSITIONS.into_iter().enumerate() {
+        let of = |range: &ZoomRange| {
             let [blur, light] = range.points[i];
             [range.focal_lengths[i], blur, light]
         };
         let numbers = std::iter::once(place).chain(of(before)).chain(of(after));
-        table.row(numbers.map(Into::into));
+        table.push_row(numbers.map(Into::into));
     }
     table
 }
 
 /// Blur and light over the focal length, before and after.
-fn draw(name: &str, before: &Range, after: &Range) -> Canvas {
+fn draw(name: &str, before: &ZoomRange, after: &ZoomRange) -> Canvas {
     let mut canvas = Canvas::new([1500, 760]);
-    let ranges: [(&str, &Range, Color); 2] =
+    let ranges: [(&str, &ZoomRange, Color); 2] =
         [("start", before, PALETTE[1]), ("optimised", after, PALETTE[0])];
     let focal = ranges.iter().flat_map(|(_, range, _)| range.focal_lengths.iter().copied());
     let x = Axis::linear("focal length, mm", focal);
@@ -200,12 +219,12 @@ fn draw(name: &str, before: &Range, after: &Range) -> Canvas {
         for (label, range, color) in ranges {
             let places = range.focal_lengths.iter().zip(&range.points);
             let places: Vec<[f64; 2]> =
-                places.map(|(f, point)| chart.place([*f, SCALES[k] * point[k]])).collect();
+                places.map(|(f, point)| chart.to_pixel([*f, SCALES[k] * point[k]])).collect();
             canvas.curve(&places, color, Stroke::Solid);
-            canvas.marks(&places, color);
+            canvas.markers(&places, color);
             let y = if label == "start" { 20.0 } else { 46.0 };
             canvas.curve(&[[120.0, y + 7.0], [170.0, y + 7.0]], color, Stroke::Solid);
-            canvas.text([185.0, y], label, BLACK, Align::Left);
+            canvas.text([185.0, y], label, BLACK, TextAlign::Left);
         }
     }
     canvas

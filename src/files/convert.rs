@@ -1,6 +1,6 @@
 //! From one file to another.
 
-use super::{FileError, Report, SaveReport, SelfCheck};
+use super::{ConversionReport, FileError, SaveReport, SelfCheck};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -10,7 +10,7 @@ use std::path::Path;
 pub struct Conversion {
     /// What became of the lines of a foreign file that was read.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub import: Option<Report>,
+    pub import: Option<ConversionReport>,
     /// The numbers to compare with the program from which it comes.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub checks: Vec<SelfCheck>,

@@ -57,7 +57,7 @@ pub enum FileError {
     #[error(
         "{file}: not saved, since it does not trace like the lens when it is read back: {what}"
     )]
-    NotProven {
+    RoundTripFailed {
         /// The file.
         file: String,
         /// The ray or number that differs.
@@ -65,9 +65,9 @@ pub enum FileError {
     },
 }
 
-/// The parts of [`FileError::Malformed`] that a reader of text knows; the file is added outside.
+/// The parts of [`FileError::ParseError`] that a reader of text knows; the file is added outside.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Malformed {
+pub(super) struct ParseError {
     /// Line and column, or line and surface.
     pub(super) place: String,
     /// What stands there.
@@ -76,8 +76,8 @@ pub(super) struct Malformed {
     pub(super) expected: String,
 }
 
-impl Malformed {
-    pub(super) fn of(self, file: &str) -> FileError {
+impl ParseError {
+    pub(super) fn in_file(self, file: &str) -> FileError {
         let Self { place, found, expected } = self;
         FileError::Malformed { file: file.to_owned(), place, found, expected }
     }

@@ -2,7 +2,7 @@
 
 /// A lens that comes with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bundled {
+pub struct BundledLens {
     /// The name of its file in `lenses/`, without `.json`.
     pub name: &'static str,
     /// What a menu shows.
@@ -12,13 +12,13 @@ pub struct Bundled {
 }
 
 /// Every lens of the folder `lenses/`, the one that opens first in front.
-pub fn library() -> &'static [Bundled] {
+pub fn bundled_lenses() -> &'static [BundledLens] {
     LENSES
 }
 
 macro_rules! lenses {
     ($($name:literal: $title:literal,)*) => {
-        &[$(Bundled {
+        &[$(BundledLens {
             name: $name,
             title: $title,
             text: include_str!(concat!("../../lenses/", $name, ".json")),
@@ -26,7 +26,7 @@ macro_rules! lenses {
     };
 }
 
-const LENSES: &[Bundled] = lenses! {
+const LENSES: &[BundledLens] = lenses! {
     "double_gauss_rudolph_50": "Double Gauss 50 mm f/4.5 (Rudolph)",
     "double_gauss_nikkor_s_50": "Double Gauss 50 mm f/2 (Nikkor-S)",
     "double_gauss_nikkor_s_50_patent": "Double Gauss 50 mm f/1.4 (Nikkor-S, patent)",

@@ -6,13 +6,13 @@ use std::io::Cursor;
 use std::path::Path;
 
 /// Most pixels along a side, and the memory that reading one may take.
-const LONGEST: u32 = 16_384;
-const MOST_BYTES: u64 = 1 << 30;
+const MAX_SIDE: u32 = 16_384;
+const MAX_BYTES: u64 = 1 << 30;
 const EXPECTED: &str = "a picture, PNG or JPEG";
 
 /// A picture in grey.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Photo {
+pub struct GrayscaleImage {
     /// Pixels in a row.
     pub width: usize,
     /// Rows.
@@ -26,7 +26,7 @@ pub struct Photo {
 /// # Errors
 /// A file that cannot be read, that is no picture, a side of more than 16384 pixels, or a picture
 /// without any light.
-pub fn read_photo(path: &Path) -> Result<Photo, FileError> {
+pub fn read_grayscale(path: &Path) -> Result<GrayscaleImage, FileError> {
     let file = path.display().to_string();
     let bytes = std::fs::read(path)
         .map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
@@ -41,13 +41,13 @@ pub fn read_photo(path: &Path) -> Result<Photo, FileError> {
     let no_picture = |says: String| wrong(says, EXPECTED.into());
     let size = reader().map_err(|error| no_picture(error.to_string()))?.into_dimensions();
     let (width, height) = size.map_err(|error| no_picture(error.to_string()))?;
-    if width > LONGEST || height > LONGEST {
-        let expected = format!("at most {LONGEST} pixels along a side");
+    if width > MAX_SIDE || height > MAX_SIDE {
+        let expected = format!("at most {MAX_SIDE} pixels along a side");
         return Err(wrong(format!("{width} x {height} pixels"), expected));
     }
     let mut reader = reader().map_err(|error| no_picture(error.to_string()))?;
     let mut limits = Limits::default();
-    limits.max_alloc = Some(MOST_BYTES);
+    limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
     let grey = reader.decode().map_err(|error| no_picture(error.to_string()))?;
     let grey = grey.into_luma_alpha16();
@@ -56,5 +56,5 @@ pub fn read_photo(path: &Path) -> Result<Photo, FileError> {
     if !light.iter().any(|light| *light > 0.0) {
         return Err(wrong("a black picture".into(), "some light in it".into()));
     }
-    Ok(Photo { width: width as usize, height: height as usize, light })
+    Ok(GrayscaleImage { width: width as usize, height: height as usize, light })
 }

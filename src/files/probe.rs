@@ -2,7 +2,7 @@
 //! pupil, for every field point and zoom position.
 
 use super::FileError;
-use crate::lens::{Field, FieldKind, Lens, LensError, Object, System};
+use crate::lens::{FieldKind, FieldPoint, Lens, LensError, Object, System};
 use crate::math::Vec3;
 use crate::paraxial::{Beam, FirstOrder, first_order};
 use crate::trace::{Fate, Ray, Tracer};
@@ -17,7 +17,7 @@ const TOLERANCE: f64 = 1e-9;
 
 /// That a written file traces like the lens it was written from.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Proof {
+pub struct RoundTripCheck {
     /// How many rays were traced through both.
     pub rays: usize,
     /// How many of them reached the image.
@@ -26,7 +26,7 @@ pub struct Proof {
     pub worst_mm: f64,
 }
 
-impl fmt::Display for Proof {
+impl fmt::Display for RoundTripCheck {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rays, imaged, worst_mm } = self;
         write!(f, "read back and traced: {rays} rays, {imaged} imaged, at most {worst_mm} mm apart")
@@ -35,25 +35,29 @@ impl fmt::Display for Proof {
 
 /// Traces the same rays through a lens and through what was read back of it; `file` is for the
 /// error.
-pub(super) fn prove(lens: &Lens, back: &Lens, file: &str) -> Result<Proof, FileError> {
+pub(super) fn check_round_trip(
+    lens: &Lens,
+    back: &Lens,
+    file: &str,
+) -> Result<RoundTripCheck, FileError> {
     let unusable = |source| FileError::Lens { file: file.to_owned(), source };
-    let mut proof = Proof::default();
+    let mut proof = RoundTripCheck::default();
     // A single configuration is no zoom lens there.
     let positions = lens.zoom_positions();
     if back.zoom_positions() != positions {
         let what = format!("{} zoom positions in place of {positions}", back.zoom_positions());
-        return Err(FileError::NotProven { file: file.to_owned(), what });
+        return Err(FileError::RoundTripFailed { file: file.to_owned(), what });
     }
     for zoom in 0..positions {
         let written = tracers(lens, zoom).map_err(unusable)?;
         let read = tracers(back, zoom).map_err(unusable)?;
-        let launch = Launch::new(lens, zoom).map_err(unusable)?;
+        let launch = ProbeLaunch::new(lens, zoom).map_err(unusable)?;
         for (number, field) in lens.fields_at(zoom).values.iter().enumerate() {
             for (i, ray) in launch.rays(*field).enumerate() {
                 let wave = i % written.len();
                 compare(&written[wave], &read[wave], ray, &mut proof).map_err(|what| {
                     let what = format!("zoom {zoom}, field {number}, ray {i}: {what}");
-                    FileError::NotProven { file: file.to_owned(), what }
+                    FileError::RoundTripFailed { file: file.to_owned(), what }
                 })?;
             }
         }
@@ -63,7 +67,7 @@ pub(super) fn prove(lens: &Lens, back: &Lens, file: &str) -> Result<Proof, FileE
 
 /// One for each wavelength.
 fn tracers(lens: &Lens, zoom: usize) -> Result<Vec<Tracer<f64>>, LensError> {
-    let at = |um| Ok(Tracer::new(&lens.system(zoom, um)?)?);
+    let at = |um| Ok(Tracer::new(&lens.resolve(zoom, um)?)?);
     lens.wavelengths.iter().map(|wave| at(wave.um)).collect()
 }
 
@@ -71,7 +75,7 @@ fn compare(
     written: &Tracer<f64>,
     read: &Tracer<f64>,
     ray: Ray<f64>,
-    proof: &mut Proof,
+    proof: &mut RoundTripCheck,
 ) -> Result<(), String> {
     let (a, b) = (written.trace(ray), read.trace(ray));
     proof.rays += 1;
@@ -89,7 +93,7 @@ fn compare(
 }
 
 /// Where the rays of a field point start.
-struct Launch {
+struct ProbeLaunch {
     object: Object,
     kind: FieldKind,
     data: Option<FirstOrder<f64>>,
@@ -97,10 +101,10 @@ struct Launch {
     pupil: (f64, f64),
 }
 
-impl Launch {
+impl ProbeLaunch {
     fn new(lens: &Lens, zoom: usize) -> Result<Self, LensError> {
-        let system = lens.system(zoom, lens.wavelengths[lens.primary()].um)?;
-        let data = first_order(&system, &Beam::of(lens, zoom)).ok();
+        let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um)?;
+        let data = first_order(&system, &Beam::for_lens(lens, zoom)).ok();
         let pupil = data.as_ref().and_then(|data| {
             let pupil = data.entrance_pupil;
             Some((pupil.position?, 0.5 * pupil.diameter?.abs()))
@@ -113,14 +117,16 @@ impl Launch {
     }
 
     /// The rays of one field point, spread evenly over the pupil.
-    fn rays(&self, field: Field) -> impl Iterator<Item = Ray<f64>> {
+    fn rays(&self, field: FieldPoint) -> impl Iterator<Item = Ray<f64>> {
         let origin = self.origin(field);
-        disc().map(move |(x, y)| {
+        sunflower().map(move |(x, y)| {
             let (z, radius) = self.pupil;
             let target = Vec3::new(x * radius, y * radius, z);
             match origin {
-                Origin::Far(direction) => Ray { point: start(target, direction), direction },
-                Origin::Near(point) => {
+                ProbeOrigin::Far(direction) => {
+                    Ray { point: launch_point(target, direction), direction }
+                }
+                ProbeOrigin::Near(point) => {
                     let way = target - point;
                     let sense = if way.z < 0.0 { -1.0 } else { 1.0 };
                     let direction = way * (sense / way.dot(way).sqrt());
@@ -130,7 +136,7 @@ impl Launch {
         })
     }
 
-    fn origin(&self, field: Field) -> Origin {
+    fn origin(&self, field: FieldPoint) -> ProbeOrigin {
         let focal = self.data.as_ref().and_then(|data| data.efl).unwrap_or(1.0);
         let scale = self.data.as_ref().and_then(|data| data.magnification).unwrap_or(1.0);
         let degrees = std::f64::consts::PI / 180.0;
@@ -140,14 +146,14 @@ impl Launch {
             FieldKind::ImageHeight => (1.0 / focal, Some(1.0 / scale)),
         };
         match (self.object, to_height) {
-            (Object::Infinity, _) => Origin::Far(direction(field, to_angle)),
+            (Object::Infinity, _) => ProbeOrigin::Far(direction(field, to_angle)),
             (Object::Finite(distance), Some(to_height)) => {
-                Origin::Near(Vec3::new(field.x * to_height, field.y * to_height, -distance))
+                ProbeOrigin::Near(Vec3::new(field.x * to_height, field.y * to_height, -distance))
             }
             (Object::Finite(distance), None) => {
                 let (z, _) = self.pupil;
                 let height = |angle: f64| -(angle * degrees).tan() * (distance + z);
-                Origin::Near(Vec3::new(height(field.x), height(field.y), -distance))
+                ProbeOrigin::Near(Vec3::new(height(field.x), height(field.y), -distance))
             }
         }
     }
@@ -155,24 +161,24 @@ impl Launch {
 
 /// Where light comes from: a direction in which it goes, or a point.
 #[derive(Clone, Copy)]
-enum Origin {
+enum ProbeOrigin {
     Far(Vec3<f64>),
     Near(Vec3<f64>),
 }
 
-fn direction(field: Field, to_angle: f64) -> Vec3<f64> {
+fn direction(field: FieldPoint, to_angle: f64) -> Vec3<f64> {
     let angle = field.x.hypot(field.y) * to_angle;
     let share = if angle == 0.0 { 0.0 } else { angle.sin() / field.x.hypot(field.y) };
     Vec3::new(field.x * share, field.y * share, angle.cos())
 }
 
 /// A point on the ray in front of the lens, where it goes forwards at all.
-fn start(target: Vec3<f64>, direction: Vec3<f64>) -> Vec3<f64> {
+fn launch_point(target: Vec3<f64>, direction: Vec3<f64>) -> Vec3<f64> {
     if direction.z < 0.01 { target } else { target - direction * (target.z / direction.z) }
 }
 
 /// Points spread evenly over the unit disc: a sunflower.
-fn disc() -> impl Iterator<Item = (f64, f64)> {
+fn sunflower() -> impl Iterator<Item = (f64, f64)> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     (0..RAYS).map(move |i| {
         let radius = ((i as f64 + 0.5) / RAYS as f64).sqrt();
@@ -207,13 +213,13 @@ pub(super) fn self_checks(lens: &Lens) -> Result<Vec<SelfCheck>, LensError> {
 }
 
 fn self_check(lens: &Lens, zoom: usize) -> Result<SelfCheck, LensError> {
-    let system = lens.system(zoom, lens.wavelengths[lens.primary()].um)?;
-    let launch = Launch::new(lens, zoom)?;
+    let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um)?;
+    let launch = ProbeLaunch::new(lens, zoom)?;
     let tracer = Tracer::new(&system)?;
-    let edge = Beam::of(lens, zoom).edge;
+    let edge = Beam::for_lens(lens, zoom).edge;
     let spot = |share: f64| {
-        let field = Field { x: 0.0, y: share * edge, weight: 1.0 };
-        rms(launch.rays(field).filter_map(|ray| {
+        let field = FieldPoint { x: 0.0, y: share * edge, weight: 1.0 };
+        rms_radius_um(launch.rays(field).filter_map(|ray| {
             let landing = tracer.trace(ray);
             landing.fate.is_imaged().then_some((landing.ray.point.x, landing.ray.point.y))
         }))
@@ -237,7 +243,7 @@ fn track(system: &System<f64>) -> f64 {
 }
 
 /// About the centre of the points, in micrometres for millimetres.
-fn rms(points: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+fn rms_radius_um(points: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     let points: Vec<(f64, f64)> = points.collect();
     let count = points.len() as f64;
     if points.is_empty() {

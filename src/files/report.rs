@@ -6,7 +6,7 @@ use std::fmt;
 /// What became of one line or one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+pub enum ConversionOutcome {
     /// It means something that the other side cannot say; it is lost.
     Dropped,
     /// It is there, but not quite as it was; the note says with what.
@@ -17,7 +17,7 @@ pub enum Outcome {
     Used,
 }
 
-impl Outcome {
+impl ConversionOutcome {
     /// All of them, the one that matters most first.
     pub const ALL: [Self; 4] = [Self::Dropped, Self::Approximated, Self::Preserved, Self::Used];
 
@@ -34,9 +34,9 @@ impl Outcome {
 
 /// One line of the source, or one number of the lens, and what became of it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ReportRow {
+pub struct ConversionRow {
     /// What became of it.
-    pub outcome: Outcome,
+    pub outcome: ConversionOutcome,
     /// Its line in the foreign file, counted from 1; `None` for what has none there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<usize>,
@@ -51,25 +51,25 @@ pub struct ReportRow {
 
 /// What an import or export used, approximated, preserved and dropped.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct Report {
+pub struct ConversionReport {
     /// A row for each line of an import; on export one for whatever is not exact.
-    pub rows: Vec<ReportRow>,
+    pub rows: Vec<ConversionRow>,
 }
 
-impl Report {
+impl ConversionReport {
     /// How many rows ended so.
-    pub fn count(&self, outcome: Outcome) -> usize {
-        self.with(outcome).count()
+    pub fn count(&self, outcome: ConversionOutcome) -> usize {
+        self.rows_with(outcome).count()
     }
 
     /// The rows that ended so.
-    pub fn with(&self, outcome: Outcome) -> impl Iterator<Item = &ReportRow> {
+    pub fn rows_with(&self, outcome: ConversionOutcome) -> impl Iterator<Item = &ConversionRow> {
         self.rows.iter().filter(move |row| row.outcome == outcome)
     }
 
     /// Adds a row that has no line in a file.
-    pub(super) fn add(&mut self, outcome: Outcome, what: &str, note: impl Into<String>) {
-        self.rows.push(ReportRow {
+    pub(super) fn add(&mut self, outcome: ConversionOutcome, what: &str, note: impl Into<String>) {
+        self.rows.push(ConversionRow {
             outcome,
             line: None,
             keyword: what.split_whitespace().next().unwrap_or_default().to_owned(),
@@ -79,7 +79,12 @@ impl Report {
     }
 
     /// Changes what became of a line that was read before.
-    pub(super) fn amend(&mut self, line: usize, outcome: Outcome, note: impl Into<String>) {
+    pub(super) fn amend(
+        &mut self,
+        line: usize,
+        outcome: ConversionOutcome,
+        note: impl Into<String>,
+    ) {
         // An import adds its lines in order, and nothing else.
         if let Ok(found) = self.rows.binary_search_by_key(&Some(line), |row| row.line) {
             self.rows[found].outcome = outcome;
@@ -88,14 +93,14 @@ impl Report {
     }
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for ConversionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, outcome) in Outcome::ALL.into_iter().enumerate() {
+        for (i, outcome) in ConversionOutcome::ALL.into_iter().enumerate() {
             let gap = if i == 0 { "" } else { ", " };
             write!(f, "{gap}{} {}", self.count(outcome), outcome.name())?;
         }
         writeln!(f)?;
-        for row in Outcome::ALL.into_iter().flat_map(|outcome| self.with(outcome)) {
+        for row in ConversionOutcome::ALL.into_iter().flat_map(|outcome| self.rows_with(outcome)) {
             let line = row.line.map(|line| line.to_string()).unwrap_or_default();
             let text: String = row.text.chars().take(60).collect();
             let row = format!("{:<12} {line:>5}  {text:<40}  {}", row.outcome.name(), row.note);
@@ -111,22 +116,22 @@ mod tests {
 
     #[test]
     fn the_table_shows_what_was_lost_first() {
-        let mut report = Report::default();
-        report.rows.push(ReportRow {
-            outcome: Outcome::Used,
+        let mut report = ConversionReport::default();
+        report.rows.push(ConversionRow {
+            outcome: ConversionOutcome::Used,
             line: Some(7),
             keyword: "ENPD".to_owned(),
             text: "ENPD 16".to_owned(),
             note: String::new(),
         });
-        report.add(Outcome::Dropped, "hyper of surface 3", "no such thing there");
+        report.add(ConversionOutcome::Dropped, "hyper of surface 3", "no such thing there");
         let table = report.to_string();
         let lines: Vec<&str> = table.lines().collect();
         assert_eq!(lines[0], "1 dropped, 0 approximated, 0 preserved, 1 used");
         assert!(lines[1].starts_with("dropped") && lines[1].ends_with("no such thing there"));
         assert!(lines[2].contains("    7  ENPD 16"), "{}", lines[2]);
         report.rows.truncate(1);
-        report.amend(7, Outcome::Approximated, "as 15");
-        assert_eq!(report.count(Outcome::Approximated), 1);
+        report.amend(7, ConversionOutcome::Approximated, "as 15");
+        assert_eq!(report.count(ConversionOutcome::Approximated), 1);
     }
 }

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Writes `bytes` to `path`; where that fails, what was there before is untouched.
-pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let unwritable = |source| FileError::Unwritable { file: path.display().to_string(), source };
     // A link keeps pointing where it did: the file behind it is replaced.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    refuse(&target).map_err(unwritable)?;
-    let beside = beside(&target).map_err(unwritable)?;
-    let written = write(&beside, &target, bytes);
+    check_replaceable(&target).map_err(unwritable)?;
+    let beside = temporary_path(&target).map_err(unwritable)?;
+    let written = write_and_rename(&beside, &target, bytes);
     if written.is_err() {
         // The first error is the one that counts.
         drop(fs::remove_file(&beside));
@@ -28,14 +28,14 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     let unwritable = |source| FileError::Unwritable { file: path.display().to_string(), source };
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    refuse(&target).map_err(unwritable)?;
-    let beside = beside(&target).map_err(unwritable)?;
+    check_replaceable(&target).map_err(unwritable)?;
+    let beside = temporary_path(&target).map_err(unwritable)?;
     let made = OpenOptions::new().write(true).create_new(true).open(&beside);
     made.and_then(|_| fs::remove_file(&beside)).map_err(unwritable)
 }
 
 /// Refuses what a rename would replace although it must not be written.
-fn refuse(target: &Path) -> io::Result<()> {
+fn check_replaceable(target: &Path) -> io::Result<()> {
     match fs::metadata(target) {
         Ok(data) if data.is_dir() => Err(io::Error::other("it is a folder")),
         Ok(data) if data.permissions().readonly() => {
@@ -46,7 +46,7 @@ fn refuse(target: &Path) -> io::Result<()> {
 }
 
 /// A name in the same folder that nothing has.
-fn beside(target: &Path) -> io::Result<PathBuf> {
+fn temporary_path(target: &Path) -> io::Result<PathBuf> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = target.file_name().ok_or_else(|| io::Error::other("it has no file name"))?;
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -54,7 +54,7 @@ fn beside(target: &Path) -> io::Result<PathBuf> {
     Ok(target.with_file_name(unique))
 }
 
-fn write(beside: &Path, target: &Path, bytes: &[u8]) -> io::Result<()> {
+fn write_and_rename(beside: &Path, target: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(beside)?;
     file.write_all(bytes)?;
     file.sync_all()?;

@@ -1,6 +1,6 @@
 //! From bytes to text: what encoding it is, and whether it is text at all.
 
-use super::error::Malformed;
+use super::error::ParseError;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 /// What a file is that starts with these bytes, if it is surely no text.
@@ -20,10 +20,10 @@ const SIGNATURES: &[(&[u8], &str)] = &[
 ];
 
 /// Why bytes are no text.
-pub(super) fn not_text(bytes: &[u8]) -> Option<String> {
+pub(super) fn binary_kind(bytes: &[u8]) -> Option<String> {
     let known = SIGNATURES.iter().find(|(signature, _)| bytes.starts_with(signature));
     // Some signatures are letters: only a file with control characters is what they say.
-    let binary = share_of_controls(bytes) > 0.02;
+    let binary = control_share(bytes) > 0.02;
     match known {
         Some((_, what)) if binary => Some((*what).to_owned()),
         None if binary && encoding(bytes).1 == WINDOWS_1252 => Some("binary data".to_owned()),
@@ -32,7 +32,7 @@ pub(super) fn not_text(bytes: &[u8]) -> Option<String> {
     }
 }
 
-fn share_of_controls(bytes: &[u8]) -> f64 {
+fn control_share(bytes: &[u8]) -> f64 {
     let start = &bytes[..bytes.len().min(4096)];
     let control = |b: &&u8| **b < 9 || (14..32).contains(*b) || **b == 127;
     start.iter().filter(control).count() as f64 / start.len().max(1) as f64
@@ -46,18 +46,18 @@ pub(super) fn decode(bytes: &[u8]) -> String {
 }
 
 /// Refuses bytes of an 8-bit code, in which letters mean what each country makes of them.
-pub(super) fn refuse_other_than_unicode(bytes: &[u8]) -> Result<(), Malformed> {
+pub(super) fn require_unicode(bytes: &[u8]) -> Result<(), ParseError> {
     if encoding(bytes).1 != WINDOWS_1252 {
         return Ok(());
     }
     let good = std::str::from_utf8(bytes).map_or_else(|error| error.valid_up_to(), str::len);
     let line = bytes[..good].split(|byte| *byte == b'\n').count();
     let found = format!("the byte {:#04x}", bytes.get(good).copied().unwrap_or_default());
-    Err(Malformed { place: format!("line {line}"), found, expected: "UTF-8 text".to_owned() })
+    Err(ParseError { place: format!("line {line}"), found, expected: "UTF-8 text".to_owned() })
 }
 
 /// UTF-16 in the order of small machines, with its byte order mark.
-pub(super) fn utf16(text: &str) -> Vec<u8> {
+pub(super) fn encode_utf16(text: &str) -> Vec<u8> {
     std::iter::once(0xFEFF).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect()
 }
 
@@ -66,9 +66,9 @@ fn encoding(bytes: &[u8]) -> (usize, &'static Encoding) {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         return (mark, encoding);
     }
-    if zeros(bytes, 1) > 0.3 {
+    if zero_share(bytes, 1) > 0.3 {
         (0, UTF_16LE)
-    } else if zeros(bytes, 0) > 0.3 {
+    } else if zero_share(bytes, 0) > 0.3 {
         (0, UTF_16BE)
     } else if std::str::from_utf8(bytes).is_ok() {
         (0, UTF_8)
@@ -78,7 +78,7 @@ fn encoding(bytes: &[u8]) -> (usize, &'static Encoding) {
 }
 
 /// The share of zeros among every other byte at the start; Latin letters in UTF-16 have them.
-fn zeros(bytes: &[u8], first: usize) -> f64 {
+fn zero_share(bytes: &[u8], first: usize) -> f64 {
     let start = &bytes[..bytes.len().min(400)];
     let half = || start.iter().skip(first).step_by(2);
     half().filter(|byte| **byte == 0).count() as f64 / half().count().max(1) as f64
@@ -109,10 +109,10 @@ mod tests {
     #[test]
     fn pictures_are_no_text_and_letters_are() {
         let picture = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\x02";
-        assert_eq!(not_text(picture).unwrap(), "a PNG picture");
-        assert_eq!(not_text(b"\0\x01\x02\x03\x04\x05\xF0\xF1").unwrap(), "binary data");
-        assert_eq!(not_text(b"").unwrap(), "an empty file");
-        assert_eq!(not_text(b"BMW and MZ are letters"), None);
-        assert_eq!(not_text(&utf16("SURF 0\r\n  STOP\r\n", false, u16::to_le_bytes)), None);
+        assert_eq!(binary_kind(picture).unwrap(), "a PNG picture");
+        assert_eq!(binary_kind(b"\0\x01\x02\x03\x04\x05\xF0\xF1").unwrap(), "binary data");
+        assert_eq!(binary_kind(b"").unwrap(), "an empty file");
+        assert_eq!(binary_kind(b"BMW and MZ are letters"), None);
+        assert_eq!(binary_kind(&utf16("SURF 0\r\n  STOP\r\n", false, u16::to_le_bytes)), None);
     }
 }

@@ -5,18 +5,18 @@
 //! the table; `biased_001.json` … where a front that was found with kept pupils stands beside it.
 
 use crate::files::{self, FileError};
-use crate::optimize::pareto::{Design, Front};
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, GRID, PALETTE, Stroke};
+use crate::optimize::pareto::{Front, ParetoPoint};
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, PALETTE, Stroke, TextAlign};
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// A front with what it is compared to.
 #[derive(Debug, Clone, Copy)]
-pub struct Survey<'a> {
+pub struct ParetoReport<'a> {
     /// What the lens is called.
     pub name: &'a str,
     /// The lens that the search has started from.
-    pub start: &'a Design,
+    pub start: &'a ParetoPoint,
     /// What was found.
     pub front: &'a Front,
     /// Spot in mm and light in mm² of the lenses that were looked at; may be empty.
@@ -37,7 +37,7 @@ const LINE: f64 = 22.0;
 
 /// The area that a front covers, in multiples of the spot of the lens at the start times its
 /// light, against twice that spot.
-pub fn hypervolume(front: &Front, start: &Design) -> f64 {
+pub fn hypervolume(front: &Front, start: &ParetoPoint) -> f64 {
     front.hypervolume(REFERENCE * start.spot, start.light)
 }
 
@@ -46,29 +46,29 @@ pub fn hypervolume(front: &Front, start: &Design) -> f64 {
 ///
 /// # Errors
 /// A folder or a file that cannot be written; what was written before stays.
-pub fn write(survey: &Survey<'_>, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+pub fn write(survey: &ParetoReport<'_>, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let unwritable = |source| FileError::Unwritable { file: folder.display().to_string(), source };
     std::fs::create_dir_all(folder).map_err(unwritable)?;
     let picture = survey.picture().png().map_err(|why| unwritable(io::Error::other(why)))?;
     let mut written = vec![folder.join("front.csv"), folder.join("front.png")];
-    files::replace(&written[1], &picture)?;
+    files::write_atomic(&written[1], &picture)?;
     for (name, design) in survey.lenses() {
         let path = folder.join(name);
         files::save(&design.lens, &path)?;
         written.push(path);
     }
     // The table names the other files: it comes when they are there.
-    files::replace(&written[0], survey.table().as_bytes())?;
+    files::write_atomic(&written[0], survey.table().as_bytes())?;
     Ok(written)
 }
 
-impl Survey<'_> {
+impl ParetoReport<'_> {
     /// The numbers as comma-separated values, a line for every lens: the start, the front, the
     /// biased front. The lens at the start has no weight.
     pub fn table(&self) -> String {
         let mut text = HEAD.to_owned();
         for (file, design) in self.lenses() {
-            let Design { spot, spot_error, light, light_error, rays, .. } = design;
+            let ParetoPoint { spot, spot_error, light, light_error, rays, .. } = design;
             let weight = design.weight.map(|weight| weight.to_string()).unwrap_or_default();
             let numbers = format!("{spot},{spot_error},{light},{light_error},{weight},{rays}");
             text.extend([numbers.as_str(), ",", file.as_str(), "\n"]);
@@ -77,10 +77,10 @@ impl Survey<'_> {
     }
 
     /// Every lens with the name of its file.
-    fn lenses(&self) -> Vec<(String, &Design)> {
-        let biased = self.biased.map_or(&[][..], Front::designs);
+    fn lenses(&self) -> Vec<(String, &ParetoPoint)> {
+        let biased = self.biased.map_or(&[][..], Front::points);
         let mut all = vec![("start.json".to_owned(), self.start)];
-        for (set, designs) in [("front", self.front.designs()), ("biased", biased)] {
+        for (set, designs) in [("front", self.front.points()), ("biased", biased)] {
             let name = |i: usize| format!("{set}_{:03}.json", i + 1);
             all.extend(designs.iter().enumerate().map(|(i, design)| (name(i), design)));
         }
@@ -90,22 +90,22 @@ impl Survey<'_> {
     /// Spot against light: the front over all that was tried, and the biased front in grey.
     pub fn picture(&self) -> Canvas {
         let mut canvas = Canvas::new(SIZE);
-        let (front, start) = (places(self.front.designs()), place(self.start));
-        let biased = places(self.biased.map_or(&[], Front::designs));
+        let (front, start) = (places(self.front.points()), place(self.start));
+        let biased = places(self.biased.map_or(&[], Front::points));
         let chart = chart(&[&front, &biased, &[start]]);
         chart.draw(&mut canvas, &format!("Sharpness against light: {}", self.name));
         for [spot, light] in self.tried {
             let at = [*light, 1e3 * spot];
-            if chart.holds(at) {
-                canvas.square(chart.place(at), 1, GRID);
+            if chart.contains(at) {
+                canvas.square(chart.to_pixel(at), 1, GRID);
             }
         }
         for (points, color) in [(&biased, GREY), (&front, PALETTE[1])] {
-            let points = chart.places(points);
+            let points = chart.to_pixels(points);
             canvas.curve(&points, color, Stroke::Solid);
-            canvas.marks(&points, color);
+            canvas.markers(&points, color);
         }
-        canvas.marks(&chart.places(&[start]), BLACK);
+        canvas.markers(&chart.to_pixels(&[start]), BLACK);
         self.legend(&mut canvas);
         canvas
     }
@@ -120,7 +120,7 @@ impl Survey<'_> {
         for (i, (text, color)) in lines.iter().enumerate() {
             let y = MARGINS[1] + 12.0 + LINE * i as f64;
             canvas.square([MARGINS[0] + 18.0, y + 7.0], 4, *color);
-            canvas.text([MARGINS[0] + 32.0, y], text, BLACK, Align::Left);
+            canvas.text([MARGINS[0] + 32.0, y], text, BLACK, TextAlign::Left);
         }
     }
 }
@@ -136,10 +136,10 @@ fn chart(shown: &[&[[f64; 2]]]) -> Chart {
 }
 
 /// Light in mm² and spot in µm.
-fn place(design: &Design) -> [f64; 2] {
+fn place(design: &ParetoPoint) -> [f64; 2] {
     [design.light, 1e3 * design.spot]
 }
 
-fn places(designs: &[Design]) -> Vec<[f64; 2]> {
+fn places(designs: &[ParetoPoint]) -> Vec<[f64; 2]> {
     designs.iter().map(place).collect()
 }

@@ -12,20 +12,20 @@
 //! thesis for any list of drifts and kicks (its Algorithm 3 accumulates after `μ` has changed and
 //! lacks the factor `h`).
 
-use super::exit::{Entry, Exit};
-use super::fate::Fate;
-use super::field::{Field, Samples};
-use super::integrator::Op;
-use super::lanes::{Column, Columns, LANES, get, put};
-use super::tracer::{Ray, Tracer, drift};
+use super::exit::{RayExit, RegionEntry};
+use super::fate::GrinFate;
+use super::field::{IndexField, IndexSamples};
+use super::integrator::IntegratorOp;
+use super::lanes::{LANES, LaneScalars, LaneVectors, get, put};
+use super::tracer::{GrinRay, GrinTracer, drift};
 use crate::math::Real;
+use crate::math::SimdWidth;
 use crate::math::Vec3;
-use crate::math::Width;
-use crate::math::widest;
+use crate::math::run_vectorized;
 
 /// The derivative of a loss by a ray's position, velocity and optical path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Seed<R> {
+pub struct RayAdjoint<R> {
     /// By the position.
     pub x: Vec3<R>,
     /// By the velocity.
@@ -34,7 +34,7 @@ pub struct Seed<R> {
     pub path: R,
 }
 
-impl<R: Real> Seed<R> {
+impl<R: Real> RayAdjoint<R> {
     pub(super) fn is_finite(&self) -> bool {
         self.x.is_finite() && self.v.is_finite() && self.path.is_finite()
     }
@@ -43,161 +43,162 @@ impl<R: Real> Seed<R> {
 /// Rays side by side on their way back; a column begins where a line of the cache does.
 #[derive(Clone, Default)]
 #[repr(C, align(64))]
-struct Block<R> {
-    x: Columns<R>,
-    v: Columns<R>,
+struct BackwardBlock<R> {
+    x: LaneVectors<R>,
+    v: LaneVectors<R>,
     /// `λ`.
-    by_x: Columns<R>,
+    by_x: LaneVectors<R>,
     /// `μ`.
-    by_v: Columns<R>,
-    by_path: Column<R>,
+    by_v: LaneVectors<R>,
+    by_path: LaneScalars<R>,
     /// The length of the step to be undone: 0 for an empty seat.
-    h: Column<R>,
+    h: LaneScalars<R>,
     /// At which step of the block the ray is back.
-    due: [u64; LANES],
+    due_step: [u64; LANES],
     /// Which ray sits here.
-    seat: [Option<usize>; LANES],
+    ray: [Option<usize>; LANES],
 }
 
 /// Room for what a kick needs.
 #[repr(C, align(64))]
-struct Scratch<R> {
-    samples: Samples<R>,
+struct KickScratch<R> {
+    samples: IndexSamples<R>,
     /// `Hess(η) μ`.
-    bent: Columns<R>,
+    hessian_product: LaneVectors<R>,
     /// What goes to the parameters with `∂η/∂θ`, and with `∂∇η/∂θ`.
-    weight: Column<R>,
-    pull: Columns<R>,
+    weight: LaneScalars<R>,
+    pull: LaneVectors<R>,
 }
 
-impl<R: Real> Default for Scratch<R> {
+impl<R: Real> Default for KickScratch<R> {
     fn default() -> Self {
-        let (samples, bent, pull) = (Samples::default(), Columns::default(), Columns::default());
-        Self { samples, bent, weight: [R::ZERO; LANES], pull }
+        let (samples, bent, pull) =
+            (IndexSamples::default(), LaneVectors::default(), LaneVectors::default());
+        Self { samples, hessian_product: bent, weight: [R::ZERO; LANES], pull }
     }
 }
 
-impl<R: Real> Block<R> {
-    fn board(&mut self, lane: usize, ray: usize, exit: &Exit<R>, seed: &Seed<R>) {
-        put(&mut self.x, lane, exit.landing.state.x);
-        put(&mut self.v, lane, exit.landing.state.v);
+impl<R: Real> BackwardBlock<R> {
+    fn load_lane(&mut self, lane: usize, ray: usize, exit: &RayExit<R>, seed: &RayAdjoint<R>) {
+        put(&mut self.x, lane, exit.record.state.x);
+        put(&mut self.v, lane, exit.record.state.v);
         put(&mut self.by_x, lane, seed.x);
         put(&mut self.by_v, lane, seed.v);
         self.by_path[lane] = seed.path;
-        self.h[lane] = exit.landing.last;
-        self.seat[lane] = Some(ray);
+        self.h[lane] = exit.record.last;
+        self.ray[lane] = Some(ray);
     }
 
     /// Empties a seat; what was not finite must not stay, since it would survive a step of 0.
-    fn leave(&mut self, lane: usize) {
+    fn clear_lane(&mut self, lane: usize) {
         for columns in [&mut self.x, &mut self.v, &mut self.by_x, &mut self.by_v] {
             put(columns, lane, Vec3::default());
         }
         self.by_path[lane] = R::ZERO;
         self.h[lane] = R::ZERO;
-        self.due[lane] = u64::MAX;
-        self.seat[lane] = None;
+        self.due_step[lane] = u64::MAX;
+        self.ray[lane] = None;
     }
 
     /// Gives every ray on its way a whole step.
-    fn go_on(&mut self, step: R) {
-        for (h, due) in self.h.iter_mut().zip(&self.due) {
+    fn set_full_step(&mut self, step: R) {
+        for (h, due) in self.h.iter_mut().zip(&self.due_step) {
             *h = R::select(*due == u64::MAX, R::ZERO, step);
         }
     }
 
-    fn earliest(&self) -> u64 {
-        self.due.into_iter().min().unwrap_or(u64::MAX)
+    fn earliest_due(&self) -> u64 {
+        self.due_step.into_iter().min().unwrap_or(u64::MAX)
     }
 
-    fn seed(&self, lane: usize) -> Seed<R> {
-        Seed { x: get(&self.by_x, lane), v: get(&self.by_v, lane), path: self.by_path[lane] }
+    fn adjoint(&self, lane: usize) -> RayAdjoint<R> {
+        RayAdjoint { x: get(&self.by_x, lane), v: get(&self.by_v, lane), path: self.by_path[lane] }
     }
 }
 
 /// One chunk of rays with what is known of them.
 pub(super) struct Chunk<'a, R> {
-    pub(super) rays: &'a [Ray<R>],
-    pub(super) exits: &'a mut [Exit<R>],
-    pub(super) seeds: &'a [Seed<R>],
+    pub(super) rays: &'a [GrinRay<R>],
+    pub(super) exits: &'a mut [RayExit<R>],
+    pub(super) seeds: &'a [RayAdjoint<R>],
     /// The gradient by the start of each ray.
-    pub(super) starts: &'a mut [Seed<R>],
+    pub(super) starts: &'a mut [RayAdjoint<R>],
 }
 
 /// What retracing a chunk showed.
 #[derive(Default)]
-pub(super) struct Retraced {
+pub(super) struct RetraceResult {
     /// The largest distance between a start and where the way back ended, in steps.
-    pub(super) worst: f64,
+    pub(super) largest_error: f64,
     /// How many rays turned out to have no gradient; what they deposited must be thrown away.
-    pub(super) lost: usize,
+    pub(super) lost_rays: usize,
 }
 
-impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
+impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     /// Traces the rays of a chunk backwards and adds to the gradient by the parameters.
-    pub(super) fn retrace(&self, chunk: &mut Chunk<'_, R>, gradient: &mut [R]) -> Retraced {
-        let (mut block, mut scratch) = (Block::default(), Scratch::default());
+    pub(super) fn retrace(&self, chunk: &mut Chunk<'_, R>, gradient: &mut [R]) -> RetraceResult {
+        let (mut block, mut scratch) = (BackwardBlock::default(), KickScratch::default());
         let (mut queue, mut clock) = (0..chunk.rays.len(), 0);
-        let mut retraced = Retraced::default();
+        let mut retraced = RetraceResult::default();
         for lane in 0..LANES {
-            self.fill_back(&mut block, lane, (&mut queue, clock), chunk);
+            self.refill_backward(&mut block, lane, (&mut queue, clock), chunk);
         }
-        let mut soonest = block.earliest();
+        let mut soonest = block.earliest_due();
         let mut boarded = true;
         // An empty seat is never due.
         while soonest != u64::MAX {
-            widest(
-                Width::Bits512,
+            run_vectorized(
+                SimdWidth::Bits512,
                 #[inline(always)]
                 || self.undo_block(&mut block, &mut scratch, gradient),
             );
             clock += 1;
             if boarded {
                 // Only the first step on the way back may be a cut one.
-                block.go_on(self.setup.step);
+                block.set_full_step(self.setup.step);
             }
             boarded = clock >= soonest;
             if !boarded {
                 continue;
             }
             for lane in 0..LANES {
-                let Some(ray) = block.seat[lane].filter(|_| clock >= block.due[lane]) else {
+                let Some(ray) = block.ray[lane].filter(|_| clock >= block.due_step[lane]) else {
                     continue;
                 };
-                self.arrive(&block, (lane, ray), chunk, gradient, &mut retraced);
-                self.fill_back(&mut block, lane, (&mut queue, clock), chunk);
+                self.finish_lane(&block, (lane, ray), chunk, gradient, &mut retraced);
+                self.refill_backward(&mut block, lane, (&mut queue, clock), chunk);
             }
-            soonest = block.earliest();
+            soonest = block.earliest_due();
         }
         retraced
     }
 
     /// Ends the way back of one ray: checks that it is where it started, and finishes its gradient.
-    fn arrive(
+    fn finish_lane(
         &self,
-        block: &Block<R>,
+        block: &BackwardBlock<R>,
         (lane, ray): (usize, usize),
         chunk: &mut Chunk<'_, R>,
         gradient: &mut [R],
-        retraced: &mut Retraced,
+        retraced: &mut RetraceResult,
     ) {
         let start = &chunk.rays[ray];
-        let seed = block.seed(lane);
+        let seed = block.adjoint(lane);
         if let Ok(entry) = self.enter(start) {
             let error = self.retrace_error(&entry, get(&block.x, lane));
-            if error <= tolerance::<R>() && seed.is_finite() {
-                retraced.worst = retraced.worst.max(error);
-                chunk.starts[ray] = self.enter_back(start, &entry, seed, gradient);
+            if error <= retrace_tolerance::<R>() && seed.is_finite() {
+                retraced.largest_error = retraced.largest_error.max(error);
+                chunk.starts[ray] = self.enter_adjoint(start, &entry, seed, gradient);
                 return;
             }
         }
-        retraced.lost += 1;
-        chunk.exits[ray].fate = Fate::Chaotic;
-        chunk.starts[ray] = Seed::default();
+        retraced.lost_rays += 1;
+        chunk.exits[ray].fate = GrinFate::Chaotic;
+        chunk.starts[ray] = RayAdjoint::default();
     }
 
     /// How far the way back ended from the start, in steps; infinite for what is no number.
-    fn retrace_error(&self, entry: &Entry<R>, back: Vec3<R>) -> f64 {
+    fn retrace_error(&self, entry: &RegionEntry<R>, back: Vec3<R>) -> f64 {
         let miss = (back - entry.state.x).value();
         let v = entry.state.v.value();
         let step = self.setup.step.value() * v.dot(v).sqrt();
@@ -206,46 +207,56 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
     }
 
     /// Gives an empty seat to the next ray that has anything to differentiate.
-    fn fill_back(
+    fn refill_backward(
         &self,
-        block: &mut Block<R>,
+        block: &mut BackwardBlock<R>,
         lane: usize,
         (queue, clock): (&mut std::ops::Range<usize>, u64),
         chunk: &mut Chunk<'_, R>,
     ) {
-        block.leave(lane);
+        block.clear_lane(lane);
         for ray in queue {
             let exit = &mut chunk.exits[ray];
             let seed = chunk.seeds[ray];
-            if !exit.fate.arrived() || seed == Seed::default() {
+            if !exit.fate.has_arrived() || seed == RayAdjoint::default() {
                 continue;
             }
-            let seed = self.leave_back(exit, seed);
+            let seed = self.exit_adjoint(exit, seed);
             if !seed.is_finite() {
-                exit.fate = Fate::Grazing;
+                exit.fate = GrinFate::Grazing;
                 continue;
             }
-            block.board(lane, ray, exit, &seed);
-            block.due[lane] = clock + u64::from(exit.steps);
+            block.load_lane(lane, ray, exit, &seed);
+            block.due_step[lane] = clock + u64::from(exit.steps);
             return;
         }
     }
 
     /// Undoes one step of every ray of a block.
     #[inline(always)]
-    fn undo_block(&self, block: &mut Block<R>, scratch: &mut Scratch<R>, gradient: &mut [R]) {
+    fn undo_block(
+        &self,
+        block: &mut BackwardBlock<R>,
+        scratch: &mut KickScratch<R>,
+        gradient: &mut [R],
+    ) {
         for op in self.ops.iter().rev() {
             match *op {
-                Op::Drift(c) => {
+                IntegratorOp::Drift(c) => {
                     drift(&mut block.x, &block.v, &block.h, -c);
                     drift(&mut block.by_v, &block.by_x, &block.h, c);
                 }
-                Op::Kick(c) => {
+                IntegratorOp::Kick(c) => {
                     let s = &mut *scratch;
                     let (x, by_v) = (&block.x, &block.by_v);
-                    self.field.samples_and_hessians(x, by_v, &mut s.samples, &mut s.bent);
+                    self.field.sample_block_with_hessians(
+                        x,
+                        by_v,
+                        &mut s.samples,
+                        &mut s.hessian_product,
+                    );
                     undo_kick(block, scratch, c);
-                    self.field.deposits(&block.x, &scratch.weight, &scratch.pull, gradient);
+                    self.field.accumulate_block(&block.x, &scratch.weight, &scratch.pull, gradient);
                 }
             }
         }
@@ -253,14 +264,14 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
 }
 
 /// How far a way back may end from its start, in steps, before its gradient counts as lost.
-fn tolerance<R: Real>() -> f64 {
+fn retrace_tolerance<R: Real>() -> f64 {
     if R::EPSILON > 1e-10 { 1e-2 } else { 1e-6 }
 }
 
 /// Undoes a kick of weight `c` for every lane, and works out what the parameters get.
 #[inline(always)]
-fn undo_kick<R: Real>(block: &mut Block<R>, scratch: &mut Scratch<R>, c: R) {
-    let Scratch { samples, bent, weight, pull } = scratch;
+fn undo_kick<R: Real>(block: &mut BackwardBlock<R>, scratch: &mut KickScratch<R>, c: R) {
+    let KickScratch { samples, hessian_product: bent, weight, pull } = scratch;
     for (lane, weight) in weight.iter_mut().enumerate() {
         let (index, g) = (samples.index[lane], get(&samples.gradient, lane));
         let (step, by_v) = (c * block.h[lane], get(&block.by_v, lane));

@@ -7,25 +7,25 @@
 use std::collections::VecDeque;
 
 /// Pairs of steps and changes of the gradient that the curvature is made of.
-const MEMORY: usize = 12;
+const STORED_PAIRS: usize = 12;
 /// A step must bring this part of what the slope promises (Armijo).
-const SUFFICIENT: f64 = 1e-4;
+const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// How often a step is halved before the direction is given up.
-const HALVINGS: usize = 20;
+const MAX_HALVINGS: usize = 20;
 
 /// What parameters may do.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
+pub struct ParameterBounds {
     /// Smallest and largest value of each parameter; one that may not change has both alike.
     pub ranges: Vec<[f64; 2]>,
     /// Largest change of a parameter in one step.
-    pub change: f64,
+    pub max_change: f64,
 }
 
-impl Limits {
+impl ParameterBounds {
     /// The same range for so many parameters.
-    pub fn even(count: usize, range: [f64; 2], change: f64) -> Self {
-        Self { ranges: vec![range; count], change }
+    pub fn uniform(count: usize, range: [f64; 2], change: f64) -> Self {
+        Self { ranges: vec![range; count], max_change: change }
     }
 
     /// Puts parameters back into their ranges; how many were outside.
@@ -41,15 +41,15 @@ impl Limits {
     }
 
     /// Scales a step down to the largest change.
-    pub fn shorten(&self, step: &mut [f64]) {
+    pub fn limit_step(&self, step: &mut [f64]) {
         let largest = step.iter().fold(0.0, |max: f64, s| max.max(s.abs()));
-        if largest > self.change {
-            step.iter_mut().for_each(|s| *s *= self.change / largest);
+        if largest > self.max_change {
+            step.iter_mut().for_each(|s| *s *= self.max_change / largest);
         }
     }
 
     /// Which parameters stay where they are: descent would push them out of their range.
-    pub fn held(&self, parameters: &[f64], gradient: &[f64]) -> Vec<bool> {
+    pub fn active_bounds(&self, parameters: &[f64], gradient: &[f64]) -> Vec<bool> {
         let held = |((value, g), [low, high]): ((&f64, &f64), &[f64; 2])| {
             (*value <= *low && *g > 0.0) || (*value >= *high && *g < 0.0)
         };
@@ -75,13 +75,13 @@ impl Adam {
     }
 
     /// Takes one step down this gradient.
-    pub fn step(&mut self, parameters: &mut [f64], gradient: &[f64], limits: &Limits) {
+    pub fn step(&mut self, parameters: &mut [f64], gradient: &[f64], limits: &ParameterBounds) {
         let (b1, b2) = (0.9, 0.999);
         self.mean.resize(parameters.len(), 0.0);
         self.square.resize(parameters.len(), 0.0);
         self.age += 1;
         let (c1, c2) = (1.0 - f64::powi(b1, self.age), 1.0 - f64::powi(b2, self.age));
-        let held = limits.held(parameters, gradient);
+        let held = limits.active_bounds(parameters, gradient);
         for (i, value) in parameters.iter_mut().enumerate() {
             // What its limit holds must not gather momentum.
             let g = if held[i] { 0.0 } else { gradient[i] };
@@ -90,7 +90,7 @@ impl Adam {
             let size = (self.square[i] / c2).sqrt();
             if size > 0.0 {
                 let step = self.rate * (self.mean[i] / c1) / size;
-                *value -= step.clamp(-limits.change, limits.change);
+                *value -= step.clamp(-limits.max_change, limits.max_change);
             }
         }
         limits.project(parameters);
@@ -109,13 +109,13 @@ pub struct Lbfgs {
 
 /// What a step of [`Lbfgs`] did.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Descended {
+pub struct LbfgsStep {
     /// The value where it ended.
     pub value: f64,
     /// How often value and gradient were asked for.
     pub evaluations: usize,
     /// Whether further steps would change nothing.
-    pub finished: bool,
+    pub converged: bool,
 }
 
 impl Lbfgs {
@@ -124,24 +124,28 @@ impl Lbfgs {
     pub fn step(
         &mut self,
         parameters: &mut [f64],
-        limits: &Limits,
+        limits: &ParameterBounds,
         mut evaluate: impl FnMut(&[f64]) -> (f64, Vec<f64>),
-    ) -> Descended {
+    ) -> LbfgsStep {
         let fresh = usize::from(self.at.is_none());
         let (value, gradient) = self.at.take().unwrap_or_else(|| evaluate(parameters));
         let mut step = self.direction(parameters, &gradient, limits);
-        for evaluations in 1..=HALVINGS {
+        for evaluations in 1..=MAX_HALVINGS {
             let mut trial: Vec<f64> = parameters.iter().zip(&step).map(|(x, s)| x + s).collect();
             limits.project(&mut trial);
             let moved: Vec<f64> = trial.iter().zip(&*parameters).map(|(a, b)| a - b).collect();
             let (new, slope) = evaluate(&trial);
-            if new <= value + SUFFICIENT * dot(&gradient, &moved) && new.is_finite() {
+            if new <= value + SUFFICIENT_DECREASE * dot(&gradient, &moved) && new.is_finite() {
                 let change = slope.iter().zip(&gradient).map(|(a, b)| a - b).collect();
-                self.learn(moved, change);
+                self.store_pair(moved, change);
                 parameters.copy_from_slice(&trial);
                 self.at = Some((new, slope));
                 let finished = !(new < value);
-                return Descended { value: new, evaluations: evaluations + fresh, finished };
+                return LbfgsStep {
+                    value: new,
+                    evaluations: evaluations + fresh,
+                    converged: finished,
+                };
             }
             step.iter_mut().for_each(|s| *s *= 0.5);
         }
@@ -149,7 +153,7 @@ impl Lbfgs {
         let finished = self.pairs.is_empty();
         self.pairs.clear();
         self.at = Some((value, gradient));
-        Descended { value, evaluations: HALVINGS + fresh, finished }
+        LbfgsStep { value, evaluations: MAX_HALVINGS + fresh, converged: finished }
     }
 
     /// Forgets what it knows of the loss, which has become another one.
@@ -158,19 +162,24 @@ impl Lbfgs {
     }
 
     /// Keeps a pair that shows positive curvature.
-    fn learn(&mut self, moved: Vec<f64>, change: Vec<f64>) {
+    fn store_pair(&mut self, moved: Vec<f64>, change: Vec<f64>) {
         if dot(&moved, &change) > 1e-12 * dot(&change, &change).sqrt() * dot(&moved, &moved).sqrt()
         {
             self.pairs.push_back((moved, change));
-            if self.pairs.len() > MEMORY {
+            if self.pairs.len() > STORED_PAIRS {
                 self.pairs.pop_front();
             }
         }
     }
 
     /// The step by the two-loop recursion, with what a limit holds left out.
-    fn direction(&self, parameters: &[f64], gradient: &[f64], limits: &Limits) -> Vec<f64> {
-        let held = limits.held(parameters, gradient);
+    fn direction(
+        &self,
+        parameters: &[f64],
+        gradient: &[f64],
+        limits: &ParameterBounds,
+    ) -> Vec<f64> {
+        let held = limits.active_bounds(parameters, gradient);
         let free = |v: &mut [f64]| {
             v.iter_mut().zip(&held).filter(|(_, held)| **held).for_each(|(v, _)| *v = 0.0);
         };
@@ -188,7 +197,7 @@ impl Lbfgs {
         } else {
             // Nothing is known of the curvature: a small step.
             let largest = step.iter().fold(0.0, |max: f64, s| max.max(s.abs()));
-            let scale = if largest > 0.0 { 0.1 * limits.change / largest } else { 0.0 };
+            let scale = if largest > 0.0 { 0.1 * limits.max_change / largest } else { 0.0 };
             step.iter_mut().for_each(|d| *d *= scale);
         }
         for ((s, y), weight) in self.pairs.iter().zip(weights.into_iter().rev()) {
@@ -196,7 +205,7 @@ impl Lbfgs {
             step.iter_mut().zip(s).for_each(|(d, s)| *d += correction * s);
         }
         free(&mut step);
-        limits.shorten(&mut step);
+        limits.limit_step(&mut step);
         step
     }
 }

@@ -1,20 +1,20 @@
 //! Both ends of a ray: how it enters the region, and how it leaves it and reaches the screen; each
 //! with its transpose.
 
-use super::adjoint::Seed;
-use super::fate::Fate;
-use super::field::Field;
-use super::region::{Face, Region, rounding};
-use super::setup::{End, LastStep, Launch};
-use super::tracer::{Ray, State, Tracer};
+use super::adjoint::RayAdjoint;
+use super::fate::GrinFate;
+use super::field::IndexField;
+use super::region::{Face, GrinRegion, rounding_error};
+use super::setup::{EndCondition, LastStep, LaunchMode};
+use super::tracer::{GrinRay, GrinTracer, RayState};
 use crate::math::Real;
 use crate::math::Vec3;
 
 /// Where a ray ended, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Exit<R> {
+pub struct RayExit<R> {
     /// How it ended.
-    pub fate: Fate,
+    pub fate: GrinFate,
     /// Where: on the screen, else on the boundary, else where it stood after its last step.
     pub x: Vec3<R>,
     /// Its velocity there: in air the direction.
@@ -29,18 +29,18 @@ pub struct Exit<R> {
     /// `|v|² - η²` before it leaves. Zero for light, up to the error of the integrator; a start with
     /// the wrong speed, or a jump of the index at the boundary that nothing refracts, stays in it.
     pub excess: R,
-    pub(super) landing: Landing<R>,
+    pub(super) record: ExitRecord<R>,
 }
 
 /// What the way back needs to know.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Landing<R> {
+pub(super) struct ExitRecord<R> {
     /// Where the way back begins.
-    pub(super) state: State<R>,
+    pub(super) state: RayState<R>,
     /// The length of the last step.
     pub(super) last: R,
     /// The derivative of the state by the length of the last step, if that was cut to length.
-    rate: Option<State<R>>,
+    rate: Option<RayState<R>>,
     /// The way along `v` from the state to the boundary: not positive.
     slide: R,
     /// The face by which it left.
@@ -49,132 +49,134 @@ pub(super) struct Landing<R> {
     flight: R,
 }
 
-impl<R: Real> Exit<R> {
-    pub(super) fn lost(fate: Fate, state: &State<R>, steps: u32) -> Self {
-        let landing = Landing { state: *state, ..Landing::default() };
-        let State { x, v, path } = *state;
-        Self { fate, x, v, path, steps, cosine: R::ONE, excess: R::ZERO, landing }
+impl<R: Real> RayExit<R> {
+    pub(super) fn from_state(fate: GrinFate, state: &RayState<R>, steps: u32) -> Self {
+        let landing = ExitRecord { state: *state, ..ExitRecord::default() };
+        let RayState { x, v, path } = *state;
+        Self { fate, x, v, path, steps, cosine: R::ONE, excess: R::ZERO, record: landing }
     }
 }
 
 /// How a ray came in.
-pub(super) struct Entry<R> {
-    pub(super) state: State<R>,
+pub(super) struct RegionEntry<R> {
+    pub(super) state: RayState<R>,
     /// The way along `v` in air.
     slide: R,
     /// The face it came through; none for a start inside.
     face: Option<Face<R>>,
 }
 
-impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
+impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     /// Brings a ray to the region and gives it its speed.
-    pub(super) fn enter(&self, ray: &Ray<R>) -> Result<Entry<R>, Fate> {
+    pub(super) fn enter(&self, ray: &GrinRay<R>) -> Result<RegionEntry<R>, GrinFate> {
         if !(ray.x.is_finite() && ray.v.is_finite()) {
-            return Err(Fate::Diverged);
+            return Err(GrinFate::Diverged);
         }
         let (face, slide) = match self.setup.region() {
-            Some(region) => approach(region, ray).ok_or(Fate::NeverEntered)?,
+            Some(region) => find_entry(region, ray).ok_or(GrinFate::NeverEntered)?,
             None => (None, R::ZERO),
         };
         let x = ray.x + ray.v * slide;
         let v = match (self.setup.launch, face) {
-            (Launch::Scaled, _) => ray.v * self.field.sample(x).index,
-            (Launch::Refracted, Some(face)) => {
+            (LaunchMode::Scaled, _) => ray.v * self.field.sample(x).index,
+            (LaunchMode::Refracted, Some(face)) => {
                 let index = self.field.sample(x).index;
-                refract(ray.v, face.normal(x), index * index).ok_or(Fate::TotalReflection)?
+                refract(ray.v, face.normal(x), index * index).ok_or(GrinFate::TotalReflection)?
             }
-            (Launch::AsGiven | Launch::Refracted, _) => ray.v,
+            (LaunchMode::AsGiven | LaunchMode::Refracted, _) => ray.v,
         };
         let path = slide * ray.v.dot(ray.v);
-        Ok(Entry { state: State { x, v, path }, slide, face })
+        Ok(RegionEntry { state: RayState { x, v, path }, slide, face })
     }
 
     /// The transpose of [`Self::enter`]: takes the gradient from the state inside to the ray.
-    pub(super) fn enter_back(
+    pub(super) fn enter_adjoint(
         &self,
-        ray: &Ray<R>,
-        entry: &Entry<R>,
-        inside: Seed<R>,
+        ray: &GrinRay<R>,
+        entry: &RegionEntry<R>,
+        inside: RayAdjoint<R>,
         gradient: &mut [R],
-    ) -> Seed<R> {
+    ) -> RayAdjoint<R> {
         let x = entry.state.x;
         let mut seed = inside;
         // What the speed takes from the index at the start.
         let by_index = match (self.setup.launch, entry.face) {
-            (Launch::Scaled, _) => {
+            (LaunchMode::Scaled, _) => {
                 let by_index = seed.v.dot(ray.v);
                 seed.v = seed.v * self.field.sample(x).index;
                 by_index
             }
-            (Launch::Refracted, Some(face)) => {
+            (LaunchMode::Refracted, Some(face)) => {
                 let index = self.field.sample(x).index;
-                let back = refract_back(ray.v, face.normal(x), index * index, seed.v);
+                let back = refract_adjoint(ray.v, face.normal(x), index * index, seed.v);
                 seed.v = back.v;
-                seed.x = seed.x + across(face.square, back.normal);
+                seed.x = seed.x + diagonal_hessian_times(face.square, back.normal);
                 back.square * R::TWO * index
             }
-            (Launch::AsGiven | Launch::Refracted, _) => R::ZERO,
+            (LaunchMode::AsGiven | LaunchMode::Refracted, _) => R::ZERO,
         };
         if by_index != R::ZERO {
             seed.x = seed.x + self.field.sample(x).gradient * by_index;
-            self.field.deposit(x, by_index, Vec3::default(), gradient);
+            self.field.accumulate(x, by_index, Vec3::default(), gradient);
         }
         match entry.face {
             Some(face) if entry.slide != R::ZERO => {
-                slide_back(entry.slide, ray.v, face.normal(x), seed)
+                slide_adjoint(entry.slide, ray.v, face.normal(x), seed)
             }
             _ => seed,
         }
     }
 
     /// Ends a ray whose last step led from `before` to `after`.
-    pub(super) fn land(
+    pub(super) fn end_ray(
         &self,
-        ray: &Ray<R>,
-        before: &State<R>,
-        after: &State<R>,
+        ray: &GrinRay<R>,
+        before: &RayState<R>,
+        after: &RayState<R>,
         steps: u32,
-    ) -> Exit<R> {
+    ) -> RayExit<R> {
         if !after.is_finite() {
-            return Exit::lost(Fate::Diverged, after, steps);
+            return RayExit::from_state(GrinFate::Diverged, after, steps);
         }
-        let Some(landing) = self.meet_boundary(before, after) else {
-            return Exit::lost(Fate::Grazing, after, steps);
+        let Some(landing) = self.find_boundary(before, after) else {
+            return RayExit::from_state(GrinFate::Grazing, after, steps);
         };
-        let state = slid(&landing.state, landing.slide);
+        let state = move_straight(&landing.state, landing.slide);
         let fate = match &self.setup.end {
-            End::Steps(_) => Fate::Stopped,
-            End::Boundary { .. } if landing.face.is_none() => Fate::Trapped,
-            End::Boundary { .. } if state.v.dot(ray.v) < R::ZERO => Fate::Turned,
-            End::Boundary { .. } => Fate::Left,
+            EndCondition::Steps(_) => GrinFate::Stopped,
+            EndCondition::Boundary { .. } if landing.face.is_none() => GrinFate::Trapped,
+            EndCondition::Boundary { .. } if state.v.dot(ray.v) < R::ZERO => GrinFate::Turned,
+            EndCondition::Boundary { .. } => GrinFate::Left,
         };
-        let mut exit = Exit { landing, ..Exit::lost(fate, &state, steps) };
+        let mut exit = RayExit { record: landing, ..RayExit::from_state(fate, &state, steps) };
         if let Some(normal) = self.normal(&landing, state.x) {
             let lengths = (normal.dot(normal) * state.v.dot(state.v)).sqrt();
             exit.cosine = normal.dot(state.v) / lengths;
         }
         let index = self.field.sample(state.x).index;
         exit.excess = state.v.dot(state.v) - index * index;
-        if fate.arrived() { self.go_out(exit) } else { exit }
+        if fate.has_arrived() { self.propagate_to_screen(exit) } else { exit }
     }
 
     /// The outward normal where a ray leaves.
-    fn normal(&self, landing: &Landing<R>, x: Vec3<R>) -> Option<Vec3<R>> {
+    fn normal(&self, landing: &ExitRecord<R>, x: Vec3<R>) -> Option<Vec3<R>> {
         let region = self.setup.region()?;
         Some(region.face(landing.face?).normal(x))
     }
 
     /// Finds where the last step met the boundary; none if that cannot be told.
-    fn meet_boundary(&self, before: &State<R>, after: &State<R>) -> Option<Landing<R>> {
-        let whole = Landing { state: *after, last: self.setup.step, ..Landing::default() };
-        let End::Boundary { region, last, .. } = &self.setup.end else { return Some(whole) };
-        if region.height(after.x) < R::ZERO {
+    fn find_boundary(&self, before: &RayState<R>, after: &RayState<R>) -> Option<ExitRecord<R>> {
+        let whole = ExitRecord { state: *after, last: self.setup.step, ..ExitRecord::default() };
+        let EndCondition::Boundary { region, last, .. } = &self.setup.end else {
+            return Some(whole);
+        };
+        if region.level(after.x) < R::ZERO {
             return Some(whole);
         }
         match last {
             LastStep::BrokenLine => {
                 let (face, back) = region.entry(after.x, -after.v)?;
-                Some(Landing { slide: -back, face: Some(face), ..whole })
+                Some(ExitRecord { slide: -back, face: Some(face), ..whole })
             }
             LastStep::Fractional => self.cut_last_step(region, before, after),
         }
@@ -184,10 +186,10 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
     /// lengths that lie inside and outside.
     fn cut_last_step(
         &self,
-        region: &Region<R>,
-        before: &State<R>,
-        after: &State<R>,
-    ) -> Option<Landing<R>> {
+        region: &GrinRegion<R>,
+        before: &RayState<R>,
+        after: &RayState<R>,
+    ) -> Option<ExitRecord<R>> {
         let step = self.setup.step;
         let (mut inside, mut outside) = (R::ZERO, step);
         let (from, to) = (region.outermost(before.x).1, region.outermost(after.x).1);
@@ -202,7 +204,7 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
             } else {
                 outside = length;
             }
-            let newton = length - correction(&region.face(face), end.x, end.v);
+            let newton = length - newton_correction(&region.face(face), end.x, end.v);
             let bracketed = newton > inside && newton < outside;
             let next = R::select(bracketed, newton, (inside + outside) * R::from_f64(0.5));
             let change = (next - length).value().abs();
@@ -215,70 +217,72 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
         for _ in 0..=R::ORDER {
             let (end, rate) = self.advance_with_rate(*before, length);
             let (face, _) = region.outermost(end.x);
-            length -= correction(&region.face(face), end.x, rate.x);
+            length -= newton_correction(&region.face(face), end.x, rate.x);
         }
         let (state, rate) = self.advance_with_rate(*before, length);
         let (face, distance) = region.outermost(state.x);
-        let near = distance.abs() <= rounding(state.x, state.x - before.x);
-        let cut = Landing { state, last: length, rate: Some(rate), ..Landing::default() };
-        (near && length.is_finite()).then_some(Landing { face: Some(face), ..cut })
+        let near = distance.abs() <= rounding_error(state.x, state.x - before.x);
+        let cut = ExitRecord { state, last: length, rate: Some(rate), ..ExitRecord::default() };
+        (near && length.is_finite()).then_some(ExitRecord { face: Some(face), ..cut })
     }
 
     /// From the boundary into air and on to the screen.
-    fn go_out(&self, mut exit: Exit<R>) -> Exit<R> {
-        if let (Launch::Refracted, Some(normal)) =
-            (self.setup.launch, self.normal(&exit.landing, exit.x))
+    fn propagate_to_screen(&self, mut exit: RayExit<R>) -> RayExit<R> {
+        if let (LaunchMode::Refracted, Some(normal)) =
+            (self.setup.launch, self.normal(&exit.record, exit.x))
         {
             match refract(exit.v, normal, R::ONE) {
                 Some(v) => exit.v = v,
-                None => exit.fate = Fate::TotalReflection,
+                None => exit.fate = GrinFate::TotalReflection,
             }
         }
-        let Some(screen) = self.setup.screen.filter(|_| exit.fate.arrived()) else { return exit };
+        let Some(screen) = self.setup.screen.filter(|_| exit.fate.has_arrived()) else {
+            return exit;
+        };
         // A screen that touches the boundary may lie behind the exit by a rounding error.
         let ahead = |t: &R| *t >= -self.setup.step && t.is_finite();
         let Some(t) = screen.crossings(exit.x, exit.v).and_then(|t| t.into_iter().find(ahead))
         else {
-            exit.fate = Fate::MissedScreen;
+            exit.fate = GrinFate::MissedScreen;
             return exit;
         };
-        let there = slid(&State { x: exit.x, v: exit.v, path: exit.path }, t);
-        (exit.x, exit.path, exit.landing.flight) = (there.x, there.path, t);
+        let there = move_straight(&RayState { x: exit.x, v: exit.v, path: exit.path }, t);
+        (exit.x, exit.path, exit.record.flight) = (there.x, there.path, t);
         exit
     }
 
     /// The transpose of everything behind the last step: from the gradient by the exit to the one
     /// by the state where the way back begins.
-    pub(super) fn leave_back(&self, exit: &Exit<R>, seed: Seed<R>) -> Seed<R> {
-        let landing = &exit.landing;
+    pub(super) fn exit_adjoint(&self, exit: &RayExit<R>, seed: RayAdjoint<R>) -> RayAdjoint<R> {
+        let landing = &exit.record;
         let mut seed = seed;
         if let Some(screen) = self.setup.screen {
-            seed = slide_back(landing.flight, exit.v, screen.normal(exit.x), seed);
+            seed = slide_adjoint(landing.flight, exit.v, screen.normal(exit.x), seed);
         }
-        let inside = slid(&landing.state, landing.slide);
+        let inside = move_straight(&landing.state, landing.slide);
         let Some(normal) = self.normal(landing, inside.x) else { return seed };
-        if self.setup.launch == Launch::Refracted {
-            let back = refract_back(inside.v, normal, R::ONE, seed.v);
+        if self.setup.launch == LaunchMode::Refracted {
+            let back = refract_adjoint(inside.v, normal, R::ONE, seed.v);
             let region = self.setup.region();
             let square = region.zip(landing.face).map(|(region, face)| region.face(face).square);
             seed.v = back.v;
-            seed.x = seed.x + across(square.unwrap_or_default(), back.normal);
+            seed.x = seed.x + diagonal_hessian_times(square.unwrap_or_default(), back.normal);
         }
         match landing.rate {
-            None => slide_back(landing.slide, inside.v, normal, seed),
+            None => slide_adjoint(landing.slide, inside.v, normal, seed),
             // The length of the last step gives way so that the end stays on the boundary.
             Some(rate) => {
                 let gain = seed.x.dot(rate.x) + seed.v.dot(rate.v) + seed.path * rate.path;
-                Seed { x: seed.x - normal * (gain / normal.dot(rate.x)), ..seed }
+                RayAdjoint { x: seed.x - normal * (gain / normal.dot(rate.x)), ..seed }
             }
         }
     }
 }
 
 /// How a ray comes to the region: the face and the way along `v`; no face for a start inside.
-fn approach<R: Real>(region: &Region<R>, ray: &Ray<R>) -> Option<(Option<Face<R>>, R)> {
+fn find_entry<R: Real>(region: &GrinRegion<R>, ray: &GrinRay<R>) -> Option<(Option<Face<R>>, R)> {
     let (face, distance) = region.outermost(ray.x);
-    let tolerance = rounding(ray.x, Vec3::default());
+    let tolerance = rounding_error(ray.x, Vec3::default());
     if distance < -tolerance {
         return Some((None, R::ZERO));
     }
@@ -290,26 +294,26 @@ fn approach<R: Real>(region: &Region<R>, ray: &Ray<R>) -> Option<(Option<Face<R>
 }
 
 /// Newton's correction to a length whose end `x` should lie on the face and moves at this rate.
-fn correction<R: Real>(face: &Face<R>, x: Vec3<R>, rate: Vec3<R>) -> R {
-    face.height(x) / face.normal(x).dot(rate)
+fn newton_correction<R: Real>(face: &Face<R>, x: Vec3<R>, rate: Vec3<R>) -> R {
+    face.level(x) / face.normal(x).dot(rate)
 }
 
 /// The state after a straight way `t v`, whose optical path is `t |v|²`.
-fn slid<R: Real>(state: &State<R>, t: R) -> State<R> {
+fn move_straight<R: Real>(state: &RayState<R>, t: R) -> RayState<R> {
     let v = state.v;
-    State { x: state.x + v * t, v, path: state.path + t * v.dot(v) }
+    RayState { x: state.x + v * t, v, path: state.path + t * v.dot(v) }
 }
 
 /// The transpose of a straight way `t v` that ends on a face with this normal: `t` gives way so that
 /// the end stays on the face.
-fn slide_back<R: Real>(t: R, v: Vec3<R>, normal: Vec3<R>, seed: Seed<R>) -> Seed<R> {
+fn slide_adjoint<R: Real>(t: R, v: Vec3<R>, normal: Vec3<R>, seed: RayAdjoint<R>) -> RayAdjoint<R> {
     let gain = seed.x.dot(v) + seed.path * v.dot(v);
     let x = seed.x - normal * (gain / normal.dot(v));
-    Seed { x, v: seed.v + x * t + v * (R::TWO * t * seed.path), path: seed.path }
+    RayAdjoint { x, v: seed.v + x * t + v * (R::TWO * t * seed.path), path: seed.path }
 }
 
 /// A diagonal Hessian, twice these squares, times a vector.
-fn across<R: Real>(square: Vec3<R>, v: Vec3<R>) -> Vec3<R> {
+fn diagonal_hessian_times<R: Real>(square: Vec3<R>, v: Vec3<R>) -> Vec3<R> {
     Vec3::new(square.x * v.x, square.y * v.y, square.z * v.z) * R::TWO
 }
 
@@ -327,14 +331,19 @@ fn refract<R: Real>(v: Vec3<R>, normal: Vec3<R>, square: R) -> Option<Vec3<R>> {
 }
 
 /// What the transpose of [`refract`] gives.
-struct RefractBack<R> {
+struct RefractAdjoint<R> {
     v: Vec3<R>,
     normal: Vec3<R>,
     square: R,
 }
 
 /// The transpose of [`refract`], where it is possible.
-fn refract_back<R: Real>(v: Vec3<R>, normal: Vec3<R>, square: R, seed: Vec3<R>) -> RefractBack<R> {
+fn refract_adjoint<R: Real>(
+    v: Vec3<R>,
+    normal: Vec3<R>,
+    square: R,
+    seed: Vec3<R>,
+) -> RefractAdjoint<R> {
     let scale = R::ONE / normal.dot(normal).sqrt();
     let unit = normal * scale;
     let along = v.dot(unit);
@@ -344,7 +353,7 @@ fn refract_back<R: Real>(v: Vec3<R>, normal: Vec3<R>, square: R, seed: Vec3<R>) 
     let by_radicand = by_jump / (R::TWO * root);
     let by_along = R::TWO * along * by_radicand - by_jump;
     let by_unit = seed * (root - along) + v * by_along;
-    RefractBack {
+    RefractAdjoint {
         v: seed + unit * by_along - v * (R::TWO * by_radicand),
         normal: (by_unit - unit * unit.dot(by_unit)) * scale,
         square: by_radicand,

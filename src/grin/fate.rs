@@ -5,7 +5,7 @@ use serde::Serialize;
 /// How a ray ends. No ray is dropped silently: each has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fate {
+pub enum GrinFate {
     /// It left the region.
     Left,
     /// It took the number of steps that was asked for.
@@ -28,7 +28,7 @@ pub enum Fate {
     Diverged,
 }
 
-impl Fate {
+impl GrinFate {
     /// Every fate.
     pub const ALL: [Self; 10] = [
         Self::Left,
@@ -60,34 +60,41 @@ impl Fate {
     }
 
     /// Whether the ray reached the end that was asked for, so that its exit can be differentiated.
-    pub fn arrived(self) -> bool {
+    pub fn has_arrived(self) -> bool {
         matches!(self, Self::Left | Self::Stopped | Self::Turned)
     }
 }
 
 /// How many rays ended how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Fates([usize; Fate::ALL.len()]);
+pub struct GrinFateCounts([usize; GrinFate::ALL.len()]);
 
-impl Fates {
+impl GrinFateCounts {
     /// Counts one more.
-    pub fn count(&mut self, fate: Fate) {
+    pub fn add(&mut self, fate: GrinFate) {
         self.0[fate as usize] += 1;
     }
 
     /// How many ended this way.
-    pub fn of(self, fate: Fate) -> usize {
+    pub fn count_of(self, fate: GrinFate) -> usize {
         self.0[fate as usize]
     }
 
     /// How many reached the end that was asked for.
-    pub fn arrived(self) -> usize {
-        Fate::ALL.into_iter().filter(|fate| fate.arrived()).map(|fate| self.of(fate)).sum()
+    pub fn arrived_count(self) -> usize {
+        GrinFate::ALL
+            .into_iter()
+            .filter(|fate| fate.has_arrived())
+            .map(|fate| self.count_of(fate))
+            .sum()
     }
 
     /// How many ended how, of the ways that occurred.
-    pub fn iter(self) -> impl Iterator<Item = (Fate, usize)> {
-        Fate::ALL.into_iter().map(move |fate| (fate, self.of(fate))).filter(|(_, count)| *count > 0)
+    pub fn iter(self) -> impl Iterator<Item = (GrinFate, usize)> {
+        GrinFate::ALL
+            .into_iter()
+            .map(move |fate| (fate, self.count_of(fate)))
+            .filter(|(_, count)| *count > 0)
     }
 
     /// How many rays there are.
@@ -96,10 +103,10 @@ impl Fates {
     }
 }
 
-impl FromIterator<Fate> for Fates {
-    fn from_iter<I: IntoIterator<Item = Fate>>(fates: I) -> Self {
+impl FromIterator<GrinFate> for GrinFateCounts {
+    fn from_iter<I: IntoIterator<Item = GrinFate>>(fates: I) -> Self {
         let mut counts = Self::default();
-        fates.into_iter().for_each(|fate| counts.count(fate));
+        fates.into_iter().for_each(|fate| counts.add(fate));
         counts
     }
 }

@@ -4,12 +4,12 @@
 //! Each part has its own gradient, and they are added in order: the same bits on any number of
 //! threads.
 
-use super::adjoint::{Chunk, Retraced, Seed};
-use super::exit::Exit;
-use super::fate::{Fate, Fates};
-use super::field::Field;
+use super::adjoint::{Chunk, RayAdjoint, RetraceResult};
+use super::exit::RayExit;
+use super::fate::{GrinFate, GrinFateCounts};
+use super::field::IndexField;
 use super::lanes::LANES;
-use super::tracer::{Ray, Tracer};
+use super::tracer::{GrinRay, GrinTracer};
 use crate::math::Real;
 use rayon::prelude::*;
 
@@ -25,11 +25,11 @@ const STRIP: usize = 4096;
 
 /// The gradient of a loss.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gradient<R> {
+pub struct AdjointGradient<R> {
     /// By the parameters of the field.
     pub parameters: Vec<R>,
     /// By the start of each ray; zero for a ray that has no gradient.
-    pub starts: Vec<Seed<R>>,
+    pub starts: Vec<RayAdjoint<R>>,
     /// The largest distance between a start and the end of its way back, in steps, of the rays
     /// that count: rounding, unless the light is chaotic.
     pub retrace_error: f64,
@@ -37,34 +37,34 @@ pub struct Gradient<R> {
 
 /// A loss with its gradient.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome<R> {
+pub struct LossAndGradient<R> {
     /// The sum over all rays.
     pub loss: R,
     /// Its gradient.
-    pub gradient: Gradient<R>,
+    pub gradient: AdjointGradient<R>,
     /// How each ray ended.
-    pub exits: Vec<Exit<R>>,
+    pub exits: Vec<RayExit<R>>,
     /// How many rays ended how.
-    pub fates: Fates,
+    pub fates: GrinFateCounts,
 }
 
-impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
+impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     /// The sum of `loss` over rays.
     ///
     /// `loss` gets the number of the ray and its exit, and gives the loss and its derivative by the
     /// exit. It is asked about every ray, also one that did not arrive, whose derivative is not
     /// used: a constant for those keeps an optimiser from driving rays away. Where the way back
-    /// shows that a ray is chaotic it is asked again, with [`Fate::Chaotic`].
+    /// shows that a ray is chaotic it is asked again, with [`GrinFate::Chaotic`].
     pub fn loss_and_gradient(
         &self,
-        rays: &[Ray<R>],
-        loss: impl Fn(usize, &Exit<R>) -> (R, Seed<R>) + Sync,
-    ) -> Outcome<R> {
-        let mut exits = self.rays(rays);
+        rays: &[GrinRay<R>],
+        loss: impl Fn(usize, &RayExit<R>) -> (R, RayAdjoint<R>) + Sync,
+    ) -> LossAndGradient<R> {
+        let mut exits = self.trace_batch(rays);
         let indexed = exits.par_iter().enumerate();
-        let (mut losses, seeds): (Vec<R>, Vec<Seed<R>>) =
+        let (mut losses, seeds): (Vec<R>, Vec<RayAdjoint<R>>) =
             indexed.map(|(i, exit)| loss(i, exit)).unzip();
-        let before: Vec<Fate> = exits.iter().map(|exit| exit.fate).collect();
+        let before: Vec<GrinFate> = exits.iter().map(|exit| exit.fate).collect();
         let gradient = self.gradient(rays, &mut exits, &seeds);
         for (i, exit) in exits.iter().enumerate() {
             if exit.fate != before[i] {
@@ -74,30 +74,30 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
         let mut sum = R::ZERO;
         losses.into_iter().for_each(|loss| sum += loss);
         let fates = exits.iter().map(|exit| exit.fate).collect();
-        Outcome { loss: sum, gradient, exits, fates }
+        LossAndGradient { loss: sum, gradient, exits, fates }
     }
 
     /// The gradient of a loss whose derivatives by the exits are known: the second pass, where the
-    /// first was [`Self::rays`] with the same rays. A ray whose way back shows that it has no
+    /// first was [`Self::trace_batch`] with the same rays. A ray whose way back shows that it has no
     /// gradient gets its new fate, and adds nothing.
     ///
     /// # Panics
     /// If there is not one exit and one seed for each ray.
     pub fn gradient(
         &self,
-        rays: &[Ray<R>],
-        exits: &mut [Exit<R>],
-        seeds: &[Seed<R>],
-    ) -> Gradient<R> {
+        rays: &[GrinRay<R>],
+        exits: &mut [RayExit<R>],
+        seeds: &[RayAdjoint<R>],
+    ) -> AdjointGradient<R> {
         assert!(rays.len() == exits.len() && rays.len() == seeds.len(), "one exit and seed a ray");
-        let mut starts = vec![Seed::default(); rays.len()];
+        let mut starts = vec![RayAdjoint::default(); rays.len()];
         let size = self.rays_per_part(rays.len());
         let parts: Vec<(Vec<R>, f64)> = rays
             .par_chunks(size)
             .zip(exits.par_chunks_mut(size))
             .zip(seeds.par_chunks(size).zip(starts.par_chunks_mut(size)))
             .map(|((rays, exits), (seeds, starts))| {
-                self.part(&mut Chunk { rays, exits, seeds, starts })
+                self.gradient_of_part(&mut Chunk { rays, exits, seeds, starts })
             })
             .collect();
         let retrace_error = parts.iter().fold(0.0, |worst: f64, part| worst.max(part.1));
@@ -105,15 +105,16 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
         let zero = || vec![R::ZERO; self.field.parameters().len()];
         let mut parameters = parts.next().unwrap_or_else(zero);
         parts.for_each(|part| add(&mut parameters, &part));
-        Gradient { parameters, starts, retrace_error }
+        AdjointGradient { parameters, starts, retrace_error }
     }
 
     /// The gradient of one part of the rays. A chaotic ray is known by its way back, when it has
     /// already deposited what is worth nothing: then the part begins again without it.
-    fn part(&self, chunk: &mut Chunk<'_, R>) -> (Vec<R>, f64) {
+    fn gradient_of_part(&self, chunk: &mut Chunk<'_, R>) -> (Vec<R>, f64) {
         loop {
             let mut parameters = vec![R::ZERO; self.field.parameters().len()];
-            let Retraced { worst, lost } = self.retrace(chunk, &mut parameters);
+            let RetraceResult { largest_error: worst, lost_rays: lost } =
+                self.retrace(chunk, &mut parameters);
             if lost == 0 {
                 return (parameters, worst);
             }
@@ -123,7 +124,8 @@ impl<R: Real, F: Field<R> + ?Sized> Tracer<'_, R, F> {
     /// The bytes that [`Self::gradient`] works with: what it keeps of the rays, and the private
     /// gradients. Neither depends on the number of steps.
     pub fn gradient_bytes(&self, rays: usize) -> [usize; 2] {
-        let each = size_of::<Ray<R>>() + size_of::<Exit<R>>() + 2 * size_of::<Seed<R>>();
+        let each =
+            size_of::<GrinRay<R>>() + size_of::<RayExit<R>>() + 2 * size_of::<RayAdjoint<R>>();
         let parts = rays.div_ceil(self.rays_per_part(rays));
         [rays * each, parts * self.field.parameters().len() * size_of::<R>()]
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// One piece of a step: its weight is a fraction of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Op<R> {
+pub enum IntegratorOp<R> {
     /// `x += c h v`.
     Drift(R),
     /// `v += c h η ∇η`, and the optical path grows by `c h η²`.
@@ -68,14 +68,14 @@ impl Integrator {
     }
 
     /// How often a step asks the field.
-    pub fn kicks(self) -> usize {
-        self.ops::<f64>().iter().filter(|op| matches!(op, Op::Kick(_))).count()
+    pub fn kicks_per_step(self) -> usize {
+        self.ops::<f64>().iter().filter(|op| matches!(op, IntegratorOp::Kick(_))).count()
     }
 
     /// The pieces of a step, in order.
-    pub fn ops<R: Real>(self) -> Vec<Op<R>> {
-        let drift = |c: f64| Op::Drift(R::from_f64(c));
-        let kick = |c: f64| Op::Kick(R::from_f64(c));
+    pub fn ops<R: Real>(self) -> Vec<IntegratorOp<R>> {
+        let drift = |c: f64| IntegratorOp::Drift(R::from_f64(c));
+        let kick = |c: f64| IntegratorOp::Kick(R::from_f64(c));
         match self {
             Self::SymplecticEuler => vec![kick(1.0), drift(1.0)],
             Self::LeapfrogDkd => vec![drift(0.5), kick(1.0), drift(0.5)],
@@ -84,13 +84,13 @@ impl Integrator {
                 let outer = 1.0 / (2.0 - 2f64.cbrt());
                 let inner = -(2f64.cbrt()) * outer;
                 let between = 0.5 * (inner + outer);
-                mirrored(&[drift(0.5 * outer), kick(outer), drift(between)], kick(inner))
+                palindrome(&[drift(0.5 * outer), kick(outer), drift(between)], kick(inner))
             }
             Self::Pefrl => {
                 let (xi, lambda, chi) =
                     (0.1786178958448091, -0.2123418310626054, -0.0662645826698185);
                 let half = [drift(xi), kick(0.5 * (1.0 - 2.0 * lambda)), drift(chi), kick(lambda)];
-                mirrored(&half, drift(1.0 - 2.0 * (chi + xi)))
+                palindrome(&half, drift(1.0 - 2.0 * (chi + xi)))
             }
             Self::BlanesMoan => {
                 let b = [0.0829844064174052, 0.396309801498368, -0.0390563049223486];
@@ -98,13 +98,13 @@ impl Integrator {
                 let last = 0.5 - (a[0] + a[1]);
                 let half =
                     [kick(b[0]), drift(a[0]), kick(b[1]), drift(a[1]), kick(b[2]), drift(last)];
-                mirrored(&half, kick(1.0 - 2.0 * (b[0] + b[1] + b[2])))
+                palindrome(&half, kick(1.0 - 2.0 * (b[0] + b[1] + b[2])))
             }
         }
     }
 }
 
 /// A palindrome: `half`, the middle, `half` backwards.
-fn mirrored<R: Real>(half: &[Op<R>], middle: Op<R>) -> Vec<Op<R>> {
+fn palindrome<R: Real>(half: &[IntegratorOp<R>], middle: IntegratorOp<R>) -> Vec<IntegratorOp<R>> {
     half.iter().copied().chain([middle]).chain(half.iter().rev().copied()).collect()
 }

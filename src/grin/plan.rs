@@ -6,12 +6,12 @@
 //! `|v|² - η²` would be cheaper, but it underestimates the error of Blanes and Moan's method up to a
 //! hundredfold.
 
-use super::fate::Fate;
-use super::field::Field;
+use super::fate::GrinFate;
+use super::field::IndexField;
 use super::integrator::Integrator;
-use super::region::Region;
-use super::setup::{End, LastStep, Launch, Setup, SetupError};
-use super::tracer::{Ray, Tracer};
+use super::region::GrinRegion;
+use super::setup::{EndCondition, GrinSetup, GrinSetupError, LastStep, LaunchMode};
+use super::tracer::{GrinRay, GrinTracer};
 use crate::math::Vec3;
 
 /// Rays that the step is tried on.
@@ -20,27 +20,27 @@ const SAMPLE: usize = 64;
 const TRIES: usize = 24;
 /// After so many tries that do not halve an error of this part of the way, light counts as chaotic:
 /// finer steps tell no more about it, and become very many.
-const STALLED: usize = 3;
-const WILD: f64 = 0.1;
+const MAX_STALLED: usize = 3;
+const CHAOTIC_ERROR: f64 = 0.1;
 /// A ray may be this many times longer than the longest straight way through the region.
-const LONGEST: f64 = 32.0;
+const MAX_RELATIVE_LENGTH: f64 = 32.0;
 /// Most steps a straight way may take before the plan gives up on a tolerance.
-const MOST_STEPS: f64 = 1e6;
+const MAX_STEPS: f64 = 1e6;
 /// Most steps a voxel where the force jumps.
-const FINEST: f64 = 16.0;
+const MAX_STEPS_PER_VOXEL: f64 = 16.0;
 /// Steps that are a simple fraction of a voxel would meet the same place of every voxel, and on a
 /// ray along the grid its faces, where rounding decides which voxel counts.
 const INCOMMENSURATE: f64 = 0.974;
 
 /// A setup and the reasons for it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct TracingPlan {
     /// How to trace.
-    pub setup: Setup<f64>,
+    pub setup: GrinSetup<f64>,
     /// The largest change of an exit position in the sample when the step is halved.
     pub error: f64,
     /// Whether that is within the tolerance.
-    pub reached: bool,
+    pub is_within_tolerance: bool,
     /// Why: a sentence for each decision, with the number it rests on.
     pub reasons: Vec<String>,
 }
@@ -50,41 +50,45 @@ pub struct Plan {
 ///
 /// # Errors
 /// A region that is empty.
-pub fn plan<F: Field<f64> + ?Sized>(
+pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
     field: &F,
-    region: &Region<f64>,
-    launch: Launch,
-    rays: &[Ray<f64>],
+    region: &GrinRegion<f64>,
+    launch: LaunchMode,
+    rays: &[GrinRay<f64>],
     tolerance: f64,
-) -> Result<Plan, SetupError> {
+) -> Result<TracingPlan, GrinSetupError> {
     let stride = rays.len().div_ceil(SAMPLE).max(1);
-    let sample: Vec<Ray<f64>> = rays.iter().step_by(stride).copied().collect();
-    let way = sample.iter().map(|ray| straight_way(region, ray)).fold(0.0, f64::max);
+    let sample: Vec<GrinRay<f64>> = rays.iter().step_by(stride).copied().collect();
+    let way = sample.iter().map(|ray| straight_path(region, ray)).fold(0.0, f64::max);
     let way = if way > 0.0 { way } else { 1.0 };
     let mut reasons = Vec::new();
-    let (integrator, last) = integrator(field, &mut reasons);
+    let (integrator, last) = choose_integrator(field, &mut reasons);
     let longest = longest_step(field, integrator, &sample, way, &mut reasons);
-    let setup = |step: f64| Setup {
+    let setup = |step: f64| GrinSetup {
         integrator,
         step,
         launch,
-        end: End::Boundary {
+        end: EndCondition::Boundary {
             region: region.clone(),
             last,
-            limit: (LONGEST * way / step).clamp(64.0, f64::from(u32::MAX)) as u32,
+            limit: (MAX_RELATIVE_LENGTH * way / step).clamp(64.0, f64::from(u32::MAX)) as u32,
         },
         screen: None,
     };
     // Where the force jumps, the error falls no further once a voxel has some steps.
-    let finest = if field.grain().continuous_force { way / MOST_STEPS } else { longest / FINEST };
-    let order = if field.grain().continuous_force { integrator.order() } else { 1 };
+    let finest = if field.resolution().continuous_force {
+        way / MAX_STEPS
+    } else {
+        longest / MAX_STEPS_PER_VOXEL
+    };
+    let order = if field.resolution().continuous_force { integrator.order() } else { 1 };
     let (mut step, mut error) = (longest, f64::INFINITY);
     let (mut least, mut stalled) = (f64::INFINITY, 0);
     for _ in 0..TRIES {
-        error = change(field, &setup(step), &setup(0.5 * step), &sample)?;
-        stalled = if error < (0.5 * least).max(WILD * way) { 0 } else { stalled + 1 };
+        error = exit_change(field, &setup(step), &setup(0.5 * step), &sample)?;
+        stalled = if error < (0.5 * least).max(CHAOTIC_ERROR * way) { 0 } else { stalled + 1 };
         least = least.min(error);
-        if error <= tolerance || step <= finest || stalled == STALLED {
+        if error <= tolerance || step <= finest || stalled == MAX_STALLED {
             break;
         }
         step *= (0.8 * tolerance / error).powf(1.0 / f64::from(order)).clamp(0.2, 0.7);
@@ -96,15 +100,15 @@ pub fn plan<F: Field<f64> + ?Sized>(
         "step {step:.3e}: halving it moves the exits of {} rays by at most {error:.1e}, {verdict} {tolerance:.1e}",
         sample.len(),
     ));
-    Ok(Plan { setup: setup(step), error, reached, reasons })
+    Ok(TracingPlan { setup: setup(step), error, is_within_tolerance: reached, reasons })
 }
 
 /// What the force of the field allows.
-fn integrator<F: Field<f64> + ?Sized>(
+fn choose_integrator<F: IndexField<f64> + ?Sized>(
     field: &F,
     reasons: &mut Vec<String>,
 ) -> (Integrator, LastStep) {
-    if field.grain().continuous_force {
+    if field.resolution().continuous_force {
         reasons.push(
             "blanes_moan: the force is smooth, and this is the most accurate for a given number of \
              kicks; the last step is cut to length, which keeps its order"
@@ -121,15 +125,15 @@ fn integrator<F: Field<f64> + ?Sized>(
 }
 
 /// The longest step to begin with.
-fn longest_step<F: Field<f64> + ?Sized>(
+fn longest_step<F: IndexField<f64> + ?Sized>(
     field: &F,
     integrator: Integrator,
-    rays: &[Ray<f64>],
+    rays: &[GrinRay<f64>],
     way: f64,
     reasons: &mut Vec<String>,
 ) -> f64 {
     let free = way / if integrator.order() > 2 { 4.0 } else { 32.0 };
-    let Some(voxel) = field.grain().voxel else { return free };
+    let Some(voxel) = field.resolution().voxel else { return free };
     // The ray moves by η times the step.
     let index = rays.iter().map(|ray| field.sample(ray.x).index).fold(1.0, f64::max);
     let limit = INCOMMENSURATE * voxel / index;
@@ -144,9 +148,9 @@ fn longest_step<F: Field<f64> + ?Sized>(
 }
 
 /// The straight way of a ray through the region, in σ.
-fn straight_way(region: &Region<f64>, ray: &Ray<f64>) -> f64 {
+fn straight_path(region: &GrinRegion<f64>, ray: &GrinRay<f64>) -> f64 {
     let start = match region.entry(ray.x, ray.v) {
-        Some((_, t)) if region.height(ray.x) > 0.0 => ray.x + ray.v * t,
+        Some((_, t)) if region.level(ray.x) > 0.0 => ray.x + ray.v * t,
         _ => ray.x,
     };
     let ahead = |n| region.face(n).crossings(start, ray.v).unwrap_or([f64::INFINITY; 2]);
@@ -159,18 +163,19 @@ fn straight_way(region: &Region<f64>, ray: &Ray<f64>) -> f64 {
 }
 
 /// The largest change of an exit position between two setups, of the rays that arrive with both.
-fn change<F: Field<f64> + ?Sized>(
+fn exit_change<F: IndexField<f64> + ?Sized>(
     field: &F,
-    coarse: &Setup<f64>,
-    fine: &Setup<f64>,
-    rays: &[Ray<f64>],
-) -> Result<f64, SetupError> {
-    let trace = |setup: &Setup<f64>| Tracer::new(field, setup.clone()).map(|t| t.rays(rays));
+    coarse: &GrinSetup<f64>,
+    fine: &GrinSetup<f64>,
+    rays: &[GrinRay<f64>],
+) -> Result<f64, GrinSetupError> {
+    let trace =
+        |setup: &GrinSetup<f64>| GrinTracer::new(field, setup.clone()).map(|t| t.trace_batch(rays));
     let length = |v: Vec3<f64>| v.dot(v).sqrt();
     let pairs = trace(coarse)?.into_iter().zip(trace(fine)?);
     let moved = pairs.map(|(a, b)| match (a.fate, b.fate) {
-        (a_fate, b_fate) if a_fate.arrived() && b_fate.arrived() => length(a.x - b.x),
-        (Fate::Trapped | Fate::NeverEntered, _) => 0.0,
+        (a_fate, b_fate) if a_fate.has_arrived() && b_fate.has_arrived() => length(a.x - b.x),
+        (GrinFate::Trapped | GrinFate::NeverEntered, _) => 0.0,
         (a_fate, b_fate) if a_fate == b_fate => 0.0,
         _ => f64::INFINITY,
     });

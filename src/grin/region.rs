@@ -1,7 +1,7 @@
 //! Where light is traced: a region bounded by planes and quadrics, and where a straight line
 //! crosses its boundary.
 
-use super::lanes::{Column, Columns, LANES, get};
+use super::lanes::{LANES, LaneScalars, LaneVectors, get};
 use crate::math::Real;
 use crate::math::Vec3;
 
@@ -37,7 +37,7 @@ impl<R: Real> Face<R> {
 
     /// `φ` at a point.
     #[inline(always)]
-    pub fn height(&self, p: Vec3<R>) -> R {
+    pub fn level(&self, p: Vec3<R>) -> R {
         let (a, b) = (self.square, self.linear);
         p.x * (a.x * p.x + b.x) + p.y * (a.y * p.y + b.y) + p.z * (a.z * p.z + b.z) + self.constant
     }
@@ -55,7 +55,7 @@ impl<R: Real> Face<R> {
         let squares = self.square;
         let a = squares.x * v.x * v.x + squares.y * v.y * v.y + squares.z * v.z * v.z;
         let half_b = self.normal(x).dot(v) * R::from_f64(0.5);
-        let c = self.height(x);
+        let c = self.level(x);
         let infinite = R::from_f64(f64::INFINITY);
         if a == R::ZERO {
             let t = -(c / (half_b + half_b));
@@ -78,7 +78,7 @@ impl<R: Real> Face<R> {
 
 /// A convex region: everything between two corners that is also inside every face.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Region<R> {
+pub struct GrinRegion<R> {
     /// Lower corner; minus infinity where there is none.
     pub low: Vec3<R>,
     /// Upper corner; infinity where there is none.
@@ -90,7 +90,7 @@ pub struct Region<R> {
 /// Faces of the box: they have the numbers 0 to 5, the further ones those behind.
 const SIDES: usize = 6;
 
-impl<R: Real> Region<R> {
+impl<R: Real> GrinRegion<R> {
     /// The box between two corners.
     pub fn block(low: Vec3<R>, high: Vec3<R>) -> Self {
         Self { low, high, faces: Vec::new() }
@@ -102,7 +102,7 @@ impl<R: Real> Region<R> {
     }
 
     /// Everything inside these faces.
-    pub fn inside(faces: Vec<Face<R>>) -> Self {
+    pub fn within_faces(faces: Vec<Face<R>>) -> Self {
         let infinite = R::from_f64(f64::INFINITY);
         let high = Vec3::new(infinite, infinite, infinite);
         Self { low: -high, high, faces }
@@ -110,18 +110,18 @@ impl<R: Real> Region<R> {
 
     /// The ball about the origin.
     pub fn ball(radius: R) -> Self {
-        Self::inside(vec![Face::sphere(radius)])
+        Self::within_faces(vec![Face::sphere(radius)])
     }
 
     /// A piece of fibre along z.
     pub fn rod(radius: R, from: R, to: R) -> Self {
-        let mut rod = Self::inside(vec![Face::cylinder(radius)]);
+        let mut rod = Self::within_faces(vec![Face::cylinder(radius)]);
         (rod.low.z, rod.high.z) = (from, to);
         rod
     }
 
     /// The same region in another number type.
-    pub fn lift<S: Real>(&self) -> Region<S> {
+    pub fn cast<S: Real>(&self) -> GrinRegion<S> {
         let vector = |v: Vec3<R>| Vec3::from_f64(v.value());
         let face = |face: &Face<R>| Face {
             square: vector(face.square),
@@ -129,24 +129,24 @@ impl<R: Real> Region<R> {
             constant: S::from_f64(face.constant.value()),
         };
         let faces = self.faces.iter().map(face).collect();
-        Region { low: vector(self.low), high: vector(self.high), faces }
+        GrinRegion { low: vector(self.low), high: vector(self.high), faces }
     }
 
     /// The largest `φ` of all faces: negative inside.
     #[inline(always)]
-    pub fn height(&self, p: Vec3<R>) -> R {
+    pub fn level(&self, p: Vec3<R>) -> R {
         let larger = |a: R, b: R| R::select(a < b, b, a);
         let x = larger(self.low.x - p.x, p.x - self.high.x);
         let y = larger(self.low.y - p.y, p.y - self.high.y);
         let z = larger(self.low.z - p.z, p.z - self.high.z);
         let sides = larger(x, larger(y, z));
-        self.faces.iter().fold(sides, |height, face| larger(height, face.height(p)))
+        self.faces.iter().fold(sides, |height, face| larger(height, face.level(p)))
     }
 
     /// How many sides each ray of a block is not inside of; more than none for what is nowhere. Numbers
     /// as wide as the places themselves, which lanes need not convert.
     #[inline(always)]
-    pub(super) fn outside(&self, at: &Columns<R>) -> Column<R> {
+    pub(super) fn count_outside(&self, at: &LaneVectors<R>) -> LaneScalars<R> {
         let mut out = [R::ZERO; LANES];
         let axes = [
             (&at.x, self.low.x, self.high.x),
@@ -160,7 +160,7 @@ impl<R: Real> Region<R> {
         }
         for face in &self.faces {
             for (lane, out) in out.iter_mut().enumerate() {
-                *out += R::select(face.height(get(at, lane)) < R::ZERO, R::ZERO, R::ONE);
+                *out += R::select(face.level(get(at, lane)) < R::ZERO, R::ZERO, R::ONE);
             }
         }
         out
@@ -194,7 +194,7 @@ impl<R: Real> Region<R> {
     pub fn outermost(&self, p: Vec3<R>) -> (usize, R) {
         let mut found = (0, R::from_f64(f64::NEG_INFINITY));
         let faces = self.faces.iter().map(|face| distance(face, p));
-        for (n, distance) in self.sides(p).into_iter().chain(faces).enumerate() {
+        for (n, distance) in self.box_distances(p).into_iter().chain(faces).enumerate() {
             if distance > found.1 {
                 found = (n, distance);
             }
@@ -205,7 +205,7 @@ impl<R: Real> Region<R> {
     /// How far a point is outside each side of the box, in the order of [`Self::face`]: minus
     /// infinity where there is none.
     #[inline(always)]
-    fn sides(&self, p: Vec3<R>) -> [R; SIDES] {
+    fn box_distances(&self, p: Vec3<R>) -> [R; SIDES] {
         let (low, high) = (self.low - p, p - self.high);
         [low.x, high.x, low.y, high.y, low.z, high.z]
     }
@@ -215,8 +215,8 @@ impl<R: Real> Region<R> {
     /// crossed the boundary.
     pub fn entry(&self, x: Vec3<R>, v: Vec3<R>) -> Option<(usize, R)> {
         let mut found: Option<(usize, R)> = None;
-        let faces = self.faces.iter().map(|face| face.height(x));
-        for (n, height) in self.sides(x).into_iter().chain(faces).enumerate() {
+        let faces = self.faces.iter().map(|face| face.level(x));
+        for (n, height) in self.box_distances(x).into_iter().chain(faces).enumerate() {
             if !(height >= R::ZERO) {
                 continue;
             }
@@ -232,7 +232,7 @@ impl<R: Real> Region<R> {
         let (face, t) = found.filter(|(_, t)| t.is_finite())?;
         let at = x + v * t;
         let (_, distance) = self.outermost(at);
-        (distance <= rounding(at, v * t)).then_some((face, t))
+        (distance <= rounding_error(at, v * t)).then_some((face, t))
     }
 }
 
@@ -240,11 +240,11 @@ impl<R: Real> Region<R> {
 fn distance<R: Real>(face: &Face<R>, p: Vec3<R>) -> R {
     let normal = face.normal(p);
     let length = normal.dot(normal).sqrt();
-    if length > R::ZERO { face.height(p) / length } else { face.height(p) }
+    if length > R::ZERO { face.level(p) / length } else { face.level(p) }
 }
 
 /// A distance that rounding may explain at a point that was reached over this way.
-pub(super) fn rounding<R: Real>(at: Vec3<R>, way: Vec3<R>) -> R {
+pub(super) fn rounding_error<R: Real>(at: Vec3<R>, way: Vec3<R>) -> R {
     let size = at.dot(at).sqrt() + way.dot(way).sqrt();
     R::from_f64(1e3 * R::EPSILON) * size
 }

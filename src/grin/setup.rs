@@ -1,14 +1,14 @@
 //! What a tracer needs to know besides the field: integrator, step, start and end.
 
 use super::integrator::Integrator;
-use super::region::{Face, Region};
+use super::region::{Face, GrinRegion};
 use crate::math::Real;
 use serde::{Deserialize, Serialize};
 
 /// How a ray's speed is made to fit the index where it starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Launch {
+pub enum LaunchMode {
     /// `v` is used as it is: right where the index at the start is `|v|`.
     #[default]
     AsGiven,
@@ -32,13 +32,13 @@ pub enum LastStep {
 
 /// Where a ray ends.
 #[derive(Debug, Clone, PartialEq)]
-pub enum End<R> {
+pub enum EndCondition<R> {
     /// After so many steps.
     Steps(u32),
     /// Where it leaves a region.
     Boundary {
         /// The region in which it is traced.
-        region: Region<R>,
+        region: GrinRegion<R>,
         /// How the last step meets the boundary.
         last: LastStep,
         /// After so many steps it counts as trapped.
@@ -48,22 +48,22 @@ pub enum End<R> {
 
 /// How rays are traced.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Setup<R> {
+pub struct GrinSetup<R> {
     /// The kind of step.
     pub integrator: Integrator,
     /// The length of a step in σ, a length; the ray moves by `η` times that.
     pub step: R,
     /// How the speed is made to fit the index at the start.
-    pub launch: Launch,
+    pub launch: LaunchMode,
     /// Where rays end.
-    pub end: End<R>,
+    pub end: EndCondition<R>,
     /// A screen in air behind the end, reached by a straight line.
     pub screen: Option<Face<R>>,
 }
 
 /// Why nothing can be traced with a setup.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum SetupError {
+pub enum GrinSetupError {
     /// The step is not a positive number.
     #[error("a step of {0}, expected a positive number")]
     Step(f64),
@@ -78,39 +78,39 @@ pub enum SetupError {
     },
 }
 
-impl<R: Real> Setup<R> {
+impl<R: Real> GrinSetup<R> {
     /// Refuses numbers that no ray can be traced with.
-    pub(super) fn check(&self) -> Result<(), SetupError> {
+    pub(super) fn check(&self) -> Result<(), GrinSetupError> {
         if !(self.step > R::ZERO && self.step.is_finite()) {
-            return Err(SetupError::Step(self.step.value()));
+            return Err(GrinSetupError::Step(self.step.value()));
         }
-        if self.limit() == 0 {
-            return Err(SetupError::NoSteps);
+        if self.max_steps() == 0 {
+            return Err(GrinSetupError::NoSteps);
         }
-        let End::Boundary { region, .. } = &self.end else { return Ok(()) };
+        let EndCondition::Boundary { region, .. } = &self.end else { return Ok(()) };
         let (low, high) = (region.low, region.high);
         let axes = [('x', low.x, high.x), ('y', low.y, high.y), ('z', low.z, high.z)];
         let empty = axes.into_iter().find(|(_, low, high)| !(low < high));
-        empty.map_or(Ok(()), |(axis, ..)| Err(SetupError::EmptyRegion { axis }))
+        empty.map_or(Ok(()), |(axis, ..)| Err(GrinSetupError::EmptyRegion { axis }))
     }
 
     /// The largest number of steps.
-    pub(super) fn limit(&self) -> u32 {
+    pub(super) fn max_steps(&self) -> u32 {
         match self.end {
-            End::Steps(limit) | End::Boundary { limit, .. } => limit,
+            EndCondition::Steps(limit) | EndCondition::Boundary { limit, .. } => limit,
         }
     }
 
     /// The region, if rays end at its boundary.
-    pub(super) fn region(&self) -> Option<&Region<R>> {
+    pub(super) fn region(&self) -> Option<&GrinRegion<R>> {
         match &self.end {
-            End::Steps(_) => None,
-            End::Boundary { region, .. } => Some(region),
+            EndCondition::Steps(_) => None,
+            EndCondition::Boundary { region, .. } => Some(region),
         }
     }
 
     /// Whether the last step is cut to length.
     pub(super) fn is_fractional(&self) -> bool {
-        matches!(self.end, End::Boundary { last: LastStep::Fractional, .. })
+        matches!(self.end, EndCondition::Boundary { last: LastStep::Fractional, .. })
     }
 }

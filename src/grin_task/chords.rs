@@ -6,19 +6,19 @@
 //! are linear in the field, so its numbers follow from linear least squares. The chord takes as many
 //! steps as the ray tracer would, so that at weak contrast both see the same integrals. After the
 //! idea of Atcheson et al. (ACM TOG 27, 2008), who solve for the three parts of `∇η` one by one and
-//! integrate them: [`Chords::by_gradients`].
+//! integrate them: [`StraightRays::reconstruct_by_gradients`].
 
 use super::cgls::cgls;
-use super::check::TaskError;
-use super::measured::known;
-use super::medium::Medium;
-use super::refuse::wrong;
-use super::scene::{Aim, Shot, setups, shots};
-use super::source::Draw;
+use super::check::GrinTaskError;
+use super::measured::measure_targets;
+use super::medium::GrinField;
+use super::refuse::invalid;
+use super::scene::{RayTarget, ViewRays, plan_views, view_rays};
+use super::source::RaySet;
 use super::space::length;
-use super::task::{Start, Task};
-use crate::grin::field::{Grid, Trilinear};
-use crate::grin::{Field, Limits, Tracer};
+use super::task::{GrinTask, InitialField};
+use crate::grin::field::{RegularGrid, Trilinear};
+use crate::grin::{GrinTracer, IndexField, ParameterBounds};
 use crate::math::Vec3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -31,11 +31,11 @@ const SURFACE: usize = 2000;
 const INTEGRATION: usize = 4;
 
 /// Traces through a field without contrast.
-type Straight<'a> = Tracer<'a, f64, dyn Field<f64> + 'a>;
+type StraightTracer<'a> = GrinTracer<'a, f64, dyn IndexField<f64> + 'a>;
 
 /// The straight way of a ray, and by how much the true one differs.
 #[derive(Debug, Clone, Copy)]
-struct Chord {
+struct StraightRay {
     from: Vec3<f64>,
     /// Of length 1.
     direction: Vec3<f64>,
@@ -50,23 +50,28 @@ struct Chord {
 
 /// The measurements of a task with the straight chords of their rays.
 #[derive(Debug, Clone)]
-pub struct Chords {
-    list: Vec<Chord>,
-    task: Task,
+pub struct StraightRays {
+    rays: Vec<StraightRay>,
+    task: GrinTask,
     /// The index around.
     ambient: f64,
     /// Where the task holds the index, and the root of the weight of each of these places.
     edge: (Vec<Vec3<f64>>, f64),
 }
 
-impl Chord {
-    fn new(field: &dyn Field<f64>, shot: &Shot, tracer: &Straight<'_>, ray: usize) -> Option<Self> {
-        let aim: Aim = *shot.aims.get(ray)?;
-        let (states, exit) = tracer.path(&shot.rays[ray]);
+impl StraightRay {
+    fn new(
+        field: &dyn IndexField<f64>,
+        shot: &ViewRays,
+        tracer: &StraightTracer<'_>,
+        ray: usize,
+    ) -> Option<Self> {
+        let aim: RayTarget = *shot.targets.get(ray)?;
+        let (states, exit) = tracer.trace_path(&shot.rays[ray]);
         let entry = states.first()?;
         let (way, speed) = (exit.x - entry.x, length(entry.v));
         let whole = length(way);
-        if !(whole > 0.0 && Shot::counts(&exit)) {
+        if !(whole > 0.0 && ViewRays::is_valid(&exit)) {
             return None;
         }
         let index = field.sample(entry.x).index;
@@ -82,7 +87,7 @@ impl Chord {
     }
 
     /// Each place with the way that is left behind it and its share of the length.
-    fn places(&self) -> impl Iterator<Item = (Vec3<f64>, f64, f64)> {
+    fn sample_points(&self) -> impl Iterator<Item = (Vec3<f64>, f64, f64)> {
         let share = self.length / self.steps as f64;
         let at = move |i: usize| share * (i as f64 + 0.5);
         let Self { from, direction, length, steps, .. } = *self;
@@ -90,80 +95,86 @@ impl Chord {
     }
 
     /// The part across the chord: along it light does not turn, and slides on the boundary.
-    fn across(&self, v: Vec3<f64>) -> Vec3<f64> {
+    fn transverse(&self, v: Vec3<f64>) -> Vec3<f64> {
         v - self.direction * self.direction.dot(v)
     }
 
     /// How a field of weak contrast turns and shifts the ray.
-    fn bend(&self, field: &dyn Field<f64>) -> [Vec3<f64>; 2] {
+    fn deflection(&self, field: &dyn IndexField<f64>) -> [Vec3<f64>; 2] {
         let mut sums = [Vec3::default(); 2];
-        for (p, left, share) in self.places() {
+        for (p, left, share) in self.sample_points() {
             let pull = field.sample(p).gradient * share;
             sums[0] = sums[0] + pull * self.gains[0];
             sums[1] = sums[1] + pull * (self.gains[1] * left);
         }
-        sums.map(|sum| self.across(sum))
+        sums.map(|sum| self.transverse(sum))
     }
 
-    /// The transpose of [`Self::bend`].
-    fn bend_back(&self, field: &dyn Field<f64>, seeds: [Vec3<f64>; 2], gradient: &mut [f64]) {
-        let [turn, shift] = seeds.map(|seed| self.across(seed));
-        for (p, left, share) in self.places() {
+    /// The transpose of [`Self::deflection`].
+    fn deflection_adjoint(
+        &self,
+        field: &dyn IndexField<f64>,
+        seeds: [Vec3<f64>; 2],
+        gradient: &mut [f64],
+    ) {
+        let [turn, shift] = seeds.map(|seed| self.transverse(seed));
+        for (p, left, share) in self.sample_points() {
             let pull = turn * (self.gains[0] * share) + shift * (self.gains[1] * left * share);
-            field.deposit(p, 0.0, pull, gradient);
+            field.accumulate(p, 0.0, pull, gradient);
         }
     }
 
     /// How a volume of one part of the gradient turns the ray.
-    fn turn(&self, part: &Trilinear<f64>) -> f64 {
-        let turns = self.places().map(|(p, _, share)| share * part.sample(p).index);
+    fn turning(&self, part: &Trilinear<f64>) -> f64 {
+        let turns = self.sample_points().map(|(p, _, share)| share * part.sample(p).index);
         self.gains[0] * turns.sum::<f64>()
     }
 
-    /// The transpose of [`Self::turn`].
-    fn turn_back(&self, part: &Trilinear<f64>, seed: f64, gradient: &mut [f64]) {
-        for (p, _, share) in self.places() {
-            part.deposit(p, self.gains[0] * share * seed, Vec3::default(), gradient);
+    /// The transpose of [`Self::turning`].
+    fn turning_adjoint(&self, part: &Trilinear<f64>, seed: f64, gradient: &mut [f64]) {
+        for (p, _, share) in self.sample_points() {
+            part.accumulate(p, self.gains[0] * share * seed, Vec3::default(), gradient);
         }
     }
 }
 
-impl Chords {
+impl StraightRays {
     /// The chords of a task, all of whose views ask for light as it leaves another field.
     ///
     /// # Errors
     /// A task that cannot be worked on.
-    pub fn new(task: &Task) -> Result<Self, TaskError> {
+    pub fn new(task: &GrinTask) -> Result<Self, GrinTaskError> {
         task.check()?;
         let ambient = match (task.edge, &task.start) {
             (Some(edge), _) => edge.index,
-            (None, Start::Uniform(index)) => *index,
-            (None, Start::Volume(_)) => 1.0,
+            (None, InitialField::Uniform(index)) => *index,
+            (None, InitialField::Volume(_)) => 1.0,
         };
         let nodes = task.levels.iter().map(|level| level.nodes).max().unwrap_or(2);
-        let even = Medium::of(task.field, nodes, |_| ambient)?;
-        let setups = setups(task, even.field(), Draw::Judge)?;
-        let shots = shots(task, &known(task)?, &setups, Draw::Judge)?;
+        let even = GrinField::from_function(task.field, nodes, |_| ambient)?;
+        let setups = plan_views(task, even.field(), RaySet::Scoring)?;
+        let shots = view_rays(task, &measure_targets(task)?, &setups, RaySet::Scoring)?;
         let mut chords = Vec::new();
         for shot in &shots {
-            let tracer = Tracer::new(even.field(), shot.setup.clone())?;
+            let tracer = GrinTracer::new(even.field(), shot.setup.clone())?;
             chords.extend(
-                (0..shot.rays.len()).filter_map(|ray| Chord::new(even.field(), shot, &tracer, ray)),
+                (0..shot.rays.len())
+                    .filter_map(|ray| StraightRay::new(even.field(), shot, &tracer, ray)),
             );
         }
         if chords.is_empty() {
-            return Err(wrong("views", "none with the goal `like`", "light that was measured"));
+            return Err(invalid("views", "none with the goal `like`", "light that was measured"));
         }
         let weight = task.edge.map_or(0.0, |edge| edge.weight);
-        let places = if weight > 0.0 { task.space.surface(SURFACE) } else { Vec::new() };
+        let places = if weight > 0.0 { task.space.surface_points(SURFACE) } else { Vec::new() };
         // The weight stands against the mean over the rays, here against their sum.
         let firm = (weight * chords.len() as f64 / SURFACE as f64).sqrt();
-        Ok(Self { list: chords, task: task.clone(), ambient, edge: (places, firm) })
+        Ok(Self { rays: chords, task: task.clone(), ambient, edge: (places, firm) })
     }
 
     /// How many there are.
     pub fn count(&self) -> usize {
-        self.list.len()
+        self.rays.len()
     }
 
     /// The field of so many nodes that explains the measurement best by straight lines, within the
@@ -172,37 +183,38 @@ impl Chords {
     ///
     /// # Errors
     /// Too few nodes.
-    pub fn field(
+    pub fn reconstruct(
         &self,
         nodes: usize,
         steps: usize,
-        mut visit: impl FnMut(&Medium) -> ControlFlow<()>,
-    ) -> Result<Medium, TaskError> {
-        let shape = Medium::of(self.task.field, nodes, |_| 0.0)?;
-        let ranges = shape.ranges(self.task.space, self.task.limits, self.task.edge);
-        let limits = Limits { ranges, change: f64::INFINITY };
+        mut visit: impl FnMut(&GrinField) -> ControlFlow<()>,
+    ) -> Result<GrinField, GrinTaskError> {
+        let shape = GrinField::from_function(self.task.field, nodes, |_| 0.0)?;
+        let ranges = shape.parameter_ranges(self.task.space, self.task.limits, self.task.edge);
+        let limits = ParameterBounds { ranges, max_change: f64::INFINITY };
         let (places, firm) = &self.edge;
-        let mut right: Vec<f64> = self.rows(|chord| chord.measured.map(|m| chord.across(m)));
+        let mut right: Vec<f64> = self.rows(|chord| chord.measured.map(|m| chord.transverse(m)));
         right.resize(right.len() + places.len(), 0.0);
         let forward = |u: &[f64]| {
-            let medium = with(&shape, u);
-            let mut rows = self.rows(|chord| chord.bend(medium.field()));
+            let medium = with_parameters(&shape, u);
+            let mut rows = self.rows(|chord| chord.deflection(medium.field()));
             rows.extend(places.iter().map(|p| firm * medium.field().sample(*p).index));
             rows
         };
         let back = |rows: &[f64]| {
-            let mut sum = self.back(shape.field().parameters().len(), rows, |chord, seeds, sum| {
-                chord.bend_back(shape.field(), seeds, sum);
-            });
-            for (p, row) in places.iter().zip(&rows[6 * self.list.len()..]) {
-                shape.field().deposit(*p, firm * row, Vec3::default(), &mut sum);
+            let mut sum =
+                self.transpose(shape.field().parameters().len(), rows, |chord, seeds, sum| {
+                    chord.deflection_adjoint(shape.field(), seeds, sum);
+                });
+            for (p, row) in places.iter().zip(&rows[6 * self.rays.len()..]) {
+                shape.field().accumulate(*p, firm * row, Vec3::default(), &mut sum);
             }
             let held = limits.ranges.iter().map(|[low, high]| low >= high);
             sum.iter_mut().zip(held).filter(|(_, held)| *held).for_each(|(g, _)| *g = 0.0);
             sum
         };
         let field = |u: &[f64]| {
-            let mut medium = with(&shape, u);
+            let mut medium = with_parameters(&shape, u);
             medium.parameters_mut().iter_mut().for_each(|value| *value += self.ambient);
             limits.project(medium.parameters_mut());
             medium
@@ -217,62 +229,71 @@ impl Chords {
     ///
     /// # Errors
     /// Too few nodes.
-    pub fn by_gradients(&self, nodes: usize, steps: usize) -> Result<Medium, TaskError> {
+    pub fn reconstruct_by_gradients(
+        &self,
+        nodes: usize,
+        steps: usize,
+    ) -> Result<GrinField, GrinTaskError> {
         let half = self.task.field.size();
-        let grid = Grid::cube(nodes, half)?;
-        let shape = Trilinear::new(grid, vec![0.0; grid.nodes()])?;
-        let part = |axis: usize| -> Result<Trilinear<f64>, TaskError> {
-            let right: Vec<f64> = self.list.iter().map(|c| along(c.measured[0], axis)).collect();
+        let grid = RegularGrid::cube(nodes, half)?;
+        let shape = Trilinear::new(grid, vec![0.0; grid.node_count()])?;
+        let part = |axis: usize| -> Result<Trilinear<f64>, GrinTaskError> {
+            let right: Vec<f64> =
+                self.rays.iter().map(|c| component(c.measured[0], axis)).collect();
             let forward = |u: &[f64]| -> Vec<f64> {
-                let volume = filled(&shape, u);
-                self.list.par_iter().map(|chord| chord.turn(&volume)).collect()
+                let volume = with_values(&shape, u);
+                self.rays.par_iter().map(|chord| chord.turning(&volume)).collect()
             };
             let back = |rows: &[f64]| {
-                let add = |chord: &Chord, ray: usize, sum: &mut [f64]| {
-                    chord.turn_back(&shape, rows[ray], sum);
+                let add = |chord: &StraightRay, ray: usize, sum: &mut [f64]| {
+                    chord.turning_adjoint(&shape, rows[ray], sum);
                 };
-                self.deposit(grid.nodes(), add)
+                self.accumulate(grid.node_count(), add)
             };
             let go_on = |_: &[f64]| ControlFlow::Continue(());
-            Ok(filled(&shape, &cgls(grid.nodes(), &right, steps, forward, back, go_on)))
+            Ok(with_values(&shape, &cgls(grid.node_count(), &right, steps, forward, back, go_on)))
         };
         let parts = [part(0)?, part(1)?, part(2)?];
-        let mut values = integrated(&shape, &parts, INTEGRATION * nodes);
+        let mut values = integrate_gradient(&shape, &parts, INTEGRATION * nodes);
         values.iter_mut().for_each(|value| *value += self.ambient);
-        Ok(Medium::Trilinear(Trilinear::new(grid, values)?))
+        Ok(GrinField::Trilinear(Trilinear::new(grid, values)?))
     }
 
     /// Six numbers a chord.
-    fn rows(&self, of: impl Fn(&Chord) -> [Vec3<f64>; 2] + Sync) -> Vec<f64> {
-        let rows = |chord: &Chord| {
+    fn rows(&self, of: impl Fn(&StraightRay) -> [Vec3<f64>; 2] + Sync) -> Vec<f64> {
+        let rows = |chord: &StraightRay| {
             let [a, b] = of(chord);
             [a.x, a.y, a.z, b.x, b.y, b.z]
         };
-        self.list.par_iter().flat_map_iter(rows).collect()
+        self.rays.par_iter().flat_map_iter(rows).collect()
     }
 
     /// The transpose of [`Self::rows`].
-    fn back(
+    fn transpose(
         &self,
         unknowns: usize,
         rows: &[f64],
-        add: impl Fn(&Chord, [Vec3<f64>; 2], &mut [f64]) + Sync,
+        add: impl Fn(&StraightRay, [Vec3<f64>; 2], &mut [f64]) + Sync,
     ) -> Vec<f64> {
-        self.deposit(unknowns, |chord, ray, sum| {
+        self.accumulate(unknowns, |chord, ray, sum| {
             let [a, b, c, d, e, f] = std::array::from_fn(|i| rows[6 * ray + i]);
             add(chord, [Vec3::new(a, b, c), Vec3::new(d, e, f)], sum);
         })
     }
 
     /// Sums over all chords, the same on any number of threads.
-    fn deposit(&self, unknowns: usize, add: impl Fn(&Chord, usize, &mut [f64]) + Sync) -> Vec<f64> {
-        let size = self.list.len().div_ceil(PARTS).max(1);
-        let part = |(first, chords): (usize, &[Chord])| {
+    fn accumulate(
+        &self,
+        unknowns: usize,
+        add: impl Fn(&StraightRay, usize, &mut [f64]) + Sync,
+    ) -> Vec<f64> {
+        let size = self.rays.len().div_ceil(PARTS).max(1);
+        let part = |(first, chords): (usize, &[StraightRay])| {
             let mut sum = vec![0.0; unknowns];
             chords.iter().enumerate().for_each(|(i, c)| add(c, first * size + i, &mut sum));
             sum
         };
-        let parts: Vec<Vec<f64>> = self.list.par_chunks(size).enumerate().map(part).collect();
+        let parts: Vec<Vec<f64>> = self.rays.par_chunks(size).enumerate().map(part).collect();
         let mut sum = vec![0.0; unknowns];
         for part in parts {
             sum.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
@@ -281,25 +302,29 @@ impl Chords {
     }
 }
 
-fn with(shape: &Medium, parameters: &[f64]) -> Medium {
+fn with_parameters(shape: &GrinField, parameters: &[f64]) -> GrinField {
     let mut medium = shape.clone();
     medium.parameters_mut().copy_from_slice(parameters);
     medium
 }
 
-fn filled(shape: &Trilinear<f64>, values: &[f64]) -> Trilinear<f64> {
+fn with_values(shape: &Trilinear<f64>, values: &[f64]) -> Trilinear<f64> {
     let mut filled = shape.clone();
     filled.parameters_mut().copy_from_slice(values);
     filled
 }
 
-fn along(v: Vec3<f64>, axis: usize) -> f64 {
+fn component(v: Vec3<f64>, axis: usize) -> f64 {
     [v.x, v.y, v.z][axis]
 }
 
 /// The values that vanish at the boundary and whose gradient is nearest to these volumes, in the
 /// middles of the voxels: Poisson's equation.
-fn integrated(shape: &Trilinear<f64>, parts: &[Trilinear<f64>; 3], steps: usize) -> Vec<f64> {
+fn integrate_gradient(
+    shape: &Trilinear<f64>,
+    parts: &[Trilinear<f64>; 3],
+    steps: usize,
+) -> Vec<f64> {
     let grid = shape.grid();
     let cells = grid.counts().map(|count| count - 1);
     let h = grid.spacing();
@@ -312,7 +337,7 @@ fn integrated(shape: &Trilinear<f64>, parts: &[Trilinear<f64>; 3], steps: usize)
     let right = |n: usize| parts.each_ref().map(|part| part.sample(middle(n)).index);
     let right: Vec<f64> = (0..all).into_par_iter().flat_map_iter(right).collect();
     let forward = |u: &[f64]| {
-        let volume = filled(shape, u);
+        let volume = with_values(shape, u);
         let slope = |n: usize| {
             let Vec3 { x, y, z } = volume.sample(middle(n)).gradient;
             [x, y, z]
@@ -325,13 +350,13 @@ fn integrated(shape: &Trilinear<f64>, parts: &[Trilinear<f64>; 3], steps: usize)
         place.iter().zip(counts).any(|(i, count)| *i == 0 || i + 1 == count)
     };
     let back = |rows: &[f64]| {
-        let mut sum = vec![0.0; grid.nodes()];
+        let mut sum = vec![0.0; grid.node_count()];
         for n in 0..all {
             let pull = Vec3::new(rows[3 * n], rows[3 * n + 1], rows[3 * n + 2]);
-            shape.deposit(middle(n), 0.0, pull, &mut sum);
+            shape.accumulate(middle(n), 0.0, pull, &mut sum);
         }
         sum.iter_mut().enumerate().filter(|(n, _)| is_rim(*n)).for_each(|(_, g)| *g = 0.0);
         sum
     };
-    cgls(grid.nodes(), &right, steps, forward, back, |_| ControlFlow::Continue(()))
+    cgls(grid.node_count(), &right, steps, forward, back, |_| ControlFlow::Continue(()))
 }

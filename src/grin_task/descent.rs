@@ -1,68 +1,68 @@
 //! The methods that a task may ask for, behind one step.
 
-use super::check::TaskError;
-use super::hold::Hold;
-use super::least_squares::{LeastSquares, Rows};
-use super::medium::Medium;
-use super::scene::{Counts, Evaluation, Shot, evaluate, rows};
-use super::task::Method;
-use crate::grin::{Adam, Lbfgs, Limits};
+use super::check::GrinTaskError;
+use super::hold::FieldPenalties;
+use super::least_squares::{LevenbergMarquardt, ResidualRows};
+use super::medium::GrinField;
+use super::scene::{LossEvaluation, RayCounts, ViewRays, evaluate, evaluate_rows};
+use super::task::GrinMethod;
+use crate::grin::{Adam, Lbfgs, ParameterBounds};
 
 /// Adam's rate falls to this part over the second half of a level.
 const ANNEALED: f64 = 0.1;
 
 /// What descends.
 #[derive(Debug, Clone)]
-pub(super) enum Descent {
+pub(super) enum FieldSolver {
     /// With the rate at the beginning of the level.
     Adam(Adam, f64),
     Lbfgs(Lbfgs),
-    LeastSquares(LeastSquares),
+    LeastSquares(LevenbergMarquardt),
 }
 
 /// The loss as a function of the numbers of a field.
-pub(super) struct Problem<'a> {
-    pub(super) shape: &'a Medium,
-    pub(super) shots: &'a [Shot],
-    pub(super) hold: &'a Hold,
-    pub(super) limits: &'a Limits,
+pub(super) struct LossFunction<'a> {
+    pub(super) shape: &'a GrinField,
+    pub(super) shots: &'a [ViewRays],
+    pub(super) hold: &'a FieldPenalties,
+    pub(super) limits: &'a ParameterBounds,
 }
 
 /// What a step did.
-pub(super) struct Step {
+pub(super) struct SolverStep {
     pub(super) loss: f64,
-    pub(super) counts: Counts,
+    pub(super) counts: RayCounts,
     /// How often the loss was asked for.
     pub(super) evaluations: usize,
     /// Whether further steps would change nothing.
-    pub(super) settled: bool,
+    pub(super) converged: bool,
 }
 
-impl Problem<'_> {
-    fn medium(&self, parameters: &[f64]) -> Medium {
+impl LossFunction<'_> {
+    fn field(&self, parameters: &[f64]) -> GrinField {
         let mut medium = self.shape.clone();
         medium.parameters_mut().copy_from_slice(parameters);
         medium
     }
 
-    fn evaluate(&self, parameters: &[f64]) -> Result<Evaluation, TaskError> {
-        evaluate(self.medium(parameters).field(), self.shots, self.hold)
+    fn evaluate(&self, parameters: &[f64]) -> Result<LossEvaluation, GrinTaskError> {
+        evaluate(self.field(parameters).field(), self.shots, self.hold)
     }
 
-    fn rows(&self, parameters: &[f64]) -> Result<Rows, TaskError> {
-        rows(self.medium(parameters).field(), self.shots, self.hold)
+    fn rows(&self, parameters: &[f64]) -> Result<ResidualRows, GrinTaskError> {
+        evaluate_rows(self.field(parameters).field(), self.shots, self.hold)
     }
 }
 
-impl Descent {
-    pub(super) fn new(method: Method, level: usize) -> Self {
+impl FieldSolver {
+    pub(super) fn new(method: GrinMethod, level: usize) -> Self {
         match method {
-            Method::Adam { rate, fall } => {
+            GrinMethod::Adam { rate, fall } => {
                 let rate = rate * fall.powi(level as i32);
                 Self::Adam(Adam::new(rate), rate)
             }
-            Method::Lbfgs => Self::Lbfgs(Lbfgs::default()),
-            Method::LeastSquares => Self::LeastSquares(LeastSquares::default()),
+            GrinMethod::Lbfgs => Self::Lbfgs(Lbfgs::default()),
+            GrinMethod::LeastSquares => Self::LeastSquares(LevenbergMarquardt::default()),
         }
     }
 
@@ -79,9 +79,9 @@ impl Descent {
     pub(super) fn step(
         &mut self,
         parameters: &mut [f64],
-        problem: &Problem<'_>,
+        problem: &LossFunction<'_>,
         share: f64,
-    ) -> Result<Step, TaskError> {
+    ) -> Result<SolverStep, GrinTaskError> {
         let limits = problem.limits;
         match self {
             Self::Adam(adam, rate) => {
@@ -89,27 +89,32 @@ impl Descent {
                 adam.rate = *rate * ANNEALED.powf((2.0 * share - 1.0).max(0.0));
                 adam.step(parameters, &found.gradient, limits);
                 let counts = found.counts();
-                Ok(Step { loss: found.loss, counts, evaluations: 1, settled: false })
+                Ok(SolverStep { loss: found.loss, counts, evaluations: 1, converged: false })
             }
-            Self::Lbfgs(lbfgs) => by_lbfgs(lbfgs, parameters, problem),
+            Self::Lbfgs(lbfgs) => step_lbfgs(lbfgs, parameters, problem),
             Self::LeastSquares(squares) => {
                 let mut evaluations = 0;
                 let (loss, settled) = squares.step(parameters, limits, |p| {
                     evaluations += 1;
                     problem.rows(p)
                 })?;
-                Ok(Step { loss, counts: Counts::default(), evaluations, settled })
+                Ok(SolverStep {
+                    loss,
+                    counts: RayCounts::default(),
+                    evaluations,
+                    converged: settled,
+                })
             }
         }
     }
 }
 
-fn by_lbfgs(
+fn step_lbfgs(
     lbfgs: &mut Lbfgs,
     parameters: &mut [f64],
-    problem: &Problem<'_>,
-) -> Result<Step, TaskError> {
-    let (mut failed, mut counts) = (None, Counts::default());
+    problem: &LossFunction<'_>,
+) -> Result<SolverStep, GrinTaskError> {
+    let (mut failed, mut counts) = (None, RayCounts::default());
     let done = lbfgs.step(parameters, problem.limits, |p| match problem.evaluate(p) {
         Ok(found) => {
             counts = found.counts();
@@ -121,5 +126,10 @@ fn by_lbfgs(
         }
     });
     failed.map_or(Ok(()), Err)?;
-    Ok(Step { loss: done.value, counts, evaluations: done.evaluations, settled: done.finished })
+    Ok(SolverStep {
+        loss: done.value,
+        counts,
+        evaluations: done.evaluations,
+        converged: done.converged,
+    })
 }

@@ -1,26 +1,26 @@
 //! Pictures that light shall make: drawn by formula, or a person's own from a file.
 
-use super::space::GOLDEN;
-use crate::files::{FileError, Photo, read_photo};
+use super::space::GOLDEN_ANGLE;
+use crate::files::{FileError, GrayscaleImage, read_grayscale};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// Points along a side of a pixel of a drawing.
-const FINE: usize = 4;
+const SUBPIXELS: usize = 4;
 /// Light where nothing is drawn: all of it cannot be taken away from any place.
-const DIM: f64 = 0.25;
+const BACKGROUND: f64 = 0.25;
 /// How soft edges are, in halves of the side.
-const SOFT: f64 = 0.03;
+const EDGE_SOFTNESS: f64 = 0.03;
 /// Points of a circle of confusion, and its radius, in halves of the side, one scene deep out of
 /// focus.
-const CONFUSED: usize = 12;
-const CONFUSION: f64 = 0.4;
+const CONFUSION_POINTS: usize = 12;
+const CONFUSION_RADIUS: f64 = 0.4;
 
 /// A picture that light shall make.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Drawing {
+pub enum TargetImage {
     /// A smiling face.
     Face,
     /// A letter A in a frame.
@@ -32,59 +32,59 @@ pub enum Drawing {
     Scene(f64),
     /// A person's own: grey, cut to the largest square in its middle. Its numbers are taken as
     /// light as they are.
-    File(PictureFile),
+    File(ImageFile),
 }
 
 /// A picture in a file, which is read once, when it is needed first.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(from = "PathBuf", into = "PathBuf")]
-pub struct PictureFile {
+pub struct ImageFile {
     path: PathBuf,
-    photo: Arc<OnceLock<Photo>>,
+    photo: Arc<OnceLock<GrayscaleImage>>,
 }
 
-impl PictureFile {
+impl ImageFile {
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// Its picture.
-    fn photo(&self) -> Result<&Photo, FileError> {
+    fn photo(&self) -> Result<&GrayscaleImage, FileError> {
         if let Some(photo) = self.photo.get() {
             return Ok(photo);
         }
-        let photo = read_photo(&self.path)?;
+        let photo = read_grayscale(&self.path)?;
         Ok(self.photo.get_or_init(|| photo))
     }
 }
 
-impl From<PathBuf> for PictureFile {
+impl From<PathBuf> for ImageFile {
     fn from(path: PathBuf) -> Self {
         Self { path, photo: Arc::default() }
     }
 }
 
-impl From<PictureFile> for PathBuf {
-    fn from(file: PictureFile) -> Self {
+impl From<ImageFile> for PathBuf {
+    fn from(file: ImageFile) -> Self {
         file.path
     }
 }
 
-impl PartialEq for PictureFile {
+impl PartialEq for ImageFile {
     fn eq(&self, other: &Self) -> bool {
         self.path == other.path
     }
 }
 
-impl Drawing {
+impl TargetImage {
     /// Its pixels in rows from the bottom, as many as columns, of mean 1.
     ///
     /// # Errors
     /// A file that holds no picture, or one without light in its middle square.
-    pub fn pixels(&self, pixels: usize) -> Result<Vec<f64>, FileError> {
+    pub fn render(&self, pixels: usize) -> Result<Vec<f64>, FileError> {
         let mut all = match self {
-            Self::File(file) => resampled(file.photo()?, pixels),
+            Self::File(file) => resample(file.photo()?, pixels),
             drawn => (0..pixels * pixels).map(|n| drawn.pixel(n, pixels)).collect(),
         };
         let mean = all.iter().sum::<f64>() / all.len() as f64;
@@ -102,11 +102,12 @@ impl Drawing {
 
     /// A pixel of a drawing by formula, averaged over its area.
     fn pixel(&self, n: usize, pixels: usize) -> f64 {
-        let fine = (pixels * FINE) as f64;
-        let at = |pixel: usize, k: usize| 2.0 * ((pixel * FINE + k) as f64 + 0.5) / fine - 1.0;
-        let lit =
-            |k: usize| self.light(at(n % pixels, k % FINE), at(n / pixels, k / FINE), k as f64);
-        (0..FINE * FINE).map(lit).sum::<f64>() / (FINE * FINE) as f64
+        let fine = (pixels * SUBPIXELS) as f64;
+        let at = |pixel: usize, k: usize| 2.0 * ((pixel * SUBPIXELS + k) as f64 + 0.5) / fine - 1.0;
+        let lit = |k: usize| {
+            self.light(at(n % pixels, k % SUBPIXELS), at(n / pixels, k / SUBPIXELS), k as f64)
+        };
+        (0..SUBPIXELS * SUBPIXELS).map(lit).sum::<f64>() / (SUBPIXELS * SUBPIXELS) as f64
     }
 
     /// The light at a point of the square from -1 to 1: soft edges on a dim ground. Points of a pixel
@@ -115,67 +116,68 @@ impl Drawing {
         let drawn = match self {
             Self::Face => face(x, y),
             Self::Letter => letter(x, y),
-            Self::Ring => edge((x.hypot(y) - 0.6).abs() - 0.08),
+            Self::Ring => soft_edge((x.hypot(y) - 0.6).abs() - 0.08),
             Self::Scene(focus) => scene([x, y], *focus, turn),
             Self::File(_) => 0.0,
         };
-        DIM + (1.0 - DIM) * drawn
+        BACKGROUND + (1.0 - BACKGROUND) * drawn
     }
 }
 
 /// 1 inside, at a negative distance, and 0 outside.
-fn edge(distance: f64) -> f64 {
-    1.0 / (1.0 + (distance / SOFT).exp())
+fn soft_edge(distance: f64) -> f64 {
+    1.0 / (1.0 + (distance / EDGE_SOFTNESS).exp())
 }
 
 fn face(x: f64, y: f64) -> f64 {
-    let ring = edge((x.hypot(y) - 0.62).abs() - 0.08);
-    let eye = |side: f64| edge((x - side * 0.24).hypot(y - 0.2) - 0.11);
-    let mouth = edge((x.hypot(y + 0.02) - 0.36).abs() - 0.06) * edge(y + 0.16);
+    let ring = soft_edge((x.hypot(y) - 0.62).abs() - 0.08);
+    let eye = |side: f64| soft_edge((x - side * 0.24).hypot(y - 0.2) - 0.11);
+    let mouth = soft_edge((x.hypot(y + 0.02) - 0.36).abs() - 0.06) * soft_edge(y + 0.16);
     ring.max(eye(-1.0)).max(eye(1.0)).max(mouth)
 }
 
 fn letter(x: f64, y: f64) -> f64 {
-    let frame = edge((x.abs().max(y.abs()) - 0.68).abs() - 0.07);
-    let leg = |side: f64| edge((x - side * 0.5 * (0.45 - y) * 0.55).abs() - 0.075);
-    let legs = leg(-1.0).max(leg(1.0)) * edge(y.abs() - 0.45);
-    let bar = edge((y + 0.08).abs() - 0.06) * edge(x.abs() - 0.2);
+    let frame = soft_edge((x.abs().max(y.abs()) - 0.68).abs() - 0.07);
+    let leg = |side: f64| soft_edge((x - side * 0.5 * (0.45 - y) * 0.55).abs() - 0.075);
+    let legs = leg(-1.0).max(leg(1.0)) * soft_edge(y.abs() - 0.45);
+    let bar = soft_edge((y + 0.08).abs() - 0.06) * soft_edge(x.abs() - 0.2);
     frame.max(legs).max(bar)
 }
 
 /// Three things at three depths, each as blurred as its depth is off the focus.
 fn scene(place: [f64; 2], focus: f64, turn: f64) -> f64 {
-    let ring = |x: f64, y: f64| edge(((x + 0.36).hypot(y - 0.3) - 0.22).abs() - 0.06);
+    let ring = |x: f64, y: f64| soft_edge(((x + 0.36).hypot(y - 0.3) - 0.22).abs() - 0.06);
     let cross = |x: f64, y: f64| {
         let (x, y) = ((x - 0.38).abs(), (y - 0.3).abs());
-        edge(x.min(y) - 0.06) * edge(x.max(y) - 0.26)
+        soft_edge(x.min(y) - 0.06) * soft_edge(x.max(y) - 0.26)
     };
-    let square = |x: f64, y: f64| edge((x.abs().max((y + 0.36).abs()) - 0.2).abs() - 0.06);
-    let front = blurred(place, focus, turn, ring);
-    let middle = blurred(place, focus - 0.5, turn, cross);
-    front.max(middle).max(blurred(place, focus - 1.0, turn, square))
+    let square = |x: f64, y: f64| soft_edge((x.abs().max((y + 0.36).abs()) - 0.2).abs() - 0.06);
+    let front = blur(place, focus, turn, ring);
+    let middle = blur(place, focus - 0.5, turn, cross);
+    front.max(middle).max(blur(place, focus - 1.0, turn, square))
 }
 
 /// The mean over a circle of confusion.
-fn blurred([x, y]: [f64; 2], off: f64, turn: f64, light: impl Fn(f64, f64) -> f64) -> f64 {
-    let radius = CONFUSION * off.abs();
-    if radius < SOFT / 4.0 {
+fn blur([x, y]: [f64; 2], off: f64, turn: f64, light: impl Fn(f64, f64) -> f64) -> f64 {
+    let radius = CONFUSION_RADIUS * off.abs();
+    if radius < EDGE_SOFTNESS / 4.0 {
         return light(x, y);
     }
     let lit = |k: usize| {
-        let r = radius * ((k as f64 + 0.5) / CONFUSED as f64).sqrt();
-        let (sin, cos) = (GOLDEN * k as f64 + turn).sin_cos();
+        let r = radius * ((k as f64 + 0.5) / CONFUSION_POINTS as f64).sqrt();
+        let (sin, cos) = (GOLDEN_ANGLE * k as f64 + turn).sin_cos();
         light(x + r * cos, y + r * sin)
     };
-    (0..CONFUSED).map(lit).sum::<f64>() / CONFUSED as f64
+    (0..CONFUSION_POINTS).map(lit).sum::<f64>() / CONFUSION_POINTS as f64
 }
 
 /// The middle square of a photo on so many pixels a side, each the mean over its area, rows from the
 /// bottom.
-fn resampled(photo: &Photo, pixels: usize) -> Vec<f64> {
+fn resample(photo: &GrayscaleImage, pixels: usize) -> Vec<f64> {
     let side = photo.width.min(photo.height);
     let (left, top) = ((photo.width - side) / 2, (photo.height - side) / 2);
-    let parts: Vec<Vec<(usize, f64)>> = (0..pixels).map(|i| covered(i, pixels, side)).collect();
+    let parts: Vec<Vec<(usize, f64)>> =
+        (0..pixels).map(|i| pixel_overlap(i, pixels, side)).collect();
     let at = |x: usize, y: usize| f64::from(photo.light[(top + y) * photo.width + left + x]);
     let mean = |n: usize| {
         let (columns, rows) = (&parts[n % pixels], &parts[pixels - 1 - n / pixels]);
@@ -187,7 +189,7 @@ fn resampled(photo: &Photo, pixels: usize) -> Vec<f64> {
 
 /// What a pixel covers of `side` others along an axis: which, and the share of each; the shares make
 /// 1.
-fn covered(pixel: usize, pixels: usize, side: usize) -> Vec<(usize, f64)> {
+fn pixel_overlap(pixel: usize, pixels: usize, side: usize) -> Vec<(usize, f64)> {
     let scale = side as f64 / pixels as f64;
     let (from, to) = (pixel as f64 * scale, (pixel + 1) as f64 * scale);
     let last = (to.ceil() as usize).min(side);
@@ -202,15 +204,15 @@ mod tests {
     #[test]
     fn a_photo_keeps_its_light_at_any_size() {
         let light: Vec<f32> = (0..7 * 5).map(|i| ((i * 37) % 11) as f32).collect();
-        let photo = Photo { width: 7, height: 5, light };
+        let photo = GrayscaleImage { width: 7, height: 5, light };
         let square = |x: usize, y: usize| f64::from(photo.light[y * 7 + 1 + x]);
         let mean = (0..25).map(|n| square(n % 5, n / 5)).sum::<f64>() / 25.0;
         for pixels in [1, 3, 4, 5, 8, 64] {
-            let found = resampled(&photo, pixels);
+            let found = resample(&photo, pixels);
             let sum = found.iter().sum::<f64>() / found.len() as f64;
             assert!((sum - mean).abs() < 1e-9 * mean, "{pixels}: {sum} {mean}");
         }
-        let same = resampled(&photo, 5);
+        let same = resample(&photo, 5);
         assert!((0..25).all(|n| (same[n] - square(n % 5, 4 - n / 5)).abs() < 1e-12));
     }
 

@@ -1,24 +1,25 @@
 //! Fields that are given: by a formula, or by a volume in a file, which is refused where it cannot be
 //! what the task needs.
 
-use super::check::ROUNDING;
-use super::medium::Medium;
-use super::range::Bound;
-use super::task::{Exact, Space, Start};
+use super::check::INDEX_ROUNDING;
+use super::medium::GrinField;
+use super::range::IndexBound;
+use super::task::{Domain, InitialField, ReferenceField};
 use crate::files::{self, FileError, Volume};
-use crate::grin::Field;
+use crate::grin::IndexField;
 use crate::grin::field::{
-    Grid, GridError, Layered, Luneburg, Maxwell, Parabolic, Plume, Sech, Tricubic, Trilinear,
+    GridError, Luneburg, Maxwell, Parabolic, Plume, ProfileField, RegularGrid, Sech, Tricubic,
+    Trilinear,
 };
 use crate::math::{Real, Vec3};
 use std::path::Path;
 
 /// By how much an index may be off that was written with four bytes.
-const SINGLE: f64 = 5e-7;
+const SINGLE_PRECISION: f64 = 5e-7;
 
 /// Why a given field cannot be had.
 #[derive(Debug, thiserror::Error)]
-pub enum NoField {
+pub enum ReferenceFieldError {
     /// Its file.
     #[error(transparent)]
     File(#[from] FileError),
@@ -48,7 +49,7 @@ pub enum NoField {
         "{file}: the index is {found} at {at:?} mm; expected {} to {}, the limits of the task",
         expected[0], expected[1]
     )]
-    Beyond {
+    BeyondLimits {
         /// The file.
         file: String,
         /// The index that is farthest off.
@@ -60,7 +61,7 @@ pub enum NoField {
     },
     /// It ends before the space does.
     #[error("{file}: reaches from {low} to {high} mm along {axis}; expected all of {expected:?}")]
-    Short {
+    TooSmall {
         /// The file.
         file: String,
         /// `x`, `y` or `z`.
@@ -75,36 +76,36 @@ pub enum NoField {
 }
 
 /// The trilinear field of a volume in a file.
-pub(super) fn from_file<R: Real>(path: &Path) -> Result<Trilinear<R>, NoField> {
+pub(super) fn read_field<R: Real>(path: &Path) -> Result<Trilinear<R>, ReferenceFieldError> {
     let Volume { grid, values } = files::read_volume(path)?;
-    let wrong = |source| NoField::Values { file: path.display().to_string(), source };
-    if let Some(n) = values.iter().position(|index| !(*index >= 1.0 - ROUNDING)) {
-        let (file, node) = (path.display().to_string(), place(grid.counts(), n));
-        return Err(NoField::Index { file, node, found: values[n] });
+    let wrong = |source| ReferenceFieldError::Values { file: path.display().to_string(), source };
+    if let Some(n) = values.iter().position(|index| !(*index >= 1.0 - INDEX_ROUNDING)) {
+        let (file, node) = (path.display().to_string(), node_place(grid.counts(), n));
+        return Err(ReferenceFieldError::Index { file, node, found: values[n] });
     }
     let (low, spacing) = (Vec3::from_f64(grid.low()), Vec3::from_f64(grid.spacing()));
-    let grid = Grid::new(grid.counts(), low, spacing).map_err(wrong)?;
+    let grid = RegularGrid::new(grid.counts(), low, spacing).map_err(wrong)?;
     Trilinear::new(grid, values.into_iter().map(R::from_f64).collect()).map_err(wrong)
 }
 
 /// The place of a node in a grid.
-fn place([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
+fn node_place([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
     [n % nx, n / nx % ny, n / nx / ny]
 }
 
 /// The index at every point.
-type Index = Box<dyn Fn(Vec3<f64>) -> f64>;
+type IndexFunction = Box<dyn Fn(Vec3<f64>) -> f64>;
 
-impl Start {
+impl InitialField {
     /// The index of the field to begin with.
-    pub(super) fn index(&self) -> Result<Index, NoField> {
+    pub(super) fn index(&self) -> Result<IndexFunction, ReferenceFieldError> {
         Ok(match self {
             Self::Uniform(index) => {
                 let index = *index;
                 Box::new(move |_| index)
             }
             Self::Volume(path) => {
-                let volume = from_file::<f64>(path)?;
+                let volume = read_field::<f64>(path)?;
                 Box::new(move |p| volume.sample(p).index)
             }
         })
@@ -113,8 +114,8 @@ impl Start {
 
 /// Refuses a volume that ends before a space does, by more than half a voxel: beyond its last nodes
 /// a field only continues.
-pub(super) fn check_reach(path: &Path, space: Space) -> Result<(), NoField> {
-    let grid = *from_file::<f64>(path)?.grid();
+pub(super) fn check_extent(path: &Path, space: Domain) -> Result<(), ReferenceFieldError> {
+    let grid = *read_field::<f64>(path)?.grid();
     let (low, spacing, counts) = (grid.low(), grid.spacing(), grid.counts());
     let [from, to] = space.corners();
     let axes = [
@@ -126,7 +127,7 @@ pub(super) fn check_reach(path: &Path, space: Space) -> Result<(), NoField> {
         let high = low + spacing * (count - 1) as f64;
         if low > expected[0] + 0.5 * spacing || high < expected[1] - 0.5 * spacing {
             let file = path.display().to_string();
-            return Err(NoField::Short { file, axis, low, high, expected });
+            return Err(ReferenceFieldError::TooSmall { file, axis, low, high, expected });
         }
     }
     Ok(())
@@ -134,65 +135,68 @@ pub(super) fn check_reach(path: &Path, space: Space) -> Result<(), NoField> {
 
 /// Refuses a volume with an index beyond limits within some spaces; what rounding to four
 /// bytes takes is nothing.
-pub(super) fn check_range(
+pub(super) fn check_index_range(
     path: &Path,
-    spaces: &[Space],
+    spaces: &[Domain],
     expected: [f64; 2],
-) -> Result<(), NoField> {
-    let medium = Medium::Trilinear(from_file::<f64>(path)?);
-    let [low, high] = [Bound::Low, Bound::High].map(|bound| medium.extreme(spaces, bound));
+) -> Result<(), ReferenceFieldError> {
+    let medium = GrinField::Trilinear(read_field::<f64>(path)?);
+    let [low, high] =
+        [IndexBound::Low, IndexBound::High].map(|bound| medium.extreme_index(spaces, bound));
     let beyond = [(low, expected[0] - low.0), (high, high.0 - expected[1])];
-    match beyond.into_iter().find(|(_, by)| *by > SINGLE) {
+    match beyond.into_iter().find(|(_, by)| *by > SINGLE_PRECISION) {
         None => Ok(()),
         Some(((found, at), _)) => {
             let file = path.display().to_string();
-            Err(NoField::Beyond { file, found, at: [at.x, at.y, at.z], expected })
+            Err(ReferenceFieldError::BeyondLimits { file, found, at: [at.x, at.y, at.z], expected })
         }
     }
 }
 
-impl Exact {
+impl ReferenceField {
     /// The same sampled on a grid.
     ///
     /// # Errors
     /// A volume that cannot be read, or a grid that cannot be made.
-    pub fn sampled<R: Real>(
+    pub fn sample_on_grid<R: Real>(
         &self,
         cubic: bool,
         nodes: usize,
         half: f64,
-    ) -> Result<Box<dyn Field<R>>, NoField> {
+    ) -> Result<Box<dyn IndexField<R>>, ReferenceFieldError> {
         let exact = self.field::<R>()?;
         let value = |p: Vec3<R>| exact.sample(p).index;
-        let wrong = |source| NoField::Values { file: format!("{nodes} nodes"), source };
+        let wrong = |source| ReferenceFieldError::Values { file: format!("{nodes} nodes"), source };
         let half = R::from_f64(half);
         if cubic {
             let cells = nodes.saturating_sub(1);
-            return Ok(Box::new(Tricubic::near(cells, half, value).map_err(wrong)?));
+            return Ok(Box::new(Tricubic::approximate(cells, half, value).map_err(wrong)?));
         }
-        let grid = Grid::cube(nodes, half).map_err(wrong)?;
-        Ok(Box::new(Trilinear::sampled(grid, value).map_err(wrong)?))
+        let grid = RegularGrid::cube(nodes, half).map_err(wrong)?;
+        Ok(Box::new(Trilinear::from_function(grid, value).map_err(wrong)?))
     }
 
     /// The field.
     ///
     /// # Errors
     /// A volume that cannot be read.
-    pub fn field<R: Real>(&self) -> Result<Box<dyn Field<R>>, NoField> {
+    pub fn field<R: Real>(&self) -> Result<Box<dyn IndexField<R>>, ReferenceFieldError> {
         let c = R::from_f64;
         Ok(match self {
-            Self::Luneburg { radius } => Box::new(Layered::sphere(Luneburg::new(c(*radius)))),
+            Self::Luneburg { radius } => Box::new(ProfileField::sphere(Luneburg::new(c(*radius)))),
             Self::Maxwell { centre, radius } => {
-                Box::new(Layered::sphere(Maxwell::new(c(*centre), c(*radius))))
+                Box::new(ProfileField::sphere(Maxwell::new(c(*centre), c(*radius))))
             }
-            Self::Secant { axis, a } => Box::new(Layered::cylinder(Sech::new(c(*axis), c(*a)))),
+            Self::Secant { axis, a } => {
+                Box::new(ProfileField::cylinder(Sech::new(c(*axis), c(*a))))
+            }
             Self::Parabolic { axis, g } => {
-                Box::new(Layered::cylinder(Parabolic::new(c(*axis), c(*g))))
+                Box::new(ProfileField::cylinder(Parabolic::new(c(*axis), c(*g))))
             }
             Self::Plume { ambient, contrast, half } => {
                 Box::new(Plume::new(c(*ambient), c(*contrast), c(*half)))
             }
-            Self::Volume(path) => Box::new(from_file(path)?),
+            Self::Volume(path) => Box::new(read_field(path)?),
         })
     }
 }

@@ -2,46 +2,49 @@
 //! range of the index; each a penalty that vanishes where it is kept.
 
 use super::space::length;
-use super::task::{Edge, FieldKind, MakerLimits, Task};
-use crate::grin::Field;
+use super::task::{BoundaryCondition, FieldRepresentation, GrinTask, ManufacturingLimits};
+use crate::grin::IndexField;
 use crate::math::Vec3;
 
 /// Fewest and most points along a side of the box at which a slope is held; else one a voxel.
 const LATTICE: [usize; 2] = [24, 64];
 /// Points of a radius at which an index is held, and how firmly.
-const SPOKE: usize = 100;
-const FIRM: f64 = 10.0;
+const RADIAL_POINTS: usize = 100;
+const STIFFNESS: f64 = 10.0;
 /// Points of the surface at which the index is held.
 const SURFACE: usize = 2000;
 
 /// What is asked of the field itself: its index at the edge, and a limit of its slope.
 #[derive(Debug, Clone)]
-pub(super) struct Hold {
-    edge: Option<(Edge, Vec<Vec3<f64>>)>,
+pub(super) struct FieldPenalties {
+    edge: Option<(BoundaryCondition, Vec<Vec3<f64>>)>,
     slope: Option<(f64, f64, Vec<Vec3<f64>>)>,
     /// The smallest and the largest index, of a spline: its coefficients alone do not keep them.
     range: Option<([f64; 2], f64, Vec<Vec3<f64>>)>,
 }
 
-impl Hold {
-    pub(super) fn new(task: &Task) -> Self {
-        let MakerLimits { slope, .. } = task.limits;
+impl FieldPenalties {
+    pub(super) fn new(task: &GrinTask) -> Self {
+        let ManufacturingLimits { slope, .. } = task.limits;
         let radius = task.field.size();
         let along = |x: f64| Vec3::new(x, 0.0, 0.0);
         let is_radial = task.field.is_radial();
-        let surface = || if is_radial { vec![along(radius)] } else { task.space.surface(SURFACE) };
+        let surface =
+            || if is_radial { vec![along(radius)] } else { task.space.surface_points(SURFACE) };
         let size = task.space.diameter();
         let finest = task.levels.iter().map(|level| level.nodes - 1).max().unwrap_or(0);
         let lattice =
             if slope.is_some() { finest.clamp(LATTICE[0], LATTICE[1]) } else { LATTICE[0] };
         let inside = || {
             if is_radial {
-                (0..=SPOKE).map(|i| along(radius * i as f64 / SPOKE as f64)).collect()
+                (0..=RADIAL_POINTS)
+                    .map(|i| along(radius * i as f64 / RADIAL_POINTS as f64))
+                    .collect()
             } else {
                 [task.space.lattice(lattice), surface()].concat()
             }
         };
-        let is_spline = !matches!(task.field, FieldKind::Trilinear { .. });
+        let is_spline = !matches!(task.field, FieldRepresentation::Trilinear { .. });
         Self {
             range: is_spline.then(|| ([task.limits.low, task.limits.high], size, inside())),
             edge: task.edge.filter(|edge| edge.weight > 0.0).map(|edge| (edge, surface())),
@@ -50,7 +53,11 @@ impl Hold {
     }
 
     /// What each place counts: the residual, and its derivative by the index and its gradient.
-    fn each(&self, field: &dyn Field<f64>, mut visit: impl FnMut(Vec3<f64>, f64, f64, Vec3<f64>)) {
+    fn visit_residuals(
+        &self,
+        field: &dyn IndexField<f64>,
+        mut visit: impl FnMut(Vec3<f64>, f64, f64, Vec3<f64>),
+    ) {
         if let Some((edge, places)) = &self.edge {
             let scale = (edge.weight / places.len() as f64).sqrt();
             for p in places {
@@ -59,7 +66,7 @@ impl Hold {
             }
         }
         if let Some(([low, high], size, places)) = &self.range {
-            let scale = FIRM * size / (places.len() as f64).sqrt();
+            let scale = STIFFNESS * size / (places.len() as f64).sqrt();
             for p in places {
                 let index = field.sample(*p).index;
                 let over = (index - high).max(0.0) - (low - index).max(0.0);
@@ -69,7 +76,7 @@ impl Hold {
             }
         }
         if let Some((limit, square, places)) = &self.slope {
-            let scale = FIRM * square / (places.len() as f64).sqrt();
+            let scale = STIFFNESS * square / (places.len() as f64).sqrt();
             for p in places {
                 let gradient = field.sample(*p).gradient;
                 let over = length(gradient) - limit;
@@ -82,29 +89,29 @@ impl Hold {
     }
 
     /// The sum of squares, and its gradient added.
-    pub(super) fn descend(&self, field: &dyn Field<f64>, gradient: &mut [f64]) -> f64 {
+    pub(super) fn add_gradient(&self, field: &dyn IndexField<f64>, gradient: &mut [f64]) -> f64 {
         let mut sum = 0.0;
-        self.each(field, |p, residual, by_index, by_slope| {
+        self.visit_residuals(field, |p, residual, by_index, by_slope| {
             sum += residual * residual;
-            field.deposit(p, 2.0 * residual * by_index, by_slope * (2.0 * residual), gradient);
+            field.accumulate(p, 2.0 * residual * by_index, by_slope * (2.0 * residual), gradient);
         });
         sum
     }
 
-    pub(super) fn rows(&self, field: &dyn Field<f64>) -> Vec<(f64, Vec<f64>)> {
+    pub(super) fn residual_rows(&self, field: &dyn IndexField<f64>) -> Vec<(f64, Vec<f64>)> {
         let mut rows = Vec::new();
-        self.each(field, |p, residual, by_index, by_slope| {
+        self.visit_residuals(field, |p, residual, by_index, by_slope| {
             let mut row = vec![0.0; field.parameters().len()];
-            field.deposit(p, by_index, by_slope, &mut row);
+            field.accumulate(p, by_index, by_slope, &mut row);
             rows.push((residual, row));
         });
         rows
     }
 
     /// The sum of squares alone.
-    pub(super) fn look(&self, field: &dyn Field<f64>) -> f64 {
+    pub(super) fn value(&self, field: &dyn IndexField<f64>) -> f64 {
         let mut sum = 0.0;
-        self.each(field, |_, residual, _, _| sum += residual * residual);
+        self.visit_residuals(field, |_, residual, _, _| sum += residual * residual);
         sum
     }
 }

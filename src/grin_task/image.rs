@@ -4,14 +4,14 @@
 //! the image changes smoothly as rays move. It takes two passes: all rays make the image, then the
 //! difference from the picture that is wanted tells each ray where it should go.
 
-use super::drawing::Drawing;
-use super::space::across;
+use super::drawing::TargetImage;
+use super::space::orthogonal_axes;
 use crate::files::FileError;
-use crate::grin::{Exit, Face, Seed};
+use crate::grin::{Face, RayAdjoint, RayExit};
 use crate::math::Vec3;
 
 /// A ray this many pixels off the screen has no place on it.
-const FAR_OFF: f64 = 1e6;
+const MAX_PIXELS_OFF: f64 = 1e6;
 
 /// A square screen across the direction of a beam, or the same at infinity, and the picture that is
 /// wanted on it.
@@ -27,7 +27,7 @@ pub(super) struct Screen {
 }
 
 /// The pixels that a ray touches along one axis: the first, three weights and their slopes.
-type Touched = (isize, [f64; 3], [f64; 3]);
+type AxisFootprint = (isize, [f64; 3], [f64; 3]);
 
 impl Screen {
     /// A screen that stands on a face.
@@ -35,10 +35,10 @@ impl Screen {
         face: Option<Face<f64>>,
         direction: Vec3<f64>,
         half: f64,
-        (drawing, pixels): (&Drawing, usize),
+        (drawing, pixels): (&TargetImage, usize),
     ) -> Result<Self, FileError> {
-        let wanted = drawing.pixels(pixels)?;
-        Ok(Self { face, direction, axes: across(direction), half, pixels, wanted })
+        let wanted = drawing.render(pixels)?;
+        Ok(Self { face, direction, axes: orthogonal_axes(direction), half, pixels, wanted })
     }
 
     fn pitch(&self) -> f64 {
@@ -47,19 +47,19 @@ impl Screen {
 
     /// Where a ray arrives along both axes of the screen, in pixels from the middle of the first;
     /// at infinity by the tangents of its direction.
-    fn place(&self, exit: &Exit<f64>) -> Option<[f64; 2]> {
+    fn arrival(&self, exit: &RayExit<f64>) -> Option<[f64; 2]> {
         let along = exit.v.dot(self.direction);
         let at = |axis: Vec3<f64>| match self.face {
             Some(_) => axis.dot(exit.x),
             None => axis.dot(exit.v) / along,
         };
         let place = self.axes.map(|axis| (at(axis) + self.half) / self.pitch() - 0.5);
-        let seen = place.iter().all(|u| u.abs() < FAR_OFF) && along > 0.0;
+        let seen = place.iter().all(|u| u.abs() < MAX_PIXELS_OFF) && along > 0.0;
         seen.then_some(place)
     }
 
     /// The pixels that a place along one axis touches.
-    fn touched(u: f64) -> Touched {
+    fn axis_footprint(u: f64) -> AxisFootprint {
         let nearest = u.round();
         let t = u - nearest;
         let weights = [0.5 * (0.5 - t).powi(2), 0.75 - t * t, 0.5 * (0.5 + t).powi(2)];
@@ -67,10 +67,10 @@ impl Screen {
     }
 
     /// What each touched pixel gets: its number, and the weight with its slopes along both axes.
-    fn footprint(&self, exit: &Exit<f64>) -> impl Iterator<Item = (usize, f64, [f64; 2])> {
+    fn footprint(&self, exit: &RayExit<f64>) -> impl Iterator<Item = (usize, f64, [f64; 2])> {
         let pixels = self.pixels as isize;
-        self.place(exit).into_iter().flat_map(move |place| {
-            let [(u, wu, su), (v, wv, sv)] = place.map(Self::touched);
+        self.arrival(exit).into_iter().flat_map(move |place| {
+            let [(u, wu, su), (v, wv, sv)] = place.map(Self::axis_footprint);
             (0..9).filter_map(move |k: usize| {
                 let (i, j) = (k % 3, k / 3);
                 let (a, b) = (u + i as isize, v + j as isize);
@@ -89,7 +89,7 @@ impl Screen {
     /// The image that rays make.
     pub(super) fn image<'a>(
         &self,
-        exits: impl Iterator<Item = &'a Exit<f64>>,
+        exits: impl Iterator<Item = &'a RayExit<f64>>,
         rays: usize,
     ) -> Vec<f64> {
         let (mut image, share) = (vec![0.0; self.pixels * self.pixels], self.share(rays));
@@ -106,13 +106,18 @@ impl Screen {
     }
 
     /// The peak signal against that difference, in dB.
-    pub(super) fn quality(&self, difference: f64) -> f64 {
+    pub(super) fn psnr(&self, difference: f64) -> f64 {
         let peak = self.wanted.iter().copied().fold(0.0, f64::max);
         10.0 * (peak * peak / difference).log10()
     }
 
     /// The derivative of that difference by the end of a ray.
-    pub(super) fn seed(&self, image: &[f64], exit: &Exit<f64>, rays: usize) -> Seed<f64> {
+    pub(super) fn adjoint(
+        &self,
+        image: &[f64],
+        exit: &RayExit<f64>,
+        rays: usize,
+    ) -> RayAdjoint<f64> {
         let scale = 2.0 * self.share(rays) / (image.len() as f64 * self.pitch());
         let (mut along, mut up) = (0.0, 0.0);
         for (pixel, _, slopes) in self.footprint(exit) {
@@ -123,13 +128,13 @@ impl Screen {
         let [u, v] = self.axes;
         let by_place = (u * along + v * up) * scale;
         if self.face.is_some() {
-            return Seed { x: by_place, ..Seed::default() };
+            return RayAdjoint { x: by_place, ..RayAdjoint::default() };
         }
         // The tangents are v/(v·d), whose derivative is 1/(v·d) less v d/(v·d)².
         let forward = exit.v.dot(self.direction);
         let turned = by_place - self.direction * (by_place.dot(exit.v) / forward);
         let v = if forward > 0.0 { turned * (1.0 / forward) } else { Vec3::default() };
-        Seed { v, ..Seed::default() }
+        RayAdjoint { v, ..RayAdjoint::default() }
     }
 }
 
@@ -143,7 +148,7 @@ mod tests {
         let [x, y, z] = [x, y, z].map(|[x, y, z]| Vec3::new(x, y, z));
         // The direction of light, right and up.
         for (d, right, up) in [(z, y, -x), (y, -z, -x), (x, z, -y), (-z, -y, -x)] {
-            let screen = Screen::new(None, d, 1.0, (&Drawing::Face, 8)).unwrap();
+            let screen = Screen::new(None, d, 1.0, (&TargetImage::Face, 8)).unwrap();
             assert_eq!(screen.axes, [right, up], "{d:?}");
             // The mouth of the face is below its eyes.
             let light = |row: usize| screen.wanted[8 * row..][..8].iter().sum::<f64>();

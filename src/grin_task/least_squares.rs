@@ -3,7 +3,7 @@
 //! A field with few numbers and a loss that is a sum of squares: each step solves for the changes
 //! that would make all residuals vanish, damped until the loss falls.
 
-use crate::grin::Limits;
+use crate::grin::ParameterBounds;
 use nalgebra::{DMatrix, DVector};
 
 /// How often the damping grows before a step is given up.
@@ -13,32 +13,32 @@ const SETTLED: f64 = 1e-9;
 const DAMPING: [f64; 2] = [1e-12, 1e6];
 
 /// Residuals with their derivatives by the parameters.
-pub(super) type Rows = Vec<(f64, Vec<f64>)>;
+pub(super) type ResidualRows = Vec<(f64, Vec<f64>)>;
 
 /// A descent on its way.
 #[derive(Debug, Clone)]
-pub(super) struct LeastSquares {
+pub(super) struct LevenbergMarquardt {
     damping: f64,
-    at: Option<Rows>,
+    at: Option<ResidualRows>,
 }
 
-impl Default for LeastSquares {
+impl Default for LevenbergMarquardt {
     fn default() -> Self {
         Self { damping: 1e-3, at: None }
     }
 }
 
-fn sum(rows: &Rows) -> f64 {
+fn sum(rows: &ResidualRows) -> f64 {
     rows.iter().map(|(residual, _)| residual * residual).sum()
 }
 
-impl LeastSquares {
+impl LevenbergMarquardt {
     /// Takes one step; what comes out is the loss and whether further steps would change nothing.
     pub(super) fn step<E>(
         &mut self,
         parameters: &mut [f64],
-        limits: &Limits,
-        mut rows: impl FnMut(&[f64]) -> Result<Rows, E>,
+        limits: &ParameterBounds,
+        mut rows: impl FnMut(&[f64]) -> Result<ResidualRows, E>,
     ) -> Result<(f64, bool), E> {
         let now = match self.at.take() {
             Some(rows) => rows,
@@ -46,10 +46,10 @@ impl LeastSquares {
         };
         let loss = sum(&now);
         let (normal, slope) = equations(&now, parameters.len());
-        let held = limits.held(parameters, slope.as_slice());
+        let held = limits.active_bounds(parameters, slope.as_slice());
         for _ in 0..TRIES {
             let mut step = solve(&normal, &slope, &held, self.damping);
-            limits.shorten(&mut step);
+            limits.limit_step(&mut step);
             let mut trial: Vec<f64> = parameters.iter().zip(&step).map(|(p, s)| p + s).collect();
             limits.project(&mut trial);
             let there = rows(&trial)?;
@@ -77,7 +77,7 @@ impl LeastSquares {
 }
 
 /// `JᵀJ` and half the gradient, `Jᵀr`.
-fn equations(rows: &Rows, count: usize) -> (DMatrix<f64>, DVector<f64>) {
+fn equations(rows: &ResidualRows, count: usize) -> (DMatrix<f64>, DVector<f64>) {
     let slopes: Vec<f64> = rows.iter().flat_map(|(_, row)| row.iter().copied()).collect();
     let jacobian = DMatrix::from_row_slice(rows.len(), count, &slopes);
     let residuals = DVector::from_iterator(rows.len(), rows.iter().map(|(residual, _)| *residual));

@@ -4,71 +4,75 @@
 //! search does not find its own errors again. A ray that tells nothing, because it is trapped,
 //! chaotic or too flat there, is told by its reason and left out.
 
-use super::check::TaskError;
-use super::given::{check_range, check_reach};
-use super::refuse::wrong;
-use super::scene::{Aim, Counts, counts};
-use super::source::{Draw, Sent};
+use super::check::GrinTaskError;
+use super::given::{check_extent, check_index_range};
+use super::refuse::invalid;
+use super::scene::{RayCounts, RayTarget, count_rays};
+use super::source::{RaySet, SourceRay};
 use super::space::{length, unit};
-use super::task::{Exact, Goal, Space, Start, Task, View};
-use crate::grin::{Exit, Ray, Seed, Tracer, plan};
+use super::task::{Domain, GrinTask, InitialField, LightGoal, LightView, ReferenceField};
+use crate::grin::{GrinRay, GrinTracer, RayAdjoint, RayExit, plan_tracing};
 
 /// The field from which a measurement comes is traced so much better than the one that is sought.
 const FINER: f64 = 0.1;
 
 /// The measured aims of the views whose rays are the same in every step; nothing for other views.
-pub(super) type Known = Vec<Option<Vec<Aim>>>;
+pub(super) type MeasuredTargets = Vec<Option<Vec<RayTarget>>>;
 
 /// What the light of a view does in the field that it is measured in.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measurement {
+pub struct ViewMeasurement {
     /// The name of the view.
     pub view: String,
     /// The largest angle between a ray and its exit, in radians, of the rays that tell something.
     pub deflection: f64,
     /// What became of the rays.
-    pub counts: Counts,
+    pub counts: RayCounts,
 }
 
-impl Task {
+impl GrinTask {
     /// The measurements that its views are compared with, by the rays that all fields are judged by.
     ///
     /// # Errors
     /// A volume that cannot be read.
-    pub fn measurements(&self) -> Result<Vec<Measurement>, TaskError> {
-        let measured = |view: &View| {
-            let Goal::Like { field, .. } = &view.goal else { return Ok(None) };
+    pub fn measurements(&self) -> Result<Vec<ViewMeasurement>, GrinTaskError> {
+        let measured = |view: &LightView| {
+            let LightGoal::Like { field, .. } = &view.goal else { return Ok(None) };
             let space = view.space.unwrap_or(self.space);
-            let sent = view.source.rays(space, Draw::Judge);
-            let exits = exits(self, view, field, &sent)?;
-            let told = |exit: &&Exit<f64>| super::scene::Shot::counts(exit);
-            let angle = |exit: &Exit<f64>, sent: &Sent| {
+            let sent = view.source.rays(space, RaySet::Scoring);
+            let exits = trace_reference(self, view, field, &sent)?;
+            let told = |exit: &&RayExit<f64>| super::scene::ViewRays::is_valid(exit);
+            let angle = |exit: &RayExit<f64>, sent: &SourceRay| {
                 let chord = length(unit(exit.v) - unit(sent.ray.v));
                 2.0 * (0.5 * chord).min(1.0).asin()
             };
             let pairs = exits.iter().zip(&sent).filter(|(exit, _)| told(exit));
             let deflection = pairs.map(|(exit, sent)| angle(exit, sent)).fold(0.0, f64::max);
-            Ok(Some(Measurement { view: view.name.clone(), deflection, counts: counts(&exits) }))
+            Ok(Some(ViewMeasurement {
+                view: view.name.clone(),
+                deflection,
+                counts: count_rays(&exits),
+            }))
         };
         self.views.iter().filter_map(|view| measured(view).transpose()).collect()
     }
 
     /// Refuses volumes that cannot be read or end before the space does, and one to begin with that
     /// is beyond the limits.
-    pub(super) fn check_volumes(&self) -> Result<(), TaskError> {
-        let check = |place: String, path: &std::path::Path, space: Space| {
-            check_reach(path, space).map_err(|source| TaskError::Field { place, source })
+    pub(super) fn check_volumes(&self) -> Result<(), GrinTaskError> {
+        let check = |place: String, path: &std::path::Path, space: Domain| {
+            check_extent(path, space).map_err(|source| GrinTaskError::Field { place, source })
         };
-        if let Start::Volume(path) = &self.start {
+        if let InitialField::Volume(path) = &self.start {
             check("start".to_owned(), path, self.space)?;
-            check_range(path, &self.spaces(), [self.limits.low, self.limits.high])
-                .map_err(|source| TaskError::Field { place: "start".to_owned(), source })?;
+            check_index_range(path, &self.spaces(), [self.limits.low, self.limits.high])
+                .map_err(|source| GrinTaskError::Field { place: "start".to_owned(), source })?;
         }
-        if let Some(Exact::Volume(path)) = &self.exact {
+        if let Some(ReferenceField::Volume(path)) = &self.exact {
             check("exact".to_owned(), path, self.space)?;
         }
         for view in &self.views {
-            if let Goal::Like { field: Exact::Volume(path), .. } = &view.goal {
+            if let LightGoal::Like { field: ReferenceField::Volume(path), .. } = &view.goal {
                 check(format!("view {}", view.name), path, view.space.unwrap_or(self.space))?;
             }
         }
@@ -77,51 +81,51 @@ impl Task {
 }
 
 /// Traces the rays of a view through the field that it is measured in, and back.
-fn exits(
-    task: &Task,
-    view: &View,
-    field: &Exact,
-    sent: &[Sent],
-) -> Result<Vec<Exit<f64>>, TaskError> {
+fn trace_reference(
+    task: &GrinTask,
+    view: &LightView,
+    field: &ReferenceField,
+    sent: &[SourceRay],
+) -> Result<Vec<RayExit<f64>>, GrinTaskError> {
     let space = view.space.unwrap_or(task.space);
     let place = format!("view {}", view.name);
-    let field = field.field().map_err(|source| TaskError::Field { place, source })?;
-    let rays: Vec<Ray<f64>> = sent.iter().map(|sent| sent.ray).collect();
+    let field = field.field().map_err(|source| GrinTaskError::Field { place, source })?;
+    let rays: Vec<GrinRay<f64>> = sent.iter().map(|sent| sent.ray).collect();
     let finer = FINER * task.tolerance;
-    let setup = plan(&*field, &space.region(), task.launch, &rays, finer)?.setup;
-    let tracer = Tracer::new(&*field, setup)?;
-    let mut exits = tracer.rays(&rays);
+    let setup = plan_tracing(&*field, &space.region(), task.launch, &rays, finer)?.setup;
+    let tracer = GrinTracer::new(&*field, setup)?;
+    let mut exits = tracer.trace_batch(&rays);
     // The way back finds the chaotic ones.
-    tracer.gradient(&rays, &mut exits, &vec![Seed::default(); rays.len()]);
+    tracer.gradient(&rays, &mut exits, &vec![RayAdjoint::default(); rays.len()]);
     Ok(exits)
 }
 
 /// Where the rays of a view shall go that are measured in a field.
-pub(super) fn aims(
-    task: &Task,
-    view: &View,
-    field: &Exact,
-    sent: &[Sent],
+pub(super) fn trace_targets(
+    task: &GrinTask,
+    view: &LightView,
+    field: &ReferenceField,
+    sent: &[SourceRay],
     direction: f64,
-) -> Result<Vec<Aim>, TaskError> {
-    let exits = exits(task, view, field, sent)?;
-    if !exits.iter().any(super::scene::Shot::counts) {
+) -> Result<Vec<RayTarget>, GrinTaskError> {
+    let exits = trace_reference(task, view, field, sent)?;
+    if !exits.iter().any(super::scene::ViewRays::is_valid) {
         let found = "no ray that leaves the field";
-        return Err(wrong(format!("view {}", view.name), found, "light that tells something"));
+        return Err(invalid(format!("view {}", view.name), found, "light that tells something"));
     }
-    let aim = |exit: &Exit<f64>| {
-        let measured = super::scene::Shot::counts(exit);
-        Aim { x: exit.x, v: exit.v, direction, measured }
+    let aim = |exit: &RayExit<f64>| {
+        let measured = super::scene::ViewRays::is_valid(exit);
+        RayTarget { x: exit.x, v: exit.v, direction, measured }
     };
     Ok(exits.iter().map(aim).collect())
 }
 
 /// Traces what is measured once and for all.
-pub(super) fn known(task: &Task) -> Result<Known, TaskError> {
-    let aims = |view: &View| match &view.goal {
-        Goal::Like { field, direction } if !view.source.is_fresh() => {
-            let sent = view.source.rays(view.space.unwrap_or(task.space), Draw::Judge);
-            aims(task, view, field, &sent, *direction).map(Some)
+pub(super) fn measure_targets(task: &GrinTask) -> Result<MeasuredTargets, GrinTaskError> {
+    let aims = |view: &LightView| match &view.goal {
+        LightGoal::Like { field, direction } if !view.source.is_resampled() => {
+            let sent = view.source.rays(view.space.unwrap_or(task.space), RaySet::Scoring);
+            trace_targets(task, view, field, &sent, *direction).map(Some)
         }
         _ => Ok(None),
     };

@@ -1,40 +1,41 @@
 //! A field on its way: how it begins, what its numbers may do, how it becomes finer, and how it is
 //! written as a volume.
 
-use super::check::TaskError;
-use super::task::{Edge, FieldKind, MakerLimits, Space, Task};
+use super::check::GrinTaskError;
+use super::task::{BoundaryCondition, Domain, FieldRepresentation, GrinTask, ManufacturingLimits};
 use crate::files::Volume;
-use crate::grin::Field;
+use crate::grin::IndexField;
 use crate::grin::field::{
-    BSpline, Coordinate, Diagonal, Grid, GridError, Layered, Profile as _, Tricubic, Trilinear,
+    BSpline, GridError, HessianDiagonal, ProfileCoordinate, ProfileField, ProfileFunction as _,
+    RegularGrid, Tricubic, Trilinear,
 };
 use crate::math::Vec3;
 
 /// Fewest coefficients of a spline.
-const FEWEST: usize = 4;
+const MIN_COEFFICIENTS: usize = 4;
 
 /// A field that a search works on.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Medium {
+pub enum GrinField {
     /// Nodes on a cube.
     Trilinear(Trilinear<f64>),
     /// Tricubic B-splines on a cube.
     Tricubic(Tricubic<f64>),
     /// A spline in the square of a radius, which ends at that radius.
-    Radial(Layered<BSpline<f64>>, f64),
+    Radial(ProfileField<BSpline<f64>>, f64),
 }
 
-impl FieldKind {
+impl FieldRepresentation {
     /// The fewest nodes or coefficients that make a field.
-    pub(super) fn fewest(self) -> usize {
+    pub(super) fn min_nodes(self) -> usize {
         match self {
             Self::Trilinear { .. } | Self::Tricubic { .. } => 2,
-            Self::Sphere { .. } | Self::Cylinder { .. } => FEWEST,
+            Self::Sphere { .. } | Self::Cylinder { .. } => MIN_COEFFICIENTS,
         }
     }
 
     /// How many numbers make a field with so many nodes along a side.
-    pub(super) fn parameters(self, nodes: usize) -> usize {
+    pub(super) fn parameter_count(self, nodes: usize) -> usize {
         match self {
             Self::Trilinear { .. } => nodes.saturating_pow(3),
             Self::Tricubic { .. } => (nodes + 2).saturating_pow(3),
@@ -57,33 +58,33 @@ impl FieldKind {
     }
 }
 
-impl Medium {
+impl GrinField {
     /// The field of a kind that takes given values.
     ///
     /// # Errors
     /// Too few nodes, no extent, or values that are no numbers.
-    pub(super) fn of(
-        kind: FieldKind,
+    pub(super) fn from_function(
+        kind: FieldRepresentation,
         nodes: usize,
         value: impl Fn(Vec3<f64>) -> f64,
     ) -> Result<Self, GridError> {
         Ok(match kind {
-            FieldKind::Trilinear { half } => {
-                Self::Trilinear(Trilinear::sampled(Grid::cube(nodes, half)?, value)?)
+            FieldRepresentation::Trilinear { half } => {
+                Self::Trilinear(Trilinear::from_function(RegularGrid::cube(nodes, half)?, value)?)
             }
-            FieldKind::Tricubic { half } => {
-                Self::Tricubic(Tricubic::near(nodes.saturating_sub(1), half, value)?)
+            FieldRepresentation::Tricubic { half } => {
+                Self::Tricubic(Tricubic::approximate(nodes.saturating_sub(1), half, value)?)
             }
-            FieldKind::Sphere { radius } | FieldKind::Cylinder { radius } => {
+            FieldRepresentation::Sphere { radius } | FieldRepresentation::Cylinder { radius } => {
                 let coordinate = match kind {
-                    FieldKind::Cylinder { .. } => Coordinate::Cylinder,
-                    _ => Coordinate::Sphere,
+                    FieldRepresentation::Cylinder { .. } => ProfileCoordinate::Cylinder,
+                    _ => ProfileCoordinate::Sphere,
                 };
                 let coefficients = vec![value(Vec3::default()); nodes];
                 let found = nodes;
                 let profile = BSpline::new(0.0, radius * radius, coefficients)
-                    .ok_or(GridError::TooFew { axis: 'r', found, least: FEWEST })?;
-                Self::Radial(Layered { coordinate, profile }, radius)
+                    .ok_or(GridError::TooFew { axis: 'r', found, least: MIN_COEFFICIENTS })?;
+                Self::Radial(ProfileField { coordinate, profile }, radius)
             }
         })
     }
@@ -92,23 +93,27 @@ impl Medium {
     ///
     /// # Errors
     /// Too few nodes, or a volume that cannot be read.
-    pub fn first(task: &Task, nodes: usize) -> Result<Self, TaskError> {
+    pub fn initial(task: &GrinTask, nodes: usize) -> Result<Self, GrinTaskError> {
         let place = "start".to_owned();
-        let index = task.start.index().map_err(|source| TaskError::Field { place, source })?;
-        Ok(Self::of(task.field, nodes, index)?)
+        let index = task.start.index().map_err(|source| GrinTaskError::Field { place, source })?;
+        Ok(Self::from_function(task.field, nodes, index)?)
     }
 
     /// The same field with other numbers of nodes or coefficients.
     ///
     /// # Errors
-    /// As [`Self::of`].
-    pub(super) fn refined(&self, kind: FieldKind, nodes: usize) -> Result<Self, GridError> {
-        let mut finer = Self::of(kind, nodes, |p| self.field().sample(p).index)?;
+    /// As [`Self::from_function`].
+    pub(super) fn refine(
+        &self,
+        kind: FieldRepresentation,
+        nodes: usize,
+    ) -> Result<Self, GridError> {
+        let mut finer = Self::from_function(kind, nodes, |p| self.field().sample(p).index)?;
         if let (Self::Radial(coarse, _), Self::Radial(fine, _)) = (self, &mut finer) {
-            let spacing = fine.profile.knots().unwrap_or(1.0);
+            let spacing = fine.profile.knot_spacing().unwrap_or(1.0);
             for (i, c) in fine.parameters_mut().iter_mut().enumerate() {
-                let there = coarse.profile.at(spacing * (i as f64 - 1.0));
-                *c = there.value - spacing * spacing / 6.0 * there.bend;
+                let there = coarse.profile.evaluate(spacing * (i as f64 - 1.0));
+                *c = there.value - spacing * spacing / 6.0 * there.curvature;
             }
         }
         if let (Self::Trilinear(coarse), Self::Trilinear(fine)) = (self, &mut finer) {
@@ -118,14 +123,14 @@ impl Medium {
     }
 
     /// Chooses the Hessian of a trilinear field.
-    pub(super) fn set_diagonal(&mut self, diagonal: Diagonal) {
+    pub(super) fn set_diagonal(&mut self, diagonal: HessianDiagonal) {
         if let Self::Trilinear(field) = self {
             field.diagonal = diagonal;
         }
     }
 
     /// What rays are traced through.
-    pub fn field(&self) -> &dyn Field<f64> {
+    pub fn field(&self) -> &dyn IndexField<f64> {
         match self {
             Self::Trilinear(field) => field,
             Self::Tricubic(field) => field,
@@ -144,32 +149,32 @@ impl Medium {
 
     /// The range of each of its numbers. A coefficient of a spline that stands outside the space is
     /// no index of it and has more room; a penalty holds the index itself.
-    pub(super) fn ranges(
+    pub(super) fn parameter_ranges(
         &self,
-        space: Space,
-        limits: MakerLimits,
-        edge: Option<Edge>,
+        space: Domain,
+        limits: ManufacturingLimits,
+        edge: Option<BoundaryCondition>,
     ) -> Vec<[f64; 2]> {
-        let MakerLimits { low, high, .. } = limits;
+        let ManufacturingLimits { low, high, .. } = limits;
         let wide = [low - (high - low), high + (high - low)];
         let region = space.region();
-        let is_inside = |p: Vec3<f64>| region.height(p) < 0.0;
+        let is_inside = |p: Vec3<f64>| region.level(p) < 0.0;
         let range = |inside: bool, outside: [f64; 2]| if inside { [low, high] } else { outside };
         match self {
             Self::Trilinear(field) => {
                 let fixed = edge.filter(|edge| edge.fixed).map(|edge| [edge.index; 2]);
                 let outside = fixed.unwrap_or([low, high]);
                 let grid = field.grid();
-                (0..grid.nodes()).map(|n| range(is_inside(grid.node(n)), outside)).collect()
+                (0..grid.node_count()).map(|n| range(is_inside(grid.node(n)), outside)).collect()
             }
             Self::Tricubic(field) => {
                 let grid = field.grid();
                 // The first coefficient stands one spacing before the domain.
                 let place = |n: usize| grid.node(n) - grid.spacing();
-                (0..grid.nodes()).map(|n| range(is_inside(place(n)), wide)).collect()
+                (0..grid.node_count()).map(|n| range(is_inside(place(n)), wide)).collect()
             }
             Self::Radial(field, radius) => {
-                let spacing = field.profile.knots().unwrap_or(1.0);
+                let spacing = field.profile.knot_spacing().unwrap_or(1.0);
                 let count = field.parameters().len();
                 let inside = |i: usize| i >= 1 && spacing * (i as f64 - 0.5) < radius * radius;
                 (0..count).map(|i| range(inside(i), wide)).collect()
@@ -191,31 +196,31 @@ impl Medium {
     ///
     /// # Errors
     /// A space without extent.
-    pub fn volume(&self, space: Space, nodes: usize) -> Result<Volume, GridError> {
+    pub fn volume(&self, space: Domain, nodes: usize) -> Result<Volume, GridError> {
         let grid = match self {
             Self::Trilinear(field) => *field.grid(),
             Self::Tricubic(field) => {
                 let grid = field.grid();
-                Grid::new(grid.counts().map(|n| n - 2), grid.low(), grid.spacing())?
+                RegularGrid::new(grid.counts().map(|n| n - 2), grid.low(), grid.spacing())?
             }
             Self::Radial(..) => {
                 let [low, high] = space.corners();
                 let nodes = nodes.max(2);
-                Grid::new([nodes; 3], low, (high - low) * (1.0 / (nodes - 1) as f64))?
+                RegularGrid::new([nodes; 3], low, (high - low) * (1.0 / (nodes - 1) as f64))?
             }
         };
-        let index = |n| self.field().sample(self.within(grid.node(n))).index;
-        Ok(Volume { grid, values: (0..grid.nodes()).map(index).collect() })
+        let index = |n| self.field().sample(self.nearest_covered(grid.node(n))).index;
+        Ok(Volume { grid, values: (0..grid.node_count()).map(index).collect() })
     }
 
     /// The nearest point at which the field is given: where a spline ends, a maker needs material of
     /// the index at its end, and not what the spline would go on to.
-    fn within(&self, point: Vec3<f64>) -> Vec3<f64> {
-        let Self::Radial(Layered { coordinate, .. }, radius) = self else { return point };
+    fn nearest_covered(&self, point: Vec3<f64>) -> Vec3<f64> {
+        let Self::Radial(ProfileField { coordinate, .. }, radius) = self else { return point };
         let across = match coordinate {
-            Coordinate::Sphere => point,
-            Coordinate::Cylinder => Vec3::new(point.x, point.y, 0.0),
-            Coordinate::Axial => return point,
+            ProfileCoordinate::Sphere => point,
+            ProfileCoordinate::Cylinder => Vec3::new(point.x, point.y, 0.0),
+            ProfileCoordinate::Axial => return point,
         };
         let size = across.dot(across).sqrt();
         if size > *radius { point - across * (1.0 - radius / size) } else { point }
@@ -228,12 +233,14 @@ mod tests {
 
     #[test]
     fn a_volume_goes_on_with_the_index_at_the_end_of_a_spline() {
-        let mut medium = Medium::of(FieldKind::Cylinder { radius: 1.0 }, 8, |_| 1.5).unwrap();
+        let mut medium =
+            GrinField::from_function(FieldRepresentation::Cylinder { radius: 1.0 }, 8, |_| 1.5)
+                .unwrap();
         for (i, coefficient) in medium.parameters_mut().iter_mut().enumerate() {
             *coefficient -= 0.05 * i as f64;
         }
         let edge = medium.field().sample(Vec3::new(1.0, 0.0, 0.0)).index;
-        let space = Space::Rod { radius: 1.5, from: 0.0, to: 4.0 };
+        let space = Domain::Rod { radius: 1.5, from: 0.0, to: 4.0 };
         let values = medium.volume(space, 9).unwrap().values;
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         assert!((least - edge).abs() < 1e-12 && edge < 1.25, "{least} {edge}");

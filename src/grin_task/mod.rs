@@ -1,8 +1,8 @@
 //! Design tasks in one gradient-index field: which light shall go where, what a maker can make, and
 //! the search for the field.
 //!
-//! A [`Task`] is what a person writes, as JSON: the kind of field and its resolutions, the
-//! sources, the goals, the limits. A [`Runner`] works on it one step at a time, by the exact adjoint
+//! A [`GrinTask`] is what a person writes, as JSON: the kind of field and its resolutions, the
+//! sources, the goals, the limits. A [`GrinOptimizer`] works on it one step at a time, by the exact adjoint
 //! of [`grin`](crate::grin): it knows no clock, no file and no window, draws nothing by chance and
 //! comes to the same field on any number of threads. Rays are traced as well as the tolerance of
 //! the task asks, chosen anew as the field takes shape; a ray that cannot count is left out, at a
@@ -39,21 +39,22 @@ mod stage;
 mod task;
 mod ways;
 
-pub use builtin::{BUILTIN, Builtin, find, read};
-pub use check::TaskError;
-pub use chords::Chords;
-pub use compare::{Difference, Extremes};
-pub use drawing::{Drawing, PictureFile};
-pub use given::NoField;
-pub use kept::Kept;
-pub use measured::Measurement;
-pub use medium::Medium;
-pub use plane::{Axis, Plane};
-pub use runner::{Judgement, Progress, Runner};
-pub use scene::{Counts, ViewResult};
-pub use seen::{Image, Seen};
+pub use builtin::{BUILTIN_TASKS, BuiltinTask, find_builtin, read_task};
+pub use check::GrinTaskError;
+pub use chords::StraightRays;
+pub use compare::{FieldDifference, FieldExtremes};
+pub use drawing::{ImageFile, TargetImage};
+pub use given::ReferenceFieldError;
+pub use kept::LimitCheck;
+pub use measured::ViewMeasurement;
+pub use medium::GrinField;
+pub use plane::{SlicePlane, SpatialAxis};
+pub use runner::{FieldScore, GrinOptimizer, GrinProgress};
+pub use scene::{RayCounts, ViewResult};
+pub use seen::{ViewImage, ViewReport};
 pub use task::{
-    Directions, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Method, Source, Space, Start,
-    Task, Tracing, VERSION, View,
+    BoundaryCondition, Domain, FieldRepresentation, GrinMethod, GrinTask, InitialField, LightGoal,
+    LightSource, LightView, ManufacturingLimits, ReferenceField, RefinementLevel, SourceDirections,
+    TASK_VERSION, TracingSettings,
 };
-pub use ways::{Way, Ways};
+pub use ways::{RayPath, RayPaths};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// An axis of space.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Axis {
+pub enum SpatialAxis {
     /// To the side.
     X,
     /// Upwards.
@@ -15,7 +15,7 @@ pub enum Axis {
     Z,
 }
 
-impl Axis {
+impl SpatialAxis {
     /// All three.
     pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
 
@@ -29,7 +29,7 @@ impl Axis {
     }
 
     /// The part of a vector along it.
-    pub const fn of(self, v: Vec3<f64>) -> f64 {
+    pub const fn component(self, v: Vec3<f64>) -> f64 {
         match self {
             Self::X => v.x,
             Self::Y => v.y,
@@ -38,7 +38,7 @@ impl Axis {
     }
 
     /// A vector of this length along it.
-    const fn times(self, length: f64) -> Vec3<f64> {
+    const fn vector(self, length: f64) -> Vec3<f64> {
         match self {
             Self::X => Vec3::new(length, 0.0, 0.0),
             Self::Y => Vec3::new(0.0, length, 0.0),
@@ -59,23 +59,23 @@ impl Axis {
 
 /// A plane across an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Plane {
+pub struct SlicePlane {
     /// The axis.
-    pub axis: Axis,
+    pub axis: SpatialAxis,
     /// Where it crosses the axis, in mm.
     pub depth: f64,
 }
 
-impl Plane {
+impl SlicePlane {
     /// The point of the plane at a place of its picture: right and up, in mm.
-    pub fn at(self, [right, up]: [f64; 2]) -> Vec3<f64> {
+    pub fn point(self, [right, up]: [f64; 2]) -> Vec3<f64> {
         let [across, above] = self.axis.across();
-        self.axis.times(self.depth) + across.times(right) + above.times(up)
+        self.axis.vector(self.depth) + across.vector(right) + above.vector(up)
     }
 
     /// Where a point is seen in the picture of the plane: it is projected along the axis.
-    pub fn seen(self, point: Vec3<f64>) -> [f64; 2] {
-        self.axis.across().map(|axis| axis.of(point))
+    pub fn project(self, point: Vec3<f64>) -> [f64; 2] {
+        self.axis.across().map(|axis| axis.component(point))
     }
 }
 
@@ -85,10 +85,10 @@ mod tests {
 
     #[test]
     fn a_point_of_a_plane_is_seen_where_it_is() {
-        for axis in Axis::ALL {
-            let plane = Plane { axis, depth: 0.5 };
-            let point = plane.at([2.0, 3.0]);
-            assert_eq!((axis.of(point), plane.seen(point)), (0.5, [2.0, 3.0]));
+        for axis in SpatialAxis::ALL {
+            let plane = SlicePlane { axis, depth: 0.5 };
+            let point = plane.point([2.0, 3.0]);
+            assert_eq!((axis.component(point), plane.project(point)), (0.5, [2.0, 3.0]));
         }
     }
 }

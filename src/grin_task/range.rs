@@ -7,11 +7,11 @@
 //! is taken back: as much as the control points of the cell need, and of the coefficients that count
 //! there, no others. The values in a cell are means of its control points, so that nothing is missed.
 
-use super::climb::{Hill, SPOKE, Spot, climb, higher};
-use super::medium::Medium;
-use super::task::Space;
+use super::climb::{FieldObjective, LocatedValue, RADIAL_POINTS, find_maximum, higher};
+use super::medium::GrinField;
+use super::task::Domain;
 
-use crate::grin::field::Grid;
+use crate::grin::field::RegularGrid;
 use crate::math::Vec3;
 use rayon::prelude::*;
 
@@ -19,20 +19,20 @@ use rayon::prelude::*;
 /// its nodes.
 const LATTICE: usize = 40;
 /// Rounds of taking back, before all of it is taken back.
-const ROUNDS: usize = 40;
+const MAX_ROUNDS: usize = 40;
 /// What is beyond the range by less is rounding.
-const TINY: f64 = 1e-12;
+const TOLERANCE: f64 = 1e-12;
 
 /// One of the two ends of the index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Bound {
+pub(super) enum IndexBound {
     Low,
     High,
 }
 
-impl Bound {
+impl IndexBound {
     /// A value that grows towards this end.
-    fn towards(self, value: f64) -> f64 {
+    fn signed(self, value: f64) -> f64 {
         match self {
             Self::Low => -value,
             Self::High => value,
@@ -40,45 +40,45 @@ impl Bound {
     }
 }
 
-impl Medium {
+impl GrinField {
     /// Its lowest or highest index in some spaces, and where that is: of a trilinear field at its
     /// nodes and many places between them, of a smooth one by a climb. A spline in one coordinate is
     /// looked at up to its end.
-    pub(super) fn extreme(&self, spaces: &[Space], bound: Bound) -> Spot {
-        let value = |p: Vec3<f64>| bound.towards(self.field().sample(p).index);
-        let of_space = |space: &Space| {
+    pub(super) fn extreme_index(&self, spaces: &[Domain], bound: IndexBound) -> LocatedValue {
+        let value = |p: Vec3<f64>| bound.signed(self.field().sample(p).index);
+        let of_space = |space: &Domain| {
             if let Self::Trilinear(field) = self {
-                return highest_of(field.grid(), *space, &value);
+                return highest_value(field.grid(), *space, &value);
             }
             let region = space.region();
-            let is_inside = |p: Vec3<f64>| region.height(p) <= 0.0;
+            let is_inside = |p: Vec3<f64>| region.level(p) <= 0.0;
             let inside =
                 |p: Vec3<f64>| if self.is_radial() { self.covers(p) } else { is_inside(p) };
-            let hill = Hill { inside: &inside, value: &value };
-            climb(&self.lookouts(*space), self.gap(*space), &hill)
+            let hill = FieldObjective { inside: &inside, value: &value };
+            find_maximum(&self.index_points(*space), self.sample_spacing(*space), &hill)
         };
         let none = (f64::NEG_INFINITY, Vec3::default());
         let (most, at) = spaces.iter().map(of_space).fold(none, higher);
-        (bound.towards(most), at)
+        (bound.signed(most), at)
     }
 
     /// The same field with the index within a range everywhere in some spaces; one that keeps it is
     /// not changed.
     #[must_use]
-    pub(super) fn bounded(&self, spaces: &[Space], range: [f64; 2]) -> Self {
+    pub(super) fn limit_index(&self, spaces: &[Domain], range: [f64; 2]) -> Self {
         let mut kept = self.clone();
-        if !self.is_loose(range) || self.keeps(spaces, range) {
+        if !self.has_loose_coefficients(range) || self.is_within(spaces, range) {
             return kept;
         }
-        for _ in 0..ROUNDS {
-            if !kept.is_loose(range) {
+        for _ in 0..MAX_ROUNDS {
+            if !kept.has_loose_coefficients(range) {
                 return kept;
             }
-            let broken = kept.broken(spaces, range);
+            let broken = kept.violations(spaces, range);
             if broken.is_empty() {
                 return kept;
             }
-            kept.take_back(&broken, range);
+            kept.project_coefficients(&broken, range);
         }
         let clamp = |value: &mut f64| *value = value.clamp(range[0], range[1]);
         kept.parameters_mut().iter_mut().for_each(clamp);
@@ -87,13 +87,13 @@ impl Medium {
 
     /// Whether its index is within a range wherever it is looked at. Control points alone do not tell:
     /// those of a cell at the surface lie outside, where a steep field may well be beyond the range.
-    fn keeps(&self, spaces: &[Space], [low, high]: [f64; 2]) -> bool {
-        self.extreme(spaces, Bound::Low).0 >= low - TINY
-            && self.extreme(spaces, Bound::High).0 <= high + TINY
+    fn is_within(&self, spaces: &[Domain], [low, high]: [f64; 2]) -> bool {
+        self.extreme_index(spaces, IndexBound::Low).0 >= low - TOLERANCE
+            && self.extreme_index(spaces, IndexBound::High).0 <= high + TOLERANCE
     }
 
     /// Whether it is a spline with a coefficient beyond a range.
-    fn is_loose(&self, [low, high]: [f64; 2]) -> bool {
+    fn has_loose_coefficients(&self, [low, high]: [f64; 2]) -> bool {
         let within = |value: &f64| (low..=high).contains(value);
         !matches!(self, Self::Trilinear(_)) && !self.field().parameters().iter().all(within)
     }
@@ -109,29 +109,33 @@ impl Medium {
     }
 
     /// Where the index is looked at: all over the space, or along x up to where a spline ends.
-    fn lookouts(&self, space: Space) -> Vec<Vec3<f64>> {
-        let Self::Radial(_, radius) = self else { return self.looks(space) };
-        let at = |i: usize| Vec3::new(radius * i as f64 / SPOKE as f64, 0.0, 0.0);
-        (0..=SPOKE).map(at).collect()
+    fn index_points(&self, space: Domain) -> Vec<Vec3<f64>> {
+        let Self::Radial(_, radius) = self else { return self.sample_points(space) };
+        let at = |i: usize| Vec3::new(radius * i as f64 / RADIAL_POINTS as f64, 0.0, 0.0);
+        (0..=RADIAL_POINTS).map(at).collect()
     }
 
     /// Means of coefficients that are beyond a range, and at which end: among them are the values of
     /// the spline wherever it counts.
-    fn broken(&self, spaces: &[Space], [low, high]: [f64; 2]) -> Vec<(Mean, Bound)> {
+    fn violations(
+        &self,
+        spaces: &[Domain],
+        [low, high]: [f64; 2],
+    ) -> Vec<(WeightedMean, IndexBound)> {
         let parameters = self.field().parameters();
-        let is_broken = |mean: Mean| match mean.iter().map(|(i, w)| w * parameters[*i]).sum::<f64>()
-        {
-            found if found > high + TINY => Some((mean, Bound::High)),
-            found if found < low - TINY => Some((mean, Bound::Low)),
-            _ => None,
-        };
+        let is_broken =
+            |mean: WeightedMean| match mean.iter().map(|(i, w)| w * parameters[*i]).sum::<f64>() {
+                found if found > high + TOLERANCE => Some((mean, IndexBound::High)),
+                found if found < low - TOLERANCE => Some((mean, IndexBound::Low)),
+                _ => None,
+            };
         match self {
             Self::Trilinear(_) => Vec::new(),
             Self::Radial(..) => {
                 let cells = 0..parameters.len() - 3;
                 let along = |first: usize| {
                     let mean = move |w: [f64; 4]| (0..4).map(|q| (first + q, w[q])).collect();
-                    CONTROL.map(mean)
+                    CONTROL_POINTS.map(mean)
                 };
                 cells.flat_map(along).filter_map(is_broken).collect()
             }
@@ -140,11 +144,11 @@ impl Medium {
                 let [nx, ny, nz] = grid.counts().map(|count| count - 3);
                 let is_loose = |i: &usize| !(low..=high).contains(&parameters[*i]);
                 let of_cell = |n: usize| {
-                    let cell = Cell { grid, at: [n % nx, n / nx % ny, n / nx / ny] };
+                    let cell = SplineCell { grid, at: [n % nx, n / nx % ny, n / nx / ny] };
                     let counts = cell.coefficients().any(|i| is_loose(&i))
                         && spaces.iter().any(|space| cell.touches(*space));
                     let points = if counts { 64 } else { 0 };
-                    (0..points).filter_map(move |point| is_broken(cell.mean(point)))
+                    (0..points).filter_map(move |point| is_broken(cell.control_point(point)))
                 };
                 (0..nx * ny * nz).into_par_iter().flat_map_iter(of_cell).collect()
             }
@@ -152,16 +156,20 @@ impl Medium {
     }
 
     /// Takes back what the coefficients of some means have beyond a range, until these are within it.
-    fn take_back(&mut self, broken: &[(Mean, Bound)], [low, high]: [f64; 2]) {
+    fn project_coefficients(
+        &mut self,
+        broken: &[(WeightedMean, IndexBound)],
+        [low, high]: [f64; 2],
+    ) {
         let beyond = |value: f64| value - value.clamp(low, high);
         let parameters = self.field().parameters();
         let mut shares = vec![1.0_f64; parameters.len()];
         for (mean, bound) in broken {
-            let excess = |i: usize| bound.towards(beyond(parameters[i])).max(0.0);
+            let excess = |i: usize| bound.signed(beyond(parameters[i])).max(0.0);
             let over: f64 = mean.iter().map(|(i, weight)| weight * excess(*i)).sum();
             let found: f64 = mean.iter().map(|(i, weight)| weight * parameters[*i]).sum();
-            let end = if *bound == Bound::Low { low } else { high };
-            let too_far = bound.towards(found - end);
+            let end = if *bound == IndexBound::Low { low } else { high };
+            let too_far = bound.signed(found - end);
             let share = if over > 0.0 { (1.0 - too_far / over).clamp(0.0, 1.0) } else { 0.0 };
             for (i, _) in mean.iter().filter(|(i, weight)| *weight > 0.0 && excess(*i) > 0.0) {
                 shares[*i] = shares[*i].min(share);
@@ -174,10 +182,10 @@ impl Medium {
 }
 
 /// Coefficients with their weights, whose sum is 1.
-type Mean = Vec<(usize, f64)>;
+type WeightedMean = Vec<(usize, f64)>;
 
 /// The control points of a cubic B-spline in a cell: the values there are means of them.
-const CONTROL: [[f64; 4]; 4] = [
+const CONTROL_POINTS: [[f64; 4]; 4] = [
     [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 0.0],
     [0.0, 2.0 / 3.0, 1.0 / 3.0, 0.0],
     [0.0, 1.0 / 3.0, 2.0 / 3.0, 0.0],
@@ -186,12 +194,12 @@ const CONTROL: [[f64; 4]; 4] = [
 
 /// A cell of a tricubic field.
 #[derive(Clone, Copy)]
-struct Cell<'a> {
-    grid: &'a Grid<f64>,
+struct SplineCell<'a> {
+    grid: &'a RegularGrid<f64>,
     at: [usize; 3],
 }
 
-impl Cell<'_> {
+impl SplineCell<'_> {
     /// The number of coefficient `n` of the 64 that count in it.
     fn coefficient(&self, n: usize) -> usize {
         let ([i, j, k], [nx, ny, _]) = (self.at, self.grid.counts());
@@ -203,30 +211,34 @@ impl Cell<'_> {
     }
 
     /// Control point `point` of its 64.
-    fn mean(&self, point: usize) -> Mean {
-        let [x, y, z] = [point % 4, point / 4 % 4, point / 16].map(|p| CONTROL[p]);
+    fn control_point(&self, point: usize) -> WeightedMean {
+        let [x, y, z] = [point % 4, point / 4 % 4, point / 16].map(|p| CONTROL_POINTS[p]);
         let weight = |n: usize| x[n % 4] * y[n / 4 % 4] * z[n / 16];
         (0..64).map(|n| (self.coefficient(n), weight(n))).collect()
     }
 
     /// Whether a space comes into it, or within half of it: its corners and the middles between them
     /// tell.
-    fn touches(&self, space: Space) -> bool {
+    fn touches(&self, space: Domain) -> bool {
         let (low, h) = (self.grid.low(), self.grid.spacing());
         let region = space.region();
         (0..125).any(|n| {
             let along = |at: usize, part: usize| at as f64 + 0.5 * part as f64 - 0.5;
             let [x, y, z] =
                 [along(self.at[0], n % 5), along(self.at[1], n / 5 % 5), along(self.at[2], n / 25)];
-            region.height(low + Vec3::new(x * h.x, y * h.y, z * h.z)) < 0.0
+            region.level(low + Vec3::new(x * h.x, y * h.y, z * h.z)) < 0.0
         })
     }
 }
 
 /// The highest value at the nodes of a grid in a space, and between them.
-fn highest_of(grid: &Grid<f64>, space: Space, value: &dyn Fn(Vec3<f64>) -> f64) -> Spot {
+fn highest_value(
+    grid: &RegularGrid<f64>,
+    space: Domain,
+    value: &dyn Fn(Vec3<f64>) -> f64,
+) -> LocatedValue {
     let region = space.region();
-    let nodes = (0..grid.nodes()).map(|n| grid.node(n)).filter(|p| region.height(*p) <= 0.0);
+    let nodes = (0..grid.node_count()).map(|n| grid.node(n)).filter(|p| region.level(*p) <= 0.0);
     let places = nodes.chain(space.lattice(LATTICE));
     places.map(|p| (value(p), p)).fold((f64::NEG_INFINITY, grid.low()), higher)
 }
@@ -234,11 +246,11 @@ fn highest_of(grid: &Grid<f64>, space: Space, value: &dyn Fn(Vec3<f64>) -> f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grin_task::task::FieldKind;
+    use crate::grin_task::task::FieldRepresentation;
 
     /// A field that waves so strongly that it is beyond its range inside and outside the space.
-    fn wild(kind: FieldKind) -> Medium {
-        let mut medium = Medium::of(kind, 9, |_| 1.3).unwrap();
+    fn wild(kind: FieldRepresentation) -> GrinField {
+        let mut medium = GrinField::from_function(kind, 9, |_| 1.3).unwrap();
         let wave = |i: usize| 1.3 + 3.0 * (0.7 * i as f64).sin();
         let numbers = medium.parameters_mut().iter_mut().enumerate();
         numbers.for_each(|(i, value)| *value = wave(i));
@@ -247,16 +259,17 @@ mod tests {
 
     #[test]
     fn a_spline_is_put_within_its_range_and_not_changed_where_it_is_there() {
-        let (space, range) = (Space::Ball { radius: 1.0 }, [1.0, 1.6]);
+        let (space, range) = (Domain::Ball { radius: 1.0 }, [1.0, 1.6]);
         for kind in [
-            FieldKind::Tricubic { half: 1.0 },
-            FieldKind::Sphere { radius: 1.0 },
-            FieldKind::Cylinder { radius: 1.0 },
+            FieldRepresentation::Tricubic { half: 1.0 },
+            FieldRepresentation::Sphere { radius: 1.0 },
+            FieldRepresentation::Cylinder { radius: 1.0 },
         ] {
             let wild = wild(kind);
-            let before = [Bound::Low, Bound::High].map(|bound| wild.extreme(&[space], bound).0);
+            let before = [IndexBound::Low, IndexBound::High]
+                .map(|bound| wild.extreme_index(&[space], bound).0);
             assert!(before[0] < 0.95 && before[1] > 1.65, "{kind:?}: {before:?}");
-            let kept = wild.bounded(&[space], range);
+            let kept = wild.limit_index(&[space], range);
             for i in 0..40_000 {
                 let t = f64::from(i);
                 let side = |golden: f64| 2.0 * (t * golden).fract() - 1.0;
@@ -265,31 +278,35 @@ mod tests {
                 let inside = p.dot(p) <= 1.0;
                 assert!(!inside || (1.0 - 1e-9..=1.6 + 1e-9).contains(&index), "{kind:?} {index}");
             }
-            assert_eq!(kept.bounded(&[space], range), kept, "once is enough");
-            assert_eq!(wild.bounded(&[space], [-9.0, 9.0]), wild, "{kind:?}");
+            assert_eq!(kept.limit_index(&[space], range), kept, "once is enough");
+            assert_eq!(wild.limit_index(&[space], [-9.0, 9.0]), wild, "{kind:?}");
         }
     }
 
     #[test]
     fn a_steep_field_that_keeps_its_range_in_the_space_is_left_alone() {
         let fish_eye = |p: Vec3<f64>| 2.0 / (1.0 + p.dot(p));
-        let medium = Medium::of(FieldKind::Tricubic { half: 1.1 }, 17, fish_eye).unwrap();
+        let medium =
+            GrinField::from_function(FieldRepresentation::Tricubic { half: 1.1 }, 17, fish_eye)
+                .unwrap();
         let range = [0.999, 2.5];
-        assert!(medium.is_loose(range), "it is below it outside");
-        assert_eq!(medium.bounded(&[Space::Ball { radius: 1.0 }], range), medium);
+        assert!(medium.has_loose_coefficients(range), "it is below it outside");
+        assert_eq!(medium.limit_index(&[Domain::Ball { radius: 1.0 }], range), medium);
     }
 
     #[test]
     fn only_what_counts_at_a_broken_place_is_taken_back() {
-        let mut medium = Medium::of(FieldKind::Tricubic { half: 1.0 }, 9, |_| 1.5).unwrap();
+        let mut medium =
+            GrinField::from_function(FieldRepresentation::Tricubic { half: 1.0 }, 9, |_| 1.5)
+                .unwrap();
         let last = medium.parameters_mut().len() - 1;
         medium.parameters_mut()[0] = 100.0;
         medium.parameters_mut()[last] = 1.7;
-        let kept = medium.bounded(&[Space::Cube { half: 1.0 }], [1.0, 1.6]);
+        let kept = medium.limit_index(&[Domain::Cube { half: 1.0 }], [1.0, 1.6]);
         let parameters = kept.field().parameters();
         assert!(parameters[0] < 100.0 && parameters[0] > 1.6, "{}", parameters[0]);
         assert_eq!(parameters[1..], medium.field().parameters()[1..], "far away nothing changes");
-        let (most, _) = kept.extreme(&[Space::Cube { half: 1.0 }], Bound::High);
+        let (most, _) = kept.extreme_index(&[Domain::Cube { half: 1.0 }], IndexBound::High);
         assert!(most <= 1.6 + 1e-9 && most > 1.59, "{most}");
     }
 }

@@ -1,76 +1,84 @@
 //! Refusals of numbers that make no sense, in the words of what the number is.
 
-use super::check::TaskError;
-pub(super) use crate::math::brief as number;
+use super::check::GrinTaskError;
+pub(super) use crate::math::format_short as number;
 use std::fmt::Display;
 
 /// No length is longer, in mm.
-pub(super) const LONG: f64 = 1e6;
+pub(super) const MAX_LENGTH: f64 = 1e6;
 
 /// An error at a place.
-pub(super) fn wrong<T: Display>(
+pub(super) fn invalid<T: Display>(
     place: impl Into<String>,
     found: T,
     expected: impl Into<String>,
-) -> TaskError {
+) -> GrinTaskError {
     let found = format!("{found}");
-    TaskError::Value { place: place.into(), found, expected: expected.into() }
+    GrinTaskError::Value { place: place.into(), found, expected: expected.into() }
 }
 
 /// Refuses a number that is not above zero.
-pub(super) fn positive(place: impl Into<String>, value: f64, what: &str) -> Result<(), TaskError> {
+pub(super) fn check_positive(
+    place: impl Into<String>,
+    value: f64,
+    what: &str,
+) -> Result<(), GrinTaskError> {
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }
-    Err(wrong(place, number(value), format!("{what} above 0")))
+    Err(invalid(place, number(value), format!("{what} above 0")))
 }
 
 /// Refuses what is no length.
-pub(super) fn extent(place: impl Into<String>, value: f64) -> Result<(), TaskError> {
-    if value > 0.0 && value <= LONG {
+pub(super) fn check_length(place: impl Into<String>, value: f64) -> Result<(), GrinTaskError> {
+    if value > 0.0 && value <= MAX_LENGTH {
         return Ok(());
     }
-    let expected = format!("a length above 0, up to {} mm", number(LONG));
-    Err(wrong(place, number(value), expected))
+    let expected = format!("a length above 0, up to {} mm", number(MAX_LENGTH));
+    Err(invalid(place, number(value), expected))
 }
 
 /// Refuses a place or a distance that no space of ours reaches.
-pub(super) fn reached(place: impl Into<String>, value: f64, low: f64) -> Result<(), TaskError> {
-    if value >= low && value <= LONG {
+pub(super) fn check_position(
+    place: impl Into<String>,
+    value: f64,
+    low: f64,
+) -> Result<(), GrinTaskError> {
+    if value >= low && value <= MAX_LENGTH {
         return Ok(());
     }
-    let expected = format!("{} to {} mm", number(low), number(LONG));
-    Err(wrong(place, number(value), expected))
+    let expected = format!("{} to {} mm", number(low), number(MAX_LENGTH));
+    Err(invalid(place, number(value), expected))
 }
 
 /// Refuses what is no weight.
-pub(super) fn weight(place: impl Into<String>, value: f64) -> Result<(), TaskError> {
+pub(super) fn check_weight(place: impl Into<String>, value: f64) -> Result<(), GrinTaskError> {
     if value >= 0.0 && value.is_finite() {
         return Ok(());
     }
-    Err(wrong(place, number(value), "a weight, 0 or more"))
+    Err(invalid(place, number(value), "a weight, 0 or more"))
 }
 
 /// Refuses what is not between two numbers.
-pub(super) fn within(
+pub(super) fn check_range(
     place: impl Into<String>,
     value: f64,
     [low, high]: [f64; 2],
     what: &str,
-) -> Result<(), TaskError> {
+) -> Result<(), GrinTaskError> {
     if value >= low && value <= high {
         return Ok(());
     }
     let expected = format!("{what} from {} to {}", number(low), number(high));
-    Err(wrong(place, number(value), expected))
+    Err(invalid(place, number(value), expected))
 }
 
 /// Refuses what is no direction.
-pub(super) fn direction(place: &str, [x, y, z]: [f64; 3]) -> Result<(), TaskError> {
+pub(super) fn check_direction(place: &str, [x, y, z]: [f64; 3]) -> Result<(), GrinTaskError> {
     let square = x * x + y * y + z * z;
     if square > 0.0 && square.is_finite() {
         return Ok(());
     }
     let found = format!("[{}]", [x, y, z].map(number).join(", "));
-    Err(wrong(place, found, "a direction: three numbers, not all 0"))
+    Err(invalid(place, found, "a direction: three numbers, not all 0"))
 }

@@ -2,36 +2,36 @@
 //! where on them it should be (5.36 and 5.37).
 
 use super::space::{length, radians, unit};
-use crate::grin::Exit;
+use crate::grin::RayExit;
 use crate::math::Vec3;
 
 /// What is shorter than this has no direction.
-const NOTHING: f64 = 1e-9;
+const MIN_LENGTH: f64 = 1e-9;
 
 /// Two rings about the direction of a beam.
 #[derive(Debug, Clone)]
-pub(super) struct Ring {
+pub(super) struct RingTarget {
     direction: Vec3<f64>,
     radius: f64,
     /// The sine of the angle of the far one.
     sine: f64,
     /// What the square of a difference in direction counts.
-    pub(super) far: f64,
+    pub(super) direction_weight: f64,
 }
 
-impl Ring {
+impl RingTarget {
     /// `angle` in degrees.
     pub(super) fn new(direction: Vec3<f64>, radius: f64, angle: f64, far: f64) -> Self {
-        Self { direction, radius, sine: radians(angle).sin(), far }
+        Self { direction, radius, sine: radians(angle).sin(), direction_weight: far }
     }
 
     /// By how much a ray misses the nearest point of the near ring, and its direction, of length 1,
     /// that of the far one. A ray on the axis has no nearest point: it goes on outwards.
-    pub(super) fn misses(&self, exit: &Exit<f64>) -> (Vec3<f64>, Vec3<f64>) {
+    pub(super) fn residuals(&self, exit: &RayExit<f64>) -> (Vec3<f64>, Vec3<f64>) {
         let across = |v: Vec3<f64>| v - self.direction * v.dot(self.direction);
         let (x, v) = (across(exit.x), across(unit(exit.v)));
-        let outwards = if length(x) > NOTHING { unit(x) } else { Vec3::default() };
-        let onwards = if length(v) > NOTHING { unit(v) } else { outwards };
+        let outwards = if length(x) > MIN_LENGTH { unit(x) } else { Vec3::default() };
+        let onwards = if length(v) > MIN_LENGTH { unit(v) } else { outwards };
         (x - outwards * self.radius, v - onwards * self.sine)
     }
 

@@ -1,14 +1,14 @@
 //! What is seen of a field at work: the light of every view, by the rays that all fields are judged
 //! by, and its image beside the picture that is wanted. No gradient, and nothing of a search.
 
-use super::check::TaskError;
-use super::measured::known;
-use super::medium::Medium;
-use super::scene::{Shot, ViewResult, setups, shots};
-use super::source::Draw;
+use super::check::GrinTaskError;
+use super::measured::measure_targets;
+use super::medium::GrinField;
+use super::scene::{ViewRays, ViewResult, plan_views, view_rays};
+use super::source::RaySet;
 use super::space::length;
-use super::task::Task;
-use crate::grin::{Exit, Field, Integrator, Ray, Setup, Tracer};
+use super::task::GrinTask;
+use crate::grin::{GrinRay, GrinSetup, GrinTracer, IndexField, Integrator, RayExit};
 
 /// Rays by which the error of the tracing is known.
 const SAMPLE: usize = 64;
@@ -16,25 +16,25 @@ const SAMPLE: usize = 64;
 /// An image of a view on its screen beside the picture that is wanted: rows from the bottom, as many
 /// as columns, both of mean 1 where all light arrives.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Image {
+pub struct ViewImage {
     /// Pixels along a side.
     pub pixels: usize,
     /// Half of the side of the screen, in mm.
     pub half: f64,
     /// The picture.
-    pub wanted: Vec<f64>,
+    pub target: Vec<f64>,
     /// What the light makes.
-    pub made: Vec<f64>,
+    pub formed: Vec<f64>,
 }
 
 /// What became of the light of a view.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct ViewReport {
     /// Loss, spot, quality, and what became of the rays; without a way back, so that no ray is
     /// known to be chaotic.
     pub result: ViewResult,
     /// Its image, where it makes one.
-    pub image: Option<Image>,
+    pub image: Option<ViewImage>,
     /// The kind of step.
     pub integrator: Integrator,
     /// The length of a step, in mm.
@@ -46,45 +46,45 @@ pub struct Seen {
     pub sample: usize,
 }
 
-impl Task {
+impl GrinTask {
     /// What becomes of the light of every view in a field, those of weight 0 included.
     ///
     /// # Errors
     /// A field that is given in a file and cannot be read, or a space of no extent.
-    pub fn seen(&self, medium: &Medium) -> Result<Vec<Seen>, TaskError> {
+    pub fn report_views(&self, medium: &GrinField) -> Result<Vec<ViewReport>, GrinTaskError> {
         let field = medium.field();
-        let setups = setups(self, field, Draw::Judge)?;
-        shots(self, &known(self)?, &setups, Draw::Judge)?
+        let setups = plan_views(self, field, RaySet::Scoring)?;
+        view_rays(self, &measure_targets(self)?, &setups, RaySet::Scoring)?
             .iter()
-            .map(|shot| seen(shot, field))
+            .map(|shot| report_view(shot, field))
             .collect()
     }
 }
 
-fn seen(shot: &Shot, field: &dyn Field<f64>) -> Result<Seen, TaskError> {
-    let Setup { integrator, step, .. } = shot.setup;
-    let exits = Tracer::new(field, shot.setup.clone())?.rays(&shot.rays);
-    let image = shot.screen.as_ref().map(|screen| Image {
+fn report_view(shot: &ViewRays, field: &dyn IndexField<f64>) -> Result<ViewReport, GrinTaskError> {
+    let GrinSetup { integrator, step, .. } = shot.setup;
+    let exits = GrinTracer::new(field, shot.setup.clone())?.trace_batch(&shot.rays);
+    let image = shot.screen.as_ref().map(|screen| ViewImage {
         pixels: screen.pixels,
         half: screen.half,
-        wanted: screen.wanted.clone(),
-        made: Shot::image(screen, &exits),
+        target: screen.wanted.clone(),
+        formed: ViewRays::image(screen, &exits),
     });
-    let (error, sample) = error(shot, field, &exits)?;
-    Ok(Seen { result: shot.result(&exits, 0.0), image, integrator, step, error, sample })
+    let (error, sample) = step_error(shot, field, &exits)?;
+    Ok(ViewReport { result: shot.result(&exits, 0.0), image, integrator, step, error, sample })
 }
 
 /// By how much exits move where the step is halved, by a sample of the rays; and its size.
-fn error(
-    shot: &Shot,
-    field: &dyn Field<f64>,
-    exits: &[Exit<f64>],
-) -> Result<(Option<f64>, usize), TaskError> {
+fn step_error(
+    shot: &ViewRays,
+    field: &dyn IndexField<f64>,
+    exits: &[RayExit<f64>],
+) -> Result<(Option<f64>, usize), GrinTaskError> {
     let stride = shot.rays.len().div_ceil(SAMPLE).max(1);
-    let rays: Vec<Ray<f64>> = shot.rays.iter().step_by(stride).copied().collect();
-    let halved = Setup { step: 0.5 * shot.setup.step, ..shot.setup.clone() };
-    let finer = Tracer::new(field, halved)?.rays(&rays);
+    let rays: Vec<GrinRay<f64>> = shot.rays.iter().step_by(stride).copied().collect();
+    let halved = GrinSetup { step: 0.5 * shot.setup.step, ..shot.setup.clone() };
+    let finer = GrinTracer::new(field, halved)?.trace_batch(&rays);
     let pairs = exits.iter().step_by(stride).zip(&finer);
-    let both = pairs.filter(|(a, b)| Shot::counts(a) && Shot::counts(b));
+    let both = pairs.filter(|(a, b)| ViewRays::is_valid(a) && ViewRays::is_valid(b));
     Ok((both.map(|(a, b)| length(a.x - b.x)).reduce(f64::max), rays.len()))
 }

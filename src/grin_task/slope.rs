@@ -4,11 +4,11 @@
 //! towards one index by the same factor therefore draws the gradient everywhere by that factor: the
 //! limit holds exactly, and a field within the range of the index stays there.
 
-use super::climb::{Hill, Spot, climb, higher};
-use super::medium::Medium;
+use super::climb::{FieldObjective, LocatedValue, find_maximum, higher};
+use super::medium::GrinField;
 use super::space::length;
-use super::task::Space;
-use crate::grin::Field as _;
+use super::task::Domain;
+use crate::grin::IndexField as _;
 use crate::grin::field::Trilinear;
 use crate::math::Vec3;
 use rayon::prelude::*;
@@ -17,30 +17,31 @@ use rayon::prelude::*;
 /// may miss.
 const MARGINS: [f64; 2] = [1e-9, 1e-3];
 
-impl Medium {
+impl GrinField {
     /// Its steepest slope in the space, in 1/mm: of a trilinear field exactly, over all voxels that
     /// the space touches; of a smooth one to about a thousandth.
-    pub fn steepest(&self, space: Space) -> f64 {
-        self.steepest_at(space).0
+    pub fn max_slope(&self, space: Domain) -> f64 {
+        self.locate_max_slope(space).0
     }
 
     /// The same, and where that is.
-    pub(super) fn steepest_at(&self, space: Space) -> Spot {
+    pub(super) fn locate_max_slope(&self, space: Domain) -> LocatedValue {
         if let Self::Trilinear(field) = self {
-            return steepest_voxel(field, space);
+            return max_voxel_slope(field, space);
         }
         let region = space.region();
-        let inside = |p: Vec3<f64>| region.height(p) <= 0.0;
+        let inside = |p: Vec3<f64>| region.level(p) <= 0.0;
         let slope = |p: Vec3<f64>| length(self.field().sample(p).gradient);
-        let hill = Hill { inside: &inside, value: &slope };
-        let (steepest, at) = climb(&self.looks(space), self.gap(space), &hill);
+        let hill = FieldObjective { inside: &inside, value: &slope };
+        let (steepest, at) =
+            find_maximum(&self.sample_points(space), self.sample_spacing(space), &hill);
         (steepest.max(0.0), at)
     }
 
     /// The same field, drawn towards an index until it is nowhere steeper than the limit.
     #[must_use]
-    pub(super) fn flattened(&self, space: Space, limit: f64, towards: f64) -> Self {
-        let steepest = self.steepest(space);
+    pub(super) fn limit_slope(&self, space: Domain, limit: f64, towards: f64) -> Self {
+        let steepest = self.max_slope(space);
         let mut flat = self.clone();
         if steepest > limit {
             let margin = MARGINS[usize::from(!matches!(self, Self::Trilinear(_)))];
@@ -54,7 +55,7 @@ impl Medium {
 
 /// The square of the slope within a voxel is convex along each axis: it is largest in a corner,
 /// where it is made of the three edges that meet there.
-fn steepest_voxel(field: &Trilinear<f64>, space: Space) -> Spot {
+fn max_voxel_slope(field: &Trilinear<f64>, space: Domain) -> LocatedValue {
     let grid = field.grid();
     let (region, [nx, ny, nz]) = (space.region(), grid.counts());
     let (values, h) = (field.parameters(), grid.spacing());
@@ -63,7 +64,7 @@ fn steepest_voxel(field: &Trilinear<f64>, space: Space) -> Spot {
         let (i, j, k) = (n % (nx - 1), n / (nx - 1) % (ny - 1), n / (nx - 1) / (ny - 1));
         let corner = |c: usize| i + (c & 1) + nx * (j + (c >> 1 & 1)) + nx * ny * (k + (c >> 2));
         let middle = (grid.node(corner(0)) + grid.node(corner(7))) * 0.5;
-        let touches = |p: Vec3<f64>| region.height(p) < 0.0;
+        let touches = |p: Vec3<f64>| region.level(p) < 0.0;
         if !touches(middle) && !(0..8).any(|c| touches(grid.node(corner(c)))) {
             return (0.0, middle);
         }

@@ -1,41 +1,44 @@
 //! The rays of a source. No chance is involved: the same step has the same rays everywhere.
 
-use super::space::{GOLDEN, across, around, even, fresh, radians, sphere, unit};
-use super::task::{Directions, Source, Space};
-use crate::grin::Ray;
+use super::space::{
+    GOLDEN_ANGLE, half_circle, orthogonal_axes, radians, sphere_points, sphere_sequence,
+    square_sequence, unit,
+};
+use super::task::{Domain, LightSource, SourceDirections};
+use crate::grin::GrinRay;
 use crate::math::Vec3;
 
 /// Directions in which a source with new ones in every step is judged.
-const JUDGED: usize = 24;
+const SCORING_DIRECTIONS: usize = 24;
 
 /// Which rays are asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Draw {
+pub(super) enum RaySet {
     /// Those of a step.
     Step(usize),
     /// Those by which fields are compared: always the same.
-    Judge,
+    Scoring,
 }
 
 /// A ray and the point of the sphere opposite to where it comes from.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sent {
-    pub(super) ray: Ray<f64>,
-    pub(super) opposite: Vec3<f64>,
+pub(super) struct SourceRay {
+    pub(super) ray: GrinRay<f64>,
+    pub(super) antipode: Vec3<f64>,
 }
 
-impl Directions {
+impl SourceDirections {
     /// Unit vectors.
-    fn list(&self, draw: Draw) -> Vec<Vec3<f64>> {
+    fn unit_vectors(&self, draw: RaySet) -> Vec<Vec3<f64>> {
         match (self, draw) {
             (Self::Given(list), _) => {
                 list.iter().map(|[x, y, z]| unit(Vec3::new(*x, *y, *z))).collect()
             }
-            (Self::Even(count), _) => sphere(*count),
-            (Self::Around(count), _) => around(*count),
-            (Self::Fresh(_), Draw::Judge) => sphere(JUDGED),
-            (Self::Fresh(count), Draw::Step(step)) => {
-                (0..*count).map(|i| fresh(step * count + i)).collect()
+            (Self::Even(count), _) => sphere_points(*count),
+            (Self::Around(count), _) => half_circle(*count),
+            (Self::Fresh(_), RaySet::Scoring) => sphere_points(SCORING_DIRECTIONS),
+            (Self::Fresh(count), RaySet::Step(step)) => {
+                (0..*count).map(|i| sphere_sequence(step * count + i)).collect()
             }
         }
     }
@@ -49,9 +52,9 @@ impl Directions {
     }
 }
 
-impl Source {
+impl LightSource {
     /// Its directions, where it has several.
-    pub(super) fn directions(&self) -> Option<&Directions> {
+    pub(super) fn directions(&self) -> Option<&SourceDirections> {
         match self {
             Self::Parallel { directions, .. } | Self::Points { directions, .. } => Some(directions),
             Self::Fan { .. } | Self::Beam { .. } => None,
@@ -65,14 +68,14 @@ impl Source {
     }
 
     /// Whether it has other rays in every step.
-    pub(super) fn is_fresh(&self) -> bool {
-        matches!(self.directions(), Some(Directions::Fresh(_)))
+    pub(super) fn is_resampled(&self) -> bool {
+        matches!(self.directions(), Some(SourceDirections::Fresh(_)))
             || matches!(self, Self::Beam { fresh: true, .. })
     }
 
     /// Rays in a step.
     pub fn count(&self) -> usize {
-        let directions = self.directions().map_or(1, Directions::count);
+        let directions = self.directions().map_or(1, SourceDirections::count);
         match self {
             Self::Parallel { rays, .. } | Self::Points { rays, .. } | Self::Fan { rays, .. } => {
                 directions * rays
@@ -82,27 +85,27 @@ impl Source {
     }
 
     /// The rays.
-    pub(super) fn rays(&self, space: Space, draw: Draw) -> Vec<Sent> {
+    pub(super) fn rays(&self, space: Domain, draw: RaySet) -> Vec<SourceRay> {
         match self {
             Self::Parallel { directions, radius, rays } => {
-                let all = directions.list(draw).into_iter().enumerate();
+                let all = directions.unit_vectors(draw).into_iter().enumerate();
                 let back = space.diameter();
                 all.flat_map(|(k, d)| disc(k, d, *radius, *rays, back)).collect()
             }
             Self::Points { directions, radius, cone, rays } => {
-                let all = directions.list(draw).into_iter().enumerate();
-                all.flat_map(|(k, d)| cone_of(k, d, *radius, radians(*cone), *rays)).collect()
+                let all = directions.unit_vectors(draw).into_iter().enumerate();
+                all.flat_map(|(k, d)| ray_cone(k, d, *radius, radians(*cone), *rays)).collect()
             }
             Self::Fan { height, z, rays } => {
                 let at = |i: usize| Vec3::new(height * (i as f64 + 0.5) / *rays as f64, 0.0, *z);
                 let v = Vec3::new(0.0, 0.0, 1.0);
-                let sent = |x| Sent { ray: Ray { x, v }, opposite: -x };
+                let sent = |x| SourceRay { ray: GrinRay { x, v }, antipode: -x };
                 (0..*rays).map(|i| sent(at(i))).collect()
             }
             Self::Beam { direction: [x, y, z], half, rays, fresh } => {
                 let first = match draw {
-                    Draw::Step(step) if *fresh => (step + 1) * rays * rays,
-                    Draw::Step(_) | Draw::Judge => 0,
+                    RaySet::Step(step) if *fresh => (step + 1) * rays * rays,
+                    RaySet::Step(_) | RaySet::Scoring => 0,
                 };
                 let d = unit(Vec3::new(*x, *y, *z));
                 square(d, *half, *rays, (space.diameter(), first))
@@ -118,42 +121,42 @@ fn disc(
     radius: f64,
     rays: usize,
     back: f64,
-) -> impl Iterator<Item = Sent> {
-    let [u, v] = across(d);
+) -> impl Iterator<Item = SourceRay> {
+    let [u, v] = orthogonal_axes(d);
     (0..rays).map(move |i| {
         let r = radius * ((i as f64 + 0.5) / rays as f64).sqrt();
-        let (sin, cos) = (GOLDEN * i as f64 + number as f64).sin_cos();
+        let (sin, cos) = (GOLDEN_ANGLE * i as f64 + number as f64).sin_cos();
         let x = u * (r * cos) + v * (r * sin) - d * back;
-        Sent { ray: Ray { x, v: d }, opposite: d }
+        SourceRay { ray: GrinRay { x, v: d }, antipode: d }
     })
 }
 
 /// An even cone of rays from a point of a sphere towards its centre.
-fn cone_of(
+fn ray_cone(
     number: usize,
     d: Vec3<f64>,
     radius: f64,
     cone: f64,
     rays: usize,
-) -> impl Iterator<Item = Sent> {
-    let [u, v] = across(d);
+) -> impl Iterator<Item = SourceRay> {
+    let [u, v] = orthogonal_axes(d);
     (0..rays).map(move |i| {
         let along = 1.0 - (1.0 - cone.cos()) * (i as f64 + 0.5) / rays as f64;
         let r = (1.0 - along * along).max(0.0).sqrt();
-        let (sin, cos) = (GOLDEN * i as f64 + number as f64).sin_cos();
+        let (sin, cos) = (GOLDEN_ANGLE * i as f64 + number as f64).sin_cos();
         let direction = d * along + u * (r * cos) + v * (r * sin);
-        Sent { ray: Ray { x: d * -radius, v: direction }, opposite: d }
+        SourceRay { ray: GrinRay { x: d * -radius, v: direction }, antipode: d }
     })
 }
 
 /// A square beam, one ray in each of its squares: where, tells a sequence from its member `first` on.
-fn square(d: Vec3<f64>, half: f64, side: usize, (back, first): (f64, usize)) -> Vec<Sent> {
-    let [u, v] = across(d);
+fn square(d: Vec3<f64>, half: f64, side: usize, (back, first): (f64, usize)) -> Vec<SourceRay> {
+    let [u, v] = orthogonal_axes(d);
     let ray = |n: usize| {
-        let (a, b) = even(first + n);
+        let (a, b) = square_sequence(first + n);
         let at = |i: usize, jitter: f64| half * (2.0 * (i as f64 + jitter) / side as f64 - 1.0);
         let x = u * at(n % side, a) + v * at(n / side, b) - d * back;
-        Sent { ray: Ray { x, v: d }, opposite: d }
+        SourceRay { ray: GrinRay { x, v: d }, antipode: d }
     };
     (0..side * side).map(ray).collect()
 }

@@ -1,20 +1,20 @@
 //! Where light bends, as the tracer wants it, and points spread over it.
 
-use super::task::Space;
-use crate::grin::{Face, Region};
+use super::task::Domain;
+use crate::grin::{Face, GrinRegion};
 use crate::math::Vec3;
 use std::f64::consts::{PI, TAU};
 
 /// The angle by which the points of a sunflower follow one another.
-pub(super) const GOLDEN: f64 = 2.399963229728653;
+pub(super) const GOLDEN_ANGLE: f64 = 2.399963229728653;
 
-impl Space {
+impl Domain {
     /// The region of the tracer.
-    pub fn region(self) -> Region<f64> {
+    pub fn region(self) -> GrinRegion<f64> {
         match self {
-            Self::Ball { radius } => Region::ball(radius),
-            Self::Rod { radius, from, to } => Region::rod(radius, from, to),
-            Self::Cube { half } => Region::cube(half),
+            Self::Ball { radius } => GrinRegion::ball(radius),
+            Self::Rod { radius, from, to } => GrinRegion::rod(radius, from, to),
+            Self::Cube { half } => GrinRegion::cube(half),
         }
     }
 
@@ -52,11 +52,11 @@ impl Space {
                 part(low.z, high.z, n / count / count),
             )
         };
-        (0..count.pow(3)).map(at).filter(|p| region.height(*p) < 0.0).collect()
+        (0..count.pow(3)).map(at).filter(|p| region.level(*p) < 0.0).collect()
     }
 
     /// The plane across a direction that stands so far behind the space.
-    pub(super) fn behind(self, direction: Vec3<f64>, distance: f64) -> Face<f64> {
+    pub(super) fn plane_behind(self, direction: Vec3<f64>, distance: f64) -> Face<f64> {
         let [low, high] = self.corners();
         let far = |d: f64, low: f64, high: f64| if d < 0.0 { d * low } else { d * high };
         let reach = far(direction.x, low.x, high.x)
@@ -66,20 +66,20 @@ impl Space {
     }
 
     /// About so many points spread over its surface; of a rod, over its wall.
-    pub(super) fn surface(self, count: usize) -> Vec<Vec3<f64>> {
+    pub(super) fn surface_points(self, count: usize) -> Vec<Vec3<f64>> {
         let share = |i: usize| (i as f64 + 0.5) / count as f64;
         match self {
-            Self::Ball { radius } => sphere(count).into_iter().map(|p| p * radius).collect(),
+            Self::Ball { radius } => sphere_points(count).into_iter().map(|p| p * radius).collect(),
             Self::Rod { radius, from, to } => {
                 let at = |i: usize| {
-                    let (sin, cos) = (GOLDEN * i as f64).sin_cos();
+                    let (sin, cos) = (GOLDEN_ANGLE * i as f64).sin_cos();
                     Vec3::new(radius * cos, radius * sin, from + (to - from) * share(i))
                 };
                 (0..count).map(at).collect()
             }
             Self::Cube { half } => {
                 let at = |i: usize| {
-                    let (u, v) = even(i);
+                    let (u, v) = square_sequence(i);
                     let (a, b) = (half * (2.0 * u - 1.0), half * (2.0 * v - 1.0));
                     let c = if i.is_multiple_of(2) { half } else { -half };
                     match i / 2 % 3 {
@@ -95,14 +95,14 @@ impl Space {
 }
 
 /// So many points spread evenly over the unit sphere: a sunflower wrapped around it.
-pub(super) fn sphere(count: usize) -> Vec<Vec3<f64>> {
-    let at = |i: usize| on_sphere((i as f64 + 0.5) / count as f64, GOLDEN * i as f64);
+pub(super) fn sphere_points(count: usize) -> Vec<Vec3<f64>> {
+    let at = |i: usize| on_sphere((i as f64 + 0.5) / count as f64, GOLDEN_ANGLE * i as f64);
     (0..count).map(at).collect()
 }
 
 /// So many directions across the z axis, evenly over half a turn; light that goes the other way would
 /// tell the same.
-pub(super) fn around(count: usize) -> Vec<Vec3<f64>> {
+pub(super) fn half_circle(count: usize) -> Vec<Vec3<f64>> {
     let at = |i: usize| {
         let (sin, cos) = (PI * (i as f64 + 0.5) / count as f64).sin_cos();
         Vec3::new(cos, sin, 0.0)
@@ -118,19 +118,19 @@ fn on_sphere(share: f64, angle: f64) -> Vec3<f64> {
 }
 
 /// Member `i` of a sequence of directions that fills the sphere ever more evenly.
-pub(super) fn fresh(i: usize) -> Vec3<f64> {
-    let (u, v) = even(i);
+pub(super) fn sphere_sequence(i: usize) -> Vec3<f64> {
+    let (u, v) = square_sequence(i);
     on_sphere(u, TAU * v)
 }
 
 /// Member `i` of the additive sequence that fills the unit square most evenly (Roberts 2018).
-pub(super) fn even(i: usize) -> (f64, f64) {
+pub(super) fn square_sequence(i: usize) -> (f64, f64) {
     let at = |step: f64| (0.5 + step * i as f64).fract();
     (at(0.7548776662466927), at(0.5698402909980532))
 }
 
 /// Two unit vectors across a unit vector and across each other.
-pub(super) fn across(d: Vec3<f64>) -> [Vec3<f64>; 2] {
+pub(super) fn orthogonal_axes(d: Vec3<f64>) -> [Vec3<f64>; 2] {
     let (x, y, z) = (d.x.abs(), d.y.abs(), d.z.abs());
     let axis = if x <= y && x <= z {
         Vec3::new(1.0, 0.0, 0.0)

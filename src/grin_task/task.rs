@@ -1,19 +1,19 @@
 //! What a person asks of a field of refractive index: the task as it is written in a file.
 
-use super::drawing::Drawing;
-use crate::grin::{Integrator, Launch};
+use super::drawing::TargetImage;
+use crate::grin::{Integrator, LaunchMode};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The version of the format.
-pub const VERSION: u32 = 1;
+pub const TASK_VERSION: u32 = 1;
 
 /// A task: which field is to be found, what it shall do to light, and what a maker can make.
 ///
 /// Lengths are in mm and angles in degrees, as in every file. `η` is the refractive index.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Task {
+pub struct GrinTask {
     /// The version of this format: 1.
     pub aplanat_grin: u32,
     /// What it is called.
@@ -22,41 +22,41 @@ pub struct Task {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub notes: String,
     /// How the field is made up.
-    pub field: FieldKind,
+    pub field: FieldRepresentation,
     /// Where light bends.
-    pub space: Space,
+    pub space: Domain,
     /// How the speed of a ray is made to fit the index where it starts.
     #[serde(default)]
-    pub launch: Launch,
+    pub launch: LaunchMode,
     /// Light and where it shall go.
-    pub views: Vec<View>,
+    pub views: Vec<LightView>,
     /// The field to begin with.
     #[serde(default)]
-    pub start: Start,
+    pub start: InitialField,
     /// Exit positions are good to this length, where the field allows it.
     pub tolerance: f64,
     /// The step of rays in a grid, where it is not to be chosen by the tolerance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tracing: Option<Tracing>,
+    pub tracing: Option<TracingSettings>,
     /// What a maker can make.
     #[serde(default)]
-    pub limits: MakerLimits,
+    pub limits: ManufacturingLimits,
     /// What holds at the boundary of the space; nothing where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub edge: Option<Edge>,
+    pub edge: Option<BoundaryCondition>,
     /// How the field is found.
-    pub method: Method,
+    pub method: GrinMethod,
     /// Resolutions from coarse to fine.
-    pub levels: Vec<Level>,
+    pub levels: Vec<RefinementLevel>,
     /// The field that is known to be the answer, for comparison; the search does not see it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub exact: Option<Exact>,
+    pub exact: Option<ReferenceField>,
 }
 
 /// How a field is made up of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum FieldKind {
+pub enum FieldRepresentation {
     /// Nodes on a cube, trilinear between them.
     Trilinear {
         /// Half the side of the cube.
@@ -82,7 +82,7 @@ pub enum FieldKind {
 /// Where light bends; outside there is air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Space {
+pub enum Domain {
     /// A ball about the origin.
     Ball {
         /// Its radius.
@@ -107,19 +107,19 @@ pub enum Space {
 /// Light from one source and what shall become of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct View {
+pub struct LightView {
     /// What it is called.
     pub name: String,
     /// Where the rays come from.
-    pub source: Source,
+    pub source: LightSource,
     /// Where they shall go.
-    pub goal: Goal,
+    pub goal: LightGoal,
     /// How much it counts; a view of weight 0 is only looked at.
     #[serde(default = "one")]
     pub weight: f64,
     /// The space of this view, where it is another one: a rod cut elsewhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub space: Option<Space>,
+    pub space: Option<Domain>,
 }
 
 fn one() -> f64 {
@@ -129,11 +129,11 @@ fn one() -> f64 {
 /// Where rays come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Source {
+pub enum LightSource {
     /// Parallel light: even discs of rays about the lines through the origin.
     Parallel {
         /// The directions in which light goes.
-        directions: Directions,
+        directions: SourceDirections,
         /// The radius of each disc.
         radius: f64,
         /// Rays a direction.
@@ -142,7 +142,7 @@ pub enum Source {
     /// Points on a sphere about the origin that send even cones of rays towards it.
     Points {
         /// From the points to the centre.
-        directions: Directions,
+        directions: SourceDirections,
         /// The radius of the sphere.
         radius: f64,
         /// The angle between the outermost rays and the axis of the cone.
@@ -176,7 +176,7 @@ pub enum Source {
 /// Directions in space.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Directions {
+pub enum SourceDirections {
     /// These, of any length.
     Given(Vec<[f64; 3]>),
     /// So many, evenly all around, the same in every step.
@@ -190,7 +190,7 @@ pub enum Directions {
 /// What shall become of light.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Goal {
+pub enum LightGoal {
     /// It leaves through this point. The loss is the mean square distance, in mm².
     Point([f64; 3]),
     /// It leaves through the point of the space's surface opposite to its source. Likewise.
@@ -199,7 +199,7 @@ pub enum Goal {
     /// from the picture of mean 1, without a unit.
     Image {
         /// The picture.
-        drawing: Drawing,
+        drawing: TargetImage,
         /// Half the side of the screen.
         half: f64,
         /// How far it stands behind the space.
@@ -211,7 +211,7 @@ pub enum Goal {
     /// focal plane of a lens. Likewise.
     Far {
         /// The picture.
-        drawing: Drawing,
+        drawing: TargetImage,
         /// The angle between the middle of the picture, in the direction of the beam, and the
         /// middle of a side.
         angle: f64,
@@ -234,7 +234,7 @@ pub enum Goal {
     /// It leaves as it does from another field, which a measurement of rays would give.
     Like {
         /// That field.
-        field: Exact,
+        field: ReferenceField,
         /// What the square of a difference in direction counts against that of one in mm.
         #[serde(default)]
         direction: f64,
@@ -244,14 +244,14 @@ pub enum Goal {
 /// The field to begin with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Start {
+pub enum InitialField {
     /// The same index everywhere.
     Uniform(f64),
     /// A volume from a file, `NumPy`'s .npz or raw numbers with a header.
     Volume(PathBuf),
 }
 
-impl Default for Start {
+impl Default for InitialField {
     fn default() -> Self {
         Self::Uniform(1.0)
     }
@@ -260,7 +260,7 @@ impl Default for Start {
 /// Steps that are tied to the voxels of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Tracing {
+pub struct TracingSettings {
     /// The kind of step.
     pub integrator: Integrator,
     /// About how many steps a voxel has.
@@ -270,7 +270,7 @@ pub struct Tracing {
 /// What a maker can make.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MakerLimits {
+pub struct ManufacturingLimits {
     /// Smallest index: 1 or more.
     #[serde(default = "one")]
     pub low: f64,
@@ -288,7 +288,7 @@ pub struct MakerLimits {
     pub change: f64,
 }
 
-impl Default for MakerLimits {
+impl Default for ManufacturingLimits {
     fn default() -> Self {
         Self { low: one(), high: two(), slope: None, change: small() }
     }
@@ -308,7 +308,7 @@ fn small() -> f64 {
 /// fixed here, or by refraction (`"launch": "refracted"`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Edge {
+pub struct BoundaryCondition {
     /// The index there.
     pub index: f64,
     /// Whether all nodes of a trilinear grid outside the space have it.
@@ -323,7 +323,7 @@ pub struct Edge {
 /// How a field is found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Method {
+pub enum GrinMethod {
     /// First order, with moments: for rays that are new in every step.
     Adam {
         /// The size of a step of the index at the first level.
@@ -341,7 +341,7 @@ pub enum Method {
 /// A resolution and how long it is worked at.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Level {
+pub struct RefinementLevel {
     /// Nodes along a side of the cube, or coefficients of the spline.
     pub nodes: usize,
     /// No more steps than this.
@@ -351,7 +351,7 @@ pub struct Level {
 /// A field that is given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Exact {
+pub enum ReferenceField {
     /// Luneburg's lens, `η = √(2 - r²/R²)` (5.38).
     Luneburg {
         /// `R`.

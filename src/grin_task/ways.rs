@@ -1,124 +1,129 @@
 //! The ways of a few rays through a field, for a drawing in a plane.
 
-use super::check::TaskError;
-use super::medium::Medium;
-use super::plane::Plane;
-use super::scene::{Shot, setups};
-use super::source::Draw;
+use super::check::GrinTaskError;
+use super::medium::GrinField;
+use super::plane::SlicePlane;
+use super::scene::{ViewRays, plan_views};
+use super::source::RaySet;
 use super::space::length;
-use super::task::{Space, Task};
-use crate::grin::{Exit, Fate, Ray, Setup, State, Tracer};
+use super::task::{Domain, GrinTask};
+use crate::grin::{GrinFate, GrinRay, GrinSetup, GrinTracer, RayExit, RayState};
 use crate::math::Vec3;
 
 /// A ray is drawn from so far before it enters on, as a part of the size of the space.
-const BEFORE: f64 = 0.12;
+const LEAD_IN: f64 = 0.12;
 /// A way of fewer steps is drawn with so many points between two of them, one of more steps than
 /// the second number without some of them.
-const BETWEEN: usize = 6;
-const MANY: usize = 300;
+const POINTS_BETWEEN: usize = 6;
+const MAX_POINTS: usize = 300;
 /// Rays to choose from: so many for two that are drawn, and all that are hardly farther off the
 /// plane than the best, as a part of the size of the space.
-const CHOICE: usize = 3;
-const HARDLY: f64 = 0.02;
+const CANDIDATES: usize = 3;
+const NEARLY: f64 = 0.02;
 
 /// The way of a ray.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Way {
+pub struct RayPath {
     /// From before it enters to where it ends: on the screen, else on the boundary.
     pub points: Vec<Vec3<f64>>,
     /// How it ends.
-    pub fate: Fate,
+    pub fate: GrinFate,
     /// Whether it arrives so flat to the boundary that it does not count.
     pub flat: bool,
 }
 
-impl Way {
+impl RayPath {
     /// Why it does not count; `None` for a ray that does.
     pub fn excluded(&self) -> Option<&'static str> {
-        if self.flat { Some("flat") } else { (!self.fate.arrived()).then(|| self.fate.name()) }
+        if self.flat { Some("flat") } else { (!self.fate.has_arrived()).then(|| self.fate.name()) }
     }
 }
 
 /// The rays of a view that are drawn.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ways {
+pub struct RayPaths {
     /// The place of the view in the task.
     pub view: usize,
     /// The rays.
-    pub ways: Vec<Way>,
+    pub paths: Vec<RayPath>,
     /// How far the farthest of them is off the plane, in mm, were it straight.
-    pub off: f64,
+    pub distance: f64,
 }
 
-impl Task {
+impl GrinTask {
     /// For each view the ways of at most `count` of the rays that all fields are judged by: of one
     /// beam or point those that run nearest to a plane, well apart from each other.
     ///
     /// # Errors
     /// A space of no extent.
-    pub fn ways(
+    pub fn ray_paths(
         &self,
-        medium: &Medium,
-        plane: Plane,
+        medium: &GrinField,
+        plane: SlicePlane,
         count: usize,
-    ) -> Result<Vec<Ways>, TaskError> {
-        let setups = setups(self, medium.field(), Draw::Judge)?;
-        let of_view = |(view, setup): (usize, Setup<f64>)| {
-            let (space, rays) = self.judging_rays(&self.views[view]);
-            let (rays, off) = handful(&rays, plane, space, count);
-            let tracer = Tracer::new(medium.field(), setup)?;
-            let way = |ray: &Ray<f64>| {
-                let (states, exit) = tracer.path(ray);
-                let flat = exit.fate.arrived() && !Shot::counts(&exit);
-                Way { points: points(ray, &states, &exit, space), fate: exit.fate, flat }
+    ) -> Result<Vec<RayPaths>, GrinTaskError> {
+        let setups = plan_views(self, medium.field(), RaySet::Scoring)?;
+        let of_view = |(view, setup): (usize, GrinSetup<f64>)| {
+            let (space, rays) = self.scoring_rays(&self.views[view]);
+            let (rays, off) = choose_rays(&rays, plane, space, count);
+            let tracer = GrinTracer::new(medium.field(), setup)?;
+            let way = |ray: &GrinRay<f64>| {
+                let (states, exit) = tracer.trace_path(ray);
+                let flat = exit.fate.has_arrived() && !ViewRays::is_valid(&exit);
+                RayPath { points: path_points(ray, &states, &exit, space), fate: exit.fate, flat }
             };
-            Ok(Ways { view, ways: rays.iter().map(way).collect(), off })
+            Ok(RayPaths { view, paths: rays.iter().map(way).collect(), distance: off })
         };
         setups.into_iter().enumerate().map(of_view).collect()
     }
 }
 
 /// Some rays of one beam or point nearest to a plane, well apart; and how far off it they are.
-fn handful(rays: &[Ray<f64>], plane: Plane, space: Space, count: usize) -> (Vec<Ray<f64>>, f64) {
+fn choose_rays(
+    rays: &[GrinRay<f64>],
+    plane: SlicePlane,
+    space: Domain,
+    count: usize,
+) -> (Vec<GrinRay<f64>>, f64) {
     let [low, high] = space.corners();
     let (centre, reach) = ((low + high) * 0.5, 0.5 * space.diameter());
-    let nearest = |ray: &Ray<f64>| {
+    let nearest = |ray: &GrinRay<f64>| {
         let way = ray.v * ((centre - ray.x).dot(ray.v) / ray.v.dot(ray.v));
         ray.x + way
     };
-    let off = |ray: &Ray<f64>| {
-        let slope = plane.axis.of(ray.v).abs() / length(ray.v);
-        (plane.axis.of(nearest(ray)) - plane.depth).abs() + reach * slope
+    let off = |ray: &GrinRay<f64>| {
+        let slope = plane.axis.component(ray.v).abs() / length(ray.v);
+        (plane.axis.component(nearest(ray)) - plane.depth).abs() + reach * slope
     };
-    let candidates = bundles(rays).into_iter().map(|bundle| {
-        let mut by_off: Vec<(f64, Ray<f64>)> =
+    let candidates = group_rays(rays).into_iter().map(|bundle| {
+        let mut by_off: Vec<(f64, GrinRay<f64>)> =
             bundle.into_iter().map(|n| (off(&rays[n]), rays[n])).collect();
         by_off.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let near = by_off.first().map_or(0.0, |(off, _)| off + 2.0 * HARDLY * reach);
+        let near = by_off.first().map_or(0.0, |(off, _)| off + 2.0 * NEARLY * reach);
         let hardly = by_off.partition_point(|(off, _)| *off <= near);
-        by_off.truncate((CHOICE * count).div_ceil(2).max(hardly));
+        by_off.truncate((CANDIDATES * count).div_ceil(2).max(hardly));
         by_off
     });
-    let mean = |bundle: &Vec<(f64, Ray<f64>)>| {
+    let mean = |bundle: &Vec<(f64, GrinRay<f64>)>| {
         bundle.iter().map(|(off, _)| off).sum::<f64>() / bundle.len().max(1) as f64
     };
     let best = candidates.min_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or_default();
-    let place = |ray: &Ray<f64>| {
-        let [right, up] = plane.seen(nearest(ray));
-        let [along, above] = plane.seen(ray.v * (reach / length(ray.v)));
+    let place = |ray: &GrinRay<f64>| {
+        let [right, up] = plane.project(nearest(ray));
+        let [along, above] = plane.project(ray.v * (reach / length(ray.v)));
         [right, up, along, above]
     };
     let places: Vec<[f64; 4]> = best.iter().map(|(_, ray)| place(ray)).collect();
-    let chosen = spread(&places, count);
+    let chosen = choose_spread(&places, count);
     let farthest = chosen.iter().map(|n| best[*n].0).fold(0.0, f64::max);
     (chosen.into_iter().map(|n| best[n].1).collect(), farthest)
 }
 
 /// The numbers of rays that go together: those of one direction, else those from one point, else
 /// all.
-fn bundles(rays: &[Ray<f64>]) -> Vec<Vec<usize>> {
+fn group_rays(rays: &[GrinRay<f64>]) -> Vec<Vec<usize>> {
     let bits = |v: Vec3<f64>| [v.x, v.y, v.z].map(f64::to_bits);
-    let by = |key: &dyn Fn(&Ray<f64>) -> [u64; 3]| -> Vec<Vec<usize>> {
+    let by = |key: &dyn Fn(&GrinRay<f64>) -> [u64; 3]| -> Vec<Vec<usize>> {
         let mut order: Vec<usize> = (0..rays.len()).collect();
         order.sort_by_key(|n| key(&rays[*n]));
         let same = |a: &usize, b: &usize| key(&rays[*a]) == key(&rays[*b]);
@@ -134,7 +139,7 @@ fn bundles(rays: &[Ray<f64>]) -> Vec<Vec<usize>> {
 
 /// The numbers of at most so many places, spread evenly along the coordinate in which they differ
 /// most.
-fn spread(places: &[[f64; 4]], count: usize) -> Vec<usize> {
+fn choose_spread(places: &[[f64; 4]], count: usize) -> Vec<usize> {
     let range = |axis: usize| {
         let values = places.iter().map(|place| place[axis]);
         let none = (f64::INFINITY, f64::NEG_INFINITY);
@@ -155,7 +160,12 @@ fn spread(places: &[[f64; 4]], count: usize) -> Vec<usize> {
 }
 
 /// The points of a way, from shortly before the space on.
-fn points(ray: &Ray<f64>, states: &[State<f64>], exit: &Exit<f64>, space: Space) -> Vec<Vec3<f64>> {
+fn path_points(
+    ray: &GrinRay<f64>,
+    states: &[RayState<f64>],
+    exit: &RayExit<f64>,
+    space: Domain,
+) -> Vec<Vec3<f64>> {
     let size = space.diameter();
     let direction = ray.v * (1.0 / length(ray.v));
     let Some(first) = states.first() else {
@@ -163,32 +173,32 @@ fn points(ray: &Ray<f64>, states: &[State<f64>], exit: &Exit<f64>, space: Space)
         let ends = [way - 0.5 * size, way + 0.5 * size].map(|t| ray.x + direction * t.max(0.0));
         return ends.into_iter().filter(|p| p.is_finite()).collect();
     };
-    let before = length(first.x - ray.x).min(BEFORE * size);
+    let before = length(first.x - ray.x).min(LEAD_IN * size);
     let mut points = vec![first.x - direction * before];
-    let stride = states.len().div_ceil(MANY).max(1);
-    let kept: Vec<State<f64>> = states.iter().step_by(stride).copied().collect();
-    let between = if states.len() < MANY / BETWEEN { BETWEEN } else { 1 };
+    let stride = states.len().div_ceil(MAX_POINTS).max(1);
+    let kept: Vec<RayState<f64>> = states.iter().step_by(stride).copied().collect();
+    let between = if states.len() < MAX_POINTS / POINTS_BETWEEN { POINTS_BETWEEN } else { 1 };
     points.extend(kept.first().map(|state| state.x));
     for pair in kept.windows(2) {
         points.extend((1..=between).map(|i| hermite(pair, i as f64 / between as f64)));
     }
-    points.extend(leaving(exit, space));
+    points.extend(exit_point(exit, space));
     points.push(exit.x);
     points.retain(|point| point.is_finite());
     points
 }
 
 /// Where a ray that ends on a screen has left the space.
-fn leaving(exit: &Exit<f64>, space: Space) -> Option<Vec3<f64>> {
+fn exit_point(exit: &RayExit<f64>, space: Domain) -> Option<Vec3<f64>> {
     let region = space.region();
-    if !exit.fate.arrived() || region.height(exit.x) <= 1e-6 * space.diameter() {
+    if !exit.fate.has_arrived() || region.level(exit.x) <= 1e-6 * space.diameter() {
         return None;
     }
     region.entry(exit.x, -exit.v).map(|(_, t)| exit.x - exit.v * t)
 }
 
 /// A point between two states, by the cubic that has their places and velocities.
-fn hermite(pair: &[State<f64>], t: f64) -> Vec3<f64> {
+fn hermite(pair: &[RayState<f64>], t: f64) -> Vec3<f64> {
     let [a, b] = [&pair[0], &pair[1]];
     // The ray moves by |v| times the step.
     let step = 2.0 * length(b.x - a.x) / (length(a.v) + length(b.v));
@@ -200,33 +210,35 @@ fn hermite(pair: &[State<f64>], t: f64) -> Vec3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grin_task::Axis;
+    use crate::grin_task::SpatialAxis;
 
     /// Two beams, one in the plane across y and one out of it.
-    fn beams() -> Vec<Ray<f64>> {
+    fn beams() -> Vec<GrinRay<f64>> {
         let at = |i: usize| 0.1 * (i as f64 - 5.0);
-        let within = (0..11)
-            .map(|i| Ray { x: Vec3::new(at(i), 0.01 * at(i), -2.0), v: Vec3::new(0.0, 0.0, 1.0) });
-        let without =
-            (0..11).map(|i| Ray { x: Vec3::new(at(i), -2.0, 0.0), v: Vec3::new(0.0, 1.0, 0.0) });
+        let within = (0..11).map(|i| GrinRay {
+            x: Vec3::new(at(i), 0.01 * at(i), -2.0),
+            v: Vec3::new(0.0, 0.0, 1.0),
+        });
+        let without = (0..11)
+            .map(|i| GrinRay { x: Vec3::new(at(i), -2.0, 0.0), v: Vec3::new(0.0, 1.0, 0.0) });
         within.chain(without).collect()
     }
 
     #[test]
     fn drawn_rays_lie_near_the_plane_and_apart() {
-        let plane = Plane { axis: Axis::Y, depth: 0.0 };
-        let (rays, off) = handful(&beams(), plane, Space::Ball { radius: 1.0 }, 3);
+        let plane = SlicePlane { axis: SpatialAxis::Y, depth: 0.0 };
+        let (rays, off) = choose_rays(&beams(), plane, Domain::Ball { radius: 1.0 }, 3);
         let mut heights: Vec<f64> = rays.iter().map(|ray| ray.x.x).collect();
         heights.sort_by(f64::total_cmp);
         assert!(rays.iter().all(|ray| ray.v.z == 1.0) && off < 0.01, "{rays:?}, {off}");
         assert!(heights.len() == 3 && heights[2] - heights[0] > 0.55, "{heights:?}");
-        assert_eq!(handful(&beams(), plane, Space::Ball { radius: 1.0 }, 0).0.len(), 0);
-        assert_eq!(handful(&[], plane, Space::Ball { radius: 1.0 }, 3).0.len(), 0);
+        assert_eq!(choose_rays(&beams(), plane, Domain::Ball { radius: 1.0 }, 0).0.len(), 0);
+        assert_eq!(choose_rays(&[], plane, Domain::Ball { radius: 1.0 }, 3).0.len(), 0);
     }
 
     #[test]
     fn the_curve_between_two_states_goes_through_both() {
-        let state = |x: f64, v: [f64; 2]| State {
+        let state = |x: f64, v: [f64; 2]| RayState {
             x: Vec3::new(x, 0.0, 0.0),
             v: Vec3::new(v[0], v[1], 0.0),
             path: 0.0,

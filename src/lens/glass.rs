@@ -22,7 +22,7 @@ pub mod line {
 /// The formula of a catalogue glass, over the wavelength in micrometres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Formula {
+pub enum DispersionFormula {
     /// `n² = 1 + c₀ + Σ Bᵢ λ²/(λ² − Cᵢ)`.
     SellmeierSq,
     /// `n² = 1 + c₀ + Σ Bᵢ λ²/(λ² − Cᵢ²)`.
@@ -43,7 +43,7 @@ pub struct Glass {
     /// Abbe number.
     pub vd: f64,
     /// The dispersion formula.
-    pub formula: Formula,
+    pub formula: DispersionFormula,
     /// Its coefficients.
     pub coefficients: Vec<f64>,
     /// Where the formula holds, in micrometres.
@@ -60,12 +60,12 @@ impl Glass {
         let (first, rest) = self.coefficients.split_first()?;
         let l2 = um * um;
         let term = |pair: &[f64]| match self.formula {
-            Formula::SellmeierSq => pair[0] * l2 / (l2 - pair[1]),
-            Formula::SellmeierLin => pair[0] * l2 / (l2 - pair[1] * pair[1]),
-            Formula::Poly => pair[0] * um.powf(pair[1]),
+            DispersionFormula::SellmeierSq => pair[0] * l2 / (l2 - pair[1]),
+            DispersionFormula::SellmeierLin => pair[0] * l2 / (l2 - pair[1] * pair[1]),
+            DispersionFormula::Poly => pair[0] * um.powf(pair[1]),
         };
         let sum: f64 = rest.chunks_exact(2).map(term).sum();
-        let one = if self.formula == Formula::Poly { 0.0 } else { 1.0 };
+        let one = if self.formula == DispersionFormula::Poly { 0.0 } else { 1.0 };
         let n2 = one + first + sum;
         (n2 > 0.0).then(|| n2.sqrt())
     }
@@ -77,7 +77,7 @@ impl Glass {
 }
 
 #[derive(Deserialize)]
-struct Catalogue {
+struct GlassCatalogue {
     glasses: Vec<Glass>,
 }
 
@@ -86,7 +86,7 @@ pub fn catalogue() -> &'static [Glass] {
     static CATALOGUE: OnceLock<Vec<Glass>> = OnceLock::new();
     CATALOGUE.get_or_init(|| {
         let text = include_str!("../../assets/glasses.json");
-        let parsed: Result<Catalogue, _> = serde_json::from_str(text);
+        let parsed: Result<GlassCatalogue, _> = serde_json::from_str(text);
         parsed.map(|c| c.glasses).unwrap_or_default()
     })
 }
@@ -94,7 +94,7 @@ pub fn catalogue() -> &'static [Glass] {
 /// The glass with this name, `SCHOTT N-BK7` or, where only one maker has it, `N-BK7`; blanks and
 /// case do not matter.
 pub fn find(name: &str) -> Option<&'static Glass> {
-    names().get(&plain(name)).copied().flatten()
+    names().get(&normalize(name)).copied().flatten()
 }
 
 /// Every name by which a glass is found; none where two makers have the same one.
@@ -103,25 +103,25 @@ fn names() -> &'static HashMap<String, Option<&'static Glass>> {
     NAMES.get_or_init(|| {
         let mut names: HashMap<_, Option<&'static Glass>> = HashMap::new();
         for glass in catalogue() {
-            let short = names.entry(plain(&glass.name));
+            let short = names.entry(normalize(&glass.name));
             short.and_modify(|only| *only = None).or_insert(Some(glass));
         }
         for glass in catalogue().iter().rev() {
-            names.insert(plain(&glass.full_name()), Some(glass));
+            names.insert(normalize(&glass.full_name()), Some(glass));
         }
         names
     })
 }
 
 /// Upper case without blanks.
-fn plain(name: &str) -> String {
+fn normalize(name: &str) -> String {
     name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_uppercase).collect()
 }
 
 /// The names nearest to one that was not found, for an error message.
-pub fn similar(name: &str) -> Vec<String> {
+pub fn similar_names(name: &str) -> Vec<String> {
     let letters = |text: &str| -> String {
-        plain(text).chars().filter(char::is_ascii_alphanumeric).collect()
+        normalize(text).chars().filter(char::is_ascii_alphanumeric).collect()
     };
     let wanted = letters(name);
     let near = |glass: &&Glass| {

@@ -1,40 +1,42 @@
 //! A gradient-index medium as it is written: a glass and how its index varies from place to place.
 
 use super::{Lens, Medium, Row};
-use crate::grin::field::{AXIAL_TERMS, GRADE_TERMS, Grade, Graded, Law, RADIAL_TERMS};
+use crate::grin::field::{
+    AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
+};
 use crate::math::{Real, Vec3};
 
 /// A gradient: the index of a glass on the axis at the vertex in front, plus polynomials in r² and
-/// in z, which counts from that vertex (see [`Law`] for what they build).
+/// in z, which counts from that vertex (see [`ProfileLaw`] for what they build).
 ///
 /// The glass has its dispersion; the coefficients are the same at every wavelength.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gradient {
+pub struct GradientIndex {
     /// The glass on the axis at z = 0: a catalogue glass, a model glass or an index.
     pub base: Medium,
     /// What the coefficients build.
-    pub law: Law,
+    pub law: ProfileLaw,
     /// Coefficients of r², r⁴, … r¹²; of the secant its constant alone, in 1/mm.
     pub radial: Vec<f64>,
     /// Coefficients of z, z², z³, z⁴.
     pub axial: Vec<f64>,
 }
 
-impl Gradient {
+impl GradientIndex {
     /// All coefficients, zero where none is written.
-    pub fn terms(&self) -> [f64; GRADE_TERMS] {
+    pub fn terms(&self) -> [f64; PROFILE_TERMS] {
         std::array::from_fn(|k| self.term(k).unwrap_or(0.0))
     }
 
     /// Coefficient number `k`: 0 (r²) to 5 (r¹²), 6 (z) to 9 (z⁴); `None` where the law has none.
     pub fn term(&self, k: usize) -> Option<f64> {
-        let (list, place) = self.place(k)?;
+        let (list, place) = self.locate(k)?;
         Some([&self.radial, &self.axial][list].get(place).copied().unwrap_or(0.0))
     }
 
     /// Writes a coefficient; `false` where the law has none.
     pub fn set_term(&mut self, k: usize, value: f64) -> bool {
-        let Some((list, place)) = self.place(k) else { return false };
+        let Some((list, place)) = self.locate(k) else { return false };
         let terms = if list == 0 { &mut self.radial } else { &mut self.axial };
         if terms.len() <= place {
             terms.resize(place + 1, 0.0);
@@ -44,26 +46,26 @@ impl Gradient {
     }
 
     /// Which of the two lists holds a coefficient, and where.
-    fn place(&self, k: usize) -> Option<(usize, usize)> {
-        let radial = if self.law == Law::Sech { 1 } else { RADIAL_TERMS };
+    fn locate(&self, k: usize) -> Option<(usize, usize)> {
+        let radial = if self.law == ProfileLaw::Sech { 1 } else { RADIAL_TERMS };
         match k {
             _ if k < radial => Some((0, k)),
-            RADIAL_TERMS..GRADE_TERMS => Some((1, k - RADIAL_TERMS)),
+            RADIAL_TERMS..PROFILE_TERMS => Some((1, k - RADIAL_TERMS)),
             _ => None,
         }
     }
 
     /// The coefficients that are written, by number.
-    pub fn written(&self) -> impl Iterator<Item = usize> {
+    pub fn written_terms(&self) -> impl Iterator<Item = usize> {
         (0..self.radial.len()).chain((0..self.axial.len()).map(|j| RADIAL_TERMS + j))
     }
 
     /// The power of a length that coefficient number `k` is measured in: −2 for that of r².
     pub fn power(&self, k: usize) -> i32 {
         match k {
-            0 if self.law == Law::Sech => -1,
+            0 if self.law == ProfileLaw::Sech => -1,
             _ if k < RADIAL_TERMS => -2 * (k as i32 + 1),
-            _ => -(k.min(GRADE_TERMS) as i32 - RADIAL_TERMS as i32 + 1),
+            _ => -(k.min(PROFILE_TERMS) as i32 - RADIAL_TERMS as i32 + 1),
         }
     }
 
@@ -82,7 +84,7 @@ impl Gradient {
     /// into the index of the base; `None` where that has dispersion, which the sum does not share, or
     /// where the law multiplies it by something else.
     #[must_use]
-    pub fn turned(&self, length: f64) -> Option<Self> {
+    pub fn reversed(&self, length: f64) -> Option<Self> {
         if !self.is_axial() {
             return Some(self.clone());
         }
@@ -95,12 +97,12 @@ impl Gradient {
             }
         }
         terms.iter_mut().skip(1).step_by(2).for_each(|odd| *odd = -*odd);
-        let base = self.raised(terms.remove(0))?;
+        let base = self.base_plus(terms.remove(0))?;
         Some(Self { base, axial: terms, ..self.clone() })
     }
 
     /// The base with a constant added to what the coefficients build.
-    fn raised(&self, by: f64) -> Option<Medium> {
+    fn base_plus(&self, by: f64) -> Option<Medium> {
         if by == 0.0 {
             return Some(self.base.clone());
         }
@@ -111,12 +113,12 @@ impl Gradient {
             _ => return None,
         };
         match self.law {
-            Law::Sech if radial => None,
-            Law::Square => {
+            ProfileLaw::Sech if radial => None,
+            ProfileLaw::Square => {
                 let square = index * index + by;
                 (square > 0.0).then(|| Medium::Index(square.sqrt()))
             }
-            Law::Index | Law::Sech => {
+            ProfileLaw::Index | ProfileLaw::Sech => {
                 let index = index + by;
                 (index > 0.0).then_some(Medium::Index(index))
             }
@@ -125,7 +127,7 @@ impl Gradient {
 
     /// What is wrong with it, if anything.
     pub(super) fn fault(&self) -> Option<String> {
-        let radial = if self.law == Law::Sech { 1 } else { RADIAL_TERMS };
+        let radial = if self.law == ProfileLaw::Sech { 1 } else { RADIAL_TERMS };
         if self.radial.len() > radial {
             let found = self.radial.len();
             return Some(format!("has {found} radial coefficients; expected at most {radial}"));
@@ -139,43 +141,45 @@ impl Gradient {
         }
         match self.base {
             Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) => None,
-            Medium::Air | Medium::Mirror | Medium::Gradient(_) => {
+            Medium::Air | Medium::Mirror | Medium::Grin(_) => {
                 Some("has no glass as its base; expected a catalogue name or an index".to_owned())
             }
         }
     }
 
-    /// What a system is traced with where it varies; `reach` is how far from the axis it is used.
-    pub(super) fn grade(&self, reach: f64) -> Grade<f64> {
-        Grade { reach, ..Grade::new(self.law, self.terms()) }
+    /// What a system is traced with where it varies; `gap_radius` is how far from the axis it is used.
+    pub(super) fn grade(&self, reach: f64) -> ProfileCoefficients<f64> {
+        ProfileCoefficients { reach, ..ProfileCoefficients::new(self.law, self.terms()) }
     }
 }
 
 impl Lens {
     /// The coefficients of the gradient behind a row, even where all are zero.
-    pub fn grade(&self, surface: usize) -> Option<Grade<f64>> {
+    pub fn grade(&self, surface: usize) -> Option<ProfileCoefficients<f64>> {
         let row = self.surfaces.get(surface)?;
-        let Medium::Gradient(gradient) = &row.medium else { return None };
-        Some(gradient.grade(reach(row, self.surfaces.get(surface + 1))))
+        let Medium::Grin(gradient) = &row.medium else { return None };
+        Some(gradient.grade(gap_radius(row, self.surfaces.get(surface + 1))))
     }
 }
 
 /// How far from the axis the gap between two rows is used: the wider of the two rims.
-pub(super) fn reach(front: &Row, back: Option<&Row>) -> f64 {
+pub(super) fn gap_radius(front: &Row, back: Option<&Row>) -> f64 {
     let of = |row: &Row| row.semi_diameter.unwrap_or(f64::INFINITY);
     back.map_or(f64::INFINITY, |back| of(front).max(of(back)))
 }
 
 /// Places at which the index is looked at, from the axis to the rim and from face to face.
-const LOOKS: usize = 17;
+const INDEX_SAMPLES: usize = 17;
 
 /// The lowest index of a gradient between z = 0 and `length`, up to its reach or, where that is not
 /// known, on the axis.
-pub(super) fn lowest(field: &Graded<f64>, length: f64) -> f64 {
-    let reach = if field.grade.reach.is_finite() { field.grade.reach } else { 0.0 };
-    let share = |i: usize| i as f64 / (LOOKS - 1) as f64;
-    let place = |i: usize| Vec3::new(reach * share(i % LOOKS), 0.0, length * share(i / LOOKS));
-    let all = (0..LOOKS * LOOKS).map(|i| field.index(place(i)));
+pub(super) fn lowest_index(field: &RotationalProfile<f64>, length: f64) -> f64 {
+    let reach = if field.coefficients.reach.is_finite() { field.coefficients.reach } else { 0.0 };
+    let share = |i: usize| i as f64 / (INDEX_SAMPLES - 1) as f64;
+    let place = |i: usize| {
+        Vec3::new(reach * share(i % INDEX_SAMPLES), 0.0, length * share(i / INDEX_SAMPLES))
+    };
+    let all = (0..INDEX_SAMPLES * INDEX_SAMPLES).map(|i| field.index(place(i)));
     // Not a number is lower than any.
     all.fold(f64::INFINITY, |low, n| {
         if n >= low {
@@ -190,122 +194,122 @@ pub(super) fn lowest(field: &Graded<f64>, length: f64) -> f64 {
 
 /// What paraxial rays need to know of a gradient at a place on its axis: the index `n` there, and
 /// `c` of the force `n ∂n/∂r = c r` across the axis.
-fn on_axis<R: Real>(field: &Graded<R>, z: R) -> (R, R) {
+fn on_axis<R: Real>(field: &RotationalProfile<R>, z: R) -> (R, R) {
     let at = Vec3::new(R::ZERO, R::ZERO, z);
     let across = Vec3::new(R::ONE, R::ZERO, R::ZERO);
-    (field.index(at), field.bend(at, across).x)
+    (field.index(at), field.force_derivative(at, across).x)
 }
 
 /// Slabs of a gap in which the paraxial equations are solved: enough for twelve digits of whatever
 /// a rod of a few pitches does. A gradient across the axis alone is exact in one.
-const SLABS: usize = 128;
+const MAGNUS_STEPS: usize = 128;
 
 /// A gap filled with a gradient, for paraxial rays. Where light runs towards −z, its index and the
 /// optical slope count negative.
 #[derive(Debug, Clone, Copy)]
-pub struct Slab<R> {
+pub struct ParaxialGrin<R> {
     /// The index on the axis at its end.
     pub index_behind: R,
     /// By how much that grows with the thickness, in 1/mm.
-    pub climb: R,
+    pub index_slope: R,
     /// The derivative of the optical slope at its end by the thickness, for a height of 1.
-    pub pull: R,
+    pub force_constant: R,
     /// From height and optical slope `n u` at its beginning to those at its end: `[[A, B], [C, D]]`.
     pub matrix: [[R; 2]; 2],
     /// What it adds to the Petzval sum, `−∫ 2 n₁/n² dz` where `n = n₀ + n₁ r²`.
     pub petzval: R,
 }
 
-impl<R: Real> Slab<R> {
+impl<R: Real> ParaxialGrin<R> {
     /// Solves `dy/dz = p/n`, `dp/dz = (c/n) y` through a gap of this thickness: Magnus's series to
     /// fourth order with two Gauss points a slab (Blanes, Casas, Oteo and Ros, Phys. Rep. 470, 2009,
     /// eq. 253), which for constant coefficients is the matrix of cosines and sines itself.
-    pub fn new(field: &Graded<R>, thickness: R) -> Self {
+    pub fn new(field: &RotationalProfile<R>, thickness: R) -> Self {
         let (index_behind, c) = on_axis(field, thickness);
         let at_end = field.force(Vec3::new(R::ZERO, R::ZERO, thickness));
         let mut slab = Self {
             index_behind,
-            climb: at_end.force.z / index_behind,
-            pull: c / index_behind,
+            index_slope: at_end.force.z / index_behind,
+            force_constant: c / index_behind,
             matrix: [[R::ONE, R::ZERO], [R::ZERO, R::ONE]],
             petzval: R::ZERO,
         };
-        if field.grade.used[1] == 0 {
-            slab.across(thickness);
+        if field.coefficients.used[1] == 0 {
+            slab.solve_radial(thickness);
         } else {
-            slab.along(field, thickness);
+            slab.solve_axial(field, thickness);
         }
         slab
     }
 
     /// A gap filled with a gradient, passed by light that runs towards −z where `sense` is below 0.
-    pub fn passed(field: &Graded<R>, thickness: R, sense: R) -> Self {
+    pub fn directed(field: &RotationalProfile<R>, thickness: R, sense: R) -> Self {
         let slab = Self::new(field, thickness);
-        if sense < R::ZERO { slab.backwards() } else { slab }
+        if sense < R::ZERO { slab.reversed() } else { slab }
     }
 
     /// The same for light that runs towards −z, through a gap whose thickness is negative.
     #[must_use]
-    fn backwards(self) -> Self {
+    fn reversed(self) -> Self {
         let [[a, b], [c, d]] = self.matrix;
         Self {
             index_behind: -self.index_behind,
-            climb: -self.climb,
-            pull: -self.pull,
+            index_slope: -self.index_slope,
+            force_constant: -self.force_constant,
             matrix: [[a, -b], [-c, d]],
             petzval: -self.petzval,
         }
     }
 
     /// All of a gap along which nothing changes: the matrix of one slab, squared again and again.
-    fn across(&mut self, thickness: R) {
-        let (n, pull) = (self.index_behind, self.pull);
-        let h = thickness * R::from_f64(1.0 / SLABS as f64);
-        self.matrix = exponential(R::ZERO, h / n, h * pull);
-        for _ in 0..SLABS.ilog2() {
-            self.matrix = times(self.matrix, self.matrix);
+    fn solve_radial(&mut self, thickness: R) {
+        let (n, pull) = (self.index_behind, self.force_constant);
+        let h = thickness * R::from_f64(1.0 / MAGNUS_STEPS as f64);
+        self.matrix = matrix_exponential(R::ZERO, h / n, h * pull);
+        for _ in 0..MAGNUS_STEPS.ilog2() {
+            self.matrix = matrix_product(self.matrix, self.matrix);
         }
         self.petzval = -(pull / (n * n) * thickness);
     }
 
-    fn along(&mut self, field: &Graded<R>, thickness: R) {
-        let h = thickness * R::from_f64(1.0 / SLABS as f64);
+    fn solve_axial(&mut self, field: &RotationalProfile<R>, thickness: R) {
+        let h = thickness * R::from_f64(1.0 / MAGNUS_STEPS as f64);
         let half = R::from_f64(0.5);
         let off = h * R::from_f64(3f64.sqrt() / 6.0);
         let mut middle = h * half;
-        for _ in 0..SLABS {
+        for _ in 0..MAGNUS_STEPS {
             let [(n1, c1), (n2, c2)] = [middle - off, middle + off].map(|z| on_axis(field, z));
             let [(b1, g1), (b2, g2)] = [(n1, c1), (n2, c2)].map(|(n, c)| (R::ONE / n, c / n));
             let mixed = h * off * half * (b2 * g1 - b1 * g2);
-            let step = exponential(mixed, (b1 + b2) * h * half, (g1 + g2) * h * half);
-            self.matrix = times(step, self.matrix);
+            let step = matrix_exponential(mixed, (b1 + b2) * h * half, (g1 + g2) * h * half);
+            self.matrix = matrix_product(step, self.matrix);
             self.petzval -= (c1 * b1 * b1 * b1 + c2 * b2 * b2 * b2) * h * half;
             middle += h;
         }
     }
 
     /// Height and optical slope at its end.
-    pub fn pass(&self, y: R, nu: R) -> (R, R) {
+    pub fn transfer(&self, y: R, nu: R) -> (R, R) {
         let [[a, b], [c, d]] = self.matrix;
         (a * y + b * nu, c * y + d * nu)
     }
 
     /// The transpose: from the derivatives by height and optical slope at its end to those by both
     /// at its beginning.
-    pub fn pass_back(&self, by_y: R, by_nu: R) -> (R, R) {
+    pub fn transfer_transposed(&self, by_y: R, by_nu: R) -> (R, R) {
         let [[a, b], [c, d]] = self.matrix;
         (a * by_y + c * by_nu, b * by_y + d * by_nu)
     }
 
     /// What height and optical slope at its end grow by with its thickness: `p/n` and `(c/n) y`, the
     /// equations themselves.
-    pub fn growth(&self, y: R, nu: R) -> (R, R) {
-        (nu / self.index_behind, self.pull * y)
+    pub fn thickness_derivative(&self, y: R, nu: R) -> (R, R) {
+        (nu / self.index_behind, self.force_constant * y)
     }
 }
 
 /// `exp [[m, b], [c, −m]]` by its series, which needs few terms for the short slabs it is for.
-fn exponential<R: Real>(m: R, b: R, c: R) -> [[R; 2]; 2] {
+fn matrix_exponential<R: Real>(m: R, b: R, c: R) -> [[R; 2]; 2] {
     let q = m * m + b * c;
     // cosh √q and sinh √q / √q.
     let (mut even, mut odd) = (R::ONE, R::ONE);
@@ -323,6 +327,6 @@ fn exponential<R: Real>(m: R, b: R, c: R) -> [[R; 2]; 2] {
     [[even + odd * m, odd * b], [odd * c, even - odd * m]]
 }
 
-fn times<R: Real>(a: [[R; 2]; 2], b: [[R; 2]; 2]) -> [[R; 2]; 2] {
+fn matrix_product<R: Real>(a: [[R; 2]; 2], b: [[R; 2]; 2]) -> [[R; 2]; 2] {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
 }

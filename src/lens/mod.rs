@@ -17,13 +17,15 @@ mod system;
 mod vary;
 
 pub use check::LensError;
-pub use gradient::{Gradient, Slab};
+pub use gradient::{GradientIndex, ParaxialGrin};
 pub use parameter::{Parameter, Quantity};
-pub use resolve::focus_gap;
-pub use system::{Invalid, Shape, Surface, System};
-pub use vary::{NumberKind, at_zoom, free, vary};
+pub use resolve::paraxial_image_distance;
+pub use system::{Shape, Surface, System, SystemError};
+pub use vary::{ParameterKind, add_variable, add_variables, at_zoom};
 
-pub use crate::grin::field::{AXIAL_TERMS, GRADE_TERMS, Grade, Graded, Law, RADIAL_TERMS};
+pub use crate::grin::field::{
+    AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -59,7 +61,7 @@ pub struct Lens {
     pub pickups: Vec<Pickup>,
     /// Whether the last thickness is solved so that the image plane lies at the paraxial focus,
     /// displaced by this many millimetres.
-    pub focus: Option<f64>,
+    pub image_solve: Option<f64>,
 }
 
 /// Where the object is.
@@ -101,7 +103,7 @@ pub enum FieldKind {
 /// One field point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Field {
+pub struct FieldPoint {
     /// Sagittal coordinate, in the unit of the [`FieldKind`].
     #[serde(default, skip_serializing_if = "is_zero")]
     pub x: f64,
@@ -119,7 +121,7 @@ pub struct Fields {
     /// What the values are measured in.
     pub kind: FieldKind,
     /// The points, in the order in which they are shown.
-    pub values: Vec<Field>,
+    pub values: Vec<FieldPoint>,
 }
 
 /// One wavelength.
@@ -157,7 +159,7 @@ pub struct Row {
     /// Whether this is the aperture stop.
     pub stop: bool,
     /// Whether the far half of the sphere or ellipsoid counts too (a hyper-hemisphere).
-    pub hyper: bool,
+    pub hyperhemisphere: bool,
     /// A remark on the surface.
     pub comment: String,
 }
@@ -182,7 +184,7 @@ pub enum Medium {
     /// The surface is a mirror; the gap is filled with what was before it.
     Mirror,
     /// An index that varies from place to place.
-    Gradient(Box<Gradient>),
+    Grin(Box<GradientIndex>),
 }
 
 /// One position of a zoom lens: what differs from the prescription.

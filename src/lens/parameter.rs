@@ -72,7 +72,7 @@ impl Medium {
     fn index(&self) -> Option<f64> {
         match self {
             Self::Model { nd: n, .. } | Self::Index(n) => Some(*n),
-            Self::Gradient(gradient) => gradient.base.index(),
+            Self::Grin(gradient) => gradient.base.index(),
             Self::Air | Self::Glass(_) | Self::Mirror => None,
         }
     }
@@ -80,7 +80,7 @@ impl Medium {
     fn index_mut(&mut self) -> Option<&mut f64> {
         match self {
             Self::Model { nd: n, .. } | Self::Index(n) => Some(n),
-            Self::Gradient(gradient) => gradient.base.index_mut(),
+            Self::Grin(gradient) => gradient.base.index_mut(),
             Self::Air | Self::Glass(_) | Self::Mirror => None,
         }
     }
@@ -101,7 +101,7 @@ impl Lens {
             Quantity::ZoomThickness(zoom) => self.thickness_at(parameter.surface, zoom),
             Quantity::Index => row.medium.index(),
             Quantity::Gradient(k) => match &row.medium {
-                Medium::Gradient(gradient) => gradient.term(k),
+                Medium::Grin(gradient) => gradient.term(k),
                 _ => None,
             },
             Quantity::SemiDiameter => row.semi_diameter,
@@ -132,7 +132,7 @@ impl Lens {
                 None => return false,
             },
             Quantity::Gradient(k) => match &mut row.medium {
-                Medium::Gradient(gradient) => return gradient.set_term(k, value),
+                Medium::Grin(gradient) => return gradient.set_term(k, value),
                 _ => return false,
             },
             Quantity::SemiDiameter => {

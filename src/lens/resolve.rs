@@ -1,7 +1,7 @@
 //! From what was written to plain numbers: pickups, glasses, the focus solve.
 
 use super::system::{Shape, Surface, System};
-use super::{ASPHERE_TERMS, Invalid, Lens, LensError, Medium, Object, Parameter, Pickup, Row};
+use super::{ASPHERE_TERMS, Lens, LensError, Medium, Object, Parameter, Pickup, Row, SystemError};
 use super::{glass, gradient};
 use crate::math::Real;
 
@@ -11,18 +11,19 @@ impl Lens {
     ///
     /// # Errors
     /// Whatever [`Lens::check`] refuses, a wavelength outside a glass's data, no such zoom position.
-    pub fn system(&self, zoom: usize, um: f64) -> Result<System<f64>, LensError> {
+    pub fn resolve(&self, zoom: usize, um: f64) -> Result<System<f64>, LensError> {
         self.check()?;
         if zoom >= self.zoom_positions() {
             let text =
                 format!("no zoom position {zoom}; expected 0 to {}", self.zoom_positions() - 1);
-            return Err(LensError::Contradiction(text));
+            return Err(LensError::Inconsistent(text));
         }
         let lens = self.with_pickups()?;
-        let mut system = lens.unfocused(zoom, um)?;
-        if let Some(offset) = lens.focus {
+        let mut system = lens.resolve_unsolved(zoom, um)?;
+        if let Some(offset) = lens.image_solve {
             let primary = lens.wavelengths[lens.primary()].um;
-            let gap = focus_gap(&lens.unfocused(zoom, primary)?, lens.object) + offset;
+            let gap = paraxial_image_distance(&lens.resolve_unsolved(zoom, primary)?, lens.object)
+                + offset;
             let last = lens.surfaces.len() - 1;
             system.surfaces[last].thickness = gap;
         }
@@ -41,7 +42,7 @@ impl Lens {
     }
 
     /// Every number that moves with `parameter` and by how much, itself with factor 1 first.
-    pub fn followers(&self, parameter: Parameter) -> Vec<(Parameter, f64)> {
+    pub fn dependents(&self, parameter: Parameter) -> Vec<(Parameter, f64)> {
         let mut moving = vec![(parameter, 1.0)];
         for pickup in self.pickup_order().unwrap_or_default() {
             let factor = moving.iter().find(|(p, _)| *p == pickup.source).map(|(_, f)| *f);
@@ -60,7 +61,7 @@ impl Lens {
                 waiting.iter().copied().partition(|p| depends(p));
             if ready.is_empty() {
                 let text = format!("the pickup of the {} depends on itself", later[0].parameter);
-                return Err(LensError::Contradiction(text));
+                return Err(LensError::Inconsistent(text));
             }
             ordered.extend(ready);
             waiting = later;
@@ -68,7 +69,7 @@ impl Lens {
         Ok(ordered)
     }
 
-    fn unfocused(&self, zoom: usize, um: f64) -> Result<System<f64>, LensError> {
+    fn resolve_unsolved(&self, zoom: usize, um: f64) -> Result<System<f64>, LensError> {
         let index_before = index(&self.object_medium, 0, um, 1.0)?;
         let mut surfaces = Vec::with_capacity(self.surfaces.len() + 1);
         let mut current = index_before;
@@ -77,8 +78,8 @@ impl Lens {
             let thickness = self.thickness_at(i, zoom).unwrap_or(row.thickness);
             let mut surface = row.surface(thickness, current);
             // A gradient that varies nowhere is glass.
-            surface.graded = self.grade(i).filter(|grade| !grade.is_constant());
-            check_lowest(i, &surface)?;
+            surface.grin = self.grade(i).filter(|grade| !grade.is_constant());
+            check_lowest_index(i, &surface)?;
             surfaces.push(surface);
         }
         surfaces.push(image_plane(current));
@@ -94,24 +95,24 @@ impl Row {
             shape: Shape::simplest(self.curvature, self.conic, terms),
             thickness,
             index,
-            graded: None,
+            grin: None,
             semi_diameter: self.semi_diameter.unwrap_or(f64::INFINITY),
             obstruction: self.obstruction.unwrap_or(0.0),
             mirror: self.medium == Medium::Mirror,
-            hyper: self.hyper,
+            hyperhemisphere: self.hyperhemisphere,
         }
     }
 }
 
 /// No glass has an index below 1 where light goes.
-fn check_lowest(surface: usize, face: &Surface<f64>) -> Result<(), LensError> {
+fn check_lowest_index(surface: usize, face: &Surface<f64>) -> Result<(), LensError> {
     let Some(field) = face.gradient() else { return Ok(()) };
-    let lowest = gradient::lowest(&field, face.thickness);
+    let lowest = gradient::lowest_index(&field, face.thickness);
     if lowest >= 1.0 {
         return Ok(());
     }
     let why = format!("falls to the index {lowest:.4} inside; expected 1 or more everywhere");
-    Err(Invalid::Gradient { surface, why }.into())
+    Err(SystemError::Grin { surface, why }.into())
 }
 
 /// A plane that clips nothing and refracts nothing.
@@ -123,8 +124,8 @@ fn image_plane(index: f64) -> Surface<f64> {
         semi_diameter: f64::INFINITY,
         obstruction: 0.0,
         mirror: false,
-        hyper: false,
-        graded: None,
+        hyperhemisphere: false,
+        grin: None,
     }
 }
 
@@ -134,15 +135,15 @@ fn index(medium: &Medium, surface: usize, um: f64, before: f64) -> Result<f64, L
         Medium::Mirror => Ok(before),
         Medium::Index(n) => Ok(*n),
         Medium::Model { nd, vd } => Ok(glass::model_index(*nd, *vd, um)),
-        Medium::Gradient(gradient) => index(&gradient.base, surface, um, before),
+        Medium::Grin(gradient) => index(&gradient.base, surface, um, before),
         Medium::Glass(name) => {
             let Some(found) = glass::find(name) else {
-                let similar = glass::similar(name);
+                let similar = glass::similar_names(name);
                 return Err(LensError::UnknownGlass { surface, name: name.clone(), similar });
             };
             found.index(um).ok_or_else(|| {
                 let [low, high] = found.range_um;
-                LensError::OutOfRange { surface, name: name.clone(), um, low, high }
+                LensError::WavelengthOutOfRange { surface, name: name.clone(), um, low, high }
             })
         }
     }
@@ -153,7 +154,7 @@ fn index(medium: &Medium, surface: usize, um: f64, before: f64) -> Result<f64, L
 ///
 /// The index counts negative behind an odd number of mirrors (Welford, *Aberrations of Optical
 /// Systems*, 1986, section 3.3).
-pub fn focus_gap<R: Real>(system: &System<R>, object: Object) -> R {
+pub fn paraxial_image_distance<R: Real>(system: &System<R>, object: Object) -> R {
     let last = system.surfaces.len() - 2;
     let mut n = system.index_before;
     let (mut y, mut nu) = match object {
@@ -174,8 +175,8 @@ pub fn focus_gap<R: Real>(system: &System<R>, object: Object) -> R {
         match surface.gradient() {
             None => y += surface.thickness * nu / n,
             Some(field) => {
-                let slab = gradient::Slab::passed(&field, surface.thickness, sense);
-                (y, nu) = slab.pass(y, nu);
+                let slab = gradient::ParaxialGrin::directed(&field, surface.thickness, sense);
+                (y, nu) = slab.transfer(y, nu);
                 n = slab.index_behind;
             }
         }

@@ -18,12 +18,12 @@ impl<R: Real> System<R> {
         let gap = |i: usize| i.checked_sub(1).map_or(distance, |i| -(turn * surfaces[i].thickness));
         let count = surfaces.len();
         let reversed = (0..count).rev().map(|i| Surface {
-            shape: surfaces[i].shape.turned(turn),
+            shape: surfaces[i].shape.with_sag_sign(turn),
             thickness: gap(i),
             index: self.index_before(i),
-            graded: i
+            grin: i
                 .checked_sub(1)
-                .and_then(|i| surfaces[i].graded.map(|grade| grade.turned(surfaces[i].thickness))),
+                .and_then(|i| surfaces[i].grin.map(|grade| grade.reversed(surfaces[i].thickness))),
             ..surfaces[i]
         });
         let plane = Surface { index: self.index_before, thickness: R::ZERO, ..*image };
@@ -37,7 +37,7 @@ impl<R: Real> System<R> {
 
 impl<R: Real> Shape<R> {
     /// The same form with its sag times `turn`, which is 1 or −1.
-    fn turned(self, turn: R) -> Self {
+    fn with_sag_sign(self, turn: R) -> Self {
         match self {
             Self::Plane => Self::Plane,
             Self::Sphere { curvature } => Self::Sphere { curvature: turn * curvature },

@@ -33,12 +33,12 @@ impl Lens {
     ///
     /// # Panics
     /// If the rows are no group: `first` behind `last`, or `last` behind the lens.
-    pub fn turn_rows(&mut self, first: usize, last: usize) {
-        let turn = Turn { first, last };
-        turn.rows(self);
+    pub fn reverse_rows(&mut self, first: usize, last: usize) {
+        let turn = Reversal { first, last };
+        turn.reverse(self);
         self.map_parameters(|parameter| Some(turn.parameter(parameter)));
-        self.variables.iter_mut().for_each(|variable| turn.bounds(variable));
-        self.pickups.iter_mut().for_each(|pickup| turn.law(pickup));
+        self.variables.iter_mut().for_each(|variable| turn.swap_bounds(variable));
+        self.pickups.iter_mut().for_each(|pickup| turn.adjust_pickup(pickup));
         for gap in self.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
             gap.surface = turn.gap(gap.surface);
         }
@@ -47,21 +47,21 @@ impl Lens {
 
 /// A group of rows that is turned around.
 #[derive(Clone, Copy)]
-struct Turn {
+struct Reversal {
     first: usize,
     last: usize,
 }
 
-impl Turn {
-    fn rows(self, lens: &mut Lens) {
+impl Reversal {
+    fn reverse(self, lens: &mut Lens) {
         let group = &mut lens.surfaces[self.first..=self.last];
         let gaps: Vec<(f64, Medium)> =
             group.iter().map(|row| (row.thickness, row.medium.clone())).collect();
         group.reverse();
         let inner = gaps.len() - 1;
         for (i, row) in group.iter_mut().enumerate() {
-            row.curvature = negative(row.curvature);
-            row.asphere.iter_mut().for_each(|a| *a = negative(*a));
+            row.curvature = negate(row.curvature);
+            row.asphere.iter_mut().for_each(|a| *a = negate(*a));
             let from = if i < inner { inner - 1 - i } else { inner };
             (row.thickness, row.medium) = gaps[from].clone();
         }
@@ -92,29 +92,29 @@ impl Turn {
     }
 
     /// Whether a number of the turned lens has the other sign.
-    fn turns(self, parameter: Parameter) -> bool {
+    fn changes_sign(self, parameter: Parameter) -> bool {
         (self.first..=self.last).contains(&parameter.surface)
             && matches!(parameter.quantity, Quantity::Curvature | Quantity::Asphere(_))
     }
 
-    fn bounds(self, variable: &mut Variable) {
-        if self.turns(variable.parameter) {
-            (variable.min, variable.max) = (variable.max.map(negative), variable.min.map(negative));
+    fn swap_bounds(self, variable: &mut Variable) {
+        if self.changes_sign(variable.parameter) {
+            (variable.min, variable.max) = (variable.max.map(negate), variable.min.map(negate));
         }
     }
 
-    fn law(self, pickup: &mut Pickup) {
-        if self.turns(pickup.parameter) {
-            pickup.scale = negative(pickup.scale);
-            pickup.offset = negative(pickup.offset);
+    fn adjust_pickup(self, pickup: &mut Pickup) {
+        if self.changes_sign(pickup.parameter) {
+            pickup.scale = negate(pickup.scale);
+            pickup.offset = negate(pickup.offset);
         }
-        if self.turns(pickup.source) {
-            pickup.scale = negative(pickup.scale);
+        if self.changes_sign(pickup.source) {
+            pickup.scale = negate(pickup.scale);
         }
     }
 }
 
 /// The other sign; a zero keeps its own.
-fn negative(value: f64) -> f64 {
+fn negate(value: f64) -> f64 {
     if value == 0.0 { value } else { -value }
 }

@@ -1,7 +1,7 @@
 //! A lens resolved to plain numbers: one wavelength, one zoom position.
 
-use super::{ASPHERE_TERMS, Grade, Graded};
-use crate::math::{Real, brief};
+use super::{ASPHERE_TERMS, ProfileCoefficients, RotationalProfile};
+use crate::math::{Real, format_short};
 
 /// The form of a surface: `z = c r² / (1 + √(1 − (1+k) c² r²)) + Σ aⱼ r^(2j+4)`.
 ///
@@ -52,9 +52,9 @@ impl<R: Real> Shape<R> {
     ///
     /// # Errors
     /// More coefficients than the model has.
-    pub fn new(curvature: R, conic: R, terms: &[R], surface: usize) -> Result<Self, Invalid> {
+    pub fn new(curvature: R, conic: R, terms: &[R], surface: usize) -> Result<Self, SystemError> {
         if terms.len() > ASPHERE_TERMS {
-            return Err(Invalid::TooManyTerms { surface, found: terms.len() });
+            return Err(SystemError::TooManyTerms { surface, found: terms.len() });
         }
         let mut all = [R::ZERO; ASPHERE_TERMS];
         all[..terms.len()].copy_from_slice(terms);
@@ -129,7 +129,7 @@ pub struct Surface<R> {
     /// the vertex.
     pub index: R,
     /// How the index of the gap varies; `None` for glass.
-    pub graded: Option<Grade<R>>,
+    pub grin: Option<ProfileCoefficients<R>>,
     /// Rays farther from the axis are clipped, the rim itself passes; infinite where nothing is.
     pub semi_diameter: R,
     /// Rays nearer to the axis are clipped, the edge itself passes; 0 where nothing is obstructed.
@@ -137,7 +137,7 @@ pub struct Surface<R> {
     /// Whether it reflects.
     pub mirror: bool,
     /// Whether the far half of the sphere or ellipsoid counts too.
-    pub hyper: bool,
+    pub hyperhemisphere: bool,
 }
 
 /// A lens in plain numbers. The last surface is where rays are collected, as a rule the image
@@ -154,14 +154,14 @@ pub struct System<R> {
 
 /// A number that no ray can be traced with.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Invalid {
+pub enum SystemError {
     /// Nothing to trace through.
     #[error("the lens has no surfaces")]
     NoSurfaces,
     /// Not finite, or so large or small that its square is not.
     #[error(
         "{what} of surface {surface} is {}; expected a finite number below 1e100",
-        brief(*found)
+        format_short(*found)
     )]
     NotFinite {
         /// What about the surface.
@@ -172,7 +172,7 @@ pub enum Invalid {
         found: f64,
     },
     /// An index that is not positive.
-    #[error("index {place} is {}; expected a positive finite number", brief(*found))]
+    #[error("index {place} is {}; expected a positive finite number", format_short(*found))]
     Index {
         /// `before surface 0` or `after surface 3`.
         place: String,
@@ -210,7 +210,7 @@ pub enum Invalid {
     },
     /// A gradient where none can be traced.
     #[error("the gradient after surface {surface} {why}")]
-    Gradient {
+    Grin {
         /// The surface, counted from 0.
         surface: usize,
         /// Why not.
@@ -229,39 +229,43 @@ pub enum Invalid {
 /// Beyond this the squares that tracing needs are no longer finite.
 const LARGEST: f64 = 1e100;
 
-fn finite(what: &'static str, surface: usize, found: f64) -> Result<(), Invalid> {
-    if found.abs() <= LARGEST { Ok(()) } else { Err(Invalid::NotFinite { what, surface, found }) }
+fn check_finite(what: &'static str, surface: usize, found: f64) -> Result<(), SystemError> {
+    if found.abs() <= LARGEST {
+        Ok(())
+    } else {
+        Err(SystemError::NotFinite { what, surface, found })
+    }
 }
 
-fn positive(place: impl FnOnce() -> String, found: f64) -> Result<(), Invalid> {
+fn check_index(place: impl FnOnce() -> String, found: f64) -> Result<(), SystemError> {
     if found > 0.0 && found <= LARGEST {
         Ok(())
     } else {
-        Err(Invalid::Index { place: place(), found })
+        Err(SystemError::Index { place: place(), found })
     }
 }
 
 impl<R: Real> System<R> {
     /// Refuses numbers that no ray can be traced with.
-    pub fn check(&self) -> Result<(), Invalid> {
+    pub fn check(&self) -> Result<(), SystemError> {
         if self.surfaces.is_empty() {
-            return Err(Invalid::NoSurfaces);
+            return Err(SystemError::NoSurfaces);
         }
-        positive(|| "before surface 0".to_owned(), self.index_before.value())?;
+        check_index(|| "before surface 0".to_owned(), self.index_before.value())?;
         self.surfaces.iter().enumerate().try_for_each(|(i, surface)| surface.check(i))?;
-        let mut graded = (0..self.surfaces.len()).filter(|i| self.surfaces[*i].graded.is_some());
-        graded.try_for_each(|i| self.check_gradient(i))
+        let mut graded = (0..self.surfaces.len()).filter(|i| self.surfaces[*i].grin.is_some());
+        graded.try_for_each(|i| self.check_grin(i))
     }
 
     /// A gradient needs two faces: refracting ones that no ray meets from behind their equator.
-    fn check_gradient(&self, i: usize) -> Result<(), Invalid> {
-        let refuse = |why: &str| Err(Invalid::Gradient { surface: i, why: why.to_owned() });
+    fn check_grin(&self, i: usize) -> Result<(), SystemError> {
+        let refuse = |why: &str| Err(SystemError::Grin { surface: i, why: why.to_owned() });
         match (&self.surfaces[i], self.surfaces.get(i + 1)) {
             (_, None) => refuse("has no surface behind it"),
             (face, Some(next)) if face.mirror || next.mirror => {
                 refuse("touches a mirror, which is not supported; expected refracting faces")
             }
-            (face, Some(next)) if face.hyper || next.hyper => refuse(
+            (face, Some(next)) if face.hyperhemisphere || next.hyperhemisphere => refuse(
                 "touches a hyper-hemisphere, which is not supported; expected faces on this side \
                  of their equator",
             ),
@@ -270,17 +274,17 @@ impl<R: Real> System<R> {
     }
 
     /// The gradient in the gap behind a surface, if there is one.
-    pub fn gradient(&self, surface: usize) -> Option<Graded<R>> {
+    pub fn gradient(&self, surface: usize) -> Option<RotationalProfile<R>> {
         self.surfaces.get(surface)?.gradient()
     }
 
     /// Whether any gap is filled with a gradient.
-    pub fn is_graded(&self) -> bool {
-        self.surfaces.iter().any(|surface| surface.graded.is_some())
+    pub fn has_grin(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.grin.is_some())
     }
 
     /// The same numbers as another number type, without derivatives.
-    pub fn lift<S: Real>(&self) -> System<S> {
+    pub fn cast<S: Real>(&self) -> System<S> {
         let lift = |value: R| S::from_f64(value.value());
         System {
             index_before: lift(self.index_before),
@@ -296,35 +300,38 @@ impl<R: Real> System<R> {
 }
 
 impl<R: Real> Surface<R> {
-    fn check(&self, i: usize) -> Result<(), Invalid> {
+    fn check(&self, i: usize) -> Result<(), SystemError> {
         let (curvature, conic, terms) = self.shape.numbers();
-        finite("curvature", i, curvature.value())?;
-        finite("conic constant", i, conic.value())?;
-        terms.iter().try_for_each(|a| finite("asphere coefficient", i, a.value()))?;
-        finite("thickness", i, self.thickness.value())?;
-        positive(|| format!("after surface {i}"), self.index.value())?;
-        if let Some(grade) = &self.graded {
-            grade.terms.iter().try_for_each(|a| finite("gradient coefficient", i, a.value()))?;
+        check_finite("curvature", i, curvature.value())?;
+        check_finite("conic constant", i, conic.value())?;
+        terms.iter().try_for_each(|a| check_finite("asphere coefficient", i, a.value()))?;
+        check_finite("thickness", i, self.thickness.value())?;
+        check_index(|| format!("after surface {i}"), self.index.value())?;
+        if let Some(grade) = &self.grin {
+            grade
+                .terms
+                .iter()
+                .try_for_each(|a| check_finite("gradient coefficient", i, a.value()))?;
         }
         let (semi_diameter, obstruction) = (self.semi_diameter.value(), self.obstruction.value());
         if !(semi_diameter >= 0.0) {
-            return Err(Invalid::SemiDiameter { surface: i, found: semi_diameter });
+            return Err(SystemError::SemiDiameter { surface: i, found: semi_diameter });
         }
         let leaves_light = obstruction > 0.0 && obstruction < semi_diameter;
         if obstruction == 0.0 || leaves_light && obstruction <= LARGEST {
             Ok(())
         } else {
-            Err(Invalid::Obstruction { surface: i, found: obstruction, semi_diameter })
+            Err(SystemError::Obstruction { surface: i, found: obstruction, semi_diameter })
         }
     }
 
     /// The gradient in the gap behind, if there is one.
-    pub fn gradient(&self) -> Option<Graded<R>> {
-        self.graded.map(|grade| Graded { base: self.index, grade })
+    pub fn gradient(&self) -> Option<RotationalProfile<R>> {
+        self.grin.map(|grade| RotationalProfile { base: self.index, coefficients: grade })
     }
 
     /// Takes away what clips: rim and obstruction.
-    pub fn clear(&mut self) {
+    pub fn remove_apertures(&mut self) {
         self.semi_diameter = R::from_f64(f64::INFINITY);
         self.obstruction = R::ZERO;
     }
@@ -345,11 +352,11 @@ impl<R: Real> Surface<R> {
             shape,
             thickness: f(self.thickness),
             index: f(self.index),
-            graded: self.graded.map(|grade| grade.map(&f)),
+            grin: self.grin.map(|grade| grade.map(&f)),
             semi_diameter: f(self.semi_diameter),
             obstruction: f(self.obstruction),
             mirror: self.mirror,
-            hyper: self.hyper,
+            hyperhemisphere: self.hyperhemisphere,
         }
     }
 }

@@ -4,7 +4,7 @@ use super::{Lens, Medium, Parameter, Pickup, Quantity, Variable};
 
 /// A kind of number that an optimizer may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NumberKind {
+pub enum ParameterKind {
     /// Every curvature with a medium of its own behind it.
     Curvatures,
     /// Every gap, at each zoom position by itself where it moves.
@@ -18,22 +18,22 @@ pub enum NumberKind {
     /// Every semi-diameter that is written.
     SemiDiameters,
     /// Every coefficient of a gradient that is written.
-    Gradients,
+    GrinCoefficients,
 }
 
 /// Frees every number of some kinds that does not follow another one; what is a variable already
 /// keeps its bounds.
-pub fn vary(lens: &mut Lens, kinds: &[NumberKind]) {
+pub fn add_variables(lens: &mut Lens, kinds: &[ParameterKind]) {
     let chosen: Vec<Parameter> = kinds.iter().flat_map(|kind| parameters(lens, *kind)).collect();
     for parameter in chosen {
-        free(lens, parameter);
+        add_variable(lens, parameter);
     }
 }
 
 /// Makes a number a variable, unless it is one, follows another number or does not exist.
-pub fn free(lens: &mut Lens, parameter: Parameter) -> bool {
+pub fn add_variable(lens: &mut Lens, parameter: Parameter) -> bool {
     let follows = lens.pickups.iter().any(|pickup| pickup.parameter == parameter);
-    if follows || solved(lens, parameter) || lens.get(parameter).is_none() {
+    if follows || is_solved(lens, parameter) || lens.get(parameter).is_none() {
         return false;
     }
     if lens.variable(parameter).is_none() {
@@ -43,52 +43,56 @@ pub fn free(lens: &mut Lens, parameter: Parameter) -> bool {
 }
 
 /// Whether it is the last gap and the focus decides it.
-fn solved(lens: &Lens, parameter: Parameter) -> bool {
+fn is_solved(lens: &Lens, parameter: Parameter) -> bool {
     let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
-    lens.focus.is_some() && gap && parameter.surface + 1 == lens.surfaces.len()
+    lens.image_solve.is_some() && gap && parameter.surface + 1 == lens.surfaces.len()
 }
 
-fn parameters(lens: &Lens, kind: NumberKind) -> Vec<Parameter> {
+fn parameters(lens: &Lens, kind: ParameterKind) -> Vec<Parameter> {
     let rows = 0..lens.surfaces.len();
     let all = |quantity: Quantity| rows.clone().map(move |i| Parameter::new(i, quantity));
     match kind {
-        NumberKind::Curvatures => {
-            all(Quantity::Curvature).filter(|p| bends(lens, p.surface)).collect()
+        ParameterKind::Curvatures => {
+            all(Quantity::Curvature).filter(|p| refracts(lens, p.surface)).collect()
         }
-        NumberKind::Thicknesses => rows.flat_map(|surface| gaps(lens, surface)).collect(),
-        NumberKind::Conics => {
+        ParameterKind::Thicknesses => {
+            rows.flat_map(|surface| thickness_parameters(lens, surface)).collect()
+        }
+        ParameterKind::Conics => {
             all(Quantity::Conic).filter(|p| lens.surfaces[p.surface].conic != 0.0).collect()
         }
-        NumberKind::Aspheres => rows
+        ParameterKind::Aspheres => rows
             .flat_map(|i| (0..lens.surfaces[i].asphere.len()).map(move |term| (i, term)))
             .map(|(i, term)| Parameter::new(i, Quantity::Asphere(term)))
             .collect(),
-        NumberKind::Indices => all(Quantity::Index).collect(),
-        NumberKind::SemiDiameters => all(Quantity::SemiDiameter).collect(),
-        NumberKind::Gradients => rows.flat_map(|surface| gradients(lens, surface)).collect(),
+        ParameterKind::Indices => all(Quantity::Index).collect(),
+        ParameterKind::SemiDiameters => all(Quantity::SemiDiameter).collect(),
+        ParameterKind::GrinCoefficients => {
+            rows.flat_map(|surface| grin_parameters(lens, surface)).collect()
+        }
     }
 }
 
 /// Whether light changes its direction at a surface.
-fn bends(lens: &Lens, surface: usize) -> bool {
+fn refracts(lens: &Lens, surface: usize) -> bool {
     let before = match surface.checked_sub(1) {
         Some(before) => &lens.surfaces[before].medium,
         None => &lens.object_medium,
     };
     let behind = &lens.surfaces[surface].medium;
     // A gradient along the axis begins anew behind each surface.
-    let starts = matches!(behind, Medium::Gradient(gradient) if gradient.is_axial());
+    let starts = matches!(behind, Medium::Grin(gradient) if gradient.is_axial());
     *behind == Medium::Mirror || before != behind || starts
 }
 
 /// The coefficients of the gradient behind a surface.
-fn gradients(lens: &Lens, surface: usize) -> Vec<Parameter> {
-    let Medium::Gradient(gradient) = &lens.surfaces[surface].medium else { return Vec::new() };
-    gradient.written().map(|k| Parameter::new(surface, Quantity::Gradient(k))).collect()
+fn grin_parameters(lens: &Lens, surface: usize) -> Vec<Parameter> {
+    let Medium::Grin(gradient) = &lens.surfaces[surface].medium else { return Vec::new() };
+    gradient.written_terms().map(|k| Parameter::new(surface, Quantity::Gradient(k))).collect()
 }
 
 /// The numbers that say how wide a gap is: one, or one for each zoom position.
-fn gaps(lens: &Lens, surface: usize) -> Vec<Parameter> {
+fn thickness_parameters(lens: &Lens, surface: usize) -> Vec<Parameter> {
     let own = |zoom: &usize| lens.zoom[*zoom].thicknesses.iter().any(|gap| gap.surface == surface);
     let moving: Vec<usize> = (0..lens.zoom.len()).filter(own).collect();
     let fixed = moving.len() < lens.zoom_positions();

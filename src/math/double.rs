@@ -10,41 +10,41 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// The sum of a number and a correction below its last digit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Double {
+pub struct DoubleDouble {
     high: f64,
     low: f64,
 }
 
 /// The sum of two numbers and its rounding error (Knuth).
 #[inline]
-fn two_sum(a: f64, b: f64) -> Double {
+fn two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
     let rest = high - a;
-    Double { high, low: (a - (high - rest)) + (b - rest) }
+    DoubleDouble { high, low: (a - (high - rest)) + (b - rest) }
 }
 
 /// The same where `|a| ≥ |b|` (Dekker).
 #[inline]
-fn fast_two_sum(a: f64, b: f64) -> Double {
+fn fast_two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
-    Double { high, low: b - (high - a) }
+    DoubleDouble { high, low: b - (high - a) }
 }
 
 /// The product of two numbers and its rounding error.
 #[inline]
-fn two_product(a: f64, b: f64) -> Double {
+fn two_product(a: f64, b: f64) -> DoubleDouble {
     let high = a * b;
-    Double { high, low: a.mul_add(b, -high) }
+    DoubleDouble { high, low: a.mul_add(b, -high) }
 }
 
-impl Double {
+impl DoubleDouble {
     /// The difference to the nearest `f64`.
     pub fn low(self) -> f64 {
         self.low
     }
 }
 
-impl Add for Double {
+impl Add for DoubleDouble {
     type Output = Self;
     fn add(self, o: Self) -> Self {
         let high = two_sum(self.high, o.high);
@@ -57,21 +57,21 @@ impl Add for Double {
     }
 }
 
-impl Neg for Double {
+impl Neg for DoubleDouble {
     type Output = Self;
     fn neg(self) -> Self {
         Self { high: -self.high, low: -self.low }
     }
 }
 
-impl Sub for Double {
+impl Sub for DoubleDouble {
     type Output = Self;
     fn sub(self, o: Self) -> Self {
         self + -o
     }
 }
 
-impl Mul for Double {
+impl Mul for DoubleDouble {
     type Output = Self;
     fn mul(self, o: Self) -> Self {
         let product = two_product(self.high, o.high);
@@ -83,7 +83,7 @@ impl Mul for Double {
     }
 }
 
-impl Div for Double {
+impl Div for DoubleDouble {
     type Output = Self;
     fn div(self, o: Self) -> Self {
         let first = self.high / o.high;
@@ -97,26 +97,26 @@ impl Div for Double {
     }
 }
 
-impl AddAssign for Double {
+impl AddAssign for DoubleDouble {
     fn add_assign(&mut self, o: Self) {
         *self = *self + o;
     }
 }
 
-impl SubAssign for Double {
+impl SubAssign for DoubleDouble {
     fn sub_assign(&mut self, o: Self) {
         *self = *self - o;
     }
 }
 
-impl PartialOrd for Double {
+impl PartialOrd for DoubleDouble {
     fn partial_cmp(&self, o: &Self) -> Option<Ordering> {
         let high = self.high.partial_cmp(&o.high)?;
         Some(high.then(self.low.partial_cmp(&o.low).unwrap_or(Ordering::Equal)))
     }
 }
 
-impl Real for Double {
+impl Real for DoubleDouble {
     const ZERO: Self = Self { high: 0.0, low: 0.0 };
     const ONE: Self = Self { high: 1.0, low: 0.0 };
     const TWO: Self = Self { high: 2.0, low: 0.0 };
@@ -149,14 +149,14 @@ mod tests {
 
     #[test]
     fn a_double_keeps_thirty_digits() {
-        let third = Double::ONE / Double::from_f64(3.0);
-        let error = third + third + third - Double::ONE;
+        let third = DoubleDouble::ONE / DoubleDouble::from_f64(3.0);
+        let error = third + third + third - DoubleDouble::ONE;
         assert!(error.value().abs() < 1e-31);
-        let two = Double::TWO.sqrt();
-        assert!((two * two - Double::TWO).value().abs() < 1e-31);
-        let tiny = Double::ONE + Double::from_f64(1e-25) - Double::ONE;
+        let two = DoubleDouble::TWO.sqrt();
+        assert!((two * two - DoubleDouble::TWO).value().abs() < 1e-31);
+        let tiny = DoubleDouble::ONE + DoubleDouble::from_f64(1e-25) - DoubleDouble::ONE;
         assert!((tiny.value() - 1e-25).abs() < 1e-38);
-        let infinite = Double::ONE / Double::ZERO;
+        let infinite = DoubleDouble::ONE / DoubleDouble::ZERO;
         assert!(infinite.value().is_infinite() && (infinite * infinite).value().is_infinite());
     }
 }

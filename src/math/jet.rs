@@ -15,14 +15,14 @@ pub struct Jet<R> {
     /// Its derivatives by x and by y.
     pub slope: [R; 2],
     /// Its second derivatives xx, xy and yy.
-    pub bend: [R; 3],
+    pub hessian: [R; 3],
 }
 
 impl<R: Real> Jet<R> {
     /// A number that neither variable changes.
     #[inline(always)]
     pub fn constant(value: R) -> Self {
-        Self { value, slope: [R::ZERO; 2], bend: [R::ZERO; 3] }
+        Self { value, slope: [R::ZERO; 2], hessian: [R::ZERO; 3] }
     }
 
     /// The variable x (0) or y (1) itself.
@@ -33,7 +33,7 @@ impl<R: Real> Jet<R> {
     pub fn variable(value: R, direction: usize) -> Self {
         let mut slope = [R::ZERO; 2];
         slope[direction] = R::ONE;
-        Self { value, slope, bend: [R::ZERO; 3] }
+        Self { value, slope, hessian: [R::ZERO; 3] }
     }
 
     /// The product with a number that neither variable changes.
@@ -52,10 +52,10 @@ impl<R: Real> Jet<R> {
         Self {
             value: f(self.value, other.value),
             slope: [f(self.slope[0], other.slope[0]), f(self.slope[1], other.slope[1])],
-            bend: [
-                f(self.bend[0], other.bend[0]),
-                f(self.bend[1], other.bend[1]),
-                f(self.bend[2], other.bend[2]),
+            hessian: [
+                f(self.hessian[0], other.hessian[0]),
+                f(self.hessian[1], other.hessian[1]),
+                f(self.hessian[2], other.hessian[2]),
             ],
         }
     }
@@ -64,11 +64,11 @@ impl<R: Real> Jet<R> {
     #[inline(always)]
     fn chain(self, value: R, first: R, second: R) -> Self {
         let [x, y] = self.slope;
-        let [xx, xy, yy] = self.bend;
+        let [xx, xy, yy] = self.hessian;
         Self {
             value,
             slope: [x * first, y * first],
-            bend: [
+            hessian: [
                 xx * first + x * x * second,
                 xy * first + x * y * second,
                 yy * first + y * y * second,
@@ -128,11 +128,11 @@ impl<R: Real> Mul for Jet<R> {
         let (a, b) = (self.value, other.value);
         let ([ax, ay], [bx, by]) = (self.slope, other.slope);
         let (xx, yy) = (ax * bx, ay * by);
-        let ([axx, axy, ayy], [bxx, bxy, byy]) = (self.bend, other.bend);
+        let ([axx, axy, ayy], [bxx, bxy, byy]) = (self.hessian, other.hessian);
         Self {
             value: a * b,
             slope: [ax * b + a * bx, ay * b + a * by],
-            bend: [
+            hessian: [
                 axx * b + a * bxx + (xx + xx),
                 axy * b + a * bxy + (ax * by + ay * bx),
                 ayy * b + a * byy + (yy + yy),
@@ -152,11 +152,11 @@ impl<R: Real> Div for Jet<R> {
         let x = (self.slope[0] - q * bx) * inverse;
         let y = (self.slope[1] - q * by) * inverse;
         let (xx, yy) = (x * bx, y * by);
-        let ([axx, axy, ayy], [bxx, bxy, byy]) = (self.bend, other.bend);
+        let ([axx, axy, ayy], [bxx, bxy, byy]) = (self.hessian, other.hessian);
         Self {
             value: q,
             slope: [x, y],
-            bend: [
+            hessian: [
                 (axx - q * bxx - (xx + xx)) * inverse,
                 (axy - q * bxy - (x * by + y * bx)) * inverse,
                 (ayy - q * byy - (yy + yy)) * inverse,
@@ -169,8 +169,8 @@ impl<R: Real> Neg for Jet<R> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        let ([x, y], [xx, xy, yy]) = (self.slope, self.bend);
-        Self { value: -self.value, slope: [-x, -y], bend: [-xx, -xy, -yy] }
+        let ([x, y], [xx, xy, yy]) = (self.slope, self.hessian);
+        Self { value: -self.value, slope: [-x, -y], hessian: [-xx, -xy, -yy] }
     }
 }
 
@@ -189,9 +189,9 @@ impl<R: Real> SubAssign for Jet<R> {
 }
 
 impl<R: Real> Real for Jet<R> {
-    const ZERO: Self = Self { value: R::ZERO, slope: [R::ZERO; 2], bend: [R::ZERO; 3] };
-    const ONE: Self = Self { value: R::ONE, slope: [R::ZERO; 2], bend: [R::ZERO; 3] };
-    const TWO: Self = Self { value: R::TWO, slope: [R::ZERO; 2], bend: [R::ZERO; 3] };
+    const ZERO: Self = Self { value: R::ZERO, slope: [R::ZERO; 2], hessian: [R::ZERO; 3] };
+    const ONE: Self = Self { value: R::ONE, slope: [R::ZERO; 2], hessian: [R::ZERO; 3] };
+    const TWO: Self = Self { value: R::TWO, slope: [R::ZERO; 2], hessian: [R::ZERO; 3] };
     const EPSILON: f64 = R::EPSILON;
     const ORDER: usize = R::ORDER + 2;
 
@@ -220,7 +220,7 @@ impl<R: Real> Real for Jet<R> {
     fn is_finite(self) -> bool {
         self.value.is_finite()
             && self.slope.iter().all(|s| s.is_finite())
-            && self.bend.iter().all(|b| b.is_finite())
+            && self.hessian.iter().all(|b| b.is_finite())
     }
 }
 
@@ -249,8 +249,14 @@ mod tests {
             let [[xx, xy], [yx, yy]] = dual.slope.map(|s| s.slope);
             assert_eq!(xy, yx);
             let expected = [dual.value.value, dual.value.slope[0], dual.value.slope[1], xx, xy, yy];
-            let found =
-                [jet.value, jet.slope[0], jet.slope[1], jet.bend[0], jet.bend[1], jet.bend[2]];
+            let found = [
+                jet.value,
+                jet.slope[0],
+                jet.slope[1],
+                jet.hessian[0],
+                jet.hessian[1],
+                jet.hessian[2],
+            ];
             for (found, expected) in found.into_iter().zip(expected) {
                 assert!((found - expected).abs() <= 1e-12 * expected.abs(), "{found} {expected}");
             }

@@ -1,12 +1,12 @@
 //! Vector instructions chosen at run time.
 //!
 //! A plain build may use only what every processor of the target has. The same loop compiled once
-//! more for wider registers is two to four times as fast, so the hot loops run inside [`widest`].
+//! more for wider registers is two to four times as fast, so the hot loops run inside [`run_vectorized`].
 //! Nothing in them is contracted or reordered: every width gives the same bits.
 
 /// How many lanes the vector instructions have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Width {
+pub enum SimdWidth {
     /// What every processor of the target has.
     Baseline,
     /// AVX2: 256 bits.
@@ -15,7 +15,7 @@ pub enum Width {
     Bits512,
 }
 
-impl Width {
+impl SimdWidth {
     /// The widest that this processor has.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -42,14 +42,14 @@ impl Width {
     reason = "measured: 940 against 220 million ray-surfaces a second; see `measure trace`"
 )]
 #[inline]
-pub(crate) fn widest<T>(width: Width, work: impl FnOnce() -> T) -> T {
+pub(crate) fn run_vectorized<T>(width: SimdWidth, work: impl FnOnce() -> T) -> T {
     #[cfg(target_arch = "x86_64")]
-    match width.min(Width::detect()) {
-        Width::Baseline => work(),
+    match width.min(SimdWidth::detect()) {
+        SimdWidth::Baseline => work(),
         // SAFETY: the processor was just asked whether it has these instructions.
-        Width::Bits256 => unsafe { with_avx2(work) },
+        SimdWidth::Bits256 => unsafe { with_avx2(work) },
         // SAFETY: as above.
-        Width::Bits512 => unsafe { with_avx512(work) },
+        SimdWidth::Bits512 => unsafe { with_avx512(work) },
     }
     #[cfg(not(target_arch = "x86_64"))]
     work()

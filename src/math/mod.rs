@@ -13,11 +13,11 @@ mod real;
 mod shown;
 mod vec3;
 
-pub use double::Double;
+pub use double::DoubleDouble;
 pub use dual::Dual;
 pub use jet::Jet;
-pub use lanes::Width;
-pub(crate) use lanes::widest;
+pub use lanes::SimdWidth;
+pub(crate) use lanes::run_vectorized;
 pub use real::Real;
-pub(crate) use shown::brief;
+pub(crate) use shown::format_short;
 pub use vec3::Vec3;

@@ -1,18 +1,18 @@
 //! Numbers in messages.
 
 /// A number in a message: a very large or small one by its exponent, not by hundreds of digits.
-pub(crate) fn brief(value: f64) -> String {
+pub(crate) fn format_short(value: f64) -> String {
     let plain = value == 0.0 || (1e-4..1e9).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::brief;
+    use super::format_short;
 
     #[test]
     fn a_number_is_never_hundreds_of_digits() {
-        let shown = [0.0, -1.0, 0.25, 1e308, -1e-300, f64::NAN, f64::INFINITY].map(brief);
+        let shown = [0.0, -1.0, 0.25, 1e308, -1e-300, f64::NAN, f64::INFINITY].map(format_short);
         assert_eq!(shown, ["0", "-1", "0.25", "1e308", "-1e-300", "NaN", "inf"]);
     }
 }

@@ -20,7 +20,7 @@ impl Stopwatch {
 }
 
 /// Does some work; what comes out, and the milliseconds that it took.
-pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+pub fn time_ms<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let watch = Stopwatch::start();
     let result = work();
     (result, 1e3 * watch.seconds())

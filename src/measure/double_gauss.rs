@@ -1,7 +1,7 @@
 //! The lens on which speed is measured.
 
 use crate::lens::{
-    Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength, glass::line,
+    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength, glass::line,
 };
 use crate::math::Vec3;
 use crate::trace::{Ray, Rays};
@@ -36,7 +36,7 @@ pub fn double_gauss() -> Lens {
             stop: i == STOP,
             ..Row::default()
         };
-    let field = |y: f64| Field { x: 0.0, y, weight: 1.0 };
+    let field = |y: f64| FieldPoint { x: 0.0, y, weight: 1.0 };
     Lens {
         name: "Double Gauss 100 mm f/3".to_owned(),
         source: "the double Gauss of many textbooks and of the Zemax samples, indices at 588 nm"
@@ -54,7 +54,7 @@ pub fn double_gauss() -> Lens {
         zoom: Vec::new(),
         variables: Vec::new(),
         pickups: Vec::new(),
-        focus: None,
+        image_solve: None,
     }
 }
 
@@ -83,8 +83,8 @@ mod tests {
     #[test]
     fn it_is_what_it_says() {
         let lens = double_gauss();
-        let system = lens.system(0, line::D).unwrap();
-        let data = first_order(&system, &Beam::of(&lens, 0)).unwrap();
+        let system = lens.resolve(0, line::D).unwrap();
+        let data = first_order(&system, &Beam::for_lens(&lens, 0)).unwrap();
         assert!((data.efl.unwrap() - 98.96).abs() < 0.01, "{:?}", data.efl);
         assert!((data.entrance_pupil.position.unwrap() - ENTRANCE_PUPIL).abs() < 1e-9);
     }

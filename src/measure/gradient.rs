@@ -9,17 +9,20 @@
 //! Single precision is measured where it exists. An edge is found to the rounding of `f64`, since
 //! what ends a pupil is decided there; a difference of two integrals has no digit left in `f32`.
 
-use super::clock::timed;
-use super::rates::{Contestant, compete};
+use super::clock::time_ms;
+use super::rates::{TimedCase, time_interleaved};
 use super::spot::Precision;
-use crate::lens::{Aperture, Field, Invalid, Lens, Shape, Surface, System};
+use crate::lens::{Aperture, FieldPoint, Lens, Shape, Surface, System, SystemError};
 use crate::math::{Real, Vec3};
 use crate::paraxial::Beam;
 use crate::pupil::{
-    Accuracy, Aiming, Bench, BenchError, Cost, Derivative, Estimator, Integrand, Launch,
-    LaunchError, NoDerivative, Pattern, Region, Warp, differentiate, plan,
+    Accuracy, Aiming, DerivativeError, DerivativeEstimator, Integrand, Launch, LaunchError,
+    PupilDerivative, PupilPattern, QuadraticIntegrand, RayModel, RayModelError, Region,
+    WarpSampling, choose_estimator, differentiate,
 };
-use crate::trace::{Gradient, Points, Ray, Rays, Seed, Sink, Slot, Tracer};
+use crate::trace::{
+    AdjointSeed, ImagePoints, Ray, Rays, SurfaceParameter, SystemGradient, TraceSink, Tracer,
+};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
@@ -27,7 +30,7 @@ use std::hint::black_box;
 /// The numbers of a lens of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Numbers {
+pub enum ParameterClass {
     /// Curvatures.
     Curvature,
     /// Conic constants.
@@ -42,7 +45,7 @@ pub enum Numbers {
     SemiDiameter,
 }
 
-impl Numbers {
+impl ParameterClass {
     /// All kinds.
     pub const ALL: [Self; 6] = [
         Self::Curvature,
@@ -53,29 +56,29 @@ impl Numbers {
         Self::SemiDiameter,
     ];
 
-    fn has(self, slot: Slot) -> bool {
+    fn contains(self, slot: SurfaceParameter) -> bool {
         match self {
-            Self::Curvature => slot == Slot::Curvature,
-            Self::Conic => slot == Slot::Conic,
-            Self::Asphere => matches!(slot, Slot::Term(_)),
-            Self::Thickness => slot == Slot::Thickness,
-            Self::Index => slot == Slot::Index,
-            Self::SemiDiameter => slot == Slot::SemiDiameter,
+            Self::Curvature => slot == SurfaceParameter::Curvature,
+            Self::Conic => slot == SurfaceParameter::Conic,
+            Self::Asphere => matches!(slot, SurfaceParameter::AsphereTerm(_)),
+            Self::Thickness => slot == SurfaceParameter::Thickness,
+            Self::Index => slot == SurfaceParameter::Index,
+            Self::SemiDiameter => slot == SurfaceParameter::SemiDiameter,
         }
     }
 
     /// The relative error of the numbers of this kind, in the root mean square; `None` where the
     /// integral depends on none of them.
-    fn error(self, found: &Gradient<f64>, exact: &Gradient<f64>) -> Option<f64> {
-        let slots = Slot::all().filter(|slot| self.has(*slot));
+    fn error(self, found: &SystemGradient<f64>, exact: &SystemGradient<f64>) -> Option<f64> {
+        let slots = SurfaceParameter::all().filter(|slot| self.contains(*slot));
         let error = |slot| {
             // Against the largest, so that no square leaves the numbers.
             let largest = exact.largest(slot);
             let sum = |numbers: &mut dyn Iterator<Item = f64>| -> f64 {
                 numbers.map(|v| (v / largest).powi(2)).sum()
             };
-            let off = found.joined(exact, |a, b| a - b);
-            let ratio = sum(&mut off.group(slot)) / sum(&mut exact.group(slot));
+            let off = found.zip_with(exact, |a, b| a - b);
+            let ratio = sum(&mut off.of_kind(slot)) / sum(&mut exact.of_kind(slot));
             (largest > 0.0).then_some(ratio.sqrt())
         };
         slots.filter_map(error).reduce(f64::max)
@@ -98,14 +101,14 @@ pub struct GradientRow {
     /// What is differentiated.
     pub integral: Integral,
     /// How.
-    pub estimator: Estimator,
+    pub estimator: DerivativeEstimator,
     /// The number type of the rays.
     pub precision: Precision,
     /// Rays traced, those included that only looked for the edge.
     pub rays: usize,
     /// What it took, on one thread.
     pub ms: f64,
-    /// The relative error of each kind of numbers, in the order of [`Numbers::ALL`]; `None` where
+    /// The relative error of each kind of numbers, in the order of [`ParameterClass::ALL`]; `None` where
     /// the integral depends on none of them.
     pub errors: [Option<f64>; 6],
 }
@@ -125,11 +128,11 @@ pub struct GradientCurves {
     /// Its light against that of the axis, in area of the first vertex plane.
     pub light: f64,
     /// The estimator that the plan chooses, and why.
-    pub planned: Estimator,
+    pub planned: DerivativeEstimator,
     /// Why.
     pub reason: String,
-    /// By what the reference was made: `Boundary`, or `Warp` where the pupil has no edge to follow.
-    pub reference: Estimator,
+    /// By what the reference was made: `Boundary`, or `WarpSampling` where the pupil has no edge to follow.
+    pub reference: DerivativeEstimator,
     /// How far the reference may be wrong, for the two integrals: its difference from central
     /// differences, the worst of all kinds of numbers, or its standard error.
     pub checked: [f64; 2],
@@ -159,7 +162,7 @@ pub struct GradientCost {
 
 /// What is measured of a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Gradients {
+pub struct GradientBenchmark {
     /// The curves of the axis and of another field.
     pub fields: Vec<GradientCurves>,
     /// What derivatives cost at the last of those fields, for more and more numbers.
@@ -168,19 +171,19 @@ pub struct Gradients {
 
 /// Why nothing could be measured.
 #[derive(Debug, thiserror::Error)]
-pub enum NoGradients {
+pub enum GradientBenchmarkError {
     /// The lens.
     #[error(transparent)]
-    Bench(#[from] BenchError),
+    RayModel(#[from] RayModelError),
     /// The field.
     #[error(transparent)]
     Launch(#[from] LaunchError),
     /// The pupil.
     #[error(transparent)]
-    Pupil(#[from] NoDerivative),
+    Pupil(#[from] DerivativeError),
     /// The numbers of the lens.
     #[error(transparent)]
-    Invalid(#[from] Invalid),
+    Invalid(#[from] SystemError),
     /// No thread.
     #[error("no thread to measure with: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -189,7 +192,7 @@ pub enum NoGradients {
 /// The order of the differences that check the reference.
 const CHECKED: usize = 8;
 /// Rays of the reference.
-const MANY: usize = 1 << 21;
+const REFERENCE_RAYS: usize = 1 << 21;
 /// Orders of the curves.
 const ORDERS: usize = 10;
 const DIFFERENCE_ORDERS: usize = 6;
@@ -212,14 +215,14 @@ const TURN: f64 = 2e-3; // seconds
 ///
 /// # Errors
 /// A lens, field or pupil without light.
-pub fn gradients(
+pub fn measure_gradients(
     lens: &Lens,
     zoom: usize,
     field: Option<f64>,
     mut report: impl FnMut(usize, usize),
-) -> Result<Gradients, NoGradients> {
+) -> Result<GradientBenchmark, GradientBenchmarkError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
-    let bench = limited_by_stop(&Bench::of(lens, zoom)?, |system| system)?;
+    let bench = limited_by_stop(&RayModel::from_lens(lens, zoom)?, |system| system)?;
     let field = field.unwrap_or_else(|| most_vignetted(&bench, lens, zoom));
     let axis = area(&bench, 0.0).unwrap_or(f64::NAN);
     let heights = if field == 0.0 { vec![0.0] } else { vec![0.0, field] };
@@ -227,12 +230,12 @@ pub fn gradients(
     let mut done = 0;
     let mut fields = Vec::new();
     for y in heights {
-        let scene = Scene::new(&bench, &pool, y)?;
+        let scene = GradientScene::new(&bench, &pool, y)?;
         let exact = scene.reference()?;
         let mut rows = Vec::new();
         for integral in [Integral::Spot, Integral::Throughput] {
             for method in METHODS {
-                rows.extend(scene.curve(integral, exact.of(integral), method));
+                rows.extend(scene.curve(integral, exact.gradient(integral), method));
                 done += 1;
                 report(done, all);
             }
@@ -241,51 +244,51 @@ pub fn gradients(
     }
     let costs = PLANES.into_iter().map(|planes| {
         let bench = limited_by_stop(&bench, |system| with_planes(system, planes))?;
-        let scene = Scene::new(&bench, &pool, field)?;
+        let scene = GradientScene::new(&bench, &pool, field)?;
         let cost = pool.install(|| scene.cost());
         done += 1;
         report(done.min(all), all);
         cost
     });
-    Ok(Gradients { costs: costs.collect::<Result<_, NoGradients>>()?, fields })
+    Ok(GradientBenchmark { costs: costs.collect::<Result<_, GradientBenchmarkError>>()?, fields })
 }
 
 /// Every estimator in every precision that it has.
-const METHODS: [(Estimator, Precision); 6] = [
-    (Estimator::Biased, Precision::F64),
-    (Estimator::Biased, Precision::F32),
-    (Estimator::Boundary, Precision::F64),
-    (Estimator::Warp, Precision::F64),
-    (Estimator::Warp, Precision::F32),
-    (Estimator::Difference, Precision::F64),
+const METHODS: [(DerivativeEstimator, Precision); 6] = [
+    (DerivativeEstimator::Biased, Precision::F64),
+    (DerivativeEstimator::Biased, Precision::F32),
+    (DerivativeEstimator::Boundary, Precision::F64),
+    (DerivativeEstimator::Warp, Precision::F64),
+    (DerivativeEstimator::Warp, Precision::F32),
+    (DerivativeEstimator::Difference, Precision::F64),
 ];
 
 /// A field at a height, in the unit of the lens's fields.
-fn at(y: f64) -> Field {
-    Field { x: 0.0, y, weight: 1.0 }
+fn at(y: f64) -> FieldPoint {
+    FieldPoint { x: 0.0, y, weight: 1.0 }
 }
 
 /// The lens at its primary wavelength, with light that only its stop and semi-diameters limit.
 fn limited_by_stop(
-    given: &Bench,
+    given: &RayModel,
     change: impl FnOnce(System<f64>) -> System<f64>,
-) -> Result<Bench, BenchError> {
-    let color = &given.colors[given.primary];
+) -> Result<RayModel, RayModelError> {
+    let color = &given.channels[given.primary];
     let beam = Beam { aperture: Aperture::StopSemiDiameter(given.stop_radius()), ..given.beam };
     let aiming = if given.aiming == Aiming::Stop { Aiming::Chief } else { given.aiming };
-    Bench::new(vec![(color.um, 1.0, change(color.system.clone()))], 0, beam, aiming)
+    RayModel::from_systems(vec![(color.um, 1.0, change(color.system.clone()))], 0, beam, aiming)
 }
 
 /// The field of the lens with the least light that has some.
-fn most_vignetted(bench: &Bench, lens: &Lens, zoom: usize) -> f64 {
+fn most_vignetted(bench: &RayModel, lens: &Lens, zoom: usize) -> f64 {
     let heights = lens.fields_at(zoom).values.iter().map(|field| field.y);
     let lit = heights.filter_map(|y| Some((y, area(bench, y)?)));
     lit.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(y, _)| y)
 }
 
-fn area(bench: &Bench, y: f64) -> Option<f64> {
+fn area(bench: &RayModel, y: f64) -> Option<f64> {
     let region = Region::new(bench.launch(at(y), 0).ok()?);
-    let light = region.lit(2);
+    let light = region.trace_pupil(2);
     light.has_light().then_some(light.moments.area)
 }
 
@@ -313,28 +316,28 @@ fn with_planes(mut system: System<f64>, planes: usize) -> System<f64> {
 /// The numbers by which is differentiated.
 fn numbers(system: &System<f64>) -> usize {
     let of = |surface: &Surface<f64>| {
-        let has = |slot: &Slot| {
-            slot.is_of(surface)
-                && (*slot != Slot::SemiDiameter || surface.semi_diameter.is_finite())
+        let has = |slot: &SurfaceParameter| {
+            slot.exists_on(surface)
+                && (*slot != SurfaceParameter::SemiDiameter || surface.semi_diameter.is_finite())
         };
-        Slot::all().filter(has).count()
+        SurfaceParameter::all().filter(has).count()
     };
     1 + system.surfaces.iter().map(of).sum::<usize>()
 }
 
 /// A derivative and the rays that it took.
-type Found = (Gradient<f64>, usize);
+type DerivativeWithRays = (SystemGradient<f64>, usize);
 
 /// The derivatives of both integrals, as well as they can be known.
-struct Reference {
-    spot: Gradient<f64>,
-    throughput: Gradient<f64>,
-    by: Estimator,
+struct ReferenceGradients {
+    spot: SystemGradient<f64>,
+    throughput: SystemGradient<f64>,
+    by: DerivativeEstimator,
     checked: [f64; 2],
 }
 
-impl Reference {
-    fn of(&self, integral: Integral) -> &Gradient<f64> {
+impl ReferenceGradients {
+    fn gradient(&self, integral: Integral) -> &SystemGradient<f64> {
         match integral {
             Integral::Spot => &self.spot,
             Integral::Throughput => &self.throughput,
@@ -343,58 +346,67 @@ impl Reference {
 }
 
 /// A field of a lens.
-struct Scene<'a> {
-    bench: &'a Bench,
+struct GradientScene<'a> {
+    bench: &'a RayModel,
     pool: &'a ThreadPool,
     single: Tracer<f32>,
     y: f64,
     /// The spot about its centroid.
-    spot: Cost,
+    spot: QuadraticIntegrand,
 }
 
-impl<'a> Scene<'a> {
-    fn new(bench: &'a Bench, pool: &'a ThreadPool, y: f64) -> Result<Self, NoGradients> {
+impl<'a> GradientScene<'a> {
+    fn new(
+        bench: &'a RayModel,
+        pool: &'a ThreadPool,
+        y: f64,
+    ) -> Result<Self, GradientBenchmarkError> {
         let region = Region::new(bench.launch(at(y), 0)?);
-        plan(&region, Accuracy::default())?;
-        let spot = Cost::spread(region.lit(CHECKED.min(region.orders() - 1)).moments.centroid);
-        let single = Tracer::new(&bench.colors[0].system.lift())?;
+        choose_estimator(&region, Accuracy::default())?;
+        let spot = QuadraticIntegrand::spread(
+            region.trace_pupil(CHECKED.min(region.orders() - 1)).moments.centroid,
+        );
+        let single = Tracer::new(&bench.channels[0].system.cast())?;
         Ok(Self { bench, pool, single, y, spot })
     }
 
-    fn cost_of(&self, integral: Integral) -> Cost {
+    fn integrand(&self, integral: Integral) -> QuadraticIntegrand {
         match integral {
             Integral::Spot => self.spot,
-            Integral::Throughput => Cost::throughput(),
+            Integral::Throughput => QuadraticIntegrand::throughput(),
         }
     }
 
-    fn reference(&self) -> Result<Reference, NoGradients> {
+    fn reference(&self) -> Result<ReferenceGradients, GradientBenchmarkError> {
         let region = Region::new(self.bench.launch(at(self.y), 0)?);
-        let (by, _) = plan(&region, Accuracy::default())?;
-        let asked = Accuracy { tolerance: f64::EPSILON, most_rays: MANY };
+        let (by, _) = choose_estimator(&region, Accuracy::default())?;
+        let asked = Accuracy { tolerance: f64::EPSILON, max_rays: REFERENCE_RAYS };
         let found = |cost| differentiate(&region, &cost, by, asked);
-        let [spot, throughput] = [found(self.spot)?, found(Cost::throughput())?];
-        let check = |cost, found: &Derivative| {
+        let [spot, throughput] = [found(self.spot)?, found(QuadraticIntegrand::throughput())?];
+        let check = |cost, found: &PupilDerivative| {
             let other = match by {
-                Estimator::Warp => Some(found.by.joined(&found.error, |by, error| by + error)),
-                _ => region.difference_derivative(&cost, CHECKED).map(|found| found.by),
+                DerivativeEstimator::Warp => {
+                    Some(found.gradient.zip_with(&found.error, |by, error| by + error))
+                }
+                _ => region.difference_derivative(&cost, CHECKED).map(|found| found.gradient),
             };
-            other.map_or(f64::INFINITY, |other| worst(&other, &found.by))
+            other.map_or(f64::INFINITY, |other| worst_error(&other, &found.gradient))
         };
-        let checked = [check(self.spot, &spot), check(Cost::throughput(), &throughput)];
-        Ok(Reference { spot: spot.by, throughput: throughput.by, by, checked })
+        let checked =
+            [check(self.spot, &spot), check(QuadraticIntegrand::throughput(), &throughput)];
+        Ok(ReferenceGradients { spot: spot.gradient, throughput: throughput.gradient, by, checked })
     }
 
     fn curves(
         &self,
-        exact: &Reference,
+        exact: &ReferenceGradients,
         axis: f64,
         rows: Vec<GradientRow>,
-    ) -> Result<GradientCurves, NoGradients> {
+    ) -> Result<GradientCurves, GradientBenchmarkError> {
         let region = Region::new(self.bench.launch(at(self.y), 0)?);
-        let (planned, reason) = plan(&region, Accuracy::default())?;
-        let light = region.lit(4).moments.area / axis;
-        let Reference { by: reference, checked, .. } = *exact;
+        let (planned, reason) = choose_estimator(&region, Accuracy::default())?;
+        let light = region.trace_pupil(4).moments.area / axis;
+        let ReferenceGradients { by: reference, checked, .. } = *exact;
         Ok(GradientCurves { y: self.y, light, planned, reason, reference, checked, rows })
     }
 
@@ -405,21 +417,21 @@ impl<'a> Scene<'a> {
     fn curve(
         &self,
         integral: Integral,
-        exact: &Gradient<f64>,
-        (estimator, precision): (Estimator, Precision),
+        exact: &SystemGradient<f64>,
+        (estimator, precision): (DerivativeEstimator, Precision),
     ) -> Vec<GradientRow> {
-        let cost = self.cost_of(integral);
+        let cost = self.integrand(integral);
         let (steps, tries) = match estimator {
-            Estimator::Biased | Estimator::Boundary => (ORDERS, 1),
-            Estimator::Warp => (SAMPLES.len(), TRIES),
-            Estimator::Difference => (DIFFERENCE_ORDERS, 1),
+            DerivativeEstimator::Biased | DerivativeEstimator::Boundary => (ORDERS, 1),
+            DerivativeEstimator::Warp => (SAMPLES.len(), TRIES),
+            DerivativeEstimator::Difference => (DIFFERENCE_ORDERS, 1),
         };
         let row = |step| {
             let method = (estimator, precision);
-            let one = |seed| self.timed(|| self.derivative(&cost, method, step, seed));
-            let found: Vec<(Found, f64)> = (0..tries).filter_map(one).collect();
+            let one = |seed| self.time(|| self.derivative(&cost, method, step, seed));
+            let found: Vec<(DerivativeWithRays, f64)> = (0..tries).filter_map(one).collect();
             let count = found.len() as f64;
-            let errors = Numbers::ALL.map(|numbers| {
+            let errors = ParameterClass::ALL.map(|numbers| {
                 let each = found.iter().map(|((by, _), _)| numbers.error(by, exact));
                 let squares: Option<Vec<f64>> = each.map(|e| Some(e?.powi(2))).collect();
                 squares.map(|squares| (squares.iter().sum::<f64>() / count).sqrt())
@@ -433,12 +445,15 @@ impl<'a> Scene<'a> {
     }
 
     /// One result, and the median of the times that it took on one thread.
-    fn timed(&self, work: impl Fn() -> Option<Found> + Sync) -> Option<(Found, f64)> {
+    fn time(
+        &self,
+        work: impl Fn() -> Option<DerivativeWithRays> + Sync,
+    ) -> Option<(DerivativeWithRays, f64)> {
         self.pool.install(|| {
-            let (result, first) = timed(&work);
+            let (result, first) = time_ms(&work);
             let mut times = vec![first];
             while times.len() < OFTEN_ENOUGH && times.iter().sum::<f64>() < LONG_ENOUGH {
-                times.push(timed(|| black_box(work())).1);
+                times.push(time_ms(|| black_box(work())).1);
             }
             times.sort_by(f64::total_cmp);
             Some((result?, times[times.len() / 2]))
@@ -448,41 +463,48 @@ impl<'a> Scene<'a> {
     /// A derivative from nothing.
     fn derivative(
         &self,
-        cost: &Cost,
-        method: (Estimator, Precision),
+        cost: &QuadraticIntegrand,
+        method: (DerivativeEstimator, Precision),
         step: usize,
         seed: u32,
-    ) -> Option<Found> {
+    ) -> Option<DerivativeWithRays> {
         let region = Region::new(self.launch()?);
         let orders = region.orders();
         match method {
-            (Estimator::Warp, precision) => {
-                let sampling = Warp { count: SAMPLES[step], seed };
+            (DerivativeEstimator::Warp, precision) => {
+                let sampling = WarpSampling { count: SAMPLES[step], seed };
                 let found = match precision {
                     Precision::F64 => region.warp_derivative(cost, sampling),
                     Precision::F32 => region.warp_derivative_in::<f32>(cost, sampling),
                 }?;
-                Some((found.by, found.rays))
+                Some((found.gradient, found.rays))
             }
             _ if step >= orders => None,
-            (Estimator::Difference, _) => {
+            (DerivativeEstimator::Difference, _) => {
                 let found = region.difference_derivative(cost, step)?;
-                Some((found.by, found.rays))
+                Some((found.gradient, found.rays))
             }
-            (Estimator::Biased, Precision::F32) => self.biased_single(&region, cost, step),
+            (DerivativeEstimator::Biased, Precision::F32) => {
+                self.biased_in_single_precision(&region, cost, step)
+            }
             (estimator, _) => {
-                let lit = region.lit(step);
+                let lit = region.trace_pupil(step);
                 let by = match estimator {
-                    Estimator::Boundary => lit.boundary_derivative(cost)?,
+                    DerivativeEstimator::Boundary => lit.boundary_derivative(cost)?,
                     _ => lit.biased_derivative(cost),
                 };
-                Some((by, region.rays + lit.traced))
+                Some((by, region.rays + lit.rays_traced))
             }
         }
     }
 
     /// The biased derivative with rays in single precision.
-    fn biased_single(&self, region: &Region<'_>, cost: &Cost, order: usize) -> Option<Found> {
+    fn biased_in_single_precision(
+        &self,
+        region: &Region<'_>,
+        cost: &QuadraticIntegrand,
+        order: usize,
+    ) -> Option<DerivativeWithRays> {
         let nodes = region.nodes(order);
         let scale = region.launch.area();
         let mut weights = Vec::with_capacity(nodes.points.len());
@@ -492,54 +514,60 @@ impl<'a> Scene<'a> {
             rays.push(Ray { point: Vec3::from_f64(point), direction: Vec3::from_f64(direction) });
             weights.push(scale * weight);
         }
-        let mut points = Points::default();
-        self.single.batch(&rays, &mut points);
+        let mut points = ImagePoints::default();
+        self.single.trace_batch(&rays, &mut points);
         let seed = |i: usize| {
             let slope = cost.slope([points.x[i].value(), points.y[i].value()]);
             let [x, y] = slope.map(|v| f32::from_f64(weights[i] * v));
             let arrived = points.fate(i).is_imaged();
             let point = if arrived { Vec3::new(x, y, 0.0) } else { Vec3::default() };
-            Seed { point, ..Seed::default() }
+            AdjointSeed { point, ..AdjointSeed::default() }
         };
         let by = self.single.gradient(&rays, seed);
-        let by = Gradient::from_numbers(by.surfaces.len(), by.numbers().map(Real::value));
+        let by = SystemGradient::from_numbers(by.surfaces.len(), by.numbers().map(Real::value));
         Some((by, region.rays + nodes.rays + rays.len()))
     }
 
     /// What derivatives cost against integrals, each at its fastest.
-    fn cost(&self) -> Result<GradientCost, NoGradients> {
+    fn cost(&self) -> Result<GradientCost, GradientBenchmarkError> {
         let region = Region::new(self.bench.launch(at(self.y), 0)?);
         let spot = self.spot;
-        let nodes = region.sampled(Pattern::Random { count: COST_SAMPLES, seed: 1 });
+        let nodes = region.pattern_nodes(PupilPattern::Random { count: COST_SAMPLES, seed: 1 });
         let rays: Rays<f64> = nodes.points.iter().filter_map(|p| region.launch.ray(*p)).collect();
-        let tracer = &self.bench.colors[0].tracer;
-        let sampling = Warp { count: COST_SAMPLES, seed: 1 };
+        let tracer = &self.bench.channels[0].tracer;
+        let sampling = WarpSampling { count: COST_SAMPLES, seed: 1 };
         let fresh = || self.launch().map(Region::new);
         let along = |differentiated: bool| {
             let region = fresh()?;
-            let lit = region.lit(COST_ORDER);
-            if differentiated { lit.boundary_derivative(&spot) } else { Some(Gradient::zero(0)) }
+            let lit = region.trace_pupil(COST_ORDER);
+            if differentiated {
+                lit.boundary_derivative(&spot)
+            } else {
+                Some(SystemGradient::zero(0))
+            }
         };
-        let mut points = Points::default();
+        let mut points = ImagePoints::default();
         let mut turns: Vec<Box<dyn FnMut() + '_>> = vec![
             Box::new(|| drop(black_box(along(false)))),
             Box::new(|| drop(black_box(along(true)))),
             Box::new(|| {
                 drop(black_box(fresh().map(|r| r.difference_derivative(&spot, COST_ORDER))));
             }),
-            Box::new(|| tracer.batch(&rays, &mut points)),
+            Box::new(|| tracer.trace_batch(&rays, &mut points)),
             Box::new(|| drop(black_box(region.warp_derivative(&spot, sampling)))),
             Box::new(|| drop(black_box(region.warp_derivative_in::<f32>(&spot, sampling)))),
         ];
-        let mut contestants: Vec<Contestant<'_>> =
-            turns.iter_mut().map(|turn| Contestant { work: 1.0, turn: Box::new(turn) }).collect();
-        let rates = compete(&mut contestants, TURNS, TURN);
+        let mut contestants: Vec<TimedCase<'_>> = turns
+            .iter_mut()
+            .map(|turn| TimedCase { work: 1.0, repetition: Box::new(turn) })
+            .collect();
+        let rates = time_interleaved(&mut contestants, TURNS, TURN);
         drop(contestants);
         drop(turns);
         // The fastest turns: slower ones had company.
         let seconds: Vec<f64> = rates.iter().map(|rate| 1.0 / rate.max).collect();
-        let has_edge = region.lit(0).boundary_derivative(&spot).is_some();
-        let system = &self.bench.colors[0].system;
+        let has_edge = region.trace_pupil(0).boundary_derivative(&spot).is_some();
+        let system = &self.bench.channels[0].system;
         Ok(GradientCost {
             surfaces: system.surfaces.len(),
             numbers: numbers(system),
@@ -553,7 +581,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The worst error of all kinds of numbers.
-fn worst(found: &Gradient<f64>, exact: &Gradient<f64>) -> f64 {
-    let errors = Numbers::ALL.into_iter().filter_map(|numbers| numbers.error(found, exact));
+fn worst_error(found: &SystemGradient<f64>, exact: &SystemGradient<f64>) -> f64 {
+    let errors = ParameterClass::ALL.into_iter().filter_map(|numbers| numbers.error(found, exact));
     errors.fold(0.0, f64::max)
 }

@@ -4,15 +4,16 @@
 //! All on one thread. The reference is the same field traced with very fine steps: a grid has an
 //! error of its own, which no step takes away and which is told beside its curves.
 
-use super::clock::timed;
+use super::clock::time_ms;
 use super::grin_starts::GrinStarts;
-use super::memory::{Memory, peak_megabytes};
+use super::memory::{MemoryUse, peak_megabytes};
 use super::spot::Precision;
-use crate::grin::field::{Diagonal, Grid, GridError, Trilinear};
+use crate::grin::field::{GridError, HessianDiagonal, RegularGrid, Trilinear};
 use crate::grin::{
-    End, Exit, Field, Integrator, LastStep, Ray, Region, Seed, Setup, SetupError, Tracer,
+    EndCondition, GrinRay, GrinRegion, GrinSetup, GrinSetupError, GrinTracer, IndexField,
+    Integrator, LastStep, RayAdjoint, RayExit,
 };
-use crate::grin_task::{Exact, NoField, Task};
+use crate::grin_task::{GrinTask, ReferenceField, ReferenceFieldError};
 use crate::math::{Real, Vec3};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
@@ -85,9 +86,9 @@ pub struct GrinMemory {
     /// Bytes of the stored path, the least that reverse mode can do with.
     pub tape_bytes: usize,
     /// The peak of the process, and what it had before; where the system tells.
-    pub adjoint_memory: Option<Memory>,
+    pub adjoint_memory: Option<MemoryUse>,
     /// The same with the stored path.
-    pub tape_memory: Option<Memory>,
+    pub tape_memory: Option<MemoryUse>,
     /// Milliseconds of the adjoint: rays forwards and back, in batches.
     pub adjoint_ms: f64,
     /// The same with the stored path, one ray after the other.
@@ -98,7 +99,7 @@ pub struct GrinMemory {
 
 /// What is measured of a task.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GrinMeasured {
+pub struct GrinBenchmark {
     /// Rays of every measurement.
     pub rays: usize,
     /// A chart for each field.
@@ -113,19 +114,19 @@ pub struct GrinMeasured {
 
 /// Why nothing could be measured.
 #[derive(Debug, thiserror::Error)]
-pub enum NoGrin {
+pub enum GrinBenchmarkError {
     /// There is nothing to compare with.
     #[error("exact: found none; expected a task whose exact field is known")]
     NoExact,
     /// The exact field.
     #[error(transparent)]
-    Field(#[from] NoField),
+    Field(#[from] ReferenceFieldError),
     /// A grid.
     #[error(transparent)]
     Grid(#[from] GridError),
     /// The space.
     #[error(transparent)]
-    Setup(#[from] SetupError),
+    Setup(#[from] GrinSetupError),
     /// No ray arrives.
     #[error("views: found no ray that leaves the space; expected light that goes through")]
     NoLight,
@@ -138,9 +139,9 @@ pub enum NoGrin {
 const RAYS: usize = 512;
 /// How often a ray asks the field in the curves, and for the reference.
 const KICKS: [f64; 6] = [14.0, 28.0, 56.0, 112.0, 224.0, 448.0];
-const FINE: f64 = 16_384.0;
+const REFERENCE_KICKS: f64 = 16_384.0;
 /// The coarse trace by which the length of the rays is learnt.
-const FIRST: f64 = 300.0;
+const COARSE_STEPS: f64 = 300.0;
 /// Nodes along a side of the grids of the curves, and of the costs.
 const NODES: usize = 33;
 const COST_NODES: usize = 65;
@@ -159,16 +160,19 @@ const TRAPPED: f64 = 8.0;
 ///
 /// # Errors
 /// A task without an exact field, or without light.
-pub fn grin(task: &Task, mut report: impl FnMut(usize, usize)) -> Result<GrinMeasured, NoGrin> {
+pub fn measure_grin(
+    task: &GrinTask,
+    mut report: impl FnMut(usize, usize),
+) -> Result<GrinBenchmark, GrinBenchmarkError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
-    let stand = pool.install(|| Stand::new(task))?;
+    let stand = pool.install(|| GrinBenchmarkScene::new(task))?;
     let all = 4 + COSTS.len() + MEMORY.len();
     let mut done = 0;
     let mut tell = || {
         done += 1;
         report(done, all);
     };
-    let mut measured = GrinMeasured {
+    let mut measured = GrinBenchmark {
         rays: stand.rays.len(),
         fields: vec![],
         starts: pool.install(|| stand.starts())?,
@@ -176,7 +180,9 @@ pub fn grin(task: &Task, mut report: impl FnMut(usize, usize)) -> Result<GrinMea
         memory: vec![],
     };
     tell();
-    for made in [Made::Exact, Made::Tricubic(NODES), Made::Trilinear(NODES)] {
+    for made in
+        [BenchmarkField::Exact, BenchmarkField::Tricubic(NODES), BenchmarkField::Trilinear(NODES)]
+    {
         measured.fields.push(pool.install(|| stand.curves(made))?);
         tell();
     }
@@ -193,23 +199,23 @@ pub fn grin(task: &Task, mut report: impl FnMut(usize, usize)) -> Result<GrinMea
 
 /// How a field is made up.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Made {
+pub(super) enum BenchmarkField {
     Exact,
     Tricubic(usize),
     /// With the smoothed diagonal.
     Trilinear(usize),
 }
 
-const COSTS: [(Made, Precision); 6] = [
-    (Made::Trilinear(COST_NODES), Precision::F64),
-    (Made::Trilinear(COST_NODES), Precision::F32),
-    (Made::Tricubic(NODES), Precision::F64),
-    (Made::Tricubic(NODES), Precision::F32),
-    (Made::Exact, Precision::F64),
-    (Made::Exact, Precision::F32),
+const COSTS: [(BenchmarkField, Precision); 6] = [
+    (BenchmarkField::Trilinear(COST_NODES), Precision::F64),
+    (BenchmarkField::Trilinear(COST_NODES), Precision::F32),
+    (BenchmarkField::Tricubic(NODES), Precision::F64),
+    (BenchmarkField::Tricubic(NODES), Precision::F32),
+    (BenchmarkField::Exact, Precision::F64),
+    (BenchmarkField::Exact, Precision::F32),
 ];
 
-impl Made {
+impl BenchmarkField {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact",
@@ -222,23 +228,23 @@ impl Made {
 }
 
 /// Light and a field to send it through.
-pub(super) struct Stand<'a> {
-    task: &'a Task,
-    pub(super) exact: &'a Exact,
-    region: Region<f64>,
+pub(super) struct GrinBenchmarkScene<'a> {
+    task: &'a GrinTask,
+    pub(super) exact: &'a ReferenceField,
+    region: GrinRegion<f64>,
     /// Half the side of the cube of a grid.
     pub(super) half: f64,
-    pub(super) rays: Vec<Ray<f64>>,
+    pub(super) rays: Vec<GrinRay<f64>>,
     /// The way of the longest ray in σ.
-    way: f64,
+    longest_path: f64,
     /// Where the loss of the gradient has its bottom.
-    bottom: Vec3<f64>,
+    loss_minimum: Vec3<f64>,
     /// The exits of the exact field.
-    exits: Vec<Exit<f64>>,
+    exits: Vec<RayExit<f64>>,
 }
 
 /// Exits and a gradient.
-struct Traced {
+struct GrinTraceResult {
     exits: Vec<Option<Vec3<f64>>>,
     gradient: Vec<f64>,
     retrace_error: f64,
@@ -247,10 +253,10 @@ struct Traced {
     gradient_ms: f64,
 }
 
-impl<'a> Stand<'a> {
-    fn new(task: &'a Task) -> Result<Self, NoGrin> {
-        let exact = task.exact.as_ref().ok_or(NoGrin::NoExact)?;
-        let (space, rays) = task.judging_rays(&task.views[0]);
+impl<'a> GrinBenchmarkScene<'a> {
+    fn new(task: &'a GrinTask) -> Result<Self, GrinBenchmarkError> {
+        let exact = task.exact.as_ref().ok_or(GrinBenchmarkError::NoExact)?;
+        let (space, rays) = task.scoring_rays(&task.views[0]);
         let stride = rays.len().div_ceil(RAYS).max(1);
         let [low, high] = space.corners();
         let size = [low.x, low.y, low.z, high.x, high.y, high.z].into_iter().map(f64::abs);
@@ -261,64 +267,75 @@ impl<'a> Stand<'a> {
             region: space.region(),
             half: MARGIN * size,
             rays: rays.into_iter().step_by(stride).collect(),
-            way: space.diameter(),
-            bottom: Vec3::new(0.3, -0.2, 0.5) * size,
+            longest_path: space.diameter(),
+            loss_minimum: Vec3::new(0.3, -0.2, 0.5) * size,
             exits: Vec::new(),
         };
         // First roughly, then as finely as the way of the longest ray asks.
         let field = exact.field::<f64>()?;
-        for kicks in [FIRST, FINE] {
+        for kicks in [COARSE_STEPS, REFERENCE_KICKS] {
             let setup = stand.setup(Integrator::BlanesMoan, kicks);
             let step = setup.step;
-            stand.exits = Tracer::new(&*field, setup)?.rays(&stand.rays);
-            let arrived = stand.exits.iter().filter(|exit| exit.fate.arrived());
-            let most = arrived.map(|exit| exit.steps).max().ok_or(NoGrin::NoLight)?;
-            stand.way = f64::from(most) * step;
+            stand.exits = GrinTracer::new(&*field, setup)?.trace_batch(&stand.rays);
+            let arrived = stand.exits.iter().filter(|exit| exit.fate.has_arrived());
+            let most = arrived.map(|exit| exit.steps).max().ok_or(GrinBenchmarkError::NoLight)?;
+            stand.longest_path = f64::from(most) * step;
         }
         Ok(stand)
     }
 
     /// How rays are traced with so many kicks on the longest way.
-    pub(super) fn setup<R: Real>(&self, integrator: Integrator, kicks: f64) -> Setup<R> {
-        let steps = kicks / integrator.kicks() as f64;
+    pub(super) fn setup<R: Real>(&self, integrator: Integrator, kicks: f64) -> GrinSetup<R> {
+        let steps = kicks / integrator.kicks_per_step() as f64;
         let limit = (TRAPPED * steps).max(64.0) as u32;
-        Setup {
+        GrinSetup {
             integrator,
-            step: R::from_f64(self.way / steps),
+            step: R::from_f64(self.longest_path / steps),
             launch: self.task.launch,
-            end: End::Boundary { region: self.region.lift(), last: LastStep::Fractional, limit },
+            end: EndCondition::Boundary {
+                region: self.region.cast(),
+                last: LastStep::Fractional,
+                limit,
+            },
             screen: None,
         }
     }
 
     /// Half a voxel of the finest grid a step, and no simple fraction of it; a last step that costs
     /// nothing.
-    fn coarse<R: Real>(&self) -> Setup<R> {
+    fn coarse_setup<R: Real>(&self) -> GrinSetup<R> {
         let step = 0.487 * 2.0 * self.half / (COST_NODES - 1) as f64;
-        let setup = self.setup(Integrator::LeapfrogDkd, self.way / step);
-        let limit = (TRAPPED * self.way / step) as u32;
-        let end = End::Boundary { region: self.region.lift(), last: LastStep::BrokenLine, limit };
-        Setup { end, ..setup }
+        let setup = self.setup(Integrator::LeapfrogDkd, self.longest_path / step);
+        let limit = (TRAPPED * self.longest_path / step) as u32;
+        let end = EndCondition::Boundary {
+            region: self.region.cast(),
+            last: LastStep::BrokenLine,
+            limit,
+        };
+        GrinSetup { end, ..setup }
     }
 
-    pub(super) fn field<R: Real>(&self, made: Made) -> Result<Box<dyn Field<R>>, NoField> {
+    pub(super) fn field<R: Real>(
+        &self,
+        made: BenchmarkField,
+    ) -> Result<Box<dyn IndexField<R>>, ReferenceFieldError> {
         match made {
-            Made::Exact => self.exact.field(),
-            Made::Tricubic(nodes) => self.exact.sampled(true, nodes, self.half),
-            Made::Trilinear(nodes) => self.exact.sampled(false, nodes, self.half),
+            BenchmarkField::Exact => self.exact.field(),
+            BenchmarkField::Tricubic(nodes) => self.exact.sample_on_grid(true, nodes, self.half),
+            BenchmarkField::Trilinear(nodes) => self.exact.sample_on_grid(false, nodes, self.half),
         }
     }
 
-    fn lifted<R: Real>(&self) -> Vec<Ray<R>> {
-        self.rays.iter().map(Ray::lift).collect()
+    fn converted_rays<R: Real>(&self) -> Vec<GrinRay<R>> {
+        self.rays.iter().map(GrinRay::cast).collect()
     }
 
     /// The derivative of the loss by each exit.
-    fn seeds<R: Real>(&self, exits: &[Exit<R>]) -> Vec<Seed<R>> {
+    fn seeds<R: Real>(&self, exits: &[RayExit<R>]) -> Vec<RayAdjoint<R>> {
         let share = 2.0 / exits.len() as f64;
-        let seed = |exit: &Exit<R>| {
-            let x = Vec3::from_f64((exit.x.value() - self.bottom) * share);
-            Seed { x, ..Seed::default() }
+        let seed = |exit: &RayExit<R>| {
+            let x = Vec3::from_f64((exit.x.value() - self.loss_minimum) * share);
+            RayAdjoint { x, ..RayAdjoint::default() }
         };
         exits.iter().map(seed).collect()
     }
@@ -326,20 +343,20 @@ impl<'a> Stand<'a> {
     /// Traces all rays forwards and back; `often` for its time.
     fn trace<R: Real>(
         &self,
-        field: &dyn Field<R>,
-        setup: Setup<R>,
+        field: &dyn IndexField<R>,
+        setup: GrinSetup<R>,
         often: usize,
-    ) -> Result<Traced, NoGrin> {
-        let rays = self.lifted();
-        let kicks = setup.integrator.kicks() as f64;
-        let tracer = Tracer::new(field, setup)?;
-        let (mut exits, ms) = fastest(often, || tracer.rays(&rays));
+    ) -> Result<GrinTraceResult, GrinBenchmarkError> {
+        let rays = self.converted_rays();
+        let kicks = setup.integrator.kicks_per_step() as f64;
+        let tracer = GrinTracer::new(field, setup)?;
+        let (mut exits, ms) = fastest(often, || tracer.trace_batch(&rays));
         let seeds = self.seeds(&exits);
         let (gradient, back_ms) = fastest(often, || tracer.gradient(&rays, &mut exits, &seeds));
         let steps: f64 = exits.iter().map(|exit| f64::from(exit.steps)).sum();
-        Ok(Traced {
+        Ok(GrinTraceResult {
             kicks: kicks * steps / exits.len() as f64,
-            exits: exits.iter().map(|e| e.fate.arrived().then_some(e.x.value())).collect(),
+            exits: exits.iter().map(|e| e.fate.has_arrived().then_some(e.x.value())).collect(),
             gradient: gradient.parameters.iter().map(|g| g.value()).collect(),
             retrace_error: gradient.retrace_error,
             ms,
@@ -347,12 +364,12 @@ impl<'a> Stand<'a> {
         })
     }
 
-    fn curves(&self, made: Made) -> Result<GrinCurves, NoGrin> {
+    fn curves(&self, made: BenchmarkField) -> Result<GrinCurves, GrinBenchmarkError> {
         let (double, single) = (self.field::<f64>(made)?, self.field::<f32>(made)?);
-        let fine = self.setup(Integrator::BlanesMoan, FINE);
+        let fine = self.setup(Integrator::BlanesMoan, REFERENCE_KICKS);
         let reference = self.trace(&*double, fine, 1)?;
         let ideal: Vec<Option<Vec3<f64>>> =
-            self.exits.iter().map(|exit| exit.fate.arrived().then_some(exit.x)).collect();
+            self.exits.iter().map(|exit| exit.fate.has_arrived().then_some(exit.x)).collect();
         let mut rows = Vec::new();
         for integrator in Integrator::ALL {
             for kicks in KICKS {
@@ -369,10 +386,14 @@ impl<'a> Stand<'a> {
         Ok(GrinCurves { field: made.name(), parameters, floor, rows })
     }
 
-    fn cost(&self, made: Made, precision: Precision) -> Result<GrinCost, NoGrin> {
+    fn cost(
+        &self,
+        made: BenchmarkField,
+        precision: Precision,
+    ) -> Result<GrinCost, GrinBenchmarkError> {
         let found = match precision {
-            Precision::F64 => self.trace(&*self.field::<f64>(made)?, self.coarse(), 40)?,
-            Precision::F32 => self.trace(&*self.field::<f32>(made)?, self.coarse(), 40)?,
+            Precision::F64 => self.trace(&*self.field::<f64>(made)?, self.coarse_setup(), 40)?,
+            Precision::F32 => self.trace(&*self.field::<f32>(made)?, self.coarse_setup(), 40)?,
         };
         let each = |ms: f64| 1e6 * ms / (found.kicks * self.rays.len() as f64);
         let back = found.gradient_ms - found.ms;
@@ -385,29 +406,29 @@ impl<'a> Stand<'a> {
         })
     }
 
-    fn memory(&self, nodes: usize, per_voxel: f64) -> Result<GrinMemory, NoGrin> {
+    fn memory(&self, nodes: usize, per_voxel: f64) -> Result<GrinMemory, GrinBenchmarkError> {
         let exact = self.exact.field::<f64>()?;
-        let grid = Grid::cube(nodes, self.half)?;
-        let mut field = Trilinear::sampled(grid, |p| exact.sample(p).index)?;
-        field.diagonal = Diagonal::Exact;
-        let kicks = self.way * per_voxel / (0.974 * field.grid().spacing().x);
-        let tracer = Tracer::new(&field, self.setup(Integrator::LeapfrogDkd, kicks))?;
+        let grid = RegularGrid::cube(nodes, self.half)?;
+        let mut field = Trilinear::from_function(grid, |p| exact.sample(p).index)?;
+        field.diagonal = HessianDiagonal::Exact;
+        let kicks = self.longest_path * per_voxel / (0.974 * field.grid().spacing().x);
+        let tracer = GrinTracer::new(&field, self.setup(Integrator::LeapfrogDkd, kicks))?;
         let rays = &self.rays;
-        let mut exits = tracer.rays(rays);
+        let mut exits = tracer.trace_batch(rays);
         let seeds = self.seeds(&exits);
         // Rays without a gradient first, so that both work on the same ones.
         let adjoint = tracer.gradient(rays, &mut exits, &seeds);
-        let tape = tracer.taped_gradient(rays, &exits, &seeds);
+        let tape = tracer.tape_gradient(rays, &exits, &seeds);
         let difference = relative(&tape.parameters, &adjoint.parameters);
         let by_adjoint = || {
-            let mut exits = tracer.rays(rays);
+            let mut exits = tracer.trace_batch(rays);
             let seeds = self.seeds(&exits);
             drop(black_box(tracer.gradient(rays, &mut exits, &seeds)));
         };
         let by_tape = || {
-            let exits = tracer.rays(rays);
+            let exits = tracer.trace_batch(rays);
             let seeds = self.seeds(&exits);
-            drop(black_box(tracer.taped_gradient(rays, &exits, &seeds)));
+            drop(black_box(tracer.tape_gradient(rays, &exits, &seeds)));
         };
         let [adjoint_bytes, volume_bytes] = tracer.gradient_bytes(rays.len());
         let steps: f64 = exits.iter().map(|exit| f64::from(exit.steps)).sum();
@@ -430,8 +451,8 @@ impl<'a> Stand<'a> {
 fn row(
     integrator: Integrator,
     precision: Precision,
-    found: &Traced,
-    reference: &Traced,
+    found: &GrinTraceResult,
+    reference: &GrinTraceResult,
 ) -> GrinRow {
     GrinRow {
         integrator,
@@ -461,13 +482,13 @@ fn relative(found: &[f64], exact: &[f64]) -> f64 {
 
 /// What comes out, and the least time of several, in milliseconds.
 fn fastest<T>(often: usize, mut work: impl FnMut() -> T) -> (T, f64) {
-    let (mut result, mut best) = timed(&mut work);
+    let (mut result, mut best) = time_ms(&mut work);
     let mut spent = best;
     for i in 1..often {
         if i >= 3 && spent > LONG_ENOUGH * often as f64 / OFTEN_ENOUGH as f64 {
             break;
         }
-        let (again, ms) = timed(&mut work);
+        let (again, ms) = time_ms(&mut work);
         (result, best, spent) = (again, best.min(ms), spent + ms);
     }
     (result, best)

@@ -4,9 +4,9 @@
 //! jumps: its derivative by the start stays wrong on any grid. Luneburg's lens shows it best, where
 //! parallel rays end in one point and the derivative is zero.
 
-use super::grin::{Made, NoGrin, Stand};
-use crate::grin::field::{Diagonal, Grid, Trilinear};
-use crate::grin::{Field, Integrator, Seed, Tracer};
+use super::grin::{BenchmarkField, GrinBenchmarkError, GrinBenchmarkScene};
+use crate::grin::field::{HessianDiagonal, RegularGrid, Trilinear};
+use crate::grin::{GrinTracer, IndexField, Integrator, RayAdjoint};
 use crate::math::Vec3;
 use serde::Serialize;
 
@@ -28,54 +28,56 @@ pub struct GrinStarts {
 /// How often a ray asks the field.
 const KICKS: f64 = 448.0;
 /// The direction in which the end of a ray is looked at.
-const ALONG: Vec3<f64> = Vec3 { x: 0.48, y: 0.64, z: -0.6 };
+const END_DIRECTION: Vec3<f64> = Vec3 { x: 0.48, y: 0.64, z: -0.6 };
 
-impl Stand<'_> {
+impl GrinBenchmarkScene<'_> {
     /// The derivatives of the exact field, of smooth grids and of trilinear ones.
-    pub(super) fn starts(&self) -> Result<Vec<GrinStarts>, NoGrin> {
+    pub(super) fn starts(&self) -> Result<Vec<GrinStarts>, GrinBenchmarkError> {
         let fine = 16.0 * KICKS;
         let smooth = Integrator::BlanesMoan;
-        let exact = self.by_start(&*self.field::<f64>(Made::Exact)?, smooth, fine)?;
+        let exact = self.by_start(&*self.field::<f64>(BenchmarkField::Exact)?, smooth, fine)?;
         let mut rows = Vec::new();
-        for made in [Made::Exact, Made::Tricubic(33), Made::Tricubic(65)] {
+        for made in
+            [BenchmarkField::Exact, BenchmarkField::Tricubic(33), BenchmarkField::Tricubic(65)]
+        {
             let found = self.by_start(&*self.field::<f64>(made)?, smooth, KICKS)?;
-            rows.push(compared(made.name(), &found, &exact));
+            rows.push(compare(made.name(), &found, &exact));
         }
         let mut field = self.trilinear()?;
         for (diagonal, name) in [
-            (Diagonal::Smoothed, "trilinear 65"),
-            (Diagonal::Exact, "trilinear 65, exact transpose"),
+            (HessianDiagonal::Smoothed, "trilinear 65"),
+            (HessianDiagonal::Exact, "trilinear 65, exact transpose"),
         ] {
             field.diagonal = diagonal;
             let found = self.by_start(&field, Integrator::LeapfrogDkd, KICKS)?;
-            rows.push(compared(name, &found, &exact));
+            rows.push(compare(name, &found, &exact));
         }
         Ok(rows)
     }
 
-    fn trilinear(&self) -> Result<Trilinear<f64>, NoGrin> {
+    fn trilinear(&self) -> Result<Trilinear<f64>, GrinBenchmarkError> {
         let exact = self.exact.field::<f64>()?;
-        let grid = Grid::cube(65, self.half)?;
-        Ok(Trilinear::sampled(grid, |p| exact.sample(p).index)?)
+        let grid = RegularGrid::cube(65, self.half)?;
+        Ok(Trilinear::from_function(grid, |p| exact.sample(p).index)?)
     }
 
     /// The derivative of each ray that arrives.
     fn by_start(
         &self,
-        field: &dyn Field<f64>,
+        field: &dyn IndexField<f64>,
         integrator: Integrator,
         kicks: f64,
-    ) -> Result<Vec<Option<Vec3<f64>>>, NoGrin> {
-        let tracer = Tracer::new(field, self.setup(integrator, kicks))?;
-        let mut exits = tracer.rays(&self.rays);
-        let seeds = vec![Seed { x: ALONG, ..Seed::default() }; exits.len()];
+    ) -> Result<Vec<Option<Vec3<f64>>>, GrinBenchmarkError> {
+        let tracer = GrinTracer::new(field, self.setup(integrator, kicks))?;
+        let mut exits = tracer.trace_batch(&self.rays);
+        let seeds = vec![RayAdjoint { x: END_DIRECTION, ..RayAdjoint::default() }; exits.len()];
         let starts = tracer.gradient(&self.rays, &mut exits, &seeds).starts;
         let pairs = exits.iter().zip(starts);
-        Ok(pairs.map(|(exit, start)| exit.fate.arrived().then_some(start.x)).collect())
+        Ok(pairs.map(|(exit, start)| exit.fate.has_arrived().then_some(start.x)).collect())
     }
 }
 
-fn compared(
+fn compare(
     field: &'static str,
     found: &[Option<Vec3<f64>>],
     exact: &[Option<Vec3<f64>>],

@@ -1,6 +1,6 @@
 //! What a measurement was made on.
 
-use crate::trace::Width;
+use crate::trace::SimdWidth;
 use serde::Serialize;
 use std::fmt;
 
@@ -19,14 +19,14 @@ pub struct Machine {
 
 impl Machine {
     /// The one that the program runs on.
-    pub fn here() -> Self {
+    pub fn detect() -> Self {
         Self {
             processor: processor().unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
             cores: std::thread::available_parallelism().map_or(1, usize::from),
-            lane_bits: match Width::detect() {
-                Width::Baseline => 128,
-                Width::Bits256 => 256,
-                Width::Bits512 => 512,
+            lane_bits: match SimdWidth::detect() {
+                SimdWidth::Baseline => 128,
+                SimdWidth::Bits256 => 256,
+                SimdWidth::Bits512 => 512,
             },
             optimised: !cfg!(debug_assertions),
         }

@@ -19,19 +19,25 @@ mod search;
 mod spot;
 mod trace;
 
-pub use clock::{Stopwatch, timed};
+pub use clock::{Stopwatch, time_ms};
 pub use double_gauss::double_gauss;
 pub use gradient::{
-    GradientCost, GradientCurves, GradientRow, Gradients, Integral, NoGradients, Numbers, gradients,
+    GradientBenchmark, GradientBenchmarkError, GradientCost, GradientCurves, GradientRow, Integral,
+    ParameterClass, measure_gradients,
 };
-pub use grin::{GrinCost, GrinCurves, GrinMeasured, GrinMemory, GrinRow, NoGrin, grin};
+pub use grin::{
+    GrinBenchmark, GrinBenchmarkError, GrinCost, GrinCurves, GrinMemory, GrinRow, measure_grin,
+};
 pub use grin_starts::GrinStarts;
 pub use machine::Machine;
-pub use memory::{Memory, peak_megabytes};
-pub use optimize::{StepCosts, StepRow, step_costs};
+pub use memory::{MemoryUse, peak_megabytes};
+pub use optimize::{StepCosts, StepRow, measure_step_costs};
 pub use process::{age_ms, processor_ms};
-pub use rates::Rate;
-pub use rounding::{Rounding, rounding};
-pub use search::{Mark, Race, SearchRow, Searches, searches};
-pub use spot::{NoCurves, Precision, Pupil, Sampling, SpotCurves, SpotRow, spot_curves};
-pub use trace::{Throughput, TraceRow, Unmeasured, throughput};
+pub use rates::RateStatistics;
+pub use rounding::{Rounding, measure_rounding};
+pub use search::{MeritQuantiles, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
+pub use spot::{
+    Precision, PupilClipping, PupilSampling, SpotCurves, SpotCurvesError, SpotRow,
+    measure_spot_curves,
+};
+pub use trace::{BenchmarkError, Throughput, TraceRow, measure_throughput};

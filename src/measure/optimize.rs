@@ -1,12 +1,12 @@
 //! What a step of a search costs.
 
-use super::clock::timed;
+use super::clock::time_ms;
 use super::double_gauss::double_gauss;
-use super::rates::Rate;
-use super::trace::Unmeasured;
+use super::rates::RateStatistics;
+use super::trace::BenchmarkError;
 use crate::lens::{Lens, Parameter, Quantity, Variable};
-use crate::merit::{Goal, PupilEdge, Term, Weighted};
-use crate::optimize::{Method, start};
+use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use crate::optimize::{DescentMethod, start};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
@@ -50,15 +50,15 @@ pub struct StepRow {
 }
 
 /// Times `steps` steps of every search on one core.
-pub fn step_costs(steps: usize) -> Result<StepCosts, Unmeasured> {
-    let clipped = free(double_gauss());
+pub fn measure_step_costs(steps: usize) -> Result<StepCosts, BenchmarkError> {
+    let clipped = with_all_variables(double_gauss());
     let mut clear = clipped.clone();
     clear.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
     let searches = [
-        ("adam_clear", Method::Adam, &clear),
-        ("adam_clipped", Method::Adam, &clipped),
-        ("dls_clear", Method::DampedLeastSquares, &clear),
-        ("dls_clipped", Method::DampedLeastSquares, &clipped),
+        ("adam_clear", DescentMethod::Adam, &clear),
+        ("adam_clipped", DescentMethod::Adam, &clipped),
+        ("dls_clear", DescentMethod::DampedLeastSquares, &clear),
+        ("dls_clipped", DescentMethod::DampedLeastSquares, &clipped),
     ];
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     let row = |(name, method, lens)| pool.install(|| time(name, method, lens, steps));
@@ -71,7 +71,7 @@ pub fn step_costs(steps: usize) -> Result<StepCosts, Unmeasured> {
 }
 
 /// All curvatures of surfaces that bend light, and all thicknesses.
-fn free(mut lens: Lens) -> Lens {
+fn with_all_variables(mut lens: Lens) -> Lens {
     let bent = |i: usize| (!lens.surfaces[i].stop).then_some((i, Quantity::Curvature));
     let curvatures = (0..lens.surfaces.len()).filter_map(bent);
     let thicknesses = (0..lens.surfaces.len()).map(|i| (i, Quantity::Thickness));
@@ -83,20 +83,20 @@ fn free(mut lens: Lens) -> Lens {
 
 fn time(
     name: &'static str,
-    method: Method,
+    method: DescentMethod,
     lens: &Lens,
     steps: usize,
-) -> Result<StepRow, Unmeasured> {
+) -> Result<StepRow, BenchmarkError> {
     let terms = vec![
-        Weighted { term: Term::Spot, weight: 1.0 },
-        Weighted { term: Term::FocalLength(99.5), weight: 1e-2 },
+        WeightedTerm { term: Term::Spot, weight: 1.0 },
+        WeightedTerm { term: Term::FocalLength(99.5), weight: 1e-2 },
     ];
     let goal = Goal { terms, pupil: PupilEdge::Kept, zoom_ratios: Vec::new() };
     let mut search = start(method, lens, &goal, TOLERANCE)?;
     let before = search.terms()?;
     let mut times = Vec::with_capacity(steps);
     for _ in 0..steps {
-        let (progress, ms) = timed(|| search.step());
+        let (progress, ms) = time_ms(|| search.step());
         if progress.finished {
             break;
         }
@@ -104,7 +104,7 @@ fn time(
     }
     let after = search.terms()?;
     let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
-    let Rate { median, min, max } = Rate::of(times);
+    let RateStatistics { median, min, max } = RateStatistics::of(times);
     Ok(StepRow {
         name,
         ms_per_iteration: median,

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// How fast something is done: the median of many turns, the slowest and the fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rate {
+pub struct RateStatistics {
     /// Half of the turns were faster.
     pub median: f64,
     /// The slowest turn.
@@ -14,7 +14,7 @@ pub struct Rate {
     pub max: f64,
 }
 
-impl Rate {
+impl RateStatistics {
     pub(super) fn of(mut turns: Vec<f64>) -> Self {
         turns.sort_by(f64::total_cmp);
         let at = |i: usize| turns.get(i).copied().unwrap_or(f64::NAN);
@@ -29,28 +29,33 @@ impl Rate {
 }
 
 /// One thing that is timed: a turn of it, and how many units of work that is.
-pub(super) struct Contestant<'a> {
+pub(super) struct TimedCase<'a> {
     pub(super) work: f64,
-    pub(super) turn: Box<dyn FnMut() + 'a>,
+    pub(super) repetition: Box<dyn FnMut() + 'a>,
 }
 
 /// Lets every contestant have `turns` turns of at least `seconds`, one after the other; how many
 /// units of work a second each did.
-pub(super) fn compete(contestants: &mut [Contestant<'_>], turns: usize, seconds: f64) -> Vec<Rate> {
-    let repeats: Vec<u32> = contestants.iter_mut().map(|c| repeats(&mut c.turn, seconds)).collect();
+pub(super) fn time_interleaved(
+    contestants: &mut [TimedCase<'_>],
+    turns: usize,
+    seconds: f64,
+) -> Vec<RateStatistics> {
+    let repeats: Vec<u32> =
+        contestants.iter_mut().map(|c| repetition_count(&mut c.repetition, seconds)).collect();
     let mut rates = vec![Vec::with_capacity(turns); contestants.len()];
     for _ in 0..turns {
         for ((contestant, repeats), rates) in contestants.iter_mut().zip(&repeats).zip(&mut rates) {
             let watch = Stopwatch::start();
-            (0..*repeats).for_each(|_| (contestant.turn)());
+            (0..*repeats).for_each(|_| (contestant.repetition)());
             rates.push(f64::from(*repeats) * contestant.work / watch.seconds());
         }
     }
-    rates.into_iter().map(Rate::of).collect()
+    rates.into_iter().map(RateStatistics::of).collect()
 }
 
 /// How often something has to be done to take `seconds`; the first time warms it up.
-fn repeats(turn: &mut dyn FnMut(), seconds: f64) -> u32 {
+fn repetition_count(turn: &mut dyn FnMut(), seconds: f64) -> u32 {
     turn();
     let watch = Stopwatch::start();
     turn();

@@ -1,8 +1,8 @@
 //! What rounding costs: the same rays in another number type and in twice the precision.
 
 use super::double_gauss::bundle;
-use crate::lens::{Invalid, System};
-use crate::math::{Double, Real, Vec3};
+use crate::lens::{System, SystemError};
+use crate::math::{DoubleDouble, Real, Vec3};
 use crate::trace::{Ray, Tracer};
 use serde::Serialize;
 
@@ -22,28 +22,31 @@ pub struct Rounding {
 }
 
 /// The rounding error of the number type `R` over a bundle through the measured lens.
-pub fn rounding<R: Real>(system: &System<f64>, rays: usize) -> Result<Rounding, Invalid> {
-    let fast = Tracer::new(&system.lift::<R>())?;
-    let exact = Tracer::new(&system.lift::<Double>())?;
+pub fn measure_rounding<R: Real>(
+    system: &System<f64>,
+    rays: usize,
+) -> Result<Rounding, SystemError> {
+    let fast = Tracer::new(&system.cast::<R>())?;
+    let exact = Tracer::new(&system.cast::<DoubleDouble>())?;
     let bundle = bundle(rays);
     let mut sum = Rounding { rays, ..Rounding::default() };
     let mut compared = 0;
     for i in 0..rays {
         let ray = bundle.get(i);
-        let got = fast.trace(lift(ray));
+        let got = fast.trace(cast_ray(ray));
         // Starting where the fast ray starts leaves the error of the tracing alone.
-        let want = exact.trace(lift(Ray::<f64> {
-            point: lift::<R>(ray).point.value(),
-            direction: lift::<R>(ray).direction.value(),
+        let want = exact.trace(cast_ray(Ray::<f64> {
+            point: cast_ray::<R>(ray).point.value(),
+            direction: cast_ray::<R>(ray).direction.value(),
         }));
         if got.fate != want.fate {
             sum.other_fates += 1;
         } else if got.fate.is_imaged() {
             let (p, q) = (got.ray.point, want.ray.point);
-            let distance = off(p.x, q.x).hypot(off(p.y, q.y));
+            let distance = rounding_error(p.x, q.x).hypot(rounding_error(p.y, q.y));
             sum.point_rms_mm += distance * distance;
             sum.point_max_mm = sum.point_max_mm.max(distance);
-            sum.path_rms_mm += off(got.opl, want.opl).powi(2);
+            sum.path_rms_mm += rounding_error(got.opl, want.opl).powi(2);
             compared += 1;
         }
     }
@@ -51,11 +54,11 @@ pub fn rounding<R: Real>(system: &System<f64>, rays: usize) -> Result<Rounding, 
     Ok(Rounding { point_rms_mm: mean(sum.point_rms_mm), path_rms_mm: mean(sum.path_rms_mm), ..sum })
 }
 
-fn lift<R: Real>(ray: Ray<f64>) -> Ray<R> {
+fn cast_ray<R: Real>(ray: Ray<f64>) -> Ray<R> {
     Ray { point: Vec3::from_f64(ray.point), direction: Vec3::from_f64(ray.direction) }
 }
 
 /// The difference of two numbers, without rounding the exact one first.
-fn off<R: Real>(got: R, exact: Double) -> f64 {
-    (Double::from_f64(got.value()) - exact).value()
+fn rounding_error<R: Real>(got: R, exact: DoubleDouble) -> f64 {
+    (DoubleDouble::from_f64(got.value()) - exact).value()
 }

@@ -7,8 +7,8 @@
 use super::clock::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::MeritError;
-use crate::search::lens::{LensLandscape, NoSearch, Plan};
-use crate::search::{Method, Run, SearchError, Settings};
+use crate::search::lens::{LensLandscape, SearchPlan, SearchSetupError};
+use crate::search::{SearchError, SearchMethod, SearchRun, SearchSettings};
 use serde::Serialize;
 
 /// The parts of the time after which a search is looked at.
@@ -16,11 +16,11 @@ const MARKS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 /// Tolerances that are compared.
 const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 /// The tolerance by which lenses are compared.
-const JUDGED: f64 = 1e-4;
+const EVALUATION_TOLERANCE: f64 = 1e-4;
 
 /// What is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Race {
+pub struct SearchBudget {
     /// Seconds of each search.
     pub seconds: f64,
     /// How many seeds, from 1 on.
@@ -31,18 +31,18 @@ pub struct Race {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchRow {
     /// The sampler.
-    pub method: Method,
+    pub method: SearchMethod,
     /// The tolerance of the spots that it rests on.
     pub tolerance: f64,
     /// Gradients of all seeds.
     pub gradients: u64,
     /// The merit after parts of the time.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<MeritQuantiles>,
 }
 
 /// The merit of the best lens after some time, over the seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Mark {
+pub struct MeritQuantiles {
     /// Seconds since the start.
     pub seconds: f64,
     /// The best of all seeds.
@@ -55,9 +55,9 @@ pub struct Mark {
 
 /// The race of the samplers, and of the tolerances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Searches {
+pub struct SearchBenchmark {
     /// How long and how often.
-    pub race: Race,
+    pub race: SearchBudget,
     /// The merit of the start.
     pub start: f64,
     /// The samplers at the tolerance that was asked for.
@@ -70,46 +70,54 @@ pub struct Searches {
 ///
 /// # Errors
 /// A lens that cannot be searched from.
-pub fn searches(lens: &Lens, plan: &Plan, race: Race) -> Result<Searches, NoSearch> {
+pub fn compare_searches(
+    lens: &Lens,
+    plan: &SearchPlan,
+    race: SearchBudget,
+) -> Result<SearchBenchmark, SearchSetupError> {
     let landscape = plan.landscape(lens)?;
     let row = |method, tolerance, gradients| {
         let mut plan = plan.clone();
         (plan.local.tolerance, plan.local.coarse) = (tolerance, tolerance);
-        plan.settings = Settings { method, gradients, moves: None, ..plan.settings };
-        time(lens, &plan, race)
+        plan.settings = SearchSettings { method, gradients, moves: None, ..plan.settings };
+        run_seeds(lens, &plan, race)
     };
     let usual = plan.local.tolerance;
-    let restore = row(Method::Restore, usual, None)?;
+    let restore = row(SearchMethod::Restore, usual, None)?;
     // Brute force divides what another method has needed for as long.
     let share = restore.gradients / race.seeds.max(1);
     let methods = vec![
         restore,
-        row(Method::Metropolis, usual, None)?,
-        row(Method::Brute, usual, Some(share.max(1)))?,
+        row(SearchMethod::Metropolis, usual, None)?,
+        row(SearchMethod::Brute, usual, Some(share.max(1)))?,
     ];
-    let tolerances = TOLERANCES.map(|tolerance| row(Method::Restore, tolerance, None));
+    let tolerances = TOLERANCES.map(|tolerance| row(SearchMethod::Restore, tolerance, None));
     let tolerances = tolerances.into_iter().collect::<Result<_, _>>()?;
-    let start = worth(&landscape, landscape.start()).unwrap_or(f64::INFINITY);
-    Ok(Searches { race, start, methods, tolerances })
+    let start = merit_of(&landscape, landscape.start()).unwrap_or(f64::INFINITY);
+    Ok(SearchBenchmark { race, start, methods, tolerances })
 }
 
-fn worth(landscape: &LensLandscape, lens: &Lens) -> Result<f64, MeritError> {
-    let merit = landscape.merit(lens, JUDGED)?;
-    merit.value(&merit.values(&landscape.freed(lens)))
+fn merit_of(landscape: &LensLandscape, lens: &Lens) -> Result<f64, MeritError> {
+    let merit = landscape.merit(lens, EVALUATION_TOLERANCE)?;
+    merit.value(&merit.values(&landscape.with_variables(lens)))
 }
 
-fn time(lens: &Lens, plan: &Plan, race: Race) -> Result<SearchRow, NoSearch> {
+fn run_seeds(
+    lens: &Lens,
+    plan: &SearchPlan,
+    race: SearchBudget,
+) -> Result<SearchRow, SearchSetupError> {
     let mut gradients = 0;
     let mut found: Vec<Vec<f64>> = vec![Vec::new(); MARKS.len()];
     for seed in 1..=race.seeds {
         let mut plan = plan.clone();
         plan.settings.seed = seed;
-        gradients += one(lens, &plan, race.seconds, &mut found)?;
+        gradients += run_seed(lens, &plan, race.seconds, &mut found)?;
     }
     let mark = |(part, merits): (f64, &mut Vec<f64>)| {
         merits.sort_by(f64::total_cmp);
         let at = |i: usize| merits.get(i).copied().unwrap_or(f64::INFINITY);
-        Mark {
+        MeritQuantiles {
             seconds: part * race.seconds,
             best: at(0),
             median: at(merits.len() / 2),
@@ -122,15 +130,20 @@ fn time(lens: &Lens, plan: &Plan, race: Race) -> Result<SearchRow, NoSearch> {
 }
 
 /// One run; adds the merit of its best lens at every mark, and returns its gradients.
-fn one(lens: &Lens, plan: &Plan, seconds: f64, found: &mut [Vec<f64>]) -> Result<u64, NoSearch> {
+fn run_seed(
+    lens: &Lens,
+    plan: &SearchPlan,
+    seconds: f64,
+    found: &mut [Vec<f64>],
+) -> Result<u64, SearchSetupError> {
     let landscape = plan.landscape(lens)?;
     let settings = plan.settings(&landscape);
-    let mut run = Run::new(&landscape, landscape.start().clone(), &settings)
-        .map_err(|cause: SearchError| NoSearch::from(cause))?;
+    let mut run = SearchRun::new(&landscape, landscape.start().clone(), &settings)
+        .map_err(|cause: SearchError| SearchSetupError::from(cause))?;
     let watch = Stopwatch::start();
     let mut best: Vec<Lens> = Vec::new();
     while best.len() < MARKS.len() {
-        let over = run.over().is_some();
+        let over = run.end_reason().is_some();
         if over || watch.seconds() >= MARKS[best.len()] * seconds {
             best.push(run.best().point.clone());
         } else {
@@ -138,7 +151,7 @@ fn one(lens: &Lens, plan: &Plan, seconds: f64, found: &mut [Vec<f64>]) -> Result
         }
     }
     for (merits, lens) in found.iter_mut().zip(&best) {
-        merits.push(worth(&landscape, lens).unwrap_or(f64::INFINITY));
+        merits.push(merit_of(&landscape, lens).unwrap_or(f64::INFINITY));
     }
     Ok(run.statistics().gradients)
 }

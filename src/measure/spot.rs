@@ -4,20 +4,20 @@
 //! way that depends on chance, or on where a grid happens to lie, is represented by the root mean
 //! square of several tries. The reference is the split boundary at its highest order.
 
-use super::clock::timed;
-use crate::lens::{Aperture, Field, Lens, Surface};
+use super::clock::time_ms;
+use crate::lens::{Aperture, FieldPoint, Lens, Surface};
 use crate::math::Real;
 use crate::pupil::{
-    Accuracy, Aiming, Bench, BenchError, Kind, Launch, LaunchError, Nodes, Pattern, Region,
-    converged,
+    Accuracy, Aiming, Launch, LaunchError, Nodes, PupilPattern, RayModel, RayModelError, Region,
+    RegionKind, converge,
 };
-use crate::trace::{Points, Ray, Rays, Sink, Tracer};
+use crate::trace::{ImagePoints, Ray, Rays, TraceSink, Tracer};
 use serde::Serialize;
 
 /// How a pupil is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Sampling {
+pub enum PupilSampling {
     /// The middles of the cells of a square grid.
     SquareGrid,
     /// Rings with the last one on the rim, the usual pattern.
@@ -32,7 +32,7 @@ pub enum Sampling {
     SplitBoundary,
 }
 
-impl Sampling {
+impl PupilSampling {
     /// All of them.
     pub const ALL: [Self; 6] = [
         Self::SquareGrid,
@@ -59,7 +59,7 @@ impl Sampling {
 /// What clips the beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Pupil {
+pub enum PupilClipping {
     /// Nothing but the disc of the entrance pupil.
     Clear,
     /// The semi-diameters of the lens as well.
@@ -80,9 +80,9 @@ pub enum Precision {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpotRow {
     /// What clips.
-    pub pupil: Pupil,
+    pub pupil: PupilClipping,
     /// How the pupil is sampled.
-    pub method: Sampling,
+    pub method: PupilSampling,
     /// The number type.
     pub precision: Precision,
     /// Rays traced, those included that only looked for the edge.
@@ -108,10 +108,10 @@ pub struct SpotCurves {
 
 /// Why there are no curves.
 #[derive(Debug, thiserror::Error)]
-pub enum NoCurves {
+pub enum SpotCurvesError {
     /// The lens.
     #[error(transparent)]
-    Bench(#[from] BenchError),
+    RayModel(#[from] RayModelError),
     /// The field.
     #[error(transparent)]
     Launch(#[from] LaunchError),
@@ -138,32 +138,32 @@ const OFTEN_ENOUGH: usize = 25;
 ///
 /// # Errors
 /// A lens or field without rays.
-pub fn spot_curves(
+pub fn measure_spot_curves(
     lens: &Lens,
     zoom: usize,
-    field: Field,
+    field: FieldPoint,
     mut report: impl FnMut(usize, usize),
-) -> Result<SpotCurves, NoCurves> {
+) -> Result<SpotCurves, SpotCurvesError> {
     let mut curves = SpotCurves { rms_clear: 0.0, rms_clipped: None, lit: 1.0, rows: Vec::new() };
-    let (mut done, all) = (0, 4 * Sampling::ALL.len());
-    for pupil in [Pupil::Clear, Pupil::Clipped] {
-        let bench = bench(lens, zoom, pupil)?;
-        let scene = Scene::new(&bench, field)?;
+    let (mut done, all) = (0, 4 * PupilSampling::ALL.len());
+    for pupil in [PupilClipping::Clear, PupilClipping::Clipped] {
+        let bench = ray_model(lens, zoom, pupil)?;
+        let scene = SpotScene::new(&bench, field)?;
         let Some((rms, area)) = scene.reference() else {
-            if pupil == Pupil::Clear {
-                return Err(NoCurves::Dark);
+            if pupil == PupilClipping::Clear {
+                return Err(SpotCurvesError::Dark);
             }
             break;
         };
         match pupil {
-            Pupil::Clear => curves.rms_clear = rms,
-            Pupil::Clipped => {
+            PupilClipping::Clear => curves.rms_clear = rms,
+            PupilClipping::Clipped => {
                 curves.rms_clipped = Some(rms);
                 curves.lit = area / std::f64::consts::PI;
             }
         }
         for precision in [Precision::F32, Precision::F64] {
-            for method in Sampling::ALL {
+            for method in PupilSampling::ALL {
                 curves.rows.extend(scene.curve(pupil, method, precision, rms));
                 done += 1;
                 report(done, all);
@@ -174,40 +174,40 @@ pub fn spot_curves(
 }
 
 /// The lens with the disc of its entrance pupil around the beam, and with or without its rims.
-fn bench(lens: &Lens, zoom: usize, pupil: Pupil) -> Result<Bench, NoCurves> {
-    let given = Bench::of(lens, zoom)?;
-    let diameter = given.first.entrance_pupil.diameter.ok_or(NoCurves::NoPupil)?;
+fn ray_model(lens: &Lens, zoom: usize, pupil: PupilClipping) -> Result<RayModel, SpotCurvesError> {
+    let given = RayModel::from_lens(lens, zoom)?;
+    let diameter = given.first_order.entrance_pupil.diameter.ok_or(SpotCurvesError::NoPupil)?;
     let by_stop = matches!(given.beam.aperture, Aperture::StopSemiDiameter(_));
-    let wider = if by_stop && pupil == Pupil::Clipped { MARGIN } else { 1.0 };
+    let wider = if by_stop && pupil == PupilClipping::Clipped { MARGIN } else { 1.0 };
     let mut beam = given.beam;
     beam.aperture = Aperture::EntrancePupilDiameter(wider * diameter);
-    let color = &given.colors[given.primary];
+    let color = &given.channels[given.primary];
     let mut system = color.system.clone();
-    if pupil == Pupil::Clear {
-        system.surfaces.iter_mut().for_each(Surface::clear);
+    if pupil == PupilClipping::Clear {
+        system.surfaces.iter_mut().for_each(Surface::remove_apertures);
     }
     let aiming = if given.aiming == Aiming::Stop { Aiming::Chief } else { given.aiming };
-    Ok(Bench::new(vec![(color.um, 1.0, system)], 0, beam, aiming)?)
+    Ok(RayModel::from_systems(vec![(color.um, 1.0, system)], 0, beam, aiming)?)
 }
 
 /// A field of a lens, in both precisions.
-struct Scene<'a> {
-    bench: &'a Bench,
-    field: Field,
+struct SpotScene<'a> {
+    bench: &'a RayModel,
+    field: FieldPoint,
     single: Tracer<f32>,
 }
 
 /// What a way of sampling gave.
-struct Sampled {
+struct SampledRms {
     rms: f64,
     rays: usize,
 }
 
-impl<'a> Scene<'a> {
-    fn new(bench: &'a Bench, field: Field) -> Result<Self, NoCurves> {
+impl<'a> SpotScene<'a> {
+    fn new(bench: &'a RayModel, field: FieldPoint) -> Result<Self, SpotCurvesError> {
         bench.launch(field, 0)?;
-        let single = Tracer::new(&bench.colors[0].system.lift());
-        Ok(Self { bench, field, single: single.map_err(BenchError::from)? })
+        let single = Tracer::new(&bench.channels[0].system.cast());
+        Ok(Self { bench, field, single: single.map_err(RayModelError::from)? })
     }
 
     fn launch(&self) -> Option<Launch<'a>> {
@@ -217,20 +217,20 @@ impl<'a> Scene<'a> {
     /// The RMS radius as well as it can be known, and the lit area.
     fn reference(&self) -> Option<(f64, f64)> {
         let region = Region::new(self.launch()?);
-        let accuracy = Accuracy { tolerance: 1e-14, most_rays: 4_000_000 };
+        let accuracy = Accuracy { tolerance: 1e-14, max_rays: 4_000_000 };
         let numbers = |nodes: &Nodes| {
-            let landed = region.trace::<Points<f64>>(nodes);
-            let area = landed.arrived().map(|(_, w)| w).sum();
-            rms(landed.arrived(), &landed.sink, nodes.mirrored).map(|rms| [rms, area])
+            let landed = region.trace::<ImagePoints<f64>>(nodes);
+            let area = landed.arrivals().map(|(_, w)| w).sum();
+            rms(landed.arrivals(), &landed.sink, nodes.mirrored).map(|rms| [rms, area])
         };
-        let found = converged(&region, accuracy, numbers, |values| *values)?;
+        let found = converge(&region, accuracy, numbers, |values| *values)?;
         Some((found.values[0], found.values[1]))
     }
 
     fn curve(
         &self,
-        pupil: Pupil,
-        method: Sampling,
+        pupil: PupilClipping,
+        method: PupilSampling,
         precision: Precision,
         exact: f64,
     ) -> Vec<SpotRow> {
@@ -238,12 +238,12 @@ impl<'a> Scene<'a> {
         for step in 0..steps(method) {
             let tries = tries(method);
             let results: Vec<_> =
-                (0..tries).filter_map(|t| self.timed(method, precision, step, t)).collect();
+                (0..tries).filter_map(|t| self.time(method, precision, step, t)).collect();
             if results.is_empty() {
                 continue;
             }
             let count = results.len() as f64;
-            let square = |(s, _): &(Sampled, f64)| (s.rms / exact - 1.0).powi(2);
+            let square = |(s, _): &(SampledRms, f64)| (s.rms / exact - 1.0).powi(2);
             let error = (results.iter().map(square).sum::<f64>() / count).sqrt();
             let ms = results.iter().map(|(_, ms)| ms).sum::<f64>() / count;
             let rays = results.iter().map(|(s, _)| s.rays).sum::<usize>() / results.len();
@@ -253,19 +253,19 @@ impl<'a> Scene<'a> {
     }
 
     /// One result, and the median of the times that it took.
-    fn timed(
+    fn time(
         &self,
-        method: Sampling,
+        method: PupilSampling,
         precision: Precision,
         step: usize,
         attempt: u32,
-    ) -> Option<(Sampled, f64)> {
-        let (mut result, first) = timed(|| self.sample(method, precision, step, attempt));
+    ) -> Option<(SampledRms, f64)> {
+        let (mut result, first) = time_ms(|| self.sample(method, precision, step, attempt));
         let mut times = vec![first];
         let enough =
             |times: &[f64]| times.len() >= OFTEN_ENOUGH || times.iter().sum::<f64>() >= LONG_ENOUGH;
         while times.len() < 3 || !enough(&times) {
-            let (again, ms) = timed(|| self.sample(method, precision, step, attempt));
+            let (again, ms) = time_ms(|| self.sample(method, precision, step, attempt));
             result = again;
             times.push(ms);
         }
@@ -276,20 +276,20 @@ impl<'a> Scene<'a> {
     /// A way of sampling, from nothing to the RMS radius.
     fn sample(
         &self,
-        method: Sampling,
+        method: PupilSampling,
         precision: Precision,
         step: usize,
         attempt: u32,
-    ) -> Option<Sampled> {
+    ) -> Option<SampledRms> {
         let launch = self.launch()?;
         let (region, nodes) = match fixed_pattern(method, step, attempt) {
             Some(pattern) => {
-                let region = Region { launch, kind: Kind::Clear, rays: 0 };
-                let nodes = region.sampled(pattern);
+                let region = Region { launch, kind: RegionKind::Clear, rays: 0 };
+                let nodes = region.pattern_nodes(pattern);
                 (region, nodes)
             }
-            None if method == Sampling::Gauss => {
-                let region = Region { launch, kind: Kind::Clear, rays: 0 };
+            None if method == PupilSampling::Gauss => {
+                let region = Region { launch, kind: RegionKind::Clear, rays: 0 };
                 let nodes = region.nodes(step);
                 (region, nodes)
             }
@@ -302,12 +302,12 @@ impl<'a> Scene<'a> {
         let rays = region.rays + nodes.rays + nodes.points.len();
         let rms = match precision {
             Precision::F64 => {
-                let landed = region.trace::<Points<f64>>(&nodes);
-                rms(landed.arrived(), &landed.sink, nodes.mirrored)
+                let landed = region.trace::<ImagePoints<f64>>(&nodes);
+                rms(landed.arrivals(), &landed.sink, nodes.mirrored)
             }
             Precision::F32 => self.trace_single(&region, &nodes),
         };
-        Some(Sampled { rms: rms?, rays })
+        Some(SampledRms { rms: rms?, rays })
     }
 
     /// The same in single precision; only the tracing is in it.
@@ -316,19 +316,19 @@ impl<'a> Scene<'a> {
         let mut rays = Rays::with_capacity(nodes.points.len());
         for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
             if let Some(ray) = region.launch.ray(*p) {
-                rays.push(rounded(ray));
+                rays.push(round_ray(ray));
                 weights.push(*weight);
             }
         }
-        let mut points = Points::default();
-        self.single.batch(&rays, &mut points);
+        let mut points = ImagePoints::default();
+        self.single.trace_batch(&rays, &mut points);
         let arrived = weights.iter().copied().enumerate();
         rms(arrived.filter(|(i, _)| points.fate(*i).is_imaged()), &points, nodes.mirrored)
     }
 }
 
 /// The ray with every number rounded.
-fn rounded<R: Real>(ray: Ray<f64>) -> Ray<R> {
+fn round_ray<R: Real>(ray: Ray<f64>) -> Ray<R> {
     Ray {
         point: crate::math::Vec3::from_f64(ray.point),
         direction: crate::math::Vec3::from_f64(ray.direction),
@@ -338,7 +338,7 @@ fn rounded<R: Real>(ray: Ray<f64>) -> Ray<R> {
 /// The RMS distance from the centroid; `None` where no ray arrives.
 fn rms<R: Real>(
     arrived: impl Iterator<Item = (usize, f64)>,
-    points: &Points<R>,
+    points: &ImagePoints<R>,
     mirrored: bool,
 ) -> Option<f64> {
     let arrived: Vec<_> = arrived.collect();
@@ -359,37 +359,41 @@ fn rms<R: Real>(
 }
 
 /// How many points a curve has.
-fn steps(method: Sampling) -> usize {
+fn steps(method: PupilSampling) -> usize {
     match method {
-        Sampling::SquareGrid | Sampling::Hexapolar | Sampling::Random => BUDGETS.len(),
+        PupilSampling::SquareGrid | PupilSampling::Hexapolar | PupilSampling::Random => {
+            BUDGETS.len()
+        }
         // The sequence repeats after 65 536 points.
-        Sampling::LowDiscrepancy => BUDGETS.len() - 1,
-        Sampling::Gauss => 14,
-        Sampling::SplitBoundary => 11,
+        PupilSampling::LowDiscrepancy => BUDGETS.len() - 1,
+        PupilSampling::Gauss => 14,
+        PupilSampling::SplitBoundary => 11,
     }
 }
 
-fn tries(method: Sampling) -> u32 {
+fn tries(method: PupilSampling) -> u32 {
     match method {
-        Sampling::Random | Sampling::LowDiscrepancy => TRIES,
-        Sampling::SquareGrid => 4,
-        Sampling::Hexapolar | Sampling::Gauss | Sampling::SplitBoundary => 1,
+        PupilSampling::Random | PupilSampling::LowDiscrepancy => TRIES,
+        PupilSampling::SquareGrid => 4,
+        PupilSampling::Hexapolar | PupilSampling::Gauss | PupilSampling::SplitBoundary => 1,
     }
 }
 
 /// The points of a fixed pattern with about the rays of a budget.
-fn fixed_pattern(method: Sampling, step: usize, attempt: u32) -> Option<Pattern> {
+fn fixed_pattern(method: PupilSampling, step: usize, attempt: u32) -> Option<PupilPattern> {
     let count = *BUDGETS.get(step)?;
     let root = (count as f64).sqrt();
     match method {
-        Sampling::SquareGrid => {
+        PupilSampling::SquareGrid => {
             let cells = root * (4.0 / std::f64::consts::PI).sqrt();
-            Some(Pattern::Square(cells.round() as usize + attempt as usize))
+            Some(PupilPattern::Square(cells.round() as usize + attempt as usize))
         }
-        Sampling::Hexapolar => Some(Pattern::Hexapolar((root / 3f64.sqrt()).round() as usize)),
-        Sampling::Random => Some(Pattern::Random { count, seed: attempt + 1 }),
-        Sampling::LowDiscrepancy => Some(Pattern::Sobol { count, seed: attempt + 1 }),
-        Sampling::Gauss | Sampling::SplitBoundary => None,
+        PupilSampling::Hexapolar => {
+            Some(PupilPattern::Hexapolar((root / 3f64.sqrt()).round() as usize))
+        }
+        PupilSampling::Random => Some(PupilPattern::Random { count, seed: attempt + 1 }),
+        PupilSampling::LowDiscrepancy => Some(PupilPattern::Sobol { count, seed: attempt + 1 }),
+        PupilSampling::Gauss | PupilSampling::SplitBoundary => None,
     }
 }
 
@@ -401,15 +405,15 @@ mod tests {
     #[test]
     fn gauss_beats_every_fixed_pattern_on_a_clear_pupil() {
         let lens = double_gauss();
-        let bench = bench(&lens, 0, Pupil::Clear).unwrap();
-        let scene = Scene::new(&bench, Field { x: 0.0, y: 10.0, weight: 1.0 }).unwrap();
+        let bench = ray_model(&lens, 0, PupilClipping::Clear).unwrap();
+        let scene = SpotScene::new(&bench, FieldPoint { x: 0.0, y: 10.0, weight: 1.0 }).unwrap();
         let (exact, _) = scene.reference().unwrap();
         let error = |method, step| {
             let sampled = scene.sample(method, Precision::F64, step, 0).unwrap();
             (sampled.rms / exact - 1.0).abs()
         };
-        assert!(error(Sampling::Gauss, 5) < 1e-9, "{}", error(Sampling::Gauss, 5));
-        for fixed in [Sampling::SquareGrid, Sampling::Hexapolar, Sampling::Random] {
+        assert!(error(PupilSampling::Gauss, 5) < 1e-9, "{}", error(PupilSampling::Gauss, 5));
+        for fixed in [PupilSampling::SquareGrid, PupilSampling::Hexapolar, PupilSampling::Random] {
             assert!(error(fixed, 3) > 1e-6, "{fixed:?}");
         }
     }

@@ -1,13 +1,13 @@
 //! How many ray-surfaces a second, and what rounding costs at that speed.
 
 use super::double_gauss::{bundle, double_gauss};
-use super::memory::{Memory, peak_megabytes};
-use super::rates::{Contestant, Rate, compete};
-use super::rounding::{Rounding, rounding};
-use crate::lens::{Invalid, LensError, Shape, System, glass::line};
+use super::memory::{MemoryUse, peak_megabytes};
+use super::rates::{RateStatistics, TimedCase, time_interleaved};
+use super::rounding::{Rounding, measure_rounding};
+use crate::lens::{LensError, Shape, System, SystemError, glass::line};
 use crate::math::{Real, Vec3};
 use crate::merit::MeritError;
-use crate::trace::{Points, Ray, Rays, Seed, Tracer, Width};
+use crate::trace::{AdjointSeed, ImagePoints, Ray, Rays, SimdWidth, Tracer};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
@@ -42,9 +42,9 @@ pub struct Throughput {
     /// tracing them included.
     pub gradient_over_forward: f64,
     /// Tracing a million rays, the rays themselves included.
-    pub memory_trace: Option<Memory>,
+    pub memory_trace: Option<MemoryUse>,
     /// The derivatives of a million rays by all numbers, the rays themselves included.
-    pub memory_gradient: Option<Memory>,
+    pub memory_gradient: Option<MemoryUse>,
 }
 
 /// One way of tracing.
@@ -61,21 +61,21 @@ pub struct TraceRow {
 }
 
 impl TraceRow {
-    fn new(name: &'static str, rate: Rate) -> Self {
-        let Rate { median, min, max } = rate.times(1e-6);
+    fn new(name: &'static str, rate: RateStatistics) -> Self {
+        let RateStatistics { median, min, max } = rate.times(1e-6);
         Self { name, million_ray_surfaces_per_s: median, min, max }
     }
 }
 
 /// Why nothing could be measured.
 #[derive(Debug, thiserror::Error)]
-pub enum Unmeasured {
+pub enum BenchmarkError {
     /// The lens of the measurement.
     #[error(transparent)]
     Lens(#[from] LensError),
     /// The numbers of the lens.
     #[error(transparent)]
-    Invalid(#[from] Invalid),
+    Invalid(#[from] SystemError),
     /// The merit of the lens.
     #[error(transparent)]
     Merit(#[from] MeritError),
@@ -85,7 +85,7 @@ pub enum Unmeasured {
 }
 
 /// The forms of the lens that are raced.
-struct Tracers {
+struct TracerVariants {
     plain: Tracer<f64>,
     single_precision: Tracer<f32>,
     spheres: Tracer<f64>,
@@ -93,8 +93,8 @@ struct Tracers {
     aspheres: Tracer<f64>,
 }
 
-impl Tracers {
-    fn new(system: &System<f64>) -> Result<Self, Invalid> {
+impl TracerVariants {
+    fn new(system: &System<f64>) -> Result<Self, SystemError> {
         let reshaped = |f: fn(usize, Shape<f64>) -> Shape<f64>| {
             let mut system = system.clone();
             for (i, surface) in system.surfaces.iter_mut().enumerate() {
@@ -104,16 +104,16 @@ impl Tracers {
         };
         Ok(Self {
             plain: Tracer::new(system)?,
-            single_precision: Tracer::new(&system.lift())?,
+            single_precision: Tracer::new(&system.cast())?,
             spheres: reshaped(|_, shape| Shape::Sphere { curvature: shape.curvature() })?,
             conics: reshaped(|_, shape| Shape::Conic { curvature: shape.curvature(), conic: 0.0 })?,
-            aspheres: reshaped(figured)?,
+            aspheres: reshaped(with_asphere)?,
         })
     }
 }
 
 /// The first and the last glass surface as aspheres, the rest as it is.
-fn figured(i: usize, shape: Shape<f64>) -> Shape<f64> {
+fn with_asphere(i: usize, shape: Shape<f64>) -> Shape<f64> {
     if i != 0 && i != 10 {
         return shape;
     }
@@ -123,15 +123,15 @@ fn figured(i: usize, shape: Shape<f64>) -> Shape<f64> {
 }
 
 /// Races every way of tracing, `turns` turns each.
-pub fn throughput(turns: usize) -> Result<Throughput, Unmeasured> {
-    let system = double_gauss().system(0, line::D)?;
-    let tracers = Tracers::new(&system)?;
+pub fn measure_throughput(turns: usize) -> Result<Throughput, BenchmarkError> {
+    let system = double_gauss().resolve(0, line::D)?;
+    let tracers = TracerVariants::new(&system)?;
     let pool = ThreadPoolBuilder::new().num_threads(2).build()?;
     let memory_trace = peak_megabytes(|| trace_many(&tracers.plain));
     let memory_gradient = peak_megabytes(|| differentiate_many(&tracers.plain));
     let (names, mut contestants): (Vec<_>, Vec<_>) =
-        contestants(&tracers, &pool).into_iter().unzip();
-    let rates = compete(&mut contestants, turns, TURN);
+        timed_cases(&tracers, &pool).into_iter().unzip();
+    let rates = time_interleaved(&mut contestants, turns, TURN);
     let rows: Vec<TraceRow> =
         names.into_iter().zip(rates).map(|(name, rate)| TraceRow::new(name, rate)).collect();
     let rate = |name| {
@@ -142,57 +142,57 @@ pub fn throughput(turns: usize) -> Result<Throughput, Unmeasured> {
         surfaces: tracers.plain.surfaces(),
         gradient_over_forward: rate(FORWARD) / rate(GRADIENT),
         rows,
-        rounding_f64: rounding::<f64>(&system, ROUNDED_RAYS)?,
-        rounding_f32: rounding::<f32>(&system, ROUNDED_RAYS)?,
+        rounding_f64: measure_rounding::<f64>(&system, ROUNDED_RAYS)?,
+        rounding_f32: measure_rounding::<f32>(&system, ROUNDED_RAYS)?,
         memory_trace,
         memory_gradient,
     })
 }
 
-fn contestants<'a>(
-    tracers: &'a Tracers,
+fn timed_cases<'a>(
+    tracers: &'a TracerVariants,
     pool: &'a ThreadPool,
-) -> Vec<(&'static str, Contestant<'a>)> {
-    let Tracers { plain, single_precision, spheres, conics, aspheres } = tracers;
+) -> Vec<(&'static str, TimedCase<'a>)> {
+    let TracerVariants { plain, single_precision, spheres, conics, aspheres } = tracers;
     vec![
-        (FORWARD, batch(plain, Width::Bits512)),
+        (FORWARD, batch(plain, SimdWidth::Bits512)),
         ("f64_batch_2_threads", on_two_threads(plain, pool)),
-        ("f64_batch_1_thread_spheres", batch(spheres, Width::Bits512)),
-        ("f64_batch_1_thread_conics", batch(conics, Width::Bits512)),
-        ("f64_batch_1_thread_2_aspheres", batch(aspheres, Width::Bits512)),
-        ("f64_batch_avx2", batch(plain, Width::Bits256)),
-        ("f64_batch_baseline", batch(plain, Width::Baseline)),
-        ("f64_single", one_by_one(plain)),
-        ("f32_batch_1_thread", batch(single_precision, Width::Bits512)),
+        ("f64_batch_1_thread_spheres", batch(spheres, SimdWidth::Bits512)),
+        ("f64_batch_1_thread_conics", batch(conics, SimdWidth::Bits512)),
+        ("f64_batch_1_thread_2_aspheres", batch(aspheres, SimdWidth::Bits512)),
+        ("f64_batch_avx2", batch(plain, SimdWidth::Bits256)),
+        ("f64_batch_baseline", batch(plain, SimdWidth::Baseline)),
+        ("f64_single", single_rays(plain)),
+        ("f32_batch_1_thread", batch(single_precision, SimdWidth::Bits512)),
         (GRADIENT, gradient(plain)),
         ("gradient_2_aspheres", gradient(aspheres)),
         ("gradient_2_threads", gradient_on_two_threads(plain, pool)),
     ]
 }
 
-fn work<R: Real>(tracer: &Tracer<R>, rays: usize) -> f64 {
+fn ray_surfaces<R: Real>(tracer: &Tracer<R>, rays: usize) -> f64 {
     (tracer.surfaces() * rays) as f64
 }
 
-fn batch<R: Real>(tracer: &Tracer<R>, width: Width) -> Contestant<'_> {
-    let (rays, mut points) = (lifted(&bundle(RAYS)), Points::<R>::default());
+fn batch<R: Real>(tracer: &Tracer<R>, width: SimdWidth) -> TimedCase<'_> {
+    let (rays, mut points) = (cast_rays(&bundle(RAYS)), ImagePoints::<R>::default());
     let turn = Box::new(move || {
-        tracer.batch_with(width, &rays, &mut points);
+        tracer.trace_batch_with(width, &rays, &mut points);
         black_box(&points);
     });
-    Contestant { work: work(tracer, RAYS), turn }
+    TimedCase { work: ray_surfaces(tracer, RAYS), repetition: turn }
 }
 
-fn on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> Contestant<'a> {
-    let (rays, mut points) = (bundle(SHARED_RAYS), Points::default());
+fn on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> TimedCase<'a> {
+    let (rays, mut points) = (bundle(SHARED_RAYS), ImagePoints::default());
     let turn = Box::new(move || {
-        pool.install(|| tracer.batch_parallel(&rays, &mut points));
+        pool.install(|| tracer.trace_batch_parallel(&rays, &mut points));
         black_box(&points);
     });
-    Contestant { work: work(tracer, SHARED_RAYS), turn }
+    TimedCase { work: ray_surfaces(tracer, SHARED_RAYS), repetition: turn }
 }
 
-fn one_by_one(tracer: &Tracer<f64>) -> Contestant<'_> {
+fn single_rays(tracer: &Tracer<f64>) -> TimedCase<'_> {
     let rays: Vec<Ray<f64>> = {
         let bundle = bundle(SINGLE_RAYS);
         (0..SINGLE_RAYS).map(|i| bundle.get(i)).collect()
@@ -202,33 +202,33 @@ fn one_by_one(tracer: &Tracer<f64>) -> Contestant<'_> {
             black_box(tracer.trace(*ray));
         }
     });
-    Contestant { work: work(tracer, SINGLE_RAYS), turn }
+    TimedCase { work: ray_surfaces(tracer, SINGLE_RAYS), repetition: turn }
 }
 
 /// The derivative of a sum of squares over the image, by where each ray lands.
-fn seed(ray: usize) -> Seed<f64> {
+fn seed(ray: usize) -> AdjointSeed<f64> {
     let (x, y) = ((ray % 7) as f64 * 1e-3, (ray % 5) as f64 * 1e-3);
-    Seed { point: Vec3::new(x, y, 0.0), ..Seed::default() }
+    AdjointSeed { point: Vec3::new(x, y, 0.0), ..AdjointSeed::default() }
 }
 
-fn gradient(tracer: &Tracer<f64>) -> Contestant<'_> {
+fn gradient(tracer: &Tracer<f64>) -> TimedCase<'_> {
     let rays = bundle(RAYS);
     let turn = Box::new(move || {
         black_box(tracer.gradient(&rays, seed));
     });
-    Contestant { work: work(tracer, RAYS), turn }
+    TimedCase { work: ray_surfaces(tracer, RAYS), repetition: turn }
 }
 
-fn gradient_on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> Contestant<'a> {
+fn gradient_on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) -> TimedCase<'a> {
     let rays = bundle(SHARED_RAYS);
     let turn = Box::new(move || {
         black_box(pool.install(|| tracer.gradient_parallel(&rays, seed)));
     });
-    Contestant { work: work(tracer, SHARED_RAYS), turn }
+    TimedCase { work: ray_surfaces(tracer, SHARED_RAYS), repetition: turn }
 }
 
 /// The same rays as another number type.
-fn lifted<R: Real>(rays: &Rays<f64>) -> Rays<R> {
+fn cast_rays<R: Real>(rays: &Rays<f64>) -> Rays<R> {
     let column = |from: &[f64]| from.iter().map(|v| R::from_f64(*v)).collect();
     Rays {
         x: column(&rays.x),
@@ -241,8 +241,8 @@ fn lifted<R: Real>(rays: &Rays<f64>) -> Rays<R> {
 }
 
 fn trace_many(tracer: &Tracer<f64>) {
-    let (rays, mut points) = (bundle(MANY_RAYS), Points::default());
-    tracer.batch(&rays, &mut points);
+    let (rays, mut points) = (bundle(MANY_RAYS), ImagePoints::default());
+    tracer.trace_batch(&rays, &mut points);
     black_box(&points);
 }
 

@@ -3,67 +3,68 @@
 //! Every number that moves is a straight line in one variable: a curvature is the variable, a
 //! pickup a multiple of it, the index of a model glass grows in proportion with nd.
 
-use super::{Along, MeritError};
+use super::{Dual1, MeritError};
 use crate::lens::glass::model_index;
 use crate::lens::{
-    Aperture, FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System, focus_gap,
+    Aperture, FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System,
+    paraxial_image_distance,
 };
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, Bench};
-use crate::trace::{Gradient, Slot};
+use crate::pupil::{Aiming, RayModel};
+use crate::trace::{SurfaceParameter, SystemGradient};
 use nalgebra::DVector;
 
 /// A number of a system that follows a variable: `offset + factor × variable`.
 #[derive(Debug, Clone, Copy)]
-struct Line {
+struct ParameterBinding {
     variable: usize,
     surface: usize,
-    slot: Slot,
+    slot: SurfaceParameter,
     factor: f64,
     offset: f64,
 }
 
 /// A lens at one zoom position: its systems, and which of their numbers follow the variables.
 #[derive(Debug, Clone)]
-pub(super) struct Zoom {
-    pub(super) number: usize,
+pub(super) struct Configuration {
+    pub(super) zoom: usize,
     pub(super) primary: usize,
     pub(super) object: Object,
-    pub(super) field: FieldKind,
+    pub(super) field_kind: FieldKind,
     /// Which gaps are glass.
-    pub(super) glass: Vec<bool>,
+    pub(super) is_glass: Vec<bool>,
     /// One for each wavelength.
     systems: Vec<System<f64>>,
     /// How the beam is limited.
     aperture: Aperture,
-    lines: Vec<Vec<Line>>,
+    bindings: Vec<Vec<ParameterBinding>>,
     /// The distance of the image plane from the paraxial focus, where the last gap is solved.
-    focus: Option<f64>,
+    focus_offset: Option<f64>,
     variables: usize,
 }
 
 /// The systems of a zoom position at some values of the variables.
 #[derive(Debug, Clone)]
-pub(super) struct Systems {
+pub(super) struct ResolvedSystems {
     /// One for each wavelength, opened so that rims do not clip.
-    pub(super) opened: Vec<System<f64>>,
+    pub(super) unclipped: Vec<System<f64>>,
     /// The same with their rims.
-    pub(super) rimmed: Vec<System<f64>>,
+    pub(super) clipped: Vec<System<f64>>,
     /// The derivative of the last gap by the variables where it is solved.
-    focus: Option<DVector<f64>>,
+    focus_slopes: Option<DVector<f64>>,
 }
 
-impl Zoom {
+impl Configuration {
     pub(super) fn new(lens: &Lens, number: usize) -> Result<Self, MeritError> {
         let aperture = lens.aperture_at(number);
         let mut systems = Vec::new();
         let mut lines = Vec::new();
         for wavelength in &lens.wavelengths {
-            let mut system = lens.system(number, wavelength.um)?;
+            let mut system = lens.resolve(number, wavelength.um)?;
             if let (Some(stop), Aperture::StopSemiDiameter(radius)) = (system.stop, aperture) {
                 system.surfaces[stop].semi_diameter = radius;
             }
-            let found = lines_of(lens, number, wavelength.um, &mut system);
+            let found = bind_parameters(lens, number, wavelength.um, &mut system);
             lines.push(found);
             systems.push(system);
         }
@@ -72,86 +73,92 @@ impl Zoom {
             match row.medium {
                 Medium::Mirror => systems[0].surfaces[i].index != 1.0,
                 Medium::Air => false,
-                Medium::Glass(_)
-                | Medium::Model { .. }
-                | Medium::Index(_)
-                | Medium::Gradient(_) => true,
+                Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) | Medium::Grin(_) => {
+                    true
+                }
             }
         };
         Ok(Self {
-            number,
+            zoom: number,
             primary: lens.primary(),
             object: lens.object,
-            field: lens.fields_at(number).kind,
-            glass: (0..lens.surfaces.len()).map(glass).collect(),
+            field_kind: lens.fields_at(number).kind,
+            is_glass: (0..lens.surfaces.len()).map(glass).collect(),
             aperture,
-            focus: lens.focus,
+            focus_offset: lens.image_solve,
             variables: lens.variables.len(),
-            lines,
+            bindings: lines,
             systems,
         })
     }
 
     /// The systems at some values of the variables.
-    pub(super) fn at(&self, values: &[f64]) -> Systems {
+    pub(super) fn at(&self, values: &[f64]) -> ResolvedSystems {
         let mut rimmed = self.systems.clone();
-        for (system, lines) in rimmed.iter_mut().zip(&self.lines) {
+        for (system, lines) in rimmed.iter_mut().zip(&self.bindings) {
             for line in lines {
                 let number = line.offset + line.factor * values[line.variable];
-                *line.slot.of(system, line.surface) = number;
+                *line.slot.value_mut(system, line.surface) = number;
             }
         }
-        let mut found = Systems { opened: Vec::new(), rimmed, focus: None };
-        if let Some(offset) = self.focus {
+        let mut found =
+            ResolvedSystems { unclipped: Vec::new(), clipped: rimmed, focus_slopes: None };
+        if let Some(offset) = self.focus_offset {
             self.solve_focus(&mut found, offset);
         }
-        found.opened.clone_from(&found.rimmed);
-        let surfaces = found.opened.iter_mut().flat_map(|system| &mut system.surfaces);
-        surfaces.for_each(open_up);
+        found.unclipped.clone_from(&found.clipped);
+        let surfaces = found.unclipped.iter_mut().flat_map(|system| &mut system.surfaces);
+        surfaces.for_each(unclip);
         found
     }
 
     /// The lens with its rims, ready for rays; a stop whose semi-diameter is the aperture has it.
-    pub(super) fn bench(
+    pub(super) fn ray_model(
         &self,
-        found: &Systems,
+        found: &ResolvedSystems,
         lens: &Lens,
         aiming: Aiming,
-    ) -> Result<Bench, MeritError> {
-        let weighted = lens.wavelengths.iter().zip(&found.rimmed);
+    ) -> Result<RayModel, MeritError> {
+        let weighted = lens.wavelengths.iter().zip(&found.clipped);
         let systems = weighted.map(|(w, system)| (w.um, w.weight, system.clone())).collect();
-        let mut beam = Beam::of(lens, self.number);
-        let primary = &found.rimmed[self.primary];
+        let mut beam = Beam::for_lens(lens, self.zoom);
+        let primary = &found.clipped[self.primary];
         if let (Some(stop), Aperture::StopSemiDiameter(_)) = (primary.stop, self.aperture) {
             beam.aperture = Aperture::StopSemiDiameter(primary.surfaces[stop].semi_diameter);
         }
-        Ok(Bench::new(systems, self.primary, beam, aiming)?)
+        Ok(RayModel::from_systems(systems, self.primary, beam, aiming)?)
     }
 
-    fn solve_focus(&self, found: &mut Systems, offset: f64) {
-        let primary = &found.rimmed[self.primary];
-        let gap = focus_gap(primary, self.object) + offset;
-        let slope =
-            |variable| focus_gap(&self.along_unfocused(primary, variable), self.object).slope[0];
-        found.focus = Some(DVector::from_iterator(self.variables, (0..self.variables).map(slope)));
-        for system in &mut found.rimmed {
+    fn solve_focus(&self, found: &mut ResolvedSystems, offset: f64) {
+        let primary = &found.clipped[self.primary];
+        let gap = paraxial_image_distance(primary, self.object) + offset;
+        let slope = |variable| {
+            paraxial_image_distance(
+                &self.system_along_without_focus(primary, variable),
+                self.object,
+            )
+            .slope[0]
+        };
+        found.focus_slopes =
+            Some(DVector::from_iterator(self.variables, (0..self.variables).map(slope)));
+        for system in &mut found.clipped {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness = gap;
         }
     }
 
-    fn along_unfocused(&self, primary: &System<f64>, variable: usize) -> System<Along> {
-        let mut system: System<Along> = primary.lift();
-        for line in self.lines[self.primary].iter().filter(|line| line.variable == variable) {
-            line.slot.of(&mut system, line.surface).slope[0] = line.factor;
+    fn system_along_without_focus(&self, primary: &System<f64>, variable: usize) -> System<Dual1> {
+        let mut system: System<Dual1> = primary.cast();
+        for line in self.bindings[self.primary].iter().filter(|line| line.variable == variable) {
+            line.slot.value_mut(&mut system, line.surface).slope[0] = line.factor;
         }
         system
     }
 
     /// The system at the primary wavelength with its derivative along one variable.
-    pub(super) fn along(&self, found: &Systems, variable: usize) -> System<Along> {
-        let mut system = self.along_unfocused(&found.rimmed[self.primary], variable);
-        if let Some(focus) = &found.focus {
+    pub(super) fn system_along(&self, found: &ResolvedSystems, variable: usize) -> System<Dual1> {
+        let mut system = self.system_along_without_focus(&found.clipped[self.primary], variable);
+        if let Some(focus) = &found.focus_slopes {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness.slope[0] = focus[variable];
         }
@@ -159,27 +166,27 @@ impl Zoom {
     }
 
     /// The derivatives by the variables from those by the numbers of a system.
-    pub(super) fn collect(
+    pub(super) fn by_variables(
         &self,
-        found: &Systems,
+        found: &ResolvedSystems,
         wavelength: usize,
-        gradient: &Gradient<f64>,
+        gradient: &SystemGradient<f64>,
     ) -> DVector<f64> {
         let mut by_variable = DVector::zeros(self.variables);
-        for line in &self.lines[wavelength] {
+        for line in &self.bindings[wavelength] {
             let surface = &gradient.surfaces[line.surface];
             let by_number = match line.slot {
-                Slot::Curvature => surface.curvature,
-                Slot::Conic => surface.conic,
-                Slot::Term(term) => surface.terms[term],
-                Slot::Thickness => surface.thickness,
-                Slot::Index => surface.index,
-                Slot::SemiDiameter => surface.semi_diameter,
-                Slot::Grade(k) => surface.grade[k],
+                SurfaceParameter::Curvature => surface.curvature,
+                SurfaceParameter::Conic => surface.conic,
+                SurfaceParameter::AsphereTerm(term) => surface.terms[term],
+                SurfaceParameter::Thickness => surface.thickness,
+                SurfaceParameter::Index => surface.index,
+                SurfaceParameter::SemiDiameter => surface.semi_diameter,
+                SurfaceParameter::GrinTerm(k) => surface.grin_terms[k],
             };
             by_variable[line.variable] += line.factor * by_number;
         }
-        if let Some(focus) = &found.focus {
+        if let Some(focus) = &found.focus_slopes {
             let last = gradient.surfaces.len() - 2;
             by_variable.axpy(gradient.surfaces[last].thickness, focus, 1.0);
         }
@@ -187,40 +194,43 @@ impl Zoom {
     }
 
     /// The numbers of a system that some variable moves.
-    pub(super) fn moving(&self, wavelength: usize) -> Vec<(Option<usize>, Slot)> {
+    pub(super) fn moving_parameters(
+        &self,
+        wavelength: usize,
+    ) -> Vec<(Option<usize>, SurfaceParameter)> {
         let mut moving = Vec::new();
-        for line in &self.lines[wavelength] {
+        for line in &self.bindings[wavelength] {
             let number = (Some(line.surface), line.slot);
             if !moving.contains(&number) {
                 moving.push(number);
             }
         }
-        let last = (Some(self.systems[wavelength].surfaces.len() - 2), Slot::Thickness);
-        if self.focus.is_some() && !moving.contains(&last) {
+        let last = (Some(self.systems[wavelength].surfaces.len() - 2), SurfaceParameter::Thickness);
+        if self.focus_offset.is_some() && !moving.contains(&last) {
             moving.push(last);
         }
         moving
     }
 
     /// The derivatives by the variables from those by the moving numbers.
-    pub(super) fn collect_row(
+    pub(super) fn row_by_variables(
         &self,
-        found: &Systems,
+        found: &ResolvedSystems,
         wavelength: usize,
-        moving: &[(Option<usize>, Slot)],
+        moving: &[(Option<usize>, SurfaceParameter)],
         row: &[f64],
         by_variable: &mut [f64],
     ) {
         by_variable.fill(0.0);
-        let by = |surface: usize, slot: Slot| {
+        let by = |surface: usize, slot: SurfaceParameter| {
             moving.iter().position(|m| *m == (Some(surface), slot)).map_or(0.0, |i| row[i])
         };
-        for line in &self.lines[wavelength] {
+        for line in &self.bindings[wavelength] {
             by_variable[line.variable] += line.factor * by(line.surface, line.slot);
         }
-        if let Some(focus) = &found.focus {
+        if let Some(focus) = &found.focus_slopes {
             let last = self.systems[wavelength].surfaces.len() - 2;
-            let by_gap = by(last, Slot::Thickness);
+            let by_gap = by(last, SurfaceParameter::Thickness);
             by_variable.iter_mut().zip(focus.iter()).for_each(|(to, f)| *to += by_gap * f);
         }
     }
@@ -228,52 +238,58 @@ impl Zoom {
 
 /// Rays may pass a rim or an obstruction by any amount while the lens moves, but an asphere ends not far behind its
 /// own: outside, its polynomial means nothing, and rays may cross it several times.
-fn open_up(surface: &mut Surface<f64>) {
+fn unclip(surface: &mut Surface<f64>) {
     surface.obstruction = 0.0;
     surface.semi_diameter = match surface.shape {
-        Shape::Asphere { .. } => BEYOND * surface.semi_diameter,
+        Shape::Asphere { .. } => ASPHERE_MARGIN * surface.semi_diameter,
         Shape::Plane | Shape::Sphere { .. } | Shape::Conic { .. } => f64::INFINITY,
     };
 }
 
 /// How far an asphere goes on behind its rim.
-const BEYOND: f64 = 1.2;
+const ASPHERE_MARGIN: f64 = 1.2;
 
 /// What follows the variables at a wavelength; the system is written in forms that have all these
 /// numbers.
-fn lines_of(lens: &Lens, zoom: usize, um: f64, system: &mut System<f64>) -> Vec<Line> {
+fn bind_parameters(
+    lens: &Lens,
+    zoom: usize,
+    um: f64,
+    system: &mut System<f64>,
+) -> Vec<ParameterBinding> {
     let mut lines = Vec::new();
     for (variable, free) in lens.variables.iter().enumerate() {
         let start = lens.get(free.parameter).unwrap_or(0.0);
-        for (parameter, factor) in lens.followers(free.parameter) {
+        for (parameter, factor) in lens.dependents(free.parameter) {
             let surface = parameter.surface;
             let own_gap = has_own_gap(lens, zoom, surface);
             let slot = match parameter.quantity {
-                Quantity::Curvature => Slot::Curvature,
-                Quantity::Conic => Slot::Conic,
-                Quantity::Asphere(term) => Slot::Term(term),
-                Quantity::Thickness if !own_gap => Slot::Thickness,
-                Quantity::ZoomThickness(z) if z == zoom => Slot::Thickness,
-                Quantity::Index => Slot::Index,
-                Quantity::Gradient(k) => Slot::Grade(k),
+                Quantity::Curvature => SurfaceParameter::Curvature,
+                Quantity::Conic => SurfaceParameter::Conic,
+                Quantity::Asphere(term) => SurfaceParameter::AsphereTerm(term),
+                Quantity::Thickness if !own_gap => SurfaceParameter::Thickness,
+                Quantity::ZoomThickness(z) if z == zoom => SurfaceParameter::Thickness,
+                Quantity::Index => SurfaceParameter::Index,
+                Quantity::Gradient(k) => SurfaceParameter::GrinTerm(k),
                 Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
-                    Slot::SemiDiameter
+                    SurfaceParameter::SemiDiameter
                 }
                 Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => {
                     continue;
                 }
             };
-            let growth = if slot == Slot::Index { index_growth(lens, surface, um) } else { 1.0 };
+            let growth =
+                if slot == SurfaceParameter::Index { index_slope(lens, surface, um) } else { 1.0 };
             let factor = factor * growth;
             for surface in followers_of_index(lens, surface, slot) {
-                if let Slot::Grade(_) = slot {
-                    let graded = &mut system.surfaces[surface].graded;
+                if let SurfaceParameter::GrinTerm(_) = slot {
+                    let graded = &mut system.surfaces[surface].grin;
                     *graded = graded.or_else(|| lens.grade(surface));
                 }
-                slot.widen(system, surface);
-                let now = *slot.of(system, surface);
+                slot.promote_shape(system, surface);
+                let now = *slot.value_mut(system, surface);
                 let offset = if factor == 1.0 && now == start { 0.0 } else { now - factor * start };
-                lines.push(Line { variable, surface, slot, factor, offset });
+                lines.push(ParameterBinding { variable, surface, slot, factor, offset });
             }
         }
     }
@@ -291,9 +307,9 @@ fn has_own_aperture(lens: &Lens, zoom: usize, surface: usize) -> bool {
 }
 
 /// How fast the index of a gap grows with its nd.
-fn index_growth(lens: &Lens, surface: usize, um: f64) -> f64 {
+fn index_slope(lens: &Lens, surface: usize, um: f64) -> f64 {
     let medium = match &lens.surfaces[surface].medium {
-        Medium::Gradient(gradient) => &gradient.base,
+        Medium::Grin(gradient) => &gradient.base,
         medium => medium,
     };
     match *medium {
@@ -303,9 +319,9 @@ fn index_growth(lens: &Lens, surface: usize, um: f64) -> f64 {
 }
 
 /// The surface itself, and for an index the mirrors behind it, and the image plane, which keep it.
-fn followers_of_index(lens: &Lens, surface: usize, slot: Slot) -> Vec<usize> {
+fn followers_of_index(lens: &Lens, surface: usize, slot: SurfaceParameter) -> Vec<usize> {
     let mut all = vec![surface];
-    if slot == Slot::Index {
+    if slot == SurfaceParameter::Index {
         let mirrors =
             lens.surfaces[surface + 1..].iter().take_while(|r| r.medium == Medium::Mirror);
         all.extend((1..=mirrors.count()).map(|i| surface + i));

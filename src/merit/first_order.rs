@@ -1,35 +1,35 @@
 //! Terms of first-order optics, differentiated by dual numbers.
 
-use super::Scene;
-use super::sum::{Detail, Sum};
+use super::EvaluationContext;
+use super::sum::{DerivativeLevel, SumOfSquares};
 use crate::lens::System;
 use crate::math::Real;
 use crate::paraxial::{paraxial_ray, signed_indices};
 use nalgebra::DVector;
 
 /// The square of the deviation of the focal length from a target.
-pub(super) fn focal_length(scene: &Scene<'_>, target: f64, sum: &mut Sum) {
-    let focal = efl(&scene.systems.rimmed[scene.zoom.primary]);
-    sum.residual(1.0, focal - target, &slopes(scene, sum.detail, efl));
+pub(super) fn focal_length(scene: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) {
+    let focal = focal_length_of(&scene.systems.clipped[scene.zoom.primary]);
+    sum.add_residual(1.0, focal - target, &slopes(scene, sum.level, focal_length_of));
 }
 
 /// The derivatives of a first-order number by the variables; zeros where none are asked for.
 pub(super) fn slopes(
-    scene: &Scene<'_>,
-    detail: Detail,
-    number: impl Fn(&System<super::Along>) -> super::Along,
+    scene: &EvaluationContext<'_>,
+    detail: DerivativeLevel,
+    number: impl Fn(&System<super::Dual1>) -> super::Dual1,
 ) -> DVector<f64> {
     let count = scene.values.len();
-    if detail == Detail::Value {
+    if detail == DerivativeLevel::Value {
         return DVector::zeros(count);
     }
-    let slope = |variable| number(&scene.zoom.along(scene.systems, variable)).slope[0];
+    let slope = |variable| number(&scene.zoom.system_along(scene.systems, variable)).slope[0];
     DVector::from_iterator(count, (0..count).map(slope))
 }
 
 /// The focal length `−n₁ y₁ / (n' u')` of the ray that arrives parallel to the axis; infinite for
 /// an afocal system.
-pub(super) fn efl<R: Real>(system: &System<R>) -> R {
+pub(super) fn focal_length_of<R: Real>(system: &System<R>) -> R {
     let ray = paraxial_ray(system, R::ONE, R::ZERO);
     let last = system.surfaces.len() - 1;
     let index = signed_indices(system)[last + 1];
@@ -39,7 +39,7 @@ pub(super) fn efl<R: Real>(system: &System<R>) -> R {
 /// The paraxial image height per unit of `tan θ`, or of object height for a finite object.
 pub(super) fn image_scale<R: Real>(system: &System<R>, object: crate::lens::Object) -> R {
     match object {
-        crate::lens::Object::Infinity => efl(system) * system.index_before,
+        crate::lens::Object::Infinity => focal_length_of(system) * system.index_before,
         crate::lens::Object::Finite(distance) => {
             let ray = paraxial_ray(system, R::from_f64(distance), R::ONE);
             let last = system.surfaces.len() - 1;

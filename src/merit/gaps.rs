@@ -2,72 +2,85 @@
 //! length of the lens, room behind it. Each is the square of what is missing, zero where nothing
 //! is.
 
-use super::binding::{Systems, Zoom};
+use super::binding::{Configuration, ResolvedSystems};
 use super::first_order::slopes;
-use super::sum::Sum;
-use super::{Along, MeritError, Scene, Term};
+use super::sum::SumOfSquares;
+use super::{Dual1, EvaluationContext, MeritError, Term};
 use crate::lens::{Lens, System};
 use crate::math::Real;
 use serde::Serialize;
 
 /// Adds one of the terms about gaps.
-pub(super) fn gaps(scene: &Scene<'_>, term: Term, sum: &mut Sum) {
-    for Limited { of, min, max } in smoothly_limited(scene.zoom, scene.systems, term) {
-        let number = Number { of, scene };
+pub(super) fn add_constraints(scene: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
+    for Constraint { quantity: of, min, max } in smooth_constraints(scene.zoom, scene.systems, term)
+    {
+        let number = BoundedLength { quantity: of, scene };
         min.into_iter().for_each(|min| number.at_least(min, sum));
         max.into_iter().for_each(|max| number.at_most(max, sum));
     }
 }
 
 /// A number of a lens and what it may be.
-struct Limited {
-    of: Of,
+struct Constraint {
+    quantity: ConstrainedQuantity,
     min: Option<f64>,
     max: Option<f64>,
 }
 
 /// What a term limits, with glass limited at each of its two rims in place of the larger one: which
 /// of them is larger may change, and no search would find its way along that edge.
-fn smoothly_limited(zoom: &Zoom, systems: &Systems, term: Term) -> Vec<Limited> {
-    let Term::GlassEdge(min) = term else { return limited(zoom, systems, term) };
-    let at = |gap, rim| Limited { of: Of::Edge { gap, rim }, min: Some(min), max: None };
-    let both = |gap| [at(gap, Rim::Front), at(gap, Rim::Rear)];
+fn smooth_constraints(
+    zoom: &Configuration,
+    systems: &ResolvedSystems,
+    term: Term,
+) -> Vec<Constraint> {
+    let Term::GlassEdge(min) = term else { return constraints(zoom, systems, term) };
+    let at = |gap, rim| Constraint {
+        quantity: ConstrainedQuantity::Edge { gap, rim },
+        min: Some(min),
+        max: None,
+    };
+    let both = |gap| [at(gap, EdgeRadius::Front), at(gap, EdgeRadius::Rear)];
     zoom.inner_gaps(true).flat_map(both).collect()
 }
 
 /// Everything that a term limits.
-fn limited(zoom: &Zoom, systems: &Systems, term: Term) -> Vec<Limited> {
-    let last = zoom.glass.len() - 1;
-    let both = |of, min, max| Limited { of, min: Some(min), max: Some(max) };
-    let least = |of, min| Limited { of, min: Some(min), max: None };
-    let most = |of, max| Limited { of, min: None, max: Some(max) };
+fn constraints(zoom: &Configuration, systems: &ResolvedSystems, term: Term) -> Vec<Constraint> {
+    let last = zoom.is_glass.len() - 1;
+    let both = |of, min, max| Constraint { quantity: of, min: Some(min), max: Some(max) };
+    let least = |of, min| Constraint { quantity: of, min: Some(min), max: None };
+    let most = |of, max| Constraint { quantity: of, min: None, max: Some(max) };
     let gaps = |glass| zoom.inner_gaps(glass);
     match term {
         Term::GlassCenter { min, max } => {
-            gaps(true).map(|gap| both(Of::Center(gap), min, max)).collect()
+            gaps(true).map(|gap| both(ConstrainedQuantity::Center(gap), min, max)).collect()
         }
         Term::AirCenter { min, max } => {
-            gaps(false).map(|gap| both(Of::Center(gap), min, max)).collect()
+            gaps(false).map(|gap| both(ConstrainedQuantity::Center(gap), min, max)).collect()
         }
-        Term::GlassEdge(min) => {
-            gaps(true).map(|gap| least(Of::Edge { gap, rim: Rim::Larger }, min)).collect()
+        Term::GlassEdge(min) => gaps(true)
+            .map(|gap| least(ConstrainedQuantity::Edge { gap, rim: EdgeRadius::Larger }, min))
+            .collect(),
+        Term::AirEdge(min) => gaps(false)
+            .map(|gap| least(ConstrainedQuantity::Edge { gap, rim: EdgeRadius::Smaller }, min))
+            .collect(),
+        Term::TotalTrack(max) => vec![most(ConstrainedQuantity::Track, max)],
+        Term::BackFocus(min) => vec![least(ConstrainedQuantity::Center(last), min)],
+        Term::Steepness(max) => {
+            (0..=last).map(|i| most(ConstrainedQuantity::Steepness(i), max)).collect()
         }
-        Term::AirEdge(min) => {
-            gaps(false).map(|gap| least(Of::Edge { gap, rim: Rim::Smaller }, min)).collect()
-        }
-        Term::TotalTrack(max) => vec![most(Of::Track, max)],
-        Term::BackFocus(min) => vec![least(Of::Center(last), min)],
-        Term::Steepness(max) => (0..=last).map(|i| most(Of::Steepness(i), max)).collect(),
-        Term::SemiDiameter { min, max } => {
-            zoom.rims(systems).into_iter().map(|i| both(Of::Rim(i), min, max)).collect()
-        }
+        Term::SemiDiameter { min, max } => zoom
+            .clipping_surfaces(systems)
+            .into_iter()
+            .map(|i| both(ConstrainedQuantity::Rim(i), min, max))
+            .collect(),
         _ => Vec::new(),
     }
 }
 
 /// A number of a lens that a term limits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Margin {
+pub struct ConstraintMargin {
     /// Which term.
     pub term: &'static str,
     /// The surface, or the one in front of the gap; the field where it is light that is limited; none
@@ -83,9 +96,9 @@ pub struct Margin {
     pub max: Option<f64>,
 }
 
-impl Margin {
+impl ConstraintMargin {
     /// By how much it is inside of what it may be, less than 0 outside.
-    pub fn room(&self) -> f64 {
+    pub fn slack(&self) -> f64 {
         let below = self.min.map_or(f64::INFINITY, |min| self.value - min);
         below.min(self.max.map_or(f64::INFINITY, |max| max - self.value))
     }
@@ -95,69 +108,72 @@ impl Margin {
 ///
 /// # Errors
 /// A lens that cannot be resolved.
-pub fn margins(lens: &Lens, terms: impl Iterator<Item = Term>) -> Result<Vec<Margin>, MeritError> {
+pub fn constraint_margins(
+    lens: &Lens,
+    terms: impl Iterator<Item = Term>,
+) -> Result<Vec<ConstraintMargin>, MeritError> {
     let terms: Vec<Term> = terms.collect();
     let mut found = Vec::new();
     for number in 0..lens.zoom_positions() {
-        let zoom = Zoom::new(lens, number)?;
+        let zoom = Configuration::new(lens, number)?;
         let values: Vec<f64> =
             lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
         let systems = zoom.at(&values);
         for term in &terms {
-            let margin = |Limited { of, min, max }: Limited| Margin {
+            let margin = |Constraint { quantity: of, min, max }: Constraint| ConstraintMargin {
                 term: term.name(),
                 surface: of.surface(),
                 zoom: number,
-                value: of.length(&systems.rimmed[zoom.primary]),
+                value: of.length(&systems.clipped[zoom.primary]),
                 min,
                 max,
             };
             // What nothing limits, like the edge of a gap without rims, has no number.
-            let all = limited(&zoom, &systems, *term).into_iter().map(margin);
+            let all = constraints(&zoom, &systems, *term).into_iter().map(margin);
             found.extend(all.filter(|margin| margin.value.is_finite()));
         }
     }
     Ok(found)
 }
 
-impl Zoom {
+impl Configuration {
     /// The gaps of a kind, without the last one, which leads to the image.
     fn inner_gaps(&self, glass: bool) -> impl Iterator<Item = usize> + '_ {
-        (0..self.glass.len() - 1).filter(move |gap| self.glass[*gap] == glass)
+        (0..self.is_glass.len() - 1).filter(move |gap| self.is_glass[*gap] == glass)
     }
 
     /// The surfaces that have a rim.
-    fn rims(&self, found: &Systems) -> Vec<usize> {
-        let surfaces = &found.rimmed[self.primary].surfaces;
-        (0..self.glass.len()).filter(|i| surfaces[*i].semi_diameter.is_finite()).collect()
+    fn clipping_surfaces(&self, found: &ResolvedSystems) -> Vec<usize> {
+        let surfaces = &found.clipped[self.primary].surfaces;
+        (0..self.is_glass.len()).filter(|i| surfaces[*i].semi_diameter.is_finite()).collect()
     }
 }
 
 /// The smallest thicknesses that a lens has at any zoom position, in mm; infinite where it has no
 /// such gap.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Slimmest {
+pub(super) struct MinimumThickness {
     pub(super) glass_center: f64,
     pub(super) glass_edge: f64,
     pub(super) air_center: f64,
     pub(super) air_edge: f64,
 }
 
-impl Slimmest {
-    pub(super) fn of(lens: &Lens) -> Result<Self, MeritError> {
+impl MinimumThickness {
+    pub(super) fn measure(lens: &Lens) -> Result<Self, MeritError> {
         let none = f64::INFINITY;
         let mut found =
             Self { glass_center: none, glass_edge: none, air_center: none, air_edge: none };
         for number in 0..lens.zoom_positions() {
-            let zoom = Zoom::new(lens, number)?;
+            let zoom = Configuration::new(lens, number)?;
             let values: Vec<f64> =
                 lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
-            let system = &zoom.at(&values).rimmed[zoom.primary];
-            for gap in 0..zoom.glass.len() - 1 {
-                let center = Of::Center(gap).length(system);
-                let rim = if zoom.glass[gap] { Rim::Larger } else { Rim::Smaller };
-                let edge = Of::Edge { gap, rim }.length(system);
-                let (to_center, to_edge) = if zoom.glass[gap] {
+            let system = &zoom.at(&values).clipped[zoom.primary];
+            for gap in 0..zoom.is_glass.len() - 1 {
+                let center = ConstrainedQuantity::Center(gap).length(system);
+                let rim = if zoom.is_glass[gap] { EdgeRadius::Larger } else { EdgeRadius::Smaller };
+                let edge = ConstrainedQuantity::Edge { gap, rim }.length(system);
+                let (to_center, to_edge) = if zoom.is_glass[gap] {
                     (&mut found.glass_center, &mut found.glass_edge)
                 } else {
                     (&mut found.air_center, &mut found.air_edge)
@@ -172,12 +188,12 @@ impl Slimmest {
 
 /// A number that a term is about.
 #[derive(Clone, Copy)]
-enum Of {
+enum ConstrainedQuantity {
     Center(usize),
     /// The thickness at a rim; infinite where that is not limited.
     Edge {
         gap: usize,
-        rim: Rim,
+        rim: EdgeRadius,
     },
     Track,
     /// `|curvature| × semi-diameter`: 1 for a hemisphere; 0 where nothing limits the surface.
@@ -187,7 +203,7 @@ enum Of {
 
 /// Where a gap has its edge.
 #[derive(Clone, Copy)]
-enum Rim {
+enum EdgeRadius {
     /// Glass reaches to the larger semi-diameter of its two surfaces.
     Larger,
     /// Elements can touch only within the smaller one.
@@ -198,7 +214,7 @@ enum Rim {
     Rear,
 }
 
-impl Rim {
+impl EdgeRadius {
     /// Its semi-diameter; none where nothing limits it.
     fn height<R: Real>(self, front: R, rear: R) -> Option<R> {
         let limited = |rim: &R| rim.value() < f64::INFINITY;
@@ -212,7 +228,7 @@ impl Rim {
     }
 }
 
-impl Of {
+impl ConstrainedQuantity {
     fn surface(self) -> Option<usize> {
         match self {
             Self::Center(at) | Self::Edge { gap: at, .. } | Self::Steepness(at) | Self::Rim(at) => {
@@ -272,20 +288,20 @@ fn along_light<R: Real>(system: &System<R>, gap: usize) -> R {
 }
 
 /// A length of a lens, to be kept on one side of a bound.
-struct Number<'a> {
-    of: Of,
-    scene: &'a Scene<'a>,
+struct BoundedLength<'a> {
+    quantity: ConstrainedQuantity,
+    scene: &'a EvaluationContext<'a>,
 }
 
-impl Number<'_> {
-    fn at_least(&self, min: f64, sum: &mut Sum) {
+impl BoundedLength<'_> {
+    fn at_least(&self, min: f64, sum: &mut SumOfSquares) {
         let length = self.value();
         if length < min {
             self.residual(length - min, sum);
         }
     }
 
-    fn at_most(&self, max: f64, sum: &mut Sum) {
+    fn at_most(&self, max: f64, sum: &mut SumOfSquares) {
         let length = self.value();
         if length > max {
             self.residual(length - max, sum);
@@ -293,11 +309,12 @@ impl Number<'_> {
     }
 
     fn value(&self) -> f64 {
-        self.of.length(&self.scene.systems.rimmed[self.scene.zoom.primary])
+        self.quantity.length(&self.scene.systems.clipped[self.scene.zoom.primary])
     }
 
-    fn residual(&self, r: f64, sum: &mut Sum) {
-        let slope = slopes(self.scene, sum.detail, |system: &System<Along>| self.of.length(system));
-        sum.residual(1.0, r, &slope);
+    fn residual(&self, r: f64, sum: &mut SumOfSquares) {
+        let slope =
+            slopes(self.scene, sum.level, |system: &System<Dual1>| self.quantity.length(system));
+        sum.add_residual(1.0, r, &slope);
     }
 }

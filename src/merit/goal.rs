@@ -1,7 +1,7 @@
 //! What a lens is asked for.
 
 use super::MeritError;
-use super::gaps::Slimmest;
+use super::gaps::MinimumThickness;
 use crate::lens::{Lens, Object};
 use crate::paraxial::{Beam, first_order};
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Goal {
     /// The terms that are summed.
-    pub terms: Vec<Weighted>,
+    pub terms: Vec<WeightedTerm>,
     /// Whether derivatives know that the pupil moves with the lens.
     #[serde(default)]
     pub pupil: PupilEdge,
@@ -36,7 +36,7 @@ pub enum PupilEdge {
 /// A term and its weight.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Weighted {
+pub struct WeightedTerm {
     /// The term.
     pub term: Term,
     /// Its factor in the sum.
@@ -136,7 +136,7 @@ impl Term {
     }
 
     /// Whether it asks how much light gets through.
-    pub fn is_about_light(self) -> bool {
+    pub fn concerns_light(self) -> bool {
         matches!(
             self,
             Self::Throughput
@@ -199,15 +199,15 @@ impl Goal {
     /// What a designer would ask of a lens first: sharp spots at the focal length it has and with
     /// the light it has, glass and air that can be made or are no thinner than they are, nothing
     /// longer than it is by more than a fifth.
-    pub fn sensible(lens: &Lens) -> Result<Self, MeritError> {
+    pub fn default_for(lens: &Lens) -> Result<Self, MeritError> {
         let focal_lengths = focal_lengths(lens)?;
         let first = focal_lengths[0];
         let size = first.map_or_else(|| track(lens), f64::abs);
-        let mut terms = vec![Weighted { term: Term::Spot, weight: 1.0 }];
+        let mut terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
         if let Some(first) = first {
-            terms.push(Weighted { term: Term::FocalLength(first), weight: 1e-2 });
+            terms.push(WeightedTerm { term: Term::FocalLength(first), weight: 1e-2 });
         }
-        let now = Slimmest::of(lens)?;
+        let now = MinimumThickness::measure(lens)?;
         let (glass, air) = (0.012 * size, 0.002 * size);
         for term in [
             Term::GlassCenter { min: now.glass_center.clamp(0.0, glass), max: 0.5 * size },
@@ -216,9 +216,9 @@ impl Goal {
             Term::AirEdge(now.air_edge.clamp(0.0, 0.5 * air)),
             Term::TotalTrack(1.2 * track(lens)),
         ] {
-            terms.push(Weighted { term, weight: 1.0 });
+            terms.push(WeightedTerm { term, weight: 1.0 });
         }
-        terms.push(Weighted { term: Term::Light(1.0), weight: (LIGHT_IN_SPOT * size).powi(2) });
+        terms.push(WeightedTerm { term: Term::Light(1.0), weight: (LIGHT_IN_SPOT * size).powi(2) });
         let zoom_ratios = match first {
             Some(first) if lens.zoom.len() > 1 => {
                 focal_lengths.iter().map(|f| f.unwrap_or(first) / first).collect()
@@ -237,7 +237,7 @@ impl Goal {
         if !self.zoom_ratios.is_empty() && self.zoom_ratios.len() != lens.zoom_positions() {
             return refuse("it has not one of `zoom_ratios` for each zoom position");
         }
-        for Weighted { term, weight } in &self.terms {
+        for WeightedTerm { term, weight } in &self.terms {
             let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
             if !(weight.is_finite() && *weight >= 0.0) {
                 return refuse("its weight is not a number of zero or more");
@@ -269,9 +269,9 @@ impl Goal {
 fn focal_lengths(lens: &Lens) -> Result<Vec<Option<f64>>, MeritError> {
     let um = lens.wavelengths[lens.primary()].um;
     let focal_length = |zoom| {
-        let system = lens.system(zoom, um)?;
-        let first = first_order(&system, &Beam::of(lens, zoom));
-        let first = first.map_err(crate::pupil::BenchError::from)?;
+        let system = lens.resolve(zoom, um)?;
+        let first = first_order(&system, &Beam::for_lens(lens, zoom));
+        let first = first.map_err(crate::pupil::RayModelError::from)?;
         Ok(first.efl)
     };
     (0..lens.zoom_positions()).map(focal_length).collect()

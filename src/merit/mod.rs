@@ -20,22 +20,22 @@ mod sampling;
 mod spot;
 mod sum;
 
-pub use gaps::{Margin, margins};
-pub use goal::{Goal, PupilEdge, Term, Weighted};
-pub use sampling::Sampled;
+pub use gaps::{ConstraintMargin, constraint_margins};
+pub use goal::{Goal, PupilEdge, Term, WeightedTerm};
+pub use sampling::SpotSampling;
 
 use crate::lens::{Lens, LensError, Variable};
 use crate::math::Dual;
-use crate::pupil::{BenchError, Cost, LaunchError, Lit};
+use crate::pupil::{LaunchError, QuadraticIntegrand, RayModelError, TracedPupil};
 use crate::trace::Fate;
-use binding::Zoom;
+use binding::Configuration;
 use nalgebra::DVector;
-use sampling::Sampling;
+use sampling::RaySampling;
 use serde::Serialize;
-pub use sum::{Detail, Sum};
+pub use sum::{DerivativeLevel, SumOfSquares};
 
 /// A number with its derivative along one variable.
-type Along = Dual<f64, 1>;
+type Dual1 = Dual<f64, 1>;
 
 /// Why a lens has no merit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,7 +45,7 @@ pub enum MeritError {
     Lens(#[from] LensError),
     /// The beam.
     #[error(transparent)]
-    Bench(#[from] BenchError),
+    RayModel(#[from] RayModelError),
     /// A field without rays.
     #[error("field {field} at zoom position {zoom}: {cause}")]
     Launch {
@@ -71,7 +71,7 @@ pub enum MeritError {
         "ray {ray} of field {field} at zoom position {zoom}, {um} um, is lost: {} at surface {}",
         .fate.name(), .fate.surface().unwrap_or(0)
     )]
-    Lost {
+    RayLost {
         /// The ray of the field, counted from 0.
         ray: usize,
         /// The field, counted from 0.
@@ -126,10 +126,10 @@ pub struct Merit {
     goal: Goal,
     lens: Lens,
     variables: Vec<Variable>,
-    zooms: Vec<Zoom>,
-    samplings: Vec<Sampling>,
+    zooms: Vec<Configuration>,
+    samplings: Vec<RaySampling>,
     /// The areas of the pupils with which it began, by zoom position.
-    start: Vec<Vec<f64>>,
+    initial_areas: Vec<Vec<f64>>,
     tolerance: f64,
 }
 
@@ -140,7 +140,7 @@ impl Merit {
         lens.check()?;
         let mut zooms = Vec::new();
         for zoom in 0..lens.zoom_positions() {
-            zooms.push(Zoom::new(lens, zoom)?);
+            zooms.push(Configuration::new(lens, zoom)?);
         }
         let mut merit = Self {
             goal: goal.clone(),
@@ -148,12 +148,12 @@ impl Merit {
             variables: lens.variables.clone(),
             zooms,
             samplings: Vec::new(),
-            start: Vec::new(),
+            initial_areas: Vec::new(),
             tolerance,
         };
         merit.goal.check(lens)?;
         merit.resample(lens)?;
-        merit.start = merit.samplings.iter().map(Sampling::areas).collect();
+        merit.initial_areas = merit.samplings.iter().map(RaySampling::areas).collect();
         Ok(merit)
     }
 
@@ -161,25 +161,25 @@ impl Merit {
     pub fn resample(&mut self, lens: &Lens) -> Result<(), MeritError> {
         let positions = 0..lens.zoom_positions();
         // A lens without light can be asked for light.
-        let about_light = self.goal.terms.iter().any(|w| w.term.is_about_light());
+        let about_light = self.goal.terms.iter().any(|w| w.term.concerns_light());
         let dark = about_light && self.goal.pupil == PupilEdge::Moving;
         let found: Result<Vec<_>, _> =
-            positions.map(|zoom| Sampling::new(lens, zoom, self.tolerance, dark)).collect();
+            positions.map(|zoom| RaySampling::new(lens, zoom, self.tolerance, dark)).collect();
         self.samplings = found?;
         Ok(())
     }
 
     /// The areas of the pupils of the lens with which the search began, by zoom position: what
     /// [`Term::Light`] compares with.
-    pub fn light_at_start(&self) -> &[Vec<f64>] {
-        &self.start
+    pub fn initial_light(&self) -> &[Vec<f64>] {
+        &self.initial_areas
     }
 
     /// The same merit, compared with the light of another lens of as many zoom positions, fields
     /// and wavelengths, whatever its structure.
     #[must_use]
-    pub fn compared_with(mut self, light_at_start: &[Vec<f64>]) -> Self {
-        self.start = light_at_start.to_vec();
+    pub fn with_initial_light(mut self, light_at_start: &[Vec<f64>]) -> Self {
+        self.initial_areas = light_at_start.to_vec();
         self
     }
 
@@ -209,32 +209,36 @@ impl Merit {
     }
 
     /// Whether light gets through at every field, zoom position and wavelength.
-    pub fn is_lit(&self) -> bool {
+    pub fn has_light(&self) -> bool {
         self.samplings.iter().flat_map(|sampling| &sampling.pupils).all(|pupil| pupil.area > 0.0)
     }
 
     /// How the spots are sampled, by zoom position, field and wavelength; a spot without rays has no
     /// light and counts nothing.
-    pub fn sampled(&self) -> Vec<Sampled> {
-        self.samplings.iter().flat_map(Sampling::sampled).collect()
+    pub fn spot_samplings(&self) -> Vec<SpotSampling> {
+        self.samplings.iter().flat_map(RaySampling::spot_samplings).collect()
     }
 
     /// The mean area of the pupils over all spots, in mm² of the first vertex plane. A goal without
     /// a term for light may buy sharpness by clipping it, so it is worth a look.
     pub fn light(&self) -> f64 {
-        let sampled = self.sampled();
+        let sampled = self.spot_samplings();
         sampled.iter().map(|spot| spot.area).sum::<f64>() / sampled.len().max(1) as f64
     }
 
     /// The merit at these values of the variables.
     pub fn value(&self, values: &[f64]) -> Result<f64, MeritError> {
-        self.sum(values, Detail::Value).map(|sum| sum.value)
+        self.evaluate(values, DerivativeLevel::Value).map(|sum| sum.value)
     }
 
     /// The merit, its derivatives, and, where asked for, the normal equations of its residuals.
-    pub fn sum(&self, values: &[f64], detail: Detail) -> Result<Sum, MeritError> {
-        let mut total = Sum::zero(values.len(), detail);
-        for (sum, weighted) in self.sums(values, detail)?.iter().zip(&self.goal.terms) {
+    pub fn evaluate(
+        &self,
+        values: &[f64],
+        detail: DerivativeLevel,
+    ) -> Result<SumOfSquares, MeritError> {
+        let mut total = SumOfSquares::zero(values.len(), detail);
+        for (sum, weighted) in self.evaluate_terms(values, detail)?.iter().zip(&self.goal.terms) {
             total.add(sum, weighted.weight);
         }
         Ok(total)
@@ -242,50 +246,68 @@ impl Merit {
 
     /// Every term by itself.
     pub fn terms(&self, values: &[f64]) -> Result<Vec<TermValue>, MeritError> {
-        let report = |(sum, weighted): (Sum, &Weighted)| {
-            let (error, rays) = self.trust(weighted.term, sum.value);
+        let report = |(sum, weighted): (SumOfSquares, &WeightedTerm)| {
+            let (error, rays) = self.error_and_rays(weighted.term, sum.value);
             let (term, weight) = (weighted.term.name(), weighted.weight);
             TermValue { term, weight, value: sum.value, error, rays }
         };
-        let sums = self.sums(values, Detail::Value)?;
+        let sums = self.evaluate_terms(values, DerivativeLevel::Value)?;
         Ok(sums.into_iter().zip(&self.goal.terms).map(report).collect())
     }
 
     /// Estimated error and rays of a term.
-    fn trust(&self, term: Term, value: f64) -> (f64, usize) {
-        let sampled = self.sampled();
+    fn error_and_rays(&self, term: Term, value: f64) -> (f64, usize) {
+        let sampled = self.spot_samplings();
         let worst = sampled.iter().fold(0.0, |e: f64, s| e.max(s.error));
         let rays = sampled.iter().map(|s| s.rays).sum();
         match term {
             Term::Spot | Term::SpotIntegral => (2.0 * worst * value, rays),
-            _ if term.is_about_light() => (worst * value.abs(), rays),
-            Term::Distortion => (0.0, self.samplings.iter().map(Sampling::chiefs).sum()),
+            _ if term.concerns_light() => (worst * value.abs(), rays),
+            Term::Distortion => (0.0, self.samplings.iter().map(RaySampling::chief_count).sum()),
             _ => (0.0, 0),
         }
     }
 
     /// The sum of every term, the mean over the zoom positions.
-    fn sums(&self, values: &[f64], detail: Detail) -> Result<Vec<Sum>, MeritError> {
-        let mut sums = vec![Sum::zero(values.len(), detail); self.goal.terms.len()];
-        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.start);
+    fn evaluate_terms(
+        &self,
+        values: &[f64],
+        detail: DerivativeLevel,
+    ) -> Result<Vec<SumOfSquares>, MeritError> {
+        let mut sums = vec![SumOfSquares::zero(values.len(), detail); self.goal.terms.len()];
+        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
         for ((zoom, sampling), start) in positions {
             let systems = zoom.at(values);
-            if self.follows_pupils() {
-                let bench = zoom.bench(&systems, &self.lens, sampling.aiming)?;
-                let light = sampling.lit(&bench, true);
+            if self.needs_pupil_edges() {
+                let bench = zoom.ray_model(&systems, &self.lens, sampling.aiming)?;
+                let light = sampling.trace_pupils(&bench, true);
                 sampling.check_light(&light)?;
-                if bench.is_graded() && light.iter().any(Lit::is_ragged) {
+                if bench.has_grin() && light.iter().any(TracedPupil::is_irregular) {
                     let why = "the pupil is in pieces or not star-shaped, and nothing tells how \
                                its edge moves with a gradient; expected a goal that keeps its pupils";
                     return Err(MeritError::DoesNotApply { term: "pupil", why });
                 }
-                let sampling = &sampling.with_light(&bench, &light);
+                let sampling = &sampling.with_pupils(&bench, &light);
                 let light = &light[..];
-                let scene = Scene { zoom, sampling, systems: &systems, values, start, light };
+                let scene = EvaluationContext {
+                    zoom,
+                    sampling,
+                    systems: &systems,
+                    values,
+                    initial_areas: start,
+                    traced_pupils: light,
+                };
                 self.add_terms(&scene, &mut sums)?;
             } else {
                 let light = &[];
-                let scene = Scene { zoom, sampling, systems: &systems, values, start, light };
+                let scene = EvaluationContext {
+                    zoom,
+                    sampling,
+                    systems: &systems,
+                    values,
+                    initial_areas: start,
+                    traced_pupils: light,
+                };
                 self.add_terms(&scene, &mut sums)?;
             }
         }
@@ -299,24 +321,30 @@ impl Merit {
     }
 
     /// Whether some term needs to know where the edges of the pupils are.
-    fn follows_pupils(&self) -> bool {
+    fn needs_pupil_edges(&self) -> bool {
         let needs =
-            |term: Term| matches!(term, Term::Spot | Term::SpotIntegral) || term.is_about_light();
+            |term: Term| matches!(term, Term::Spot | Term::SpotIntegral) || term.concerns_light();
         self.goal.pupil == PupilEdge::Moving && self.goal.terms.iter().any(|w| needs(w.term))
     }
 
-    fn add_terms(&self, scene: &Scene<'_>, sums: &mut [Sum]) -> Result<(), MeritError> {
+    fn add_terms(
+        &self,
+        scene: &EvaluationContext<'_>,
+        sums: &mut [SumOfSquares],
+    ) -> Result<(), MeritError> {
         for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
             match weighted.term {
-                Term::Spot => spot::spot(scene, spot::Per::Area, sum)?,
-                Term::SpotIntegral => spot::spot(scene, spot::Per::Nothing, sum)?,
-                Term::Distortion => spot::distortion(scene, sum)?,
+                Term::Spot => spot::add_spot(scene, spot::Normalization::PupilArea, sum)?,
+                Term::SpotIntegral => {
+                    spot::add_spot(scene, spot::Normalization::Unnormalized, sum)?
+                }
+                Term::Distortion => spot::add_distortion(scene, sum)?,
                 Term::FocalLength(target) => {
-                    let target = self.goal.target(scene.zoom.number, target);
+                    let target = self.goal.target(scene.zoom.zoom, target);
                     first_order::focal_length(scene, target, sum);
                 }
-                term if term.is_about_light() => light::light(scene, term, sum),
-                term => gaps::gaps(scene, term, sum),
+                term if term.concerns_light() => light::add_light_term(scene, term, sum),
+                term => gaps::add_constraints(scene, term, sum),
             }
         }
         Ok(())
@@ -324,26 +352,31 @@ impl Merit {
 }
 
 /// A lens at one zoom position and some values of the variables.
-struct Scene<'a> {
-    zoom: &'a Zoom,
-    sampling: &'a Sampling,
-    systems: &'a binding::Systems,
+struct EvaluationContext<'a> {
+    zoom: &'a Configuration,
+    sampling: &'a RaySampling,
+    systems: &'a binding::ResolvedSystems,
     values: &'a [f64],
     /// The areas of the pupils with which the search began.
-    start: &'a [f64],
+    initial_areas: &'a [f64],
     /// The light of every pupil of the sampling; none where pupils are kept.
-    light: &'a [Lit<'a>],
+    traced_pupils: &'a [TracedPupil<'a>],
 }
 
-impl Scene<'_> {
+impl EvaluationContext<'_> {
     /// The derivatives by the variables that the motion of the pupils' edges contributes to
     /// integrals of these costs, one for each pupil; zeros where pupils are kept.
-    fn edge_motion(&self, costs: impl Iterator<Item = Cost>) -> DVector<f64> {
+    fn edge_motion(&self, costs: impl Iterator<Item = QuadraticIntegrand>) -> DVector<f64> {
         let mut total = DVector::zeros(self.values.len());
-        for ((lit, pupil), cost) in self.light.iter().zip(&self.sampling.pupils).zip(costs) {
+        for ((lit, pupil), cost) in self.traced_pupils.iter().zip(&self.sampling.pupils).zip(costs)
+        {
             let asked = cost.square != 0.0 || cost.constant != 0.0;
             if asked {
-                total += self.zoom.collect(self.systems, pupil.wavelength, &lit.motion(&cost));
+                total += self.zoom.by_variables(
+                    self.systems,
+                    pupil.wavelength,
+                    &lit.robust_edge_motion(&cost),
+                );
             }
         }
         total

@@ -1,9 +1,10 @@
 //! The rays that spots are computed from, found once to a tolerance.
 
 use super::MeritError;
-use crate::lens::{Field, Lens};
+use crate::lens::{FieldPoint, Lens};
 use crate::pupil::{
-    Accuracy, Aiming, Anchor, Bench, Kind, Launch, Lit, Moments, Nodes, Region, converged,
+    Accuracy, Aiming, FixedLaunch, Launch, Nodes, PupilMoments, RayModel, Region, RegionKind,
+    TracedPupil, converge,
 };
 use crate::trace::{Ray, Rays};
 use serde::Serialize;
@@ -11,7 +12,7 @@ use std::f64::consts::PI;
 
 /// How one spot is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Sampled {
+pub struct SpotSampling {
     /// The zoom position.
     pub zoom: usize,
     /// The field, counted from 0.
@@ -31,7 +32,7 @@ pub struct Sampled {
 
 /// The pupil of one field and wavelength, as it was when it was looked for.
 #[derive(Debug, Clone)]
-pub(super) struct Pupil {
+pub(super) struct SampledPupil {
     pub(super) field: usize,
     pub(super) wavelength: usize,
     /// Its part of the whole: fields and wavelengths weighted, one in all.
@@ -40,12 +41,12 @@ pub(super) struct Pupil {
     pub(super) weight: f64,
     /// The cosine of the angle with the axis at which a collimated beam arrives.
     cosine: Option<f64>,
-    anchor: Anchor,
-    kind: Kind,
+    anchor: FixedLaunch,
+    kind: RegionKind,
     /// The order of quadrature that was good enough.
     order: usize,
-    pub(super) moments: Moments,
-    /// [`Lit::area`], in mm².
+    pub(super) moments: PupilMoments,
+    /// [`TracedPupil::signed_area`], in mm².
     pub(super) area: f64,
     /// The area of the ideal entrance pupil, in mm².
     ideal: f64,
@@ -53,20 +54,20 @@ pub(super) struct Pupil {
 
 /// The rays of one zoom position.
 #[derive(Debug, Clone)]
-pub(super) struct Sampling {
+pub(super) struct RaySampling {
     /// One for each wavelength, all fields one after the other.
-    pub(super) colors: Vec<Color>,
+    pub(super) channels: Vec<ChannelRays>,
     /// The chief ray of each field at the primary wavelength.
-    pub(super) chief: Rays<f64>,
-    pub(super) fields: Vec<Field>,
-    pub(super) pupils: Vec<Pupil>,
+    pub(super) chief_rays: Rays<f64>,
+    pub(super) fields: Vec<FieldPoint>,
+    pub(super) pupils: Vec<SampledPupil>,
     pub(super) aiming: Aiming,
-    sampled: Vec<Sampled>,
+    spot_samplings: Vec<SpotSampling>,
 }
 
 /// The rays at one wavelength.
 #[derive(Debug, Clone)]
-pub(super) struct Color {
+pub(super) struct ChannelRays {
     pub(super) um: f64,
     pub(super) rays: Rays<f64>,
     /// The share of each ray in the spot of its field, fields and wavelengths weighted.
@@ -77,16 +78,16 @@ pub(super) struct Color {
     pub(super) mirrored: Vec<bool>,
 }
 
-impl Color {
+impl ChannelRays {
     fn new(um: f64) -> Self {
         let (weights, ends, mirrored) = (Vec::new(), Vec::new(), Vec::new());
         Self { um, rays: Rays::default(), weights, ends, mirrored }
     }
 
     /// Adds the rays of a pupil with their share of the whole.
-    fn add(&mut self, lit: &Lit<'_>, share: f64) {
-        let weight: f64 = lit.landed.arrived().map(|(_, w)| w).sum();
-        for (i, w) in lit.landed.arrived() {
+    fn add_pupil(&mut self, lit: &TracedPupil<'_>, share: f64) {
+        let weight: f64 = lit.landed.arrivals().map(|(_, w)| w).sum();
+        for (i, w) in lit.landed.arrivals() {
             self.rays.push(lit.rays.get(i));
             self.weights.push(share * w / weight);
         }
@@ -99,7 +100,7 @@ impl Color {
     }
 }
 
-impl Sampling {
+impl RaySampling {
     /// Finds the pupils of a lens, each sampled so that the radius of its spot is good to a
     /// tolerance. A lens without any light is refused unless `dark_too`.
     pub(super) fn new(
@@ -108,56 +109,56 @@ impl Sampling {
         tolerance: f64,
         dark_too: bool,
     ) -> Result<Self, MeritError> {
-        let bench = Bench::of(lens, zoom)?;
+        let bench = RayModel::from_lens(lens, zoom)?;
         let mut sampling = Self {
-            colors: Vec::new(),
-            chief: Rays::default(),
+            channels: Vec::new(),
+            chief_rays: Rays::default(),
             fields: bench.fields.clone(),
             pupils: Vec::new(),
             aiming: bench.aiming,
-            sampled: Vec::new(),
+            spot_samplings: Vec::new(),
         };
         let total: f64 = sampling.fields.iter().map(|f| f.weight).sum();
-        let colors: f64 = bench.colors.iter().map(|c| c.weight).sum();
-        for (wavelength, color) in bench.colors.iter().enumerate() {
+        let colors: f64 = bench.channels.iter().map(|c| c.weight).sum();
+        for (wavelength, color) in bench.channels.iter().enumerate() {
             for number in 0..sampling.fields.len() {
                 let field = sampling.fields[number];
-                let place = Sampled::at(zoom, number, color.um);
+                let place = SpotSampling::unlit(zoom, number, color.um);
                 let launch = bench.launch(field, wavelength);
                 let launch =
                     launch.map_err(|cause| MeritError::Launch { field: number, zoom, cause })?;
                 if wavelength == bench.primary {
-                    sampling.chief.push(chief(&launch).ok_or_else(|| dark(&place))?);
+                    sampling.chief_rays.push(chief_ray(&launch).ok_or_else(|| no_light(&place))?);
                 }
                 let share = field.weight / total * color.weight / colors;
                 if share > 0.0 {
-                    sampling.look(launch, share, tolerance, place);
+                    sampling.find_pupil(launch, share, tolerance, place);
                 }
             }
         }
-        sampling.share_of_light();
-        let lit = sampling.lit(&bench, false);
-        sampling.colors = sampling.colors(&bench, &lit);
+        sampling.redistribute_dark_shares();
+        let lit = sampling.trace_pupils(&bench, false);
+        sampling.channels = sampling.channel_rays(&bench, &lit);
         for (sampled, (pupil, lit)) in
-            sampling.sampled.iter_mut().zip(sampling.pupils.iter_mut().zip(&lit))
+            sampling.spot_samplings.iter_mut().zip(sampling.pupils.iter_mut().zip(&lit))
         {
-            (pupil.moments, pupil.area) = (lit.moments, lit.area());
+            (pupil.moments, pupil.area) = (lit.moments, lit.signed_area());
             sampled.area = lit.moments.area;
-            sampled.light = lit.landed.arrived().map(|(_, w)| w).sum::<f64>() / PI;
+            sampled.light = lit.landed.arrivals().map(|(_, w)| w).sum::<f64>() / PI;
             sampled.rays = if sampled.light > 0.0 { lit.rays.len() } else { 0 };
         }
-        match sampling.sampled.first() {
-            Some(first) if !dark_too && sampling.sampled.iter().all(|s| s.rays == 0) => {
-                Err(dark(first))
+        match sampling.spot_samplings.first() {
+            Some(first) if !dark_too && sampling.spot_samplings.iter().all(|s| s.rays == 0) => {
+                Err(no_light(first))
             }
             _ => Ok(sampling),
         }
     }
 
     /// Looks for the pupil of a field and how finely it has to be sampled.
-    fn look(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: Sampled) {
+    fn find_pupil(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: SpotSampling) {
         let (field, wavelength) = (place.field, launch.wavelength);
-        let (anchor, cosine) = (launch.anchor(), launch.cosine());
+        let (anchor, cosine) = (launch.to_fixed(), launch.axis_cosine());
         let ideal = PI * launch.area();
         let region = Region::new(launch);
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
@@ -167,11 +168,11 @@ impl Sampling {
             let moments = region.moments(nodes);
             (moments.area > 0.0).then(|| [(moments.spread / moments.area).sqrt()])
         };
-        let found = converged(&region, accuracy, radius, |values| *values);
+        let found = converge(&region, accuracy, radius, |values| *values);
         let error = found.map_or(0.0, |f| f.errors[0] / f.values[0].max(f64::MIN_POSITIVE));
-        let (kind, moments) = (region.kind, Moments::default());
+        let (kind, moments) = (region.kind, PupilMoments::default());
         let order = orders.saturating_sub(1);
-        self.pupils.push(Pupil {
+        self.pupils.push(SampledPupil {
             field,
             wavelength,
             share,
@@ -184,12 +185,14 @@ impl Sampling {
             area: 0.0,
             ideal,
         });
-        self.sampled.push(Sampled { error, ..place });
+        self.spot_samplings.push(SpotSampling { error, ..place });
     }
 
     /// Spots without light leave their share to the others.
-    fn share_of_light(&mut self) {
-        let is_lit = |pupil: &&mut Pupil| !matches!(pupil.kind, Kind::Dark | Kind::Endless);
+    fn redistribute_dark_shares(&mut self) {
+        let is_lit = |pupil: &&mut SampledPupil| {
+            !matches!(pupil.kind, RegionKind::Dark | RegionKind::Unbounded)
+        };
         let lit: f64 = self.pupils.iter_mut().filter(is_lit).map(|pupil| pupil.share).sum();
         if lit > 0.0 {
             self.pupils.iter_mut().filter(is_lit).for_each(|pupil| pupil.share /= lit);
@@ -197,50 +200,55 @@ impl Sampling {
     }
 
     /// The light of every pupil through a lens: where it was found, or followed to where it is now.
-    pub(super) fn lit<'a>(&self, bench: &'a Bench, follow: bool) -> Vec<Lit<'a>> {
-        let lit = |pupil: &Pupil| {
+    pub(super) fn trace_pupils<'a>(
+        &self,
+        bench: &'a RayModel,
+        follow: bool,
+    ) -> Vec<TracedPupil<'a>> {
+        let lit = |pupil: &SampledPupil| {
             let launch = pupil.anchor.launch(bench);
             let region = if follow {
-                Region::followed(&pupil.kind, launch)
+                Region::track(&pupil.kind, launch)
             } else {
                 Region { launch, kind: pupil.kind.clone(), rays: 0 }
             };
-            region.lit(pupil.order)
+            region.trace_pupil(pupil.order)
         };
         self.pupils.iter().map(lit).collect()
     }
 
     /// Refuses light that has gone out since the pupils were looked for: a spot without light is
     /// none, and would be the sharpest of all.
-    pub(super) fn check_light(&self, lit: &[Lit<'_>]) -> Result<(), MeritError> {
-        let was_lit = |pupil: &Pupil| pupil.moments.area > 0.0;
-        let mut all = self.pupils.iter().zip(lit).zip(&self.sampled);
+    pub(super) fn check_light(&self, lit: &[TracedPupil<'_>]) -> Result<(), MeritError> {
+        let was_lit = |pupil: &SampledPupil| pupil.moments.area > 0.0;
+        let mut all = self.pupils.iter().zip(lit).zip(&self.spot_samplings);
         match all.find(|((pupil, lit), _)| was_lit(pupil) && !(lit.moments.area > 0.0)) {
-            Some((_, place)) => Err(dark(place)),
+            Some((_, place)) => Err(no_light(place)),
             None => Ok(()),
         }
     }
 
     /// The same sampling with the rays of other light.
-    pub(super) fn with_light(&self, bench: &Bench, lit: &[Lit<'_>]) -> Self {
+    pub(super) fn with_pupils(&self, bench: &RayModel, lit: &[TracedPupil<'_>]) -> Self {
         let mut pupils = self.pupils.clone();
         for (pupil, lit) in pupils.iter_mut().zip(lit) {
-            (pupil.moments, pupil.area) = (lit.moments, lit.area());
+            (pupil.moments, pupil.area) = (lit.moments, lit.signed_area());
         }
-        Self { colors: self.colors(bench, lit), pupils, ..self.clone() }
+        Self { channels: self.channel_rays(bench, lit), pupils, ..self.clone() }
     }
 
     /// The rays of all pupils, sorted by wavelength and field.
-    fn colors(&self, bench: &Bench, lit: &[Lit<'_>]) -> Vec<Color> {
-        let mut colors: Vec<Color> = bench.colors.iter().map(|c| Color::new(c.um)).collect();
+    fn channel_rays(&self, bench: &RayModel, lit: &[TracedPupil<'_>]) -> Vec<ChannelRays> {
+        let mut colors: Vec<ChannelRays> =
+            bench.channels.iter().map(|c| ChannelRays::new(c.um)).collect();
         for (wavelength, color) in colors.iter_mut().enumerate() {
             for field in 0..self.fields.len() {
                 color.mirrored.push(self.fields[field].x == 0.0);
-                let here = |(pupil, _): &(&Pupil, &Lit<'_>)| {
+                let here = |(pupil, _): &(&SampledPupil, &TracedPupil<'_>)| {
                     (pupil.wavelength, pupil.field) == (wavelength, field)
                 };
                 let mine = self.pupils.iter().zip(lit).filter(here);
-                mine.for_each(|(pupil, lit)| color.add(lit, pupil.share));
+                mine.for_each(|(pupil, lit)| color.add_pupil(lit, pupil.share));
                 color.ends.push(color.weights.len());
             }
         }
@@ -249,7 +257,7 @@ impl Sampling {
 
     /// The areas of the pupils; of dark ones those that they would ideally have.
     pub(super) fn areas(&self) -> Vec<f64> {
-        let area = |pupil: &Pupil| if pupil.area > 0.0 { pupil.area } else { pupil.ideal };
+        let area = |pupil: &SampledPupil| if pupil.area > 0.0 { pupil.area } else { pupil.ideal };
         self.pupils.iter().map(area).collect()
     }
 
@@ -263,31 +271,31 @@ impl Sampling {
         self.pupils.iter().find(|pupil| pupil.field == field)?.cosine
     }
 
-    pub(super) fn sampled(&self) -> Vec<Sampled> {
-        self.sampled.clone()
+    pub(super) fn spot_samplings(&self) -> Vec<SpotSampling> {
+        self.spot_samplings.clone()
     }
 
     /// Whether no light of a field gets through at any wavelength.
     pub(super) fn is_dark(&self, field: usize) -> bool {
-        self.colors.iter().all(|color| color.range(field).is_empty())
+        self.channels.iter().all(|color| color.range(field).is_empty())
     }
 
-    pub(super) fn chiefs(&self) -> usize {
-        self.chief.len()
+    pub(super) fn chief_count(&self) -> usize {
+        self.chief_rays.len()
     }
 }
 
-impl Sampled {
-    fn at(zoom: usize, field: usize, um: f64) -> Self {
+impl SpotSampling {
+    fn unlit(zoom: usize, field: usize, um: f64) -> Self {
         Self { zoom, field, um, rays: 0, error: 0.0, light: 0.0, area: 0.0 }
     }
 }
 
-fn dark(place: &Sampled) -> MeritError {
+fn no_light(place: &SpotSampling) -> MeritError {
     MeritError::NoLight { field: place.field, zoom: place.zoom, um: place.um }
 }
 
 /// The ray through the centre of the pupil.
-fn chief(launch: &Launch<'_>) -> Option<Ray<f64>> {
+fn chief_ray(launch: &Launch<'_>) -> Option<Ray<f64>> {
     launch.ray([0.0, 0.0])
 }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// How much of a sum is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Detail {
+pub enum DerivativeLevel {
     /// The value alone.
     Value,
     /// The value and its derivatives.
@@ -15,9 +15,9 @@ pub enum Detail {
 
 /// `Σ w r²` with its derivatives by the variables.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sum {
+pub struct SumOfSquares {
     /// How much of it is computed.
-    pub detail: Detail,
+    pub level: DerivativeLevel,
     /// The sum.
     pub value: f64,
     /// `2 Σ w r ∂r`.
@@ -26,19 +26,19 @@ pub struct Sum {
     pub normal: DMatrix<f64>,
 }
 
-impl Sum {
+impl SumOfSquares {
     /// Zero for this many variables.
-    pub fn zero(variables: usize, detail: Detail) -> Self {
-        let rows = if detail == Detail::Normal { variables } else { 0 };
+    pub fn zero(variables: usize, detail: DerivativeLevel) -> Self {
+        let rows = if detail == DerivativeLevel::Normal { variables } else { 0 };
         let gradient = DVector::zeros(variables);
-        Self { detail, value: 0.0, gradient, normal: DMatrix::zeros(rows, rows) }
+        Self { level: detail, value: 0.0, gradient, normal: DMatrix::zeros(rows, rows) }
     }
 
     /// Adds `weight` times another one.
     pub fn add(&mut self, other: &Self, weight: f64) {
         self.value += weight * other.value;
         self.gradient.axpy(weight, &other.gradient, 1.0);
-        if self.detail == Detail::Normal {
+        if self.level == DerivativeLevel::Normal {
             self.normal += &other.normal * weight;
         }
     }
@@ -51,12 +51,12 @@ impl Sum {
     }
 
     /// Adds `weight r²` with `slope = ∂r`.
-    pub fn residual(&mut self, weight: f64, r: f64, slope: &DVector<f64>) {
+    pub fn add_residual(&mut self, weight: f64, r: f64, slope: &DVector<f64>) {
         self.value += weight * r * r;
-        if self.detail > Detail::Value {
+        if self.level > DerivativeLevel::Value {
             self.gradient.axpy(2.0 * weight * r, slope, 1.0);
         }
-        if self.detail == Detail::Normal {
+        if self.level == DerivativeLevel::Normal {
             self.normal.ger(weight, slope, slope, 1.0);
         }
     }

@@ -6,10 +6,10 @@
 //! number of steps, while its rate falls to zero as a cosine (Loshchilov and Hutter, "SGDR", ICLR
 //! 2017), so that a run costs what it was meant to cost.
 
-use super::state::State;
-use super::{Optimizer, Progress};
+use super::state::OptimizerState;
+use super::{OptimizationProgress, Optimizer};
 use crate::lens::Lens;
-use crate::merit::{Detail, Merit, MeritError, TermValue};
+use crate::merit::{DerivativeLevel, Merit, MeritError, TermValue};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -28,27 +28,27 @@ const ANNEALED_RATE: f64 = 0.01;
 
 /// How the rate falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Pace {
+pub(super) enum LearningRate {
     /// By half, whenever patience ends.
-    Patient,
+    ReduceOnPlateau,
     /// As a cosine, to zero after so many steps.
-    Annealed(usize),
+    CosineAnnealing(usize),
 }
 
 /// The running means of a gradient in scaled variables and of its square.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Moments {
+pub(super) struct AdamMoments {
     mean: Vec<f64>,
     square: Vec<f64>,
     /// Gradients that they have seen.
     age: i32,
 }
 
-impl Moments {
+impl AdamMoments {
     /// Takes a gradient in; the step that follows, in scaled variables. None is taken through a
     /// bound at which a variable is held.
-    pub(super) fn step(&mut self, gradient: &[f64], state: &State, rate: f64) -> Vec<f64> {
+    pub(super) fn step(&mut self, gradient: &[f64], state: &OptimizerState, rate: f64) -> Vec<f64> {
         if self.mean.len() != gradient.len() {
             *self = Self::default();
             self.mean.resize(gradient.len(), 0.0);
@@ -57,7 +57,7 @@ impl Moments {
         self.age = self.age.saturating_add(1);
         let [b1, b2] = DECAY;
         let (c1, c2) = (1.0 - b1.powi(self.age), 1.0 - b2.powi(self.age));
-        let held = state.held(gradient);
+        let held = state.at_bounds(gradient);
         let step = |i: usize| {
             let g = gradient[i] * state.scales[i];
             self.mean[i] = b1 * self.mean[i] + (1.0 - b1) * g;
@@ -70,27 +70,27 @@ impl Moments {
 }
 
 #[derive(Debug)]
-pub(super) struct Adam {
-    state: State,
+pub(super) struct AdamOptimizer {
+    state: OptimizerState,
     gradient: Vec<f64>,
-    moments: Moments,
+    moments: AdamMoments,
     rate: f64,
-    pace: Pace,
+    schedule: LearningRate,
     since_better: usize,
 }
 
-impl Adam {
-    pub(super) fn new(merit: Merit, lens: &Lens, pace: Pace) -> Result<Self, MeritError> {
-        let mut state = State::new(merit, lens)?;
-        let sum = state.merit.sum(&state.values, Detail::Normal)?;
-        if pace == Pace::Patient {
+impl AdamOptimizer {
+    pub(super) fn new(merit: Merit, lens: &Lens, pace: LearningRate) -> Result<Self, MeritError> {
+        let mut state = OptimizerState::new(merit, lens)?;
+        let sum = state.merit.evaluate(&state.values, DerivativeLevel::Normal)?;
+        if pace == LearningRate::ReduceOnPlateau {
             state.rescale(&sum);
         }
         Ok(Self {
             gradient: sum.gradient.iter().copied().collect(),
-            moments: Moments::default(),
-            rate: if pace == Pace::Patient { RATE } else { ANNEALED_RATE },
-            pace,
+            moments: AdamMoments::default(),
+            rate: if pace == LearningRate::ReduceOnPlateau { RATE } else { ANNEALED_RATE },
+            schedule: pace,
             since_better: 0,
             state,
         })
@@ -102,35 +102,36 @@ impl Adam {
     }
 
     /// Back to the best lens with half of the rate and fresh moments.
-    fn slow_down(&mut self) {
+    fn reduce_rate(&mut self) {
         self.rate *= 0.5;
         self.since_better = 0;
-        self.moments = Moments::default();
+        self.moments = AdamMoments::default();
         self.state.return_to_best();
         self.differentiate();
     }
 
     fn differentiate(&mut self) {
-        if let Ok(sum) = self.state.merit.sum(&self.state.values, Detail::Normal) {
-            if self.pace == Pace::Patient {
+        if let Ok(sum) = self.state.merit.evaluate(&self.state.values, DerivativeLevel::Normal) {
+            if self.schedule == LearningRate::ReduceOnPlateau {
                 self.state.rescale(&sum);
             }
             self.gradient = sum.gradient.iter().copied().collect();
         }
     }
 
-    fn patient_step(&mut self) -> f64 {
+    fn plateau_step(&mut self) -> f64 {
         let step = self.direction();
         let before = self.state.best_value;
         let limit = self.state.value + WORSE * self.state.value.abs();
-        let (accepted, sum) = self.state.advance(&step, Detail::Gradient, |value| value <= limit);
+        let (accepted, sum) =
+            self.state.advance(&step, DerivativeLevel::Gradient, |value| value <= limit);
         match sum {
             Some(sum) => self.gradient = sum.gradient.iter().copied().collect(),
-            None => self.slow_down(),
+            None => self.reduce_rate(),
         }
         self.since_better = if self.state.best_value < before { 0 } else { self.since_better + 1 };
         if self.since_better >= PATIENCE {
-            self.slow_down();
+            self.reduce_rate();
         }
         accepted
     }
@@ -140,7 +141,7 @@ impl Adam {
         let done = self.state.steps as f64 / steps as f64;
         self.rate = 0.5 * ANNEALED_RATE * (1.0 + (PI * done).cos());
         let step = self.direction();
-        let (accepted, sum) = self.state.advance(&step, Detail::Gradient, |_| true);
+        let (accepted, sum) = self.state.advance(&step, DerivativeLevel::Gradient, |_| true);
         if let Some(sum) = sum {
             self.gradient = sum.gradient.iter().copied().collect();
         } else {
@@ -151,30 +152,30 @@ impl Adam {
     }
 
     fn has_ended(&self) -> bool {
-        match self.pace {
-            Pace::Patient => self.rate < SMALLEST_RATE || self.state.has_ended(),
-            Pace::Annealed(steps) => self.state.steps >= steps,
+        match self.schedule {
+            LearningRate::ReduceOnPlateau => self.rate < SMALLEST_RATE || self.state.has_ended(),
+            LearningRate::CosineAnnealing(steps) => self.state.steps >= steps,
         }
     }
 }
 
-impl Optimizer for Adam {
-    fn step(&mut self) -> Progress {
+impl Optimizer for AdamOptimizer {
+    fn step(&mut self) -> OptimizationProgress {
         if self.has_ended() {
             return self.state.progress(0.0, true);
         }
-        let accepted = match self.pace {
-            Pace::Patient => self.patient_step(),
-            Pace::Annealed(steps) => self.annealed_step(steps),
+        let accepted = match self.schedule {
+            LearningRate::ReduceOnPlateau => self.plateau_step(),
+            LearningRate::CosineAnnealing(steps) => self.annealed_step(steps),
         };
         let progress = self.state.progress(accepted, false);
-        if self.state.resample_if_due() && self.pace == Pace::Patient {
+        if self.state.resample_if_due() && self.schedule == LearningRate::ReduceOnPlateau {
             self.differentiate();
         }
         progress
     }
 
-    fn settle(&mut self) {
+    fn verify_best(&mut self) {
         self.state.verify_best();
     }
 

@@ -4,10 +4,10 @@
 //! does not reduce the merit, or makes the lens invalid, raises the damping; a good one lowers it
 //! (Marquardt 1963; Nielsen 1999 for the update).
 
-use super::state::State;
-use super::{Optimizer, Progress};
+use super::state::OptimizerState;
+use super::{OptimizationProgress, Optimizer};
 use crate::lens::Lens;
-use crate::merit::{Detail, Merit, MeritError, Sum, TermValue};
+use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
 use nalgebra::{DMatrix, DVector};
 
 /// The first damping.
@@ -25,26 +25,30 @@ const SMALL_GAIN: f64 = 1e-4;
 const PATIENCE: usize = 3;
 
 #[derive(Debug)]
-pub(super) struct LeastSquares {
-    state: State,
-    sum: Sum,
+pub(super) struct LeastSquaresOptimizer {
+    state: OptimizerState,
+    sum: SumOfSquares,
     damping: f64,
     growth: f64,
     idle: usize,
     /// When this often the merit was taken, no other damping is tried.
-    limit: usize,
+    max_evaluations: usize,
 }
 
-impl LeastSquares {
+impl LeastSquaresOptimizer {
     pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
-        let (state, sum) = State::with_sum(merit, lens, Detail::Normal)?;
-        Ok(Self::resumed(state, sum, None))
+        let (state, sum) = OptimizerState::with_evaluation(merit, lens, DerivativeLevel::Normal)?;
+        Ok(Self::resume(state, sum, None))
     }
 
     /// A search that goes on with the damping, and its growth, of one before.
-    pub(super) fn resumed(state: State, sum: Sum, damping: Option<[f64; 2]>) -> Self {
+    pub(super) fn resume(
+        state: OptimizerState,
+        sum: SumOfSquares,
+        damping: Option<[f64; 2]>,
+    ) -> Self {
         let [damping, growth] = damping.unwrap_or([DAMPING, GROWTH]);
-        Self { state, sum, damping, growth, idle: 0, limit: usize::MAX }
+        Self { state, sum, damping, growth, idle: 0, max_evaluations: usize::MAX }
     }
 
     /// The damping, and how fast it grows.
@@ -53,16 +57,16 @@ impl LeastSquares {
     }
 
     /// Where it stands.
-    pub(super) fn into_state(self) -> State {
+    pub(super) fn into_state(self) -> OptimizerState {
         self.state
     }
 
     /// So many steps, those that are tried and not taken included, or fewer where hardly anything is
     /// left to gain.
     pub(super) fn take_steps(&mut self, steps: usize) {
-        self.limit = self.state.evaluations + steps;
+        self.max_evaluations = self.state.evaluations + steps;
         let mut idle = 0;
-        while self.state.evaluations < self.limit {
+        while self.state.evaluations < self.max_evaluations {
             let before = self.state.value;
             let accepted = self.descend();
             let gain = (before - self.state.value) / before.max(f64::MIN_POSITIVE);
@@ -77,7 +81,7 @@ impl LeastSquares {
     fn proposal(&self) -> Option<(Vec<f64>, f64)> {
         let scales = DVector::from_column_slice(&self.state.scales);
         let gradient: Vec<f64> = self.sum.gradient.iter().copied().collect();
-        let held = self.state.held(&gradient);
+        let held = self.state.at_bounds(&gradient);
         let half = self.sum.gradient.component_mul(&scales) * 0.5;
         let mut matrix = &self.sum.normal * 1.0;
         let mut right = -&half;
@@ -101,19 +105,19 @@ impl LeastSquares {
         Some((step.iter().copied().collect(), promised))
     }
 
-    fn relax(&mut self, gain: f64) {
+    fn lower_damping(&mut self, gain: f64) {
         self.damping =
             (self.damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 5.0)).max(LEAST_DAMPING);
         self.growth = GROWTH;
     }
 
-    fn tighten(&mut self) {
+    fn raise_damping(&mut self) {
         self.damping *= self.growth;
         self.growth *= 2.0;
     }
 
     fn differentiate(&mut self) {
-        if let Ok(sum) = self.state.merit.sum(&self.state.values, Detail::Normal) {
+        if let Ok(sum) = self.state.merit.evaluate(&self.state.values, DerivativeLevel::Normal) {
             self.sum = sum;
         }
     }
@@ -123,27 +127,28 @@ impl LeastSquares {
         let before = self.state.value;
         let mut first = None;
         while self.damping < MOST_DAMPING {
-            if self.state.evaluations >= self.limit {
+            if self.state.evaluations >= self.max_evaluations {
                 return 0.0;
             }
             let Some((step, promised)) = self.proposal() else {
-                self.tighten();
+                self.raise_damping();
                 continue;
             };
             let length = step.iter().map(|v| v * v).sum::<f64>().sqrt();
             let asked = *first.get_or_insert(length);
-            let (accepted, sum) = self.state.advance(&step, Detail::Normal, |v| v < before);
+            let (accepted, sum) =
+                self.state.advance(&step, DerivativeLevel::Normal, |v| v < before);
             if let Some(sum) = sum {
                 self.sum = sum;
                 let gain = (before - self.state.value) / promised.max(f64::MIN_POSITIVE);
                 if accepted < 1.0 {
-                    self.tighten();
+                    self.raise_damping();
                 } else {
-                    self.relax(gain.min(1.0));
+                    self.lower_damping(gain.min(1.0));
                 }
                 return if asked > 0.0 { accepted * length / asked } else { 1.0 };
             }
-            self.tighten();
+            self.raise_damping();
         }
         (self.damping, self.growth) = (DAMPING, GROWTH);
         0.0
@@ -165,8 +170,8 @@ fn scale(matrix: &mut DMatrix<f64>, scales: &DVector<f64>) {
     }
 }
 
-impl Optimizer for LeastSquares {
-    fn step(&mut self) -> Progress {
+impl Optimizer for LeastSquaresOptimizer {
+    fn step(&mut self) -> OptimizationProgress {
         if self.idle >= PATIENCE || self.state.has_ended() {
             return self.state.progress(0.0, true);
         }
@@ -176,7 +181,7 @@ impl Optimizer for LeastSquares {
         self.idle = if gain > SMALLEST_GAIN { 0 } else { self.idle + 1 };
         let finished = self.idle >= PATIENCE;
         if finished {
-            self.settle();
+            self.verify_best();
         }
         let progress = self.state.progress(accepted, finished);
         if self.state.resample_if_due() {
@@ -185,7 +190,7 @@ impl Optimizer for LeastSquares {
         progress
     }
 
-    fn settle(&mut self) {
+    fn verify_best(&mut self) {
         self.state.verify_best();
     }
 

@@ -9,7 +9,7 @@ pub mod pareto;
 mod state;
 mod stretch;
 
-pub use stretch::{Memory, Stretch, Stretched, stretch};
+pub use stretch::{DescentState, SegmentResult, SegmentSettings, run_segment};
 
 use crate::lens::Lens;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
@@ -19,10 +19,10 @@ use std::fmt::Debug;
 /// A search that can be stepped, watched and stopped by its caller.
 pub trait Optimizer: Send + Debug {
     /// Takes one step; a step that would make the lens invalid is refused and shortened.
-    fn step(&mut self) -> Progress;
+    fn step(&mut self) -> OptimizationProgress;
     /// Judges the best lens by its own rays, as the search itself does from time to time; to be
     /// called when it is stopped, so that the best lens is one that is known to be better.
-    fn settle(&mut self);
+    fn verify_best(&mut self);
     /// The best lens so far.
     fn best(&self) -> &Lens;
     /// The lens at the current step.
@@ -33,7 +33,7 @@ pub trait Optimizer: Send + Debug {
 
 /// What a step did.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Progress {
+pub struct OptimizationProgress {
     /// Steps so far.
     pub step: usize,
     /// Merit of the current lens.
@@ -51,7 +51,7 @@ pub struct Progress {
 /// Which method searches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum DescentMethod {
     /// First order, with moments (Kingma and Ba, ICLR 2015).
     Adam,
     /// Damped least squares (Levenberg 1944; Marquardt 1963).
@@ -59,7 +59,7 @@ pub enum Method {
     DampedLeastSquares,
 }
 
-impl Method {
+impl DescentMethod {
     /// What it is called in menus.
     pub fn name(self) -> &'static str {
         match self {
@@ -74,15 +74,19 @@ impl Method {
 /// # Errors
 /// A lens without variables, or one without merit: see [`MeritError`].
 pub fn start(
-    method: Method,
+    method: DescentMethod,
     lens: &Lens,
     goal: &Goal,
     tolerance: f64,
 ) -> Result<Box<dyn Optimizer>, MeritError> {
     let merit = Merit::new(lens, goal, tolerance)?;
     Ok(match method {
-        Method::Adam => Box::new(adam::Adam::new(merit, lens, adam::Pace::Patient)?),
-        Method::DampedLeastSquares => Box::new(least_squares::LeastSquares::new(merit, lens)?),
+        DescentMethod::Adam => {
+            Box::new(adam::AdamOptimizer::new(merit, lens, adam::LearningRate::ReduceOnPlateau)?)
+        }
+        DescentMethod::DampedLeastSquares => {
+            Box::new(least_squares::LeastSquaresOptimizer::new(merit, lens)?)
+        }
     })
 }
 
@@ -91,12 +95,12 @@ pub fn start(
 ///
 /// # Errors
 /// As [`start`].
-pub fn annealed(
+pub fn start_annealed(
     lens: &Lens,
     goal: &Goal,
     tolerance: f64,
     steps: usize,
 ) -> Result<Box<dyn Optimizer>, MeritError> {
     let merit = Merit::new(lens, goal, tolerance)?;
-    Ok(Box::new(adam::Adam::new(merit, lens, adam::Pace::Annealed(steps))?))
+    Ok(Box::new(adam::AdamOptimizer::new(merit, lens, adam::LearningRate::CosineAnnealing(steps))?))
 }

@@ -12,21 +12,21 @@
 //! the four run side by side, so that the result does not depend on how many cores there are. The
 //! caller owns the loop.
 
-use super::{Method, Optimizer, annealed, start};
-use crate::lens::{Lens, LensError, NumberKind, Quantity, vary};
-use crate::merit::{Goal, Merit, MeritError, PupilEdge, Term, Weighted};
-use crate::pupil::{BenchError, limited_by_stop};
+use super::{DescentMethod, Optimizer, start, start_annealed};
+use crate::lens::{Lens, LensError, ParameterKind, Quantity, add_variables};
+use crate::merit::{Goal, Merit, MeritError, PupilEdge, Term, WeightedTerm};
+use crate::pupil::{RayModelError, limited_by_stop};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How a front is swept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Settings {
+pub struct ParetoSettings {
     /// How many weights.
     pub points: usize,
     /// What descends.
-    pub method: Method,
+    pub method: DescentMethod,
     /// No more steps than this for each weight.
     pub steps: usize,
     /// The blur of the rim ray √β that the smallest and the largest weight stand for, relative to
@@ -40,11 +40,11 @@ pub struct Settings {
     pub rims: [f64; 2],
 }
 
-impl Default for Settings {
+impl Default for ParetoSettings {
     fn default() -> Self {
         Self {
             points: 20,
-            method: Method::Adam,
+            method: DescentMethod::Adam,
             steps: 500,
             blur: [4e-5, 3.5e-3],
             pupil: PupilEdge::Moving,
@@ -56,7 +56,7 @@ impl Default for Settings {
 
 /// A lens with what it is worth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Design {
+pub struct ParetoPoint {
     /// The lens.
     pub lens: Lens,
     /// The weight β that it was found with, in mm²; none for the lens at the start.
@@ -70,18 +70,18 @@ pub struct Design {
     /// Its estimated error, in mm².
     pub light_error: f64,
     /// Whether light gets through at every field; a spot without light is none.
-    pub lit: bool,
+    pub has_light: bool,
     /// Rays that these numbers rest on.
     pub rays: usize,
 }
 
-impl Design {
+impl ParetoPoint {
     /// Judges a lens by its own rays, good to a tolerance.
     ///
     /// # Errors
     /// A lens without merit.
-    pub fn of(lens: &Lens, weight: Option<f64>, tolerance: f64) -> Result<Self, MeritError> {
-        let terms = [Term::Spot, Term::Throughput].map(|term| Weighted { term, weight: 1.0 });
+    pub fn evaluate(lens: &Lens, weight: Option<f64>, tolerance: f64) -> Result<Self, MeritError> {
+        let terms = [Term::Spot, Term::Throughput].map(|term| WeightedTerm { term, weight: 1.0 });
         let goal = Goal { terms: terms.to_vec(), pupil: PupilEdge::Kept, zoom_ratios: Vec::new() };
         let merit = Merit::new(lens, &goal, tolerance)?;
         let values = merit.terms(&merit.values(lens))?;
@@ -94,7 +94,7 @@ impl Design {
             spot_error: if spot > 0.0 { 0.5 * square.error / spot } else { 0.0 },
             light: -area.value,
             light_error: area.error,
-            lit: merit.is_lit(),
+            has_light: merit.has_light(),
             rays: square.rays,
         })
     }
@@ -109,26 +109,26 @@ impl Design {
 /// Lenses of which none is beaten by another one in both sharpness and light, by growing light.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Front {
-    designs: Vec<Design>,
+    points: Vec<ParetoPoint>,
 }
 
 impl Front {
     /// The lenses.
-    pub fn designs(&self) -> &[Design] {
-        &self.designs
+    pub fn points(&self) -> &[ParetoPoint] {
+        &self.points
     }
 
     /// Takes a lens in unless one that is there is no worse; those that it beats go. Returns
     /// whether it was taken.
-    pub fn offer(&mut self, design: Design) -> bool {
-        let no_worse = |d: &Design| d.spot <= design.spot && d.light >= design.light;
-        let sound = design.spot.is_finite() && design.light.is_finite() && design.lit;
-        if !sound || self.designs.iter().any(no_worse) {
+    pub fn insert(&mut self, design: ParetoPoint) -> bool {
+        let no_worse = |d: &ParetoPoint| d.spot <= design.spot && d.light >= design.light;
+        let sound = design.spot.is_finite() && design.light.is_finite() && design.has_light;
+        if !sound || self.points.iter().any(no_worse) {
             return false;
         }
-        self.designs.retain(|other| !design.dominates(other));
-        let place = self.designs.partition_point(|other| other.light < design.light);
-        self.designs.insert(place, design);
+        self.points.retain(|other| !design.dominates(other));
+        let place = self.points.partition_point(|other| other.light < design.light);
+        self.points.insert(place, design);
         true
     }
 
@@ -137,7 +137,7 @@ impl Front {
     /// multiple of the reference's spot times its light (Zitzler and Thiele, PPSN V, 1998).
     pub fn hypervolume(&self, spot: f64, light: f64) -> f64 {
         let (mut covered, mut below) = (0.0, 0.0);
-        for design in self.designs.iter().filter(|design| design.spot < spot) {
+        for design in self.points.iter().filter(|design| design.spot < spot) {
             covered += (spot - design.spot) * (design.light - below);
             below = design.light;
         }
@@ -147,10 +147,10 @@ impl Front {
 
 /// Why there is no front.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NoFront {
+pub enum ParetoError {
     /// The lens.
     #[error(transparent)]
-    Bench(#[from] BenchError),
+    RayModel(#[from] RayModelError),
     /// Its prescription.
     #[error(transparent)]
     Lens(#[from] LensError),
@@ -172,54 +172,54 @@ pub enum NoFront {
 /// How many times the steps of a weight correct the lens at the beginning of a chain.
 const FIRST: usize = 3;
 /// Steps between two looks at the lenses.
-const SLICE: usize = 25;
+const STEPS_PER_SLICE: usize = 25;
 /// Relative error of the numbers that lenses are compared by.
-const JUDGED: f64 = 1e-4;
+const EVALUATION_TOLERANCE: f64 = 1e-4;
 /// The share of its light that every field keeps.
-const LEAST_LIGHT: f64 = 0.1;
+const MIN_LIGHT: f64 = 0.1;
 /// No surface may be steeper than this: curvature times semi-diameter.
-const STEEPEST: f64 = 0.9;
+const MAX_STEEPNESS: f64 = 0.9;
 
 /// A front on its way.
 #[derive(Debug)]
-pub struct Sweep {
+pub struct ParetoSweep {
     /// The lens at the start, limited by its stop.
-    pub start: Design,
-    settings: Settings,
-    chains: Vec<Chain>,
+    pub start: ParetoPoint,
+    settings: ParetoSettings,
+    chains: Vec<SweepChain>,
     front: Front,
-    tried: Vec<[f64; 2]>,
+    evaluated: Vec<[f64; 2]>,
     done: usize,
 }
 
 /// Some weights, one after the other.
 #[derive(Debug)]
-struct Chain {
+struct SweepChain {
     lens: Lens,
     goal: Goal,
     /// Weight and treatment of the pupil with which the lens is corrected first.
-    begin: Option<(f64, PupilEdge)>,
+    first_correction: Option<(f64, PupilEdge)>,
     /// The weights to come, the next one last.
     weights: Vec<f64>,
-    method: Method,
+    method: DescentMethod,
     steps: usize,
     tolerance: f64,
-    running: Option<Running>,
+    active: Option<ActiveDescent>,
     refused: Option<String>,
 }
 
 /// The descent for one weight.
 #[derive(Debug)]
-struct Running {
+struct ActiveDescent {
     weight: f64,
     search: Box<dyn Optimizer>,
     /// Steps that it may still take.
-    left: usize,
+    remaining_steps: usize,
 }
 
 /// What a slice of a sweep has brought.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Slice {
+pub struct SweepProgress {
     /// Steps so far, over all chains; those that a descent did not need count as taken.
     pub done: usize,
     /// Steps in all.
@@ -232,26 +232,26 @@ pub struct Slice {
     pub finished: bool,
 }
 
-impl Sweep {
+impl ParetoSweep {
     /// Prepares a sweep. A lens without variables has all its curvatures, gaps and semi-diameters
     /// free; one with variables only those and its semi-diameters.
     ///
     /// # Errors
     /// A lens without merit, settings without meaning.
-    pub fn new(lens: &Lens, settings: &Settings) -> Result<Self, NoFront> {
+    pub fn new(lens: &Lens, settings: &ParetoSettings) -> Result<Self, ParetoError> {
         settings.check()?;
-        let lens = freed(&limited_by_stop(lens)?, settings.rims);
+        let lens = with_sweep_variables(&limited_by_stop(lens)?, settings.rims);
         lens.check()?;
-        let start = Design::of(&lens, None, JUDGED)?;
-        let goal = composite(&lens, start.light, settings.pupil)?;
+        let start = ParetoPoint::evaluate(&lens, None, EVALUATION_TOLERANCE)?;
+        let goal = weighted_sum_goal(&lens, start.light, settings.pupil)?;
         let weights = settings.weights(goal_focal_length(&goal, &lens));
         let last = weights.last().copied().unwrap_or(0.0);
         let begin = [(last, goal.pupil), (0.0, PupilEdge::Kept)];
         let both = begin.into_iter().flat_map(|begin| [(begin, true), (begin, false)]);
-        let chain = |(begin, falling)| Chain {
+        let chain = |(begin, falling)| SweepChain {
             lens: lens.clone(),
             goal: goal.clone(),
-            begin: Some(begin),
+            first_correction: Some(begin),
             // The next one is the last.
             weights: if falling {
                 weights.clone()
@@ -261,31 +261,32 @@ impl Sweep {
             method: settings.method,
             steps: settings.steps,
             tolerance: settings.tolerance,
-            running: None,
+            active: None,
             refused: None,
         };
-        let chains: Vec<Chain> = both.map(chain).collect();
+        let chains: Vec<SweepChain> = both.map(chain).collect();
         // A weight that cannot even begin is an error of the lens, not of the search.
         Merit::new(&lens, &goal, settings.tolerance)?;
         let mut front = Front::default();
-        front.offer(start.clone());
+        front.insert(start.clone());
         let settings = settings.clone();
-        Ok(Self { start, settings, chains, front, tried: Vec::new(), done: 0 })
+        Ok(Self { start, settings, chains, front, evaluated: Vec::new(), done: 0 })
     }
 
     /// Goes on for a slice of steps in every chain, on all cores.
-    pub fn step(&mut self) -> Slice {
-        let found: Vec<Vec<Design>> = self.chains.par_iter_mut().map(Chain::slice).collect();
+    pub fn step(&mut self) -> SweepProgress {
+        let found: Vec<Vec<ParetoPoint>> =
+            self.chains.par_iter_mut().map(SweepChain::run_slice).collect();
         let mut joined = 0;
         for design in found.into_iter().flatten() {
-            self.tried.push([design.spot, design.light]);
-            joined += usize::from(self.front.offer(design));
+            self.evaluated.push([design.spot, design.light]);
+            joined += usize::from(self.front.insert(design));
         }
-        let left: usize = self.chains.iter().map(Chain::left).sum();
+        let left: usize = self.chains.iter().map(SweepChain::remaining_steps).sum();
         self.done = self.total() - left;
         let refused = self.chains.iter_mut().filter_map(|chain| chain.refused.take()).last();
         let (done, total) = (self.done, self.total());
-        Slice { done, total, joined, refused, finished: left == 0 }
+        SweepProgress { done, total, joined, refused, finished: left == 0 }
     }
 
     /// The front so far.
@@ -294,8 +295,8 @@ impl Sweep {
     }
 
     /// Spot in mm and light in mm² of every lens that was looked at.
-    pub fn tried(&self) -> &[[f64; 2]] {
-        &self.tried
+    pub fn evaluated(&self) -> &[[f64; 2]] {
+        &self.evaluated
     }
 
     /// The hypervolume of the front against twice the spot of the lens at the start.
@@ -308,10 +309,10 @@ impl Sweep {
     }
 }
 
-impl Settings {
-    fn check(&self) -> Result<(), NoFront> {
+impl ParetoSettings {
+    fn check(&self) -> Result<(), ParetoError> {
         let refuse =
-            |what, found: String, expected| Err(NoFront::Settings { what, found, expected });
+            |what, found: String, expected| Err(ParetoError::Settings { what, found, expected });
         let [low, high] = self.blur;
         let [narrow, wide] = self.rims;
         if self.points == 0 || self.points > 1000 {
@@ -341,54 +342,61 @@ impl Settings {
     }
 }
 
-impl Chain {
+impl SweepChain {
     /// The next steps; the lenses that they have led to.
-    fn slice(&mut self) -> Vec<Design> {
-        if self.running.is_none() {
-            self.begin();
+    fn run_slice(&mut self) -> Vec<ParetoPoint> {
+        if self.active.is_none() {
+            self.start_next();
         }
-        let Some(Running { weight, search, left }) = &mut self.running else { return Vec::new() };
-        for _ in 0..SLICE.min(*left) {
+        let Some(ActiveDescent { weight, search, remaining_steps: left }) = &mut self.active else {
+            return Vec::new();
+        };
+        for _ in 0..STEPS_PER_SLICE.min(*left) {
             *left -= 1;
             if search.step().finished {
                 *left = 0;
                 break;
             }
         }
-        let judge = |lens: &Lens| Design::of(lens, Some(*weight), JUDGED).ok();
+        let judge =
+            |lens: &Lens| ParetoPoint::evaluate(lens, Some(*weight), EVALUATION_TOLERANCE).ok();
         if *left > 0 {
             return judge(search.current()).into_iter().collect();
         }
-        search.settle();
+        search.verify_best();
         self.lens.clone_from(search.best());
         let found = judge(&self.lens);
-        self.running = None;
+        self.active = None;
         found.into_iter().collect()
     }
 
-    fn begin(&mut self) {
-        let begin = self.begin.take();
+    fn start_next(&mut self) {
+        let begin = self.first_correction.take();
         let left = if begin.is_some() { FIRST * self.steps } else { self.steps };
         let next = begin.or_else(|| Some((self.weights.pop()?, self.goal.pupil)));
         let Some((weight, pupil)) = next else { return };
         let mut goal = Goal { pupil, ..self.goal.clone() };
         if weight > 0.0 {
-            goal.terms.push(Weighted { term: Term::Throughput, weight });
+            goal.terms.push(WeightedTerm { term: Term::Throughput, weight });
         }
         let search = match self.method {
-            Method::Adam => annealed(&self.lens, &goal, self.tolerance, left),
-            Method::DampedLeastSquares => start(self.method, &self.lens, &goal, self.tolerance),
+            DescentMethod::Adam => start_annealed(&self.lens, &goal, self.tolerance, left),
+            DescentMethod::DampedLeastSquares => {
+                start(self.method, &self.lens, &goal, self.tolerance)
+            }
         };
         match search {
-            Ok(search) => self.running = Some(Running { weight, search, left }),
+            Ok(search) => {
+                self.active = Some(ActiveDescent { weight, search, remaining_steps: left })
+            }
             Err(cause) => self.refused = Some(cause.to_string()),
         }
     }
 
     /// Steps to come, at most.
-    fn left(&self) -> usize {
-        let coming = self.weights.len() + if self.begin.is_some() { FIRST } else { 0 };
-        coming * self.steps + self.running.as_ref().map_or(0, |running| running.left)
+    fn remaining_steps(&self) -> usize {
+        let coming = self.weights.len() + if self.first_correction.is_some() { FIRST } else { 0 };
+        coming * self.steps + self.active.as_ref().map_or(0, |running| running.remaining_steps)
     }
 }
 
@@ -398,17 +406,17 @@ impl Chain {
 ///
 /// # Errors
 /// A lens without first-order data.
-pub fn composite(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
-    let sensible = Goal::sensible(lens)?;
-    let mut terms = vec![Weighted { term: Term::SpotIntegral, weight: 1.0 }];
+pub fn weighted_sum_goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
+    let sensible = Goal::default_for(lens)?;
+    let mut terms = vec![WeightedTerm { term: Term::SpotIntegral, weight: 1.0 }];
     // The integral of a spot is its mean square times the light, and so must the others count.
     let others =
         sensible.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
-    terms.extend(others.map(|w| Weighted { weight: light * w.weight, ..w }));
-    terms.push(Weighted { term: Term::Steepness(STEEPEST), weight: light });
+    terms.extend(others.map(|w| WeightedTerm { weight: light * w.weight, ..w }));
+    terms.push(WeightedTerm { term: Term::Steepness(MAX_STEEPNESS), weight: light });
     // No field may go dark: a spot without light would be the sharpest of all.
     let worth = terms[0].weight * light * goal_size(lens).powi(2);
-    terms.push(Weighted { term: Term::Light(LEAST_LIGHT), weight: worth });
+    terms.push(WeightedTerm { term: Term::Light(MIN_LIGHT), weight: worth });
     Ok(Goal { terms, pupil, zoom_ratios: sensible.zoom_ratios })
 }
 
@@ -427,13 +435,13 @@ fn goal_focal_length(goal: &Goal, lens: &Lens) -> f64 {
 }
 
 /// The lens with everything free that a sweep may change.
-fn freed(lens: &Lens, [narrow, wide]: [f64; 2]) -> Lens {
+fn with_sweep_variables(lens: &Lens, [narrow, wide]: [f64; 2]) -> Lens {
     let mut lens = lens.clone();
     let own: Vec<_> = lens.variables.clone();
     if own.is_empty() {
-        vary(&mut lens, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
+        add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
     }
-    vary(&mut lens, &[NumberKind::SemiDiameters]);
+    add_variables(&mut lens, &[ParameterKind::SemiDiameters]);
     let sizes: Vec<Option<f64>> = lens.surfaces.iter().map(|row| row.semi_diameter).collect();
     for variable in &mut lens.variables {
         if let (Quantity::SemiDiameter, Some(size)) =

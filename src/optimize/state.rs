@@ -1,12 +1,12 @@
 //! What every local search shares: scaled variables with bounds, the best lens, and the rule that
 //! no step may make the lens invalid.
 
-use super::Progress;
+use super::OptimizationProgress;
 use crate::lens::{ASPHERE_TERMS, Lens, Medium, Quantity, RADIAL_TERMS, Variable};
-use crate::merit::{Detail, Merit, MeritError, Sum, TermValue};
+use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
 
 /// How often a step is halved before it is given up.
-const HALVINGS: usize = 12;
+const MAX_HALVINGS: usize = 12;
 /// Steps between two searches for the rays of the spots.
 const RESAMPLE: usize = 25;
 /// As many of these without a better lens end the search.
@@ -16,14 +16,14 @@ const SMALLEST_GAIN: f64 = 1e-4;
 
 /// A lens on its way.
 #[derive(Debug, Clone)]
-pub(super) struct State {
+pub(super) struct OptimizerState {
     pub(super) merit: Merit,
     /// The variables at the current step.
     pub(super) values: Vec<f64>,
     /// What a change of one means for each variable.
     pub(super) scales: Vec<f64>,
     /// The most that it may mean.
-    widest: Vec<f64>,
+    max_scales: Vec<f64>,
     pub(super) current: Lens,
     pub(super) best: Lens,
     pub(super) value: f64,
@@ -32,35 +32,35 @@ pub(super) struct State {
     verified: Lens,
     verified_value: f64,
     /// How often since then none better was found.
-    stale: usize,
+    failed_verifications: usize,
     pub(super) steps: usize,
     /// How often a lens had a merit, in whatever detail: one that has none costs little.
     pub(super) evaluations: usize,
     pub(super) refused: Option<String>,
 }
 
-impl State {
+impl OptimizerState {
     pub(super) fn new(merit: Merit, lens: &Lens) -> Result<Self, MeritError> {
-        Self::with_sum(merit, lens, Detail::Value).map(|(state, _)| state)
+        Self::with_evaluation(merit, lens, DerivativeLevel::Value).map(|(state, _)| state)
     }
 
     /// A lens at the beginning of a search, with its merit in some detail.
-    pub(super) fn with_sum(
+    pub(super) fn with_evaluation(
         merit: Merit,
         lens: &Lens,
-        detail: Detail,
-    ) -> Result<(Self, Sum), MeritError> {
+        detail: DerivativeLevel,
+    ) -> Result<(Self, SumOfSquares), MeritError> {
         if merit.variables().is_empty() {
             return Err(MeritError::NoVariables);
         }
         let values = merit.values(lens);
-        let sum = merit.sum(&values, detail)?;
+        let sum = merit.evaluate(&values, detail)?;
         let value = sum.value;
         let scales: Vec<f64> = merit.variables().iter().map(|v| scale(lens, v)).collect();
         let state = Self {
             merit,
             values,
-            widest: scales.clone(),
+            max_scales: scales.clone(),
             scales,
             current: lens.clone(),
             best: lens.clone(),
@@ -68,7 +68,7 @@ impl State {
             best_value: value,
             verified: lens.clone(),
             verified_value: value,
-            stale: 0,
+            failed_verifications: 0,
             steps: 0,
             evaluations: 1,
             refused: None,
@@ -81,21 +81,21 @@ impl State {
     pub(super) fn advance(
         &mut self,
         step: &[f64],
-        detail: Detail,
+        detail: DerivativeLevel,
         accept: impl Fn(f64) -> bool,
-    ) -> (f64, Option<Sum>) {
+    ) -> (f64, Option<SumOfSquares>) {
         let mut fraction = 1.0;
-        for _ in 0..HALVINGS {
+        for _ in 0..MAX_HALVINGS {
             let proposal = self.proposal(step, fraction);
             let found = self.evaluate(&proposal, detail);
             self.evaluations += usize::from(found.is_ok());
             match found {
                 Ok(sum) if accept(sum.value) => {
-                    self.take(proposal, sum.value);
+                    self.accept_step(proposal, sum.value);
                     return (fraction, Some(sum));
                 }
                 Ok(_) => return (0.0, None),
-                Err(cause) => self.refuse(step, &cause),
+                Err(cause) => self.record_refusal(step, &cause),
             }
             fraction *= 0.5;
         }
@@ -104,11 +104,11 @@ impl State {
 
     /// Measures every variable by what it does: a change of one alters the residuals by as much as
     /// they are.
-    pub(super) fn rescale(&mut self, sum: &Sum) {
+    pub(super) fn rescale(&mut self, sum: &SumOfSquares) {
         for (i, scale) in self.scales.iter_mut().enumerate() {
             let measured = (sum.value / sum.normal[(i, i)]).sqrt();
             if measured.is_finite() && measured > 0.0 {
-                *scale = measured.min(self.widest[i]);
+                *scale = measured.min(self.max_scales[i]);
             }
         }
     }
@@ -123,18 +123,22 @@ impl State {
     }
 
     /// The merit at some values, which must be those of a lens that passes its own check.
-    fn evaluate(&self, values: &[f64], detail: Detail) -> Result<Sum, MeritError> {
+    fn evaluate(
+        &self,
+        values: &[f64],
+        detail: DerivativeLevel,
+    ) -> Result<SumOfSquares, MeritError> {
         if let Some(i) = values.iter().position(|v| !v.is_finite()) {
             let parameter = self.merit.variables()[i].parameter;
             let found = values[i];
             let what = parameter.to_string();
             let expected = "a finite number";
-            return Err(crate::lens::LensError::Number { what, found, expected }.into());
+            return Err(crate::lens::LensError::InvalidNumber { what, found, expected }.into());
         }
-        self.merit.sum(values, detail)
+        self.merit.evaluate(values, detail)
     }
 
-    fn take(&mut self, values: Vec<f64>, value: f64) {
+    fn accept_step(&mut self, values: Vec<f64>, value: f64) {
         self.values = values;
         self.value = value;
         self.current = self.merit.lens(&self.values);
@@ -145,7 +149,7 @@ impl State {
     }
 
     /// Notes why a step was refused and which variable it moved most.
-    fn refuse(&mut self, step: &[f64], cause: &MeritError) {
+    fn record_refusal(&mut self, step: &[f64], cause: &MeritError) {
         let most = (0..step.len()).max_by(|a, b| step[*a].abs().total_cmp(&step[*b].abs()));
         let parameter = most.map(|i| self.merit.variables()[i].parameter.to_string());
         let parameter = parameter.unwrap_or_default();
@@ -186,9 +190,9 @@ impl State {
             Ok(value) if value < enough => {
                 self.verified.clone_from(&self.best);
                 self.verified_value = value;
-                self.stale = 0;
+                self.failed_verifications = 0;
             }
-            Ok(_) | Err(_) => self.stale += 1,
+            Ok(_) | Err(_) => self.failed_verifications += 1,
         }
         self.best.clone_from(&self.verified);
         self.best_value = self.verified_value;
@@ -196,7 +200,7 @@ impl State {
 
     /// Whether the last looks at the best lens have found none better.
     pub(super) fn has_ended(&self) -> bool {
-        self.stale >= PATIENCE
+        self.failed_verifications >= PATIENCE
     }
 
     /// Goes on from the best lens.
@@ -206,9 +210,9 @@ impl State {
         self.value = self.merit.value(&self.values).unwrap_or(self.best_value);
     }
 
-    pub(super) fn progress(&mut self, accepted: f64, finished: bool) -> Progress {
+    pub(super) fn progress(&mut self, accepted: f64, finished: bool) -> OptimizationProgress {
         self.steps += 1;
-        Progress {
+        OptimizationProgress {
             step: self.steps,
             merit: self.value,
             best: self.best_value,
@@ -219,7 +223,7 @@ impl State {
     }
 
     /// Which variables stand at a bound that a descent would push them through.
-    pub(super) fn held(&self, gradient: &[f64]) -> Vec<bool> {
+    pub(super) fn at_bounds(&self, gradient: &[f64]) -> Vec<bool> {
         let held = |i: usize| {
             let variable = &self.merit.variables()[i];
             let value = self.values[i];
@@ -266,7 +270,7 @@ fn scale(lens: &Lens, variable: &Variable) -> f64 {
         Quantity::Index => 0.1,
         // As much index at the rim, or at the other face.
         Quantity::Gradient(k) => match &lens.surfaces[variable.parameter.surface].medium {
-            Medium::Gradient(gradient) => {
+            Medium::Grin(gradient) => {
                 let length = if k < RADIAL_TERMS { rim } else { size };
                 0.02 * length.powi(gradient.power(k))
             }

@@ -4,7 +4,7 @@
 //! (Welford 1986, section 3.6). A ray that vanishes at the stop gives both pupils, and no case
 //! needs a special path: a pupil at infinity is a ray that leaves parallel to the axis.
 
-use super::ray::{ParaxialRay, paraxial_ray, signed_indices, slabs};
+use super::ray::{ParaxialRay, paraxial_grins, paraxial_ray, signed_indices};
 use crate::lens::{Aperture, FieldKind, Lens, Object, System};
 use crate::math::Real;
 
@@ -23,7 +23,7 @@ pub struct Beam {
 
 impl Beam {
     /// The beam of a lens at a zoom position, up to its field point farthest from the axis.
-    pub fn of(lens: &Lens, zoom: usize) -> Self {
+    pub fn for_lens(lens: &Lens, zoom: usize) -> Self {
         let fields = lens.fields_at(zoom);
         let edge = fields.values.iter().fold(0.0, |edge: f64, field| {
             let here = if field.x == 0.0 { field.y } else { field.x.hypot(field.y) };
@@ -35,7 +35,7 @@ impl Beam {
 
 /// Why first-order data do not exist for a beam.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum Undefined {
+pub enum ParaxialError {
     /// An infinitely distant pupil has no diameter.
     #[error(
         "the aperture is an entrance pupil diameter, but the entrance pupil is at infinity; \
@@ -63,7 +63,7 @@ pub enum Undefined {
 
 /// An image of the stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pupil<R> {
+pub struct ParaxialPupil<R> {
     /// Where it is, in mm: the entrance pupil from the first vertex, the exit pupil from the last
     /// vertex before the image; `None` at infinity (telecentric).
     pub position: Option<R>,
@@ -86,13 +86,13 @@ pub struct FirstOrder<R> {
     /// The front focal point, from the first vertex in mm.
     pub ffl: Option<R>,
     /// The front principal plane, from the first vertex in mm.
-    pub pp1: Option<R>,
+    pub front_principal_plane: Option<R>,
     /// The rear principal plane, from the last vertex before the image in mm.
-    pub pp2: Option<R>,
+    pub rear_principal_plane: Option<R>,
     /// The stop as seen from the object.
-    pub entrance_pupil: Pupil<R>,
+    pub entrance_pupil: ParaxialPupil<R>,
     /// The stop as seen from the image.
-    pub exit_pupil: Pupil<R>,
+    pub exit_pupil: ParaxialPupil<R>,
     /// The height of the marginal ray at the stop, in mm, not negative.
     pub stop_semi_diameter: R,
     /// Focal length over entrance pupil diameter.
@@ -118,7 +118,7 @@ pub struct FirstOrder<R> {
 }
 
 /// The matrix of a lens from its first vertex to every surface, as two rays.
-struct Basis<R> {
+struct TransferRays<R> {
     /// `(y, nu) = (1, 0)`.
     parallel: ParaxialRay<R>,
     /// `(y, nu) = (0, 1)`.
@@ -132,7 +132,7 @@ struct Basis<R> {
     last: usize,
 }
 
-impl<R: Real> Basis<R> {
+impl<R: Real> TransferRays<R> {
     fn new(system: &System<R>) -> Self {
         let indices = signed_indices(system);
         let last = system.surfaces.len().saturating_sub(2);
@@ -157,47 +157,47 @@ impl<R: Real> Basis<R> {
     }
 
     /// The height at the stop of the ray with this height and slope in front of the lens.
-    fn at_stop(&self, (y, u): (R, R)) -> R {
+    fn height_at_stop(&self, (y, u): (R, R)) -> R {
         y * self.parallel.heights[self.stop] + self.index * u * self.slanted.heights[self.stop]
     }
 
     /// The slope of this ray behind the lens.
-    fn behind(&self, (y, u): (R, R)) -> R {
+    fn slope_behind(&self, (y, u): (R, R)) -> R {
         y * self.parallel.slopes[self.last] + self.index * u * self.slanted.slopes[self.last]
     }
 
     /// The height of this ray in the entrance pupil, if that is not at infinity.
-    fn in_pupil(&self, (y, u): (R, R)) -> Option<R> {
+    fn height_in_pupil(&self, (y, u): (R, R)) -> Option<R> {
         self.entrance().map(|z| y + z * u)
     }
 
     /// The factor that makes the axial ray the marginal one.
-    fn marginal_scale(&self, beam: &Beam) -> Result<R, Undefined> {
-        let ray = axial(beam.object);
-        let pupil = self.in_pupil(ray);
+    fn marginal_scale(&self, beam: &Beam) -> Result<R, ParaxialError> {
+        let ray = unscaled_marginal(beam.object);
+        let pupil = self.height_in_pupil(ray);
         let upwards =
             |size: R| if pupil.is_some_and(|h| h < R::ZERO) { -size.abs() } else { size.abs() };
         match beam.aperture {
             Aperture::EntrancePupilDiameter(diameter) => {
-                let height = pupil.ok_or(Undefined::PupilAtInfinity)?;
-                nonzero(height, Undefined::ObjectInPupil)?;
+                let height = pupil.ok_or(ParaxialError::PupilAtInfinity)?;
+                nonzero(height, ParaxialError::ObjectInPupil)?;
                 Ok(R::from_f64(0.5 * diameter) / height)
             }
             Aperture::FNumber(f_number) => {
-                let slope = self.index_behind * self.behind(ray);
-                nonzero(slope, Undefined::Afocal)?;
+                let slope = self.index_behind * self.slope_behind(ray);
+                nonzero(slope, ParaxialError::Afocal)?;
                 Ok(upwards(R::from_f64(0.5 / f_number) / slope))
             }
             Aperture::ObjectNa(na) => {
                 let index = self.index.value();
                 if na >= index {
-                    return Err(Undefined::NumericalAperture { na, index });
+                    return Err(ParaxialError::NumericalAperture { na, index });
                 }
                 Ok(upwards(R::from_f64((na / index).asin().tan())))
             }
             Aperture::StopSemiDiameter(radius) => {
-                let height = self.at_stop(ray);
-                nonzero(height, Undefined::StopAtImage)?;
+                let height = self.height_at_stop(ray);
+                nonzero(height, ParaxialError::StopAtImage)?;
                 Ok(upwards(R::from_f64(radius) / height))
             }
         }
@@ -238,20 +238,21 @@ impl<R: Real> Basis<R> {
     /// Image height over object height; `None` where the image lies at infinity or at the object's
     /// own principal plane.
     fn magnification(&self, distance: f64) -> Option<R> {
-        let behind = self.index_behind * self.behind(axial(Object::Finite(distance)));
+        let behind =
+            self.index_behind * self.slope_behind(unscaled_marginal(Object::Finite(distance)));
         (behind.value() != 0.0).then(|| self.index / behind)
     }
 }
 
 /// The height at the first vertex and the slope of the marginal ray, but for a factor.
-fn axial<R: Real>(object: Object) -> (R, R) {
+fn unscaled_marginal<R: Real>(object: Object) -> (R, R) {
     match object {
         Object::Infinity => (R::ONE, R::ZERO),
         Object::Finite(distance) => (R::from_f64(distance), R::ONE),
     }
 }
 
-fn nonzero<R: Real>(value: R, otherwise: Undefined) -> Result<(), Undefined> {
+fn nonzero<R: Real>(value: R, otherwise: ParaxialError) -> Result<(), ParaxialError> {
     if value.value() == 0.0 { Err(otherwise) } else { Ok(()) }
 }
 
@@ -259,12 +260,15 @@ fn nonzero<R: Real>(value: R, otherwise: Undefined) -> Result<(), Undefined> {
 /// surface; the last surface is the image plane.
 ///
 /// # Errors
-/// Where the aperture has no meaning for the lens: see [`Undefined`].
-pub fn first_order<R: Real>(system: &System<R>, beam: &Beam) -> Result<FirstOrder<R>, Undefined> {
-    let basis = Basis::new(system);
+/// Where the aperture has no meaning for the lens: see [`ParaxialError`].
+pub fn first_order<R: Real>(
+    system: &System<R>,
+    beam: &Beam,
+) -> Result<FirstOrder<R>, ParaxialError> {
+    let basis = TransferRays::new(system);
     let last = basis.last;
     let scale = basis.marginal_scale(beam)?;
-    let (y, u): (R, R) = axial(beam.object);
+    let (y, u): (R, R) = unscaled_marginal(beam.object);
     let marginal = paraxial_ray(system, y * scale, u * scale);
     let chief = basis.chief(beam).map(|(y, u)| paraxial_ray(system, y, u));
     let power = basis.power();
@@ -280,8 +284,8 @@ pub fn first_order<R: Real>(system: &System<R>, beam: &Beam) -> Result<FirstOrde
         efl,
         bfl,
         ffl,
-        pp1: ffl.zip(efl).map(|(z, f)| z + basis.index * f),
-        pp2: bfl.zip(efl).map(|(z, f)| z - basis.index_behind * f),
+        front_principal_plane: ffl.zip(efl).map(|(z, f)| z + basis.index * f),
+        rear_principal_plane: bfl.zip(efl).map(|(z, f)| z - basis.index_behind * f),
         f_number: efl.zip(entrance_pupil.diameter).and_then(|(f, d)| ratio(f, d)),
         entrance_pupil,
         exit_pupil: exit_pupil(&basis, system, &marginal),
@@ -313,28 +317,28 @@ fn lagrange<R: Real>(index: R, marginal: &ParaxialRay<R>, chief: &ParaxialRay<R>
     index * (chief.start_slope * y - u * chief.heights[0])
 }
 
-fn entrance_pupil<R: Real>(basis: &Basis<R>, marginal: (R, R)) -> Pupil<R> {
-    let diameter = basis.in_pupil(marginal).map(|h| (h + h).abs());
-    Pupil { position: basis.entrance(), diameter }
+fn entrance_pupil<R: Real>(basis: &TransferRays<R>, marginal: (R, R)) -> ParaxialPupil<R> {
+    let diameter = basis.height_in_pupil(marginal).map(|h| (h + h).abs());
+    ParaxialPupil { position: basis.entrance(), diameter }
 }
 
 /// The exit pupil from a ray that vanishes at the stop.
 fn exit_pupil<R: Real>(
-    basis: &Basis<R>,
+    basis: &TransferRays<R>,
     system: &System<R>,
     marginal: &ParaxialRay<R>,
-) -> Pupil<R> {
+) -> ParaxialPupil<R> {
     let stop = basis.stop;
     let height = -basis.slanted.heights[stop];
     let slope = basis.parallel.heights[stop] / basis.index;
     let position = paraxial_ray(system, height, slope).crossing(basis.last);
     let (y, u) = (marginal.heights[basis.last], marginal.slopes[basis.last]);
-    Pupil { position, diameter: position.map(|z| (y + z * u).abs() * R::TWO) }
+    ParaxialPupil { position, diameter: position.map(|z| (y + z * u).abs() * R::TWO) }
 }
 
 fn petzval_sum<R: Real>(system: &System<R>) -> R {
     let indices = signed_indices(system);
-    let slabs = slabs(system);
+    let slabs = paraxial_grins(system);
     let (mut sum, mut n) = (R::ZERO, indices[0]);
     for (i, surface) in system.surfaces.iter().enumerate() {
         let behind = indices[i + 1];
@@ -363,8 +367,8 @@ mod tests {
             semi_diameter: R::from_f64(f64::INFINITY),
             obstruction: R::ZERO,
             mirror: false,
-            hyper: false,
-            graded: None,
+            hyperhemisphere: false,
+            grin: None,
         }
     }
 
@@ -388,7 +392,7 @@ mod tests {
         assert_eq!((data.power, data.efl, data.bfl, data.f_number), (0.0, None, None, None));
         assert_eq!(data.exit_pupil.diameter, Some(4.0));
         let f_number = beam(Object::Infinity, Aperture::FNumber(4.0));
-        assert_eq!(first_order(&plate, &f_number), Err(Undefined::Afocal));
+        assert_eq!(first_order(&plate, &f_number), Err(ParaxialError::Afocal));
     }
 
     #[test]
@@ -397,10 +401,10 @@ mod tests {
         let lens = system::<f64>(&[(0.02, 0.0, 1.5), (-0.02, 50.0, 1.0), (0.0, 50.0, 1.0)], 2);
         let finite = Object::Finite(50.0);
         let data = first_order(&lens, &beam(finite, Aperture::ObjectNa(0.1))).unwrap();
-        assert_eq!(data.entrance_pupil, Pupil { position: None, diameter: None });
+        assert_eq!(data.entrance_pupil, ParaxialPupil { position: None, diameter: None });
         assert!((data.stop_semi_diameter - 50.0 * 0.1f64.asin().tan()).abs() < 1e-12);
         let diameter = beam(finite, Aperture::EntrancePupilDiameter(4.0));
-        assert_eq!(first_order(&lens, &diameter), Err(Undefined::PupilAtInfinity));
+        assert_eq!(first_order(&lens, &diameter), Err(ParaxialError::PupilAtInfinity));
         let chief = Beam {
             field: FieldKind::ObjectHeight,
             edge: 3.0,
@@ -435,7 +439,10 @@ mod tests {
                 .unwrap();
         assert!((data.efl.unwrap() - 50.0).abs() < 1e-12);
         assert!((data.bfl.unwrap() + 50.0).abs() < 1e-12);
-        assert!(data.pp2.unwrap().abs() < 1e-12 && data.image_defocus.unwrap().abs() < 1e-12);
+        assert!(
+            data.rear_principal_plane.unwrap().abs() < 1e-12
+                && data.image_defocus.unwrap().abs() < 1e-12
+        );
         assert_eq!(data.petzval_sum, -0.02);
     }
 

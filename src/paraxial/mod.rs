@@ -13,6 +13,6 @@ mod first_order;
 mod ray;
 mod seidel;
 
-pub use first_order::{Beam, FirstOrder, Pupil, Undefined, first_order};
+pub use first_order::{Beam, FirstOrder, ParaxialError, ParaxialPupil, first_order};
 pub use ray::{ParaxialRay, paraxial_ray, signed_indices};
 pub use seidel::{Seidel, SeidelSums, seidel};

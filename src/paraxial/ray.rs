@@ -1,8 +1,8 @@
 //! A ray close to the axis: refraction `n'u' = nu − y (n' − n) c`, transfer `y⁺ = y + t u'`
-//! (Welford 1986, equations 3.11 and 3.12), or the matrix of the [`Slab`] of a gradient, whose
+//! (Welford 1986, equations 3.11 and 3.12), or the matrix of the [`ParaxialGrin`] of a gradient, whose
 //! indices are those on the axis at the two faces.
 
-use crate::lens::{Slab, System};
+use crate::lens::{ParaxialGrin, System};
 use crate::math::Real;
 
 /// The heights of a paraxial ray at every surface, and its slopes behind every surface.
@@ -32,14 +32,14 @@ pub fn signed_indices<R: Real>(system: &System<R>) -> Vec<R> {
 }
 
 /// The gradients of the gaps, for paraxial rays; none for a lens of glass.
-pub(super) fn slabs<R: Real>(system: &System<R>) -> Vec<Option<Slab<R>>> {
-    if !system.is_graded() {
+pub(super) fn paraxial_grins<R: Real>(system: &System<R>) -> Vec<Option<ParaxialGrin<R>>> {
+    if !system.has_grin() {
         return Vec::new();
     }
     let indices = signed_indices(system);
     let gaps = system.surfaces.iter().zip(&indices[1..]);
     gaps.map(|(surface, n)| {
-        surface.gradient().map(|field| Slab::passed(&field, surface.thickness, *n))
+        surface.gradient().map(|field| ParaxialGrin::directed(&field, surface.thickness, *n))
     })
     .collect()
 }
@@ -47,7 +47,7 @@ pub(super) fn slabs<R: Real>(system: &System<R>) -> Vec<Option<Slab<R>>> {
 /// The paraxial ray that meets the vertex plane of the first surface at `height` with `slope`.
 pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> ParaxialRay<R> {
     let indices = signed_indices(system);
-    let slabs = slabs(system);
+    let slabs = paraxial_grins(system);
     let mut before = indices[0];
     let count = system.surfaces.len();
     let (mut heights, mut slopes) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -58,7 +58,7 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
         let u = nu / indices[i + 1];
         slopes.push(u);
         if let Some(Some(slab)) = slabs.get(i) {
-            (y, nu) = slab.pass(y, nu);
+            (y, nu) = slab.transfer(y, nu);
             before = slab.index_behind;
         } else {
             y += surface.thickness * u;

@@ -64,18 +64,18 @@ pub fn seidel<R: Real>(
     data: &FirstOrder<R>,
     outer: Option<(&System<R>, &System<R>)>,
 ) -> Option<Seidel<R>> {
-    if system.is_graded() {
+    if system.has_grin() {
         return None;
     }
     let (chief, lagrange) = (data.chief.as_ref()?, data.lagrange?);
     let indices = signed_indices(system);
-    let spread = spreads(system, &indices, outer);
+    let spread = relative_dispersions(system, &indices, outer);
     let at = |i: usize| {
         let (n, behind) = (indices[i], indices[i + 1]);
         let surface = &system.surfaces[i];
         let c = surface.shape.curvature();
         let (y, y_chief) = (data.marginal.heights[i], chief.heights[i]);
-        let meeting = Meeting {
+        let meeting = SurfaceHeights {
             n,
             behind,
             c,
@@ -94,7 +94,7 @@ pub fn seidel<R: Real>(
 }
 
 /// `δn/n` of every gap.
-fn spreads<R: Real>(
+fn relative_dispersions<R: Real>(
     system: &System<R>,
     indices: &[R],
     outer: Option<(&System<R>, &System<R>)>,
@@ -111,7 +111,7 @@ fn figuring<R: Real>(surface: &Surface<R>) -> R {
 }
 
 /// The two rays at one surface.
-struct Meeting<R> {
+struct SurfaceHeights<R> {
     n: R,
     behind: R,
     c: R,
@@ -122,7 +122,7 @@ struct Meeting<R> {
     lagrange: R,
 }
 
-impl<R: Real> Meeting<R> {
+impl<R: Real> SurfaceHeights<R> {
     fn sums(&self, figuring: R, colour: R) -> SeidelSums<R> {
         let Self { n, behind, c, y, y_chief, a, a_chief, lagrange } = *self;
         let (before, after) = (R::ONE / n, R::ONE / behind);

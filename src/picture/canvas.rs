@@ -11,11 +11,11 @@ const DOT: i32 = 2;
 const ADVANCE: i32 = 6;
 /// How long a dash is and how far it is to the next one, in pixels.
 const DASH: f64 = 8.0;
-const PERIOD: f64 = 14.0;
+const DASH_PERIOD: f64 = 14.0;
 
 /// Where a text stands from its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Align {
+pub enum TextAlign {
     /// It begins there.
     Left,
     /// Its middle is there.
@@ -53,7 +53,7 @@ impl Canvas {
         self.0.as_raw()
     }
 
-    fn dot(&mut self, x: i32, y: i32, color: Color) {
+    fn put_pixel(&mut self, x: i32, y: i32, color: Color) {
         let place = u32::try_from(x).ok().zip(u32::try_from(y).ok());
         let inside = place.filter(|(x, y)| *x < self.0.width() && *y < self.0.height());
         if let Some((x, y)) = inside {
@@ -65,7 +65,7 @@ impl Canvas {
     pub fn square(&mut self, [x, y]: [f64; 2], half: i32, color: Color) {
         let (x, y) = (x.round() as i32, y.round() as i32);
         for dy in -half..=half {
-            (-half..=half).for_each(|dx| self.dot(x + dx, y + dy, color));
+            (-half..=half).for_each(|dx| self.put_pixel(x + dx, y + dy, color));
         }
     }
 
@@ -85,7 +85,7 @@ impl Canvas {
             let steps = length.ceil().max(1.0);
             for i in 0..=steps as i32 {
                 let t = f64::from(i) / steps;
-                let drawn = stroke == Stroke::Solid || (way + t * length) % PERIOD < DASH;
+                let drawn = stroke == Stroke::Solid || (way + t * length) % DASH_PERIOD < DASH;
                 if drawn {
                     self.square([0, 1].map(|k| from[k] + t * (to[k] - from[k])), 1, color);
                 }
@@ -95,7 +95,7 @@ impl Canvas {
     }
 
     /// A marker at every point.
-    pub fn marks(&mut self, points: &[[f64; 2]], color: Color) {
+    pub fn markers(&mut self, points: &[[f64; 2]], color: Color) {
         points.iter().for_each(|point| self.square(*point, 3, color));
     }
 
@@ -106,31 +106,31 @@ impl Canvas {
             let corner = [i % columns, i / columns].map(|k| (k * cell) as i32);
             for pixel in 0..cell * cell {
                 let [dx, dy] = [pixel % cell, pixel / cell].map(|k| k as i32);
-                self.dot(x + corner[0] + dx, y + corner[1] + dy, *color);
+                self.put_pixel(x + corner[0] + dx, y + corner[1] + dy, *color);
             }
         }
     }
 
     /// A line of text; the place is at its top.
-    pub fn text(&mut self, [x, y]: [f64; 2], text: &str, color: Color, align: Align) {
+    pub fn text(&mut self, [x, y]: [f64; 2], text: &str, color: Color, align: TextAlign) {
         let width = DOT * ADVANCE * text.chars().count() as i32;
         let start = x.round() as i32
             - match align {
-                Align::Left => 0,
-                Align::Middle => width / 2,
-                Align::Right => width,
+                TextAlign::Left => 0,
+                TextAlign::Middle => width / 2,
+                TextAlign::Right => width,
             };
         for (i, letter) in text.chars().enumerate() {
-            self.letter([start + DOT * ADVANCE * i as i32, y.round() as i32], letter, color);
+            self.draw_glyph([start + DOT * ADVANCE * i as i32, y.round() as i32], letter, color);
         }
     }
 
-    fn letter(&mut self, [x, y]: [i32; 2], letter: char, color: Color) {
+    fn draw_glyph(&mut self, [x, y]: [i32; 2], letter: char, color: Color) {
         for (column, bits) in glyph(letter).into_iter().enumerate() {
             for row in (0..8).filter(|row| bits >> row & 1 == 1) {
                 let corner = [x + DOT * column as i32, y + DOT * row];
                 for i in 0..DOT * DOT {
-                    self.dot(corner[0] + i % DOT, corner[1] + i / DOT, color);
+                    self.put_pixel(corner[0] + i % DOT, corner[1] + i / DOT, color);
                 }
             }
         }

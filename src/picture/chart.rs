@@ -1,14 +1,14 @@
 //! A chart: two axes, and the way from two quantities to a place on the canvas.
 
-use super::canvas::{Align, Canvas};
+use super::canvas::{Canvas, TextAlign};
 use super::color::{BLACK, GRID};
 
 /// About how many lines a linear axis has.
-const LINES: f64 = 5.0;
+const TICKS: f64 = 5.0;
 /// A line this close to the end of an axis, in steps, still belongs to it.
-const EVEN: f64 = 1e-6;
+const END_TOLERANCE: f64 = 1e-6;
 /// Room for the letters of an axis, in pixels.
-const GAP: f64 = 10.0;
+const PADDING: f64 = 10.0;
 const HALF_LETTER: f64 = 7.0;
 
 /// An axis from one whole step to another.
@@ -27,7 +27,7 @@ impl Axis {
     pub fn linear(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = range(values).unwrap_or((0.0, 1.0));
         let width = if high > low { high - low } else { low.abs().max(1.0) };
-        let step = round_step(width / LINES);
+        let step = round_step(width / TICKS);
         let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
         let high = if high > low { high } else { low + step };
         Self { name: name.to_owned(), low, high, step, logarithmic: false }
@@ -43,15 +43,17 @@ impl Axis {
     }
 
     /// Where a value stands, 0 at the beginning of the axis and 1 at its end.
-    fn share(&self, value: f64) -> f64 {
+    fn fraction(&self, value: f64) -> f64 {
         let place = if self.logarithmic { value.log10().max(self.low) } else { value };
         (place - self.low) / (self.high - self.low)
     }
 
     /// The lines of the grid with their labels.
-    fn lines(&self) -> impl Iterator<Item = (f64, String)> + '_ {
-        let [first, last] =
-            [(self.low / self.step - EVEN).ceil(), (self.high / self.step + EVEN).floor()];
+    fn ticks(&self) -> impl Iterator<Item = (f64, String)> + '_ {
+        let [first, last] = [
+            (self.low / self.step - END_TOLERANCE).ceil(),
+            (self.high / self.step + END_TOLERANCE).floor(),
+        ];
         (first as i32..=last as i32).map(|i| {
             let place = f64::from(i) * self.step;
             let share = (place - self.low) / (self.high - self.low);
@@ -114,7 +116,7 @@ impl Chart {
 
     /// The same with as many pixels a unit on one axis as on the other: a map.
     #[must_use]
-    pub fn to_scale(mut self) -> Self {
+    pub fn with_equal_scales(mut self) -> Self {
         let (width, height) = (self.right - self.left, self.bottom - self.top);
         let (x, y) = (self.x.high - self.x.low, self.y.high - self.y.low);
         let unit = (x / width).max(y / height);
@@ -124,22 +126,22 @@ impl Chart {
     }
 
     /// Where two quantities stand on the canvas.
-    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn to_pixel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [
-            self.left + (self.right - self.left) * self.x.share(x),
-            self.bottom - (self.bottom - self.top) * self.y.share(y),
+            self.left + (self.right - self.left) * self.x.fraction(x),
+            self.bottom - (self.bottom - self.top) * self.y.fraction(y),
         ]
     }
 
     /// Whether two quantities are within the axes.
-    pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
+    pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
         let within = |share: f64| (0.0..=1.0).contains(&share);
-        within(self.x.share(x)) && within(self.y.share(y))
+        within(self.x.fraction(x)) && within(self.y.fraction(y))
     }
 
     /// Where several pairs of quantities stand.
-    pub fn places(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        points.iter().map(|point| self.place(*point)).collect()
+    pub fn to_pixels(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        points.iter().map(|point| self.to_pixel(*point)).collect()
     }
 
     /// Draws the grid, the numbers and the names of the axes, and a title above.
@@ -147,22 +149,22 @@ impl Chart {
         self.draw_grid(canvas);
         self.draw_frame(canvas);
         let middle = 0.5 * (self.left + self.right);
-        canvas.text([middle, self.top - 48.0], title, BLACK, Align::Middle);
-        canvas.text([middle, self.bottom + 46.0], &self.x.name, BLACK, Align::Middle);
-        let above = [self.left - GAP, self.top - 24.0];
-        canvas.text(above, &self.y.name, BLACK, Align::Left);
+        canvas.text([middle, self.top - 48.0], title, BLACK, TextAlign::Middle);
+        canvas.text([middle, self.bottom + 46.0], &self.x.name, BLACK, TextAlign::Middle);
+        let above = [self.left - PADDING, self.top - 24.0];
+        canvas.text(above, &self.y.name, BLACK, TextAlign::Left);
     }
 
     fn draw_grid(&self, canvas: &mut Canvas) {
-        for (share, label) in self.x.lines() {
+        for (share, label) in self.x.ticks() {
             let x = self.left + (self.right - self.left) * share;
             canvas.line([x, self.top], [x, self.bottom], GRID);
-            canvas.text([x, self.bottom + GAP], &label, BLACK, Align::Middle);
+            canvas.text([x, self.bottom + PADDING], &label, BLACK, TextAlign::Middle);
         }
-        for (share, label) in self.y.lines() {
+        for (share, label) in self.y.ticks() {
             let y = self.bottom - (self.bottom - self.top) * share;
             canvas.line([self.left, y], [self.right, y], GRID);
-            canvas.text([self.left - GAP, y - HALF_LETTER], &label, BLACK, Align::Right);
+            canvas.text([self.left - PADDING, y - HALF_LETTER], &label, BLACK, TextAlign::Right);
         }
     }
 
@@ -185,9 +187,9 @@ mod tests {
         assert_eq!((axis.low, axis.high, axis.step), (0.0, 10.0, 2.0));
         let axis = Axis::logarithmic("ms", [0.02, 700.0, 0.0], 1e-3);
         assert_eq!((axis.low, axis.high), (-3.0, 3.0));
-        assert_eq!(axis.share(1.0), 0.5);
-        assert_eq!(axis.share(0.0), 0.0);
-        let labels: Vec<String> = axis.lines().map(|line| line.1).collect();
+        assert_eq!(axis.fraction(1.0), 0.5);
+        assert_eq!(axis.fraction(0.0), 0.0);
+        let labels: Vec<String> = axis.ticks().map(|line| line.1).collect();
         assert_eq!([&labels[0], &labels[3]], ["1e-3", "1e0"]);
     }
 
@@ -203,9 +205,9 @@ mod tests {
     #[test]
     fn a_chart_to_scale_has_square_units() {
         let (x, y) = (Axis::linear("x", [0.0, 1.0]), Axis::linear("y", [0.0, 1.0]));
-        let chart = Chart::new([0.0, 0.0], [400.0, 100.0], x, y).to_scale();
-        let [a, b] = [chart.place([0.0, 0.0]), chart.place([0.5, 0.5])];
+        let chart = Chart::new([0.0, 0.0], [400.0, 100.0], x, y).with_equal_scales();
+        let [a, b] = [chart.to_pixel([0.0, 0.0]), chart.to_pixel([0.5, 0.5])];
         assert!(((b[0] - a[0]) - (a[1] - b[1])).abs() < 1e-9);
-        assert_eq!(chart.place([0.5, 0.5]), [200.0, 50.0]);
+        assert_eq!(chart.to_pixel([0.5, 0.5]), [200.0, 50.0]);
     }
 }

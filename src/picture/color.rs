@@ -23,17 +23,17 @@ pub const PALETTE: [Color; 8] = [
 ];
 
 /// From black at 0 to white at 1.
-pub fn grey(value: f64) -> Color {
-    [level(value); 3]
+pub fn gray_level(value: f64) -> Color {
+    [byte(value); 3]
 }
 
 /// From blue at −1 over white at 0 to red at 1.
 pub fn diverging(value: f64) -> Color {
-    let faded = level(1.0 - value.abs());
+    let faded = byte(1.0 - value.abs());
     if value < 0.0 { [faded, faded, 0xff] } else { [0xff, faded, faded] }
 }
 
-fn level(share: f64) -> u8 {
+fn byte(share: f64) -> u8 {
     (255.0 * share.clamp(0.0, 1.0)).round() as u8
 }
 
@@ -43,7 +43,10 @@ mod tests {
 
     #[test]
     fn scales_reach_their_ends_and_stay_there() {
-        assert_eq!([grey(0.0), grey(1.0), grey(9.0)], [BLACK, [0xff; 3], [0xff; 3]]);
+        assert_eq!(
+            [gray_level(0.0), gray_level(1.0), gray_level(9.0)],
+            [BLACK, [0xff; 3], [0xff; 3]]
+        );
         assert_eq!(diverging(0.0), [0xff; 3]);
         assert_eq!([diverging(-2.0), diverging(1.0)], [[0, 0, 0xff], [0xff, 0, 0]]);
     }

@@ -8,6 +8,6 @@ mod chart;
 mod color;
 mod font;
 
-pub use canvas::{Align, Canvas, Stroke};
+pub use canvas::{Canvas, Stroke, TextAlign};
 pub use chart::{Axis, Chart};
-pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, grey};
+pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, gray_level};

@@ -1,8 +1,8 @@
 //! A lens with its beam, ready for rays.
 
-use crate::lens::{Aperture, Field, Invalid, Lens, LensError, System};
+use crate::lens::{Aperture, FieldPoint, Lens, LensError, System, SystemError};
 use crate::math::Dual;
-use crate::paraxial::{Beam, FirstOrder, Seidel, Undefined, first_order, seidel};
+use crate::paraxial::{Beam, FirstOrder, ParaxialError, Seidel, first_order, seidel};
 use crate::trace::Tracer;
 
 use super::launch::Launch;
@@ -25,25 +25,25 @@ pub enum Aiming {
 
 /// Beyond this miss of the stop's centre by the paraxial chief ray, in stop radii, the pupil of a
 /// wide field is looked for where it is: paraxial coordinates would waste half of the beam.
-pub const MISS: f64 = 0.25;
+pub const WIDE_AIMING_THRESHOLD: f64 = 0.25;
 
 /// Why a lens cannot be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BenchError {
+pub enum RayModelError {
     /// The prescription.
     #[error(transparent)]
     Lens(#[from] LensError),
     /// Its numbers.
     #[error(transparent)]
-    Invalid(#[from] Invalid),
+    Invalid(#[from] SystemError),
     /// Its aperture.
     #[error(transparent)]
-    Undefined(#[from] Undefined),
+    Undefined(#[from] ParaxialError),
 }
 
 /// A lens at one wavelength.
 #[derive(Debug, Clone)]
-pub struct Color {
+pub struct Channel {
     /// The wavelength in micrometres.
     pub um: f64,
     /// Its share in polychromatic results.
@@ -53,42 +53,43 @@ pub struct Color {
     /// The same made ready for tracing.
     pub tracer: Tracer<f64>,
     /// The same clipped by nothing, with derivatives by two pupil coordinates.
-    pub(super) open: Tracer<Dual2>,
+    pub(super) unclipped: Tracer<Dual2>,
 }
 
 /// A lens with its beam at one zoom position, ready for rays at every wavelength.
 #[derive(Debug, Clone)]
-pub struct Bench {
+pub struct RayModel {
     /// How it is used.
     pub beam: Beam,
     /// The field points, in the unit of the beam's field kind.
-    pub fields: Vec<Field>,
+    pub fields: Vec<FieldPoint>,
     /// One entry a wavelength.
-    pub colors: Vec<Color>,
+    pub channels: Vec<Channel>,
     /// Which of them is the primary one.
     pub primary: usize,
     /// First-order data at the primary wavelength.
-    pub first: FirstOrder<f64>,
+    pub first_order: FirstOrder<f64>,
     /// How pupil coordinates become rays.
     pub aiming: Aiming,
 }
 
-impl Bench {
+impl RayModel {
     /// A lens at a zoom position. Rays are aimed paraxially unless the chief ray of the farthest
     /// field then misses the centre of the stop by more than a quarter of its radius.
-    pub fn of(lens: &Lens, zoom: usize) -> Result<Self, BenchError> {
+    pub fn from_lens(lens: &Lens, zoom: usize) -> Result<Self, RayModelError> {
         let mut bench = Self::with_aiming(lens, zoom, Aiming::Paraxial)?;
-        if bench.stop_miss().is_none_or(|miss| miss > MISS) {
+        if bench.stop_miss().is_none_or(|miss| miss > WIDE_AIMING_THRESHOLD) {
             bench.aiming = Aiming::Chief;
         }
         Ok(bench)
     }
 
     /// A lens at a zoom position, aimed as said.
-    pub fn with_aiming(lens: &Lens, zoom: usize, aiming: Aiming) -> Result<Self, BenchError> {
-        let system = |w: &crate::lens::Wavelength| Ok((w.um, w.weight, lens.system(zoom, w.um)?));
+    pub fn with_aiming(lens: &Lens, zoom: usize, aiming: Aiming) -> Result<Self, RayModelError> {
+        let system = |w: &crate::lens::Wavelength| Ok((w.um, w.weight, lens.resolve(zoom, w.um)?));
         let systems: Result<Vec<_>, LensError> = lens.wavelengths.iter().map(system).collect();
-        let mut bench = Self::new(systems?, lens.primary(), Beam::of(lens, zoom), aiming)?;
+        let mut bench =
+            Self::from_systems(systems?, lens.primary(), Beam::for_lens(lens, zoom), aiming)?;
         bench.fields.clone_from(&lens.fields_at(zoom).values);
         Ok(bench)
     }
@@ -97,12 +98,12 @@ impl Bench {
     ///
     /// # Errors
     /// Numbers that cannot be traced, or an aperture without meaning for the lens.
-    pub fn new(
+    pub fn from_systems(
         systems: Vec<(f64, f64, System<f64>)>,
         primary: usize,
         beam: Beam,
         aiming: Aiming,
-    ) -> Result<Self, BenchError> {
+    ) -> Result<Self, RayModelError> {
         let first = first_order(&systems[primary].2, &beam)?;
         let rim = match (beam.aperture, aiming) {
             (Aperture::StopSemiDiameter(_), Aiming::Stop) => Some(f64::INFINITY),
@@ -113,17 +114,24 @@ impl Bench {
             let stop = system.stop.unwrap_or(0);
             rim.into_iter().for_each(|radius| system.surfaces[stop].semi_diameter = radius);
             let tracer = Tracer::new(&system)?;
-            let open = Tracer::new(&system.lift::<Dual2>())?.opened();
-            Ok(Color { um, weight, system, tracer, open })
+            let open = Tracer::new(&system.cast::<Dual2>())?.without_rims();
+            Ok(Channel { um, weight, system, tracer, unclipped: open })
         };
-        let colors: Result<Vec<_>, Invalid> = systems.into_iter().map(color).collect();
-        Ok(Self { beam, fields: Vec::new(), colors: colors?, primary, first, aiming })
+        let colors: Result<Vec<_>, SystemError> = systems.into_iter().map(color).collect();
+        Ok(Self {
+            beam,
+            fields: Vec::new(),
+            channels: colors?,
+            primary,
+            first_order: first,
+            aiming,
+        })
     }
 
     /// The rays of a field at a wavelength.
     pub fn launch(
         &self,
-        field: Field,
+        field: FieldPoint,
         wavelength: usize,
     ) -> Result<Launch<'_>, super::LaunchError> {
         Launch::new(self, field, wavelength, self.aiming)
@@ -132,11 +140,11 @@ impl Bench {
     /// The third-order sums, chromatic ones between the shortest and the longest wavelength where
     /// there are two; `None` where there is no chief ray or a gradient fills a gap.
     pub fn seidel(&self) -> Option<Seidel<f64>> {
-        let by_length = |a: &&Color, b: &&Color| a.um.total_cmp(&b.um);
-        let short = self.colors.iter().min_by(by_length)?;
-        let long = self.colors.iter().max_by(by_length)?;
+        let by_length = |a: &&Channel, b: &&Channel| a.um.total_cmp(&b.um);
+        let short = self.channels.iter().min_by(by_length)?;
+        let long = self.channels.iter().max_by(by_length)?;
         let outer = (short.um < long.um).then_some((&short.system, &long.system));
-        seidel(&self.colors[self.primary].system, &self.first, outer)
+        seidel(&self.channels[self.primary].system, &self.first_order, outer)
     }
 
     /// The same beam without a search for the stop: the rim of the stop limits it, where that is
@@ -144,30 +152,34 @@ impl Bench {
     ///
     /// # Errors
     /// Numbers that cannot be traced.
-    pub fn limited_by_stop(&self) -> Result<Self, Invalid> {
+    pub fn limited_by_stop(&self) -> Result<Self, SystemError> {
         let (stop, radius) = (self.stop(), self.stop_radius());
-        let color = |color: &Color| {
+        let color = |color: &Channel| {
             let mut system = color.system.clone();
             let rim = &mut system.surfaces[stop].semi_diameter;
             *rim = rim.min(radius);
             let tracer = Tracer::new(&system)?;
-            Ok(Color { system, tracer, ..color.clone() })
+            Ok(Channel { system, tracer, ..color.clone() })
         };
-        let colors: Result<_, Invalid> = self.colors.iter().map(color).collect();
+        let colors: Result<_, SystemError> = self.channels.iter().map(color).collect();
         let beam = Beam { aperture: Aperture::StopSemiDiameter(radius), ..self.beam };
-        Ok(Self { colors: colors?, beam, aiming: Aiming::Chief, ..self.clone() })
+        Ok(Self { channels: colors?, beam, aiming: Aiming::Chief, ..self.clone() })
     }
 
     /// The same beam through a lens that has changed at one wavelength: where its stop limits it,
     /// the stop is as large as that says.
-    pub(super) fn changed(&self, wavelength: usize, system: System<f64>) -> Result<Self, Invalid> {
+    pub(super) fn with_system(
+        &self,
+        wavelength: usize,
+        system: System<f64>,
+    ) -> Result<Self, SystemError> {
         let mut bench = self.clone();
         if let Aperture::StopSemiDiameter(radius) = &mut bench.beam.aperture {
             *radius = system.surfaces[self.stop()].semi_diameter;
         }
-        let color = &mut bench.colors[wavelength];
+        let color = &mut bench.channels[wavelength];
         color.tracer = Tracer::new(&system)?;
-        color.open = Tracer::new(&system.lift::<Dual2>())?.opened();
+        color.unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
         color.system = system;
         Ok(bench)
     }
@@ -179,29 +191,29 @@ impl Bench {
     }
 
     /// Whether a gradient fills a gap.
-    pub fn is_graded(&self) -> bool {
-        self.colors[self.primary].system.is_graded()
+    pub fn has_grin(&self) -> bool {
+        self.channels[self.primary].system.has_grin()
     }
 
     /// The radius of the stop in mm: as given, or the height of the paraxial marginal ray there.
     pub fn stop_radius(&self) -> f64 {
         match self.beam.aperture {
             Aperture::StopSemiDiameter(radius) => radius,
-            _ => self.first.stop_semi_diameter,
+            _ => self.first_order.stop_semi_diameter,
         }
     }
 
     /// The surface that is the stop.
     pub fn stop(&self) -> usize {
-        self.colors[self.primary].system.stop.unwrap_or(0)
+        self.channels[self.primary].system.stop.unwrap_or(0)
     }
 
     /// By how many stop radii the paraxial chief ray of the farthest field misses the centre of
     /// the stop; `None` where that ray does not get there.
     pub fn stop_miss(&self) -> Option<f64> {
-        let edge = Field { x: 0.0, y: self.beam.edge, weight: 1.0 };
+        let edge = FieldPoint { x: 0.0, y: self.beam.edge, weight: 1.0 };
         let launch = Launch::new(self, edge, self.primary, Aiming::Paraxial).ok()?;
-        let [x, y] = launch.at_stop([0.0, 0.0])?;
+        let [x, y] = launch.stop_point([0.0, 0.0])?;
         let miss = x.hypot(y) / self.stop_radius();
         miss.is_finite().then_some(miss)
     }

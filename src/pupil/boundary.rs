@@ -3,41 +3,41 @@
 //!
 //! From a point inside, the pupil's edge is a function `R(ψ)` of azimuth, both in a frame that is
 //! stretched with the pupil so that a narrow sliver looks round. It is the zero of one
-//! margin of the ray (see [`Hurdle`]) along the radius, found by a bracketed secant; where the
+//! margin of the ray (see [`RayLimit`]) along the radius, found by a bracketed secant; where the
 //! margin that ends it changes, `R` has a corner, and there the azimuths are split into arcs.
 
 use super::launch::Launch;
-use crate::trace::Hurdle;
+use crate::trace::RayLimit;
 use std::f64::consts::PI;
 
 /// What ends the pupil somewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Limit {
+pub enum PupilLimit {
     /// The disc of the entrance pupil, or of the stop that rays are aimed at.
     Disc,
     /// A surface that clips, misses or totally reflects.
-    Surface(usize, Hurdle),
+    Surface(usize, RayLimit),
     /// No ray is found that crosses the stop there.
     Unaimed,
 }
 
-impl Limit {
+impl PupilLimit {
     /// Whether a cosine vanishes there, so that rays turn ever faster towards it.
     pub fn is_grazing(self) -> bool {
-        matches!(self, Self::Surface(_, Hurdle::Miss | Hurdle::Reflection))
+        matches!(self, Self::Surface(_, RayLimit::Miss | RayLimit::TotalReflection))
     }
 }
 
 /// Polar coordinates about a point of the pupil, stretched with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct PolarFrame {
     /// The point, in pupil coordinates.
     pub center: [f64; 2],
     /// Where the frame's unit vectors along x and y lie.
     pub axes: [[f64; 2]; 2],
 }
 
-impl Frame {
+impl PolarFrame {
     /// Along which pupil coordinates change with the radius at an azimuth from +y towards +x.
     pub fn direction(&self, azimuth: f64) -> [f64; 2] {
         let (sin, cos) = azimuth.sin_cos();
@@ -68,45 +68,45 @@ impl Frame {
 
 /// The edge of the pupil along one radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Edge {
+pub struct EdgePoint {
     /// Its distance from the centre, in the frame.
     pub radius: f64,
     /// What ends the pupil there.
-    pub limit: Limit,
+    pub limit: PupilLimit,
 }
 
 /// A stretch of the edge that one limit makes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arc {
+pub struct BoundaryArc {
     /// Azimuth where it begins, in radians from the frame's +y towards its +x.
     pub from: f64,
     /// Azimuth where it ends.
     pub to: f64,
     /// What ends the pupil along it.
-    pub limit: Limit,
+    pub limit: PupilLimit,
 }
 
 /// The edge of a pupil that is star-shaped about a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
     /// In what it is measured.
-    pub frame: Frame,
+    pub frame: PolarFrame,
     /// The arcs in order of azimuth: over a half turn where the pupil is its own mirror image.
-    pub arcs: Vec<Arc>,
+    pub arcs: Vec<BoundaryArc>,
     /// The edge at the azimuths that were looked at.
-    pub(super) samples: Vec<(f64, Edge)>,
+    pub(super) samples: Vec<(f64, EdgePoint)>,
     /// Limits at which a cosine vanishes on the edge or not far behind it.
-    pub(super) grazing: Vec<Limit>,
+    pub(super) grazing_limits: Vec<PupilLimit>,
     /// Rays traced to find it.
     pub rays: usize,
 }
 
 /// How a ray fares against the limits.
-pub(super) struct Probe {
+pub(super) struct LimitProbe {
     /// The first limit that it fails, with the margin.
-    pub(super) failed: Option<(Limit, f64)>,
+    pub(super) failed: Option<(PupilLimit, f64)>,
     /// Its margin at the limit that was asked for; not a number where it does not get that far.
-    wanted: f64,
+    margin_at_limit: f64,
 }
 
 /// A ray so close to the rim of the disc, relatively, counts as one at the rim: where the rim of
@@ -119,52 +119,52 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Two edges as close as that differ by less than this, relatively, unless the edge jumps.
 const JUMP: f64 = 1e-5;
 /// How far, relatively, the edge between two known azimuths may be from their interpolation.
-pub(super) const NEAR: f64 = 0.003;
+pub(super) const GUESS_SPREAD: f64 = 0.003;
 /// How far inside the edge, relatively, margins are looked at.
 const INSIDE: f64 = 1e-9;
 /// A margin this small against its neighbours is one that ends the pupil.
 const ENDING: f64 = 1e-6;
 /// A cosine that vanishes this much inside the edge, relatively, vanishes there but for rounding.
-const GRAZED: f64 = 1.0 - 1e-9;
+const AT_GRAZING: f64 = 1.0 - 1e-9;
 /// A squared cosine that has fallen to this part of what it is at the centre is one that vanishes
 /// not far away.
-const NEARLY: f64 = 0.3;
+const NEAR_GRAZING: f64 = 0.3;
 /// What is added to the largest radius seen so that none is larger.
 const COVER: f64 = 1.02;
 /// More arcs than this are no pupil but noise.
-pub(super) const MOST_ARCS: usize = 24;
+pub(super) const MAX_ARCS: usize = 24;
 /// A pupil that reaches this far, in its frame, is limited by nothing.
-const ENDLESS: f64 = 1e4;
+const UNBOUNDED: f64 = 1e4;
 
 /// Which limits a search for the edge looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Seen {
+pub(super) enum LimitFilter {
     /// All.
     All,
     /// All but the obstructions.
-    Rims,
+    WithoutObstructions,
     /// The obstructions alone, from inside: the edge is where their shadow ends.
-    Shadow,
+    Obstructions,
 }
 
 impl Launch<'_> {
     /// Whether the ray at `p` gets through, and its margin at one limit.
-    pub(super) fn probe(&self, p: [f64; 2], wanted: Limit) -> Probe {
-        self.probe_seeing(p, wanted, |_| true)
+    pub(super) fn probe(&self, p: [f64; 2], wanted: PupilLimit) -> LimitProbe {
+        self.probe_filtered(p, wanted, |_| true)
     }
 
     /// Whether the ray at `p` is in no shadow, with margins that are negative there.
-    fn probe_shadow(&self, p: [f64; 2], wanted: Limit) -> Probe {
-        let mut probe = Probe { failed: None, wanted: f64::NAN };
+    fn probe_obstructions(&self, p: [f64; 2], wanted: PupilLimit) -> LimitProbe {
+        let mut probe = LimitProbe { failed: None, margin_at_limit: f64::NAN };
         let Some(ray) = self.ray(p) else { return probe };
-        let mut deepest: Option<(Limit, f64)> = None;
-        self.color().tracer.margins(ray, |surface, hurdle, margin| {
-            if hurdle != Hurdle::Obstruction {
+        let mut deepest: Option<(PupilLimit, f64)> = None;
+        self.channel().tracer.margins(ray, |surface, hurdle, margin| {
+            if hurdle != RayLimit::Obstruction {
                 return;
             }
-            let limit = Limit::Surface(surface, hurdle);
+            let limit = PupilLimit::Surface(surface, hurdle);
             if limit == wanted {
-                probe.wanted = -margin;
+                probe.margin_at_limit = -margin;
             }
             if deepest.is_none_or(|(_, least)| margin < least) {
                 deepest = Some((limit, margin));
@@ -174,15 +174,23 @@ impl Launch<'_> {
         probe
     }
 
-    fn probe_seeing(&self, p: [f64; 2], wanted: Limit, sees: impl Fn(Hurdle) -> bool) -> Probe {
+    fn probe_filtered(
+        &self,
+        p: [f64; 2],
+        wanted: PupilLimit,
+        sees: impl Fn(RayLimit) -> bool,
+    ) -> LimitProbe {
         let Some(ray) = self.ray(p) else {
-            return Probe { failed: Some((Limit::Unaimed, -1.0)), wanted: f64::NAN };
+            return LimitProbe {
+                failed: Some((PupilLimit::Unaimed, -1.0)),
+                margin_at_limit: f64::NAN,
+            };
         };
-        let mut probe = Probe { failed: None, wanted: f64::NAN };
-        self.color().tracer.margins(ray, |surface, hurdle, margin| {
-            let limit = Limit::Surface(surface, hurdle);
+        let mut probe = LimitProbe { failed: None, margin_at_limit: f64::NAN };
+        self.channel().tracer.margins(ray, |surface, hurdle, margin| {
+            let limit = PupilLimit::Surface(surface, hurdle);
             if limit == wanted {
-                probe.wanted = margin;
+                probe.margin_at_limit = margin;
             }
             if probe.failed.is_none() && !(margin >= 0.0) && sees(hurdle) {
                 probe.failed = Some((limit, if margin < 0.0 { margin } else { -1.0 }));
@@ -192,44 +200,46 @@ impl Launch<'_> {
     }
 
     /// The margins of a ray at every hurdle; `None` where it does not get through.
-    pub(super) fn margins_of_passing(&self, p: [f64; 2]) -> Option<Vec<f64>> {
+    pub(super) fn margins_if_passing(&self, p: [f64; 2]) -> Option<Vec<f64>> {
         let ray = self.ray(p)?;
-        let mut margins = Vec::with_capacity(3 * self.color().tracer.surfaces());
-        self.color().tracer.margins(ray, |_, _, margin| margins.push(margin));
+        let mut margins = Vec::with_capacity(3 * self.channel().tracer.surfaces());
+        self.channel().tracer.margins(ray, |_, _, margin| margins.push(margin));
         margins.iter().all(|margin| *margin >= 0.0).then_some(margins)
     }
 
     /// Whether the ray at `p` gets through the surfaces.
     pub(super) fn is_lit(&self, p: [f64; 2]) -> bool {
-        self.probe(p, Limit::Disc).failed.is_none()
+        self.probe(p, PupilLimit::Disc).failed.is_none()
     }
 }
 
 /// A search for the edge from one point.
-pub(super) struct Search<'a> {
+pub(super) struct EdgeSearch<'a> {
     pub(super) launch: &'a Launch<'a>,
-    pub(super) frame: Frame,
+    pub(super) frame: PolarFrame,
     pub(super) rays: usize,
-    seen: Seen,
+    limits: LimitFilter,
 }
 
-impl<'a> Search<'a> {
-    pub(super) fn new(launch: &'a Launch<'a>, frame: Frame) -> Self {
-        Self { launch, frame, rays: 0, seen: Seen::All }
+impl<'a> EdgeSearch<'a> {
+    pub(super) fn new(launch: &'a Launch<'a>, frame: PolarFrame) -> Self {
+        Self { launch, frame, rays: 0, limits: LimitFilter::All }
     }
 
     /// The same search for another edge.
-    pub(super) fn seeing(self, seen: Seen) -> Self {
-        Self { seen, ..self }
+    pub(super) fn with_limits(self, seen: LimitFilter) -> Self {
+        Self { limits: seen, ..self }
     }
 
-    fn probe(&mut self, azimuth: f64, r: f64, wanted: Limit) -> Probe {
+    fn probe(&mut self, azimuth: f64, r: f64, wanted: PupilLimit) -> LimitProbe {
         self.rays += 1;
         let p = self.frame.point(azimuth, r);
-        match self.seen {
-            Seen::All => self.launch.probe(p, wanted),
-            Seen::Rims => self.launch.probe_seeing(p, wanted, |h| h != Hurdle::Obstruction),
-            Seen::Shadow => self.launch.probe_shadow(p, wanted),
+        match self.limits {
+            LimitFilter::All => self.launch.probe(p, wanted),
+            LimitFilter::WithoutObstructions => {
+                self.launch.probe_filtered(p, wanted, |h| h != RayLimit::Obstruction)
+            }
+            LimitFilter::Obstructions => self.launch.probe_obstructions(p, wanted),
         }
     }
 
@@ -248,21 +258,21 @@ impl<'a> Search<'a> {
 
     /// The edge at an azimuth, searched around a guess of its radius that is right within a
     /// `spread`, relatively; `None` where nothing limits the pupil.
-    pub(super) fn edge(&mut self, azimuth: f64, guess: f64, spread: f64) -> Option<Edge> {
+    pub(super) fn edge(&mut self, azimuth: f64, guess: f64, spread: f64) -> Option<EdgePoint> {
         let disc = self.disc(azimuth);
         let last = disc * (1.0 - AT_DISC);
         let mut spread = spread;
         let mut low = 0.0;
         let mut high = (guess * (1.0 + spread)).min(last);
         loop {
-            if let Some(failed) = self.probe(azimuth, high, Limit::Disc).failed {
+            if let Some(failed) = self.probe(azimuth, high, PupilLimit::Disc).failed {
                 let from = if low > 0.0 { low } else { guess.min(high) * (1.0 - spread) };
-                return Some(self.between(azimuth, from, high, failed));
+                return Some(self.search_inward(azimuth, from, high, failed));
             }
             if high >= last {
-                return Some(Edge { radius: disc, limit: Limit::Disc });
+                return Some(EdgePoint { radius: disc, limit: PupilLimit::Disc });
             }
-            if high > ENDLESS {
+            if high > UNBOUNDED {
                 return None;
             }
             spread *= 3.0;
@@ -272,13 +282,13 @@ impl<'a> Search<'a> {
     }
 
     /// The edge in front of a ray that fails, looked for behind ever smaller radii.
-    fn between(
+    fn search_inward(
         &mut self,
         azimuth: f64,
         mut low: f64,
         mut high: f64,
-        mut failed: (Limit, f64),
-    ) -> Edge {
+        mut failed: (PupilLimit, f64),
+    ) -> EdgePoint {
         loop {
             low = low.max(0.0);
             let probe = self.probe(azimuth, low, failed.0);
@@ -289,7 +299,12 @@ impl<'a> Search<'a> {
                     low -= step;
                 }
                 Some(_) | None => {
-                    return self.bracketed(azimuth, (low, probe.wanted), high, failed);
+                    return self.refine_bracket(
+                        azimuth,
+                        (low, probe.margin_at_limit),
+                        high,
+                        failed,
+                    );
                 }
             }
         }
@@ -297,13 +312,13 @@ impl<'a> Search<'a> {
 
     /// The zero of the margin that ends the pupil between a ray that passes and one that fails:
     /// the method of Anderson and Björck (BIT 13, 1973), halving where it is slow.
-    fn bracketed(
+    fn refine_bracket(
         &mut self,
         azimuth: f64,
         (mut low, mut at_low): (f64, f64),
         mut high: f64,
-        (mut limit, mut at_high): (Limit, f64),
-    ) -> Edge {
+        (mut limit, mut at_high): (PupilLimit, f64),
+    ) -> EdgePoint {
         let (mut last, mut slow) = (f64::INFINITY, 0);
         for _ in 0..100 {
             let width = high - low;
@@ -311,14 +326,14 @@ impl<'a> Search<'a> {
             let inside = secant > low && secant < high && slow < 3;
             let r = if inside { secant } else { low + 0.5 * width };
             if (r - last).abs() <= ROUNDING * high || r <= low || r >= high {
-                return Edge { radius: r, limit };
+                return EdgePoint { radius: r, limit };
             }
             last = r;
             let probe = self.probe(azimuth, r, limit);
             match probe.failed {
                 None => {
-                    at_high *= damping(probe.wanted, at_low);
-                    (low, at_low) = (r, probe.wanted);
+                    at_high *= damping(probe.margin_at_limit, at_low);
+                    (low, at_low) = (r, probe.margin_at_limit);
                 }
                 Some((same, margin)) if same == limit => {
                     at_low *= damping(margin, at_high);
@@ -326,36 +341,41 @@ impl<'a> Search<'a> {
                 }
                 Some((other, margin)) if width > 1e-10 * high => {
                     (high, at_high, limit) = (r, margin, other);
-                    at_low = self.probe(azimuth, low, limit).wanted;
+                    at_low = self.probe(azimuth, low, limit).margin_at_limit;
                 }
-                Some(_) => return Edge { radius: r, limit },
+                Some(_) => return EdgePoint { radius: r, limit },
             }
             slow = if high - low > 0.5 * width { slow + 1 } else { 0 };
         }
-        Edge { radius: low, limit }
+        EdgePoint { radius: low, limit }
     }
 
     /// The edge at an azimuth where it is expected of one limit: the zero of its margin alone, if
     /// a ray just inside of it passes everything.
-    pub(super) fn expected(&mut self, limit: Limit, azimuth: f64, guess: f64) -> Option<Edge> {
-        let radius = self.zero(limit, azimuth, guess).filter(|r| *r > 0.0)?;
+    pub(super) fn edge_at_limit(
+        &mut self,
+        limit: PupilLimit,
+        azimuth: f64,
+        guess: f64,
+    ) -> Option<EdgePoint> {
+        let radius = self.limit_zero(limit, azimuth, guess).filter(|r| *r > 0.0)?;
         self.rays += 1;
         let inside = self.frame.point(azimuth, radius * (1.0 - INSIDE));
-        self.launch.is_lit(inside).then_some(Edge { radius, limit })
+        self.launch.is_lit(inside).then_some(EdgePoint { radius, limit })
     }
 
     /// The margin of a ray at one limit; not a number where it does not get there.
-    fn margin(&mut self, azimuth: f64, r: f64, limit: Limit) -> f64 {
+    fn margin(&mut self, azimuth: f64, r: f64, limit: PupilLimit) -> f64 {
         self.rays += 1;
-        let Limit::Surface(surface, hurdle) = limit else { return f64::NAN };
+        let PupilLimit::Surface(surface, hurdle) = limit else { return f64::NAN };
         let ray = self.launch.ray(self.frame.point(azimuth, r));
-        let tracer = &self.launch.color().tracer;
+        let tracer = &self.launch.channel().tracer;
         ray.and_then(|ray| tracer.margin(ray, surface, hurdle)).unwrap_or(f64::NAN)
     }
 
     /// Where one limit alone would end the pupil along a radius, by secants from a guess.
-    fn zero(&mut self, limit: Limit, azimuth: f64, guess: f64) -> Option<f64> {
-        if limit == Limit::Disc {
+    fn limit_zero(&mut self, limit: PupilLimit, azimuth: f64, guess: f64) -> Option<f64> {
+        if limit == PupilLimit::Disc {
             return Some(self.disc(azimuth));
         }
         let (mut r, mut step) = (guess, 1e-4 * guess);
@@ -376,21 +396,26 @@ impl<'a> Search<'a> {
 
     /// Where along a radius the nearest of some cosines vanishes, in parts of the distance to the
     /// edge; the one that is the edge does not count.
-    pub(super) fn grazing(&mut self, limits: &[Limit], azimuth: f64, edge: Edge) -> f64 {
+    pub(super) fn grazing_distance(
+        &mut self,
+        limits: &[PupilLimit],
+        azimuth: f64,
+        edge: EdgePoint,
+    ) -> f64 {
         let others = limits.iter().filter(|limit| **limit != edge.limit);
-        let zeros = others.filter_map(|limit| self.zero(*limit, azimuth, edge.radius));
-        let parts = zeros.map(|radius| radius / edge.radius).filter(|part| *part > GRAZED);
+        let zeros = others.filter_map(|limit| self.limit_zero(*limit, azimuth, edge.radius));
+        let parts = zeros.map(|radius| radius / edge.radius).filter(|part| *part > AT_GRAZING);
         parts.fold(f64::INFINITY, f64::min).max(1.0)
     }
 
     /// The corner between two edges where the limit of one takes over from that of the other, by
     /// a bracketed secant on the distance between the two; `None` where a third one is in the way.
-    fn corner(&mut self, a: (f64, Edge), b: (f64, Edge)) -> Option<f64> {
+    fn find_corner(&mut self, a: (f64, EdgePoint), b: (f64, EdgePoint)) -> Option<f64> {
         let (mut low, mut high) = (a.0, b.0);
         let gap = |search: &mut Self, azimuth: f64| {
             let share = (azimuth - a.0) / (b.0 - a.0);
             let guess = a.1.radius + share * (b.1.radius - a.1.radius);
-            let ends = [a.1.limit, b.1.limit].map(|limit| search.zero(limit, azimuth, guess));
+            let ends = [a.1.limit, b.1.limit].map(|limit| search.limit_zero(limit, azimuth, guess));
             Some((ends[1]? - ends[0]?, ends[0]?))
         };
         let (mut at_low, mut at_high) = (gap(self, low)?.0, gap(self, high)?.0);
@@ -418,30 +443,36 @@ impl<'a> Search<'a> {
 
     /// The edge all around, from the azimuths 0 to `end`; `None` where nothing limits the pupil
     /// or where its edge is too ragged to be split.
-    pub(super) fn boundary(mut self, end: f64, azimuths: usize) -> Option<Boundary> {
-        let samples = self.samples(end, azimuths)?;
-        let mut arcs = vec![Arc { from: 0.0, to: end, limit: samples[0].1.limit }];
+    pub(super) fn trace_boundary(mut self, end: f64, azimuths: usize) -> Option<Boundary> {
+        let samples = self.sample_edge(end, azimuths)?;
+        let mut arcs = vec![BoundaryArc { from: 0.0, to: end, limit: samples[0].1.limit }];
         for pair in samples.windows(2) {
-            self.corners(pair[0], pair[1], &mut arcs)?;
+            self.find_corners(pair[0], pair[1], &mut arcs)?;
         }
         arcs.retain(|arc| arc.to > arc.from);
         if end > 1.5 * PI {
-            joined(&mut arcs, end);
+            join_ends(&mut arcs, end);
         }
-        let grazing = self.grazed(&samples);
-        Some(Boundary { frame: self.frame, arcs, samples, grazing, rays: self.rays })
+        let grazing = self.find_grazing_limits(&samples);
+        Some(Boundary {
+            frame: self.frame,
+            arcs,
+            samples,
+            grazing_limits: grazing,
+            rays: self.rays,
+        })
     }
 
     /// The limits whose squared cosine falls from the centre to the edge by so much that it will
     /// vanish not far behind.
-    fn grazed(&mut self, samples: &[(f64, Edge)]) -> Vec<Limit> {
+    fn find_grazing_limits(&mut self, samples: &[(f64, EdgePoint)]) -> Vec<PupilLimit> {
         let inside = 1.0 - INSIDE;
         let mut margins = |p: [f64; 2]| {
             self.rays += 1;
             let mut found = Vec::new();
             if let Some(ray) = self.launch.ray(p) {
-                self.launch.color().tracer.margins(ray, |surface, hurdle, margin| {
-                    found.push((Limit::Surface(surface, hurdle), margin));
+                self.launch.channel().tracer.margins(ray, |surface, hurdle, margin| {
+                    found.push((PupilLimit::Surface(surface, hurdle), margin));
                 });
             }
             found
@@ -452,7 +483,7 @@ impl<'a> Search<'a> {
         for (azimuth, edge) in samples {
             let there = margins(frame.point(*azimuth, edge.radius * inside));
             for ((limit, from), (_, to)) in center.iter().zip(there) {
-                if limit.is_grazing() && to < NEARLY * from && !grazed.contains(limit) {
+                if limit.is_grazing() && to < NEAR_GRAZING * from && !grazed.contains(limit) {
                     grazed.push(*limit);
                 }
             }
@@ -461,7 +492,7 @@ impl<'a> Search<'a> {
     }
 
     /// Edges at equal steps of azimuth, and where another limit comes close in between.
-    fn samples(&mut self, end: f64, azimuths: usize) -> Option<Vec<(f64, Edge)>> {
+    fn sample_edge(&mut self, end: f64, azimuths: usize) -> Option<Vec<(f64, EdgePoint)>> {
         let step = end / azimuths as f64;
         let mut samples = Vec::with_capacity(azimuths + 1);
         let mut margins = Vec::with_capacity(azimuths + 1);
@@ -473,14 +504,14 @@ impl<'a> Search<'a> {
             samples.push((azimuth, edge));
             self.rays += 1;
             let inside = self.frame.point(azimuth, edge.radius * (1.0 - INSIDE));
-            margins.push(self.launch.margins_of_passing(inside).unwrap_or_default());
+            margins.push(self.launch.margins_if_passing(inside).unwrap_or_default());
         }
         let half = end < 1.5 * PI;
         margins.truncate(if half { azimuths + 1 } else { azimuths });
-        for dip in dips(&margins, half) {
+        for dip in margin_minima(&margins, half) {
             let azimuth =
                 if half { (step * dip).clamp(0.0, end) } else { (step * dip).rem_euclid(end) };
-            let distance = |sample: &&(f64, Edge)| (sample.0 - azimuth).abs();
+            let distance = |sample: &&(f64, EdgePoint)| (sample.0 - azimuth).abs();
             let near = samples.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
             samples.push((azimuth, self.edge(azimuth, near.1.radius, 0.02)?));
         }
@@ -491,7 +522,12 @@ impl<'a> Search<'a> {
 
     /// The corners between two edges: one, or what halving the azimuths brings to light where
     /// another limit makes an arc in between.
-    fn corners(&mut self, a: (f64, Edge), b: (f64, Edge), arcs: &mut Vec<Arc>) -> Option<()> {
+    fn find_corners(
+        &mut self,
+        a: (f64, EdgePoint),
+        b: (f64, EdgePoint),
+        arcs: &mut Vec<BoundaryArc>,
+    ) -> Option<()> {
         if a.1.limit == b.1.limit {
             return Some(());
         }
@@ -500,23 +536,24 @@ impl<'a> Search<'a> {
         if next && hides_light(a.1, b.1) {
             return None;
         }
-        let found = if next { Some(middle) } else { self.corner(a, b) };
+        let found = if next { Some(middle) } else { self.find_corner(a, b) };
         if let Some(corner) = found {
             let end = arcs.last_mut().map(|arc| std::mem::replace(&mut arc.to, corner))?;
-            arcs.push(Arc { from: corner, to: end, limit: b.1.limit });
-            return (arcs.len() <= MOST_ARCS).then_some(());
+            arcs.push(BoundaryArc { from: corner, to: end, limit: b.1.limit });
+            return (arcs.len() <= MAX_ARCS).then_some(());
         }
         let guess = 0.5 * (a.1.radius + b.1.radius);
         let between = (middle, self.edge(middle, guess, 0.05 * (b.0 - a.0).min(0.2))?);
-        self.corners(a, between, arcs)?;
-        self.corners(between, b, arcs)
+        self.find_corners(a, between, arcs)?;
+        self.find_corners(between, b, arcs)
     }
 }
 
 /// Whether the edge jumps from the near side of a shadow to what ends the pupil behind it: there
 /// is light behind the shadow that the centre does not see. The two edges are next to a corner.
-fn hides_light(a: Edge, b: Edge) -> bool {
-    let shadow = |edge: Edge| matches!(edge.limit, Limit::Surface(_, Hurdle::Obstruction));
+fn hides_light(a: EdgePoint, b: EdgePoint) -> bool {
+    let shadow =
+        |edge: EdgePoint| matches!(edge.limit, PupilLimit::Surface(_, RayLimit::Obstruction));
     let jump = (a.radius - b.radius).abs() > JUMP * a.radius.max(b.radius);
     jump && (shadow(a) || shadow(b))
 }
@@ -524,7 +561,7 @@ fn hides_light(a: Edge, b: Edge) -> bool {
 /// Where margins dip between rays at equal steps of azimuth, in steps from the first of them: the
 /// bottoms of the parabolas through a least margin and its neighbours, if they are much lower than
 /// that. Over half a turn the rays beyond its ends are mirror images.
-pub(super) fn dips(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
+pub(super) fn margin_minima(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
     let count = margins.len();
     let mut dips = Vec::new();
     for i in 0..count {
@@ -558,7 +595,7 @@ fn damping(new: f64, replaced: f64) -> f64 {
 }
 
 /// The first and the last arc of a full turn are one where the same limit makes them.
-fn joined(arcs: &mut Vec<Arc>, turn: f64) {
+fn join_ends(arcs: &mut Vec<BoundaryArc>, turn: f64) {
     if let (Some(first), Some(last)) = (arcs.first().copied(), arcs.last().copied())
         && arcs.len() > 1
         && first.limit == last.limit
@@ -573,7 +610,7 @@ fn joined(arcs: &mut Vec<Arc>, turn: f64) {
 impl Boundary {
     /// Points of the edge, or, for an `inside` below 1, just inside it, at some azimuths.
     pub fn points(&self, launch: &Launch<'_>, count: usize, inside: f64) -> Vec<[f64; 2]> {
-        let mut search = Search::new(launch, self.frame);
+        let mut search = EdgeSearch::new(launch, self.frame);
         let mut points = Vec::with_capacity(count + self.arcs.len());
         let end = self.samples.last().map_or(0.0, |s| s.0);
         let steps = (0..=count).map(|i| end * i as f64 / count as f64);
@@ -581,7 +618,7 @@ impl Boundary {
         let mut azimuths: Vec<f64> = steps.chain(corners).collect();
         azimuths.sort_by(f64::total_cmp);
         for azimuth in azimuths {
-            if let Some(edge) = search.edge(azimuth, self.near(azimuth), NEAR) {
+            if let Some(edge) = search.edge(azimuth, self.radius_guess(azimuth), GUESS_SPREAD) {
                 points.push(self.frame.point(azimuth, inside * edge.radius));
             }
         }
@@ -589,14 +626,14 @@ impl Boundary {
     }
 
     /// The frame grown until its unit disc holds all of the pupil.
-    pub(super) fn cover(&self) -> Frame {
+    pub(super) fn enclosing_disc(&self) -> PolarFrame {
         let reach = self.samples.iter().map(|(_, edge)| edge.radius).fold(0.0, f64::max);
         let grown = COVER * reach;
-        Frame { axes: self.frame.axes.map(|axis| axis.map(|v| v * grown)), ..self.frame }
+        PolarFrame { axes: self.frame.axes.map(|axis| axis.map(|v| v * grown)), ..self.frame }
     }
 
     /// A frame whose square from −1 to 1 holds all of the pupil, with the same turn.
-    pub(super) fn boxed(&self, mirrored: bool) -> Frame {
+    pub(super) fn enclosing_square(&self, mirrored: bool) -> PolarFrame {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for (azimuth, edge) in &self.samples {
             let (sin, cos) = azimuth.sin_cos();
@@ -611,11 +648,11 @@ impl Boundary {
         let half = [0, 1].map(|i| 0.5 * COVER * (high[i] - low[i]));
         let [a, b] = self.frame.axes;
         let center = [0, 1].map(|k| self.frame.center[k] + middle[0] * a[k] + middle[1] * b[k]);
-        Frame { center, axes: [a.map(|v| half[0] * v), b.map(|v| half[1] * v)] }
+        PolarFrame { center, axes: [a.map(|v| half[0] * v), b.map(|v| half[1] * v)] }
     }
 
     /// A guess of the radius at an azimuth, from the nearest ones known.
-    pub(super) fn near(&self, azimuth: f64) -> f64 {
+    pub(super) fn radius_guess(&self, azimuth: f64) -> f64 {
         let end = self.samples.last().map_or(1.0, |s| s.0);
         let azimuth = if azimuth > end { azimuth - end } else { azimuth };
         let after = self.samples.partition_point(|(a, _)| *a < azimuth);

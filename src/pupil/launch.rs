@@ -5,12 +5,12 @@
 //! an object point the plane of the entrance pupil; in a telecentric beam `q` is the slope. A chart
 //! leads from pupil coordinates to that plane.
 
-use super::aim::{Aimed, aimed, solve};
-use super::bench::{Aiming, Bench, Color, Dual2};
-use crate::lens::{Field, FieldKind, Object};
+use super::aim::{AimedRay, aim_at, solve_2x2};
+use super::bench::{Aiming, Channel, Dual2, RayModel};
+use crate::lens::{FieldKind, FieldPoint, Object};
 use crate::math::Real;
 use crate::math::Vec3;
-use crate::trace::{Landing, Ray};
+use crate::trace::{Ray, TracedRay};
 use serde::Serialize;
 
 /// Why a field has no rays.
@@ -30,7 +30,7 @@ pub enum LaunchError {
 
 /// What all rays of a field have in common.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Source {
+pub(super) enum FieldSource {
     /// A direction; `across` spans the plane perpendicular to it, `ahead` is how far in front of
     /// that plane a ray starts that does not start at the first vertex plane.
     Collimated { direction: Vec3<f64>, across: [Vec3<f64>; 2], ahead: f64 },
@@ -47,7 +47,7 @@ const GRAZING: f64 = 0.05;
 /// A field beyond this many degrees is a wide one.
 const WIDE: f64 = 45.0;
 
-impl Source {
+impl FieldSource {
     #[inline(always)]
     pub(super) fn ray<R: Real>(&self, q: [R; 2]) -> Ray<R> {
         match *self {
@@ -72,7 +72,7 @@ impl Source {
     }
 }
 
-impl Source {
+impl FieldSource {
     /// Where the ray meets the plane through the first vertex, in mm.
     fn at_vertex<R: Real>(&self, q: [R; 2]) -> [R; 2] {
         let Ray { point, direction } = self.ray(q);
@@ -91,12 +91,12 @@ fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
 
 /// An affine map from pupil coordinates to the plane in which rays are named.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Chart {
+pub(super) struct PupilMap {
     pub(super) origin: [f64; 2],
     pub(super) columns: [[f64; 2]; 2],
 }
 
-impl Chart {
+impl PupilMap {
     #[inline(always)]
     pub(super) fn map<R: Real>(&self, p: [R; 2]) -> [R; 2] {
         let [a, b] = self.columns;
@@ -108,26 +108,26 @@ impl Chart {
 
     fn inverse(&self, q: [f64; 2]) -> Option<[f64; 2]> {
         let [[a, b], [c, d]] = self.columns;
-        solve([[a, c], [b, d]], [q[0] - self.origin[0], q[1] - self.origin[1]])
+        solve_2x2([[a, c], [b, d]], [q[0] - self.origin[0], q[1] - self.origin[1]])
     }
 }
 
 /// From where the rays of one field and wavelength start, whatever becomes of the lens behind: what
 /// an integral over a moving pupil keeps while the lens moves.
 #[derive(Debug, Clone, Copy)]
-pub struct Anchor {
-    field: Field,
+pub struct FixedLaunch {
+    field: FieldPoint,
     wavelength: usize,
     aiming: Aiming,
-    source: Source,
-    chart: Chart,
+    source: FieldSource,
+    map: PupilMap,
 }
 
-impl Anchor {
+impl FixedLaunch {
     /// The same rays through a lens of the same wavelengths.
-    pub fn launch(self, bench: &Bench) -> Launch<'_> {
-        let Self { field, wavelength, aiming, source, chart } = self;
-        Launch { bench, field, wavelength, aiming, source, chart }
+    pub fn launch(self, bench: &RayModel) -> Launch<'_> {
+        let Self { field, wavelength, aiming, source, map: chart } = self;
+        Launch { bench, field, wavelength, aiming, source, map: chart }
     }
 }
 
@@ -135,51 +135,51 @@ impl Anchor {
 #[derive(Debug, Clone)]
 pub struct Launch<'a> {
     /// The lens.
-    pub bench: &'a Bench,
+    pub bench: &'a RayModel,
     /// The field.
-    pub field: Field,
+    pub field: FieldPoint,
     /// Which wavelength.
     pub wavelength: usize,
     aiming: Aiming,
-    source: Source,
-    chart: Chart,
+    source: FieldSource,
+    map: PupilMap,
 }
 
 impl<'a> Launch<'a> {
     pub(super) fn new(
-        bench: &'a Bench,
-        field: Field,
+        bench: &'a RayModel,
+        field: FieldPoint,
         wavelength: usize,
         aiming: Aiming,
     ) -> Result<Self, LaunchError> {
-        if wavelength >= bench.colors.len() {
+        if wavelength >= bench.channels.len() {
             return Err(LaunchError::NoWavelength);
         }
-        let source = source(bench, field).ok_or(LaunchError::NoObjectPoint)?;
-        let chart = paraxial_chart(bench, &source);
-        let mut launch = Self { bench, field, wavelength, aiming, source, chart };
+        let source = field_source(bench, field).ok_or(LaunchError::NoObjectPoint)?;
+        let chart = paraxial_map(bench, &source);
+        let mut launch = Self { bench, field, wavelength, aiming, source, map: chart };
         match aiming {
             Aiming::Paraxial => {}
             Aiming::Chief | Aiming::Stop => {
-                let chief = launch.chief().ok_or(LaunchError::NotAimed)?;
-                launch.chart = chief.chart(bench.stop_radius()).ok_or(LaunchError::NotAimed)?;
+                let chief = launch.chief_ray().ok_or(LaunchError::NotAimed)?;
+                launch.map = chief.pupil_map(bench.stop_radius()).ok_or(LaunchError::NotAimed)?;
             }
         }
         Ok(launch)
     }
 
     /// Where its rays start.
-    pub fn anchor(&self) -> Anchor {
-        let Self { field, wavelength, aiming, source, chart, .. } = *self;
-        Anchor { field, wavelength, aiming, source, chart }
+    pub fn to_fixed(&self) -> FixedLaunch {
+        let Self { field, wavelength, aiming, source, map: chart, .. } = *self;
+        FixedLaunch { field, wavelength, aiming, source, map: chart }
     }
 
     /// The cosine of the angle with the axis at which a collimated beam arrives; `None` for the
     /// rays of an object point.
-    pub fn cosine(&self) -> Option<f64> {
+    pub fn axis_cosine(&self) -> Option<f64> {
         match self.source {
-            Source::Collimated { direction, .. } => Some(direction.z),
-            Source::Point { .. } | Source::Slopes { .. } => None,
+            FieldSource::Collimated { direction, .. } => Some(direction.z),
+            FieldSource::Point { .. } | FieldSource::Slopes { .. } => None,
         }
     }
 
@@ -189,8 +189,8 @@ impl<'a> Launch<'a> {
     }
 
     /// The lens at this wavelength.
-    pub fn color(&self) -> &'a Color {
-        &self.bench.colors[self.wavelength]
+    pub fn channel(&self) -> &'a Channel {
+        &self.bench.channels[self.wavelength]
     }
 
     /// Whether the rays at `(−px, py)` mirror those at `(px, py)`.
@@ -202,38 +202,40 @@ impl<'a> Launch<'a> {
     /// measure of integrals over a pupil. Where a collimated beam grazes that plane (a direction
     /// cosine below 0.05), across the beam instead.
     pub fn area(&self) -> f64 {
-        let [[a, b], [c, d]] = self.chart.columns;
+        let [[a, b], [c, d]] = self.map.columns;
         let area = (a * d - b * c).abs();
         match self.source {
-            Source::Collimated { direction, .. } if direction.z > GRAZING => area / direction.z,
-            Source::Collimated { .. } => area,
-            Source::Point { from, through } => area * (from.z / (through - from.z)).powi(2),
-            Source::Slopes { from } => area * from.z * from.z,
+            FieldSource::Collimated { direction, .. } if direction.z > GRAZING => {
+                area / direction.z
+            }
+            FieldSource::Collimated { .. } => area,
+            FieldSource::Point { from, through } => area * (from.z / (through - from.z)).powi(2),
+            FieldSource::Slopes { from } => area * from.z * from.z,
         }
     }
 
     /// The ray at these pupil coordinates; `None` where none was found that crosses the stop
     /// there.
     pub fn ray(&self, p: [f64; 2]) -> Option<Ray<f64>> {
-        Some(self.source.ray(self.place(p)?))
+        Some(self.source.ray(self.ray_coordinates(p)?))
     }
 
     /// Where the ray at these pupil coordinates crosses the plane in which pupils are compared, in
     /// mm: the plane through the first vertex, or, where the field of the lens is wide
-    /// ([`Launch::is_across`]), the one across the beam. `None` where no ray was found that crosses
+    /// ([`Launch::is_across_beam`]), the one across the beam. `None` where no ray was found that crosses
     /// the stop there.
     pub fn crossing(&self, p: [f64; 2]) -> Option<[f64; 2]> {
-        self.place(p).map(|q| self.crossing_of(q))
+        self.ray_coordinates(p).map(|q| self.crossing_at(q))
     }
 
-    fn crossing_of<R: Real>(&self, q: [R; 2]) -> [R; 2] {
-        if self.is_across() { q } else { self.source.at_vertex(q) }
+    fn crossing_at<R: Real>(&self, q: [R; 2]) -> [R; 2] {
+        if self.is_across_beam() { q } else { self.source.at_vertex(q) }
     }
 
     /// The same with the area in mm² that one unit of pupil coordinates stands for there. Where
     /// every ray is aimed at the stop, that changes over the pupil.
     pub(super) fn crossing_with_area(&self, p: [f64; 2]) -> Option<([f64; 2], f64)> {
-        let [x, y] = self.crossing_of(self.dual_place(p)?);
+        let [x, y] = self.crossing_at(self.dual_ray_coordinates(p)?);
         let area = x.slope[0] * y.slope[1] - x.slope[1] * y.slope[0];
         Some(([x.value, y.value], area.abs()))
     }
@@ -241,19 +243,19 @@ impl<'a> Launch<'a> {
     /// Whether [`Launch::crossing`] looks along the beam: a collimated one that grazes the plane
     /// through the first vertex, and every one of a lens whose field reaches beyond 45 degrees,
     /// where that plane stretches the pupils at the edge out of all comparison.
-    pub fn is_across(&self) -> bool {
-        let Source::Collimated { direction, .. } = self.source else { return false };
+    pub fn is_across_beam(&self) -> bool {
+        let FieldSource::Collimated { direction, .. } = self.source else { return false };
         let beam = &self.bench.beam;
         direction.z <= GRAZING || (beam.field == FieldKind::Angle && beam.edge.abs() > WIDE)
     }
 
     /// The optical path from the object point to the start of a ray of this field, or from the
     /// plane wave through the first vertex, in mm.
-    pub fn path_to(&self, ray: Ray<f64>) -> f64 {
-        let index = self.color().system.index_before;
+    pub fn optical_path_to(&self, ray: Ray<f64>) -> f64 {
+        let index = self.channel().system.index_before;
         let away = match self.source {
-            Source::Collimated { .. } => ray.point,
-            Source::Point { from, .. } | Source::Slopes { from } => ray.point - from,
+            FieldSource::Collimated { .. } => ray.point,
+            FieldSource::Point { from, .. } | FieldSource::Slopes { from } => ray.point - from,
         };
         index * away.dot(ray.direction)
     }
@@ -261,22 +263,22 @@ impl<'a> Launch<'a> {
     /// The ray at these pupil coordinates over any number type, for coordinates that need no search
     /// for the stop: an affine map to the plane in which rays are named.
     #[inline(always)]
-    pub(super) fn charted<R: Real>(&self, p: [R; 2]) -> Ray<R> {
-        self.source.ray(self.chart.map(p))
+    pub(super) fn mapped_ray<R: Real>(&self, p: [R; 2]) -> Ray<R> {
+        self.source.ray(self.map.map(p))
     }
 
     /// The ray at these pupil coordinates with its derivatives by the two pupil coordinates.
     pub fn dual_ray(&self, p: [f64; 2]) -> Option<Ray<Dual2>> {
-        self.dual_place(p).map(|q| self.source.ray(q))
+        self.dual_ray_coordinates(p).map(|q| self.source.ray(q))
     }
 
-    fn dual_place(&self, p: [f64; 2]) -> Option<[Dual2; 2]> {
+    fn dual_ray_coordinates(&self, p: [f64; 2]) -> Option<[Dual2; 2]> {
         if self.aiming != Aiming::Stop {
             let variables = [Dual2::variable(p[0], 0), Dual2::variable(p[1], 1)];
-            return Some(self.chart.map(variables));
+            return Some(self.map.map(variables));
         }
         let found = self.aim(p)?;
-        let chart = found.chart(self.bench.stop_radius())?;
+        let chart = found.pupil_map(self.bench.stop_radius())?;
         Some([0, 1].map(|i| Dual2 {
             value: found.q[i],
             slope: [chart.columns[0][i], chart.columns[1][i]],
@@ -284,42 +286,42 @@ impl<'a> Launch<'a> {
     }
 
     /// Where the ray at these pupil coordinates crosses the stop, clipped by nothing.
-    pub fn at_stop(&self, p: [f64; 2]) -> Option<[f64; 2]> {
-        let ray = self.source.ray(self.place(p)?.map(Dual2::constant));
-        let landing = self.color().open.trace_to(ray, self.bench.stop());
+    pub fn stop_point(&self, p: [f64; 2]) -> Option<[f64; 2]> {
+        let ray = self.source.ray(self.ray_coordinates(p)?.map(Dual2::constant));
+        let landing = self.channel().unclipped.trace_to(ray, self.bench.stop());
         let point = landing.ray.point.value();
         landing.fate.is_imaged().then_some([point.x, point.y])
     }
 
     /// The ray at these pupil coordinates at the image, clipped by nothing, with its derivatives;
     /// `None` where it does not get there.
-    pub fn open_landing(&self, p: [f64; 2]) -> Option<Landing<Dual2>> {
-        let landing = self.color().open.trace(self.dual_ray(p)?);
+    pub fn unclipped_landing(&self, p: [f64; 2]) -> Option<TracedRay<Dual2>> {
+        let landing = self.channel().unclipped.trace(self.dual_ray(p)?);
         landing.fate.is_imaged().then_some(landing)
     }
 
     /// The derivatives by the pupil coordinates of the direction cosines `L'` and `M'` with which
     /// a ray arrives; `None` for a ray that is lost.
-    pub fn slopes_of_directions(&self, p: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+    pub fn direction_derivatives(&self, p: [f64; 2]) -> Option<[[f64; 2]; 2]> {
         let ray = self.ray(p)?;
-        if !self.color().tracer.trace(ray).fate.is_imaged() {
+        if !self.channel().tracer.trace(ray).fate.is_imaged() {
             return None;
         }
-        let direction = self.open_landing(p)?.ray.direction;
+        let direction = self.unclipped_landing(p)?.ray.direction;
         Some([direction.x.slope, direction.y.slope])
     }
 
-    fn place(&self, p: [f64; 2]) -> Option<[f64; 2]> {
+    fn ray_coordinates(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         match self.aiming {
-            Aiming::Paraxial | Aiming::Chief => Some(self.chart.map(p)),
+            Aiming::Paraxial | Aiming::Chief => Some(self.map.map(p)),
             Aiming::Stop => self.aim(p).map(|found| found.q),
         }
     }
 
-    fn aim(&self, p: [f64; 2]) -> Option<Aimed> {
+    fn aim(&self, p: [f64; 2]) -> Option<AimedRay> {
         let radius = self.bench.stop_radius();
-        let (guess, target) = (self.chart.map(p), p.map(|v| v * radius));
-        aimed(self.bench, self.wavelength, &self.source, self.bench.stop(), guess, target)
+        let (guess, target) = (self.map.map(p), p.map(|v| v * radius));
+        aim_at(self.bench, self.wavelength, &self.source, self.bench.stop(), guess, target)
     }
 
     /// The pupil point whose ray, clipped by nothing, goes through the vertex of a surface, inside
@@ -327,28 +329,29 @@ impl<'a> Launch<'a> {
     pub(super) fn through_vertex(&self, surface: usize) -> Option<[f64; 2]> {
         let (bench, source) = (self.bench, &self.source);
         let search = |start: [f64; 2]| {
-            let guess = self.chart.map(start);
-            aimed(bench, self.wavelength, source, surface, guess, [0.0; 2])
+            let guess = self.map.map(start);
+            aim_at(bench, self.wavelength, source, surface, guess, [0.0; 2])
         };
         let starts = [[0.0, 0.0], [0.0, 0.9], [0.0, -0.9], [0.9, 0.0], [-0.9, 0.0]];
         let q = starts.into_iter().find_map(search)?.q;
         if self.aiming != Aiming::Stop {
-            return self.chart.inverse(q);
+            return self.map.inverse(q);
         }
-        let landing = self.color().open.trace_to(source.ray(q.map(Dual2::constant)), bench.stop());
+        let landing =
+            self.channel().unclipped.trace_to(source.ray(q.map(Dual2::constant)), bench.stop());
         let point = landing.ray.point.value();
         let radius = bench.stop_radius();
         landing.fate.is_imaged().then_some([point.x / radius, point.y / radius])
     }
 
     /// The real ray through the centre of the stop, followed from the axis to the field.
-    fn chief(&self) -> Option<Aimed> {
-        let mut walk = Walk { done: 0.0, shift: [0.0; 2], slope: [0.0; 2] };
+    fn chief_ray(&self) -> Option<AimedRay> {
+        let mut walk = ChiefRayContinuation { done: 0.0, shift: [0.0; 2], slope: [0.0; 2] };
         let mut step: f64 = if self.is_wide() { 0.125 } else { 1.0 };
-        let mut found = self.chief_at(&walk, 0.0)?;
+        let mut found = self.chief_ray_at(&walk, 0.0)?;
         while walk.done < 1.0 {
             let next = (walk.done + step).min(1.0);
-            if let Some(there) = self.chief_at(&walk, next) {
+            if let Some(there) = self.chief_ray_at(&walk, next) {
                 walk.advance(next, there.shift);
                 found = there;
             } else {
@@ -363,20 +366,21 @@ impl<'a> Launch<'a> {
 
     fn is_wide(&self) -> bool {
         match self.source {
-            Source::Collimated { direction, .. } => direction.z < 0.9,
-            Source::Point { .. } | Source::Slopes { .. } => false,
+            FieldSource::Collimated { direction, .. } => direction.z < 0.9,
+            FieldSource::Point { .. } | FieldSource::Slopes { .. } => false,
         }
     }
 
     /// The chief ray at a fraction of the field, from where the walk so far predicts it.
-    fn chief_at(&self, walk: &Walk, fraction: f64) -> Option<Aimed> {
-        let field = Field { x: self.field.x * fraction, y: self.field.y * fraction, ..self.field };
-        let source = source(self.bench, field)?;
-        let paraxial = paraxial_chart(self.bench, &source);
+    fn chief_ray_at(&self, walk: &ChiefRayContinuation, fraction: f64) -> Option<AimedRay> {
+        let field =
+            FieldPoint { x: self.field.x * fraction, y: self.field.y * fraction, ..self.field };
+        let source = field_source(self.bench, field)?;
+        let paraxial = paraxial_map(self.bench, &source);
         let shift = walk.predict(fraction);
         let guess = [paraxial.origin[0] + shift[0], paraxial.origin[1] + shift[1]];
         let mut found =
-            aimed(self.bench, self.wavelength, &source, self.bench.stop(), guess, [0.0; 2])?;
+            aim_at(self.bench, self.wavelength, &source, self.bench.stop(), guess, [0.0; 2])?;
         found.shift = [found.q[0] - paraxial.origin[0], found.q[1] - paraxial.origin[1]];
         Some(found)
     }
@@ -386,13 +390,13 @@ impl<'a> Launch<'a> {
 const SMALLEST_STEP: f64 = 1e-3;
 
 /// The way from the axis to a field: how far the chief ray's place is from its paraxial one.
-struct Walk {
+struct ChiefRayContinuation {
     done: f64,
     shift: [f64; 2],
     slope: [f64; 2],
 }
 
-impl Walk {
+impl ChiefRayContinuation {
     fn predict(&self, fraction: f64) -> [f64; 2] {
         [0, 1].map(|i| self.shift[i] + (fraction - self.done) * self.slope[i])
     }
@@ -403,87 +407,87 @@ impl Walk {
     }
 }
 
-fn source(bench: &Bench, field: Field) -> Option<Source> {
+fn field_source(bench: &RayModel, field: FieldPoint) -> Option<FieldSource> {
     match (bench.beam.field, bench.beam.object) {
         (FieldKind::Angle, Object::Infinity) => {
             let angle = field.x.hypot(field.y).to_radians();
-            collimated(bench, field, angle)
+            collimated_source(bench, field, angle)
         }
         (FieldKind::ImageHeight, Object::Infinity) => {
-            let index = bench.colors[bench.primary].system.index_before;
-            let slope = field.x.hypot(field.y) * bench.first.power / index;
+            let index = bench.channels[bench.primary].system.index_before;
+            let slope = field.x.hypot(field.y) * bench.first_order.power / index;
             let turned =
-                Field { x: field.x * slope.signum(), y: field.y * slope.signum(), ..field };
+                FieldPoint { x: field.x * slope.signum(), y: field.y * slope.signum(), ..field };
             (slope != 0.0 || field.x.hypot(field.y) == 0.0)
-                .then(|| collimated(bench, turned, slope.abs().atan()))?
+                .then(|| collimated_source(bench, turned, slope.abs().atan()))?
         }
         (FieldKind::ObjectHeight, Object::Finite(distance)) => {
-            Some(point(bench, field.x, field.y, distance))
+            Some(point_source(bench, field.x, field.y, distance))
         }
         (FieldKind::ImageHeight, Object::Finite(distance)) => {
-            let scale = bench.first.magnification?;
-            Some(point(bench, field.x / scale, field.y / scale, distance))
+            let scale = bench.first_order.magnification?;
+            Some(point_source(bench, field.x / scale, field.y / scale, distance))
         }
         (FieldKind::Angle, Object::Finite(distance)) => {
-            let reach = distance + bench.first.entrance_pupil.position?;
+            let reach = distance + bench.first_order.entrance_pupil.position?;
             let angle = field.x.hypot(field.y);
             let height = -reach * angle.to_radians().tan();
-            let [x, y] = toward(field, angle).map(|part| part * height);
-            (angle < 90.0).then(|| point(bench, x, y, distance))
+            let [x, y] = field_direction(field, angle).map(|part| part * height);
+            (angle < 90.0).then(|| point_source(bench, x, y, distance))
         }
         (FieldKind::ObjectHeight, Object::Infinity) => None,
     }
 }
 
 /// The unit vector in the direction of a field, `length` of it given.
-fn toward(field: Field, length: f64) -> [f64; 2] {
+fn field_direction(field: FieldPoint, length: f64) -> [f64; 2] {
     if length == 0.0 { [0.0, 1.0] } else { [field.x / length, field.y / length] }
 }
 
-fn collimated(bench: &Bench, field: Field, angle: f64) -> Option<Source> {
+fn collimated_source(bench: &RayModel, field: FieldPoint, angle: f64) -> Option<FieldSource> {
     let (sin, cos) = angle.sin_cos();
-    let [tx, ty] = toward(field, field.x.hypot(field.y));
+    let [tx, ty] = field_direction(field, field.x.hypot(field.y));
     let direction = Vec3::new(sin * tx, sin * ty, cos);
     // Perpendicular to the beam, turned out of the x-y plane by the field angle about the axis
     // that is perpendicular to both: the projections of x and y for small angles.
     let turn = 1.0 - cos;
     let e = Vec3::new(1.0 - turn * tx * tx, -turn * tx * ty, -sin * tx);
     let f = Vec3::new(-turn * tx * ty, 1.0 - turn * ty * ty, -sin * ty);
-    let system = &bench.colors[bench.primary].system;
+    let system = &bench.channels[bench.primary].system;
     let first = &system.surfaces[0];
     let sizes = [first.semi_diameter, 1.0 / first.shape.curvature().abs()];
     let size = sizes.into_iter().filter(|v| v.is_finite()).fold(0.0, f64::max);
-    let pupil = bench.first.entrance_pupil.position.unwrap_or(0.0).abs();
-    let ahead = 4.0 * (size + pupil + bench.first.marginal.heights[0].abs());
-    angle.is_finite().then_some(Source::Collimated { direction, across: [e, f], ahead })
+    let pupil = bench.first_order.entrance_pupil.position.unwrap_or(0.0).abs();
+    let ahead = 4.0 * (size + pupil + bench.first_order.marginal.heights[0].abs());
+    angle.is_finite().then_some(FieldSource::Collimated { direction, across: [e, f], ahead })
 }
 
-fn point(bench: &Bench, x: f64, y: f64, distance: f64) -> Source {
+fn point_source(bench: &RayModel, x: f64, y: f64, distance: f64) -> FieldSource {
     let from = Vec3::new(x, y, -distance);
-    match bench.first.entrance_pupil.position {
-        Some(through) => Source::Point { from, through },
-        None => Source::Slopes { from },
+    match bench.first_order.entrance_pupil.position {
+        Some(through) => FieldSource::Point { from, through },
+        None => FieldSource::Slopes { from },
     }
 }
 
 /// The chart of the paraxial entrance pupil.
-fn paraxial_chart(bench: &Bench, source: &Source) -> Chart {
-    let pupil = bench.first.entrance_pupil;
-    let marginal = &bench.first.marginal;
+fn paraxial_map(bench: &RayModel, source: &FieldSource) -> PupilMap {
+    let pupil = bench.first_order.entrance_pupil;
+    let marginal = &bench.first_order.marginal;
     let radius = pupil.diameter.map_or(marginal.heights[0].abs(), |d| 0.5 * d);
     match source {
-        Source::Collimated { across: [e, f], .. } => {
+        FieldSource::Collimated { across: [e, f], .. } => {
             let z = pupil.position.unwrap_or(0.0);
-            Chart {
+            PupilMap {
                 origin: [e.z * z, f.z * z],
                 columns: [[e.x * radius, f.x * radius], [e.y * radius, f.y * radius]],
             }
         }
-        Source::Point { .. } => straight(radius),
-        Source::Slopes { .. } => straight(marginal.start_slope.abs()),
+        FieldSource::Point { .. } => scaled_map(radius),
+        FieldSource::Slopes { .. } => scaled_map(marginal.start_slope.abs()),
     }
 }
 
-fn straight(scale: f64) -> Chart {
-    Chart { origin: [0.0; 2], columns: [[scale, 0.0], [0.0, scale]] }
+fn scaled_map(scale: f64) -> PupilMap {
+    PupilMap { origin: [0.0; 2], columns: [[scale, 0.0], [0.0, scale]] }
 }

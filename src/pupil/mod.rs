@@ -1,6 +1,6 @@
 //! The set of rays that get through: where they start, where the set ends, quadrature over it.
 //!
-//! A [`Bench`] is a lens with its beam, ready for rays. A [`Launch`] turns pupil coordinates of
+//! A [`RayModel`] is a lens with its beam, ready for rays. A [`Launch`] turns pupil coordinates of
 //! one field and wavelength into rays. A [`Region`] knows which of them arrive: the whole disc, a
 //! piece of it bounded by the rims that clip, or nothing at all. Its quadrature converges
 //! spectrally in both cases, so the difference of two orders is an honest error estimate.
@@ -29,18 +29,19 @@ mod sample;
 mod shadow;
 mod stopped;
 
-pub use bench::{Aiming, Bench, BenchError, Color, Dual2, MISS};
-pub use boundary::{Arc, Boundary, Edge, Frame, Limit};
+pub use bench::{Aiming, Channel, Dual2, RayModel, RayModelError, WIDE_AIMING_THRESHOLD};
+pub use boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
 pub use gradient::{
-    Cost, Derivative, Estimator, Integrand, NoDerivative, Warp, differentiate, plan,
+    DerivativeError, DerivativeEstimator, Integrand, PupilDerivative, QuadraticIntegrand,
+    WarpSampling, choose_estimator, differentiate,
 };
-pub use launch::{Anchor, Launch, LaunchError};
-pub use lit::Lit;
-pub use moments::Moments;
-pub use outline::{Outline, Side};
-pub use quadrature::{Accuracy, Converged, Landed, Nodes, converged};
-pub use region::{Kind, Region};
-pub use ring::Ring;
-pub use sample::{Pattern, pattern};
-pub use shadow::Shadow;
+pub use launch::{FixedLaunch, Launch, LaunchError};
+pub use lit::TracedPupil;
+pub use moments::PupilMoments;
+pub use outline::{OutlineSide, PupilOutline};
+pub use quadrature::{Accuracy, ConvergedValues, Nodes, TracedNodes, converge};
+pub use region::{Region, RegionKind};
+pub use ring::Annulus;
+pub use sample::{PupilPattern, pattern_points};
+pub use shadow::DarkPupil;
 pub use stopped::limited_by_stop;

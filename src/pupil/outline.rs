@@ -4,19 +4,19 @@
 //! the smooth curve: the chords of all points and of every other one, extrapolated (Richardson), so
 //! that 128 points give six digits.
 
-use super::bench::{Aiming, Bench};
-use super::boundary::{Arc, Boundary, Limit, NEAR, Search};
+use super::bench::{Aiming, RayModel};
+use super::boundary::{Boundary, BoundaryArc, EdgeSearch, GUESS_SPREAD, PupilLimit};
 use super::launch::Launch;
-use super::quadrature::{Accuracy, Converged, Nodes, converged};
-use super::region::{Kind, Region};
-use crate::trace::Hurdle;
+use super::quadrature::{Accuracy, ConvergedValues, Nodes, converge};
+use super::region::{Region, RegionKind};
+use crate::trace::RayLimit;
 use std::f64::consts::{PI, TAU};
 
 /// A side of the edge that one limit makes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Side {
+pub struct OutlineSide {
     /// What ends the pupil along it.
-    pub limit: Limit,
+    pub limit: PupilLimit,
     /// Its points in mm in the plane of [`Launch::crossing`], its ends included; the first and the
     /// last are the same where one limit makes the whole edge.
     pub points: Vec<[f64; 2]>,
@@ -26,16 +26,16 @@ pub struct Side {
 
 /// The closed edge of a pupil.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outline {
+pub struct PupilOutline {
     /// Its sides, each beginning where the one before ends.
-    pub sides: Vec<Side>,
+    pub sides: Vec<OutlineSide>,
     /// A point inside that sees all of the edge, in mm.
     pub center: [f64; 2],
     /// Rays traced to draw it, those that found the pupil not included.
     pub rays: usize,
 }
 
-impl Outline {
+impl PupilOutline {
     /// The places in mm where one limit takes over from another; none where one makes all.
     pub fn corners(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let several = self.sides.len() > 1;
@@ -43,7 +43,7 @@ impl Outline {
     }
 
     /// The share of the edge that a limit makes, 0 to 1.
-    pub fn share(&self, limit: Limit) -> f64 {
+    pub fn share(&self, limit: PupilLimit) -> f64 {
         let length = |all: bool| -> f64 {
             let sides = self.sides.iter().filter(|side| all || side.limit == limit);
             sides.map(|side| side.length).sum()
@@ -52,8 +52,8 @@ impl Outline {
     }
 
     /// What makes the edge, the largest share first.
-    pub fn limits(&self) -> Vec<(Limit, f64)> {
-        let mut limits: Vec<(Limit, f64)> = Vec::new();
+    pub fn limits_by_share(&self) -> Vec<(PupilLimit, f64)> {
+        let mut limits: Vec<(PupilLimit, f64)> = Vec::new();
         for side in &self.sides {
             if limits.iter().all(|(limit, _)| *limit != side.limit) {
                 limits.push((side.limit, self.share(side.limit)));
@@ -65,11 +65,11 @@ impl Outline {
 
     /// Whether the whole disc gets through and no surface clips.
     pub fn is_clear(&self) -> bool {
-        self.sides.iter().all(|side| side.limit == Limit::Disc)
+        self.sides.iter().all(|side| side.limit == PupilLimit::Disc)
     }
 }
 
-impl Limit {
+impl PupilLimit {
     /// The surface that makes it, counted from 0.
     pub const fn surface(self) -> Option<usize> {
         match self {
@@ -79,20 +79,26 @@ impl Limit {
     }
 }
 
-impl Bench {
+impl RayModel {
     /// What a limit is called, with surfaces counted from 0: `rim of surface 3`.
-    pub fn limit_name(&self, limit: Limit) -> String {
+    pub fn limit_name(&self, limit: PupilLimit) -> String {
         match limit {
-            Limit::Disc if self.aiming == Aiming::Stop => "rim of the stop".to_owned(),
-            Limit::Disc => "entrance pupil".to_owned(),
-            Limit::Surface(i, Hurdle::Rim) if i == self.stop() => format!("stop, surface {i}"),
-            Limit::Surface(i, Hurdle::Rim) => format!("rim of surface {i}"),
-            Limit::Surface(i, Hurdle::Obstruction) => format!("obstruction of surface {i}"),
-            Limit::Surface(i, Hurdle::Miss) => format!("missed surface {i}"),
-            Limit::Surface(i, Hurdle::Equator) => format!("equator of surface {i}"),
-            Limit::Surface(i, Hurdle::Reflection) => format!("critical angle at surface {i}"),
-            Limit::Surface(i, Hurdle::Side) => format!("side of the gradient before surface {i}"),
-            Limit::Unaimed => "no ray to the stop".to_owned(),
+            PupilLimit::Disc if self.aiming == Aiming::Stop => "rim of the stop".to_owned(),
+            PupilLimit::Disc => "entrance pupil".to_owned(),
+            PupilLimit::Surface(i, RayLimit::Rim) if i == self.stop() => {
+                format!("stop, surface {i}")
+            }
+            PupilLimit::Surface(i, RayLimit::Rim) => format!("rim of surface {i}"),
+            PupilLimit::Surface(i, RayLimit::Obstruction) => format!("obstruction of surface {i}"),
+            PupilLimit::Surface(i, RayLimit::Miss) => format!("missed surface {i}"),
+            PupilLimit::Surface(i, RayLimit::Equator) => format!("equator of surface {i}"),
+            PupilLimit::Surface(i, RayLimit::TotalReflection) => {
+                format!("critical angle at surface {i}")
+            }
+            PupilLimit::Surface(i, RayLimit::Side) => {
+                format!("side of the gradient before surface {i}")
+            }
+            PupilLimit::Unaimed => "no ray to the stop".to_owned(),
         }
     }
 }
@@ -100,30 +106,30 @@ impl Bench {
 impl Region<'_> {
     /// The edge, drawn with about so many points; `None` where there is no light, where nothing
     /// limits it or where it is ragged.
-    pub fn outline(&self, points: usize) -> Option<Outline> {
+    pub fn outline(&self, points: usize) -> Option<PupilOutline> {
         let launch = &self.launch;
         match &self.kind {
-            Kind::Clear => {
+            RegionKind::Clear => {
                 let points = launch.rim(points);
-                let side = Side { limit: Limit::Disc, length: length(&points), points };
+                let side = OutlineSide { limit: PupilLimit::Disc, length: length(&points), points };
                 let center = launch.crossing([0.0; 2])?;
-                Some(Outline { sides: vec![side], center, rays: 0 })
+                Some(PupilOutline { sides: vec![side], center, rays: 0 })
             }
-            Kind::Split(boundary) => split(launch, boundary, points),
-            Kind::Dark | Kind::Ragged { .. } | Kind::Endless => None,
+            RegionKind::StarShaped(boundary) => boundary_outline(launch, boundary, points),
+            RegionKind::Dark | RegionKind::Irregular { .. } | RegionKind::Unbounded => None,
         }
     }
 
     /// The area of the light in mm² and the x and y of its centroid in mm, in the plane of
     /// [`Launch::crossing`]; the centroid is known to the tolerance times the root of the area.
     /// `None` where no light gets through.
-    pub fn extent(&self, accuracy: Accuracy) -> Option<Converged<3>> {
+    pub fn extent(&self, accuracy: Accuracy) -> Option<ConvergedValues<3>> {
         let scales = |[area, ..]: &[f64; 3]| [*area, area.sqrt(), area.sqrt()];
-        converged(self, accuracy, |nodes| self.first_moments(nodes), scales)
+        converge(self, accuracy, |nodes| self.area_and_centroid(nodes), scales)
     }
 
-    fn first_moments(&self, nodes: &Nodes) -> Option<[f64; 3]> {
-        let lit = self.launch.fates(&nodes.points);
+    fn area_and_centroid(&self, nodes: &Nodes) -> Option<[f64; 3]> {
+        let lit = self.launch.lit_mask(&nodes.points);
         let (mut area, mut sum) = (0.0, [0.0; 2]);
         for ((p, weight), _) in nodes.points.iter().zip(&nodes.weights).zip(lit).filter(|n| n.1) {
             let Some((at, unit)) = self.launch.crossing_with_area(*p) else { continue };
@@ -138,40 +144,50 @@ impl Region<'_> {
 impl Launch<'_> {
     /// The rim of the unit disc in mm: about so many points from +y towards +x, closed.
     pub fn rim(&self, points: usize) -> Vec<[f64; 2]> {
-        let steps = even(points);
+        let steps = even_steps(points);
         let azimuths = (0..=steps).map(|i| TAU * i as f64 / steps as f64);
         azimuths.filter_map(|azimuth| self.crossing(azimuth.sin_cos().into())).collect()
     }
 }
 
 /// So many steps, an even number of them and not too few for a length.
-fn even(steps: usize) -> usize {
+fn even_steps(steps: usize) -> usize {
     2 * steps.div_ceil(2).max(4)
 }
 
-fn split(launch: &Launch<'_>, boundary: &Boundary, points: usize) -> Option<Outline> {
-    let mut search = Search::new(launch, boundary.frame);
-    let sides = boundary.arcs.iter().map(|arc| side(&mut search, boundary, arc, points));
-    let mut sides = sides.collect::<Option<Vec<Side>>>()?;
+fn boundary_outline(
+    launch: &Launch<'_>,
+    boundary: &Boundary,
+    points: usize,
+) -> Option<PupilOutline> {
+    let mut search = EdgeSearch::new(launch, boundary.frame);
+    let sides = boundary.arcs.iter().map(|arc| outline_side(&mut search, boundary, arc, points));
+    let mut sides = sides.collect::<Option<Vec<OutlineSide>>>()?;
     let reach = boundary.arcs.iter().map(|arc| arc.to - arc.from).sum::<f64>();
     if reach < 1.5 * PI {
-        let mirrored: Vec<Side> = sides.iter().rev().map(Side::mirrored).collect();
+        let mirrored: Vec<OutlineSide> =
+            sides.iter().rev().map(OutlineSide::mirror_image).collect();
         sides.extend(mirrored);
     }
     let center = launch.crossing(boundary.frame.center)?;
-    Some(Outline { sides: joined(sides), center, rays: search.rays })
+    Some(PupilOutline { sides: merge_adjacent(sides), center, rays: search.rays })
 }
 
-fn side(search: &mut Search<'_>, boundary: &Boundary, arc: &Arc, points: usize) -> Option<Side> {
+fn outline_side(
+    search: &mut EdgeSearch<'_>,
+    boundary: &Boundary,
+    arc: &BoundaryArc,
+    points: usize,
+) -> Option<OutlineSide> {
     let turn = arc.to - arc.from;
-    let steps = even((points as f64 * turn / TAU).ceil() as usize);
+    let steps = even_steps((points as f64 * turn / TAU).ceil() as usize);
     let point = |i: usize| {
         let azimuth = arc.from + turn * i as f64 / steps as f64;
-        let edge = search.edge(azimuth, boundary.near(azimuth), NEAR)?;
+        let edge = search.edge(azimuth, boundary.radius_guess(azimuth), GUESS_SPREAD)?;
         search.launch.crossing(boundary.frame.point(azimuth, edge.radius))
     };
     let points = (0..=steps).map(point).collect::<Option<Vec<_>>>()?;
-    Some(Side { limit: arc.limit, length: length(&points), points })
+    Some(OutlineSide { limit: arc.limit, length: length(&points), points })
 }
 
 /// The length of a smooth curve through points at an even number of equal steps.
@@ -183,32 +199,32 @@ fn length(points: &[[f64; 2]]) -> f64 {
     (4.0 * chords(1) - chords(2)) / 3.0
 }
 
-impl Side {
+impl OutlineSide {
     /// The same on the other side of the y axis, from its end to its beginning.
-    fn mirrored(&self) -> Self {
+    fn mirror_image(&self) -> Self {
         let points = self.points.iter().rev().map(|[x, y]| [-x, *y]).collect();
         Self { points, ..self.clone() }
     }
 
     /// Goes on along a side of the same limit that begins where this one ends.
-    fn go_on(&mut self, next: Self) {
+    fn append(&mut self, next: Self) {
         self.points.extend(next.points.into_iter().skip(1));
         self.length += next.length;
     }
 }
 
 /// Neighbours that the same limit makes are one side.
-fn joined(sides: Vec<Side>) -> Vec<Side> {
-    let mut whole: Vec<Side> = Vec::with_capacity(sides.len());
+fn merge_adjacent(sides: Vec<OutlineSide>) -> Vec<OutlineSide> {
+    let mut whole: Vec<OutlineSide> = Vec::with_capacity(sides.len());
     for side in sides {
         match whole.last_mut() {
-            Some(last) if last.limit == side.limit => last.go_on(side),
+            Some(last) if last.limit == side.limit => last.append(side),
             _ => whole.push(side),
         }
     }
     if whole.len() > 1 && whole.first().map(|side| side.limit) == whole.last().map(|s| s.limit) {
         let first = whole.remove(0);
-        whole.iter_mut().last().into_iter().for_each(|last| last.go_on(first.clone()));
+        whole.iter_mut().last().into_iter().for_each(|last| last.append(first.clone()));
     }
     whole
 }

@@ -5,11 +5,11 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
 //! is integrated over one half.
 
-use super::boundary::{Arc, Boundary, Edge, Frame, NEAR, Search};
-use super::region::{Kind, Region};
+use super::boundary::{Boundary, BoundaryArc, EdgePoint, EdgeSearch, GUESS_SPREAD, PolarFrame};
+use super::region::{Region, RegionKind};
 use super::rules::{legendre, radial};
-use super::sample::additive;
-use crate::trace::{Rays, Sink};
+use super::sample::additive_sequence;
+use crate::trace::{Rays, TraceSink};
 use std::f64::consts::PI;
 
 /// Points of the pupil with their weights.
@@ -32,18 +32,18 @@ pub struct Accuracy {
     /// The error allowed, relative to what the analysis names as its scale.
     pub tolerance: f64,
     /// No more rays than this for one field and wavelength.
-    pub most_rays: usize,
+    pub max_rays: usize,
 }
 
 impl Default for Accuracy {
     fn default() -> Self {
-        Self { tolerance: 1e-3, most_rays: 100_000 }
+        Self { tolerance: 1e-3, max_rays: 100_000 }
     }
 }
 
 /// Numbers with their errors, and what they cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Converged<const K: usize> {
+pub struct ConvergedValues<const K: usize> {
     /// The numbers at the highest order.
     pub values: [f64; K],
     /// How much the last raising of the order changed each.
@@ -51,19 +51,19 @@ pub struct Converged<const K: usize> {
     /// Rays traced.
     pub rays: usize,
     /// Whether the errors are what was asked for; else the rays ran out.
-    pub reached: bool,
+    pub converged: bool,
 }
 
 /// A radius of a split pupil, from the centre of its frame to its edge.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Spoke {
+pub(super) struct RadialLine {
     pub(super) azimuth: f64,
-    pub(super) edge: Edge,
+    pub(super) edge: EdgePoint,
     /// Its share of the turn, in the area of the frame.
     pub(super) share: f64,
     /// Where a cosine vanishes behind its end, in parts of its length: infinite where none does
     /// nearby.
-    pub(super) grazing: f64,
+    pub(super) grazing_distance: f64,
 }
 
 /// A cosine that vanishes farther out than this, in parts of the radius, is far away.
@@ -71,7 +71,7 @@ const FAR: f64 = 1.5;
 
 /// The nodes on some radii. Where a cosine vanishes at the edge or close behind it, the image moves
 /// with the root of the distance from there: Gauss nodes in a variable that makes it smooth.
-fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
+fn line_nodes(spokes: &[RadialLine], frame: &PolarFrame, radii: usize) -> Nodes {
     let mut nodes = Nodes::default();
     for spoke in spokes {
         let radius = spoke.edge.radius;
@@ -80,8 +80,8 @@ fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
             nodes.points.push(frame.point(spoke.azimuth, r * radius));
             nodes.weights.push(sector * weight);
         };
-        let beyond = spoke.grazing - 1.0;
-        match (spoke.edge.limit.is_grazing(), spoke.grazing < FAR) {
+        let beyond = spoke.grazing_distance - 1.0;
+        match (spoke.edge.limit.is_grazing(), spoke.grazing_distance < FAR) {
             (false, false) => radial(radii).iter().for_each(|(r, weight)| add(*r, *weight)),
             // r = 1 − s²
             (true, false) => legendre(2 * radii).iter().for_each(|(s, w)| {
@@ -90,10 +90,10 @@ fn nodes_of(spokes: &[Spoke], frame: &Frame, radii: usize) -> Nodes {
             }),
             // r = 1 + beyond − s²
             (false, true) => {
-                let [first, last] = [beyond.sqrt(), spoke.grazing.sqrt()];
+                let [first, last] = [beyond.sqrt(), spoke.grazing_distance.sqrt()];
                 legendre(2 * radii).iter().for_each(|(t, w)| {
                     let s = first + t * (last - first);
-                    let r = spoke.grazing - s * s;
+                    let r = spoke.grazing_distance - s * s;
                     add(r, 2.0 * s * (last - first) * r * w);
                 });
             }
@@ -121,16 +121,17 @@ struct Grading {
 }
 
 impl Grading {
-    fn of(arcs: &[Arc], i: usize, whole: bool) -> Self {
+    fn of(arcs: &[BoundaryArc], i: usize, whole: bool) -> Self {
         let count = arcs.len();
-        let differs = |other: &Arc| other.limit.is_grazing() && other.limit != arcs[i].limit;
+        let differs =
+            |other: &BoundaryArc| other.limit.is_grazing() && other.limit != arcs[i].limit;
         let before = if i > 0 || whole { arcs.get((i + count - 1) % count) } else { None };
         let after = if i + 1 < count || whole { arcs.get((i + 1) % count) } else { None };
         Self { from: before.is_some_and(differs), to: after.is_some_and(differs) }
     }
 
     /// The place between 0 and 1 of a node, and how densely nodes lie there.
-    fn place(self, t: f64) -> (f64, f64) {
+    fn map(self, t: f64) -> (f64, f64) {
         match (self.from, self.to) {
             (false, false) => (t, 1.0),
             (true, false) => (t * t, 2.0 * t),
@@ -141,9 +142,9 @@ impl Grading {
 }
 
 /// Nodes along the radius and along half a turn, of the clear disc.
-const CLEAR: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
+const CLEAR_ORDERS: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
 /// Nodes along an arc and along the radius, of a piece.
-const SPLIT: [(usize, usize); 12] = [
+const STAR_ORDERS: [(usize, usize); 12] = [
     (4, 3),
     (6, 4),
     (8, 5),
@@ -158,54 +159,62 @@ const SPLIT: [(usize, usize); 12] = [
     (96, 56),
 ];
 /// Points of the lowest order where nothing better is known than a clipped low-discrepancy set.
-const RAGGED: usize = 1024;
-const RAGGED_ORDERS: usize = 8;
+const IRREGULAR_POINTS: usize = 1024;
+const IRREGULAR_ORDERS: usize = 8;
 
 impl Region<'_> {
     /// How many orders of quadrature there are.
     pub fn orders(&self) -> usize {
         match self.kind {
-            Kind::Dark | Kind::Endless => 0,
-            Kind::Clear => CLEAR.len(),
-            Kind::Split(_) | Kind::Ragged { ring: Some(_), .. } => SPLIT.len(),
-            Kind::Ragged { .. } => RAGGED_ORDERS,
+            RegionKind::Dark | RegionKind::Unbounded => 0,
+            RegionKind::Clear => CLEAR_ORDERS.len(),
+            RegionKind::StarShaped(_) | RegionKind::Irregular { annulus: Some(_), .. } => {
+                STAR_ORDERS.len()
+            }
+            RegionKind::Irregular { .. } => IRREGULAR_ORDERS,
         }
     }
 
     /// The nodes of an order, counted from 0; none where there is no light.
     pub fn nodes(&self, order: usize) -> Nodes {
-        self.nodes_and_spokes(order, false).0
+        self.nodes_and_lines(order, false).0
     }
 
     /// The nodes of an order, and the radii that they lie on where the pupil is split; one radius
     /// where all azimuths are `alike` and that is enough.
-    pub(super) fn nodes_and_spokes(&self, order: usize, alike: bool) -> (Nodes, Vec<Spoke>) {
+    pub(super) fn nodes_and_lines(&self, order: usize, alike: bool) -> (Nodes, Vec<RadialLine>) {
         let mirrored = self.launch.is_symmetric();
-        let (azimuths, radii) = SPLIT[order.min(SPLIT.len() - 1)];
+        let (azimuths, radii) = STAR_ORDERS[order.min(STAR_ORDERS.len() - 1)];
         match &self.kind {
-            Kind::Dark | Kind::Endless => Default::default(),
-            Kind::Clear => (clear(CLEAR[order.min(CLEAR.len() - 1)], mirrored), Vec::new()),
-            Kind::Split(boundary) => {
+            RegionKind::Dark | RegionKind::Unbounded => Default::default(),
+            RegionKind::Clear => {
+                (clear_nodes(CLEAR_ORDERS[order.min(CLEAR_ORDERS.len() - 1)], mirrored), Vec::new())
+            }
+            RegionKind::StarShaped(boundary) => {
                 let alike = alike && self.launch.is_axial() && boundary.arcs.len() == 1;
-                let (spokes, rays) = self.spokes(boundary, if alike { 1 } else { azimuths });
-                let nodes = nodes_of(&spokes, &boundary.frame, radii);
+                let (spokes, rays) = self.radial_lines(boundary, if alike { 1 } else { azimuths });
+                let nodes = line_nodes(&spokes, &boundary.frame, radii);
                 (Nodes { mirrored, rays, ..nodes }, spokes)
             }
-            Kind::Ragged { ring: Some(ring), .. } => {
-                let (spokes, rays) = ring.spokes(&self.launch, azimuths);
-                let nodes = ring.nodes_of(&spokes, radii);
+            RegionKind::Irregular { annulus: Some(ring), .. } => {
+                let (spokes, rays) = ring.radial_lines(&self.launch, azimuths);
+                let nodes = ring.nodes(&spokes, radii);
                 (Nodes { mirrored, rays, ..nodes }, spokes.into_iter().flatten().collect())
             }
-            Kind::Ragged { square, .. } => {
+            RegionKind::Irregular { square, .. } => {
                 let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };
-                (ragged(*square, RAGGED << (2 * order), reach), Vec::new())
+                (irregular_nodes(*square, IRREGULAR_POINTS << (2 * order), reach), Vec::new())
             }
         }
     }
 
     /// Radii at the Gauss nodes of azimuth of every arc, and the rays traced to find their ends.
-    pub(super) fn spokes(&self, boundary: &Boundary, azimuths: usize) -> (Vec<Spoke>, usize) {
-        let mut search = Search::new(&self.launch, boundary.frame);
+    pub(super) fn radial_lines(
+        &self,
+        boundary: &Boundary,
+        azimuths: usize,
+    ) -> (Vec<RadialLine>, usize) {
+        let mut search = EdgeSearch::new(&self.launch, boundary.frame);
         let halves = if self.launch.is_symmetric() { 2.0 } else { 1.0 };
         let factor = halves * boundary.frame.area();
         let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
@@ -213,14 +222,14 @@ impl Region<'_> {
             let length = arc.to - arc.from;
             let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
             for (t, share) in legendre(azimuths) {
-                let (t, stretch) = grading.place(*t);
+                let (t, stretch) = grading.map(*t);
                 let azimuth = arc.from + t * length;
-                let guess = boundary.near(azimuth);
-                let expected = search.expected(arc.limit, azimuth, guess);
-                if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, NEAR)) {
-                    let grazing = search.grazing(&boundary.grazing, azimuth, edge);
+                let guess = boundary.radius_guess(azimuth);
+                let expected = search.edge_at_limit(arc.limit, azimuth, guess);
+                if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, GUESS_SPREAD)) {
+                    let grazing = search.grazing_distance(&boundary.grazing_limits, azimuth, edge);
                     let share = factor * share * stretch * length;
-                    spokes.push(Spoke { azimuth, edge, share, grazing });
+                    spokes.push(RadialLine { azimuth, edge, share, grazing_distance: grazing });
                 }
             }
         }
@@ -228,8 +237,8 @@ impl Region<'_> {
     }
 
     /// Traces nodes; `visit` gets the weight and the number of each ray that arrives in `sink`.
-    pub fn trace<S: Sink<f64> + Default>(&self, nodes: &Nodes) -> Landed<S> {
-        let mut landed = Landed { sink: S::default(), weights: Vec::new(), lost: 0 };
+    pub fn trace<S: TraceSink<f64> + Default>(&self, nodes: &Nodes) -> TracedNodes<S> {
+        let mut landed = TracedNodes { sink: S::default(), weights: Vec::new(), lost: 0 };
         let mut rays = Rays::with_capacity(nodes.points.len());
         for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
             match self.launch.ray(*p) {
@@ -240,14 +249,14 @@ impl Region<'_> {
                 None => landed.lost += 1,
             }
         }
-        self.launch.color().tracer.batch(&rays, &mut landed.sink);
+        self.launch.channel().tracer.trace_batch(&rays, &mut landed.sink);
         landed
     }
 }
 
 /// Rays of a quadrature where they landed.
 #[derive(Debug, Clone)]
-pub struct Landed<S> {
+pub struct TracedNodes<S> {
     /// Where.
     pub sink: S,
     /// The weight of each.
@@ -256,15 +265,15 @@ pub struct Landed<S> {
     pub lost: usize,
 }
 
-impl<S: Sink<f64>> Landed<S> {
+impl<S: TraceSink<f64>> TracedNodes<S> {
     /// The number and weight of every ray that arrived.
-    pub fn arrived(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub fn arrivals(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let all = self.weights.iter().copied().enumerate();
         all.filter(|(i, _)| self.sink.fate(*i).is_imaged())
     }
 }
 
-fn clear(order: usize, mirrored: bool) -> Nodes {
+fn clear_nodes(order: usize, mirrored: bool) -> Nodes {
     let azimuths = if mirrored { order } else { 2 * order };
     let turn = if mirrored { PI } else { 2.0 * PI };
     let step = turn / azimuths as f64;
@@ -281,9 +290,9 @@ fn clear(order: usize, mirrored: bool) -> Nodes {
 }
 
 /// An even sequence over a square. Points farther out than `reach`, where no beam is, are left out.
-fn ragged((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
+fn irregular_nodes((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
     let point = |i: usize| {
-        let u = additive([0.5; 2], i);
+        let u = additive_sequence([0.5; 2], i);
         [0, 1].map(|k| center[k] + half * (2.0 * u[k] - 1.0))
     };
     let weight = 4.0 * half * half / count as f64;
@@ -293,7 +302,7 @@ fn ragged((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
 
 /// The error of clipped points from their last change: four times as many are no more than four
 /// times as good, even where two counts agree by chance.
-fn cautious(change: f64, error_before: f64) -> f64 {
+fn sampling_error(change: f64, error_before: f64) -> f64 {
     let least = if error_before.is_finite() { 0.25 * error_before } else { 0.0 };
     (2.0 * change).max(least)
 }
@@ -301,33 +310,35 @@ fn cautious(change: f64, error_before: f64) -> f64 {
 /// Raises the order until each of some numbers changes by less than the tolerance times its scale;
 /// `None` where no light gets through. `numbers` computes them from nodes, `scales` says against
 /// what each is measured.
-pub fn converged<const K: usize>(
+pub fn converge<const K: usize>(
     region: &Region<'_>,
     accuracy: Accuracy,
     mut numbers: impl FnMut(&Nodes) -> Option<[f64; K]>,
     scales: impl Fn(&[f64; K]) -> [f64; K],
-) -> Option<Converged<K>> {
+) -> Option<ConvergedValues<K>> {
     let mut rays = region.rays;
-    let mut before: Option<Converged<K>> = None;
+    let mut before: Option<ConvergedValues<K>> = None;
     for order in 0..region.orders() {
         let nodes = region.nodes(order);
         let cost = nodes.points.len() + nodes.rays;
         let has_error = before.is_some_and(|b| b.errors.iter().all(|e| e.is_finite()));
-        if has_error && rays + cost > accuracy.most_rays {
+        if has_error && rays + cost > accuracy.max_rays {
             break;
         }
         rays += cost;
         let Some(values) = numbers(&nodes) else { continue };
-        let mut now = Converged { values, errors: [f64::INFINITY; K], rays, reached: false };
+        let mut now =
+            ConvergedValues { values, errors: [f64::INFINITY; K], rays, converged: false };
         if let Some(before) = before {
             let scales = scales(&values);
             now.errors = std::array::from_fn(|k| (values[k] - before.values[k]).abs());
-            if matches!(region.kind, Kind::Ragged { ring: None, .. }) {
-                now.errors = std::array::from_fn(|k| cautious(now.errors[k], before.errors[k]));
+            if matches!(region.kind, RegionKind::Irregular { annulus: None, .. }) {
+                now.errors =
+                    std::array::from_fn(|k| sampling_error(now.errors[k], before.errors[k]));
             }
-            now.reached = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
+            now.converged = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
         }
-        if now.reached {
+        if now.converged {
             return Some(now);
         }
         before = Some(now);

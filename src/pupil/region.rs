@@ -4,12 +4,14 @@
 //! where light is, in how many pieces, and whether one point sees all of it; then the edge is
 //! followed from there.
 
-use super::boundary::{Boundary, Edge, Frame, NEAR, Search, Seen, dips};
+use super::boundary::{
+    Boundary, EdgePoint, EdgeSearch, GUESS_SPREAD, LimitFilter, PolarFrame, margin_minima,
+};
 use super::launch::Launch;
 use super::quadrature::Nodes;
-use super::ring::Ring;
-use super::sample::{Pattern, pattern};
-use crate::trace::{Points, Rays, Sink};
+use super::ring::Annulus;
+use super::sample::{PupilPattern, pattern_points};
+use crate::trace::{ImagePoints, Rays, TraceSink};
 use std::f64::consts::{PI, TAU};
 
 /// Rays at the rim that tell whether a pupil is clear.
@@ -19,36 +21,36 @@ const RIM_RAYS: usize = 16;
 const SCANS: [(usize, f64); 3] = [(25, 120.0), (101, 13.0), (301, 1.7)];
 /// A grid with fewer rays than this in the light is too coarse for a verdict: another one is laid
 /// around that light, this often at most.
-const FEW: usize = 12;
-const ZOOMS: usize = 14;
+const ENOUGH_LIT: usize = 12;
+const MAX_ZOOMS: usize = 14;
 /// Light through a hole narrower than this, in pupil coordinates, is a single ray: a rim of size
 /// zero lets it through on the axis.
-const NARROWEST: f64 = 1e-9;
+const NARROWEST_PUPIL: f64 = 1e-9;
 /// Azimuths at which the edge is looked at first, over a half turn.
 const AZIMUTHS: usize = 24;
 /// How far from the axis light is looked for first where no disc limits the pupil.
-const REACH: f64 = 1.6;
+const FIRST_REACH: f64 = 1.6;
 
 /// The form of a pupil.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum RegionKind {
     /// Nothing gets through.
     Dark,
     /// The whole disc gets through.
     Clear,
     /// One piece, bounded by arcs.
-    Split(Boundary),
+    StarShaped(Boundary),
     /// No single point sees all of it, or its edge is noise: it is sampled and clipped.
-    Ragged {
+    Irregular {
         /// How many separate pieces were seen.
         pieces: usize,
         /// A square that holds all of it: its centre and half of its side.
         square: ([f64; 2], f64),
         /// Its two edges, where it is a ring about a shadow: its quadrature lies between them.
-        ring: Option<Box<Ring>>,
+        annulus: Option<Box<Annulus>>,
     },
     /// Nothing limits it, so that no beam is defined.
-    Endless,
+    Unbounded,
 }
 
 /// The rays of a field at a wavelength that get through.
@@ -57,7 +59,7 @@ pub struct Region<'a> {
     /// Where its rays start.
     pub launch: Launch<'a>,
     /// Its form.
-    pub kind: Kind,
+    pub kind: RegionKind,
     /// Rays traced to find it.
     pub rays: usize,
 }
@@ -66,21 +68,21 @@ impl<'a> Region<'a> {
     /// The region of a launch.
     pub fn new(launch: Launch<'a>) -> Self {
         let disc = launch.bench.ends_at_disc();
-        let shadows = launch.shadows();
+        let shadows = launch.obstruction_centers();
         let mut rays = 0;
         if launch.bench.stop_radius() == 0.0 {
-            return Self { launch, kind: Kind::Dark, rays };
+            return Self { launch, kind: RegionKind::Dark, rays };
         }
         if disc && launch.is_clear(&shadows, &mut rays) {
-            return Self { launch, kind: Kind::Clear, rays };
+            return Self { launch, kind: RegionKind::Clear, rays };
         }
-        let Some(grid) = Grid::on_light(&launch, &mut rays) else {
-            return Self { launch, kind: Kind::Dark, rays };
+        let Some(grid) = LightGrid::around_light(&launch, &mut rays) else {
+            return Self { launch, kind: RegionKind::Dark, rays };
         };
-        let kind = grid.kind(&launch, &shadows);
+        let kind = grid.classify(&launch, &shadows);
         rays += match &kind {
-            Kind::Split(boundary) => boundary.rays,
-            Kind::Ragged { ring: Some(ring), .. } => ring.rays(),
+            RegionKind::StarShaped(boundary) => boundary.rays,
+            RegionKind::Irregular { annulus: Some(ring), .. } => ring.rays(),
             _ => 0,
         };
         Self { launch, kind, rays }
@@ -88,41 +90,43 @@ impl<'a> Region<'a> {
 
     /// The points of a pattern over a disc, or a stretched one, that holds all of the light: a
     /// sum over those that arrive is what clipped patterns give in other programs.
-    pub fn sampled(&self, chosen: Pattern) -> Nodes {
+    pub fn pattern_nodes(&self, chosen: PupilPattern) -> Nodes {
         let frame = match &self.kind {
-            Kind::Clear => Frame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
-            Kind::Split(_) | Kind::Ragged { .. } if self.launch.bench.ends_at_disc() => {
-                Frame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] }
+            RegionKind::Clear => PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
+            RegionKind::StarShaped(_) | RegionKind::Irregular { .. }
+                if self.launch.bench.ends_at_disc() =>
+            {
+                PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] }
             }
-            Kind::Split(boundary) => boundary.cover(),
-            Kind::Ragged { square: (center, half), .. } => {
+            RegionKind::StarShaped(boundary) => boundary.enclosing_disc(),
+            RegionKind::Irregular { square: (center, half), .. } => {
                 let reach = half * std::f64::consts::SQRT_2;
-                Frame { center: *center, axes: [[reach, 0.0], [0.0, reach]] }
+                PolarFrame { center: *center, axes: [[reach, 0.0], [0.0, reach]] }
             }
-            Kind::Dark | Kind::Endless => return Nodes::default(),
+            RegionKind::Dark | RegionKind::Unbounded => return Nodes::default(),
         };
         let place = |p: &[f64; 2]| {
             let [a, b] = frame.axes;
             [0, 1].map(|i| frame.center[i] + p[0] * a[i] + p[1] * b[i])
         };
-        let points: Vec<_> = pattern(chosen).iter().map(place).collect();
+        let points: Vec<_> = pattern_points(chosen).iter().map(place).collect();
         let weight = PI * frame.area() / points.len() as f64;
         Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
     }
 
     /// Whether no light gets through.
     pub fn is_dark(&self) -> bool {
-        self.kind == Kind::Dark
+        self.kind == RegionKind::Dark
     }
 }
 
 /// The ray at an azimuth of the rim.
-fn rim(azimuth: f64) -> [f64; 2] {
+fn rim_point(azimuth: f64) -> [f64; 2] {
     azimuth.sin_cos().into()
 }
 
 /// The point of the unit disc nearest to another one.
-fn in_disc([x, y]: [f64; 2]) -> [f64; 2] {
+fn nearest_in_disc([x, y]: [f64; 2]) -> [f64; 2] {
     let outside = x.hypot(y).max(1.0);
     [x / outside, y / outside]
 }
@@ -130,8 +134,8 @@ fn in_disc([x, y]: [f64; 2]) -> [f64; 2] {
 impl Launch<'_> {
     /// Where in the pupil, inside or not, the shadow of every obstruction has its middle: the ray
     /// through the vertex of the surface. `None` for one that was not found.
-    fn shadows(&self) -> Vec<Option<[f64; 2]>> {
-        let surfaces = self.color().system.surfaces.iter().enumerate();
+    fn obstruction_centers(&self) -> Vec<Option<[f64; 2]>> {
+        let surfaces = self.channel().system.surfaces.iter().enumerate();
         let obstructed = surfaces.filter(|(_, surface)| surface.obstruction > 0.0);
         obstructed.map(|(i, _)| self.through_vertex(i)).collect()
     }
@@ -145,26 +149,28 @@ impl Launch<'_> {
         let mut margins = Vec::with_capacity(RIM_RAYS);
         for i in 0..RIM_RAYS {
             *rays += 1;
-            let Some(found) = self.margins_of_passing(rim(step * i as f64)) else { return false };
+            let Some(found) = self.margins_if_passing(rim_point(step * i as f64)) else {
+                return false;
+            };
             margins.push(found);
         }
         *rays += 1;
-        let dips = dips(&margins, half);
+        let dips = margin_minima(&margins, half);
         *rays += dips.len();
-        let passes = |p: [f64; 2]| self.margins_of_passing(p).is_some();
+        let passes = |p: [f64; 2]| self.margins_if_passing(p).is_some();
         *rays += shadows.len();
         passes([0.0, 0.0])
-            && dips.into_iter().all(|dip| passes(rim(step * dip)))
-            && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(in_disc(p))))
+            && dips.into_iter().all(|dip| passes(rim_point(step * dip)))
+            && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(nearest_in_disc(p))))
     }
 
     /// Which of these pupil points get through the surfaces.
-    pub(super) fn fates(&self, points: &[[f64; 2]]) -> Vec<bool> {
+    pub(super) fn lit_mask(&self, points: &[[f64; 2]]) -> Vec<bool> {
         let mut lit = vec![false; points.len()];
         let launched = points.iter().enumerate().filter_map(|(i, p)| Some((i, self.ray(*p)?)));
         let (places, rays): (Vec<usize>, Rays<f64>) = launched.unzip_rays();
-        let mut landed = Points::default();
-        self.color().tracer.batch(&rays, &mut landed);
+        let mut landed = ImagePoints::default();
+        self.channel().tracer.trace_batch(&rays, &mut landed);
         places.iter().enumerate().for_each(|(ray, i)| lit[*i] = landed.fate(ray).is_imaged());
         lit
     }
@@ -187,7 +193,7 @@ impl<T, I: Iterator<Item = (T, crate::trace::Ray<f64>)>> UnzipRays<T> for I {
 }
 
 /// A coarse picture of the light in a square of the pupil plane.
-struct Grid {
+struct LightGrid {
     cells: usize,
     center: [f64; 2],
     half: f64,
@@ -195,32 +201,32 @@ struct Grid {
     rays: usize,
 }
 
-impl Grid {
+impl LightGrid {
     /// A grid that holds all of the light and enough of it; `None` where there is none.
-    fn on_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
+    fn around_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
         let mut grid =
             SCANS.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays))?;
-        for _ in 0..ZOOMS {
-            let (center, half) = grid.square();
-            if grid.count() >= FEW || half > 0.9 * grid.half {
+        for _ in 0..MAX_ZOOMS {
+            let (center, half) = grid.bounding_square();
+            if grid.count() >= ENOUGH_LIT || half > 0.9 * grid.half {
                 break;
             }
-            let closer = Self::of(launch, SCANS[0].0, center, half);
+            let closer = Self::sample(launch, SCANS[0].0, center, half);
             *rays += closer.rays;
             if closer.count() == 0 {
                 break;
             }
             grid = closer;
         }
-        (grid.half > NARROWEST).then_some(grid)
+        (grid.half > NARROWEST_PUPIL).then_some(grid)
     }
 
     /// Ever larger grids about the axis until one holds light, and all of it.
     fn scan(launch: &Launch<'_>, cells: usize, widest: f64, rays: &mut usize) -> Option<Self> {
         let disc = launch.bench.ends_at_disc();
-        let mut half = if disc { 1.0 } else { REACH };
+        let mut half = if disc { 1.0 } else { FIRST_REACH };
         loop {
-            let grid = Self::of(launch, cells, [0.0; 2], half);
+            let grid = Self::sample(launch, cells, [0.0; 2], half);
             *rays += grid.rays;
             let largest = disc || 2.0 * half > widest;
             let holds = grid.count() > 0 && !grid.touches_its_edge();
@@ -231,7 +237,7 @@ impl Grid {
         }
     }
 
-    fn of(launch: &Launch<'_>, cells: usize, center: [f64; 2], half: f64) -> Self {
+    fn sample(launch: &Launch<'_>, cells: usize, center: [f64; 2], half: f64) -> Self {
         let lit = vec![false; cells * cells];
         let mut grid = Self { cells, center, half, lit, rays: 0 };
         let disc = launch.bench.ends_at_disc();
@@ -242,7 +248,7 @@ impl Grid {
             .collect();
         let points: Vec<_> = chosen.iter().map(|i| grid.point(*i)).collect();
         grid.rays = points.len();
-        for (i, lit) in chosen.iter().zip(launch.fates(&points)) {
+        for (i, lit) in chosen.iter().zip(launch.lit_mask(&points)) {
             grid.lit[*i] = lit;
             if mirrored {
                 let (row, column) = (i / cells, i % cells);
@@ -273,34 +279,39 @@ impl Grid {
         self.lit_cells().any(|i| at_edge(i % self.cells) || at_edge(i / self.cells))
     }
 
-    fn kind(&self, launch: &Launch<'_>, shadows: &[Option<[f64; 2]>]) -> Kind {
+    fn classify(&self, launch: &Launch<'_>, shadows: &[Option<[f64; 2]>]) -> RegionKind {
         if !launch.bench.ends_at_disc() && self.touches_its_edge() {
-            return Kind::Endless;
+            return RegionKind::Unbounded;
         }
-        let pieces = self.pieces();
+        let pieces = self.count_pieces();
         let end = if launch.is_symmetric() { PI } else { TAU };
         let azimuths = if launch.is_symmetric() { AZIMUTHS } else { 2 * AZIMUTHS };
         if pieces == 1
-            && let Some(boundary) = Search::new(launch, self.frame(launch)).boundary(end, azimuths)
+            && let Some(boundary) =
+                EdgeSearch::new(launch, self.frame(launch)).trace_boundary(end, azimuths)
             && self.agrees(launch, &boundary, shadows)
         {
-            return Kind::Split(boundary);
+            return RegionKind::StarShaped(boundary);
         }
         let around = |middle: [f64; 2]| {
             let symmetric = launch.is_symmetric();
             let center = if symmetric { [0.0, middle[1]] } else { middle };
-            let frame = Frame { center, axes: self.axes(self.middle(), symmetric) };
-            Ring::around(launch, frame, end, azimuths)
+            let frame = PolarFrame { center, axes: self.axes(self.centroid(), symmetric) };
+            Annulus::around(launch, frame, end, azimuths)
         };
         let rings = shadows.iter().flatten().filter_map(|middle| around(*middle));
-        let ring = rings.into_iter().find(|ring| self.agrees_with_ring(launch, ring, shadows));
+        let ring = rings.into_iter().find(|ring| self.agrees_with_annulus(launch, ring, shadows));
         // A grid may be too coarse to see that a narrow ring hangs together.
         let pieces = if ring.is_some() { 1 } else { pieces };
-        Kind::Ragged { pieces, square: self.square(), ring: ring.map(Box::new) }
+        RegionKind::Irregular {
+            pieces,
+            square: self.bounding_square(),
+            annulus: ring.map(Box::new),
+        }
     }
 
     /// The centroid of the light.
-    fn middle(&self) -> [f64; 2] {
+    fn centroid(&self) -> [f64; 2] {
         let count = self.count() as f64;
         let points = self.lit_cells().map(|i| self.point(i));
         let sum = points.fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
@@ -309,16 +320,16 @@ impl Grid {
 
     /// The frame in which the light looks round about its centroid, or about the lit point nearest
     /// to that.
-    fn frame(&self, launch: &Launch<'_>) -> Frame {
+    fn frame(&self, launch: &Launch<'_>) -> PolarFrame {
         let points = || self.lit_cells().map(|i| self.point(i));
-        let middle = self.middle();
+        let middle = self.centroid();
         let mut center = if launch.is_symmetric() { [0.0, middle[1]] } else { middle };
         if !launch.is_lit(center) {
             let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
             let nearest = points().min_by(|a, b| distance(a).total_cmp(&distance(b)));
             center = nearest.unwrap_or(center);
         }
-        Frame { center, axes: self.axes(middle, launch.is_symmetric()) }
+        PolarFrame { center, axes: self.axes(middle, launch.is_symmetric()) }
     }
 
     /// The axes of an ellipse with the second moments of the light: those of a uniform one are a
@@ -342,7 +353,7 @@ impl Grid {
     }
 
     /// A square around the light.
-    fn square(&self) -> ([f64; 2], f64) {
+    fn bounding_square(&self) -> ([f64; 2], f64) {
         let cell = 2.0 * self.half / self.cells as f64;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in self.lit_cells().map(|i| self.point(i)) {
@@ -354,7 +365,7 @@ impl Grid {
     }
 
     /// How many separate pieces the light has.
-    fn pieces(&self) -> usize {
+    fn count_pieces(&self) -> usize {
         let mut seen = vec![false; self.lit.len()];
         let mut pieces = 0;
         for start in self.lit_cells() {
@@ -388,7 +399,7 @@ impl Grid {
     }
 
     /// Grid points and the middles of shadows, and whether they are lit.
-    fn seen<'b>(
+    fn labelled_points<'b>(
         &'b self,
         shadows: &'b [Option<[f64; 2]>],
     ) -> impl Iterator<Item = ([f64; 2], bool)> + 'b {
@@ -403,23 +414,28 @@ impl Grid {
         boundary: &Boundary,
         shadows: &[Option<[f64; 2]>],
     ) -> bool {
-        let mut search = Search::new(launch, boundary.frame);
-        self.seen(shadows).all(|(point, lit)| on_side(&mut search, boundary, point, lit))
+        let mut search = EdgeSearch::new(launch, boundary.frame);
+        self.labelled_points(shadows)
+            .all(|(point, lit)| lies_on_side(&mut search, boundary, point, lit))
     }
 
     /// Whether light lies between the two edges of a ring and dark does not.
-    fn agrees_with_ring(
+    fn agrees_with_annulus(
         &self,
         launch: &Launch<'_>,
-        ring: &Ring,
+        ring: &Annulus,
         shadows: &[Option<[f64; 2]>],
     ) -> bool {
-        let Ring { outer, inner } = ring;
-        let mut rims = Search::new(launch, outer.frame).seeing(Seen::Rims);
-        let mut shadow = Search::new(launch, inner.frame).seeing(Seen::Shadow);
-        self.seen(shadows).all(|(point, lit)| {
-            let (light, dark) =
-                (on_side(&mut rims, outer, point, lit), on_side(&mut shadow, inner, point, !lit));
+        let Annulus { outer, inner } = ring;
+        let mut rims =
+            EdgeSearch::new(launch, outer.frame).with_limits(LimitFilter::WithoutObstructions);
+        let mut shadow =
+            EdgeSearch::new(launch, inner.frame).with_limits(LimitFilter::Obstructions);
+        self.labelled_points(shadows).all(|(point, lit)| {
+            let (light, dark) = (
+                lies_on_side(&mut rims, outer, point, lit),
+                lies_on_side(&mut shadow, inner, point, !lit),
+            );
             if lit { light && dark } else { light || dark }
         })
     }
@@ -427,16 +443,21 @@ impl Grid {
 
 /// Whether a point lies inside an edge, or outside, as it should; where it is close to it, the edge
 /// is looked for at its azimuth.
-fn on_side(search: &mut Search<'_>, boundary: &Boundary, point: [f64; 2], inside: bool) -> bool {
+fn lies_on_side(
+    search: &mut EdgeSearch<'_>,
+    boundary: &Boundary,
+    point: [f64; 2],
+    inside: bool,
+) -> bool {
     let end = boundary.samples.last().map_or(TAU, |s| s.0);
     let (mut azimuth, r) = boundary.frame.polar(point);
     if azimuth > end {
         azimuth = TAU - azimuth;
     }
-    let near = boundary.near(azimuth);
+    let near = boundary.radius_guess(azimuth);
     let fits = |radius: f64, slack: f64| {
         if inside { r <= radius + slack } else { r >= radius - slack }
     };
-    let exact = |edge: Edge| fits(edge.radius, 1e-6 * edge.radius);
-    fits(near, 0.0) || search.edge(azimuth, near, NEAR).is_some_and(exact)
+    let exact = |edge: EdgePoint| fits(edge.radius, 1e-6 * edge.radius);
+    fits(near, 0.0) || search.edge(azimuth, near, GUESS_SPREAD).is_some_and(exact)
 }

@@ -3,34 +3,38 @@
 //! No point sees all of a ring, but from the middle of the shadow both of its edges are functions
 //! of azimuth. Gauss nodes between them converge as fast as those of a pupil that one point sees.
 
-use super::boundary::{Boundary, Frame, Limit, NEAR, Search, Seen};
+use super::boundary::{Boundary, EdgeSearch, GUESS_SPREAD, LimitFilter, PolarFrame, PupilLimit};
 use super::launch::Launch;
-use super::quadrature::{Nodes, Spoke};
+use super::quadrature::{Nodes, RadialLine};
 use super::rules::legendre;
-use crate::trace::Hurdle;
+use crate::trace::RayLimit;
 use std::f64::consts::PI;
 
 /// The two edges of a ring, both from the same point inside the shadow.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ring {
+pub struct Annulus {
     /// Where the light ends.
     pub outer: Boundary,
     /// Where the shadow of the obstructions ends.
     pub inner: Boundary,
 }
 
-impl Ring {
+impl Annulus {
     /// The ring about the middle of a frame, over azimuths from 0 to `end`; `None` where the light
     /// does not go all around the shadow.
     pub(super) fn around(
         launch: &Launch<'_>,
-        frame: Frame,
+        frame: PolarFrame,
         end: f64,
         azimuths: usize,
     ) -> Option<Self> {
-        let edge = |seen| Search::new(launch, frame).seeing(seen).boundary(end, azimuths);
-        let ring = Self { outer: edge(Seen::Rims)?, inner: edge(Seen::Shadow)? };
-        let shadow = |limit| matches!(limit, Limit::Surface(_, Hurdle::Obstruction));
+        let edge =
+            |seen| EdgeSearch::new(launch, frame).with_limits(seen).trace_boundary(end, azimuths);
+        let ring = Self {
+            outer: edge(LimitFilter::WithoutObstructions)?,
+            inner: edge(LimitFilter::Obstructions)?,
+        };
+        let shadow = |limit| matches!(limit, PupilLimit::Surface(_, RayLimit::Obstruction));
         let closed = ring.inner.arcs.iter().all(|arc| shadow(arc.limit)) && ring.is_open();
         closed.then_some(ring)
     }
@@ -38,8 +42,11 @@ impl Ring {
     /// Whether there is light between the edges wherever they were looked at.
     fn is_open(&self) -> bool {
         let Self { outer, inner } = self;
-        inner.samples.iter().all(|(azimuth, edge)| edge.radius < outer.near(*azimuth))
-            && outer.samples.iter().all(|(azimuth, edge)| edge.radius > inner.near(*azimuth))
+        inner.samples.iter().all(|(azimuth, edge)| edge.radius < outer.radius_guess(*azimuth))
+            && outer
+                .samples
+                .iter()
+                .all(|(azimuth, edge)| edge.radius > inner.radius_guess(*azimuth))
     }
 
     /// Rays traced to find both edges.
@@ -50,20 +57,25 @@ impl Ring {
     /// The ends of radii at Gauss nodes of azimuth between corners of either edge, the outer one
     /// first, and the rays traced to find them. The shares of the inner ends are negative: what
     /// lies within is not lit.
-    pub(super) fn spokes(&self, launch: &Launch<'_>, azimuths: usize) -> (Vec<[Spoke; 2]>, usize) {
+    pub(super) fn radial_lines(
+        &self,
+        launch: &Launch<'_>,
+        azimuths: usize,
+    ) -> (Vec<[RadialLine; 2]>, usize) {
         let frame = self.outer.frame;
-        let mut outer = Search::new(launch, frame).seeing(Seen::Rims);
-        let mut inner = Search::new(launch, frame).seeing(Seen::Shadow);
+        let mut outer =
+            EdgeSearch::new(launch, frame).with_limits(LimitFilter::WithoutObstructions);
+        let mut inner = EdgeSearch::new(launch, frame).with_limits(LimitFilter::Obstructions);
         let factor = frame.area() * if launch.is_symmetric() { 2.0 } else { 1.0 };
         let mut spokes = Vec::new();
-        for (from, to) in self.stretches() {
+        for (from, to) in self.azimuth_intervals() {
             for (t, share) in legendre(azimuths) {
                 let azimuth = from + t * (to - from);
                 let share = factor * share * (to - from);
                 let ends = [(&mut outer, &self.outer, share), (&mut inner, &self.inner, -share)];
                 let [far, near] = ends.map(|(search, side, share)| {
-                    let edge = search.edge(azimuth, side.near(azimuth), NEAR)?;
-                    Some(Spoke { azimuth, edge, share, grazing: f64::INFINITY })
+                    let edge = search.edge(azimuth, side.radius_guess(azimuth), GUESS_SPREAD)?;
+                    Some(RadialLine { azimuth, edge, share, grazing_distance: f64::INFINITY })
                 });
                 spokes.extend(far.zip(near).map(|(far, near)| [far, near]));
             }
@@ -72,7 +84,7 @@ impl Ring {
     }
 
     /// Gauss nodes along radii from one edge to the other.
-    pub(super) fn nodes_of(&self, spokes: &[[Spoke; 2]], radii: usize) -> Nodes {
+    pub(super) fn nodes(&self, spokes: &[[RadialLine; 2]], radii: usize) -> Nodes {
         let mut nodes = Nodes::default();
         for [far, near] in spokes {
             let from = near.edge.radius;
@@ -87,7 +99,7 @@ impl Ring {
     }
 
     /// The azimuths between one corner and the next, of whichever edge.
-    fn stretches(&self) -> Vec<(f64, f64)> {
+    fn azimuth_intervals(&self) -> Vec<(f64, f64)> {
         let arcs = || self.outer.arcs.iter().chain(&self.inner.arcs);
         let first = self.outer.arcs.first().map_or(0.0, |arc| arc.from);
         let turn = self.outer.samples.last().map_or(2.0 * PI, |sample| sample.0);

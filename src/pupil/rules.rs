@@ -8,11 +8,11 @@ use std::sync::OnceLock;
 const LARGEST: usize = 96;
 
 /// Nodes and weights on the interval from 0 to 1.
-pub(super) type Rule = Vec<(f64, f64)>;
+pub(super) type GaussRule = Vec<(f64, f64)>;
 
 /// The Gauss-Legendre rule with `count` nodes on the interval from 0 to 1.
-pub(super) fn legendre(count: usize) -> &'static Rule {
-    static RULES: [OnceLock<Rule>; LARGEST + 1] = [const { OnceLock::new() }; LARGEST + 1];
+pub(super) fn legendre(count: usize) -> &'static GaussRule {
+    static RULES: [OnceLock<GaussRule>; LARGEST + 1] = [const { OnceLock::new() }; LARGEST + 1];
     RULES[count.min(LARGEST)].get_or_init(|| gauss_legendre(count.min(LARGEST), 0.0, 1.0))
 }
 
@@ -20,13 +20,13 @@ pub(super) fn legendre(count: usize) -> &'static Rule {
 ///
 /// Its nodes are those of the Gauss-Radau rule with one more node, without the one at the centre:
 /// the zeros of `(P_n + P_{n+1}) / (1 + x)` (Abramowitz and Stegun, 25.4.31).
-pub(super) fn radial(count: usize) -> &'static Rule {
-    static RULES: [OnceLock<Rule>; LARGEST + 1] = [const { OnceLock::new() }; LARGEST + 1];
+pub(super) fn radial(count: usize) -> &'static GaussRule {
+    static RULES: [OnceLock<GaussRule>; LARGEST + 1] = [const { OnceLock::new() }; LARGEST + 1];
     let count = count.min(LARGEST);
     RULES[count].get_or_init(|| radial_rule(count))
 }
 
-fn radial_rule(count: usize) -> Rule {
+fn radial_rule(count: usize) -> GaussRule {
     let weight = |x: f64| {
         let [p, _] = legendre_pair(count, x);
         let radau = (1.0 - x) / (((count + 1) as f64) * p).powi(2);
@@ -43,10 +43,10 @@ fn zeros(count: usize) -> Vec<f64> {
     let node = |i: usize| -(PI * (i as f64 + 0.5) / (cells as f64 + 0.5)).cos();
     let pairs = (0..cells).map(|i| (node(i), node(i + 1).min(1.0)));
     let changes = pairs.filter(|(a, b)| (value(*a) > 0.0) != (value(*b) > 0.0));
-    changes.map(|(a, b)| halved(value, a, b)).collect()
+    changes.map(|(a, b)| bisect(value, a, b)).collect()
 }
 
-fn halved(value: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+fn bisect(value: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
     let rising = value(b) > 0.0;
     for _ in 0..60 {
         let middle = 0.5 * (a + b);

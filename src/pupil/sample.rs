@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 /// A pattern of points in the unit disc.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pattern {
+pub enum PupilPattern {
     /// The middles of the cells of a square grid, as many along a side.
     Square(usize),
     /// The centre and rings of 6, 12, 18, ... points, the last one on the rim: the usual pattern.
@@ -30,28 +30,28 @@ pub enum Pattern {
 }
 
 /// The points of a pattern in the unit disc.
-pub fn pattern(pattern: Pattern) -> Vec<[f64; 2]> {
+pub fn pattern_points(pattern: PupilPattern) -> Vec<[f64; 2]> {
     match pattern {
-        Pattern::Square(cells) => square(cells),
-        Pattern::Hexapolar(rings) => {
+        PupilPattern::Square(cells) => square_grid(cells),
+        PupilPattern::Hexapolar(rings) => {
             let ring = |j: usize| (j as f64 / rings as f64, 6 * j);
             std::iter::once([0.0, 0.0]).chain(circles((1..=rings).map(ring))).collect()
         }
-        Pattern::HexapolarInside(rings) => {
+        PupilPattern::HexapolarInside(rings) => {
             // Every ring's points stand for equal areas: 6, 18, 30, ... of them.
             let ring = |j: usize| ((j as f64 + 0.5) / rings as f64, 12 * j + 6);
             circles((0..rings).map(ring)).collect()
         }
-        Pattern::Random { count, seed } => {
+        PupilPattern::Random { count, seed } => {
             let mut random = SplitMix(u64::from(seed));
-            (0..count).map(|_| disc(random.uniform(), random.uniform())).collect()
+            (0..count).map(|_| disc_point(random.uniform(), random.uniform())).collect()
         }
-        Pattern::Sobol { count, seed } => {
+        PupilPattern::Sobol { count, seed } => {
             let number = |i: usize, dimension: u32| {
                 let index = u32::try_from(i % LONGEST).unwrap_or(0);
                 f64::from(sobol_burley::sample(index, dimension, seed))
             };
-            (0..count).map(|i| disc(number(i, 0), number(i, 1))).collect()
+            (0..count).map(|i| disc_point(number(i, 0), number(i, 1))).collect()
         }
     }
 }
@@ -59,7 +59,7 @@ pub fn pattern(pattern: Pattern) -> Vec<[f64; 2]> {
 /// The sequence repeats after this many points.
 const LONGEST: usize = 1 << 16;
 
-fn square(cells: usize) -> Vec<[f64; 2]> {
+fn square_grid(cells: usize) -> Vec<[f64; 2]> {
     let at = |i: usize| (2.0 * i as f64 + 1.0) / cells as f64 - 1.0;
     let points = (0..cells).flat_map(|row| (0..cells).map(move |column| [at(column), at(row)]));
     points.filter(|p| p[0] * p[0] + p[1] * p[1] <= 1.0).collect()
@@ -76,14 +76,14 @@ fn circles(rings: impl Iterator<Item = (f64, usize)>) -> impl Iterator<Item = [f
 }
 
 /// A point of the unit disc from one of the unit square, area for area.
-fn disc(u: f64, v: f64) -> [f64; 2] {
+fn disc_point(u: f64, v: f64) -> [f64; 2] {
     let (sin, cos) = (TAU * v).sin_cos();
     [u.sqrt() * cos, u.sqrt() * sin]
 }
 
 /// Point `i` of Roberts's additive sequence over the unit square, begun at `start`: points that fill
 /// it evenly for any count.
-pub(super) fn additive(start: [f64; 2], i: usize) -> [f64; 2] {
+pub(super) fn additive_sequence(start: [f64; 2], i: usize) -> [f64; 2] {
     const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
     [0, 1].map(|k| (start[k] + STEP[k] * i as f64).fract())
 }
@@ -107,18 +107,18 @@ mod tests {
 
     #[test]
     fn six_rings_are_127_points() {
-        assert_eq!(pattern(Pattern::Hexapolar(6)).len(), 127);
+        assert_eq!(pattern_points(PupilPattern::Hexapolar(6)).len(), 127);
     }
 
     #[test]
     fn unbiased_patterns_have_the_second_moment_of_the_disc() {
         for chosen in [
-            Pattern::Square(100),
-            Pattern::HexapolarInside(40),
-            Pattern::Random { count: 40_000, seed: 7 },
-            Pattern::Sobol { count: 4096, seed: 7 },
+            PupilPattern::Square(100),
+            PupilPattern::HexapolarInside(40),
+            PupilPattern::Random { count: 40_000, seed: 7 },
+            PupilPattern::Sobol { count: 4096, seed: 7 },
         ] {
-            let points = pattern(chosen);
+            let points = pattern_points(chosen);
             let sum: f64 = points.iter().map(|p| p[0] * p[0] + p[1] * p[1]).sum();
             assert!((sum / points.len() as f64 - 0.5).abs() < 0.01, "{chosen:?}");
         }

@@ -1,6 +1,6 @@
 //! An aperture that is a hole in the lens.
 
-use super::bench::{Aiming, Bench, BenchError};
+use super::bench::{Aiming, RayModel, RayModelError};
 use crate::lens::{Aperture, Lens};
 
 /// The same lens limited by its stop: an aperture given as a pupil or a cone becomes the
@@ -13,14 +13,14 @@ use crate::lens::{Aperture, Lens};
 ///
 /// # Errors
 /// A lens that cannot be set up.
-pub fn limited_by_stop(lens: &Lens) -> Result<Lens, BenchError> {
+pub fn limited_by_stop(lens: &Lens) -> Result<Lens, RayModelError> {
     let mut limited = lens.clone();
     let stop = lens.stop().unwrap_or(0);
     limited.surfaces[stop].stop = true;
     let rim = lens.surfaces[stop].semi_diameter.unwrap_or(f64::INFINITY);
     let radius = |zoom| match lens.aperture_at(zoom) {
         Aperture::StopSemiDiameter(radius) => Ok(radius),
-        _ => Bench::with_aiming(lens, zoom, Aiming::Paraxial).map(|b| b.stop_radius().min(rim)),
+        _ => RayModel::with_aiming(lens, zoom, Aiming::Paraxial).map(|b| b.stop_radius().min(rim)),
     };
     let radii: Vec<f64> = (0..lens.zoom_positions()).map(radius).collect::<Result<_, _>>()?;
     let first = radii[0];

@@ -1,6 +1,6 @@
 //! A run as a file, so that it goes on later as if it had never ended: bit for bit.
 
-use super::{Landscape, Method, Point, Run, SearchError, Settings};
+use super::{Landscape, SearchError, SearchMethod, SearchPoint, SearchRun, SearchSettings};
 use crate::files;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -11,19 +11,19 @@ use std::path::Path;
 /// The version of the file; another one is not read.
 const VERSION: u32 = 1;
 
-/// The field of [`Landscape::about`] that says where a search begins, if there is one.
+/// The field of [`Landscape::fingerprint`] that says where a search begins, if there is one.
 const START: &str = "start";
 /// No more characters of a value that differs are shown.
 const SHOWN: usize = 60;
 
 /// What every version of the file begins with.
 #[derive(Deserialize)]
-struct Head {
+struct CheckpointHeader {
     aplanat_search: u32,
 }
 
 #[derive(Serialize)]
-struct Written<'a, R> {
+struct CheckpointContent<'a, R> {
     aplanat_search: u32,
     landscape: &'a Value,
     run: &'a R,
@@ -33,7 +33,7 @@ struct Written<'a, R> {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Read<R> {
+struct StoredCheckpoint<R> {
     #[serde(rename = "aplanat_search")]
     _version: u32,
     landscape: Value,
@@ -43,7 +43,7 @@ struct Read<R> {
     _beside: Value,
 }
 
-impl<P: Point, M: Point + Default> Run<P, M> {
+impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// Saves the run; where that fails, what was there before is untouched.
     ///
     /// # Errors
@@ -52,14 +52,14 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     where
         L: Landscape<Point = P, Memory = M>,
     {
-        self.save_beside(landscape, path, &Value::Null)
+        self.save_with_sidecar(landscape, path, &Value::Null)
     }
 
     /// The same with something beside the run, under the name `beside`, on which it does not depend.
     ///
     /// # Errors
-    /// As those of [`Run::save`].
-    pub fn save_beside<L>(
+    /// As those of [`SearchRun::save`].
+    pub fn save_with_sidecar<L>(
         &self,
         landscape: &L,
         path: &Path,
@@ -68,27 +68,32 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     where
         L: Landscape<Point = P, Memory = M>,
     {
-        let about = landscape.about();
-        let written = Written { aplanat_search: VERSION, landscape: &about, run: self, beside };
+        let about = landscape.fingerprint();
+        let written =
+            CheckpointContent { aplanat_search: VERSION, landscape: &about, run: self, beside };
         let file = path.display().to_string();
-        let unproven = |what: String| SearchError::NotProven { file: file.clone(), what };
+        let unproven = |what: String| SearchError::RoundTripFailed { file: file.clone(), what };
         let bytes = serde_json::to_vec(&written).map_err(|error| unproven(error.to_string()))?;
-        let read: Result<Read<Self>, _> = serde_json::from_slice(&bytes);
+        let read: Result<StoredCheckpoint<Self>, _> = serde_json::from_slice(&bytes);
         let read = read.map_err(|error| unproven(error.to_string()))?;
         if read.run != *self {
             return Err(unproven("it reads back as another run".to_owned()));
         }
-        Ok(files::replace(path, &bytes)?)
+        Ok(files::write_atomic(path, &bytes)?)
     }
 
     /// A run that goes on where it was saved, on the same landscape by the same settings; only its
-    /// ends, [`Settings::moves`] and [`Settings::gradients`], may be others, except for brute
+    /// ends, [`SearchSettings::moves`] and [`SearchSettings::gradients`], may be others, except for brute
     /// force, which has divided them.
     ///
     /// # Errors
     /// The file cannot be read, is damaged, of another version, or of another search: the first
     /// thing that differs is named.
-    pub fn load<L>(landscape: &L, settings: &Settings, path: &Path) -> Result<Self, SearchError>
+    pub fn load<L>(
+        landscape: &L,
+        settings: &SearchSettings,
+        path: &Path,
+    ) -> Result<Self, SearchError>
     where
         L: Landscape<Point = P, Memory = M>,
     {
@@ -97,27 +102,29 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         let unreadable = |source| files::FileError::Unreadable { file: file.clone(), source };
         let bytes = fs::read(path).map_err(unreadable)?;
         let corrupt = |what: String| SearchError::Corrupt { file: file.clone(), what };
-        let head: Head = serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
+        let head: CheckpointHeader =
+            serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
         if head.aplanat_search != VERSION {
             let (found, expected) = (head.aplanat_search, VERSION);
-            return Err(SearchError::Version { file, found, expected });
+            return Err(SearchError::UnsupportedVersion { file, found, expected });
         }
-        let mut read: Read<Self> =
+        let mut read: StoredCheckpoint<Self> =
             serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
-        read.run.is_sound().map_err(corrupt)?;
-        let about = landscape.about();
+        read.run.check_consistency().map_err(corrupt)?;
+        let about = landscape.fingerprint();
         // What a search begins with is the first thing to compare: much else follows from it.
         let (start, own_start) = (&read.landscape[START], &about[START]);
-        if let Some((name, found, expected)) = difference("landscape.start", start, own_start) {
+        if let Some((name, found, expected)) = first_difference("landscape.start", start, own_start)
+        {
             return Err(SearchError::OtherStart { file, name, found, expected });
         }
         let pairs = [
             ("landscape", read.landscape, about),
-            ("settings", fixed(read.run.settings())?, fixed(settings)?),
+            ("settings", fixed_settings(read.run.settings())?, fixed_settings(settings)?),
         ];
         for (name, found, expected) in pairs {
-            if let Some((name, found, expected)) = difference(name, &found, &expected) {
-                return Err(SearchError::Differs { file, name, found, expected });
+            if let Some((name, found, expected)) = first_difference(name, &found, &expected) {
+                return Err(SearchError::OtherSearch { file, name, found, expected });
             }
         }
         read.run.settings = settings.clone();
@@ -125,7 +132,7 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     }
 
     /// What a file that can be read may still get wrong.
-    fn is_sound(&self) -> Result<(), String> {
+    fn check_consistency(&self) -> Result<(), String> {
         self.settings.check().map_err(|error| error.to_string())?;
         let numbers = self.tree.nodes().iter().map(|node| node.number);
         if self.chains.len() != self.settings.chains {
@@ -133,7 +140,7 @@ impl<P: Point, M: Point + Default> Run<P, M> {
             return Err(format!("found {found} chains; expected {expected}"));
         }
         if !numbers.clone().is_sorted_by(|a, b| a < b)
-            || numbers.last().is_some_and(|last| last >= self.tree.born())
+            || numbers.last().is_some_and(|last| last >= self.tree.total())
         {
             return Err("the generations are out of order".to_owned());
         }
@@ -142,9 +149,9 @@ impl<P: Point, M: Point + Default> Run<P, M> {
 }
 
 /// The settings that a run cannot change any more.
-fn fixed(settings: &Settings) -> Result<Value, SearchError> {
+fn fixed_settings(settings: &SearchSettings) -> Result<Value, SearchError> {
     let mut fixed = settings.clone();
-    if fixed.method != Method::Brute {
+    if fixed.method != SearchMethod::Brute {
         (fixed.moves, fixed.gradients) = (None, None);
     }
     let unwritable = |error: serde_json::Error| SearchError::Corrupt {
@@ -156,7 +163,7 @@ fn fixed(settings: &Settings) -> Result<Value, SearchError> {
 
 /// The first thing in which two values differ: its name, and what it is in each. Plain values are
 /// compared before lists, since they say it in fewer words.
-fn difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
+fn first_difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
             let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
@@ -167,13 +174,13 @@ fn difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, Strin
             let (nested, plain): (Vec<_>, Vec<_>) =
                 pairs.partition(|(_, a, b)| is_nested(a) || is_nested(b));
             let mut all = plain.into_iter().chain(nested);
-            all.find_map(|(key, a, b)| difference(&format!("{name}.{key}"), &a, &b))
+            all.find_map(|(key, a, b)| first_difference(&format!("{name}.{key}"), &a, &b))
         }
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
             let mut pairs = a.iter().zip(b).enumerate();
-            pairs.find_map(|(i, (a, b))| difference(&format!("{name}[{i}]"), a, b))
+            pairs.find_map(|(i, (a, b))| first_difference(&format!("{name}[{i}]"), a, b))
         }
-        _ => (a != b).then(|| (name.to_owned(), shown(a), shown(b))),
+        _ => (a != b).then(|| (name.to_owned(), abbreviate(a), abbreviate(b))),
     }
 }
 
@@ -182,7 +189,7 @@ fn is_nested(value: &Value) -> bool {
 }
 
 /// A value in a few words.
-fn shown(value: &Value) -> String {
+fn abbreviate(value: &Value) -> String {
     if let Value::Array(entries) = value {
         return format!("a list of {}", entries.len());
     }

@@ -7,39 +7,39 @@
 //! `κ = πP/π − 1 + C μ/π` with any `C` that keeps it positive: (4.11) with `Q* = P* − 1`. A gradient
 //! step is a map `g`, and so `πP(θ) = π(g⁻¹(θ)) / |det Dg|`. Equation (4.13) has no determinant, and
 //! (4.16) has `C` in place of `C μ/π`, which is the same only if regenerations are already drawn
-//! from the target. [`Rate`] has all of these forms, and figure 4.1 shows which of them sample it.
+//! from the target. [`RegenerationRate`] has all of these forms, and figure 4.1 shows which of them sample it.
 
-use super::reservoir::{Entry, Reservoir};
-use super::{Landscape, Random, Refusal, Temperature, Weights};
+use super::reservoir::{Reservoir, ReservoirEntry};
+use super::{Landscape, MutationError, MutationWeights, Random, Temperature};
 use rand::RngExt as _;
 use rand_distr::Exp1;
 use std::mem;
 
 /// How often a regeneration tries to mutate a point before it draws one from anywhere.
-const ATTEMPTS: usize = 16;
+const MAX_ATTEMPTS: usize = 16;
 
 /// A landscape whose densities of draws and of arrivals are known.
-pub trait Traceable: Landscape {
+pub trait KnownDensity: Landscape {
     /// The density of [`Landscape::draw`]: μ where all regenerations are draws.
-    fn density_of_draw(&self, point: &Self::Point) -> f64;
+    fn draw_density(&self, point: &Self::Point) -> f64;
 
     /// The density `πP` that a local move brings to a point from all others, itself included.
-    fn arriving(&self, point: &Self::Point, temperature: Temperature) -> f64;
+    fn arrival_density(&self, point: &Self::Point, temperature: Temperature) -> f64;
 }
 
 /// The rate κ of regenerations, never below 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Rate {
+pub enum RegenerationRate {
     /// `πP(θ)/π(θ) − 1 + C μ(θ)/π(θ)`, μ being the draw from anywhere: (4.11).
     Exact(f64),
     /// `(π(θ) − π(θ*))/π(θ) + C`, `θ*` being where a step from here leads: (4.16).
-    Printed(f64),
+    AsPrinted(f64),
     /// `(π(θ') − π(θ))/π(θ') + C`, `θ'` being where the step came from: the order of algorithm 1. A
     /// descent that begins came from nowhere, and the first part is 0.
-    Behind(f64),
+    PreviousStep(f64),
     /// `π(θ')/π(θ) − 1 + C μ(θ)/π(θ)`, `θ'` being where the step came from: (4.11) with (4.13). A
     /// descent that begins came from nowhere, and the first part is 0.
-    Undetermined(f64),
+    WithoutDeterminant(f64),
 }
 
 /// What a regeneration is.
@@ -61,7 +61,7 @@ pub enum Regeneration {
 
 /// A place that the process was at.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Weighted<P> {
+pub struct WeightedSample<P> {
     /// The place.
     pub point: P,
     /// How long.
@@ -72,10 +72,10 @@ pub struct Weighted<P> {
 
 /// The process; an endless iterator over weighted samples.
 #[derive(Debug)]
-pub struct Clocks<'a, L: Traceable> {
+pub struct CompetingClocks<'a, L: KnownDensity> {
     landscape: &'a L,
     temperature: Temperature,
-    rate: Rate,
+    rate: RegenerationRate,
     regeneration: Regeneration,
     reservoir: Reservoir<L::Point>,
     random: Random,
@@ -83,12 +83,12 @@ pub struct Clocks<'a, L: Traceable> {
     loss: f64,
     memory: L::Memory,
     /// The loss before the step that led here.
-    came_from: Option<f64>,
-    clamped: u64,
-    ended: u64,
+    previous_loss: Option<f64>,
+    clipped_rates: u64,
+    regenerations: u64,
 }
 
-impl<'a, L: Traceable> Clocks<'a, L> {
+impl<'a, L: KnownDensity> CompetingClocks<'a, L> {
     /// A process that begins with a draw from anywhere.
     ///
     /// # Errors
@@ -96,10 +96,10 @@ impl<'a, L: Traceable> Clocks<'a, L> {
     pub fn new(
         landscape: &'a L,
         temperature: Temperature,
-        rate: Rate,
+        rate: RegenerationRate,
         regeneration: Regeneration,
         mut random: Random,
-    ) -> Result<Self, Refusal> {
+    ) -> Result<Self, MutationError> {
         let size = match regeneration {
             Regeneration::Draw | Regeneration::Target => 1,
             Regeneration::Reservoir { size, .. } => size,
@@ -115,42 +115,51 @@ impl<'a, L: Traceable> Clocks<'a, L> {
             loss: landscape.loss(&point),
             point,
             memory: L::Memory::default(),
-            came_from: None,
-            clamped: 0,
-            ended: 0,
+            previous_loss: None,
+            clipped_rates: 0,
+            regenerations: 0,
         })
     }
 
     /// How often κ would have been negative, and was taken as 0: where that is not 0, the weighted
     /// samples do not have the target's density.
-    pub fn clamped(&self) -> u64 {
-        self.clamped
+    pub fn clipped_rates(&self) -> u64 {
+        self.clipped_rates
     }
 
     /// The rate of regenerations here, `next` being the loss behind the next step.
-    fn kappa(&mut self, next: f64) -> f64 {
+    fn regeneration_rate(&mut self, next: f64) -> f64 {
         let Self { landscape, temperature, loss, ref point, .. } = *self;
         let density = temperature.density(loss);
-        let drawn = |c: f64| c * landscape.density_of_draw(point) / density;
+        let drawn = |c: f64| c * landscape.draw_density(point) / density;
         let kappa = match self.rate {
-            Rate::Exact(c) => landscape.arriving(point, temperature) / density - 1.0 + drawn(c),
-            Rate::Printed(c) => 1.0 - temperature.log_ratio(loss, next).exp() + c,
-            Rate::Behind(c) => {
-                let came = self.came_from.map(|from| 1.0 - temperature.log_ratio(from, loss).exp());
+            RegenerationRate::Exact(c) => {
+                landscape.arrival_density(point, temperature) / density - 1.0 + drawn(c)
+            }
+            RegenerationRate::AsPrinted(c) => 1.0 - temperature.log_ratio(loss, next).exp() + c,
+            RegenerationRate::PreviousStep(c) => {
+                let came =
+                    self.previous_loss.map(|from| 1.0 - temperature.log_ratio(from, loss).exp());
                 came.unwrap_or(0.0) + c
             }
-            Rate::Undetermined(c) => {
-                let came = self.came_from.map(|from| temperature.log_ratio(loss, from).exp() - 1.0);
+            RegenerationRate::WithoutDeterminant(c) => {
+                let came =
+                    self.previous_loss.map(|from| temperature.log_ratio(loss, from).exp() - 1.0);
                 came.unwrap_or(0.0) + drawn(c)
             }
         };
-        self.clamped += u64::from(kappa < 0.0);
+        self.clipped_rates += u64::from(kappa < 0.0);
         kappa.max(0.0)
     }
 
     fn regenerate(&mut self) {
         if let Regeneration::Reservoir { gamma, .. } = self.regeneration {
-            let entry = Entry::of(self.landscape, self.ended, self.loss, self.point.clone());
+            let entry = ReservoirEntry::new(
+                self.landscape,
+                self.regenerations,
+                self.loss,
+                self.point.clone(),
+            );
             self.reservoir.offer(entry);
             if self.random.random::<f64>() >= gamma && self.mutate() {
                 return;
@@ -168,8 +177,8 @@ impl<'a, L: Traceable> Clocks<'a, L> {
 
     /// Goes to a mutation of any point of the reservoir; whether there was one.
     fn mutate(&mut self) -> bool {
-        let weights = Weights::default();
-        (0..ATTEMPTS).any(|_| {
+        let weights = MutationWeights::default();
+        (0..MAX_ATTEMPTS).any(|_| {
             let entries = self.reservoir.entries();
             let Some(last) = entries.len().checked_sub(1) else { return false };
             let parent = &entries[self.random.random_range(0..=last)].point;
@@ -180,26 +189,26 @@ impl<'a, L: Traceable> Clocks<'a, L> {
     }
 }
 
-impl<L: Traceable> Iterator for Clocks<'_, L> {
-    type Item = Weighted<L::Point>;
+impl<L: KnownDensity> Iterator for CompetingClocks<'_, L> {
+    type Item = WeightedSample<L::Point>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let (next, next_loss, _) = self.landscape.descend(&self.point, &mut self.memory);
-        let kappa = self.kappa(next_loss);
+        let kappa = self.regeneration_rate(next_loss);
         let local: f64 = self.random.sample(Exp1);
         let global = self.random.sample::<f64, _>(Exp1) / kappa;
         let regenerates = global < local;
         let place = self.point.clone();
         if regenerates {
             self.regenerate();
-            self.ended += 1;
+            self.regenerations += 1;
             self.memory = L::Memory::default();
-            self.came_from = None;
+            self.previous_loss = None;
             self.loss = self.landscape.loss(&self.point);
         } else {
-            self.came_from = Some(mem::replace(&mut self.loss, next_loss));
+            self.previous_loss = Some(mem::replace(&mut self.loss, next_loss));
             self.point = next;
         }
-        Some(Weighted { point: place, weight: local.min(global), regenerates })
+        Some(WeightedSample { point: place, weight: local.min(global), regenerates })
     }
 }

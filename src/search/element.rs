@@ -4,7 +4,7 @@ use crate::lens::{Lens, Medium};
 
 /// What an element is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Make {
+pub enum ElementKind {
     /// This many pieces of glass, cemented where there are several, with air on both sides.
     Glass(usize),
     /// Pieces of glass that touch the object or the image, like the oil of a microscope or the cover
@@ -18,7 +18,7 @@ pub enum Make {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Element {
     /// What it is made of.
-    pub make: Make,
+    pub kind: ElementKind,
     /// Its first surface, counted from 0.
     pub first: usize,
     /// Its last surface.
@@ -28,30 +28,32 @@ pub struct Element {
 impl Element {
     /// How many pieces of glass it has.
     pub fn pieces(&self) -> usize {
-        match self.make {
-            Make::Glass(pieces) | Make::Open(pieces) | Make::Mirror(pieces) => pieces,
+        match self.kind {
+            ElementKind::Glass(pieces)
+            | ElementKind::Open(pieces)
+            | ElementKind::Mirror(pieces) => pieces,
         }
     }
 
     /// Whether it is a single piece of glass in air.
     pub fn is_singlet(&self) -> bool {
-        self.make == Make::Glass(1)
+        self.kind == ElementKind::Glass(1)
     }
 
     /// Whether a surface belongs to it.
-    pub fn has(&self, surface: usize) -> bool {
+    pub fn contains(&self, surface: usize) -> bool {
         (self.first..=self.last).contains(&surface)
     }
 }
 
 /// Which gaps are glass, the space in front of the first surface first; behind a mirror stands what
 /// stood before it. An index of less than 1.05 is a kind of air.
-pub(super) fn filled(lens: &Lens) -> Vec<bool> {
+pub(super) fn glass_gaps(lens: &Lens) -> Vec<bool> {
     let is_glass = |medium: &Medium, before: bool| match medium {
         Medium::Air => false,
         Medium::Mirror => before,
         Medium::Index(n) => *n >= 1.05,
-        Medium::Glass(_) | Medium::Model { .. } | Medium::Gradient(_) => true,
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Grin(_) => true,
     };
     let mut gaps = vec![is_glass(&lens.object_medium, false)];
     for (i, row) in lens.surfaces.iter().enumerate() {
@@ -68,7 +70,7 @@ pub(super) fn is_backwards(lens: &Lens, surface: usize) -> bool {
 
 /// The elements of a lens in the order of its rows; a stop in air is none.
 pub fn elements(lens: &Lens) -> Vec<Element> {
-    let gaps = filled(lens);
+    let gaps = glass_gaps(lens);
     let rows = lens.surfaces.len();
     let mut found = Vec::new();
     let mut first = 0;
@@ -80,12 +82,12 @@ pub fn elements(lens: &Lens) -> Vec<Element> {
         let mirror = lens.surfaces[first..=last].iter().any(|row| row.medium == Medium::Mirror);
         let open = gaps[first] || gaps[last + 1];
         let make = match (mirror, open) {
-            (true, _) => Make::Mirror(pieces),
-            (false, true) => Make::Open(pieces),
-            (false, false) => Make::Glass(pieces),
+            (true, _) => ElementKind::Mirror(pieces),
+            (false, true) => ElementKind::Open(pieces),
+            (false, false) => ElementKind::Glass(pieces),
         };
         if mirror || pieces > 0 {
-            found.push(Element { make, first, last });
+            found.push(Element { kind: make, first, last });
         }
         first = last + 1;
     }
@@ -93,7 +95,7 @@ pub fn elements(lens: &Lens) -> Vec<Element> {
 }
 
 /// How many pieces of glass a lens has.
-pub fn pieces(lens: &Lens) -> usize {
+pub fn piece_count(lens: &Lens) -> usize {
     elements(lens).iter().map(Element::pieces).sum()
 }
 
@@ -109,11 +111,11 @@ pub fn topology(lens: &Lens) -> String {
             parts.push("stop".to_owned());
             passed = true;
         }
-        parts.push(match element.make {
-            Make::Glass(pieces) => pieces.to_string(),
-            Make::Open(pieces) => format!("o{pieces}"),
-            Make::Mirror(0) => "m".to_owned(),
-            Make::Mirror(pieces) => format!("m{pieces}"),
+        parts.push(match element.kind {
+            ElementKind::Glass(pieces) => pieces.to_string(),
+            ElementKind::Open(pieces) => format!("o{pieces}"),
+            ElementKind::Mirror(0) => "m".to_owned(),
+            ElementKind::Mirror(pieces) => format!("m{pieces}"),
         });
     }
     if !passed {

@@ -17,13 +17,13 @@ pub enum SearchError {
     },
     /// The start is worth nothing.
     #[error("the search cannot begin: the loss of the start is {loss}; expected a number")]
-    Start {
+    InvalidStart {
         /// Its loss.
         loss: f64,
     },
     /// No such generation.
     #[error("generation {number} is not remembered, of {born} so far")]
-    Forgotten {
+    UnknownGeneration {
         /// The number that was asked for.
         number: u64,
         /// How many there have been.
@@ -34,7 +34,7 @@ pub enum SearchError {
     File(#[from] FileError),
     /// A checkpoint would not read back as it is.
     #[error("{file}: not saved, since it would not read back as it is: {what}")]
-    NotProven {
+    RoundTripFailed {
         /// The file.
         file: String,
         /// What would become of it.
@@ -50,7 +50,7 @@ pub enum SearchError {
     },
     /// A checkpoint was written by another version.
     #[error("{file}: a checkpoint of version {found}; expected version {expected}")]
-    Version {
+    UnsupportedVersion {
         /// The file.
         file: String,
         /// Its version.
@@ -75,7 +75,7 @@ pub enum SearchError {
     },
     /// A checkpoint belongs to another search.
     #[error("{file}: a checkpoint of another search: {name} is {found} there and {expected} here")]
-    Differs {
+    OtherSearch {
         /// The file.
         file: String,
         /// What differs: the names on the way to it.

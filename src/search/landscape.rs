@@ -1,6 +1,6 @@
 //! What a search walks through.
 
-use super::{Kind, Random, Refusal, Weights};
+use super::{MutationError, MutationKind, MutationWeights, Random};
 use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
 
@@ -8,9 +8,12 @@ use std::fmt::Debug;
 ///
 /// A checkpoint keeps it as JSON, which has no word for infinity: a type that can hold one writes
 /// it in another way. A checkpoint that would not read back as it was is refused when it is saved.
-pub trait Point: Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned {}
+pub trait SearchPoint:
+    Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned
+{
+}
 
-impl<T: Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned> Point for T {}
+impl<T: Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned> SearchPoint for T {}
 
 /// Points with a loss, a descent, mutations, and draws from anywhere.
 ///
@@ -18,10 +21,10 @@ impl<T: Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned> 
 /// number of threads. A loss that is not finite says that a point is worth nothing.
 pub trait Landscape: Sync {
     /// A place in it.
-    type Point: Point;
+    type Point: SearchPoint;
     /// What a descent remembers from one move to the next, like the moments of Adam; the default
     /// begins a new descent.
-    type Memory: Point + Default;
+    type Memory: SearchPoint + Default;
 
     /// What a point is worth, less being better: (4.6); infinite where it is worth nothing.
     fn loss(&self, point: &Self::Point) -> f64;
@@ -42,57 +45,57 @@ pub trait Landscape: Sync {
     }
 
     /// A point from anywhere: `p_global` of (4.14).
-    fn draw(&self, random: &mut Random) -> Result<Self::Point, Refusal>;
+    fn draw(&self, random: &mut Random) -> Result<Self::Point, MutationError>;
 
     /// A mutation of a point, of a kind drawn with these weights times those of the landscape's own
     /// rules; a weight of 0 forbids a kind.
     fn mutate(
         &self,
         point: &Self::Point,
-        weights: &Weights,
+        weights: &MutationWeights,
         random: &mut Random,
-    ) -> Result<Mutated<Self::Point>, Refusal>;
+    ) -> Result<MutatedPoint<Self::Point>, MutationError>;
 
     /// What two points of the same structure have in common: a reservoir may hold one of each.
     fn topology(&self, point: &Self::Point) -> String;
 
     /// How far the structure of a point is from those that are asked for: 0 for one of them. A point
     /// that is nearer to them is better than any that is farther away, whatever their losses.
-    fn outside(&self, _point: &Self::Point) -> u64 {
+    fn structure_violation(&self, _point: &Self::Point) -> u64 {
         0
     }
 
     /// What distinguishes this landscape from others, like its rules and its objective: a
     /// checkpoint made on another one is refused, by the name of the first field that differs. A
     /// field `start` says where searches begin, and is compared first.
-    fn about(&self) -> serde_json::Value {
+    fn fingerprint(&self) -> serde_json::Value {
         serde_json::Value::Null
     }
 
     /// How many elements a point has; brute force adds after each and removes each.
-    fn elements(&self, _point: &Self::Point) -> usize {
+    fn element_count(&self, _point: &Self::Point) -> usize {
         0
     }
 
     /// The mutation of this kind of one element, counted from 0: brute force asks for
-    /// [`Kind::AddSinglet`] and [`Kind::RemoveSinglet`].
+    /// [`MutationKind::AddSinglet`] and [`MutationKind::RemoveSinglet`].
     fn mutate_at(
         &self,
         _point: &Self::Point,
         _element: usize,
-        kind: Kind,
+        kind: MutationKind,
         _random: &mut Random,
-    ) -> Result<Mutated<Self::Point>, Refusal> {
-        Err(Refusal { kind, why: "this landscape has no elements".to_owned() })
+    ) -> Result<MutatedPoint<Self::Point>, MutationError> {
+        Err(MutationError { kind, why: "this landscape has no elements".to_owned() })
     }
 
     /// Loss and gradient by every variable, in the units in which a descent takes its steps: what
     /// Langevin steps of Metropolis and Hastings need. None where there is no gradient.
-    fn slope(&self, _point: &Self::Point) -> Option<Slope> {
+    fn loss_gradient(&self, _point: &Self::Point) -> Option<LossGradient> {
         None
     }
 
-    /// The point with other values of the variables that [`Landscape::slope`] lists; none where
+    /// The point with other values of the variables that [`Landscape::loss_gradient`] lists; none where
     /// they are out of bounds. It may not change them, or the proposal would be another one.
     fn with_values(&self, _point: &Self::Point, _values: &[f64]) -> Option<Self::Point> {
         None
@@ -101,7 +104,7 @@ pub trait Landscape: Sync {
 
 /// A loss and its gradient.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Slope {
+pub struct LossGradient {
     /// The loss.
     pub loss: f64,
     /// The variables.
@@ -112,11 +115,11 @@ pub struct Slope {
 
 /// A point after a mutation.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mutated<P> {
+pub struct MutatedPoint<P> {
     /// The point.
     pub point: P,
     /// What was done.
-    pub kind: Kind,
+    pub kind: MutationKind,
     /// What was done, where, in words.
     pub what: String,
     /// The logarithm of the density of proposing the way back over that of the way there, times

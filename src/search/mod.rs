@@ -30,20 +30,20 @@ mod temperature;
 pub mod toy;
 mod weights;
 
-pub use chain::{Chain, Tour};
+pub use chain::{Chain, ChainDescent};
 pub use error::SearchError;
-pub use family::{Ended, Node, Tree};
-pub use landscape::{Landscape, Mutated, Point, Slope};
-pub use mutation::{Kind, Mutant, Refusal, mutate, propose};
-pub use projection::{Projection, Unprojectable};
-pub use reservoir::{Entry, Offer, Reservoir};
-pub use rules::{BadRule, Rules};
-pub use run::{Event, Found, Over, Run, RunOf};
-pub use settings::{Langevin, Method, Settings};
-pub use statistics::{Statistics, Tally};
-pub use steer::Steer;
+pub use family::{DescentEnd, Lineage, LineageNode};
+pub use landscape::{Landscape, LossGradient, MutatedPoint, SearchPoint};
+pub use mutation::{MutatedLens, MutationError, MutationKind, mutate, propose};
+pub use projection::{Projection, ProjectionError};
+pub use reservoir::{OfferOutcome, Reservoir, ReservoirEntry};
+pub use rules::{RuleError, SearchRules};
+pub use run::{FoundPoint, RunEnd, SearchEvent, SearchRun, SearchRunOn};
+pub use settings::{LangevinSettings, SearchMethod, SearchSettings};
+pub use statistics::{MutationStatistics, SearchStatistics};
+pub use steer::SteerCommand;
 pub use temperature::{Temperature, Termination};
-pub use weights::Weights;
+pub use weights::MutationWeights;
 
 /// The source of all chance in a search; its state is part of a checkpoint.
 pub type Random = rand_xoshiro::Xoshiro256PlusPlus;

@@ -4,11 +4,11 @@
 //! The rim of a new surface is as wide as the rays are that pass it, and as the edge of its glass and
 //! of the air beside it allow. Old rims become smaller only where their surfaces would cross.
 
-use super::Rules;
-use super::element::{filled, is_backwards};
+use super::SearchRules;
+use super::element::{glass_gaps, is_backwards};
 use crate::lens::{Lens, Shape, System};
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, Bench, MISS};
+use crate::pupil::{Aiming, RayModel, WIDE_AIMING_THRESHOLD};
 use crate::trace::{Ray, Tracer};
 
 /// Pupil points whose rays say how wide a beam is; some lie beyond the paraxial pupil, which the
@@ -41,15 +41,15 @@ pub(super) fn repair(
     before: &Lens,
     lens: &mut Lens,
     rimless: &[usize],
-    rules: &Rules,
+    rules: &SearchRules,
 ) -> Result<(), String> {
-    in_order(lens)?;
-    within(before, lens, rules)?;
+    check_vertex_order(lens)?;
+    check_limits(before, lens, rules)?;
     for row in rimless {
-        lens.surfaces[*row].semi_diameter = Some(widest(lens, *row, rules));
+        lens.surfaces[*row].semi_diameter = Some(largest_semi_diameter(lens, *row, rules));
     }
-    trim(lens, rimless, rules);
-    let extents = extents(lens)?;
+    trim_rims(lens, rimless, rules);
+    let extents = ray_extents(lens)?;
     let found: Vec<f64> = rimless.iter().map(|row| MARGIN * extents[*row]).collect();
     let common = found.iter().fold(0.0, |most: f64, found| most.max(*found));
     for row in rimless {
@@ -60,7 +60,7 @@ pub(super) fn repair(
 }
 
 /// No vertex stands in front of the one before it.
-fn in_order(lens: &Lens) -> Result<(), String> {
+fn check_vertex_order(lens: &Lens) -> Result<(), String> {
     for row in 0..lens.surfaces.len() - 1 {
         let sense = if is_backwards(lens, row) { -1.0 } else { 1.0 };
         for zoom in 0..lens.zoom_positions() {
@@ -74,7 +74,7 @@ fn in_order(lens: &Lens) -> Result<(), String> {
 }
 
 /// The limits of the rules that concern the whole lens.
-fn within(before: &Lens, lens: &Lens, rules: &Rules) -> Result<(), String> {
+fn check_limits(before: &Lens, lens: &Lens, rules: &SearchRules) -> Result<(), String> {
     let last = |lens: &Lens, zoom| lens.thickness_at(lens.surfaces.len() - 1, zoom).unwrap_or(0.0);
     let track = |lens: &Lens, zoom| {
         let rows = 0..lens.surfaces.len();
@@ -85,7 +85,7 @@ fn within(before: &Lens, lens: &Lens, rules: &Rules) -> Result<(), String> {
         if let Some(most) = rules.track.filter(|most| long > most.max(was)) {
             return Err(format!("the lens would be {long:.3} mm long, the rules allow {most}"));
         }
-        if lens.focus.is_some() {
+        if lens.image_solve.is_some() {
             continue;
         }
         let (back, was) = (last(lens, zoom).abs(), last(before, zoom).abs());
@@ -97,7 +97,7 @@ fn within(before: &Lens, lens: &Lens, rules: &Rules) -> Result<(), String> {
 }
 
 /// The widest that the rules let a surface be by itself.
-fn widest(lens: &Lens, row: usize, rules: &Rules) -> f64 {
+fn largest_semi_diameter(lens: &Lens, row: usize, rules: &SearchRules) -> f64 {
     let curvature = lens.surfaces[row].curvature.abs();
     let steep = if curvature > 0.0 { rules.steepness / curvature } else { f64::INFINITY };
     let rims = lens.surfaces.iter().filter_map(|row| row.semi_diameter);
@@ -108,7 +108,7 @@ fn widest(lens: &Lens, row: usize, rules: &Rules) -> f64 {
 }
 
 /// A surface as a form with a rim.
-fn shape(lens: &Lens, row: usize) -> Shape<f64> {
+fn surface_shape(lens: &Lens, row: usize) -> Shape<f64> {
     let row = &lens.surfaces[row];
     let mut terms = [0.0; crate::lens::ASPHERE_TERMS];
     terms.iter_mut().zip(&row.asphere).for_each(|(to, from)| *to = *from);
@@ -117,8 +117,8 @@ fn shape(lens: &Lens, row: usize) -> Shape<f64> {
 
 /// Makes rims smaller until every gap has its least thickness at the rim: that of the rules beside
 /// new surfaces, none elsewhere.
-fn trim(lens: &mut Lens, rimless: &[usize], rules: &Rules) {
-    let glass = filled(lens);
+fn trim_rims(lens: &mut Lens, rimless: &[usize], rules: &SearchRules) {
+    let glass = glass_gaps(lens);
     for gap in 0..lens.surfaces.len() - 1 {
         let new = [gap, gap + 1].map(|row| rimless.contains(&row));
         let floor = match (new.contains(&true), glass[gap + 1]) {
@@ -148,7 +148,7 @@ fn clear_height(lens: &Lens, gap: usize, floor: f64) -> Option<f64> {
     let sense = if is_backwards(lens, gap) { -1.0 } else { 1.0 };
     let zooms = (0..lens.zoom_positions()).filter_map(|zoom| lens.thickness_at(gap, zoom));
     let center = zooms.fold(f64::INFINITY, |least, length| least.min(sense * length));
-    let (front, rear) = (shape(lens, gap), shape(lens, gap + 1));
+    let (front, rear) = (surface_shape(lens, gap), surface_shape(lens, gap + 1));
     let floor = floor.min(center);
     let is_clear = |height: f64| {
         let square = height * height;
@@ -168,17 +168,17 @@ fn clear_height(lens: &Lens, gap: usize, floor: f64) -> Option<f64> {
 }
 
 /// How far from the axis rays that arrive meet each surface, at any zoom position and field.
-fn extents(lens: &Lens) -> Result<Vec<f64>, String> {
+fn ray_extents(lens: &Lens) -> Result<Vec<f64>, String> {
     let mut extents = vec![0.0; lens.surfaces.len() + 1];
     let mut heights = extents.clone();
     let mut lit = false;
     for zoom in 0..lens.zoom_positions() {
-        let bench = bench(lens, zoom)?;
+        let bench = primary_bench(lens, zoom)?;
         for field in &lens.fields_at(zoom).values {
             let Ok(launch) = bench.launch(*field, 0) else { continue };
             let rays = FAN.iter().filter_map(|point| launch.ray(*point));
             for ray in rays {
-                lit |= widen(&mut extents, &mut heights, &launch.color().tracer, ray);
+                lit |= widen_extents(&mut extents, &mut heights, &launch.channel().tracer, ray);
             }
         }
     }
@@ -186,9 +186,14 @@ fn extents(lens: &Lens) -> Result<Vec<f64>, String> {
 }
 
 /// Traces a ray, and widens the extents where it arrives without going backwards.
-fn widen(extents: &mut [f64], heights: &mut [f64], tracer: &Tracer<f64>, ray: Ray<f64>) -> bool {
+fn widen_extents(
+    extents: &mut [f64],
+    heights: &mut [f64],
+    tracer: &Tracer<f64>,
+    ray: Ray<f64>,
+) -> bool {
     let landing = tracer.visit(ray, |surface, point| heights[surface] = point.x.hypot(point.y));
-    let arrived = landing.fate.is_imaged() && landing.backwards.is_none();
+    let arrived = landing.fate.is_imaged() && landing.first_backward_surface.is_none();
     if arrived {
         for (extent, height) in extents.iter_mut().zip(heights) {
             *extent = extent.max(*height);
@@ -198,13 +203,13 @@ fn widen(extents: &mut [f64], heights: &mut [f64], tracer: &Tracer<f64>, ray: Ra
 }
 
 /// The lens at its primary wavelength, aimed as wide fields need it.
-fn bench(lens: &Lens, zoom: usize) -> Result<Bench, String> {
+fn primary_bench(lens: &Lens, zoom: usize) -> Result<RayModel, String> {
     let um = lens.wavelengths[lens.primary()].um;
-    let system: System<f64> = lens.system(zoom, um).map_err(|error| error.to_string())?;
-    let beam = Beam::of(lens, zoom);
-    let bench = Bench::new(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial);
+    let system: System<f64> = lens.resolve(zoom, um).map_err(|error| error.to_string())?;
+    let beam = Beam::for_lens(lens, zoom);
+    let bench = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial);
     let mut bench = bench.map_err(|error| error.to_string())?;
-    if bench.stop_miss().is_none_or(|miss| miss > MISS) {
+    if bench.stop_miss().is_none_or(|miss| miss > WIDE_AIMING_THRESHOLD) {
         bench.aiming = Aiming::Chief;
     }
     Ok(bench)

@@ -9,12 +9,12 @@ use std::cmp::Ordering;
 pub struct Reservoir<P> {
     size: usize,
     one_per_topology: bool,
-    entries: Vec<Entry<P>>,
+    entries: Vec<ReservoirEntry<P>>,
 }
 
 /// A point of the reservoir.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Entry<P> {
+pub struct ReservoirEntry<P> {
     /// Its number in the family tree.
     pub number: u64,
     /// What it is worth.
@@ -28,10 +28,11 @@ pub struct Entry<P> {
     pub point: P,
 }
 
-impl<P> Entry<P> {
+impl<P> ReservoirEntry<P> {
     /// A point of a landscape.
-    pub fn of<L: Landscape<Point = P>>(landscape: &L, number: u64, loss: f64, point: P) -> Self {
-        let (topology, outside) = (landscape.topology(&point), landscape.outside(&point));
+    pub fn new<L: Landscape<Point = P>>(landscape: &L, number: u64, loss: f64, point: P) -> Self {
+        let (topology, outside) =
+            (landscape.topology(&point), landscape.structure_violation(&point));
         Self { number, loss, topology, outside, point }
     }
 
@@ -42,7 +43,7 @@ impl<P> Entry<P> {
     }
 
     /// Whether it is better than another one.
-    pub fn beats(&self, other: &Self) -> bool {
+    pub fn is_better_than(&self, other: &Self) -> bool {
         (self.outside, self.loss) < (other.outside, other.loss)
     }
 }
@@ -50,7 +51,7 @@ impl<P> Entry<P> {
 /// What became of a point that was offered to the reservoir.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Offer {
+pub enum OfferOutcome {
     /// It is in, and there was room.
     Entered,
     /// It is in, in place of this one.
@@ -65,9 +66,9 @@ pub enum Offer {
     Worthless,
 }
 
-impl Offer {
+impl OfferOutcome {
     /// Whether the point is in.
-    pub fn entered(self) -> bool {
+    pub fn is_accepted(self) -> bool {
         matches!(self, Self::Entered | Self::Replaced(_))
     }
 }
@@ -79,47 +80,53 @@ impl<P: Clone + PartialEq> Reservoir<P> {
     }
 
     /// Its points.
-    pub fn entries(&self) -> &[Entry<P>] {
+    pub fn entries(&self) -> &[ReservoirEntry<P>] {
         &self.entries
     }
 
     /// The best of them, the first of equals; none before the first one entered.
-    pub fn best(&self) -> Option<&Entry<P>> {
+    pub fn best(&self) -> Option<&ReservoirEntry<P>> {
         self.entries.iter().min_by(|a, b| a.rank(b))
     }
 
     /// Whether a point of this number is in.
-    pub fn holds(&self, number: u64) -> bool {
+    pub fn contains(&self, number: u64) -> bool {
         self.entries.iter().any(|entry| entry.number == number)
     }
 
     /// Takes a point in where it is good enough: one of a topology that is in replaces its twin if
     /// it is better; another one takes the free place, or that of the worst if it is better.
-    pub fn offer(&mut self, entry: Entry<P>) -> Offer {
+    pub fn offer(&mut self, entry: ReservoirEntry<P>) -> OfferOutcome {
         if !entry.loss.is_finite() {
-            return Offer::Worthless;
+            return OfferOutcome::Worthless;
         }
         if let Some(same) = self.entries.iter().find(|old| old.point == entry.point) {
-            return Offer::Same(same.number);
+            return OfferOutcome::Same(same.number);
         }
         let twin = self.entries.iter_mut().find(|old| old.topology == entry.topology);
         if let Some(twin) = twin.filter(|_| self.one_per_topology) {
-            return put_if_better(twin, entry, Offer::BehindTwin);
+            return replace_if_better(twin, entry, OfferOutcome::BehindTwin);
         }
         if self.entries.len() < self.size {
             self.entries.push(entry);
-            return Offer::Entered;
+            return OfferOutcome::Entered;
         }
         let worst = self.entries.iter_mut().max_by(|a, b| a.rank(b));
-        worst.map_or(Offer::BehindAll, |worst| put_if_better(worst, entry, |_| Offer::BehindAll))
+        worst.map_or(OfferOutcome::BehindAll, |worst| {
+            replace_if_better(worst, entry, |_| OfferOutcome::BehindAll)
+        })
     }
 }
 
-fn put_if_better<P>(old: &mut Entry<P>, new: Entry<P>, refused: fn(u64) -> Offer) -> Offer {
+fn replace_if_better<P>(
+    old: &mut ReservoirEntry<P>,
+    new: ReservoirEntry<P>,
+    refused: fn(u64) -> OfferOutcome,
+) -> OfferOutcome {
     let number = old.number;
-    if new.beats(old) {
+    if new.is_better_than(old) {
         *old = new;
-        Offer::Replaced(number)
+        OfferOutcome::Replaced(number)
     } else {
         refused(number)
     }

@@ -1,14 +1,14 @@
 //! What a search may do to a lens, and what a factory can make.
 
-use super::Kind;
+use super::MutationKind;
 use crate::lens::glass;
-use crate::math::brief;
+use crate::math::format_short;
 use serde::{Deserialize, Serialize};
 
 /// The limits of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Rules {
+pub struct SearchRules {
     /// The smallest and the largest number of glass elements. From a lens with more or fewer a
     /// search goes towards them: of two lenses the one that is nearer to them is better.
     pub elements: [usize; 2],
@@ -20,7 +20,7 @@ pub struct Rules {
     pub kept: [usize; 2],
     /// How often each kind of mutation is tried, relatively; a kind that is not listed has 1, and 0
     /// forbids it.
-    pub weights: Vec<(Kind, f64)>,
+    pub weights: Vec<(MutationKind, f64)>,
     /// Whether a mutation is made paraxially equivalent: section 4.5.
     pub projection: bool,
     /// The smallest and largest thickness of glass on the axis, in mm.
@@ -41,7 +41,7 @@ pub struct Rules {
     pub back_focus: Option<f64>,
 }
 
-impl Default for Rules {
+impl Default for SearchRules {
     fn default() -> Self {
         Self {
             elements: [2, 8],
@@ -61,9 +61,9 @@ impl Default for Rules {
     }
 }
 
-impl Rules {
+impl SearchRules {
     /// How often a kind of mutation is tried, relatively.
-    pub fn weight(&self, kind: Kind) -> f64 {
+    pub fn weight(&self, kind: MutationKind) -> f64 {
         let listed = self.weights.iter().find(|(listed, _)| *listed == kind);
         listed.map_or(1.0, |(_, weight)| *weight)
     }
@@ -71,20 +71,20 @@ impl Rules {
     /// The same rules for mutations that touch only the surfaces `first` to `last` of a lens of so
     /// many rows.
     #[must_use]
-    pub fn touching(mut self, first: usize, last: usize, rows: usize) -> Self {
+    pub fn restricted_to(mut self, first: usize, last: usize, rows: usize) -> Self {
         self.kept = [first, rows.saturating_sub(last + 1)];
         self
     }
 
     /// Whether mutations may touch a surface of a lens of so many rows.
-    pub fn allow(&self, surface: usize, rows: usize) -> bool {
+    pub fn may_change(&self, surface: usize, rows: usize) -> bool {
         surface >= self.kept[0] && surface + self.kept[1] < rows
     }
 
     /// The same rules where nobody has said how many elements there may be: as many as a lens with
     /// so many has are allowed too.
     #[must_use]
-    pub fn holding(mut self, pieces: usize) -> Self {
+    pub fn admit_element_count(mut self, pieces: usize) -> Self {
         if self.elements == Self::default().elements {
             let [min, max] = self.elements;
             self.elements = [min.min(pieces), max.max(pieces)];
@@ -93,7 +93,7 @@ impl Rules {
     }
 
     /// Whether a glass of the catalogue, by its full name, is one of those that are allowed.
-    pub fn lists(&self, glass: &str) -> bool {
+    pub fn allows_glass(&self, glass: &str) -> bool {
         self.glasses.is_empty() || self.glasses.iter().any(|listed| listed == glass)
     }
 
@@ -101,7 +101,7 @@ impl Rules {
     ///
     /// # Errors
     /// The first rule that makes no sense.
-    pub fn checked(&self) -> Result<Self, BadRule> {
+    pub fn normalize(&self) -> Result<Self, RuleError> {
         self.check_elements()?;
         self.check_weights()?;
         self.check_sizes()?;
@@ -119,61 +119,65 @@ impl Rules {
     ///
     /// # Errors
     /// More surfaces are to be left alone than there are.
-    pub fn check_kept(&self, rows: usize) -> Result<(), BadRule> {
+    pub fn check_fixed_ends(&self, rows: usize) -> Result<(), RuleError> {
         let [front, rear] = self.kept;
         if front <= rows && rear <= rows - front {
             return Ok(());
         }
         let expected = format!("no more surfaces than the {rows} of the lens, both ends together");
-        Err(BadRule::new("kept", format!("[{front}, {rear}]"), expected))
+        Err(RuleError::new("kept", format!("[{front}, {rear}]"), expected))
     }
 
-    fn check_elements(&self) -> Result<(), BadRule> {
+    fn check_elements(&self) -> Result<(), RuleError> {
         let [min, max] = self.elements;
         if min <= max {
             return Ok(());
         }
         let expected = "two numbers, the smaller one first";
-        Err(BadRule::new("elements", format!("[{min}, {max}]"), expected))
+        Err(RuleError::new("elements", format!("[{min}, {max}]"), expected))
     }
 
-    fn check_weights(&self) -> Result<(), BadRule> {
+    fn check_weights(&self) -> Result<(), RuleError> {
         for (i, (kind, weight)) in self.weights.iter().enumerate() {
             let name = format!("the weight of {}", kind.name());
             if !(*weight >= 0.0 && weight.is_finite()) {
-                return Err(BadRule::new(name, brief(*weight), "0 or more"));
+                return Err(RuleError::new(name, format_short(*weight), "0 or more"));
             }
-            if *kind == Kind::Global && *weight != 0.0 {
+            if *kind == MutationKind::Global && *weight != 0.0 {
                 let expected = "0, which forbids it; gamma says how often it is tried";
-                return Err(BadRule::new(name, brief(*weight), expected));
+                return Err(RuleError::new(name, format_short(*weight), expected));
             }
             if self.weights[..i].iter().any(|(before, _)| before == kind) {
-                return Err(BadRule::new(name, "listed twice", "one weight for each kind"));
+                return Err(RuleError::new(name, "listed twice", "one weight for each kind"));
             }
         }
         Ok(())
     }
 
-    fn check_sizes(&self) -> Result<(), BadRule> {
+    fn check_sizes(&self) -> Result<(), RuleError> {
         for (name, [min, max]) in
             [("glass_center", self.glass_center), ("air_center", self.air_center)]
         {
             if !(0.0 <= min && min <= max && max.is_finite()) {
-                let found = format!("[{}, {}]", brief(min), brief(max));
+                let found = format!("[{}, {}]", format_short(min), format_short(max));
                 let expected = "two lengths of 0 or more in mm, the smaller one first";
-                return Err(BadRule::new(name, found, expected));
+                return Err(RuleError::new(name, found, expected));
             }
         }
         let least = [("glass_edge", Some(self.glass_edge)), ("air_edge", Some(self.air_edge))];
         for (name, value) in least.into_iter().chain([("back_focus", self.back_focus)]) {
             if let Some(value) = value.filter(|v| !(*v >= 0.0 && v.is_finite())) {
-                return Err(BadRule::new(name, brief(value), "a length of 0 or more in mm"));
+                return Err(RuleError::new(
+                    name,
+                    format_short(value),
+                    "a length of 0 or more in mm",
+                ));
             }
         }
         let most = [("semi_diameter", self.semi_diameter), ("track", self.track)];
         for (name, value) in most.into_iter().chain([("steepness", Some(self.steepness))]) {
             if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-                return Err(BadRule::new(name, brief(value), "a number above 0"));
+                return Err(RuleError::new(name, format_short(value), "a number above 0"));
             }
         }
         Ok(())
@@ -181,23 +185,23 @@ impl Rules {
 }
 
 /// The full name of a glass of the list.
-fn full_name(i: usize, name: &str) -> Result<String, BadRule> {
+fn full_name(i: usize, name: &str) -> Result<String, RuleError> {
     if let Some(found) = glass::find(name) {
         return Ok(found.full_name());
     }
-    let similar = glass::similar(name);
+    let similar = glass::similar_names(name);
     let expected = if similar.is_empty() {
         "maker and name of a glass of the catalogue, like SCHOTT N-BK7".to_owned()
     } else {
         format!("maker and name of one glass of the catalogue, perhaps {}", similar.join(" or "))
     };
-    Err(BadRule::new(format!("glasses[{i}]"), format!("`{name}`"), expected))
+    Err(RuleError::new(format!("glasses[{i}]"), format!("`{name}`"), expected))
 }
 
 /// A rule that makes no sense.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("rules: {name} is {found}; expected {expected}")]
-pub struct BadRule {
+pub struct RuleError {
     /// Which one.
     pub name: String,
     /// What it is.
@@ -206,7 +210,7 @@ pub struct BadRule {
     pub expected: String,
 }
 
-impl BadRule {
+impl RuleError {
     fn new(name: impl Into<String>, found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self { name: name.into(), found: found.into(), expected: expected.into() }
     }

@@ -4,11 +4,12 @@
 //! it was before; then what happened is written down in the order of the chains. So a run is a
 //! function of its landscape, start and settings, on any number of threads.
 
-use super::chain::{Birth, Chain, Shared, Task, Tour};
-use super::family::{Node, Tree};
-use super::reservoir::{Entry, Reservoir};
+use super::chain::{BruteForceJob, Chain, ChainDescent, NewDescent, RoundContext};
+use super::family::{Lineage, LineageNode};
+use super::reservoir::{Reservoir, ReservoirEntry};
 use super::{
-    Kind, Landscape, Method, Point, Random, SearchError, Settings, Statistics, Temperature, Weights,
+    Landscape, MutationKind, MutationWeights, Random, SearchError, SearchMethod, SearchPoint,
+    SearchSettings, SearchStatistics, Temperature,
 };
 use rand::SeedableRng as _;
 use rayon::prelude::*;
@@ -16,44 +17,44 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 
 /// So many rounds in a row without a move end a run.
-const IDLE: u64 = 100;
+const MAX_IDLE_ROUNDS: u64 = 100;
 
 /// The run of a search on some landscape.
-pub type RunOf<L> = Run<<L as Landscape>::Point, <L as Landscape>::Memory>;
+pub type SearchRunOn<L> = SearchRun<<L as Landscape>::Point, <L as Landscape>::Memory>;
 
 /// A search that goes on, with everything that it depends on besides its landscape.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Run<P, M> {
-    pub(super) settings: Settings,
+pub struct SearchRun<P, M> {
+    pub(super) settings: SearchSettings,
     pub(super) temperature: Temperature,
-    pub(super) weights: Weights,
-    pub(super) pinned: Option<Entry<P>>,
+    pub(super) weights: MutationWeights,
+    pub(super) pinned: Option<ReservoirEntry<P>>,
     pub(super) stopped: bool,
     pub(super) chains: Vec<Chain<P, M>>,
-    pub(super) tree: Tree<P>,
-    pub(super) start: Entry<P>,
-    pub(super) best: Entry<P>,
+    pub(super) tree: Lineage<P>,
+    pub(super) start: ReservoirEntry<P>,
+    pub(super) best: ReservoirEntry<P>,
     pub(super) reservoir: Reservoir<P>,
-    pub(super) statistics: Statistics,
-    tasks: VecDeque<Task>,
+    pub(super) statistics: SearchStatistics,
+    tasks: VecDeque<BruteForceJob>,
 }
 
 /// Something that happened in a round.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Event {
+pub enum SearchEvent {
     /// This generation began.
-    Born(u64),
+    Started(u64),
     /// The descent of this generation ended.
     Ended(u64),
     /// This generation came to the best loss so far.
-    Best(u64),
+    NewBest(u64),
 }
 
 /// A point that a run has found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found<'a, P> {
+pub struct FoundPoint<'a, P> {
     /// The point, and what it is worth.
-    pub entry: &'a Entry<P>,
+    pub entry: &'a ReservoirEntry<P>,
     /// Whether its descent still goes on: only what has ended enters the reservoir.
     pub running: bool,
 }
@@ -61,7 +62,7 @@ pub struct Found<'a, P> {
 /// Why a run is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Over {
+pub enum RunEnd {
     /// It was stopped.
     Stopped,
     /// It has made as many local moves as its settings say.
@@ -74,7 +75,7 @@ pub enum Over {
     Stuck,
 }
 
-impl<P: Point, M: Point + Default> Run<P, M> {
+impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// A run from a start.
     ///
     /// The first chain descends from the start, and every other one from a mutation of it; all
@@ -82,40 +83,41 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     ///
     /// # Errors
     /// A setting makes no sense, or the start is worth nothing.
-    pub fn new<L>(landscape: &L, start: P, settings: &Settings) -> Result<Self, SearchError>
+    pub fn new<L>(landscape: &L, start: P, settings: &SearchSettings) -> Result<Self, SearchError>
     where
         L: Landscape<Point = P, Memory = M>,
     {
         settings.check()?;
         let loss = landscape.loss(&start);
         if !loss.is_finite() {
-            return Err(SearchError::Start { loss });
+            return Err(SearchError::InvalidStart { loss });
         }
-        let tasks = tasks(landscape.elements(&start), settings);
-        let start = Entry::of(landscape, 0, loss, start);
+        let tasks = brute_force_jobs(landscape.element_count(&start), settings);
+        let start = ReservoirEntry::new(landscape, 0, loss, start);
         let mut reservoir = Reservoir::new(settings.reservoir, settings.one_per_topology);
         let offer = reservoir.offer(start.clone());
         let mut run = Self {
-            temperature: settings.temperature.unwrap_or(Temperature::halving(loss)),
-            weights: Weights::default(),
+            temperature: settings.temperature.unwrap_or(Temperature::at_half_density(loss)),
+            weights: MutationWeights::default(),
             pinned: None,
             stopped: false,
-            chains: chains(settings),
-            tree: Tree::new(settings.remembered),
+            chains: new_chains(settings),
+            tree: Lineage::new(settings.remembered),
             best: start.clone(),
             reservoir,
-            statistics: Statistics::default(),
+            statistics: SearchStatistics::default(),
             tasks,
             settings: settings.clone(),
             start,
         };
-        run.tree.add(Node { offer: Some(offer), ..run.node(0, run.first()) });
-        run.set_out();
+        run.tree
+            .add(LineageNode { offer: Some(offer), ..run.new_node(0, run.descent_from_start()) });
+        run.start_chains();
         Ok(run)
     }
 
     /// The settings.
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &SearchSettings {
         &self.settings
     }
 
@@ -125,22 +127,22 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     }
 
     /// How often each kind of mutation is tried, relatively to the rules of the landscape.
-    pub fn weights(&self) -> &Weights {
+    pub fn weights(&self) -> &MutationWeights {
         &self.weights
     }
 
     /// The point that all regenerations begin from; none where they begin from the reservoir.
-    pub fn pinned(&self) -> Option<&Entry<P>> {
+    pub fn pinned(&self) -> Option<&ReservoirEntry<P>> {
         self.pinned.as_ref()
     }
 
     /// The start.
-    pub fn start(&self) -> &Entry<P> {
+    pub fn start(&self) -> &ReservoirEntry<P> {
         &self.start
     }
 
     /// The best point so far, those of descents that go on included.
-    pub fn best(&self) -> &Entry<P> {
+    pub fn best(&self) -> &ReservoirEntry<P> {
         &self.best
     }
 
@@ -151,19 +153,20 @@ impl<P: Point, M: Point + Default> Run<P, M> {
 
     /// What was found, the best first: the reservoir, and the best point before it where the descent
     /// that has come to it still goes on.
-    pub fn found(&self) -> Vec<Found<'_, P>> {
+    pub fn found_points(&self) -> Vec<FoundPoint<'_, P>> {
         let kept = self.reservoir.entries();
-        let running = kept.iter().all(|entry| self.best.beats(entry));
-        let mut found: Vec<_> = kept.iter().map(|entry| Found { entry, running: false }).collect();
+        let running = kept.iter().all(|entry| self.best.is_better_than(entry));
+        let mut found: Vec<_> =
+            kept.iter().map(|entry| FoundPoint { entry, running: false }).collect();
         found.sort_by(|a, b| a.entry.rank(b.entry));
         if running {
-            found.insert(0, Found { entry: &self.best, running });
+            found.insert(0, FoundPoint { entry: &self.best, running });
         }
         found
     }
 
     /// The family tree.
-    pub fn tree(&self) -> &Tree<P> {
+    pub fn lineage(&self) -> &Lineage<P> {
         &self.tree
     }
 
@@ -173,39 +176,41 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     }
 
     /// What the run has done so far.
-    pub fn statistics(&self) -> &Statistics {
+    pub fn statistics(&self) -> &SearchStatistics {
         &self.statistics
     }
 
     /// Whether the run is over, and why.
-    pub fn over(&self) -> Option<Over> {
+    pub fn end_reason(&self) -> Option<RunEnd> {
         let reached = |limit: Option<u64>, count| limit.is_some_and(|limit| count >= limit);
-        let Settings { method, moves, gradients, .. } = self.settings;
+        let SearchSettings { method, moves, gradients, .. } = self.settings;
         let waits = |chain: &Chain<P, M>| chain.tour.is_none() && chain.task.is_none();
         if self.stopped {
-            Some(Over::Stopped)
-        } else if method == Method::Brute && self.tasks.is_empty() && self.chains.iter().all(waits)
+            Some(RunEnd::Stopped)
+        } else if method == SearchMethod::Brute
+            && self.tasks.is_empty()
+            && self.chains.iter().all(waits)
         {
-            Some(Over::Done)
+            Some(RunEnd::Done)
         } else if reached(moves, self.statistics.moves) {
-            Some(Over::Moves)
-        } else if method != Method::Brute && reached(gradients, self.statistics.gradients) {
-            Some(Over::Gradients)
+            Some(RunEnd::Moves)
+        } else if method != SearchMethod::Brute && reached(gradients, self.statistics.gradients) {
+            Some(RunEnd::Gradients)
         } else {
-            (self.statistics.idle >= IDLE).then_some(Over::Stuck)
+            (self.statistics.idle >= MAX_IDLE_ROUNDS).then_some(RunEnd::Stuck)
         }
     }
 
     /// One turn of every chain; nothing where the run is over.
-    pub fn round<L>(&mut self, landscape: &L) -> Vec<Event>
+    pub fn round<L>(&mut self, landscape: &L) -> Vec<SearchEvent>
     where
         L: Landscape<Point = P, Memory = M>,
     {
-        if self.over().is_some() {
+        if self.end_reason().is_some() {
             return Vec::new();
         }
-        self.give_tasks();
-        let shared = Shared {
+        self.assign_jobs();
+        let shared = RoundContext {
             landscape,
             settings: &self.settings,
             temperature: self.temperature,
@@ -214,30 +219,30 @@ impl<P: Point, M: Point + Default> Run<P, M> {
             reservoir: &self.reservoir,
             pinned: self.pinned.as_ref(),
         };
-        let shares = self.shares();
+        let shares = self.gradient_budgets();
         let chains = self.chains.par_iter_mut().zip(shares);
         let turns: Vec<_> = chains.map(|(chain, most)| shared.turn(chain, most)).collect();
         let moves = self.statistics.moves;
         let mut events = Vec::new();
         for (chain, turn) in turns.into_iter().enumerate() {
             for happening in turn {
-                self.write_down(chain, happening, landscape, &mut events);
+                self.record(chain, happening, landscape, &mut events);
             }
-            self.compare(chain, landscape, &mut events);
+            self.update_best_from_chain(chain, landscape, &mut events);
         }
         self.statistics.rounds += 1;
         let moved = self.statistics.moves > moves;
         self.statistics.idle = if moved { 0 } else { self.statistics.idle + 1 };
-        self.forget();
+        self.prune_lineage();
         events
     }
 
     /// How many gradients each chain may take in its turn: an equal part of those that are left,
     /// far more than a turn takes but in the last rounds. Brute force has divided them among its
     /// mutations.
-    fn shares(&self) -> Vec<usize> {
-        let Settings { method, gradients, .. } = self.settings;
-        let limit = gradients.filter(|_| method != Method::Brute);
+    fn gradient_budgets(&self) -> Vec<usize> {
+        let SearchSettings { method, gradients, .. } = self.settings;
+        let limit = gradients.filter(|_| method != SearchMethod::Brute);
         let left = limit.map_or(u64::MAX, |limit| limit.saturating_sub(self.statistics.gradients));
         let count = self.chains.len().max(1) as u64;
         let share = |i: u64| left / count + u64::from(i < left % count);
@@ -245,10 +250,10 @@ impl<P: Point, M: Point + Default> Run<P, M> {
     }
 
     /// A node that begins.
-    pub(super) fn node(&self, chain: usize, birth: Birth<P>) -> Node<P> {
-        let Birth { parent, kind, what, before, loss, point } = birth;
-        Node {
-            number: self.tree.born(),
+    pub(super) fn new_node(&self, chain: usize, birth: NewDescent<P>) -> LineageNode<P> {
+        let NewDescent { parent, kind, what, before, loss, point } = birth;
+        LineageNode {
+            number: self.tree.total(),
             parent,
             chain,
             kind,
@@ -264,27 +269,35 @@ impl<P: Point, M: Point + Default> Run<P, M> {
         }
     }
 
-    fn first(&self) -> Birth<P> {
+    fn descent_from_start(&self) -> NewDescent<P> {
         let (loss, point) = (self.start.loss, self.start.point.clone());
-        Birth { parent: None, kind: None, what: "the start".to_owned(), before: None, loss, point }
-    }
-
-    /// Lets those chains begin that begin at the start.
-    fn set_out(&mut self) {
-        let count = match self.settings.method {
-            Method::Restore => 1,
-            Method::Metropolis => self.chains.len(),
-            Method::Brute => 0,
-        };
-        for i in 0..count {
-            if i > 0 {
-                self.chains[i].number = self.tree.add(self.node(i, self.first()));
-            }
-            self.chains[i].tour = Some(Tour::new(self.start.point.clone(), self.start.loss));
+        NewDescent {
+            parent: None,
+            kind: None,
+            what: "the start".to_owned(),
+            before: None,
+            loss,
+            point,
         }
     }
 
-    fn give_tasks(&mut self) {
+    /// Lets those chains begin that begin at the start.
+    fn start_chains(&mut self) {
+        let count = match self.settings.method {
+            SearchMethod::Restore => 1,
+            SearchMethod::Metropolis => self.chains.len(),
+            SearchMethod::Brute => 0,
+        };
+        for i in 0..count {
+            if i > 0 {
+                self.chains[i].number = self.tree.add(self.new_node(i, self.descent_from_start()));
+            }
+            self.chains[i].tour =
+                Some(ChainDescent::new(self.start.point.clone(), self.start.loss));
+        }
+    }
+
+    fn assign_jobs(&mut self) {
         for chain in &mut self.chains {
             if chain.tour.is_none() && chain.task.is_none() {
                 chain.task = self.tasks.pop_front();
@@ -294,7 +307,7 @@ impl<P: Point, M: Point + Default> Run<P, M> {
 }
 
 /// Chains with a source of chance each, far apart in one sequence.
-fn chains<P, M>(settings: &Settings) -> Vec<Chain<P, M>> {
+fn new_chains<P, M>(settings: &SearchSettings) -> Vec<Chain<P, M>> {
     let mut random = Random::seed_from_u64(settings.seed);
     let mut next = || {
         random.long_jump();
@@ -304,13 +317,14 @@ fn chains<P, M>(settings: &Settings) -> Vec<Chain<P, M>> {
 }
 
 /// What brute force tries: the gradients divided by twice the number of elements.
-fn tasks(elements: usize, settings: &Settings) -> VecDeque<Task> {
-    let Some(gradients) = settings.gradients.filter(|_| settings.method == Method::Brute) else {
+fn brute_force_jobs(elements: usize, settings: &SearchSettings) -> VecDeque<BruteForceJob> {
+    let Some(gradients) = settings.gradients.filter(|_| settings.method == SearchMethod::Brute)
+    else {
         return VecDeque::new();
     };
     let budget = (gradients / (2 * elements.max(1) as u64)).max(1);
-    let kinds = [Kind::AddSinglet, Kind::RemoveSinglet];
-    let each = |element| kinds.map(|kind| Task { element, kind, budget });
+    let kinds = [MutationKind::AddSinglet, MutationKind::RemoveSinglet];
+    let each = |element| kinds.map(|kind| BruteForceJob { element, kind, budget });
     // Where there is less than a gradient for each, the last mutations have none.
     let most = usize::try_from(gradients).unwrap_or(usize::MAX);
     (0..elements).flat_map(each).take(most).collect()

@@ -1,18 +1,18 @@
 //! How a search goes: everything that a run depends on besides its landscape and its start.
 
 use super::{SearchError, Temperature, Termination};
-use crate::math::brief;
+use crate::math::format_short;
 use serde::{Deserialize, Serialize};
 
 /// No more chains than this: each takes the memory of a descent, and a turn of every round.
-const MOST_CHAINS: usize = 1024;
+const MAX_CHAINS: usize = 1024;
 
 /// How a search goes; the defaults are the thesis's, or say where they are not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Settings {
+pub struct SearchSettings {
     /// The sampler.
-    pub method: Method,
+    pub method: SearchMethod,
     /// All chance of a run follows from it.
     pub seed: u64,
     /// Chains that share the reservoir: a property of the run, whatever the number of threads.
@@ -44,13 +44,13 @@ pub struct Settings {
     /// How many generations are remembered besides the ancestors of what is in the reservoir.
     pub remembered: usize,
     /// Langevin steps of Metropolis and Hastings.
-    pub metropolis: Langevin,
+    pub metropolis: LangevinSettings,
 }
 
-impl Default for Settings {
+impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            method: Method::Restore,
+            method: SearchMethod::Restore,
             seed: 1,
             chains: 4,
             reservoir: 5,
@@ -64,12 +64,12 @@ impl Default for Settings {
             moves: None,
             gradients: Some(10_000),
             remembered: 256,
-            metropolis: Langevin::default(),
+            metropolis: LangevinSettings::default(),
         }
     }
 }
 
-impl Settings {
+impl SearchSettings {
     /// Whether a run can go on these settings.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ impl Settings {
                 return wrong(name, "0".to_owned(), "1 or more");
             }
         }
-        if self.chains > MOST_CHAINS {
+        if self.chains > MAX_CHAINS {
             return wrong("chains", self.chains.to_string(), "1024 at most");
         }
         if self.longest == 0 {
@@ -91,11 +91,11 @@ impl Settings {
         let shares = [("gamma", self.gamma), ("metropolis.mutation", self.metropolis.mutation)];
         for (name, share) in shares {
             if !(0.0..=1.0).contains(&share) {
-                return wrong(name, brief(share), "0 to 1");
+                return wrong(name, format_short(share), "0 to 1");
             }
         }
         if !(self.c >= 0.0 && self.c.is_finite()) {
-            return wrong("c", brief(self.c), "0 or more");
+            return wrong("c", format_short(self.c), "0 or more");
         }
         let sizes = [
             ("reheat", self.reheat),
@@ -104,10 +104,10 @@ impl Settings {
         ];
         for (name, size) in sizes {
             if !(size > 0.0 && size.is_finite()) {
-                return wrong(name, brief(size), "more than 0");
+                return wrong(name, format_short(size), "more than 0");
             }
         }
-        if self.method == Method::Brute && self.gradients.is_none() {
+        if self.method == SearchMethod::Brute && self.gradients.is_none() {
             return wrong("gradients", "none".to_owned(), "a number, which brute force divides");
         }
         Ok(())
@@ -117,7 +117,7 @@ impl Settings {
 /// A sampler.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum SearchMethod {
     /// Descents that end by chance and begin again from the reservoir: algorithm 1.
     Restore,
     /// Langevin steps (4.10) and reversible mutations, each accepted or not: (4.8).
@@ -138,7 +138,7 @@ pub enum Method {
 /// whatever the slope is: steps of `√(ε/floor)`, 3 units of every variable, which nothing accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Langevin {
+pub struct LangevinSettings {
     /// ε.
     pub epsilon: f64,
     /// What keeps `M` finite where there is no slope.
@@ -147,7 +147,7 @@ pub struct Langevin {
     pub mutation: f64,
 }
 
-impl Default for Langevin {
+impl Default for LangevinSettings {
     fn default() -> Self {
         Self { epsilon: 1e-3, floor: 1e-4, mutation: 0.01 }
     }

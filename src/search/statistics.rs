@@ -1,6 +1,6 @@
 //! What a run has done so far, in numbers.
 
-use super::{Ended, Kind, Refusal};
+use super::{DescentEnd, MutationError, MutationKind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ const OTHER: &str = "other reasons";
 
 /// What a run has done so far.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Statistics {
+pub struct SearchStatistics {
     /// Rounds of all chains.
     pub rounds: u64,
     /// Local moves of all chains.
@@ -24,14 +24,14 @@ pub struct Statistics {
     /// Rounds in a row in which no chain moved.
     pub idle: u64,
     /// Each kind of mutation that was tried.
-    pub kinds: BTreeMap<Kind, Tally>,
+    pub kinds: BTreeMap<MutationKind, MutationStatistics>,
     /// What ended descents.
-    pub ended: BTreeMap<Ended, u64>,
+    pub ended: BTreeMap<DescentEnd, u64>,
 }
 
 /// What became of a kind of mutation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Tally {
+pub struct MutationStatistics {
     /// How often it was tried.
     pub tried: u64,
     /// How often it was refused, for each reason.
@@ -48,19 +48,19 @@ pub struct Tally {
     pub moves: u64,
 }
 
-impl Tally {
+impl MutationStatistics {
     /// Local moves of a descent that began with it, on average; none before the first has ended.
-    pub fn lifetime(&self) -> Option<f64> {
+    pub fn mean_moves(&self) -> Option<f64> {
         (self.ended > 0).then(|| self.moves as f64 / self.ended as f64)
     }
 }
 
-impl Statistics {
-    pub(super) fn kind(&mut self, kind: Kind) -> &mut Tally {
+impl SearchStatistics {
+    pub(super) fn kind(&mut self, kind: MutationKind) -> &mut MutationStatistics {
         self.kinds.entry(kind).or_default()
     }
 
-    pub(super) fn refuse(&mut self, refusal: &Refusal) {
+    pub(super) fn refuse(&mut self, refusal: &MutationError) {
         let tally = self.kind(refusal.kind);
         tally.tried += 1;
         let known = tally.refused.contains_key(&refusal.why) || tally.refused.len() < REASONS;

@@ -3,7 +3,7 @@
 //! Everything is computed from logarithms, so that densities far below the smallest number still
 //! compare. At temperature 0 only the order of two losses is left, at infinite temperature nothing.
 
-use crate::math::brief;
+use crate::math::format_short;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::{self, Display};
 
@@ -19,7 +19,7 @@ impl Temperature {
 
     /// The temperature at which a loss has a density of one half, `|L| / ln 2`; 1 where the loss
     /// is 0, which no temperature can halve.
-    pub fn halving(loss: f64) -> Self {
+    pub fn at_half_density(loss: f64) -> Self {
         let value = loss.abs() / std::f64::consts::LN_2;
         Self(if value > 0.0 && value.is_finite() { value } else { 1.0 })
     }
@@ -30,7 +30,7 @@ impl Temperature {
     }
 
     /// So many times as hot, as far as numbers go.
-    pub(super) fn times(self, factor: f64) -> Self {
+    pub(super) fn scale_by(self, factor: f64) -> Self {
         Self::new(self.0 * factor).unwrap_or(self)
     }
 
@@ -67,7 +67,11 @@ impl Temperature {
 
 impl Display for Temperature {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_finite() { f.write_str(&brief(self.0)) } else { f.write_str("infinite") }
+        if self.0.is_finite() {
+            f.write_str(&format_short(self.0))
+        } else {
+            f.write_str("infinite")
+        }
     }
 }
 
@@ -85,14 +89,14 @@ impl<'de> Deserialize<'de> for Temperature {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
         #[serde(untagged)]
-        enum Written {
+        enum NumberOrWord {
             Number(f64),
             Word(String),
         }
-        let found = match Written::deserialize(deserializer)? {
-            Written::Number(value) => Self::new(value).ok_or_else(|| brief(value)),
-            Written::Word(word) if word == "infinite" => Ok(Self(f64::INFINITY)),
-            Written::Word(word) => Err(format!("`{word}`")),
+        let found = match NumberOrWord::deserialize(deserializer)? {
+            NumberOrWord::Number(value) => Self::new(value).ok_or_else(|| format_short(value)),
+            NumberOrWord::Word(word) if word == "infinite" => Ok(Self(f64::INFINITY)),
+            NumberOrWord::Word(word) => Err(format!("`{word}`")),
         };
         let expected = "expected a temperature, 0 or more, or \"infinite\"";
         found.map_err(|found| serde::de::Error::custom(format!("found {found}; {expected}")))

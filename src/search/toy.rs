@@ -5,20 +5,23 @@
 //! loss is `y²`. Everything that theory speaks of can be computed: the target, the way back of a
 //! gradient step, and the determinant of that way.
 
-use super::clocks::Traceable;
-use super::{Kind, Landscape, Mutated, Random, Refusal, Slope, Temperature, Weights};
+use super::clocks::KnownDensity;
+use super::{
+    Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
+    Temperature,
+};
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 /// What a fixed point may still move by, relatively to the box.
-const SETTLED: f64 = 1e-14;
-const ROUNDS: usize = 400;
+const FIXED_POINT_TOLERANCE: f64 = 1e-14;
+const MAX_ITERATIONS: usize = 400;
 
 /// One or two thin singlets before a sensor; a point is the list of their gaps, in mm, the last one
 /// to the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Toy {
+pub struct ToyLandscape {
     /// Smallest and largest number of singlets, 1 or 2.
     pub singlets: [usize; 2],
     /// The focal length of each, in mm.
@@ -35,9 +38,9 @@ pub struct Toy {
     pub shift: f64,
 }
 
-impl Toy {
+impl ToyLandscape {
     /// One singlet, whose distance from the sensor is free.
-    pub fn one() -> Self {
+    pub fn one_singlet() -> Self {
         Self {
             singlets: [1, 1],
             focal_length: 50.0,
@@ -50,13 +53,13 @@ impl Toy {
     }
 
     /// Two singlets, whose distances from each other and from the sensor are free.
-    pub fn two() -> Self {
-        Self { singlets: [2, 2], rate: 1.5, ..Self::one() }
+    pub fn two_singlets() -> Self {
+        Self { singlets: [2, 2], rate: 1.5, ..Self::one_singlet() }
     }
 
     /// One singlet or two.
-    pub fn either() -> Self {
-        Self { singlets: [1, 2], ..Self::two() }
+    pub fn one_or_two_singlets() -> Self {
+        Self { singlets: [1, 2], ..Self::two_singlets() }
     }
 
     /// The ranges of the gaps of so many singlets, in mm.
@@ -78,7 +81,7 @@ impl Toy {
         }
     }
 
-    fn holds(&self, gaps: &[f64]) -> bool {
+    fn contains(&self, gaps: &[f64]) -> bool {
         let ranges = self.ranges(gaps.len());
         gaps.iter().zip(&ranges).all(|(gap, range)| (range[0]..=range[1]).contains(gap))
     }
@@ -95,10 +98,10 @@ impl Toy {
 
     /// Where a gradient step came from: the fixed point of `x = y + η ∇L(x)`, the only one where
     /// the step contracts; none where it does not settle.
-    fn back(&self, gaps: &[f64]) -> Option<Vec<f64>> {
+    fn invert_step(&self, gaps: &[f64]) -> Option<Vec<f64>> {
         let mut place = gaps.to_vec();
-        let settled = SETTLED * self.focal_length;
-        for _ in 0..ROUNDS {
+        let settled = FIXED_POINT_TOLERANCE * self.focal_length;
+        for _ in 0..MAX_ITERATIONS {
             let gradient = self.gradient(&place);
             let next: Vec<f64> =
                 gaps.iter().zip(gradient).map(|(gap, g)| gap + self.rate * g).collect();
@@ -129,72 +132,82 @@ impl Toy {
         }
     }
 
-    fn uniform(&self, singlets: usize, random: &mut Random) -> Vec<f64> {
+    fn draw_uniform(&self, singlets: usize, random: &mut Random) -> Vec<f64> {
         let ranges = self.ranges(singlets);
         ranges.iter().map(|range| random.random_range(range[0]..=range[1])).collect()
     }
 
     /// One singlet more, in front: the logarithm of the ratio is that of the range of its gap.
-    fn add(&self, gaps: &[f64], random: &mut Random) -> Mutated<Vec<f64>> {
+    fn add(&self, gaps: &[f64], random: &mut Random) -> MutatedPoint<Vec<f64>> {
         let range = self.pair[0];
         let point = vec![random.random_range(range[0]..=range[1]), gaps[0]];
         let log_ratio = Some((range[1] - range[0]).ln());
-        Mutated { point, kind: Kind::AddSinglet, what: "one more in front".to_owned(), log_ratio }
+        MutatedPoint {
+            point,
+            kind: MutationKind::AddSinglet,
+            what: "one more in front".to_owned(),
+            log_ratio,
+        }
     }
 
-    fn remove(&self, gaps: &[f64]) -> Mutated<Vec<f64>> {
+    fn remove(&self, gaps: &[f64]) -> MutatedPoint<Vec<f64>> {
         let range = self.pair[0];
         let log_ratio = Some(-(range[1] - range[0]).ln());
         let (point, what) = (vec![gaps[1]], "the first one gone".to_owned());
-        Mutated { point, kind: Kind::RemoveSinglet, what, log_ratio }
+        MutatedPoint { point, kind: MutationKind::RemoveSinglet, what, log_ratio }
     }
 
-    fn shifted(&self, gaps: &[f64], random: &mut Random) -> Mutated<Vec<f64>> {
+    fn shift(&self, gaps: &[f64], random: &mut Random) -> MutatedPoint<Vec<f64>> {
         let mut noise = || self.shift * random.sample::<f64, _>(StandardNormal);
         let point = gaps.iter().map(|gap| gap + noise()).collect();
-        Mutated { point, kind: Kind::Bend, what: "shifted".to_owned(), log_ratio: Some(0.0) }
+        MutatedPoint {
+            point,
+            kind: MutationKind::Bend,
+            what: "shifted".to_owned(),
+            log_ratio: Some(0.0),
+        }
     }
 }
 
-impl Landscape for Toy {
+impl Landscape for ToyLandscape {
     type Point = Vec<f64>;
     type Memory = ();
 
     fn loss(&self, gaps: &Vec<f64>) -> f64 {
-        if self.holds(gaps) { self.ray(gaps).0.powi(2) } else { f64::INFINITY }
+        if self.contains(gaps) { self.ray(gaps).0.powi(2) } else { f64::INFINITY }
     }
 
     /// A step of plain gradient descent; one that would leave the bounds is not made.
     fn descend(&self, gaps: &Vec<f64>, _memory: &mut ()) -> (Vec<f64>, f64, usize) {
         let next = self.step(gaps);
-        let next = if self.holds(&next) { next } else { gaps.clone() };
+        let next = if self.contains(&next) { next } else { gaps.clone() };
         let loss = self.loss(&next);
         (next, loss, 1)
     }
 
-    fn draw(&self, random: &mut Random) -> Result<Vec<f64>, Refusal> {
+    fn draw(&self, random: &mut Random) -> Result<Vec<f64>, MutationError> {
         let singlets = random.random_range(self.singlets[0]..=self.singlets[1]);
-        Ok(self.uniform(singlets, random))
+        Ok(self.draw_uniform(singlets, random))
     }
 
     fn mutate(
         &self,
         gaps: &Vec<f64>,
-        weights: &Weights,
+        weights: &MutationWeights,
         random: &mut Random,
-    ) -> Result<Mutated<Vec<f64>>, Refusal> {
+    ) -> Result<MutatedPoint<Vec<f64>>, MutationError> {
         let mutated = if self.singlets[0] == self.singlets[1] {
-            self.shifted(gaps, random)
+            self.shift(gaps, random)
         } else if gaps.len() == 1 {
             self.add(gaps, random)
         } else {
             self.remove(gaps)
         };
         let kind = mutated.kind;
-        let refused = |why: &str| Refusal { kind, why: why.to_owned() };
+        let refused = |why: &str| MutationError { kind, why: why.to_owned() };
         if weights.of(kind) == 0.0 {
             Err(refused("it is forbidden"))
-        } else if self.holds(&mutated.point) {
+        } else if self.contains(&mutated.point) {
             Ok(mutated)
         } else {
             Err(refused("a gap would be out of its range"))
@@ -205,11 +218,11 @@ impl Landscape for Toy {
         gaps.len().to_string()
     }
 
-    fn about(&self) -> serde_json::Value {
+    fn fingerprint(&self) -> serde_json::Value {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    fn elements(&self, gaps: &Vec<f64>) -> usize {
+    fn element_count(&self, gaps: &Vec<f64>) -> usize {
         gaps.len()
     }
 
@@ -217,38 +230,38 @@ impl Landscape for Toy {
         &self,
         gaps: &Vec<f64>,
         _element: usize,
-        kind: Kind,
+        kind: MutationKind,
         random: &mut Random,
-    ) -> Result<Mutated<Vec<f64>>, Refusal> {
+    ) -> Result<MutatedPoint<Vec<f64>>, MutationError> {
         match (kind, gaps.len()) {
-            (Kind::AddSinglet, 1) => Ok(self.add(gaps, random)),
-            (Kind::RemoveSinglet, 2) => Ok(self.remove(gaps)),
-            _ => Err(Refusal { kind, why: format!("there are {} singlets", gaps.len()) }),
+            (MutationKind::AddSinglet, 1) => Ok(self.add(gaps, random)),
+            (MutationKind::RemoveSinglet, 2) => Ok(self.remove(gaps)),
+            _ => Err(MutationError { kind, why: format!("there are {} singlets", gaps.len()) }),
         }
     }
 
-    fn slope(&self, gaps: &Vec<f64>) -> Option<Slope> {
+    fn loss_gradient(&self, gaps: &Vec<f64>) -> Option<LossGradient> {
         let (loss, gradient) = (self.loss(gaps), self.gradient(gaps));
-        loss.is_finite().then(|| Slope { loss, values: gaps.clone(), gradient })
+        loss.is_finite().then(|| LossGradient { loss, values: gaps.clone(), gradient })
     }
 
     fn with_values(&self, _gaps: &Vec<f64>, values: &[f64]) -> Option<Vec<f64>> {
-        self.holds(values).then(|| values.to_vec())
+        self.contains(values).then(|| values.to_vec())
     }
 }
 
-impl Traceable for Toy {
-    fn density_of_draw(&self, gaps: &Vec<f64>) -> f64 {
+impl KnownDensity for ToyLandscape {
+    fn draw_density(&self, gaps: &Vec<f64>) -> f64 {
         let numbers = (self.singlets[1] - self.singlets[0] + 1) as f64;
         let ranges = self.ranges(gaps.len());
         let volume: f64 = ranges.iter().map(|range| range[1] - range[0]).product();
         1.0 / (numbers * volume)
     }
 
-    fn arriving(&self, gaps: &Vec<f64>, temperature: Temperature) -> f64 {
-        let stays = !self.holds(&self.step(gaps));
+    fn arrival_density(&self, gaps: &Vec<f64>, temperature: Temperature) -> f64 {
+        let stays = !self.contains(&self.step(gaps));
         let staying = if stays { temperature.density(self.loss(gaps)) } else { 0.0 };
-        let source = self.back(gaps).filter(|source| self.holds(source));
+        let source = self.invert_step(gaps).filter(|source| self.contains(source));
         let coming = source.map(|source| {
             temperature.density(self.loss(&source)) / self.determinant(&source).abs()
         });

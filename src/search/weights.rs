@@ -1,6 +1,6 @@
 //! How often each kind of mutation is tried.
 
-use super::Kind;
+use super::MutationKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -8,16 +8,16 @@ use std::collections::BTreeMap;
 /// forbids it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Weights(BTreeMap<Kind, f64>);
+pub struct MutationWeights(BTreeMap<MutationKind, f64>);
 
-impl Weights {
+impl MutationWeights {
     /// The weight of a kind.
-    pub fn of(&self, kind: Kind) -> f64 {
+    pub fn of(&self, kind: MutationKind) -> f64 {
         self.0.get(&kind).copied().unwrap_or(1.0)
     }
 
     /// Gives a kind another weight; false, and nothing done, where it is negative or not finite.
-    pub fn set(&mut self, kind: Kind, weight: f64) -> bool {
+    pub fn set(&mut self, kind: MutationKind, weight: f64) -> bool {
         let sound = weight >= 0.0 && weight.is_finite();
         if sound {
             self.0.insert(kind, weight);

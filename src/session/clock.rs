@@ -18,7 +18,7 @@ pub struct Timed<T> {
 }
 
 /// Computes something and looks at the clock before and after.
-pub(super) fn timed<T>(compute: impl FnOnce() -> T) -> Timed<T> {
+pub(super) fn time<T>(compute: impl FnOnce() -> T) -> Timed<T> {
     let start = now();
     let value = compute();
     Timed { value, ms: start.elapsed().as_secs_f64() * 1e3 }
@@ -26,20 +26,20 @@ pub(super) fn timed<T>(compute: impl FnOnce() -> T) -> Timed<T> {
 
 /// Lets something happen at most so often.
 #[derive(Debug)]
-pub(super) struct Pace {
-    every: Duration,
+pub(super) struct Throttle {
+    interval: Duration,
     last: Option<Instant>,
 }
 
-impl Pace {
+impl Throttle {
     pub(super) fn new(every: Duration) -> Self {
-        Self { every, last: None }
+        Self { interval: every, last: None }
     }
 
     /// Whether it is time; if so, the next time is that much later.
-    pub(super) fn is_due(&mut self) -> bool {
+    pub(super) fn ready(&mut self) -> bool {
         let now = now();
-        let due = self.last.is_none_or(|last| now.duration_since(last) >= self.every);
+        let due = self.last.is_none_or(|last| now.duration_since(last) >= self.interval);
         if due {
             self.last = Some(now);
         }

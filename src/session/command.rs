@@ -4,17 +4,17 @@
 //! the design and can be undone, every other [`Command`] opens, saves, searches or sets up what is
 //! shown.
 
-use super::forming::Form;
-use super::quest::Quest;
-use crate::effects::{Choice, Effect};
+use super::forming::GrinCommand;
+use super::quest::StructureSearchRequest;
+use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
 use crate::lens::{
     Aperture, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, Variable, Wavelength,
     ZoomPosition,
 };
 use crate::merit::Goal;
-use crate::optimize::{Method, pareto};
-use crate::search::Steer;
+use crate::optimize::{DescentMethod, pareto};
+use crate::search::SteerCommand;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ pub enum Command {
     /// Change the design: one undo step.
     Edit(Edit),
     /// Typing into a cell has ended: the next edit of the same cell is an undo step of its own.
-    Settle,
+    CommitEdit,
     /// Take back the last step.
     Undo,
     /// Do it again.
@@ -41,7 +41,7 @@ pub enum Command {
     /// Search for a better lens in the background, on a copy.
     Optimize {
         /// How.
-        method: Method,
+        method: DescentMethod,
         /// What for.
         goal: Goal,
     },
@@ -54,34 +54,34 @@ pub enum Command {
     /// End the search; its result stays to be taken or thrown away.
     Stop,
     /// Make the best lens of the search the design, as one undo step, and end the search.
-    Take,
+    AcceptResult,
     /// End the search and throw its result away.
-    Discard,
+    DiscardResult,
     /// Sweep the front of sharpness against light in the background, from the design.
-    StartFront {
+    StartPareto {
         /// How.
-        settings: pareto::Settings,
+        settings: pareto::ParetoSettings,
         /// Whether to do the same afterwards with pupils that the derivatives keep as they are.
         compare: bool,
     },
     /// Hold the sweep after its current slice.
-    PauseFront,
+    PausePareto,
     /// Let it go on.
-    ResumeFront,
+    ResumePareto,
     /// End the sweep; its front stays.
-    StopFront,
+    StopPareto,
     /// End the sweep and forget its front and all earlier ones.
-    ClearFronts,
+    ClearPareto,
     /// Write the front into this folder: table, picture and every lens.
-    ExportFront(Option<PathBuf>),
+    ExportPareto(Option<PathBuf>),
     /// Search over structure.
-    Explore(Explore),
+    StructureSearch(StructureSearchCommand),
     /// Form a gradient-index field, or look at one.
-    Form(Form),
+    Grin(GrinCommand),
     /// Show another lens in place of the design, which stays what it is; `None` for the design.
     Preview(Option<Box<Lens>>),
     /// Make the lens that is shown in place of the design the design, as one undo step.
-    TakePreview,
+    AcceptPreview,
     /// How exact the shown numbers have to be: a relative error, 0.001 for 0.1 %.
     SetTolerance(f64),
     /// Which zoom position is shown.
@@ -89,13 +89,13 @@ pub enum Command {
     /// How many rays of each field the layout shows.
     ShowRays(usize),
     /// Whether a physical effect is computed: as planned, always or never.
-    Choose(Effect, Choice),
+    SetEffect(Effect, EffectOverride),
     /// Whether the pupils of the fields are computed: while a panel shows them.
     ShowPupils(bool),
     /// The wavelength of the pupils that are shown; `None` for the primary one.
     ShowPupilWavelength(Option<usize>),
     /// Carry out an experiment in the background, in place of the one that runs.
-    Experiment {
+    StartExperiment {
         /// The number of its figure or table.
         id: String,
         /// How much it works for its claims.
@@ -104,7 +104,7 @@ pub enum Command {
     /// Tell the experiment to stop.
     CancelExperiment,
     /// End the experiment and forget what it found.
-    CloseExperiment,
+    DismissExperiment,
     /// Write what the experiment found into this folder.
     SaveExperiment(PathBuf),
     /// Point out a surface in every panel, or none.
@@ -116,11 +116,11 @@ pub enum Command {
 /// What a person asks of a search over structure. It works on its own copy of the design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Explore {
+pub enum StructureSearchCommand {
     /// Begin one from the design, in place of the one before.
-    Start(Box<Quest>),
+    Start(Box<StructureSearchRequest>),
     /// Go on with the one that a file holds.
-    GoOn(Option<PathBuf>),
+    ResumeFrom(Option<PathBuf>),
     /// Hold it after its present round.
     Pause,
     /// Let it go on.
@@ -128,13 +128,13 @@ pub enum Explore {
     /// End it; what it has found stays.
     Stop,
     /// Pin a lens, forbid a mutation, change the temperature.
-    Steer(Steer),
+    Control(SteerCommand),
     /// Show the lens of a chain, counted from 0, in place of the design as it changes; or no more.
-    Follow(Option<usize>),
+    Preview(Option<usize>),
     /// Save it to this file from now on, or the next one where none goes on.
     SaveTo(Option<PathBuf>),
     /// Make the lens of a generation the design, as one undo step.
-    Take(u64),
+    Accept(u64),
     /// Write the lens of a generation.
     Export {
         /// Its number.
@@ -145,7 +145,7 @@ pub enum Explore {
     /// End it and forget it; its file stays.
     Clear,
     /// Remove the file of the one that was left when the program was closed.
-    ForgetLeft,
+    DismissUnfinished,
 }
 
 /// One change of the design.
@@ -199,7 +199,7 @@ pub enum Edit {
     /// Make this row the aperture stop.
     SetStop(usize),
     /// Whether the far half of the sphere counts too.
-    SetHyper {
+    SetHyperhemisphere {
         /// The row.
         surface: usize,
         /// Whether it does.
@@ -229,7 +229,7 @@ pub enum Edit {
     /// Take a row and the gap behind it out.
     RemoveRow(usize),
     /// Turn a group of rows around, so that its last surface comes first.
-    FlipRows {
+    ReverseRows {
         /// Its first row.
         first: usize,
         /// Its last row.
@@ -255,11 +255,11 @@ pub enum Edit {
     SetWavelengths(Vec<Wavelength>),
     /// Solve the last gap for the paraxial focus, displaced by so many mm; or no longer, and leave
     /// the image plane where it is.
-    SetFocus(Option<f64>),
+    SetFocusSolve(Option<f64>),
     /// Let an optimizer change a number, within bounds.
-    Free(Variable),
+    AddVariable(Variable),
     /// Let it no longer.
-    Fix(Parameter),
+    RemoveVariable(Parameter),
     /// Let an optimizer change these numbers and no others.
     SetVariables(Vec<Variable>),
     /// Let a number follow another.
@@ -294,7 +294,7 @@ impl From<Edit> for Command {
 
 /// The cell that an edit writes to; consecutive edits of one cell are one undo step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Cell {
+pub(super) enum EditedCell {
     Number(Parameter),
     Comment(usize),
     Name,
@@ -304,17 +304,17 @@ pub(super) enum Cell {
 
 impl Edit {
     /// The cell into which a person types or drags with this edit, if it is such a one.
-    pub(super) fn cell(&self) -> Option<Cell> {
+    pub(super) fn cell(&self) -> Option<EditedCell> {
         let curvature = |surface| Parameter::new(surface, Quantity::Curvature);
         match self {
             Self::Set { parameter, .. } | Self::Type { parameter, .. } => {
-                Some(Cell::Number(*parameter))
+                Some(EditedCell::Number(*parameter))
             }
-            Self::TypeRadius { surface, .. } => Some(Cell::Number(curvature(*surface))),
-            Self::SetComment { surface, .. } => Some(Cell::Comment(*surface)),
-            Self::SetName(_) => Some(Cell::Name),
-            Self::SetSource(_) => Some(Cell::Source),
-            Self::SetNotes(_) => Some(Cell::Notes),
+            Self::TypeRadius { surface, .. } => Some(EditedCell::Number(curvature(*surface))),
+            Self::SetComment { surface, .. } => Some(EditedCell::Comment(*surface)),
+            Self::SetName(_) => Some(EditedCell::Name),
+            Self::SetSource(_) => Some(EditedCell::Source),
+            Self::SetNotes(_) => Some(EditedCell::Notes),
             _ => None,
         }
     }
@@ -329,12 +329,12 @@ impl Edit {
             Self::SetMedium { surface, .. } => format!("glass after surface {surface}"),
             Self::SetObjectMedium(_) => "object medium".to_owned(),
             Self::SetStop(surface) => format!("stop to surface {surface}"),
-            Self::SetHyper { surface, .. } => format!("far half of surface {surface}"),
+            Self::SetHyperhemisphere { surface, .. } => format!("far half of surface {surface}"),
             Self::SetComment { surface, .. } => format!("remark on surface {surface}"),
             Self::SetRow { surface, .. } => format!("surface {surface}"),
             Self::InsertRow { at, .. } => format!("insert surface {at}"),
             Self::RemoveRow(surface) => format!("remove surface {surface}"),
-            Self::FlipRows { first, last } => format!("flip surfaces {first} to {last}"),
+            Self::ReverseRows { first, last } => format!("flip surfaces {first} to {last}"),
             Self::Scale(factor) => format!("scale by {factor}"),
             Self::SetName(_) => "name".to_owned(),
             Self::SetSource(_) => "source".to_owned(),
@@ -344,10 +344,10 @@ impl Edit {
             Self::LimitByStop => "limit the beam by the stop".to_owned(),
             Self::SetFields(_) => "fields".to_owned(),
             Self::SetWavelengths(_) => "wavelengths".to_owned(),
-            Self::SetFocus(_) => "focus solve".to_owned(),
-            Self::Free(variable) => format!("free the {}", variable.parameter),
+            Self::SetFocusSolve(_) => "focus solve".to_owned(),
+            Self::AddVariable(variable) => format!("free the {}", variable.parameter),
             Self::SetVariables(_) => "variables".to_owned(),
-            Self::Fix(parameter) => format!("fix the {parameter}"),
+            Self::RemoveVariable(parameter) => format!("fix the {parameter}"),
             Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter),
             Self::RemovePickup(parameter) => format!("no pickup of the {parameter}"),
             Self::InsertZoom { at, .. } => format!("insert zoom position {at}"),

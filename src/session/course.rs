@@ -1,7 +1,7 @@
 //! Which run of its kind a session shows, and how it will stand: what is told of others is not
 //! heard.
 
-use super::worker::Standing;
+use super::worker::RunStatus;
 
 /// The last run of a kind, if it is not forgotten.
 #[derive(Debug, Default)]
@@ -9,7 +9,7 @@ pub(super) struct Course {
     /// How many were begun.
     count: u64,
     number: Option<u64>,
-    pending: Option<Standing>,
+    pending: Option<RunStatus>,
     failed: Option<String>,
 }
 
@@ -37,7 +37,7 @@ impl Course {
     }
 
     /// How the run will stand once its present work is done, where it was told so.
-    pub(super) fn pending(&self) -> Option<Standing> {
+    pub(super) fn pending(&self) -> Option<RunStatus> {
         self.pending
     }
 
@@ -53,7 +53,7 @@ impl Course {
 
     /// Notes that the run is to stand otherwise, unless there is none or it has `ended`; whether it
     /// has to be told.
-    pub(super) fn turn(&mut self, standing: Standing, ended: bool) -> bool {
+    pub(super) fn turn(&mut self, standing: RunStatus, ended: bool) -> bool {
         let turns = self.is_there() && self.failed.is_none() && !ended;
         if turns {
             self.pending = Some(standing);
@@ -62,8 +62,8 @@ impl Course {
     }
 
     /// Hears how the run stands; what it stands as may be older than what it was told since.
-    pub(super) fn stands(&mut self, now: Standing) {
-        if Some(now) == self.pending || !now.can_go_on() {
+    pub(super) fn stands(&mut self, now: RunStatus) {
+        if Some(now) == self.pending || !now.is_active() {
             self.pending = None;
         }
     }

@@ -1,13 +1,13 @@
 //! What a session keeps beside a saved search, so that it looks the next day as it was left: the curve
 //! behind it and the time that it has taken. The search itself does not depend on it.
 
-use super::moments::History;
+use super::moments::SearchHistory;
 use serde::{Deserialize, Serialize};
 
 /// What is kept beside a saved search.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub(super) struct Diary {
+pub(super) struct CheckpointSidecar {
     /// It ends after so many minutes of work; none for no limit.
     pub(super) minutes: Option<f64>,
     /// The time that it has worked, in seconds.
@@ -15,12 +15,12 @@ pub(super) struct Diary {
     /// The gradients of that time.
     pub(super) gradients: u64,
     /// The merit so far, and every mutation.
-    pub(super) history: History,
+    pub(super) history: SearchHistory,
 }
 
-impl Diary {
+impl CheckpointSidecar {
     /// The limit, unless it is used up: whoever goes on with such a search wants more of it.
-    pub(super) fn minutes_left(&self) -> Option<f64> {
+    pub(super) fn remaining_minutes(&self) -> Option<f64> {
         self.minutes.filter(|minutes| self.seconds < 60.0 * minutes)
     }
 }

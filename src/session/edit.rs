@@ -6,12 +6,12 @@
 use super::command::Edit;
 use super::rows;
 use super::scale::scale;
-use super::typed::{NoNumber, evaluate};
+use super::typed::{ParseNumberError, evaluate};
 use crate::lens::{
     Aperture, Lens, LensError, Medium, Parameter, Pickup, Quantity, Row, Variable, ZoomPosition,
     ZoomThickness,
 };
-use crate::pupil::{BenchError, limited_by_stop};
+use crate::pupil::{RayModelError, limited_by_stop};
 
 /// Why an edit was refused; the lens is what it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -21,13 +21,13 @@ pub enum EditError {
     Lens(#[from] LensError),
     /// A beam that cannot be set up.
     #[error(transparent)]
-    Bench(#[from] BenchError),
+    Bench(#[from] RayModelError),
     /// A text that is no number.
     #[error(transparent)]
-    NoNumber(#[from] NoNumber),
+    NoNumber(#[from] ParseNumberError),
     /// A row that does not exist.
     #[error("there is no surface {surface}; expected 0 to {last}")]
-    NoRow {
+    UnknownSurface {
         /// The row that was named.
         surface: usize,
         /// The last one there is.
@@ -35,7 +35,7 @@ pub enum EditError {
     },
     /// A zoom position that does not exist.
     #[error("there is no zoom position {at}; the lens has {count}")]
-    NoZoom {
+    UnknownZoomPosition {
         /// The position that was named.
         at: usize,
         /// How many there are.
@@ -43,22 +43,22 @@ pub enum EditError {
     },
     /// A number that the lens does not have.
     #[error("this lens has no {0}")]
-    NoNumberThere(Parameter),
+    UnknownParameter(Parameter),
     /// A number that follows another.
     #[error("the {0} follows the {1}; remove that pickup first")]
-    Follows(Parameter, Parameter),
+    PickedUp(Parameter, Parameter),
     /// The last gap, while it is solved.
     #[error("the last thickness is solved for the paraxial focus; remove that solve first")]
     Solved,
     /// The stop cannot be removed.
     #[error("surface {0} is the stop; make another surface the stop first")]
-    IsStop(usize),
+    RemovedStop(usize),
     /// A lens needs a surface.
     #[error("the only surface cannot be removed")]
-    OnlyRow,
+    OnlySurface,
     /// A group that ends before it begins.
     #[error("surfaces {first} to {last} are no group; expected the first one in front")]
-    NoGroup {
+    ReversedRange {
         /// The first row.
         first: usize,
         /// The last row.
@@ -72,10 +72,10 @@ pub enum EditError {
         "the gradient after surface {0} varies along the axis; a group with it cannot be turned \
          around"
     )]
-    AxialGradient(usize),
+    AxialGrin(usize),
     /// A scale that leaves no lens.
     #[error("the scale is {0}; expected a number above 0")]
-    Scale(f64),
+    InvalidScale(f64),
 }
 
 /// The lens after an edit.
@@ -85,9 +85,9 @@ pub enum EditError {
 ///
 /// What follows another number has its value written into the lens, so that a table of the lens
 /// shows it.
-pub fn edited(lens: &Lens, edit: &Edit) -> Result<Lens, EditError> {
+pub fn apply_edit(lens: &Lens, edit: &Edit) -> Result<Lens, EditError> {
     let mut changed = lens.clone();
-    changed.edit(edit)?;
+    changed.apply(edit)?;
     changed.check()?;
     let changed = changed.with_pickups()?;
     changed.check()?;
@@ -99,91 +99,99 @@ pub fn edited(lens: &Lens, edit: &Edit) -> Result<Lens, EditError> {
 }
 
 impl Lens {
-    fn edit(&mut self, edit: &Edit) -> Result<(), EditError> {
+    fn apply(&mut self, edit: &Edit) -> Result<(), EditError> {
         match edit {
             Edit::Set { parameter, value } => self.write(*parameter, *value)?,
             Edit::Type { parameter, text } => self.type_number(*parameter, text)?,
             Edit::TypeRadius { surface, text } => self.type_radius(*surface, text)?,
-            Edit::SetSemiDiameter { surface, value } => self.limit(*surface, *value)?,
-            Edit::SetAsphere { surface, terms } => self.row(*surface)?.asphere.clone_from(terms),
-            Edit::SetMedium { surface, medium } => self.fill(*surface, medium)?,
+            Edit::SetSemiDiameter { surface, value } => self.set_semi_diameter(*surface, *value)?,
+            Edit::SetAsphere { surface, terms } => {
+                self.row_mut(*surface)?.asphere.clone_from(terms)
+            }
+            Edit::SetMedium { surface, medium } => self.set_medium(*surface, medium)?,
             Edit::SetObjectMedium(medium) => self.object_medium.clone_from(medium),
             Edit::SetStop(surface) => self.move_stop(*surface)?,
-            Edit::SetHyper { surface, hyper } => self.row(*surface)?.hyper = *hyper,
-            Edit::SetComment { surface, text } => self.row(*surface)?.comment.clone_from(text),
+            Edit::SetHyperhemisphere { surface, hyper } => {
+                self.row_mut(*surface)?.hyperhemisphere = *hyper
+            }
+            Edit::SetComment { surface, text } => self.row_mut(*surface)?.comment.clone_from(text),
             Edit::SetRow { surface, row } => rows::replace(self, *surface, row)?,
             Edit::InsertRow { at, row } => rows::insert(self, *at, row)?,
             Edit::RemoveRow(surface) => rows::remove(self, *surface)?,
-            Edit::FlipRows { first, last } => rows::flip(self, *first, *last)?,
+            Edit::ReverseRows { first, last } => rows::flip(self, *first, *last)?,
             Edit::Scale(factor) => scale(self, *factor)?,
             Edit::SetName(text) => self.name.clone_from(text),
             Edit::SetSource(text) => self.source.clone_from(text),
             Edit::SetNotes(text) => self.notes.clone_from(text),
             Edit::SetObject(object) => self.object = *object,
-            Edit::SetAperture(aperture) => self.open(*aperture),
+            Edit::SetAperture(aperture) => self.set_aperture(*aperture),
             Edit::LimitByStop => *self = limited_by_stop(self)?,
             Edit::SetFields(fields) => self.fields.clone_from(fields),
             Edit::SetWavelengths(wavelengths) => self.wavelengths.clone_from(wavelengths),
-            Edit::SetFocus(offset) => self.solve_focus(*offset)?,
-            Edit::Free(variable) => self.free(*variable)?,
-            Edit::Fix(parameter) => self.variables.retain(|v| v.parameter != *parameter),
+            Edit::SetFocusSolve(offset) => self.set_focus_solve(*offset)?,
+            Edit::AddVariable(variable) => self.add_variable(*variable)?,
+            Edit::RemoveVariable(parameter) => self.variables.retain(|v| v.parameter != *parameter),
             Edit::SetVariables(variables) => self.variables.clone_from(variables),
-            Edit::SetPickup(pickup) => self.pick_up(*pickup),
+            Edit::SetPickup(pickup) => self.set_pickup(*pickup),
             Edit::RemovePickup(follower) => self.pickups.retain(|p| p.parameter != *follower),
             Edit::InsertZoom { at, position } => self.insert_zoom(*at, position)?,
             Edit::RemoveZoom(at) => self.remove_zoom(*at)?,
-            Edit::SetZoom { at, position } => self.position(*at)?.clone_from(position),
+            Edit::SetZoom { at, position } => self.zoom_mut(*at)?.clone_from(position),
             Edit::Replace(lens) => self.clone_from(lens),
         }
         Ok(())
     }
 
     /// A row to be changed.
-    pub(super) fn row(&mut self, surface: usize) -> Result<&mut Row, EditError> {
+    pub(super) fn row_mut(&mut self, surface: usize) -> Result<&mut Row, EditError> {
         let last = self.surfaces.len() - 1;
-        self.surfaces.get_mut(surface).ok_or(EditError::NoRow { surface, last })
+        self.surfaces.get_mut(surface).ok_or(EditError::UnknownSurface { surface, last })
     }
 
     /// A zoom position to be changed.
-    fn position(&mut self, at: usize) -> Result<&mut ZoomPosition, EditError> {
+    fn zoom_mut(&mut self, at: usize) -> Result<&mut ZoomPosition, EditError> {
         let count = self.zoom.len();
-        self.zoom.get_mut(at).ok_or(EditError::NoZoom { at, count })
+        self.zoom.get_mut(at).ok_or(EditError::UnknownZoomPosition { at, count })
     }
 
     /// Refuses a number that something else decides.
-    fn may_be_written(&mut self, parameter: Parameter) -> Result<(), EditError> {
-        self.row(parameter.surface)?;
+    fn check_writable(&mut self, parameter: Parameter) -> Result<(), EditError> {
+        self.row_mut(parameter.surface)?;
         if let Some(pickup) = self.pickups.iter().find(|p| p.parameter == parameter) {
-            return Err(EditError::Follows(parameter, pickup.source));
+            return Err(EditError::PickedUp(parameter, pickup.source));
         }
         let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
-        if gap && self.focus.is_some() && parameter.surface + 1 == self.surfaces.len() {
+        if gap && self.image_solve.is_some() && parameter.surface + 1 == self.surfaces.len() {
             return Err(EditError::Solved);
         }
         Ok(())
     }
 
     fn write(&mut self, parameter: Parameter, value: f64) -> Result<(), EditError> {
-        self.may_be_written(parameter)?;
-        if self.set(parameter, value) { Ok(()) } else { Err(EditError::NoNumberThere(parameter)) }
+        self.check_writable(parameter)?;
+        if self.set(parameter, value) {
+            Ok(())
+        } else {
+            Err(EditError::UnknownParameter(parameter))
+        }
     }
 
     fn type_number(&mut self, parameter: Parameter, text: &str) -> Result<(), EditError> {
-        self.may_be_written(parameter)?;
+        self.check_writable(parameter)?;
         let unlimited = parameter.quantity == Quantity::SemiDiameter;
         if unlimited && text.trim().is_empty() {
-            return self.limit(parameter.surface, None);
+            return self.set_semi_diameter(parameter.surface, None);
         }
         let old = self.get(parameter).or(unlimited.then_some(f64::INFINITY));
-        let value = evaluate(text, old.ok_or(EditError::NoNumberThere(parameter))?)?;
+        let value = evaluate(text, old.ok_or(EditError::UnknownParameter(parameter))?)?;
         if unlimited && value == f64::INFINITY {
-            return self.limit(parameter.surface, None);
+            return self.set_semi_diameter(parameter.surface, None);
         }
         self.write(parameter, value)
     }
 
     fn type_radius(&mut self, surface: usize, text: &str) -> Result<(), EditError> {
-        let old = self.row(surface)?.curvature;
+        let old = self.row_mut(surface)?.curvature;
         let old = if old == 0.0 { f64::INFINITY } else { 1.0 / old };
         let plane = text.trim().is_empty();
         let radius = if plane { f64::INFINITY } else { evaluate(text, old)? };
@@ -191,36 +199,36 @@ impl Lens {
         self.write(Parameter::new(surface, Quantity::Curvature), curvature)
     }
 
-    fn limit(&mut self, surface: usize, value: Option<f64>) -> Result<(), EditError> {
+    fn set_semi_diameter(&mut self, surface: usize, value: Option<f64>) -> Result<(), EditError> {
         let parameter = Parameter::new(surface, Quantity::SemiDiameter);
         if let Some(value) = value {
             return self.write(parameter, value);
         }
-        self.may_be_written(parameter)?;
-        self.forget(parameter);
-        self.row(surface)?.semi_diameter = None;
+        self.check_writable(parameter)?;
+        self.drop_references(parameter);
+        self.row_mut(surface)?.semi_diameter = None;
         Ok(())
     }
 
     /// A glass with a fixed index has none that could vary or be followed.
-    fn fill(&mut self, surface: usize, medium: &Medium) -> Result<(), EditError> {
-        self.row(surface)?.medium.clone_from(medium);
+    fn set_medium(&mut self, surface: usize, medium: &Medium) -> Result<(), EditError> {
+        self.row_mut(surface)?.medium.clone_from(medium);
         let index = Parameter::new(surface, Quantity::Index);
         if self.get(index).is_none() {
-            self.forget(index);
+            self.drop_references(index);
         }
         Ok(())
     }
 
     /// Removes a number that goes away from variables and pickups.
-    pub(super) fn forget(&mut self, parameter: Parameter) {
+    pub(super) fn drop_references(&mut self, parameter: Parameter) {
         self.variables.retain(|v| v.parameter != parameter);
         self.pickups.retain(|p| p.parameter != parameter && p.source != parameter);
     }
 
     /// Moves the stop. An aperture given by the size of the stop takes that of the new one.
     fn move_stop(&mut self, surface: usize) -> Result<(), EditError> {
-        self.row(surface)?;
+        self.row_mut(surface)?;
         for (i, row) in self.surfaces.iter_mut().enumerate() {
             row.stop = i == surface;
         }
@@ -233,15 +241,15 @@ impl Lens {
     }
 
     /// Sets the aperture; the size of the stop is that of its row too.
-    fn open(&mut self, aperture: Aperture) {
+    fn set_aperture(&mut self, aperture: Aperture) {
         self.aperture = aperture;
         if let (Aperture::StopSemiDiameter(size), Some(stop)) = (aperture, self.stop()) {
             self.surfaces[stop].semi_diameter = Some(size);
         }
     }
 
-    fn free(&mut self, variable: Variable) -> Result<(), EditError> {
-        self.may_be_written(variable.parameter)?;
+    fn add_variable(&mut self, variable: Variable) -> Result<(), EditError> {
+        self.check_writable(variable.parameter)?;
         match self.variables.iter_mut().find(|v| v.parameter == variable.parameter) {
             Some(old) => *old = variable,
             None => self.variables.push(variable),
@@ -249,7 +257,7 @@ impl Lens {
         Ok(())
     }
 
-    fn pick_up(&mut self, pickup: Pickup) {
+    fn set_pickup(&mut self, pickup: Pickup) {
         self.variables.retain(|v| v.parameter != pickup.parameter);
         match self.pickups.iter_mut().find(|p| p.parameter == pickup.parameter) {
             Some(old) => *old = pickup,
@@ -257,11 +265,11 @@ impl Lens {
         }
     }
 
-    fn solve_focus(&mut self, offset: Option<f64>) -> Result<(), EditError> {
+    fn set_focus_solve(&mut self, offset: Option<f64>) -> Result<(), EditError> {
         if offset.is_none() {
-            self.freeze_focus()?;
+            self.replace_focus_solve()?;
         }
-        self.focus = offset;
+        self.image_solve = offset;
         let last = self.surfaces.len() - 1;
         if offset.is_some() {
             let solved = |q| matches!(q, Quantity::Thickness | Quantity::ZoomThickness(_));
@@ -271,14 +279,14 @@ impl Lens {
     }
 
     /// Writes the solved last gap down at every zoom position, and solves it no longer.
-    pub(super) fn freeze_focus(&mut self) -> Result<(), EditError> {
-        if self.focus.is_none() {
+    pub(super) fn replace_focus_solve(&mut self) -> Result<(), EditError> {
+        if self.image_solve.is_none() {
             return Ok(());
         }
         let last = self.surfaces.len() - 1;
         let um = self.wavelengths[self.primary()].um;
         let gaps: Result<Vec<f64>, LensError> = (0..self.zoom_positions())
-            .map(|zoom| Ok(self.system(zoom, um)?.surfaces[last].thickness))
+            .map(|zoom| Ok(self.resolve(zoom, um)?.surfaces[last].thickness))
             .collect();
         let gaps = gaps?;
         self.surfaces[last].thickness = gaps[0];
@@ -286,24 +294,24 @@ impl Lens {
             position.thicknesses.retain(|gap| gap.surface != last);
             position.thicknesses.push(ZoomThickness { surface: last, thickness });
         }
-        self.focus = None;
+        self.image_solve = None;
         Ok(())
     }
 
     fn insert_zoom(&mut self, at: usize, position: &ZoomPosition) -> Result<(), EditError> {
         let count = self.zoom.len();
         if at > count {
-            return Err(EditError::NoZoom { at, count });
+            return Err(EditError::UnknownZoomPosition { at, count });
         }
         self.zoom.insert(at, position.clone());
-        self.map_zooms(|zoom| Some(if zoom < at { zoom } else { zoom + 1 }));
+        self.renumber_zooms(|zoom| Some(if zoom < at { zoom } else { zoom + 1 }));
         Ok(())
     }
 
     fn remove_zoom(&mut self, at: usize) -> Result<(), EditError> {
-        self.position(at)?;
+        self.zoom_mut(at)?;
         self.zoom.remove(at);
-        self.map_zooms(|zoom| match zoom {
+        self.renumber_zooms(|zoom| match zoom {
             zoom if zoom == at => None,
             zoom if zoom > at => Some(zoom - 1),
             zoom => Some(zoom),
@@ -311,7 +319,7 @@ impl Lens {
         Ok(())
     }
 
-    fn map_zooms(&mut self, map: impl Fn(usize) -> Option<usize>) {
+    fn renumber_zooms(&mut self, map: impl Fn(usize) -> Option<usize>) {
         self.map_parameters(|parameter| match parameter.quantity {
             Quantity::ZoomThickness(zoom) => map(zoom)
                 .map(|zoom| Parameter { quantity: Quantity::ZoomThickness(zoom), ..parameter }),
@@ -322,7 +330,7 @@ impl Lens {
     /// Refuses a lens whose pickups, glasses or solves lead to numbers that cannot be traced.
     fn check_resolved(&self) -> Result<(), LensError> {
         for zoom in 0..self.zoom_positions() {
-            self.wavelengths.iter().try_for_each(|w| self.system(zoom, w.um).map(drop))?;
+            self.wavelengths.iter().try_for_each(|w| self.resolve(zoom, w.um).map(drop))?;
         }
         Ok(())
     }

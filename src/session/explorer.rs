@@ -4,16 +4,16 @@
 //! place for it. A panic inside ends the search and not the session: what was found stays.
 
 use super::background::{Background, Outbox, Work, guarded, pool};
-use super::clock::{Pace, Timed, timed};
-use super::diary::Diary;
-use super::exploration::{Ending, Exploration};
-use super::judged::Judged;
-use super::quest::{Engine, Explores, Quest};
+use super::clock::{Throttle, Timed, time};
+use super::diary::CheckpointSidecar;
+use super::exploration::{EndReason, StructureSearchSnapshot};
+use super::judged::ScoredLens;
+use super::quest::{LensSearchEngine, StructureSearchEngine, StructureSearchRequest};
 use super::slot::Slot;
-use super::worker::Standing;
+use super::worker::RunStatus;
 use crate::lens::Lens;
-use crate::merit::Margin;
-use crate::search::Steer;
+use crate::merit::ConstraintMargin;
+use crate::search::SteerCommand;
 use rayon::ThreadPool;
 use std::io;
 use std::path::PathBuf;
@@ -29,7 +29,7 @@ const SAVED: Duration = Duration::from_secs(5);
 /// What happened to a search; each carries its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Told {
-    Now(u64, Standing),
+    Now(u64, RunStatus),
     Failed(u64, String),
     Refused(String),
     /// The lens of a generation was finished and written.
@@ -43,32 +43,45 @@ pub(super) enum Told {
 /// What the thread is told.
 #[derive(Debug)]
 enum Order {
-    Start { number: u64, lens: Arc<Lens>, quest: Box<Quest>, path: Option<PathBuf> },
-    GoOn { number: u64, path: PathBuf },
-    Stand(Standing),
-    Steer(Steer),
+    Start {
+        number: u64,
+        lens: Arc<Lens>,
+        quest: Box<StructureSearchRequest>,
+        path: Option<PathBuf>,
+    },
+    GoOn {
+        number: u64,
+        path: PathBuf,
+    },
+    Stand(RunStatus),
+    Steer(SteerCommand),
     SaveTo(PathBuf),
     Clear,
     Judge(Arc<Lens>),
-    Export { generation: u64, lens: Arc<Lens>, path: PathBuf },
+    Export {
+        generation: u64,
+        lens: Arc<Lens>,
+        path: PathBuf,
+    },
 }
 
-type Begin = dyn Fn(&Lens, &Quest) -> Result<Box<dyn Explores>, String> + Send;
+type Begin =
+    dyn Fn(&Lens, &StructureSearchRequest) -> Result<Box<dyn StructureSearchEngine>, String> + Send;
 
 /// The handle of the thread that searches over structure.
 #[derive(Debug)]
 pub(super) struct Explorer {
     thread: Background<Order, Told>,
-    run: Slot<Exploration>,
-    judged: Slot<Judged>,
+    run: Slot<StructureSearchSnapshot>,
+    judged: Slot<ScoredLens>,
 }
 
 impl Explorer {
     /// Starts the thread. `wake` is called from it when there is something new to look at.
     pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
-        let begin = |lens: &Lens, quest: &Quest| {
-            let engine = Engine::begin(lens, quest).map_err(|why| why.to_string())?;
-            Ok(Box::new(engine) as Box<dyn Explores>)
+        let begin = |lens: &Lens, quest: &StructureSearchRequest| {
+            let engine = LensSearchEngine::start(lens, quest).map_err(|why| why.to_string())?;
+            Ok(Box::new(engine) as Box<dyn StructureSearchEngine>)
         };
         Self::with(Box::new(begin), wake)
     }
@@ -82,8 +95,8 @@ impl Explorer {
             judged: judgements,
             begin,
             pool: None,
-            looks: Pace::new(BETWEEN),
-            saves: Pace::new(SAVED),
+            looks: Throttle::new(BETWEEN),
+            saves: Throttle::new(SAVED),
             run: None,
         };
         Ok(Self { thread: Background::spawn("search", wake, desk)?, run, judged })
@@ -94,7 +107,7 @@ impl Explorer {
         &self,
         number: u64,
         lens: Arc<Lens>,
-        quest: Box<Quest>,
+        quest: Box<StructureSearchRequest>,
         path: Option<PathBuf>,
     ) {
         self.thread.tell(Order::Start { number, lens, quest, path });
@@ -106,12 +119,12 @@ impl Explorer {
     }
 
     /// Holds the search, lets it go on or ends it, after its round.
-    pub(super) fn stand(&self, standing: Standing) {
+    pub(super) fn stand(&self, standing: RunStatus) {
         self.thread.tell(Order::Stand(standing));
     }
 
     /// Steers the search between two rounds.
-    pub(super) fn steer(&self, steer: Steer) {
+    pub(super) fn steer(&self, steer: SteerCommand) {
         self.thread.tell(Order::Steer(steer));
     }
 
@@ -136,12 +149,12 @@ impl Explorer {
     }
 
     /// How far the search is.
-    pub(super) fn run(&self) -> Option<Arc<Exploration>> {
+    pub(super) fn run(&self) -> Option<Arc<StructureSearchSnapshot>> {
         self.run.latest()
     }
 
     /// The design that was judged last.
-    pub(super) fn judged(&self) -> Option<Arc<Judged>> {
+    pub(super) fn judged(&self) -> Option<Arc<ScoredLens>> {
         self.judged.latest()
     }
 
@@ -154,45 +167,47 @@ impl Explorer {
 /// What the thread works with.
 struct Desk {
     outbox: Outbox<Told>,
-    shown: Slot<Exploration>,
-    judged: Slot<Judged>,
+    shown: Slot<StructureSearchSnapshot>,
+    judged: Slot<ScoredLens>,
     begin: Box<Begin>,
     /// Threads of its own, from the first search on.
     pool: Option<ThreadPool>,
-    looks: Pace,
-    saves: Pace,
+    looks: Throttle,
+    saves: Throttle,
     run: Option<Run>,
 }
 
 /// A search under way or ended.
 struct Run {
-    engine: Box<dyn Explores>,
-    state: Exploration,
-    diary: Diary,
+    engine: Box<dyn StructureSearchEngine>,
+    state: StructureSearchSnapshot,
+    diary: CheckpointSidecar,
 }
 
 impl Work for Desk {
     type Order = Order;
 
     fn is_running(&self) -> bool {
-        self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running)
+        self.run.as_ref().is_some_and(|run| run.state.status == RunStatus::Running)
     }
 
     fn obey(&mut self, order: Order) {
         match order {
             Order::Start { number, lens, quest, path } => {
                 let begun = guarded(|| (self.begin)(&lens, &quest));
-                let diary = Diary { minutes: quest.minutes, ..Diary::default() };
+                let diary =
+                    CheckpointSidecar { minutes: quest.minutes, ..CheckpointSidecar::default() };
                 self.begin(number, begun.map(|engine| (engine, *quest, diary)), path);
             }
             Order::GoOn { number, path } => {
-                let begun = guarded(|| Engine::go_on(&path).map_err(|why| why.to_string()));
-                let boxed = |engine| Box::new(engine) as Box<dyn Explores>;
+                let begun =
+                    guarded(|| LensSearchEngine::resume(&path).map_err(|why| why.to_string()));
+                let boxed = |engine| Box::new(engine) as Box<dyn StructureSearchEngine>;
                 let begun = begun.map(|(engine, quest, diary)| (boxed(engine), quest, diary));
                 self.begin(number, begun, Some(path));
             }
             Order::Stand(standing) => {
-                if self.run.as_ref().is_some_and(|run| run.state.is_under_way()) {
+                if self.run.as_ref().is_some_and(|run| run.state.is_active()) {
                     self.stand(standing);
                 }
             }
@@ -203,7 +218,7 @@ impl Work for Desk {
                 self.run = None;
             }
             Order::Judge(lens) => {
-                self.judged.set(Judged::of(lens));
+                self.judged.set(ScoredLens::new(lens));
                 self.outbox.wake();
             }
             Order::Export { generation, lens, path } => self.export(generation, lens, path),
@@ -214,15 +229,15 @@ impl Work for Desk {
     fn advance(&mut self) {
         let (Some(run), Some(pool)) = (&mut self.run, &self.pool) else { return };
         match guarded(|| Ok(run.round(pool))) {
-            Ok(over) => run.state.over = over,
+            Ok(over) => run.state.end_reason = over,
             Err(why) => return self.give_up(why),
         }
-        if run.state.over.is_some() {
-            self.stand(Standing::Finished);
-        } else if self.looks.is_due() {
+        if run.state.end_reason.is_some() {
+            self.stand(RunStatus::Finished);
+        } else if self.looks.ready() {
             self.show();
         }
-        if self.saves.is_due() {
+        if self.saves.ready() {
             self.save();
             if let Some(run) = &mut self.run {
                 run.appraise();
@@ -239,7 +254,10 @@ impl Desk {
     fn begin(
         &mut self,
         number: u64,
-        begun: Result<(Box<dyn Explores>, Quest, Diary), String>,
+        begun: Result<
+            (Box<dyn StructureSearchEngine>, StructureSearchRequest, CheckpointSidecar),
+            String,
+        >,
         path: Option<PathBuf>,
     ) {
         self.save();
@@ -252,33 +270,33 @@ impl Desk {
         });
         match ready {
             Ok((engine, quest, mut diary)) => {
-                let mut state = Exploration::new(number, quest, engine.run(), path);
-                state.start_breaks = broken(engine.as_ref(), &engine.run().start().point);
+                let mut state = StructureSearchSnapshot::new(number, quest, engine.run(), path);
+                state.start_violations = broken(engine.as_ref(), &engine.run().start().point);
                 diary.history.begin(engine.run());
                 self.run = Some(Run { engine, state, diary });
-                self.saves.is_due();
-                self.stand(Standing::Running);
+                self.saves.ready();
+                self.stand(RunStatus::Running);
             }
             Err(why) => self.outbox.emit(Told::Failed(number, why)),
         }
     }
 
     /// Lets the search stand otherwise, saves it, shows it and says so.
-    fn stand(&mut self, standing: Standing) {
+    fn stand(&mut self, standing: RunStatus) {
         let Some(run) = &mut self.run else { return };
-        run.state.standing = standing;
+        run.state.status = standing;
         run.appraise();
         let number = run.state.number;
-        if standing != Standing::Running {
+        if standing != RunStatus::Running {
             self.save();
         }
         self.show();
         self.outbox.emit(Told::Now(number, standing));
     }
 
-    fn steer(&mut self, steer: Steer) {
+    fn steer(&mut self, steer: SteerCommand) {
         let Some(run) = &mut self.run else { return };
-        if let Err(why) = run.engine.steer(steer) {
+        if let Err(why) = run.engine.control(steer) {
             self.outbox.emit(Told::Refused(why.to_string()));
         }
         self.show();
@@ -297,17 +315,17 @@ impl Desk {
     fn save(&mut self) {
         let Some(run) = &mut self.run else { return };
         let failed = guarded(|| Ok(run.save())).unwrap_or_else(Some);
-        if failed.is_some() && run.state.checkpoint.failed != failed {
+        if failed.is_some() && run.state.checkpoint.error != failed {
             let why = failed.clone().unwrap_or_default();
             self.outbox.emit(Told::NotSaved(format!("the search is not saved: {why}")));
         }
-        run.state.checkpoint.failed = failed;
+        run.state.checkpoint.error = failed;
     }
 
     /// Finishes a lens in a thread of its own, which the end of the program does not wait for.
     fn export(&self, generation: u64, lens: Arc<Lens>, path: PathBuf) {
         let Some(run) = &self.run else { return };
-        let (finishing, outbox) = (run.engine.finishing(), self.outbox.clone());
+        let (finishing, outbox) = (run.engine.finalizer(), self.outbox.clone());
         let work = move || match finishing.write(&lens, &path) {
             Ok(report) => outbox.emit(Told::Written(generation, path, report)),
             Err(why) => outbox.emit(Told::NotWritten(generation, why)),
@@ -326,7 +344,7 @@ impl Desk {
 
     fn give_up(&mut self, why: String) {
         let Some(run) = &mut self.run else { return };
-        run.state.standing = Standing::Stopped;
+        run.state.status = RunStatus::Stopped;
         let number = run.state.number;
         self.shown.set(run.state.clone());
         self.outbox.emit(Told::Failed(number, why));
@@ -334,27 +352,27 @@ impl Desk {
 }
 
 /// The limits that a lens breaks.
-fn broken(engine: &dyn Explores, lens: &Lens) -> Vec<Margin> {
-    guarded(|| Ok(engine.broken(lens))).unwrap_or_default()
+fn broken(engine: &dyn StructureSearchEngine, lens: &Lens) -> Vec<ConstraintMargin> {
+    guarded(|| Ok(engine.violations(lens))).unwrap_or_default()
 }
 
 impl Run {
     /// One turn of every chain; why the search is over, where it is.
-    fn round(&mut self, pool: &ThreadPool) -> Option<Ending> {
+    fn round(&mut self, pool: &ThreadPool) -> Option<EndReason> {
         let before = self.engine.run().statistics().gradients;
         let engine = &mut self.engine;
-        let Timed { value: events, ms } = timed(|| pool.install(|| engine.round()));
+        let Timed { value: events, ms } = time(|| pool.install(|| engine.round()));
         self.diary.seconds += 1e-3 * ms;
         self.diary.gradients += self.engine.run().statistics().gradients - before;
-        self.diary.history.note(self.engine.run(), &events);
+        self.diary.history.record(self.engine.run(), &events);
         self.over()
     }
 
-    fn over(&self) -> Option<Ending> {
-        let minutes = self.state.quest.minutes;
+    fn over(&self) -> Option<EndReason> {
+        let minutes = self.state.request.minutes;
         let late = minutes.is_some_and(|minutes| self.diary.seconds >= 60.0 * minutes);
-        let over = self.engine.run().over().map(Ending::Over);
-        over.or_else(|| late.then_some(Ending::Time))
+        let over = self.engine.run().end_reason().map(EndReason::Sampler);
+        over.or_else(|| late.then_some(EndReason::TimeLimit))
     }
 
     /// Counts the rays of a gradient of the best lens, and looks which limits it breaks.
@@ -363,12 +381,12 @@ impl Run {
         let best = &engine.run().best().point;
         let state = &mut self.state;
         state.rays = guarded(|| Ok(engine.rays())).unwrap_or(state.rays);
-        state.best_breaks = broken(engine.as_ref(), best);
+        state.best_violations = broken(engine.as_ref(), best);
     }
 
     /// Takes over what the search has found.
-    fn look(&mut self) -> Exploration {
-        self.state.look(self.engine.run());
+    fn look(&mut self) -> StructureSearchSnapshot {
+        self.state.update(self.engine.run());
         self.state.seconds = self.diary.seconds;
         self.state.gradients = self.diary.gradients;
         self.state.history = Arc::new(self.diary.history.clone());

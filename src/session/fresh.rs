@@ -12,8 +12,8 @@ const INDEX: f64 = 0.2;
 
 /// The rows of a lens, counted from 0, behind which there is glass that `own` does not have: what
 /// is left where as many pieces as possible are found again in the same order.
-pub fn fresh_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
-    let (rows, old) = (pieces(lens), pieces(own));
+pub fn added_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
+    let (rows, old) = (glass_pieces(lens), glass_pieces(own));
     let size = own.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>();
     let costs = costs(&rows, &old, size);
     let (mut i, mut j) = (rows.len(), old.len());
@@ -21,7 +21,7 @@ pub fn fresh_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
     while i > 0 {
         if costs[i][j] == costs[i - 1][j] + NEW {
             i -= 1;
-            fresh.push(rows[i].at);
+            fresh.push(rows[i].surface);
         } else if j > 0 && costs[i][j] == costs[i][j - 1] + NEW {
             j -= 1;
         } else {
@@ -34,29 +34,33 @@ pub fn fresh_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
 }
 
 /// A piece of glass.
-struct Piece<'a> {
-    at: usize,
+struct GlassPiece<'a> {
+    surface: usize,
     medium: &'a Medium,
     curvatures: [f64; 2],
 }
 
-fn pieces(lens: &Lens) -> Vec<Piece<'_>> {
+fn glass_pieces(lens: &Lens) -> Vec<GlassPiece<'_>> {
     let is_glass = |row: &Row| match row.medium {
         Medium::Air | Medium::Mirror => false,
         Medium::Index(n) => n >= 1.05,
-        Medium::Glass(_) | Medium::Model { .. } | Medium::Gradient(_) => true,
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Grin(_) => true,
     };
     let pairs = lens.surfaces.windows(2).enumerate();
     let glass = pairs.filter(|(_, pair)| is_glass(&pair[0]));
     let piece = |(at, pair): (usize, &'_ [Row])| (at, [pair[0].curvature, pair[1].curvature]);
     glass
         .map(piece)
-        .map(|(at, curvatures)| Piece { at, medium: &lens.surfaces[at].medium, curvatures })
+        .map(|(at, curvatures)| GlassPiece {
+            surface: at,
+            medium: &lens.surfaces[at].medium,
+            curvatures,
+        })
         .collect()
 }
 
 /// The least cost of turning the first `j` old pieces into the first `i` new ones.
-fn costs(rows: &[Piece<'_>], old: &[Piece<'_>], size: f64) -> Vec<Vec<f64>> {
+fn costs(rows: &[GlassPiece<'_>], old: &[GlassPiece<'_>], size: f64) -> Vec<Vec<f64>> {
     let mut costs = vec![vec![0.0; old.len() + 1]; rows.len() + 1];
     for i in 0..=rows.len() {
         for j in 0..=old.len() {
@@ -75,7 +79,7 @@ fn costs(rows: &[Piece<'_>], old: &[Piece<'_>], size: f64) -> Vec<Vec<f64>> {
 }
 
 /// How different two pieces are: 0 to 1 for the same glass, infinite for another one.
-fn difference(a: &Piece<'_>, b: &Piece<'_>, size: f64) -> f64 {
+fn difference(a: &GlassPiece<'_>, b: &GlassPiece<'_>, size: f64) -> f64 {
     let glass = match (a.medium, b.medium) {
         (Medium::Model { nd: a, .. }, Medium::Model { nd: b, .. }) => {
             let off = (a - b).abs() / INDEX;
@@ -117,9 +121,9 @@ mod tests {
             (vec![("A", 0.3), ("A", 0.02), ("B", 0.01), ("D", 0.0)], vec![0, 6]),
         ];
         for (glasses, fresh) in cases {
-            assert_eq!(fresh_glass(&lens(&glasses), &own), fresh, "{glasses:?}");
+            assert_eq!(added_glass(&lens(&glasses), &own), fresh, "{glasses:?}");
         }
-        assert_eq!(fresh_glass(&lens(&[]), &own), [0; 0]);
-        assert_eq!(fresh_glass(&own, &lens(&[])), [0, 2, 4]);
+        assert_eq!(added_glass(&lens(&[]), &own), [0; 0]);
+        assert_eq!(added_glass(&own, &lens(&[])), [0, 2, 4]);
     }
 }

@@ -1,45 +1,45 @@
 //! The fronts of a session: the one that is swept, those before it, and where the design stands.
 
 use super::course::Course;
-use super::judged::Judged;
-use super::sweeper::{FrontRun, Job, Sweeper, Told};
-use super::worker::Standing;
+use super::judged::ScoredLens;
+use super::sweeper::{Job, ParetoRun, Sweeper, Told};
+use super::worker::RunStatus;
 use crate::lens::Lens;
-use crate::optimize::pareto::Settings;
+use crate::optimize::pareto::ParetoSettings;
 use std::io;
 use std::sync::Arc;
 
 /// How many earlier runs are kept.
-const EARLIER: usize = 8;
+const MAX_EARLIER: usize = 8;
 
 /// What is known about fronts.
 #[derive(Debug, Clone, Default)]
-pub struct Fronts {
+pub struct ParetoView {
     /// The run in the background, or the last one.
-    pub run: Option<Arc<FrontRun>>,
+    pub run: Option<Arc<ParetoRun>>,
     /// Whether one was asked for that has not begun yet.
     pub starting: bool,
     /// How the run will stand once its slice is done, where it was told so.
-    pub pending: Option<Standing>,
+    pub pending: Option<RunStatus>,
     /// Runs before it, the oldest first.
-    pub earlier: Vec<Arc<FrontRun>>,
+    pub earlier: Vec<Arc<ParetoRun>>,
     /// The design among them; maybe as it was a moment ago.
-    pub here: Option<Arc<Judged>>,
+    pub current_design: Option<Arc<ScoredLens>>,
     /// Why the last run could not begin or go on.
-    pub failed: Option<String>,
+    pub error: Option<String>,
 }
 
 /// What a session keeps of its fronts.
 #[derive(Debug)]
-pub(super) struct FrontDesk {
+pub(super) struct ParetoState {
     sweeper: Sweeper,
     course: Course,
-    earlier: Vec<Arc<FrontRun>>,
+    earlier: Vec<Arc<ParetoRun>>,
     /// The design that was judged last.
     asked: Option<Arc<Lens>>,
 }
 
-impl FrontDesk {
+impl ParetoState {
     pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         Ok(Self {
             sweeper: Sweeper::spawn(wake)?,
@@ -54,18 +54,18 @@ impl FrontDesk {
     }
 
     /// Begins a run; the one before it stays to compare with.
-    pub(super) fn start(&mut self, lens: &Arc<Lens>, settings: Settings, compare: bool) {
-        let worth = |run: &Arc<FrontRun>| run.main.front.designs().len() > 1;
+    pub(super) fn start(&mut self, lens: &Arc<Lens>, settings: ParetoSettings, compare: bool) {
+        let worth = |run: &Arc<ParetoRun>| run.main.front.points().len() > 1;
         self.earlier.extend(self.run().filter(worth));
-        let surplus = self.earlier.len().saturating_sub(EARLIER);
+        let surplus = self.earlier.len().saturating_sub(MAX_EARLIER);
         self.earlier.drain(..surplus);
         let (number, lens) = (self.course.begin(), Arc::clone(lens));
         self.sweeper.start(Job { number, lens, settings, compare });
     }
 
     /// Lets the run stand otherwise once its slice is done; a run that has ended stays so.
-    pub(super) fn stand(&mut self, standing: Standing) {
-        let ended = self.run().is_some_and(|run| !run.is_under_way());
+    pub(super) fn stand(&mut self, standing: RunStatus) {
+        let ended = self.run().is_some_and(|run| !run.is_active());
         if self.course.turn(standing, ended) {
             self.sweeper.stand(standing);
         }
@@ -80,7 +80,7 @@ impl FrontDesk {
     }
 
     /// What happened since the last look to the run that is shown.
-    pub(super) fn told(&mut self) -> Vec<Told> {
+    pub(super) fn drain_events(&mut self) -> Vec<Told> {
         let mut told = self.sweeper.told();
         told.retain(|told| match told {
             Told::Now(number, _) | Told::Failed(number, _) => self.course.is(*number),
@@ -97,7 +97,7 @@ impl FrontDesk {
     }
 
     /// Has the design judged, once for each, as long as there is a front to stand beside.
-    pub(super) fn keep_up(&mut self, lens: &Arc<Lens>) {
+    pub(super) fn sync(&mut self, lens: &Arc<Lens>) {
         let known = self.asked.as_ref().is_some_and(|asked| Arc::ptr_eq(asked, lens));
         if self.course.is_there() && !known {
             self.asked = Some(Arc::clone(lens));
@@ -105,19 +105,19 @@ impl FrontDesk {
         }
     }
 
-    pub(super) fn view(&self) -> Fronts {
+    pub(super) fn view(&self) -> ParetoView {
         let run = self.run();
-        Fronts {
+        ParetoView {
             starting: self.course.is_starting(run.is_some()),
             run,
             pending: self.course.pending(),
             earlier: self.earlier.clone(),
-            here: self.sweeper.judged().filter(|_| self.asked.is_some()),
-            failed: self.course.failed(),
+            current_design: self.sweeper.judged().filter(|_| self.asked.is_some()),
+            error: self.course.failed(),
         }
     }
 
-    fn run(&self) -> Option<Arc<FrontRun>> {
+    fn run(&self) -> Option<Arc<ParetoRun>> {
         self.sweeper.run().filter(|run| self.course.is(run.number))
     }
 }

@@ -1,51 +1,51 @@
 //! Undo and redo: whole lenses, shared and never copied.
 
-use super::command::Cell;
+use super::command::EditedCell;
 use crate::lens::Lens;
 use std::sync::Arc;
 
 /// How many steps can be taken back.
-const DEEPEST: usize = 1000;
+const MAX_STEPS: usize = 1000;
 
 /// The lenses before and after the present one.
 #[derive(Debug, Default)]
-pub(super) struct History {
-    past: Vec<Step>,
-    future: Vec<Step>,
+pub(super) struct UndoStack {
+    past: Vec<UndoStep>,
+    future: Vec<UndoStep>,
     /// The cell that is being typed into.
-    typing: Option<Cell>,
+    typing: Option<EditedCell>,
 }
 
 /// A lens on the other side of an edit.
 #[derive(Debug)]
-struct Step {
+struct UndoStep {
     lens: Arc<Lens>,
     title: String,
 }
 
-impl History {
+impl UndoStack {
     /// The lens before the typing into this cell began, if that is what the last step was.
-    pub(super) fn before_typing(&self, cell: Option<Cell>) -> Option<&Arc<Lens>> {
+    pub(super) fn before_edit(&self, cell: Option<EditedCell>) -> Option<&Arc<Lens>> {
         let same = cell.is_some() && self.typing == cell;
         self.past.last().filter(|_| same).map(|step| &step.lens)
     }
 
     /// Notes that `lens` was changed by an edit; more typing into one cell is no new step.
-    pub(super) fn note(&mut self, lens: Arc<Lens>, title: String, cell: Option<Cell>) {
-        let merges = self.before_typing(cell).is_some();
+    pub(super) fn push(&mut self, lens: Arc<Lens>, title: String, cell: Option<EditedCell>) {
+        let merges = self.before_edit(cell).is_some();
         self.future.clear();
         self.typing = cell;
         if merges {
             return;
         }
-        self.past.push(Step { lens, title });
-        if self.past.len() > DEEPEST {
+        self.past.push(UndoStep { lens, title });
+        if self.past.len() > MAX_STEPS {
             self.past.remove(0);
         }
     }
 
     /// Ends the typing into a cell.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn commit(&mut self) {
         self.typing = None;
     }
 
@@ -53,7 +53,7 @@ impl History {
     pub(super) fn undo(&mut self, present: &Arc<Lens>) -> Option<Arc<Lens>> {
         self.typing = None;
         let step = self.past.pop()?;
-        self.future.push(Step { lens: Arc::clone(present), title: step.title });
+        self.future.push(UndoStep { lens: Arc::clone(present), title: step.title });
         Some(step.lens)
     }
 
@@ -61,7 +61,7 @@ impl History {
     pub(super) fn redo(&mut self, present: &Arc<Lens>) -> Option<Arc<Lens>> {
         self.typing = None;
         let step = self.future.pop()?;
-        self.past.push(Step { lens: Arc::clone(present), title: step.title });
+        self.past.push(UndoStep { lens: Arc::clone(present), title: step.title });
         Some(step.lens)
     }
 

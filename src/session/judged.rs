@@ -2,7 +2,7 @@
 
 use super::background::guarded;
 use crate::lens::Lens;
-use crate::optimize::pareto::Design;
+use crate::optimize::pareto::ParetoPoint;
 use crate::pupil::limited_by_stop;
 use std::sync::Arc;
 
@@ -11,23 +11,23 @@ const ERROR: f64 = 1e-4;
 
 /// A lens, and what it is worth beside others.
 #[derive(Debug, Clone)]
-pub struct Judged {
+pub struct ScoredLens {
     /// The lens.
     pub lens: Arc<Lens>,
     /// What it is worth, or why nothing.
-    pub found: Result<Design, String>,
+    pub score: Result<ParetoPoint, String>,
 }
 
-impl Judged {
+impl ScoredLens {
     /// Judges a lens; a panic is a reason, too.
-    pub(super) fn of(lens: Arc<Lens>) -> Self {
-        let found = guarded(|| judge(&lens));
-        Self { lens, found }
+    pub(super) fn new(lens: Arc<Lens>) -> Self {
+        let found = guarded(|| score(&lens));
+        Self { lens, score: found }
     }
 }
 
 /// A lens as it is when its stop alone limits the beam.
-pub(super) fn judge(lens: &Lens) -> Result<Design, String> {
+pub(super) fn score(lens: &Lens) -> Result<ParetoPoint, String> {
     let lens = limited_by_stop(lens).map_err(|why| why.to_string())?;
-    Design::of(&lens, None, ERROR).map_err(|why| why.to_string())
+    ParetoPoint::evaluate(&lens, None, ERROR).map_err(|why| why.to_string())
 }

@@ -5,9 +5,11 @@
 //! two of its steps.
 
 use super::background::said;
-use super::clock::{Pace, Timed, timed};
-use super::slot::{Mailbox, Slot};
-use crate::experiments::{Effort, Ended, Experiment, Outcome, Progress, Report};
+use super::clock::{Throttle, Timed, time};
+use super::slot::{LatestRequest, Slot};
+use crate::experiments::{
+    Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentProgress, ExperimentReport,
+};
 use std::io;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,18 +23,18 @@ const BETWEEN: Duration = Duration::from_millis(50);
 
 /// An experiment that was begun.
 #[derive(Debug, Clone)]
-pub struct Trial {
+pub struct ExperimentRun {
     /// Which trial of the session it is, counted from 1.
     pub number: u64,
     /// The experiment.
-    pub study: &'static Experiment,
+    pub experiment: &'static Experiment,
     /// How it stands.
-    pub stage: Stage,
+    pub status: ExperimentStatus,
 }
 
 /// How an experiment stands.
 #[derive(Debug, Clone)]
-pub enum Stage {
+pub enum ExperimentStatus {
     /// It works.
     Running {
         /// The part that is done, 0 to 1.
@@ -41,7 +43,7 @@ pub enum Stage {
         doing: String,
     },
     /// It has found something.
-    Done(Arc<Report>),
+    Done(Arc<ExperimentReport>),
     /// It was told to stop.
     Stopped,
     /// It could not be carried out.
@@ -50,18 +52,18 @@ pub enum Stage {
 
 /// What is wanted.
 #[derive(Debug)]
-struct Request {
+struct ExperimentRequest {
     number: u64,
-    study: &'static Experiment,
+    experiment: &'static Experiment,
     effort: Effort,
     cancelled: Arc<AtomicBool>,
 }
 
 /// The handle of the thread that experiments.
 #[derive(Debug)]
-pub(super) struct Laboratory {
-    requests: Arc<Mailbox<Request>>,
-    trial: Slot<Trial>,
+pub(super) struct ExperimentWorker {
+    requests: Arc<LatestRequest<ExperimentRequest>>,
+    run: Slot<ExperimentRun>,
     cancelled: Arc<AtomicBool>,
     begun: u64,
     /// The last trial, unless it was put away.
@@ -69,30 +71,34 @@ pub(super) struct Laboratory {
     thread: Option<JoinHandle<()>>,
 }
 
-impl Laboratory {
+impl ExperimentWorker {
     /// Starts the thread. `wake` is called from it when there is something new to look at.
     pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
-        let requests = Arc::new(Mailbox::new());
+        let requests = Arc::new(LatestRequest::new());
         let trial = Slot::default();
         let (inbox, outbox) = (Arc::clone(&requests), trial.clone());
         let thread = thread::Builder::new().name("laboratory".into()).spawn(move || {
             while let Some(request) = inbox.take() {
-                carry_out(&request, &inbox, &outbox, &wake);
+                run_experiment(&request, &inbox, &outbox, &wake);
             }
         })?;
         let cancelled = Arc::default();
-        Ok(Self { requests, trial, cancelled, begun: 0, shown: None, thread: Some(thread) })
+        Ok(Self { requests, run: trial, cancelled, begun: 0, shown: None, thread: Some(thread) })
     }
 
     /// Begins an experiment in place of the one that runs.
-    pub(super) fn begin(&mut self, study: &'static Experiment, effort: Effort) {
+    pub(super) fn start(&mut self, study: &'static Experiment, effort: Effort) {
         self.cancel();
         self.cancelled = Arc::default();
         self.begun += 1;
         self.shown = Some(self.begun);
         let (number, cancelled) = (self.begun, Arc::clone(&self.cancelled));
-        self.trial.set(Trial { number, study, stage: Stage::waiting() });
-        self.requests.put(Request { number, study, effort, cancelled });
+        self.run.set(ExperimentRun {
+            number,
+            experiment: study,
+            status: ExperimentStatus::waiting(),
+        });
+        self.requests.submit(ExperimentRequest { number, experiment: study, effort, cancelled });
     }
 
     /// Tells the experiment to stop.
@@ -101,18 +107,18 @@ impl Laboratory {
     }
 
     /// Ends the experiment and forgets what it found.
-    pub(super) fn put_away(&mut self) {
+    pub(super) fn dismiss(&mut self) {
         self.cancel();
         self.shown = None;
     }
 
     /// The last experiment, unless it was put away.
-    pub(super) fn trial(&self) -> Option<Arc<Trial>> {
-        self.trial.latest().filter(|trial| Some(trial.number) == self.shown)
+    pub(super) fn run(&self) -> Option<Arc<ExperimentRun>> {
+        self.run.latest().filter(|trial| Some(trial.number) == self.shown)
     }
 }
 
-impl Drop for Laboratory {
+impl Drop for ExperimentWorker {
     fn drop(&mut self) {
         self.cancel();
         self.requests.close();
@@ -122,52 +128,52 @@ impl Drop for Laboratory {
     }
 }
 
-impl Stage {
+impl ExperimentStatus {
     fn waiting() -> Self {
         Self::Running { done: 0.0, doing: String::new() }
     }
 }
 
 /// Carries an experiment out and shows how far it is.
-fn carry_out(
-    request: &Request,
-    inbox: &Mailbox<Request>,
-    outbox: &Slot<Trial>,
+fn run_experiment(
+    request: &ExperimentRequest,
+    inbox: &LatestRequest<ExperimentRequest>,
+    outbox: &Slot<ExperimentRun>,
     wake: &(impl Fn() + Send),
 ) {
-    let Request { number, study, effort, ref cancelled } = *request;
-    let unwanted = || inbox.interrupts() || cancelled.load(Ordering::Relaxed);
-    let show = |stage: Stage| {
-        outbox.set(Trial { number, study, stage });
+    let ExperimentRequest { number, experiment: study, effort, ref cancelled } = *request;
+    let unwanted = || inbox.is_interrupted() || cancelled.load(Ordering::Relaxed);
+    let show = |stage: ExperimentStatus| {
+        outbox.set(ExperimentRun { number, experiment: study, status: stage });
         wake();
     };
-    let mut pace = Pace::new(BETWEEN);
-    let mut watch = |Progress { done, doing }: Progress<'_>| {
+    let mut pace = Throttle::new(BETWEEN);
+    let mut watch = |ExperimentProgress { done, doing }: ExperimentProgress<'_>| {
         if unwanted() {
             return ControlFlow::Break(());
         }
-        if pace.is_due() {
-            show(Stage::Running { done, doing: doing.to_owned() });
+        if pace.ready() {
+            show(ExperimentStatus::Running { done, doing: doing.to_owned() });
         }
         ControlFlow::Continue(())
     };
-    let run = AssertUnwindSafe(|| timed(|| (study.run)(effort, &mut watch)));
+    let run = AssertUnwindSafe(|| time(|| (study.run)(effort, &mut watch)));
     let stage = match catch_unwind(run) {
-        Ok(ended) => Stage::after(study, ended),
-        Err(panic) => Stage::Failed(said(panic.as_ref())),
+        Ok(ended) => ExperimentStatus::after(study, ended),
+        Err(panic) => ExperimentStatus::Failed(said(panic.as_ref())),
     };
     // The place belongs to the next one by now, where there is one.
-    if !inbox.interrupts() {
+    if !inbox.is_interrupted() {
         show(stage);
     }
 }
 
-impl Stage {
-    fn after(study: &Experiment, ended: Timed<Result<Outcome, Ended>>) -> Self {
+impl ExperimentStatus {
+    fn after(study: &Experiment, ended: Timed<Result<ExperimentOutcome, ExperimentError>>) -> Self {
         match ended.value {
-            Ok(outcome) => Self::Done(Arc::new(Report::new(study, outcome, ended.ms))),
-            Err(Ended::Stopped) => Self::Stopped,
-            Err(Ended::Failed(why)) => Self::Failed(why),
+            Ok(outcome) => Self::Done(Arc::new(ExperimentReport::new(study, outcome, ended.ms))),
+            Err(ExperimentError::Stopped) => Self::Stopped,
+            Err(ExperimentError::Failed(why)) => Self::Failed(why),
         }
     }
 }

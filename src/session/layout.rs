@@ -1,25 +1,25 @@
 //! The rays of the layout, in mm: what a drawing needs and nothing about how it looks.
 
 use crate::math::Vec3;
-use crate::pupil::Bench;
-use crate::trace::{Fates, Path};
+use crate::pupil::RayModel;
+use crate::trace::{Fates, RayPolyline};
 
 /// The rays that a layout shows.
 #[derive(Debug, Clone, Default)]
-pub struct Layout {
+pub struct RayLayout {
     /// The rays, field by field, from the lower rim of the pupil to the upper.
-    pub rays: Vec<DrawnRay>,
+    pub rays: Vec<LayoutRay>,
     /// How far from the axis these rays meet each surface, the image plane last.
-    pub reached: Vec<f64>,
+    pub ray_heights: Vec<f64>,
     /// How the rays ended.
     pub fates: Fates,
     /// Fields without rays, and why.
-    pub dark: Vec<(usize, String)>,
+    pub errors: Vec<(usize, String)>,
 }
 
 /// One ray of a layout.
 #[derive(Debug, Clone)]
-pub struct DrawnRay {
+pub struct LayoutRay {
     /// Its field.
     pub field: usize,
     /// Its wavelength.
@@ -28,59 +28,59 @@ pub struct DrawnRay {
     pub pupil: f64,
     /// Its corners in the frame of the first vertex, from in front of the lens to its end, and how
     /// it ended.
-    pub path: Path,
+    pub path: RayPolyline,
 }
 
 /// How far in front of the lens rays begin, as a share of its length with the way to the image.
 const LEAD: f64 = 0.15;
 
 /// A fan of rays of each field in the meridional plane, at the primary wavelength.
-pub fn layout(bench: &Bench, count: usize) -> Layout {
-    let mut layout = Layout {
-        reached: vec![0.0; bench.colors[bench.primary].tracer.surfaces()],
-        ..Layout::default()
+pub fn ray_layout(bench: &RayModel, count: usize) -> RayLayout {
+    let mut layout = RayLayout {
+        ray_heights: vec![0.0; bench.channels[bench.primary].tracer.surfaces()],
+        ..RayLayout::default()
     };
     for (field, point) in bench.fields.iter().enumerate() {
         match bench.launch(*point, bench.primary) {
             Ok(launch) => {
-                for pupil in across(count) {
+                for pupil in pupil_coordinates(count) {
                     if let Some(ray) = launch.ray([0.0, pupil]) {
-                        let mut path = launch.color().tracer.path(ray);
+                        let mut path = launch.channel().tracer.path(ray);
                         layout.count(&path);
-                        lead_in(bench, &mut path.points, ray.direction);
+                        extend_backwards(bench, &mut path.points, ray.direction);
                         let wavelength = bench.primary;
-                        layout.rays.push(DrawnRay { field, wavelength, pupil, path });
+                        layout.rays.push(LayoutRay { field, wavelength, pupil, path });
                     }
                 }
             }
-            Err(why) => layout.dark.push((field, why.to_string())),
+            Err(why) => layout.errors.push((field, why.to_string())),
         }
     }
     layout
 }
 
 /// Evenly spaced places from one rim of the pupil to the other.
-fn across(count: usize) -> impl Iterator<Item = f64> {
+fn pupil_coordinates(count: usize) -> impl Iterator<Item = f64> {
     let place = move |i: usize| {
         if count < 2 { 0.0 } else { 2.0 * i as f64 / (count - 1) as f64 - 1.0 }
     };
     (0..count).map(place)
 }
 
-impl Layout {
+impl RayLayout {
     /// Notes how a ray ended and how far from the axis it met each surface.
-    fn count(&mut self, path: &Path) {
+    fn count(&mut self, path: &RayPolyline) {
         self.fates.count(path.fate);
-        let met = path.fate.surface().unwrap_or(self.reached.len());
-        for (reached, height) in self.reached.iter_mut().zip(&path.heights).take(met) {
+        let met = path.fate.surface().unwrap_or(self.ray_heights.len());
+        for (reached, height) in self.ray_heights.iter_mut().zip(&path.heights).take(met) {
             *reached = reached.max(*height);
         }
     }
 }
 
 /// Where drawn rays begin: in front of everything, mirrors that stand before the first vertex too.
-fn front(bench: &Bench) -> f64 {
-    let surfaces = &bench.colors[bench.primary].system.surfaces;
+fn drawing_start(bench: &RayModel) -> f64 {
+    let surfaces = &bench.channels[bench.primary].system.surfaces;
     let (mut z, mut first, mut last) = (0.0_f64, 0.0_f64, 0.0_f64);
     for surface in surfaces {
         (first, last) = (first.min(z), last.max(z));
@@ -90,9 +90,9 @@ fn front(bench: &Bench) -> f64 {
 }
 
 /// Moves the start of a ray to where drawing begins: the object, or a plane in front of the lens.
-fn lead_in(bench: &Bench, points: &mut [Vec3<f64>], along: Vec3<f64>) {
+fn extend_backwards(bench: &RayModel, points: &mut [Vec3<f64>], along: Vec3<f64>) {
     let [start, ..] = points else { return };
-    let front = front(bench);
+    let front = drawing_start(bench);
     let from = match bench.beam.object {
         crate::lens::Object::Finite(distance) if distance > 0.0 => -distance,
         _ => f64::NEG_INFINITY,

@@ -1,7 +1,7 @@
 //! One open design: the document, commands and undo, a search and an analyst in the background.
 //!
 //! A [`Session`] is told what a person wants as [`Command`]s and shows what there is as a
-//! [`View`]. It knows no widgets: the window, a test and a script use it alike.
+//! [`SessionView`]. It knows no widgets: the window, a test and a script use it alike.
 //!
 //! - *The document changes only by a command*, and an edit that would leave a lens that cannot be
 //!   used is refused: the document is then what it was.
@@ -42,29 +42,33 @@ mod typed;
 mod view;
 mod worker;
 
-pub use analyst::{Numbers, Results, compute};
+pub use analyst::{Analyses, AnalysisResults, analyze};
 pub use clock::Timed;
-pub use command::{Command, Edit, Explore};
-pub use desk::{Event, Session};
-pub use edit::{EditError, edited};
-pub use exploration::{Checkpoint, Ending, Exploration, Found, Place};
-pub use explorations::Explorations;
-pub use forming::{
-    Contour, Form, Formation, Forming, Loss, MOST_NODES, Origin, Profile, Quantity, Sight,
-    Sighting, Slice, Subject,
+pub use command::{Command, Edit, StructureSearchCommand};
+pub use desk::{Session, SessionEvent};
+pub use edit::{EditError, apply_edit};
+pub use exploration::{
+    ChainPosition, CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot,
 };
-pub use fresh::fresh_glass;
-pub use fronts::Fronts;
-pub use judged::Judged;
-pub use laboratory::{Stage, Trial};
-pub use layout::{DrawnRay, Layout, layout};
-pub use moments::{History, Mark, Moment};
-pub use pupils::Pupils;
-pub use quest::Quest;
-pub use saving::timed_plan;
-pub use scatter::{Scatter, scatter};
+pub use explorations::StructureSearchView;
+pub use forming::{
+    Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinRun, GrinView,
+    IndexProfile, LossSample, MAX_NODES, Slice, SliceQuantity, SliceSettings,
+};
+pub use fresh::added_glass;
+pub use fronts::ParetoView;
+pub use judged::ScoredLens;
+pub use laboratory::{ExperimentRun, ExperimentStatus};
+pub use layout::{LayoutRay, RayLayout, ray_layout};
+pub use moments::{DescentMark, HistorySample, SearchHistory};
+pub use pupils::FieldPupils;
+pub use quest::StructureSearchRequest;
+pub use saving::measure_effect_costs;
+pub use scatter::{SpotPoints, spot_points};
 pub use slot::Slot;
-pub use sweeper::{FrontRun, Leg};
-pub use typed::{NoNumber, evaluate};
-pub use view::{Message, Settings, Severity, View, blank};
-pub use worker::{HistoryPoint, Search, Standing, Starter, Task};
+pub use sweeper::{ParetoPass, ParetoRun};
+pub use typed::{ParseNumberError, evaluate};
+pub use view::{AnalysisSettings, Message, SessionView, Severity, blank};
+pub use worker::{
+    MeritSample, OptimizationRequest, OptimizationSnapshot, OptimizerFactory, RunStatus,
+};

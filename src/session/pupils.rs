@@ -1,40 +1,55 @@
 //! The pupils of all fields, each with its time.
 
-use super::analyst::each;
-use super::clock::{Timed, timed};
-use super::view::Settings;
+use super::analyst::for_each_field;
+use super::clock::{Timed, time};
+use super::view::AnalysisSettings;
 use crate::analysis;
-use crate::analysis::{Estimate, Pupil, Rims};
-use crate::lens::Field;
-use crate::pupil::{Accuracy, Bench, NoDerivative};
+use crate::analysis::{Estimate, FieldPupil, RimSensitivities};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, DerivativeError, RayModel};
 
 /// The pupils of all fields at one wavelength.
 #[derive(Debug, Clone)]
-pub struct Pupils {
+pub struct FieldPupils {
     /// The wavelength.
     pub wavelength: usize,
     /// The pupil of each field, in order.
-    pub fields: Vec<Timed<Pupil>>,
+    pub fields: Vec<Timed<FieldPupil>>,
     /// The area of the pupil on the axis, in mm²; `None` where that one is dark.
     pub axis: Option<Estimate>,
     /// What the rims of the lens do to each field, or why that is not known.
-    pub rims: Timed<Vec<Result<Rims, NoDerivative>>>,
+    pub rims: Timed<Vec<Result<RimSensitivities, DerivativeError>>>,
     /// What they do to all fields with light together.
-    pub all_rims: Option<Rims>,
+    pub all_rims: Option<RimSensitivities>,
 }
 
 /// The pupils of all fields at the wavelength that is asked for, or the primary one.
-pub(super) fn pupils(bench: &Bench, settings: &Settings, accuracy: Accuracy) -> Pupils {
-    let chosen = settings.pupil_wavelength.filter(|chosen| *chosen < bench.colors.len());
+pub(super) fn field_pupils(
+    bench: &RayModel,
+    settings: &AnalysisSettings,
+    accuracy: Accuracy,
+) -> FieldPupils {
+    let chosen = settings.pupil_wavelength.filter(|chosen| *chosen < bench.channels.len());
     let wavelength = chosen.unwrap_or(bench.primary);
-    let pupil = |field: Field| timed(|| analysis::pupil(bench, field, wavelength, accuracy));
-    let fields = each(bench, pupil);
-    let on_axis = |pupil: &&Timed<Pupil>| pupil.value.field.x == 0.0 && pupil.value.field.y == 0.0;
+    let pupil = |field: FieldPoint| time(|| analysis::pupil(bench, field, wavelength, accuracy));
+    let fields = for_each_field(bench, pupil);
+    let on_axis =
+        |pupil: &&Timed<FieldPupil>| pupil.value.field.x == 0.0 && pupil.value.field.y == 0.0;
     let axis = fields.iter().find(on_axis).cloned();
-    let axis = axis.unwrap_or_else(|| pupil(Field { x: 0.0, y: 0.0, weight: 1.0 }));
-    let rims = timed(|| each(bench, |field| analysis::rims(bench, field, wavelength, accuracy)));
+    let axis = axis.unwrap_or_else(|| pupil(FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }));
+    let rims = time(|| {
+        for_each_field(bench, |field| {
+            analysis::rim_sensitivities(bench, field, wavelength, accuracy)
+        })
+    });
     let known = rims.value.iter().zip(&bench.fields);
     let known = known.filter_map(|(rims, field)| Some((field.weight, rims.as_ref().ok()?)));
-    let all_rims = analysis::together(&known.collect::<Vec<_>>());
-    Pupils { wavelength, fields, axis: axis.value.light.map(|light| light.area), rims, all_rims }
+    let all_rims = analysis::mean_rim_sensitivities(&known.collect::<Vec<_>>());
+    FieldPupils {
+        wavelength,
+        fields,
+        axis: axis.value.extent.map(|light| light.area),
+        rims,
+        all_rims,
+    }
 }

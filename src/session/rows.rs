@@ -1,32 +1,32 @@
 //! Rows come, go and turn around; everything that names a row by its number follows.
 
 use super::edit::EditError;
-use crate::lens::{GRADE_TERMS, Lens, Medium, Parameter, Quantity, Row};
+use crate::lens::{Lens, Medium, PROFILE_TERMS, Parameter, Quantity, Row};
 
 /// Puts a row in front of row `at`. A solved last gap stays with the last row.
 pub(super) fn insert(lens: &mut Lens, at: usize, row: &Row) -> Result<(), EditError> {
     let count = lens.surfaces.len();
     if at > count {
-        return Err(EditError::NoRow { surface: at, last: count });
+        return Err(EditError::UnknownSurface { surface: at, last: count });
     }
-    let focus = lens.focus;
+    let focus = lens.image_solve;
     if at == count {
-        lens.freeze_focus()?;
+        lens.replace_focus_solve()?;
     }
     lens.surfaces.insert(at, row.clone());
-    lens.focus = focus;
+    lens.image_solve = focus;
     lens.renumber_rows(|surface| Some(if surface < at { surface } else { surface + 1 }));
     Ok(())
 }
 
 /// Takes a row out. What followed one of its numbers keeps its value and follows no longer.
 pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
-    lens.row(surface)?;
+    lens.row_mut(surface)?;
     if lens.surfaces.len() == 1 {
-        return Err(EditError::OnlyRow);
+        return Err(EditError::OnlySurface);
     }
     if lens.surfaces[surface].stop {
-        return Err(EditError::IsStop(surface));
+        return Err(EditError::RemovedStop(surface));
     }
     lens.surfaces.remove(surface);
     lens.renumber_rows(|row| match row {
@@ -39,12 +39,12 @@ pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
 
 /// Replaces a row; variables and pickups of numbers that it does not have go.
 pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), EditError> {
-    lens.row(surface)?.clone_from(row);
-    let gradient = (0..GRADE_TERMS).map(Quantity::Gradient);
+    lens.row_mut(surface)?.clone_from(row);
+    let gradient = (0..PROFILE_TERMS).map(Quantity::Gradient);
     for quantity in [Quantity::Index, Quantity::SemiDiameter].into_iter().chain(gradient) {
         let parameter = Parameter::new(surface, quantity);
         if lens.get(parameter).is_none() {
-            lens.forget(parameter);
+            lens.drop_references(parameter);
         }
     }
     Ok(())
@@ -53,20 +53,20 @@ pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), 
 /// Turns the rows `first` to `last` around: surfaces and the gaps between them in reverse order,
 /// every curvature and asphere coefficient with the other sign. The gap behind the group stays.
 pub(super) fn flip(lens: &mut Lens, first: usize, last: usize) -> Result<(), EditError> {
-    lens.row(last)?;
+    lens.row_mut(last)?;
     if first > last {
-        return Err(EditError::NoGroup { first, last });
+        return Err(EditError::ReversedRange { first, last });
     }
     if let Some(i) = (first..=last).find(|i| lens.surfaces[*i].medium == Medium::Mirror) {
         return Err(EditError::Mirror(i));
     }
     let along = |i: &usize| match &lens.surfaces[*i].medium {
-        Medium::Gradient(gradient) => gradient.axial.iter().any(|term| *term != 0.0),
+        Medium::Grin(gradient) => gradient.axial.iter().any(|term| *term != 0.0),
         _ => false,
     };
     if let Some(i) = (first..last).find(along) {
-        return Err(EditError::AxialGradient(i));
+        return Err(EditError::AxialGrin(i));
     }
-    lens.turn_rows(first, last);
+    lens.reverse_rows(first, last);
     Ok(())
 }

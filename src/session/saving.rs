@@ -1,52 +1,52 @@
 //! How much time each effect takes, measured: the spots of a lens with it and without it.
 
-use super::clock::timed;
-use super::view::Settings;
+use super::clock::time;
+use super::view::AnalysisSettings;
 use crate::analysis;
 use crate::effects;
-use crate::effects::{Choice, Effect, Facts, Plan, Task};
+use crate::effects::{Effect, EffectMeasurements, EffectOverride, EffectPlan, TracePurpose};
 use crate::lens::Lens;
 use crate::pupil::Accuracy;
 
 /// A time is the shortest of so many.
-const RUNS: usize = 2;
+const REPETITIONS: usize = 2;
 
 /// The plan of a lens for the spots that its settings ask for, with the time that each effect
 /// takes; `None` if `interrupted` says so between two measurements.
 ///
 /// # Errors
 /// A lens or aperture through which nothing can be traced.
-pub fn timed_plan(
+pub fn measure_effect_costs(
     lens: &Lens,
-    settings: &Settings,
+    settings: &AnalysisSettings,
     interrupted: impl Fn() -> bool,
-) -> Option<Result<Plan, String>> {
-    let facts = match effects::survey(lens, settings.zoom) {
+) -> Option<Result<EffectPlan, String>> {
+    let facts = match effects::measure_effects(lens, settings.zoom) {
         Ok(facts) => facts,
         Err(why) => return Some(Err(why.to_string())),
     };
-    let task = Task::Spot(settings.tolerance);
-    let mut plan = effects::plan(&facts, task, &settings.choices);
+    let task = TracePurpose::Spot(settings.tolerance);
+    let mut plan = effects::plan(&facts, task, &settings.overrides);
     for decision in &mut plan.decisions {
-        let pair = Pair::new(&facts, settings, decision.effect);
+        let pair = EffectOnOff::new(&facts, settings, decision.effect);
         decision.saved_ms = Some(pair.difference(lens, settings, &interrupted)?);
     }
     Some(Ok(plan))
 }
 
 /// The same lens with and without an effect.
-struct Pair {
-    on: Plan,
-    off: Plan,
+struct EffectOnOff {
+    on: EffectPlan,
+    off: EffectPlan,
 }
 
-impl Pair {
-    fn new(facts: &Facts, settings: &Settings, effect: Effect) -> Self {
+impl EffectOnOff {
+    fn new(facts: &EffectMeasurements, settings: &AnalysisSettings, effect: Effect) -> Self {
         let plan = |choice| {
-            let choices = settings.choices.clone().with(effect, choice);
-            effects::plan(facts, Task::Spot(settings.tolerance), &choices)
+            let choices = settings.overrides.clone().with(effect, choice);
+            effects::plan(facts, TracePurpose::Spot(settings.tolerance), &choices)
         };
-        Self { on: plan(Choice::On), off: plan(Choice::Off) }
+        Self { on: plan(EffectOverride::On), off: plan(EffectOverride::Off) }
     }
 
     /// Whether both come to the same.
@@ -61,19 +61,19 @@ impl Pair {
     fn difference(
         &self,
         lens: &Lens,
-        settings: &Settings,
+        settings: &AnalysisSettings,
         interrupted: &impl Fn() -> bool,
     ) -> Option<f64> {
         if self.is_same() {
             return Some(0.0);
         }
         let mut best = [f64::INFINITY; 2];
-        for _ in 0..RUNS {
+        for _ in 0..REPETITIONS {
             for (best, plan) in best.iter_mut().zip([&self.on, &self.off]) {
                 if interrupted() {
                     return None;
                 }
-                *best = best.min(timed(|| work(lens, settings, plan)).ms);
+                *best = best.min(time(|| spots_of(lens, settings, plan)).ms);
             }
         }
         Some(best[0] - best[1])
@@ -81,11 +81,11 @@ impl Pair {
 }
 
 /// The spots of a lens as a plan resolves it; a lens without any is done at once.
-fn work(lens: &Lens, settings: &Settings, plan: &Plan) -> usize {
-    let accuracy = Accuracy { tolerance: settings.tolerance, most_rays: MOST_RAYS };
-    effects::bench(lens, settings.zoom, plan)
+fn spots_of(lens: &Lens, settings: &AnalysisSettings, plan: &EffectPlan) -> usize {
+    let accuracy = Accuracy { tolerance: settings.tolerance, max_rays: MAX_RAYS };
+    effects::build_ray_model(lens, settings.zoom, plan)
         .map_or(0, |bench| analysis::spots(&bench, accuracy).len())
 }
 
 /// A lens without an effect may have spots that no number of rays gets right.
-const MOST_RAYS: usize = 10_000;
+const MAX_RAYS: usize = 10_000;

@@ -11,7 +11,7 @@ fn power(rows: &[Row], parameter: Parameter) -> i32 {
         Quantity::Asphere(term) => -(2 * term as i32 + 3),
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 1,
         Quantity::Gradient(k) => match &rows[parameter.surface].medium {
-            Medium::Gradient(gradient) => gradient.power(k),
+            Medium::Grin(gradient) => gradient.power(k),
             _ => 0,
         },
     }
@@ -20,7 +20,7 @@ fn power(rows: &[Row], parameter: Parameter) -> i32 {
 /// Multiplies every length; angles, f-numbers and apertures by number stay.
 pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
     if !(factor > 0.0 && factor.is_finite()) {
-        return Err(EditError::Scale(factor));
+        return Err(EditError::InvalidScale(factor));
     }
     for row in &mut lens.surfaces {
         row.curvature *= factor.powi(-1);
@@ -30,8 +30,8 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
         }
-        if let Medium::Gradient(gradient) = &mut row.medium {
-            for k in gradient.written().collect::<Vec<_>>() {
+        if let Medium::Grin(gradient) = &mut row.medium {
+            for k in gradient.written_terms().collect::<Vec<_>>() {
                 let term = gradient.term(k).unwrap_or(0.0);
                 gradient.set_term(k, term * factor.powi(gradient.power(k)));
             }
@@ -40,7 +40,7 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
     if let Object::Finite(distance) = &mut lens.object {
         *distance *= factor;
     }
-    lens.focus = lens.focus.map(|offset| offset * factor);
+    lens.image_solve = lens.image_solve.map(|offset| offset * factor);
     scale_aperture(&mut lens.aperture, factor);
     scale_fields(&mut lens.fields, factor);
     for position in &mut lens.zoom {

@@ -1,11 +1,11 @@
 //! Where the rays of each field land: the dots of a spot diagram.
 
-use crate::pupil::{Bench, Launch, Pattern, pattern};
-use crate::trace::{Fates, Points, Rays, Sink};
+use crate::pupil::{Launch, PupilPattern, RayModel, pattern_points};
+use crate::trace::{Fates, ImagePoints, Rays, TraceSink};
 
 /// The dots of one field at one wavelength.
 #[derive(Debug, Clone, Default)]
-pub struct Scatter {
+pub struct SpotPoints {
     /// The field.
     pub field: usize,
     /// The wavelength.
@@ -20,26 +20,27 @@ pub struct Scatter {
 const RINGS: usize = 6;
 
 /// The dots of every field and wavelength; a field without rays has none.
-pub fn scatter(bench: &Bench) -> Vec<Scatter> {
-    let points = pattern(Pattern::Hexapolar(RINGS));
+pub fn spot_points(bench: &RayModel) -> Vec<SpotPoints> {
+    let points = pattern_points(PupilPattern::Hexapolar(RINGS));
     let mut all = Vec::new();
     for (field, point) in bench.fields.iter().enumerate() {
-        for wavelength in 0..bench.colors.len() {
-            let dots = bench.launch(*point, wavelength).ok().map(|launch| dots(&launch, &points));
-            all.push(Scatter { field, wavelength, ..dots.unwrap_or_default() });
+        for wavelength in 0..bench.channels.len() {
+            let dots =
+                bench.launch(*point, wavelength).ok().map(|launch| points_of(&launch, &points));
+            all.push(SpotPoints { field, wavelength, ..dots.unwrap_or_default() });
         }
     }
     all
 }
 
-fn dots(launch: &Launch<'_>, points: &[[f64; 2]]) -> Scatter {
+fn points_of(launch: &Launch<'_>, points: &[[f64; 2]]) -> SpotPoints {
     let rays: Rays<f64> = points.iter().filter_map(|p| launch.ray(*p)).collect();
-    let mut landed = Points::default();
-    launch.color().tracer.batch(&rays, &mut landed);
+    let mut landed = ImagePoints::default();
+    launch.channel().tracer.trace_batch(&rays, &mut landed);
     let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
-    Scatter {
+    SpotPoints {
         points: arrived.map(|i| [landed.x[i], landed.y[i]]).collect(),
         fates: landed.fates(),
-        ..Scatter::default()
+        ..SpotPoints::default()
     }
 }

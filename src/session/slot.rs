@@ -38,26 +38,26 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// A letter box that holds one letter: a newer one replaces one that was not read yet.
 #[derive(Debug)]
-pub(super) struct Mailbox<T> {
-    state: Mutex<State<T>>,
+pub(super) struct LatestRequest<T> {
+    state: Mutex<RequestState<T>>,
     arrived: Condvar,
 }
 
 #[derive(Debug)]
-struct State<T> {
-    letter: Option<T>,
+struct RequestState<T> {
+    request: Option<T>,
     closed: bool,
 }
 
-impl<T> Mailbox<T> {
+impl<T> LatestRequest<T> {
     pub(super) fn new() -> Self {
-        let state = State { letter: None, closed: false };
+        let state = RequestState { request: None, closed: false };
         Self { state: Mutex::new(state), arrived: Condvar::new() }
     }
 
     /// Leaves a letter.
-    pub(super) fn put(&self, letter: T) {
-        locked(&self.state).letter = Some(letter);
+    pub(super) fn submit(&self, letter: T) {
+        locked(&self.state).request = Some(letter);
         self.arrived.notify_one();
     }
 
@@ -68,22 +68,22 @@ impl<T> Mailbox<T> {
     }
 
     /// Whether a reader should leave what it is at.
-    pub(super) fn interrupts(&self) -> bool {
+    pub(super) fn is_interrupted(&self) -> bool {
         let state = locked(&self.state);
-        state.closed || state.letter.is_some()
+        state.closed || state.request.is_some()
     }
 
     /// Waits for a letter; `None` when the box is closed.
     pub(super) fn take(&self) -> Option<T> {
-        let waiting = |state: &mut State<T>| !state.closed && state.letter.is_none();
+        let waiting = |state: &mut RequestState<T>| !state.closed && state.request.is_none();
         let state = self.arrived.wait_while(locked(&self.state), waiting);
         let mut state = state.unwrap_or_else(PoisonError::into_inner);
-        if state.closed { None } else { state.letter.take() }
+        if state.closed { None } else { state.request.take() }
     }
 
     /// Whether nothing arrives for a while.
-    pub(super) fn is_quiet_for(&self, time: Duration) -> bool {
-        let waiting = |state: &mut State<T>| !state.closed && state.letter.is_none();
+    pub(super) fn idle_for(&self, time: Duration) -> bool {
+        let waiting = |state: &mut RequestState<T>| !state.closed && state.request.is_none();
         let waited = self.arrived.wait_timeout_while(locked(&self.state), time, waiting);
         waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
     }

@@ -8,12 +8,12 @@ use std::iter::Peekable;
 use std::str::Chars;
 
 /// How deep brackets may be nested.
-const DEEPEST: usize = 32;
+const MAX_DEPTH: usize = 32;
 
 /// Why a text is no number.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` is no number; expected one such as 12.5, or arithmetic such as 25.4/2, *2 or +5")]
-pub struct NoNumber {
+pub struct ParseNumberError {
     /// What was typed.
     pub text: String,
 }
@@ -22,24 +22,24 @@ pub struct NoNumber {
 ///
 /// # Errors
 /// A text that is no number, or arithmetic without a result, such as `0/0`.
-pub fn evaluate(text: &str, old: f64) -> Result<f64, NoNumber> {
+pub fn evaluate(text: &str, old: f64) -> Result<f64, ParseNumberError> {
     let trimmed = text.trim();
     let goes_on = trimmed.starts_with(['*', '/', '+']) || trimmed.starts_with("- ");
-    let mut reader = Reader { rest: trimmed.chars().peekable(), depth: 0 };
+    let mut reader = ExpressionParser { rest: trimmed.chars().peekable(), depth: 0 };
     let value = if goes_on { reader.tail(old) } else { reader.sum() };
     match value {
         Some(value) if reader.rest.next().is_none() && !value.is_nan() => Ok(value),
-        _ => Err(NoNumber { text: text.to_owned() }),
+        _ => Err(ParseNumberError { text: text.to_owned() }),
     }
 }
 
 /// Reads from left to right; `None` where the text stops making sense.
-struct Reader<'a> {
+struct ExpressionParser<'a> {
     rest: Peekable<Chars<'a>>,
     depth: usize,
 }
 
-impl Reader<'_> {
+impl ExpressionParser<'_> {
     fn sum(&mut self) -> Option<f64> {
         let first = self.product()?;
         self.terms(first)
@@ -92,7 +92,7 @@ impl Reader<'_> {
             return self.number();
         }
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > MAX_DEPTH {
             return None;
         }
         let value = self.sum()?;

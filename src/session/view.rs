@@ -1,41 +1,41 @@
 //! What a panel reads: a snapshot of the session that nothing changes.
 
-use super::analyst::Results;
-use super::explorations::Explorations;
-use super::forming::Forming;
-use super::fronts::Fronts;
-use super::laboratory::Trial;
-use super::worker::Search;
-use crate::effects::Choices;
-use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Row, Wavelength};
+use super::analyst::AnalysisResults;
+use super::explorations::StructureSearchView;
+use super::forming::GrinView;
+use super::fronts::ParetoView;
+use super::laboratory::ExperimentRun;
+use super::worker::OptimizationSnapshot;
+use crate::effects::EffectOverrides;
+use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A snapshot of one open design and everything that is known about it.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct SessionView {
     /// The design.
     pub lens: Arc<Lens>,
     /// Counts every change of the design and of the settings.
     pub version: u64,
     /// The newest numbers there are, maybe of an older version.
-    pub results: Option<Arc<Results>>,
+    pub results: Option<Arc<AnalysisResults>>,
     /// The search in the background, or the last one whose result was neither taken nor thrown
     /// away.
-    pub search: Option<Arc<Search>>,
+    pub optimization: Option<Arc<OptimizationSnapshot>>,
     /// The fronts of sharpness against light.
-    pub fronts: Fronts,
+    pub pareto: ParetoView,
     /// The search over structure.
-    pub explorations: Explorations,
+    pub structure_search: StructureSearchView,
     /// The gradient-index field that is open.
-    pub forming: Forming,
+    pub grin: GrinView,
     /// A lens that is shown in place of the design.
-    pub candidate: Option<Arc<Lens>>,
+    pub preview_lens: Option<Arc<Lens>>,
     /// The numbers of that lens, or of the one that the search shows, maybe of a step before.
-    pub preview: Option<Arc<Results>>,
+    pub preview_results: Option<Arc<AnalysisResults>>,
     /// The experiment in the background, or the last one until it is put away.
-    pub trial: Option<Arc<Trial>>,
+    pub experiment: Option<Arc<ExperimentRun>>,
     /// What was said, newest last.
     pub messages: Vec<Message>,
     /// What undo would take back; `None` where there is nothing.
@@ -47,36 +47,36 @@ pub struct View {
     /// Whether the design differs from its file.
     pub dirty: bool,
     /// What is shown and how exactly.
-    pub settings: Settings,
+    pub settings: AnalysisSettings,
     /// The surface that every panel points out.
     pub selected: Option<usize>,
 }
 
-impl Default for View {
+impl Default for SessionView {
     fn default() -> Self {
         Self {
             lens: Arc::new(blank()),
             version: 0,
             results: None,
-            search: None,
-            fronts: Fronts::default(),
-            explorations: Explorations::default(),
-            forming: Forming::default(),
-            candidate: None,
-            preview: None,
-            trial: None,
+            optimization: None,
+            pareto: ParetoView::default(),
+            structure_search: StructureSearchView::default(),
+            grin: GrinView::default(),
+            preview_lens: None,
+            preview_results: None,
+            experiment: None,
             messages: Vec::new(),
             undo: None,
             redo: None,
             path: None,
             dirty: false,
-            settings: Settings::default(),
+            settings: AnalysisSettings::default(),
             selected: None,
         }
     }
 }
 
-impl View {
+impl SessionView {
     /// Whether the numbers belong to the design as it is now.
     pub fn is_current(&self) -> bool {
         self.results.as_ref().is_some_and(|results| results.version == self.version)
@@ -95,7 +95,7 @@ impl View {
 
 /// What is shown and how exactly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
+pub struct AnalysisSettings {
     /// The relative error that the shown numbers may have.
     pub tolerance: f64,
     /// The zoom position that is shown.
@@ -103,20 +103,20 @@ pub struct Settings {
     /// How many rays of each field the layout shows.
     pub rays: usize,
     /// Effects that are not left to the plan.
-    pub choices: Choices,
+    pub overrides: EffectOverrides,
     /// Whether pupils are computed: what is not shown is not.
     pub pupils: bool,
     /// The wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
 }
 
-impl Default for Settings {
+impl Default for AnalysisSettings {
     fn default() -> Self {
         Self {
             tolerance: 1e-3,
             zoom: 0,
             rays: 15,
-            choices: Choices::default(),
+            overrides: EffectOverrides::default(),
             pupils: false,
             pupil_wavelength: None,
         }
@@ -162,7 +162,7 @@ pub fn blank() -> Lens {
         aperture: Aperture::EntrancePupilDiameter(10.0),
         fields: Fields {
             kind: FieldKind::Angle,
-            values: vec![Field { x: 0.0, y: 0.0, weight: 1.0 }],
+            values: vec![FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }],
         },
         wavelengths: vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }],
         surfaces: vec![
@@ -172,6 +172,6 @@ pub fn blank() -> Lens {
         zoom: Vec::new(),
         variables: Vec::new(),
         pickups: Vec::new(),
-        focus: None,
+        image_solve: None,
     }
 }

@@ -5,11 +5,11 @@
 //! thirty times a second, and at once where something ends.
 
 use super::background::{Background, Outbox, Work, guarded};
-use super::clock::Pace;
+use super::clock::Throttle;
 use super::slot::Slot;
 use crate::lens::Lens;
 use crate::merit::{Goal, TermValue};
-use crate::optimize::{Method, Optimizer, Progress};
+use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer};
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,9 +21,9 @@ const HISTORY: usize = 2000;
 
 /// What a search is to do.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Task {
+pub struct OptimizationRequest {
     /// How to search.
-    pub method: Method,
+    pub method: DescentMethod,
     /// From where.
     pub lens: Arc<Lens>,
     /// What for.
@@ -33,11 +33,12 @@ pub struct Task {
 }
 
 /// Begins a search.
-pub type Starter = dyn Fn(&Task) -> Result<Box<dyn Optimizer>, String> + Send;
+pub type OptimizerFactory =
+    dyn Fn(&OptimizationRequest) -> Result<Box<dyn Optimizer>, String> + Send;
 
 /// How a search stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
+pub enum RunStatus {
     /// It takes steps.
     Running,
     /// It is held and can go on.
@@ -48,39 +49,39 @@ pub enum Standing {
     Finished,
 }
 
-impl Standing {
+impl RunStatus {
     /// Whether it goes on or can.
-    pub const fn can_go_on(self) -> bool {
+    pub const fn is_active(self) -> bool {
         matches!(self, Self::Running | Self::Paused)
     }
 }
 
 /// How far a search is.
 #[derive(Debug, Clone)]
-pub struct Search {
+pub struct OptimizationSnapshot {
     /// Which search of the session it is, counted from 1.
     pub number: u64,
     /// How it stands.
-    pub standing: Standing,
+    pub status: RunStatus,
     /// What it was told to do, with the lens it started from.
-    pub task: Arc<Task>,
+    pub request: Arc<OptimizationRequest>,
     /// What its last step did; `None` before the first.
-    pub progress: Option<Progress>,
+    pub progress: Option<OptimizationProgress>,
     /// The best lens so far.
     pub best: Arc<Lens>,
     /// The lens at the current step.
     pub current: Arc<Lens>,
     /// Every term of the merit for the lens it started from.
-    pub before: Vec<TermValue>,
+    pub initial_terms: Vec<TermValue>,
     /// Every term of the merit for the best lens so far.
-    pub terms: Vec<TermValue>,
+    pub best_terms: Vec<TermValue>,
     /// The merit against the step, at most a few thousand points of the whole way.
-    pub history: Vec<HistoryPoint>,
+    pub history: Vec<MeritSample>,
 }
 
 /// A point of the merit history.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HistoryPoint {
+pub struct MeritSample {
     /// Steps so far.
     pub step: usize,
     /// Merit of the current lens.
@@ -103,7 +104,7 @@ pub(super) enum News {
 /// What a search is told.
 #[derive(Debug)]
 enum Order {
-    Start { number: u64, task: Task },
+    Start { number: u64, task: OptimizationRequest },
     Pause,
     Resume,
     Step,
@@ -114,20 +115,23 @@ enum Order {
 #[derive(Debug)]
 pub(super) struct Worker {
     thread: Background<Order, News>,
-    search: Slot<Search>,
+    search: Slot<OptimizationSnapshot>,
 }
 
 impl Worker {
     /// Starts the thread. `wake` is called from it when there is something new to look at.
-    pub(super) fn spawn(start: Box<Starter>, wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+    pub(super) fn spawn(
+        start: Box<OptimizerFactory>,
+        wake: impl Fn() + Send + 'static,
+    ) -> io::Result<Self> {
         let search = Slot::default();
         let shown = search.clone();
         let desk =
-            |outbox| Desk { outbox, search: shown, start, pace: Pace::new(BETWEEN), run: None };
+            |outbox| Desk { outbox, search: shown, start, pace: Throttle::new(BETWEEN), run: None };
         Ok(Self { thread: Background::spawn("optimizer", wake, desk)?, search })
     }
 
-    pub(super) fn start(&self, number: u64, task: Task) {
+    pub(super) fn start(&self, number: u64, task: OptimizationRequest) {
         self.thread.tell(Order::Start { number, task });
     }
 
@@ -148,7 +152,7 @@ impl Worker {
     }
 
     /// How far the search is.
-    pub(super) fn search(&self) -> Option<Arc<Search>> {
+    pub(super) fn search(&self) -> Option<Arc<OptimizationSnapshot>> {
         self.search.latest()
     }
 
@@ -161,16 +165,16 @@ impl Worker {
 /// What the thread works with.
 struct Desk {
     outbox: Outbox<News>,
-    search: Slot<Search>,
-    start: Box<Starter>,
-    pace: Pace,
+    search: Slot<OptimizationSnapshot>,
+    start: Box<OptimizerFactory>,
+    pace: Throttle,
     run: Option<Run>,
 }
 
 /// A search under way.
 struct Run {
     optimizer: Box<dyn Optimizer>,
-    state: Search,
+    state: OptimizationSnapshot,
     stride: usize,
 }
 
@@ -178,7 +182,7 @@ impl Work for Desk {
     type Order = Order;
 
     fn is_running(&self) -> bool {
-        self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running)
+        self.run.as_ref().is_some_and(|run| run.state.status == RunStatus::Running)
     }
 
     fn obey(&mut self, order: Order) {
@@ -195,21 +199,21 @@ impl Work for Desk {
 }
 
 impl Desk {
-    fn begin(&self, number: u64, task: Task) -> Option<Run> {
+    fn begin(&self, number: u64, task: OptimizationRequest) -> Option<Run> {
         match guarded(|| (self.start)(&task)) {
             Ok(optimizer) => {
                 let before = optimizer.terms().unwrap_or_default();
                 let merit = before.iter().map(|term| term.weight * term.value).sum();
-                let start = HistoryPoint { step: 0, current: merit, best: merit };
-                let state = Search {
+                let start = MeritSample { step: 0, current: merit, best: merit };
+                let state = OptimizationSnapshot {
                     number,
-                    standing: Standing::Running,
+                    status: RunStatus::Running,
                     progress: None,
                     best: Arc::clone(&task.lens),
                     current: Arc::clone(&task.lens),
-                    task: Arc::new(task),
-                    before,
-                    terms: Vec::new(),
+                    request: Arc::new(task),
+                    initial_terms: before,
+                    best_terms: Vec::new(),
                     history: vec![start],
                 };
                 let run = Run { optimizer, state, stride: 1 };
@@ -225,22 +229,22 @@ impl Desk {
 
     fn steer(&mut self, order: &Order, mut run: Run) -> Option<Run> {
         let number = run.state.number;
-        match (order, run.state.standing) {
-            (Order::Pause, Standing::Running) => {
-                run.state.standing = Standing::Paused;
+        match (order, run.state.status) {
+            (Order::Pause, RunStatus::Running) => {
+                run.state.status = RunStatus::Paused;
                 self.tell(&run, News::Paused(number));
             }
-            (Order::Resume, Standing::Paused) => {
-                run.state.standing = Standing::Running;
+            (Order::Resume, RunStatus::Paused) => {
+                run.state.status = RunStatus::Running;
                 self.tell(&run, News::Resumed(number));
             }
-            (Order::Step, Standing::Paused) => {
+            (Order::Step, RunStatus::Paused) => {
                 run = self.step(run)?;
                 self.publish(&run);
             }
-            (Order::Stop, Standing::Running | Standing::Paused) => {
-                run.state.standing = Standing::Stopped;
-                run.optimizer.settle();
+            (Order::Stop, RunStatus::Running | RunStatus::Paused) => {
+                run.state.status = RunStatus::Stopped;
+                run.optimizer.verify_best();
                 self.tell(&run, News::Stopped(number));
                 return None;
             }
@@ -257,16 +261,16 @@ impl Desk {
             Ok(())
         });
         if let Err(why) = stepped {
-            run.state.standing = Standing::Stopped;
+            run.state.status = RunStatus::Stopped;
             self.tell(&run, News::Failed(number, why));
             return None;
         }
         if run.state.progress.as_ref().is_some_and(|progress| progress.finished) {
-            run.state.standing = Standing::Finished;
+            run.state.status = RunStatus::Finished;
             self.tell(&run, News::Finished(number));
             return None;
         }
-        if self.pace.is_due() {
+        if self.pace.ready() {
             self.publish(&run);
         }
         Some(run)
@@ -288,8 +292,8 @@ impl Run {
     fn step(&mut self) {
         let progress = self.optimizer.step();
         if progress.step.is_multiple_of(self.stride) || progress.finished {
-            let Progress { step, merit: current, best, .. } = progress;
-            self.state.history.push(HistoryPoint { step, current, best });
+            let OptimizationProgress { step, merit: current, best, .. } = progress;
+            self.state.history.push(MeritSample { step, current, best });
         }
         if self.state.history.len() > HISTORY {
             self.stride *= 2;
@@ -298,11 +302,11 @@ impl Run {
         self.state.progress = Some(progress);
     }
 
-    fn snapshot(&self) -> Search {
-        Search {
+    fn snapshot(&self) -> OptimizationSnapshot {
+        OptimizationSnapshot {
             best: Arc::new(self.optimizer.best().clone()),
             current: Arc::new(self.optimizer.current().clone()),
-            terms: self.optimizer.terms().unwrap_or_default(),
+            best_terms: self.optimizer.terms().unwrap_or_default(),
             ..self.state.clone()
         }
     }

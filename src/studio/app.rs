@@ -9,16 +9,19 @@ use eframe::egui::{
 };
 use eframe::{App, Storage};
 
-use super::chooser::{Chooser, Purpose};
+use super::chooser::{FileDialog, FileRequest};
 use super::dock::Dock;
-use super::draw::Backing;
-use super::experiment::Bench;
-use super::menu::{self, Wish};
-use super::shell::Memory;
-use super::unsaved::{Then, Waiting};
-use super::wording::{capital, counted_from_one};
+use super::draw::RenderBackend;
+use super::experiment::ExperimentWindow;
+use super::menu::{self, UiAction};
+use super::shell::Persistence;
+use super::unsaved::{PendingAction, PendingState};
+use super::wording::{capitalize, counted_from_one};
 use crate::files;
-use crate::session::{Command, Event, Explore, Form, Message, Origin, Session, Severity, View};
+use crate::session::{
+    Command, DocumentSource, GrinCommand, Message, Session, SessionEvent, SessionView, Severity,
+    StructureSearchCommand,
+};
 
 /// Under which name the arrangement of the panels is remembered.
 const DOCK: &str = "dock";
@@ -28,37 +31,37 @@ const DOCK: &str = "dock";
 pub struct Studio {
     pub(super) session: Session,
     dock: Dock,
-    pub(super) chooser: Chooser,
-    bench: Bench,
-    memory: Memory,
+    pub(super) file_dialog: FileDialog,
+    experiment_window: ExperimentWindow,
+    persistence: Persistence,
     /// What waits for the answer to whether changes may be lost.
-    pub(super) waiting: Option<Waiting>,
+    pub(super) pending: Option<PendingState>,
     /// A message too long for the line at the bottom.
-    report: Option<String>,
+    message: Option<String>,
     title: String,
     /// The window closes although changes are lost.
-    pub(super) leaving: bool,
+    pub(super) closing: bool,
 }
 
 impl Studio {
-    /// A studio on a session. `left` is where the last window has left the panels.
+    /// A studio on a session. `unfinished` is where the last window has left the panels.
     pub fn new(
         session: Session,
-        backing: Backing,
-        memory: Memory,
+        backing: RenderBackend,
+        memory: Persistence,
         left: Option<&dyn Storage>,
     ) -> Self {
         let tree = left.and_then(|storage| eframe::get_value(storage, DOCK));
         Self {
             session,
             dock: Dock::new(backing, tree),
-            chooser: Chooser::default(),
-            bench: Bench::default(),
-            memory,
-            waiting: None,
-            report: None,
+            file_dialog: FileDialog::default(),
+            experiment_window: ExperimentWindow::default(),
+            persistence: memory,
+            pending: None,
+            message: None,
             title: String::new(),
-            leaving: false,
+            closing: false,
         }
     }
 
@@ -68,8 +71,8 @@ impl Studio {
     }
 
     /// Lets the window close although changes are lost.
-    pub const fn leave_without_asking(&mut self) {
-        self.leaving = true;
+    pub const fn close_without_asking(&mut self) {
+        self.closing = true;
     }
 
     /// The same, to be told commands directly.
@@ -80,146 +83,167 @@ impl Studio {
     /// Does what a command says, as a panel would ask for it.
     pub fn apply(&mut self, context: &Context, command: Command) {
         let events = self.session.apply(command);
-        self.hear(events);
+        self.on_events(events);
         context.request_repaint();
     }
 
     /// Shows the whole window and does what is wished in it.
     pub fn ui(&mut self, ui: &mut Ui) {
         let events = self.session.poll();
-        self.hear(events);
+        self.on_events(events);
         let view = self.session.view();
-        self.name_window(ui.ctx(), &view);
-        let mut wishes = menu::keys(ui, &view, self.dock.is_typing(ui.ctx()));
+        self.update_title(ui.ctx(), &view);
+        let mut wishes = menu::shortcut_actions(ui, &view, self.dock.is_typing(ui.ctx()));
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut wishes));
-        bar_frame(ui, Side::bottom("status"), |ui| Self::status(ui, &view, &mut wishes));
+        bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut wishes));
         let mut commands = Vec::new();
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut commands));
-        wishes.extend(commands.into_iter().map(Wish::Do));
+        wishes.extend(commands.into_iter().map(UiAction::Run));
         let context = ui.ctx().clone();
-        self.bench.ui(&context, view.trial.as_deref(), &mut wishes);
+        self.experiment_window.ui(&context, view.experiment.as_deref(), &mut wishes);
         self.dialogs(&context, &view);
         for wish in wishes {
-            self.fulfil(&context, &view, wish);
+            self.dispatch(&context, &view, wish);
         }
     }
 
-    fn fulfil(&mut self, context: &Context, view: &View, wish: Wish) {
+    fn dispatch(&mut self, context: &Context, view: &SessionView, wish: UiAction) {
         match wish {
-            Wish::Do(Command::ExportFront(None)) => {
+            UiAction::Run(Command::ExportPareto(None)) => {
                 let folder = view.path.as_deref().map(|path| path.with_file_name("front"));
                 let folder = folder.unwrap_or_else(|| PathBuf::from("front"));
-                self.chooser.ask(context, Purpose::ExportFront, Some(&folder));
+                self.file_dialog.ask(context, FileRequest::ExportFront, Some(&folder));
             }
-            Wish::Do(Command::Explore(wish)) => self.explore(context, view, wish),
-            Wish::Do(Command::Form(Form::Open(None))) => {
-                self.chooser.ask(context, Purpose::OpenField, opened(view));
+            UiAction::Run(Command::StructureSearch(wish)) => {
+                self.dispatch_search(context, view, wish)
             }
-            Wish::Do(Command::Form(Form::Save { path: None, nodes })) => {
-                self.choose_field(context, view, nodes);
+            UiAction::Run(Command::Grin(GrinCommand::OpenFile(None))) => {
+                self.file_dialog.ask(context, FileRequest::OpenField, open_field_path(view));
             }
-            Wish::Choose(purpose) => self.chooser.ask(context, purpose, view.path.as_deref()),
-            Wish::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name) {
+            UiAction::Run(Command::Grin(GrinCommand::Save { path: None, nodes })) => {
+                self.ask_field_path(context, view, nodes);
+            }
+            UiAction::AskPath(purpose) => {
+                self.file_dialog.ask(context, purpose, view.path.as_deref())
+            }
+            UiAction::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name)
+            {
                 Ok(opened) => {
                     let command = Command::New(Box::new(opened.lens));
-                    self.attempt(context, Then::Do(command), None);
+                    self.run_or_ask(context, PendingAction::Run(command), None);
                 }
-                Err(why) => self.report = Some(why.to_string()),
+                Err(why) => self.message = Some(why.to_string()),
             },
-            Wish::Do(command) => self.attempt(context, Then::Do(command), None),
+            UiAction::Run(command) => self.run_or_ask(context, PendingAction::Run(command), None),
         }
     }
 
     /// Asks for the file of the field.
-    pub(super) fn choose_field(&mut self, context: &Context, view: &View, nodes: usize) {
-        let field = opened(view).map(|path| path.with_extension("npz"));
+    pub(super) fn ask_field_path(&mut self, context: &Context, view: &SessionView, nodes: usize) {
+        let field = open_field_path(view).map(|path| path.with_extension("npz"));
         let field = field.unwrap_or_else(|| PathBuf::from("field.npz"));
-        self.chooser.ask(context, Purpose::SaveField(nodes), Some(&field));
+        self.file_dialog.ask(context, FileRequest::SaveField(nodes), Some(&field));
     }
 
     /// Does what is asked of a search, a file being chosen first where one is needed.
-    fn explore(&mut self, context: &Context, view: &View, wish: Explore) {
-        let known = &view.explorations;
+    fn dispatch_search(
+        &mut self,
+        context: &Context,
+        view: &SessionView,
+        wish: StructureSearchCommand,
+    ) {
+        let known = &view.structure_search;
         let saved = known.run.as_ref().and_then(|run| run.checkpoint.path.as_deref());
         match wish {
-            Explore::GoOn(None) => {
-                let near = saved.or(known.left.as_deref());
-                self.chooser.ask(context, Purpose::OpenSearch, near);
+            StructureSearchCommand::ResumeFrom(None) => {
+                let near = saved.or(known.unfinished.as_deref());
+                self.file_dialog.ask(context, FileRequest::OpenSearch, near);
             }
-            Explore::SaveTo(None) => {
-                let near = saved.or(known.place.as_deref());
-                self.chooser.ask(context, Purpose::SaveSearch, near);
+            StructureSearchCommand::SaveTo(None) => {
+                let near = saved.or(known.save_path.as_deref());
+                self.file_dialog.ask(context, FileRequest::SaveSearch, near);
             }
-            Explore::Export { number, path: None } => {
+            StructureSearchCommand::Export { number, path: None } => {
                 let near = view.path.as_deref();
-                self.chooser.ask(context, Purpose::ExportFound(number), near);
+                self.file_dialog.ask(context, FileRequest::ExportSearchLens(number), near);
             }
-            wish => self.apply(context, Command::Explore(wish)),
+            wish => self.apply(context, Command::StructureSearch(wish)),
         }
     }
 
-    fn dialogs(&mut self, context: &Context, view: &View) {
-        if let Some((purpose, path)) = self.chooser.ui(context) {
-            self.chosen(context, purpose, path);
+    fn dialogs(&mut self, context: &Context, view: &SessionView) {
+        if let Some((purpose, path)) = self.file_dialog.ui(context) {
+            self.on_path_chosen(context, purpose, path);
         }
         let closing = context.input(|input| input.viewport().close_requested());
-        if closing && !self.leaving && self.loses(&Then::Quit) {
+        if closing && !self.closing && self.would_discard(&PendingAction::Quit) {
             context.send_viewport_cmd(ViewportCommand::CancelClose);
-            self.attempt(context, Then::Quit, None);
+            self.run_or_ask(context, PendingAction::Quit, None);
         }
-        self.question(context, view);
-        self.show_report(context);
+        self.unsaved_dialog(context, view);
+        self.show_message(context);
     }
 
-    fn chosen(&mut self, context: &Context, purpose: Purpose, path: PathBuf) {
+    fn on_path_chosen(&mut self, context: &Context, purpose: FileRequest, path: PathBuf) {
         match purpose {
-            Purpose::Open => self.attempt(context, Then::Do(Command::Open(path)), None),
-            Purpose::ExperimentFolder => self.apply(context, Command::SaveExperiment(path)),
-            Purpose::Save => self.apply(context, Command::Save(Some(path))),
-            Purpose::ExportFront => self.apply(context, Command::ExportFront(Some(path))),
-            Purpose::OpenSearch => {
-                self.apply(context, Command::Explore(Explore::GoOn(Some(path))));
+            FileRequest::Open => {
+                self.run_or_ask(context, PendingAction::Run(Command::Open(path)), None)
             }
-            Purpose::SaveSearch => {
-                self.apply(context, Command::Explore(Explore::SaveTo(Some(path))));
+            FileRequest::ExperimentFolder => self.apply(context, Command::SaveExperiment(path)),
+            FileRequest::Save => self.apply(context, Command::Save(Some(path))),
+            FileRequest::ExportFront => self.apply(context, Command::ExportPareto(Some(path))),
+            FileRequest::OpenSearch => {
+                self.apply(
+                    context,
+                    Command::StructureSearch(StructureSearchCommand::ResumeFrom(Some(path))),
+                );
             }
-            Purpose::ExportFound(number) => {
+            FileRequest::SaveSearch => {
+                self.apply(
+                    context,
+                    Command::StructureSearch(StructureSearchCommand::SaveTo(Some(path))),
+                );
+            }
+            FileRequest::ExportSearchLens(number) => {
                 let path = Some(path);
-                self.apply(context, Command::Explore(Explore::Export { number, path }));
+                self.apply(
+                    context,
+                    Command::StructureSearch(StructureSearchCommand::Export { number, path }),
+                );
             }
-            Purpose::OpenField => {
-                let command = Command::Form(Form::Open(Some(path)));
-                self.attempt(context, Then::Do(command), None);
+            FileRequest::OpenField => {
+                let command = Command::Grin(GrinCommand::OpenFile(Some(path)));
+                self.run_or_ask(context, PendingAction::Run(command), None);
             }
-            Purpose::SaveField(nodes) => {
+            FileRequest::SaveField(nodes) => {
                 let path = Some(path);
-                self.apply(context, Command::Form(Form::Save { path, nodes }));
+                self.apply(context, Command::Grin(GrinCommand::Save { path, nodes }));
             }
-            Purpose::ExportZemax | Purpose::ExportJson => {
+            FileRequest::ExportZemax | FileRequest::ExportJson => {
                 self.apply(context, Command::Export(path));
             }
         }
     }
 
     /// Notes what is too much for the line at the bottom.
-    fn hear(&mut self, events: Vec<Event>) {
+    fn on_events(&mut self, events: Vec<SessionEvent>) {
         for event in events {
-            if let Event::Said(message) = event
+            if let SessionEvent::Said(message) = event
                 && (message.text.lines().count() > 1 || message.severity == Severity::Error)
             {
-                self.report = Some(message.text);
+                self.message = Some(message.text);
             }
         }
     }
 
     /// Shows a report or an error until it is closed.
-    fn show_report(&mut self, context: &Context) {
-        let Some(text) = &self.report else { return };
+    fn show_message(&mut self, context: &Context) {
+        let Some(text) = &self.message else { return };
         let mut read = false;
         let modal = Modal::new(Id::unique("report")).show(context, |ui| {
             let (words, table) = text.split_once('\n').unwrap_or((text, ""));
             ui.set_max_width(if table.is_empty() { 460.0 } else { 820.0 });
-            ui.label(capital(&counted_from_one(words)));
+            ui.label(capitalize(&counted_from_one(words)));
             if !table.is_empty() {
                 ScrollArea::both().max_height(440.0).show(ui, |ui| {
                     let table = RichText::new(counted_from_one(table)).monospace();
@@ -230,11 +254,11 @@ impl Studio {
             read = ui.button("OK").clicked();
         });
         if read || modal.should_close() {
-            self.report = None;
+            self.message = None;
         }
     }
 
-    fn name_window(&mut self, context: &Context, view: &View) {
+    fn update_title(&mut self, context: &Context, view: &SessionView) {
         let mark = if view.dirty { "• " } else { "" };
         let file = view.path.as_ref().and_then(|path| path.file_name());
         let file = file.map(|name| format!(" ({})", name.to_string_lossy())).unwrap_or_default();
@@ -246,11 +270,11 @@ impl Studio {
     }
 
     /// The line at the bottom: the last message, and how old the numbers are.
-    fn status(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
+    fn status_bar(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
         ui.horizontal(|ui| {
             messages(ui, &view.messages, wishes);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.weak(freshness(view))
+                ui.weak(timing_text(view))
                     .on_hover_text("How long all numbers of all panels took after the last change");
                 if view.dirty {
                     ui.separator();
@@ -267,21 +291,21 @@ impl App for Studio {
     }
 
     fn save(&mut self, storage: &mut dyn Storage) {
-        if self.memory == Memory::Kept {
+        if self.persistence == Persistence::Enabled {
             eframe::set_value(storage, DOCK, self.dock.tree());
         }
     }
 
     fn persist_egui_memory(&self) -> bool {
-        self.memory == Memory::Kept
+        self.persistence == Persistence::Enabled
     }
 }
 
 /// The file of the gradient-index field that is open.
-fn opened(view: &View) -> Option<&Path> {
-    match &view.forming.run.as_ref()?.subject.origin {
-        Origin::File(path) => Some(path),
-        Origin::Builtin(_) => None,
+fn open_field_path(view: &SessionView) -> Option<&Path> {
+    match &view.grin.run.as_ref()?.document.source {
+        DocumentSource::File(path) => Some(path),
+        DocumentSource::Builtin(_) => None,
     }
 }
 
@@ -291,7 +315,7 @@ fn bar_frame(ui: &mut Ui, side: Side, show: impl FnOnce(&mut Ui)) {
 }
 
 /// The last message, and a button for those before it.
-fn messages(ui: &mut Ui, messages: &[Message], wishes: &mut Vec<Wish>) {
+fn messages(ui: &mut Ui, messages: &[Message], wishes: &mut Vec<UiAction>) {
     let Some(last) = messages.last() else {
         ui.weak("Ready");
         return;
@@ -299,17 +323,17 @@ fn messages(ui: &mut Ui, messages: &[Message], wishes: &mut Vec<Wish>) {
     ui.menu_button(format!("Messages ({})", messages.len()), |ui| {
         ui.set_min_width(420.0);
         ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
-            messages.iter().rev().for_each(|message| drop(said(ui, message)));
+            messages.iter().rev().for_each(|message| drop(message_label(ui, message)));
         });
         if ui.button("Forget all").clicked() {
-            wishes.push(Wish::Do(Command::ClearMessages));
+            wishes.push(UiAction::Run(Command::ClearMessages));
             ui.close();
         }
     });
-    said(ui, last);
+    message_label(ui, last);
 }
 
-fn said(ui: &mut Ui, message: &Message) -> Response {
+fn message_label(ui: &mut Ui, message: &Message) -> Response {
     let visuals = ui.visuals();
     let color = match message.severity {
         Severity::Note => visuals.text_color(),
@@ -317,11 +341,11 @@ fn said(ui: &mut Ui, message: &Message) -> Response {
         Severity::Error => visuals.error_fg_color,
     };
     let line = message.text.lines().next().unwrap_or_default();
-    let text = RichText::new(capital(&counted_from_one(line))).color(color);
-    ui.add(Label::new(text).truncate()).on_hover_text(capital(&counted_from_one(&message.text)))
+    let text = RichText::new(capitalize(&counted_from_one(line))).color(color);
+    ui.add(Label::new(text).truncate()).on_hover_text(capitalize(&counted_from_one(&message.text)))
 }
 
-fn freshness(view: &View) -> String {
+fn timing_text(view: &SessionView) -> String {
     match &view.results {
         Some(results) if view.is_current() => format!("all numbers in {:.1} ms", results.ms),
         _ => "computing…".to_owned(),

@@ -9,7 +9,7 @@ use eframe::egui::{self, Key};
 
 /// What a file is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub enum FileRequest {
     /// To read a lens from it, of any known form.
     Open,
     /// To write the lens in our own form.
@@ -27,14 +27,14 @@ pub enum Purpose {
     /// To save a search over structure to it.
     SaveSearch,
     /// To write the lens of a generation of a search.
-    ExportFound(u64),
+    ExportSearchLens(u64),
     /// To read a task or a volume from it, and look at the gradient-index field.
     OpenField,
     /// To write the gradient-index field, with so many nodes along a side.
     SaveField(usize),
 }
 
-impl Purpose {
+impl FileRequest {
     const fn title(self) -> &'static str {
         match self {
             Self::Open => "Open a lens",
@@ -45,7 +45,7 @@ impl Purpose {
             Self::ExperimentFolder => "Save the experiment into a folder",
             Self::OpenSearch => "Go on with a search",
             Self::SaveSearch => "Save the search",
-            Self::ExportFound(_) => "Export the lens of the search",
+            Self::ExportSearchLens(_) => "Export the lens of the search",
             Self::OpenField => "Open a GRIN task or a volume",
             Self::SaveField(_) => "Save the volume",
         }
@@ -55,7 +55,7 @@ impl Purpose {
         match self {
             Self::Open => &["json", "zmx", "ZMX"],
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
-            Self::ExportFound(_) => &["json", "zmx"],
+            Self::ExportSearchLens(_) => &["json", "zmx"],
             Self::ExportZemax => &["zmx"],
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],
@@ -64,24 +64,24 @@ impl Purpose {
     }
 
     /// What files of this kind are called.
-    const fn kind(self) -> &'static str {
+    const fn filter_name(self) -> &'static str {
         if matches!(self, Self::OpenField | Self::SaveField(_)) { "GRIN fields" } else { "Lenses" }
     }
 
     /// Whether the name of a new file is asked for.
-    fn names_a_file(self) -> bool {
-        self.is_written() && !matches!(self, Self::ExportFront | Self::ExperimentFolder)
+    fn asks_for_name(self) -> bool {
+        self.is_save() && !matches!(self, Self::ExportFront | Self::ExperimentFolder)
     }
 
     /// Whether the file is written.
-    fn is_written(self) -> bool {
+    fn is_save(self) -> bool {
         !matches!(self, Self::Open | Self::OpenSearch | Self::OpenField)
     }
 
     /// The path with the extension that it needs, if it has none.
-    fn complete(self, path: PathBuf) -> PathBuf {
+    fn with_extension(self, path: PathBuf) -> PathBuf {
         match self.extensions().first() {
-            Some(extension) if self.is_written() && path.extension().is_none() => {
+            Some(extension) if self.is_save() && path.extension().is_none() => {
                 path.with_extension(extension)
             }
             _ => path,
@@ -91,58 +91,61 @@ impl Purpose {
 
 /// Asks for files, one at a time.
 #[derive(Debug, Default)]
-pub struct Chooser {
-    asked: Option<(Purpose, Receiver<Option<PathBuf>>)>,
-    typed: Option<(Purpose, String)>,
+pub struct FileDialog {
+    native: Option<(FileRequest, Receiver<Option<PathBuf>>)>,
+    prompt: Option<(FileRequest, String)>,
 }
 
-impl Chooser {
+impl FileDialog {
     /// Asks with the desktop's dialog, or with a line to type into where it has none.
-    pub fn ask(&mut self, context: &egui::Context, purpose: Purpose, near: Option<&Path>) {
-        if self.asked.is_some() {
+    pub fn ask(&mut self, context: &egui::Context, purpose: FileRequest, near: Option<&Path>) {
+        if self.native.is_some() {
             return;
         }
-        match has_dialogs().then(|| open_dialog(context, purpose, near)) {
-            Some(Ok(answer)) => self.asked = Some((purpose, answer)),
+        match has_native_dialogs().then(|| open_native(context, purpose, near)) {
+            Some(Ok(answer)) => self.native = Some((purpose, answer)),
             Some(Err(error)) => {
                 log::warn!("no file dialog: {error}");
-                self.ask_for_path(purpose, near);
+                self.ask_in_window(purpose, near);
             }
-            None => self.ask_for_path(purpose, near),
+            None => self.ask_in_window(purpose, near),
         }
     }
 
     /// Whether a question waits for its answer.
     pub const fn is_open(&self) -> bool {
-        self.asked.is_some() || self.typed.is_some()
+        self.native.is_some() || self.prompt.is_some()
     }
 
     /// Asks with a line to type a path into.
-    pub fn ask_for_path(&mut self, purpose: Purpose, near: Option<&Path>) {
-        let near =
-            if purpose == Purpose::ExperimentFolder { near.and_then(Path::parent) } else { near };
+    pub fn ask_in_window(&mut self, purpose: FileRequest, near: Option<&Path>) {
+        let near = if purpose == FileRequest::ExperimentFolder {
+            near.and_then(Path::parent)
+        } else {
+            near
+        };
         let start = near.map(|path| path.display().to_string()).unwrap_or_default();
-        self.typed = Some((purpose, start));
+        self.prompt = Some((purpose, start));
     }
 
     /// Shows the line, if there is one, and gives the file once it is chosen.
-    pub fn ui(&mut self, context: &egui::Context) -> Option<(Purpose, PathBuf)> {
-        self.answered().or_else(|| self.typed_path(context))
+    pub fn ui(&mut self, context: &egui::Context) -> Option<(FileRequest, PathBuf)> {
+        self.native_answer().or_else(|| self.prompt_answer(context))
     }
 
-    fn answered(&mut self) -> Option<(Purpose, PathBuf)> {
-        let (purpose, answer) = self.asked.as_ref()?;
+    fn native_answer(&mut self) -> Option<(FileRequest, PathBuf)> {
+        let (purpose, answer) = self.native.as_ref()?;
         let path = match answer.try_recv() {
             Err(TryRecvError::Empty) => return None,
             Err(TryRecvError::Disconnected) => None,
-            Ok(path) => path.map(|path| (*purpose, purpose.complete(path))),
+            Ok(path) => path.map(|path| (*purpose, purpose.with_extension(path))),
         };
-        self.asked = None;
+        self.native = None;
         path
     }
 
-    fn typed_path(&mut self, context: &egui::Context) -> Option<(Purpose, PathBuf)> {
-        let (purpose, text) = self.typed.as_mut()?;
+    fn prompt_answer(&mut self, context: &egui::Context) -> Option<(FileRequest, PathBuf)> {
+        let (purpose, text) = self.prompt.as_mut()?;
         let purpose = *purpose;
         let mut done = false;
         let modal = egui::Modal::new(egui::Id::unique("path")).show(context, |ui| {
@@ -162,37 +165,39 @@ impl Chooser {
         });
         let path = PathBuf::from(text.trim());
         if done && !path.as_os_str().is_empty() {
-            self.typed = None;
-            return Some((purpose, purpose.complete(path)));
+            self.prompt = None;
+            return Some((purpose, purpose.with_extension(path)));
         }
         if modal.should_close() {
-            self.typed = None;
+            self.prompt = None;
         }
         None
     }
 }
 
-fn open_dialog(
+fn open_native(
     context: &egui::Context,
-    purpose: Purpose,
+    purpose: FileRequest,
     near: Option<&Path>,
 ) -> std::io::Result<Receiver<Option<PathBuf>>> {
     let (give, answer) = channel();
     let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
     if !purpose.extensions().is_empty() {
-        dialog = dialog.add_filter(purpose.kind(), purpose.extensions());
+        dialog = dialog.add_filter(purpose.filter_name(), purpose.extensions());
     }
     if let Some(directory) = near.and_then(Path::parent).filter(|dir| dir.is_dir()) {
         dialog = dialog.set_directory(directory);
     }
-    if let Some(name) = near.and_then(Path::file_name).filter(|_| purpose.names_a_file()) {
+    if let Some(name) = near.and_then(Path::file_name).filter(|_| purpose.asks_for_name()) {
         dialog = dialog.set_file_name(name.to_string_lossy());
     }
     let context = context.clone();
     thread::Builder::new().name("file dialog".into()).spawn(move || {
         let path = match purpose {
-            Purpose::Open | Purpose::OpenSearch | Purpose::OpenField => dialog.pick_file(),
-            Purpose::ExportFront | Purpose::ExperimentFolder => dialog.pick_folder(),
+            FileRequest::Open | FileRequest::OpenSearch | FileRequest::OpenField => {
+                dialog.pick_file()
+            }
+            FileRequest::ExportFront | FileRequest::ExperimentFolder => dialog.pick_folder(),
             _ => dialog.save_file(),
         };
         // Nobody listens when the window was closed before the dialog.
@@ -203,7 +208,7 @@ fn open_dialog(
 }
 
 /// Whether a dialog can be expected: on Linux it comes over the session bus or from `zenity`.
-fn has_dialogs() -> bool {
+fn has_native_dialogs() -> bool {
     if !cfg!(target_os = "linux") {
         return true;
     }
@@ -218,11 +223,12 @@ mod tests {
 
     #[test]
     fn a_written_file_gets_its_extension() {
-        let complete = |purpose: Purpose, path: &str| purpose.complete(PathBuf::from(path));
-        assert_eq!(complete(Purpose::Save, "a/lens"), PathBuf::from("a/lens.json"));
-        assert_eq!(complete(Purpose::Save, "a/lens.v2"), PathBuf::from("a/lens.v2"));
-        assert_eq!(complete(Purpose::ExportZemax, "lens"), PathBuf::from("lens.zmx"));
-        assert_eq!(complete(Purpose::Open, "lens"), PathBuf::from("lens"));
-        assert_eq!(complete(Purpose::ExportFront, "front"), PathBuf::from("front"));
+        let complete =
+            |purpose: FileRequest, path: &str| purpose.with_extension(PathBuf::from(path));
+        assert_eq!(complete(FileRequest::Save, "a/lens"), PathBuf::from("a/lens.json"));
+        assert_eq!(complete(FileRequest::Save, "a/lens.v2"), PathBuf::from("a/lens.v2"));
+        assert_eq!(complete(FileRequest::ExportZemax, "lens"), PathBuf::from("lens.zmx"));
+        assert_eq!(complete(FileRequest::Open, "lens"), PathBuf::from("lens"));
+        assert_eq!(complete(FileRequest::ExportFront, "front"), PathBuf::from("front"));
     }
 }

@@ -7,14 +7,14 @@ use egui_tiles::{
     Tree, UiResponse,
 };
 
-use super::draw::Backing;
-use super::panels::{Kind, Panel};
-use crate::session::{Command, Form, View};
+use super::draw::RenderBackend;
+use super::panels::{Panel, PanelKind};
+use crate::session::{Command, GrinCommand, SessionView};
 
 /// The arranged panels.
 pub struct Dock {
-    tree: Tree<Kind>,
-    panels: Vec<(Kind, Box<dyn Panel>)>,
+    tree: Tree<PanelKind>,
+    panels: Vec<(PanelKind, Box<dyn Panel>)>,
 }
 
 impl std::fmt::Debug for Dock {
@@ -25,36 +25,37 @@ impl std::fmt::Debug for Dock {
 
 impl Dock {
     /// All panels, arranged as they were left or as usual.
-    pub fn new(backing: Backing, left: Option<Tree<Kind>>) -> Self {
-        let whole =
-            |tree: &Tree<Kind>| Kind::ALL.iter().all(|kind| tree.tiles.find_pane(kind).is_some());
-        let tree = left.filter(whole).unwrap_or_else(usual);
-        Self { tree, panels: Kind::ALL.map(|kind| (kind, kind.panel(backing))).into() }
+    pub fn new(backing: RenderBackend, left: Option<Tree<PanelKind>>) -> Self {
+        let whole = |tree: &Tree<PanelKind>| {
+            PanelKind::ALL.iter().all(|kind| tree.tiles.find_pane(kind).is_some())
+        };
+        let tree = left.filter(whole).unwrap_or_else(default_arrangement);
+        Self { tree, panels: PanelKind::ALL.map(|kind| (kind, kind.panel(backing))).into() }
     }
 
     /// How the panels are arranged.
-    pub const fn tree(&self) -> &Tree<Kind> {
+    pub const fn tree(&self) -> &Tree<PanelKind> {
         &self.tree
     }
 
     /// Arranges all panels as usual.
     pub fn reset(&mut self) {
-        self.tree = usual();
+        self.tree = default_arrangement();
     }
 
     /// Whether a panel is shown.
-    pub fn is_open(&self, kind: Kind) -> bool {
+    pub fn is_open(&self, kind: PanelKind) -> bool {
         self.tree.tiles.find_pane(&kind).is_some_and(|tile| self.tree.tiles.is_visible(tile))
     }
 
     /// Whether a panel can be seen: open, and not behind another one.
-    fn is_shown(&self, kind: Kind) -> bool {
+    fn is_visible(&self, kind: PanelKind) -> bool {
         let tile = self.tree.tiles.find_pane(&kind);
         tile.is_some_and(|tile| self.tree.active_tiles().contains(&tile))
     }
 
     /// Shows or hides a panel.
-    pub fn toggle(&mut self, kind: Kind) {
+    pub fn toggle(&mut self, kind: PanelKind) {
         let open = !self.is_open(kind);
         if let Some(tile) = self.tree.tiles.find_pane(&kind) {
             self.tree.set_visible(tile, open);
@@ -63,7 +64,7 @@ impl Dock {
     }
 
     /// What a panel's tab says.
-    pub fn title(&self, kind: Kind) -> &'static str {
+    pub fn title(&self, kind: PanelKind) -> &'static str {
         let panel = self.panels.iter().find(|(other, _)| *other == kind);
         panel.map_or("", |(_, panel)| panel.title())
     }
@@ -74,35 +75,35 @@ impl Dock {
     }
 
     /// Shows all panels.
-    pub fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    pub fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
         let Self { tree, panels } = self;
-        tree.ui(&mut Shown { panels, view, wishes }, ui);
-        let pupils = self.is_shown(Kind::Pupil);
+        tree.ui(&mut DockFrame { panels, view, commands: wishes }, ui);
+        let pupils = self.is_visible(PanelKind::Pupil);
         if pupils != view.settings.pupils {
             wishes.push(Command::ShowPupils(pupils));
         }
-        let watched = self.is_shown(Kind::Slice);
-        if watched != view.forming.watched {
-            wishes.push(Command::Form(Form::Watch(watched)));
+        let watched = self.is_visible(PanelKind::Slice);
+        if watched != view.grin.is_active {
+            wishes.push(Command::Grin(GrinCommand::SetActive(watched)));
         }
     }
 }
 
 /// The drawings with the numbers of the lens below it; beside them how good it is and the search.
-fn usual() -> Tree<Kind> {
+fn default_arrangement() -> Tree<PanelKind> {
     let mut tiles = Tiles::default();
-    let mut pane = |kind: Kind| tiles.insert_pane(kind);
+    let mut pane = |kind: PanelKind| tiles.insert_pane(kind);
     let [layout, slice, spot, pupil, table, optimizer, pareto, search, first, effects] = [
-        Kind::Layout,
-        Kind::Slice,
-        Kind::Spot,
-        Kind::Pupil,
-        Kind::Prescription,
-        Kind::Optimizer,
-        Kind::Pareto,
-        Kind::Search,
-        Kind::FirstOrder,
-        Kind::Effects,
+        PanelKind::Layout,
+        PanelKind::Slice,
+        PanelKind::Spot,
+        PanelKind::Pupil,
+        PanelKind::Prescription,
+        PanelKind::Optimizer,
+        PanelKind::Pareto,
+        PanelKind::Search,
+        PanelKind::FirstOrder,
+        PanelKind::Effects,
     ]
     .map(&mut pane);
     let facts = tiles.insert_tab_tile(vec![first, effects]);
@@ -116,15 +117,19 @@ fn usual() -> Tree<Kind> {
     Tree::new(Id::unique("dock"), root, tiles)
 }
 
-fn row(tiles: &mut Tiles<Kind>, parts: &[(TileId, f32)]) -> TileId {
-    line(tiles, LinearDir::Horizontal, parts)
+fn row(tiles: &mut Tiles<PanelKind>, parts: &[(TileId, f32)]) -> TileId {
+    linear_tile(tiles, LinearDir::Horizontal, parts)
 }
 
-fn column(tiles: &mut Tiles<Kind>, parts: &[(TileId, f32)]) -> TileId {
-    line(tiles, LinearDir::Vertical, parts)
+fn column(tiles: &mut Tiles<PanelKind>, parts: &[(TileId, f32)]) -> TileId {
+    linear_tile(tiles, LinearDir::Vertical, parts)
 }
 
-fn line(tiles: &mut Tiles<Kind>, direction: LinearDir, parts: &[(TileId, f32)]) -> TileId {
+fn linear_tile(
+    tiles: &mut Tiles<PanelKind>,
+    direction: LinearDir,
+    parts: &[(TileId, f32)],
+) -> TileId {
     let mut linear = Linear::new(direction, parts.iter().map(|(tile, _)| *tile).collect());
     for (tile, share) in parts {
         linear.shares.set_share(*tile, *share);
@@ -133,36 +138,36 @@ fn line(tiles: &mut Tiles<Kind>, direction: LinearDir, parts: &[(TileId, f32)]) 
 }
 
 /// The panels in one frame.
-struct Shown<'a> {
-    panels: &'a mut Vec<(Kind, Box<dyn Panel>)>,
-    view: &'a View,
-    wishes: &'a mut Vec<Command>,
+struct DockFrame<'a> {
+    panels: &'a mut Vec<(PanelKind, Box<dyn Panel>)>,
+    view: &'a SessionView,
+    commands: &'a mut Vec<Command>,
 }
 
-impl Behavior<Kind> for Shown<'_> {
-    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, kind: &mut Kind) -> UiResponse {
+impl Behavior<PanelKind> for DockFrame<'_> {
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, kind: &mut PanelKind) -> UiResponse {
         let panel = self.panels.iter_mut().find(|(other, _)| other == kind);
         if let Some((_, panel)) = panel {
             let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::same(5));
             frame.show(ui, |ui| {
                 ui.set_min_size(ui.available_size());
-                panel.ui(ui, self.view, self.wishes);
+                panel.ui(ui, self.view, self.commands);
             });
         }
         UiResponse::None
     }
 
-    fn tab_title_for_pane(&mut self, kind: &Kind) -> WidgetText {
+    fn tab_title_for_pane(&mut self, kind: &PanelKind) -> WidgetText {
         let panel = self.panels.iter().find(|(other, _)| other == kind);
         panel.map_or("", |(_, panel)| panel.title()).into()
     }
 
-    fn is_tab_closable(&self, _tiles: &Tiles<Kind>, _tile: TileId) -> bool {
+    fn is_tab_closable(&self, _tiles: &Tiles<PanelKind>, _tile: TileId) -> bool {
         true
     }
 
     /// A closed panel is hidden, so that the menu can bring it back to its place.
-    fn on_tab_close(&mut self, tiles: &mut Tiles<Kind>, tile: TileId) -> bool {
+    fn on_tab_close(&mut self, tiles: &mut Tiles<PanelKind>, tile: TileId) -> bool {
         tiles.set_visible(tile, false);
         false
     }
@@ -186,7 +191,7 @@ impl Behavior<Kind> for Shown<'_> {
     fn tab_outline_stroke(
         &self,
         _visuals: &Visuals,
-        _tiles: &Tiles<Kind>,
+        _tiles: &Tiles<PanelKind>,
         _tile: TileId,
         _state: &TabState,
     ) -> Stroke {
@@ -196,7 +201,7 @@ impl Behavior<Kind> for Shown<'_> {
     fn tab_text_color(
         &self,
         visuals: &Visuals,
-        _tiles: &Tiles<Kind>,
+        _tiles: &Tiles<PanelKind>,
         _tile: TileId,
         state: &TabState,
     ) -> Color32 {

@@ -6,58 +6,63 @@ use eframe::egui::{
     TextureHandle, TextureOptions, Ui, Window, vec2,
 };
 
-use super::chooser::Purpose;
-use super::menu::Wish;
+use super::chooser::FileRequest;
+use super::menu::UiAction;
 use super::number;
 use super::palette::{Palette, color32};
-use super::wording::capital;
-use crate::experiments::{ALL, Claim, Effort, Experiment, Picture, Report};
-use crate::session::{Command, Stage, Trial};
+use super::wording::capitalize;
+use crate::experiments::{ALL, Claim, Effort, Experiment, ExperimentReport, NamedPlot};
+use crate::session::{Command, ExperimentRun, ExperimentStatus};
 
 /// The pictures of the experiment that is shown, as textures.
 #[derive(Default)]
-pub(super) struct Bench {
+pub(super) struct ExperimentWindow {
     /// The trial that they belong to.
     number: u64,
     pictures: Vec<(&'static str, TextureHandle)>,
 }
 
-impl std::fmt::Debug for Bench {
+impl std::fmt::Debug for ExperimentWindow {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Bench").field("number", &self.number).finish_non_exhaustive()
     }
 }
 
 /// The menu of all experiments.
-pub(super) fn menu(ui: &mut Ui, wishes: &mut Vec<Wish>) {
+pub(super) fn menu(ui: &mut Ui, wishes: &mut Vec<UiAction>) {
     ui.set_min_width(380.0);
     for study in ALL {
         let button = Button::new(format!("{}  {}", study.id, study.title));
-        let button = ui.add(button.shortcut_text(seconds(study)));
+        let button = ui.add(button.shortcut_text(duration_text(study)));
         if button.on_hover_text(format!("{}.", study.claim)).clicked() {
-            wishes.push(Wish::Do(begin(study)));
+            wishes.push(UiAction::Run(run_command(study)));
             ui.close();
         }
     }
 }
 
-fn begin(study: &Experiment) -> Command {
-    Command::Experiment { id: study.id.to_owned(), effort: Effort::Full }
+fn run_command(study: &Experiment) -> Command {
+    Command::StartExperiment { id: study.id.to_owned(), effort: Effort::Full }
 }
 
 /// About how long it takes.
-fn seconds(study: &Experiment) -> String {
-    format!("about {} s", number::show_digits(study.seconds, 2))
+fn duration_text(study: &Experiment) -> String {
+    format!("about {} s", number::format_digits(study.seconds, 2))
 }
 
-impl Bench {
+impl ExperimentWindow {
     /// Shows an experiment, where there is one.
-    pub(super) fn ui(&mut self, context: &Context, trial: Option<&Trial>, wishes: &mut Vec<Wish>) {
+    pub(super) fn ui(
+        &mut self,
+        context: &Context,
+        trial: Option<&ExperimentRun>,
+        wishes: &mut Vec<UiAction>,
+    ) {
         let Some(trial) = trial else {
             *self = Self::default();
             return;
         };
-        let study = trial.study;
+        let study = trial.experiment;
         let mut open = true;
         let area = context.content_rect();
         let window = Window::new(format!("Experiment {}: {}", study.id, study.title))
@@ -69,27 +74,35 @@ impl Bench {
         window.show(context, |ui| {
             ui.label(format!("{}.", study.claim));
             ui.separator();
-            match &trial.stage {
-                Stage::Running { done, doing } => running(ui, study, *done, doing, wishes),
-                Stage::Done(report) => self.report(ui, trial.number, report, wishes),
-                Stage::Stopped => {
-                    ui.label("Stopped before it had found anything.");
-                    again(ui, study, wishes);
+            match &trial.status {
+                ExperimentStatus::Running { done, doing } => {
+                    running(ui, study, *done, doing, wishes)
                 }
-                Stage::Failed(why) => {
-                    ui.colored_label(ui.visuals().error_fg_color, capital(why));
-                    again(ui, study, wishes);
+                ExperimentStatus::Done(report) => self.report(ui, trial.number, report, wishes),
+                ExperimentStatus::Stopped => {
+                    ui.label("Stopped before it had found anything.");
+                    run_again_button(ui, study, wishes);
+                }
+                ExperimentStatus::Failed(why) => {
+                    ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
+                    run_again_button(ui, study, wishes);
                 }
             }
         });
         if !open {
-            wishes.push(Wish::Do(Command::CloseExperiment));
+            wishes.push(UiAction::Run(Command::DismissExperiment));
         }
     }
 
-    fn report(&mut self, ui: &mut Ui, number: u64, report: &Report, wishes: &mut Vec<Wish>) {
+    fn report(
+        &mut self,
+        ui: &mut Ui,
+        number: u64,
+        report: &ExperimentReport,
+        wishes: &mut Vec<UiAction>,
+    ) {
         if self.number != number {
-            let load = |picture: &Picture| (picture.name, texture(ui.ctx(), picture));
+            let load = |picture: &NamedPlot| (picture.name, texture(ui.ctx(), picture));
             *self = Self { number, pictures: report.outcome.pictures.iter().map(load).collect() };
         }
         verdict(ui, report, wishes);
@@ -97,7 +110,7 @@ impl Bench {
             claims(ui, &report.outcome.claims);
             for (name, texture) in &self.pictures {
                 ui.add_space(8.0);
-                ui.strong(capital(&name.replace(['_', '-'], " ")));
+                ui.strong(capitalize(&name.replace(['_', '-'], " ")));
                 let image = Image::new(texture).max_width(ui.available_width());
                 ui.add(image.alt_text(format!("Picture {name} of the experiment")));
             }
@@ -105,30 +118,30 @@ impl Bench {
     }
 }
 
-fn running(ui: &mut Ui, study: &Experiment, done: f64, doing: &str, wishes: &mut Vec<Wish>) {
+fn running(ui: &mut Ui, study: &Experiment, done: f64, doing: &str, wishes: &mut Vec<UiAction>) {
     ui.horizontal(|ui| {
         #[expect(clippy::cast_possible_truncation, reason = "a part of a bar")]
         let bar = ProgressBar::new(done as f32).desired_width(0.6 * ui.available_width());
         ui.add(bar.text(format!("{:.0} %  {doing}", 100.0 * done)));
         if ui.button("Cancel").on_hover_text("Stop at the next step").clicked() {
-            wishes.push(Wish::Do(Command::CancelExperiment));
+            wishes.push(UiAction::Run(Command::CancelExperiment));
         }
-        ui.weak(seconds(study)).on_hover_text("On two cores without other work");
+        ui.weak(duration_text(study)).on_hover_text("On two cores without other work");
     });
 }
 
-fn again(ui: &mut Ui, study: &Experiment, wishes: &mut Vec<Wish>) {
+fn run_again_button(ui: &mut Ui, study: &Experiment, wishes: &mut Vec<UiAction>) {
     if ui.button("Run again").clicked() {
-        wishes.push(Wish::Do(begin(study)));
+        wishes.push(UiAction::Run(run_command(study)));
     }
 }
 
 /// Whether all claims hold, what it cost, and what can be done with it.
-fn verdict(ui: &mut Ui, report: &Report, wishes: &mut Vec<Wish>) {
+fn verdict(ui: &mut Ui, report: &ExperimentReport, wishes: &mut Vec<UiAction>) {
     let (failed, all) = (report.outcome.failed().count(), report.outcome.claims.len());
     ui.horizontal(|ui| {
         if failed == 0 {
-            let better = color32(Palette::of(ui.visuals()).better);
+            let better = color32(Palette::for_visuals(ui.visuals()).better);
             ui.label(RichText::new(format!("All {all} claims hold")).strong().color(better));
         } else {
             let text = format!("{failed} of {all} claims do not hold");
@@ -137,11 +150,11 @@ fn verdict(ui: &mut Ui, report: &Report, wishes: &mut Vec<Wish>) {
         ui.weak(format!("{} rays, {:.1} s", report.outcome.rays, 1e-3 * report.ms));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if let Some(study) = ALL.iter().find(|study| study.id == report.id) {
-                again(ui, study, wishes);
+                run_again_button(ui, study, wishes);
             }
             let hint = "Writes data (CSV, JSON) and pictures (PNG) into a folder";
             if ui.button("Save…").on_hover_text(hint).clicked() {
-                wishes.push(Wish::Choose(Purpose::ExperimentFolder));
+                wishes.push(UiAction::AskPath(FileRequest::ExperimentFolder));
             }
         });
     });
@@ -155,20 +168,20 @@ fn claims(ui: &mut Ui, claims: &[Claim]) {
         ui.end_row();
         for claim in claims {
             let (word, color) = if claim.holds {
-                ("holds", color32(Palette::of(ui.visuals()).better))
+                ("holds", color32(Palette::for_visuals(ui.visuals()).better))
             } else {
                 ("fails", ui.visuals().error_fg_color)
             };
             ui.label(RichText::new(word).strong().color(color));
-            ui.label(found(claim));
+            ui.label(value_text(claim));
             ui.label(format!("{} {} {}", claim.rule, short(claim.limit), claim.unit));
-            ui.label(capital(&claim.says));
+            ui.label(capitalize(&claim.says));
             ui.end_row();
         }
     });
 }
 
-fn found(claim: &Claim) -> String {
+fn value_text(claim: &Claim) -> String {
     let error = if claim.error == 0.0 { String::new() } else { format!(" ± {:.1e}", claim.error) };
     format!("{}{error} {}", short(claim.value), claim.unit)
 }
@@ -179,11 +192,11 @@ fn short(value: f64) -> String {
     if size > 0.0 && !(1e-3..1e6).contains(&size) {
         format!("{value:.2e}")
     } else {
-        number::show_digits(value, 4)
+        number::format_digits(value, 4)
     }
 }
 
-fn texture(context: &Context, picture: &Picture) -> TextureHandle {
+fn texture(context: &Context, picture: &NamedPlot) -> TextureHandle {
     let size = picture.canvas.size().map(|side| side as usize);
     let image = ColorImage::from_rgb(size, picture.canvas.pixels());
     context.load_texture(picture.name, image, TextureOptions::LINEAR)

@@ -12,40 +12,40 @@ use eframe::egui::{
 
 /// What was typed into the fields of a panel and is not accepted yet.
 #[derive(Debug, Default)]
-pub struct Drafts {
-    drafts: Vec<Draft>,
+pub struct EditBuffers {
+    buffers: Vec<EditBuffer>,
     /// The field that was entered by a click that is still going on: it selects all of its text
     /// once the button is released.
-    entered: Option<Id>,
+    selecting: Option<Id>,
 }
 
 #[derive(Debug)]
-struct Draft {
-    field: Id,
+struct EditBuffer {
+    input: Id,
     /// What the field showed when the typing began.
-    before: String,
+    original: String,
     text: String,
-    refused: Option<String>,
+    error: Option<String>,
 }
 
 /// How a field looks and what it is called.
 #[derive(Debug, Clone, Copy)]
-pub struct Field<'a> {
+pub struct TextInput<'a> {
     /// What a screen reader calls it.
     pub name: &'a str,
     /// What it shows while nothing is typed.
-    pub shown: &'a str,
+    pub value: &'a str,
     /// What it shows, faintly, where it is empty.
     pub hint: &'a str,
     /// Numbers stand at the right.
     pub align: Align,
     /// Where it stands.
-    pub place: Place,
+    pub placement: InputPlacement,
 }
 
 /// Where a field stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum InputPlacement {
     /// In a table, whose lines are frame enough.
     Table,
     /// By itself, with a frame that says where one can type.
@@ -54,85 +54,90 @@ pub enum Place {
 
 /// What became of a field in this frame.
 #[derive(Debug)]
-pub struct Entry {
+pub struct InputResponse {
     /// The field.
     pub response: Response,
     /// What was typed, when typing has just ended.
-    pub typed: Option<String>,
+    pub submitted: Option<String>,
 }
 
-impl Drafts {
+impl EditBuffers {
     /// Shows a field in all the width that is left.
-    pub fn show(&mut self, ui: &mut Ui, id: Id, field: Field<'_>) -> Entry {
-        self.forget_stale(ui, id, field.shown);
-        let draft = self.drafts.iter().position(|draft| draft.field == id);
-        let mut text = draft.map_or(field.shown, |i| self.drafts[i].text.as_str()).to_owned();
-        let refused = draft.and_then(|i| self.drafts[i].refused.clone());
+    pub fn show(&mut self, ui: &mut Ui, id: Id, field: TextInput<'_>) -> InputResponse {
+        self.discard_stale(ui, id, field.value);
+        let draft = self.buffers.iter().position(|draft| draft.input == id);
+        let mut text = draft.map_or(field.value, |i| self.buffers[i].text.as_str()).to_owned();
+        let refused = draft.and_then(|i| self.buffers[i].error.clone());
         let response = edit(ui, id, field, &mut text, refused.is_some());
         self.select_all(ui, &response);
         if response.changed() {
-            self.keep(id, field.shown, &text);
+            self.store(id, field.value, &text);
         }
-        let typed = if response.lost_focus() { self.end(ui, id) } else { None };
+        let typed = if response.lost_focus() { self.finish(ui, id) } else { None };
         let response = match refused {
             Some(why) => response.on_hover_text(WidgetText::from(why).color(error_color(ui))),
             None => response,
         };
-        Entry { response, typed }
+        InputResponse { response, submitted: typed }
     }
 
     /// Says why what was typed into a field cannot be taken; it stays there.
-    pub fn refuse(&mut self, field: Id, why: String) {
-        if let Some(draft) = self.drafts.iter_mut().find(|draft| draft.field == field) {
-            draft.refused = Some(why);
+    pub fn reject(&mut self, field: Id, why: String) {
+        if let Some(draft) = self.buffers.iter_mut().find(|draft| draft.input == field) {
+            draft.error = Some(why);
         }
     }
 
     /// What was typed into a field has been taken.
     pub fn accept(&mut self, field: Id) {
-        self.drafts.retain(|draft| draft.field != field);
+        self.buffers.retain(|draft| draft.input != field);
     }
 
     /// Gives everything up, as for another lens.
     pub fn clear(&mut self) {
-        self.drafts.clear();
+        self.buffers.clear();
     }
 
     /// Why the last text that was refused cannot be taken.
-    pub fn complaint(&self) -> Option<&str> {
-        self.drafts.iter().rev().find_map(|draft| draft.refused.as_deref())
+    pub fn last_error(&self) -> Option<&str> {
+        self.buffers.iter().rev().find_map(|draft| draft.error.as_deref())
     }
 
     /// What is being typed into a field.
     pub fn text(&self, field: Id) -> Option<&str> {
-        self.drafts.iter().find(|draft| draft.field == field).map(|draft| draft.text.as_str())
+        self.buffers.iter().find(|draft| draft.input == field).map(|draft| draft.text.as_str())
     }
 
     /// Whether something is being typed into the field that has the cursor.
     pub fn is_typing(&self, context: &Context) -> bool {
         let cursor = context.memory(Memory::focused);
-        self.drafts.iter().any(|draft| Some(draft.field) == cursor)
+        self.buffers.iter().any(|draft| Some(draft.input) == cursor)
     }
 
-    fn keep(&mut self, field: Id, shown: &str, text: &str) {
-        let at = self.drafts.iter().position(|draft| draft.field == field);
+    fn store(&mut self, field: Id, shown: &str, text: &str) {
+        let at = self.buffers.iter().position(|draft| draft.input == field);
         let at = at.unwrap_or_else(|| {
             let before = shown.to_owned();
-            self.drafts.push(Draft { field, before, text: String::new(), refused: None });
-            self.drafts.len() - 1
+            self.buffers.push(EditBuffer {
+                input: field,
+                original: before,
+                text: String::new(),
+                error: None,
+            });
+            self.buffers.len() - 1
         });
-        text.clone_into(&mut self.drafts[at].text);
-        self.drafts[at].refused = None;
+        text.clone_into(&mut self.buffers[at].text);
+        self.buffers[at].error = None;
     }
 
     /// Ends the typing: gives the text, or gives it up.
-    fn end(&mut self, ui: &Ui, field: Id) -> Option<String> {
+    fn finish(&mut self, ui: &Ui, field: Id) -> Option<String> {
         if ui.input(|input| input.key_pressed(Key::Escape)) {
             self.accept(field);
             return None;
         }
-        let draft = self.drafts.iter().find(|draft| draft.field == field)?;
-        if draft.text == draft.before {
+        let draft = self.buffers.iter().find(|draft| draft.input == field)?;
+        if draft.text == draft.original {
             self.accept(field);
             return None;
         }
@@ -140,18 +145,18 @@ impl Drafts {
     }
 
     /// A refused text goes once the value below it changes, by undo for example.
-    fn forget_stale(&mut self, ui: &Ui, field: Id, shown: &str) {
+    fn discard_stale(&mut self, ui: &Ui, field: Id, shown: &str) {
         if !ui.memory(|memory| memory.has_focus(field)) {
-            self.drafts.retain(|draft| draft.field != field || draft.before == shown);
+            self.buffers.retain(|draft| draft.input != field || draft.original == shown);
         }
     }
 
     /// Selects the whole text of a field that is entered, so that typing replaces it.
     fn select_all(&mut self, ui: &Ui, field: &Response) {
         if field.gained_focus() {
-            self.entered = Some(field.id);
+            self.selecting = Some(field.id);
         }
-        if self.entered != Some(field.id) {
+        if self.selecting != Some(field.id) {
             return;
         }
         let mut state = TextEditState::load(ui.ctx(), field.id).unwrap_or_default();
@@ -159,7 +164,7 @@ impl Drafts {
         state.cursor.set_char_range(Some(all));
         state.store(ui.ctx(), field.id);
         if !ui.input(|input| input.pointer.any_down()) {
-            self.entered = None;
+            self.selecting = None;
         }
     }
 }
@@ -169,11 +174,11 @@ pub fn error_color(ui: &Ui) -> Color32 {
     ui.visuals().error_fg_color
 }
 
-fn edit(ui: &mut Ui, id: Id, field: Field<'_>, text: &mut String, refused: bool) -> Response {
+fn edit(ui: &mut Ui, id: Id, field: TextInput<'_>, text: &mut String, refused: bool) -> Response {
     let focused = ui.memory(|memory| memory.has_focus(id));
     let hovered = ui.ctx().read_response(id).is_some_and(|last| last.hovered());
     let visuals = ui.visuals();
-    let boxed = field.place == Place::Form;
+    let boxed = field.placement == InputPlacement::Form;
     let line = if refused {
         visuals.error_fg_color
     } else if focused {

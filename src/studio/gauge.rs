@@ -9,10 +9,10 @@ use eframe::{App, CreationContext};
 use serde::Serialize;
 
 use super::app::Studio;
-use super::draw::Backing;
-use super::shell::{self, Memory, Started, StudioError};
+use super::draw::RenderBackend;
+use super::shell::{self, AppResult, Persistence, StudioError};
 use super::{first_lens, panels};
-use crate::measure::{age_ms, processor_ms, timed};
+use crate::measure::{age_ms, processor_ms, time_ms};
 use crate::session::{Command, Edit, Session};
 
 /// How many edits are timed.
@@ -20,15 +20,15 @@ const EDITS: usize = 21;
 /// How many repainted frames share the measured processor time.
 const FRAMES: usize = 20;
 /// How long the window is left alone.
-const ALONE: Duration = Duration::from_secs(5);
+const IDLE_TIME: Duration = Duration::from_secs(5);
 /// How long it may go on settling before that.
-const SETTLE: Duration = Duration::from_millis(700);
+const SETTLING_TIME: Duration = Duration::from_millis(700);
 /// How long the numbers of an edit may take at most.
-const PATIENCE: u32 = 20_000; // looks, a tenth of a millisecond apart
+const MAX_POLLS: u32 = 20_000; // looks, a tenth of a millisecond apart
 
 /// What a window costs. What the system does not count is absent.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Figures {
+pub struct WindowMetrics {
     /// What draws the window.
     pub renderer: String,
     /// Width and height of the window in pixels.
@@ -52,23 +52,25 @@ pub struct Figures {
 ///
 /// # Errors
 /// Where no window can open: see [`StudioError`].
-pub fn measure() -> Result<Figures, StudioError> {
-    let figures = Arc::new(Mutex::new(Figures::default()));
+pub fn measure_window() -> Result<WindowMetrics, StudioError> {
+    let figures = Arc::new(Mutex::new(WindowMetrics::default()));
     let shared = Arc::clone(&figures);
-    shell::open(Memory::None, move |context, backing| gauge(context, backing, &shared))?;
+    shell::open_window(Persistence::Disabled, move |context, backing| {
+        start_benchmark(context, backing, &shared)
+    })?;
     let found = figures.lock().unwrap_or_else(PoisonError::into_inner).clone();
     Ok(found)
 }
 
-fn gauge(
+fn start_benchmark(
     context: &CreationContext<'_>,
-    backing: Backing,
-    figures: &Arc<Mutex<Figures>>,
-) -> Started {
+    backing: RenderBackend,
+    figures: &Arc<Mutex<WindowMetrics>>,
+) -> AppResult {
     let wake = context.egui_ctx.clone();
     let session = Session::new(first_lens(), move || wake.request_repaint())?;
-    let mut studio = Studio::new(session, backing, Memory::None, None);
-    studio.leave_without_asking();
+    let mut studio = Studio::new(session, backing, Persistence::Disabled, None);
+    studio.close_without_asking();
     let renderer = context.wgpu_render_state.as_ref().map_or_else(
         || "OpenGL".to_owned(),
         |state| {
@@ -78,37 +80,37 @@ fn gauge(
     );
     let figures = Arc::clone(figures);
     figures.lock().unwrap_or_else(PoisonError::into_inner).renderer = renderer;
-    Ok(Box::new(Gauge { studio, figures, stage: Stage::Opening }))
+    Ok(Box::new(WindowBenchmark { studio, metrics: figures, phase: BenchmarkPhase::Opening }))
 }
 
 /// A studio that measures itself.
-struct Gauge {
+struct WindowBenchmark {
     studio: Studio,
-    figures: Arc<Mutex<Figures>>,
-    stage: Stage,
+    metrics: Arc<Mutex<WindowMetrics>>,
+    phase: BenchmarkPhase,
 }
 
 /// What is being measured.
 #[derive(Debug, Clone, Copy)]
-enum Stage {
+enum BenchmarkPhase {
     /// The first frame with the lens and all its numbers is not on the screen yet.
     Opening,
     /// It is being drawn.
-    Drawing,
+    FirstDrawing,
     /// So many frames until the drawings are there.
     Settling(usize),
     /// So many frames are still to be repainted; the processor time when that began.
     Repainting(usize, Option<f64>),
     /// So many frames until the window is left alone.
-    Calming(usize),
+    SettlingIdle(usize),
     /// Another thread looks on.
-    Alone,
+    Idle,
 }
 
-impl App for Gauge {
+impl App for WindowBenchmark {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         let context = ui.ctx().clone();
-        self.stage = self.next(&context);
+        self.phase = self.advance(&context);
         self.studio.ui(ui);
     }
 
@@ -117,51 +119,55 @@ impl App for Gauge {
     }
 }
 
-impl Gauge {
+impl WindowBenchmark {
     /// Does what belongs to this frame and tells what comes next.
-    fn next(&mut self, context: &Context) -> Stage {
-        if !matches!(self.stage, Stage::Alone) {
+    fn advance(&mut self, context: &Context) -> BenchmarkPhase {
+        if !matches!(self.phase, BenchmarkPhase::Idle) {
             context.request_repaint();
         }
-        match self.stage {
-            Stage::Opening if self.studio.session().view().is_current() => Stage::Drawing,
-            Stage::Opening => Stage::Opening,
-            Stage::Drawing => {
+        match self.phase {
+            BenchmarkPhase::Opening if self.studio.session().view().is_current() => {
+                BenchmarkPhase::FirstDrawing
+            }
+            BenchmarkPhase::Opening => BenchmarkPhase::Opening,
+            BenchmarkPhase::FirstDrawing => {
                 let size = context.content_rect().size() * context.pixels_per_point();
-                self.note(|figures| {
+                self.record(|figures| {
                     figures.first_frame_ms = age_ms();
                     figures.size = [size.x as u32, size.y as u32];
                 });
-                self.edit();
-                Stage::Settling(5)
+                self.time_edits();
+                BenchmarkPhase::Settling(5)
             }
-            Stage::Settling(0) => Stage::Repainting(FRAMES, processor_ms()),
-            Stage::Settling(left) => Stage::Settling(left - 1),
-            Stage::Repainting(0, before) => {
-                let spent = spent_since(before).map(|ms| ms / FRAMES as f64);
-                self.note(|figures| figures.frame_processor_ms = spent);
-                context.memory_mut(|memory| memory.request_focus(panels::first_field()));
-                Stage::Calming(5)
+            BenchmarkPhase::Settling(0) => BenchmarkPhase::Repainting(FRAMES, processor_ms()),
+            BenchmarkPhase::Settling(left) => BenchmarkPhase::Settling(left - 1),
+            BenchmarkPhase::Repainting(0, before) => {
+                let spent = processor_ms_since(before).map(|ms| ms / FRAMES as f64);
+                self.record(|figures| figures.frame_processor_ms = spent);
+                context.memory_mut(|memory| memory.request_focus(panels::first_radius_field()));
+                BenchmarkPhase::SettlingIdle(5)
             }
-            Stage::Repainting(left, before) => Stage::Repainting(left - 1, before),
-            Stage::Calming(0) => {
-                self.look_on(context);
-                Stage::Alone
+            BenchmarkPhase::Repainting(left, before) => {
+                BenchmarkPhase::Repainting(left - 1, before)
             }
-            Stage::Calming(left) => Stage::Calming(left - 1),
-            Stage::Alone => Stage::Alone,
+            BenchmarkPhase::SettlingIdle(0) => {
+                self.measure_idle(context);
+                BenchmarkPhase::Idle
+            }
+            BenchmarkPhase::SettlingIdle(left) => BenchmarkPhase::SettlingIdle(left - 1),
+            BenchmarkPhase::Idle => BenchmarkPhase::Idle,
         }
     }
 
-    fn note(&self, note: impl FnOnce(&mut Figures)) {
-        note(&mut self.figures.lock().unwrap_or_else(PoisonError::into_inner));
+    fn record(&self, note: impl FnOnce(&mut WindowMetrics)) {
+        note(&mut self.metrics.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Types radii and waits each time for the numbers of all panels.
-    fn edit(&mut self) {
+    fn time_edits(&mut self) {
         let mut times: Vec<f64> = (0..EDITS).map(|i| self.time_edit(i)).collect();
         times.sort_by(f64::total_cmp);
-        self.note(|figures| {
+        self.record(|figures| {
             figures.edit_ms = times[EDITS / 2];
             figures.slowest_edit_ms = times[EDITS - 1];
         });
@@ -171,10 +177,10 @@ impl Gauge {
         let text = if i.is_multiple_of(2) { "*1.001" } else { "/1.001" };
         let edit = Edit::TypeRadius { surface: 0, text: text.to_owned() };
         let session = self.studio.session_mut();
-        let ((), ms) = timed(|| {
+        let ((), ms) = time_ms(|| {
             session.apply(Command::Edit(edit));
-            session.apply(Command::Settle);
-            for _ in 0..PATIENCE {
+            session.apply(Command::CommitEdit);
+            for _ in 0..MAX_POLLS {
                 if session.view().is_current() {
                     break;
                 }
@@ -185,15 +191,15 @@ impl Gauge {
     }
 
     /// Leaves the window alone, looks at the processor time meanwhile, and closes it.
-    fn look_on(&self, context: &Context) {
-        let (figures, window) = (Arc::clone(&self.figures), context.clone());
+    fn measure_idle(&self, context: &Context) {
+        let (figures, window) = (Arc::clone(&self.metrics), context.clone());
         let look = move || {
-            thread::sleep(SETTLE);
+            thread::sleep(SETTLING_TIME);
             let before = processor_ms();
-            thread::sleep(ALONE);
-            let spent = spent_since(before);
+            thread::sleep(IDLE_TIME);
+            let spent = processor_ms_since(before);
             let mut figures = figures.lock().unwrap_or_else(PoisonError::into_inner);
-            figures.idle_seconds = ALONE.as_secs_f64();
+            figures.idle_seconds = IDLE_TIME.as_secs_f64();
             figures.idle_processor_ms = spent;
             drop(figures);
             window.send_viewport_cmd(ViewportCommand::Close);
@@ -205,6 +211,6 @@ impl Gauge {
     }
 }
 
-fn spent_since(before: Option<f64>) -> Option<f64> {
+fn processor_ms_since(before: Option<f64>) -> Option<f64> {
     Some(processor_ms()? - before?)
 }

@@ -4,23 +4,23 @@ use eframe::egui::{
     Align, Button, Key, KeyboardShortcut, Layout, MenuBar, Modifiers, Theme, Ui, ViewportCommand,
 };
 
-use super::chooser::Purpose;
+use super::chooser::FileRequest;
 use super::dock::Dock;
 use super::experiment;
-use super::panels::Kind;
+use super::panels::PanelKind;
 use super::wording::counted_from_one;
-use crate::files::{self, Bundled};
-use crate::session::{Command, View, blank};
+use crate::files::{self, BundledLens};
+use crate::session::{Command, SessionView, blank};
 
 /// What the menu asks for.
 #[derive(Debug)]
-pub(super) enum Wish {
+pub(super) enum UiAction {
     /// A change of the design.
-    Do(Command),
+    Run(Command),
     /// A lens that comes with the program.
-    Bundled(&'static Bundled),
+    Bundled(&'static BundledLens),
     /// A file has to be chosen first.
-    Choose(Purpose),
+    AskPath(FileRequest),
 }
 
 const fn control(key: Key) -> KeyboardShortcut {
@@ -41,51 +41,55 @@ const REDO: KeyboardShortcut = control_shift(Key::Z);
 const REDO_TOO: KeyboardShortcut = control(Key::Y);
 
 /// What the keys ask for. Undo and redo are left to a field while something is typed into it.
-pub(super) fn keys(ui: &Ui, view: &View, typing: bool) -> Vec<Wish> {
+pub(super) fn shortcut_actions(ui: &Ui, view: &SessionView, typing: bool) -> Vec<UiAction> {
     let pressed = |key: &KeyboardShortcut| ui.input_mut(|input| input.consume_shortcut(key));
     let mut wishes = Vec::new();
     // A shortcut with Shift also contains the one without: the longer ones are asked first.
     if pressed(&SAVE_AS) {
-        wishes.push(Wish::Choose(Purpose::Save));
+        wishes.push(UiAction::AskPath(FileRequest::Save));
     }
     if pressed(&SAVE) {
-        wishes.push(save(view));
+        wishes.push(save_action(view));
     }
     if pressed(&OPEN) {
-        wishes.push(Wish::Choose(Purpose::Open));
+        wishes.push(UiAction::AskPath(FileRequest::Open));
     }
     if pressed(&EXPORT) {
-        wishes.push(Wish::Choose(Purpose::ExportZemax));
+        wishes.push(UiAction::AskPath(FileRequest::ExportZemax));
     }
     if pressed(&NEW) {
-        wishes.push(new());
+        wishes.push(new_lens_action());
     }
     if !typing && (pressed(&REDO) || pressed(&REDO_TOO)) {
-        wishes.push(Wish::Do(Command::Redo));
+        wishes.push(UiAction::Run(Command::Redo));
     }
     if !typing && pressed(&UNDO) {
-        wishes.push(Wish::Do(Command::Undo));
+        wishes.push(UiAction::Run(Command::Undo));
     }
     wishes
 }
 
-fn new() -> Wish {
-    Wish::Do(Command::New(Box::new(blank())))
+fn new_lens_action() -> UiAction {
+    UiAction::Run(Command::New(Box::new(blank())))
 }
 
-fn save(view: &View) -> Wish {
-    if view.path.is_some() { Wish::Do(Command::Save(None)) } else { Wish::Choose(Purpose::Save) }
+fn save_action(view: &SessionView) -> UiAction {
+    if view.path.is_some() {
+        UiAction::Run(Command::Save(None))
+    } else {
+        UiAction::AskPath(FileRequest::Save)
+    }
 }
 
 /// Shows the menu bar.
-pub(super) fn bar(ui: &mut Ui, view: &View, dock: &mut Dock, wishes: &mut Vec<Wish>) {
+pub(super) fn bar(ui: &mut Ui, view: &SessionView, dock: &mut Dock, wishes: &mut Vec<UiAction>) {
     MenuBar::new().ui(ui, |ui| {
-        ui.menu_button("File", |ui| file(ui, view, wishes));
-        ui.menu_button("Edit", |ui| edit(ui, view, wishes));
-        ui.menu_button("View", |ui| panels(ui, dock));
+        ui.menu_button("File", |ui| file_menu(ui, view, wishes));
+        ui.menu_button("Edit", |ui| edit_menu(ui, view, wishes));
+        ui.menu_button("View", |ui| view_menu(ui, dock));
         ui.menu_button("Experiments", |ui| experiment::menu(ui, wishes));
         ui.separator();
-        history_buttons(ui, view, wishes);
+        undo_buttons(ui, view, wishes);
         ui.with_layout(Layout::right_to_left(Align::Center), theme_button);
     });
 }
@@ -102,37 +106,37 @@ fn item(ui: &mut Ui, text: &str, key: Option<&KeyboardShortcut>) -> bool {
     clicked
 }
 
-fn file(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
+fn file_menu(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
     ui.set_min_width(210.0);
     if item(ui, "New", Some(&NEW)) {
-        wishes.push(new());
+        wishes.push(new_lens_action());
     }
     if item(ui, "Open or import…", Some(&OPEN)) {
-        wishes.push(Wish::Choose(Purpose::Open));
+        wishes.push(UiAction::AskPath(FileRequest::Open));
     }
     ui.menu_button("Bundled lenses", |ui| {
-        for bundled in files::library() {
+        for bundled in files::bundled_lenses() {
             if item(ui, bundled.title, None) {
-                wishes.push(Wish::Bundled(bundled));
+                wishes.push(UiAction::Bundled(bundled));
             }
         }
     });
     ui.separator();
     if item(ui, "Save", Some(&SAVE)) {
-        wishes.push(save(view));
+        wishes.push(save_action(view));
     }
     if item(ui, "Save as…", Some(&SAVE_AS)) {
-        wishes.push(Wish::Choose(Purpose::Save));
+        wishes.push(UiAction::AskPath(FileRequest::Save));
     }
     if item(ui, "Export for Zemax…", Some(&EXPORT)) {
-        wishes.push(Wish::Choose(Purpose::ExportZemax));
+        wishes.push(UiAction::AskPath(FileRequest::ExportZemax));
     }
     if item(ui, "Export a copy as JSON…", None) {
-        wishes.push(Wish::Choose(Purpose::ExportJson));
+        wishes.push(UiAction::AskPath(FileRequest::ExportJson));
     }
-    ui.add_enabled_ui(view.fronts.run.is_some(), |ui| {
+    ui.add_enabled_ui(view.pareto.run.is_some(), |ui| {
         if item(ui, "Export the front…", None) {
-            wishes.push(Wish::Do(Command::ExportFront(None)));
+            wishes.push(UiAction::Run(Command::ExportPareto(None)));
         }
     });
     ui.separator();
@@ -141,7 +145,7 @@ fn file(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
     }
 }
 
-fn edit(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
+fn edit_menu(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
     ui.set_min_width(260.0);
     let steps =
         [("Undo", &view.undo, UNDO, Command::Undo), ("Redo", &view.redo, REDO, Command::Redo)];
@@ -152,14 +156,14 @@ fn edit(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
         );
         ui.add_enabled_ui(title.is_some(), |ui| {
             if item(ui, &text, Some(&key)) {
-                wishes.push(Wish::Do(command));
+                wishes.push(UiAction::Run(command));
             }
         });
     }
 }
 
-fn panels(ui: &mut Ui, dock: &mut Dock) {
-    for kind in Kind::ALL {
+fn view_menu(ui: &mut Ui, dock: &mut Dock) {
+    for kind in PanelKind::ALL {
         let mut open = dock.is_open(kind);
         if ui.checkbox(&mut open, dock.title(kind)).clicked() {
             dock.toggle(kind);
@@ -179,7 +183,7 @@ fn panels(ui: &mut Ui, dock: &mut Dock) {
     }
 }
 
-fn history_buttons(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
+fn undo_buttons(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
     let steps = [("Undo", &view.undo, Command::Undo), ("Redo", &view.redo, Command::Redo)];
     for (name, title, command) in steps {
         let button = ui.add_enabled(title.is_some(), Button::new(name));
@@ -188,7 +192,7 @@ fn history_buttons(ui: &mut Ui, view: &View, wishes: &mut Vec<Wish>) {
             |title| format!("{name}: {}", counted_from_one(title)),
         );
         if button.on_hover_text(hint).clicked() {
-            wishes.push(Wish::Do(command));
+            wishes.push(UiAction::Run(command));
         }
     }
 }

@@ -21,11 +21,11 @@ mod unsaved;
 pub mod wording;
 
 pub use app::Studio;
-pub use gauge::{Figures, measure};
+pub use gauge::{WindowMetrics, measure_window};
 
 use std::path::Path;
 
-use shell::{Memory, StudioError};
+use shell::{Persistence, StudioError};
 
 use crate::files;
 use crate::lens::Lens;
@@ -37,13 +37,13 @@ use crate::session::{Command, Session, blank};
 /// # Errors
 /// Where no window can open: see [`StudioError`]. A file that cannot be read is said in the window.
 pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
-    shell::open(Memory::Kept, |context, backing| {
+    shell::open_window(Persistence::Enabled, |context, backing| {
         let wake = context.egui_ctx.clone();
         let mut session = Session::new(first_lens(), move || wake.request_repaint())?;
         if let Some(folder) = eframe::storage_dir("aplanat") {
-            session.keep_searches_in(folder.join("searches"));
+            session.set_save_folder(folder.join("searches"));
         }
-        let mut studio = Studio::new(session, backing, Memory::Kept, context.storage);
+        let mut studio = Studio::new(session, backing, Persistence::Enabled, context.storage);
         if let Some(path) = path {
             studio.apply(&context.egui_ctx, Command::Open(path.to_owned()));
         }
@@ -53,7 +53,7 @@ pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
 
 /// The lens that the studio opens with.
 fn first_lens() -> Lens {
-    let first = files::library().first();
+    let first = files::bundled_lenses().first();
     let read = first.and_then(|lens| files::parse(lens.text.as_bytes(), lens.name).ok());
     read.map_or_else(blank, |opened| opened.lens)
 }

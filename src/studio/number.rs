@@ -3,15 +3,15 @@
 /// How many digits a cell shows; the value itself keeps all of them.
 const DIGITS: i32 = 7;
 /// Most digits of a number that stands among others close to it.
-const MOST: i32 = 10;
+const MAX_DIGITS: i32 = 10;
 
 /// A number with seven digits, without trailing zeros.
-pub fn show(value: f64) -> String {
-    show_digits(value, DIGITS)
+pub fn format_number(value: f64) -> String {
+    format_digits(value, DIGITS)
 }
 
 /// A number with some digits, without trailing zeros.
-pub fn show_digits(value: f64, digits: i32) -> String {
+pub fn format_digits(value: f64, digits: i32) -> String {
     if value.is_infinite() {
         return if value > 0.0 { "Infinity" } else { "-Infinity" }.to_owned();
     }
@@ -41,7 +41,7 @@ pub fn digits_between(size: f64, step: f64, least: i32) -> i32 {
     }
     #[expect(clippy::cast_possible_truncation, reason = "an exponent between -324 and 309")]
     let digits = apart.ceil() as i32 + 1;
-    digits.clamp(least, least.max(MOST))
+    digits.clamp(least, least.max(MAX_DIGITS))
 }
 
 /// The radius of a surface, as it is shown for a curvature.
@@ -71,13 +71,13 @@ mod tests {
             (f64::INFINITY, "Infinity"),
         ];
         for (value, text) in cases {
-            assert_eq!(show(value), text);
+            assert_eq!(format_number(value), text);
         }
     }
 
     #[test]
     fn close_numbers_are_told_apart() {
-        let show = |value, step| show_digits(value, digits_between(value, step, 4));
+        let show = |value, step| format_digits(value, digits_between(value, step, 4));
         assert_eq!([show(1.000225, 7.5e-5), show(1.00015, 5e-5)], ["1.00022", "1.00015"]);
         assert_eq!([show(1.5, 0.1), show(1.05, 0.0)], ["1.5", "1.05"]);
         assert!(show(1.0, 1e-300).len() < 12);

@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Color32};
 
-use super::draw::Colour;
+use super::draw::Rgba;
 
 /// Colours of fields in their order: blue, green, red, then what is left of the set of Okabe and
 /// Ito (2008), which people with every kind of colour blindness can tell apart.
@@ -54,30 +54,30 @@ const LIMITS_LIGHT: [[u8; 3]; 8] = [
 pub struct Palette {
     dark: bool,
     /// Behind everything.
-    pub background: Colour,
+    pub background: Rgba,
     /// Inside a lens; a denser glass is drawn less transparent.
-    pub glass: Colour,
+    pub glass: Rgba,
     /// The same for glass that the design does not have.
-    pub fresh: Colour,
+    pub added_glass: Rgba,
     /// The rim of a lens.
-    pub outline: Colour,
+    pub outline: Rgba,
     /// A mirror.
-    pub mirror: Colour,
+    pub mirror: Rgba,
     /// The stop and the image plane.
-    pub strong: Colour,
+    pub strong: Rgba,
     /// The axis, and surfaces between equal media.
-    pub faint: Colour,
+    pub faint: Rgba,
     /// Where a ray has died.
-    pub lost: Colour,
+    pub lost_ray: Rgba,
     /// A change for the better.
-    pub better: Colour,
+    pub better: Rgba,
     /// A change for the worse.
-    pub worse: Colour,
+    pub worse: Rgba,
 }
 
 impl Palette {
     /// The colours that go with the window's theme.
-    pub fn of(visuals: &egui::Visuals) -> Self {
+    pub fn for_visuals(visuals: &egui::Visuals) -> Self {
         if visuals.dark_mode { Self::DARK } else { Self::LIGHT }
     }
 
@@ -86,12 +86,12 @@ impl Palette {
         dark: true,
         background: [22, 24, 28, 255],
         glass: [110, 165, 225, 70],
-        fresh: [250, 190, 80, 95],
+        added_glass: [250, 190, 80, 95],
         outline: [160, 190, 220, 255],
         mirror: [120, 210, 140, 255],
         strong: [235, 235, 235, 255],
         faint: [120, 125, 135, 130],
-        lost: [255, 90, 90, 255],
+        lost_ray: [255, 90, 90, 255],
         better: [51, 187, 238, 255],
         worse: [238, 119, 51, 255],
     };
@@ -101,25 +101,25 @@ impl Palette {
         dark: false,
         background: [252, 252, 252, 255],
         glass: [90, 150, 215, 60],
-        fresh: [235, 140, 0, 80],
+        added_glass: [235, 140, 0, 80],
         outline: [60, 95, 135, 255],
         mirror: [30, 130, 60, 255],
         strong: [25, 25, 25, 255],
         faint: [110, 115, 125, 130],
-        lost: [205, 20, 20, 255],
+        lost_ray: [205, 20, 20, 255],
         better: [0, 105, 180, 255],
         worse: [200, 75, 0, 255],
     };
 
     /// The colour of a field by its place in the list.
-    pub fn field(&self, index: usize) -> Colour {
+    pub fn field(&self, index: usize) -> Rgba {
         let set = if self.dark { FIELDS_DARK } else { FIELDS_LIGHT };
         let [r, g, b] = set[index % set.len()];
         [r, g, b, 255]
     }
 
     /// The colour of what limits a pupil, by the order in which limits have turned up.
-    pub fn limit(&self, index: usize) -> Colour {
+    pub fn limit(&self, index: usize) -> Rgba {
         let set = if self.dark { LIMITS_DARK } else { LIMITS_LIGHT };
         let [r, g, b] = set[index % set.len()];
         [r, g, b, 255]
@@ -127,13 +127,13 @@ impl Palette {
 
     /// The colour of a kind of mutation, by its place among them; those beyond the set start again
     /// in the colours of fields.
-    pub fn mutation(&self, index: usize) -> Colour {
+    pub fn mutation(&self, index: usize) -> Rgba {
         let count = LIMITS_DARK.len();
         if index < count { self.limit(index) } else { self.field(index - count) }
     }
 
     /// About the hue that a wavelength has to the eye, violet below 0.4 µm and red above 0.7 µm.
-    pub fn wavelength(&self, um: f64) -> Colour {
+    pub fn wavelength(&self, um: f64) -> Rgba {
         const HUES: [(f64, [f64; 3]); 7] = [
             (0.40, [150.0, 60.0, 255.0]),
             (0.45, [70.0, 90.0, 255.0]),
@@ -161,7 +161,7 @@ pub fn to_byte(value: f64) -> u8 {
 }
 
 /// A colour as the widgets want it.
-pub fn color32([r, g, b, a]: Colour) -> Color32 {
+pub fn color32([r, g, b, a]: Rgba) -> Color32 {
     Color32::from_rgba_unmultiplied(r, g, b, a)
 }
 

@@ -18,7 +18,7 @@ const VIRIDIS: [[u8; 3]; 10] = [
 ];
 
 /// The colour of a number by its place in a range, 0 to 1.
-pub fn rising(share: f64) -> [u8; 3] {
+pub fn sequential(share: f64) -> [u8; 3] {
     let last = VIRIDIS.len() - 1;
     let at = if share.is_finite() { share.clamp(0.0, 1.0) * last as f64 } else { 0.0 };
     let (below, t) = ((at as usize).min(last - 1), at - (at as usize).min(last - 1) as f64);
@@ -31,7 +31,7 @@ pub fn rising(share: f64) -> [u8; 3] {
 
 /// The colour of a difference by its size and sign, -1 to 1: blue below zero, orange above, and zero
 /// like the ground, dark or light. Straight lines in Oklab (Ottosson 2020), where they look even.
-pub fn about_zero(share: f64, dark: bool) -> [u8; 3] {
+pub fn diverging(share: f64, dark: bool) -> [u8; 3] {
     let share = if share.is_finite() { share.clamp(-1.0, 1.0) } else { 0.0 };
     let [ground, end, chroma] = if dark { [0.25, 0.84, 0.125] } else { [0.97, 0.50, 0.15] };
     let hue: f64 = if share < 0.0 { 245.0 } else { 60.0 };
@@ -82,9 +82,9 @@ mod tests {
     #[test]
     fn lightness_rises_evenly() {
         let maps: [(&str, Vec<f64>); 3] = [
-            ("rising", steps(rising)),
-            ("dark", steps(|share| about_zero(share, true))),
-            ("light", steps(|share| about_zero(-share, false))),
+            ("rising", steps(sequential)),
+            ("dark", steps(|share| diverging(share, true))),
+            ("light", steps(|share| diverging(-share, false))),
         ];
         for (name, steps) in maps {
             assert!(steps.iter().all(|step| (0.6..1.5).contains(step)), "{name}: {steps:?}");
@@ -93,10 +93,10 @@ mod tests {
 
     #[test]
     fn the_ends_and_what_is_no_number_have_colours() {
-        assert_eq!((rising(-1.0), rising(2.0)), (VIRIDIS[0], VIRIDIS[9]));
-        assert_eq!(rising(f64::NAN), VIRIDIS[0]);
-        assert_eq!(about_zero(f64::NAN, true), about_zero(0.0, true));
-        let [below, above] = [-1.0, 1.0].map(|share| about_zero(share, true));
+        assert_eq!((sequential(-1.0), sequential(2.0)), (VIRIDIS[0], VIRIDIS[9]));
+        assert_eq!(sequential(f64::NAN), VIRIDIS[0]);
+        assert_eq!(diverging(f64::NAN, true), diverging(0.0, true));
+        let [below, above] = [-1.0, 1.0].map(|share| diverging(share, true));
         assert!(below[2] > below[0] && above[0] > above[2]);
     }
 }

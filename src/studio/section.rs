@@ -6,7 +6,7 @@
 
 use glam::DVec2;
 
-use super::draw::{Bounds, Colour, Scene};
+use super::draw::{BoundingBox, Rgba, Scene};
 use super::palette::{Palette, to_byte};
 use crate::lens::{Shape, System};
 
@@ -16,31 +16,32 @@ const PIECES: i32 = 96;
 
 /// The section of a system, ready to be drawn.
 #[derive(Clone, Debug)]
-pub struct Section<'a> {
+pub struct LensSection<'a> {
     system: &'a System<f64>,
     vertices: Vec<f64>,
     heights: Vec<f64>,
 }
 
-impl<'a> Section<'a> {
+impl<'a> LensSection<'a> {
     /// The section of a system. `reached` says how far from the axis rays meet each surface.
     pub fn new(system: &'a System<f64>, reached: &[f64]) -> Self {
         Self { system, vertices: vertices(system), heights: heights(system, reached) }
     }
 
     /// What a picture of the whole lens shows: all surfaces and the place of the image.
-    pub fn bounds(&self) -> Option<Bounds> {
+    pub fn bounds(&self) -> Option<BoundingBox> {
         let heights = self.heights.iter().enumerate();
         let heights = heights.map(|(i, h)| if i == self.last() { 0.0 } else { *h });
         let corners = self.vertices.iter().zip(heights);
-        Bounds::around(corners.flat_map(|(&z, h)| [DVec2::new(z, h), DVec2::new(z, -h)]))
+        BoundingBox::around(corners.flat_map(|(&z, h)| [DVec2::new(z, h), DVec2::new(z, -h)]))
     }
 
-    /// Draws glass, to lie below the rays; that behind the surfaces of `fresh` is tinted.
+    /// Draws glass, to lie below the rays; that behind the surfaces of `added_glass` is tinted.
     pub fn draw_glass(&self, scene: &mut Scene, palette: &Palette, fresh: &[usize]) {
         for (left, medium) in self.elements() {
             let height = self.heights[left].max(self.heights[left + 1]);
-            let mut colour = if fresh.contains(&left) { palette.fresh } else { palette.glass };
+            let mut colour =
+                if fresh.contains(&left) { palette.added_glass } else { palette.glass };
             colour[3] = glass_alpha(colour[3], medium);
             scene.strip(&self.curve(left, height), &self.curve(left + 1, height), colour);
         }
@@ -79,7 +80,7 @@ impl<'a> Section<'a> {
     }
 
     /// Draws the rims alone, in one colour: a lens to compare with.
-    pub fn draw_ghost(&self, scene: &mut Scene, colour: Colour) {
+    pub fn draw_ghost(&self, scene: &mut Scene, colour: Rgba) {
         for (left, _) in self.elements() {
             scene.outline(&self.rim(left), 1.0, colour);
         }
@@ -208,8 +209,8 @@ mod tests {
             semi_diameter,
             obstruction,
             mirror: false,
-            hyper: false,
-            graded: None,
+            hyperhemisphere: false,
+            grin: None,
         }
     }
 
@@ -226,7 +227,7 @@ mod tests {
     #[test]
     fn an_element_reaches_to_its_larger_semi_diameter() {
         let system = singlet();
-        let section = Section::new(&system, &[]);
+        let section = LensSection::new(&system, &[]);
         let back = section.curve(1, 10.0);
         let rim = back.last().copied().unwrap_or_default();
         assert_eq!(rim.y, 10.0);
@@ -236,8 +237,8 @@ mod tests {
     #[test]
     fn a_surface_without_semi_diameter_reaches_as_far_as_its_rays() {
         let system = singlet();
-        assert_eq!(Section::new(&system, &[9.0, 9.0, 3.0]).heights, [10.0, 8.0, 3.0]);
-        assert_eq!(Section::new(&system, &[]).heights, [10.0, 8.0, 10.0]);
+        assert_eq!(LensSection::new(&system, &[9.0, 9.0, 3.0]).heights, [10.0, 8.0, 3.0]);
+        assert_eq!(LensSection::new(&system, &[]).heights, [10.0, 8.0, 10.0]);
     }
 
     #[test]
@@ -250,15 +251,15 @@ mod tests {
     fn only_glass_is_filled() {
         let system = singlet();
         let mut scene = Scene::default();
-        Section::new(&system, &[]).draw_glass(&mut scene, &Palette::DARK, &[]);
-        let behind = scene.corners.iter().map(|corner| corner.at.x).fold(0.0, f32::max);
+        LensSection::new(&system, &[]).draw_glass(&mut scene, &Palette::DARK, &[]);
+        let behind = scene.vertices.iter().map(|corner| corner.position.x).fold(0.0, f32::max);
         assert!(behind <= 5.01, "nothing is filled behind the singlet");
     }
 
     #[test]
     fn a_lens_without_surfaces_draws_nothing() {
         let system = System { index_before: 1.0, surfaces: Vec::new(), stop: Some(3) };
-        let section = Section::new(&system, &[]);
+        let section = LensSection::new(&system, &[]);
         let mut scene = Scene::default();
         section.draw_glass(&mut scene, &Palette::DARK, &[]);
         section.draw_outlines(&mut scene, &Palette::DARK);

@@ -7,7 +7,7 @@ use eframe::egui;
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use eframe::{App, CreationContext, NativeOptions, Renderer};
 
-use super::draw::{Backing, install};
+use super::draw::{RenderBackend, install_gpu_cache};
 use super::theme;
 
 /// Why the studio cannot open.
@@ -46,24 +46,24 @@ const WITHOUT_WINDOW: &str = "the same work without a window: \
 
 /// Whether the window remembers its size and panels from one start to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Memory {
+pub enum Persistence {
     /// It does.
-    Kept,
+    Enabled,
     /// It starts as new and leaves nothing behind.
-    None,
+    Disabled,
 }
 
 /// What a window shows, or why there is nothing to show.
-pub type Started = Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>;
+pub type AppResult = Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>;
 
 /// Opens a window and stays until it is closed. `start` makes what the window shows; it may be
 /// called a second time when the first renderer fails.
-pub fn open(
-    memory: Memory,
-    start: impl Fn(&CreationContext<'_>, Backing) -> Started,
+pub fn open_window(
+    memory: Persistence,
+    start: impl Fn(&CreationContext<'_>, RenderBackend) -> AppResult,
 ) -> Result<(), StudioError> {
     let wgpu = match open_with(Renderer::Wgpu, memory, &start) {
-        Err(eframe::Error::Wgpu(error)) => plain(&error.to_string()),
+        Err(eframe::Error::Wgpu(error)) => without_source_location(&error.to_string()),
         Err(error) => return Err(error.into()),
         Ok(()) => return Ok(()),
     };
@@ -79,40 +79,42 @@ pub fn open(
 impl From<eframe::Error> for StudioError {
     fn from(error: eframe::Error) -> Self {
         match error {
-            eframe::Error::WinitEventLoop(reason) => Self::NoDisplay(plain(&reason.to_string())),
+            eframe::Error::WinitEventLoop(reason) => {
+                Self::NoDisplay(without_source_location(&reason.to_string()))
+            }
             other => Self::Window(other.to_string()),
         }
     }
 }
 
 /// A library's message without the place in its source and without what it left unfilled.
-fn plain(message: &str) -> String {
+fn without_source_location(message: &str) -> String {
     let after_place = message.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
     after_place.map_or(message, |(_, rest)| rest).trim_end_matches(": {}").to_owned()
 }
 
 fn open_with(
     renderer: Renderer,
-    memory: Memory,
-    start: &impl Fn(&CreationContext<'_>, Backing) -> Started,
+    memory: Persistence,
+    start: &impl Fn(&CreationContext<'_>, RenderBackend) -> AppResult,
 ) -> eframe::Result {
     let create = |context: &CreationContext<'_>| {
         let backing = match &context.wgpu_render_state {
             Some(state) => {
                 report_errors(state);
-                install(state);
-                Backing::Gpu
+                install_gpu_cache(state);
+                RenderBackend::Gpu
             }
-            None => Backing::Software,
+            None => RenderBackend::Software,
         };
-        theme::dress(&context.egui_ctx);
+        theme::apply(&context.egui_ctx);
         start(context, backing)
     };
     eframe::run_native("Aplanat", options(renderer, memory), Box::new(create))
 }
 
-fn options(renderer: Renderer, memory: Memory) -> NativeOptions {
-    let kept = memory == Memory::Kept;
+fn options(renderer: Renderer, memory: Persistence) -> NativeOptions {
+    let kept = memory == Persistence::Enabled;
     NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Aplanat")
@@ -122,13 +124,16 @@ fn options(renderer: Renderer, memory: Memory) -> NativeOptions {
         renderer,
         persist_window: kept,
         dithering: false,
-        wgpu_options: WgpuConfiguration { wgpu_setup: setup(), ..WgpuConfiguration::default() },
+        wgpu_options: WgpuConfiguration {
+            wgpu_setup: wgpu_setup(),
+            ..WgpuConfiguration::default()
+        },
         ..NativeOptions::default()
     }
 }
 
 /// Asks for all that the adapter can do: the usual request leaves old OpenGL without its abilities.
-fn setup() -> WgpuSetup {
+fn wgpu_setup() -> WgpuSetup {
     let mut setup = WgpuSetupCreateNew::without_display_handle();
     setup.device_descriptor = Arc::new(|adapter| wgpu::DeviceDescriptor {
         label: Some("studio"),
@@ -153,9 +158,15 @@ mod tests {
     #[test]
     fn messages_of_libraries_lose_their_source_places() {
         let winit = "os error at /x/linux/mod.rs:765: DISPLAY is not set";
-        assert_eq!(plain(winit), "DISPLAY is not set");
-        assert_eq!(plain("Failed to create surface: {}"), "Failed to create surface");
-        assert_eq!(plain("glutin error: [a7] GLXBadFBConfig"), "glutin error: [a7] GLXBadFBConfig");
+        assert_eq!(without_source_location(winit), "DISPLAY is not set");
+        assert_eq!(
+            without_source_location("Failed to create surface: {}"),
+            "Failed to create surface"
+        );
+        assert_eq!(
+            without_source_location("glutin error: [a7] GLXBadFBConfig"),
+            "glutin error: [a7] GLXBadFBConfig"
+        );
     }
 
     #[test]

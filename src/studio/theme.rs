@@ -9,17 +9,17 @@ use eframe::egui::{
 ///
 /// A text cursor that blinks repaints the window twice a second for ever, and animations many
 /// times after each click: neither moves.
-pub fn dress(context: &Context) {
+pub fn apply(context: &Context) {
     context.all_styles_mut(|style| {
         style.animation_time = 0.0;
         style.scroll_animation = eframe::egui::style::ScrollAnimation::none();
-        room(style);
+        set_spacing(style);
     });
-    context.style_mut_of(Theme::Dark, |style| colour(&mut style.visuals, &Greys::DARK));
-    context.style_mut_of(Theme::Light, |style| colour(&mut style.visuals, &Greys::LIGHT));
+    context.style_mut_of(Theme::Dark, |style| set_colors(&mut style.visuals, &ThemeColors::DARK));
+    context.style_mut_of(Theme::Light, |style| set_colors(&mut style.visuals, &ThemeColors::LIGHT));
 }
 
-fn room(style: &mut Style) {
+fn set_spacing(style: &mut Style) {
     style.spacing.item_spacing = vec2(6.0, 4.0);
     style.spacing.button_padding = vec2(7.0, 2.0);
     style.spacing.menu_margin = Margin::same(5);
@@ -31,7 +31,7 @@ fn room(style: &mut Style) {
 }
 
 /// The greys of a theme and its accent.
-struct Greys {
+struct ThemeColors {
     panel: Color32,
     sunken: Color32,
     raised: Color32,
@@ -46,7 +46,7 @@ struct Greys {
     warning: Color32,
 }
 
-impl Greys {
+impl ThemeColors {
     const DARK: Self = Self {
         panel: Color32::from_rgb(30, 32, 37),
         sunken: Color32::from_rgb(20, 22, 26),
@@ -78,7 +78,7 @@ impl Greys {
     };
 }
 
-fn colour(visuals: &mut Visuals, greys: &Greys) {
+fn set_colors(visuals: &mut Visuals, greys: &ThemeColors) {
     visuals.panel_fill = greys.panel;
     visuals.window_fill = greys.panel;
     visuals.window_stroke = Stroke::new(1.0, greys.line);
@@ -92,10 +92,10 @@ fn colour(visuals: &mut Visuals, greys: &Greys) {
     visuals.selection.stroke = Stroke::new(1.0, greys.accent);
     visuals.text_cursor.blink = false;
     visuals.text_cursor.stroke = Stroke::new(1.5, greys.accent);
-    widgets(visuals, greys);
+    set_widget_colors(visuals, greys);
 }
 
-fn widgets(visuals: &mut Visuals, greys: &Greys) {
+fn set_widget_colors(visuals: &mut Visuals, greys: &ThemeColors) {
     let widgets = &mut visuals.widgets;
     let states = [
         (&mut widgets.noninteractive, greys.panel, greys.line, greys.text),

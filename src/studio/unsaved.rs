@@ -1,149 +1,172 @@
 //! The question before something is lost that is in no file: the lens, or the field that was formed.
 
 use super::app::Studio;
-use super::chooser::Purpose;
-use super::panels::slice::NODES;
-use crate::session::{Command, Form, Standing, View};
+use super::chooser::FileRequest;
+use super::panels::slice::DEFAULT_NODES;
+use crate::session::{Command, GrinCommand, RunStatus, SessionView};
 use eframe::egui::{Context, Id, Modal, ViewportCommand};
 
 /// What may be lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Lost {
+pub(super) enum UnsavedDocument {
     Lens,
     Field,
 }
 
 /// What a person wants to do although something would be lost.
 #[derive(Debug)]
-pub(super) enum Then {
-    Do(Command),
+pub(super) enum PendingAction {
+    Run(Command),
     Quit,
 }
 
-impl Then {
+impl PendingAction {
     /// What it throws away.
-    fn losses(&self) -> &'static [Lost] {
+    fn discards(&self) -> &'static [UnsavedDocument] {
         match self {
-            Self::Quit => &[Lost::Lens, Lost::Field],
-            Self::Do(Command::New(_) | Command::Open(_)) => &[Lost::Lens],
-            Self::Do(Command::Form(
-                Form::Open(Some(_)) | Form::Builtin(_) | Form::Close | Form::Start,
-            )) => &[Lost::Field],
-            Self::Do(_) => &[],
+            Self::Quit => &[UnsavedDocument::Lens, UnsavedDocument::Field],
+            Self::Run(Command::New(_) | Command::Open(_)) => &[UnsavedDocument::Lens],
+            Self::Run(Command::Grin(
+                GrinCommand::OpenFile(Some(_))
+                | GrinCommand::OpenBuiltin(_)
+                | GrinCommand::Close
+                | GrinCommand::Start,
+            )) => &[UnsavedDocument::Field],
+            Self::Run(_) => &[],
         }
     }
 }
 
 /// What waits until a person has answered, or until something is saved.
 #[derive(Debug)]
-pub(super) enum Waiting {
-    Answer(Lost, Then),
-    Saving(Lost, Then),
+pub(super) enum PendingState {
+    Asking(UnsavedDocument, PendingAction),
+    Saving(UnsavedDocument, PendingAction),
 }
 
 /// What a person answers to whether changes may be lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Answer {
+enum UnsavedAnswer {
     Save,
-    Lose,
-    Stay,
+    Discard,
+    Cancel,
 }
 
 impl Studio {
     /// Whether something would be lost that is in no file.
-    pub(super) fn loses(&self, then: &Then) -> bool {
-        then.losses().iter().any(|lost| self.is_unsaved(*lost))
+    pub(super) fn would_discard(&self, then: &PendingAction) -> bool {
+        then.discards().iter().any(|lost| self.is_unsaved(*lost))
     }
 
-    fn is_unsaved(&self, lost: Lost) -> bool {
+    fn is_unsaved(&self, lost: UnsavedDocument) -> bool {
         match lost {
-            Lost::Lens => self.session.is_dirty(),
-            Lost::Field => self.session.view().forming.run.is_some_and(|run| run.is_unsaved()),
+            UnsavedDocument::Lens => self.session.is_dirty(),
+            UnsavedDocument::Field => {
+                self.session.view().grin.run.is_some_and(|run| run.is_unsaved())
+            }
         }
     }
 
     /// Does something, at once or after a question for each thing that would be lost, those up to the
     /// one that was answered apart.
-    pub(super) fn attempt(&mut self, context: &Context, then: Then, answered: Option<Lost>) {
-        let losses = then.losses();
+    pub(super) fn run_or_ask(
+        &mut self,
+        context: &Context,
+        then: PendingAction,
+        answered: Option<UnsavedDocument>,
+    ) {
+        let losses = then.discards();
         let done = losses.iter().position(|lost| Some(*lost) == answered).map_or(0, |i| i + 1);
         if let Some(lost) = losses[done..].iter().find(|lost| self.is_unsaved(**lost)) {
-            self.waiting = Some(Waiting::Answer(*lost, then));
+            self.pending = Some(PendingState::Asking(*lost, then));
             return context.request_repaint();
         }
         match then {
-            Then::Do(command) => self.apply(context, command),
-            Then::Quit => {
-                self.leaving = true;
+            PendingAction::Run(command) => self.apply(context, command),
+            PendingAction::Quit => {
+                self.closing = true;
                 context.send_viewport_cmd(ViewportCommand::Close);
             }
         }
     }
 
     /// Asks before changes are lost.
-    pub(super) fn question(&mut self, context: &Context, view: &View) {
-        match self.waiting.take() {
+    pub(super) fn unsaved_dialog(&mut self, context: &Context, view: &SessionView) {
+        match self.pending.take() {
             None => {}
-            Some(Waiting::Saving(lost, then)) => self.go_on_when_saved(context, lost, then),
-            Some(Waiting::Answer(lost, then)) => match ask(context, view, lost) {
-                None => self.waiting = Some(Waiting::Answer(lost, then)),
-                Some(answer) => self.answered(context, view, (lost, then), answer),
-            },
-        }
-    }
-
-    fn answered(
-        &mut self,
-        context: &Context,
-        view: &View,
-        (lost, then): (Lost, Then),
-        answer: Answer,
-    ) {
-        context.request_repaint();
-        match answer {
-            Answer::Stay => {}
-            Answer::Lose => self.attempt(context, then, Some(lost)),
-            Answer::Save => {
-                self.waiting = Some(Waiting::Saving(lost, then));
-                self.save(context, view, lost);
+            Some(PendingState::Saving(lost, then)) => self.continue_when_saved(context, lost, then),
+            Some(PendingState::Asking(lost, then)) => {
+                match ask_about_unsaved(context, view, lost) {
+                    None => self.pending = Some(PendingState::Asking(lost, then)),
+                    Some(answer) => self.on_unsaved_answer(context, view, (lost, then), answer),
+                }
             }
         }
     }
 
-    fn save(&mut self, context: &Context, view: &View, lost: Lost) {
+    fn on_unsaved_answer(
+        &mut self,
+        context: &Context,
+        view: &SessionView,
+        (lost, then): (UnsavedDocument, PendingAction),
+        answer: UnsavedAnswer,
+    ) {
+        context.request_repaint();
+        match answer {
+            UnsavedAnswer::Cancel => {}
+            UnsavedAnswer::Discard => self.run_or_ask(context, then, Some(lost)),
+            UnsavedAnswer::Save => {
+                self.pending = Some(PendingState::Saving(lost, then));
+                self.save_document(context, view, lost);
+            }
+        }
+    }
+
+    fn save_document(&mut self, context: &Context, view: &SessionView, lost: UnsavedDocument) {
         match lost {
-            Lost::Lens if view.path.is_some() => self.apply(context, Command::Save(None)),
-            Lost::Lens => self.chooser.ask(context, Purpose::Save, None),
-            Lost::Field => {
+            UnsavedDocument::Lens if view.path.is_some() => {
+                self.apply(context, Command::Save(None))
+            }
+            UnsavedDocument::Lens => self.file_dialog.ask(context, FileRequest::Save, None),
+            UnsavedDocument::Field => {
                 // What goes on changing is never saved as it is.
-                let run = view.forming.run.as_ref();
-                if run.is_some_and(|run| run.standing == Standing::Running) {
-                    self.apply(context, Command::Form(Form::Pause));
+                let run = view.grin.run.as_ref();
+                if run.is_some_and(|run| run.status == RunStatus::Running) {
+                    self.apply(context, Command::Grin(GrinCommand::Pause));
                 }
-                self.choose_field(context, view, NODES);
+                self.ask_field_path(context, view, DEFAULT_NODES);
             }
         }
     }
 
     /// Goes on once it is saved; gives up where no file was chosen or it could not be saved.
-    fn go_on_when_saved(&mut self, context: &Context, lost: Lost, then: Then) {
-        let is_writing = lost == Lost::Field && self.session.view().forming.writing;
+    fn continue_when_saved(
+        &mut self,
+        context: &Context,
+        lost: UnsavedDocument,
+        then: PendingAction,
+    ) {
+        let is_writing = lost == UnsavedDocument::Field && self.session.view().grin.writing;
         if !self.is_unsaved(lost) {
-            self.attempt(context, then, Some(lost));
-        } else if self.chooser.is_open() || is_writing {
-            self.waiting = Some(Waiting::Saving(lost, then));
+            self.run_or_ask(context, then, Some(lost));
+        } else if self.file_dialog.is_open() || is_writing {
+            self.pending = Some(PendingState::Saving(lost, then));
         }
     }
 }
 
-fn ask(context: &Context, view: &View, lost: Lost) -> Option<Answer> {
+fn ask_about_unsaved(
+    context: &Context,
+    view: &SessionView,
+    lost: UnsavedDocument,
+) -> Option<UnsavedAnswer> {
     let (heading, text) = match lost {
-        Lost::Lens => {
+        UnsavedDocument::Lens => {
             let name = &view.lens.name;
             ("Save the changes first?", format!("{name} has changes that are in no file yet."))
         }
-        Lost::Field => {
-            let name = view.forming.run.as_ref().map_or("", |run| run.subject.name.as_str());
+        UnsavedDocument::Field => {
+            let name = view.grin.run.as_ref().map_or("", |run| run.document.name.as_str());
             ("Save the field first?", format!("The field of “{name}” is in no file yet."))
         }
     };
@@ -153,8 +176,11 @@ fn ask(context: &Context, view: &View, lost: Lost) -> Option<Answer> {
         ui.heading(heading);
         ui.label(text);
         ui.add_space(8.0);
-        let answers =
-            [("Save", Answer::Save), ("Don't save", Answer::Lose), ("Cancel", Answer::Stay)];
+        let answers = [
+            ("Save", UnsavedAnswer::Save),
+            ("Don't save", UnsavedAnswer::Discard),
+            ("Cancel", UnsavedAnswer::Cancel),
+        ];
         ui.horizontal(|ui| {
             for (text, chosen) in answers {
                 if ui.button(text).clicked() {
@@ -163,5 +189,5 @@ fn ask(context: &Context, view: &View, lost: Lost) -> Option<Answer> {
             }
         });
     });
-    answer.or_else(|| modal.should_close().then_some(Answer::Stay))
+    answer.or_else(|| modal.should_close().then_some(UnsavedAnswer::Cancel))
 }

@@ -1,6 +1,6 @@
 //! Messages as a designer reads them: surfaces are counted from 1 in the window, from 0 in files.
 
-use crate::session::Standing;
+use crate::session::RunStatus;
 
 /// A message with every `surface 3` and `surfaces 3 to 5` counted one further.
 pub fn counted_from_one(message: &str) -> String {
@@ -24,21 +24,21 @@ fn one_more(word: &str) -> String {
 }
 
 /// A text with a capital first letter.
-pub fn capital(text: &str) -> String {
+pub fn capitalize(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     first + letters.as_str()
 }
 
 /// How a run stands, or will as soon as its present work is done.
-pub fn standing(now: Standing, pending: Option<Standing>) -> &'static str {
+pub fn status_text(now: RunStatus, pending: Option<RunStatus>) -> &'static str {
     match now {
-        _ if pending == Some(Standing::Paused) => "Pausing…",
-        _ if pending == Some(Standing::Stopped) => "Stopping…",
-        Standing::Running => "Running",
-        Standing::Paused => "Paused",
-        Standing::Stopped => "Stopped",
-        Standing::Finished => "Finished",
+        _ if pending == Some(RunStatus::Paused) => "Pausing…",
+        _ if pending == Some(RunStatus::Stopped) => "Stopping…",
+        RunStatus::Running => "Running",
+        RunStatus::Paused => "Paused",
+        RunStatus::Stopped => "Stopped",
+        RunStatus::Finished => "Finished",
     }
 }
 

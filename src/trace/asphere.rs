@@ -15,13 +15,19 @@ use crate::math::Vec3;
 /// above the slope itself; infinite where there is none.
 ///
 /// The slope at the middle of each of some intervals, and what it can change by inside.
-pub(super) fn steepest<R: Real>(shape: &Shape<R>, radius: f64) -> f64 {
+pub(super) fn slope_bound<R: Real>(shape: &Shape<R>, radius: f64) -> f64 {
     let Shape::Asphere { curvature, conic, terms } = shape else { return 0.0 };
-    steepest_between(curvature.value(), conic.value(), &terms.map(Real::value), (0.0, radius), 64)
+    slope_bound_between(
+        curvature.value(),
+        conic.value(),
+        &terms.map(Real::value),
+        (0.0, radius),
+        64,
+    )
 }
 
 /// Between which heights an asphere lies within `radius` of the axis; infinite without a bound.
-pub(super) fn span<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
+pub(super) fn sag_range<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
     let Shape::Asphere { curvature, conic, terms } = shape else { return (0.0, 0.0) };
     let (c, conic, terms) = (curvature.value(), conic.value(), terms.map(Real::value));
     let plain = Shape::Asphere { curvature: c, conic, terms };
@@ -29,7 +35,7 @@ pub(super) fn span<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
     for i in 0..64 {
         let (from, to) = (f64::from(i) * width, f64::from(i + 1) * width);
         let middle = 0.5 * (from + to);
-        let change = 0.5 * width * steepest_between(c, conic, &terms, (from, to), 1);
+        let change = 0.5 * width * slope_bound_between(c, conic, &terms, (from, to), 1);
         let Some((z, _)) = plain.sag(middle * middle).filter(|_| change.is_finite()) else {
             return (f64::NEG_INFINITY, f64::INFINITY);
         };
@@ -39,7 +45,7 @@ pub(super) fn span<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
 }
 
 /// A bound of the slope between two distances from the axis, from some intervals of them.
-fn steepest_between(
+fn slope_bound_between(
     c: f64,
     conic: f64,
     terms: &[f64],
@@ -49,7 +55,7 @@ fn steepest_between(
     let (mut steepest, width): (f64, f64) = (0.0, (to - from) / f64::from(intervals));
     for i in 0..intervals {
         let start = from + f64::from(i) * width;
-        let change = 0.5 * width * bend_bound(c, conic, terms, start + width);
+        let change = 0.5 * width * second_derivative_bound(c, conic, terms, start + width);
         // `max` would forget what is not a number.
         if !change.is_finite() {
             return f64::INFINITY;
@@ -68,7 +74,7 @@ fn slope_at(c: f64, conic: f64, terms: &[f64], r: f64) -> f64 {
 }
 
 /// A bound of `|d²z/dr²|` within `radius` of the axis.
-fn bend_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f64 {
+fn second_derivative_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f64 {
     let r2 = radius * radius;
     let radicand = 1.0 - (1.0 + conic) * c * c * r2;
     if !(radicand > 0.0 && radius.is_finite()) {
@@ -88,7 +94,7 @@ fn bend_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f64 {
 impl<R: Real> Interface<R> {
     /// The square of the distance from the axis within which the conic exists and nothing clips.
     #[inline(always)]
-    fn inside2(&self) -> R {
+    fn usable_radius2(&self) -> R {
         let square = (R::ONE + self.conic) * self.curvature * self.curvature;
         let exists = R::select(square > R::ZERO, R::ONE / square, self.rim2);
         R::select(exists < self.rim2, exists, self.rim2)
@@ -96,7 +102,7 @@ impl<R: Real> Interface<R> {
 }
 
 /// A ray against one asphere, in plain numbers.
-struct Problem {
+struct RayAtAsphere {
     surface: Interface<f64>,
     p: Vec3<f64>,
     k: Vec3<f64>,
@@ -109,7 +115,7 @@ struct Problem {
 }
 
 /// Where some rays cross an asphere, as far as Newton's iteration can be trusted.
-pub(super) struct Quick<R, const W: usize> {
+pub(super) struct NewtonResult<R, const W: usize> {
     /// How far along `k`.
     pub(super) s: [R; W],
     /// 1 where this is the only crossing inside the semi-diameter, else 0: a number of the same
@@ -118,11 +124,11 @@ pub(super) struct Quick<R, const W: usize> {
 }
 
 /// Points of rays and their optical directions, as columns.
-pub(super) struct Starts<R, const W: usize> {
+pub(super) struct RayStarts<R, const W: usize> {
     columns: [[R; W]; 6],
 }
 
-impl<R: Real, const W: usize> Starts<R, W> {
+impl<R: Real, const W: usize> RayStarts<R, W> {
     #[inline(always)]
     pub(super) fn new() -> Self {
         Self { columns: [[R::ZERO; W]; 6] }
@@ -144,20 +150,20 @@ impl<R: Real, const W: usize> Starts<R, W> {
 /// Newton's iteration from the conic, or from the vertex plane where that is missed. Each ray stops
 /// by itself, so that it does not matter which others are beside it.
 #[inline(always)]
-pub(super) fn quick<R: Real, const W: usize>(
+pub(super) fn newton_crossings<R: Real, const W: usize>(
     surface: &Interface<R>,
-    rays: &Starts<R, W>,
-) -> Quick<R, W> {
-    let near = Interface { far: false, ..*surface };
+    rays: &RayStarts<R, W>,
+) -> NewtonResult<R, W> {
+    let near = Interface { starts_far: false, ..*surface };
     let mut s = [R::ZERO; W];
     let mut moving = [R::ONE; W];
     let tolerance = R::from_f64(R::EPSILON.powf(2.0 / 3.0));
     for (j, s) in s.iter_mut().enumerate() {
         let (p, k) = rays.get(j);
-        let conic = near.meet_conic(p, k);
+        let conic = near.intersect_conic(p, k);
         *s = R::select(conic.missed, -(p.z / k.z), conic.s);
     }
-    for _ in 0..STEPS {
+    for _ in 0..NEWTON_STEPS {
         for j in 0..W {
             let (p, k) = rays.get(j);
             let (f, slope) = surface.height_above(p + k * s[j], k);
@@ -172,7 +178,7 @@ pub(super) fn quick<R: Real, const W: usize>(
             break;
         }
     }
-    let steepest = R::from_f64(surface.steepest);
+    let steepest = R::from_f64(surface.slope_bound);
     let steepest2 = steepest * steepest;
     let trusted = std::array::from_fn(|j| {
         let (p, k) = rays.get(j);
@@ -180,62 +186,64 @@ pub(super) fn quick<R: Real, const W: usize>(
         let across2 = k.x * k.x + k.y * k.y;
         // A ray along the axis crosses a graph once, however steep that may be elsewhere.
         let unique = (across2 == R::ZERO) | (steepest2 * across2 < k.z * k.z);
-        let inside = point.x * point.x + point.y * point.y <= surface.inside2();
+        let inside = point.x * point.x + point.y * point.y <= surface.usable_radius2();
         R::select(unique & inside & !(moving[j] > R::ZERO), R::ONE, R::ZERO)
     });
-    Quick { s, trusted }
+    NewtonResult { s, trusted }
 }
 
 /// Steps of Newton's iteration before a crossing is isolated instead.
-const STEPS: usize = 10;
+const NEWTON_STEPS: usize = 10;
 
 /// How far along `k` the ray first crosses the surface in its sense of travel: inside the
 /// semi-diameter if it does so there, else outside; `None` where it never does.
 ///
 /// `p` is any point of the ray, and the ray starts at `p + start k`.
-pub(super) fn crossing(
+pub(super) fn find_crossing(
     surface: Interface<f64>,
     p: Vec3<f64>,
     k: Vec3<f64>,
     start: f64,
 ) -> Option<f64> {
-    let mut ray = Starts::<f64, 1>::new();
+    let mut ray = RayStarts::<f64, 1>::new();
     ray.set(0, p, k);
-    let quick = quick(&surface, &ray);
-    if quick.trusted[0] > 0.0 { Some(quick.s[0]) } else { isolated(surface, p, k, start) }
+    let quick = newton_crossings(&surface, &ray);
+    if quick.trusted[0] > 0.0 { Some(quick.s[0]) } else { isolate_crossing(surface, p, k, start) }
 }
 
 /// The same by isolating the crossings.
-pub(super) fn isolated(
+pub(super) fn isolate_crossing(
     surface: Interface<f64>,
     p: Vec3<f64>,
     k: Vec3<f64>,
     start: f64,
 ) -> Option<f64> {
     let across = k.x.hypot(k.y);
-    let problem = Problem { surface, p, k, across, slant: p.x * k.x + p.y * k.y, start };
+    let problem = RayAtAsphere { surface, p, k, across, slant: p.x * k.x + p.y * k.y, start };
     let rim = problem.surface.rim2.sqrt();
-    let edge = problem.edge();
+    let edge = problem.domain_radius();
     let inside = rim.min(edge);
     if inside.is_finite() {
         let outside = if rim < edge { edge.min(4.0 * rim) } else { edge };
         let anywhere = (f64::NEG_INFINITY, f64::INFINITY);
-        let found = problem.first(inside, problem.surface.span);
-        return found.or_else(|| problem.first(outside, anywhere));
+        let found = problem.first_crossing(inside, problem.surface.sag_range);
+        return found.or_else(|| problem.first_crossing(outside, anywhere));
     }
-    let (reach, anywhere) = (problem.reach(), (f64::NEG_INFINITY, f64::INFINITY));
-    problem.first(reach, anywhere).or_else(|| problem.first(64.0 * reach, anywhere))
+    let (reach, anywhere) = (problem.search_radius(), (f64::NEG_INFINITY, f64::INFINITY));
+    problem
+        .first_crossing(reach, anywhere)
+        .or_else(|| problem.first_crossing(64.0 * reach, anywhere))
 }
 
-impl Problem {
+impl RayAtAsphere {
     /// Beyond this distance from the axis the conic does not exist.
-    fn edge(&self) -> f64 {
+    fn domain_radius(&self) -> f64 {
         let square = (1.0 + self.surface.conic) * self.surface.curvature.powi(2);
         if square > 0.0 { 1.0 / square.sqrt() } else { f64::INFINITY }
     }
 
     /// A distance from the axis within which an unlimited surface is searched.
-    fn reach(&self) -> f64 {
+    fn search_radius(&self) -> f64 {
         let start = self.p.x.hypot(self.p.y);
         let at_vertex_plane =
             if self.k.z == 0.0 { 0.0 } else { start + (self.p.z / self.k.z).abs() * self.across };
@@ -254,7 +262,7 @@ impl Problem {
         let high = self.r2(from).max(self.r2(to)).sqrt().min(radius);
         let surface = &self.surface;
         let range = (low.min(high), high);
-        steepest_between(surface.curvature, surface.conic, &surface.terms, range, 2)
+        slope_bound_between(surface.curvature, surface.conic, &surface.terms, range, 2)
     }
 
     /// Height of the surface above the ray, and its slope along the ray.
@@ -271,20 +279,20 @@ impl Problem {
 
     /// The first crossing within `radius` of the axis and between two heights, behind the start of
     /// the ray, or else the last one in front of it.
-    fn first(&self, radius: f64, heights: (f64, f64)) -> Option<f64> {
-        let (from, to) = self.within(radius)?;
-        let (low, high) = self.between(heights);
+    fn first_crossing(&self, radius: f64, heights: (f64, f64)) -> Option<f64> {
+        let (from, to) = self.part_within(radius)?;
+        let (low, high) = self.part_between(heights);
         let (from, to) = (from.max(low), to.min(high));
         if !(from <= to) {
             return None;
         }
         let start = self.start.max(from).min(to);
-        let behind = self.search(start, to, radius, Order::First);
-        behind.or_else(|| self.search(from, start, radius, Order::Last))
+        let behind = self.search(start, to, radius, CrossingChoice::First);
+        behind.or_else(|| self.search(from, start, radius, CrossingChoice::Last))
     }
 
     /// The part of the ray within `radius` of the axis.
-    fn within(&self, radius: f64) -> Option<(f64, f64)> {
+    fn part_within(&self, radius: f64) -> Option<(f64, f64)> {
         let r2 = self.p.x * self.p.x + self.p.y * self.p.y;
         let square = self.across * self.across;
         if square == 0.0 {
@@ -300,7 +308,7 @@ impl Problem {
     }
 
     /// The part of the ray between two heights, a little more for rounding.
-    fn between(&self, (low, high): (f64, f64)) -> (f64, f64) {
+    fn part_between(&self, (low, high): (f64, f64)) -> (f64, f64) {
         let (a, b) = ((low - self.p.z) / self.k.z, (high - self.p.z) / self.k.z);
         let slack = 1e-9 * (a.abs() + b.abs() + self.scale());
         if slack.is_finite() {
@@ -310,17 +318,17 @@ impl Problem {
         }
     }
 
-    fn search(&self, from: f64, to: f64, radius: f64, order: Order) -> Option<f64> {
-        let mut search = Search { problem: self, radius, order, budget: BUDGET };
-        search.isolate(self.end(from), self.end(to))
+    fn search(&self, from: f64, to: f64, radius: f64, order: CrossingChoice) -> Option<f64> {
+        let mut search = CrossingSearch { problem: self, radius, order, budget: MAX_INTERVALS };
+        search.isolate(self.endpoint(from), self.endpoint(to))
     }
 
-    fn end(&self, s: f64) -> End {
-        End { s, height: self.surface.sense * self.height(s).0 }
+    fn endpoint(&self, s: f64) -> IntervalEnd {
+        IntervalEnd { s, height: self.surface.sense * self.height(s).0 }
     }
 
     /// The crossing between two points of opposite height, by Newton's iteration kept inside.
-    fn bracketed(&self, mut above: f64, mut below: f64) -> f64 {
+    fn solve_bracketed(&self, mut above: f64, mut below: f64) -> f64 {
         let mut s = 0.5 * (above + below);
         for _ in 0..200 {
             let (f, slope) = self.height(s);
@@ -343,22 +351,22 @@ impl Problem {
 
 /// Which crossing of an interval is wanted.
 #[derive(Clone, Copy, PartialEq)]
-enum Order {
+enum CrossingChoice {
     First,
     Last,
 }
 
 /// A search for one crossing within some distance of the axis.
-struct Search<'a> {
-    problem: &'a Problem,
+struct CrossingSearch<'a> {
+    problem: &'a RayAtAsphere,
     radius: f64,
-    order: Order,
+    order: CrossingChoice,
     budget: u32,
 }
 
-impl Search<'_> {
+impl CrossingSearch<'_> {
     /// A crossing from above between two points, by halving what cannot be decided.
-    fn isolate(&mut self, from: End, to: End) -> Option<f64> {
+    fn isolate(&mut self, from: IntervalEnd, to: IntervalEnd) -> Option<f64> {
         self.budget = self.budget.checked_sub(1)?;
         let problem = self.problem;
         let width = to.s - from.s;
@@ -371,22 +379,25 @@ impl Search<'_> {
         }
         let narrow = width <= 1e-13 * (from.s.abs() + to.s.abs() + problem.scale());
         if monotone || narrow {
-            return (!same_side && from.height > 0.0).then(|| problem.bracketed(from.s, to.s));
+            return (!same_side && from.height > 0.0)
+                .then(|| problem.solve_bracketed(from.s, to.s));
         }
-        let middle = problem.end(0.5 * (from.s + to.s));
+        let middle = problem.endpoint(0.5 * (from.s + to.s));
         match self.order {
-            Order::First => self.isolate(from, middle).or_else(|| self.isolate(middle, to)),
-            Order::Last => self.isolate(middle, to).or_else(|| self.isolate(from, middle)),
+            CrossingChoice::First => {
+                self.isolate(from, middle).or_else(|| self.isolate(middle, to))
+            }
+            CrossingChoice::Last => self.isolate(middle, to).or_else(|| self.isolate(from, middle)),
         }
     }
 }
 
 /// An end of an interval of the ray, with the signed height above the ray there.
 #[derive(Clone, Copy)]
-struct End {
+struct IntervalEnd {
     s: f64,
     height: f64,
 }
 
 /// How many intervals are looked at before the search gives up.
-const BUDGET: u32 = 20_000;
+const MAX_INTERVALS: u32 = 20_000;

@@ -15,18 +15,18 @@
 //! the cost does not depend on the number of parameters.
 
 use super::Tracer;
-use super::batch::{BLOCK, Block, CHUNK, Hits, Rays};
-use super::interface::{Form, Interface};
-use super::slot::Slot;
-use crate::lens::{ASPHERE_TERMS, GRADE_TERMS};
+use super::batch::{BLOCK, CHUNK, Landings, RayBlock, Rays};
+use super::interface::{Interface, SurfaceForm};
+use super::slot::SurfaceParameter;
+use crate::lens::{ASPHERE_TERMS, PROFILE_TERMS};
 use crate::math::Real;
 use crate::math::Vec3;
-use crate::math::{Width, widest};
+use crate::math::{SimdWidth, run_vectorized};
 use rayon::prelude::*;
 
 /// The derivative of something by where and how a ray lands.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Seed<R> {
+pub struct AdjointSeed<R> {
     /// By the point, in the frame of the last surface.
     pub point: Vec3<R>,
     /// By the direction cosines behind the last surface.
@@ -51,19 +51,19 @@ pub struct SurfaceGradient<R> {
     /// By the semi-diameter: zero for rays that are kept, something for the edge of a pupil.
     pub semi_diameter: R,
     /// By the coefficients of the gradient behind it; only where there is one.
-    pub grade: [R; GRADE_TERMS],
+    pub grin_terms: [R; PROFILE_TERMS],
 }
 
 /// Derivatives by every number of a system.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Gradient<R> {
+pub struct SystemGradient<R> {
     /// By the index in front of the first surface.
     pub index_before: R,
     /// By the numbers of each surface.
     pub surfaces: Vec<SurfaceGradient<R>>,
 }
 
-impl<R: Real> Gradient<R> {
+impl<R: Real> SystemGradient<R> {
     /// Zero for a system of this many surfaces.
     pub fn zero(surfaces: usize) -> Self {
         Self { index_before: R::ZERO, surfaces: vec![SurfaceGradient::default(); surfaces] }
@@ -74,7 +74,7 @@ impl<R: Real> Gradient<R> {
         let of = |s: &SurfaceGradient<R>| {
             let SurfaceGradient { curvature, conic, terms, thickness, index, .. } = *s;
             let plain = [curvature, conic, thickness, index, s.semi_diameter];
-            plain.into_iter().chain(terms).chain(s.grade)
+            plain.into_iter().chain(terms).chain(s.grin_terms)
         };
         std::iter::once(self.index_before).chain(self.surfaces.iter().flat_map(of))
     }
@@ -88,8 +88,16 @@ impl<R: Real> Gradient<R> {
         let surface = |_| {
             let [curvature, conic, thickness, index, semi_diameter] = [(); 5].map(|()| next());
             let terms = [(); ASPHERE_TERMS].map(|()| next());
-            let grade = [(); GRADE_TERMS].map(|()| next());
-            SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter, grade }
+            let grade = [(); PROFILE_TERMS].map(|()| next());
+            SurfaceGradient {
+                curvature,
+                conic,
+                terms,
+                thickness,
+                index,
+                semi_diameter,
+                grin_terms: grade,
+            }
         };
         Self { index_before, surfaces: (0..surfaces).map(surface).collect() }
     }
@@ -104,26 +112,26 @@ impl<R: Real> Gradient<R> {
             to.index += from.index * factor;
             to.semi_diameter += from.semi_diameter * factor;
             to.terms.iter_mut().zip(from.terms).for_each(|(t, f)| *t += f * factor);
-            to.grade.iter_mut().zip(from.grade).for_each(|(t, f)| *t += f * factor);
+            to.grin_terms.iter_mut().zip(from.grin_terms).for_each(|(t, f)| *t += f * factor);
         }
     }
 }
 
 /// The derivatives of something that the adjoint of a block of rays begins with.
-pub(super) trait Sowing<R> {
+pub(super) trait SeedSource<R> {
     /// By the landing of ray `j`.
-    fn seed(&self, j: usize) -> Seed<R>;
+    fn seed(&self, j: usize) -> AdjointSeed<R>;
 
     /// By how far each ray is from the limits of a surface, if anything depends on that.
     #[inline(always)]
-    fn pulls(&self, _surface: usize) -> Option<&Pulls<R>> {
+    fn limit_adjoint(&self, _surface: usize) -> Option<&LimitAdjoint<R>> {
         None
     }
 }
 
-impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
+impl<R, F: Fn(usize) -> AdjointSeed<R>> SeedSource<R> for F {
     #[inline(always)]
-    fn seed(&self, j: usize) -> Seed<R> {
+    fn seed(&self, j: usize) -> AdjointSeed<R> {
         self(j)
     }
 }
@@ -131,25 +139,25 @@ impl<R, F: Fn(usize) -> Seed<R>> Sowing<R> for F {
 /// The derivatives of something by the limits of a surface (see [`super::limit`]): a column for each
 /// limit.
 #[derive(Debug, Clone)]
-pub(super) struct Pulls<R> {
+pub(super) struct LimitAdjoint<R> {
     pub(super) rim: [R; BLOCK],
     pub(super) angle: [R; BLOCK],
     /// Only where there is one.
     pub(super) obstruction: Option<[R; BLOCK]>,
     /// Only where a sheet can end anything.
-    pub(super) sheet: Option<[R; BLOCK]>,
+    pub(super) conic_edge: Option<[R; BLOCK]>,
 }
 
 /// Who takes the derivatives of a block of rays as they come.
-pub(super) trait Harvest<R> {
+pub(super) trait GradientSink<R> {
     /// The derivatives of a block by a number of a surface, to be added to what came before.
     /// `surface` is `None` for the index in front of the first surface.
-    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]);
+    fn add_lanes(&mut self, surface: Option<usize>, slot: SurfaceParameter, lanes: &[R; BLOCK]);
 }
 
-impl<R: Real> Harvest<R> for Gradient<R> {
+impl<R: Real> GradientSink<R> for SystemGradient<R> {
     #[inline(always)]
-    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]) {
+    fn add_lanes(&mut self, surface: Option<usize>, slot: SurfaceParameter, lanes: &[R; BLOCK]) {
         let sum = lane_sum(lanes);
         let Some(surface) = surface else {
             self.index_before += sum;
@@ -157,13 +165,13 @@ impl<R: Real> Harvest<R> for Gradient<R> {
         };
         let surface = &mut self.surfaces[surface];
         match slot {
-            Slot::Curvature => surface.curvature += sum,
-            Slot::Conic => surface.conic += sum,
-            Slot::Term(term) => surface.terms[term] += sum,
-            Slot::Thickness => surface.thickness += sum,
-            Slot::Index => surface.index += sum,
-            Slot::SemiDiameter => surface.semi_diameter += sum,
-            Slot::Grade(k) => surface.grade[k] += sum,
+            SurfaceParameter::Curvature => surface.curvature += sum,
+            SurfaceParameter::Conic => surface.conic += sum,
+            SurfaceParameter::AsphereTerm(term) => surface.terms[term] += sum,
+            SurfaceParameter::Thickness => surface.thickness += sum,
+            SurfaceParameter::Index => surface.index += sum,
+            SurfaceParameter::SemiDiameter => surface.semi_diameter += sum,
+            SurfaceParameter::GrinTerm(k) => surface.grin_terms[k] += sum,
         }
     }
 }
@@ -183,15 +191,15 @@ fn lane_sum<R: Real>(lanes: &[R; BLOCK]) -> R {
 
 /// The derivative of each ray by some numbers of the system.
 #[derive(Debug)]
-struct Rows<'a, R> {
-    wanted: &'a [(Option<usize>, Slot)],
+struct JacobianColumns<'a, R> {
+    wanted: &'a [(Option<usize>, SurfaceParameter)],
     /// A column for each wanted number.
     columns: &'a mut [[R; BLOCK]],
 }
 
-impl<R: Real> Harvest<R> for Rows<'_, R> {
+impl<R: Real> GradientSink<R> for JacobianColumns<'_, R> {
     #[inline(always)]
-    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[R; BLOCK]) {
+    fn add_lanes(&mut self, surface: Option<usize>, slot: SurfaceParameter, lanes: &[R; BLOCK]) {
         let asked = self.wanted.iter().position(|w| *w == (surface, slot));
         if let Some(column) = asked.map(|i| &mut self.columns[i]) {
             column.iter_mut().zip(lanes).for_each(|(to, from)| *to += *from);
@@ -203,8 +211,12 @@ impl<R: Real> Tracer<R> {
     /// The derivative of a sum over rays by every number of the system, on the calling thread;
     /// `seed` gives the derivative of the sum by the landing of ray `i`. Rays that are lost count
     /// nothing.
-    pub fn gradient(&self, rays: &Rays<R>, seed: impl Fn(usize) -> Seed<R> + Sync) -> Gradient<R> {
-        let mut total = Gradient::zero(self.surfaces());
+    pub fn gradient(
+        &self,
+        rays: &Rays<R>,
+        seed: impl Fn(usize) -> AdjointSeed<R> + Sync,
+    ) -> SystemGradient<R> {
+        let mut total = SystemGradient::zero(self.surfaces());
         for from in (0..rays.len()).step_by(CHUNK) {
             total.add(&self.chunk_gradient(rays, from, &seed), R::ONE);
         }
@@ -215,12 +227,12 @@ impl<R: Real> Tracer<R> {
     pub fn gradient_parallel(
         &self,
         rays: &Rays<R>,
-        seed: impl Fn(usize) -> Seed<R> + Sync,
-    ) -> Gradient<R> {
+        seed: impl Fn(usize) -> AdjointSeed<R> + Sync,
+    ) -> SystemGradient<R> {
         let starts: Vec<usize> = (0..rays.len()).step_by(CHUNK).collect();
         let parts: Vec<_> =
             starts.par_iter().map(|from| self.chunk_gradient(rays, *from, &seed)).collect();
-        let mut total = Gradient::zero(self.surfaces());
+        let mut total = SystemGradient::zero(self.surfaces());
         parts.iter().for_each(|part| total.add(part, R::ONE));
         total
     }
@@ -229,20 +241,20 @@ impl<R: Real> Tracer<R> {
         &self,
         rays: &Rays<R>,
         start: usize,
-        seed: &(impl Fn(usize) -> Seed<R> + Sync),
-    ) -> Gradient<R> {
-        let mut gradient = Gradient::zero(self.surfaces());
+        seed: &(impl Fn(usize) -> AdjointSeed<R> + Sync),
+    ) -> SystemGradient<R> {
+        let mut gradient = SystemGradient::zero(self.surfaces());
         let mut distances = vec![[R::ZERO; BLOCK]; self.surfaces()];
         let end = rays.len().min(start + CHUNK);
-        widest(
-            Width::detect(),
+        run_vectorized(
+            SimdWidth::detect(),
             #[inline(always)]
             || {
                 for from in (start..end).step_by(BLOCK) {
                     let count = BLOCK.min(end - from);
-                    let block = self.outward(rays, from, count, &mut distances);
+                    let block = self.forward(rays, from, count, &mut distances);
                     let seed = |j| seed(from + j);
-                    self.homeward(block, &distances, count, &seed, &mut gradient);
+                    self.backward(block, &distances, count, &seed, &mut gradient);
                 }
             },
         );
@@ -252,28 +264,34 @@ impl<R: Real> Tracer<R> {
     /// Where rays land and the derivatives of their points across the axis by some numbers of the
     /// system: for each ray `2 wanted` numbers, first those of x, then those of y; zeros for a ray
     /// that is lost. `surface` is `None` for the index in front of the first one.
-    pub fn jacobian(&self, rays: &Rays<R>, wanted: &[(Option<usize>, Slot)]) -> (Hits<R>, Vec<R>) {
-        let mut hits = Hits::default();
-        self.batch(rays, &mut hits);
+    pub fn jacobian(
+        &self,
+        rays: &Rays<R>,
+        wanted: &[(Option<usize>, SurfaceParameter)],
+    ) -> (Landings<R>, Vec<R>) {
+        let mut hits = Landings::default();
+        self.trace_batch(rays, &mut hits);
         let row = 2 * wanted.len();
         let mut matrix = vec![R::ZERO; row * rays.len()];
         let mut distances = vec![[R::ZERO; BLOCK]; self.surfaces()];
         let mut columns = vec![[R::ZERO; BLOCK]; row];
-        let x = Seed { point: Vec3::new(R::ONE, R::ZERO, R::ZERO), ..Seed::default() };
-        let y = Seed { point: Vec3::new(R::ZERO, R::ONE, R::ZERO), ..Seed::default() };
-        widest(
-            Width::detect(),
+        let x =
+            AdjointSeed { point: Vec3::new(R::ONE, R::ZERO, R::ZERO), ..AdjointSeed::default() };
+        let y =
+            AdjointSeed { point: Vec3::new(R::ZERO, R::ONE, R::ZERO), ..AdjointSeed::default() };
+        run_vectorized(
+            SimdWidth::detect(),
             #[inline(always)]
             || {
                 for from in (0..rays.len()).step_by(BLOCK) {
                     let count = BLOCK.min(rays.len() - from);
-                    let block = self.outward(rays, from, count, &mut distances);
+                    let block = self.forward(rays, from, count, &mut distances);
                     columns.fill([R::ZERO; BLOCK]);
                     let (of_x, of_y) = columns.split_at_mut(wanted.len());
-                    let mut rows = Rows { wanted, columns: of_x };
-                    self.homeward(block.clone(), &distances, count, &|_| x, &mut rows);
-                    let mut rows = Rows { wanted, columns: of_y };
-                    self.homeward(block, &distances, count, &|_| y, &mut rows);
+                    let mut rows = JacobianColumns { wanted, columns: of_x };
+                    self.backward(block.clone(), &distances, count, &|_| x, &mut rows);
+                    let mut rows = JacobianColumns { wanted, columns: of_y };
+                    self.backward(block, &distances, count, &|_| y, &mut rows);
                     for j in 0..count {
                         let to = &mut matrix[(from + j) * row..(from + j + 1) * row];
                         to.iter_mut().zip(&columns).for_each(|(to, column)| *to = column[j]);
@@ -286,21 +304,21 @@ impl<R: Real> Tracer<R> {
 
     /// Traces a block and keeps the distance to each surface.
     #[inline(always)]
-    fn outward(
+    fn forward(
         &self,
         rays: &Rays<R>,
         from: usize,
         count: usize,
         distances: &mut [[R; BLOCK]],
-    ) -> Block<R> {
-        let mut block = Block::new();
+    ) -> RayBlock<R> {
+        let mut block = RayBlock::new();
         block.load(rays.slice(from, from + count), 0, count, self.index_before);
-        self.leave_out(&mut block, count);
+        self.mask(&mut block, count);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate() {
-            if self.touches_gradient(i) {
-                block.pass_gradient(self, i, |j, arrival| distance[j] = arrival.met.s);
+            if self.touches_grin(i) {
+                block.cross_grin(self, i, |j, arrival| distance[j] = arrival.met.s);
             } else {
-                block.cross_keeping(interface, i as u32, distance);
+                block.cross_recording(interface, i as u32, distance);
             }
         }
         block
@@ -308,50 +326,50 @@ impl<R: Real> Tracer<R> {
 
     /// Retraces a block from the last surface to its start and passes on the derivatives.
     #[inline(always)]
-    pub(super) fn homeward(
+    pub(super) fn backward(
         &self,
-        block: Block<R>,
+        block: RayBlock<R>,
         distances: &[[R; BLOCK]],
         count: usize,
-        sowing: &impl Sowing<R>,
-        harvest: &mut impl Harvest<R>,
+        sowing: &impl SeedSource<R>,
+        harvest: &mut impl GradientSink<R>,
     ) {
-        let mut way = Homeward::new(block);
-        self.sow(&mut way, count, sowing, harvest);
+        let mut way = AdjointBlock::new(block);
+        self.seed_landing(&mut way, count, sowing, harvest);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
             way.s = *distance;
-            if self.touches_gradient(i) {
-                self.pass_back(&mut way, i, harvest);
+            if self.touches_grin(i) {
+                self.backward_grin(&mut way, i, harvest);
                 continue;
             }
-            let pulls = sowing.pulls(i);
+            let pulls = sowing.limit_adjoint(i);
             // A factor that is known to be one costs nothing.
             if interface.sense > R::ZERO {
-                way.pass(&Interface { sense: R::ONE, ..*interface }, pulls);
+                way.retrace_surface(&Interface { sense: R::ONE, ..*interface }, pulls);
             } else {
-                way.pass(&Interface { sense: -R::ONE, ..*interface }, pulls);
+                way.retrace_surface(&Interface { sense: -R::ONE, ..*interface }, pulls);
             }
-            way.harvest(interface, i, harvest);
+            way.accumulate(interface, i, harvest);
             if pulls.is_some() {
-                let lanes = way.arrived(&way.by_semi_diameter);
-                harvest.take(Some(i), Slot::SemiDiameter, &lanes);
+                let lanes = way.mask_lost(&way.by_semi_diameter);
+                harvest.add_lanes(Some(i), SurfaceParameter::SemiDiameter, &lanes);
             }
         }
-        self.launch_index(&way, harvest);
+        self.add_launch_index(&way, harvest);
     }
 
     /// The adjoint of the landing; the direction cosines are `k / n'`. In front of a gap with a
     /// gradient, where a lens never ends but a part of one may, the seed is by `k` itself.
     #[inline(always)]
-    fn sow(
+    fn seed_landing(
         &self,
-        way: &mut Homeward<R>,
+        way: &mut AdjointBlock<R>,
         count: usize,
-        sowing: &impl Sowing<R>,
-        harvest: &mut impl Harvest<R>,
+        sowing: &impl SeedSource<R>,
+        harvest: &mut impl GradientSink<R>,
     ) {
         let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
-        let last = self.interfaces.len().checked_sub(1).and_then(|i| self.gap_behind(i));
+        let last = self.interfaces.len().checked_sub(1).and_then(|i| self.grin_gap_behind(i));
         let inverse = if last.is_some() { R::ONE } else { R::ONE / index };
         let mut by_index = [R::ZERO; BLOCK];
         for (j, by_index) in by_index.iter_mut().enumerate().take(count) {
@@ -368,27 +386,27 @@ impl<R: Real> Tracer<R> {
             }
         }
         let behind = self.interfaces.iter().rposition(|interface| !interface.mirror);
-        harvest.take(behind, Slot::Index, &by_index);
+        harvest.add_lanes(behind, SurfaceParameter::Index, &by_index);
     }
 
     /// The first optical direction is the index times the direction.
     #[inline(always)]
-    fn launch_index(&self, way: &Homeward<R>, harvest: &mut impl Harvest<R>) {
+    fn add_launch_index(&self, way: &AdjointBlock<R>, harvest: &mut impl GradientSink<R>) {
         let inverse = R::ONE / self.index_before;
         let lanes = std::array::from_fn(|j| {
             let (_, k) = way.block.state(j);
             let by_index = way.by_k(j).dot(k) * inverse;
             R::select(way.block.code[j] > R::ZERO, R::ZERO, by_index)
         });
-        harvest.take(None, Slot::Index, &lanes);
+        harvest.add_lanes(None, SurfaceParameter::Index, &lanes);
     }
 }
 
 /// A block of rays on its way back: where it is, the derivatives by its state, and those by the
 /// numbers of the surface it has just passed. One value, so that the compiler sees that no column
 /// overlaps another.
-pub(super) struct Homeward<R> {
-    pub(super) block: Block<R>,
+pub(super) struct AdjointBlock<R> {
+    pub(super) block: RayBlock<R>,
     /// The distance to the surface.
     pub(super) s: [R; BLOCK],
     pub(super) by_x: [R; BLOCK],
@@ -409,7 +427,7 @@ pub(super) struct Homeward<R> {
 
 /// The normal of a surface and everything about it that the adjoint needs.
 #[derive(Clone, Copy)]
-pub(super) struct Normal<R> {
+pub(super) struct SurfaceNormal<R> {
     pub(super) vector: Vec3<R>,
     /// `N·N`.
     pub(super) m: R,
@@ -418,26 +436,31 @@ pub(super) struct Normal<R> {
 }
 
 #[inline(always)]
-fn sphere_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
+fn sphere_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> SurfaceNormal<R> {
     let c = surface.curvature;
     let vector = Vec3::new(-(c * p.x), -(c * p.y), R::ONE - c * p.z);
-    Normal { vector, m: R::ONE, unit: true }
+    SurfaceNormal { vector, m: R::ONE, unit: true }
 }
 
 #[inline(always)]
-fn conic_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> Normal<R> {
+fn conic_normal<R: Real>(surface: &Interface<R>, p: Vec3<R>) -> SurfaceNormal<R> {
     let c = surface.curvature;
     let vector = Vec3::new(-(c * p.x), -(c * p.y), R::ONE - c * (p.z + surface.conic * p.z));
-    Normal { vector, m: vector.dot(vector), unit: false }
+    SurfaceNormal { vector, m: vector.dot(vector), unit: false }
 }
 
 impl<R: Real> Interface<R> {
     /// The adjoint of the limit of the angle, and what is left of it for the square of the index in
     /// front, all else of the index apart.
     #[inline(always)]
-    fn slanted(&self, pull: R, normal: Normal<R>, back: Refracted<R>) -> (Refracted<R>, R) {
+    fn angle_limit_adjoint(
+        &self,
+        pull: R,
+        normal: SurfaceNormal<R>,
+        back: RefractionAdjoint<R>,
+    ) -> (RefractionAdjoint<R>, R) {
         let share = pull / self.n2;
-        let loss = self.loss();
+        let loss = self.index_drop2();
         let by_a = -((back.a + back.a) * share);
         let mut by_normal = back.by_normal + back.k * by_a;
         if !normal.unit {
@@ -447,13 +470,13 @@ impl<R: Real> Interface<R> {
         let by_behind2 = R::select(loss > R::ZERO, -(share * normal.m), R::ZERO);
         let by_dn2 = back.by_dn2 + by_behind2;
         let by_n2 = (back.a * back.a - loss * normal.m) * share / self.n2;
-        (Refracted { by_k, by_normal, by_dn2, ..back }, by_n2)
+        (RefractionAdjoint { by_k, by_normal, by_dn2, ..back }, by_n2)
     }
 }
 
 /// What refraction read backwards gives.
 #[derive(Clone, Copy)]
-pub(super) struct Refracted<R> {
+pub(super) struct RefractionAdjoint<R> {
     /// The direction in front.
     pub(super) k: Vec3<R>,
     /// `k·N`.
@@ -466,11 +489,11 @@ pub(super) struct Refracted<R> {
 #[inline(always)]
 pub(super) fn unrefract<R: Real>(
     surface: &Interface<R>,
-    normal: Normal<R>,
+    normal: SurfaceNormal<R>,
     behind: Vec3<R>,
     by_behind: Vec3<R>,
-) -> Refracted<R> {
-    let Normal { vector, m, unit } = normal;
+) -> RefractionAdjoint<R> {
+    let SurfaceNormal { vector, m, unit } = normal;
     let a_behind = behind.dot(vector);
     let by_gamma = by_behind.dot(vector);
     let inverse_m = if unit { R::ONE } else { R::ONE / m };
@@ -494,12 +517,12 @@ pub(super) fn unrefract<R: Real>(
     if !unit {
         by_normal = by_normal + vector * (by_m + by_m);
     }
-    Refracted { k, a, by_k: by_behind + vector * by_a, by_normal, by_dn2 }
+    RefractionAdjoint { k, a, by_k: by_behind + vector * by_a, by_normal, by_dn2 }
 }
 
-impl<R: Real> Homeward<R> {
+impl<R: Real> AdjointBlock<R> {
     #[inline(always)]
-    fn new(block: Block<R>) -> Self {
+    fn new(block: RayBlock<R>) -> Self {
         let zero = [R::ZERO; BLOCK];
         Self {
             block,
@@ -539,19 +562,19 @@ impl<R: Real> Homeward<R> {
 
     /// Goes back through a surface to the one before.
     #[inline(always)]
-    fn pass(&mut self, surface: &Interface<R>, pulls: Option<&Pulls<R>>) {
+    fn retrace_surface(&mut self, surface: &Interface<R>, pulls: Option<&LimitAdjoint<R>>) {
         let sheet = pulls.and_then(|pulls| {
-            self.pull_rim(surface, &pulls.rim);
+            self.rim_adjoint(surface, &pulls.rim);
             if let Some(pull) = &pulls.obstruction {
-                self.pull_radius(pull, -(R::ONE / surface.obstruction2));
+                self.radius_adjoint(pull, -(R::ONE / surface.obstruction2));
             }
-            pulls.sheet.as_ref().map(|sheet| self.pull_sheet(surface, sheet))
+            pulls.conic_edge.as_ref().map(|sheet| self.conic_edge_adjoint(surface, sheet))
         });
         let angle = pulls.map(|pulls| &pulls.angle);
         match surface.form {
-            Form::Plane | Form::Sphere => self.retrace(surface, sphere_normal, angle),
-            Form::Conic => self.retrace(surface, conic_normal, angle),
-            Form::Asphere => self.retrace_asphere(surface, angle),
+            SurfaceForm::Plane | SurfaceForm::Sphere => self.retrace(surface, sphere_normal, angle),
+            SurfaceForm::Conic => self.retrace(surface, conic_normal, angle),
+            SurfaceForm::Asphere => self.retrace_asphere(surface, angle),
         }
         if let Some([by_curvature, by_conic]) = sheet {
             for j in 0..BLOCK {
@@ -563,9 +586,9 @@ impl<R: Real> Homeward<R> {
 
     /// The adjoint of the rim.
     #[inline(always)]
-    fn pull_rim(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) {
+    fn rim_adjoint(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) {
         let (inverse, radius) = (R::ONE / surface.rim2, surface.rim2.sqrt());
-        self.pull_radius(pull, inverse);
+        self.radius_adjoint(pull, inverse);
         for (j, pull) in pull.iter().enumerate() {
             let (p, _) = self.block.state(j);
             self.by_semi_diameter[j] = -(*pull * inverse * (p.x * p.x + p.y * p.y) / radius);
@@ -574,7 +597,7 @@ impl<R: Real> Homeward<R> {
 
     /// The adjoint of half the square of the distance from the axis, `factor` times.
     #[inline(always)]
-    fn pull_radius(&mut self, pull: &[R; BLOCK], factor: R) {
+    fn radius_adjoint(&mut self, pull: &[R; BLOCK], factor: R) {
         for (j, pull) in pull.iter().enumerate() {
             let (p, _) = self.block.state(j);
             let share = *pull * factor;
@@ -585,12 +608,12 @@ impl<R: Real> Homeward<R> {
 
     /// The adjoint of the edge of a conic; what it leaves for the curvature and the conic constant.
     #[inline(always)]
-    fn pull_sheet(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) -> [[R; BLOCK]; 2] {
+    fn conic_edge_adjoint(&mut self, surface: &Interface<R>, pull: &[R; BLOCK]) -> [[R; BLOCK]; 2] {
         let (c, k1) = (surface.curvature, R::ONE + surface.conic);
         let mut left = [[R::ZERO; BLOCK]; 2];
         for (j, pull) in pull.iter().enumerate() {
             let (p, _) = self.block.state(j);
-            if surface.form == Form::Asphere {
+            if surface.form == SurfaceForm::Asphere {
                 let (r2, pull) = (p.x * p.x + p.y * p.y, c * *pull);
                 let outward = k1 * c * pull * R::TWO;
                 self.by_x[j] += p.x * outward;
@@ -610,7 +633,7 @@ impl<R: Real> Homeward<R> {
     fn retrace(
         &mut self,
         surface: &Interface<R>,
-        normal: impl Fn(&Interface<R>, Vec3<R>) -> Normal<R>,
+        normal: impl Fn(&Interface<R>, Vec3<R>) -> SurfaceNormal<R>,
         angle: Option<&[R; BLOCK]>,
     ) {
         let surface = *surface;
@@ -622,7 +645,7 @@ impl<R: Real> Homeward<R> {
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
             let mut by_n2 = R::ZERO;
             if let Some(angle) = angle {
-                (back, by_n2) = surface.slanted(angle[j], normal, back);
+                (back, by_n2) = surface.angle_limit_adjoint(angle[j], normal, back);
             }
             let n = back.by_normal;
             let by_point = self.by_point(j) - Vec3::new(n.x * c, n.y * c, n.z * (k1 * c));
@@ -632,7 +655,7 @@ impl<R: Real> Homeward<R> {
             if !normal.unit {
                 self.by_conic[j] = c * p.z * (lambda * p.z * half - n.z);
             }
-            self.step_back(&surface, j, p, &back, by_point - normal.vector * lambda);
+            self.transfer_back(&surface, j, p, &back, by_point - normal.vector * lambda);
             if angle.is_some() {
                 self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
             }
@@ -645,26 +668,26 @@ impl<R: Real> Homeward<R> {
         let surface = *surface;
         for j in 0..BLOCK {
             let (p, behind) = self.block.state(j);
-            let sag = Sag::new(&surface, p.x * p.x + p.y * p.y);
+            let sag = SagDerivatives::new(&surface, p.x * p.x + p.y * p.y);
             let slope = -(sag.slope + sag.slope);
             let vector = Vec3::new(p.x * slope, p.y * slope, R::ONE);
-            let normal = Normal { vector, m: vector.dot(vector), unit: false };
+            let normal = SurfaceNormal { vector, m: vector.dot(vector), unit: false };
             let mut back = unrefract(&surface, normal, behind, self.by_k(j));
             let mut by_n2 = R::ZERO;
             if let Some(angle) = angle {
-                (back, by_n2) = surface.slanted(angle[j], normal, back);
+                (back, by_n2) = surface.angle_limit_adjoint(angle[j], normal, back);
             }
             // N = (−2 x w, −2 y w, 1) with w = dz/dr².
             let n = back.by_normal;
             let by_slope = -(p.x * n.x + p.y * n.y) * R::TWO;
-            let radial = by_slope * sag.bend * R::TWO;
+            let radial = by_slope * sag.second * R::TWO;
             let by_point = self.by_point(j)
                 + Vec3::new(p.x * radial + n.x * slope, p.y * radial + n.y * slope, R::ZERO);
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             (self.by_curvature[j], self.by_conic[j]) = sag.by_conic(lambda, by_slope);
             let terms = sag.by_terms(lambda, by_slope);
             self.by_terms.iter_mut().zip(terms).for_each(|(column, by_term)| column[j] = by_term);
-            self.step_back(&surface, j, p, &back, by_point - vector * lambda);
+            self.transfer_back(&surface, j, p, &back, by_point - vector * lambda);
             if angle.is_some() {
                 self.by_index_before[j] += by_n2 * surface.index_before * R::TWO;
             }
@@ -673,12 +696,12 @@ impl<R: Real> Homeward<R> {
 
     /// From the surface to the one before: the adjoint of the way between and of the gap.
     #[inline(always)]
-    pub(super) fn step_back(
+    pub(super) fn transfer_back(
         &mut self,
         surface: &Interface<R>,
         j: usize,
         p: Vec3<R>,
-        back: &Refracted<R>,
+        back: &RefractionAdjoint<R>,
         by_start: Vec3<R>,
     ) {
         let s = self.s[j];
@@ -694,34 +717,43 @@ impl<R: Real> Homeward<R> {
 
     /// A lost ray counts nothing, whatever its numbers have become.
     #[inline(always)]
-    pub(super) fn arrived(&self, lanes: &[R; BLOCK]) -> [R; BLOCK] {
+    pub(super) fn mask_lost(&self, lanes: &[R; BLOCK]) -> [R; BLOCK] {
         std::array::from_fn(|j| R::select(self.block.code[j] > R::ZERO, R::ZERO, lanes[j]))
     }
 
     /// Hands over the derivatives by the numbers of a surface.
     #[inline(always)]
-    pub(super) fn harvest(&self, surface: &Interface<R>, i: usize, harvest: &mut impl Harvest<R>) {
-        let arrived = |lanes: &[R; BLOCK]| self.arrived(lanes);
-        harvest.take(Some(i), Slot::Curvature, &arrived(&self.by_curvature));
-        if matches!(surface.form, Form::Conic | Form::Asphere) {
-            harvest.take(Some(i), Slot::Conic, &arrived(&self.by_conic));
+    pub(super) fn accumulate(
+        &self,
+        surface: &Interface<R>,
+        i: usize,
+        harvest: &mut impl GradientSink<R>,
+    ) {
+        let arrived = |lanes: &[R; BLOCK]| self.mask_lost(lanes);
+        harvest.add_lanes(Some(i), SurfaceParameter::Curvature, &arrived(&self.by_curvature));
+        if matches!(surface.form, SurfaceForm::Conic | SurfaceForm::Asphere) {
+            harvest.add_lanes(Some(i), SurfaceParameter::Conic, &arrived(&self.by_conic));
         }
-        if surface.form == Form::Asphere {
+        if surface.form == SurfaceForm::Asphere {
             for (term, lanes) in self.by_terms.iter().enumerate() {
-                harvest.take(Some(i), Slot::Term(term), &arrived(lanes));
+                harvest.add_lanes(Some(i), SurfaceParameter::AsphereTerm(term), &arrived(lanes));
             }
         }
         if let Some(before) = i.checked_sub(1) {
-            harvest.take(Some(before), Slot::Thickness, &arrived(&self.by_gap));
+            harvest.add_lanes(Some(before), SurfaceParameter::Thickness, &arrived(&self.by_gap));
         }
-        harvest.take(surface.medium, Slot::Index, &arrived(&self.by_index_before));
-        let behind = if surface.mirror { surface.medium } else { Some(i) };
-        harvest.take(behind, Slot::Index, &arrived(&self.by_index_behind));
+        harvest.add_lanes(
+            surface.medium_before,
+            SurfaceParameter::Index,
+            &arrived(&self.by_index_before),
+        );
+        let behind = if surface.mirror { surface.medium_before } else { Some(i) };
+        harvest.add_lanes(behind, SurfaceParameter::Index, &arrived(&self.by_index_behind));
     }
 }
 
 /// An asphere at a distance from the axis: `w = dz/dr²` and every derivative of z and w.
-pub(super) struct Sag<R> {
+pub(super) struct SagDerivatives<R> {
     r2: R,
     curvature: R,
     /// `√(1 − (1+κ) c² r²)`.
@@ -729,10 +761,10 @@ pub(super) struct Sag<R> {
     /// `w`.
     pub(super) slope: R,
     /// `dw/dr²`.
-    pub(super) bend: R,
+    pub(super) second: R,
 }
 
-impl<R: Real> Sag<R> {
+impl<R: Real> SagDerivatives<R> {
     #[inline(always)]
     pub(super) fn new(surface: &Interface<R>, r2: R) -> Self {
         let c = surface.curvature;
@@ -749,7 +781,7 @@ impl<R: Real> Sag<R> {
             curvature: c,
             root,
             slope: c / (root + root) + slope * r2,
-            bend: c * square / (R::from_f64(4.0) * root * root * root) + bend,
+            second: c * square / (R::from_f64(4.0) * root * root * root) + bend,
         }
     }
 

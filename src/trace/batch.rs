@@ -8,14 +8,14 @@
 
 use super::asphere;
 use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
-use super::graded::Arrival;
-use super::interface::{Crossing, Form, Interface, Meeting};
-use super::single::{Ray, launch};
+use super::graded::PropagatedRay;
+use super::interface::{Interface, Intersection, Refraction, SurfaceForm};
+use super::single::{Ray, optical_direction};
 use super::{Fates, Tracer};
-use crate::lens::Invalid;
+use crate::lens::SystemError;
 use crate::math::Real;
 use crate::math::Vec3;
-use crate::math::{Width, widest};
+use crate::math::{SimdWidth, run_vectorized};
 use rayon::prelude::*;
 
 /// Rays in a block.
@@ -78,8 +78,8 @@ impl<R: Real> Rays<R> {
         }
     }
 
-    pub(super) fn slice(&self, from: usize, to: usize) -> Columns<'_, R> {
-        Columns {
+    pub(super) fn slice(&self, from: usize, to: usize) -> RaySlice<'_, R> {
+        RaySlice {
             x: &self.x[from..to],
             y: &self.y[from..to],
             z: &self.z[from..to],
@@ -92,7 +92,7 @@ impl<R: Real> Rays<R> {
 
 impl Rays<f64> {
     /// Refuses a batch with a ray that cannot be traced.
-    pub fn check(&self) -> Result<(), Invalid> {
+    pub fn check(&self) -> Result<(), SystemError> {
         (0..self.len()).try_for_each(|i| self.get(i).check(i))
     }
 }
@@ -108,7 +108,7 @@ impl<R: Real> FromIterator<Ray<R>> for Rays<R> {
 
 /// A part of some rays.
 #[derive(Clone, Copy)]
-pub(super) struct Columns<'a, R> {
+pub(super) struct RaySlice<'a, R> {
     x: &'a [R],
     y: &'a [R],
     z: &'a [R],
@@ -119,7 +119,7 @@ pub(super) struct Columns<'a, R> {
 
 /// Where rays land, as columns, in the frame of the last surface; zeros for a ray that was lost.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Hits<R> {
+pub struct Landings<R> {
     /// Point, in mm.
     pub x: Vec<R>,
     /// Point, in mm.
@@ -139,7 +139,7 @@ pub struct Hits<R> {
 
 /// Where rays land across the axis, and nothing else: what a spot needs.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Points<R> {
+pub struct ImagePoints<R> {
     /// Point, in mm; 0 for a ray that was lost.
     pub x: Vec<R>,
     /// Point, in mm; 0 for a ray that was lost.
@@ -148,34 +148,34 @@ pub struct Points<R> {
 }
 
 /// What is kept of traced rays.
-pub trait Sink<R>: Send {
+pub trait TraceSink<R>: Send {
     /// Whether the optical path is wanted.
-    const PATH: bool;
+    const WITH_PATH: bool;
     /// Makes room for this many rays.
     fn resize(&mut self, count: usize);
     /// A borrowed part for every `size` rays, in order.
-    fn parts(&mut self, size: usize) -> Vec<SinkPart<'_, R>>;
+    fn parts(&mut self, size: usize) -> Vec<TraceSinkPart<'_, R>>;
     /// How a ray ended.
     fn fate(&self, ray: usize) -> Fate;
     /// How many rays ended how.
     fn fates(&self) -> Fates;
 }
 
-/// A borrowed stretch of the columns of a [`Sink`]; empty columns are not wanted.
+/// A borrowed stretch of the columns of a [`TraceSink`]; empty columns are not wanted.
 #[derive(Debug)]
-pub struct SinkPart<'a, R> {
+pub struct TraceSinkPart<'a, R> {
     columns: [&'a mut [R]; 7],
     codes: &'a mut [u32],
 }
 
-fn count(codes: &[u32]) -> Fates {
+fn count_fates(codes: &[u32]) -> Fates {
     let mut fates = Fates::default();
     codes.iter().for_each(|code| fates.count(Fate::from_code(*code)));
     fates
 }
 
-impl<R: Real> Sink<R> for Hits<R> {
-    const PATH: bool = true;
+impl<R: Real> TraceSink<R> for Landings<R> {
+    const WITH_PATH: bool = true;
 
     fn resize(&mut self, count: usize) {
         let Self { x, y, z, l, m, n, opl, codes } = self;
@@ -183,7 +183,7 @@ impl<R: Real> Sink<R> for Hits<R> {
         codes.resize(count, 0);
     }
 
-    fn parts(&mut self, size: usize) -> Vec<SinkPart<'_, R>> {
+    fn parts(&mut self, size: usize) -> Vec<TraceSinkPart<'_, R>> {
         let columns = [
             &mut self.x,
             &mut self.y,
@@ -194,7 +194,7 @@ impl<R: Real> Sink<R> for Hits<R> {
             &mut self.opl,
         ];
         let mut columns = columns.map(|column| column.chunks_mut(size));
-        let part = |codes| SinkPart {
+        let part = |codes| TraceSinkPart {
             columns: std::array::from_fn(|i| columns[i].next().unwrap_or_default()),
             codes,
         };
@@ -206,12 +206,12 @@ impl<R: Real> Sink<R> for Hits<R> {
     }
 
     fn fates(&self) -> Fates {
-        count(&self.codes)
+        count_fates(&self.codes)
     }
 }
 
-impl<R: Real> Sink<R> for Points<R> {
-    const PATH: bool = false;
+impl<R: Real> TraceSink<R> for ImagePoints<R> {
+    const WITH_PATH: bool = false;
 
     fn resize(&mut self, count: usize) {
         self.x.resize(count, R::ZERO);
@@ -219,13 +219,13 @@ impl<R: Real> Sink<R> for Points<R> {
         self.codes.resize(count, 0);
     }
 
-    fn parts(&mut self, size: usize) -> Vec<SinkPart<'_, R>> {
+    fn parts(&mut self, size: usize) -> Vec<TraceSinkPart<'_, R>> {
         let columns = self.x.chunks_mut(size).zip(self.y.chunks_mut(size));
         let part = |((x, y), codes)| {
             let mut columns: [&mut [R]; 7] = Default::default();
             columns[0] = x;
             columns[1] = y;
-            SinkPart { columns, codes }
+            TraceSinkPart { columns, codes }
         };
         columns.zip(self.codes.chunks_mut(size)).map(part).collect()
     }
@@ -235,7 +235,7 @@ impl<R: Real> Sink<R> for Points<R> {
     }
 
     fn fates(&self) -> Fates {
-        count(&self.codes)
+        count_fates(&self.codes)
     }
 }
 
@@ -244,8 +244,8 @@ impl<R: Real> Tracer<R> {
     ///
     /// # Panics
     /// If the columns of `rays` differ in length.
-    pub fn batch<S: Sink<R>>(&self, rays: &Rays<R>, sink: &mut S) {
-        self.batch_with(Width::detect(), rays, sink);
+    pub fn trace_batch<S: TraceSink<R>>(&self, rays: &Rays<R>, sink: &mut S) {
+        self.trace_batch_with(SimdWidth::detect(), rays, sink);
     }
 
     /// Traces rays on the calling thread with at most these lanes; narrower ones where the
@@ -253,58 +253,67 @@ impl<R: Real> Tracer<R> {
     ///
     /// # Panics
     /// If the columns of `rays` differ in length.
-    pub fn batch_with<S: Sink<R>>(&self, width: Width, rays: &Rays<R>, sink: &mut S) {
+    pub fn trace_batch_with<S: TraceSink<R>>(
+        &self,
+        width: SimdWidth,
+        rays: &Rays<R>,
+        sink: &mut S,
+    ) {
         sink.resize(rays.len());
         for (i, part) in sink.parts(CHUNK).into_iter().enumerate() {
-            self.chunk::<S>(width, rays, i * CHUNK, part);
+            self.trace_chunk::<S>(width, rays, i * CHUNK, part);
         }
     }
 
-    /// Traces rays on all cores; the same bits as [`Tracer::batch`].
+    /// Traces rays on all cores; the same bits as [`Tracer::trace_batch`].
     ///
     /// # Panics
     /// If the columns of `rays` differ in length.
-    pub fn batch_parallel<S: Sink<R>>(&self, rays: &Rays<R>, sink: &mut S) {
+    pub fn trace_batch_parallel<S: TraceSink<R>>(&self, rays: &Rays<R>, sink: &mut S) {
         sink.resize(rays.len());
-        let width = Width::detect();
+        let width = SimdWidth::detect();
         let parts = sink.parts(CHUNK).into_par_iter().enumerate();
-        parts.for_each(|(i, part)| self.chunk::<S>(width, rays, i * CHUNK, part));
+        parts.for_each(|(i, part)| self.trace_chunk::<S>(width, rays, i * CHUNK, part));
     }
 
-    fn chunk<S: Sink<R>>(
+    fn trace_chunk<S: TraceSink<R>>(
         &self,
-        width: Width,
+        width: SimdWidth,
         rays: &Rays<R>,
         from: usize,
-        mut part: SinkPart<'_, R>,
+        mut part: TraceSinkPart<'_, R>,
     ) {
         let columns = rays.slice(from, from + part.codes.len());
-        widest(
+        run_vectorized(
             width,
             #[inline(always)]
-            || self.blocks::<S>(columns, &mut part),
+            || self.trace_blocks::<S>(columns, &mut part),
         );
     }
 
     /// What only fills a block up counts as lost where every ray costs time of its own.
     #[inline(always)]
-    pub(super) fn leave_out(&self, block: &mut Block<R>, count: usize) {
-        if !self.gaps.is_empty() {
+    pub(super) fn mask(&self, block: &mut RayBlock<R>, count: usize) {
+        if !self.grin_gaps.is_empty() {
             block.code[count..].fill(R::ONE);
         }
     }
 
     #[inline(always)]
-    fn blocks<S: Sink<R>>(&self, rays: Columns<'_, R>, part: &mut SinkPart<'_, R>) {
-        let mut block = Block::new();
+    fn trace_blocks<S: TraceSink<R>>(
+        &self,
+        rays: RaySlice<'_, R>,
+        part: &mut TraceSinkPart<'_, R>,
+    ) {
+        let mut block = RayBlock::new();
         let mut from = 0;
         while from < rays.x.len() {
             let count = BLOCK.min(rays.x.len() - from);
             block.load(rays, from, count, self.index_before);
-            self.leave_out(&mut block, count);
+            self.mask(&mut block, count);
             for (i, interface) in self.interfaces.iter().enumerate() {
-                if self.touches_gradient(i) {
-                    block.step_through::<S>(self, i);
+                if self.touches_grin(i) {
+                    block.cross_grin_into::<S>(self, i);
                 } else {
                     block.cross::<S>(interface, i as u32);
                 }
@@ -318,7 +327,7 @@ impl<R: Real> Tracer<R> {
 
 /// Rays on their way, as columns.
 #[derive(Clone)]
-pub(super) struct Block<R> {
+pub(super) struct RayBlock<R> {
     pub(super) x: [R; BLOCK],
     pub(super) y: [R; BLOCK],
     pub(super) z: [R; BLOCK],
@@ -331,7 +340,7 @@ pub(super) struct Block<R> {
     pub(super) code: [R; BLOCK],
 }
 
-impl<R: Real> Block<R> {
+impl<R: Real> RayBlock<R> {
     #[inline(always)]
     pub(super) fn new() -> Self {
         let zero = [R::ZERO; BLOCK];
@@ -340,7 +349,7 @@ impl<R: Real> Block<R> {
 
     /// Takes rays from the columns; a block that is not full is filled up with its first ray.
     #[inline(always)]
-    pub(super) fn load(&mut self, rays: Columns<'_, R>, from: usize, count: usize, index: R) {
+    pub(super) fn load(&mut self, rays: RaySlice<'_, R>, from: usize, count: usize, index: R) {
         for (to, column) in [
             (&mut self.x, rays.x),
             (&mut self.y, rays.y),
@@ -353,7 +362,7 @@ impl<R: Real> Block<R> {
             to[count..].fill(column[from]);
         }
         for j in 0..BLOCK {
-            let k = launch(Vec3::new(self.kx[j], self.ky[j], self.kz[j]), index);
+            let k = optical_direction(Vec3::new(self.kx[j], self.ky[j], self.kz[j]), index);
             (self.kx[j], self.ky[j], self.kz[j]) = (k.x, k.y, k.z);
             self.opl[j] = R::ZERO;
             self.code[j] = R::ZERO;
@@ -362,19 +371,19 @@ impl<R: Real> Block<R> {
 
     /// Takes rays as they are made.
     #[inline(always)]
-    pub(super) fn start(&mut self, index: R, ray: impl Fn(usize) -> Ray<R>) {
+    pub(super) fn fill(&mut self, index: R, ray: impl Fn(usize) -> Ray<R>) {
         for j in 0..BLOCK {
             let ray = ray(j);
-            self.set(j, ray.point, launch(ray.direction, index));
+            self.set(j, ray.point, optical_direction(ray.direction, index));
             self.code[j] = R::ZERO;
         }
     }
 
     /// The same rays over another number type.
     #[inline(always)]
-    pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Block<S> {
+    pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> RayBlock<S> {
         let column = |from: &[R; BLOCK]| std::array::from_fn(|j| f(from[j]));
-        Block {
+        RayBlock {
             x: column(&self.x),
             y: column(&self.y),
             z: column(&self.z),
@@ -400,21 +409,21 @@ impl<R: Real> Block<R> {
     }
 
     #[inline(always)]
-    fn cross<S: Sink<R>>(&mut self, interface: &Interface<R>, number: u32) {
-        if S::PATH {
+    fn cross<S: TraceSink<R>>(&mut self, interface: &Interface<R>, number: u32) {
+        if S::WITH_PATH {
             let mut opl = self.opl;
-            self.meet(interface, number, |j, met| opl[j] += met.s * interface.n2);
+            self.cross_with(interface, number, |j, met| opl[j] += met.s * interface.n2);
             self.opl = opl;
         } else {
-            self.meet(interface, number, |_, _| {});
+            self.cross_with(interface, number, |_, _| {});
         }
     }
 
     #[inline(never)]
-    fn step_through<S: Sink<R>>(&mut self, tracer: &Tracer<R>, number: usize) {
+    fn cross_grin_into<S: TraceSink<R>>(&mut self, tracer: &Tracer<R>, number: usize) {
         let mut opl = self.opl;
-        self.pass_gradient(tracer, number, |j, arrival| {
-            if S::PATH {
+        self.cross_grin(tracer, number, |j, arrival| {
+            if S::WITH_PATH {
                 opl[j] += arrival.path;
             }
         });
@@ -423,61 +432,61 @@ impl<R: Real> Block<R> {
 
     /// Crosses a surface that a gradient touches, ray by ray.
     #[inline(never)]
-    pub(super) fn pass_gradient(
+    pub(super) fn cross_grin(
         &mut self,
         tracer: &Tracer<R>,
         number: usize,
-        mut keep: impl FnMut(usize, &Arrival<R>),
+        mut keep: impl FnMut(usize, &PropagatedRay<R>),
     ) {
         for j in 0..BLOCK {
             if self.code[j] > R::ZERO {
                 continue;
             }
             let (p, k) = self.state(j);
-            let arrival = tracer.arrive_at(number, p, k);
+            let arrival = tracer.propagate(number, p, k);
             keep(j, &arrival);
-            let crossing = arrival.go_on();
+            let crossing = arrival.refract();
             self.set(j, crossing.point, crossing.k);
-            if let Some(cause) = arrival.cause(&crossing) {
-                self.code[j] = R::from_f64(f64::from(fate::code(number as u32, cause)));
+            if let Some(cause) = arrival.loss_cause(&crossing) {
+                self.code[j] = R::from_f64(f64::from(fate::encode(number as u32, cause)));
             }
         }
     }
 
     /// Crosses a surface and keeps the distance to it.
     #[inline(always)]
-    pub(super) fn cross_keeping(
+    pub(super) fn cross_recording(
         &mut self,
         interface: &Interface<R>,
         number: u32,
         distance: &mut [R; BLOCK],
     ) {
-        self.meet(interface, number, |j, met| distance[j] = met.s);
+        self.cross_with(interface, number, |j, met| distance[j] = met.s);
     }
 
     /// Crosses a surface; the two senses of travel are compiled apart, since a factor that is known
     /// to be one costs nothing.
     #[inline(always)]
-    pub(super) fn meet(
+    pub(super) fn cross_with(
         &mut self,
         interface: &Interface<R>,
         number: u32,
-        keep: impl FnMut(usize, &Meeting<R>),
+        keep: impl FnMut(usize, &Intersection<R>),
     ) {
         if interface.sense > R::ZERO {
-            self.meet_along(&Interface { sense: R::ONE, ..*interface }, number, keep);
+            self.cross_along(&Interface { sense: R::ONE, ..*interface }, number, keep);
         } else {
-            self.meet_along(&Interface { sense: -R::ONE, ..*interface }, number, keep);
+            self.cross_along(&Interface { sense: -R::ONE, ..*interface }, number, keep);
         }
         if interface.obstruction2 > R::ZERO {
-            self.obstruct(interface, number);
+            self.clip_obstruction(interface, number);
         }
     }
 
     /// Clips the rays that met a surface inside its obstruction.
     #[inline(always)]
-    fn obstruct(&mut self, interface: &Interface<R>, number: u32) {
-        let lost = |cause: u32| R::from_f64(f64::from(fate::code(number, cause)));
+    fn clip_obstruction(&mut self, interface: &Interface<R>, number: u32) {
+        let lost = |cause: u32| R::from_f64(f64::from(fate::encode(number, cause)));
         let (clipped, reflected) = (lost(CLIPPED), lost(TOTAL_REFLECTION));
         for j in 0..BLOCK {
             let (p, _) = self.state(j);
@@ -488,50 +497,50 @@ impl<R: Real> Block<R> {
     }
 
     #[inline(always)]
-    fn meet_along(
+    fn cross_along(
         &mut self,
         interface: &Interface<R>,
         number: u32,
-        keep: impl FnMut(usize, &Meeting<R>),
+        keep: impl FnMut(usize, &Intersection<R>),
     ) {
         match interface.form {
-            Form::Plane => {
-                self.sweep(
+            SurfaceForm::Plane => {
+                self.cross_form(
                     interface,
                     number,
                     #[inline(always)]
-                    |i, _, p, k| i.meet_plane(p, k),
+                    |i, _, p, k| i.intersect_plane(p, k),
                     keep,
                 );
             }
-            Form::Sphere => {
-                self.sweep(
+            SurfaceForm::Sphere => {
+                self.cross_form(
                     interface,
                     number,
                     #[inline(always)]
-                    |i, _, p, k| i.meet_sphere(p, k),
+                    |i, _, p, k| i.intersect_sphere(p, k),
                     keep,
                 );
             }
-            Form::Conic => {
-                self.sweep(
+            SurfaceForm::Conic => {
+                self.cross_form(
                     interface,
                     number,
                     #[inline(always)]
-                    |i, _, p, k| i.meet_conic(p, k),
+                    |i, _, p, k| i.intersect_conic(p, k),
                     keep,
                 );
             }
-            Form::Asphere if R::ORDER > 0 => {
-                self.sweep(interface, number, |i, _, p, k| i.meet_asphere(p, k), keep);
+            SurfaceForm::Asphere if R::ORDER > 0 => {
+                self.cross_form(interface, number, |i, _, p, k| i.intersect_asphere(p, k), keep);
             }
-            Form::Asphere => {
-                let s = self.asphere(interface);
+            SurfaceForm::Asphere => {
+                let s = self.asphere_distances(interface);
                 let meet = |i: &Interface<R>, j: usize, p, k| {
-                    let (start, before) = i.closest(p, k);
-                    i.meet_asphere_at(start, k, s[j], before)
+                    let (start, before) = i.closest_approach(p, k);
+                    i.intersection_on_asphere(start, k, s[j], before)
                 };
-                self.sweep(interface, number, meet, keep);
+                self.cross_form(interface, number, meet, keep);
             }
         }
     }
@@ -539,21 +548,22 @@ impl<R: Real> Block<R> {
     /// How far from its start, or from its point of closest approach, every ray meets an asphere;
     /// not a number where it does not.
     #[inline(always)]
-    fn asphere(&self, interface: &Interface<R>) -> [R; BLOCK] {
+    fn asphere_distances(&self, interface: &Interface<R>) -> [R; BLOCK] {
         let mut before = [R::ZERO; BLOCK];
-        let mut rays = asphere::Starts::<R, BLOCK>::new();
+        let mut rays = asphere::RayStarts::<R, BLOCK>::new();
         for (j, before) in before.iter_mut().enumerate() {
             let (p, k) = self.state(j);
-            let (start, distance) = interface.closest(Vec3::new(p.x, p.y, p.z - interface.gap), k);
+            let (start, distance) =
+                interface.closest_approach(Vec3::new(p.x, p.y, p.z - interface.gap), k);
             *before = distance;
             rays.set(j, start, k);
         }
-        let asphere::Quick { mut s, trusted } = asphere::quick(interface, &rays);
+        let asphere::NewtonResult { mut s, trusted } = asphere::newton_crossings(interface, &rays);
         for j in 0..BLOCK {
             if !(trusted[j] > R::ZERO) && !(self.code[j] > R::ZERO) {
                 let (p, k) = rays.get(j);
                 let (p, k, start) = (p.value(), k.value(), -before[j].value());
-                let found = asphere::isolated(interface.value(), p, k, start);
+                let found = asphere::isolate_crossing(interface.value(), p, k, start);
                 s[j] = R::from_f64(found.unwrap_or(f64::NAN));
             }
         }
@@ -561,15 +571,15 @@ impl<R: Real> Block<R> {
     }
 
     #[inline(always)]
-    fn sweep(
+    fn cross_form(
         &mut self,
         interface: &Interface<R>,
         number: u32,
-        meet: impl Fn(&Interface<R>, usize, Vec3<R>, Vec3<R>) -> Meeting<R>,
-        mut keep: impl FnMut(usize, &Meeting<R>),
+        meet: impl Fn(&Interface<R>, usize, Vec3<R>, Vec3<R>) -> Intersection<R>,
+        mut keep: impl FnMut(usize, &Intersection<R>),
     ) {
         let interface = *interface;
-        let lost = |cause: u32| R::from_f64(f64::from(fate::code(number, cause)));
+        let lost = |cause: u32| R::from_f64(f64::from(fate::encode(number, cause)));
         let (missed, clipped) = (lost(MISSED), lost(CLIPPED));
         let reflected = lost(TOTAL_REFLECTION);
         for j in 0..BLOCK {
@@ -577,22 +587,28 @@ impl<R: Real> Block<R> {
             let p = Vec3::new(p.x, p.y, p.z - interface.gap);
             let met = meet(&interface, j, p, k);
             keep(j, &met);
-            let crossing = interface.go_on(met, k);
+            let crossing = interface.refract(met, k);
             self.set(j, crossing.point, crossing.k);
-            let code = code(&crossing, missed, clipped, reflected);
+            let code = first_cause(&crossing, missed, clipped, reflected);
             self.code[j] = R::select(self.code[j] > R::ZERO, self.code[j], code);
         }
     }
 
     #[inline(always)]
-    fn store<S: Sink<R>>(&self, part: &mut SinkPart<'_, R>, from: usize, count: usize, index: R) {
+    fn store<S: TraceSink<R>>(
+        &self,
+        part: &mut TraceSinkPart<'_, R>,
+        from: usize,
+        count: usize,
+        index: R,
+    ) {
         let inverse = R::ONE / index;
         let arrived = |j: usize, value: R| R::select(self.code[j] > R::ZERO, R::ZERO, value);
         for j in 0..count {
             part.columns[0][from + j] = arrived(j, self.x[j]);
             part.columns[1][from + j] = arrived(j, self.y[j]);
         }
-        if S::PATH {
+        if S::WITH_PATH {
             for j in 0..count {
                 part.columns[2][from + j] = arrived(j, self.z[j]);
                 part.columns[3][from + j] = arrived(j, self.kx[j] * inverse);
@@ -609,7 +625,7 @@ impl<R: Real> Block<R> {
 
 /// The code of the first thing that goes wrong at a surface, or 0.
 #[inline(always)]
-fn code<R: Real>(crossing: &Crossing<R>, missed: R, clipped: R, reflected: R) -> R {
+fn first_cause<R: Real>(crossing: &Refraction<R>, missed: R, clipped: R, reflected: R) -> R {
     let code = R::select(crossing.reflected, reflected, R::ZERO);
     let code = R::select(crossing.clipped, clipped, code);
     R::select(crossing.missed, missed, code)

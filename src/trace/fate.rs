@@ -52,10 +52,10 @@ impl Fate {
     }
 
     /// The number that stands for a cause at a surface inside the kernels: 0 for a ray on its way,
-    /// else `CAUSES surface + cause`.
+    /// else `CAUSES_PER_SURFACE surface + cause`.
     pub(super) fn from_code(code: u32) -> Self {
-        let surface = code / CAUSES;
-        match code % CAUSES {
+        let surface = code / CAUSES_PER_SURFACE;
+        match code % CAUSES_PER_SURFACE {
             MISSED => Self::Missed(surface),
             CLIPPED => Self::Clipped(surface),
             TOTAL_REFLECTION => Self::TotalReflection(surface),
@@ -72,11 +72,11 @@ pub(super) const TOTAL_REFLECTION: u32 = 3;
 pub(super) const TURNED: u32 = 4;
 pub(super) const TRAPPED: u32 = 5;
 /// Room for causes at each surface.
-const CAUSES: u32 = 8;
+const CAUSES_PER_SURFACE: u32 = 8;
 
 /// The number that stands for a cause at a surface.
-pub(super) fn code(surface: u32, cause: u32) -> u32 {
-    CAUSES * surface + cause
+pub(super) fn encode(surface: u32, cause: u32) -> u32 {
+    CAUSES_PER_SURFACE * surface + cause
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]

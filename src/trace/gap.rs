@@ -7,66 +7,66 @@
 use super::Ray;
 use super::fate::{MISSED, TRAPPED, TURNED};
 use super::interface::Interface;
-use crate::grin::field::GradeSlopes;
-use crate::grin::{Op, State};
-use crate::lens::Graded;
+use crate::grin::field::ProfileGradient;
+use crate::grin::{IntegratorOp, RayState};
+use crate::lens::RotationalProfile;
 use crate::math::{Real, Vec3};
 
 /// A gap filled with a gradient, ready for rays.
 #[derive(Debug, Clone)]
-pub(super) struct Gap<R> {
-    pub(super) field: Graded<R>,
-    pub(super) ops: Vec<Op<R>>,
+pub(super) struct GrinGap<R> {
+    pub(super) field: RotationalProfile<R>,
+    pub(super) ops: Vec<IntegratorOp<R>>,
     /// The length of a step in σ, in mm over the index.
     pub(super) step: R,
     /// Steps after which a ray counts as trapped.
-    pub(super) limit: u32,
+    pub(super) max_steps: u32,
     /// The square of the radius of the glass: of the wider of its two faces.
     pub(super) side2: R,
 }
 
 /// A ray at the end of a gap.
-pub(super) struct Crossed<R> {
-    pub(super) state: State<R>,
+pub(super) struct GapExit<R> {
+    pub(super) state: RayState<R>,
     /// All of σ, negative for a ray that went back.
     pub(super) length: R,
     /// The largest square of the distance from the axis on the way.
     pub(super) widest: R,
 }
 
-impl<R: Real> Gap<R> {
+impl<R: Real> GrinGap<R> {
     /// One step of length `h`.
     #[inline(always)]
-    pub(super) fn advance(&self, state: State<R>, h: R) -> State<R> {
-        let State { mut x, mut v, mut path } = state;
+    pub(super) fn advance(&self, state: RayState<R>, h: R) -> RayState<R> {
+        let RayState { mut x, mut v, mut path } = state;
         for op in &self.ops {
             match *op {
-                Op::Drift(c) => x = x + v * (c * h),
-                Op::Kick(c) => {
+                IntegratorOp::Drift(c) => x = x + v * (c * h),
+                IntegratorOp::Kick(c) => {
                     let here = self.field.force(x);
                     v = v + here.force * (c * h);
                     path += c * h * here.square;
                 }
             }
         }
-        State { x, v, path }
+        RayState { x, v, path }
     }
 
     /// How fast the end of a step of length `h` moves with `h`.
-    fn rate(&self, state: State<R>, h: R) -> State<R> {
-        let State { mut x, mut v, .. } = state;
-        let mut rate = State::default();
+    fn rate(&self, state: RayState<R>, h: R) -> RayState<R> {
+        let RayState { mut x, mut v, .. } = state;
+        let mut rate = RayState::default();
         for op in &self.ops {
             match *op {
-                Op::Drift(c) => {
+                IntegratorOp::Drift(c) => {
                     x = x + v * (c * h);
                     rate.x = rate.x + (v + rate.v * h) * c;
                 }
-                Op::Kick(c) => {
+                IntegratorOp::Kick(c) => {
                     let here = self.field.force(x);
                     v = v + here.force * (c * h);
                     let climb = here.force.dot(rate.x);
-                    rate.v = rate.v + (here.force + self.field.bend(x, rate.x) * h) * c;
+                    rate.v = rate.v + (here.force + self.field.force_derivative(x, rate.x) * h) * c;
                     rate.path += c * (here.square + R::TWO * h * climb);
                 }
             }
@@ -80,32 +80,32 @@ impl<R: Real> Gap<R> {
         &self,
         surface: &Interface<R>,
         entry: Option<&Interface<R>>,
-        start: State<R>,
-    ) -> Result<Crossed<R>, (u32, State<R>)> {
+        start: RayState<R>,
+    ) -> Result<GapExit<R>, (u32, RayState<R>)> {
         let gap = surface.gap;
-        let back = surface.passed_by(start.x, start.v, gap).0 > R::ZERO;
+        let back = surface.signed_height(start.x, start.v, gap).0 > R::ZERO;
         let h = if back { -self.step } else { self.step };
         let mut state = start;
         let mut widest = square_of_distance(start.x);
-        for count in 0..=self.limit {
+        for count in 0..=self.max_steps {
             let next = self.advance(state, h);
-            let height = surface.passed_by(next.x, next.v, gap).0;
-            let some_index = next.v.dot(next.v) > R::from_f64(LEAST_SQUARE);
+            let height = surface.signed_height(next.x, next.v, gap).0;
+            let some_index = next.v.dot(next.v) > R::from_f64(MIN_INDEX2);
             if !(some_index && next.x.is_finite() && next.v.is_finite()) {
                 return Err((TRAPPED, state));
             }
             let over = if back { height <= R::ZERO } else { height >= R::ZERO };
             if over {
-                let last = self.cut(surface, gap, state, h);
+                let last = self.last_step(surface, gap, state, h);
                 let (length, end) = last.ok_or((MISSED, state))?;
-                widest = self.wider(widest, state, length, end);
+                widest = self.widest_radius2(widest, state, length, end);
                 let length = h * R::from_f64(f64::from(count)) + length;
-                return Ok(Crossed { state: end, length, widest });
+                return Ok(GapExit { state: end, length, widest });
             }
-            if !back && is_turned(entry, &next) {
+            if !back && is_turned_back(entry, &next) {
                 return Err((TURNED, next));
             }
-            widest = self.wider(widest, state, h, next);
+            widest = self.widest_radius2(widest, state, h, next);
             state = next;
         }
         Err((TRAPPED, state))
@@ -113,10 +113,16 @@ impl<R: Real> Gap<R> {
 
     /// The length of the last step that ends on the surface, between 0 and `h`, and its end: Newton's
     /// iteration between two lengths on either side.
-    fn cut(&self, surface: &Interface<R>, gap: R, before: State<R>, h: R) -> Option<(R, State<R>)> {
-        let (from, _) = surface.passed_by(before.x, before.v, gap);
+    fn last_step(
+        &self,
+        surface: &Interface<R>,
+        gap: R,
+        before: RayState<R>,
+        h: R,
+    ) -> Option<(R, RayState<R>)> {
+        let (from, _) = surface.signed_height(before.x, before.v, gap);
         let after = self.advance(before, h);
-        let (to, _) = surface.passed_by(after.x, after.v, gap);
+        let (to, _) = surface.signed_height(after.x, after.v, gap);
         let (mut near, mut far) = (R::ZERO, h);
         let start = from / (from - to);
         let inside = start >= R::ZERO && start <= R::ONE;
@@ -125,7 +131,7 @@ impl<R: Real> Gap<R> {
         let half = R::from_f64(0.5);
         for _ in 0..60 {
             let end = self.advance(before, length);
-            let (height, slope) = surface.passed_by(end.x, end.v, gap);
+            let (height, slope) = surface.signed_height(end.x, end.v, gap);
             // The same side as the start of the step.
             if (height < R::ZERO) == (from < R::ZERO) {
                 near = length;
@@ -149,11 +155,11 @@ impl<R: Real> Gap<R> {
         // good for.
         for _ in 0..2 * R::ORDER {
             let end = self.advance(before, length);
-            let (height, slope) = surface.passed_by(end.x, end.v, gap);
+            let (height, slope) = surface.signed_height(end.x, end.v, gap);
             length -= height / slope;
         }
         let end = self.advance(before, length);
-        let (height, _) = surface.passed_by(end.x, end.v, gap);
+        let (height, _) = surface.signed_height(end.x, end.v, gap);
         let size = end.x.x.abs() + end.x.y.abs() + end.x.z.abs() + self.step;
         let near = height.value().abs() <= 64.0 * R::EPSILON * size.value();
         (near && surface.exists_at(end.x)).then_some((length, end))
@@ -162,10 +168,10 @@ impl<R: Real> Gap<R> {
     /// The larger of a square of the distance from the axis and the largest one on a step. Where the
     /// step has its farthest point inside and near the side of the glass, that point is looked for;
     /// the derivative of its distance does not depend on where exactly it is.
-    fn wider(&self, widest: R, before: State<R>, h: R, after: State<R>) -> R {
+    fn widest_radius2(&self, widest: R, before: RayState<R>, h: R, after: RayState<R>) -> R {
         let end = square_of_distance(after.x);
         let widest = R::select(end > widest, end, widest);
-        let (rises, falls) = (outwards(&before) * h, outwards(&after) * h);
+        let (rises, falls) = (radial_rate(&before) * h, radial_rate(&after) * h);
         let peaks = rises > R::ZERO && falls < R::ZERO;
         // The tangent lies above a curve that bends down.
         let highest = square_of_distance(before.x) + R::TWO * rises;
@@ -180,7 +186,7 @@ impl<R: Real> Gap<R> {
             let across = there.v.x * there.v.x + there.v.y * there.v.y;
             let force = self.field.force(there.x).force;
             let bend = across + there.x.x * force.x + there.x.y * force.y;
-            let newton = share - outwards(&there) / (bend * h);
+            let newton = share - radial_rate(&there) / (bend * h);
             let inside = newton > R::ZERO && newton < R::ONE;
             share = R::select(inside, newton, share);
         }
@@ -190,23 +196,23 @@ impl<R: Real> Gap<R> {
 }
 
 /// Where `|v|² = n²` is less than this the polynomial means no glass any more.
-const LEAST_SQUARE: f64 = 0.04;
+const MIN_INDEX2: f64 = 0.04;
 
 /// Points of a drawn ray inside a gradient.
-const DRAWN: u32 = 24;
+const DRAWN_POINTS: u32 = 24;
 
-impl Gap<f64> {
+impl GrinGap<f64> {
     /// Points of a ray that starts behind the surface before, between its ends.
-    pub(super) fn between(
+    pub(super) fn sample_points(
         &self,
         surface: &Interface<f64>,
         ray: Ray<f64>,
     ) -> impl Iterator<Item = Vec3<f64>> {
         let index = self.field.index(ray.point);
-        let start = State { x: ray.point, v: ray.direction * index, path: 0.0 };
+        let start = RayState { x: ray.point, v: ray.direction * index, path: 0.0 };
         let length = self.cross(surface, None, start).map_or(0.0, |crossed| crossed.length);
         let pieces = (length.abs() / self.step).ceil().clamp(1.0, 4096.0) as u32;
-        let pieces = pieces.max(DRAWN);
+        let pieces = pieces.max(DRAWN_POINTS);
         let mut state = start;
         (1..pieces).map(move |_| {
             state = self.advance(state, length / f64::from(pieces));
@@ -224,27 +230,27 @@ fn square_of_distance<R: Real>(x: Vec3<R>) -> R {
 }
 
 /// Half of how fast the square of the distance from the axis grows.
-fn outwards<R: Real>(state: &State<R>) -> R {
+fn radial_rate<R: Real>(state: &RayState<R>) -> R {
     state.x.x * state.v.x + state.x.y * state.v.y
 }
 
 /// Whether a ray is in front of the surface by which it came, and on its way from it.
-fn is_turned<R: Real>(entry: Option<&Interface<R>>, state: &State<R>) -> bool {
+fn is_turned_back<R: Real>(entry: Option<&Interface<R>>, state: &RayState<R>) -> bool {
     entry.is_some_and(|entry| {
-        let (height, rate) = entry.passed_by(state.x, state.v, R::ZERO);
+        let (height, rate) = entry.signed_height(state.x, state.v, R::ZERO);
         height < R::ZERO && rate < R::ZERO
     })
 }
 
 /// The derivative of something by a state.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pull<R> {
+pub(super) struct StateAdjoint<R> {
     pub(super) x: Vec3<R>,
     pub(super) v: Vec3<R>,
     pub(super) path: R,
 }
 
-impl<R: Real> Gap<R> {
+impl<R: Real> GrinGap<R> {
     /// The length of the last step and the number of those before it, of a ray that took `length`.
     fn steps(&self, length: R) -> (R, u32, R) {
         let h = if length < R::ZERO { -self.step } else { self.step };
@@ -254,7 +260,7 @@ impl<R: Real> Gap<R> {
     }
 
     /// How fast the end of the last step moves with its length.
-    pub(super) fn final_rate(&self, end: State<R>, length: R) -> State<R> {
+    pub(super) fn final_rate(&self, end: RayState<R>, length: R) -> RayState<R> {
         let (last, _, _) = self.steps(length);
         // Undone by its negative: every list of pieces reads the same backwards.
         let before = self.advance(end, -last);
@@ -262,13 +268,13 @@ impl<R: Real> Gap<R> {
     }
 
     /// Undoes all steps of a ray that took `length`, and takes the derivatives along.
-    pub(super) fn go_back(
+    pub(super) fn backward(
         &self,
-        end: State<R>,
+        end: RayState<R>,
         length: R,
-        pull: Pull<R>,
-        by: &mut GradeSlopes<R>,
-    ) -> (State<R>, Pull<R>) {
+        pull: StateAdjoint<R>,
+        by: &mut ProfileGradient<R>,
+    ) -> (RayState<R>, StateAdjoint<R>) {
         let (last, count, h) = self.steps(length);
         let (mut state, mut pull) = self.undo(end, last, pull, by);
         for _ in 0..count {
@@ -280,30 +286,31 @@ impl<R: Real> Gap<R> {
     /// Undoes one step and applies its transpose.
     fn undo(
         &self,
-        state: State<R>,
+        state: RayState<R>,
         h: R,
-        pull: Pull<R>,
-        by: &mut GradeSlopes<R>,
-    ) -> (State<R>, Pull<R>) {
-        let State { mut x, mut v, mut path } = state;
+        pull: StateAdjoint<R>,
+        by: &mut ProfileGradient<R>,
+    ) -> (RayState<R>, StateAdjoint<R>) {
+        let RayState { mut x, mut v, mut path } = state;
         let mut pull = pull;
         for op in self.ops.iter().rev() {
             match *op {
-                Op::Drift(c) => {
+                IntegratorOp::Drift(c) => {
                     x = x - v * (c * h);
                     pull.v = pull.v + pull.x * (c * h);
                 }
-                Op::Kick(c) => {
+                IntegratorOp::Kick(c) => {
                     let weight = c * h;
                     let here = self.field.force(x);
                     v = v - here.force * weight;
                     path -= weight * here.square;
-                    self.field.deposit(x, pull.path * weight, pull.v * weight, by);
-                    let turn = self.field.bend(x, pull.v) + here.force * (R::TWO * pull.path);
+                    self.field.accumulate(x, pull.path * weight, pull.v * weight, by);
+                    let turn =
+                        self.field.force_derivative(x, pull.v) + here.force * (R::TWO * pull.path);
                     pull.x = pull.x + turn * weight;
                 }
             }
         }
-        (State { x, v, path }, pull)
+        (RayState { x, v, path }, pull)
     }
 }

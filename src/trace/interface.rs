@@ -17,7 +17,7 @@ use crate::math::Vec3;
 
 /// The form of a surface, as far as it decides what has to be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum SurfaceForm {
     Plane,
     Sphere,
     Conic,
@@ -27,11 +27,11 @@ pub(super) enum Form {
 /// A surface with every constant that does not depend on the ray.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Interface<R> {
-    pub(super) form: Form,
+    pub(super) form: SurfaceForm,
     pub(super) mirror: bool,
     /// Whether rays come from so far away that they are first moved to their point of closest
     /// approach: `B² − A F` would cancel otherwise.
-    pub(super) far: bool,
+    pub(super) starts_far: bool,
     /// The sense of travel σ in front of the surface, +1 or −1.
     pub(super) sense: R,
     /// The distance from the vertex before.
@@ -41,7 +41,7 @@ pub(super) struct Interface<R> {
     pub(super) terms: [R; ASPHERE_TERMS],
     /// The surface whose index the light is in when it arrives; `None` for the index in front of
     /// the first one. A mirror sets no index.
-    pub(super) medium: Option<usize>,
+    pub(super) medium_before: Option<usize>,
     /// The index in front.
     pub(super) index_before: R,
     /// Its square.
@@ -56,16 +56,16 @@ pub(super) struct Interface<R> {
     pub(super) obstruction2: R,
     /// `1 − (1+κ) c z` may not fall below this: 0 on the sag sheet, anything where the far half
     /// of an ellipsoid counts too.
-    pub(super) sheet: R,
+    pub(super) min_normal_z: R,
     /// The largest slope of an asphere inside its semi-diameter; infinite where there is no bound.
-    pub(super) steepest: f64,
+    pub(super) slope_bound: f64,
     /// The lowest and the highest point of an asphere inside its semi-diameter.
-    pub(super) span: (f64, f64),
+    pub(super) sag_range: (f64, f64),
 }
 
 /// Where a ray meets a surface, before anything happens to it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Meeting<R> {
+pub(super) struct Intersection<R> {
     /// The point in the frame of the surface.
     pub(super) point: Vec3<R>,
     /// How far along `k` it lies.
@@ -81,7 +81,7 @@ pub(super) struct Meeting<R> {
 
 /// A ray just behind a surface.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Crossing<R> {
+pub(super) struct Refraction<R> {
     pub(super) point: Vec3<R>,
     pub(super) k: Vec3<R>,
     pub(super) s: R,
@@ -91,7 +91,7 @@ pub(super) struct Crossing<R> {
 }
 
 /// Rays that travel farther than this many radii of curvature are moved close first.
-const FAR: f64 = 0.5;
+const FAR_START: f64 = 0.5;
 
 /// The surfaces of a system, prepared.
 pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
@@ -101,26 +101,26 @@ pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
         let (curvature, conic, terms) = surface.shape.numbers();
         let behind = if surface.mirror { n } else { surface.index };
         let rim2 = surface.semi_diameter * surface.semi_diameter;
-        let whole = surface.hyper && conic.value() > -1.0;
+        let whole = surface.hyperhemisphere && conic.value() > -1.0;
         let interface = Interface {
             form: form(&surface.shape),
             mirror: surface.mirror,
-            far: i == 0 || (curvature.value() * gap.value()).abs() > FAR,
+            starts_far: i == 0 || (curvature.value() * gap.value()).abs() > FAR_START,
             sense,
             gap,
             curvature,
             conic,
             terms,
-            medium,
+            medium_before: medium,
             index_before: n,
             n2: n * n,
             index_behind: behind,
             dn2: (behind - n) * (behind + n),
             rim2,
             obstruction2: surface.obstruction * surface.obstruction,
-            sheet: R::from_f64(if whole { f64::NEG_INFINITY } else { 0.0 }),
-            steepest: asphere::steepest(&surface.shape, surface.semi_diameter.value()),
-            span: asphere::span(&surface.shape, surface.semi_diameter.value()),
+            min_normal_z: R::from_f64(if whole { f64::NEG_INFINITY } else { 0.0 }),
+            slope_bound: asphere::slope_bound(&surface.shape, surface.semi_diameter.value()),
+            sag_range: asphere::sag_range(&surface.shape, surface.semi_diameter.value()),
         };
         (n, gap) = (behind, surface.thickness);
         medium = if surface.mirror { medium } else { Some(i) };
@@ -130,33 +130,33 @@ pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
     system.surfaces.iter().enumerate().map(prepare).collect()
 }
 
-fn form<R>(shape: &Shape<R>) -> Form {
+fn form<R>(shape: &Shape<R>) -> SurfaceForm {
     match shape {
-        Shape::Plane => Form::Plane,
-        Shape::Sphere { .. } => Form::Sphere,
-        Shape::Conic { .. } => Form::Conic,
-        Shape::Asphere { .. } => Form::Asphere,
+        Shape::Plane => SurfaceForm::Plane,
+        Shape::Sphere { .. } => SurfaceForm::Sphere,
+        Shape::Conic { .. } => SurfaceForm::Conic,
+        Shape::Asphere { .. } => SurfaceForm::Asphere,
     }
 }
 
 impl<R: Real> Interface<R> {
     /// Meets the surface and goes on behind it; `p` is in the frame of the vertex before.
     #[inline(always)]
-    pub(super) fn cross(&self, p: Vec3<R>, k: Vec3<R>) -> Crossing<R> {
+    pub(super) fn cross(&self, p: Vec3<R>, k: Vec3<R>) -> Refraction<R> {
         let start = Vec3::new(p.x, p.y, p.z - self.gap);
         let met = match self.form {
-            Form::Plane => self.meet_plane(start, k),
-            Form::Sphere => self.meet_sphere(start, k),
-            Form::Conic => self.meet_conic(start, k),
-            Form::Asphere => self.meet_asphere(start, k),
+            SurfaceForm::Plane => self.intersect_plane(start, k),
+            SurfaceForm::Sphere => self.intersect_sphere(start, k),
+            SurfaceForm::Conic => self.intersect_conic(start, k),
+            SurfaceForm::Asphere => self.intersect_asphere(start, k),
         };
-        let crossing = self.go_on(met, k);
+        let crossing = self.refract(met, k);
         let clipped = crossing.clipped || self.obstructs(met.point);
-        Crossing { clipped, ..crossing }
+        Refraction { clipped, ..crossing }
     }
 
     /// Whether a point of the surface lies inside its obstruction. Asked apart from
-    /// [`Interface::go_on`], so that the many surfaces without one pay nothing.
+    /// [`Interface::refract`], so that the many surfaces without one pay nothing.
     #[inline(always)]
     pub(super) fn obstructs(&self, p: Vec3<R>) -> bool {
         p.x * p.x + p.y * p.y < self.obstruction2
@@ -164,18 +164,18 @@ impl<R: Real> Interface<R> {
 
     /// Clips at the rim, then refracts or reflects.
     #[inline(always)]
-    pub(super) fn go_on(&self, met: Meeting<R>, k: Vec3<R>) -> Crossing<R> {
+    pub(super) fn refract(&self, met: Intersection<R>, k: Vec3<R>) -> Refraction<R> {
         let p = met.point;
         let clipped = !(p.x * p.x + p.y * p.y <= self.rim2);
         let (gamma, reflected) =
-            if self.mirror { (-(met.a + met.a) / met.m, false) } else { self.refraction(&met) };
+            if self.mirror { (-(met.a + met.a) / met.m, false) } else { self.snell_factor(&met) };
         let k = k + met.normal * gamma;
-        Crossing { point: p, k, s: met.s, missed: met.missed, clipped, reflected }
+        Refraction { point: p, k, s: met.s, missed: met.missed, clipped, reflected }
     }
 
     /// `Γ` of Snell's law `k' = k + Γ N`, and whether the ray is totally reflected instead.
     #[inline(always)]
-    fn refraction(&self, met: &Meeting<R>) -> (R, bool) {
+    fn snell_factor(&self, met: &Intersection<R>) -> (R, bool) {
         let behind2 = met.a * met.a + self.dn2 * met.m;
         let behind = self.sense * behind2.sqrt();
         let gamma = (behind - met.a) / met.m;
@@ -183,9 +183,9 @@ impl<R: Real> Interface<R> {
     }
 
     #[inline(always)]
-    pub(super) fn meet_plane(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+    pub(super) fn intersect_plane(&self, p: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
         let s = -p.z / k.z;
-        Meeting {
+        Intersection {
             point: Vec3::new(p.x + k.x * s, p.y + k.y * s, R::ZERO),
             s,
             normal: Vec3::new(R::ZERO, R::ZERO, R::ONE),
@@ -196,22 +196,22 @@ impl<R: Real> Interface<R> {
     }
 
     #[inline(always)]
-    pub(super) fn meet_sphere(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+    pub(super) fn intersect_sphere(&self, p: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
         let c = self.curvature;
-        let (p, before) = self.closest(p, k);
+        let (p, before) = self.closest_approach(p, k);
         let b = k.z - c * p.dot(k);
         let f = c * p.dot(p) - (p.z + p.z);
         let (s, a, missed) = self.root(c * self.n2, b, f);
         let point = p + k * s;
         let normal = Vec3::new(-(c * point.x), -(c * point.y), R::ONE - c * point.z);
-        let missed = missed | !(normal.z >= self.sheet);
-        Meeting { point, s: before + s, normal, a, m: R::ONE, missed }
+        let missed = missed | !(normal.z >= self.min_normal_z);
+        Intersection { point, s: before + s, normal, a, m: R::ONE, missed }
     }
 
     #[inline(always)]
-    pub(super) fn meet_conic(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+    pub(super) fn intersect_conic(&self, p: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
         let c = self.curvature;
-        let (p, before) = self.closest(p, k);
+        let (p, before) = self.closest_approach(p, k);
         let axial = self.conic * p.z;
         let b = k.z - c * (p.dot(k) + axial * k.z);
         let f = c * (p.dot(p) + axial * p.z) - (p.z + p.z);
@@ -219,8 +219,8 @@ impl<R: Real> Interface<R> {
         let point = p + k * s;
         let normal_z = R::ONE - c * (point.z + self.conic * point.z);
         let normal = Vec3::new(-(c * point.x), -(c * point.y), normal_z);
-        let missed = missed | !(normal_z >= self.sheet);
-        Meeting { point, s: before + s, normal, a, m: normal.dot(normal), missed }
+        let missed = missed | !(normal_z >= self.min_normal_z);
+        Intersection { point, s: before + s, normal, a, m: normal.dot(normal), missed }
     }
 
     /// The root of `A s² − 2 B s + F` where `k·N` has the sense of travel, with `k·N`, and whether
@@ -238,8 +238,8 @@ impl<R: Real> Interface<R> {
     /// The point of closest approach to the vertex, and how far along `k` it lies; the start
     /// itself where nothing would cancel.
     #[inline(always)]
-    pub(super) fn closest(&self, p: Vec3<R>, k: Vec3<R>) -> (Vec3<R>, R) {
-        if self.far {
+    pub(super) fn closest_approach(&self, p: Vec3<R>, k: Vec3<R>) -> (Vec3<R>, R) {
+        if self.starts_far {
             let s = -p.dot(k) / self.n2;
             (p + k * s, s)
         } else {
@@ -247,33 +247,33 @@ impl<R: Real> Interface<R> {
         }
     }
 
-    pub(super) fn meet_asphere(&self, p: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
-        let (start, before) = self.closest(p, k);
-        let s = asphere::crossing(self.value(), start.value(), k.value(), -before.value());
+    pub(super) fn intersect_asphere(&self, p: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
+        let (start, before) = self.closest_approach(p, k);
+        let s = asphere::find_crossing(self.value(), start.value(), k.value(), -before.value());
         let mut s = R::from_f64(s.unwrap_or(f64::NAN));
         for _ in 0..R::ORDER {
             let (f, slope) = self.height_above(start + k * s, k);
             s -= f / slope;
         }
-        self.meet_asphere_at(start, k, s, before)
+        self.intersection_on_asphere(start, k, s, before)
     }
 
     /// The meeting at `start + s k`, which lies on the asphere; missed where `s` is not a number.
     #[inline(always)]
-    pub(super) fn meet_asphere_at(
+    pub(super) fn intersection_on_asphere(
         &self,
         start: Vec3<R>,
         k: Vec3<R>,
         s: R,
         before: R,
-    ) -> Meeting<R> {
+    ) -> Intersection<R> {
         let point = start + k * s;
         let (_, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
         let slope = -(dz_dr2 + dz_dr2);
         let normal = Vec3::new(point.x * slope, point.y * slope, R::ONE);
         let a = k.dot(normal);
         let missed = !(self.sense * a > R::ZERO);
-        Meeting { point, s: before + s, normal, a, m: normal.dot(normal), missed }
+        Intersection { point, s: before + s, normal, a, m: normal.dot(normal), missed }
     }
 
     /// The same surface without derivatives.
@@ -281,22 +281,22 @@ impl<R: Real> Interface<R> {
         Interface {
             form: self.form,
             mirror: self.mirror,
-            far: self.far,
+            starts_far: self.starts_far,
             sense: self.sense.value(),
             gap: self.gap.value(),
             curvature: self.curvature.value(),
             conic: self.conic.value(),
             terms: self.terms.map(Real::value),
-            medium: self.medium,
+            medium_before: self.medium_before,
             index_before: self.index_before.value(),
             n2: self.n2.value(),
             index_behind: self.index_behind.value(),
             dn2: self.dn2.value(),
             rim2: self.rim2.value(),
             obstruction2: self.obstruction2.value(),
-            sheet: self.sheet.value(),
-            steepest: self.steepest,
-            span: self.span,
+            min_normal_z: self.min_normal_z.value(),
+            slope_bound: self.slope_bound,
+            sag_range: self.sag_range,
         }
     }
 

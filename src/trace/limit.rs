@@ -24,49 +24,50 @@
 //! the answer is what stands at εη.
 
 use super::Tracer;
-use super::backward::{Gradient, Harvest, Pulls, Seed, Sowing};
-use super::batch::{BLOCK, Block};
-use super::interface::{Form, Interface};
+use super::backward::{AdjointSeed, GradientSink, LimitAdjoint, SeedSource, SystemGradient};
+use super::batch::{BLOCK, RayBlock};
+use super::interface::{Interface, SurfaceForm};
 use super::single::Ray;
-use super::slot::Slot;
-use crate::lens::{Invalid, System};
+use super::slot::SurfaceParameter;
+use crate::lens::{System, SystemError};
 use crate::math::{Dual, Jet, Real, Vec3};
-use crate::math::{Width, widest};
+use crate::math::{SimdWidth, run_vectorized};
 
 /// Rays that travel abreast.
 pub const LANES: usize = BLOCK;
 
 /// A number of the algebra with ε² = η² = 0; the outer slope belongs to ε.
-type Pair<R> = Dual<Dual<R, 1>, 1>;
+type MixedDual<R> = Dual<Dual<R, 1>, 1>;
 
 /// A limit of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Limit {
+enum LimitFunction {
     Rim,
     Obstruction,
     Angle,
-    Sheet,
+    ConicEdge,
 }
 
 impl<R: Real> Interface<R> {
     /// `max(0, n² − n'²)`.
     #[inline(always)]
-    pub(super) fn loss(&self) -> R {
+    pub(super) fn index_drop2(&self) -> R {
         R::select(self.dn2 < R::ZERO, -self.dn2, R::ZERO)
     }
 
     /// Whether a limit can end anything. A plane ends no ray by its angle where the index does not
     /// fall, and the rim keeps most rays from where a conic turns over.
-    fn has(&self, limit: Limit) -> bool {
+    fn has(&self, limit: LimitFunction) -> bool {
         let surface = self.value();
         let c2 = (1.0 + surface.conic) * surface.curvature * surface.curvature;
-        let flat = surface.form != Form::Asphere && surface.curvature == 0.0;
+        let flat = surface.form != SurfaceForm::Asphere && surface.curvature == 0.0;
         match limit {
-            Limit::Rim => surface.rim2 < f64::INFINITY,
-            Limit::Obstruction => surface.obstruction2 > 0.0,
-            Limit::Angle => !flat || surface.dn2 < 0.0,
-            Limit::Sheet => {
-                let closed = surface.form == Form::Asphere || surface.sheet > f64::NEG_INFINITY;
+            LimitFunction::Rim => surface.rim2 < f64::INFINITY,
+            LimitFunction::Obstruction => surface.obstruction2 > 0.0,
+            LimitFunction::Angle => !flat || surface.dn2 < 0.0,
+            LimitFunction::ConicEdge => {
+                let closed = surface.form == SurfaceForm::Asphere
+                    || surface.min_normal_z > f64::NEG_INFINITY;
                 closed && c2 > 0.0 && c2 * surface.rim2 >= 1.0
             }
         }
@@ -76,16 +77,16 @@ impl<R: Real> Interface<R> {
 impl<R: Real> Interface<Jet<R>> {
     /// `N·N` at a point of the surface.
     #[inline(always)]
-    fn square_of_normal(&self, p: Vec3<Jet<R>>) -> Jet<R> {
+    fn normal_squared(&self, p: Vec3<Jet<R>>) -> Jet<R> {
         let c = self.curvature;
         let r2 = p.x * p.x + p.y * p.y;
         match self.form {
-            Form::Plane | Form::Sphere => Jet::ONE,
-            Form::Conic => {
+            SurfaceForm::Plane | SurfaceForm::Sphere => Jet::ONE,
+            SurfaceForm::Conic => {
                 let z = Jet::ONE - c * (p.z + self.conic * p.z);
                 c * c * r2 + z * z
             }
-            Form::Asphere => {
+            SurfaceForm::Asphere => {
                 let slope = self.sag(r2).1;
                 slope * slope * r2 * Jet::from_f64(4.0) + Jet::ONE
             }
@@ -93,43 +94,43 @@ impl<R: Real> Interface<Jet<R>> {
     }
 
     #[inline(always)]
-    fn limits(
+    fn limit_values(
         &self,
-        limit: Limit,
-        block: &Block<Jet<R>>,
+        limit: LimitFunction,
+        block: &RayBlock<Jet<R>>,
         slants: &[Jet<R>; BLOCK],
         lanes: &mut [Jet<R>; BLOCK],
     ) {
         for j in 0..BLOCK {
-            lanes[j] = self.limit(limit, block.state(j).0, slants[j]);
+            lanes[j] = self.limit_value(limit, block.state(j).0, slants[j]);
         }
     }
 
     /// One of the functions above, from the point and `k·N`.
     #[inline(always)]
-    fn limit(&self, limit: Limit, p: Vec3<Jet<R>>, a: Jet<R>) -> Jet<R> {
+    fn limit_value(&self, limit: LimitFunction, p: Vec3<Jet<R>>, a: Jet<R>) -> Jet<R> {
         let r2 = p.x * p.x + p.y * p.y;
         let c2 = (R::ONE + self.conic.value) * self.curvature.value;
         let minus_one = Jet::constant(-R::ONE);
         match limit {
-            Limit::Rim => {
+            LimitFunction::Rim => {
                 let half = R::from_f64(0.5);
                 r2.scaled(half / self.rim2.value) - Jet::constant(half)
             }
-            Limit::Obstruction => {
+            LimitFunction::Obstruction => {
                 let half = R::from_f64(0.5);
                 Jet::constant(half) - r2.scaled(half / self.obstruction2.value)
             }
-            Limit::Angle => {
+            LimitFunction::Angle => {
                 let inverse = R::ONE / self.n2.value;
-                let loss = self.loss().value * inverse;
-                let m = if loss > R::ZERO { self.square_of_normal(p) } else { Jet::ZERO };
+                let loss = self.index_drop2().value * inverse;
+                let m = if loss > R::ZERO { self.normal_squared(p) } else { Jet::ZERO };
                 m.scaled(loss) - (a * a).scaled(inverse)
             }
-            Limit::Sheet if self.form == Form::Asphere => {
+            LimitFunction::ConicEdge if self.form == SurfaceForm::Asphere => {
                 r2.scaled(c2 * self.curvature.value) + minus_one
             }
-            Limit::Sheet => p.z.scaled(c2) + minus_one,
+            LimitFunction::ConicEdge => p.z.scaled(c2) + minus_one,
         }
     }
 }
@@ -137,7 +138,7 @@ impl<R: Real> Interface<Jet<R>> {
 /// A block of rays that have arrived, each with its derivatives by two pupil coordinates, and the
 /// derivatives that their adjoint begins with.
 #[derive(Debug)]
-pub struct Abreast<R> {
+pub struct JetBlock<R> {
     /// Where they land across the axis.
     pub landing: [[Jet<R>; LANES]; 2],
     /// How far they are from every limit that may end them, below zero.
@@ -151,38 +152,43 @@ pub struct Abreast<R> {
 
 /// A system made ready for derivatives of integrals over the rays that get through it.
 #[derive(Debug, Clone)]
-pub struct PupilTracer<R> {
-    outward: Tracer<Jet<R>>,
-    homeward: Tracer<Pair<R>>,
+pub struct WarpTracer<R> {
+    forward: Tracer<Jet<R>>,
+    backward: Tracer<MixedDual<R>>,
     /// Surface by surface.
-    limits: Vec<(usize, Limit)>,
+    limits: Vec<(usize, LimitFunction)>,
 }
 
-impl<R: Real> PupilTracer<R> {
+impl<R: Real> WarpTracer<R> {
     /// Prepares a system.
     ///
     /// # Errors
     /// Numbers that no ray can be traced with: see [`System::check`]. A gradient, whose steps would
     /// have to carry second derivatives.
-    pub fn new(system: &System<f64>) -> Result<Self, Invalid> {
-        if let Some(surface) = system.surfaces.iter().position(|s| s.graded.is_some()) {
+    pub fn new(system: &System<f64>) -> Result<Self, SystemError> {
+        if let Some(surface) = system.surfaces.iter().position(|s| s.grin.is_some()) {
             let why = "has no warp field; expected `boundary` or `difference`".to_owned();
-            return Err(Invalid::Gradient { surface, why });
+            return Err(SystemError::Grin { surface, why });
         }
-        let outward = Tracer::new(&system.lift::<Jet<R>>())?;
-        let kinds = [Limit::Rim, Limit::Obstruction, Limit::Angle, Limit::Sheet];
+        let outward = Tracer::new(&system.cast::<Jet<R>>())?;
+        let kinds = [
+            LimitFunction::Rim,
+            LimitFunction::Obstruction,
+            LimitFunction::Angle,
+            LimitFunction::ConicEdge,
+        ];
         let all = |i: usize| kinds.map(|limit| (i, limit));
         let limits = (0..outward.surfaces()).flat_map(all);
         let limits = limits.filter(|(i, limit)| outward.interfaces[*i].has(*limit)).collect();
-        let mut homeward = Tracer::<Pair<R>>::new(&system.lift())?;
+        let mut homeward = Tracer::<MixedDual<R>>::new(&system.cast())?;
         // The square of an infinite number has no slopes.
-        homeward.interfaces.iter_mut().for_each(|i| i.rim2 = Pair::from_f64(i.rim2.value()));
-        Ok(Self { outward, homeward, limits })
+        homeward.interfaces.iter_mut().for_each(|i| i.rim2 = MixedDual::from_f64(i.rim2.value()));
+        Ok(Self { forward: outward, backward: homeward, limits })
     }
 
     /// How many surfaces there are.
     pub fn surfaces(&self) -> usize {
-        self.outward.surfaces()
+        self.forward.surfaces()
     }
 
     /// The derivative by every number of the system, at fixed rays, of a sum over the rays at some
@@ -192,20 +198,20 @@ impl<R: Real> PupilTracer<R> {
         &self,
         points: &[[R; 2]],
         ray: impl Fn([R; 2]) -> Ray<Jet<R>>,
-        fill: impl Fn(&[[R; 2]; LANES], &mut Abreast<R>),
-    ) -> Gradient<R> {
-        let mut gradient = Gradient::zero(self.surfaces());
-        let mut room = Room::new(self);
-        let width = Width::detect();
+        fill: impl Fn(&[[R; 2]; LANES], &mut JetBlock<R>),
+    ) -> SystemGradient<R> {
+        let mut gradient = SystemGradient::zero(self.surfaces());
+        let mut room = WarpWorkspace::new(self);
+        let width = SimdWidth::detect();
         for points in points.chunks(BLOCK) {
             let mut all = [points[0]; BLOCK];
             all[..points.len()].copy_from_slice(points);
             // Compiled apart: all in one is too much for the lanes to be found.
-            let block = widest(
+            let block = run_vectorized(
                 width,
                 #[inline(always)]
                 || {
-                    self.go(
+                    self.forward(
                         &mut room,
                         points.len(),
                         #[inline(always)]
@@ -213,18 +219,18 @@ impl<R: Real> PupilTracer<R> {
                     )
                 },
             );
-            widest(
+            run_vectorized(
                 width,
                 #[inline(always)]
-                || fill(&all, &mut room.abreast),
+                || fill(&all, &mut room.jets),
             );
-            widest(
+            run_vectorized(
                 width,
                 #[inline(always)]
                 || {
-                    room.spread(&self.limits);
-                    let (block, sum) = (block.map(pair), &mut Top(&mut gradient));
-                    self.homeward.homeward(block, &room.distances, points.len(), &room, sum);
+                    room.distribute_limits(&self.limits);
+                    let (block, sum) = (block.map(first_order), &mut MixedPart(&mut gradient));
+                    self.backward.backward(block, &room.distances, points.len(), &room, sum);
                 },
             );
         }
@@ -233,21 +239,21 @@ impl<R: Real> PupilTracer<R> {
 
     /// Traces a block and keeps the limits and the distance to each surface.
     #[inline(always)]
-    fn go(
+    fn forward(
         &self,
-        room: &mut Room<R>,
+        room: &mut WarpWorkspace<R>,
         count: usize,
         ray: impl Fn(usize) -> Ray<Jet<R>>,
-    ) -> Block<Jet<R>> {
-        let mut block = Block::new();
-        block.start(self.outward.index_before, ray);
+    ) -> RayBlock<Jet<R>> {
+        let mut block = RayBlock::new();
+        block.fill(self.forward.index_before, ray);
         // What only fills the block up counts as lost.
         block.code[count..].fill(Jet::ONE);
-        let mut limits = self.limits.iter().zip(&mut room.abreast.limits).peekable();
-        for (i, interface) in self.outward.interfaces.iter().enumerate() {
+        let mut limits = self.limits.iter().zip(&mut room.jets.limits).peekable();
+        for (i, interface) in self.forward.interfaces.iter().enumerate() {
             // Local, so that the lanes need not ask whether it overlaps the block.
             let mut kept = [[Jet::ZERO; BLOCK]; 2];
-            block.meet(
+            block.cross_with(
                 interface,
                 i as u32,
                 #[inline(always)]
@@ -255,29 +261,35 @@ impl<R: Real> PupilTracer<R> {
             );
             let [distances, slants] = kept;
             for (to, from) in room.distances[i].iter_mut().zip(&distances) {
-                *to = pair(*from);
+                *to = first_order(*from);
             }
             while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i)
             {
                 // Known inside the loops, so that these have no branch.
                 match limit {
-                    Limit::Rim => interface.limits(Limit::Rim, &block, &slants, lanes),
-                    Limit::Obstruction => {
-                        interface.limits(Limit::Obstruction, &block, &slants, lanes);
+                    LimitFunction::Rim => {
+                        interface.limit_values(LimitFunction::Rim, &block, &slants, lanes)
                     }
-                    Limit::Angle => interface.limits(Limit::Angle, &block, &slants, lanes),
-                    Limit::Sheet => interface.limits(Limit::Sheet, &block, &slants, lanes),
+                    LimitFunction::Obstruction => {
+                        interface.limit_values(LimitFunction::Obstruction, &block, &slants, lanes);
+                    }
+                    LimitFunction::Angle => {
+                        interface.limit_values(LimitFunction::Angle, &block, &slants, lanes)
+                    }
+                    LimitFunction::ConicEdge => {
+                        interface.limit_values(LimitFunction::ConicEdge, &block, &slants, lanes)
+                    }
                 }
             }
         }
-        room.abreast.landing = [block.x, block.y];
+        room.jets.landing = [block.x, block.y];
         block
     }
 }
 
 /// A jet without its second derivatives.
 #[inline(always)]
-fn pair<R: Real>(jet: Jet<R>) -> Pair<R> {
+fn first_order<R: Real>(jet: Jet<R>) -> MixedDual<R> {
     let [x, y] = jet.slope;
     Dual {
         value: Dual { value: jet.value, slope: [y] },
@@ -287,44 +299,51 @@ fn pair<R: Real>(jet: Jet<R>) -> Pair<R> {
 
 /// What derivatives by a jet are as a number of the algebra.
 #[inline(always)]
-fn transposed<R: Real>([value, x, y]: [R; 3]) -> Pair<R> {
+fn transposed<R: Real>([value, x, y]: [R; 3]) -> MixedDual<R> {
     Dual { value: Dual { value: R::ZERO, slope: [x] }, slope: [Dual { value: y, slope: [value] }] }
 }
 
 /// What a block needs on its way, made once.
-struct Room<R> {
-    abreast: Abreast<R>,
-    distances: Vec<[Pair<R>; BLOCK]>,
-    pulls: Vec<Pulls<Pair<R>>>,
+struct WarpWorkspace<R> {
+    jets: JetBlock<R>,
+    distances: Vec<[MixedDual<R>; BLOCK]>,
+    limit_adjoints: Vec<LimitAdjoint<MixedDual<R>>>,
 }
 
-impl<R: Real> Room<R> {
-    fn new(tracer: &PupilTracer<R>) -> Self {
-        let (surfaces, limits) = (tracer.outward.surfaces(), tracer.limits.len());
+impl<R: Real> WarpWorkspace<R> {
+    fn new(tracer: &WarpTracer<R>) -> Self {
+        let (surfaces, limits) = (tracer.forward.surfaces(), tracer.limits.len());
         let jets = [Jet::ZERO; BLOCK];
-        let abreast = Abreast {
+        let abreast = JetBlock {
             landing: [jets; 2],
             limits: vec![jets; limits],
             by_landing: [[R::ZERO; BLOCK]; 2],
             by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
         };
-        let distances = vec![[Pair::ZERO; BLOCK]; surfaces];
-        let none = [Pair::ZERO; BLOCK];
+        let distances = vec![[MixedDual::ZERO; BLOCK]; surfaces];
+        let none = [MixedDual::ZERO; BLOCK];
         let pulls =
-            vec![Pulls { rim: none, angle: none, obstruction: None, sheet: None }; surfaces];
-        Self { abreast, distances, pulls }
+            vec![
+                LimitAdjoint { rim: none, angle: none, obstruction: None, conic_edge: None };
+                surfaces
+            ];
+        Self { jets: abreast, distances, limit_adjoints: pulls }
     }
 
     /// Brings what was filled in to its surface.
     #[inline(always)]
-    fn spread(&mut self, limits: &[(usize, Limit)]) {
-        for ((surface, limit), by_limit) in limits.iter().zip(&self.abreast.by_limit) {
-            let pulls = &mut self.pulls[*surface];
+    fn distribute_limits(&mut self, limits: &[(usize, LimitFunction)]) {
+        for ((surface, limit), by_limit) in limits.iter().zip(&self.jets.by_limit) {
+            let pulls = &mut self.limit_adjoints[*surface];
             let lanes = match limit {
-                Limit::Rim => &mut pulls.rim,
-                Limit::Obstruction => pulls.obstruction.get_or_insert([Pair::ZERO; BLOCK]),
-                Limit::Angle => &mut pulls.angle,
-                Limit::Sheet => pulls.sheet.get_or_insert([Pair::ZERO; BLOCK]),
+                LimitFunction::Rim => &mut pulls.rim,
+                LimitFunction::Obstruction => {
+                    pulls.obstruction.get_or_insert([MixedDual::ZERO; BLOCK])
+                }
+                LimitFunction::Angle => &mut pulls.angle,
+                LimitFunction::ConicEdge => {
+                    pulls.conic_edge.get_or_insert([MixedDual::ZERO; BLOCK])
+                }
             };
             for (pull, by_limit) in lanes.iter_mut().zip(by_limit) {
                 *pull = transposed(*by_limit);
@@ -333,26 +352,31 @@ impl<R: Real> Room<R> {
     }
 }
 
-impl<R: Real> Sowing<Pair<R>> for Room<R> {
+impl<R: Real> SeedSource<MixedDual<R>> for WarpWorkspace<R> {
     #[inline(always)]
-    fn seed(&self, j: usize) -> Seed<Pair<R>> {
-        let by = |i: usize| transposed([self.abreast.by_landing[i][j], R::ZERO, R::ZERO]);
-        Seed { point: Vec3::new(by(0), by(1), Pair::ZERO), ..Seed::default() }
+    fn seed(&self, j: usize) -> AdjointSeed<MixedDual<R>> {
+        let by = |i: usize| transposed([self.jets.by_landing[i][j], R::ZERO, R::ZERO]);
+        AdjointSeed { point: Vec3::new(by(0), by(1), MixedDual::ZERO), ..AdjointSeed::default() }
     }
 
     #[inline(always)]
-    fn pulls(&self, surface: usize) -> Option<&Pulls<Pair<R>>> {
-        Some(&self.pulls[surface])
+    fn limit_adjoint(&self, surface: usize) -> Option<&LimitAdjoint<MixedDual<R>>> {
+        Some(&self.limit_adjoints[surface])
     }
 }
 
 /// Takes what stands at εη.
-struct Top<'a, R>(&'a mut Gradient<R>);
+struct MixedPart<'a, R>(&'a mut SystemGradient<R>);
 
-impl<R: Real> Harvest<Pair<R>> for Top<'_, R> {
+impl<R: Real> GradientSink<MixedDual<R>> for MixedPart<'_, R> {
     #[inline(always)]
-    fn take(&mut self, surface: Option<usize>, slot: Slot, lanes: &[Pair<R>; BLOCK]) {
+    fn add_lanes(
+        &mut self,
+        surface: Option<usize>,
+        slot: SurfaceParameter,
+        lanes: &[MixedDual<R>; BLOCK],
+    ) {
         let top = std::array::from_fn(|j| lanes[j].slope[0].slope[0]);
-        self.0.take(surface, slot, &top);
+        self.0.add_lanes(surface, slot, &top);
     }
 }

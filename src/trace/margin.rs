@@ -5,14 +5,14 @@
 //! digit by a root finder, which yes or no could not.
 
 use super::Tracer;
-use super::interface::{Form, Interface, Meeting};
-use super::single::{Ray, launch};
+use super::interface::{Interface, Intersection, SurfaceForm};
+use super::single::{Ray, optical_direction};
 use crate::math::Real;
 use crate::math::Vec3;
 
 /// What may end a ray at a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Hurdle {
+pub enum RayLimit {
     /// The surface is not met: the ray passes by it.
     Miss,
     /// The ray meets the far half of a sphere or conic, behind its equator, which does not count.
@@ -22,7 +22,7 @@ pub enum Hurdle {
     /// The ray meets it inside the obstruction.
     Obstruction,
     /// The ray is totally reflected.
-    Reflection,
+    TotalReflection,
     /// The ray leaves the gradient in front of the surface through its side.
     Side,
 }
@@ -37,45 +37,45 @@ impl<R: Real> Tracer<R> {
     /// optical direction's component along the normal at a miss and at a total reflection, −1 at an
     /// asphere that is missed, and the normal's component along the axis at an equator. Where a
     /// gradient touches a surface it is treated like an asphere, and the side of the glass like a rim.
-    pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, Hurdle, R)) {
-        let mut k = launch(ray.direction, self.index_before);
+    pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, RayLimit, R)) {
+        let mut k = optical_direction(ray.direction, self.index_before);
         let mut point = ray.point;
         for (i, interface) in self.interfaces.iter().enumerate() {
-            if self.touches_gradient(i) {
-                let arrival = self.arrive_at(i, point, k);
+            if self.touches_grin(i) {
+                let arrival = self.propagate(i, point, k);
                 arrival.margins(i, &mut visit);
-                let Some(passed) = arrival.pass_edge(None) else { return };
+                let Some(passed) = arrival.cross_at_edge(None) else { return };
                 (point, k) = passed;
                 continue;
             }
             let start = Vec3::new(point.x, point.y, point.z - interface.gap);
-            let met = interface.meeting(start, k);
+            let met = interface.intersect(start, k);
             let passes_by = met.missed && !interface.is_behind_equator(&met);
-            visit(i, Hurdle::Miss, interface.miss_margin(&met, start, k, passes_by));
+            visit(i, RayLimit::Miss, interface.miss_margin(&met, start, k, passes_by));
             if passes_by {
                 return;
             }
             if interface.has_equator() {
-                visit(i, Hurdle::Equator, interface.equator_margin(&met));
+                visit(i, RayLimit::Equator, interface.equator_margin(&met));
             }
             if met.missed {
                 return;
             }
             let p = met.point;
             if interface.rim2.value() < f64::INFINITY {
-                visit(i, Hurdle::Rim, interface.rim_margin(p));
+                visit(i, RayLimit::Rim, interface.rim_margin(p));
             }
             if interface.obstruction2.value() > 0.0 {
-                visit(i, Hurdle::Obstruction, interface.obstruction_margin(p));
+                visit(i, RayLimit::Obstruction, interface.obstruction_margin(p));
             }
             if !interface.mirror {
                 let behind2 = met.a * met.a + interface.dn2 * met.m;
-                visit(i, Hurdle::Reflection, behind2);
+                visit(i, RayLimit::TotalReflection, behind2);
                 if !(behind2 >= R::ZERO) {
                     return;
                 }
             }
-            k = interface.go_on(met, k).k;
+            k = interface.refract(met, k).k;
             point = p;
         }
     }
@@ -90,22 +90,22 @@ impl<R: Real> Interface<R> {
         p.x * p.x + p.y * p.y - self.obstruction2
     }
 
-    pub(super) fn meeting(&self, start: Vec3<R>, k: Vec3<R>) -> Meeting<R> {
+    pub(super) fn intersect(&self, start: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
         match self.form {
-            Form::Plane => self.meet_plane(start, k),
-            Form::Sphere => self.meet_sphere(start, k),
-            Form::Conic => self.meet_conic(start, k),
-            Form::Asphere => self.meet_asphere(start, k),
+            SurfaceForm::Plane => self.intersect_plane(start, k),
+            SurfaceForm::Sphere => self.intersect_sphere(start, k),
+            SurfaceForm::Conic => self.intersect_conic(start, k),
+            SurfaceForm::Asphere => self.intersect_asphere(start, k),
         }
     }
 
     /// `(k·N)²`, negative where no point of the ray lies on the surface.
-    fn miss_margin(&self, met: &Meeting<R>, p: Vec3<R>, k: Vec3<R>, passes_by: bool) -> R {
+    fn miss_margin(&self, met: &Intersection<R>, p: Vec3<R>, k: Vec3<R>, passes_by: bool) -> R {
         let square = match self.form {
-            Form::Plane => return self.sense * k.z,
-            Form::Asphere if met.missed => return -R::ONE,
-            Form::Asphere => return met.a * met.a,
-            Form::Sphere | Form::Conic => self.discriminant(p, k),
+            SurfaceForm::Plane => return self.sense * k.z,
+            SurfaceForm::Asphere if met.missed => return -R::ONE,
+            SurfaceForm::Asphere => return met.a * met.a,
+            SurfaceForm::Sphere | SurfaceForm::Conic => self.discriminant(p, k),
         };
         // Rounding may tell the two computations of the discriminant apart: the ray decides.
         let agrees = passes_by != (square > R::ZERO);
@@ -114,16 +114,17 @@ impl<R: Real> Interface<R> {
 
     /// Whether only the half of the surface in front of its equator counts.
     fn has_equator(&self) -> bool {
-        matches!(self.form, Form::Sphere | Form::Conic) && self.sheet.value() > f64::NEG_INFINITY
+        matches!(self.form, SurfaceForm::Sphere | SurfaceForm::Conic)
+            && self.min_normal_z.value() > f64::NEG_INFINITY
     }
 
     /// The normal's component along the axis, negative behind the equator.
-    pub(super) fn equator_margin(&self, met: &Meeting<R>) -> R {
-        met.normal.z - self.sheet
+    pub(super) fn equator_margin(&self, met: &Intersection<R>) -> R {
+        met.normal.z - self.min_normal_z
     }
 
     /// Whether the ray meets the surface behind its equator, instead of not at all.
-    fn is_behind_equator(&self, met: &Meeting<R>) -> bool {
+    fn is_behind_equator(&self, met: &Intersection<R>) -> bool {
         self.has_equator() && self.equator_margin(met) < R::ZERO
     }
 

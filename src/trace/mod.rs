@@ -25,20 +25,20 @@ mod single;
 mod slot;
 mod step;
 
-pub use crate::math::Width;
-pub use backward::{Gradient, Seed, SurfaceGradient};
-pub use batch::{Hits, Points, Rays, Sink};
+pub use crate::math::SimdWidth;
+pub use backward::{AdjointSeed, SurfaceGradient, SystemGradient};
+pub use batch::{ImagePoints, Landings, Rays, TraceSink};
 pub use fate::{Fate, Fates};
-pub use limit::{Abreast, LANES, PupilTracer};
-pub use margin::Hurdle;
-pub use single::{Landing, Path, Ray};
-pub use slot::Slot;
-pub use step::GapPlan;
+pub use limit::{JetBlock, LANES, WarpTracer};
+pub use margin::RayLimit;
+pub use single::{Ray, RayPolyline, TracedRay};
+pub use slot::SurfaceParameter;
+pub use step::GrinStepPlan;
 
-use crate::lens::Invalid;
 use crate::lens::System;
+use crate::lens::SystemError;
 use crate::math::Real;
-use gap::Gap;
+use gap::GrinGap;
 use interface::Interface;
 
 /// A system made ready for tracing: checked, with every constant of a surface worked out once.
@@ -47,8 +47,8 @@ pub struct Tracer<R> {
     interfaces: Vec<Interface<R>>,
     index_before: R,
     /// The gradients of the gaps; empty for a lens of glass.
-    gaps: Vec<Option<Gap<R>>>,
-    plans: Vec<GapPlan>,
+    grin_gaps: Vec<Option<GrinGap<R>>>,
+    step_plans: Vec<GrinStepPlan>,
 }
 
 impl<R: Real> Tracer<R> {
@@ -56,47 +56,48 @@ impl<R: Real> Tracer<R> {
     ///
     /// # Errors
     /// Numbers that no ray can be traced with: see [`System::check`].
-    pub fn new(system: &System<R>) -> Result<Self, Invalid> {
+    pub fn new(system: &System<R>) -> Result<Self, SystemError> {
         system.check()?;
         let interfaces = interface::interfaces(system);
         let index_before = system.index_before;
-        let mut tracer = Self { interfaces, index_before, gaps: Vec::new(), plans: Vec::new() };
-        if system.is_graded() {
-            tracer.fill(system)?;
+        let mut tracer =
+            Self { interfaces, index_before, grin_gaps: Vec::new(), step_plans: Vec::new() };
+        if system.has_grin() {
+            tracer.fill_grin_gaps(system)?;
         }
         Ok(tracer)
     }
 
     /// Fills the gaps of a system that have a gradient.
-    fn fill(&mut self, system: &System<R>) -> Result<(), Invalid> {
+    fn fill_grin_gaps(&mut self, system: &System<R>) -> Result<(), SystemError> {
         for (i, surface) in system.surfaces.iter().enumerate() {
             let faces = self.interfaces.get(i).zip(self.interfaces.get(i + 1));
             let gap = match (surface.gradient(), faces) {
                 (Some(field), Some((front, back))) => {
-                    let (gap, plan) = Gap::new(field, i, [front, back])?;
-                    self.plans.push(plan);
+                    let (gap, plan) = GrinGap::new(field, i, [front, back])?;
+                    self.step_plans.push(plan);
                     Some(gap)
                 }
                 _ => None,
             };
-            self.gaps.push(gap);
+            self.grin_gaps.push(gap);
         }
         Ok(())
     }
 
     /// The steps in every gap with a gradient.
-    pub fn gap_plans(&self) -> &[GapPlan] {
-        &self.plans
+    pub fn grin_step_plans(&self) -> &[GrinStepPlan] {
+        &self.step_plans
     }
 
     /// The same surfaces with no rim that clips. An asphere still ends where it was said to end:
     /// behind that its polynomial means nothing.
     #[must_use]
-    pub fn opened(mut self) -> Self {
+    pub fn without_rims(mut self) -> Self {
         for interface in &mut self.interfaces {
             (interface.rim2, interface.obstruction2) = (R::from_f64(f64::INFINITY), R::ZERO);
         }
-        for gap in self.gaps.iter_mut().flatten() {
+        for gap in self.grin_gaps.iter_mut().flatten() {
             gap.side2 = R::from_f64(f64::INFINITY);
         }
         self

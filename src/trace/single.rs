@@ -2,9 +2,9 @@
 
 use super::Tracer;
 use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
-use super::graded::Arrival;
+use super::graded::PropagatedRay;
 use super::interface::Interface;
-use crate::lens::Invalid;
+use crate::lens::SystemError;
 use crate::math::Real;
 use crate::math::Vec3;
 
@@ -20,8 +20,8 @@ pub struct Ray<R> {
 impl Ray<f64> {
     /// Refuses a ray that is not finite or whose direction is not of length 1 within 1e-9; `number`
     /// is how the error calls it.
-    pub fn check(&self, number: usize) -> Result<(), Invalid> {
-        let refuse = |found: String| Err(Invalid::Ray { ray: number, found });
+    pub fn check(&self, number: usize) -> Result<(), SystemError> {
+        let refuse = |found: String| Err(SystemError::Ray { ray: number, found });
         let (p, d) = (self.point, self.direction);
         let sizes = [p.x, p.y, p.z].map(f64::abs);
         if !(p.is_finite() && d.is_finite()) || sizes.iter().any(|v| *v > 1e100) {
@@ -37,7 +37,7 @@ impl Ray<f64> {
 
 /// Where and how a ray ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Landing<R> {
+pub struct TracedRay<R> {
     /// How.
     pub fate: Fate,
     /// Point and direction in the frame of the surface where it ended: behind the last surface for
@@ -47,12 +47,12 @@ pub struct Landing<R> {
     /// The optical path from the start to that point, in mm.
     pub opl: R,
     /// The first surface that was reached by going backwards.
-    pub backwards: Option<usize>,
+    pub first_backward_surface: Option<usize>,
 }
 
 /// The corners of a ray's way and how it ended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Path {
+pub struct RayPolyline {
     /// The start, every point of incidence, and points between on the curve through a gradient, in
     /// the frame of the first vertex.
     pub points: Vec<Vec3<f64>>,
@@ -64,41 +64,42 @@ pub struct Path {
 
 impl<R: Real> Tracer<R> {
     /// Traces one ray that starts in the frame of the first vertex. Its direction is normalised.
-    pub fn trace(&self, ray: Ray<R>) -> Landing<R> {
-        self.follow(ray, self.interfaces.len(), |_, _| {})
+    pub fn trace(&self, ray: Ray<R>) -> TracedRay<R> {
+        self.trace_surfaces(ray, self.interfaces.len(), |_, _| {})
     }
 
     /// Traces one ray and calls `visit` with each surface and the point of incidence in its frame.
-    pub fn visit(&self, ray: Ray<R>, visit: impl FnMut(usize, Vec3<R>)) -> Landing<R> {
-        self.follow(ray, self.interfaces.len(), visit)
+    pub fn visit(&self, ray: Ray<R>, visit: impl FnMut(usize, Vec3<R>)) -> TracedRay<R> {
+        self.trace_surfaces(ray, self.interfaces.len(), visit)
     }
 
     /// Traces one ray through the first surfaces, up to and with `surface`.
-    pub fn trace_to(&self, ray: Ray<R>, surface: usize) -> Landing<R> {
-        self.follow(ray, (surface + 1).min(self.interfaces.len()), |_, _| {})
+    pub fn trace_to(&self, ray: Ray<R>, surface: usize) -> TracedRay<R> {
+        self.trace_surfaces(ray, (surface + 1).min(self.interfaces.len()), |_, _| {})
     }
 
-    fn follow(
+    fn trace_surfaces(
         &self,
         ray: Ray<R>,
         surfaces: usize,
         visit: impl FnMut(usize, Vec3<R>),
-    ) -> Landing<R> {
-        if self.gaps.is_empty() {
-            self.follow_through_glass(ray, surfaces, visit)
+    ) -> TracedRay<R> {
+        if self.grin_gaps.is_empty() {
+            self.trace_homogeneous(ray, surfaces, visit)
         } else {
-            self.follow_through_gradients(ray, surfaces, visit)
+            self.trace_grin(ray, surfaces, visit)
         }
     }
 
-    fn follow_through_glass(
+    fn trace_homogeneous(
         &self,
         ray: Ray<R>,
         surfaces: usize,
         mut visit: impl FnMut(usize, Vec3<R>),
-    ) -> Landing<R> {
-        let mut k = launch(ray.direction, self.index_before);
-        let mut landing = Landing { fate: Fate::Imaged, ray, opl: R::ZERO, backwards: None };
+    ) -> TracedRay<R> {
+        let mut k = optical_direction(ray.direction, self.index_before);
+        let mut landing =
+            TracedRay { fate: Fate::Imaged, ray, opl: R::ZERO, first_backward_surface: None };
         let mut index = self.index_before;
         for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
             let Some(behind) = landing.cross(i, interface, k, &mut visit) else { break };
@@ -112,24 +113,25 @@ impl<R: Real> Tracer<R> {
     /// registers from the other one.
     #[cold]
     #[inline(never)]
-    fn follow_through_gradients(
+    fn trace_grin(
         &self,
         ray: Ray<R>,
         surfaces: usize,
         mut visit: impl FnMut(usize, Vec3<R>),
-    ) -> Landing<R> {
-        let mut k = launch(ray.direction, self.index_before);
-        let mut landing = Landing { fate: Fate::Imaged, ray, opl: R::ZERO, backwards: None };
+    ) -> TracedRay<R> {
+        let mut k = optical_direction(ray.direction, self.index_before);
+        let mut landing =
+            TracedRay { fate: Fate::Imaged, ray, opl: R::ZERO, first_backward_surface: None };
         let mut index = self.index_before;
         for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
-            if !self.touches_gradient(i) {
+            if !self.touches_grin(i) {
                 let Some(behind) = landing.cross(i, interface, k, &mut visit) else { break };
                 (k, index) = (behind, interface.index_behind);
                 continue;
             }
             let p = landing.ray.point;
-            let arrival = self.arrive_at(i, p, k);
-            let Some(behind) = landing.pass(i, p, &arrival, &mut visit) else {
+            let arrival = self.propagate(i, p, k);
+            let Some(behind) = landing.cross_grin(i, p, &arrival, &mut visit) else {
                 (k, index) = (arrival.k, arrival.surface.index_before);
                 break;
             };
@@ -140,7 +142,7 @@ impl<R: Real> Tracer<R> {
     }
 }
 
-impl<R: Real> Landing<R> {
+impl<R: Real> TracedRay<R> {
     /// Takes a ray with the optical direction `k` through a surface between glasses; its direction
     /// behind, if it gets through.
     #[inline(always)]
@@ -153,7 +155,7 @@ impl<R: Real> Landing<R> {
     ) -> Option<Vec3<R>> {
         let p = self.ray.point;
         let crossing = interface.cross(p, k);
-        let code = |cause| fate::code(i as u32, cause);
+        let code = |cause| fate::encode(i as u32, cause);
         if crossing.missed {
             self.ray.point.z = p.z - interface.gap;
             self.fate = Fate::from_code(code(MISSED));
@@ -161,8 +163,8 @@ impl<R: Real> Landing<R> {
         }
         self.ray.point = crossing.point;
         self.opl += crossing.s * interface.n2;
-        if self.backwards.is_none() && is_backwards(crossing.s, p, interface.n2) {
-            self.backwards = Some(i);
+        if self.first_backward_surface.is_none() && is_backwards(crossing.s, p, interface.n2) {
+            self.first_backward_surface = Some(i);
         }
         visit(i, crossing.point);
         if crossing.clipped || crossing.reflected {
@@ -175,28 +177,30 @@ impl<R: Real> Landing<R> {
 
     /// Takes a ray that comes from `p` through a surface that a gradient touches; its direction
     /// behind, if it gets through.
-    fn pass(
+    fn cross_grin(
         &mut self,
         i: usize,
         p: Vec3<R>,
-        arrival: &Arrival<R>,
+        arrival: &PropagatedRay<R>,
         visit: &mut impl FnMut(usize, Vec3<R>),
     ) -> Option<Vec3<R>> {
-        let crossing = arrival.go_on();
+        let crossing = arrival.refract();
         if arrival.met.missed {
-            self.ray.point = arrival.stand(p);
+            self.ray.point = arrival.end_position(p);
         } else {
             self.ray.point = crossing.point;
             self.opl += arrival.path;
-            if self.backwards.is_none() && is_backwards(crossing.s, p, arrival.surface.n2) {
-                self.backwards = Some(i);
+            if self.first_backward_surface.is_none()
+                && is_backwards(crossing.s, p, arrival.surface.n2)
+            {
+                self.first_backward_surface = Some(i);
             }
             visit(i, crossing.point);
         }
-        match arrival.cause(&crossing) {
+        match arrival.loss_cause(&crossing) {
             None => Some(crossing.k),
             Some(cause) => {
-                self.fate = Fate::from_code(fate::code(i as u32, cause));
+                self.fate = Fate::from_code(fate::encode(i as u32, cause));
                 None
             }
         }
@@ -213,7 +217,7 @@ fn is_backwards<R: Real>(s: R, p: Vec3<R>, n2: R) -> bool {
 impl Tracer<f64> {
     /// The corners of a ray's way, for drawing. A ray that misses a surface is drawn on to the
     /// vertex plane of that surface, if it is going there.
-    pub fn path(&self, ray: Ray<f64>) -> Path {
+    pub fn path(&self, ray: Ray<f64>) -> RayPolyline {
         let mut points = vec![ray.point];
         let mut vertices = Vec::with_capacity(self.interfaces.len());
         let mut z = 0.0;
@@ -223,9 +227,9 @@ impl Tracer<f64> {
         }
         let mut heights = Vec::with_capacity(self.interfaces.len());
         let landing = self.visit(ray, |i, p| {
-            if let Some(gap) = self.gap_before(i) {
+            if let Some(gap) = self.grin_gap_before(i) {
                 let before = self.trace_to(ray, i - 1).ray;
-                let inside = gap.between(&self.interfaces[i], before);
+                let inside = gap.sample_points(&self.interfaces[i], before);
                 points.extend(inside.map(|p| Vec3::new(p.x, p.y, p.z + vertices[i - 1])));
             }
             heights.push(p.x.hypot(p.y));
@@ -239,12 +243,12 @@ impl Tracer<f64> {
                 points.push(Vec3::new(end.x, end.y, vertices[surface as usize]));
             }
         }
-        Path { points, heights, fate: landing.fate }
+        RayPolyline { points, heights, fate: landing.fate }
     }
 }
 
 /// The optical direction `n d / |d|`.
 #[inline(always)]
-pub(super) fn launch<R: Real>(direction: Vec3<R>, index: R) -> Vec3<R> {
+pub(super) fn optical_direction<R: Real>(direction: Vec3<R>, index: R) -> Vec3<R> {
     direction * (index / direction.dot(direction).sqrt())
 }

@@ -5,25 +5,25 @@
 //! while a search moves the lens; it depends on nothing but the gap and its two faces, so that every
 //! number type takes the same steps.
 
-use super::gap::Gap;
+use super::gap::GrinGap;
 use super::interface::Interface;
-use crate::grin::{Integrator, State};
-use crate::lens::{Graded, Invalid, Law, RADIAL_TERMS};
+use crate::grin::{Integrator, RayState};
+use crate::lens::{ProfileLaw, RADIAL_TERMS, RotationalProfile, SystemError};
 use crate::math::{Real, Vec3};
 use serde::Serialize;
 
 /// How exact a ray is behind a gap, of its length.
 const TOLERANCE: f64 = 1e-11;
 /// More steps than this are not tried.
-const MOST_STEPS: u32 = 4096;
+const MAX_STEPS: u32 = 4096;
 /// A ray may be so many times longer than the axis.
-const LONGEST: u32 = 8;
+const MAX_LENGTH_RATIO: u32 = 8;
 /// What the steps are made of: the most accurate for a number of kicks, symplectic and symmetric.
 const INTEGRATOR: Integrator = Integrator::BlanesMoan;
 
 /// The steps of one gap, and what they are good for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct GapPlan {
+pub struct GrinStepPlan {
     /// The surface in front of the gap.
     pub surface: usize,
     /// Steps of a ray along the axis.
@@ -39,24 +39,27 @@ pub struct GapPlan {
     pub step: f64,
 }
 
-impl<R: Real> Gap<R> {
+impl<R: Real> GrinGap<R> {
     /// Prepares a gap between two surfaces, `number` of which the first one is.
     ///
     /// # Errors
     /// A gradient so strong that no number of steps will do.
     pub(super) fn new(
-        field: Graded<R>,
+        field: RotationalProfile<R>,
         number: usize,
         faces: [&Interface<R>; 2],
-    ) -> Result<(Self, GapPlan), Invalid> {
+    ) -> Result<(Self, GrinStepPlan), SystemError> {
         let side2 = R::select(faces[0].rim2 > faces[1].rim2, faces[0].rim2, faces[1].rim2);
-        let plain = Graded { base: field.base.value(), grade: field.grade.map(Real::value) };
-        let plan = plan(&plain, number, &faces.map(Interface::value))?;
+        let plain = RotationalProfile {
+            base: field.base.value(),
+            coefficients: field.coefficients.map(Real::value),
+        };
+        let plan = choose_steps(&plain, number, &faces.map(Interface::value))?;
         let gap = Self {
             field,
             ops: INTEGRATOR.ops(),
             step: R::from_f64(plan.step),
-            limit: LONGEST * plan.steps + 64,
+            max_steps: MAX_LENGTH_RATIO * plan.steps + 64,
             side2,
         };
         Ok((gap, plan))
@@ -64,80 +67,86 @@ impl<R: Real> Gap<R> {
 }
 
 /// Tries 1, 2, 4, ... steps.
-fn plan(
-    field: &Graded<f64>,
+fn choose_steps(
+    field: &RotationalProfile<f64>,
     surface: usize,
     faces: &[Interface<f64>; 2],
-) -> Result<GapPlan, Invalid> {
-    let reach = reach(field, faces[1].gap.abs());
-    let length = length(faces, reach);
+) -> Result<GrinStepPlan, SystemError> {
+    let reach = trial_radius(field, faces[1].gap.abs());
+    let length = longest_length(faces, reach);
     let whole = length / field.base;
-    let trial = |steps: u32| Gap {
+    let trial = |steps: u32| GrinGap {
         field: *field,
         ops: INTEGRATOR.ops(),
         step: whole / f64::from(steps),
-        limit: steps,
+        max_steps: steps,
         side2: f64::INFINITY,
     };
-    let starts = starts(field, &faces[0], reach, faces[1].sense);
+    let starts = trial_rays(field, &faces[0], reach, faces[1].sense);
     let allowed = TOLERANCE * length;
-    let mut steps = fewest(field, reach, whole);
+    let mut steps = min_steps(field, reach, whole);
     let mut error = f64::INFINITY;
-    while steps <= MOST_STEPS {
-        let tried = [*field, raised(field, reach, length)].map(|field| {
-            let gaps = [steps, 2 * steps].map(|steps| Gap { field, ..trial(steps) });
-            let moved = starts.iter().map(|s| difference(s, &gaps[0], &gaps[1], reach, length));
+    while steps <= MAX_STEPS {
+        let tried = [*field, with_trial_terms(field, reach, length)].map(|field| {
+            let gaps = [steps, 2 * steps].map(|steps| GrinGap { field, ..trial(steps) });
+            let moved = starts.iter().map(|s| end_difference(s, &gaps[0], &gaps[1], reach, length));
             moved.fold(0.0, f64::max)
         });
         error = tried[0];
-        if error <= allowed && tried[1] <= allowed / RAISED {
-            let kicks = steps * INTEGRATOR.kicks() as u32;
+        if error <= allowed && tried[1] <= allowed / TRIAL_CHANGE {
+            let kicks = steps * INTEGRATOR.kicks_per_step() as u32;
             let step = whole / f64::from(steps);
-            return Ok(GapPlan { surface, steps, error, tolerance: allowed, kicks, step });
+            return Ok(GrinStepPlan { surface, steps, error, tolerance: allowed, kicks, step });
         }
         steps *= 2;
     }
     let why = if error.is_finite() {
         format!(
-            "is too strong: with {MOST_STEPS} steps rays still move by {error:.1e} mm when they are \
+            "is too strong: with {MAX_STEPS} steps rays still move by {error:.1e} mm when they are \
              halved, and {allowed:.1e} mm is allowed"
         )
     } else {
-        format!("is too strong for {MOST_STEPS} steps")
+        format!("is too strong for {MAX_STEPS} steps")
     };
-    Err(Invalid::Gradient { surface, why })
+    Err(SystemError::Grin { surface, why })
 }
 
 /// The fewest steps that are worth a trial: light may turn by a third of a right angle or so in one,
 /// else rays that leave would hide what happens.
-fn fewest(field: &Graded<f64>, reach: f64, whole: f64) -> u32 {
+fn min_steps(field: &RotationalProfile<f64>, reach: f64, whole: f64) -> u32 {
     let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
     let places = [0.0, 0.5, 1.0].map(|share| Vec3::new(0.0, share * reach, 0.0));
-    let bends = places.iter().flat_map(|at| axes.map(|along| field.bend(*at, along).dot(along)));
+    let bends = places
+        .iter()
+        .flat_map(|at| axes.map(|along| field.force_derivative(*at, along).dot(along)));
     let strongest = bends.fold(0.0, |most: f64, bend| most.max(bend.abs()));
     let turns = whole * strongest.sqrt();
     // Beyond all steps that are tried, whatever it is.
-    if turns < f64::from(MOST_STEPS) {
+    if turns < f64::from(MAX_STEPS) {
         (turns.ceil() as u32).max(1).next_power_of_two()
     } else {
-        2 * MOST_STEPS
+        2 * MAX_STEPS
     }
 }
 
 /// A coefficient that counts though it is zero is tried where it changes the index by this.
-const RAISED: f64 = 1e-3;
+const TRIAL_CHANGE: f64 = 1e-3;
 
 /// The same gradient with those coefficients raised that count though they are zero: a search is about
 /// to move them.
-fn raised(field: &Graded<f64>, reach: f64, length: f64) -> Graded<f64> {
+fn with_trial_terms(
+    field: &RotationalProfile<f64>,
+    reach: f64,
+    length: f64,
+) -> RotationalProfile<f64> {
     let mut field = *field;
-    let [radial, axial] = field.grade.used;
+    let [radial, axial] = field.coefficients.used;
     let across = (0..radial).map(|i| (i, reach.powi(2 * i as i32 + 2)));
     let along = (0..axial).map(|j| (RADIAL_TERMS + j, length.powi(j as i32 + 1)));
     for (k, power) in across.chain(along) {
-        let term = &mut field.grade.terms[k];
-        if *term == 0.0 && field.grade.law != Law::Sech {
-            *term = RAISED * field.base / power;
+        let term = &mut field.coefficients.terms[k];
+        if *term == 0.0 && field.coefficients.law != ProfileLaw::Sech {
+            *term = TRIAL_CHANGE * field.base / power;
         }
     }
     field
@@ -145,9 +154,9 @@ fn raised(field: &Graded<f64>, reach: f64, length: f64) -> Graded<f64> {
 
 /// How far from the axis rays are tried: to the rim, or where nobody says to where the index has
 /// changed by a twentieth, but not farther than the gap is long.
-fn reach(field: &Graded<f64>, length: f64) -> f64 {
-    if field.grade.reach.is_finite() {
-        return field.grade.reach;
+fn trial_radius(field: &RotationalProfile<f64>, length: f64) -> f64 {
+    if field.coefficients.reach.is_finite() {
+        return field.coefficients.reach;
     }
     let length = if length > 0.0 { length } else { 1.0 };
     let changes = |r: f64| {
@@ -162,7 +171,7 @@ fn reach(field: &Graded<f64>, length: f64) -> f64 {
 }
 
 /// How long the gap is where it is longest.
-fn length(faces: &[Interface<f64>; 2], reach: f64) -> f64 {
+fn longest_length(faces: &[Interface<f64>; 2], reach: f64) -> f64 {
     let edge = |face: &Interface<f64>| {
         let sag = face.sag(reach * reach).0;
         if sag.is_finite() { sag } else { 0.0 }
@@ -174,7 +183,12 @@ fn length(faces: &[Interface<f64>; 2], reach: f64) -> f64 {
 }
 
 /// Rays at the first face: through its vertex, its zone and its rim, straight and slanted.
-fn starts(field: &Graded<f64>, face: &Interface<f64>, reach: f64, sense: f64) -> Vec<State<f64>> {
+fn trial_rays(
+    field: &RotationalProfile<f64>,
+    face: &Interface<f64>,
+    reach: f64,
+    sense: f64,
+) -> Vec<RayState<f64>> {
     let mut starts = Vec::new();
     for height in [0.0, 0.6, 1.0] {
         let y = height * reach;
@@ -184,7 +198,7 @@ fn starts(field: &Graded<f64>, face: &Interface<f64>, reach: f64, sense: f64) ->
         for slope in [0.0, -0.15, 0.25] {
             let direction = Vec3::new(0.3 * slope, slope, sense);
             let v = direction * (n / direction.dot(direction).sqrt());
-            starts.push(State { x, v, path: 0.0 });
+            starts.push(RayState { x, v, path: 0.0 });
         }
     }
     starts
@@ -192,16 +206,16 @@ fn starts(field: &Graded<f64>, face: &Interface<f64>, reach: f64, sense: f64) ->
 
 /// How far the ends of a ray by two numbers of steps lie apart; nothing for a ray that leaves the
 /// glass.
-fn difference(
-    start: &State<f64>,
-    coarse: &Gap<f64>,
-    fine: &Gap<f64>,
+fn end_difference(
+    start: &RayState<f64>,
+    coarse: &GrinGap<f64>,
+    fine: &GrinGap<f64>,
     reach: f64,
     length: f64,
 ) -> f64 {
-    let end = |gap: &Gap<f64>| {
+    let end = |gap: &GrinGap<f64>| {
         let mut state = *start;
-        for _ in 0..gap.limit {
+        for _ in 0..gap.max_steps {
             state = gap.advance(state, gap.step);
             let inside = state.x.x.hypot(state.x.y) <= 1.1 * reach && state.v.is_finite();
             if !inside {

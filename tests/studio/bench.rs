@@ -4,51 +4,52 @@ use std::sync::Arc;
 
 use aplanat::files;
 use aplanat::lens::Lens;
-use aplanat::session::{Command, Results, Settings, View, compute};
+use aplanat::session::{AnalysisResults, AnalysisSettings, Command, SessionView, analyze};
 use aplanat::studio::panels::Panel;
 use aplanat::studio::theme;
 use egui_kittest::Harness;
 
 /// The lens that the studio opens with.
 pub(super) fn double_gauss() -> Lens {
-    let bundled = &files::library()[0];
+    let bundled = &files::bundled_lenses()[0];
     files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens
 }
 
 /// A view of a lens with all its numbers, those of its pupils too.
-pub(super) fn view_of(lens: Lens) -> View {
+pub(super) fn view_of(lens: Lens) -> SessionView {
     let lens = Arc::new(lens);
-    let settings = Settings { pupils: true, ..Settings::default() };
-    let view = View { lens: Arc::clone(&lens), version: 1, settings, ..View::default() };
+    let settings = AnalysisSettings { pupils: true, ..AnalysisSettings::default() };
+    let view =
+        SessionView { lens: Arc::clone(&lens), version: 1, settings, ..SessionView::default() };
     let (version, settings) = (view.version, view.settings.clone());
-    let numbers = compute(&lens, &settings);
-    let results = Results { version, lens, settings, numbers, ms: 1.0 };
-    View { results: Some(Arc::new(results)), ..view }
+    let numbers = analyze(&lens, &settings);
+    let results = AnalysisResults { version, lens, settings, analyses: numbers, ms: 1.0 };
+    SessionView { results: Some(Arc::new(results)), ..view }
 }
 
 /// A view of the double Gauss.
-pub(super) fn view() -> View {
+pub(super) fn view() -> SessionView {
     view_of(double_gauss())
 }
 
 /// A panel alone, with what it shows and what was wished in it.
 pub(super) struct Stand<P> {
     pub(super) panel: P,
-    pub(super) view: View,
+    pub(super) view: SessionView,
     pub(super) wishes: Vec<Command>,
 }
 
 /// A harness around a panel, large enough for all of it.
-pub(super) fn stand<P: Panel + 'static>(panel: P, view: View) -> Harness<'static, Stand<P>> {
+pub(super) fn stand<P: Panel + 'static>(panel: P, view: SessionView) -> Harness<'static, Stand<P>> {
     let state = Stand { panel, view, wishes: Vec::new() };
-    let builder = Harness::builder().with_size([900.0, 620.0]).with_context_setup(theme::dress);
+    let builder = Harness::builder().with_size([900.0, 620.0]).with_context_setup(theme::apply);
     let show = |ui: &mut eframe::egui::Ui, stand: &mut Stand<P>| {
         let before = stand.wishes.len();
         stand.panel.ui(ui, &stand.view, &mut stand.wishes);
         for wish in &stand.wishes[before..] {
             match wish {
                 Command::Select(surface) => stand.view.selected = *surface,
-                Command::Preview(lens) => stand.view.candidate = lens.clone().map(Arc::from),
+                Command::Preview(lens) => stand.view.preview_lens = lens.clone().map(Arc::from),
                 _ => {}
             }
         }

@@ -1,6 +1,6 @@
 //! The scene drawn by the graphics card against the same scene drawn by the processor.
 
-use aplanat::studio::draw::{Camera, Picture, Scene, gpu, software};
+use aplanat::studio::draw::{Camera, RgbaImage, Scene, gpu, software};
 use glam::DVec2;
 
 /// The card counts positions in 1/256 pixel, fuses multiplications and rounds its blending in its
@@ -46,11 +46,11 @@ fn rays(scene: &mut Scene) {
 }
 
 fn camera() -> Camera {
-    Camera { centre: DVec2::new(22.3, 0.7), scale: 9.7 }
+    Camera { center: DVec2::new(22.3, 0.7), scale: 9.7 }
 }
 
 /// How far each pixel of one picture is from the other's, in the worst of its four channels.
-fn distances(a: &Picture, b: &Picture) -> Vec<u8> {
+fn distances(a: &RgbaImage, b: &RgbaImage) -> Vec<u8> {
     let pixels = a.rgba.chunks_exact(4).zip(b.rgba.chunks_exact(4));
     pixels.map(|(p, q)| p.iter().zip(q).map(|(x, y)| x.abs_diff(*y)).max().unwrap()).collect()
 }
@@ -58,10 +58,10 @@ fn distances(a: &Picture, b: &Picture) -> Vec<u8> {
 #[test]
 #[ignore = "needs a GPU or a software Vulkan driver"]
 fn the_card_draws_what_the_processor_draws() {
-    let device = pollster::block_on(gpu::headless()).unwrap();
+    let device = pollster::block_on(gpu::headless_device()).unwrap();
     let scene = lens_scene();
     assert_eq!(scene.segments.len(), 20_000 + 2 * 82 + 3);
-    let fast = gpu::picture(&device, &scene, camera(), SIZE).unwrap();
+    let fast = gpu::render_image(&device, &scene, camera(), SIZE).unwrap();
     let slow = software::draw(&scene, camera(), SIZE);
     let distances = distances(&fast, &slow);
     let worst = distances.iter().max().unwrap();
@@ -74,8 +74,8 @@ fn the_card_draws_what_the_processor_draws() {
 #[test]
 #[ignore = "needs a GPU or a software Vulkan driver"]
 fn the_card_draws_an_empty_scene() {
-    let device = pollster::block_on(gpu::headless()).unwrap();
+    let device = pollster::block_on(gpu::headless_device()).unwrap();
     let scene = Scene::on([10, 20, 30, 255]);
-    let picture = gpu::picture(&device, &scene, camera(), [33, 7]).unwrap();
+    let picture = gpu::render_image(&device, &scene, camera(), [33, 7]).unwrap();
     assert_eq!(picture, software::draw(&scene, camera(), [33, 7]));
 }

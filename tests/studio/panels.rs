@@ -2,15 +2,18 @@
 
 use std::sync::Arc;
 
-use aplanat::effects::{Choice, Effect};
+use aplanat::effects::{Effect, EffectOverride};
 use aplanat::lens::{Aperture, Lens, Medium, Object, Parameter, Quantity, Row, Variable};
 use aplanat::merit::{Goal, PupilEdge, Term};
-use aplanat::optimize::{Method, Progress, pareto};
-use aplanat::session::{Command, Edit, FrontRun, Fronts, Leg, Search, Standing, Task, View};
-use aplanat::studio::draw::Backing;
+use aplanat::optimize::{DescentMethod, OptimizationProgress, pareto};
+use aplanat::session::{
+    Command, Edit, OptimizationRequest, OptimizationSnapshot, ParetoPass, ParetoRun, ParetoView,
+    RunStatus, SessionView,
+};
+use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::panels::{
-    Effects, FirstOrderData, LensLayout, Optimizer, Panel, ParetoFront, Prescription, Pupils,
-    SpotDiagram,
+    EffectsPanel, FirstOrderPanel, LayoutPanel, OptimizerPanel, Panel, ParetoPanel,
+    PrescriptionPanel, PupilPanel, SpotPanel,
 };
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
@@ -18,8 +21,8 @@ use egui_kittest::kittest::Queryable;
 
 use crate::bench::{Stand, double_gauss, stand, view};
 
-fn prescription() -> Harness<'static, Stand<Prescription>> {
-    let mut harness = stand(Prescription::default(), view());
+fn prescription() -> Harness<'static, Stand<PrescriptionPanel>> {
+    let mut harness = stand(PrescriptionPanel::default(), view());
     harness.run();
     harness
 }
@@ -46,7 +49,7 @@ fn a_typed_radius_is_wished_for_at_enter() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 1", "15*1.1", Key::Enter);
     let wanted = Edit::TypeRadius { surface: 0, text: "15*1.1".into() };
-    assert_eq!(harness.state().wishes, [Command::Edit(wanted), Command::Settle]);
+    assert_eq!(harness.state().wishes, [Command::Edit(wanted), Command::CommitEdit]);
     assert!(harness.get_by_label("Radius of surface 2").is_focused(), "Enter goes down");
 }
 
@@ -118,7 +121,10 @@ fn a_badge_frees_and_fixes() {
     harness.run();
     let free = Parameter::new(0, Quantity::Curvature);
     let parameter = Parameter::new(1, Quantity::Conic);
-    let wanted = [Edit::Fix(free), Edit::Free(Variable { parameter, min: None, max: None })];
+    let wanted = [
+        Edit::RemoveVariable(free),
+        Edit::AddVariable(Variable { parameter, min: None, max: None }),
+    ];
     assert_eq!(edits(&harness.state().wishes), wanted.iter().collect::<Vec<_>>());
 }
 
@@ -130,7 +136,7 @@ fn a_key_frees_the_number_under_the_cursor() {
     harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::V);
     harness.run();
     let parameter = Parameter::new(0, Quantity::Conic);
-    let wanted = Edit::Free(Variable { parameter, min: None, max: None });
+    let wanted = Edit::AddVariable(Variable { parameter, min: None, max: None });
     assert_eq!(edits(&harness.state().wishes), [&wanted]);
 }
 
@@ -143,7 +149,7 @@ fn a_selected_row_can_be_deleted_and_flipped() {
     harness.run();
     harness.get_by_label("Flip element").click();
     harness.run();
-    let wanted = [Edit::RemoveRow(2), Edit::FlipRows { first: 2, last: 4 }];
+    let wanted = [Edit::RemoveRow(2), Edit::ReverseRows { first: 2, last: 4 }];
     assert_eq!(edits(&harness.state().wishes), wanted.iter().collect::<Vec<_>>());
 }
 
@@ -158,30 +164,36 @@ fn a_row_has_a_menu_of_its_own() {
 }
 
 /// A search that stands somehow.
-fn searching(standing: Standing) -> View {
+fn searching(standing: RunStatus) -> SessionView {
     let view = view();
-    let goal = Goal::sensible(&view.lens).unwrap();
-    let method = Method::Adam;
-    let task = Task { method, lens: Arc::clone(&view.lens), goal, tolerance: 1e-3 };
+    let goal = Goal::default_for(&view.lens).unwrap();
+    let method = DescentMethod::Adam;
+    let task = OptimizationRequest { method, lens: Arc::clone(&view.lens), goal, tolerance: 1e-3 };
     let refused = Some("ray 4 is lost: clipped at surface 2".to_owned());
-    let progress =
-        Progress { step: 7, merit: 0.5, best: 0.25, accepted: 1.0, refused, finished: false };
-    let search = Search {
+    let progress = OptimizationProgress {
+        step: 7,
+        merit: 0.5,
+        best: 0.25,
+        accepted: 1.0,
+        refused,
+        finished: false,
+    };
+    let search = OptimizationSnapshot {
         number: 1,
-        standing,
-        task: Arc::new(task),
+        status: standing,
+        request: Arc::new(task),
         progress: Some(progress),
         best: Arc::clone(&view.lens),
         current: Arc::clone(&view.lens),
-        before: Vec::new(),
-        terms: Vec::new(),
+        initial_terms: Vec::new(),
+        best_terms: Vec::new(),
         history: Vec::new(),
     };
-    View { search: Some(Arc::new(search)), ..view }
+    SessionView { optimization: Some(Arc::new(search)), ..view }
 }
 
-fn optimizer(view: View) -> Harness<'static, Stand<Optimizer>> {
-    let mut harness = stand(Optimizer::default(), view);
+fn optimizer(view: SessionView) -> Harness<'static, Stand<OptimizerPanel>> {
+    let mut harness = stand(OptimizerPanel::default(), view);
     harness.run();
     harness
 }
@@ -197,7 +209,7 @@ fn optimize_wishes_for_a_search_with_the_terms_of_the_panel() {
     let [Command::Optimize { method, goal }] = harness.state().wishes.as_slice() else {
         panic!("{:?}", harness.state().wishes);
     };
-    assert_eq!(*method, Method::DampedLeastSquares);
+    assert_eq!(*method, DescentMethod::DampedLeastSquares);
     assert_eq!(goal.terms[0].weight, 3.0);
     assert!(goal.terms.iter().all(|weighted| weighted.term.name() != "focal_length"));
 }
@@ -277,19 +289,19 @@ fn a_semi_diameter_is_freed_by_its_badge() {
     let mut harness = prescription();
     press(&mut harness, "Semi-diameter of surface 1 variable");
     let parameter = Parameter::new(0, Quantity::SemiDiameter);
-    let wanted = Edit::Free(Variable { parameter, min: None, max: None });
+    let wanted = Edit::AddVariable(Variable { parameter, min: None, max: None });
     assert_eq!(edits(&harness.state().wishes), [&wanted]);
 }
 
 #[test]
 fn a_search_can_be_held_stepped_ended_and_taken() {
     let cases = [
-        (Standing::Running, "Pause", Command::Pause),
-        (Standing::Running, "Stop", Command::Stop),
-        (Standing::Paused, "Resume", Command::Resume),
-        (Standing::Paused, "Step", Command::Step),
-        (Standing::Stopped, "Take", Command::Take),
-        (Standing::Finished, "Discard", Command::Discard),
+        (RunStatus::Running, "Pause", Command::Pause),
+        (RunStatus::Running, "Stop", Command::Stop),
+        (RunStatus::Paused, "Resume", Command::Resume),
+        (RunStatus::Paused, "Step", Command::Step),
+        (RunStatus::Stopped, "Take", Command::AcceptResult),
+        (RunStatus::Finished, "Discard", Command::DiscardResult),
     ];
     for (standing, button, command) in cases {
         let mut harness = optimizer(searching(standing));
@@ -301,7 +313,7 @@ fn a_search_can_be_held_stepped_ended_and_taken() {
 
 #[test]
 fn a_refused_step_names_parameter_and_ray_counted_as_in_the_table() {
-    let harness = optimizer(searching(Standing::Running));
+    let harness = optimizer(searching(RunStatus::Running));
     harness.get_by_label("Ray 4 is lost: clipped at surface 3");
     harness.get_by_label("after step 7");
 }
@@ -318,7 +330,7 @@ fn a_lens_without_variables_cannot_be_optimized() {
 
 #[test]
 fn spots_show_radii_with_errors_and_rays() {
-    let mut harness = stand(SpotDiagram::new(Backing::Software), view());
+    let mut harness = stand(SpotPanel::new(RenderBackend::Software), view());
     harness.run();
     for text in ["RMS 50.59 µm ±", "RMS 93.31 µm ±", "RMS 101.3 µm ±", "GEO 152.1 µm ±"] {
         harness.get_by_label_contains(text);
@@ -328,7 +340,7 @@ fn spots_show_radii_with_errors_and_rays() {
 
 #[test]
 fn the_error_of_spots_can_be_chosen() {
-    let mut harness = stand(SpotDiagram::new(Backing::Software), view());
+    let mut harness = stand(SpotPanel::new(RenderBackend::Software), view());
     harness.run();
     harness.get_by_label("Allowed error").click();
     harness.run();
@@ -337,8 +349,8 @@ fn the_error_of_spots_can_be_chosen() {
     assert_eq!(harness.state().wishes, [Command::SetTolerance(1e-6)]);
 }
 
-fn pupils(lens: Lens) -> Harness<'static, Stand<Pupils>> {
-    let mut harness = stand(Pupils::default(), crate::bench::view_of(lens));
+fn pupils(lens: Lens) -> Harness<'static, Stand<PupilPanel>> {
+    let mut harness = stand(PupilPanel::default(), crate::bench::view_of(lens));
     harness.run();
     harness
 }
@@ -444,7 +456,7 @@ fn a_ragged_pupil_is_told_in_pieces() {
 
 #[test]
 fn the_layout_tells_how_many_rays_are_lost_and_how() {
-    let mut harness = stand(LensLayout::new(Backing::Software), view());
+    let mut harness = stand(LayoutPanel::new(RenderBackend::Software), view());
     harness.run();
     harness.get_by_label_contains("clipped of 45 rays");
     harness.get_by_label_contains("Section of");
@@ -452,7 +464,7 @@ fn the_layout_tells_how_many_rays_are_lost_and_how() {
 
 #[test]
 fn first_order_data_are_there_by_name() {
-    let mut harness = stand(FirstOrderData, view());
+    let mut harness = stand(FirstOrderPanel, view());
     harness.run();
     for text in ["Focal length", "49.389 mm", "Petzval radius", "Seidel sums, µm"] {
         harness.get_by_label(text);
@@ -461,13 +473,13 @@ fn first_order_data_are_there_by_name() {
 
 #[test]
 fn an_effect_can_be_forced() {
-    let mut harness = stand(Effects, view());
+    let mut harness = stand(EffectsPanel, view());
     harness.run();
     harness.get_by_label("Choice of ray aiming").click();
     harness.run();
     harness.get_by_label("On").click();
     harness.run();
-    assert_eq!(harness.state().wishes, [Command::Choose(Effect::Aiming, Choice::On)]);
+    assert_eq!(harness.state().wishes, [Command::SetEffect(Effect::Aiming, EffectOverride::On)]);
 }
 
 #[test]
@@ -475,54 +487,54 @@ fn a_lens_that_cannot_be_traced_says_why_in_every_panel() {
     let mut broken = view();
     let results = broken.results.take().unwrap();
     let mut results = Arc::unwrap_or_clone(results);
-    results.numbers = Err("no beam at surface 2".to_owned());
+    results.analyses = Err("no beam at surface 2".to_owned());
     broken.results = Some(Arc::new(results));
-    let mut harness = stand(SpotDiagram::new(Backing::Software), broken);
+    let mut harness = stand(SpotPanel::new(RenderBackend::Software), broken);
     harness.run();
     harness.get_by_label("No beam at surface 3");
 }
 
 /// A front of the double Gauss that stands somehow, and one before it.
-fn fronts(standing: Standing) -> View {
+fn fronts(standing: RunStatus) -> SessionView {
     let view = view();
-    let design = |i: usize| pareto::Design {
+    let design = |i: usize| pareto::ParetoPoint {
         lens: Lens { name: format!("lens {i}"), ..double_gauss() },
         weight: Some(1e-6 * i as f64),
         spot: 0.01 * (1 + i) as f64,
         spot_error: 1e-6,
         light: 10.0 * (3 + i) as f64,
         light_error: 1e-3,
-        lit: true,
+        has_light: true,
         rays: 600,
     };
     let mut front = pareto::Front::default();
-    (0..6).for_each(|i| assert!(front.offer(design(i))));
-    let leg = Leg {
+    (0..6).for_each(|i| assert!(front.insert(design(i))));
+    let leg = ParetoPass {
         front: Arc::new(front),
-        tried: Arc::new(vec![[0.05, 40.0]]),
+        evaluated: Arc::new(vec![[0.05, 40.0]]),
         hypervolume: 0.5,
         done: 400,
         total: 400,
         seconds: 2.0,
-        refused: None,
+        rejection: None,
     };
-    let run = FrontRun {
+    let run = ParetoRun {
         number: 2,
-        standing,
-        settings: pareto::Settings::default(),
+        status: standing,
+        settings: pareto::ParetoSettings::default(),
         compare: true,
         lens: Arc::clone(&view.lens),
         start: Arc::new(design(6)),
         main: leg.clone(),
         biased: Some(leg),
     };
-    let earlier = vec![Arc::new(FrontRun { number: 1, ..run.clone() })];
-    let fronts = Fronts { run: Some(Arc::new(run)), earlier, ..Fronts::default() };
-    View { fronts, ..view }
+    let earlier = vec![Arc::new(ParetoRun { number: 1, ..run.clone() })];
+    let fronts = ParetoView { run: Some(Arc::new(run)), earlier, ..ParetoView::default() };
+    SessionView { pareto: fronts, ..view }
 }
 
-fn pareto_front(view: View) -> Harness<'static, Stand<ParetoFront>> {
-    let mut harness = stand(ParetoFront::default(), view);
+fn pareto_front(view: SessionView) -> Harness<'static, Stand<ParetoPanel>> {
+    let mut harness = stand(ParetoPanel::default(), view);
     harness.run();
     harness
 }
@@ -535,18 +547,18 @@ fn a_front_is_wished_for_with_the_settings_of_the_panel() {
     harness.run();
     harness.get_by_label("Start").click();
     harness.run();
-    let settings = pareto::Settings::default();
-    assert_eq!(harness.state().wishes, [Command::StartFront { settings, compare: true }]);
+    let settings = pareto::ParetoSettings::default();
+    assert_eq!(harness.state().wishes, [Command::StartPareto { settings, compare: true }]);
 }
 
 #[test]
 fn a_sweep_can_be_held_ended_exported_and_forgotten() {
     let cases = [
-        (Standing::Running, "Pause", Command::PauseFront),
-        (Standing::Paused, "Resume", Command::ResumeFront),
-        (Standing::Running, "Stop", Command::StopFront),
-        (Standing::Finished, "Export…", Command::ExportFront(None)),
-        (Standing::Stopped, "Clear", Command::ClearFronts),
+        (RunStatus::Running, "Pause", Command::PausePareto),
+        (RunStatus::Paused, "Resume", Command::ResumePareto),
+        (RunStatus::Running, "Stop", Command::StopPareto),
+        (RunStatus::Finished, "Export…", Command::ExportPareto(None)),
+        (RunStatus::Stopped, "Clear", Command::ClearPareto),
     ];
     for (standing, button, command) in cases {
         let mut harness = pareto_front(fronts(standing));
@@ -558,9 +570,9 @@ fn a_sweep_can_be_held_ended_exported_and_forgotten() {
 
 #[test]
 fn lenses_of_the_front_are_stepped_through_and_taken() {
-    let view = fronts(Standing::Finished);
-    let run = view.fronts.run.clone().unwrap();
-    let designs = run.main.front.designs();
+    let view = fronts(RunStatus::Finished);
+    let run = view.pareto.run.clone().unwrap();
+    let designs = run.main.front.points();
     let mut harness = pareto_front(view);
     harness.get_by_label_contains("hypervolume");
     harness.get_by_label("Sharper").click();
@@ -572,12 +584,12 @@ fn lenses_of_the_front_are_stepped_through_and_taken() {
     harness.get_by_label_contains("% of the start");
     harness.get_by_label("Take this lens").click();
     harness.run();
-    assert_eq!(harness.state().wishes[1..], [preview(1), Command::TakePreview]);
+    assert_eq!(harness.state().wishes[1..], [preview(1), Command::AcceptPreview]);
 }
 
 #[test]
 fn a_click_on_a_point_shows_its_lens() {
-    let mut harness = pareto_front(fronts(Standing::Finished));
+    let mut harness = pareto_front(fronts(RunStatus::Finished));
     let plot = harness.get_by_label_contains("Front of").rect();
     // Somewhere on the way across the plot lies a point.
     'search: for i in 0..40 {
@@ -602,12 +614,12 @@ fn a_click_on_a_point_shows_its_lens() {
 #[test]
 fn a_front_that_failed_says_why_and_a_dark_lens_cannot_begin_one() {
     let mut failed = view();
-    failed.fronts.failed = Some("surface 2 is steeper than a hemisphere".to_owned());
+    failed.pareto.error = Some("surface 2 is steeper than a hemisphere".to_owned());
     pareto_front(failed).get_by_label("Surface 3 is steeper than a hemisphere");
 
     let mut dark = view();
     let mut results = Arc::unwrap_or_clone(dark.results.take().unwrap());
-    results.numbers = Err("no beam at surface 2".to_owned());
+    results.analyses = Err("no beam at surface 2".to_owned());
     dark.results = Some(Arc::new(results));
     let mut harness = pareto_front(dark);
     harness.get_by_label("Start").click();

@@ -5,45 +5,47 @@ use std::sync::Arc;
 
 use aplanat::files;
 use aplanat::lens::{Fields, Lens, Medium};
-use aplanat::merit::Margin;
-use aplanat::optimize::pareto::Design;
+use aplanat::merit::ConstraintMargin;
+use aplanat::optimize::pareto::ParetoPoint;
 use aplanat::search::{
-    Ended, Kind, Method, Node, Offer, Statistics, Steer, Tally, Temperature, Weights,
+    DescentEnd, LineageNode, MutationKind, MutationStatistics, MutationWeights, OfferOutcome,
+    SearchMethod, SearchStatistics, SteerCommand, Temperature,
 };
 use aplanat::session::{
-    Checkpoint, Command, Exploration, Explore, Found, History, Judged, Mark, Moment, Place, Quest,
-    Standing, View,
+    ChainPosition, CheckpointStatus, Command, DescentMark, FoundLens, HistorySample, RunStatus,
+    ScoredLens, SearchHistory, SessionView, StructureSearchCommand, StructureSearchRequest,
+    StructureSearchSnapshot,
 };
-use aplanat::studio::panels::StructureSearch;
+use aplanat::studio::panels::SearchPanel;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use crate::bench::{Stand, double_gauss, stand, view, view_of};
 
-fn panel(view: View) -> Harness<'static, Stand<StructureSearch>> {
-    let mut harness = stand(StructureSearch::default(), view);
+fn panel(view: SessionView) -> Harness<'static, Stand<SearchPanel>> {
+    let mut harness = stand(SearchPanel::default(), view);
     harness.run();
     harness
 }
 
-fn press(harness: &mut Harness<'_, Stand<StructureSearch>>, name: &str) {
+fn press(harness: &mut Harness<'_, Stand<SearchPanel>>, name: &str) {
     harness.get_by_label(name).click();
     harness.run();
 }
 
 /// What was asked of the search.
-fn asked(harness: &Harness<'_, Stand<StructureSearch>>) -> Vec<Explore> {
+fn asked(harness: &Harness<'_, Stand<SearchPanel>>) -> Vec<StructureSearchCommand> {
     let wishes = harness.state().wishes.iter();
     let asked = wishes.filter_map(|wish| match wish {
-        Command::Explore(explore) => Some(explore.clone()),
+        Command::StructureSearch(explore) => Some(explore.clone()),
         _ => None,
     });
     asked.collect()
 }
 
-fn started(harness: &Harness<'_, Stand<StructureSearch>>) -> Quest {
+fn started(harness: &Harness<'_, Stand<SearchPanel>>) -> StructureSearchRequest {
     match asked(harness).as_slice() {
-        [Explore::Start(quest)] => Quest::clone(quest),
+        [StructureSearchCommand::Start(quest)] => StructureSearchRequest::clone(quest),
         other => panic!("{other:?}"),
     }
 }
@@ -56,24 +58,24 @@ fn other(number: u64) -> Arc<Lens> {
     Arc::new(lens)
 }
 
-fn found(number: u64, merit: f64) -> Arc<Found> {
+fn found(number: u64, merit: f64) -> Arc<FoundLens> {
     let lens = other(number);
-    let design = Design {
+    let design = ParetoPoint {
         lens: Lens::clone(&lens),
         weight: None,
         spot: 0.5 * merit,
         spot_error: 1e-6,
         light: 90.0,
         light_error: 1e-3,
-        lit: true,
+        has_light: true,
         rays: 900,
     };
-    let judged = Some(Judged { lens: Arc::clone(&lens), found: Ok(design) });
-    Arc::new(Found { number, merit, elements: 6, lens, judged })
+    let judged = Some(ScoredLens { lens: Arc::clone(&lens), score: Ok(design) });
+    Arc::new(FoundLens { number, merit, elements: 6, lens, score: judged })
 }
 
-fn node(number: u64, kind: Option<Kind>) -> Arc<Node<Arc<Lens>>> {
-    Arc::new(Node {
+fn node(number: u64, kind: Option<MutationKind>) -> Arc<LineageNode<Arc<Lens>>> {
+    Arc::new(LineageNode {
         number,
         parent: number.checked_sub(1),
         chain: 0,
@@ -84,37 +86,59 @@ fn node(number: u64, kind: Option<Kind>) -> Arc<Node<Arc<Lens>>> {
         descended: 0.02,
         moves: 17,
         gradients: 340,
-        ended: Some(Ended::Clock),
-        offer: Some(Offer::Entered),
+        ended: Some(DescentEnd::Clock),
+        offer: Some(OfferOutcome::Entered),
         point: other(number),
     })
 }
 
 /// Glass that is thinner at its rim than it may be.
-fn thin(value: f64) -> Margin {
-    Margin { term: "glass_edge", surface: Some(2), zoom: 0, value, min: Some(0.8), max: None }
+fn thin(value: f64) -> ConstraintMargin {
+    ConstraintMargin {
+        term: "glass_edge",
+        surface: Some(2),
+        zoom: 0,
+        value,
+        min: Some(0.8),
+        max: None,
+    }
 }
 
 /// A search from the double Gauss that has found two lenses, and stands somehow.
-fn searching(standing: Standing) -> View {
+fn searching(standing: RunStatus) -> SessionView {
     let mut view = view();
-    let mut history = History::default();
+    let mut history = SearchHistory::default();
     for round in 0..30_u32 {
         let merit = 0.1 / f64::from(round + 1);
         let chains = vec![Some((2.0 * merit, 6)), None];
-        history.moments.push(Moment { round: round.into(), best: merit, chains });
+        history.moments.push(HistorySample { round: round.into(), best: merit, chains });
     }
-    let kind = Some(Kind::AddSinglet);
-    history.marks.push(Mark { round: 9, number: 1, chain: 0, kind, merit: 0.08, entered: true });
-    let mut statistics = Statistics { moves: 60, gradients: 1200, ..Statistics::default() };
-    let refused = [("no gap is wide enough before surface 2".to_owned(), 3)].into();
-    let tally = Tally { tried: 5, refused, ended: 2, improved: 1, moves: 34, ..Tally::default() };
-    statistics.kinds.insert(Kind::AddSinglet, tally);
-    let place = Place { number: 1, merit: 0.03, elements: 6, lens: other(1) };
-    let run = Exploration {
+    let kind = Some(MutationKind::AddSinglet);
+    history.marks.push(DescentMark {
+        round: 9,
         number: 1,
-        standing,
-        quest: Arc::default(),
+        chain: 0,
+        kind,
+        merit: 0.08,
+        entered: true,
+    });
+    let mut statistics =
+        SearchStatistics { moves: 60, gradients: 1200, ..SearchStatistics::default() };
+    let refused = [("no gap is wide enough before surface 2".to_owned(), 3)].into();
+    let tally = MutationStatistics {
+        tried: 5,
+        refused,
+        ended: 2,
+        improved: 1,
+        moves: 34,
+        ..MutationStatistics::default()
+    };
+    statistics.kinds.insert(MutationKind::AddSinglet, tally);
+    let place = ChainPosition { number: 1, merit: 0.03, elements: 6, lens: other(1) };
+    let run = StructureSearchSnapshot {
+        number: 1,
+        status: standing,
+        request: Arc::default(),
         start: found(0, 0.1),
         best: found(1, 0.02),
         reservoir: vec![found(1, 0.02), found(0, 0.1)],
@@ -122,19 +146,23 @@ fn searching(standing: Standing) -> View {
         chains: vec![Some(place), None],
         statistics,
         temperature: Temperature::new(0.15).unwrap(),
-        weights: Weights::default(),
+        weights: MutationWeights::default(),
         history: Arc::new(history),
-        family: vec![node(0, None), node(1, kind)],
-        over: None,
+        lineage: vec![node(0, None), node(1, kind)],
+        end_reason: None,
         seconds: 12.0,
         gradients: 1200,
         rays: 300,
-        start_breaks: vec![thin(0.2), thin(0.3)],
-        best_breaks: vec![thin(0.79)],
-        checkpoint: Checkpoint { path: Some("a/b.json".into()), moves: Some(50), failed: None },
+        start_violations: vec![thin(0.2), thin(0.3)],
+        best_violations: vec![thin(0.79)],
+        checkpoint: CheckpointStatus {
+            path: Some("a/b.json".into()),
+            moves: Some(50),
+            error: None,
+        },
     };
-    view.explorations.here = Some(Arc::new(run.start.judged.clone().unwrap()));
-    view.explorations.run = Some(Arc::new(run));
+    view.structure_search.current_design = Some(Arc::new(run.start.score.clone().unwrap()));
+    view.structure_search.run = Some(Arc::new(run));
     view
 }
 
@@ -148,7 +176,7 @@ fn a_search_is_wished_for_as_the_panel_says() {
     press(&mut harness, "minutes");
     press(&mut harness, "Search");
     let quest = started(&harness);
-    assert_eq!(quest.plan.settings.method, Method::Restore);
+    assert_eq!(quest.plan.settings.method, SearchMethod::Restore);
     assert!(!quest.plan.rules.projection && !quest.free);
     assert!(quest.open.is_some() && quest.minutes.is_some());
     assert!(quest.plan.settings.gradients.is_none(), "nothing but a person ends it");
@@ -201,21 +229,21 @@ fn limits_weights_and_the_sampler_are_there_by_name() {
 #[test]
 fn a_search_can_be_held_ended_saved_and_forgotten() {
     let cases = [
-        (Standing::Running, "Pause", Explore::Pause),
-        (Standing::Paused, "Resume", Explore::Resume),
-        (Standing::Running, "Stop", Explore::Stop),
-        (Standing::Running, "Save to…", Explore::SaveTo(None)),
-        (Standing::Stopped, "Open…", Explore::GoOn(None)),
-        (Standing::Finished, "Clear", Explore::Clear),
-        (Standing::Running, "Reheat", Explore::Steer(Steer::Reheat)),
-        (Standing::Running, "Follow the search", Explore::Follow(Some(0))),
+        (RunStatus::Running, "Pause", StructureSearchCommand::Pause),
+        (RunStatus::Paused, "Resume", StructureSearchCommand::Resume),
+        (RunStatus::Running, "Stop", StructureSearchCommand::Stop),
+        (RunStatus::Running, "Save to…", StructureSearchCommand::SaveTo(None)),
+        (RunStatus::Stopped, "Open…", StructureSearchCommand::ResumeFrom(None)),
+        (RunStatus::Finished, "Clear", StructureSearchCommand::Clear),
+        (RunStatus::Running, "Reheat", StructureSearchCommand::Control(SteerCommand::Reheat)),
+        (RunStatus::Running, "Follow the search", StructureSearchCommand::Preview(Some(0))),
     ];
     for (standing, button, explore) in cases {
         let mut harness = panel(searching(standing));
         press(&mut harness, button);
         assert_eq!(asked(&harness), [explore], "{button}");
     }
-    let mut harness = panel(searching(Standing::Running));
+    let mut harness = panel(searching(RunStatus::Running));
     press(&mut harness, "Search");
     assert_eq!(asked(&harness), [], "one at a time");
     harness.get_by_label_contains("merit 0.1 to 0.02");
@@ -229,7 +257,7 @@ fn a_search_can_be_held_ended_saved_and_forgotten() {
 
 #[test]
 fn a_lens_that_is_kept_is_compared_pinned_taken_and_exported() {
-    let mut harness = panel(searching(Standing::Running));
+    let mut harness = panel(searching(RunStatus::Running));
     harness.get_by_label_contains("Click a lens or a mark");
     harness.get_by_label_contains("Lens 1: 10 µm, 90 mm², 6 elements").click();
     harness.run();
@@ -239,25 +267,32 @@ fn a_lens_that_is_kept_is_compared_pinned_taken_and_exported() {
     for button in ["Pin", "Take", "Export…"] {
         press(&mut harness, button);
     }
-    let export = Explore::Export { number: 1, path: None };
-    assert_eq!(asked(&harness), [Explore::Steer(Steer::Pin(1)), Explore::Take(1), export]);
+    let export = StructureSearchCommand::Export { number: 1, path: None };
+    assert_eq!(
+        asked(&harness),
+        [
+            StructureSearchCommand::Control(SteerCommand::Pin(1)),
+            StructureSearchCommand::Accept(1),
+            export
+        ]
+    );
     press(&mut harness, "Back to the design");
     assert_eq!(harness.state().wishes.last(), Some(&Command::Preview(None)));
 
-    let mut pinned = searching(Standing::Running);
-    let mut run = Exploration::clone(pinned.explorations.run.as_ref().unwrap());
+    let mut pinned = searching(RunStatus::Running);
+    let mut run = StructureSearchSnapshot::clone(pinned.structure_search.run.as_ref().unwrap());
     run.pinned = Some(1);
-    pinned.explorations.run = Some(Arc::new(run));
+    pinned.structure_search.run = Some(Arc::new(run));
     let mut harness = panel(pinned);
     harness.get_by_label_contains("Lens 1, pinned: 10 µm").click();
     harness.run();
     press(&mut harness, "Unpin");
-    assert_eq!(asked(&harness), [Explore::Steer(Steer::Unpin)]);
+    assert_eq!(asked(&harness), [StructureSearchCommand::Control(SteerCommand::Unpin)]);
 }
 
 #[test]
 fn moves_are_counted_with_reasons() {
-    let mut harness = panel(searching(Standing::Running));
+    let mut harness = panel(searching(RunStatus::Running));
     press(&mut harness, "Moves");
     harness.get_by_label("Weight of add singlet");
     harness.get_by_label("1 of 2");
@@ -268,7 +303,7 @@ fn moves_are_counted_with_reasons() {
 
 #[test]
 fn every_lens_tells_where_it_came_from() {
-    let mut harness = panel(searching(Standing::Stopped));
+    let mut harness = panel(searching(RunStatus::Stopped));
     press(&mut harness, "Family");
     harness.get_by_label("Family tree of 2 generations");
     harness.get_by_label("add singlet: a plate before surface 3");
@@ -286,28 +321,31 @@ fn every_lens_tells_where_it_came_from() {
 #[test]
 fn without_a_search_the_panel_says_what_is_missing() {
     let mut failed = view();
-    failed.explorations.failed = Some("surface 2 is steeper than a hemisphere".to_owned());
+    failed.structure_search.error = Some("surface 2 is steeper than a hemisphere".to_owned());
     panel(failed).get_by_label("Surface 3 is steeper than a hemisphere");
 
     let mut left = view();
     let path = PathBuf::from("folder/Nikkor_1.search.json");
-    left.explorations.left = Some(path.clone());
+    left.structure_search.unfinished = Some(path.clone());
     let mut harness = panel(left);
     harness.get_by_label("Nikkor_1");
     press(&mut harness, "Go on");
     press(&mut harness, "Forget it");
-    assert_eq!(asked(&harness), [Explore::GoOn(Some(path)), Explore::ForgetLeft]);
+    assert_eq!(
+        asked(&harness),
+        [StructureSearchCommand::ResumeFrom(Some(path)), StructureSearchCommand::DismissUnfinished]
+    );
 
     let mut dark = view();
     let mut results = Arc::unwrap_or_clone(dark.results.take().unwrap());
-    results.numbers = Err("no beam at surface 2".to_owned());
+    results.analyses = Err("no beam at surface 2".to_owned());
     dark.results = Some(Arc::new(results));
     let mut harness = panel(dark);
     press(&mut harness, "Search");
     assert_eq!(asked(&harness), []);
     harness.get_by_label("No light gets through this lens");
 
-    let zooms = files::library()
+    let zooms = files::bundled_lenses()
         .iter()
         .map(|bundled| files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens);
     let zoom = zooms.into_iter().find(|lens| lens.zoom_positions() > 1).unwrap();

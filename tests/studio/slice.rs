@@ -2,21 +2,24 @@
 
 use std::time::Duration;
 
-use aplanat::grin_task::{Axis, Plane};
-use aplanat::session::{Command, Form, Forming, Quantity, Session, Sight, Standing, View, blank};
-use aplanat::studio::draw::Backing;
-use aplanat::studio::panels::GrinSlice;
+use aplanat::grin_task::{SlicePlane, SpatialAxis};
+use aplanat::session::{
+    Command, GrinCommand, GrinView, RunStatus, Session, SessionView, SliceQuantity, SliceSettings,
+    blank,
+};
+use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::panels::GrinPanel;
 use eframe::egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use crate::bench::{Stand, stand};
 
-type Bench = Harness<'static, Stand<GrinSlice>>;
+type Bench = Harness<'static, Stand<GrinPanel>>;
 
-fn panel(forming: Forming) -> Bench {
-    let view = View { forming, ..View::default() };
-    let mut harness = stand(GrinSlice::new(Backing::Software), view);
+fn panel(forming: GrinView) -> Bench {
+    let view = SessionView { grin: forming, ..SessionView::default() };
+    let mut harness = stand(GrinPanel::new(RenderBackend::Software), view);
     harness.run();
     harness
 }
@@ -27,20 +30,20 @@ fn press(harness: &mut Bench, name: &str) {
 }
 
 /// What was asked of the field.
-fn asked(harness: &Bench) -> Vec<Form> {
+fn asked(harness: &Bench) -> Vec<GrinCommand> {
     let wishes = harness.state().wishes.iter();
     let asked = wishes.filter_map(|wish| match wish {
-        Command::Form(form) => Some(form.clone()),
+        Command::Grin(form) => Some(form.clone()),
         _ => None,
     });
     asked.collect()
 }
 
 /// Waits until a session knows enough.
-fn wait(session: &mut Session, what: &str, enough: impl Fn(&Forming) -> bool) {
+fn wait(session: &mut Session, what: &str, enough: impl Fn(&GrinView) -> bool) {
     for _ in 0..30_000 {
         session.poll();
-        if enough(&session.view().forming) {
+        if enough(&session.view().grin) {
             return;
         }
         std::thread::sleep(Duration::from_millis(2));
@@ -49,52 +52,55 @@ fn wait(session: &mut Session, what: &str, enough: impl Fn(&Forming) -> bool) {
 }
 
 /// Whether everything that can be seen of the field is there.
-fn is_seen(forming: &Forming) -> bool {
-    let Forming { run: Some(run), slice: Some(slice), sighting: Some(sighting), .. } = forming
+fn is_seen(forming: &GrinView) -> bool {
+    let GrinView { run: Some(run), slice: Some(slice), analysis: Some(sighting), .. } = forming
     else {
         return false;
     };
     let (Ok(slice), Ok(sighting)) = (slice.as_ref(), sighting.as_ref()) else { return false };
-    let media = [&slice.medium, &sighting.medium];
-    media.into_iter().all(|medium| std::sync::Arc::ptr_eq(medium, &run.medium))
+    let media = [&slice.field, &sighting.field];
+    media.into_iter().all(|medium| std::sync::Arc::ptr_eq(medium, &run.field))
 }
 
 /// A task that is open, looked at, and maybe worked on to its end.
-fn opened(name: &str, to_its_end: bool) -> Forming {
+fn opened(name: &str, to_its_end: bool) -> GrinView {
     let mut session = Session::new(blank(), || {}).unwrap();
-    session.apply(Command::Form(Form::Watch(true)));
-    session.apply(Command::Form(Form::Builtin(name.to_owned())));
+    session.apply(Command::Grin(GrinCommand::SetActive(true)));
+    session.apply(Command::Grin(GrinCommand::OpenBuiltin(name.to_owned())));
     wait(&mut session, "the opening", |forming| forming.run.is_some());
     if to_its_end {
-        session.apply(Command::Form(Form::Start));
+        session.apply(Command::Grin(GrinCommand::Start));
         wait(&mut session, "the end", |forming| {
-            forming.run.as_ref().is_some_and(|run| run.standing == Standing::Finished)
+            forming.run.as_ref().is_some_and(|run| run.status == RunStatus::Finished)
         });
     }
     wait(&mut session, "the view", is_seen);
-    session.view().forming
+    session.view().grin
 }
 
 #[test]
 fn without_a_task_the_panel_says_what_to_do_and_asks_for_nothing() {
-    let mut harness = panel(Forming::default());
+    let mut harness = panel(GrinView::default());
     harness.get_by_label_contains("Open a task and press Optimize");
     assert_eq!(harness.state().wishes, []);
     assert!(harness.query_by_label("Optimize").is_none());
     press(&mut harness, "Luneburg lens as a function of the radius");
     press(&mut harness, "Open file…");
-    assert_eq!(asked(&harness), [Form::Builtin("luneburg-radial".into()), Form::Open(None)]);
+    assert_eq!(
+        asked(&harness),
+        [GrinCommand::OpenBuiltin("luneburg-radial".into()), GrinCommand::OpenFile(None)]
+    );
 
-    let failed = Forming { failed: Some("a.json: found a lens".into()), ..Forming::default() };
+    let failed = GrinView { error: Some("a.json: found a lens".into()), ..GrinView::default() };
     panel(failed).get_by_label("A.json: found a lens");
-    let opening = Forming { opening: true, ..Forming::default() };
+    let opening = GrinView { opening: true, ..GrinView::default() };
     panel(opening).get_by_label("Opening…");
 }
 
 #[test]
 fn a_task_is_worked_on_turned_and_saved_by_buttons() {
     let ready = opened("luneburg-radial", false);
-    let sight = ready.sight;
+    let sight = ready.slice_settings;
     let mut harness = panel(ready.clone());
     harness.get_by_label_contains("Ready: at most 120 steps, 6, 9 nodes");
     harness.get_by_label_contains("at y = 0 mm: index");
@@ -104,26 +110,35 @@ fn a_task_is_worked_on_turned_and_saved_by_buttons() {
     for button in ["Optimize", "Save volume…", "x", "Close"] {
         press(&mut harness, button);
     }
-    let turned = Sight { plane: Plane { axis: Axis::X, depth: 0.0 }, ..sight };
-    let save = Form::Save { path: None, nodes: 65 };
-    assert_eq!(asked(&harness), [Form::Start, save, Form::Look(turned), Form::Close]);
+    let turned = SliceSettings { plane: SlicePlane { axis: SpatialAxis::X, depth: 0.0 }, ..sight };
+    let save = GrinCommand::Save { path: None, nodes: 65 };
+    assert_eq!(
+        asked(&harness),
+        [GrinCommand::Start, save, GrinCommand::SetSlice(turned), GrinCommand::Close]
+    );
 
     let mut harness = panel(ready.clone());
     harness.get_by_role_and_label(Role::Slider, "Depth of the slice").set_value_accesskit(0.25);
     harness.run();
     let moved = asked(&harness);
-    let [Form::Look(Sight { plane: Plane { axis: Axis::Y, depth }, .. })] = &moved[..] else {
+    let [
+        GrinCommand::SetSlice(SliceSettings {
+            plane: SlicePlane { axis: SpatialAxis::Y, depth },
+            ..
+        }),
+    ] = &moved[..]
+    else {
         panic!("{moved:?}");
     };
     assert!((depth - 0.25).abs() < 1e-9, "{depth}");
 
     for (standing, buttons) in [
-        (Standing::Running, [("Pause", Form::Pause), ("Stop", Form::Stop)]),
-        (Standing::Paused, [("Go on", Form::Resume), ("Stop", Form::Stop)]),
+        (RunStatus::Running, [("Pause", GrinCommand::Pause), ("Stop", GrinCommand::Stop)]),
+        (RunStatus::Paused, [("Go on", GrinCommand::Resume), ("Stop", GrinCommand::Stop)]),
     ] {
         let mut held = opened("luneburg-radial", true);
         let mut run = held.run.as_deref().unwrap().clone();
-        run.standing = standing;
+        run.status = standing;
         held.run = Some(run.into());
         for (button, form) in buttons {
             let mut harness = panel(held.clone());
@@ -160,9 +175,11 @@ fn a_found_field_has_its_numbers_curves_and_places() {
 
     harness.get_by_label("Quantity of the slice").click();
     harness.run();
-    press(&mut harness, Quantity::Error.name());
-    let [Form::Look(sight)] = asked(&harness)[..] else { panic!("{:?}", asked(&harness)) };
-    assert_eq!(sight.quantity, Quantity::Error);
+    press(&mut harness, SliceQuantity::Error.name());
+    let [GrinCommand::SetSlice(sight)] = asked(&harness)[..] else {
+        panic!("{:?}", asked(&harness))
+    };
+    assert_eq!(sight.quantity, SliceQuantity::Error);
 }
 
 #[test]

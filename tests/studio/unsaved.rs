@@ -2,18 +2,18 @@
 
 use std::time::Duration;
 
-use aplanat::session::{Command, Form, Formation, Session, Standing, blank};
+use aplanat::session::{Command, GrinCommand, GrinRun, RunStatus, Session, blank};
 use aplanat::studio::Studio;
-use aplanat::studio::draw::Backing;
-use aplanat::studio::shell::Memory;
+use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::shell::Persistence;
 use eframe::egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 type Window = Harness<'static, Studio>;
 
-fn run(harness: &Window) -> Option<std::sync::Arc<Formation>> {
-    harness.state().session().view().forming.run
+fn run(harness: &Window) -> Option<std::sync::Arc<GrinRun>> {
+    harness.state().session().view().grin.run
 }
 
 fn wait(harness: &mut Window, what: &str, so: impl Fn(&Window) -> bool) {
@@ -27,22 +27,22 @@ fn wait(harness: &mut Window, what: &str, so: impl Fn(&Window) -> bool) {
     panic!("{what} never happened");
 }
 
-fn tell(harness: &mut Window, form: Form) {
-    harness.state_mut().session_mut().apply(Command::Form(form));
+fn tell(harness: &mut Window, form: GrinCommand) {
+    harness.state_mut().session_mut().apply(Command::Grin(form));
 }
 
 /// A window in which a field has been formed.
 fn formed() -> Window {
     let session = Session::new(blank(), || {}).unwrap();
-    let studio = Studio::new(session, Backing::Software, Memory::None, None);
+    let studio = Studio::new(session, RenderBackend::Software, Persistence::Disabled, None);
     let builder = Harness::builder().with_size([1280.0, 800.0]);
     let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
     harness.get_by_label("GRIN slice").click();
-    tell(&mut harness, Form::Builtin("luneburg-radial".to_owned()));
+    tell(&mut harness, GrinCommand::OpenBuiltin("luneburg-radial".to_owned()));
     wait(&mut harness, "the opening", |harness| run(harness).is_some());
     assert!(!run(&harness).unwrap().is_unsaved(), "nothing has been formed yet");
-    tell(&mut harness, Form::Start);
-    let is_done = |harness: &Window| run(harness).unwrap().standing == Standing::Finished;
+    tell(&mut harness, GrinCommand::Start);
+    let is_done = |harness: &Window| run(harness).unwrap().status == RunStatus::Finished;
     wait(&mut harness, "the end", is_done);
     assert!(run(&harness).unwrap().is_unsaved());
     harness
@@ -65,7 +65,7 @@ fn a_field_is_not_lost_without_a_question() {
     press(&mut harness, "Don't save");
     assert!(harness.query_by_label("Save the field first?").is_none());
     wait(&mut harness, "the beginning", |harness| {
-        harness.state().session().view().forming.pending.is_none()
+        harness.state().session().view().grin.pending.is_none()
     });
 }
 
@@ -73,7 +73,7 @@ fn a_field_is_not_lost_without_a_question() {
 fn a_field_that_is_in_a_file_is_replaced_at_once() {
     let mut harness = formed();
     let path = std::env::temp_dir().join(format!("aplanat-{}-field.npz", std::process::id()));
-    tell(&mut harness, Form::Save { path: Some(path.clone()), nodes: 5 });
+    tell(&mut harness, GrinCommand::Save { path: Some(path.clone()), nodes: 5 });
     wait(&mut harness, "the file", |harness| !run(harness).unwrap().is_unsaved());
     std::fs::remove_file(path).unwrap();
     press(&mut harness, "Start over");

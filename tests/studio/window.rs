@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use aplanat::experiments::{self, Effort, Experiment};
-use aplanat::session::{Command, Session, Stage};
+use aplanat::session::{Command, ExperimentStatus, Session};
 use aplanat::studio::Studio;
-use aplanat::studio::draw::Backing;
-use aplanat::studio::shell::Memory;
+use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::shell::Persistence;
 use aplanat::studio::theme;
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
@@ -20,8 +20,8 @@ const PAUSE: Duration = Duration::from_millis(5);
 
 fn window() -> Harness<'static, Studio> {
     let session = Session::new(double_gauss(), || {}).unwrap();
-    let studio = Studio::new(session, Backing::Software, Memory::None, None);
-    let builder = Harness::builder().with_size([1280.0, 800.0]).with_context_setup(theme::dress);
+    let studio = Studio::new(session, RenderBackend::Software, Persistence::Disabled, None);
+    let builder = Harness::builder().with_size([1280.0, 800.0]).with_context_setup(theme::apply);
     let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
     settle(&mut harness);
     harness
@@ -146,8 +146,8 @@ fn a_search_bends_the_shown_lens_and_its_result_is_one_step() {
     harness.run_steps(3);
     wait(&mut harness, "a better spot", |harness| {
         let view = harness.state().session().view();
-        let steps = view.search.and_then(|search| search.progress.as_ref().map(|p| p.step));
-        view.preview.is_some() && steps.unwrap_or(0) > 3
+        let steps = view.optimization.and_then(|search| search.progress.as_ref().map(|p| p.step));
+        view.preview_results.is_some() && steps.unwrap_or(0) > 3
     });
     harness.get_by_label("Stop").click();
     wait(&mut harness, "the end", |harness| {
@@ -173,12 +173,12 @@ fn a_search_over_structure_shows_its_lenses_and_one_is_taken_as_one_step() {
     button.click();
     wait(&mut harness, "a card", |harness| {
         let cards = harness.query_all_by_label_contains(" elements, ");
-        let moves = harness.state().session().view().explorations.run;
+        let moves = harness.state().session().view().structure_search.run;
         cards.count() > 0 && moves.is_some_and(|run| run.statistics.moves > 8)
     });
     harness.get_by_label("Follow the search").click();
     wait(&mut harness, "the lens of the chain", |harness| {
-        harness.state().session().view().preview.is_some()
+        harness.state().session().view().preview_results.is_some()
     });
     assert!(!harness.state().session().is_dirty());
     harness.get_by_label("Stop").click();
@@ -215,7 +215,7 @@ fn pupils_are_computed_while_they_are_shown_and_follow_an_edit() {
     let mut harness = window();
     let pupils = |harness: &Harness<'_, Studio>| {
         let results = harness.state().session().results().unwrap();
-        results.numbers.as_ref().unwrap().pupils.is_some()
+        results.analyses.as_ref().unwrap().pupils.is_some()
     };
     assert!(!pupils(&harness), "what is not shown is not computed");
     harness.get_by_label("Pupil").click();
@@ -251,15 +251,20 @@ fn an_experiment_runs_from_the_menu_and_shows_its_claims_and_pictures() {
         harness.query_by_label("Stopped before it had found anything.").is_some()
     });
     let effort = Effort::Small;
-    harness.state_mut().session_mut().apply(Command::Experiment { id: study.id.into(), effort });
+    harness
+        .state_mut()
+        .session_mut()
+        .apply(Command::StartExperiment { id: study.id.into(), effort });
     wait(&mut harness, "the outcome", |harness| {
         harness.query_by_label_contains("claims hold").is_some()
     });
     harness.run_steps(3);
     let count = harness.get_all_by_label("holds").count();
     let view = harness.state().session().view();
-    let Some(Stage::Done(report)) = view.trial.as_deref().map(|trial| trial.stage.clone()) else {
-        panic!("{:?}", view.trial);
+    let Some(ExperimentStatus::Done(report)) =
+        view.experiment.as_deref().map(|trial| trial.status.clone())
+    else {
+        panic!("{:?}", view.experiment);
     };
     assert_eq!(count, report.outcome.claims.len());
     let pictures = harness.get_all_by_label_contains("of the experiment").count();
@@ -278,16 +283,16 @@ fn nothing_repaints_while_nothing_changes() {
 #[test]
 fn a_field_is_looked_at_only_while_its_panel_is_shown() {
     let mut harness = window();
-    let forming = |harness: &Harness<'_, Studio>| harness.state().session().view().forming;
-    assert!(!forming(&harness).watched && forming(&harness).run.is_none());
+    let forming = |harness: &Harness<'_, Studio>| harness.state().session().view().grin;
+    assert!(!forming(&harness).is_active && forming(&harness).run.is_none());
     harness.get_by_label("GRIN slice").click();
     harness.run_steps(3);
-    assert!(forming(&harness).watched);
+    assert!(forming(&harness).is_active);
     harness.get_by_label("Luneburg lens as a function of the radius").click();
     wait(&mut harness, "a slice", |harness| forming(harness).slice.is_some());
     harness.run_steps(2);
     harness.get_by_label_contains("Slice of Luneburg");
     harness.get_by_label("Layout").click();
     harness.run_steps(3);
-    assert!(!forming(&harness).watched && forming(&harness).run.is_some(), "it stays open");
+    assert!(!forming(&harness).is_active && forming(&harness).run.is_some(), "it stays open");
 }

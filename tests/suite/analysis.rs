@@ -2,15 +2,15 @@
 
 use crate::reference::{Reference, Worst, count, lenses, number, numbers};
 use aplanat::analysis::{
-    Form, contrast, distortion, fan, field_curvature, illumination, path_differences, pupil, spot,
+    PupilShape, distortion, fan, field_curvature, illumination, mtf, path_differences, pupil, spot,
     wavefront,
 };
-use aplanat::lens::{Field, FieldKind};
+use aplanat::lens::{FieldKind, FieldPoint};
 use aplanat::paraxial::{Beam, first_order, seidel};
-use aplanat::pupil::{Accuracy, Bench};
+use aplanat::pupil::{Accuracy, RayModel};
 use aplanat::trace::{Fate, Tracer};
 
-const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, most_rays: 400_000 };
+const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, max_rays: 400_000 };
 
 #[test]
 fn reference_integrals() {
@@ -21,8 +21,8 @@ fn reference_integrals() {
             let got = spot(&bench, field, ACCURACY).unwrap();
             for exact in exact["per_wavelength"].as_array().unwrap() {
                 let w = count(&exact["w"]);
-                let color = got.colors[w].unwrap();
-                let mtf = contrast(&bench, field, w, &[10.0, 30.0], ACCURACY).unwrap();
+                let color = got.channels[w].unwrap();
+                let mtf = mtf(&bench, field, w, &[10.0, 30.0], ACCURACY).unwrap();
                 for (got, name) in [
                     (color.rms, "rms"),
                     (color.centroid[0], "centroid_x"),
@@ -48,13 +48,13 @@ fn reference_vignetted() {
         let (bench, mut worst) = (lens.clipped_bench(), Worst::default());
         let w = lens.primary();
         let light = illumination(&bench, w, ACCURACY);
-        let pupil = bench.first.entrance_pupil.diameter.unwrap();
+        let pupil = bench.first_order.entrance_pupil.diameter.unwrap();
         let scale = (pupil / number(&lens.data["aperture"]["epd"])).powi(2);
         for exact in lens.data["vignetted"]["fields"].as_array().unwrap() {
             let f = count(&exact["f"]);
             let field = bench.fields[f];
             if exact["no_light"].as_bool() == Some(true) {
-                assert!(light[f].dark.is_some() && light[f].cone.value == 0.0, "{}", lens.id());
+                assert!(light[f].error.is_some() && light[f].cone.value == 0.0, "{}", lens.id());
                 continue;
             }
             let mut note = |name: &str, got: aplanat::analysis::Estimate, factor: f64| {
@@ -71,12 +71,12 @@ fn reference_vignetted() {
             };
             note("relative_illumination", light[f].relative.unwrap(), 1.0);
             note("solid_angle_projected", light[f].cone, 1.0);
-            let got = spot(&bench, field, ACCURACY).unwrap().colors[w].unwrap();
+            let got = spot(&bench, field, ACCURACY).unwrap().channels[w].unwrap();
             note("ep_area_unit_disc", got.area, scale);
             note("unvignetted_fraction", got.area, scale / std::f64::consts::PI);
             note("rms", got.rms, 1.0);
             note("centroid_y", got.centroid[1], 1.0);
-            let mtf = contrast(&bench, field, w, &[30.0], ACCURACY).unwrap();
+            let mtf = mtf(&bench, field, w, &[30.0], ACCURACY).unwrap();
             note("gmtf_t30", mtf[0].tangential, 1.0);
         }
         worst.check(&format!("vignetted {}", lens.id()), 1.0);
@@ -85,8 +85,8 @@ fn reference_vignetted() {
 
 /// Sixteen times the rounding of the path along the axis, in wavelengths: long systems have no
 /// better path differences.
-fn path_rounding(bench: &Bench, wavelength: usize) -> f64 {
-    let color = &bench.colors[wavelength];
+fn path_rounding(bench: &RayModel, wavelength: usize) -> f64 {
+    let color = &bench.channels[wavelength];
     let gap = |s: &aplanat::lens::Surface<f64>| s.index * s.thickness.abs();
     let path: f64 = color.system.surfaces.iter().map(gap).sum();
     16.0 * 0.5 * f64::EPSILON * path / (color.um * 1e-3)
@@ -143,14 +143,14 @@ fn reference_chief_rays() {
 }
 
 /// Every analysis of a field, for a lens that lets nothing of it through.
-fn all_dark(bench: &Bench, field: Field) {
+fn all_dark(bench: &RayModel, field: FieldPoint) {
     let accuracy = Accuracy::default();
     assert!(spot(bench, field, accuracy).is_err());
-    assert!(contrast(bench, field, 0, &[10.0], accuracy).is_err());
+    assert!(mtf(bench, field, 0, &[10.0], accuracy).is_err());
     assert!(wavefront(bench, field, 0, accuracy).is_err());
-    let light = illumination(&Bench { fields: vec![field], ..bench.clone() }, 0, accuracy);
+    let light = illumination(&RayModel { fields: vec![field], ..bench.clone() }, 0, accuracy);
     assert_eq!(light[0].cone.value, 0.0);
-    assert!(light[0].dark.is_some() && light[0].relative.is_none());
+    assert!(light[0].error.is_some() && light[0].relative.is_none());
     if let Ok(fans) = fan(bench, field, 11) {
         assert!(fans.iter().all(|f| f.tangential.iter().all(|point| point.error.is_none())));
     }
@@ -169,9 +169,9 @@ fn a_field_without_light_says_so_in_every_analysis() {
     let angles = |lens: &&Reference| lens.field_kind() == FieldKind::Angle;
     for lens in lenses().iter().filter(angles).filter(behind) {
         for angle in [75.0, 90.0, -150.0] {
-            let field = Field { x: 0.0, y: angle, weight: 1.0 };
+            let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
             let mut bench = lens.clipped_bench();
-            for color in &mut bench.colors {
+            for color in &mut bench.channels {
                 color.system.surfaces[0].semi_diameter = 1e-9;
                 color.tracer = Tracer::new(&color.system).unwrap();
             }
@@ -185,7 +185,7 @@ fn a_spot_out_of_focus_is_the_spot_of_the_moved_image_plane() {
     let lens = lenses().into_iter().find(|lens| lens.id() == "cooke_triplet").unwrap();
     let at = |defocus: f64| {
         let mut bench = lens.open_bench();
-        for color in &mut bench.colors {
+        for color in &mut bench.channels {
             let last = color.system.surfaces.len() - 2;
             color.system.surfaces[last].thickness += defocus;
             color.tracer = Tracer::new(&color.system).unwrap();
@@ -196,25 +196,26 @@ fn a_spot_out_of_focus_is_the_spot_of_the_moved_image_plane() {
     for defocus in [-0.3, 0.1, 0.4] {
         let moved = at(defocus);
         assert!((focused.rms_at(defocus) / moved.rms.value - 1.0).abs() < 1e-9, "{defocus}");
-        let (color, moved) = (focused.colors[1].unwrap(), moved.colors[1].unwrap());
+        let (color, moved) = (focused.channels[1].unwrap(), moved.channels[1].unwrap());
         assert!((color.rms_at(defocus) / moved.rms.value - 1.0).abs() < 1e-9, "{defocus}");
     }
     let best = focused.best_focus().unwrap();
     assert!(at(best).best_focus().unwrap().abs() < 1e-6);
-    let best = focused.colors[1].unwrap().best_focus().unwrap();
-    assert!(at(best).colors[1].unwrap().best_focus().unwrap().abs() < 1e-6);
+    let best = focused.channels[1].unwrap().best_focus().unwrap();
+    assert!(at(best).channels[1].unwrap().best_focus().unwrap().abs() < 1e-6);
 }
 
 #[test]
 fn field_curvature_near_the_axis_follows_the_seidel_sums() {
     let lens = lenses().into_iter().find(|lens| lens.id() == "cooke_triplet").unwrap();
     let bench = lens.open_bench();
-    let system = &bench.colors[bench.primary].system;
+    let system = &bench.channels[bench.primary].system;
     let beam = Beam { edge: 0.1, ..bench.beam };
     let first = first_order(system, &beam).unwrap();
     let sums = seidel(system, &first, None).unwrap().total;
-    let at =
-        |y: f64| field_curvature(&bench, Field { x: 0.0, y, weight: 1.0 }, bench.primary).unwrap();
+    let at = |y: f64| {
+        field_curvature(&bench, FieldPoint { x: 0.0, y, weight: 1.0 }, bench.primary).unwrap()
+    };
     let (axis, edge) = (at(0.0), at(0.1));
     // Longitudinal shifts −(S3 + S4)/(2 n' u'²) and −(3 S3 + S4)/(2 n' u'²); Welford 8.
     let na2 = first.marginal.slopes.last().unwrap().powi(2);
@@ -255,35 +256,39 @@ fn bundled(name: &str) -> aplanat::lens::Lens {
 #[test]
 fn the_pupil_of_a_dark_field_tells_which_surface_ends_most_rays() {
     let mut lens = bundled("double_gauss_rudolph_50");
-    let field = Field { x: 0.0, y: 40.0, weight: 1.0 };
+    let field = FieldPoint { x: 0.0, y: 40.0, weight: 1.0 };
     lens.fields.values.push(field);
-    let bench = Bench::of(&lens, 0).unwrap();
+    let bench = RayModel::from_lens(&lens, 0).unwrap();
     let dark = pupil(&bench, field, bench.primary, Accuracy::default());
-    let Form::Dark(loss) = dark.form else { panic!("{:?}", dark.form) };
-    assert_eq!((loss.most, loss.rays, loss.chief), (Some(Fate::Clipped(0)), 127, true));
-    let whole = pupil(&bench, Field { y: 0.0, ..field }, bench.primary, Accuracy::default());
-    let share = dark.share_of(whole.light.unwrap().area).unwrap();
+    let PupilShape::Dark(loss) = dark.shape else { panic!("{:?}", dark.shape) };
+    assert_eq!(
+        (loss.main_fate, loss.rays, loss.includes_chief),
+        (Some(Fate::Clipped(0)), 127, true)
+    );
+    let whole = pupil(&bench, FieldPoint { y: 0.0, ..field }, bench.primary, Accuracy::default());
+    let share = dark.share_of(whole.extent.unwrap().area).unwrap();
     assert_eq!(share.value, 0.0);
-    assert!(dark.light.is_none());
+    assert!(dark.extent.is_none());
 }
 
 #[test]
 fn wide_pupils_are_compared_across_the_beam() {
-    let bench = Bench::of(&bundled("fisheye_minolta_16_f28"), 0).unwrap();
+    let bench = RayModel::from_lens(&bundled("fisheye_minolta_16_f28"), 0).unwrap();
     let seen = |y: f64| {
-        let field = Field { x: 0.0, y, weight: 1.0 };
+        let field = FieldPoint { x: 0.0, y, weight: 1.0 };
         pupil(&bench, field, bench.primary, Accuracy::default())
     };
-    let axis = seen(0.0).light.unwrap().area;
+    let axis = seen(0.0).extent.unwrap().area;
     // The aperture is f/2.8 at 16 mm, and no surface clips on the axis.
-    let exact = std::f64::consts::PI * (bench.first.entrance_pupil.diameter.unwrap() / 2.0).powi(2);
+    let exact =
+        std::f64::consts::PI * (bench.first_order.entrance_pupil.diameter.unwrap() / 2.0).powi(2);
     assert!((axis.value / exact - 1.0).abs() < 1e-12);
     let mut before = 1.0 + 1e-9;
     for angle in [20.0, 45.0, 80.0, 92.0] {
         let pupil = seen(angle);
         let share = pupil.share_of(axis).unwrap();
         println!("{angle} degrees: {:.4} of the pupil on the axis", share.value);
-        assert!(pupil.across && share.value < before && share.value > 0.1);
+        assert!(pupil.across_beam && share.value < before && share.value > 0.1);
         before = share.value;
     }
 }

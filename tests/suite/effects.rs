@@ -1,17 +1,18 @@
 //! What the plan leaves out costs nothing and changes no more than it said, on every lens.
 
-use aplanat::analysis::{Dark, Spot, spots};
+use aplanat::analysis::{AnalysisError, Spot, spots};
 use aplanat::effects::{
-    Choice, Choices, Decision, Effect, Plan, Task, bench, plan, simplify, survey,
+    Effect, EffectDecision, EffectOverride, EffectOverrides, EffectPlan, TracePurpose,
+    build_ray_model, measure_effects, plan, simplify,
 };
 use aplanat::files;
-use aplanat::lens::{Field, FieldKind, Lens, Object, Row, Shape};
-use aplanat::pupil::{Accuracy, Bench};
+use aplanat::lens::{FieldKind, FieldPoint, Lens, Object, Row, Shape};
+use aplanat::pupil::{Accuracy, RayModel};
 
-const TASK: Task = Task::Spot(1e-3);
+const TASK: TracePurpose = TracePurpose::Spot(1e-3);
 
 fn library() -> impl Iterator<Item = (&'static str, Lens)> {
-    files::library()
+    files::bundled_lenses()
         .iter()
         .map(|lens| (lens.name, files::native::read(lens.text, lens.name).unwrap()))
 }
@@ -20,21 +21,21 @@ fn lens(name: &str) -> Lens {
     library().find(|(other, _)| *other == name).unwrap().1
 }
 
-fn planned(lens: &Lens, zoom: usize, task: Task, choices: &Choices) -> Plan {
-    plan(&survey(lens, zoom).unwrap(), task, choices)
+fn planned(lens: &Lens, zoom: usize, task: TracePurpose, choices: &EffectOverrides) -> EffectPlan {
+    plan(&measure_effects(lens, zoom).unwrap(), task, choices)
 }
 
-fn forced(effect: Effect, choice: Choice) -> Choices {
-    Choices::default().with(effect, choice)
+fn forced(effect: Effect, choice: EffectOverride) -> EffectOverrides {
+    EffectOverrides::default().with(effect, choice)
 }
 
-fn exact(bench: &Bench) -> Vec<Result<Spot, Dark>> {
+fn exact(bench: &RayModel) -> Vec<Result<Spot, AnalysisError>> {
     spots(bench, Accuracy { tolerance: 1e-4, ..Accuracy::default() })
 }
 
 /// The largest change of the RMS radius of any field, in mm, and the errors of both; `None` where
 /// a field is dark in one of the two.
-fn change(a: &Bench, b: &Bench) -> Option<(f64, f64)> {
+fn change(a: &RayModel, b: &RayModel) -> Option<(f64, f64)> {
     let (mut change, mut error) = (0.0f64, 0.0f64);
     for pair in exact(a).iter().zip(exact(b)) {
         match pair {
@@ -51,23 +52,24 @@ fn change(a: &Bench, b: &Bench) -> Option<(f64, f64)> {
 
 /// How many stop radii the chief ray of the farthest field crosses the stop from where the other
 /// does.
-fn chief_change(a: &Bench, b: &Bench) -> f64 {
-    let edge = |bench: &Bench| {
-        let field = Field { x: 0.0, y: bench.beam.edge, weight: 1.0 };
-        bench.launch(field, bench.primary).unwrap().at_stop([0.0, 0.0]).unwrap()
+fn chief_change(a: &RayModel, b: &RayModel) -> f64 {
+    let edge = |bench: &RayModel| {
+        let field = FieldPoint { x: 0.0, y: bench.beam.edge, weight: 1.0 };
+        bench.launch(field, bench.primary).unwrap().stop_point([0.0, 0.0]).unwrap()
     };
     let ([ax, ay], [bx, by]) = (edge(a), edge(b));
     (ax - bx).hypot(ay - by) / a.stop_radius()
 }
 
-fn check(name: &str, zoom: usize, lens: &Lens, auto: &Plan, decision: &Decision) {
+fn check(name: &str, zoom: usize, lens: &Lens, auto: &EffectPlan, decision: &EffectDecision) {
     let effect = decision.effect;
-    let forced = planned(lens, zoom, TASK, &forced(effect, Choice::On));
+    let forced = planned(lens, zoom, TASK, &forced(effect, EffectOverride::On));
     let same = forced.plain == auto.plain && forced.open == auto.open;
     if same && Effect::ALL.iter().all(|e| forced.computes(*e) == auto.computes(*e)) {
         return; // It is computed anyway.
     }
-    let (on, off) = (bench(lens, zoom, &forced).unwrap(), bench(lens, zoom, auto).unwrap());
+    let (on, off) =
+        (build_ray_model(lens, zoom, &forced).unwrap(), build_ray_model(lens, zoom, auto).unwrap());
     if effect == Effect::Aiming {
         let change = chief_change(&on, &off);
         assert!(change <= decision.left * (1.0 + 1e-9), "{name} aiming: {change}");
@@ -85,7 +87,7 @@ fn check(name: &str, zoom: usize, lens: &Lens, auto: &Plan, decision: &Decision)
 fn forcing_an_effect_on_changes_no_more_than_the_plan_said() {
     for (name, lens) in library() {
         for zoom in 0..lens.zoom_positions() {
-            let auto = planned(&lens, zoom, TASK, &Choices::default());
+            let auto = planned(&lens, zoom, TASK, &EffectOverrides::default());
             println!("{name} zoom {zoom}");
             for decision in &auto.decisions {
                 println!(
@@ -103,7 +105,7 @@ fn forcing_an_effect_on_changes_no_more_than_the_plan_said() {
     }
 }
 
-fn effect_name(decision: &Decision) -> &'static str {
+fn effect_name(decision: &EffectDecision) -> &'static str {
     decision.effect.name()
 }
 
@@ -112,10 +114,11 @@ fn forcing_an_effect_off_changes_no_more_than_its_number() {
     let mut checked = 0;
     for (name, lens) in library() {
         for effect in [Effect::Dispersion, Effect::Asphere, Effect::FiniteObject] {
-            let on = planned(&lens, 0, TASK, &forced(effect, Choice::On));
-            let off = planned(&lens, 0, TASK, &forced(effect, Choice::Off));
-            let error = off.of(effect).unwrap().left;
-            let (on, off) = (bench(&lens, 0, &on).unwrap(), bench(&lens, 0, &off).unwrap());
+            let on = planned(&lens, 0, TASK, &forced(effect, EffectOverride::On));
+            let off = planned(&lens, 0, TASK, &forced(effect, EffectOverride::Off));
+            let error = off.decision(effect).unwrap().left;
+            let (on, off) =
+                (build_ray_model(&lens, 0, &on).unwrap(), build_ray_model(&lens, 0, &off).unwrap());
             if !error.is_finite() {
                 continue;
             }
@@ -132,25 +135,26 @@ fn forcing_an_effect_off_changes_no_more_than_its_number() {
 fn an_effect_that_is_left_out_is_not_there() {
     let um = 0.5875618;
     let phone = lens("phone_us7558005_1");
-    let choices = forced(Effect::Asphere, Choice::Off).with(Effect::Clipping, Choice::On);
+    let choices =
+        forced(Effect::Asphere, EffectOverride::Off).with(Effect::Clipping, EffectOverride::On);
     let off = planned(&phone, 0, TASK, &choices);
     let mut plain = phone.clone();
     plain.surfaces.iter_mut().for_each(|row| row.asphere.clear());
-    let mut system = phone.system(0, um).unwrap();
+    let mut system = phone.resolve(0, um).unwrap();
     simplify(&mut system, &off);
     assert!(system.surfaces.iter().all(|s| !matches!(s.shape, Shape::Asphere { .. })));
-    assert_eq!(system, plain.system(0, um).unwrap());
+    assert_eq!(system, plain.resolve(0, um).unwrap());
 
     let gauss = lens("double_gauss_rudolph_50");
-    let off = planned(&gauss, 0, TASK, &forced(Effect::Clipping, Choice::Off));
+    let off = planned(&gauss, 0, TASK, &forced(Effect::Clipping, EffectOverride::Off));
     let mut open = gauss.clone();
     open.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
-    let mut system = gauss.system(0, um).unwrap();
+    let mut system = gauss.resolve(0, um).unwrap();
     simplify(&mut system, &off);
-    assert_eq!(system, open.system(0, um).unwrap());
+    assert_eq!(system, open.resolve(0, um).unwrap());
 
-    let off = planned(&gauss, 0, TASK, &forced(Effect::Dispersion, Choice::Off));
-    assert_eq!(bench(&gauss, 0, &off).unwrap().colors.len(), 1);
+    let off = planned(&gauss, 0, TASK, &forced(Effect::Dispersion, EffectOverride::Off));
+    assert_eq!(build_ray_model(&gauss, 0, &off).unwrap().channels.len(), 1);
 }
 
 #[test]
@@ -158,14 +162,14 @@ fn a_figuring_that_moves_no_ray_is_left_out_and_one_that_does_is_not() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[3].asphere = vec![1e-14];
     lens.surfaces[8].asphere = vec![1e-6];
-    let auto = planned(&lens, 0, TASK, &Choices::default());
-    let asphere = auto.of(Effect::Asphere).unwrap();
+    let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
+    let asphere = auto.decision(Effect::Asphere).unwrap();
     assert_eq!((&auto.plain, &asphere.surfaces), (&vec![3], &vec![8]));
     assert!(asphere.left > 0.0 && asphere.left < asphere.limit, "{asphere:?}");
     check("figured double Gauss", 0, &lens, &auto, asphere);
-    let traced = planned(&lens, 0, Task::Trace, &Choices::default());
+    let traced = planned(&lens, 0, TracePurpose::Trace, &EffectOverrides::default());
     assert!(traced.plain.len() < 2, "a ray as such is exact");
-    let drawn = planned(&lens, 0, Task::Layout, &Choices::default());
+    let drawn = planned(&lens, 0, TracePurpose::Layout, &EffectOverrides::default());
     assert!(!drawn.computes(Effect::Dispersion), "nobody sees colours in a drawing of the lens");
 }
 
@@ -174,10 +178,10 @@ fn a_far_object_is_at_infinity_and_a_near_one_is_not() {
     let mut lens = lens("double_gauss_rudolph_50");
     for (distance, finite) in [(1e9, false), (500.0, true)] {
         lens.object = Object::Finite(distance);
-        let auto = planned(&lens, 0, TASK, &Choices::default());
-        let object = auto.of(Effect::FiniteObject).unwrap();
+        let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
+        let object = auto.decision(Effect::FiniteObject).unwrap();
         assert_eq!(object.computed, finite, "{object:?}");
-        let bench = bench(&lens, 0, &auto).unwrap();
+        let bench = build_ray_model(&lens, 0, &auto).unwrap();
         assert_eq!(bench.beam.object == Object::Infinity, !finite);
         check("double Gauss", 0, &lens, &auto, object);
     }
@@ -188,9 +192,9 @@ fn a_far_object_is_at_infinity_and_a_near_one_is_not() {
 fn a_rim_that_no_ray_reaches_goes_and_the_others_stay() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(50.0);
-    let auto = planned(&lens, 0, TASK, &Choices::default());
+    let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
     assert!(auto.open.contains(&0), "{:?}", auto.open);
-    let clipping = auto.of(Effect::Clipping).unwrap();
+    let clipping = auto.decision(Effect::Clipping).unwrap();
     assert!(clipping.computed && !clipping.surfaces.contains(&0), "{clipping:?}");
 }
 
@@ -198,9 +202,9 @@ fn a_rim_that_no_ray_reaches_goes_and_the_others_stay() {
 fn the_plan_aims_where_the_pupil_does() {
     for (name, lens) in library() {
         for zoom in 0..lens.zoom_positions() {
-            let auto = planned(&lens, zoom, TASK, &Choices::default());
-            let aiming = bench(&lens, zoom, &auto).unwrap().aiming;
-            assert_eq!(aiming, Bench::of(&lens, zoom).unwrap().aiming, "{name}");
+            let auto = planned(&lens, zoom, TASK, &EffectOverrides::default());
+            let aiming = build_ray_model(&lens, zoom, &auto).unwrap().aiming;
+            assert_eq!(aiming, RayModel::from_lens(&lens, zoom).unwrap().aiming, "{name}");
         }
     }
 }
@@ -209,10 +213,10 @@ fn the_plan_aims_where_the_pupil_does() {
 fn a_plan_survives_lenses_through_which_nothing_passes() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(0.0);
-    let auto = planned(&lens, 0, TASK, &Choices::default());
+    let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
     assert_eq!(auto.decisions.len(), Effect::ALL.len());
     lens.surfaces.push(Row { curvature: 10.0, thickness: -5.0, ..Row::default() });
-    let auto = planned(&lens, 0, TASK, &Choices::default());
+    let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
     let text = serde_json::to_string(&auto).unwrap();
     assert!(text.contains("\"effect\":\"dispersion\""), "{text}");
 }

@@ -1,12 +1,14 @@
 //! Every experiment at small effort: its claims hold, its data and pictures are there, it can be
 //! stopped; and the checks can fail.
 
-use aplanat::experiments::{self, ALL, Cell, Effort, Ended, Outcome, Table};
+use aplanat::experiments::{
+    self, ALL, DataTable, Effort, ExperimentError, ExperimentOutcome, TableCell,
+};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 /// Runs an experiment and checks what all of them have in common.
-fn outcome(id: &str) -> Outcome {
+fn outcome(id: &str) -> ExperimentOutcome {
     let mut last = 0.0;
     let study = experiments::find(id).unwrap();
     let found = (study.run)(Effort::Small, &mut |progress| {
@@ -34,11 +36,11 @@ fn outcome(id: &str) -> Outcome {
 }
 
 /// A column of a table, as numbers.
-fn column(table: &Table, name: &str) -> Vec<f64> {
+fn column(table: &DataTable, name: &str) -> Vec<f64> {
     let place = table.columns.iter().position(|column| *column == name).unwrap();
-    let number = |row: &Vec<Cell>| match &row[place] {
-        Cell::Number(value) => *value,
-        Cell::Word(word) => panic!("{name} is `{word}`"),
+    let number = |row: &Vec<TableCell>| match &row[place] {
+        TableCell::Number(value) => *value,
+        TableCell::Word(word) => panic!("{name} is `{word}`"),
     };
     table.rows.iter().map(number).collect()
 }
@@ -58,7 +60,7 @@ fn an_experiment_stops_when_it_is_told_to() {
             asked += 1;
             if asked < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        assert_eq!((ended.unwrap_err(), asked), (Ended::Stopped, 3), "{}", study.id);
+        assert_eq!((ended.unwrap_err(), asked), (ExperimentError::Stopped, 3), "{}", study.id);
     }
 }
 
@@ -122,10 +124,10 @@ fn zoom_lenses_get_better_between_their_positions_too() {
 }
 
 /// The rows of a table in which a column has this word.
-fn rows_with(table: &Table, name: &str, word: &str) -> Table {
+fn rows_with(table: &DataTable, name: &str, word: &str) -> DataTable {
     let place = table.columns.iter().position(|column| *column == name).unwrap();
-    let rows = table.rows.iter().filter(|row| row[place] == Cell::Word(word.to_owned()));
-    Table { rows: rows.cloned().collect(), ..table.clone() }
+    let rows = table.rows.iter().filter(|row| row[place] == TableCell::Word(word.to_owned()));
+    DataTable { rows: rows.cloned().collect(), ..table.clone() }
 }
 
 #[test]

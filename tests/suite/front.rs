@@ -2,13 +2,13 @@
 
 use super::merit::bundled;
 use aplanat::files;
-use aplanat::front::{Survey, hypervolume, write};
-use aplanat::optimize::pareto::{Design, Front, Settings, Sweep};
+use aplanat::front::{ParetoReport, hypervolume, write};
+use aplanat::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep};
 
 /// The lens at the start and the front of a short sweep.
-fn swept() -> Sweep {
-    let settings = Settings { points: 2, steps: 5, ..Settings::default() };
-    let mut sweep = Sweep::new(&bundled("double_gauss_rudolph_50"), &settings).unwrap();
+fn swept() -> ParetoSweep {
+    let settings = ParetoSettings { points: 2, steps: 5, ..ParetoSettings::default() };
+    let mut sweep = ParetoSweep::new(&bundled("double_gauss_rudolph_50"), &settings).unwrap();
     while !sweep.step().finished {}
     sweep
 }
@@ -18,10 +18,10 @@ fn a_front_is_written_with_every_lens() {
     let sweep = swept();
     let folder = std::env::temp_dir().join(format!("aplanat-front-{}", std::process::id()));
     let biased = Some(sweep.front());
-    let (start, front, tried) = (&sweep.start, sweep.front(), sweep.tried());
-    let survey = Survey { name: "test", start, front, tried, biased };
+    let (start, front, tried) = (&sweep.start, sweep.front(), sweep.evaluated());
+    let survey = ParetoReport { name: "test", start, front, tried, biased };
     let written = write(&survey, &folder.join("new")).unwrap();
-    let designs = front.designs();
+    let designs = front.points();
     assert!(designs.len() > 1);
     assert_eq!(written.len(), 3 + 2 * designs.len());
 
@@ -35,7 +35,7 @@ fn a_front_is_written_with_every_lens() {
         assert_eq!(read, numbers, "digits that bring back the same number");
         let lens = files::open(folder.join("new").join(line[6])).unwrap().lens;
         assert_eq!(lens, design.lens);
-        let again = Design::of(&lens, design.weight, 1e-4).unwrap();
+        let again = ParetoPoint::evaluate(&lens, design.weight, 1e-4).unwrap();
         assert!((again.spot - design.spot).abs() < 1e-3 * design.spot);
     }
     let picture = std::fs::read(&written[1]).unwrap();
@@ -45,9 +45,9 @@ fn a_front_is_written_with_every_lens() {
 
 #[test]
 fn a_folder_that_is_a_file_is_named() {
-    let start = Design::of(&bundled("double_gauss_rudolph_50"), None, 1e-3).unwrap();
+    let start = ParetoPoint::evaluate(&bundled("double_gauss_rudolph_50"), None, 1e-3).unwrap();
     let front = Front::default();
-    let survey = Survey { name: "", start: &start, front: &front, tried: &[], biased: None };
+    let survey = ParetoReport { name: "", start: &start, front: &front, tried: &[], biased: None };
     let why = write(&survey, "Cargo.toml".as_ref()).unwrap_err().to_string();
     assert!(why.starts_with("Cargo.toml: cannot be written"), "{why}");
     assert_eq!(hypervolume(&front, &start), 0.0);

@@ -1,37 +1,38 @@
 //! Pictures that light makes behind a field: near and at infinity, of a person's own, of no light, by
 //! beams that miss, and the same on any number of threads.
 
-use aplanat::grin::Fate;
+use aplanat::grin::GrinFate;
 use aplanat::grin_task::{
-    self, Drawing, Goal, Image, Level, Medium, PictureFile, Runner, Source, Space, Task,
+    self, Domain, GrinField, GrinOptimizer, GrinTask, ImageFile, LightGoal, LightSource,
+    RefinementLevel, TargetImage, ViewImage,
 };
 use image::{GrayImage, Luma};
 use rayon::ThreadPoolBuilder;
 use std::path::PathBuf;
 
 /// A task that comes with the program, with so many steps of its first level, quick to work on.
-fn quick(name: &str, steps: usize) -> Task {
-    let mut task = grin_task::find(name).unwrap().task().unwrap();
-    task.levels = vec![Level { nodes: 5, steps }];
+fn quick(name: &str, steps: usize) -> GrinTask {
+    let mut task = grin_task::find_builtin(name).unwrap().task().unwrap();
+    task.levels = vec![RefinementLevel { nodes: 5, steps }];
     for view in &mut task.views {
-        if let Source::Beam { rays, .. } = &mut view.source {
+        if let LightSource::Beam { rays, .. } = &mut view.source {
             *rays = 32;
         }
-        if let Goal::Image { pixels, .. } | Goal::Far { pixels, .. } = &mut view.goal {
+        if let LightGoal::Image { pixels, .. } | LightGoal::Far { pixels, .. } = &mut view.goal {
             *pixels = 16;
         }
     }
     task
 }
 
-fn solved(task: &Task) -> Medium {
-    let mut runner = Runner::new(task).unwrap();
+fn solved(task: &GrinTask) -> GrinField {
+    let mut runner = GrinOptimizer::new(task).unwrap();
     while !runner.step().unwrap().finished {}
     runner.current().clone()
 }
 
-fn images(task: &Task, medium: &Medium) -> Vec<Image> {
-    task.seen(medium).unwrap().into_iter().filter_map(|seen| seen.image).collect()
+fn images(task: &GrinTask, medium: &GrinField) -> Vec<ViewImage> {
+    task.report_views(medium).unwrap().into_iter().filter_map(|seen| seen.image).collect()
 }
 
 /// A file that is gone after the test.
@@ -52,8 +53,8 @@ impl Scrap {
         scrap
     }
 
-    fn drawing(&self) -> Drawing {
-        Drawing::File(PictureFile::from(self.0.clone()))
+    fn drawing(&self) -> TargetImage {
+        TargetImage::File(ImageFile::from(self.0.clone()))
     }
 }
 
@@ -64,18 +65,18 @@ impl Drop for Scrap {
 }
 
 /// A task whose picture is this one.
-fn of_picture(wanted: Drawing) -> Task {
+fn of_picture(wanted: TargetImage) -> GrinTask {
     let mut task = quick("caustic-near", 10);
-    let Goal::Image { drawing, .. } = &mut task.views[0].goal else { panic!("no image") };
+    let LightGoal::Image { drawing, .. } = &mut task.views[0].goal else { panic!("no image") };
     *drawing = wanted;
     task
 }
 
 /// What is wrong with a task of this picture.
-fn refused(drawing: Drawing) -> String {
+fn refused(drawing: TargetImage) -> String {
     let task = of_picture(drawing);
     let error = task.check().unwrap_err().to_string();
-    assert_eq!(Runner::new(&task).map(|_| ()).unwrap_err().to_string(), error);
+    assert_eq!(GrinOptimizer::new(&task).map(|_| ()).unwrap_err().to_string(), error);
     error
 }
 
@@ -83,21 +84,23 @@ fn refused(drawing: Drawing) -> String {
 fn a_screen_far_away_shows_what_is_seen_at_infinity() {
     let far = quick("caustic-far", 15);
     let medium = solved(&far);
-    let Goal::Far { drawing, angle, pixels } = far.views[0].goal.clone() else { panic!("not far") };
+    let LightGoal::Far { drawing, angle, pixels } = far.views[0].goal.clone() else {
+        panic!("not far")
+    };
     let at = |distance: f64| {
         let mut near = far.clone();
         let half = distance * angle.to_radians().tan();
-        near.views[0].goal = Goal::Image { drawing: drawing.clone(), half, distance, pixels };
+        near.views[0].goal = LightGoal::Image { drawing: drawing.clone(), half, distance, pixels };
         images(&near, &medium).remove(0)
     };
     let wanted = images(&far, &medium).remove(0);
-    let off = |image: &Image| {
-        let pairs = image.made.iter().zip(&wanted.made);
+    let off = |image: &ViewImage| {
+        let pairs = image.formed.iter().zip(&wanted.formed);
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let [near, farther, farthest] = [1e2, 1e4, 1e6].map(|distance| off(&at(distance)));
     println!("off the image at infinity: {near:.1e}, {farther:.1e}, {farthest:.1e}");
-    assert!(wanted.light() > 0.5 && near > 1e-3);
+    assert!(wanted.light_share() > 0.5 && near > 1e-3);
     assert!(farther < 0.05 * near && farthest < 1e-3 * near, "{near} {farther} {farthest}");
 }
 
@@ -121,10 +124,10 @@ fn images_are_the_same_bits_on_one_thread_and_on_two() {
 #[test]
 fn every_goal_across_a_beam_is_come_nearer_to() {
     for name in ["multifocal", "caustic-near", "caustic-far", "caustic"] {
-        let mut runner = Runner::new(&quick(name, 25)).unwrap();
-        let before = runner.judge(runner.best()).unwrap();
+        let mut runner = GrinOptimizer::new(&quick(name, 25)).unwrap();
+        let before = runner.score(runner.best()).unwrap();
         while !runner.step().unwrap().finished {}
-        let after = runner.judge(runner.best()).unwrap();
+        let after = runner.score(runner.best()).unwrap();
         println!("{name}: {:.3e} to {:.3e}", before.loss, after.loss);
         assert!(after.loss < 0.9 * before.loss, "{name}: {} {}", before.loss, after.loss);
         assert!(after.views.iter().all(|view| view.retrace_error < 1e-9));
@@ -142,14 +145,14 @@ fn a_persons_own_picture_is_made_whatever_its_size() {
     let task = of_picture(scrap.drawing());
     let text = serde_json::to_string(&task).unwrap();
     assert!(text.contains("{\"file\":\""), "{text}");
-    assert_eq!(grin_task::read(&text, "a file").unwrap(), task);
-    let [even, found] = [Runner::new(&task).unwrap().best().clone(), solved(&task)]
+    assert_eq!(grin_task::read_task(&text, "a file").unwrap(), task);
+    let [even, found] = [GrinOptimizer::new(&task).unwrap().best().clone(), solved(&task)]
         .map(|m| images(&task, &m).remove(0));
-    let rows = |image: &Image, from: usize| {
-        image.wanted[16 * from..16 * (from + 8)].iter().sum::<f64>() / 128.0
+    let rows = |image: &ViewImage, from: usize| {
+        image.target[16 * from..16 * (from + 8)].iter().sum::<f64>() / 128.0
     };
     // Its middle square is what counts, rows from the bottom: the disc is above the middle.
-    assert!((even.wanted.iter().sum::<f64>() / 256.0 - 1.0).abs() < 1e-12);
+    assert!((even.target.iter().sum::<f64>() / 256.0 - 1.0).abs() < 1e-12);
     assert!(rows(&even, 8) > 1.2 * rows(&even, 0), "{} {}", rows(&even, 8), rows(&even, 0));
     println!("own picture: correlation {:.2} to {:.2}", even.correlation(), found.correlation());
     assert!(found.correlation() > even.correlation() + 0.3);
@@ -158,12 +161,12 @@ fn a_persons_own_picture_is_made_whatever_its_size() {
 #[test]
 fn a_small_or_transparent_picture_is_a_picture() {
     let one = Scrap::picture("one.png", [1, 1], |_, _| 7);
-    let wanted = one.drawing().pixels(8).unwrap();
+    let wanted = one.drawing().render(8).unwrap();
     assert!(wanted.iter().all(|value| (value - 1.0).abs() < 1e-12));
     let scrap = Scrap::new("half.png", &[]);
     let half = |x: u32, _: u32| image::LumaA([200_u8, if x < 4 { 255 } else { 0 }]);
     image::GrayAlphaImage::from_fn(8, 8, half).save(&scrap.0).unwrap();
-    let wanted = scrap.drawing().pixels(8).unwrap();
+    let wanted = scrap.drawing().render(8).unwrap();
     assert!(
         wanted
             .iter()
@@ -177,7 +180,7 @@ fn wrong_pictures_are_refused_with_their_file() {
     let says = |found: String, words: &[&str]| {
         words.iter().for_each(|word| assert!(found.contains(word), "`{found}`: no `{word}`"));
     };
-    let missing = Drawing::File(PathBuf::from("there is none.png").into());
+    let missing = TargetImage::File(PathBuf::from("there is none.png").into());
     says(
         refused(missing),
         &["views, number 0, goal, drawing", "there is none.png", "cannot be read"],
@@ -196,65 +199,65 @@ fn wrong_pictures_are_refused_with_their_file() {
     let bytes = std::fs::read(&whole.0).unwrap();
     let torn = Scrap::new("torn.png", &bytes[..bytes.len() / 2]);
     says(refused(torn.drawing()), &["torn.png", "picture"]);
-    says(refused(Drawing::Scene(f64::NAN)), &["goal, drawing, scene", "NaN"]);
+    says(refused(TargetImage::Scene(f64::NAN)), &["goal, drawing, scene", "NaN"]);
 }
 
 #[test]
 fn wrong_goals_across_a_beam_are_refused_by_name() {
-    let refused = |name: &str, change: &dyn Fn(&mut Goal)| {
+    let refused = |name: &str, change: &dyn Fn(&mut LightGoal)| {
         let mut task = quick(name, 1);
         change(&mut task.views[0].goal);
-        Runner::new(&task).map(|_| ()).unwrap_err().to_string()
+        GrinOptimizer::new(&task).map(|_| ()).unwrap_err().to_string()
     };
     let says = |found: String, word: &str| assert!(found.contains(word), "`{found}`: no `{word}`");
-    let flat = |goal: &mut Goal| {
-        if let Goal::Far { angle, .. } | Goal::Ring { angle, .. } = goal {
+    let flat = |goal: &mut LightGoal| {
+        if let LightGoal::Far { angle, .. } | LightGoal::Ring { angle, .. } = goal {
             *angle = 90.0;
         }
     };
     says(refused("caustic-far", &flat), "goal, angle");
     says(refused("caustic", &flat), "goal, angle");
-    let empty = |goal: &mut Goal| {
-        if let Goal::Ring { radius, .. } = goal {
+    let empty = |goal: &mut LightGoal| {
+        if let LightGoal::Ring { radius, .. } = goal {
             *radius = 0.0;
         }
     };
     says(refused("caustic", &empty), "goal, radius");
-    let coarse = |goal: &mut Goal| {
-        if let Goal::Far { pixels, .. } = goal {
+    let coarse = |goal: &mut LightGoal| {
+        if let LightGoal::Far { pixels, .. } = goal {
             *pixels = 1;
         }
     };
     says(refused("caustic-far", &coarse), "goal, pixels");
     let mut task = quick("caustic", 1);
-    task.views[0].source = Source::Fan { height: 0.5, z: -2.0, rays: 5 };
-    says(Runner::new(&task).map(|_| ()).unwrap_err().to_string(), "beam");
+    task.views[0].source = LightSource::Fan { height: 0.5, z: -2.0, rays: 5 };
+    says(GrinOptimizer::new(&task).map(|_| ()).unwrap_err().to_string(), "beam");
 }
 
 #[test]
 fn a_beam_that_misses_the_space_is_told_and_changes_nothing() {
     for name in ["caustic-near", "caustic-far", "caustic"] {
         let mut task = quick(name, 3);
-        task.views[0].space = Some(Space::Rod { radius: 0.2, from: -0.5, to: 0.5 });
-        if let Source::Beam { direction, half, .. } = &mut task.views[0].source {
+        task.views[0].space = Some(Domain::Rod { radius: 0.2, from: -0.5, to: 0.5 });
+        if let LightSource::Beam { direction, half, .. } = &mut task.views[0].source {
             (*direction, *half) = ([0.0, 0.0, 1.0], 0.5);
         }
-        let partly = Runner::new(&task).unwrap();
-        let counts = partly.judge(partly.best()).unwrap().views[0].counts;
-        let missed = counts.fates.of(Fate::NeverEntered);
+        let partly = GrinOptimizer::new(&task).unwrap();
+        let counts = partly.score(partly.best()).unwrap().views[0].counts;
+        let missed = counts.fates.count_of(GrinFate::NeverEntered);
         assert!(
-            missed > 500 && counts.counted() > 0 && counts.counted() + missed == 1024,
+            missed > 500 && counts.valid() > 0 && counts.valid() + missed == 1024,
             "{counts:?}"
         );
         // A rod far up the axis, and a beam across it: no ray meets it.
-        task.views[0].space = Some(Space::Rod { radius: 0.2, from: 5.0, to: 6.0 });
-        if let Source::Beam { direction, .. } = &mut task.views[0].source {
+        task.views[0].space = Some(Domain::Rod { radius: 0.2, from: 5.0, to: 6.0 });
+        if let LightSource::Beam { direction, .. } = &mut task.views[0].source {
             *direction = [1.0, 0.0, 0.0];
         }
-        let mut runner = Runner::new(&task).unwrap();
+        let mut runner = GrinOptimizer::new(&task).unwrap();
         let before = runner.current().clone();
         while !runner.step().unwrap().finished {}
-        let judged = runner.judge(runner.current()).unwrap();
+        let judged = runner.score(runner.current()).unwrap();
         let excluded: Vec<_> = judged.views[0].counts.excluded().collect();
         assert_eq!(excluded, [("never_entered", 1024)], "{name}");
         assert!(judged.loss.is_finite() && *runner.current() == before, "{name}: {judged:?}");

@@ -6,9 +6,11 @@
 //! units where a decision is close.
 
 use super::reference::{number, read};
-use aplanat::lens::{ASPHERE_TERMS, Invalid, Shape, Surface, System};
-use aplanat::math::{Double, Dual, Real, Vec3};
-use aplanat::trace::{Fate, Gradient, Hits, Landing, Ray, Rays, Seed, Sink, Tracer, Width};
+use aplanat::lens::{ASPHERE_TERMS, Shape, Surface, System, SystemError};
+use aplanat::math::{DoubleDouble, Dual, Real, Vec3};
+use aplanat::trace::{
+    AdjointSeed, Fate, Landings, Ray, Rays, SimdWidth, SystemGradient, TraceSink, TracedRay, Tracer,
+};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -37,7 +39,7 @@ impl<R: Real> Lift<'_, R> {
     }
 
     /// The simplest form that still depends on the named number, which may be zero.
-    fn shape(&self, s: &Value, i: usize) -> Result<Shape<R>, Invalid> {
+    fn shape(&self, s: &Value, i: usize) -> Result<Shape<R>, SystemError> {
         let own = |key: &str| self.number(&format!("s{i}.{key}"), get(s, key, 0.0));
         let (curvature, conic) = (own("c"), own("k"));
         let mut terms = numbers(&s["a"]);
@@ -61,7 +63,7 @@ impl<R: Real> Lift<'_, R> {
         })
     }
 
-    fn system(&self, input: &Value) -> Result<System<R>, Invalid> {
+    fn system(&self, input: &Value) -> Result<System<R>, SystemError> {
         let mut surfaces = Vec::new();
         for (i, s) in input["surfaces"].as_array().unwrap().iter().enumerate() {
             let own =
@@ -73,8 +75,8 @@ impl<R: Real> Lift<'_, R> {
                 semi_diameter: R::from_f64(get(s, "sd", f64::INFINITY)),
                 obstruction: R::ZERO,
                 mirror: s["mirror"] == true,
-                hyper: s["hyper"] == true,
-                graded: None,
+                hyperhemisphere: s["hyper"] == true,
+                grin: None,
             });
         }
         let index_before = self.number("n0", get(input, "n0", 1.0));
@@ -102,7 +104,7 @@ fn status(fate: Fate) -> &'static str {
     }
 }
 
-fn outputs<R: Real>(landing: &Landing<R>) -> [R; 7] {
+fn outputs<R: Real>(landing: &TracedRay<R>) -> [R; 7] {
     let (p, d) = (landing.ray.point, landing.ray.direction);
     [p.x, p.y, p.z, d.x, d.y, d.z, landing.opl]
 }
@@ -132,7 +134,7 @@ impl Report {
 }
 
 /// Compares a traced ray with what is expected of it.
-fn compare(report: &mut Report, id: &str, family: &str, landing: &Landing<f64>, expect: &Value) {
+fn compare(report: &mut Report, id: &str, family: &str, landing: &TracedRay<f64>, expect: &Value) {
     if let Some(any) = expect.get("status_any_of").and_then(Value::as_array) {
         let got = status(landing.fate);
         if !any.iter().any(|s| s == got) {
@@ -162,7 +164,7 @@ fn compare_numbers(
     report: &mut Report,
     id: &str,
     family: &str,
-    landing: &Landing<f64>,
+    landing: &TracedRay<f64>,
     expect: &Value,
 ) {
     let exact = expected(expect);
@@ -186,13 +188,16 @@ fn compare_numbers(
     }
     if let Some(list) = expect.get("negative_t") {
         let first = list.as_array().unwrap().first().and_then(Value::as_u64);
-        let got = landing.backwards.map(|i| i as u64);
+        let got = landing.first_backward_surface.map(|i| i as u64);
         // A way of no length but rounding has no direction.
         let ways = numbers(&expect["t"]);
         let long =
             |i: Option<u64>| i.is_none_or(|i| ways[i as usize].abs() > 1e-12 * size.max(1.0));
         if first != got && long(first) && long(got) {
-            report.fail(id, format!("negative t at {:?}, expected {first:?}", landing.backwards));
+            report.fail(
+                id,
+                format!("negative t at {:?}, expected {first:?}", landing.first_backward_surface),
+            );
         }
     }
 }
@@ -224,8 +229,9 @@ fn compare_derivatives(report: &mut Report, case: &Value, id: &str, family: &str
     for i in 0..7 {
         let largest = exact.values().fold(0.0, |m: f64, row| m.max(row[i].abs()));
         for (name, row) in &exact {
-            let twice =
-                derivative(case, name, |v| Dual::<Double, 1>::variable(Double::from_f64(v), 0));
+            let twice = derivative(case, name, |v| {
+                Dual::<DoubleDouble, 1>::variable(DoubleDouble::from_f64(v), 0)
+            });
             let plain = derivative(case, name, |v| Dual::<f64, 1>::variable(v, 0));
             let what = format!("d{}/d{name}", OUTPUTS[i]);
             let relative = |got: f64| (got - row[i]).abs() / largest.max(1e-200);
@@ -248,7 +254,7 @@ fn derivative<R: Real>(case: &Value, named: &str, variable: fn(f64) -> Dual<R, 1
     outputs(&tracer.trace(lift.ray(&case["input"]["ray"]))).map(|output| output.slope[0])
 }
 
-fn trace_case(input: &Value, start: &Value) -> Result<Landing<f64>, Invalid> {
+fn trace_case(input: &Value, start: &Value) -> Result<TracedRay<f64>, SystemError> {
     let tracer = Tracer::new(&PLAIN.system(input)?)?;
     let start = PLAIN.ray(start);
     start.check(0)?;
@@ -311,9 +317,9 @@ fn reference_hard_cases_in_batches_give_the_same_bits() {
         }
         let one = tracer.trace(start);
         let rays: Rays<f64> = std::iter::repeat_n(start, 70).collect();
-        for width in [Width::Baseline, Width::Bits256, Width::Bits512] {
-            let mut hits = Hits::default();
-            tracer.batch_with(width, &rays, &mut hits);
+        for width in [SimdWidth::Baseline, SimdWidth::Bits256, SimdWidth::Bits512] {
+            let mut hits = Landings::default();
+            tracer.trace_batch_with(width, &rays, &mut hits);
             assert_eq!(hits.fate(69), one.fate, "{} at {width:?}", case["id"]);
             if one.fate.is_imaged() {
                 let columns =
@@ -328,14 +334,14 @@ fn reference_hard_cases_in_batches_give_the_same_bits() {
 }
 
 /// One output of a landing as the seed of the backward pass.
-fn seed(output: usize) -> Seed<f64> {
+fn seed(output: usize) -> AdjointSeed<f64> {
     let mut v = [0.0; 7];
     v[output] = 1.0;
     let [x, y, z, l, m, n, opl] = v;
-    Seed { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n), opl }
+    AdjointSeed { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n), opl }
 }
 
-pub(crate) fn parameter(gradient: &Gradient<f64>, name: &str) -> Option<f64> {
+pub(crate) fn parameter(gradient: &SystemGradient<f64>, name: &str) -> Option<f64> {
     if name == "n0" {
         return Some(gradient.index_before);
     }

@@ -1,8 +1,8 @@
 //! Every lens that comes with the program opens, has the focal length that its source states,
 //! and survives being written and read.
 
-use aplanat::files::{self, Bundled, native};
-use aplanat::lens::{Aperture, Graded, Lens, Object, System};
+use aplanat::files::{self, BundledLens, native};
+use aplanat::lens::{Aperture, Lens, Object, RotationalProfile, System};
 use aplanat::math::Vec3;
 use aplanat::trace::{Ray, Tracer};
 use serde::Deserialize;
@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 /// The reference prints six or seven digits, and takes catalogue indices rounded to five.
 const DIGITS: f64 = 1e-5;
 
-/// `tests/reference/library.json`.
+/// `tests/reference/bundled_lenses.json`.
 #[derive(Deserialize)]
 struct Table {
     lenses: Vec<Stated>,
@@ -37,7 +37,7 @@ fn table() -> Vec<Stated> {
     serde_json::from_str::<Table>(&text).unwrap().lenses
 }
 
-fn opened(bundled: &Bundled) -> Lens {
+fn opened(bundled: &BundledLens) -> Lens {
     let name = format!("lenses/{}.json", bundled.name);
     files::open(&name).unwrap_or_else(|error| panic!("{error}")).lens
 }
@@ -67,7 +67,7 @@ fn focal_lengths(system: &System<f64>) -> (f64, f64) {
 
 /// A paraxial ray through a gradient, `dy/dz = p/n` and `dp/dz = y ∂n/∂r / r`, by the classical
 /// method of fourth order.
-fn through(field: &Graded<f64>, length: f64, mut y: f64, mut p: f64) -> (f64, f64) {
+fn through(field: &RotationalProfile<f64>, length: f64, mut y: f64, mut p: f64) -> (f64, f64) {
     const STEPS: u32 = 1000;
     let near = 1e-4;
     let slope = |z: f64, y: f64, p: f64| {
@@ -88,20 +88,20 @@ fn through(field: &Graded<f64>, length: f64, mut y: f64, mut p: f64) -> (f64, f6
 }
 
 fn at_primary(lens: &Lens, zoom: usize) -> System<f64> {
-    lens.system(zoom, lens.wavelengths[lens.primary()].um).unwrap()
+    lens.resolve(zoom, lens.wavelengths[lens.primary()].um).unwrap()
 }
 
 #[test]
 fn the_embedded_lenses_are_those_of_the_folder() {
     let embedded: BTreeSet<String> =
-        files::library().iter().map(|b| format!("{}.json", b.name)).collect();
+        files::bundled_lenses().iter().map(|b| format!("{}.json", b.name)).collect();
     let folder: BTreeSet<String> = std::fs::read_dir("lenses")
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     assert_eq!(embedded, folder);
-    assert_eq!(embedded.len(), files::library().len());
-    for bundled in files::library() {
+    assert_eq!(embedded.len(), files::bundled_lenses().len());
+    for bundled in files::bundled_lenses() {
         let text = std::fs::read_to_string(format!("lenses/{}.json", bundled.name)).unwrap();
         assert_eq!(bundled.text, text, "{}: build again", bundled.name);
     }
@@ -110,8 +110,8 @@ fn the_embedded_lenses_are_those_of_the_folder() {
 #[test]
 fn every_lens_has_its_stated_focal_length() {
     let table = table();
-    assert_eq!(table.len(), files::library().len());
-    for bundled in files::library() {
+    assert_eq!(table.len(), files::bundled_lenses().len());
+    for bundled in files::bundled_lenses() {
         let lens = opened(bundled);
         let stated = table.iter().find(|stated| stated.lens == bundled.name).unwrap();
         for position in &stated.efl {
@@ -131,7 +131,7 @@ fn every_lens_has_its_stated_focal_length() {
 
 #[test]
 fn every_lens_is_the_same_after_writing_and_reading() {
-    for bundled in files::library() {
+    for bundled in files::bundled_lenses() {
         let lens = opened(bundled);
         let text = native::write(&lens);
         assert_eq!(text, bundled.text, "{}: not in the form in which it is written", bundled.name);
@@ -171,7 +171,7 @@ fn half_beam(lens: &Lens, zoom: usize) -> f64 {
 
 #[test]
 fn light_on_the_axis_goes_through_every_lens_at_every_zoom_position() {
-    for bundled in files::library() {
+    for bundled in files::bundled_lenses() {
         let lens = opened(bundled);
         for zoom in 0..lens.zoom_positions() {
             let tracer = Tracer::new(&at_primary(&lens, zoom)).unwrap();

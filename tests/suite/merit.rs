@@ -1,8 +1,10 @@
 //! Derivatives of every term by every kind of variable, against central differences.
 
 use aplanat::files;
-use aplanat::lens::{Aperture, Field, Lens, Medium, Parameter, Pickup, Quantity, Row, Variable};
-use aplanat::merit::{Detail, Goal, Merit, PupilEdge, Term, Weighted};
+use aplanat::lens::{
+    Aperture, FieldPoint, Lens, Medium, Parameter, Pickup, Quantity, Row, Variable,
+};
+use aplanat::merit::{DerivativeLevel, Goal, Merit, PupilEdge, Term, WeightedTerm};
 
 pub(crate) fn bundled(name: &str) -> Lens {
     files::open(format!("lenses/{name}.json")).unwrap().lens
@@ -21,7 +23,7 @@ fn everything() -> Lens {
     lens.surfaces[2].conic = -0.3;
     lens.surfaces[9].asphere = vec![1e-6, -2e-9];
     lens.surfaces[0].medium = Medium::Model { nd: 1.5725, vd: 57.5 };
-    lens.focus = Some(0.1);
+    lens.image_solve = Some(0.1);
     for surface in [0, 1, 4, 6] {
         vary(&mut lens, surface, Quantity::Curvature);
     }
@@ -57,13 +59,14 @@ fn terms() -> Vec<Term> {
 }
 
 pub(crate) fn check(lens: &Lens, term: Term, pupil: PupilEdge, steps: impl Fn(Quantity) -> f64) {
-    let goal = Goal { terms: vec![Weighted { term, weight: 1.0 }], zoom_ratios: Vec::new(), pupil };
+    let goal =
+        Goal { terms: vec![WeightedTerm { term, weight: 1.0 }], zoom_ratios: Vec::new(), pupil };
     // The motion of the edge is exact in the limit of many rays only.
     let tolerance = if pupil == PupilEdge::Moving { 1e-11 } else { 1e-4 };
     let merit = Merit::new(lens, &goal, tolerance).unwrap();
     let values = merit.values(lens);
-    let sum = merit.sum(&values, Detail::Gradient).unwrap();
-    let normal = merit.sum(&values, Detail::Normal).unwrap();
+    let sum = merit.evaluate(&values, DerivativeLevel::Gradient).unwrap();
+    let normal = merit.evaluate(&values, DerivativeLevel::Normal).unwrap();
     let mut worst: f64 = 0.0;
     for (i, variable) in merit.variables().iter().enumerate() {
         let step = steps(variable.parameter.quantity);
@@ -159,13 +162,14 @@ fn dark_pupils_have_a_derivative_that_leads_back_to_light() {
         check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
     }
     let goal = Goal {
-        terms: vec![Weighted { term: Term::Throughput, weight: 1.0 }],
+        terms: vec![WeightedTerm { term: Term::Throughput, weight: 1.0 }],
         zoom_ratios: Vec::new(),
         pupil: PupilEdge::Moving,
     };
     let merit = Merit::new(&lens, &goal, 1e-3).unwrap();
-    assert!(!merit.is_lit());
-    let gradient = merit.sum(&merit.values(&lens), Detail::Gradient).unwrap().gradient;
+    assert!(!merit.has_light());
+    let gradient =
+        merit.evaluate(&merit.values(&lens), DerivativeLevel::Gradient).unwrap().gradient;
     let by_rims = merit.variables().iter().zip(gradient.iter());
     let by_rims = by_rims.filter(|(v, _)| v.parameter.quantity == Quantity::SemiDiameter);
     let steepest = by_rims.min_by(|a, b| a.1.total_cmp(b.1)).unwrap();
@@ -190,20 +194,20 @@ fn a_pupil_in_pieces_has_the_derivative_of_the_warp_field() {
         Row { stop: true, ..row(0.0, 5.0, 1.0, 1.0) },
     ];
     lens.aperture = Aperture::StopSemiDiameter(1.0);
-    lens.fields.values = vec![Field { x: 0.0, y: 0.0, weight: 1.0 }];
+    lens.fields.values = vec![FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }];
     lens.wavelengths.truncate(1);
     lens.wavelengths[0].primary = true;
     lens.variables.clear();
     vary(&mut lens, 0, Quantity::Curvature);
     vary(&mut lens, 2, Quantity::SemiDiameter);
     let goal = |pupil| Goal {
-        terms: vec![Weighted { term: Term::Throughput, weight: 1.0 }],
+        terms: vec![WeightedTerm { term: Term::Throughput, weight: 1.0 }],
         zoom_ratios: Vec::new(),
         pupil,
     };
     let gradient = |pupil| {
         let merit = Merit::new(&lens, &goal(pupil), 1e-3).unwrap();
-        merit.sum(&merit.values(&lens), Detail::Gradient).unwrap().gradient
+        merit.evaluate(&merit.values(&lens), DerivativeLevel::Gradient).unwrap().gradient
     };
     let moving = gradient(PupilEdge::Moving);
     let area = |change: f64| {
@@ -242,14 +246,15 @@ fn the_gauss_newton_matrix_is_that_of_the_residuals() {
     lens.variables.clear();
     vary(&mut lens, 2, Quantity::Thickness);
     let goal = Goal {
-        terms: vec![Weighted { term: Term::Spot, weight: 1.0 }],
+        terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
         zoom_ratios: vec![],
         pupil: PupilEdge::default(),
     };
     let merit = Merit::new(&lens, &goal, 1e-4).unwrap();
     let values = merit.values(&lens);
-    let at = |t: f64| merit.sum(&[values[0] + t], Detail::Gradient).unwrap().gradient[0];
+    let at =
+        |t: f64| merit.evaluate(&[values[0] + t], DerivativeLevel::Gradient).unwrap().gradient[0];
     let second = (at(0.01) - at(-0.01)) / 0.02;
-    let normal = merit.sum(&values, Detail::Normal).unwrap().normal[(0, 0)];
+    let normal = merit.evaluate(&values, DerivativeLevel::Normal).unwrap().normal[(0, 0)];
     assert!((second / (2.0 * normal) - 1.0).abs() < 1e-6, "{second} and {normal}");
 }

@@ -1,24 +1,24 @@
 //! Local search on real lenses.
 
 use super::merit::{bundled, vary};
-use aplanat::lens::{self, Lens, NumberKind, Parameter, Pickup, Quantity};
-use aplanat::merit::{Goal, Merit, MeritError, PupilEdge, Term, Weighted};
-use aplanat::optimize::{Method, start};
+use aplanat::lens::{self, Lens, Parameter, ParameterKind, Pickup, Quantity};
+use aplanat::merit::{Goal, Merit, MeritError, PupilEdge, Term, WeightedTerm};
+use aplanat::optimize::{DescentMethod, start};
 
 /// Sharpness alone, with pupils that are kept, or all that a designer would ask for, light among it.
 fn goals(lens: &Lens) -> [Goal; 2] {
-    let all = Goal::sensible(lens).unwrap();
+    let all = Goal::default_for(lens).unwrap();
     let mut sharp = Goal { pupil: PupilEdge::Kept, ..all.clone() };
-    sharp.terms.retain(|weighted| !weighted.term.is_about_light());
+    sharp.terms.retain(|weighted| !weighted.term.concerns_light());
     [sharp, all]
 }
 
 /// The RMS radius of the spots before and after a search, and the share of the light that is left.
-fn improve(method: Method, steps: usize, goal: usize) -> (f64, f64, f64) {
+fn improve(method: DescentMethod, steps: usize, goal: usize) -> (f64, f64, f64) {
     let lens = bundled("double_gauss_rudolph_50");
     let goal = goals(&lens)[goal].clone();
     let area = |lens: &Lens| {
-        let sampled = Merit::new(lens, &goal, 1e-6).unwrap().sampled();
+        let sampled = Merit::new(lens, &goal, 1e-6).unwrap().spot_samplings();
         sampled.iter().map(|s| s.area).sum::<f64>()
     };
     let mut optimizer = start(method, &lens, &goal, 1e-3).unwrap();
@@ -42,24 +42,24 @@ fn improve(method: Method, steps: usize, goal: usize) -> (f64, f64, f64) {
 
 #[test]
 fn least_squares_sharpens_the_double_gauss() {
-    let (before, after, _) = improve(Method::DampedLeastSquares, 60, 0);
+    let (before, after, _) = improve(DescentMethod::DampedLeastSquares, 60, 0);
     assert!(after < 0.4 * before);
 }
 
 #[test]
 fn adam_sharpens_the_double_gauss() {
-    let (before, after, _) = improve(Method::Adam, 200, 0);
+    let (before, after, _) = improve(DescentMethod::Adam, 200, 0);
     assert!(after < 0.6 * before);
 }
 
 /// A goal that asks for light gets sharpness without paying with it; one that does not, clips.
 #[test]
 fn sharpness_is_not_bought_with_light() {
-    for method in [Method::DampedLeastSquares, Method::Adam] {
+    for method in [DescentMethod::DampedLeastSquares, DescentMethod::Adam] {
         let (before, after, light) = improve(method, 120, 1);
         assert!(after < 0.75 * before && light > 0.97, "{method:?}");
     }
-    let (_, _, light) = improve(Method::DampedLeastSquares, 120, 0);
+    let (_, _, light) = improve(DescentMethod::DampedLeastSquares, 120, 0);
     assert!(light < 0.8, "with pupils that are kept");
 }
 
@@ -67,14 +67,17 @@ fn sharpness_is_not_bought_with_light() {
 fn bounds_hold_and_a_lens_without_variables_is_refused() {
     let mut lens = bundled("achromat_ac254_100");
     lens.variables.clear();
-    let goal = Goal::sensible(&lens).unwrap();
-    assert_eq!(start(Method::Adam, &lens, &goal, 1e-3).unwrap_err(), MeritError::NoVariables);
+    let goal = Goal::default_for(&lens).unwrap();
+    assert_eq!(
+        start(DescentMethod::Adam, &lens, &goal, 1e-3).unwrap_err(),
+        MeritError::NoVariables
+    );
     vary(&mut lens, 2, Quantity::Thickness);
     vary(&mut lens, 0, Quantity::Curvature);
     let thickness = lens.surfaces[2].thickness;
     lens.variables[0].min = Some(thickness + 0.0);
     lens.variables[0].max = Some(thickness + 0.001);
-    for method in [Method::Adam, Method::DampedLeastSquares] {
+    for method in [DescentMethod::Adam, DescentMethod::DampedLeastSquares] {
         let mut optimizer = start(method, &lens, &goal, 1e-3).unwrap();
         for _ in 0..30 {
             optimizer.step();
@@ -90,12 +93,12 @@ fn bounds_hold_and_a_lens_without_variables_is_refused() {
 fn a_step_that_kills_a_ray_is_shortened_and_says_so() {
     let mut lens = bundled("double_gauss_rudolph_50");
     let goal = Goal {
-        terms: vec![Weighted { term: Term::BackFocus(400.0), weight: 1.0 }, spot()],
+        terms: vec![WeightedTerm { term: Term::BackFocus(400.0), weight: 1.0 }, spot()],
         zoom_ratios: Vec::new(),
         pupil: PupilEdge::Kept,
     };
     lens.variables.retain(|v| v.parameter.quantity == Quantity::Curvature);
-    let mut optimizer = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();
+    let mut optimizer = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();
     let mut reasons = Vec::new();
     for _ in 0..60 {
         let progress = optimizer.step();
@@ -106,8 +109,8 @@ fn a_step_that_kills_a_ray_is_shortened_and_says_so() {
     assert!(reasons.iter().any(|r| r.contains("ray ") && r.contains("moved the")), "{reasons:?}");
 }
 
-fn spot() -> Weighted {
-    Weighted { term: Term::Spot, weight: 1.0 }
+fn spot() -> WeightedTerm {
+    WeightedTerm { term: Term::Spot, weight: 1.0 }
 }
 
 #[test]
@@ -115,21 +118,21 @@ fn a_goal_that_is_not_finite_or_does_not_apply_is_refused() {
     let lens = bundled("double_gauss_rudolph_50");
     for term in [Term::FocalLength(f64::NAN), Term::TotalTrack(f64::INFINITY)] {
         let goal = Goal {
-            terms: vec![Weighted { term, weight: 1.0 }],
+            terms: vec![WeightedTerm { term, weight: 1.0 }],
             zoom_ratios: Vec::new(),
             pupil: PupilEdge::default(),
         };
-        let refused = start(Method::Adam, &lens, &goal, 1e-3).unwrap_err();
+        let refused = start(DescentMethod::Adam, &lens, &goal, 1e-3).unwrap_err();
         assert!(matches!(refused, MeritError::DoesNotApply { .. }), "{refused}");
     }
     let mut afocal = lens.clone();
     afocal.surfaces.iter_mut().for_each(|row| row.curvature = 0.0);
     let goal = Goal {
-        terms: vec![Weighted { term: Term::FocalLength(50.0), weight: 1.0 }],
+        terms: vec![WeightedTerm { term: Term::FocalLength(50.0), weight: 1.0 }],
         zoom_ratios: Vec::new(),
         pupil: PupilEdge::default(),
     };
-    assert!(start(Method::Adam, &afocal, &goal, 1e-3).is_err());
+    assert!(start(DescentMethod::Adam, &afocal, &goal, 1e-3).is_err());
 }
 
 /// Dark fields leave their share to the others; a lens with none but dark ones is refused.
@@ -138,7 +141,7 @@ fn a_lens_without_light_has_no_merit() {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(0.0);
     let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new(), pupil: PupilEdge::default() };
-    let refused = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap_err();
+    let refused = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-3).unwrap_err();
     assert!(matches!(refused, MeritError::NoLight { .. }), "{refused}");
 }
 
@@ -146,20 +149,20 @@ fn a_lens_without_light_has_no_merit() {
 #[test]
 fn a_dark_lens_that_is_asked_for_light_finds_the_way_back() {
     let sound = bundled("double_gauss_rudolph_50");
-    let goal = Goal::sensible(&sound).unwrap();
+    let goal = Goal::default_for(&sound).unwrap();
     let full = Merit::new(&sound, &goal, 1e-3).unwrap().light();
     for (surface, rim) in [(0, 0.0), (10, 0.5)] {
         let mut lens = sound.clone();
         lens.surfaces[surface].semi_diameter = Some(rim);
-        lens::vary(&mut lens, &[NumberKind::SemiDiameters]);
-        for method in [Method::Adam, Method::DampedLeastSquares] {
+        lens::add_variables(&mut lens, &[ParameterKind::SemiDiameters]);
+        for method in [DescentMethod::Adam, DescentMethod::DampedLeastSquares] {
             let mut optimizer = start(method, &lens, &goal, 1e-3).unwrap();
             let ended = (0..600).find(|_| optimizer.step().finished);
-            optimizer.settle();
+            optimizer.verify_best();
             let found = Merit::new(optimizer.best(), &goal, 1e-3).unwrap();
             let share = found.light() / full;
             println!("{method:?}, surface {surface}, ended {ended:?}: {share:.3} of the light");
-            assert!(found.is_lit() && share > 0.8, "{method:?}, surface {surface}: {share}");
+            assert!(found.has_light() && share > 0.8, "{method:?}, surface {surface}: {share}");
         }
     }
 }
@@ -173,11 +176,11 @@ fn pickups_follow_the_search() {
     let source = Parameter::new(0, front);
     lens.pickups.push(Pickup { parameter: back, source, scale: -1.0, offset: 0.0 });
     let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new(), pupil: PupilEdge::default() };
-    let mut optimizer = start(Method::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();
+    let mut optimizer = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();
     for _ in 0..5 {
         optimizer.step();
     }
-    optimizer.settle();
+    optimizer.verify_best();
     let best = optimizer.best();
     assert_ne!(best.surfaces[0].curvature, lens.surfaces[0].curvature);
     assert_eq!(best.surfaces[10].curvature, -best.surfaces[0].curvature);

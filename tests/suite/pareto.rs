@@ -1,22 +1,22 @@
 //! The front of sharpness against light.
 
 use super::merit::bundled;
-use aplanat::lens::{Field, Lens, Wavelength};
+use aplanat::lens::{FieldPoint, Lens, Wavelength};
 use aplanat::merit::PupilEdge;
-use aplanat::optimize::pareto::{Design, Front, NoFront, Settings, Sweep};
+use aplanat::optimize::pareto::{Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
 
 /// A lens in one colour at three fields.
 fn lens() -> Lens {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.variables.clear();
     lens.wavelengths = vec![Wavelength { um: 0.587_561_8, weight: 1.0, primary: true }];
-    lens.fields.values = [0.0, 10.0, 20.0].map(|y| Field { x: 0.0, y, weight: 1.0 }).to_vec();
+    lens.fields.values = [0.0, 10.0, 20.0].map(|y| FieldPoint { x: 0.0, y, weight: 1.0 }).to_vec();
     lens
 }
 
-fn swept(pupil: PupilEdge) -> Sweep {
-    let settings = Settings { points: 4, steps: 100, pupil, ..Settings::default() };
-    let mut sweep = Sweep::new(&lens(), &settings).unwrap();
+fn swept(pupil: PupilEdge) -> ParetoSweep {
+    let settings = ParetoSettings { points: 4, steps: 100, pupil, ..ParetoSettings::default() };
+    let mut sweep = ParetoSweep::new(&lens(), &settings).unwrap();
     let mut before = 0.0;
     loop {
         let slice = sweep.step();
@@ -32,16 +32,16 @@ fn swept(pupil: PupilEdge) -> Sweep {
 #[test]
 fn a_front_that_sees_light_covers_more_than_one_that_does_not() {
     let [ours, biased] = [PupilEdge::Moving, PupilEdge::Kept].map(swept);
-    let [a, b] = [&ours, &biased].map(Sweep::hypervolume);
+    let [a, b] = [&ours, &biased].map(ParetoSweep::hypervolume);
     println!("hypervolume {a:.4}, biased {b:.4}");
     assert!(a > b);
-    let designs = ours.front().designs();
+    let designs = ours.front().points();
     for pair in designs.windows(2) {
         assert!(pair[0].light < pair[1].light && pair[0].spot < pair[1].spot);
     }
     for design in designs {
         design.lens.check().unwrap();
-        let again = Design::of(&design.lens, design.weight, 1e-6).unwrap();
+        let again = ParetoPoint::evaluate(&design.lens, design.weight, 1e-6).unwrap();
         assert!((again.spot / design.spot - 1.0).abs() < 1e-3, "{} {}", again.spot, design.spot);
         assert!((again.light / design.light - 1.0).abs() < 1e-3);
     }
@@ -49,11 +49,11 @@ fn a_front_that_sees_light_covers_more_than_one_that_does_not() {
 
 #[test]
 fn a_front_is_the_same_on_one_thread_and_on_two() {
-    let settings = Settings { points: 2, steps: 5, ..Settings::default() };
+    let settings = ParetoSettings { points: 2, steps: 5, ..ParetoSettings::default() };
     let [one, two] = [1, 2].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut sweep = Sweep::new(&lens(), &settings).unwrap();
+            let mut sweep = ParetoSweep::new(&lens(), &settings).unwrap();
             while !sweep.step().finished {}
             sweep.front().clone()
         })
@@ -63,33 +63,36 @@ fn a_front_is_the_same_on_one_thread_and_on_two() {
 
 #[test]
 fn a_front_drops_what_is_beaten() {
-    let start = Design::of(&lens(), None, 1e-4).unwrap();
-    let design = |spot: f64, light: f64| Design { spot, light, ..start.clone() };
+    let start = ParetoPoint::evaluate(&lens(), None, 1e-4).unwrap();
+    let design = |spot: f64, light: f64| ParetoPoint { spot, light, ..start.clone() };
     let mut front = Front::default();
-    assert!(front.offer(design(2.0, 1.0)) && front.offer(design(3.0, 2.0)));
-    assert!(!front.offer(design(2.5, 1.0)) && !front.offer(design(2.0, 1.0)));
-    assert!(!front.offer(design(f64::NAN, 9.0)));
-    assert!(!front.offer(Design { lit: false, ..design(0.1, 9.0) }));
+    assert!(front.insert(design(2.0, 1.0)) && front.insert(design(3.0, 2.0)));
+    assert!(!front.insert(design(2.5, 1.0)) && !front.insert(design(2.0, 1.0)));
+    assert!(!front.insert(design(f64::NAN, 9.0)));
+    assert!(!front.insert(ParetoPoint { has_light: false, ..design(0.1, 9.0) }));
     // (4 - 2) x 1 + (4 - 3) x (2 - 1), in multiples of 4 x 1.
     assert!((front.hypervolume(4.0, 1.0) - 0.75).abs() < 1e-15);
-    assert!(front.offer(design(1.0, 3.0)));
-    assert_eq!(front.designs().len(), 1);
+    assert!(front.insert(design(1.0, 3.0)));
+    assert_eq!(front.points().len(), 1);
 }
 
 #[test]
 fn settings_without_meaning_and_lenses_without_light_are_refused() {
     for settings in [
-        Settings { points: 0, ..Settings::default() },
-        Settings { steps: 0, ..Settings::default() },
-        Settings { blur: [0.0, 1e-3], ..Settings::default() },
-        Settings { blur: [f64::NAN, 1e-3], ..Settings::default() },
-        Settings { rims: [1.1, 1.3], ..Settings::default() },
-        Settings { tolerance: 0.0, ..Settings::default() },
+        ParetoSettings { points: 0, ..ParetoSettings::default() },
+        ParetoSettings { steps: 0, ..ParetoSettings::default() },
+        ParetoSettings { blur: [0.0, 1e-3], ..ParetoSettings::default() },
+        ParetoSettings { blur: [f64::NAN, 1e-3], ..ParetoSettings::default() },
+        ParetoSettings { rims: [1.1, 1.3], ..ParetoSettings::default() },
+        ParetoSettings { tolerance: 0.0, ..ParetoSettings::default() },
     ] {
-        let refused = Sweep::new(&lens(), &settings).unwrap_err();
-        assert!(matches!(refused, NoFront::Settings { .. }), "{refused}");
+        let refused = ParetoSweep::new(&lens(), &settings).unwrap_err();
+        assert!(matches!(refused, ParetoError::Settings { .. }), "{refused}");
     }
     let mut dark = lens();
     dark.surfaces[0].semi_diameter = Some(0.0);
-    assert!(matches!(Sweep::new(&dark, &Settings::default()), Err(NoFront::Merit(_))));
+    assert!(matches!(
+        ParetoSweep::new(&dark, &ParetoSettings::default()),
+        Err(ParetoError::Merit(_))
+    ));
 }

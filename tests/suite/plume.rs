@@ -3,13 +3,15 @@
 
 use crate::grin::length;
 use aplanat::files::{Volume, write_volume};
-use aplanat::grin::field::{Grid, Plume};
+use aplanat::grin::field::{Plume, RegularGrid};
 use aplanat::grin::{
-    End, Fate, Field as _, Integrator, LastStep, Launch, Ray, Region, Setup, Tracer,
+    EndCondition, GrinFate, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField as _,
+    Integrator, LastStep, LaunchMode,
 };
 use aplanat::grin_task::{
-    self, Chords, Directions, Edge, Exact, FieldKind, Goal, Level, MakerLimits, Medium, Method,
-    Runner, Source, Space, Start, Task, Tracing,
+    self, BoundaryCondition, Domain, FieldRepresentation, GrinField, GrinMethod, GrinOptimizer,
+    GrinTask, InitialField, LightGoal, LightSource, ManufacturingLimits, ReferenceField,
+    RefinementLevel, SourceDirections, StraightRays, TracingSettings,
 };
 use aplanat::math::{Real, Vec3};
 use rayon::ThreadPoolBuilder;
@@ -17,16 +19,17 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// The task of the weakest plume with few rays and a coarse grid.
-fn small() -> Task {
-    let mut task = grin_task::find("plume").unwrap().task().unwrap();
-    task.levels = vec![Level { nodes: 5, steps: 8 }, Level { nodes: 9, steps: 15 }];
+fn small() -> GrinTask {
+    let mut task = grin_task::find_builtin("plume").unwrap().task().unwrap();
+    task.levels =
+        vec![RefinementLevel { nodes: 5, steps: 8 }, RefinementLevel { nodes: 9, steps: 15 }];
     task.views[0].source =
-        Source::Parallel { directions: Directions::Around(8), radius: 0.95, rays: 150 };
+        LightSource::Parallel { directions: SourceDirections::Around(8), radius: 0.95, rays: 150 };
     task
 }
 
-fn solved(task: &Task) -> Runner {
-    let mut runner = Runner::new(task).unwrap();
+fn solved(task: &GrinTask) -> GrinOptimizer {
+    let mut runner = GrinOptimizer::new(task).unwrap();
     while !runner.step().unwrap().finished {}
     runner
 }
@@ -39,9 +42,9 @@ fn folder(name: &str) -> PathBuf {
 }
 
 /// The truth and the goal of a task.
-fn with_truth(task: &Task, exact: Exact) -> Task {
+fn with_truth(task: &GrinTask, exact: ReferenceField) -> GrinTask {
     let mut task = task.clone();
-    task.views[0].goal = Goal::Like { field: exact.clone(), direction: 1.0 };
+    task.views[0].goal = LightGoal::Like { field: exact.clone(), direction: 1.0 };
     task.exact = Some(exact);
     task
 }
@@ -63,8 +66,8 @@ fn raw(folder: &Path, numbers: &str, map: &str, bytes: &[u8]) -> PathBuf {
 /// The density of the plume, 0 to 1, at the nodes of 64³.
 fn densities() -> Vec<f64> {
     let plume = Plume::<f64>::new(0.0, 1.0, 1.0);
-    let grid = Grid::cube(64, 1.0).unwrap();
-    (0..grid.nodes()).map(|n| plume.sample(grid.node(n)).index.clamp(0.0, 1.0)).collect()
+    let grid = RegularGrid::cube(64, 1.0).unwrap();
+    (0..grid.node_count()).map(|n| plume.sample(grid.node(n)).index.clamp(0.0, 1.0)).collect()
 }
 
 #[test]
@@ -85,16 +88,16 @@ fn grin_a_volume_of_ones_own_is_found_in_any_precision() {
     ];
     for (numbers, map, bytes, limit) in cases {
         let path = raw(&folder, numbers, &map, &bytes);
-        let mut task = with_truth(&small(), Exact::Volume(path.clone()));
-        task.field = FieldKind::Trilinear { half: 1.0 };
-        task.edge = Some(Edge { index: 1.0003, fixed: true, weight: 0.0 });
+        let mut task = with_truth(&small(), ReferenceField::Volume(path.clone()));
+        task.field = FieldRepresentation::Trilinear { half: 1.0 };
+        task.edge = Some(BoundaryCondition { index: 1.0003, fixed: true, weight: 0.0 });
         let text = serde_json::to_string(&task).unwrap();
-        let task = grin_task::read(&text, "a task").unwrap();
+        let task = grin_task::read_task(&text, "a task").unwrap();
         let runner = solved(&task);
         let found = task.difference(runner.best()).unwrap().unwrap();
         println!("own volume, {numbers}: {found:?}");
-        assert!(found.of_contrast < limit, "{numbers}: {found:?}");
-        let judged = runner.judge(runner.best()).unwrap();
+        assert!(found.relative_to_contrast < limit, "{numbers}: {found:?}");
+        let judged = runner.score(runner.best()).unwrap();
         assert_eq!(judged.views[0].counts.excluded().count(), 0);
     }
     std::fs::remove_dir_all(folder).unwrap();
@@ -104,8 +107,8 @@ fn grin_a_volume_of_ones_own_is_found_in_any_precision() {
 fn grin_a_volume_that_is_wrong_is_refused_with_its_reason() {
     let folder = folder("wrong-volume");
     let refused = |path: PathBuf| {
-        let task = with_truth(&small(), Exact::Volume(path));
-        Runner::new(&task).map(|_| ()).unwrap_err().to_string()
+        let task = with_truth(&small(), ReferenceField::Volume(path));
+        GrinOptimizer::new(&task).map(|_| ()).unwrap_err().to_string()
     };
     let says = |found: String, words: &[&str]| {
         words.iter().for_each(|word| assert!(found.contains(word), "`{found}`: no `{word}`"));
@@ -137,16 +140,16 @@ fn grin_a_volume_that_is_wrong_is_refused_with_its_reason() {
 fn grin_a_volume_without_contrast_is_found_at_once() {
     let folder = folder("empty-volume");
     let path = folder.join("air.npz");
-    let grid = Grid::cube(2, 1.0).unwrap();
+    let grid = RegularGrid::cube(2, 1.0).unwrap();
     write_volume(&path, &Volume { grid, values: vec![1.0003; 8] }).unwrap();
-    let task = with_truth(&small(), Exact::Volume(path));
+    let task = with_truth(&small(), ReferenceField::Volume(path));
     let runner = solved(&task);
     let found = task.difference(runner.best()).unwrap().unwrap();
     println!("no contrast: {found:?} after {} steps", runner.steps());
-    assert!(found.relative < 1e-12 && !found.of_contrast.is_nan(), "{found:?}");
-    assert!(runner.judge(runner.best()).unwrap().loss < 1e-20);
-    let chords = Chords::new(&task).unwrap();
-    let even = chords.field(9, 5, |_| ControlFlow::Continue(())).unwrap();
+    assert!(found.relative < 1e-12 && !found.relative_to_contrast.is_nan(), "{found:?}");
+    assert!(runner.score(runner.best()).unwrap().loss < 1e-20);
+    let chords = StraightRays::new(&task).unwrap();
+    let even = chords.reconstruct(9, 5, |_| ControlFlow::Continue(())).unwrap();
     assert!(task.difference(&even).unwrap().unwrap().relative < 1e-12);
     std::fs::remove_dir_all(folder).unwrap();
 }
@@ -154,15 +157,15 @@ fn grin_a_volume_without_contrast_is_found_at_once() {
 #[test]
 fn grin_a_plume_in_one_voxel_does_as_well_as_it_can() {
     let mut task = small();
-    task.field = FieldKind::Trilinear { half: 1.0 };
+    task.field = FieldRepresentation::Trilinear { half: 1.0 };
     task.edge = None;
-    task.levels = vec![Level { nodes: 2, steps: 5 }];
-    let before = Runner::new(&task).unwrap();
-    let before = before.judge(before.best()).unwrap().loss;
+    task.levels = vec![RefinementLevel { nodes: 2, steps: 5 }];
+    let before = GrinOptimizer::new(&task).unwrap();
+    let before = before.score(before.best()).unwrap().loss;
     let runner = solved(&task);
-    let after = runner.judge(runner.best()).unwrap().loss;
+    let after = runner.score(runner.best()).unwrap().loss;
     assert!(after.is_finite() && after <= before, "{before} {after}");
-    let lines = Chords::new(&task).unwrap().by_gradients(2, 5).unwrap();
+    let lines = StraightRays::new(&task).unwrap().reconstruct_by_gradients(2, 5).unwrap();
     assert!(lines.field().parameters().iter().all(|index| *index == 1.0003));
 }
 
@@ -172,15 +175,15 @@ fn grin_straight_lines_are_the_same_on_one_thread_and_on_two() {
     let on = |threads: usize| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let chords = Chords::new(&task).unwrap();
+            let chords = StraightRays::new(&task).unwrap();
             assert_eq!(chords.count(), 1200);
             let mut errors = Vec::new();
-            let visit = |medium: &Medium| {
-                errors.push(task.difference(medium).unwrap().unwrap().of_contrast);
+            let visit = |medium: &GrinField| {
+                errors.push(task.difference(medium).unwrap().unwrap().relative_to_contrast);
                 ControlFlow::Continue(())
             };
-            let field = chords.field(9, 8, visit).unwrap();
-            (field, chords.by_gradients(9, 8).unwrap(), errors)
+            let field = chords.reconstruct(9, 8, visit).unwrap();
+            (field, chords.reconstruct_by_gradients(9, 8).unwrap(), errors)
         })
     };
     let (one, two) = (on(1), on(2));
@@ -189,13 +192,14 @@ fn grin_straight_lines_are_the_same_on_one_thread_and_on_two() {
     // On so coarse a grid the later steps fit what straight lines cannot explain.
     let best = one.2.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(one.2.len() == 8 && best < 0.3 && one.2[7] < one.2[0], "{:?}", one.2);
-    let stopped = Chords::new(&task).unwrap().field(9, 8, |_| ControlFlow::Break(())).unwrap();
-    assert_eq!(task.difference(&stopped).unwrap().unwrap().of_contrast, one.2[0]);
+    let stopped =
+        StraightRays::new(&task).unwrap().reconstruct(9, 8, |_| ControlFlow::Break(())).unwrap();
+    assert_eq!(task.difference(&stopped).unwrap().unwrap().relative_to_contrast, one.2[0]);
 }
 
 /// A plume much denser than the air around, a thousand times stronger than the strongest task.
-fn wild() -> Exact {
-    Exact::Plume { ambient: 1.0, contrast: 300.0, half: 1.0 }
+fn wild() -> ReferenceField {
+    ReferenceField::Plume { ambient: 1.0, contrast: 300.0, half: 1.0 }
 }
 
 #[test]
@@ -203,23 +207,24 @@ fn grin_a_plume_that_is_chaotic_is_told_and_nothing_becomes_nan() {
     let folder = folder("wild");
     let path = folder.join("wild.npz");
     let exact = wild().field::<f64>().unwrap();
-    let grid = Grid::cube(33, 1.0).unwrap();
-    let values = (0..grid.nodes()).map(|n| exact.sample(grid.node(n)).index).collect();
+    let grid = RegularGrid::cube(33, 1.0).unwrap();
+    let values = (0..grid.node_count()).map(|n| exact.sample(grid.node(n)).index).collect();
     write_volume(&path, &Volume { grid, values }).unwrap();
-    let mut task = with_truth(&small(), Exact::Plume { ambient: 1.0, contrast: 0.3, half: 1.0 });
-    task.launch = Launch::AsGiven;
-    task.field = FieldKind::Trilinear { half: 1.0 };
-    task.start = Start::Volume(path);
+    let mut task =
+        with_truth(&small(), ReferenceField::Plume { ambient: 1.0, contrast: 0.3, half: 1.0 });
+    task.launch = LaunchMode::AsGiven;
+    task.field = FieldRepresentation::Trilinear { half: 1.0 };
+    task.start = InitialField::Volume(path);
     task.edge = None;
-    task.limits = MakerLimits { low: 1.0, high: 301.0, slope: None, change: 1.0 };
-    task.levels = vec![Level { nodes: 33, steps: 2 }];
-    let mut runner = Runner::new(&task).unwrap();
-    let judged = runner.judge(runner.best()).unwrap();
+    task.limits = ManufacturingLimits { low: 1.0, high: 301.0, slope: None, change: 1.0 };
+    task.levels = vec![RefinementLevel { nodes: 33, steps: 2 }];
+    let mut runner = GrinOptimizer::new(&task).unwrap();
+    let judged = runner.score(runner.best()).unwrap();
     let counts = judged.views[0].counts;
     println!("wild: {:?}", counts.excluded().collect::<Vec<_>>());
-    assert!(counts.fates.of(Fate::Chaotic) > 0 && judged.loss.is_finite());
+    assert!(counts.fates.count_of(GrinFate::Chaotic) > 0 && judged.loss.is_finite());
     let told: usize = counts.excluded().map(|(_, count)| count).sum();
-    assert_eq!(told + counts.counted(), 1200);
+    assert_eq!(told + counts.valid(), 1200);
     assert!(judged.views[0].retrace_error.is_finite());
     while !runner.step().unwrap().finished {}
     assert!(runner.best().field().parameters().iter().all(|index| index.is_finite()));
@@ -230,17 +235,22 @@ fn grin_a_plume_that_is_chaotic_is_told_and_nothing_becomes_nan() {
 fn grin_rays_that_a_measurement_loses_are_left_out_and_counted() {
     let mut task = with_truth(&small(), wild());
     task.views[0].source =
-        Source::Parallel { directions: Directions::Around(4), radius: 0.95, rays: 30 };
-    let task = Task { launch: Launch::AsGiven, start: Start::Uniform(1.0), edge: None, ..task };
-    let task = Task { limits: MakerLimits { high: 301.0, ..task.limits }, ..task };
+        LightSource::Parallel { directions: SourceDirections::Around(4), radius: 0.95, rays: 30 };
+    let task = GrinTask {
+        launch: LaunchMode::AsGiven,
+        start: InitialField::Uniform(1.0),
+        edge: None,
+        ..task
+    };
+    let task = GrinTask { limits: ManufacturingLimits { high: 301.0, ..task.limits }, ..task };
     let measured = task.measurements().unwrap().remove(0);
     println!("measured: {:?}", measured.counts.excluded().collect::<Vec<_>>());
-    let lost = measured.counts.sent() - measured.counts.counted();
+    let lost = measured.counts.total() - measured.counts.valid();
     assert!(lost > 0 && lost < 120 && measured.deflection.is_finite());
-    let runner = Runner::new(&task).unwrap();
-    let judged = runner.judge(runner.best()).unwrap();
+    let runner = GrinOptimizer::new(&task).unwrap();
+    let judged = runner.score(runner.best()).unwrap();
     let counts = judged.views[0].counts;
-    assert_eq!((counts.unmeasured, counts.sent(), counts.counted()), (lost, 120, 120 - lost));
+    assert_eq!((counts.unmeasured, counts.total(), counts.valid()), (lost, 120, 120 - lost));
     assert!(counts.excluded().any(|(reason, n)| reason == "unmeasured" && n == lost));
     assert!(judged.loss.is_finite());
 }
@@ -250,27 +260,27 @@ fn grin_rays_that_a_field_traps_are_told_as_trapped() {
     // Every ray of a fish-eye without a boundary is a circle, here within the cube.
     let folder = folder("fish-eye");
     let path = folder.join("fish-eye.npz");
-    let grid = Grid::cube(65, 4.0).unwrap();
+    let grid = RegularGrid::cube(65, 4.0).unwrap();
     let index = |p: Vec3<f64>| 8.0 / (1.0 + p.dot(p));
-    let values = (0..grid.nodes()).map(|n| index(grid.node(n)).max(1.0)).collect();
+    let values = (0..grid.node_count()).map(|n| index(grid.node(n)).max(1.0)).collect();
     write_volume(&path, &Volume { grid, values }).unwrap();
     let mut task = small();
-    task.field = FieldKind::Tricubic { half: 4.0 };
-    task.space = Space::Cube { half: 4.0 };
-    task.launch = Launch::Scaled;
-    task.start = Start::Volume(path);
+    task.field = FieldRepresentation::Tricubic { half: 4.0 };
+    task.space = Domain::Cube { half: 4.0 };
+    task.launch = LaunchMode::Scaled;
+    task.start = InitialField::Volume(path);
     task.edge = None;
     task.exact = None;
-    task.tracing = Some(Tracing { integrator: Integrator::LeapfrogDkd, per_voxel: 20.0 });
-    task.limits = MakerLimits { low: 1.0, high: 9.0, slope: None, change: 0.05 };
-    task.levels = vec![Level { nodes: 65, steps: 1 }];
-    task.method = Method::Lbfgs;
+    task.tracing = Some(TracingSettings { integrator: Integrator::LeapfrogDkd, per_voxel: 20.0 });
+    task.limits = ManufacturingLimits { low: 1.0, high: 9.0, slope: None, change: 0.05 };
+    task.levels = vec![RefinementLevel { nodes: 65, steps: 1 }];
+    task.method = GrinMethod::Lbfgs;
     // Across the radius at 0.6 and at 1.8 mm: the far ends of their circles are at 1.7 and 0.56 mm.
-    task.views[0].source = Source::Fan { height: 2.4, z: 0.0, rays: 2 };
-    task.views[0].goal = Goal::Point([4.0, 0.0, 0.0]);
-    let runner = Runner::new(&task).unwrap();
+    task.views[0].source = LightSource::Fan { height: 2.4, z: 0.0, rays: 2 };
+    task.views[0].goal = LightGoal::Point([4.0, 0.0, 0.0]);
+    let runner = GrinOptimizer::new(&task).unwrap();
     std::fs::remove_dir_all(folder).unwrap();
-    let judged = runner.judge(runner.best()).unwrap();
+    let judged = runner.score(runner.best()).unwrap();
     let counts = judged.views[0].counts;
     println!("fish-eye: {:?}", counts.excluded().collect::<Vec<_>>());
     assert!(counts.excluded().any(|(reason, count)| reason == "trapped" && count == 2));
@@ -281,36 +291,38 @@ fn grin_rays_that_a_field_traps_are_told_as_trapped() {
 
 #[test]
 fn grin_a_plume_below_vacuum_is_refused() {
-    let thin = Exact::Plume { ambient: 1.0, contrast: -0.1, half: 1.0 };
-    let error = Runner::new(&with_truth(&small(), thin)).unwrap_err().to_string();
+    let thin = ReferenceField::Plume { ambient: 1.0, contrast: -0.1, half: 1.0 };
+    let error = GrinOptimizer::new(&with_truth(&small(), thin)).unwrap_err().to_string();
     assert!(error.contains("0.9") && error.contains("1 or more"), "{error}");
-    let error =
-        Runner::new(&Task { limits: MakerLimits { low: 0.9, ..small().limits }, ..small() });
+    let error = GrinOptimizer::new(&GrinTask {
+        limits: ManufacturingLimits { low: 0.9, ..small().limits },
+        ..small()
+    });
     assert!(error.unwrap_err().to_string().contains("limits, low"));
 }
 
 /// Where light leaves the plume, in one number type.
 fn exits<R: Real>() -> Vec<Vec3<f64>> {
-    let exact = Exact::Plume { ambient: 1.3, contrast: -0.3, half: 1.0 };
+    let exact = ReferenceField::Plume { ambient: 1.3, contrast: -0.3, half: 1.0 };
     let field = exact.field::<R>().unwrap();
-    let region = Region::cube(R::ONE);
-    let end = End::Boundary { region, last: LastStep::Fractional, limit: 10_000 };
-    let setup = Setup {
+    let region = GrinRegion::cube(R::ONE);
+    let end = EndCondition::Boundary { region, last: LastStep::Fractional, limit: 10_000 };
+    let setup = GrinSetup {
         integrator: Integrator::BlanesMoan,
         step: R::from_f64(0.03),
-        launch: Launch::Scaled,
+        launch: LaunchMode::Scaled,
         end,
         screen: None,
     };
-    let tracer = Tracer::new(&*field, setup).unwrap();
-    let ray = |i: u32| Ray {
+    let tracer = GrinTracer::new(&*field, setup).unwrap();
+    let ray = |i: u32| GrinRay {
         x: Vec3::new(-2.0, 0.07 * f64::from(i) - 0.7, 0.05 * f64::from(i) - 0.5),
         v: Vec3::new(1.0, 0.0, 0.0),
     };
-    let exits = (0..20).map(|i| tracer.ray(&ray(i).lift()));
+    let exits = (0..20).map(|i| tracer.trace(&ray(i).cast()));
     exits
         .map(|exit| {
-            assert_eq!(exit.fate, Fate::Left);
+            assert_eq!(exit.fate, GrinFate::Left);
             exit.x.value()
         })
         .collect()
@@ -325,38 +337,38 @@ fn grin_the_plume_bends_light_alike_in_single_and_double_precision() {
 }
 
 /// The steepest slope of a field by brute force, on a lattice that knows nothing of its cells.
-fn steepest(medium: &Medium, space: Space) -> f64 {
+fn steepest(medium: &GrinField, space: Domain) -> f64 {
     let at = |i: usize| 2.0 * (i as f64 + 0.5) / 61.0 - 1.0;
     let place = |n: usize| Vec3::new(at(n % 61), at(n / 61 % 61), at(n / 61 / 61));
-    let inside = (0..61 * 61 * 61).map(place).filter(|p| space.region().height(*p) < 0.0);
+    let inside = (0..61 * 61 * 61).map(place).filter(|p| space.region().level(*p) < 0.0);
     inside.map(|p| length(medium.field().sample(p).gradient)).fold(0.0, f64::max)
 }
 
 #[test]
 fn grin_no_place_is_steeper_than_a_maker_allows() {
     let free = small();
-    let radial = |mut task: Task| {
-        task.field = FieldKind::Sphere { radius: 1.0 };
-        task.space = Space::Ball { radius: 1.0 };
-        task.levels = vec![Level { nodes: 6, steps: 15 }];
+    let radial = |mut task: GrinTask| {
+        task.field = FieldRepresentation::Sphere { radius: 1.0 };
+        task.space = Domain::Ball { radius: 1.0 };
+        task.levels = vec![RefinementLevel { nodes: 6, steps: 15 }];
         task
     };
-    let trilinear = |mut task: Task| {
-        task.field = FieldKind::Trilinear { half: 1.0 };
-        task.edge = Some(Edge { index: 1.0003, fixed: true, weight: 0.0 });
+    let trilinear = |mut task: GrinTask| {
+        task.field = FieldRepresentation::Trilinear { half: 1.0 };
+        task.edge = Some(BoundaryCondition { index: 1.0003, fixed: true, weight: 0.0 });
         task
     };
     for task in [free.clone(), trilinear(free.clone()), radial(free)] {
         let runner = solved(&task);
         let (slope, loss) =
-            (task.extremes(runner.best()).slope, runner.judge(runner.best()).unwrap().loss);
+            (task.extremes(runner.best()).slope, runner.score(runner.best()).unwrap().loss);
         let limit = 0.7 * slope;
-        let limited = MakerLimits { slope: Some(limit), ..task.limits };
-        let task = Task { limits: limited, ..task };
-        let start = Runner::new(&task).unwrap();
-        let start = start.judge(start.best()).unwrap().loss;
+        let limited = ManufacturingLimits { slope: Some(limit), ..task.limits };
+        let task = GrinTask { limits: limited, ..task };
+        let start = GrinOptimizer::new(&task).unwrap();
+        let start = start.score(start.best()).unwrap().loss;
         let runner = solved(&task);
-        let after = runner.judge(runner.best()).unwrap().loss;
+        let after = runner.score(runner.best()).unwrap().loss;
         let extremes = task.extremes(runner.best());
         println!(
             "{:?}: slope {slope:.3e}, allowed {limit:.3e}, {:.3e} ({:.3e} by brute force); \
@@ -377,7 +389,7 @@ fn grin_no_place_is_steeper_than_a_maker_allows() {
 #[test]
 fn grin_light_comes_from_all_around_the_axis() {
     let task = small();
-    let (_, rays) = task.judging_rays(&task.views[0]);
+    let (_, rays) = task.scoring_rays(&task.views[0]);
     let mut angles: Vec<f64> = rays.iter().map(|ray| ray.v.y.atan2(ray.v.x).to_degrees()).collect();
     assert!(rays.iter().all(|ray| ray.v.z == 0.0 && (length(ray.v) - 1.0).abs() < 1e-15));
     angles.dedup_by(|a, b| (*a - *b).abs() < 1e-9);

@@ -1,10 +1,14 @@
 //! Rays from pupil coordinates against the hexapolar sums of `lenses.json`.
 
 use crate::reference::{Reference, Worst, count, lenses, number, numbers};
-use aplanat::lens::{ASPHERE_TERMS, Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::lens::{
+    ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System,
+};
 use aplanat::paraxial::Beam;
-use aplanat::pupil::{Accuracy, Aiming, Bench, Kind, Limit, Pattern, Region, pattern};
-use aplanat::trace::{Hurdle, Points, Rays, Sink};
+use aplanat::pupil::{
+    Accuracy, Aiming, PupilLimit, PupilPattern, RayModel, Region, RegionKind, pattern_points,
+};
+use aplanat::trace::{ImagePoints, RayLimit, Rays, TraceSink};
 use std::f64::consts::PI;
 
 /// Relative to the RMS radius, or to the height of a centroid. One unit of a ray's rounding comes on
@@ -32,19 +36,21 @@ fn compare(worst: &mut Worst, got: [f64; 3], exact: &serde_json::Value, rounding
 }
 
 /// The largest coordinate on the way of a beam.
-fn size(bench: &Bench) -> f64 {
-    let rows = &bench.colors[bench.primary].system.surfaces;
-    let heights = bench.first.marginal.heights.iter();
+fn size(bench: &RayModel) -> f64 {
+    let rows = &bench.channels[bench.primary].system.surfaces;
+    let heights = bench.first_order.marginal.heights.iter();
     rows.iter().map(|row| &row.thickness).chain(heights).fold(0.0, |m: f64, v| m.max(v.abs()))
 }
 
 /// Where the rays of the usual pattern land.
-fn hexapolar(bench: &Bench, field: usize, wavelength: usize) -> Vec<[f64; 2]> {
+fn hexapolar(bench: &RayModel, field: usize, wavelength: usize) -> Vec<[f64; 2]> {
     let launch = bench.launch(bench.fields[field], wavelength).unwrap();
-    let rays: Rays<f64> =
-        pattern(Pattern::Hexapolar(6)).iter().map(|p| launch.ray(*p).unwrap()).collect();
-    let mut landed = Points::default();
-    launch.color().tracer.batch(&rays, &mut landed);
+    let rays: Rays<f64> = pattern_points(PupilPattern::Hexapolar(6))
+        .iter()
+        .map(|p| launch.ray(*p).unwrap())
+        .collect();
+    let mut landed = ImagePoints::default();
+    launch.channel().tracer.trace_batch(&rays, &mut landed);
     assert_eq!(landed.fates().imaged, 127);
     landed.x.into_iter().zip(landed.y).map(|(x, y)| [x, y]).collect()
 }
@@ -85,7 +91,7 @@ fn reference_rays_of_exact_pupil_points() {
             let pupil = numbers(&ray["pupil"]);
             let launch = bench.launch(bench.fields[f], w).unwrap();
             let start = launch.ray([pupil[0], pupil[1]]).unwrap();
-            let landing = launch.color().tracer.trace(start);
+            let landing = launch.channel().tracer.trace(start);
             let exact = numbers(&ray["xy_exact_pupil"]);
             let point = landing.ray.point;
             for (got, exact) in [point.x, point.y].into_iter().zip(exact) {
@@ -101,12 +107,12 @@ fn reference_rays_of_exact_pupil_points() {
 fn orders(region: &Region<'_>) -> Vec<(usize, usize, f64)> {
     let at = |order: usize| {
         let nodes = region.nodes(order);
-        let landed = region.trace::<Points<f64>>(&nodes);
-        let area: f64 = landed.arrived().map(|(_, w)| w).sum();
+        let landed = region.trace::<ImagePoints<f64>>(&nodes);
+        let area: f64 = landed.arrivals().map(|(_, w)| w).sum();
         let points = &landed.sink;
-        let y = landed.arrived().map(|(i, w)| w * points.y[i]).sum::<f64>() / area;
+        let y = landed.arrivals().map(|(i, w)| w * points.y[i]).sum::<f64>() / area;
         let square = |i: usize| points.x[i].powi(2) + (points.y[i] - y).powi(2);
-        let rms = (landed.arrived().map(|(i, w)| w * square(i)).sum::<f64>() / area).sqrt();
+        let rms = (landed.arrivals().map(|(i, w)| w * square(i)).sum::<f64>() / area).sqrt();
         (nodes.points.len(), nodes.points.len() + nodes.rays, rms)
     };
     (0..region.orders()).map(at).collect()
@@ -117,7 +123,7 @@ fn double_gauss() -> Reference {
 }
 
 /// Prints the errors of all orders against the highest and returns them.
-fn errors(bench: &Bench, field: usize) -> Vec<(usize, f64)> {
+fn errors(bench: &RayModel, field: usize) -> Vec<(usize, f64)> {
     let region = Region::new(bench.launch(bench.fields[field], bench.primary).unwrap());
     let orders = orders(&region);
     let best = orders.last().unwrap().2;
@@ -153,18 +159,21 @@ fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
         semi_diameter,
         obstruction: 0.0,
         mirror: false,
-        hyper: false,
-        graded: None,
+        hyperhemisphere: false,
+        grin: None,
     };
     let image = surface((0.0, 0.0, 1.0, f64::INFINITY));
     let surfaces = rows.iter().copied().map(surface).chain([image]).collect();
     System { index_before: 1.0, surfaces, stop: Some(stop) }
 }
 
-fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> Bench {
+fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> RayModel {
     let beam = Beam { object: Object::Infinity, aperture, field: FieldKind::Angle, edge };
-    let fields = vec![Field { x: 0.0, y: edge, weight: 1.0 }];
-    Bench { fields, ..Bench::new(vec![(0.55, 1.0, system)], 0, beam, aiming).unwrap() }
+    let fields = vec![FieldPoint { x: 0.0, y: edge, weight: 1.0 }];
+    RayModel {
+        fields,
+        ..RayModel::from_systems(vec![(0.55, 1.0, system)], 0, beam, aiming).unwrap()
+    }
 }
 
 fn area(region: &Region<'_>) -> f64 {
@@ -196,11 +205,11 @@ fn a_pupil_cut_by_a_distant_rim_is_the_overlap_of_two_discs() {
 
 /// A stop of radius 5 and a rim of radius `rim` 100 mm behind it, the centre of whose shadow lies
 /// 10 mm from the middle of the stop.
-fn vignetted(rim: f64, turn: f64) -> (Bench, Field) {
+fn vignetted(rim: f64, turn: f64) -> (RayModel, FieldPoint) {
     let edge = 0.1f64.atan().to_degrees();
     let rows = [(0.0, 100.0, 1.0, 5.0), (0.0, 50.0, 1.0, rim)];
     let bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
-    (bench, Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+    (bench, FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
 }
 
 #[test]
@@ -209,7 +218,8 @@ fn the_sides_of_an_outline_are_as_long_as_the_arcs_of_two_discs() {
         let (bench, field) = vignetted(rim, turn);
         let region = Region::new(bench.launch(field, 0).unwrap());
         let outline = region.outline(128).unwrap();
-        let (stop, clips) = (Limit::Surface(0, Hurdle::Rim), Limit::Surface(1, Hurdle::Rim));
+        let (stop, clips) =
+            (PupilLimit::Surface(0, RayLimit::Rim), PupilLimit::Surface(1, RayLimit::Rim));
         assert_eq!(outline.sides.len(), 2, "{rim} {turn}");
         // Half the angle that each arc spans about its own centre.
         let half = |r: f64, s: f64| ((100.0 + r * r - s * s) / (20.0 * r)).acos();
@@ -218,7 +228,7 @@ fn the_sides_of_an_outline_are_as_long_as_the_arcs_of_two_discs() {
             let share = outline.share(limit);
             assert!((share - exact / (a + b)).abs() < 3e-6, "{rim} {turn} {limit:?} {share}");
         }
-        let total: f64 = outline.limits().iter().map(|(_, share)| share).sum();
+        let total: f64 = outline.limits_by_share().iter().map(|(_, share)| share).sum();
         assert!((total - 1.0).abs() < 1e-12);
         assert_eq!(outline.corners().count(), 2);
         let first = &outline.sides[0];
@@ -235,7 +245,7 @@ fn the_sides_of_an_outline_are_as_long_as_the_arcs_of_two_discs() {
 
 #[test]
 fn the_extent_of_a_pupil_is_in_square_millimetres_about_its_centroid() {
-    let accuracy = Accuracy { tolerance: 1e-10, most_rays: 100_000 };
+    let accuracy = Accuracy { tolerance: 1e-10, max_rays: 100_000 };
     for (rim, turn) in [(10.0, 0.0), (8.0, 0.7)] {
         let (bench, field) = vignetted(rim, turn);
         let region = Region::new(bench.launch(field, 0).unwrap());
@@ -269,7 +279,7 @@ fn a_clear_pupil_is_a_disc_of_the_aperture() {
         let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
         let outline = region.outline(64).unwrap();
         assert!(outline.is_clear() && outline.corners().count() == 0);
-        assert_eq!(outline.limits(), [(Limit::Disc, 1.0)]);
+        assert_eq!(outline.limits_by_share(), [(PupilLimit::Disc, 1.0)]);
         let [area, x, y] = region.extent(Accuracy::default()).unwrap().values;
         // In air, the plane of the stop is seen from the first vertex undistorted.
         assert!((area / (25.0 * PI) - 1.0).abs() < 1e-12, "{aiming:?} {area}");
@@ -281,12 +291,12 @@ fn a_clear_pupil_is_a_disc_of_the_aperture() {
 fn limits_have_names() {
     let (bench, _) = vignetted(8.0, 0.0);
     let cases = [
-        (Limit::Disc, "entrance pupil"),
-        (Limit::Surface(0, Hurdle::Rim), "stop, surface 0"),
-        (Limit::Surface(1, Hurdle::Rim), "rim of surface 1"),
-        (Limit::Surface(1, Hurdle::Miss), "missed surface 1"),
-        (Limit::Surface(1, Hurdle::Reflection), "critical angle at surface 1"),
-        (Limit::Unaimed, "no ray to the stop"),
+        (PupilLimit::Disc, "entrance pupil"),
+        (PupilLimit::Surface(0, RayLimit::Rim), "stop, surface 0"),
+        (PupilLimit::Surface(1, RayLimit::Rim), "rim of surface 1"),
+        (PupilLimit::Surface(1, RayLimit::Miss), "missed surface 1"),
+        (PupilLimit::Surface(1, RayLimit::TotalReflection), "critical angle at surface 1"),
+        (PupilLimit::Unaimed, "no ray to the stop"),
     ];
     for (limit, name) in cases {
         assert_eq!(bench.limit_name(limit), name);
@@ -312,10 +322,14 @@ fn a_sliver_that_a_rim_cuts_off_is_seen() {
         let aperture = Aperture::EntrancePupilDiameter(10.0);
         let bench = bench(system(&rows, 0), aperture, edge, Aiming::Paraxial);
         for turn in [0.0f64, 0.2, 0.11] {
-            let field = Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 };
+            let field = FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 };
             let region = Region::new(bench.launch(field, 0).unwrap());
             let exact = overlap(1.0, 12.0, 11.0 + cut);
-            assert!(matches!(region.kind, Kind::Split(_)), "{cut} {turn} {:?}", region.kind);
+            assert!(
+                matches!(region.kind, RegionKind::StarShaped(_)),
+                "{cut} {turn} {:?}",
+                region.kind
+            );
             assert!((area(&region) - exact).abs() < 1e-10, "{cut} {turn}");
         }
     }
@@ -337,11 +351,11 @@ fn a_rim_of_size_zero_is_dark() {
 fn a_beam_that_nothing_limits_is_endless() {
     let rows = [(0.0, 10.0, 1.5, f64::INFINITY), (0.0, 10.0, 1.0, f64::INFINITY)];
     let mut bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(1.0), 5.0, Aiming::Paraxial);
-    let color = &mut bench.colors[0];
+    let color = &mut bench.channels[0];
     color.system.surfaces[0].semi_diameter = f64::INFINITY;
     color.tracer = aplanat::trace::Tracer::new(&color.system).unwrap();
     let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
-    assert_eq!(region.kind, Kind::Endless);
+    assert_eq!(region.kind, RegionKind::Unbounded);
 }
 
 #[test]
@@ -352,13 +366,13 @@ fn a_pupil_in_two_pieces_is_told_and_sampled() {
     let bench =
         bench(system(&rows, 0), Aperture::EntrancePupilDiameter(26.0), 0.0, Aiming::Paraxial);
     let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
-    let Kind::Ragged { pieces, .. } = region.kind else { panic!("{:?}", region.kind) };
+    let RegionKind::Irregular { pieces, .. } = region.kind else { panic!("{:?}", region.kind) };
     assert!(pieces >= 2, "{pieces}");
     let spot = aplanat::analysis::spot(&bench, bench.fields[0], Accuracy::default()).unwrap();
-    let points = pattern(Pattern::Square(900));
+    let points = pattern_points(PupilPattern::Square(900));
     let rays: Rays<f64> = points.iter().map(|p| region.launch.ray(*p).unwrap()).collect();
-    let mut landed = Points::default();
-    region.launch.color().tracer.batch(&rays, &mut landed);
+    let mut landed = ImagePoints::default();
+    region.launch.channel().tracer.trace_batch(&rays, &mut landed);
     let lit = || (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
     let square: f64 = lit().map(|i| landed.x[i].powi(2) + landed.y[i].powi(2)).sum();
     let rms = (square / lit().count() as f64).sqrt();
@@ -367,18 +381,18 @@ fn a_pupil_in_two_pieces_is_told_and_sampled() {
 
 /// A disc of radius 5 mm, and 100 mm behind it a plane that is obstructed as far as `inner`: its
 /// shadow lies `away` radii of the disc from the middle.
-fn shadowed(inner: f64, away: f64, turn: f64) -> (Bench, Field) {
+fn shadowed(inner: f64, away: f64, turn: f64) -> (RayModel, FieldPoint) {
     let mut lens = system(&[(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, f64::INFINITY)], 0);
     lens.surfaces[1].obstruction = 5.0 * inner;
     let edge = (0.05 * away).atan().to_degrees();
     let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
-    (bench, Field { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+    (bench, FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
 }
 
 /// The area of a pupil, with its error.
-fn lit(bench: &Bench, field: Field, tolerance: f64) -> aplanat::analysis::Estimate {
-    let accuracy = Accuracy { tolerance, most_rays: 300_000 };
-    aplanat::analysis::spot(bench, field, accuracy).unwrap().colors[0].unwrap().area
+fn lit(bench: &RayModel, field: FieldPoint, tolerance: f64) -> aplanat::analysis::Estimate {
+    let accuracy = Accuracy { tolerance, max_rays: 300_000 };
+    aplanat::analysis::spot(bench, field, accuracy).unwrap().channels[0].unwrap().area
 }
 
 #[test]
@@ -401,7 +415,7 @@ fn an_annular_pupil_is_one_piece_that_no_point_sees() {
 
 /// A ring is one piece that no point sees, with two edges.
 fn assert_ring(region: &Region<'_>) {
-    let ring = matches!(region.kind, Kind::Ragged { pieces: 1, ring: Some(_), .. });
+    let ring = matches!(region.kind, RegionKind::Irregular { pieces: 1, annulus: Some(_), .. });
     assert!(ring, "{:?}", region.kind);
 }
 
@@ -424,7 +438,10 @@ fn a_shadow_smaller_than_the_first_look_is_found() {
                     let best = (area(&region) - exact).abs();
                     assert!(away > 0.6 || best < 1e-9, "{what} {best:e}");
                 } else {
-                    let ragged = matches!(region.kind, Kind::Ragged { pieces: 1, ring: None, .. });
+                    let ragged = matches!(
+                        region.kind,
+                        RegionKind::Irregular { pieces: 1, annulus: None, .. }
+                    );
                     assert!(ragged, "{inner} {away} {turn}: {:?}", region.kind);
                 }
             }
@@ -433,7 +450,7 @@ fn a_shadow_smaller_than_the_first_look_is_found() {
         for away in [1.0 + 1.01 * inner, 3.0, 40.0] {
             let (bench, field) = shadowed(inner, away, 0.2);
             let region = Region::new(bench.launch(field, 0).unwrap());
-            assert_eq!(region.kind, Kind::Clear, "{inner} {away}");
+            assert_eq!(region.kind, RegionKind::Clear, "{inner} {away}");
         }
     }
 }
@@ -449,12 +466,12 @@ fn a_shadow_that_bites_the_edge_leaves_a_pupil_that_is_split_where_one_point_see
             let region = Region::new(bench.launch(field, 0).unwrap());
             let exact = PI - overlap(1.0, inner, away);
             match region.kind {
-                Kind::Split(_) => {
+                RegionKind::StarShaped(_) => {
                     split += 1;
                     // Slower where the pupil has horns.
                     assert!((area(&region) - exact).abs() < 1e-7, "{inner} {away} {turn}");
                 }
-                Kind::Ragged { .. } => {
+                RegionKind::Irregular { .. } => {
                     let area = lit(&bench, field, 1e-3);
                     let error = (area.value - exact).abs();
                     assert!(error <= 3.0 * area.error, "{inner} {away}: {area:?} {exact}");
@@ -475,7 +492,7 @@ fn a_shadow_across_a_narrow_pupil_leaves_two_pieces() {
     let edge = 0.08f64.atan().to_degrees();
     let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
     let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
-    assert!(matches!(region.kind, Kind::Ragged { pieces: 2, .. }), "{:?}", region.kind);
+    assert!(matches!(region.kind, RegionKind::Irregular { pieces: 2, .. }), "{:?}", region.kind);
 }
 
 #[test]
@@ -488,8 +505,8 @@ fn an_obstruction_as_wide_as_the_beam_is_dark() {
 fn turning_the_field_turns_the_spot() {
     let bench = double_gauss().clipped_bench();
     let spot = |x: f64, y: f64| {
-        let accuracy = Accuracy { tolerance: 1e-8, most_rays: 100_000 };
-        aplanat::analysis::spot(&bench, Field { x, y, weight: 1.0 }, accuracy).unwrap()
+        let accuracy = Accuracy { tolerance: 1e-8, max_rays: 100_000 };
+        aplanat::analysis::spot(&bench, FieldPoint { x, y, weight: 1.0 }, accuracy).unwrap()
     };
     let upright = spot(0.0, 14.0);
     for angle in [0.3f64, 1.0, std::f64::consts::FRAC_PI_2, -2.5] {
@@ -507,8 +524,8 @@ fn aimed_rays_cross_the_stop_where_they_should() {
         let radius = bench.stop_radius();
         for field in &bench.fields {
             let launch = bench.launch(*field, bench.primary).unwrap();
-            for p in pattern(Pattern::Hexapolar(3)) {
-                let [x, y] = launch.at_stop(p).unwrap();
+            for p in pattern_points(PupilPattern::Hexapolar(3)) {
+                let [x, y] = launch.stop_point(p).unwrap();
                 let miss = (x - p[0] * radius).hypot(y - p[1] * radius);
                 assert!(miss < 1e-14 * (1.0 + radius), "{} {}: {miss:e}", lens.id(), field.y);
             }
@@ -519,12 +536,12 @@ fn aimed_rays_cross_the_stop_where_they_should() {
 #[test]
 fn a_fisheye_takes_light_from_behind_it() {
     let lens = aplanat::files::open("lenses/fisheye_minolta_16_f28.json").unwrap().lens;
-    let bench = Bench::of(&lens, 0).unwrap();
+    let bench = RayModel::from_lens(&lens, 0).unwrap();
     assert_eq!(bench.aiming, Aiming::Chief);
     for angle in [45.0, 80.0, 88.0, 90.0, 92.0] {
-        let field = Field { x: 0.0, y: angle, weight: 1.0 };
+        let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
         let launch = bench.launch(field, bench.primary).unwrap();
-        let [x, y] = launch.at_stop([0.0, 0.0]).unwrap();
+        let [x, y] = launch.stop_point([0.0, 0.0]).unwrap();
         assert!(x.hypot(y) < 1e-9 * bench.stop_radius(), "{angle}");
         println!("{angle} degrees: pupil area {:.6}", area(&Region::new(launch)));
     }
@@ -535,7 +552,7 @@ fn a_telecentric_object_space_fills_its_aperture() {
     // The stop stands in the back focal plane of a lens.
     let mut lens =
         system(&[(0.02, 3.0, 1.5, 30.0), (-0.02, 0.0, 1.0, 30.0), (0.0, 60.0, 1.0, 30.0)], 2);
-    let focus = aplanat::lens::focus_gap(
+    let focus = aplanat::lens::paraxial_image_distance(
         &system(&[(0.02, 3.0, 1.5, 30.0), (-0.02, 0.0, 1.0, 30.0)], 0),
         Object::Infinity,
     );
@@ -546,18 +563,19 @@ fn a_telecentric_object_space_fills_its_aperture() {
         field: FieldKind::ObjectHeight,
         edge: 2.0,
     };
-    let mut bench = Bench::new(vec![(0.55, 1.0, lens)], 0, beam, Aiming::Paraxial).unwrap();
+    let mut bench =
+        RayModel::from_systems(vec![(0.55, 1.0, lens)], 0, beam, Aiming::Paraxial).unwrap();
     // Rounding may leave the pupil very far away instead of at infinity; both must do.
-    for position in [bench.first.entrance_pupil.position, None] {
-        bench.first.entrance_pupil.position = position;
+    for position in [bench.first_order.entrance_pupil.position, None] {
+        bench.first_order.entrance_pupil.position = position;
         if position.is_none() {
-            bench.first.entrance_pupil.diameter = None;
+            bench.first_order.entrance_pupil.diameter = None;
         }
-        let launch = bench.launch(Field { x: 0.0, y: 2.0, weight: 1.0 }, 0).unwrap();
-        let [x, y] = launch.at_stop([0.0, 0.0]).unwrap();
+        let launch = bench.launch(FieldPoint { x: 0.0, y: 2.0, weight: 1.0 }, 0).unwrap();
+        let [x, y] = launch.stop_point([0.0, 0.0]).unwrap();
         assert!(x.hypot(y) < 0.05, "{x} {y}");
         let ray = launch.ray([0.0, 1.0]).unwrap();
         assert!((ray.direction.y.abs() - 0.1).abs() < 1e-6, "{:?}", ray.direction);
-        assert_eq!(Region::new(launch).kind, Kind::Clear);
+        assert_eq!(Region::new(launch).kind, RegionKind::Clear);
     }
 }

@@ -1,8 +1,10 @@
 //! Reading the reference cases: `tests/reference/`, or the folder that `APLANAT_REFERENCE` names.
 
-use aplanat::lens::{ASPHERE_TERMS, Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::lens::{
+    ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System,
+};
 use aplanat::paraxial::Beam;
-use aplanat::pupil::{Aiming, Bench};
+use aplanat::pupil::{Aiming, RayModel};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -96,23 +98,25 @@ impl Reference {
     }
 
     /// The lens ready for rays over the whole unit disc of the pupil, clipped by nothing.
-    pub(crate) fn open_bench(&self) -> Bench {
+    pub(crate) fn open_bench(&self) -> RayModel {
         let systems = self.systems(|w| self.open(w));
         let (aiming, mut beam) = (self.aiming(), self.beam());
         if aiming == Aiming::Stop {
             beam.aperture = Aperture::StopSemiDiameter(number(&self.data["stop_radius"]));
         }
-        self.with_fields(Bench::new(systems, self.primary(), beam, aiming).unwrap())
+        self.with_fields(RayModel::from_systems(systems, self.primary(), beam, aiming).unwrap())
     }
 
     /// The lens ready for rays, limited by its stop and clipped by its semi-diameters; by its stop
     /// alone where rays are aimed at that.
-    pub(crate) fn clipped_bench(&self) -> Bench {
+    pub(crate) fn clipped_bench(&self) -> RayModel {
         let aimed = self.aimed_at_stop();
         let systems = self.systems(|w| if aimed { self.open(w) } else { self.clipped(w) });
         let mut beam = self.beam();
         beam.aperture = Aperture::StopSemiDiameter(number(&self.data["stop_radius"]));
-        self.with_fields(Bench::new(systems, self.primary(), beam, self.aiming()).unwrap())
+        self.with_fields(
+            RayModel::from_systems(systems, self.primary(), beam, self.aiming()).unwrap(),
+        )
     }
 
     fn systems(&self, system: impl Fn(usize) -> System<f64>) -> Vec<(f64, f64, System<f64>)> {
@@ -124,9 +128,9 @@ impl Reference {
         if self.aimed_at_stop() { Aiming::Stop } else { Aiming::Paraxial }
     }
 
-    fn with_fields(&self, bench: Bench) -> Bench {
-        let field = |y: f64| Field { x: 0.0, y, weight: 1.0 };
-        Bench { fields: self.fields().into_iter().map(field).collect(), ..bench }
+    fn with_fields(&self, bench: RayModel) -> RayModel {
+        let field = |y: f64| FieldPoint { x: 0.0, y, weight: 1.0 };
+        RayModel { fields: self.fields().into_iter().map(field).collect(), ..bench }
     }
 
     /// The lens at a wavelength, clipped by nothing.
@@ -160,8 +164,8 @@ fn surface(row: &Value, wavelength: usize) -> Surface<f64> {
         semi_diameter: row["sd"].as_f64().unwrap_or(f64::INFINITY),
         obstruction: 0.0,
         mirror: row["mirror"].as_bool().unwrap_or(false),
-        hyper: false,
-        graded: None,
+        hyperhemisphere: false,
+        grin: None,
     }
 }
 

@@ -1,9 +1,9 @@
 //! What the size of every rim does, against lenses with larger and smaller rims.
 
-use aplanat::analysis::{self, RimEffect, Rims};
-use aplanat::files::{library, native};
+use aplanat::analysis::{self, RimSensitivities, RimSensitivity};
+use aplanat::files::{bundled_lenses, native};
 use aplanat::lens::{Lens, Parameter, Quantity};
-use aplanat::pupil::{Accuracy, Bench, NoDerivative};
+use aplanat::pupil::{Accuracy, DerivativeError, RayModel};
 
 /// By how much rims are made larger and smaller, in mm.
 const STEP: f64 = 1e-3;
@@ -12,15 +12,15 @@ const LEFT: f64 = 1e-3;
 
 /// The first lens of the library: its rims alone limit the beam.
 fn double_gauss() -> Lens {
-    native::read(library()[0].text, library()[0].name).unwrap()
+    native::read(bundled_lenses()[0].text, bundled_lenses()[0].name).unwrap()
 }
 
 /// Area and RMS radius of a field at the primary wavelength.
 fn light_and_blur(lens: &Lens, field: usize) -> [f64; 2] {
-    let bench = Bench::of(lens, 0).unwrap();
+    let bench = RayModel::from_lens(lens, 0).unwrap();
     let accuracy = Accuracy { tolerance: 1e-8, ..Accuracy::default() };
     let spot = analysis::spot(&bench, bench.fields[field], accuracy).unwrap();
-    let color = spot.colors[bench.primary].unwrap();
+    let color = spot.channels[bench.primary].unwrap();
     [color.light.value, color.rms.value]
 }
 
@@ -36,13 +36,13 @@ fn shown(lens: &Lens, field: usize, surface: usize) -> [f64; 2] {
     [0, 1].map(|i| (more[i] - less[i]) / (2.0 * STEP))
 }
 
-fn of(lens: &Lens, field: usize, tolerance: f64) -> Result<Rims, NoDerivative> {
-    let bench = Bench::of(lens, 0).unwrap();
+fn of(lens: &Lens, field: usize, tolerance: f64) -> Result<RimSensitivities, DerivativeError> {
+    let bench = RayModel::from_lens(lens, 0).unwrap();
     let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-    analysis::rims(&bench, bench.fields[field], bench.primary, accuracy)
+    analysis::rim_sensitivities(&bench, bench.fields[field], bench.primary, accuracy)
 }
 
-fn both(effect: &RimEffect) -> [analysis::Estimate; 2] {
+fn both(effect: &RimSensitivity) -> [analysis::Estimate; 2] {
     [effect.area, effect.rms]
 }
 
@@ -72,20 +72,20 @@ fn what_a_rim_does_is_what_a_larger_one_shows() {
 fn fields_together_have_the_mean_light_and_the_root_mean_square() {
     let lens = double_gauss();
     let [axis, edge] = [0, 2].map(|field| of(&lens, field, 1e-3).unwrap());
-    let both = analysis::together(&[(1.0, &axis), (3.0, &edge)]).unwrap();
+    let both = analysis::mean_rim_sensitivities(&[(1.0, &axis), (3.0, &edge)]).unwrap();
     assert!((both.area - 0.25 * axis.area - 0.75 * edge.area).abs() < 1e-9);
     let square = 0.25 * axis.rms.powi(2) + 0.75 * edge.rms.powi(2);
     assert!((both.rms.powi(2) - square).abs() < 1e-12);
-    let front = |rims: &Rims| rims.surfaces[0].rms.value;
+    let front = |rims: &RimSensitivities| rims.surfaces[0].rms.value;
     let slope = 0.25 * axis.rms * front(&axis) + 0.75 * edge.rms * front(&edge);
     assert!((both.rms * front(&both) - slope).abs() < 1e-12);
-    assert!(analysis::together(&[]).is_none());
-    assert!(analysis::together(&[(0.0, &axis)]).is_none());
+    assert!(analysis::mean_rim_sensitivities(&[]).is_none());
+    assert!(analysis::mean_rim_sensitivities(&[(0.0, &axis)]).is_none());
 }
 
 #[test]
 fn a_dark_field_has_no_derivative_and_says_why() {
     let mut lens = double_gauss();
     lens.fields.values[2].y = 40.0;
-    assert!(matches!(of(&lens, 2, 1e-3), Err(NoDerivative::Dark(..))));
+    assert!(matches!(of(&lens, 2, 1e-3), Err(DerivativeError::Dark(..))));
 }

@@ -1,17 +1,18 @@
 //! A session keeps the design sound, whatever it is told, and its threads keep their word.
 
-use aplanat::effects::{Choice, Effect};
+use aplanat::effects::{Effect, EffectOverride};
 use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
 use aplanat::lens::{
-    Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
-    Variable, ZoomPosition, ZoomThickness,
+    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity,
+    Row, Variable, ZoomPosition, ZoomThickness,
 };
 use aplanat::merit::{Goal, MeritError, PupilEdge, TermValue};
-use aplanat::optimize::{Method, Optimizer, Progress};
-use aplanat::pupil::Bench;
+use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
+use aplanat::pupil::RayModel;
 use aplanat::session::{
-    Command, Edit, Event, Session, Settings, Severity, Stage, Standing, Starter, View, compute,
+    AnalysisSettings, Command, Edit, ExperimentStatus, OptimizerFactory, RunStatus, Session,
+    SessionEvent, SessionView, Severity, analyze,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,7 +20,7 @@ use std::time::Duration;
 
 /// A lens of the library.
 fn lens(name: &str) -> Lens {
-    let bundled = files::library().iter().find(|lens| lens.name == name).unwrap();
+    let bundled = files::bundled_lenses().iter().find(|lens| lens.name == name).unwrap();
     files::native::read(bundled.text, name).unwrap()
 }
 
@@ -38,17 +39,24 @@ struct Toy {
 }
 
 impl Optimizer for Toy {
-    fn step(&mut self) -> Progress {
+    fn step(&mut self) -> OptimizationProgress {
         assert_ne!(self.step, self.breaks, "the toy breaks");
         self.step += 1;
         self.steps.fetch_add(1, Ordering::SeqCst);
         self.lens.surfaces[0].curvature *= 1.0 + 1e-6;
         let merit = 1.0 / self.step as f64;
         let finished = self.step == self.last;
-        Progress { step: self.step, merit, best: merit, accepted: 1.0, refused: None, finished }
+        OptimizationProgress {
+            step: self.step,
+            merit,
+            best: merit,
+            accepted: 1.0,
+            refused: None,
+            finished,
+        }
     }
 
-    fn settle(&mut self) {}
+    fn verify_best(&mut self) {}
 
     fn best(&self) -> &Lens {
         &self.lens
@@ -64,7 +72,7 @@ impl Optimizer for Toy {
 }
 
 /// A toy that ends after its `last` step, and breaks if it is the name of the lens that says so.
-fn toy(last: usize, steps: &Arc<AtomicUsize>) -> Box<Starter> {
+fn toy(last: usize, steps: &Arc<AtomicUsize>) -> Box<OptimizerFactory> {
     let steps = Arc::clone(steps);
     Box::new(move |task| {
         let lens = &task.lens;
@@ -78,16 +86,20 @@ fn toy(last: usize, steps: &Arc<AtomicUsize>) -> Box<Starter> {
 }
 
 fn session(lens: Lens) -> Session {
-    Session::with_starter(lens, toy(1_000_000, &Arc::default()), || {}).unwrap()
+    Session::with_optimizer(lens, toy(1_000_000, &Arc::default()), || {}).unwrap()
 }
 
 const OPTIMIZE: Command = Command::Optimize {
-    method: Method::Adam,
+    method: DescentMethod::Adam,
     goal: Goal { terms: Vec::new(), zoom_ratios: Vec::new(), pupil: PupilEdge::Moving },
 };
 
 /// Waits until something has happened in the background.
-fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
+fn wait(
+    session: &mut Session,
+    what: &str,
+    happened: impl Fn(&SessionView, &[SessionEvent]) -> bool,
+) {
     let mut events = Vec::new();
     for _ in 0..10_000 {
         events.extend(session.poll());
@@ -99,8 +111,8 @@ fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) ->
     panic!("{what} never happened");
 }
 
-fn step_of(view: &View) -> usize {
-    let progress = view.search.as_ref().and_then(|search| search.progress.as_ref());
+fn step_of(view: &SessionView) -> usize {
+    let progress = view.optimization.as_ref().and_then(|search| search.progress.as_ref());
     progress.map_or(0, |progress| progress.step)
 }
 
@@ -111,7 +123,7 @@ const GAP: Parameter = Parameter::new(1, Quantity::Thickness);
 fn every_edit(lens: &Lens) -> Vec<Edit> {
     let last = lens.surfaces.len() - 1;
     let stop = lens.stop().unwrap();
-    let angles = vec![Field { x: 0.0, y: 3.0, weight: 2.0 }];
+    let angles = vec![FieldPoint { x: 0.0, y: 3.0, weight: 2.0 }];
     let position = ZoomPosition {
         name: "near".into(),
         thicknesses: vec![ZoomThickness { surface: 1, thickness: 0.7 }],
@@ -128,12 +140,12 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
         Edit::SetMedium { surface: 0, medium: Medium::Model { nd: 1.6, vd: 50.0 } },
         Edit::SetObjectMedium(Medium::Index(1.33)),
         Edit::SetStop(usize::from(stop == 0)),
-        Edit::SetHyper { surface: 0, hyper: true },
+        Edit::SetHyperhemisphere { surface: 0, hyper: true },
         Edit::SetComment { surface: 0, text: "front".into() },
         Edit::SetRow { surface: last, row: Row { stop: last == stop, ..row.clone() } },
         Edit::InsertRow { at: 1, row: row.clone() },
         Edit::RemoveRow(1),
-        Edit::FlipRows { first: 0, last: 1 },
+        Edit::ReverseRows { first: 0, last: 1 },
         Edit::Scale(2.0),
         Edit::SetName("Other".into()),
         Edit::SetSource("elsewhere".into()),
@@ -147,9 +159,9 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
             weight: 1.0,
             primary: true,
         }]),
-        Edit::SetFocus(Some(0.1)),
-        Edit::Free(Variable { parameter: CURVATURE, min: None, max: None }),
-        Edit::Fix(CURVATURE),
+        Edit::SetFocusSolve(Some(0.1)),
+        Edit::AddVariable(Variable { parameter: CURVATURE, min: None, max: None }),
+        Edit::RemoveVariable(CURVATURE),
         Edit::SetPickup(Pickup { parameter: GAP, source: CURVATURE, scale: 1.0, offset: 3.0 }),
         Edit::RemovePickup(GAP),
         Edit::InsertZoom { at: 0, position: position.clone() },
@@ -171,12 +183,12 @@ fn kind(edit: &Edit) -> usize {
         Edit::SetMedium { .. } => 5,
         Edit::SetObjectMedium(_) => 6,
         Edit::SetStop(_) => 7,
-        Edit::SetHyper { .. } => 8,
+        Edit::SetHyperhemisphere { .. } => 8,
         Edit::SetComment { .. } => 9,
         Edit::SetRow { .. } => 10,
         Edit::InsertRow { .. } => 11,
         Edit::RemoveRow(_) => 12,
-        Edit::FlipRows { .. } => 13,
+        Edit::ReverseRows { .. } => 13,
         Edit::Scale(_) => 14,
         Edit::SetName(_) => 15,
         Edit::SetSource(_) => 16,
@@ -186,9 +198,9 @@ fn kind(edit: &Edit) -> usize {
         Edit::LimitByStop => 20,
         Edit::SetFields(_) => 21,
         Edit::SetWavelengths(_) => 22,
-        Edit::SetFocus(_) => 23,
-        Edit::Free(_) => 24,
-        Edit::Fix(_) => 25,
+        Edit::SetFocusSolve(_) => 23,
+        Edit::AddVariable(_) => 24,
+        Edit::RemoveVariable(_) => 25,
         Edit::SetPickup(_) => 26,
         Edit::RemovePickup(_) => 27,
         Edit::InsertZoom { .. } => 28,
@@ -207,12 +219,12 @@ fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());
-        let refused = matches!(events.last(), Some(Event::Said(_)));
+        let refused = matches!(events.last(), Some(SessionEvent::Said(_)));
         assert!(!refused && session.lens() != lenses.last().unwrap(), "{edit:?}: {events:?}");
         let text = serde_json::to_string(&Command::from(edit.clone())).unwrap();
         assert_eq!(serde_json::from_str::<Command>(&text).unwrap(), Command::Edit(edit), "{text}");
         lenses.push(Arc::clone(session.lens()));
-        session.apply(Command::Settle);
+        session.apply(Command::CommitEdit);
     }
     for before in lenses.iter().rev().skip(1) {
         session.apply(Command::Undo);
@@ -234,7 +246,7 @@ fn typing_into_one_cell_is_one_step_from_the_value_that_was_there() {
         session.apply(Edit::Type { parameter: GAP, text: text.into() }.into());
     }
     assert_eq!(session.lens().surfaces[1].thickness, before * 10.5);
-    session.apply(Command::Settle);
+    session.apply(Command::CommitEdit);
     session.apply(Edit::Type { parameter: GAP, text: "+1".into() }.into());
     assert_eq!(session.lens().surfaces[1].thickness, before * 10.5 + 1.0);
     session.apply(Command::Undo);
@@ -252,7 +264,7 @@ fn refused_edits_leave_the_design_and_say_why() {
         (Edit::SetSemiDiameter { surface: 0, value: Some(-1.0) }, "expected zero or more"),
         (Edit::SetMedium { surface: 0, medium: Medium::Glass("N-BK77".into()) }, "unknown glass"),
         (Edit::RemoveRow(usize::MAX), "there is no surface"),
-        (Edit::FlipRows { first: 2, last: 1 }, "no group"),
+        (Edit::ReverseRows { first: 2, last: 1 }, "no group"),
         (Edit::SetWavelengths(Vec::new()), "no wavelengths"),
         (Edit::RemoveZoom(0), "the lens has 0"),
         (Edit::Scale(0.0), "the scale is 0"),
@@ -262,7 +274,7 @@ fn refused_edits_leave_the_design_and_say_why() {
     let before = session.view();
     for (edit, words) in cases {
         let events = session.apply(edit.into());
-        let [Event::Said(message)] = events.as_slice() else { panic!("{events:?}") };
+        let [SessionEvent::Said(message)] = events.as_slice() else { panic!("{events:?}") };
         assert!(message.text.contains(words), "{} has no `{words}`", message.text);
         assert_eq!(message.severity, Severity::Warning);
     }
@@ -311,19 +323,19 @@ fn what_names_a_row_follows_it_when_rows_come_and_go() {
 #[test]
 fn a_row_that_changes_nothing_changes_no_focal_length_wherever_it_is_put() {
     let mut base = double_gauss();
-    base.focus = Some(0.0);
+    base.image_solve = Some(0.0);
     let um = base.wavelengths[base.primary()].um;
     let efl = |lens: &Lens| {
-        let system = lens.system(0, um).unwrap();
+        let system = lens.resolve(0, um).unwrap();
         let length: f64 = system.surfaces.iter().map(|s| s.thickness).sum();
-        let beam = aplanat::paraxial::Beam::of(lens, 0);
+        let beam = aplanat::paraxial::Beam::for_lens(lens, 0);
         (aplanat::paraxial::first_order(&system, &beam).unwrap().efl.unwrap(), length)
     };
     let (f, length) = efl(&base);
     for at in 0..=base.surfaces.len() {
         let medium = if at == 0 { Medium::Air } else { base.surfaces[at - 1].medium.clone() };
         let row = Row { medium, ..Row::default() };
-        let lens = aplanat::session::edited(&base, &Edit::InsertRow { at, row }).unwrap();
+        let lens = aplanat::session::apply_edit(&base, &Edit::InsertRow { at, row }).unwrap();
         let (other, other_length) = efl(&lens);
         assert!((other - f).abs() < 1e-12 * f, "row {at}: {other}");
         assert!((other_length - length).abs() < 1e-9, "row {at}: {other_length}");
@@ -344,12 +356,17 @@ fn a_group_turned_twice_is_what_it_was() {
     });
     let lens = lens.with_pickups().unwrap();
     for (first, last) in [(0, 16), (2, 5), (4, 4), (4, 7), (6, 9)] {
-        let flip = Edit::FlipRows { first, last };
-        let turned = aplanat::session::edited(&lens, &flip).unwrap();
+        let flip = Edit::ReverseRows { first, last };
+        let turned = aplanat::session::apply_edit(&lens, &flip).unwrap();
         assert_ne!(turned, lens);
-        assert_eq!(aplanat::session::edited(&turned, &flip).unwrap(), lens, "{first} to {last}");
+        assert_eq!(
+            aplanat::session::apply_edit(&turned, &flip).unwrap(),
+            lens,
+            "{first} to {last}"
+        );
     }
-    let turned = aplanat::session::edited(&lens, &Edit::FlipRows { first: 4, last: 5 }).unwrap();
+    let turned =
+        aplanat::session::apply_edit(&lens, &Edit::ReverseRows { first: 4, last: 5 }).unwrap();
     let (bound, law) = (turned.variables[2], turned.pickups[1]);
     assert_eq!((bound.parameter.surface, bound.min, bound.max), (5, Some(0.0), Some(1e-8)));
     assert_eq!((law.parameter.surface, law.scale, law.offset), (4, 3.0, -0.02));
@@ -357,16 +374,16 @@ fn a_group_turned_twice_is_what_it_was() {
 
 #[test]
 fn a_scaled_lens_has_the_scaled_focal_length_and_goes_back() {
-    for bundled in files::library() {
+    for bundled in files::bundled_lenses() {
         let lens = lens(bundled.name);
         let um = lens.wavelengths[lens.primary()].um;
         let power = |lens: &Lens| {
-            let beam = aplanat::paraxial::Beam::of(lens, 0);
-            aplanat::paraxial::first_order(&lens.system(0, um).unwrap(), &beam).unwrap().power
+            let beam = aplanat::paraxial::Beam::for_lens(lens, 0);
+            aplanat::paraxial::first_order(&lens.resolve(0, um).unwrap(), &beam).unwrap().power
         };
-        let twice = aplanat::session::edited(&lens, &Edit::Scale(2.0)).unwrap();
+        let twice = aplanat::session::apply_edit(&lens, &Edit::Scale(2.0)).unwrap();
         assert!((2.0 * power(&twice) - power(&lens)).abs() < 1e-12, "{}", bundled.name);
-        let back = aplanat::session::edited(&twice, &Edit::Scale(0.5)).unwrap();
+        let back = aplanat::session::apply_edit(&twice, &Edit::Scale(0.5)).unwrap();
         assert_eq!(back, lens, "{}", bundled.name);
     }
 }
@@ -374,15 +391,15 @@ fn a_scaled_lens_has_the_scaled_focal_length_and_goes_back() {
 #[test]
 fn the_image_plane_stays_where_it_was_when_the_solve_goes() {
     let mut lens = wired();
-    lens.focus = Some(0.25);
+    lens.image_solve = Some(0.25);
     let um = lens.wavelengths[lens.primary()].um;
-    let fixed = aplanat::session::edited(&lens, &Edit::SetFocus(None)).unwrap();
+    let fixed = aplanat::session::apply_edit(&lens, &Edit::SetFocusSolve(None)).unwrap();
     for zoom in 0..3 {
-        assert_eq!(fixed.system(zoom, um).unwrap(), lens.system(zoom, um).unwrap());
+        assert_eq!(fixed.resolve(zoom, um).unwrap(), lens.resolve(zoom, um).unwrap());
     }
     let last = Parameter::new(16, Quantity::Thickness);
     let edit = Edit::Set { parameter: last, value: 30.0 };
-    assert!(aplanat::session::edited(&lens, &edit).is_err(), "a solved gap is not typed");
+    assert!(aplanat::session::apply_edit(&lens, &edit).is_err(), "a solved gap is not typed");
 }
 
 #[test]
@@ -392,12 +409,12 @@ fn a_search_runs_beside_the_design_and_its_result_is_one_step() {
     session.apply(OPTIMIZE);
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
     session.apply(Command::Stop);
-    wait(&mut session, "the stop", |view, _| !view.search.as_ref().unwrap().is_under_way());
+    wait(&mut session, "the stop", |view, _| !view.optimization.as_ref().unwrap().is_active());
     assert_eq!(*session.lens(), before, "the search has its own copy");
-    let best = Arc::clone(&session.view().search.unwrap().best);
-    session.apply(Command::Take);
+    let best = Arc::clone(&session.view().optimization.unwrap().best);
+    session.apply(Command::AcceptResult);
     assert_eq!(*session.lens(), best);
-    assert!(session.view().search.is_none());
+    assert!(session.view().optimization.is_none());
     session.apply(Command::Undo);
     assert_eq!(*session.lens(), before);
     assert!(!session.view().can_undo());
@@ -406,18 +423,18 @@ fn a_search_runs_beside_the_design_and_its_result_is_one_step() {
 #[test]
 fn the_double_gauss_gets_better_in_the_background() {
     let lens = double_gauss();
-    let goal = Goal::sensible(&lens).unwrap();
+    let goal = Goal::default_for(&lens).unwrap();
     let mut session = Session::new(lens, || {}).unwrap();
-    session.apply(Command::Optimize { method: Method::DampedLeastSquares, goal });
+    session.apply(Command::Optimize { method: DescentMethod::DampedLeastSquares, goal });
     wait(&mut session, "ten steps", |view, _| {
-        let over = view.search.as_ref().is_some_and(|search| !search.is_under_way());
+        let over = view.optimization.as_ref().is_some_and(|search| !search.is_active());
         step_of(view) >= 10 || over
     });
-    let search = session.view().search.unwrap();
+    let search = session.view().optimization.unwrap();
     let (first, last) = (search.history[0], search.history[search.history.len() - 1]);
     assert!(last.best < first.best, "{first:?} {last:?}");
-    assert!(!search.terms.is_empty());
-    session.apply(Command::Take);
+    assert!(!search.best_terms.is_empty());
+    session.apply(Command::AcceptResult);
     assert_eq!(*session.lens(), session.view().lens);
     assert!(session.view().can_undo());
 }
@@ -428,12 +445,15 @@ fn a_discarded_search_leaves_the_design_alone() {
     let before = session.view();
     session.apply(OPTIMIZE);
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
-    session.apply(Command::Discard);
+    session.apply(Command::DiscardResult);
     let after = session.view();
-    assert!(after.search.is_none());
+    assert!(after.optimization.is_none());
     assert_eq!((after.version, &after.lens), (before.version, &before.lens));
-    let events = session.apply(Command::Take);
-    assert!(matches!(events.last(), Some(Event::Said(_))), "there is nothing to take: {events:?}");
+    let events = session.apply(Command::AcceptResult);
+    assert!(
+        matches!(events.last(), Some(SessionEvent::Said(_))),
+        "there is nothing to take: {events:?}"
+    );
 }
 
 #[test]
@@ -446,10 +466,10 @@ fn a_result_taken_after_an_edit_keeps_the_edit() {
     session.apply(Command::Pause);
     session.apply(Edit::Set { parameter: GAP, value: 0.5 }.into());
     wait(&mut session, "the pause", |view, _| {
-        view.search.as_ref().is_some_and(|search| search.standing == Standing::Paused)
+        view.optimization.as_ref().is_some_and(|search| search.status == RunStatus::Paused)
     });
-    let best = Arc::clone(&session.view().search.unwrap().best);
-    session.apply(Command::Take);
+    let best = Arc::clone(&session.view().optimization.unwrap().best);
+    session.apply(Command::AcceptResult);
     assert_eq!(session.lens().surfaces[0].curvature, best.surfaces[0].curvature);
     assert_eq!(session.lens().surfaces[1].thickness, 0.5);
 }
@@ -457,11 +477,11 @@ fn a_result_taken_after_an_edit_keeps_the_edit() {
 #[test]
 fn pause_holds_and_step_advances_by_one() {
     let steps = Arc::new(AtomicUsize::new(0));
-    let mut session = Session::with_starter(double_gauss(), toy(600, &steps), || {}).unwrap();
+    let mut session = Session::with_optimizer(double_gauss(), toy(600, &steps), || {}).unwrap();
     session.apply(OPTIMIZE);
     session.apply(Command::Pause);
     wait(&mut session, "the pause", |view, _| {
-        view.search.as_ref().is_some_and(|search| search.standing == Standing::Paused)
+        view.optimization.as_ref().is_some_and(|search| search.status == RunStatus::Paused)
     });
     let held = steps.load(Ordering::SeqCst);
     std::thread::sleep(Duration::from_millis(60));
@@ -473,11 +493,11 @@ fn pause_holds_and_step_advances_by_one() {
     }
     session.apply(Command::Resume);
     wait(&mut session, "the end", |view, _| {
-        view.search.as_ref().is_some_and(|search| search.standing == Standing::Finished)
+        view.optimization.as_ref().is_some_and(|search| search.status == RunStatus::Finished)
     });
-    let search = session.view().search.unwrap();
+    let search = session.view().optimization.unwrap();
     // Every step, and the start before the first one.
-    assert_eq!((search.standing, search.history.len()), (Standing::Finished, 601));
+    assert_eq!((search.status, search.history.len()), (RunStatus::Finished, 601));
 }
 
 #[test]
@@ -496,7 +516,7 @@ fn a_search_that_breaks_says_so_and_the_next_one_works() {
     wait(&mut session, "the refusal", |view, _| {
         view.messages.iter().any(|m| m.text.contains("needs a curved surface"))
     });
-    assert!(session.view().search.is_none());
+    assert!(session.view().optimization.is_none());
 }
 
 #[test]
@@ -505,7 +525,8 @@ fn the_threads_end_when_the_session_is_dropped() {
     let steps = Arc::new(AtomicUsize::new(0));
     let held = Arc::clone(&alive);
     let wake = move || assert!(Arc::strong_count(&held) > 0);
-    let mut session = Session::with_starter(double_gauss(), toy(usize::MAX, &steps), wake).unwrap();
+    let mut session =
+        Session::with_optimizer(double_gauss(), toy(usize::MAX, &steps), wake).unwrap();
     session.apply(OPTIMIZE);
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
     drop(session);
@@ -522,22 +543,24 @@ fn quick() -> &'static Experiment {
 }
 
 fn begin(study: &Experiment) -> Command {
-    Command::Experiment { id: study.id.to_owned(), effort: Effort::Small }
+    Command::StartExperiment { id: study.id.to_owned(), effort: Effort::Small }
 }
 
-fn stage(view: &View) -> Option<&Stage> {
-    view.trial.as_deref().map(|trial| &trial.stage)
+fn stage(view: &SessionView) -> Option<&ExperimentStatus> {
+    view.experiment.as_deref().map(|trial| &trial.status)
 }
 
 #[test]
 fn an_experiment_runs_in_the_background_and_can_be_saved() {
     let mut session = session(double_gauss());
-    assert!(session.view().trial.is_none());
+    assert!(session.view().experiment.is_none());
     session.apply(begin(quick()));
-    assert!(matches!(stage(&session.view()), Some(Stage::Running { .. })), "at once");
-    wait(&mut session, "the outcome", |view, _| matches!(stage(view), Some(Stage::Done(_))));
+    assert!(matches!(stage(&session.view()), Some(ExperimentStatus::Running { .. })), "at once");
+    wait(&mut session, "the outcome", |view, _| {
+        matches!(stage(view), Some(ExperimentStatus::Done(_)))
+    });
     let view = session.view();
-    let Some(Stage::Done(report)) = stage(&view) else { unreachable!() };
+    let Some(ExperimentStatus::Done(report)) = stage(&view) else { unreachable!() };
     assert!(report.holds && report.ms > 0.0 && !report.outcome.claims.is_empty());
     let folder = std::env::temp_dir().join(format!("aplanat-experiment-{}", std::process::id()));
     session.apply(Command::SaveExperiment(folder.join("deep")));
@@ -547,8 +570,8 @@ fn an_experiment_runs_in_the_background_and_can_be_saved() {
     let expected = outcome.tables.len() + outcome.pictures.len() + outcome.lenses.len() + 1;
     assert_eq!(written, expected);
     assert_eq!(session.view().messages.last().unwrap().severity, Severity::Note);
-    session.apply(Command::CloseExperiment);
-    assert!(session.view().trial.is_none());
+    session.apply(Command::DismissExperiment);
+    assert!(session.view().experiment.is_none());
     session.apply(Command::SaveExperiment(folder));
     assert_eq!(session.view().messages.last().unwrap().severity, Severity::Warning);
 }
@@ -558,16 +581,23 @@ fn an_experiment_is_cancelled_or_replaced_between_two_steps() {
     let mut session = session(double_gauss());
     session.apply(begin(quick()));
     session.apply(Command::CancelExperiment);
-    wait(&mut session, "the end", |view, _| !matches!(stage(view), Some(Stage::Running { .. })));
-    assert!(matches!(stage(&session.view()), Some(Stage::Stopped)));
+    wait(&mut session, "the end", |view, _| {
+        !matches!(stage(view), Some(ExperimentStatus::Running { .. }))
+    });
+    assert!(matches!(stage(&session.view()), Some(ExperimentStatus::Stopped)));
     for study in experiments::ALL {
-        session.apply(Command::Experiment { id: study.id.to_owned(), effort: Effort::Full });
+        session.apply(Command::StartExperiment { id: study.id.to_owned(), effort: Effort::Full });
     }
     session.apply(begin(quick()));
-    wait(&mut session, "the last one", |view, _| matches!(stage(view), Some(Stage::Done(_))));
-    let trial = session.view().trial.unwrap();
-    assert_eq!((trial.study.id, trial.number), (quick().id, experiments::ALL.len() as u64 + 2));
-    let unknown = Command::Experiment { id: "0.0".into(), effort: Effort::Small };
+    wait(&mut session, "the last one", |view, _| {
+        matches!(stage(view), Some(ExperimentStatus::Done(_)))
+    });
+    let trial = session.view().experiment.unwrap();
+    assert_eq!(
+        (trial.experiment.id, trial.number),
+        (quick().id, experiments::ALL.len() as u64 + 2)
+    );
+    let unknown = Command::StartExperiment { id: "0.0".into(), effort: Effort::Small };
     session.apply(unknown);
     assert_eq!(session.view().messages.last().unwrap().text, "there is no experiment `0.0`");
 }
@@ -578,8 +608,8 @@ fn a_beam_limited_by_the_stop_is_as_wide_as_before_in_one_step() {
     lens.aperture = Aperture::FNumber(5.6);
     let mut session = session(lens);
     let entrance = |session: &Session| {
-        let bench = Bench::of(session.lens(), 0).unwrap();
-        bench.first.f_number.unwrap()
+        let bench = RayModel::from_lens(session.lens(), 0).unwrap();
+        bench.first_order.f_number.unwrap()
     };
     let before = entrance(&session);
     session.apply(Edit::LimitByStop.into());
@@ -591,12 +621,13 @@ fn a_beam_limited_by_the_stop_is_as_wide_as_before_in_one_step() {
 
 #[test]
 fn what_rims_do_is_computed_with_the_pupils() {
-    let settings = Settings { pupils: true, ..Settings::default() };
-    let numbers = compute(&double_gauss(), &settings).unwrap();
+    let settings = AnalysisSettings { pupils: true, ..AnalysisSettings::default() };
+    let numbers = analyze(&double_gauss(), &settings).unwrap();
     let pupils = numbers.pupils.unwrap().value;
     assert_eq!(pupils.rims.value.len(), pupils.fields.len());
     let all = pupils.all_rims.unwrap();
-    let felt: Vec<usize> = (0..all.surfaces.len()).filter(|i| all.surfaces[*i].is_felt()).collect();
+    let felt: Vec<usize> =
+        (0..all.surfaces.len()).filter(|i| all.surfaces[*i].is_significant()).collect();
     assert_eq!(felt, [0, 5, 10], "front, stop and rear");
     assert!(felt.iter().all(|i| all.surfaces[*i].area.value > 0.0), "glass lets light through");
 }
@@ -609,7 +640,7 @@ fn a_slow_window_holds_nothing_up_and_is_not_woken_too_often() {
     let wake = move || {
         count.fetch_add(1, Ordering::SeqCst);
     };
-    let mut session = Session::with_starter(double_gauss(), toy(500_000, &steps), wake).unwrap();
+    let mut session = Session::with_optimizer(double_gauss(), toy(500_000, &steps), wake).unwrap();
     session.apply(OPTIMIZE);
     std::thread::sleep(Duration::from_millis(300));
     let (taken, looks) = (steps.load(Ordering::SeqCst), woken.load(Ordering::SeqCst));
@@ -626,8 +657,8 @@ fn the_numbers_of_the_newest_design_arrive() {
     wait(&mut session, "the numbers", |view, _| view.is_current());
     let results = session.results().unwrap();
     assert_eq!(results.lens.surfaces[1].thickness, 0.49);
-    let numbers = results.numbers.as_ref().unwrap();
-    assert!((numbers.first().efl.unwrap() - 49.4).abs() < 1.0);
+    let numbers = results.analyses.as_ref().unwrap();
+    assert!((numbers.first_order().efl.unwrap() - 49.4).abs() < 1.0);
     let rms: Vec<f64> =
         numbers.spots.value.iter().map(|spot| spot.as_ref().unwrap().rms.value).collect();
     assert!(rms.len() == 3 && rms.iter().all(|rms| *rms > 0.0), "{rms:?}");
@@ -636,45 +667,45 @@ fn the_numbers_of_the_newest_design_arrive() {
 #[test]
 fn an_effect_that_is_switched_off_is_not_computed() {
     let mut session = session(double_gauss());
-    session.apply(Command::Choose(Effect::Dispersion, Choice::Off));
-    session.apply(Command::Choose(Effect::Clipping, Choice::Off));
+    session.apply(Command::SetEffect(Effect::Dispersion, EffectOverride::Off));
+    session.apply(Command::SetEffect(Effect::Clipping, EffectOverride::Off));
     wait(&mut session, "the numbers", |view, _| view.is_current());
     let results = session.results().unwrap();
-    let numbers = results.numbers.as_ref().unwrap();
-    assert_eq!((numbers.bench.value.colors.len(), numbers.scatter.value.len()), (1, 3));
+    let numbers = results.analyses.as_ref().unwrap();
+    assert_eq!((numbers.bench.value.channels.len(), numbers.spot_points.value.len()), (1, 3));
     assert_eq!(numbers.layout.value.fates.clipped, 0);
     assert!(!session.view().dirty && !session.view().can_undo(), "the design is what it was");
-    session.apply(Command::Choose(Effect::Clipping, Choice::Auto));
-    session.apply(Command::Choose(Effect::Dispersion, Choice::Auto));
+    session.apply(Command::SetEffect(Effect::Clipping, EffectOverride::Auto));
+    session.apply(Command::SetEffect(Effect::Dispersion, EffectOverride::Auto));
     wait(&mut session, "the numbers", |view, _| view.is_current());
     let results = session.results().unwrap();
-    let numbers = results.numbers.as_ref().unwrap();
-    assert!(numbers.bench.value.colors.len() == 3 && numbers.layout.value.fates.clipped > 0);
+    let numbers = results.analyses.as_ref().unwrap();
+    assert!(numbers.bench.value.channels.len() == 3 && numbers.layout.value.fates.clipped > 0);
 }
 
 #[test]
 fn when_there_is_time_the_cost_of_each_effect_is_measured() {
     let mut session = session(double_gauss());
     wait(&mut session, "the measured plan", |view, _| {
-        let numbers = view.results.as_ref().and_then(|results| results.numbers.as_ref().ok());
+        let numbers = view.results.as_ref().and_then(|results| results.analyses.as_ref().ok());
         numbers.is_some_and(|n| n.plan.value.decisions.iter().all(|d| d.saved_ms.is_some()))
     });
     let results = session.results().unwrap();
-    let plan = &results.numbers.as_ref().unwrap().plan.value;
+    let plan = &results.analyses.as_ref().unwrap().plan.value;
     for decision in &plan.decisions {
         println!("{}: {:.2} ms", decision.effect.name(), decision.saved_ms.unwrap());
     }
-    assert!(plan.of(Effect::Dispersion).unwrap().saved_ms.unwrap() > 0.0);
-    assert_eq!(plan.of(Effect::Asphere).unwrap().saved_ms, Some(0.0));
+    assert!(plan.decision(Effect::Dispersion).unwrap().saved_ms.unwrap() > 0.0);
+    assert_eq!(plan.decision(Effect::Asphere).unwrap().saved_ms, Some(0.0));
     assert!(session.view().is_current());
 }
 
 #[test]
 fn every_number_of_every_library_lens_is_there_in_time() {
-    for bundled in files::library() {
+    for bundled in files::bundled_lenses() {
         let lens = lens(bundled.name);
-        let settings = Settings::default();
-        let numbers = compute(&lens, &settings).unwrap();
+        let settings = AnalysisSettings::default();
+        let numbers = analyze(&lens, &settings).unwrap();
         println!(
             "{:32} plan {:.2}, bench {:.2}, layout {:.2}, dots {:.2}, spots {:.2}, \
              fans {:.2}, illumination {:.2}, distortion {:.2}, curvature {:.2}",
@@ -682,14 +713,14 @@ fn every_number_of_every_library_lens_is_there_in_time() {
             numbers.plan.ms,
             numbers.bench.ms,
             numbers.layout.ms,
-            numbers.scatter.ms,
+            numbers.spot_points.ms,
             numbers.spots.ms,
             numbers.fans.ms,
             numbers.illumination.ms,
             numbers.distortion.ms,
             numbers.curvature.ms
         );
-        assert!(numbers.first().efl.is_some());
+        assert!(numbers.first_order().efl.is_some());
         assert_eq!(numbers.spots.value.len(), lens.fields_at(0).values.len());
         assert!(numbers.layout.value.rays.len() > 10, "{}", bundled.name);
     }
@@ -702,10 +733,10 @@ fn a_design_is_saved_and_opened() {
     let path = folder.join("lens.json");
     let mut session = session(double_gauss());
     let events = session.apply(Command::Save(None));
-    assert!(matches!(events.last(), Some(Event::Said(_))), "it has no file yet");
+    assert!(matches!(events.last(), Some(SessionEvent::Said(_))), "it has no file yet");
     session.apply(Edit::SetName("Mine".into()).into());
     let events = session.apply(Command::Save(Some(path.clone())));
-    assert!(events.contains(&Event::Saved(path.clone())), "{events:?}");
+    assert!(events.contains(&SessionEvent::Saved(path.clone())), "{events:?}");
     assert!(!session.view().dirty);
     session.apply(Edit::SetName("Other".into()).into());
     assert!(session.view().dirty);
@@ -714,7 +745,10 @@ fn a_design_is_saved_and_opened() {
     assert_eq!(session.view().path, Some(path));
     let before = Arc::clone(session.lens());
     let events = session.apply(Command::Open(folder.join("missing.json")));
-    assert!(matches!(&events[0], Event::Said(m) if m.text.contains("missing.json")), "{events:?}");
+    assert!(
+        matches!(&events[0], SessionEvent::Said(m) if m.text.contains("missing.json")),
+        "{events:?}"
+    );
     assert_eq!(*session.lens(), before);
     std::fs::remove_dir_all(folder).unwrap();
 }
@@ -786,7 +820,7 @@ impl Random {
     fn edit(&mut self) -> Edit {
         let (parameter, value, surface) = (self.parameter(), self.number(), self.below(20));
         let limit = (self.below(3) > 0).then_some(value);
-        let angles = vec![Field { x: self.number(), y: value, weight: 1.0 }; self.below(3)];
+        let angles = vec![FieldPoint { x: self.number(), y: value, weight: 1.0 }; self.below(3)];
         let texts = ["*2", "/0", "-1", "inf", "", "(", "1e400", "+0.1"];
         let text = texts[self.below(texts.len())].to_owned();
         match self.below(26) {
@@ -800,13 +834,13 @@ impl Random {
             9 => Edit::SetRow { surface, row: self.row() },
             10 | 11 => Edit::InsertRow { at: surface, row: self.row() },
             12 | 13 => Edit::RemoveRow(surface),
-            14 => Edit::FlipRows { first: surface, last: self.below(20) },
+            14 => Edit::ReverseRows { first: surface, last: self.below(20) },
             15 => Edit::Scale(value.abs() + 0.9),
             16 => Edit::SetObject(Object::Finite(100.0 * value)),
             17 => Edit::SetAperture(Aperture::StopSemiDiameter(value)),
             18 => Edit::SetFields(Fields { kind: FieldKind::Angle, values: angles }),
-            19 => Edit::SetFocus(limit),
-            20 => Edit::Free(Variable { parameter, min: limit, max: None }),
+            19 => Edit::SetFocusSolve(limit),
+            20 => Edit::AddVariable(Variable { parameter, min: limit, max: None }),
             21 => Edit::SetPickup(Pickup {
                 parameter,
                 source: self.parameter(),
@@ -824,15 +858,15 @@ impl Random {
         match self.below(30) {
             0 | 1 => Command::Undo,
             2 => Command::Redo,
-            3 => Command::Settle,
+            3 => Command::CommitEdit,
             4 => OPTIMIZE,
             5 => Command::Pause,
             6 => Command::Step,
-            7 => Command::Take,
-            8 => Command::Discard,
+            7 => Command::AcceptResult,
+            8 => Command::DiscardResult,
             9 => Command::ShowZoom(self.below(5)),
             10 => Command::SetTolerance(self.number()),
-            11 => Command::Choose(Effect::Clipping, Choice::Off),
+            11 => Command::SetEffect(Effect::Clipping, EffectOverride::Off),
             12 => Command::ShowRays(self.below(40)),
             _ => Command::Edit(self.edit()),
         }
@@ -853,7 +887,8 @@ fn a_thousand_random_commands_leave_a_sound_design() {
             session.lens().check().unwrap_or_else(|why| panic!("{command:?}: {why}"));
             let changed = *session.lens() != before;
             accepted += usize::from(changed);
-            if matches!((&command, events.last()), (Command::Edit(_), Some(Event::Said(_)))) {
+            if matches!((&command, events.last()), (Command::Edit(_), Some(SessionEvent::Said(_))))
+            {
                 refused += 1;
                 assert!(!changed, "refused and yet changed: {command:?}");
             }

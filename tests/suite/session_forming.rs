@@ -3,12 +3,14 @@
 
 use super::session_front::wait;
 use aplanat::files::{Volume, read_volume, write_volume};
-use aplanat::grin::field::Grid;
-use aplanat::grin_task::{self, Axis, Level, Medium, Plane, Runner, Task};
+use aplanat::grin::field::RegularGrid;
+use aplanat::grin_task::{
+    self, GrinField, GrinOptimizer, GrinTask, RefinementLevel, SlicePlane, SpatialAxis,
+};
 use aplanat::math::Vec3;
 use aplanat::session::{
-    Command, Event, Form, Formation, Forming, Quantity, Session, Severity, Sight, Slice, Standing,
-    blank,
+    Command, GrinCommand, GrinRun, GrinView, RunStatus, Session, SessionEvent, Severity, Slice,
+    SliceQuantity, SliceSettings, blank,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,48 +28,48 @@ fn folder(name: &str) -> PathBuf {
 }
 
 /// A built-in task with few steps at a coarse resolution.
-fn coarse(name: &str, levels: &[Level]) -> Task {
-    let task = grin_task::find(name).unwrap().task().unwrap();
-    Task { levels: levels.to_vec(), ..task }
+fn coarse(name: &str, levels: &[RefinementLevel]) -> GrinTask {
+    let task = grin_task::find_builtin(name).unwrap().task().unwrap();
+    GrinTask { levels: levels.to_vec(), ..task }
 }
 
-fn write_task(path: &Path, task: &Task) {
+fn write_task(path: &Path, task: &GrinTask) {
     std::fs::write(path, serde_json::to_string(task).unwrap()).unwrap();
 }
 
-fn form(session: &mut Session, wish: Form) {
-    session.apply(Command::Form(wish));
+fn form(session: &mut Session, wish: GrinCommand) {
+    session.apply(Command::Grin(wish));
 }
 
-fn forming(session: &Session) -> Forming {
-    session.view().forming
+fn forming(session: &Session) -> GrinView {
+    session.view().grin
 }
 
-fn run(session: &Session) -> Arc<Formation> {
+fn run(session: &Session) -> Arc<GrinRun> {
     forming(session).run.unwrap()
 }
 
 /// Waits until what is open stands so, whatever it stood like before.
-fn stands(session: &mut Session, standing: Standing) {
+fn stands(session: &mut Session, standing: RunStatus) {
     wait(session, "the standing", |view, _| {
-        let Forming { run, opening, pending, .. } = &view.forming;
-        let now = run.as_ref().map(|run| run.standing);
+        let GrinView { run, opening, pending, .. } = &view.grin;
+        let now = run.as_ref().map(|run| run.status);
         now == Some(standing) && !opening && pending.is_none()
     });
 }
 
 fn open(session: &mut Session, path: &Path) {
-    form(session, Form::Open(Some(path.to_owned())));
-    wait(session, "the opening", |view, _| !view.forming.opening);
+    form(session, GrinCommand::OpenFile(Some(path.to_owned())));
+    wait(session, "the opening", |view, _| !view.grin.opening);
 }
 
 /// Waits for a slice of the field as it is, looked at as it is asked for.
 fn slice(session: &mut Session) -> Slice {
     wait(session, "a slice", |view, _| {
-        let forming = &view.forming;
+        let forming = &view.grin;
         let run = forming.run.as_ref().unwrap();
         forming.slice.as_ref().and_then(|slice| slice.as_ref().as_ref().ok()).is_some_and(|slice| {
-            Arc::ptr_eq(&slice.medium, &run.medium) && slice.sight == forming.sight
+            Arc::ptr_eq(&slice.field, &run.field) && slice.settings == forming.slice_settings
         })
     });
     forming(session).slice.unwrap().as_ref().as_ref().unwrap().clone()
@@ -78,7 +80,7 @@ fn refused(session: &mut Session, path: &Path) -> String {
     open(session, path);
     let said = session.view().messages.last().cloned().unwrap();
     assert_eq!(said.severity, Severity::Error, "{}", said.text);
-    assert_eq!(forming(session).failed, Some(said.text.clone()));
+    assert_eq!(forming(session).error, Some(said.text.clone()));
     said.text
 }
 
@@ -86,57 +88,61 @@ fn refused(session: &mut Session, path: &Path) -> String {
 fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
     let folder = folder("forming");
     let path = folder.join("task.json");
-    let task =
-        coarse("luneburg", &[Level { nodes: 3, steps: 12 }, Level { nodes: 5, steps: 100_000 }]);
+    let task = coarse(
+        "luneburg",
+        &[RefinementLevel { nodes: 3, steps: 12 }, RefinementLevel { nodes: 5, steps: 100_000 }],
+    );
     write_task(&path, &task);
     let mut session = session();
-    form(&mut session, Form::Watch(true));
+    form(&mut session, GrinCommand::SetActive(true));
     open(&mut session, &path);
     assert!(run(&session).is_ready());
-    form(&mut session, Form::Start);
+    form(&mut session, GrinCommand::Start);
     wait(&mut session, "steps", |view, _| {
-        view.forming.run.as_ref().is_some_and(|run| {
+        view.grin.run.as_ref().is_some_and(|run| {
             run.progress.as_ref().is_some_and(|progress| progress.step > 15 && progress.level == 1)
         })
     });
-    form(&mut session, Form::Pause);
-    stands(&mut session, Standing::Paused);
+    form(&mut session, GrinCommand::Pause);
+    stands(&mut session, RunStatus::Paused);
     let held = run(&session);
     slice(&mut session);
     std::thread::sleep(std::time::Duration::from_millis(60));
     session.poll();
     assert_eq!(run(&session).progress, held.progress, "it is held");
-    form(&mut session, Form::Resume);
-    stands(&mut session, Standing::Running);
-    form(&mut session, Form::Stop);
-    stands(&mut session, Standing::Stopped);
+    form(&mut session, GrinCommand::Resume);
+    stands(&mut session, RunStatus::Running);
+    form(&mut session, GrinCommand::Stop);
+    stands(&mut session, RunStatus::Stopped);
 
     let stopped = run(&session);
     let steps = stopped.progress.as_ref().unwrap().step;
-    let mut headless = Runner::new(&task).unwrap();
+    let mut headless = GrinOptimizer::new(&task).unwrap();
     for _ in 0..steps {
         headless.step().unwrap();
     }
-    headless.settle().unwrap();
-    assert_eq!(*stopped.medium, *headless.best(), "after {steps} steps");
-    assert_eq!(stopped.rays, headless.rays());
+    headless.finish().unwrap();
+    assert_eq!(*stopped.field, *headless.best(), "after {steps} steps");
+    assert_eq!(stopped.rays, headless.rays_traced());
     assert!(stopped.history.len() > 10 && stopped.seconds > 0.0);
 
     for name in ["field.npz", "field.json"] {
         let file = folder.join(name);
-        form(&mut session, Form::Save { path: Some(file.clone()), nodes: 65 });
-        wait(&mut session, "the file", |_, events| events.contains(&Event::Saved(file.clone())));
+        form(&mut session, GrinCommand::Save { path: Some(file.clone()), nodes: 65 });
+        wait(&mut session, "the file", |_, events| {
+            events.contains(&SessionEvent::Saved(file.clone()))
+        });
         assert_eq!(read_volume(&file).unwrap(), headless.best().volume(task.space, 65).unwrap());
     }
-    form(&mut session, Form::Save { path: Some(folder.join("field.txt")), nodes: 65 });
+    form(&mut session, GrinCommand::Save { path: Some(folder.join("field.txt")), nodes: 65 });
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text.contains("ends in .npz or .json"))
     });
 
-    form(&mut session, Form::Start);
-    stands(&mut session, Standing::Running);
+    form(&mut session, GrinCommand::Start);
+    stands(&mut session, RunStatus::Running);
     assert!(run(&session).progress.as_ref().is_none_or(|progress| progress.step < steps), "anew");
-    form(&mut session, Form::Close);
+    form(&mut session, GrinCommand::Close);
     assert!(forming(&session).run.is_none() && forming(&session).slice.is_none());
     std::fs::remove_dir_all(folder).unwrap();
 }
@@ -144,73 +150,73 @@ fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
 #[test]
 fn nothing_is_computed_before_something_is_open_and_looked_at() {
     let mut session = session();
-    form(&mut session, Form::Watch(true));
-    form(&mut session, Form::Start);
+    form(&mut session, GrinCommand::SetActive(true));
+    form(&mut session, GrinCommand::Start);
     assert_eq!(
         session.view().messages.last().unwrap().text,
         "there is no task to work on; open one first"
     );
-    form(&mut session, Form::Save { path: Some("field.npz".into()), nodes: 65 });
+    form(&mut session, GrinCommand::Save { path: Some("field.npz".into()), nodes: 65 });
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text.starts_with("there is no field to save"))
     });
-    let Forming { run, slice, sighting, .. } = forming(&session);
+    let GrinView { run, slice, analysis: sighting, .. } = forming(&session);
     assert!(run.is_none() && slice.is_none() && sighting.is_none());
 
-    form(&mut session, Form::Watch(false));
-    form(&mut session, Form::Builtin("luneburg-radial".into()));
-    stands(&mut session, Standing::Paused);
+    form(&mut session, GrinCommand::SetActive(false));
+    form(&mut session, GrinCommand::OpenBuiltin("luneburg-radial".into()));
+    stands(&mut session, RunStatus::Paused);
     std::thread::sleep(std::time::Duration::from_millis(50));
     session.poll();
-    let Forming { slice, sighting, .. } = forming(&session);
+    let GrinView { slice, analysis: sighting, .. } = forming(&session);
     assert!(slice.is_none() && sighting.is_none(), "nobody looks");
-    form(&mut session, Form::Watch(true));
+    form(&mut session, GrinCommand::SetActive(true));
     super::session_forming::slice(&mut session);
 }
 
 #[test]
 fn slices_turn_and_show_every_quantity_with_rays_and_the_exact_field() {
     let mut session = session();
-    form(&mut session, Form::Watch(true));
-    form(&mut session, Form::Builtin("luneburg-radial".into()));
-    stands(&mut session, Standing::Paused);
+    form(&mut session, GrinCommand::SetActive(true));
+    form(&mut session, GrinCommand::OpenBuiltin("luneburg-radial".into()));
+    stands(&mut session, RunStatus::Paused);
     let first = slice(&mut session);
-    assert_eq!(first.sight.plane, Plane { axis: Axis::Y, depth: 0.0 });
+    assert_eq!(first.settings.plane, SlicePlane { axis: SpatialAxis::Y, depth: 0.0 });
     let [low, high] = first.range;
     assert!(low == high && (low - 1.0).abs() < 1e-12 && first.contours.is_empty(), "even");
-    assert_eq!((first.size, first.axes()), ([240, 240], [Axis::Z, Axis::X]));
-    let [rays] = &first.ways[..] else { panic!("one view") };
-    assert_eq!(rays.ways.len(), first.sight.rays);
-    assert!(rays.off < 0.3 && rays.ways.iter().all(|way| way.points.len() > 2));
-    assert_eq!((first.profile.along, first.profile.exact.len()), ("r", 201));
+    assert_eq!((first.size, first.axes()), ([240, 240], [SpatialAxis::Z, SpatialAxis::X]));
+    let [rays] = &first.paths[..] else { panic!("one view") };
+    assert_eq!(rays.paths.len(), first.settings.rays);
+    assert!(rays.distance < 0.3 && rays.paths.iter().all(|way| way.points.len() > 2));
+    assert_eq!((first.profile.along, first.profile.reference.len()), ("r", 201));
     assert!(first.difference.unwrap().relative > 0.1);
 
-    form(&mut session, Form::Start);
-    stands(&mut session, Standing::Finished);
+    form(&mut session, GrinCommand::Start);
+    stands(&mut session, RunStatus::Finished);
     let found = slice(&mut session);
     let difference = found.difference.unwrap();
     assert!(difference.relative < 1e-4 && difference.without_offset <= difference.relative);
     assert!((found.range[1] - 2.0_f64.sqrt()).abs() < 1e-3, "{:?}", found.range);
     assert!(found.contours.len() >= 4 && found.spacing > 0.0);
-    for plane in [(Axis::X, 0.3), (Axis::Z, -0.2), (Axis::Y, 7.0)] {
-        for quantity in Quantity::ALL {
-            let plane = Plane { axis: plane.0, depth: plane.1 };
-            form(&mut session, Form::Look(Sight { plane, quantity, rays: 3 }));
+    for plane in [(SpatialAxis::X, 0.3), (SpatialAxis::Z, -0.2), (SpatialAxis::Y, 7.0)] {
+        for quantity in SliceQuantity::ALL {
+            let plane = SlicePlane { axis: plane.0, depth: plane.1 };
+            form(&mut session, GrinCommand::SetSlice(SliceSettings { plane, quantity, rays: 3 }));
             let seen = slice(&mut session);
-            assert_eq!(seen.sight.plane.depth, plane.depth.min(1.0), "held within the ball");
+            assert_eq!(seen.settings.plane.depth, plane.depth.min(1.0), "held within the ball");
             let numbers = seen.values.iter().filter(|value| value.is_finite());
             assert_eq!(numbers.count() > 0, plane.depth < 1.0);
-            let error = quantity == Quantity::Error;
+            let error = quantity == SliceQuantity::Error;
             assert!(!error || seen.range[1] < 2e-3 && seen.range[0] == -seen.range[1]);
         }
     }
     wait(&mut session, "all light", |view, _| {
-        let sighting = view.forming.sighting.as_deref().and_then(|seen| seen.as_ref().ok());
-        let run = view.forming.run.as_ref().unwrap();
+        let sighting = view.grin.analysis.as_deref().and_then(|seen| seen.as_ref().ok());
+        let run = view.grin.run.as_ref().unwrap();
         sighting.is_some_and(|seen| {
             let view = &seen.views.value[0];
             assert!(view.error.unwrap() < 1e-6 && view.image.is_none());
-            Arc::ptr_eq(&seen.medium, &run.medium) && view.result.spot < 1e-3
+            Arc::ptr_eq(&seen.field, &run.field) && view.result.spot < 1e-3
         })
     });
 }
@@ -219,30 +225,30 @@ fn slices_turn_and_show_every_quantity_with_rays_and_the_exact_field() {
 fn images_of_a_display_stand_beside_their_pictures() {
     let folder = folder("display");
     let path = folder.join("task.json");
-    let mut task = coarse("display", &[Level { nodes: 4, steps: 2 }]);
+    let mut task = coarse("display", &[RefinementLevel { nodes: 4, steps: 2 }]);
     for view in &mut task.views {
-        if let grin_task::Source::Beam { rays, .. } = &mut view.source {
+        if let grin_task::LightSource::Beam { rays, .. } = &mut view.source {
             *rays = 32;
         }
     }
     write_task(&path, &task);
     let mut session = session();
-    form(&mut session, Form::Watch(true));
+    form(&mut session, GrinCommand::SetActive(true));
     open(&mut session, &path);
-    assert_eq!(forming(&session).sight.plane.axis, Axis::Z, "both beams lie in it");
-    wait(&mut session, "images", |view, _| view.forming.sighting.is_some());
-    let sighting = forming(&session).sighting.unwrap();
+    assert_eq!(forming(&session).slice_settings.plane.axis, SpatialAxis::Z, "both beams lie in it");
+    wait(&mut session, "images", |view, _| view.grin.analysis.is_some());
+    let sighting = forming(&session).analysis.unwrap();
     let seen = sighting.as_ref().as_ref().unwrap();
-    let runner = Runner::new(&task).unwrap();
-    let judged = runner.judge(runner.current()).unwrap();
+    let runner = GrinOptimizer::new(&task).unwrap();
+    let judged = runner.score(runner.current()).unwrap();
     assert_eq!(seen.views.value.len(), judged.views.len());
     for (seen, judged) in seen.views.value.iter().zip(&judged.views) {
         let image = seen.image.as_ref().unwrap();
-        assert_eq!((image.wanted.len(), image.made.len()), (64 * 64, 64 * 64));
-        assert_eq!((seen.result.quality, seen.result.loss), (judged.quality, judged.loss));
+        assert_eq!((image.target.len(), image.formed.len()), (64 * 64, 64 * 64));
+        assert_eq!((seen.result.psnr, seen.result.loss), (judged.psnr, judged.loss));
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        assert!((mean(&image.wanted) - 1.0).abs() < 1e-12);
-        assert!((mean(&image.made) - 1.0).abs() < 0.02, "nearly all light arrives");
+        assert!((mean(&image.target) - 1.0).abs() < 1e-12);
+        assert!((mean(&image.formed) - 1.0).abs() < 0.02, "nearly all light arrives");
     }
     std::fs::remove_dir_all(folder).unwrap();
 }
@@ -251,37 +257,37 @@ fn images_of_a_display_stand_beside_their_pictures() {
 fn rays_that_do_not_count_are_drawn_and_counted_with_their_reason() {
     let folder = folder("excluded");
     let path = folder.join("task.json");
-    let mut task = coarse("display", &[Level { nodes: 4, steps: 2 }]);
+    let mut task = coarse("display", &[RefinementLevel { nodes: 4, steps: 2 }]);
     for view in &mut task.views {
-        if let grin_task::Source::Beam { rays, half, .. } = &mut view.source {
+        if let grin_task::LightSource::Beam { rays, half, .. } = &mut view.source {
             (*rays, *half) = (32, 1.5);
         }
     }
     write_task(&path, &task);
     let mut session = session();
-    form(&mut session, Form::Watch(true));
+    form(&mut session, GrinCommand::SetActive(true));
     open(&mut session, &path);
-    for ways in slice(&mut session).ways {
+    for ways in slice(&mut session).paths {
         let (lost, there): (Vec<_>, Vec<_>) =
-            ways.ways.iter().partition(|way| way.excluded().is_some());
+            ways.paths.iter().partition(|way| way.excluded().is_some());
         assert!(lost.len() >= 2 && there.len() >= 4, "{} and {}", lost.len(), there.len());
         assert!(lost.iter().all(|way| way.excluded() == Some("never_entered")));
-        assert!(ways.ways.iter().all(|way| way.points.len() >= 2));
+        assert!(ways.paths.iter().all(|way| way.points.len() >= 2));
     }
-    wait(&mut session, "all light", |view, _| view.forming.sighting.is_some());
-    let sighting = forming(&session).sighting.unwrap();
+    wait(&mut session, "all light", |view, _| view.grin.analysis.is_some());
+    let sighting = forming(&session).analysis.unwrap();
     for seen in &sighting.as_ref().as_ref().unwrap().views.value {
         let excluded: Vec<_> = seen.result.counts.excluded().collect();
         let [("never_entered", count)] = excluded[..] else { panic!("{excluded:?}") };
-        assert_eq!(seen.result.counts.counted() + count, 32 * 32);
+        assert_eq!(seen.result.counts.valid() + count, 32 * 32);
     }
     std::fs::remove_dir_all(folder).unwrap();
 }
 
 /// A volume of so many nodes along each axis.
 fn volume(counts: [usize; 3], value: impl Fn(usize) -> f64) -> Volume {
-    let grid = Grid::new(counts, Vec3::default(), Vec3::new(0.5, 0.5, 0.5)).unwrap();
-    Volume { grid, values: (0..grid.nodes()).map(value).collect() }
+    let grid = RegularGrid::new(counts, Vec3::default(), Vec3::new(0.5, 0.5, 0.5)).unwrap();
+    Volume { grid, values: (0..grid.node_count()).map(value).collect() }
 }
 
 #[test]
@@ -291,20 +297,20 @@ fn a_volume_is_looked_at_and_written_in_the_other_format() {
     let known = volume([3, 4, 5], |n| 1.0 + 0.01 * n as f64);
     write_volume(&path, &known).unwrap();
     let mut session = session();
-    form(&mut session, Form::Watch(true));
+    form(&mut session, GrinCommand::SetActive(true));
     open(&mut session, &path);
     let seen = run(&session);
-    assert_eq!((seen.subject.name.as_str(), seen.standing), ("volume.npz", Standing::Stopped));
+    assert_eq!((seen.document.name.as_str(), seen.status), ("volume.npz", RunStatus::Stopped));
     let seen = slice(&mut session);
-    assert!(seen.ways.is_empty() && seen.difference.is_none() && seen.profile.start.is_empty());
+    assert!(seen.paths.is_empty() && seen.difference.is_none() && seen.profile.start.is_empty());
     assert!((seen.range[0] - 1.0).abs() < 1e-12 && (seen.range[1] - 1.59).abs() < 1e-12);
-    let Medium::Trilinear(field) = &*seen.medium else { panic!("a grid") };
+    let GrinField::Trilinear(field) = &*seen.field else { panic!("a grid") };
     assert_eq!(field.grid().counts(), [3, 4, 5]);
-    form(&mut session, Form::Start);
+    form(&mut session, GrinCommand::Start);
     assert_eq!(session.view().messages.last().unwrap().text, "a volume has no task to work on");
     let file = folder.join("copy.json");
-    form(&mut session, Form::Save { path: Some(file.clone()), nodes: 65 });
-    wait(&mut session, "the file", |_, events| events.contains(&Event::Saved(file.clone())));
+    form(&mut session, GrinCommand::Save { path: Some(file.clone()), nodes: 65 });
+    wait(&mut session, "the file", |_, events| events.contains(&SessionEvent::Saved(file.clone())));
     assert_eq!(read_volume(&file).unwrap(), known);
     std::fs::remove_dir_all(folder).unwrap();
 }
@@ -313,14 +319,14 @@ fn a_volume_is_looked_at_and_written_in_the_other_format() {
 fn what_is_no_task_and_no_volume_is_refused_by_name_and_what_is_open_stays() {
     let folder = folder("refused");
     let mut session = session();
-    form(&mut session, Form::Builtin("fibre".into()));
-    stands(&mut session, Standing::Paused);
+    form(&mut session, GrinCommand::OpenBuiltin("fibre".into()));
+    stands(&mut session, RunStatus::Paused);
     let file = |name: &str, text: &str| {
         let path = folder.join(name);
         std::fs::write(&path, text).unwrap();
         path
     };
-    let task = grin_task::find("fibre").unwrap().text;
+    let task = grin_task::find_builtin("fibre").unwrap().text;
     let cases = [
         (file("lens.json", r#"{"aplanat": 1}"#), "found a lens; expected a task"),
         (file("text.txt", "no field"), "found neither; expected a task"),
@@ -344,6 +350,9 @@ fn what_is_no_task_and_no_volume_is_refused_by_name_and_what_is_open_stays() {
     let hole = |n: usize| if n == 5 { f64::NAN } else { 1.0 };
     write_volume(&path, &volume([2, 2, 2], hole)).unwrap();
     assert!(refused(&mut session, &path).contains("one finite value for each node"));
-    assert_eq!(run(&session).subject.name, grin_task::find("fibre").unwrap().task().unwrap().name);
+    assert_eq!(
+        run(&session).document.name,
+        grin_task::find_builtin("fibre").unwrap().task().unwrap().name
+    );
     std::fs::remove_dir_all(folder).unwrap();
 }

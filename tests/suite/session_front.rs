@@ -2,8 +2,10 @@
 
 use super::merit::bundled;
 use aplanat::lens::Lens;
-use aplanat::optimize::pareto::Settings;
-use aplanat::session::{Command, Event, FrontRun, Session, Severity, Standing, View};
+use aplanat::optimize::pareto::ParetoSettings;
+use aplanat::session::{
+    Command, ParetoRun, RunStatus, Session, SessionEvent, SessionView, Severity,
+};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,14 +19,21 @@ fn double_gauss() -> Lens {
 
 /// A sweep that ends soon, or not by itself.
 fn start(steps: usize, compare: bool) -> Command {
-    Command::StartFront { settings: Settings { points: 2, steps, ..Settings::default() }, compare }
+    Command::StartPareto {
+        settings: ParetoSettings { points: 2, steps, ..ParetoSettings::default() },
+        compare,
+    }
 }
 
 const SOON: usize = 4;
 const NEVER: usize = 10_000_000;
 
 /// Waits until something has happened in the background.
-pub(crate) fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &[Event]) -> bool) {
+pub(crate) fn wait(
+    session: &mut Session,
+    what: &str,
+    happened: impl Fn(&SessionView, &[SessionEvent]) -> bool,
+) {
     let mut events = Vec::new();
     for _ in 0..30_000 {
         events.extend(session.poll());
@@ -36,37 +45,37 @@ pub(crate) fn wait(session: &mut Session, what: &str, happened: impl Fn(&View, &
     panic!("{what} never happened");
 }
 
-fn stands(session: &mut Session, standing: Standing) {
-    wait(session, "the standing", |_, events| events.contains(&Event::Front(standing)));
+fn stands(session: &mut Session, standing: RunStatus) {
+    wait(session, "the standing", |_, events| events.contains(&SessionEvent::Front(standing)));
 }
 
-fn run(session: &Session) -> Arc<FrontRun> {
-    session.view().fronts.run.unwrap()
+fn run(session: &Session) -> Arc<ParetoRun> {
+    session.view().pareto.run.unwrap()
 }
 
 #[test]
 fn a_front_fills_is_held_goes_on_and_ends_while_the_design_stays() {
     let mut session = session(double_gauss());
     session.apply(start(NEVER, false));
-    assert!(session.view().fronts.starting);
+    assert!(session.view().pareto.starting);
     wait(&mut session, "a front", |view, _| {
-        view.fronts.run.as_ref().is_some_and(|run| run.main.front.designs().len() > 2)
+        view.pareto.run.as_ref().is_some_and(|run| run.main.front.points().len() > 2)
     });
-    session.apply(Command::PauseFront);
-    stands(&mut session, Standing::Paused);
+    session.apply(Command::PausePareto);
+    stands(&mut session, RunStatus::Paused);
     let held = run(&session);
     assert!(held.main.seconds > 0.0 && held.main.hypervolume > 0.0);
-    assert!(held.done() > 0.0 && held.done() < 1.0);
+    assert!(held.fraction_done() > 0.0 && held.fraction_done() < 1.0);
     std::thread::sleep(Duration::from_millis(150));
     session.poll();
     assert_eq!(run(&session).main.done, held.main.done, "it is held");
-    session.apply(Command::ResumeFront);
+    session.apply(Command::ResumePareto);
     wait(&mut session, "more steps", |view, _| {
-        view.fronts.run.as_ref().is_some_and(|run| run.main.done > held.main.done)
+        view.pareto.run.as_ref().is_some_and(|run| run.main.done > held.main.done)
     });
-    session.apply(Command::StopFront);
-    stands(&mut session, Standing::Stopped);
-    assert!(run(&session).main.front.designs().len() > 2, "what was found stays");
+    session.apply(Command::StopPareto);
+    stands(&mut session, RunStatus::Stopped);
+    assert!(run(&session).main.front.points().len() > 2, "what was found stays");
     assert!(!session.is_dirty());
     // The handle of a sweep that runs ends its thread.
     session.apply(start(NEVER, false));
@@ -77,39 +86,39 @@ fn a_front_fills_is_held_goes_on_and_ends_while_the_design_stays() {
 fn a_lens_of_the_front_is_looked_at_and_taken_as_one_step() {
     let mut session = session(double_gauss());
     session.apply(start(SOON, false));
-    stands(&mut session, Standing::Finished);
+    stands(&mut session, RunStatus::Finished);
     let run = run(&session);
-    let designs = run.main.front.designs();
+    let designs = run.main.front.points();
     let best = &designs[0];
     assert!(best.spot < run.start.spot);
     let version = session.view().version;
     session.apply(Command::Preview(Some(Box::new(best.lens.clone()))));
     wait(&mut session, "its numbers", |view, _| {
-        view.preview.as_ref().is_some_and(|results| *results.lens == best.lens)
+        view.preview_results.as_ref().is_some_and(|results| *results.lens == best.lens)
     });
     let view = session.view();
     assert_eq!((view.version, view.dirty, view.undo), (version, false, None), "only looked at");
     session.apply(Command::Preview(None));
-    assert!(session.view().preview.is_none() && session.view().candidate.is_none());
+    assert!(session.view().preview_results.is_none() && session.view().preview_lens.is_none());
 
     session.apply(Command::Preview(Some(Box::new(best.lens.clone()))));
-    session.apply(Command::TakePreview);
+    session.apply(Command::AcceptPreview);
     let view = session.view();
     assert_eq!(view.undo.as_deref(), Some("take a lens of the front"));
-    assert!(view.candidate.is_none());
+    assert!(view.preview_lens.is_none());
     assert_eq!(view.lens.surfaces, best.lens.surfaces);
     assert_eq!(view.lens.variables, double_gauss().variables, "the design's own variables");
     wait(&mut session, "where the design stands now", |view, _| {
-        let here = view.fronts.here.as_ref();
+        let here = view.pareto.current_design.as_ref();
         let here = here.filter(|here| Arc::ptr_eq(&here.lens, &view.lens));
         here.is_some_and(|here| {
-            let found = here.found.as_ref().unwrap();
+            let found = here.score.as_ref().unwrap();
             (found.spot - best.spot).abs() < 1e-3 * best.spot
         })
     });
     session.apply(Command::Undo);
     assert_eq!(**session.lens(), double_gauss());
-    session.apply(Command::TakePreview);
+    session.apply(Command::AcceptPreview);
     assert_eq!(session.view().messages.last().unwrap().severity, Severity::Warning);
 }
 
@@ -117,28 +126,30 @@ fn a_lens_of_the_front_is_looked_at_and_taken_as_one_step() {
 fn kept_pupils_follow_and_earlier_runs_stay() {
     let mut session = session(double_gauss());
     session.apply(start(SOON, true));
-    stands(&mut session, Standing::Finished);
+    stands(&mut session, RunStatus::Finished);
     let first = run(&session);
     let biased = first.biased.as_ref().unwrap();
-    assert_eq!((first.done(), biased.done), (1.0, biased.total));
+    assert_eq!((first.fraction_done(), biased.done), (1.0, biased.total));
     assert!(biased.hypervolume > 0.0 && biased.hypervolume != first.main.hypervolume);
     session.apply(start(SOON, false));
-    stands(&mut session, Standing::Finished);
-    let fronts = session.view().fronts;
+    stands(&mut session, RunStatus::Finished);
+    let fronts = session.view().pareto;
     assert_eq!(fronts.earlier.iter().map(|run| run.number).collect::<Vec<_>>(), [1]);
     assert_eq!(fronts.run.unwrap().main.front, first.main.front, "the same again");
 
     let folder = std::env::temp_dir().join(format!("aplanat-session-{}", std::process::id()));
-    session.apply(Command::ExportFront(Some(folder.clone())));
-    wait(&mut session, "the files", |_, events| events.contains(&Event::Saved(folder.clone())));
+    session.apply(Command::ExportPareto(Some(folder.clone())));
+    wait(&mut session, "the files", |_, events| {
+        events.contains(&SessionEvent::Saved(folder.clone()))
+    });
     let table = std::fs::read_to_string(folder.join("front.csv")).unwrap();
-    assert_eq!(table.lines().count(), 2 + first.main.front.designs().len());
+    assert_eq!(table.lines().count(), 2 + first.main.front.points().len());
     std::fs::remove_dir_all(&folder).unwrap();
 
-    session.apply(Command::ClearFronts);
-    let fronts = session.view().fronts;
-    assert!(fronts.run.is_none() && fronts.earlier.is_empty() && fronts.here.is_none());
-    session.apply(Command::ExportFront(Some(folder.clone())));
+    session.apply(Command::ClearPareto);
+    let fronts = session.view().pareto;
+    assert!(fronts.run.is_none() && fronts.earlier.is_empty() && fronts.current_design.is_none());
+    session.apply(Command::ExportPareto(Some(folder.clone())));
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text == "there is no front to export yet")
     });
@@ -148,17 +159,17 @@ fn kept_pupils_follow_and_earlier_runs_stay() {
 #[test]
 fn a_sweep_that_cannot_begin_says_why() {
     let mut session = session(double_gauss());
-    let settings = Settings { points: 0, ..Settings::default() };
-    session.apply(Command::StartFront { settings, compare: false });
-    stands(&mut session, Standing::Stopped);
+    let settings = ParetoSettings { points: 0, ..ParetoSettings::default() };
+    session.apply(Command::StartPareto { settings, compare: false });
+    stands(&mut session, RunStatus::Stopped);
     let view = session.view();
     let why = "the number of points is 0; expected 1 to 1000";
-    assert_eq!(view.fronts.failed.as_deref(), Some(why));
-    assert!(!view.fronts.starting && view.fronts.run.is_none());
+    assert_eq!(view.pareto.error.as_deref(), Some(why));
+    assert!(!view.pareto.starting && view.pareto.run.is_none());
     assert_eq!(view.messages.last().unwrap().severity, Severity::Error);
     session.apply(start(SOON, false));
-    assert!(session.view().fronts.failed.is_none());
-    stands(&mut session, Standing::Finished);
+    assert!(session.view().pareto.error.is_none());
+    stands(&mut session, RunStatus::Finished);
     session.apply(Command::New(Box::new(aplanat::session::blank())));
-    assert!(session.view().fronts.run.is_none(), "another lens has no front yet");
+    assert!(session.view().pareto.run.is_none(), "another lens has no front yet");
 }

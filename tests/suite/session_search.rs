@@ -3,9 +3,10 @@
 use super::merit::bundled;
 use super::session_front::wait;
 use aplanat::lens::Lens;
-use aplanat::search::{Kind, Rules, Settings, Steer, Temperature};
+use aplanat::search::{MutationKind, SearchRules, SearchSettings, SteerCommand, Temperature};
 use aplanat::session::{
-    Command, Ending, Event, Exploration, Explore, Quest, Session, Severity, Standing, View,
+    Command, EndReason, RunStatus, Session, SessionEvent, SessionView, Severity,
+    StructureSearchCommand, StructureSearchRequest, StructureSearchSnapshot,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,33 +21,34 @@ fn double_gauss() -> Lens {
 }
 
 /// A search by two chains with short moves that ends after some of them, or not by itself.
-fn quest(moves: Option<u64>) -> Quest {
-    let mut quest = Quest::default();
+fn quest(moves: Option<u64>) -> StructureSearchRequest {
+    let mut quest = StructureSearchRequest::default();
     let settings = quest.plan.settings;
-    quest.plan.settings = Settings { chains: 2, moves, gradients: None, remembered: 8, ..settings };
+    quest.plan.settings =
+        SearchSettings { chains: 2, moves, gradients: None, remembered: 8, ..settings };
     quest.plan.local.steps = 2;
     quest.minutes = Some(10.0);
     quest
 }
 
-fn explore(session: &mut Session, wish: Explore) -> Vec<Event> {
-    session.apply(Command::Explore(wish))
+fn explore(session: &mut Session, wish: StructureSearchCommand) -> Vec<SessionEvent> {
+    session.apply(Command::StructureSearch(wish))
 }
 
 fn start(session: &mut Session, moves: Option<u64>) {
-    explore(session, Explore::Start(Box::new(quest(moves))));
+    explore(session, StructureSearchCommand::Start(Box::new(quest(moves))));
 }
 
-fn stands(session: &mut Session, standing: Standing) {
-    wait(session, "the standing", |_, events| events.contains(&Event::Explored(standing)));
+fn stands(session: &mut Session, standing: RunStatus) {
+    wait(session, "the standing", |_, events| events.contains(&SessionEvent::Explored(standing)));
 }
 
-fn run(session: &Session) -> Arc<Exploration> {
-    session.view().explorations.run.unwrap()
+fn run(session: &Session) -> Arc<StructureSearchSnapshot> {
+    session.view().structure_search.run.unwrap()
 }
 
-fn moves(view: &View) -> u64 {
-    view.explorations.run.as_ref().map_or(0, |run| run.statistics.moves)
+fn moves(view: &SessionView) -> u64 {
+    view.structure_search.run.as_ref().map_or(0, |run| run.statistics.moves)
 }
 
 fn folder(name: &str) -> PathBuf {
@@ -57,11 +59,11 @@ fn folder(name: &str) -> PathBuf {
 fn a_search_goes_on_is_held_and_ends_while_the_design_stays() {
     let mut session = session(double_gauss());
     start(&mut session, None);
-    assert!(session.view().explorations.starting);
+    assert!(session.view().structure_search.starting);
     wait(&mut session, "some moves", |view, _| moves(view) > 6);
-    explore(&mut session, Explore::Pause);
-    assert_eq!(session.view().explorations.pending, Some(Standing::Paused));
-    stands(&mut session, Standing::Paused);
+    explore(&mut session, StructureSearchCommand::Pause);
+    assert_eq!(session.view().structure_search.pending, Some(RunStatus::Paused));
+    stands(&mut session, RunStatus::Paused);
     let held = run(&session);
     assert!(held.seconds > 0.0 && held.gradients > 0 && held.best.merit < held.start.merit);
     let moment = held.history.moments.last().unwrap();
@@ -70,14 +72,14 @@ fn a_search_goes_on_is_held_and_ends_while_the_design_stays() {
     std::thread::sleep(Duration::from_millis(150));
     session.poll();
     assert_eq!(run(&session).statistics.moves, held.statistics.moves, "it is held");
-    explore(&mut session, Explore::Resume);
+    explore(&mut session, StructureSearchCommand::Resume);
     wait(&mut session, "more moves", |view, _| moves(view) > held.statistics.moves);
-    explore(&mut session, Explore::Stop);
-    stands(&mut session, Standing::Stopped);
+    explore(&mut session, StructureSearchCommand::Stop);
+    stands(&mut session, RunStatus::Stopped);
     assert!(run(&session).best.merit <= held.best.merit, "what was found stays");
     assert!(!session.is_dirty());
-    explore(&mut session, Explore::Clear);
-    assert!(session.view().explorations.run.is_none());
+    explore(&mut session, StructureSearchCommand::Clear);
+    assert!(session.view().structure_search.run.is_none());
     // The handle of a search that runs ends its thread.
     start(&mut session, None);
     drop(session);
@@ -88,11 +90,11 @@ fn the_same_seed_finds_the_same_and_every_lens_has_its_line() {
     let [first, second] = [(), ()].map(|()| {
         let mut session = session(double_gauss());
         start(&mut session, Some(60));
-        stands(&mut session, Standing::Finished);
+        stands(&mut session, RunStatus::Finished);
         run(&session)
     });
-    assert_eq!(first.over, Some(Ending::Over(aplanat::search::Over::Moves)));
-    assert_eq!(first.done(), Some(1.0));
+    assert_eq!(first.end_reason, Some(EndReason::Sampler(aplanat::search::RunEnd::Moves)));
+    assert_eq!(first.fraction_done(), Some(1.0));
     assert_eq!(first.best.merit, second.best.merit);
     assert_eq!(first.best.lens, second.best.lens);
     assert_eq!(first.statistics, second.statistics);
@@ -100,11 +102,11 @@ fn the_same_seed_finds_the_same_and_every_lens_has_its_line() {
     let merits: Vec<f64> = first.reservoir.iter().map(|found| found.merit).collect();
     assert!(merits.is_sorted() && !merits.is_empty(), "{merits:?}");
     for found in &first.reservoir {
-        let judged = found.judged.as_ref().unwrap().found.as_ref().unwrap();
+        let judged = found.score.as_ref().unwrap().score.as_ref().unwrap();
         assert!(judged.spot > 0.0 && judged.light > 0.0 && found.elements >= 2);
-        let line: Vec<u64> = first.line(found.number).map(|node| node.number).collect();
+        let line: Vec<u64> = first.ancestry(found.number).map(|node| node.number).collect();
         assert!(line.first() == Some(&found.number) && line.is_sorted_by(|a, b| a > b), "{line:?}");
-        assert_eq!(first.lens_of(found.number).unwrap(), &found.lens);
+        assert_eq!(first.lens_by_number(found.number).unwrap(), &found.lens);
     }
 }
 
@@ -114,51 +116,57 @@ fn a_person_steers_a_search_between_two_rounds() {
     start(&mut session, None);
     wait(&mut session, "some moves", |view, _| moves(view) > 2);
     let cold = run(&session).temperature;
-    explore(&mut session, Explore::Steer(Steer::Pin(0)));
-    explore(&mut session, Explore::Steer(Steer::Reheat));
-    explore(&mut session, Explore::Steer(Steer::Weight(Kind::AddSinglet, 0.0)));
+    explore(&mut session, StructureSearchCommand::Control(SteerCommand::Pin(0)));
+    explore(&mut session, StructureSearchCommand::Control(SteerCommand::Reheat));
+    explore(
+        &mut session,
+        StructureSearchCommand::Control(SteerCommand::Weight(MutationKind::AddSinglet, 0.0)),
+    );
     wait(&mut session, "the weight", |view, _| {
-        let run = view.explorations.run.as_ref().unwrap();
-        run.weights.of(Kind::AddSinglet) == 0.0
+        let run = view.structure_search.run.as_ref().unwrap();
+        run.weights.of(MutationKind::AddSinglet) == 0.0
     });
     let steered = run(&session);
     assert_eq!(steered.pinned, Some(0));
     assert_eq!(steered.temperature.value(), 2.0 * cold.value());
-    explore(&mut session, Explore::Steer(Steer::Unpin));
-    explore(&mut session, Explore::Steer(Steer::Temperature(Temperature::new(0.5).unwrap())));
+    explore(&mut session, StructureSearchCommand::Control(SteerCommand::Unpin));
+    explore(
+        &mut session,
+        StructureSearchCommand::Control(SteerCommand::Temperature(Temperature::new(0.5).unwrap())),
+    );
     wait(&mut session, "the temperature", |view, _| {
-        let run = view.explorations.run.as_ref().unwrap();
+        let run = view.structure_search.run.as_ref().unwrap();
         run.temperature.value() == 0.5 && run.pinned.is_none()
     });
-    explore(&mut session, Explore::Steer(Steer::Pin(1_000_000)));
+    explore(&mut session, StructureSearchCommand::Control(SteerCommand::Pin(1_000_000)));
     wait(&mut session, "a refusal", |view, _| {
         let refused = "generation 1000000 is not remembered";
         view.messages.last().is_some_and(|said| said.text.starts_with(refused))
     });
-    assert_eq!(run(&session).standing, Standing::Running);
+    assert_eq!(run(&session).status, RunStatus::Running);
 }
 
 #[test]
 fn the_layout_follows_a_chain() {
     let mut session = session(double_gauss());
     start(&mut session, None);
-    explore(&mut session, Explore::Follow(Some(0)));
+    explore(&mut session, StructureSearchCommand::Preview(Some(0)));
     wait(&mut session, "numbers of the chain's lens", |view, _| {
-        let shown = view.preview.as_ref();
+        let shown = view.preview_results.as_ref();
         shown.is_some_and(|results| results.lens.surfaces != double_gauss().surfaces)
     });
     assert!(!session.is_dirty());
-    explore(&mut session, Explore::Follow(None));
-    assert!(session.view().preview.is_none());
+    explore(&mut session, StructureSearchCommand::Preview(None));
+    assert!(session.view().preview_results.is_none());
 }
 
 #[test]
 fn a_lens_that_was_found_is_taken_as_one_step() {
     let mut session = session(double_gauss());
     start(&mut session, Some(20));
-    stands(&mut session, Standing::Finished);
+    stands(&mut session, RunStatus::Finished);
     let best = Arc::clone(&run(&session).reservoir[0]);
-    explore(&mut session, Explore::Take(best.number));
+    explore(&mut session, StructureSearchCommand::Accept(best.number));
     let view = session.view();
     let title = format!("take lens {} of the search", best.number);
     assert_eq!(view.undo.as_deref(), Some(title.as_str()));
@@ -166,12 +174,12 @@ fn a_lens_that_was_found_is_taken_as_one_step() {
     let is_held = |v: &aplanat::lens::Variable| v.min.is_some() && v.min == v.max;
     assert!(!view.lens.variables.iter().any(is_held), "what was held is no variable");
     wait(&mut session, "the design beside it", |view, _| {
-        let here = view.explorations.here.as_ref();
+        let here = view.structure_search.current_design.as_ref();
         here.is_some_and(|here| Arc::ptr_eq(&here.lens, &view.lens))
     });
     session.apply(Command::Undo);
     assert_eq!(**session.lens(), double_gauss());
-    explore(&mut session, Explore::Take(1_000_000));
+    explore(&mut session, StructureSearchCommand::Accept(1_000_000));
     assert_eq!(session.view().messages.last().unwrap().severity, Severity::Warning);
 }
 
@@ -180,34 +188,34 @@ fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
     let folder = folder("left");
     let mut whole = session(double_gauss());
     start(&mut whole, Some(60));
-    stands(&mut whole, Standing::Finished);
+    stands(&mut whole, RunStatus::Finished);
 
     let mut first = session(double_gauss());
-    first.keep_searches_in(&folder);
-    assert_eq!(first.view().explorations.left, None);
+    first.set_save_folder(&folder);
+    assert_eq!(first.view().structure_search.unfinished, None);
     start(&mut first, Some(60));
     wait(&mut first, "some moves", |view, _| moves(view) > 10);
     drop(first);
 
     let mut second = session(double_gauss());
-    second.keep_searches_in(&folder);
-    let left = second.view().explorations.left.unwrap();
+    second.set_save_folder(&folder);
+    let left = second.view().structure_search.unfinished.unwrap();
     assert!(left.starts_with(&folder), "{}", left.display());
-    explore(&mut second, Explore::GoOn(Some(left.clone())));
-    assert_eq!(second.view().explorations.left, None);
-    stands(&mut second, Standing::Finished);
+    explore(&mut second, StructureSearchCommand::ResumeFrom(Some(left.clone())));
+    assert_eq!(second.view().structure_search.unfinished, None);
+    stands(&mut second, RunStatus::Finished);
     let (whole, found) = (run(&whole), run(&second));
     assert_eq!(found.best.lens, whole.best.lens);
     assert_eq!(found.statistics, whole.statistics);
     assert_eq!(found.history, whole.history, "the curve behind it is there too");
-    assert_eq!((found.gradients, found.quest.minutes), (whole.gradients, Some(10.0)));
+    assert_eq!((found.gradients, found.request.minutes), (whole.gradients, Some(10.0)));
     assert_eq!(found.checkpoint.moves, Some(60));
     assert_eq!(found.checkpoint.path.as_ref(), Some(&left));
 
     let third = &mut session(double_gauss());
-    third.keep_searches_in(&folder);
-    explore(third, Explore::ForgetLeft);
-    assert!(!left.exists() && third.view().explorations.left.is_none());
+    third.set_save_folder(&folder);
+    explore(third, StructureSearchCommand::DismissUnfinished);
+    assert!(!left.exists() && third.view().structure_search.unfinished.is_none());
     drop(second);
     std::fs::remove_dir_all(&folder).unwrap();
 }
@@ -216,19 +224,19 @@ fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
 fn a_forgotten_search_with_light_of_its_own_for_each_field_goes_on() {
     let folder = folder("forgotten");
     let mut first = session(double_gauss());
-    first.keep_searches_in(&folder);
+    first.set_save_folder(&folder);
     let mut asked = quest(Some(8));
     asked.plan.light = vec![0.9, 0.8, 0.7];
-    explore(&mut first, Explore::Start(Box::new(asked)));
+    explore(&mut first, StructureSearchCommand::Start(Box::new(asked)));
     wait(&mut first, "a move", |view, _| moves(view) > 0);
     drop(first);
 
     let mut second = session(double_gauss());
-    second.keep_searches_in(&folder);
-    explore(&mut second, Explore::ForgetLeft);
+    second.set_save_folder(&folder);
+    explore(&mut second, StructureSearchCommand::DismissUnfinished);
     let forgotten = folder.join("forgotten.json");
-    explore(&mut second, Explore::GoOn(Some(forgotten.clone())));
-    stands(&mut second, Standing::Finished);
+    explore(&mut second, StructureSearchCommand::ResumeFrom(Some(forgotten.clone())));
+    stands(&mut second, RunStatus::Finished);
     assert_eq!(moves(&second.view()), 8);
     let place = run(&second).checkpoint.path.clone().unwrap();
     assert!(place != forgotten && place.exists() && !forgotten.exists(), "{}", place.display());
@@ -241,19 +249,19 @@ fn a_person_chooses_where_a_search_is_saved() {
     let folder = folder("place");
     let mut session = session(double_gauss());
     let [before, behind] = ["a.json", "b.json"].map(|name| folder.join(name));
-    explore(&mut session, Explore::SaveTo(Some(before.clone())));
-    assert_eq!(session.view().explorations.place.as_ref(), Some(&before));
+    explore(&mut session, StructureSearchCommand::SaveTo(Some(before.clone())));
+    assert_eq!(session.view().structure_search.save_path.as_ref(), Some(&before));
     start(&mut session, None);
-    explore(&mut session, Explore::Pause);
-    stands(&mut session, Standing::Paused);
+    explore(&mut session, StructureSearchCommand::Pause);
+    stands(&mut session, RunStatus::Paused);
     assert!(before.exists());
-    explore(&mut session, Explore::SaveTo(Some(behind.clone())));
+    explore(&mut session, StructureSearchCommand::SaveTo(Some(behind.clone())));
     wait(&mut session, "the other file", |_, _| behind.exists());
-    explore(&mut session, Explore::SaveTo(Some(before.join("under a file"))));
+    explore(&mut session, StructureSearchCommand::SaveTo(Some(before.join("under a file"))));
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text.starts_with("the search is not saved"))
     });
-    assert_eq!(run(&session).standing, Standing::Paused, "the search is not lost");
+    assert_eq!(run(&session).status, RunStatus::Paused, "the search is not lost");
     drop(session);
     std::fs::remove_dir_all(&folder).unwrap();
 }
@@ -263,44 +271,47 @@ fn a_search_that_cannot_begin_says_why() {
     let mut session = session(double_gauss());
     let mut wrong = quest(None);
     wrong.plan.settings.chains = 0;
-    explore(&mut session, Explore::Start(Box::new(wrong)));
-    stands(&mut session, Standing::Stopped);
+    explore(&mut session, StructureSearchCommand::Start(Box::new(wrong)));
+    stands(&mut session, RunStatus::Stopped);
     let view = session.view();
     let why = "setting chains: found 0; expected 1 or more";
-    assert_eq!(view.explorations.failed.as_deref(), Some(why));
-    assert!(!view.explorations.starting && view.explorations.run.is_none());
+    assert_eq!(view.structure_search.error.as_deref(), Some(why));
+    assert!(!view.structure_search.starting && view.structure_search.run.is_none());
     assert_eq!(view.messages.last().unwrap().severity, Severity::Error);
 
     let mut impossible = quest(None);
     impossible.plan.rules.track = Some(10.0);
-    explore(&mut session, Explore::Start(Box::new(impossible)));
-    stands(&mut session, Standing::Stopped);
-    let failed = session.view().explorations.failed.unwrap();
+    explore(&mut session, StructureSearchCommand::Start(Box::new(impossible)));
+    stands(&mut session, RunStatus::Stopped);
+    let failed = session.view().structure_search.error.unwrap();
     assert!(failed.starts_with("no lens keeps these limits: a track of 10 mm"), "{failed}");
 
     let file = folder("foreign");
     std::fs::write(&file, "{\"aplanat\": 1}").unwrap();
-    explore(&mut session, Explore::GoOn(Some(file.clone())));
-    stands(&mut session, Standing::Stopped);
-    let failed = session.view().explorations.failed.unwrap();
+    explore(&mut session, StructureSearchCommand::ResumeFrom(Some(file.clone())));
+    stands(&mut session, RunStatus::Stopped);
+    let failed = session.view().structure_search.error.unwrap();
     assert!(failed.contains("no checkpoint of a search over lenses"), "{failed}");
     std::fs::remove_file(&file).unwrap();
 
     start(&mut session, Some(4));
-    assert!(session.view().explorations.failed.is_none());
-    stands(&mut session, Standing::Finished);
+    assert!(session.view().structure_search.error.is_none());
+    stands(&mut session, RunStatus::Finished);
 }
 
 /// Has the start of a search finished and exported.
-fn export(rules: impl Fn(&mut Rules), path: &Path) -> Session {
+fn export(rules: impl Fn(&mut SearchRules), path: &Path) -> Session {
     let mut session = session(double_gauss());
     let mut asked = quest(Some(2));
     rules(&mut asked.plan.rules);
-    explore(&mut session, Explore::Start(Box::new(asked)));
-    stands(&mut session, Standing::Finished);
-    explore(&mut session, Explore::Export { number: 0, path: Some(path.to_owned()) });
-    assert_eq!(session.view().explorations.exporting, [0]);
-    wait(&mut session, "the end of it", |view, _| view.explorations.exporting.is_empty());
+    explore(&mut session, StructureSearchCommand::Start(Box::new(asked)));
+    stands(&mut session, RunStatus::Finished);
+    explore(
+        &mut session,
+        StructureSearchCommand::Export { number: 0, path: Some(path.to_owned()) },
+    );
+    assert_eq!(session.view().structure_search.exporting, [0]);
+    wait(&mut session, "the end of it", |view, _| view.structure_search.exporting.is_empty());
     session
 }
 

@@ -4,7 +4,10 @@ use super::merit::bundled;
 use super::reference::{self, Reference, number, numbers};
 use aplanat::lens::{Shape, Surface, System};
 use aplanat::math::{Dual, Real, Vec3};
-use aplanat::trace::{Fate, Gradient, Hits, Hurdle, Points, Ray, Rays, Seed, Sink, Tracer, Width};
+use aplanat::trace::{
+    AdjointSeed, Fate, ImagePoints, Landings, Ray, RayLimit, Rays, SimdWidth, SystemGradient,
+    TraceSink, Tracer,
+};
 use serde_json::Value;
 
 const EPSILON: f64 = f64::EPSILON;
@@ -67,7 +70,11 @@ fn reference_lens_rays_have_the_right_derivatives() {
             let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::default()];
             for (output, point) in axes.into_iter().enumerate() {
                 let opl = if output == 2 { 1.0 } else { 0.0 };
-                let gradient = tracer.gradient(&rays, |_| Seed { point, opl, ..Seed::default() });
+                let gradient = tracer.gradient(&rays, |_| AdjointSeed {
+                    point,
+                    opl,
+                    ..AdjointSeed::default()
+                });
                 worst = worst.max(worst_derivative(lens.id(), &gradient, derivatives, output));
             }
         }
@@ -78,7 +85,7 @@ fn reference_lens_rays_have_the_right_derivatives() {
 /// The largest error of the derivatives of one output, relative to the largest of them.
 fn worst_derivative(
     lens: &str,
-    gradient: &Gradient<f64>,
+    gradient: &SystemGradient<f64>,
     derivatives: &serde_json::Map<String, Value>,
     output: usize,
 ) -> f64 {
@@ -108,27 +115,30 @@ fn some_rays(count: usize) -> Rays<f64> {
 }
 
 fn system() -> System<f64> {
-    bundled("double_gauss_rudolph_50").system(0, 0.5875618).unwrap()
+    bundled("double_gauss_rudolph_50").resolve(0, 0.5875618).unwrap()
 }
 
 #[test]
 fn one_thread_two_threads_and_single_rays_give_the_same_bits() {
     let tracer = Tracer::new(&system()).unwrap();
     let rays = some_rays(10_000);
-    let mut one = Hits::default();
-    tracer.batch(&rays, &mut one);
+    let mut one = Landings::default();
+    tracer.trace_batch(&rays, &mut one);
     for threads in [1, 2, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let mut many = Hits::default();
-        pool.install(|| tracer.batch_parallel(&rays, &mut many));
+        let mut many = Landings::default();
+        pool.install(|| tracer.trace_batch_parallel(&rays, &mut many));
         assert_eq!(one, many, "{threads} threads");
-        let seed = |i: usize| Seed { point: Vec3::new(one.x[i], one.y[i], 0.0), ..Seed::default() };
+        let seed = |i: usize| AdjointSeed {
+            point: Vec3::new(one.x[i], one.y[i], 0.0),
+            ..AdjointSeed::default()
+        };
         let gradient = pool.install(|| tracer.gradient_parallel(&rays, seed));
         assert_eq!(gradient, tracer.gradient(&rays, seed), "{threads} threads");
     }
-    let mut points = Points::default();
-    for width in [Width::Baseline, Width::Bits256, Width::Bits512] {
-        tracer.batch_with(width, &rays, &mut points);
+    let mut points = ImagePoints::default();
+    for width in [SimdWidth::Baseline, SimdWidth::Bits256, SimdWidth::Bits512] {
+        tracer.trace_batch_with(width, &rays, &mut points);
         assert_eq!((&points.x, &points.y), (&one.x, &one.y), "{width:?}");
     }
     for i in (0..rays.len()).step_by(97) {
@@ -164,8 +174,8 @@ fn an_obstruction_clips_inside_and_its_edge_passes() {
         semi_diameter: 4.0,
         obstruction,
         mirror: false,
-        hyper: false,
-        graded: None,
+        hyperhemisphere: false,
+        grin: None,
     };
     let surfaces = vec![plane(0.0), plane(2.0), plane(0.0)];
     let tracer = Tracer::new(&System { index_before: 1.0, surfaces, stop: None }).unwrap();
@@ -181,12 +191,12 @@ fn an_obstruction_clips_inside_and_its_edge_passes() {
     ] {
         let ray = Ray { point: Vec3::new(0.0, y, -1.0), direction: Vec3::new(0.0, 0.0, 1.0) };
         assert_eq!(tracer.trace(ray).fate, fate, "{y}");
-        let mut hits = Hits::default();
-        tracer.batch(&std::iter::once(ray).collect(), &mut hits);
+        let mut hits = Landings::default();
+        tracer.trace_batch(&std::iter::once(ray).collect(), &mut hits);
         assert_eq!(hits.fate(0), fate, "{y}");
         let mut found = None;
         tracer.margins(ray, |surface, hurdle, margin| {
-            if hurdle == Hurdle::Obstruction {
+            if hurdle == RayLimit::Obstruction {
                 assert!(found.replace((surface, margin)).is_none());
             }
         });
@@ -199,13 +209,13 @@ fn obstructed_rays_end_alike_in_blocks_and_alone() {
     let (clear, system) = (system(), obstructed(1.0));
     let tracer = Tracer::new(&system).unwrap();
     let rays = some_rays(5000);
-    let (mut hits, mut without) = (Hits::default(), Hits::default());
-    tracer.batch(&rays, &mut hits);
+    let (mut hits, mut without) = (Landings::default(), Landings::default());
+    tracer.trace_batch(&rays, &mut hits);
     let mut open = system.clone();
     open.surfaces.iter_mut().for_each(|surface| surface.obstruction = 0.0);
-    Tracer::new(&open).unwrap().batch(&rays, &mut without);
-    let mut narrow = Hits::default();
-    tracer.batch_with(Width::Baseline, &rays, &mut narrow);
+    Tracer::new(&open).unwrap().trace_batch(&rays, &mut without);
+    let mut narrow = Landings::default();
+    tracer.trace_batch_with(SimdWidth::Baseline, &rays, &mut narrow);
     assert_eq!(hits, narrow);
     let mut blocked = std::collections::BTreeSet::new();
     for i in 0..rays.len() {
@@ -219,7 +229,7 @@ fn obstructed_rays_end_alike_in_blocks_and_alone() {
             }
         });
         assert_eq!(first.map(|(surface, _)| surface), landing.fate.surface(), "ray {i}");
-        if let Some((surface, Hurdle::Obstruction)) = first {
+        if let Some((surface, RayLimit::Obstruction)) = first {
             assert_eq!(landing.fate, Fate::Clipped(u32::try_from(surface).unwrap()));
             blocked.insert(surface);
         } else {
@@ -245,7 +255,7 @@ fn obstructions_that_leave_no_light_are_refused() {
     let mut system = system();
     (system.surfaces[2].obstruction, system.surfaces[2].semi_diameter) = (0.0, 0.0);
     assert!(Tracer::new(&system).is_ok());
-    assert_eq!(obstructed(1.0).lift::<f32>().surfaces[0].obstruction, 1.0);
+    assert_eq!(obstructed(1.0).cast::<f32>().surfaces[0].obstruction, 1.0);
 }
 
 #[test]
@@ -268,8 +278,8 @@ fn a_ray_turned_about_the_axis_lands_turned() {
 #[test]
 fn a_lens_scaled_by_a_power_of_two_gives_the_scaled_bits() {
     let mut lens = bundled("phone_us7558005_1");
-    lens.surfaces[2].hyper = true;
-    let system = lens.system(0, 0.5875618).unwrap();
+    lens.surfaces[2].hyperhemisphere = true;
+    let system = lens.resolve(0, 0.5875618).unwrap();
     let factor = 1024.0;
     let scaled = System {
         surfaces: system.surfaces.iter().map(|s| scale(s, factor)).collect(),
@@ -311,7 +321,7 @@ fn scale(surface: &Surface<f64>, factor: f64) -> Surface<f64> {
 #[test]
 fn a_reversed_ray_returns_to_its_start() {
     for name in ["double_gauss_rudolph_50", "zoom_tamron_28_75_f28", "phone_us7558005_1"] {
-        let system = bundled(name).system(0, 0.5875618).unwrap();
+        let system = bundled(name).resolve(0, 0.5875618).unwrap();
         let (forth, back) =
             (Tracer::new(&system).unwrap(), Tracer::new(&reversed(&system)).unwrap());
         let scale = 0.1 * system.surfaces[0].semi_diameter;
@@ -343,8 +353,8 @@ fn reversed(system: &System<f64>) -> System<f64> {
         semi_diameter: f64::INFINITY,
         obstruction: 0.0,
         mirror: false,
-        hyper: false,
-        graded: None,
+        hyperhemisphere: false,
+        grin: None,
     };
     let image_index = system.surfaces[count - 1].index;
     let mut surfaces = vec![plane(system.surfaces[count - 2].thickness, image_index)];
@@ -410,7 +420,7 @@ fn jets_are_the_derivatives_of_rays() {
         Tracer::new(&system).unwrap().trace(some_rays(40).get(9)).ray.point.y
     };
     let c = system().surfaces[4].shape.curvature();
-    let mut lifted: System<Jet> = system().lift();
+    let mut lifted: System<Jet> = system().cast();
     lifted.surfaces[4].shape = Shape::Sphere { curvature: Jet::variable(Dual::variable(c, 0), 0) };
     let ray = some_rays(40).get(9);
     let ray = Ray { point: Vec3::from_f64(ray.point), direction: Vec3::from_f64(ray.direction) };
@@ -434,8 +444,8 @@ fn lost_rays_end_with_a_surface_and_finite_numbers() {
         let direction = Vec3::new(b.sin() * a.cos(), b.sin() * a.sin(), b.cos());
         rays.push(Ray { point: Vec3::new(0.0, 0.004 * f64::from(i) - 8.0, -2.0), direction });
     }
-    let mut hits = Hits::default();
-    tracer.batch(&rays, &mut hits);
+    let mut hits = Landings::default();
+    tracer.trace_batch(&rays, &mut hits);
     for i in 0..rays.len() {
         let landing = tracer.trace(rays.get(i));
         assert_eq!(landing.fate, hits.fate(i), "ray {i}");
@@ -452,7 +462,7 @@ fn lost_rays_end_with_a_surface_and_finite_numbers() {
 fn a_reversed_lens_leads_rays_back_to_where_they_came_from() {
     for name in ["double_gauss_canon_fd50_f12", "phone_us7558005_1", "telescope_rc_f8"] {
         let lens = bundled(name);
-        let system = lens.system(0, lens.wavelengths[lens.primary()].um).unwrap();
+        let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap();
         let size = system.surfaces[0].semi_diameter.min(100.0);
         let (there, back) =
             (Tracer::new(&system).unwrap(), Tracer::new(&system.reversed(0.0)).unwrap());

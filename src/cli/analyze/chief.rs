@@ -1,27 +1,27 @@
 //! What chief rays show: distortion and field curvature.
 
-use super::{AtField, Lines, Task, show};
+use super::{AnalysisRun, AtField, TextLines, estimate_text};
 use crate::analysis::{Estimate, distortion, field_curvature};
-use crate::measure::timed;
+use crate::measure::time_ms;
 use serde::Serialize;
 
 /// The distortion at a field.
 #[derive(Serialize)]
-pub(super) struct DistortionKeys {
+pub(super) struct DistortionJson {
     height: Estimate,
     ideal: f64,
     distortion: Option<Estimate>,
     f_theta: Option<Estimate>,
 }
 
-pub(super) fn distortions(task: &Task) -> Vec<AtField<DistortionKeys>> {
-    let at = |field: &crate::lens::Field| {
-        let (result, ms) = timed(|| distortion(&task.bench, *field, task.bench.primary));
+pub(super) fn distortions(task: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
+    let at = |field: &crate::lens::FieldPoint| {
+        let (result, ms) = time_ms(|| distortion(&task.bench, *field, task.bench.primary));
         let keys = result.map(|d| {
-            let height = task.of_one_ray(d.height, ms);
+            let height = task.single_ray_estimate(d.height, ms);
             let relative =
                 |value| Estimate { value, error: height.error / d.ideal.abs(), ..height };
-            DistortionKeys {
+            DistortionJson {
                 height,
                 ideal: d.ideal,
                 distortion: d.distortion.map(relative),
@@ -33,35 +33,35 @@ pub(super) fn distortions(task: &Task) -> Vec<AtField<DistortionKeys>> {
     task.fields.iter().map(at).collect()
 }
 
-impl Lines for DistortionKeys {
+impl TextLines for DistortionJson {
     const TITLE: &'static str =
         "distortion of the chief ray at the primary wavelength: heights in mm, ratios minus 1";
 
     fn lines(&self) -> Vec<String> {
-        let mut lines = vec![show("chief ray height", &self.height)];
-        lines.extend(self.distortion.iter().map(|e| show("against f tan(theta)", e)));
-        lines.extend(self.f_theta.iter().map(|e| show("against f theta", e)));
+        let mut lines = vec![estimate_text("chief ray height", &self.height)];
+        lines.extend(self.distortion.iter().map(|e| estimate_text("against f tan(theta)", e)));
+        lines.extend(self.f_theta.iter().map(|e| estimate_text("against f theta", e)));
         lines
     }
 }
 
 /// The foci at a field.
 #[derive(Serialize)]
-pub(super) struct CurvatureKeys {
+pub(super) struct FieldCurvatureJson {
     tangential: Option<Estimate>,
     sagittal: Option<Estimate>,
 }
 
-pub(super) fn curvatures(task: &Task) -> Vec<AtField<CurvatureKeys>> {
+pub(super) fn curvatures(task: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> {
     // A focus is where rays cross at a small angle: rounding across the axis counts more along it.
-    let cone = task.bench.first.working_f_number.unwrap_or(1.0).abs().max(1.0);
-    let at = |field: &crate::lens::Field| {
-        let (result, ms) = timed(|| field_curvature(&task.bench, *field, task.bench.primary));
+    let cone = task.bench.first_order.working_f_number.unwrap_or(1.0).abs().max(1.0);
+    let at = |field: &crate::lens::FieldPoint| {
+        let (result, ms) = time_ms(|| field_curvature(&task.bench, *field, task.bench.primary));
         let estimate = |value: f64| {
-            let one = task.of_one_ray(value, ms);
+            let one = task.single_ray_estimate(value, ms);
             Estimate { error: one.error * cone, ..one }
         };
-        let keys = result.map(|c| CurvatureKeys {
+        let keys = result.map(|c| FieldCurvatureJson {
             tangential: c.tangential.map(estimate),
             sagittal: c.sagittal.map(estimate),
         });
@@ -70,13 +70,13 @@ pub(super) fn curvatures(task: &Task) -> Vec<AtField<CurvatureKeys>> {
     task.fields.iter().map(at).collect()
 }
 
-impl Lines for CurvatureKeys {
+impl TextLines for FieldCurvatureJson {
     const TITLE: &'static str =
         "foci along the chief ray at the primary wavelength, in mm behind the image plane";
 
     fn lines(&self) -> Vec<String> {
         let line = |name: &str, focus: &Option<Estimate>| {
-            focus.as_ref().map_or(format!("{name}: rays are parallel"), |e| show(name, e))
+            focus.as_ref().map_or(format!("{name}: rays are parallel"), |e| estimate_text(name, e))
         };
         vec![line("tangential", &self.tangential), line("sagittal", &self.sagittal)]
     }

@@ -1,9 +1,9 @@
 //! Transverse ray errors along the two sections of the pupil.
 
-use super::{AtField, Lines, Task};
+use super::{AnalysisRun, AtField, TextLines};
 use crate::analysis::{Fan, FanPoint, fan};
-use crate::cli::output::{Number, optional};
-use crate::measure::timed;
+use crate::cli::output::{ShortNumber, or_dash};
+use crate::measure::time_ms;
 use serde::Serialize;
 
 /// Rays of a fan: a curve that people look at, not a sum.
@@ -11,22 +11,22 @@ const POINTS: usize = 21;
 
 /// The fans of a field.
 #[derive(Serialize)]
-pub(super) struct FanKeys {
+pub(super) struct FanJson {
     error: f64,
     rays: usize,
     milliseconds: f64,
-    colors: Vec<ColorKeys>,
+    colors: Vec<ColorFanJson>,
 }
 
 #[derive(Serialize)]
-struct ColorKeys {
+struct ColorFanJson {
     wavelength_um: f64,
-    tangential: Vec<PointKeys>,
-    sagittal: Vec<PointKeys>,
+    tangential: Vec<FanPointJson>,
+    sagittal: Vec<FanPointJson>,
 }
 
 #[derive(Serialize)]
-struct PointKeys {
+struct FanPointJson {
     pupil: f64,
     dx: Option<f64>,
     dy: Option<f64>,
@@ -34,32 +34,32 @@ struct PointKeys {
     surface: Option<usize>,
 }
 
-pub(super) fn fans(task: &Task) -> Vec<AtField<FanKeys>> {
-    let at = |field: &crate::lens::Field| {
-        let (result, milliseconds) = timed(|| fan(&task.bench, *field, POINTS));
-        let keys = |fans: Vec<Fan>| FanKeys {
+pub(super) fn fans(task: &AnalysisRun) -> Vec<AtField<FanJson>> {
+    let at = |field: &crate::lens::FieldPoint| {
+        let (result, milliseconds) = time_ms(|| fan(&task.bench, *field, POINTS));
+        let keys = |fans: Vec<Fan>| FanJson {
             error: task.rounding(),
             rays: 2 * POINTS * fans.len(),
             milliseconds,
-            colors: fans.iter().map(|fan| ColorKeys::new(task, fan)).collect(),
+            colors: fans.iter().map(|fan| ColorFanJson::new(task, fan)).collect(),
         };
         AtField::new(*field, result.map(keys))
     };
     task.fields.iter().map(at).collect()
 }
 
-impl ColorKeys {
-    fn new(task: &Task, fan: &Fan) -> Self {
-        let keys = |points: &[FanPoint]| points.iter().map(PointKeys::new).collect();
+impl ColorFanJson {
+    fn new(task: &AnalysisRun, fan: &Fan) -> Self {
+        let keys = |points: &[FanPoint]| points.iter().map(FanPointJson::new).collect();
         Self {
-            wavelength_um: task.bench.colors[fan.wavelength].um,
+            wavelength_um: task.bench.channels[fan.wavelength].um,
             tangential: keys(&fan.tangential),
             sagittal: keys(&fan.sagittal),
         }
     }
 }
 
-impl PointKeys {
+impl FanPointJson {
     fn new(point: &FanPoint) -> Self {
         Self {
             pupil: point.pupil,
@@ -71,7 +71,7 @@ impl PointKeys {
     }
 }
 
-impl Lines for FanKeys {
+impl TextLines for FanJson {
     const TITLE: &'static str =
         "ray fans: distance from the chief ray of the primary wavelength, in mm";
 
@@ -82,8 +82,8 @@ impl Lines for FanKeys {
             lines.push(format!("{} um", color.wavelength_um));
             lines.push("   pupil   tangential dy  sagittal dx  sagittal dy".to_owned());
             for (t, s) in color.tangential.iter().zip(&color.sagittal) {
-                let [t, sx, sy] = [t.dy, s.dx, s.dy].map(optional);
-                lines.push(format!("{:>8}  {t:>14}  {sx:>11}  {sy:>11}", Number(s.pupil)));
+                let [t, sx, sy] = [t.dy, s.dx, s.dy].map(or_dash);
+                lines.push(format!("{:>8}  {t:>14}  {sx:>11}  {sy:>11}", ShortNumber(s.pupil)));
             }
         }
         lines

@@ -1,11 +1,11 @@
 //! The spot at image planes around the one of the lens.
 
-use super::{AtField, Lines, Outcome, Task, show, spot};
-use crate::analysis::{Dark, Estimate};
-use crate::cli::failure::Failure;
-use crate::cli::output::Number;
+use super::{AnalysisRun, AtField, FieldOutcome, TextLines, estimate_text, spot};
+use crate::analysis::{AnalysisError, Estimate};
+use crate::cli::failure::CliError;
+use crate::cli::output::ShortNumber;
 use crate::lens::{Lens, Parameter, Quantity};
-use crate::measure::timed;
+use crate::measure::time_ms;
 use serde::Serialize;
 
 /// Image planes on each side of the one of the lens.
@@ -13,45 +13,52 @@ const STEPS: i32 = 5;
 
 /// The spots of a field through focus.
 #[derive(Serialize)]
-pub(super) struct FocusKeys {
-    positions: Vec<Position>,
+pub(super) struct ThroughFocusJson {
+    positions: Vec<FocusPosition>,
 }
 
 #[derive(Serialize)]
-struct Position {
+struct FocusPosition {
     /// How far the image plane is moved along z, in mm.
     defocus: f64,
     rms: Option<Estimate>,
 }
 
-pub(super) fn through_focus(task: &Task) -> Result<Vec<AtField<FocusKeys>>, Failure> {
-    let step = step(task);
+pub(super) fn through_focus(
+    task: &AnalysisRun,
+) -> Result<Vec<AtField<ThroughFocusJson>>, CliError> {
+    let step = focus_step(task);
     let mut columns = Vec::new();
     for i in -STEPS..=STEPS {
         let defocus = f64::from(i) * step;
         columns.push((defocus, spots(task, defocus)?));
     }
-    let at = |(i, field): (usize, &crate::lens::Field)| {
-        let position = |(defocus, spots): &(f64, Vec<Result<Estimate, Dark>>)| Position {
-            defocus: *defocus,
-            rms: spots[i].ok(),
+    let at = |(i, field): (usize, &crate::lens::FieldPoint)| {
+        let position = |(defocus, spots): &(f64, Vec<Result<Estimate, AnalysisError>>)| {
+            FocusPosition { defocus: *defocus, rms: spots[i].ok() }
         };
         let dark = columns.iter().find_map(|(_, spots)| spots[i].err());
         let lit = columns.iter().any(|(_, spots)| spots[i].is_ok());
-        let keys = FocusKeys { positions: columns.iter().map(position).collect() };
-        AtField::new(*field, if lit { Ok(keys) } else { Err(dark.unwrap_or(Dark::NoLight)) })
+        let keys = ThroughFocusJson { positions: columns.iter().map(position).collect() };
+        AtField::new(
+            *field,
+            if lit { Ok(keys) } else { Err(dark.unwrap_or(AnalysisError::NoLight)) },
+        )
     };
     Ok(task.fields.iter().enumerate().map(at).collect())
 }
 
 /// The RMS radii of all fields with the image plane moved.
-fn spots(task: &Task, defocus: f64) -> Result<Vec<Result<Estimate, Dark>>, Failure> {
+fn spots(
+    task: &AnalysisRun,
+    defocus: f64,
+) -> Result<Vec<Result<Estimate, AnalysisError>>, CliError> {
     let mut moved = task.opened.clone();
     shift_image(&mut moved.lens, task.zoom, defocus);
     let mut bench = moved.bench(task.zoom)?;
     bench.aiming = task.bench.aiming;
-    let spot = |field: &crate::lens::Field| {
-        let (result, ms) = timed(|| crate::analysis::spot(&bench, *field, task.accuracy));
+    let spot = |field: &crate::lens::FieldPoint| {
+        let (result, ms) = time_ms(|| crate::analysis::spot(&bench, *field, task.accuracy));
         result.map(|spot| Estimate { milliseconds: Some(ms), ..spot.rms })
     };
     Ok(task.fields.iter().map(spot).collect())
@@ -59,7 +66,7 @@ fn spots(task: &Task, defocus: f64) -> Result<Vec<Result<Estimate, Dark>>, Failu
 
 /// Moves the image plane along z, whichever number it hangs on.
 fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
-    if let Some(offset) = &mut lens.focus {
+    if let Some(offset) = &mut lens.image_solve {
         *offset += defocus;
         return;
     }
@@ -77,13 +84,13 @@ fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
 
 /// A step over which the spot of the sharpest field changes by about its own size, as a round
 /// number.
-fn step(task: &Task) -> f64 {
-    let rms = |field: &AtField<spot::SpotKeys>| match &field.outcome {
-        Outcome::Lit(lit) => Some(lit.rms()),
-        Outcome::Dark { .. } => None,
+fn focus_step(task: &AnalysisRun) -> f64 {
+    let rms = |field: &AtField<spot::SpotJson>| match &field.outcome {
+        FieldOutcome::Lit(lit) => Some(lit.rms()),
+        FieldOutcome::Dark { .. } => None,
     };
     let smallest = spot::spots(task).iter().filter_map(rms).fold(f64::INFINITY, f64::min);
-    let first = &task.bench.first;
+    let first = &task.bench.first_order;
     let f_number = first.working_f_number.unwrap_or(1.0).abs();
     let airy = 1.22 * task.primary_um() * 1e-3 * f_number;
     let step = f_number * if smallest.is_finite() { smallest.max(airy) } else { airy };
@@ -91,15 +98,18 @@ fn step(task: &Task) -> f64 {
     power * (step / power).round().max(1.0)
 }
 
-impl Lines for FocusKeys {
+impl TextLines for ThroughFocusJson {
     const TITLE: &'static str =
         "through focus: rms radius in mm over all colours, against the shift of the image plane";
 
     fn lines(&self) -> Vec<String> {
-        let line = |position: &Position| {
+        let line = |position: &FocusPosition| {
             let sign = if position.defocus > 0.0 { "+" } else { "" };
-            let name = format!("{sign}{}", Number(position.defocus));
-            position.rms.as_ref().map_or(format!("{name:<22} no light"), |rms| show(&name, rms))
+            let name = format!("{sign}{}", ShortNumber(position.defocus));
+            position
+                .rms
+                .as_ref()
+                .map_or(format!("{name:<22} no light"), |rms| estimate_text(&name, rms))
         };
         self.positions.iter().map(line).collect()
     }

@@ -1,21 +1,21 @@
 //! How much light a field gets.
 
-use super::{AtField, Lines, Task, show};
+use super::{AnalysisRun, AtField, TextLines, estimate_text};
 use crate::analysis::{Estimate, Illumination, illumination};
-use crate::measure::timed;
-use crate::pupil::Bench;
+use crate::measure::time_ms;
+use crate::pupil::RayModel;
 use serde::Serialize;
 
 /// The light at a field; a field without any has 0 and says why.
 #[derive(Serialize)]
-pub(super) struct LightKeys {
+pub(super) struct IlluminationJson {
     cone: Estimate,
     relative: Option<Estimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     dark: Option<String>,
 }
 
-pub(super) fn illuminations(task: &Task) -> Vec<AtField<LightKeys>> {
+pub(super) fn illuminations(task: &AnalysisRun) -> Vec<AtField<IlluminationJson>> {
     // Light is compared with that of the first field of the lens, asked for or not.
     let first = task.bench.fields.first().copied();
     let alone = first.is_some_and(|first| task.fields == [first]);
@@ -23,33 +23,33 @@ pub(super) fn illuminations(task: &Task) -> Vec<AtField<LightKeys>> {
     let listed = task.fields == task.bench.fields;
     let fields = if listed { asked } else { first.into_iter().chain(asked).collect() };
     let skipped = usize::from(!listed && !alone);
-    let bench = Bench { fields, ..task.bench.clone() };
-    let (results, ms) = timed(|| illumination(&bench, bench.primary, task.accuracy));
-    let dark = results.iter().all(|light| light.dark.is_some());
-    let found = |light: &Illumination| match light.dark {
+    let bench = RayModel { fields, ..task.bench.clone() };
+    let (results, ms) = time_ms(|| illumination(&bench, bench.primary, task.accuracy));
+    let dark = results.iter().all(|light| light.error.is_some());
+    let found = |light: &Illumination| match light.error {
         Some(why) if dark => AtField::new(light.field, Err(why)),
         _ => keys(light, ms),
     };
     results.iter().skip(skipped).map(found).collect()
 }
 
-fn keys(light: &Illumination, milliseconds: f64) -> AtField<LightKeys> {
+fn keys(light: &Illumination, milliseconds: f64) -> AtField<IlluminationJson> {
     let milliseconds = Some(milliseconds);
-    let keys = LightKeys {
+    let keys = IlluminationJson {
         cone: Estimate { milliseconds, ..light.cone },
         relative: light.relative.map(|e| Estimate { milliseconds, ..e }),
-        dark: light.dark.map(|dark| dark.to_string()),
+        dark: light.error.map(|dark| dark.to_string()),
     };
     AtField::new(light.field, Ok(keys))
 }
 
-impl Lines for LightKeys {
+impl TextLines for IlluminationJson {
     const TITLE: &'static str = "illumination at the primary wavelength: area of the cone in direction cosines, and \
          against the first field";
 
     fn lines(&self) -> Vec<String> {
-        let mut lines = vec![show("cone", &self.cone)];
-        lines.extend(self.relative.iter().map(|e| show("relative", e)));
+        let mut lines = vec![estimate_text("cone", &self.cone)];
+        lines.extend(self.relative.iter().map(|e| estimate_text("relative", e)));
         lines.extend(self.dark.clone());
         lines
     }

@@ -6,13 +6,13 @@ mod focus;
 mod illumination;
 mod spot;
 
-use super::failure::Failure;
-use super::input::{LensFile, Opened, Tolerance};
-use super::output::{Number, Output};
-use crate::analysis::{Dark, Estimate};
-use crate::lens::{Field, FieldKind};
-use crate::measure::timed;
-use crate::pupil::{Accuracy, Bench};
+use super::failure::CliError;
+use super::input::{LensFile, LoadedLens, Tolerance};
+use super::output::{Output, ShortNumber};
+use crate::analysis::{AnalysisError, Estimate};
+use crate::lens::{FieldKind, FieldPoint};
+use crate::measure::time_ms;
+use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fate, Fates};
 use clap::ValueEnum;
 use serde::Serialize;
@@ -22,12 +22,12 @@ use std::fmt::{self, Display};
 /// Spot, fans, distortion, ...: each number with its estimated error, rays and milliseconds
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/analyze.txt"))]
-pub(super) struct Analyze {
+pub(super) struct AnalyzeArgs {
     #[command(flatten)]
     lens: LensFile,
 
     /// What to analyze
-    what: What,
+    what: AnalysisKind,
 
     /// The error allowed, relative to the number: `0.1%` or `1e-3`
     #[arg(long, default_value = "0.1%", value_name = "TOLERANCE")]
@@ -45,7 +45,7 @@ pub(super) struct Analyze {
 /// The analyses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "snake_case")]
-enum What {
+enum AnalysisKind {
     /// RMS and geometric radius, centroid, colours
     Spot,
     /// Transverse ray errors along both sections of the pupil
@@ -60,37 +60,39 @@ enum What {
     ThroughFocus,
 }
 
-impl Analyze {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
-        let task = Task::new(self)?;
+impl AnalyzeArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let task = AnalysisRun::new(self)?;
         match self.what {
-            What::Spot => output.print(&task.report(spot::spots(&task))?),
-            What::Fan => output.print(&task.report(fan::fans(&task))?),
-            What::Distortion => output.print(&task.report(chief::distortions(&task))?),
-            What::FieldCurvature => output.print(&task.report(chief::curvatures(&task))?),
-            What::Illumination => output.print(&task.report(illumination::illuminations(&task))?),
-            What::ThroughFocus => output.print(&task.report(focus::through_focus(&task)?)?),
+            AnalysisKind::Spot => output.print(&task.report(spot::spots(&task))?),
+            AnalysisKind::Fan => output.print(&task.report(fan::fans(&task))?),
+            AnalysisKind::Distortion => output.print(&task.report(chief::distortions(&task))?),
+            AnalysisKind::FieldCurvature => output.print(&task.report(chief::curvatures(&task))?),
+            AnalysisKind::Illumination => {
+                output.print(&task.report(illumination::illuminations(&task))?)
+            }
+            AnalysisKind::ThroughFocus => output.print(&task.report(focus::through_focus(&task)?)?),
         }
     }
 }
 
 /// A lens that is to be analyzed.
-struct Task {
-    what: What,
-    opened: Opened,
-    bench: Bench,
+struct AnalysisRun {
+    what: AnalysisKind,
+    opened: LoadedLens,
+    bench: RayModel,
     /// The fields that are asked for.
-    fields: Vec<Field>,
+    fields: Vec<FieldPoint>,
     zoom: usize,
     accuracy: Accuracy,
 }
 
-impl Task {
-    fn new(analyze: &Analyze) -> Result<Self, Failure> {
+impl AnalysisRun {
+    fn new(analyze: &AnalyzeArgs) -> Result<Self, CliError> {
         let opened = analyze.lens.open()?;
         let bench = opened.bench(analyze.zoom)?;
         let fields = match analyze.field {
-            Some(y) => vec![opened.field(y, analyze.zoom)?],
+            Some(y) => vec![opened.field_at(y, analyze.zoom)?],
             None => bench.fields.clone(),
         };
         let accuracy = Accuracy { tolerance: analyze.error.0, ..Accuracy::default() };
@@ -98,30 +100,33 @@ impl Task {
     }
 
     fn primary_um(&self) -> f64 {
-        self.bench.colors[self.bench.primary].um
+        self.bench.channels[self.bench.primary].um
     }
 
     /// What rounding in `f64` may do to a length that one ray gives.
     fn rounding(&self) -> f64 {
-        let surfaces = &self.bench.colors[self.bench.primary].system.surfaces;
+        let surfaces = &self.bench.channels[self.bench.primary].system.surfaces;
         let length: f64 = surfaces.iter().map(|surface| surface.thickness.abs()).sum();
         16.0 * f64::EPSILON * length
     }
 
     /// A length from one ray.
-    fn of_one_ray(&self, value: f64, milliseconds: f64) -> Estimate {
+    fn single_ray_estimate(&self, value: f64, milliseconds: f64) -> Estimate {
         let milliseconds = Some(milliseconds);
         Estimate { milliseconds, ..Estimate::new(value, self.rounding(), 1) }
     }
 
     /// The results at every field, unless no field has any light.
-    fn report<T: Lines + Serialize>(&self, fields: Vec<AtField<T>>) -> Result<Report<T>, Failure> {
-        if let Some(reason) = all_dark(&fields) {
+    fn report<T: TextLines + Serialize>(
+        &self,
+        fields: Vec<AtField<T>>,
+    ) -> Result<AnalysisReport<T>, CliError> {
+        if let Some(reason) = common_reason(&fields) {
             return Err(self.no_light(reason));
         }
-        let first = &self.bench.first;
+        let first = &self.bench.first_order;
         let um = self.primary_um();
-        Ok(Report {
+        Ok(AnalysisReport {
             analysis: self.what,
             zoom: self.zoom,
             wavelength_um: um,
@@ -133,13 +138,13 @@ impl Task {
     }
 
     /// Says where the light is lost of which nothing arrives.
-    fn no_light(&self, reason: &str) -> Failure {
+    fn no_light(&self, reason: &str) -> CliError {
         let mut ends: BTreeMap<Fate, usize> = BTreeMap::new();
         let mut fates = Fates::default();
-        let color = &self.bench.colors[self.bench.primary];
+        let color = &self.bench.channels[self.bench.primary];
         for field in &self.fields {
             let Ok(launch) = self.bench.launch(*field, self.bench.primary) else { continue };
-            let grid = crate::pupil::pattern(crate::pupil::Pattern::Square(16));
+            let grid = crate::pupil::pattern_points(crate::pupil::PupilPattern::Square(16));
             for ray in grid.into_iter().filter_map(|p| launch.ray(p)) {
                 let fate = color.tracer.trace(ray).fate;
                 *ends.entry(fate).or_default() += 1;
@@ -153,22 +158,22 @@ impl Task {
             format!("{count} of {total} rays end {name} at surface {surface}")
         });
         let file = &self.opened.file;
-        Failure::Input(format!("{file}: {reason}: {place}; expected a lens that images"))
+        CliError::Input(format!("{file}: {reason}: {place}; expected a lens that images"))
     }
 }
 
-fn all_dark<T>(fields: &[AtField<T>]) -> Option<&str> {
-    let reason = |field: &AtField<T>| matches!(field.outcome, Outcome::Dark { .. });
+fn common_reason<T>(fields: &[AtField<T>]) -> Option<&str> {
+    let reason = |field: &AtField<T>| matches!(field.outcome, FieldOutcome::Dark { .. });
     match fields.first().map(|field| &field.outcome) {
-        Some(Outcome::Dark { dark }) if fields.iter().all(reason) => Some(dark),
+        Some(FieldOutcome::Dark { dark }) if fields.iter().all(reason) => Some(dark),
         _ => None,
     }
 }
 
 /// What is printed.
 #[derive(Serialize)]
-struct Report<T> {
-    analysis: What,
+struct AnalysisReport<T> {
+    analysis: AnalysisKind,
     zoom: usize,
     wavelength_um: f64,
     tolerance: f64,
@@ -183,36 +188,36 @@ struct AtField<T> {
     x: f64,
     y: f64,
     #[serde(flatten)]
-    outcome: Outcome<T>,
+    outcome: FieldOutcome<T>,
 }
 
 /// A result, or why there is none.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Outcome<T> {
+enum FieldOutcome<T> {
     Lit(T),
     Dark { dark: String },
 }
 
 impl<T> AtField<T> {
-    fn new(field: Field, result: Result<T, Dark>) -> Self {
+    fn new(field: FieldPoint, result: Result<T, AnalysisError>) -> Self {
         let outcome = match result {
-            Ok(lit) => Outcome::Lit(lit),
-            Err(dark) => Outcome::Dark { dark: dark.to_string() },
+            Ok(lit) => FieldOutcome::Lit(lit),
+            Err(dark) => FieldOutcome::Dark { dark: dark.to_string() },
         };
         Self { x: field.x, y: field.y, outcome }
     }
 }
 
 /// How a result is shown to people.
-trait Lines {
+trait TextLines {
     /// What the numbers are, for the first line.
     const TITLE: &'static str;
     /// Lines about a field.
     fn lines(&self) -> Vec<String>;
 }
 
-impl<T: Lines> Display for Report<T> {
+impl<T: TextLines> Display for AnalysisReport<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let unit = match self.field_kind {
             FieldKind::Angle => "degrees",
@@ -222,13 +227,13 @@ impl<T: Lines> Display for Report<T> {
         writeln!(f, "{}", T::TITLE)?;
         for field in &self.fields {
             let AtField { x, y, outcome } = field;
-            let across = if *x == 0.0 { String::new() } else { format!("x {}, ", Number(*x)) };
-            writeln!(f, "\nfield {across}y {} {unit}", Number(*y))?;
+            let across = if *x == 0.0 { String::new() } else { format!("x {}, ", ShortNumber(*x)) };
+            writeln!(f, "\nfield {across}y {} {unit}", ShortNumber(*y))?;
             match outcome {
-                Outcome::Lit(lit) => {
+                FieldOutcome::Lit(lit) => {
                     lit.lines().iter().try_for_each(|line| writeln!(f, "  {line}"))?;
                 }
-                Outcome::Dark { dark } => writeln!(f, "  {dark}")?,
+                FieldOutcome::Dark { dark } => writeln!(f, "  {dark}")?,
             }
         }
         Ok(())
@@ -236,15 +241,15 @@ impl<T: Lines> Display for Report<T> {
 }
 
 /// A number with its error, rays and milliseconds.
-fn show(name: &str, estimate: &Estimate) -> String {
+fn estimate_text(name: &str, estimate: &Estimate) -> String {
     let Estimate { value, error, rays, milliseconds } = *estimate;
     let ms = milliseconds.map(|ms| format!(", {ms:.3} ms")).unwrap_or_default();
-    format!("{name:<22} {:>13} ± {error:.1e}   {rays} rays{ms}", Number(value))
+    format!("{name:<22} {:>13} ± {error:.1e}   {rays} rays{ms}", ShortNumber(value))
 }
 
 /// Does some work and notes the milliseconds in its results.
 fn with_time<T>(work: impl FnOnce() -> T, note: impl FnOnce(&mut T, f64)) -> T {
-    let (mut result, milliseconds) = timed(work);
+    let (mut result, milliseconds) = time_ms(work);
     note(&mut result, milliseconds);
     result
 }

@@ -1,24 +1,24 @@
 //! Where the rays of a field land.
 
-use super::{AtField, Lines, Task, show, with_time};
-use crate::analysis::{ColorSpot, Dark, Estimate, Spot, spot};
+use super::{AnalysisRun, AtField, TextLines, estimate_text, with_time};
+use crate::analysis::{AnalysisError, Estimate, MonochromaticSpot, Spot, spot};
 use serde::Serialize;
 
 /// The spot of a field.
 #[derive(Serialize)]
-pub(super) struct SpotKeys {
+pub(super) struct SpotJson {
     rms: Estimate,
     radius: Estimate,
     centroid_x: Estimate,
     centroid_y: Estimate,
     reached: bool,
-    colors: Vec<ColorKeys>,
+    colors: Vec<ColorSpotJson>,
 }
 
 /// The spot in one colour.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum ColorKeys {
+enum ColorSpotJson {
     Lit {
         wavelength_um: f64,
         rms: Estimate,
@@ -33,44 +33,44 @@ enum ColorKeys {
     },
 }
 
-pub(super) fn spots(task: &Task) -> Vec<AtField<SpotKeys>> {
-    let at = |field: &crate::lens::Field| {
+pub(super) fn spots(task: &AnalysisRun) -> Vec<AtField<SpotJson>> {
+    let at = |field: &crate::lens::FieldPoint| {
         let result = with_time(|| spot(&task.bench, *field, task.accuracy), note_time);
-        AtField::new(*field, result.map(|spot| SpotKeys::new(task, &spot)))
+        AtField::new(*field, result.map(|spot| SpotJson::new(task, &spot)))
     };
     task.fields.iter().map(at).collect()
 }
 
 /// All numbers of a spot come from the same rays at the same time.
-fn note_time(result: &mut Result<Spot, Dark>, milliseconds: f64) {
-    let Ok(Spot { rms, centroid: [x, y], radius, colors, .. }) = result else { return };
+fn note_time(result: &mut Result<Spot, AnalysisError>, milliseconds: f64) {
+    let Ok(Spot { rms, centroid: [x, y], radius, channels: colors, .. }) = result else { return };
     let note = |estimate: &mut Estimate| estimate.milliseconds = Some(milliseconds);
     [rms, x, y, radius].into_iter().for_each(note);
-    for ColorSpot { rms, centroid: [x, y], area, .. } in colors.iter_mut().flatten() {
+    for MonochromaticSpot { rms, centroid: [x, y], area, .. } in colors.iter_mut().flatten() {
         [rms, x, y, area].into_iter().for_each(note);
     }
 }
 
-impl SpotKeys {
+impl SpotJson {
     pub(super) fn rms(&self) -> f64 {
         self.rms.value
     }
 
-    fn new(task: &Task, spot: &Spot) -> Self {
-        let colors = task.bench.colors.iter().zip(&spot.colors);
+    fn new(task: &AnalysisRun, spot: &Spot) -> Self {
+        let colors = task.bench.channels.iter().zip(&spot.channels);
         Self {
             rms: spot.rms,
             radius: spot.radius,
             centroid_x: spot.centroid[0],
             centroid_y: spot.centroid[1],
-            reached: spot.colors.iter().flatten().all(|color| color.reached),
-            colors: colors.map(|(color, spot)| ColorKeys::new(color.um, spot)).collect(),
+            reached: spot.channels.iter().flatten().all(|color| color.converged),
+            colors: colors.map(|(color, spot)| ColorSpotJson::new(color.um, spot)).collect(),
         }
     }
 }
 
-impl ColorKeys {
-    fn new(wavelength_um: f64, spot: &Result<ColorSpot, Dark>) -> Self {
+impl ColorSpotJson {
+    fn new(wavelength_um: f64, spot: &Result<MonochromaticSpot, AnalysisError>) -> Self {
         match spot {
             Ok(spot) => Self::Lit {
                 wavelength_um,
@@ -87,27 +87,27 @@ impl ColorKeys {
     fn line(&self) -> String {
         match self {
             Self::Lit { wavelength_um, rms, .. } => {
-                show(&format!("rms at {wavelength_um} um"), rms)
+                estimate_text(&format!("rms at {wavelength_um} um"), rms)
             }
             Self::Dark { wavelength_um, dark } => format!("{wavelength_um} um: {dark}"),
         }
     }
 }
 
-impl Lines for SpotKeys {
+impl TextLines for SpotJson {
     const TITLE: &'static str = "spot, in mm; the centroid is that of all colours";
 
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![
-            show("rms radius", &self.rms),
-            show("geometric radius", &self.radius),
-            show("centroid x", &self.centroid_x),
-            show("centroid y", &self.centroid_y),
+            estimate_text("rms radius", &self.rms),
+            estimate_text("geometric radius", &self.radius),
+            estimate_text("centroid x", &self.centroid_x),
+            estimate_text("centroid y", &self.centroid_y),
         ];
         if !self.reached {
             lines.push("the tolerance was not reached".to_owned());
         }
-        lines.extend(self.colors.iter().map(ColorKeys::line));
+        lines.extend(self.colors.iter().map(ColorSpotJson::line));
         lines
     }
 }

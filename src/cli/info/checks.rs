@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// Something about a lens that is worth a second look.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Check {
+pub(super) struct LensCheck {
     /// The surface that it is about, or the one in front of the gap.
     #[serde(skip_serializing_if = "Option::is_none")]
     surface: Option<usize>,
@@ -14,7 +14,7 @@ pub(super) struct Check {
     found: String,
 }
 
-impl Check {
+impl LensCheck {
     pub(super) fn line(&self) -> String {
         let place = self.surface.map(|i| format!("surface {i}: ")).unwrap_or_default();
         format!("  {place}{}", self.found)
@@ -22,35 +22,35 @@ impl Check {
 }
 
 /// Looks at the gaps and rims of a lens, and at the rays that were tried.
-pub(super) fn checks(system: &System<f64>, media: &[Medium], fates: Fates) -> Vec<Check> {
+pub(super) fn checks(system: &System<f64>, media: &[Medium], fates: Fates) -> Vec<LensCheck> {
     let rows = media.len();
-    let mut checks: Vec<Check> = (0..rows).filter_map(|i| rim(system, i)).collect();
+    let mut checks: Vec<LensCheck> = (0..rows).filter_map(|i| rim(system, i)).collect();
     // Behind a mirror gaps are negative, and an edge means something else.
     let straight = media.iter().position(|m| *m == Medium::Mirror).unwrap_or(rows);
     checks.extend((0..straight.min(rows - 1)).filter_map(|i| gap(system, i)));
     let lost = fates.total() - fates.imaged;
     if fates.imaged == 0 && lost > 0 {
         let found = format!("no light: none of {lost} rays gets through");
-        checks.push(Check { surface: None, found });
+        checks.push(LensCheck { surface: None, found });
     }
     checks
 }
 
 /// A rim where the surface has ended already.
-fn rim(system: &System<f64>, i: usize) -> Option<Check> {
+fn rim(system: &System<f64>, i: usize) -> Option<LensCheck> {
     let surface = &system.surfaces[i];
     let sd = surface.semi_diameter;
-    if !sd.is_finite() || surface.hyper || surface.shape.sag(sd * sd).is_some() {
+    if !sd.is_finite() || surface.hyperhemisphere || surface.shape.sag(sd * sd).is_some() {
         return None;
     }
     let found = format!("the semi-diameter {sd} mm is beyond the edge of the surface");
-    Some(Check { surface: Some(i), found })
+    Some(LensCheck { surface: Some(i), found })
 }
 
 /// A gap without thickness on the axis or at the rims of its surfaces.
-fn gap(system: &System<f64>, i: usize) -> Option<Check> {
+fn gap(system: &System<f64>, i: usize) -> Option<LensCheck> {
     let [before, behind] = [&system.surfaces[i], &system.surfaces[i + 1]];
-    let check = |found| Some(Check { surface: Some(i), found });
+    let check = |found| Some(LensCheck { surface: Some(i), found });
     if before.thickness < 0.0 {
         return check(format!("the gap behind it is {} mm", before.thickness));
     }

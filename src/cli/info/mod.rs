@@ -3,20 +3,20 @@
 mod checks;
 mod effects;
 
-use super::failure::Failure;
-use super::input::{LensFile, Opened};
-use super::output::{Number, Output, Table, optional};
-use crate::effects::Decision;
+use super::failure::CliError;
+use super::input::{LensFile, LoadedLens};
+use super::output::{Output, ShortNumber, TextTable, or_dash};
+use crate::effects::EffectDecision;
 use crate::lens::Lens;
-use crate::paraxial::{Beam, FirstOrder, Pupil, SeidelSums, first_order, seidel};
-use checks::{Check, checks};
+use crate::paraxial::{Beam, FirstOrder, ParaxialPupil, SeidelSums, first_order, seidel};
+use checks::{LensCheck, checks};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
 /// First-order data, Seidel sums, semi-diameters, checks, and the effects chosen and why
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/info.txt"))]
-pub(super) struct Info {
+pub(super) struct InfoArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -25,8 +25,8 @@ pub(super) struct Info {
     zoom: Option<usize>,
 }
 
-impl Info {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl InfoArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
         let zooms = match self.zoom {
             Some(zoom) => {
@@ -35,29 +35,29 @@ impl Info {
             }
             None => 0..opened.lens.zoom_positions(),
         };
-        let positions: Vec<Position> =
-            zooms.map(|zoom| Position::new(&opened, zoom)).collect::<Result<_, _>>()?;
-        output.print(&Report::new(&opened, positions))
+        let positions: Vec<ZoomReport> =
+            zooms.map(|zoom| ZoomReport::new(&opened, zoom)).collect::<Result<_, _>>()?;
+        output.print(&InfoReport::new(&opened, positions))
     }
 }
 
 /// What is printed.
 #[derive(Serialize)]
-struct Report {
+struct InfoReport {
     name: String,
     wavelength_um: f64,
     /// The first of the positions again, so that a lens that does not zoom has its data at hand.
     #[serde(flatten)]
-    first: Option<Position>,
+    first: Option<ZoomReport>,
     semi_diameters: Vec<Option<f64>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     obstructions: Vec<Option<f64>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    positions: Vec<Position>,
+    positions: Vec<ZoomReport>,
 }
 
-impl Report {
-    fn new(opened: &Opened, positions: Vec<Position>) -> Self {
+impl InfoReport {
+    fn new(opened: &LoadedLens, positions: Vec<ZoomReport>) -> Self {
         let Lens { name, surfaces, .. } = &opened.lens;
         let obstructed = surfaces.iter().any(|row| row.obstruction.is_some());
         let obstructions = surfaces.iter().filter(|_| obstructed).map(|row| row.obstruction);
@@ -71,7 +71,7 @@ impl Report {
         }
     }
 
-    fn positions(&self) -> impl Iterator<Item = &Position> {
+    fn positions(&self) -> impl Iterator<Item = &ZoomReport> {
         let first = if self.positions.is_empty() { self.first.as_ref() } else { None };
         first.into_iter().chain(&self.positions)
     }
@@ -79,7 +79,7 @@ impl Report {
 
 /// The data at one zoom position.
 #[derive(Serialize, Clone)]
-struct Position {
+struct ZoomReport {
     zoom: usize,
     #[serde(skip_serializing_if = "String::is_empty")]
     zoom_name: String,
@@ -90,8 +90,8 @@ struct Position {
     rear_principal_plane: Option<f64>,
     f_number: Option<f64>,
     working_f_number: Option<f64>,
-    entrance_pupil: PupilKeys,
-    exit_pupil: PupilKeys,
+    entrance_pupil: PupilJson,
+    exit_pupil: PupilJson,
     stop_surface: Option<usize>,
     stop_semi_diameter: f64,
     total_track: f64,
@@ -100,33 +100,33 @@ struct Position {
     magnification: Option<f64>,
     lagrange: Option<f64>,
     petzval_sum: f64,
-    seidel: Option<SeidelKeys>,
+    seidel: Option<SeidelJson>,
     #[serde(skip)]
     no_seidel: &'static str,
-    checks: Vec<Check>,
-    effects: Vec<Decision>,
+    checks: Vec<LensCheck>,
+    effects: Vec<EffectDecision>,
 }
 
 #[derive(Serialize, Clone)]
-struct PupilKeys {
+struct PupilJson {
     position: Option<f64>,
     diameter: Option<f64>,
 }
 
-impl PupilKeys {
-    fn new(pupil: Pupil<f64>) -> Self {
+impl PupilJson {
+    fn new(pupil: ParaxialPupil<f64>) -> Self {
         Self { position: pupil.position, diameter: pupil.diameter }
     }
 }
 
 #[derive(Serialize, Clone)]
-struct SeidelKeys {
-    total: Sums,
-    surfaces: Vec<Sums>,
+struct SeidelJson {
+    total: SeidelSumsJson,
+    surfaces: Vec<SeidelSumsJson>,
 }
 
 #[derive(Serialize, Clone)]
-struct Sums {
+struct SeidelSumsJson {
     s1: f64,
     s2: f64,
     s3: f64,
@@ -136,7 +136,7 @@ struct Sums {
     c2: f64,
 }
 
-impl Sums {
+impl SeidelSumsJson {
     fn new(sums: &SeidelSums<f64>) -> Self {
         let SeidelSums { s1, s2, s3, s4, s5, c1, c2 } = *sums;
         Self { s1, s2, s3, s4, s5, c1, c2 }
@@ -148,12 +148,12 @@ impl Sums {
     }
 }
 
-impl Position {
-    fn new(opened: &Opened, zoom: usize) -> Result<Self, Failure> {
+impl ZoomReport {
+    fn new(opened: &LoadedLens, zoom: usize) -> Result<Self, CliError> {
         let lens = &opened.lens;
         let system = opened.system(zoom, None)?;
-        let undefined = |source| Failure::Undefined { file: opened.file.clone(), source };
-        let data = first_order(&system, &Beam::of(lens, zoom)).map_err(undefined)?;
+        let undefined = |source| CliError::Paraxial { file: opened.file.clone(), source };
+        let data = first_order(&system, &Beam::for_lens(lens, zoom)).map_err(undefined)?;
         let last = system.surfaces.len() - 1;
         let media: Vec<_> = lens.surfaces.iter().map(|row| row.medium.clone()).collect();
         let (facts, effects) = effects::decisions(opened, zoom)?;
@@ -163,12 +163,12 @@ impl Position {
             efl: data.efl,
             bfl: data.bfl,
             ffl: data.ffl,
-            front_principal_plane: data.pp1,
-            rear_principal_plane: data.pp2,
+            front_principal_plane: data.front_principal_plane,
+            rear_principal_plane: data.rear_principal_plane,
             f_number: data.f_number,
             working_f_number: data.working_f_number,
-            entrance_pupil: PupilKeys::new(data.entrance_pupil),
-            exit_pupil: PupilKeys::new(data.exit_pupil),
+            entrance_pupil: PupilJson::new(data.entrance_pupil),
+            exit_pupil: PupilJson::new(data.exit_pupil),
             stop_surface: system.stop,
             stop_semi_diameter: data.stop_semi_diameter,
             total_track: system.surfaces[..last].iter().map(|s| s.thickness).sum(),
@@ -178,7 +178,7 @@ impl Position {
             lagrange: data.lagrange,
             petzval_sum: data.petzval_sum,
             seidel: seidel_keys(opened, zoom, &data)?,
-            no_seidel: if system.is_graded() {
+            no_seidel: if system.has_grin() {
                 "those of a gradient-index medium are not implemented"
             } else {
                 "there is no chief ray"
@@ -191,22 +191,22 @@ impl Position {
 
 /// The third-order sums, with colour between the two outer wavelengths.
 fn seidel_keys(
-    opened: &Opened,
+    opened: &LoadedLens,
     zoom: usize,
     data: &FirstOrder<f64>,
-) -> Result<Option<SeidelKeys>, Failure> {
+) -> Result<Option<SeidelJson>, CliError> {
     let system = opened.system(zoom, None)?;
     let um = opened.lens.wavelengths.iter().map(|w| w.um);
     let (short, long) = (um.clone().fold(f64::INFINITY, f64::min), um.fold(0.0, f64::max));
     let outer = (opened.system(zoom, Some(short))?, opened.system(zoom, Some(long))?);
     let sums = seidel(&system, data, Some((&outer.0, &outer.1)));
-    Ok(sums.map(|sums| SeidelKeys {
-        total: Sums::new(&sums.total),
-        surfaces: sums.surfaces.iter().map(Sums::new).collect(),
+    Ok(sums.map(|sums| SeidelJson {
+        total: SeidelSumsJson::new(&sums.total),
+        surfaces: sums.surfaces.iter().map(SeidelSumsJson::new).collect(),
     }))
 }
 
-impl Display for Report {
+impl Display for InfoReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}\nat {} um, lengths in mm\n", self.name, self.wavelength_um)?;
         write!(f, "{}", self.first_order())?;
@@ -216,48 +216,48 @@ impl Display for Report {
         for position in self.positions() {
             write!(f, "\n{}", position.effects_and_checks())?;
         }
-        writeln!(f, "\nsemi-diameters  {}", radii(&self.semi_diameters, "unlimited"))?;
+        writeln!(f, "\nsemi-diameters  {}", radii_text(&self.semi_diameters, "unlimited"))?;
         if self.obstructions.is_empty() {
             return Ok(());
         }
-        writeln!(f, "obstructions    {}", radii(&self.obstructions, "none"))
+        writeln!(f, "obstructions    {}", radii_text(&self.obstructions, "none"))
     }
 }
 
 /// Radii in a row, with a word for those that are not there.
-fn radii(radii: &[Option<f64>], none: &str) -> String {
-    let shown = |r: &Option<f64>| r.map_or(none.to_owned(), |r| Number(r).to_string());
+fn radii_text(radii: &[Option<f64>], none: &str) -> String {
+    let shown = |r: &Option<f64>| r.map_or(none.to_owned(), |r| ShortNumber(r).to_string());
     radii.iter().map(shown).collect::<Vec<_>>().join("  ")
 }
 
 /// A row of the table of first-order data.
-type Datum = (&'static str, fn(&Position) -> String);
+type FirstOrderRow = (&'static str, fn(&ZoomReport) -> String);
 
-const FIRST_ORDER: [Datum; 18] = [
-    ("focal length", |p| optional(p.efl)),
-    ("back focal point, from the last vertex", |p| optional(p.bfl)),
-    ("front focal point, from the first vertex", |p| optional(p.ffl)),
-    ("front principal plane, from the first vertex", |p| optional(p.front_principal_plane)),
-    ("rear principal plane, from the last vertex", |p| optional(p.rear_principal_plane)),
-    ("f-number", |p| optional(p.f_number)),
-    ("working f-number", |p| optional(p.working_f_number)),
-    ("entrance pupil, from the first vertex", |p| optional(p.entrance_pupil.position)),
-    ("entrance pupil diameter", |p| optional(p.entrance_pupil.diameter)),
-    ("exit pupil, from the last vertex", |p| optional(p.exit_pupil.position)),
-    ("exit pupil diameter", |p| optional(p.exit_pupil.diameter)),
-    ("stop semi-diameter", |p| Number(p.stop_semi_diameter).to_string()),
-    ("first vertex to image plane", |p| Number(p.total_track).to_string()),
-    ("paraxial image, from the last vertex", |p| optional(p.paraxial_image)),
-    ("image plane behind the paraxial image", |p| optional(p.image_defocus)),
-    ("magnification", |p| optional(p.magnification)),
-    ("Lagrange invariant", |p| optional(p.lagrange)),
-    ("Petzval sum, 1/mm", |p| Number(p.petzval_sum).to_string()),
+const FIRST_ORDER: [FirstOrderRow; 18] = [
+    ("focal length", |p| or_dash(p.efl)),
+    ("back focal point, from the last vertex", |p| or_dash(p.bfl)),
+    ("front focal point, from the first vertex", |p| or_dash(p.ffl)),
+    ("front principal plane, from the first vertex", |p| or_dash(p.front_principal_plane)),
+    ("rear principal plane, from the last vertex", |p| or_dash(p.rear_principal_plane)),
+    ("f-number", |p| or_dash(p.f_number)),
+    ("working f-number", |p| or_dash(p.working_f_number)),
+    ("entrance pupil, from the first vertex", |p| or_dash(p.entrance_pupil.position)),
+    ("entrance pupil diameter", |p| or_dash(p.entrance_pupil.diameter)),
+    ("exit pupil, from the last vertex", |p| or_dash(p.exit_pupil.position)),
+    ("exit pupil diameter", |p| or_dash(p.exit_pupil.diameter)),
+    ("stop semi-diameter", |p| ShortNumber(p.stop_semi_diameter).to_string()),
+    ("first vertex to image plane", |p| ShortNumber(p.total_track).to_string()),
+    ("paraxial image, from the last vertex", |p| or_dash(p.paraxial_image)),
+    ("image plane behind the paraxial image", |p| or_dash(p.image_defocus)),
+    ("magnification", |p| or_dash(p.magnification)),
+    ("Lagrange invariant", |p| or_dash(p.lagrange)),
+    ("Petzval sum, 1/mm", |p| ShortNumber(p.petzval_sum).to_string()),
 ];
 
-impl Report {
-    fn first_order(&self) -> Table {
-        let head = |p: &Position| format!("zoom {} {}", p.zoom, p.zoom_name);
-        let mut table = Table::default();
+impl InfoReport {
+    fn first_order(&self) -> TextTable {
+        let head = |p: &ZoomReport| format!("zoom {} {}", p.zoom, p.zoom_name);
+        let mut table = TextTable::default();
         if !self.positions.is_empty() {
             table.row(std::iter::once(String::new()).chain(self.positions().map(head)));
         }
@@ -268,27 +268,28 @@ impl Report {
     }
 }
 
-impl Position {
+impl ZoomReport {
     fn effects_and_checks(&self) -> String {
         let zoom = self.zoom;
-        let mut lines = vec![format!("effects on spots good to {}, zoom {zoom}", effects::SHARE)];
-        lines.extend(self.effects.iter().map(effects::line));
+        let mut lines =
+            vec![format!("effects on spots good to {}, zoom {zoom}", effects::SPOT_TOLERANCE)];
+        lines.extend(self.effects.iter().map(effects::decision_text));
         lines.push(format!("\nchecks, zoom {zoom}"));
-        lines.extend(self.checks.iter().map(Check::line));
+        lines.extend(self.checks.iter().map(LensCheck::line));
         if self.checks.is_empty() {
             lines.push("  nothing to remark".to_owned());
         }
         lines.join("\n") + "\n"
     }
 
-    fn seidel_table(&self) -> Table {
+    fn seidel_table(&self) -> TextTable {
         let title = format!("Seidel sums, zoom {}", self.zoom);
         let columns =
             ["spherical", "coma", "astigm.", "Petzval", "distort.", "axial c.", "lateral c."];
         let Some(seidel) = &self.seidel else {
-            return Table::new(&[&format!("{title}: none, since {}", self.no_seidel)]);
+            return TextTable::new(&[&format!("{title}: none, since {}", self.no_seidel)]);
         };
-        let mut table = Table::new(&[[title.as_str()].as_slice(), &columns].concat());
+        let mut table = TextTable::new(&[[title.as_str()].as_slice(), &columns].concat());
         for (i, sums) in seidel.surfaces.iter().enumerate() {
             table.row(sums.row(format!("surface {i}")));
         }

@@ -1,14 +1,15 @@
 //! Accuracy of aperture-aware derivatives against time.
 
-use super::plot::{self, Chart, Color, Curve, Label, Stroke};
-use crate::cli::failure::Failure;
-use crate::cli::input::{LensFile, check_target};
-use crate::cli::output::{Number, Output, Table};
+use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
+use crate::cli::failure::CliError;
+use crate::cli::input::{LensFile, check_output_file};
+use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::files;
 use crate::measure::{
-    GradientCost, GradientCurves, GradientRow, Gradients, Integral, Machine, Precision, gradients,
+    GradientBenchmark, GradientCost, GradientCurves, GradientRow, Integral, Machine, Precision,
+    measure_gradients,
 };
-use crate::pupil::Estimator;
+use crate::pupil::DerivativeEstimator;
 use image::ImageError;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -18,7 +19,7 @@ use std::path::PathBuf;
 /// Error against milliseconds of every estimator of derivatives over a pupil that moves
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_gradient.txt"))]
-pub(super) struct Gradient {
+pub(super) struct MeasureGradientArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -36,40 +37,44 @@ pub(super) struct Gradient {
     plot: Option<PathBuf>,
 }
 
-impl Gradient {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl MeasureGradientArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        self.plot.iter().try_for_each(|path| check_target(path, &["png"]))?;
+        self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))?;
         opened.bench(self.zoom)?;
-        self.field.map(|y| opened.field(y, self.zoom)).transpose()?;
+        self.field.map(|y| opened.field_at(y, self.zoom)).transpose()?;
         let bar = ProgressBar::new(0);
         let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} curves");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let measured = gradients(&opened.lens, self.zoom, self.field, |done, all| {
+        let measured = measure_gradients(&opened.lens, self.zoom, self.field, |done, all| {
             bar.set_length(all as u64);
             bar.set_position(done as u64);
         });
         bar.finish_and_clear();
-        let measured = measured.map_err(|e| Failure::Input(format!("{}: {e}", opened.file)))?;
+        let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
         if let Some(path) = &self.plot {
-            let png = picture(&measured, &opened.lens.name);
-            files::replace(path, &png.map_err(|e| Failure::Failed(e.to_string()))?)?;
+            let png = draw_curves(&measured, &opened.lens.name);
+            files::write_atomic(path, &png.map_err(|e| CliError::Failed(e.to_string()))?)?;
         }
-        output.print(&Report { machine: Machine::here(), lens: opened.file, measured })
+        output.print(&MeasureGradientReport {
+            machine: Machine::detect(),
+            lens: opened.file,
+            measured,
+        })
     }
 }
 
-const COLORS: [(Estimator, Color); 4] = [
-    (Estimator::Biased, [0x7f, 0x7f, 0x7f]),
-    (Estimator::Boundary, [0xd6, 0x27, 0x28]),
-    (Estimator::Warp, [0x2c, 0xa0, 0x2c]),
-    (Estimator::Difference, [0x1f, 0x77, 0xb4]),
+const COLORS: [(DerivativeEstimator, Color); 4] = [
+    (DerivativeEstimator::Biased, [0x7f, 0x7f, 0x7f]),
+    (DerivativeEstimator::Boundary, [0xd6, 0x27, 0x28]),
+    (DerivativeEstimator::Warp, [0x2c, 0xa0, 0x2c]),
+    (DerivativeEstimator::Difference, [0x1f, 0x77, 0xb4]),
 ];
 const STROKES: [(Integral, Stroke); 2] =
     [(Integral::Spot, Stroke::Solid), (Integral::Throughput, Stroke::Dashed)];
 
 /// A chart for each field, in `f64`.
-fn picture(measured: &Gradients, title: &str) -> Result<Vec<u8>, ImageError> {
+fn draw_curves(measured: &GradientBenchmark, title: &str) -> Result<Vec<u8>, ImageError> {
     let chart = |curves: &GradientCurves| {
         let curve = |(estimator, color), (integral, stroke)| {
             let mine = |row: &&GradientRow| {
@@ -78,30 +83,30 @@ fn picture(measured: &Gradients, title: &str) -> Result<Vec<u8>, ImageError> {
                     && row.precision == Precision::F64
             };
             let points = curves.rows.iter().filter(mine).map(|row| [row.ms, row.worst()]);
-            Curve { color, stroke, points: points.collect() }
+            ErrorCurve { color, stroke, points: points.collect() }
         };
-        let name = format!("field {}, {:.0} % light", Number(curves.y), 100.0 * curves.light);
+        let name = format!("field {}, {:.0} % light", ShortNumber(curves.y), 100.0 * curves.light);
         let all = COLORS.into_iter().flat_map(|c| STROKES.map(|s| curve(c, s))).collect();
-        Chart { name, curves: all }
+        ErrorChart { name, curves: all }
     };
-    let charts: Vec<Chart> = measured.fields.iter().map(chart).collect();
-    let colors = COLORS.map(|(estimator, color)| Label::of(estimator.name(), color));
+    let charts: Vec<ErrorChart> = measured.fields.iter().map(chart).collect();
+    let colors = COLORS.map(|(estimator, color)| LegendEntry::colored(estimator.name(), color));
     let strokes = [("spot", Stroke::Solid), ("throughput", Stroke::Dashed)];
-    let strokes = strokes.map(|(name, stroke)| Label::drawn(name, stroke));
-    let labels: Vec<Label> = colors.into_iter().chain(strokes).collect();
+    let strokes = strokes.map(|(name, stroke)| LegendEntry::stroked(name, stroke));
+    let labels: Vec<LegendEntry> = colors.into_iter().chain(strokes).collect();
     plot::draw(&charts, &labels, title)
 }
 
 /// What is printed.
 #[derive(Serialize)]
-struct Report {
+struct MeasureGradientReport {
     machine: Machine,
     lens: String,
     #[serde(flatten)]
-    measured: Gradients,
+    measured: GradientBenchmark,
 }
 
-impl Display for Report {
+impl Display for MeasureGradientReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { machine, lens, measured } = self;
         writeln!(f, "{machine}\n{lens}: relative errors of derivatives, one thread")?;
@@ -116,10 +121,10 @@ impl Display for Report {
 fn write_curves(f: &mut fmt::Formatter<'_>, curves: &GradientCurves) -> fmt::Result {
     let GradientCurves { y, light, planned, reason, reference, checked, .. } = curves;
     let light = 100.0 * light;
-    writeln!(f, "\nfield {}, {light:.1} % of the light on the axis", Number(*y))?;
+    writeln!(f, "\nfield {}, {light:.1} % of the light on the axis", ShortNumber(*y))?;
     writeln!(f, "planned: {planned}, because {reason}")?;
     let check = match reference {
-        Estimator::Warp => "its standard error",
+        DerivativeEstimator::Warp => "its standard error",
         _ => "central differences are off by",
     };
     let [spot, throughput] = checked;
@@ -134,13 +139,13 @@ fn write_curves(f: &mut fmt::Formatter<'_>, curves: &GradientCurves) -> fmt::Res
     Ok(())
 }
 
-fn table<'a>(name: &str, rows: impl Iterator<Item = &'a GradientRow>) -> Table {
+fn table<'a>(name: &str, rows: impl Iterator<Item = &'a GradientRow>) -> TextTable {
     let kinds = ["curvature", "conic", "asphere", "thickness", "index", "semi-d."];
     let rows: Vec<&GradientRow> = rows.collect();
     let used = |i: &usize| rows.iter().any(|row| row.errors[*i].is_some());
     let columns: Vec<usize> = (0..kinds.len()).filter(used).collect();
     let head = [name, "rays", "ms"].into_iter().chain(columns.iter().map(|i| kinds[*i]));
-    let mut table = Table::new(&head.collect::<Vec<_>>());
+    let mut table = TextTable::new(&head.collect::<Vec<_>>());
     for row in rows {
         let precision = if row.precision == Precision::F32 { " f32" } else { "" };
         let start = [
@@ -154,8 +159,8 @@ fn table<'a>(name: &str, rows: impl Iterator<Item = &'a GradientRow>) -> Table {
     table
 }
 
-fn costs(costs: &[GradientCost]) -> Table {
-    let mut table = Table::new(&[
+fn costs(costs: &[GradientCost]) -> TextTable {
+    let mut table = TextTable::new(&[
         "surfaces",
         "numbers",
         "integral ms",

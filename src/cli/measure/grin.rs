@@ -1,16 +1,16 @@
 //! Light in gradient-index fields: accuracy against time, cost, memory.
 
-use super::plot::{self, Chart, Color, Curve, Label, Stroke};
-use crate::cli::failure::Failure;
-use crate::cli::grin::task_of;
-use crate::cli::input::check_target;
+use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
+use crate::cli::failure::CliError;
+use crate::cli::grin::load_task;
+use crate::cli::input::check_output_file;
 use crate::cli::optimize::progress_bar;
-use crate::cli::output::{Output, Table};
+use crate::cli::output::{Output, TextTable};
 use crate::files;
 use crate::grin::Integrator;
 use crate::measure::{
-    GrinCost, GrinCurves, GrinMeasured, GrinMemory, GrinRow, GrinStarts, Machine, Memory,
-    Precision, grin,
+    GrinBenchmark, GrinCost, GrinCurves, GrinMemory, GrinRow, GrinStarts, Machine, MemoryUse,
+    Precision, measure_grin,
 };
 use crate::picture::PALETTE;
 use image::ImageError;
@@ -22,7 +22,7 @@ use std::path::PathBuf;
 /// costs in time and memory
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_grin.txt"))]
-pub(super) struct Grin {
+pub(super) struct MeasureGrinArgs {
     /// A task whose exact field is known: a name that comes with the program, or a file .json
     #[arg(value_name = "TASK", default_value = "luneburg")]
     task: String,
@@ -32,22 +32,22 @@ pub(super) struct Grin {
     plot: Option<PathBuf>,
 }
 
-impl Grin {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
-        let task = task_of(&self.task)?;
-        self.plot.iter().try_for_each(|path| check_target(path, &["png"]))?;
+impl MeasureGrinArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let task = load_task(&self.task)?;
+        self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))?;
         let bar = progress_bar(0);
-        let measured = grin(&task, |done, all| {
+        let measured = measure_grin(&task, |done, all| {
             bar.set_length(all as u64);
             bar.set_position(done as u64);
         });
         bar.finish_and_clear();
-        let measured = measured.map_err(|e| Failure::Input(format!("{}: {e}", self.task)))?;
+        let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", self.task)))?;
         if let Some(path) = &self.plot {
-            let png = picture(&measured, &task.name);
-            files::replace(path, &png.map_err(|e| Failure::Failed(e.to_string()))?)?;
+            let png = draw_curves(&measured, &task.name);
+            files::write_atomic(path, &png.map_err(|e| CliError::Failed(e.to_string()))?)?;
         }
-        output.print(&Report { machine: Machine::here(), task: task.name, measured })
+        output.print(&MeasureGrinReport { machine: Machine::detect(), task: task.name, measured })
     }
 }
 
@@ -60,34 +60,34 @@ fn color(integrator: Integrator) -> Color {
 }
 
 /// A chart for each of the first two fields.
-fn picture(measured: &GrinMeasured, title: &str) -> Result<Vec<u8>, ImageError> {
+fn draw_curves(measured: &GrinBenchmark, title: &str) -> Result<Vec<u8>, ImageError> {
     let chart = |curves: &GrinCurves| {
         let curve = |integrator: Integrator, (precision, stroke)| {
             let mine = |row: &&GrinRow| row.integrator == integrator && row.precision == precision;
             let points = curves.rows.iter().filter(mine).map(|row| [row.ms, row.exit_error]);
-            Curve { color: color(integrator), stroke, points: points.collect() }
+            ErrorCurve { color: color(integrator), stroke, points: points.collect() }
         };
         let all = Integrator::ALL.into_iter().flat_map(|i| STROKES.map(|s| curve(i, s)));
-        Chart { name: format!("{}, error of exits, mm", curves.field), curves: all.collect() }
+        ErrorChart { name: format!("{}, error of exits, mm", curves.field), curves: all.collect() }
     };
-    let charts: Vec<Chart> = measured.fields.iter().take(2).map(chart).collect();
-    let named = Integrator::ALL.into_iter().map(|i| Label::of(i.name(), color(i)));
+    let charts: Vec<ErrorChart> = measured.fields.iter().take(2).map(chart).collect();
+    let named = Integrator::ALL.into_iter().map(|i| LegendEntry::colored(i.name(), color(i)));
     let strokes = [("f64", Stroke::Solid), ("f32", Stroke::Dashed)];
-    let strokes = strokes.map(|(name, stroke)| Label::drawn(name, stroke));
-    let labels: Vec<Label> = named.chain(strokes).collect();
+    let strokes = strokes.map(|(name, stroke)| LegendEntry::stroked(name, stroke));
+    let labels: Vec<LegendEntry> = named.chain(strokes).collect();
     plot::draw(&charts, &labels, title)
 }
 
 /// What is printed.
 #[derive(Serialize)]
-struct Report {
+struct MeasureGrinReport {
     machine: Machine,
     task: String,
     #[serde(flatten)]
-    measured: GrinMeasured,
+    measured: GrinBenchmark,
 }
 
-impl Display for Report {
+impl Display for MeasureGrinReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { machine, task, measured } = self;
         writeln!(f, "{machine}\n{task}: {} rays, one thread", measured.rays)?;
@@ -108,8 +108,8 @@ impl Display for Report {
     }
 }
 
-fn table(curves: &GrinCurves) -> Table {
-    let mut table = Table::new(&[
+fn table(curves: &GrinCurves) -> TextTable {
+    let mut table = TextTable::new(&[
         "integrator",
         "kicks",
         "ms",
@@ -135,8 +135,8 @@ fn table(curves: &GrinCurves) -> Table {
     table
 }
 
-fn starts(rows: &[GrinStarts]) -> Table {
-    let mut table = Table::new(&["field", "size", "off the exact field", "worst ray", "rays"]);
+fn starts(rows: &[GrinStarts]) -> TextTable {
+    let mut table = TextTable::new(&["field", "size", "off the exact field", "worst ray", "rays"]);
     for row in rows {
         table.row([
             row.field.to_owned(),
@@ -149,8 +149,9 @@ fn starts(rows: &[GrinStarts]) -> Table {
     table
 }
 
-fn costs(costs: &[GrinCost]) -> Table {
-    let mut table = Table::new(&["field", "ns forwards", "ns back", "both in times of forwards"]);
+fn costs(costs: &[GrinCost]) -> TextTable {
+    let mut table =
+        TextTable::new(&["field", "ns forwards", "ns back", "both in times of forwards"]);
     for cost in costs {
         let precision = if cost.precision == Precision::F32 { " f32" } else { "" };
         table.row([
@@ -163,8 +164,8 @@ fn costs(costs: &[GrinCost]) -> Table {
     table
 }
 
-fn memory(rows: &[GrinMemory]) -> Table {
-    let mut table = Table::new(&[
+fn memory(rows: &[GrinMemory]) -> TextTable {
+    let mut table = TextTable::new(&[
         "nodes",
         "rays",
         "steps",
@@ -178,7 +179,7 @@ fn memory(rows: &[GrinMemory]) -> Table {
         "difference",
     ]);
     let kb = |bytes: usize| format!("{:.0}", bytes as f64 / 1024.0);
-    let mb = |memory: Option<Memory>| {
+    let mb = |memory: Option<MemoryUse>| {
         memory.map_or("-".to_owned(), |m| format!("{:.1}", m.peak_mb - m.before_mb))
     };
     for row in rows {

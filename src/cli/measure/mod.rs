@@ -9,39 +9,39 @@ mod spot;
 mod trace;
 mod window;
 
-use super::failure::Failure;
+use super::failure::CliError;
 use super::output::Output;
 use clap::Subcommand;
 
 /// Measures accuracy against time, throughput and memory on this machine
 #[derive(Debug, clap::Args)]
-pub(super) struct Measure {
+pub(super) struct MeasureArgs {
     #[command(subcommand)]
-    what: What,
+    what: BenchmarkCommand,
 }
 
 /// Everything that is measured.
 #[derive(Debug, Subcommand)]
-enum What {
-    Trace(trace::Trace),
-    Spot(spot::Spot),
-    Gradient(gradient::Gradient),
-    Grin(grin::Grin),
-    Optimize(optimize::Optimize),
-    Search(Box<search::Search>),
-    Window(window::Window),
+enum BenchmarkCommand {
+    Trace(trace::MeasureTraceArgs),
+    Spot(spot::MeasureSpotArgs),
+    Gradient(gradient::MeasureGradientArgs),
+    Grin(grin::MeasureGrinArgs),
+    Optimize(optimize::MeasureOptimizeArgs),
+    Search(Box<search::MeasureSearchArgs>),
+    Window(window::MeasureWindowArgs),
 }
 
-impl Measure {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl MeasureArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         match &self.what {
-            What::Trace(trace) => trace.run(output),
-            What::Spot(spot) => spot.run(output),
-            What::Gradient(gradient) => gradient.run(output),
-            What::Grin(grin) => grin.run(output),
-            What::Optimize(optimize) => optimize.run(output),
-            What::Search(search) => search.run(output),
-            What::Window(window) => window.run(output),
+            BenchmarkCommand::Trace(trace) => trace.run(output),
+            BenchmarkCommand::Spot(spot) => spot.run(output),
+            BenchmarkCommand::Gradient(gradient) => gradient.run(output),
+            BenchmarkCommand::Grin(grin) => grin.run(output),
+            BenchmarkCommand::Optimize(optimize) => optimize.run(output),
+            BenchmarkCommand::Search(search) => search.run(output),
+            BenchmarkCommand::Window(window) => window.run(output),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Curves of error against time as a picture: one log-log chart or two side by side.
 
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart as Axes};
+use crate::picture::{Axis, BLACK, Canvas, Chart as Axes, TextAlign};
 use image::ImageError;
 
 pub(super) use crate::picture::{Color, Stroke};
@@ -9,68 +9,72 @@ const SIZE: [u32; 2] = [1800, 900];
 const TOP: f64 = 120.0;
 const BOTTOM: f64 = 800.0;
 /// Left and right of each chart.
-const PLACES: [(f64, f64); 2] = [(120.0, 740.0), (860.0, 1480.0)];
+const CHART_SPANS: [(f64, f64); 2] = [(120.0, 740.0), (860.0, 1480.0)];
 const LEGEND: f64 = 1510.0;
 /// Below this an error is drawn at the foot of the chart.
 const SMALLEST: f64 = 1e-16;
 
 /// Milliseconds and relative errors.
-pub(super) struct Curve {
+pub(super) struct ErrorCurve {
     pub(super) color: Color,
     pub(super) stroke: Stroke,
     pub(super) points: Vec<[f64; 2]>,
 }
 
 /// Curves over the same axes.
-pub(super) struct Chart {
+pub(super) struct ErrorChart {
     pub(super) name: String,
-    pub(super) curves: Vec<Curve>,
+    pub(super) curves: Vec<ErrorCurve>,
 }
 
 /// What a kind of curve is called.
-pub(super) struct Label {
+pub(super) struct LegendEntry {
     pub(super) name: &'static str,
     pub(super) color: Color,
     pub(super) stroke: Stroke,
 }
 
-impl Label {
+impl LegendEntry {
     /// The name of a color.
-    pub(super) fn of(name: &'static str, color: Color) -> Self {
+    pub(super) fn colored(name: &'static str, color: Color) -> Self {
         Self { name, color, stroke: Stroke::Solid }
     }
 
     /// The name of a stroke.
-    pub(super) fn drawn(name: &'static str, stroke: Stroke) -> Self {
+    pub(super) fn stroked(name: &'static str, stroke: Stroke) -> Self {
         Self { name, color: BLACK, stroke }
     }
 }
 
 /// One chart or two as a PNG.
-pub(super) fn draw(charts: &[Chart], labels: &[Label], title: &str) -> Result<Vec<u8>, ImageError> {
+pub(super) fn draw(
+    charts: &[ErrorChart],
+    labels: &[LegendEntry],
+    title: &str,
+) -> Result<Vec<u8>, ImageError> {
     let mut canvas = Canvas::new(SIZE);
-    canvas.text([60.0, 30.0], title, BLACK, Align::Left);
+    canvas.text([60.0, 30.0], title, BLACK, TextAlign::Left);
     let points = || charts.iter().flat_map(|c| &c.curves).flat_map(|curve| &curve.points);
     let x = Axis::logarithmic("time, ms", points().map(|p| p[0]), SMALLEST);
     let y = Axis::logarithmic("relative error", points().map(|p| p[1]), SMALLEST);
-    for (chart, (left, right)) in charts.iter().zip(PLACES) {
+    for (chart, (left, right)) in charts.iter().zip(CHART_SPANS) {
         let axes = Axes::new([left, TOP], [right, BOTTOM], x.clone(), y.clone());
         axes.draw(&mut canvas, &chart.name);
         for curve in &chart.curves {
-            marked(&mut canvas, &axes.places(&curve.points), curve.color, curve.stroke);
+            draw_curve(&mut canvas, &axes.to_pixels(&curve.points), curve.color, curve.stroke);
         }
     }
     for (i, label) in labels.iter().enumerate() {
         let y = TOP + 20.0 + 34.0 * i as f64;
-        marked(&mut canvas, &[[LEGEND, y], [LEGEND + 40.0, y]], label.color, label.stroke);
-        canvas.text([LEGEND + 52.0, y - 7.0], label.name, BLACK, Align::Left);
+        draw_curve(&mut canvas, &[[LEGEND, y], [LEGEND + 40.0, y]], label.color, label.stroke);
+        canvas.text([LEGEND + 52.0, y - 7.0], label.name, BLACK, TextAlign::Left);
     }
     canvas.png()
 }
 
-fn marked(canvas: &mut Canvas, points: &[[f64; 2]], color: Color, stroke: Stroke) {
+fn draw_curve(canvas: &mut Canvas, points: &[[f64; 2]], color: Color, stroke: Stroke) {
     canvas.curve(points, color, stroke);
-    canvas.marks(points, color);
+    canvas.markers(points, color);
 }
 
 #[cfg(test)]
@@ -82,10 +86,11 @@ mod tests {
         let color = [0xff, 0x7f, 0x0e];
         let points = vec![[0.01, 1e-3], [0.1, 0.0]];
         let chart = |points| {
-            let curves = vec![Curve { color, stroke: Stroke::Solid, points }];
-            Chart { name: "clear pupil".to_owned(), curves }
+            let curves = vec![ErrorCurve { color, stroke: Stroke::Solid, points }];
+            ErrorChart { name: "clear pupil".to_owned(), curves }
         };
-        let png = draw(&[chart(points)], &[Label::of("Gauss", color)], "a lens").unwrap();
+        let png =
+            draw(&[chart(points)], &[LegendEntry::colored("Gauss", color)], "a lens").unwrap();
         let picture = image::load_from_memory(&png).unwrap().to_rgb8();
         assert_eq!([picture.width(), picture.height()], SIZE);
         assert!(picture.pixels().any(|pixel| pixel.0 == color));

@@ -1,11 +1,11 @@
 //! What searches come to in the same time.
 
-use crate::cli::failure::Failure;
+use crate::cli::failure::CliError;
 use crate::cli::input::LensFile;
-use crate::cli::output::{Number, Output, Table};
-use crate::cli::search::Asked;
-use crate::measure::{Machine, Race, SearchRow, Searches, searches};
-use crate::search::Method;
+use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::search::SearchPlanArgs;
+use crate::measure::{Machine, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
+use crate::search::SearchMethod;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
@@ -13,7 +13,7 @@ use std::fmt::{self, Display};
 /// the tolerance of the spots does to it
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_search.txt"))]
-pub(super) struct Search {
+pub(super) struct MeasureSearchArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -26,49 +26,53 @@ pub(super) struct Search {
     seeds: u64,
 
     #[command(flatten)]
-    asked: Asked,
+    asked: SearchPlanArgs,
 }
 
-impl Search {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl MeasureSearchArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let Self { seconds, seeds, .. } = *self;
         if !(seconds > 0.0 && seconds.is_finite()) {
             let text = format!("--seconds: found {seconds}; expected more than 0");
-            return Err(Failure::Input(text));
+            return Err(CliError::Input(text));
         }
         if seeds == 0 {
-            return Err(Failure::Input("--seeds: found 0; expected 1 or more".into()));
+            return Err(CliError::Input("--seeds: found 0; expected 1 or more".into()));
         }
         let opened = self.lens.open()?;
         let plan = self.asked.plan(&opened.lens)?;
-        let lens = self.asked.start(&opened.lens)?;
-        let found = searches(&lens, &plan, Race { seconds, seeds })
-            .map_err(|cause| Failure::Input(format!("{}: {cause}", opened.file)))?;
-        output.print(&Report { machine: Machine::here(), found })
+        let lens = self.asked.start_lens(&opened.lens)?;
+        let found = compare_searches(&lens, &plan, SearchBudget { seconds, seeds })
+            .map_err(|cause| CliError::Input(format!("{}: {cause}", opened.file)))?;
+        output.print(&MeasureSearchReport { machine: Machine::detect(), found })
     }
 }
 
 #[derive(Serialize)]
-struct Report {
+struct MeasureSearchReport {
     machine: Machine,
     #[serde(flatten)]
-    found: Searches,
+    found: SearchBenchmark,
 }
 
-fn name(method: Method) -> &'static str {
+fn name(method: SearchMethod) -> &'static str {
     match method {
-        Method::Restore => "RESTORE",
-        Method::Metropolis => "Metropolis-Hastings",
-        Method::Brute => "brute force",
+        SearchMethod::Restore => "RESTORE",
+        SearchMethod::Metropolis => "Metropolis-Hastings",
+        SearchMethod::Brute => "brute force",
     }
 }
 
-impl Display for Report {
+impl Display for MeasureSearchReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Searches { race, start, methods, tolerances } = &self.found;
+        let SearchBenchmark { race, start, methods, tolerances } = &self.found;
         writeln!(f, "{}", self.machine)?;
-        let Race { seconds, seeds } = race;
-        writeln!(f, "{seeds} seeds of {seconds} s each; merit of the start {}", Number(*start))?;
+        let SearchBudget { seconds, seeds } = race;
+        writeln!(
+            f,
+            "{seeds} seeds of {seconds} s each; merit of the start {}",
+            ShortNumber(*start)
+        )?;
         writeln!(f, "merit of the best lens: median of the seeds, best to worst\n")?;
         for (title, rows) in [("sampler", methods), ("RESTORE", tolerances)] {
             let marks = rows.first().map_or(&[][..], |row| &row.marks);
@@ -79,7 +83,7 @@ impl Display for Report {
                 .chain(after)
                 .collect();
             let head: Vec<&str> = head.iter().map(String::as_str).collect();
-            let mut table = Table::new(&head);
+            let mut table = TextTable::new(&head);
             for SearchRow { method, tolerance, gradients, marks } in rows {
                 let start =
                     [name(*method).to_owned(), tolerance.to_string(), gradients.to_string()];

@@ -1,41 +1,46 @@
 //! The speed of tracing.
 
-use crate::cli::failure::Failure;
-use crate::cli::output::{Number, Output, Table};
-use crate::measure::{Machine, Memory, Rounding, Throughput, throughput};
+use crate::cli::failure::CliError;
+use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::measure::{Machine, MemoryUse, Rounding, Throughput, measure_throughput};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
 /// Ray-surfaces a second, rounding errors and memory, on a double Gauss with 12 surfaces
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_trace.txt"))]
-pub(super) struct Trace {
+pub(super) struct MeasureTraceArgs {
     /// How many times each way of tracing is timed
     #[arg(long, value_name = "N", default_value_t = 201)]
     turns: usize,
 }
 
-impl Trace {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
-        let measured = throughput(self.turns).map_err(|e| Failure::Failed(e.to_string()))?;
-        output.print(&Report { machine: Machine::here(), turns: self.turns, measured })
+impl MeasureTraceArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let measured =
+            measure_throughput(self.turns).map_err(|e| CliError::Failed(e.to_string()))?;
+        output.print(&MeasureTraceReport {
+            machine: Machine::detect(),
+            turns: self.turns,
+            measured,
+        })
     }
 }
 
 #[derive(Serialize)]
-struct Report {
+struct MeasureTraceReport {
     machine: Machine,
     turns: usize,
     #[serde(flatten)]
     measured: Throughput,
 }
 
-impl Display for Report {
+impl Display for MeasureTraceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { machine, turns, measured } = self;
         writeln!(f, "{machine}")?;
         writeln!(f, "million ray-surfaces a second, fates included, over {turns} turns:\n")?;
-        let mut table = Table::new(&["", "median", "slowest", "fastest"]);
+        let mut table = TextTable::new(&["", "median", "slowest", "fastest"]);
         for row in &measured.rows {
             let rates = [row.million_ray_surfaces_per_s, row.min, row.max];
             let rates = rates.map(|rate| format!("{rate:.1}"));
@@ -56,15 +61,15 @@ fn write_rounding(f: &mut fmt::Formatter<'_>, name: &str, rounding: &Rounding) -
     writeln!(
         f,
         "rounding in {name}: image point {} mm rms, {} mm at most; optical path {} mm rms",
-        Number(point_rms_mm),
-        Number(point_max_mm),
-        Number(path_rms_mm)
+        ShortNumber(point_rms_mm),
+        ShortNumber(point_max_mm),
+        ShortNumber(path_rms_mm)
     )
 }
 
-fn write_memory(f: &mut fmt::Formatter<'_>, what: &str, memory: Option<Memory>) -> fmt::Result {
+fn write_memory(f: &mut fmt::Formatter<'_>, what: &str, memory: Option<MemoryUse>) -> fmt::Result {
     match memory {
-        Some(Memory { before_mb, peak_mb }) => {
+        Some(MemoryUse { before_mb, peak_mb }) => {
             writeln!(f, "{what}: {peak_mb:.0} MB at the peak, {before_mb:.0} MB before")
         }
         None => writeln!(f, "{what}: this system does not tell its memory"),

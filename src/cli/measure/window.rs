@@ -1,7 +1,7 @@
 //! What the window costs.
 
-use crate::cli::failure::Failure;
-use crate::cli::output::{Number, Output, Table};
+use crate::cli::failure::CliError;
+use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::window;
 use crate::measure::Machine;
 use serde::Serialize;
@@ -11,17 +11,20 @@ use std::fmt::{self, Display};
 /// First frame, edits and frames of the studio, measured in a real window that needs a display
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_window.txt"))]
-pub(super) struct Window {}
+pub(super) struct MeasureWindowArgs {}
 
-impl Window {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl MeasureWindowArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let Self {} = self;
-        output.print(&Report { machine: Machine::here(), figures: window::figures()? })
+        output.print(&MeasureWindowReport {
+            machine: Machine::detect(),
+            figures: window::benchmark()?,
+        })
     }
 }
 
 #[derive(Serialize)]
-struct Report {
+struct MeasureWindowReport {
     machine: Machine,
     #[serde(flatten)]
     figures: Value,
@@ -38,14 +41,14 @@ const NAMES: [(&str, &str); 7] = [
     ("renderer", "drawn by"),
 ];
 
-impl Display for Report {
+impl Display for MeasureWindowReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.machine)?;
-        let mut table = Table::default();
+        let mut table = TextTable::default();
         for (key, name) in NAMES {
             let value = match &self.figures[key] {
                 Value::String(text) => text.clone(),
-                value => value.as_f64().map_or("-".to_owned(), |v| Number(v).to_string()),
+                value => value.as_f64().map_or("-".to_owned(), |v| ShortNumber(v).to_string()),
             };
             table.row([name.to_owned(), value]);
         }

@@ -1,19 +1,19 @@
 //! What a search may do and aims at, as arguments.
 
-use crate::cli::failure::Failure;
+use crate::cli::failure::CliError;
 use crate::cli::input::{self, Tolerance};
-use crate::cli::output::Number;
-use crate::lens::{Field, FieldKind, Fields, Lens, Object, Wavelength};
+use crate::cli::output::ShortNumber;
+use crate::lens::{FieldKind, FieldPoint, Fields, Lens, Object, Wavelength};
 use crate::optimize;
-use crate::search::lens::{Local, Plan, opened};
-use crate::search::{Kind, Rules, Temperature, element};
+use crate::search::lens::{DescentSettings, SearchPlan, with_open_apertures};
+use crate::search::{MutationKind, SearchRules, Temperature, element};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// What a search may do and aims at.
 #[derive(Debug, clap::Args)]
-pub(in crate::cli) struct Asked {
+pub(in crate::cli) struct SearchPlanArgs {
     /// What to aim at, as JSON; sharp spots with the light it has, at its focal length, where absent
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
@@ -39,7 +39,7 @@ pub(in crate::cli) struct Asked {
 
     /// The smallest and the largest number of elements: `4..8`
     #[arg(long, value_name = "RANGE")]
-    elements: Option<Range>,
+    elements: Option<ElementRange>,
 
     /// No surface is larger than this, in mm
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -59,7 +59,7 @@ pub(in crate::cli) struct Asked {
 
     /// Kinds of mutations that are not tried
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
-    forbid: Vec<Mutation>,
+    forbid: Vec<MutationArg>,
 
     /// Opens every rim as far as its neighbours allow, at most to this semi-diameter in mm; the
     /// diaphragm goes
@@ -88,7 +88,7 @@ pub(in crate::cli) struct Asked {
 
     /// 0 or more, or `infinite`; the start has a density of one half where it is absent
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
-    temperature: Option<Heat>,
+    temperature: Option<TemperatureArg>,
 
     /// The larger, the shorter descents are
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
@@ -103,7 +103,7 @@ pub(in crate::cli) struct Asked {
     descent: Descent,
 
     /// Steps that a local move tries
-    #[arg(long, value_name = "N", default_value_t = Local::default().steps)]
+    #[arg(long, value_name = "N", default_value_t = DescentSettings::default().steps)]
     steps: usize,
 
     /// The error allowed of the radius of each spot while searching: `1%` or `1e-2`
@@ -122,18 +122,18 @@ enum Descent {
 
 impl Descent {
     fn usual() -> Self {
-        match Local::default().method {
-            optimize::Method::Adam => Self::Adam,
-            optimize::Method::DampedLeastSquares => Self::Dls,
+        match DescentSettings::default().method {
+            optimize::DescentMethod::Adam => Self::Adam,
+            optimize::DescentMethod::DampedLeastSquares => Self::Dls,
         }
     }
 }
 
 /// Two numbers, `4..8`.
 #[derive(Debug, Clone, Copy)]
-struct Range([usize; 2]);
+struct ElementRange([usize; 2]);
 
-impl FromStr for Range {
+impl FromStr for ElementRange {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -147,9 +147,9 @@ impl FromStr for Range {
 
 /// A temperature.
 #[derive(Debug, Clone, Copy)]
-struct Heat(Temperature);
+struct TemperatureArg(Temperature);
 
-impl FromStr for Heat {
+impl FromStr for TemperatureArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -161,33 +161,33 @@ impl FromStr for Heat {
 
 /// A kind of mutation by its name.
 #[derive(Debug, Clone, Copy)]
-struct Mutation(Kind);
+struct MutationArg(MutationKind);
 
-impl FromStr for Mutation {
+impl FromStr for MutationArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let name = |kind: Kind| kind.name().replace(' ', "-");
-        let all = Kind::MUTATIONS.into_iter().chain([Kind::Global]);
+        let name = |kind: MutationKind| kind.name().replace(' ', "-");
+        let all = MutationKind::MUTATIONS.into_iter().chain([MutationKind::Global]);
         let found = all.clone().find(|kind| name(*kind) == text.replace('_', "-"));
         let known: Vec<String> = all.map(name).collect();
         found.map(Self).ok_or_else(|| format!("expected one of {}", known.join(", ")))
     }
 }
 
-fn positive(name: &str, value: Option<f64>) -> Result<Option<f64>, Failure> {
+fn positive(name: &str, value: Option<f64>) -> Result<Option<f64>, CliError> {
     match value {
         Some(v) if !(v > 0.0 && v.is_finite()) => {
-            Err(Failure::Input(format!("{name}: found {}; expected more than 0", Number(v))))
+            Err(CliError::Input(format!("{name}: found {}; expected more than 0", ShortNumber(v))))
         }
         value => Ok(value),
     }
 }
 
 /// Focal lengths that can be asked for, in mm, whatever their sign.
-const LENGTHS: [f64; 2] = [1e-9, 1e9];
+const FOCAL_LENGTHS: [f64; 2] = [1e-9, 1e9];
 
-impl Asked {
+impl SearchPlanArgs {
     /// The files that are read, each with its argument.
     pub(in crate::cli) fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
         let goal = self.goal.as_deref().map(|path| ("--goal", path));
@@ -195,15 +195,15 @@ impl Asked {
     }
 
     /// The search of a lens that is asked for.
-    pub(in crate::cli) fn plan(&self, lens: &Lens) -> Result<Plan, Failure> {
+    pub(in crate::cli) fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
         let rules = self.rules(lens)?;
-        let mut plan = Plan { rules, light: self.light.clone(), ..Plan::default() };
+        let mut plan = SearchPlan { rules, light: self.light.clone(), ..SearchPlan::default() };
         self.light.iter().try_for_each(|share| positive("--light", Some(*share)).map(drop))?;
         plan.focal_length = match self.focal_length {
-            Some(focal) if !(LENGTHS[0]..=LENGTHS[1]).contains(&focal.abs()) => {
+            Some(focal) if !(FOCAL_LENGTHS[0]..=FOCAL_LENGTHS[1]).contains(&focal.abs()) => {
                 let text = "expected a number other than 0, up to 1e9 mm";
-                let text = format!("--focal-length: found {}; {text}", Number(focal));
-                return Err(Failure::Input(text));
+                let text = format!("--focal-length: found {}; {text}", ShortNumber(focal));
+                return Err(CliError::Input(text));
             }
             focal => focal,
         };
@@ -212,8 +212,8 @@ impl Asked {
         plan.local.coarse = self.error.0;
         plan.local.steps = self.steps;
         plan.local.method = match self.descent {
-            Descent::Adam => optimize::Method::Adam,
-            Descent::Dls => optimize::Method::DampedLeastSquares,
+            Descent::Adam => optimize::DescentMethod::Adam,
+            Descent::Dls => optimize::DescentMethod::DampedLeastSquares,
         };
         let settings = &mut plan.settings;
         settings.chains = self.chains.unwrap_or(settings.chains);
@@ -224,12 +224,12 @@ impl Asked {
         Ok(plan)
     }
 
-    fn rules(&self, lens: &Lens) -> Result<Rules, Failure> {
+    fn rules(&self, lens: &Lens) -> Result<SearchRules, CliError> {
         let read = self.rules.as_deref().map(input::read_json).transpose()?;
-        let mut rules: Rules = read.unwrap_or_default();
+        let mut rules: SearchRules = read.unwrap_or_default();
         rules = match self.elements {
-            Some(Range(elements)) => Rules { elements, ..rules },
-            None if self.rules.is_none() => rules.holding(element::pieces(lens)),
+            Some(ElementRange(elements)) => SearchRules { elements, ..rules },
+            None if self.rules.is_none() => rules.admit_element_count(element::piece_count(lens)),
             None => rules,
         };
         let widest = positive("--max-diameter", self.max_diameter)?.map(|d| 0.5 * d);
@@ -239,7 +239,7 @@ impl Asked {
         let room = positive("--min-back-focus", self.min_back_focus)?;
         rules.back_focus = room.or(rules.back_focus);
         rules.projection &= !self.no_projection;
-        for Mutation(kind) in &self.forbid {
+        for MutationArg(kind) in &self.forbid {
             rules.weights.retain(|(other, _)| other != kind);
             rules.weights.push((*kind, 0.0));
         }
@@ -247,7 +247,7 @@ impl Asked {
     }
 
     /// The lens that the search starts from.
-    pub(in crate::cli) fn start(&self, lens: &Lens) -> Result<Lens, Failure> {
+    pub(in crate::cli) fn start_lens(&self, lens: &Lens) -> Result<Lens, CliError> {
         let mut start = lens.clone();
         if self.free {
             start.variables.clear();
@@ -259,19 +259,20 @@ impl Asked {
         if let Some(um) = positive("--wavelength", self.wavelength)? {
             start.wavelengths = vec![Wavelength { um, weight: 1.0, primary: true }];
         }
-        Ok(self.open.map_or_else(|| start.clone(), |limit| opened(&start, limit)))
+        Ok(self.open.map_or_else(|| start.clone(), |limit| with_open_apertures(&start, limit)))
     }
 
-    fn fields(&self, lens: &Lens) -> Result<Fields, Failure> {
+    fn fields(&self, lens: &Lens) -> Result<Fields, CliError> {
         let Some(focal) = self.focal_length.filter(|_| lens.object == Object::Infinity) else {
             let text = "--heights: expected --focal-length beside it, and an object at infinity";
-            return Err(Failure::Input(text.into()));
+            return Err(CliError::Input(text.into()));
         };
         if let Some(height) = self.heights.iter().find(|h| !h.is_finite()) {
-            let text = format!("--heights: found {}; expected mm", Number(*height));
-            return Err(Failure::Input(text));
+            let text = format!("--heights: found {}; expected mm", ShortNumber(*height));
+            return Err(CliError::Input(text));
         }
-        let angle = |h: &f64| Field { x: 0.0, y: (h / focal).atan().to_degrees(), weight: 1.0 };
+        let angle =
+            |h: &f64| FieldPoint { x: 0.0, y: (h / focal).atan().to_degrees(), weight: 1.0 };
         Ok(Fields { kind: FieldKind::Angle, values: self.heights.iter().map(angle).collect() })
     }
 }

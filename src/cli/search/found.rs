@@ -1,42 +1,44 @@
 //! What a search has found: the start against the best lens, and the lens that was finished.
 
-use super::limits::{self, Broken};
-use crate::cli::optimize::TermKeys;
-use crate::cli::output::{Number, Table, optional};
+use super::limits::{self, ViolatedLimit};
+use crate::cli::optimize::TermComparison;
+use crate::cli::output::{ShortNumber, TextTable, or_dash};
 use crate::lens::Lens;
-use crate::search::lens::{FieldFigures, Figures, Finished, LensLandscape, NoLandscape, Unlisted};
+use crate::search::lens::{
+    FieldSummary, FinalizedLens, LandscapeError, LensLandscape, LensSummary, UnlistedGlass,
+};
 use serde::Serialize;
 use std::fmt;
 
 /// The tolerance of the numbers that are printed.
-const PRINTED: f64 = 1e-4;
+const FIGURES_TOLERANCE: f64 = 1e-4;
 
 /// The start against the best lens.
 #[derive(Serialize)]
-pub(super) struct Compared {
-    start: Figures,
-    best: Figures,
-    terms: Vec<TermKeys>,
-    best_breaks: Vec<Broken>,
+pub(super) struct StartAgainstBest {
+    start: LensSummary,
+    best: LensSummary,
+    terms: Vec<TermComparison>,
+    best_breaks: Vec<ViolatedLimit>,
 }
 
 /// A lens that was finished, and what is not kept.
 #[derive(Serialize)]
-pub(super) struct FinishedKeys {
+pub(super) struct FinishedReport {
     pub(super) failures: Vec<String>,
     #[serde(flatten)]
-    pub(super) finished: Finished,
+    pub(super) finished: FinalizedLens,
 }
 
-impl Compared {
-    pub(super) fn new(landscape: &LensLandscape, best: &Lens) -> Result<Self, NoLandscape> {
+impl StartAgainstBest {
+    pub(super) fn new(landscape: &LensLandscape, best: &Lens) -> Result<Self, LandscapeError> {
         let start = landscape.start();
-        let [before, after] = [landscape.terms(start)?, landscape.terms(best)?];
+        let [before, after] = [landscape.term_values(start)?, landscape.term_values(best)?];
         Ok(Self {
-            start: Figures::of(start, PRINTED)?,
-            best: Figures::of(best, PRINTED)?,
-            terms: TermKeys::all(&before, &after),
-            best_breaks: Broken::all(landscape.broken(best)?),
+            start: LensSummary::new(start, FIGURES_TOLERANCE)?,
+            best: LensSummary::new(best, FIGURES_TOLERANCE)?,
+            terms: TermComparison::compare(&before, &after),
+            best_breaks: ViolatedLimit::all(landscape.violations(best)?),
         })
     }
 
@@ -48,7 +50,7 @@ impl Compared {
     /// The start against the best lens.
     pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (start, best) = (&self.start, &self.best);
-        let mut table = Table::new(&[
+        let mut table = TextTable::new(&[
             "field",
             "spot, um",
             "error",
@@ -66,11 +68,11 @@ impl Compared {
                 String::new()
             };
             let name = if before.x == 0.0 {
-                format!("{}{zoom}", Number(before.y))
+                format!("{}{zoom}", ShortNumber(before.y))
             } else {
-                format!("{}, {}{zoom}", Number(before.x), Number(before.y))
+                format!("{}, {}{zoom}", ShortNumber(before.x), ShortNumber(before.y))
             };
-            let light = |field: &FieldFigures| {
+            let light = |field: &FieldSummary| {
                 [format!("{:.2}", field.light.value), format!("{:.0e}", field.light.error)]
             };
             let cells = [spot(before), spot(after), light(before), light(after)];
@@ -78,9 +80,9 @@ impl Compared {
         }
         write!(f, "{table}")?;
         for (a, b) in start.focal_lengths.iter().zip(&best.focal_lengths) {
-            writeln!(f, "focal length {} -> {} mm", optional(*a), optional(*b))?;
+            writeln!(f, "focal length {} -> {} mm", or_dash(*a), or_dash(*b))?;
         }
-        writeln!(f, "track {} -> {} mm", Number(start.track), Number(best.track))?;
+        writeln!(f, "track {} -> {} mm", ShortNumber(start.track), ShortNumber(best.track))?;
         let [from, to] = [start, best].map(|lens| format!("{} ({})", lens.elements, lens.topology));
         writeln!(f, "elements {from} -> {to}")?;
         Ok(())
@@ -88,25 +90,25 @@ impl Compared {
 
     /// What each term is worth, and the limits that are not kept.
     pub(super) fn write_terms(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", TermKeys::table(&self.terms))?;
+        writeln!(f, "{}", TermComparison::table(&self.terms))?;
         limits::write(&self.best_breaks, f)
     }
 }
 
-impl FinishedKeys {
+impl FinishedReport {
     pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Finished { glasses, unlisted, gradients, figures, confirmed, .. } = &self.finished;
+        let FinalizedLens { glasses, unlisted, gradients, figures, confirmed, .. } = &self.finished;
         let (kept, light) = (&self.finished.limits, &self.finished.light);
         let verdict = if self.failures.is_empty() { "every limit is kept" } else { "NOT finished" };
         writeln!(f, "\nfinished: {verdict}")?;
         for change in glasses {
             let (nd, vd) = change.was;
-            let was = format!("{} {}", Number(nd), optional(vd));
+            let was = format!("{} {}", ShortNumber(nd), or_dash(vd));
             let (nd, vd) = change.is;
-            let is = format!("{} ({} {})", change.glass, Number(nd), Number(vd));
+            let is = format!("{} ({} {})", change.glass, ShortNumber(nd), ShortNumber(vd));
             writeln!(f, "  glass behind surface {}: {was} -> {is}", change.surface)?;
         }
-        for Unlisted { surface, glass } in unlisted {
+        for UnlistedGlass { surface, glass } in unlisted {
             writeln!(
                 f,
                 "  glass behind surface {surface}: {glass} stays: the rules do not list it, \
@@ -118,9 +120,9 @@ impl FinishedKeys {
         }
         let head =
             ["field", "spot, um", "error", "other rays", "light, mm^2", "error", "other rays"];
-        let mut table = Table::new(&head);
+        let mut table = TextTable::new(&head);
         for (field, other) in figures.fields.iter().zip(confirmed) {
-            let name = format!("{} zoom {}", Number(field.y), field.zoom);
+            let name = format!("{} zoom {}", ShortNumber(field.y), field.zoom);
             let second = [format!("{:.3}", 1e3 * other.spot), format!("{:.2}", other.light)];
             let light = [format!("{:.2}", field.light.value), format!("{:.0e}", field.light.error)];
             let [spot_second, light_second] = second;
@@ -129,16 +131,16 @@ impl FinishedKeys {
         }
         writeln!(f, "{table}")?;
         let mut table =
-            Table::new(&["limit", "surface or field", "zoom", "value", "min", "max", "margin"]);
+            TextTable::new(&["limit", "surface or field", "zoom", "value", "min", "max", "margin"]);
         for limit in kept.iter().chain(light) {
-            table.row(limits::cells(limit).into_iter().chain([format!("{:.4}", limit.room())]));
+            table.row(limits::cells(limit).into_iter().chain([format!("{:.4}", limit.slack())]));
         }
         write!(f, "{table}")
     }
 }
 
 /// µm.
-fn spot(field: &FieldFigures) -> [String; 2] {
+fn spot(field: &FieldSummary) -> [String; 2] {
     let both = |spot: crate::analysis::Estimate| {
         [format!("{:.3}", 1e3 * spot.value), format!("{:.0e}", 1e3 * spot.error)]
     };

@@ -5,22 +5,22 @@ mod found;
 mod limits;
 mod report;
 
-pub(super) use asked::Asked;
+pub(super) use asked::SearchPlanArgs;
 
-use super::experiment::check_folder;
-use super::failure::Failure;
+use super::experiment::create_folder;
+use super::failure::CliError;
 use super::input::{self, LensFile};
 use super::optimize::{progress_bar, stop_flag};
-use super::output::{Number, Output, remark};
+use super::output::{Output, ShortNumber, print_note};
 use super::targets;
 use crate::files;
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
-use crate::search::lens::{LensLandscape, NoLandscape, Plan, finish};
-use crate::search::{Found, Method, Over, Run, RunOf, SearchError};
+use crate::search::lens::{LandscapeError, LensLandscape, SearchPlan, finalize};
+use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
 use clap::ValueEnum;
-use found::Compared;
-use report::Report;
+use found::StartAgainstBest;
+use report::SearchReport;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,7 +29,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// it and saves what was found
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/search.txt"))]
-pub(super) struct Search {
+pub(super) struct SearchArgs {
     #[command(flatten)]
     lens: LensFile,
 
@@ -78,7 +78,7 @@ pub(super) struct Search {
     finish: bool,
 
     #[command(flatten)]
-    asked: Asked,
+    asked: SearchPlanArgs,
 }
 
 /// The samplers.
@@ -94,66 +94,66 @@ enum Sampler {
 }
 
 impl Sampler {
-    fn method(self) -> Method {
+    fn method(self) -> SearchMethod {
         match self {
-            Self::Restore => Method::Restore,
-            Self::Metropolis => Method::Metropolis,
-            Self::Brute => Method::Brute,
+            Self::Restore => SearchMethod::Restore,
+            Self::Metropolis => SearchMethod::Metropolis,
+            Self::Brute => SearchMethod::Brute,
         }
     }
 }
 
 /// Gradients of a search that nothing else ends.
-const ITERATIONS: u64 = 12_000;
+const DEFAULT_ITERATIONS: u64 = 12_000;
 /// Seconds between two checkpoints.
 const SAVED: f64 = 3.0;
 
 /// What ended a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-enum Ended {
+enum SearchEnd {
     /// The run says so.
-    Run(Over),
+    Run(RunEnd),
     /// The minutes are used up.
     Time,
     /// The person stopped it.
     Interrupted,
 }
 
-impl Search {
-    pub(super) fn run(&self, output: &Output) -> Result<(), Failure> {
+impl SearchArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check()?;
         let opened = self.lens.open()?;
         let plan = self.plan(&opened.lens)?;
-        let lens = self.asked.start(&opened.lens)?;
-        let refused = |cause: NoLandscape| refused_landscape(&opened.file, cause);
+        let lens = self.asked.start_lens(&opened.lens)?;
+        let refused = |cause: LandscapeError| landscape_error(&opened.file, cause);
         let landscape = plan.landscape(&lens).map_err(refused)?;
-        let start_breaks = landscape.broken(landscape.start()).map_err(refused)?;
-        let (mut run, resumed) = self.begin(&landscape, &plan, &opened.file)?;
-        self.reservoir_dir.iter().try_for_each(|folder| check_folder(folder))?;
+        let start_breaks = landscape.violations(landscape.start()).map_err(refused)?;
+        let (mut run, resumed) = self.start_or_resume(&landscape, &plan, &opened.file)?;
+        self.reservoir_dir.iter().try_for_each(|folder| create_folder(folder))?;
         limits::warn(&start_breaks);
         let idle = resumed.then(|| nothing_to_do(&run)).flatten();
-        idle.iter().for_each(remark);
+        idle.iter().for_each(print_note);
         let watch = Stopwatch::start();
         let before = run.statistics().gradients;
-        let ended = self.go_on(&landscape, &mut run, watch)?;
+        let ended = self.run_rounds(&landscape, &mut run, watch)?;
         let ms = 1e3 * watch.seconds();
-        let best = written(&run.best().point, &opened.lens);
+        let best = lens_to_write(&run.best().point, &opened.lens);
         if let Some(path) = &self.out {
             files::save(&best, path)?;
         }
-        let stored = self.store(&run, &opened.lens)?;
+        let stored = self.write_reservoir(&run, &opened.lens)?;
         let finished = if self.finish {
-            Some(finish(&landscape, &run.best().point).map_err(refused)?)
+            Some(finalize(&landscape, &run.best().point).map_err(refused)?)
         } else {
             None
         };
         if let (Some(path), Some(finished)) = (&self.out, &finished) {
-            files::save(&written(&finished.lens, &opened.lens), path)?;
+            files::save(&lens_to_write(&finished.lens, &opened.lens), path)?;
         }
         let printed = Stopwatch::start();
-        let compared = Compared::new(&landscape, &run.best().point).map_err(refused)?;
-        let report = Report::new(report::Searched {
+        let compared = StartAgainstBest::new(&landscape, &run.best().point).map_err(refused)?;
+        let report = SearchReport::new(report::SearchResults {
             landscape: &landscape,
             run: &run,
             ended,
@@ -169,13 +169,13 @@ impl Search {
             finished,
         });
         output.print(&report)?;
-        report.verdict()
+        report.check_finished()
     }
 
-    fn check(&self) -> Result<(), Failure> {
+    fn check(&self) -> Result<(), CliError> {
         let wrong = |name: &str, found: f64, expected: &str| {
-            let found = Number(found);
-            Err(Failure::Input(format!("{name}: found {found}; expected {expected}")))
+            let found = ShortNumber(found);
+            Err(CliError::Input(format!("{name}: found {found}; expected {expected}")))
         };
         if let Some(minutes) = self.minutes.filter(|m| !(*m > 0.0 && m.is_finite())) {
             return wrong("--minutes", minutes, "more than 0");
@@ -186,71 +186,71 @@ impl Search {
         if self.iterations == Some(0) {
             return wrong("--iterations", 0.0, "1 or more");
         }
-        self.out.iter().try_for_each(|path| input::check_target(path, &["json", "zmx"]))?;
-        self.checkpoint.iter().try_for_each(|path| input::check_target(path, &["json"]))?;
+        self.out.iter().try_for_each(|path| input::check_output_file(path, &["json", "zmx"]))?;
+        self.checkpoint.iter().try_for_each(|path| input::check_output_file(path, &["json"]))?;
         self.reservoir_dir.iter().try_for_each(|folder| targets::check_folder(folder))?;
         let out = self.out.as_deref().map(|path| ("--out", path));
         let checkpoint = self.checkpoint.as_deref().map(|path| ("--checkpoint", path));
         let read = std::iter::once(("the lens", self.lens.path())).chain(self.asked.files());
-        targets::check_apart(&[out, checkpoint], read)
+        targets::check_distinct(&[out, checkpoint], read)
     }
 
-    fn plan(&self, lens: &Lens) -> Result<Plan, Failure> {
+    fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
         let mut plan = self.asked.plan(lens)?;
         plan.settings.method = self.method.method();
         plan.settings.seed = self.seed;
-        let usual = if self.minutes.is_none() { Some(ITERATIONS) } else { None };
+        let usual = if self.minutes.is_none() { Some(DEFAULT_ITERATIONS) } else { None };
         plan.settings.gradients = self.iterations.or(usual);
-        plan.settings.check().map_err(refused)?;
+        plan.settings.check().map_err(search_error)?;
         Ok(plan)
     }
 
     /// A new run, or the one of the checkpoint.
-    fn begin(
+    fn start_or_resume(
         &self,
         landscape: &LensLandscape,
-        plan: &Plan,
+        plan: &SearchPlan,
         file: &str,
-    ) -> Result<(RunOf<LensLandscape>, bool), Failure> {
+    ) -> Result<(SearchRunOn<LensLandscape>, bool), CliError> {
         let settings = plan.settings(landscape);
         if let Some(path) = self.checkpoint.as_deref().filter(|path| path.exists()) {
-            let run: RunOf<LensLandscape> =
-                Run::load(landscape, &settings, path).map_err(refused)?;
+            let run: SearchRunOn<LensLandscape> =
+                SearchRun::load(landscape, &settings, path).map_err(search_error)?;
             let done = run.statistics().gradients;
-            remark(format!("{}: goes on after {done} gradients", path.display()));
+            print_note(format!("{}: goes on after {done} gradients", path.display()));
             return Ok((run, true));
         }
         let start = landscape.start().clone();
-        let run = Run::new(landscape, start, &settings).map_err(|cause| match cause {
-            SearchError::Start { .. } => Failure::Input(format!("{file}: {cause}")),
-            cause => refused(cause),
+        let run = SearchRun::new(landscape, start, &settings).map_err(|cause| match cause {
+            SearchError::InvalidStart { .. } => CliError::Input(format!("{file}: {cause}")),
+            cause => search_error(cause),
         })?;
         Ok((run, false))
     }
 
     /// Rounds until the run is over, the time is used up, or the person has had enough.
-    fn go_on(
+    fn run_rounds(
         &self,
         landscape: &LensLandscape,
-        run: &mut RunOf<LensLandscape>,
+        run: &mut SearchRunOn<LensLandscape>,
         watch: Stopwatch,
-    ) -> Result<Ended, Failure> {
+    ) -> Result<SearchEnd, CliError> {
         let stop = stop_flag();
         let bar = progress_bar(run.settings().gradients.unwrap_or(0) as usize);
         let mut saved = 0.0;
         let ended = loop {
-            if let Some(over) = run.over() {
-                break Ended::Run(over);
+            if let Some(over) = run.end_reason() {
+                break SearchEnd::Run(over);
             }
             if is_raised(&stop) {
-                break Ended::Interrupted;
+                break SearchEnd::Interrupted;
             }
             if self.minutes.is_some_and(|minutes| watch.seconds() >= 60.0 * minutes) {
-                break Ended::Time;
+                break SearchEnd::Time;
             }
             run.round(landscape);
             bar.set_position(run.statistics().gradients);
-            bar.set_message(format!("merit {}", Number(run.best().loss)));
+            bar.set_message(format!("merit {}", ShortNumber(run.best().loss)));
             if watch.seconds() - saved >= self.checkpoint_every {
                 self.save(landscape, run)?;
                 saved = watch.seconds();
@@ -261,20 +261,28 @@ impl Search {
         Ok(ended)
     }
 
-    fn save(&self, landscape: &LensLandscape, run: &RunOf<LensLandscape>) -> Result<(), Failure> {
+    fn save(
+        &self,
+        landscape: &LensLandscape,
+        run: &SearchRunOn<LensLandscape>,
+    ) -> Result<(), CliError> {
         let Some(path) = &self.checkpoint else { return Ok(()) };
-        run.save(landscape, path).map_err(refused)
+        run.save(landscape, path).map_err(search_error)
     }
 
     /// Writes what was found, best lens first; the files.
-    fn store(&self, run: &RunOf<LensLandscape>, opened: &Lens) -> Result<Vec<String>, Failure> {
+    fn write_reservoir(
+        &self,
+        run: &SearchRunOn<LensLandscape>,
+        opened: &Lens,
+    ) -> Result<Vec<String>, CliError> {
         let Some(folder) = &self.reservoir_dir else { return Ok(Vec::new()) };
         let mut files = Vec::new();
-        for (i, Found { entry, running }) in run.found().into_iter().enumerate() {
+        for (i, FoundPoint { entry, running }) in run.found_points().into_iter().enumerate() {
             let running = if running { "_running" } else { "" };
             let name = format!("{:02}_generation_{}{running}.json", i + 1, entry.number);
             let path = folder.join(name);
-            files::save(&written(&entry.point, opened), &path)?;
+            files::save(&lens_to_write(&entry.point, opened), &path)?;
             files.push(path.display().to_string());
         }
         Ok(files)
@@ -282,7 +290,7 @@ impl Search {
 }
 
 /// A lens as a file has it: what was held or free only for the search is not written.
-fn written(lens: &Lens, opened: &Lens) -> Lens {
+fn lens_to_write(lens: &Lens, opened: &Lens) -> Lens {
     let same = lens.surfaces.len() == opened.surfaces.len();
     let variables = if same { opened.variables.clone() } else { Vec::new() };
     let written = Lens { variables, ..lens.clone() };
@@ -294,30 +302,32 @@ fn is_raised(flag: &AtomicBool) -> bool {
 }
 
 /// What a run that was taken up again has no more to do; none where it goes on.
-fn nothing_to_do(run: &RunOf<LensLandscape>) -> Option<String> {
+fn nothing_to_do(run: &SearchRunOn<LensLandscape>) -> Option<String> {
     let (done, limit) = (run.statistics().gradients, run.settings().gradients);
-    Some(match (run.over()?, limit) {
-        (Over::Gradients, Some(limit)) => {
+    Some(match (run.end_reason()?, limit) {
+        (RunEnd::Gradients, Some(limit)) => {
             format!("nothing to do: {done} of {limit} gradients are made; raise --iterations")
         }
-        (Over::Done, _) => "nothing to do: everything was tried".to_owned(),
-        (over, _) => format!("nothing to do: {}", report::why(Ended::Run(over))),
+        (RunEnd::Done, _) => "nothing to do: everything was tried".to_owned(),
+        (over, _) => format!("nothing to do: {}", report::stop_reason_text(SearchEnd::Run(over))),
     })
 }
 
 /// What a lens, or what is asked of it, makes impossible.
-fn refused_landscape(file: &str, cause: NoLandscape) -> Failure {
+fn landscape_error(file: &str, cause: LandscapeError) -> CliError {
     match cause {
-        NoLandscape::Setting { .. } | NoLandscape::Rule(_) => Failure::Input(cause.to_string()),
-        cause => Failure::Input(format!("{file}: {cause}")),
+        LandscapeError::Setting { .. } | LandscapeError::Rule(_) => {
+            CliError::Input(cause.to_string())
+        }
+        cause => CliError::Input(format!("{file}: {cause}")),
     }
 }
 
 /// What the search itself refuses: its settings, or a checkpoint.
-fn refused(cause: SearchError) -> Failure {
+fn search_error(cause: SearchError) -> CliError {
     match cause {
-        SearchError::File(error) => Failure::File(error),
-        SearchError::NotProven { .. } => Failure::Failed(cause.to_string()),
-        cause => Failure::Input(cause.to_string()),
+        SearchError::File(error) => CliError::File(error),
+        SearchError::RoundTripFailed { .. } => CliError::Failed(cause.to_string()),
+        cause => CliError::Input(cause.to_string()),
     }
 }

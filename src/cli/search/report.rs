@@ -1,22 +1,22 @@
 //! What a search prints: the start against the best lens, what there is besides, and what it took.
 
-use super::Ended;
-use super::found::{Compared, FinishedKeys};
-use super::limits::Broken;
-use crate::cli::failure::Failure;
-use crate::cli::output::{Number, Table};
-use crate::merit::Margin;
-use crate::search::lens::{Finished, LensLandscape};
-use crate::search::{Found, Over, RunOf, Tally};
+use super::SearchEnd;
+use super::found::{FinishedReport, StartAgainstBest};
+use super::limits::ViolatedLimit;
+use crate::cli::failure::CliError;
+use crate::cli::output::{ShortNumber, TextTable};
+use crate::merit::ConstraintMargin;
+use crate::search::lens::{FinalizedLens, LensLandscape};
+use crate::search::{FoundPoint, MutationStatistics, RunEnd, SearchRunOn};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::Path;
 
 /// All that is known after a search.
-pub(super) struct Searched<'a> {
+pub(super) struct SearchResults<'a> {
     pub(super) landscape: &'a LensLandscape,
-    pub(super) run: &'a RunOf<LensLandscape>,
-    pub(super) ended: Ended,
+    pub(super) run: &'a SearchRunOn<LensLandscape>,
+    pub(super) ended: SearchEnd,
     pub(super) resumed: bool,
     /// Why it had nothing to do, if that is so.
     pub(super) idle: Option<String>,
@@ -24,18 +24,18 @@ pub(super) struct Searched<'a> {
     /// Gradients since it began or was taken up again.
     pub(super) gradients: u64,
     /// What the start does not keep.
-    pub(super) start_breaks: Vec<Margin>,
-    pub(super) compared: Compared,
+    pub(super) start_breaks: Vec<ConstraintMargin>,
+    pub(super) compared: StartAgainstBest,
     pub(super) compared_ms: f64,
     pub(super) stored: Vec<String>,
     pub(super) out: Option<&'a Path>,
-    pub(super) finished: Option<Finished>,
+    pub(super) finished: Option<FinalizedLens>,
 }
 
 /// What is printed.
 #[derive(Serialize)]
-pub(super) struct Report {
-    ended: Ended,
+pub(super) struct SearchReport {
+    ended: SearchEnd,
     resumed: bool,
     nothing_to_do: Option<String>,
     seed: u64,
@@ -49,20 +49,20 @@ pub(super) struct Report {
     temperature: f64,
     merit_start: f64,
     merit_best: f64,
-    start_breaks: Vec<Broken>,
+    start_breaks: Vec<ViolatedLimit>,
     #[serde(flatten)]
-    compared: Compared,
+    compared: StartAgainstBest,
     figures_ms: f64,
-    reservoir: Vec<Kept>,
-    mutations: Vec<Mutations>,
-    ended_by: std::collections::BTreeMap<crate::search::Ended, u64>,
+    reservoir: Vec<ReservoirRow>,
+    mutations: Vec<MutationRow>,
+    ended_by: std::collections::BTreeMap<crate::search::DescentEnd, u64>,
     files: Vec<String>,
-    finished: Option<FinishedKeys>,
+    finished: Option<FinishedReport>,
     out: Option<String>,
 }
 
 #[derive(Serialize)]
-struct Kept {
+struct ReservoirRow {
     generation: u64,
     merit: f64,
     topology: String,
@@ -70,17 +70,17 @@ struct Kept {
 }
 
 #[derive(Serialize)]
-struct Mutations {
+struct MutationRow {
     kind: &'static str,
     #[serde(flatten)]
-    tally: Tally,
+    tally: MutationStatistics,
 }
 
-impl Report {
-    pub(super) fn new(searched: Searched<'_>) -> Self {
-        let Searched { landscape, run, ended, resumed, idle, ms, gradients, .. } = searched;
+impl SearchReport {
+    pub(super) fn new(searched: SearchResults<'_>) -> Self {
+        let SearchResults { landscape, run, ended, resumed, idle, ms, gradients, .. } = searched;
         let statistics = run.statistics();
-        let kept = |Found { entry, running }: Found<'_, _>| Kept {
+        let kept = |FoundPoint { entry, running }: FoundPoint<'_, _>| ReservoirRow {
             generation: entry.number,
             merit: entry.loss,
             topology: entry.topology.clone(),
@@ -88,10 +88,10 @@ impl Report {
         };
         let kinds = statistics.kinds.iter();
         let mutations =
-            kinds.map(|(kind, tally)| Mutations { kind: kind.name(), tally: tally.clone() });
+            kinds.map(|(kind, tally)| MutationRow { kind: kind.name(), tally: tally.clone() });
         let finished = searched
             .finished
-            .map(|finished| FinishedKeys { failures: finished.failures(), finished });
+            .map(|finished| FinishedReport { failures: finished.failures(), finished });
         Self {
             ended,
             resumed,
@@ -102,15 +102,15 @@ impl Report {
             gradients_in_all: statistics.gradients,
             moves: statistics.moves,
             better: statistics.better,
-            generations: run.tree().born(),
-            rays_of_a_gradient: landscape.rays(&run.best().point),
+            generations: run.lineage().total(),
+            rays_of_a_gradient: landscape.rays_per_gradient(&run.best().point),
             temperature: run.temperature().value(),
             merit_start: run.start().loss,
             merit_best: run.best().loss,
-            start_breaks: Broken::all(searched.start_breaks),
+            start_breaks: ViolatedLimit::all(searched.start_breaks),
             compared: searched.compared,
             figures_ms: searched.compared_ms,
-            reservoir: run.found().into_iter().map(kept).collect(),
+            reservoir: run.found_points().into_iter().map(kept).collect(),
             mutations: mutations.collect(),
             ended_by: statistics.ended.clone(),
             files: searched.stored,
@@ -120,10 +120,10 @@ impl Report {
     }
 
     /// A lens that was to be finished and could not be is a failure.
-    pub(super) fn verdict(&self) -> Result<(), Failure> {
+    pub(super) fn check_finished(&self) -> Result<(), CliError> {
         match &self.finished {
-            Some(FinishedKeys { failures, .. }) if !failures.is_empty() => {
-                Err(Failure::Failed(format!("the lens is not finished: {}", failures.join("; "))))
+            Some(FinishedReport { failures, .. }) if !failures.is_empty() => {
+                Err(CliError::Failed(format!("the lens is not finished: {}", failures.join("; "))))
             }
             _ => Ok(()),
         }
@@ -131,19 +131,19 @@ impl Report {
 }
 
 /// What ended a search, in words.
-pub(super) fn why(ended: Ended) -> &'static str {
+pub(super) fn stop_reason_text(ended: SearchEnd) -> &'static str {
     match ended {
-        Ended::Run(Over::Stopped) | Ended::Interrupted => "stopped",
-        Ended::Run(Over::Moves | Over::Gradients) => "the iterations are used up",
-        Ended::Run(Over::Done) => "everything was tried",
-        Ended::Run(Over::Stuck) => "nothing was found to go on from",
-        Ended::Time => "the time is used up",
+        SearchEnd::Run(RunEnd::Stopped) | SearchEnd::Interrupted => "stopped",
+        SearchEnd::Run(RunEnd::Moves | RunEnd::Gradients) => "the iterations are used up",
+        SearchEnd::Run(RunEnd::Done) => "everything was tried",
+        SearchEnd::Run(RunEnd::Stuck) => "nothing was found to go on from",
+        SearchEnd::Time => "the time is used up",
     }
 }
 
-impl Display for Report {
+impl Display for SearchReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ended = why(self.ended);
+        let ended = stop_reason_text(self.ended);
         let Self { gradients, gradients_in_all, moves, better, generations, .. } = self;
         write!(f, "{gradients} gradients of {} rays ", self.rays_of_a_gradient)?;
         writeln!(f, "in {:.2} s: {ended}", 1e-3 * self.ms)?;
@@ -155,7 +155,7 @@ impl Display for Report {
             f,
             "{moves} moves, {share:.1} % of them better than the start; {generations} generations"
         )?;
-        let (start, best) = (Number(self.merit_start), Number(self.merit_best));
+        let (start, best) = (ShortNumber(self.merit_start), ShortNumber(self.merit_best));
         if let Some(idle) = &self.nothing_to_do {
             writeln!(f, "{idle}")?;
         }
@@ -179,12 +179,12 @@ impl Display for Report {
     }
 }
 
-impl Report {
+impl SearchReport {
     fn write_reservoir(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = Table::new(&["reservoir", "merit", "generation", ""]);
-        for Kept { generation, merit, topology, running } in &self.reservoir {
+        let mut table = TextTable::new(&["reservoir", "merit", "generation", ""]);
+        for ReservoirRow { generation, merit, topology, running } in &self.reservoir {
             let state = if *running { "running, not in it yet" } else { "" };
-            let merit = Number(*merit).to_string();
+            let merit = ShortNumber(*merit).to_string();
             table.row([topology.clone(), merit, generation.to_string(), state.to_owned()]);
         }
         writeln!(f, "{table}")
@@ -192,11 +192,11 @@ impl Report {
 
     fn write_mutations(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let head = ["mutation", "tried", "refused", "ended", "better", "kept", "moves each"];
-        let mut table = Table::new(&head);
-        for Mutations { kind, tally } in &self.mutations {
+        let mut table = TextTable::new(&head);
+        for MutationRow { kind, tally } in &self.mutations {
             let refused: u64 = tally.refused.values().sum();
             let counts = [tally.tried, refused, tally.ended, tally.improved, tally.entered];
-            let life = tally.lifetime().map_or("-".to_owned(), |moves| format!("{moves:.1}"));
+            let life = tally.mean_moves().map_or("-".to_owned(), |moves| format!("{moves:.1}"));
             let counts = counts.iter().map(ToString::to_string);
             table.row(std::iter::once((*kind).to_owned()).chain(counts).chain([life]));
         }

@@ -4,18 +4,21 @@
 //! it, each with the weight and the objective that it was found with, two searches go on for as many
 //! gradients: one mutates, one descends only. The best lens of each joins the front of its side.
 
-use super::course::{Course, finish};
-use super::race::Runner;
+use super::course::{RecordedSearch, run_to_end};
+use super::race::SamplerKind;
 use super::{at_heights, rules};
-use crate::experiments::front::lens_and_spots;
-use crate::experiments::trade::{self, Part};
-use crate::experiments::{Claim, Effort, Ended, Experiment, Outcome, Picture, Watch, report};
+use crate::experiments::front::draw_lens_and_spots;
+use crate::experiments::trade::{self, ProgressSpan};
+use crate::experiments::{
+    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
+    report_progress,
+};
 use crate::lens::Lens;
-use crate::merit::{PupilEdge, Term, Weighted};
-use crate::optimize::pareto::{Design, Front, Settings, Sweep, composite};
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, PALETTE};
-use crate::search::Rules;
-use crate::search::lens::Plan;
+use crate::merit::{PupilEdge, Term, WeightedTerm};
+use crate::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep, weighted_sum_goal};
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, TextAlign};
+use crate::search::SearchRules;
+use crate::search::lens::SearchPlan;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.7",
@@ -28,32 +31,40 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
 /// The lens of the front.
 const FILE: &str = "double_gauss_nikkor_s_50";
 /// The part of the work that is the sweep.
-const SWEPT: f64 = 0.4;
+const SWEEP_SHARE: f64 = 0.4;
 /// How exact the numbers of a design are, relatively.
-const JUDGED: f64 = 1e-4;
+const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
     let start = at_heights(FILE)?;
-    let settings =
-        Settings { points: effort.pick(8, 2), steps: effort.pick(400, 25), ..Settings::default() };
-    let sweep = swept(&start, &settings, watch)?;
-    let chosen = chosen(sweep.front(), effort.pick(8, 2));
-    let gradients = effort.pick(4000, 60);
-    let sides = Sides::of(&sweep, &chosen, gradients, watch)?;
-    let mut outcome = Outcome { claims: sides.claims(&sweep, effort), ..Outcome::default() };
+    let settings = ParetoSettings {
+        points: effort.select(8, 2),
+        steps: effort.select(400, 25),
+        ..ParetoSettings::default()
+    };
+    let sweep = run_sweep(&start, &settings, watch)?;
+    let chosen = select_designs(sweep.front(), effort.select(8, 2));
+    let gradients = effort.select(4000, 60);
+    let sides = MutationGain::of(&sweep, &chosen, gradients, watch)?;
+    let mut outcome =
+        ExperimentOutcome { claims: sides.claims(&sweep, effort), ..ExperimentOutcome::default() };
     outcome.rays = sides.rays;
     outcome.tables.push(trade::table("designs", &sides.designs(&sweep), &mut outcome.rays)?);
-    outcome.pictures.push(Picture { name: "front", canvas: sides.draw(&sweep)? });
+    outcome.pictures.push(NamedPlot { name: "front", canvas: sides.draw(&sweep)? });
     outcome.lenses.extend(sides.lenses());
     Ok(outcome)
 }
 
 /// The front that the lens can reach as it is.
-fn swept(start: &Lens, settings: &Settings, watch: &mut Watch<'_>) -> Result<Sweep, Ended> {
-    let mut sweep = Sweep::new(start, settings).map_err(Ended::from_error)?;
+fn run_sweep(
+    start: &Lens,
+    settings: &ParetoSettings,
+    watch: &mut ProgressFn<'_>,
+) -> Result<ParetoSweep, ExperimentError> {
+    let mut sweep = ParetoSweep::new(start, settings).map_err(ExperimentError::from_error)?;
     let mut done = 0.0;
     loop {
-        report(watch, SWEPT * done, "the front without mutations")?;
+        report_progress(watch, SWEEP_SHARE * done, "the front without mutations")?;
         let slice = sweep.step();
         done = slice.done as f64 / slice.total as f64;
         if slice.finished {
@@ -63,9 +74,9 @@ fn swept(start: &Lens, settings: &Settings, watch: &mut Watch<'_>) -> Result<Swe
 }
 
 /// Designs of a front with their weights, evenly among all.
-fn chosen(front: &Front, count: usize) -> Vec<(Design, f64)> {
-    let weighted = front.designs().iter().filter_map(|d| Some((d.clone(), d.weight?)));
-    let all: Vec<(Design, f64)> = weighted.filter(|(_, weight)| *weight > 0.0).collect();
+fn select_designs(front: &Front, count: usize) -> Vec<(ParetoPoint, f64)> {
+    let weighted = front.points().iter().filter_map(|d| Some((d.clone(), d.weight?)));
+    let all: Vec<(ParetoPoint, f64)> = weighted.filter(|(_, weight)| *weight > 0.0).collect();
     let count = count.min(all.len());
     let last = (count.max(2) - 1) as f64;
     let place = |i: usize| (i as f64 / last * (all.len() - 1) as f64).round() as usize;
@@ -73,54 +84,58 @@ fn chosen(front: &Front, count: usize) -> Vec<(Design, f64)> {
 }
 
 /// What mutations have found, and what a longer descent has.
-struct Sides {
+struct MutationGain {
     mutated: Front,
     descended: Front,
     /// Those that mutations have found.
-    found: Vec<Design>,
+    found: Vec<ParetoPoint>,
     rays: usize,
 }
 
-impl Sides {
+impl MutationGain {
     fn of(
-        sweep: &Sweep,
-        chosen: &[(Design, f64)],
+        sweep: &ParetoSweep,
+        chosen: &[(ParetoPoint, f64)],
         gradients: u64,
-        watch: &mut Watch<'_>,
-    ) -> Result<Self, Ended> {
+        watch: &mut ProgressFn<'_>,
+    ) -> Result<Self, ExperimentError> {
         let mut courses = Vec::new();
-        for runner in [Runner::Restore, Runner::Descent] {
+        for runner in [SamplerKind::Restore, SamplerKind::Descent] {
             for (i, (design, weight)) in chosen.iter().enumerate() {
                 let plan = plan(&sweep.start, *weight, gradients)?;
-                courses.push(Course::new(&design.lens, &runner.plan(&plan, 1 + i as u64))?);
+                courses.push(RecordedSearch::new(&design.lens, &runner.plan(&plan, 1 + i as u64))?);
             }
         }
-        let part = Part { from: SWEPT, to: 1.0, name: "from the front, with mutations" };
-        finish(&mut courses, part, watch)?;
-        let rays = courses.iter().map(Course::rays).sum();
-        let judged = |(course, (_, weight)): (&Course, &(Design, f64))| {
-            Design::of(&course.run.best().point, Some(*weight), JUDGED).map_err(Ended::from_error)
+        let part =
+            ProgressSpan { from: SWEEP_SHARE, to: 1.0, name: "from the front, with mutations" };
+        run_to_end(&mut courses, part, watch)?;
+        let rays = courses.iter().map(RecordedSearch::rays).sum();
+        let judged = |(course, (_, weight)): (&RecordedSearch, &(ParetoPoint, f64))| {
+            ParetoPoint::evaluate(&course.run.best().point, Some(*weight), EVALUATION_TOLERANCE)
+                .map_err(ExperimentError::from_error)
         };
         let (mutated, descended) = courses.split_at(chosen.len());
-        let [found, longer] = [mutated, descended]
-            .map(|side| side.iter().zip(chosen).map(judged).collect::<Result<Vec<_>, Ended>>());
+        let [found, longer] = [mutated, descended].map(|side| {
+            side.iter().zip(chosen).map(judged).collect::<Result<Vec<_>, ExperimentError>>()
+        });
         let (found, longer) = (found?, longer?);
         Ok(Self {
-            mutated: joined(sweep.front(), &found),
-            descended: joined(sweep.front(), &longer),
+            mutated: extend_front(sweep.front(), &found),
+            descended: extend_front(sweep.front(), &longer),
             found,
             rays,
         })
     }
 
-    fn claims(&self, sweep: &Sweep, effort: Effort) -> Vec<Claim> {
+    fn claims(&self, sweep: &ParetoSweep, effort: Effort) -> Vec<Claim> {
         let (spot, light) = (2.0 * sweep.start.spot, sweep.start.light);
         let volume = |front: &Front| front.hypervolume(spot, light);
         let fronts = [&self.mutated, &self.descended, sweep.front()];
         let [with, longer, without] = fronts.map(volume);
-        let old = self.descended.designs();
-        let beyond = |design: &&Design| !old.iter().any(|o| o.dominates(design) || o == *design);
-        let new = self.mutated.designs().iter().filter(beyond).count();
+        let old = self.descended.points();
+        let beyond =
+            |design: &&ParetoPoint| !old.iter().any(|o| o.dominates(design) || o == *design);
+        let new = self.mutated.points().iter().filter(beyond).count();
         let mut claims = vec![
             Claim::at_least(
                 "hypervolume of the front with mutations, against that without",
@@ -141,8 +156,8 @@ impl Sides {
         claims
     }
 
-    fn designs<'a>(&'a self, sweep: &'a Sweep) -> Vec<(&'static str, &'a Design)> {
-        let named = |name, front: &'a Front| front.designs().iter().map(move |d| (name, d));
+    fn designs<'a>(&'a self, sweep: &'a ParetoSweep) -> Vec<(&'static str, &'a ParetoPoint)> {
+        let named = |name, front: &'a Front| front.points().iter().map(move |d| (name, d));
         let start = std::iter::once(("start", &sweep.start));
         start
             .chain(named("without mutations", sweep.front()))
@@ -159,10 +174,10 @@ impl Sides {
     }
 
     /// The plane of blur and light, and the lenses at the ends of the front with their spots.
-    fn draw(&self, sweep: &Sweep) -> Result<Canvas, Ended> {
+    fn draw(&self, sweep: &ParetoSweep) -> Result<Canvas, ExperimentError> {
         let mut canvas = Canvas::new([2020, 1000]);
-        let um = |design: &Design| [1e3 * design.spot, design.light];
-        let points = |front: &Front| front.designs().iter().map(um).collect::<Vec<_>>();
+        let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
+        let points = |front: &Front| front.points().iter().map(um).collect::<Vec<_>>();
         let sets: [(&str, Vec<[f64; 2]>, Color); 4] = [
             ("start", vec![um(&sweep.start)], BLACK),
             ("with mutations", points(&self.mutated), PALETTE[0]),
@@ -176,9 +191,9 @@ impl Sides {
         chart.draw(&mut canvas, FILE);
         for (i, (label, points, color)) in sets.iter().enumerate() {
             let place = [130.0, 20.0 + 28.0 * i as f64];
-            canvas.marks(&[[place[0], place[1] + 7.0]], *color);
-            canvas.text([place[0] + 20.0, place[1]], label, BLACK, Align::Left);
-            canvas.marks(&chart.places(points), *color);
+            canvas.markers(&[[place[0], place[1] + 7.0]], *color);
+            canvas.text([place[0] + 20.0, place[1]], label, BLACK, TextAlign::Left);
+            canvas.markers(&chart.to_pixels(points), *color);
         }
         let found = &self.found;
         let shown = [
@@ -188,7 +203,7 @@ impl Sides {
         ];
         for (i, (name, design)) in shown.into_iter().enumerate() {
             if let Some(design) = design {
-                lens_and_spots(&mut canvas, name, &design.lens, 90.0 + 310.0 * i as f64)?;
+                draw_lens_and_spots(&mut canvas, name, &design.lens, 90.0 + 310.0 * i as f64)?;
             }
         }
         Ok(canvas)
@@ -196,27 +211,27 @@ impl Sides {
 }
 
 /// A front that more designs have been offered to.
-fn joined(front: &Front, found: &[Design]) -> Front {
+fn extend_front(front: &Front, found: &[ParetoPoint]) -> Front {
     let mut front = front.clone();
     found.iter().for_each(|design| {
-        front.offer(design.clone());
+        front.insert(design.clone());
     });
     front
 }
 
 /// The search that goes on where the sweep was with this weight: the same objective, no wider rims.
-fn plan(start: &Design, weight: f64, gradients: u64) -> Result<Plan, Ended> {
-    let goal = composite(&start.lens, start.light, PupilEdge::Moving);
-    let mut goal = goal.map_err(Ended::from_error)?;
-    goal.terms.push(Weighted { term: Term::Throughput, weight });
+fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> Result<SearchPlan, ExperimentError> {
+    let goal = weighted_sum_goal(&start.lens, start.light, PupilEdge::Moving);
+    let mut goal = goal.map_err(ExperimentError::from_error)?;
+    goal.terms.push(WeightedTerm { term: Term::Throughput, weight });
     let rims = start.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
-    let widest = Settings::default().rims[1] * rims.fold(0.0, f64::max);
-    let rules = Rules { semi_diameter: Some(widest), ..rules() };
-    let default = Plan::default();
-    let settings = crate::search::Settings {
+    let widest = ParetoSettings::default().rims[1] * rims.fold(0.0, f64::max);
+    let rules = SearchRules { semi_diameter: Some(widest), ..rules() };
+    let default = SearchPlan::default();
+    let settings = crate::search::SearchSettings {
         chains: 1,
         gradients: Some(gradients),
         ..default.settings.clone()
     };
-    Ok(Plan { goal: Some(goal), rules, settings, ..default })
+    Ok(SearchPlan { goal: Some(goal), rules, settings, ..default })
 }

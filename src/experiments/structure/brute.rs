@@ -6,8 +6,8 @@
 //! from a published lens in a long valley (135 mm) it comes as low as the search, which spends its
 //! gradients on many structures.
 
-use super::race::{Race, Runner};
-use crate::experiments::{Effort, Ended, Experiment, Outcome, Watch};
+use super::race::{SamplerComparison, SamplerKind};
+use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.5",
@@ -17,9 +17,10 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let (lenses, seeds, gradients) = effort.race();
-    let runners = &[Runner::Restore, Runner::Brute, Runner::Metropolis, Runner::Descent];
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let (lenses, seeds, gradients) = effort.comparison_size();
+    let runners =
+        &[SamplerKind::Restore, SamplerKind::Brute, SamplerKind::Metropolis, SamplerKind::Descent];
     let rivals = &runners[1..3];
-    Race { runners, rivals, lenses, seeds, gradients }.run(watch)
+    SamplerComparison { samplers: runners, rivals, lenses, seeds, gradients }.run(watch)
 }

@@ -1,16 +1,16 @@
 //! The limits of a factory, as far as a published lens keeps them.
 
 use crate::lens::Lens;
-use crate::merit::{Goal, Margin, MeritError, Term, Weighted, margins};
+use crate::merit::{ConstraintMargin, Goal, MeritError, Term, WeightedTerm, constraint_margins};
 
 /// The same goal, each limit of a gap, an edge or a steepness no tighter than what the lens has.
-pub(super) fn kept_by(lens: &Lens, goal: &Goal) -> Result<Goal, MeritError> {
-    let found = margins(lens, goal.terms.iter().map(|w| w.term))?;
-    let loosened = |w: &Weighted| Weighted { term: loosened(w.term, &found), ..*w };
+pub(super) fn relax_limits(lens: &Lens, goal: &Goal) -> Result<Goal, MeritError> {
+    let found = constraint_margins(lens, goal.terms.iter().map(|w| w.term))?;
+    let loosened = |w: &WeightedTerm| WeightedTerm { term: relax_term(w.term, &found), ..*w };
     Ok(Goal { terms: goal.terms.iter().map(loosened).collect(), ..goal.clone() })
 }
 
-fn loosened(term: Term, found: &[Margin]) -> Term {
+fn relax_term(term: Term, found: &[ConstraintMargin]) -> Term {
     let values = || found.iter().filter(|margin| margin.term == term.name()).map(|m| m.value);
     let least = |min: f64| values().fold(min, f64::min);
     let most = |max: f64| values().fold(max, f64::max);
@@ -27,19 +27,19 @@ fn loosened(term: Term, found: &[Margin]) -> Term {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::structure::{SUBJECTS, at_heights, rules};
+    use crate::experiments::structure::{STUDY_LENSES, at_heights, rules};
     use crate::search::lens::goal;
 
     #[test]
     fn a_lens_keeps_its_own_limits_and_no_others_are_loosened() {
-        for subject in SUBJECTS {
+        for subject in STUDY_LENSES {
             let lens = at_heights(subject.file).unwrap();
             let usual = goal(&lens, &rules(), None, 1.0).unwrap();
-            let kept = kept_by(&lens, &usual).unwrap();
+            let kept = relax_limits(&lens, &usual).unwrap();
             let terms = |goal: &Goal| goal.terms.iter().map(|w| w.term).collect::<Vec<_>>();
             let room = |goal: &Goal| {
-                let found = margins(&lens, terms(goal).into_iter()).unwrap();
-                found.iter().map(Margin::room).fold(f64::INFINITY, f64::min)
+                let found = constraint_margins(&lens, terms(goal).into_iter()).unwrap();
+                found.iter().map(ConstraintMargin::slack).fold(f64::INFINITY, f64::min)
             };
             assert!(room(&kept) >= 0.0, "{}: {}", subject.name, room(&kept));
             assert_eq!(room(&usual) >= 0.0, terms(&usual) == terms(&kept), "{}", subject.name);

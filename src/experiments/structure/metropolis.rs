@@ -5,8 +5,8 @@
 //! A Langevin step looks for the pupils of the lens anew, a step of a descent only every twentieth
 //! time: by the clock Metropolis and Hastings are farther behind than here.
 
-use super::race::{Race, Runner};
-use crate::experiments::{Effort, Ended, Experiment, Outcome, Watch};
+use super::race::{SamplerComparison, SamplerKind};
+use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.4",
@@ -16,8 +16,15 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let (lenses, seeds, gradients) = effort.race();
-    let runners = &[Runner::Restore, Runner::Metropolis];
-    Race { runners, rivals: &[Runner::Metropolis], lenses, seeds, gradients }.run(watch)
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let (lenses, seeds, gradients) = effort.comparison_size();
+    let runners = &[SamplerKind::Restore, SamplerKind::Metropolis];
+    SamplerComparison {
+        samplers: runners,
+        rivals: &[SamplerKind::Metropolis],
+        lenses,
+        seeds,
+        gradients,
+    }
+    .run(watch)
 }

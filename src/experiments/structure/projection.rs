@@ -10,13 +10,16 @@
 //! Shares of single searches lie anywhere between .02 and .9, so that the means of 24 seeds are
 //! compared: those of 8 have the order wrong in one or two of eight places.
 
-use super::course::{Course, Mark, finish};
-use super::{SUBJECTS, Subject, at_heights, plan, rules};
-use crate::experiments::trade::Part;
-use crate::experiments::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
-use crate::optimize::Method;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke};
-use crate::search::{Kind, Rules};
+use super::course::{RecordedSearch, RoundRecord, run_to_end};
+use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
+use crate::experiments::trade::ProgressSpan;
+use crate::experiments::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, TableCell,
+};
+use crate::optimize::DescentMethod;
+use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::search::{MutationKind, SearchRules};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.6",
@@ -44,24 +47,25 @@ const THESIS: [[[f64; 2]; 2]; 4] = [
 /// With and without.
 const SIDES: [(bool, &str); 2] = [(true, "projection"), (false, "no projection")];
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
     // A test has room for the lens of the picture alone, and for one place.
-    let lenses = effort.pick(0..SUBJECTS.len(), 3..SUBJECTS.len());
-    let (seeds, read) = (effort.pick(24, 1), effort.pick(&READ[..], &[200]));
-    let mut outcome = Outcome::default();
+    let lenses = effort.select(0..STUDY_LENSES.len(), 3..STUDY_LENSES.len());
+    let (seeds, read) = (effort.select(24, 1), effort.select(&READ[..], &[200]));
+    let mut outcome = ExperimentOutcome::default();
     let mut table = shares_table();
     let count = lenses.len() as f64;
     for (done, i) in lenses.enumerate() {
         let [from, to] = [done, done + 1].map(|part| part as f64 / count);
-        let part = Part { from, to, name: SUBJECTS[i].name };
-        let pair = Pair::of(SUBJECTS[i], seeds, read[read.len() - 1], part, watch)?;
+        let part = ProgressSpan { from, to, name: STUDY_LENSES[i].name };
+        let pair =
+            ProjectionComparison::of(STUDY_LENSES[i], seeds, read[read.len() - 1], part, watch)?;
         for (k, gradients) in read.iter().enumerate() {
-            outcome.claims.push(effort.pick(pair.claim(*gradients), pair.gains(*gradients)));
+            outcome.claims.push(effort.select(pair.claim(*gradients), pair.gains(*gradients)));
             pair.rows(&mut table, *gradients, THESIS[i].map(|side| side[k]));
         }
-        outcome.rays += pair.sides.iter().flatten().map(Course::rays).sum::<usize>();
-        if i + 1 == SUBJECTS.len() {
-            outcome.pictures.push(Picture { name: "telephoto", canvas: pair.draw() });
+        outcome.rays += pair.sides.iter().flatten().map(RecordedSearch::rays).sum::<usize>();
+        if i + 1 == STUDY_LENSES.len() {
+            outcome.pictures.push(NamedPlot { name: "telephoto", canvas: pair.draw() });
             outcome.tables.push(pair.moves());
         }
     }
@@ -69,7 +73,7 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
     Ok(outcome)
 }
 
-fn shares_table() -> Table {
+fn shares_table() -> DataTable {
     let columns = [
         "lens",
         "mutations",
@@ -82,34 +86,34 @@ fn shares_table() -> Table {
         "generations",
         "best",
     ];
-    Table::new("shares", &columns)
+    DataTable::new("shares", &columns)
 }
 
 /// A lens with searches on both sides, one for each seed.
-struct Pair {
-    subject: Subject,
-    sides: [Vec<Course>; 2],
+struct ProjectionComparison {
+    subject: StudyLens,
+    sides: [Vec<RecordedSearch>; 2],
 }
 
-impl Pair {
+impl ProjectionComparison {
     fn of(
-        subject: Subject,
+        subject: StudyLens,
         seeds: u64,
         gradients: u64,
-        part: Part<'_>,
-        watch: &mut Watch<'_>,
-    ) -> Result<Self, Ended> {
+        part: ProgressSpan<'_>,
+        watch: &mut ProgressFn<'_>,
+    ) -> Result<Self, ExperimentError> {
         let start = at_heights(subject.file)?;
         let mut all = Vec::new();
         for (projection, _) in SIDES {
-            let mut plan = plan(&start, Rules { projection, ..rules() }, gradients)?;
+            let mut plan = plan(&start, SearchRules { projection, ..rules() }, gradients)?;
             for seed in 1..=seeds {
                 (plan.settings.seed, plan.settings.c) = (seed, C);
-                plan.local.method = Method::Adam;
-                all.push(Course::new(&start, &plan)?);
+                plan.local.method = DescentMethod::Adam;
+                all.push(RecordedSearch::new(&start, &plan)?);
             }
         }
-        finish(&mut all, part, watch)?;
+        run_to_end(&mut all, part, watch)?;
         let without = all.split_off(seeds as usize);
         Ok(Self { subject, sides: [all, without] })
     }
@@ -126,7 +130,7 @@ impl Pair {
     /// The share of the moves behind a mutation that led to something better than the start, over
     /// all seeds; not a number where there are none.
     fn share_of_mutants(&self, side: usize, gradients: u64) -> f64 {
-        let counts = self.sides[side].iter().map(|course| course.mutants_after(gradients));
+        let counts = self.sides[side].iter().map(|course| course.mutation_moves_after(gradients));
         let [better, moves] = counts.fold([0, 0], |sum, n| [0, 1].map(|i| sum[i] + n[i]));
         better as f64 / moves as f64
     }
@@ -152,35 +156,35 @@ impl Pair {
         Claim::at_least(says, self.share(0, gradients)[0], self.share(1, gradients)[0])
     }
 
-    fn rows(&self, table: &mut Table, gradients: u64, thesis: [f64; 2]) {
+    fn rows(&self, table: &mut DataTable, gradients: u64, thesis: [f64; 2]) {
         for (side, (_, name)) in SIDES.iter().enumerate() {
             let [mean, least, most] = self.share(side, gradients);
-            let born = |course: &Course| {
+            let born = |course: &RecordedSearch| {
                 let seen = course.marks.iter().take_while(|mark| mark.gradients <= gradients);
                 seen.map(|mark| mark.generation + 1).max().unwrap_or(1) as f64
             };
             let generations = self.sides[side].iter().map(born).sum::<f64>();
             let generations = generations / self.sides[side].len() as f64;
-            let words = [self.subject.name, *name].map(Cell::from);
+            let words = [self.subject.name, *name].map(TableCell::from);
             let mutants = self.share_of_mutants(side, gradients);
             let best = self.best(side, gradients);
             let ours = [gradients as f64, mean, least, most];
             let numbers = ours.into_iter().chain([thesis[side], mutants, generations, best]);
-            table.row(words.into_iter().chain(numbers.map(Cell::from)));
+            table.push_row(words.into_iter().chain(numbers.map(TableCell::from)));
         }
     }
 
     /// Every move of the first seed.
-    fn moves(&self) -> Table {
+    fn moves(&self) -> DataTable {
         let columns = ["mutations", "gradients", "generation", "began_with", "merit", "best"];
-        let mut table = Table::new("moves", &columns);
+        let mut table = DataTable::new("moves", &columns);
         for (courses, (_, name)) in self.sides.iter().zip(SIDES) {
             for mark in &courses[0].marks {
-                let kind = mark.kind.map_or("start", Kind::name);
-                let numbers = [mark.gradients as f64, mark.generation as f64].map(Cell::from);
-                let merits = [mark.loss.unwrap_or(f64::NAN), mark.best].map(Cell::from);
-                let row = std::iter::once(Cell::from(name)).chain(numbers);
-                table.row(row.chain([kind.into()]).chain(merits));
+                let kind = mark.kind.map_or("start", MutationKind::name);
+                let numbers = [mark.gradients as f64, mark.generation as f64].map(TableCell::from);
+                let merits = [mark.loss.unwrap_or(f64::NAN), mark.best].map(TableCell::from);
+                let row = std::iter::once(TableCell::from(name)).chain(numbers);
+                table.push_row(row.chain([kind.into()]).chain(merits));
             }
         }
         table
@@ -202,7 +206,7 @@ impl Pair {
             let chart = Chart::new([120.0, top], [1380.0, top + 420.0], x, y);
             chart.draw(&mut canvas, &format!("{}, {name}", self.subject.name));
             let level = [[0.0, start], [last, start]];
-            canvas.curve(&chart.places(&level), GREY, Stroke::Dashed);
+            canvas.curve(&chart.to_pixels(&level), GREY, Stroke::Dashed);
             draw_moves(&mut canvas, &chart, &self.sides[i][0].marks);
         }
         key(&mut canvas);
@@ -214,8 +218,9 @@ impl Pair {
 const WORST: f64 = 1e4;
 
 /// What a move is drawn in.
-fn color(kind: Option<Kind>) -> Color {
-    let place = kind.and_then(|kind| Kind::MUTATIONS.iter().position(|other| *other == kind));
+fn color(kind: Option<MutationKind>) -> Color {
+    let place =
+        kind.and_then(|kind| MutationKind::MUTATIONS.iter().position(|other| *other == kind));
     match (kind, place) {
         (None, _) => BLACK,
         (_, Some(place)) if place < PALETTE.len() => PALETTE[place],
@@ -223,25 +228,27 @@ fn color(kind: Option<Kind>) -> Color {
     }
 }
 
-fn draw_moves(canvas: &mut Canvas, chart: &Chart, marks: &[Mark]) {
+fn draw_moves(canvas: &mut Canvas, chart: &Chart, marks: &[RoundRecord]) {
     for descent in marks.chunk_by(|a, b| a.generation == b.generation) {
         let losses = descent.iter().filter_map(|mark| Some([mark.gradients as f64, mark.loss?]));
-        let inside: Vec<[f64; 2]> = losses.filter(|point| chart.holds(*point)).collect();
-        let places = chart.places(&inside);
+        let inside: Vec<[f64; 2]> = losses.filter(|point| chart.contains(*point)).collect();
+        let places = chart.to_pixels(&inside);
         let color = color(descent[0].kind);
         canvas.curve(&places, color, Stroke::Solid);
-        canvas.marks(&places[..places.len().min(1)], color);
+        canvas.markers(&places[..places.len().min(1)], color);
     }
 }
 
 /// Which mutation has which colour.
 fn key(canvas: &mut Canvas) {
-    let kinds = std::iter::once(None).chain(Kind::MUTATIONS.map(Some)).chain([Some(Kind::Global)]);
+    let kinds = std::iter::once(None)
+        .chain(MutationKind::MUTATIONS.map(Some))
+        .chain([Some(MutationKind::Global)]);
     for (i, kind) in kinds.enumerate() {
         let y = 140.0 + 30.0 * i as f64;
-        canvas.marks(&[[1420.0, y + 7.0]], color(kind));
-        canvas.text([1436.0, y], kind.map_or("start", Kind::name), BLACK, Align::Left);
+        canvas.markers(&[[1420.0, y + 7.0]], color(kind));
+        canvas.text([1436.0, y], kind.map_or("start", MutationKind::name), BLACK, TextAlign::Left);
     }
     canvas.curve(&[[1410.0, 507.0], [1430.0, 507.0]], GREY, Stroke::Dashed);
-    canvas.text([1436.0, 500.0], "merit of the start", BLACK, Align::Left);
+    canvas.text([1436.0, 500.0], "merit of the start", BLACK, TextAlign::Left);
 }

@@ -1,16 +1,18 @@
 //! Samplers side by side: the same lenses, the same objective, as many gradients, several seeds.
 
-use super::course::{Course, finish};
-use super::{SUBJECTS, Subject, at_heights, plan, rules};
-use crate::experiments::trade::Part;
-use crate::experiments::{Cell, Claim, Effort, Ended, Outcome, Picture, Table, Watch};
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE, Stroke};
-use crate::search::lens::Plan;
-use crate::search::{Method, Settings, Temperature, Termination};
+use super::course::{RecordedSearch, run_to_end};
+use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
+use crate::experiments::trade::ProgressSpan;
+use crate::experiments::{
+    Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn, TableCell,
+};
+use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::search::lens::SearchPlan;
+use crate::search::{SearchMethod, SearchSettings, Temperature, Termination};
 
 /// A sampler in a race.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Runner {
+pub(super) enum SamplerKind {
     Restore,
     Metropolis,
     Brute,
@@ -18,7 +20,7 @@ pub(super) enum Runner {
     Descent,
 }
 
-impl Runner {
+impl SamplerKind {
     fn name(self) -> &'static str {
         match self {
             Self::Restore => "RESTORE",
@@ -28,24 +30,24 @@ impl Runner {
         }
     }
 
-    pub(super) fn plan(self, plan: &Plan, seed: u64) -> Plan {
+    pub(super) fn plan(self, plan: &SearchPlan, seed: u64) -> SearchPlan {
         let mut own = plan.clone();
         own.settings.seed = seed;
         own.settings.method = match self {
-            Self::Restore | Self::Descent => Method::Restore,
-            Self::Metropolis => Method::Metropolis,
-            Self::Brute => Method::Brute,
+            Self::Restore | Self::Descent => SearchMethod::Restore,
+            Self::Metropolis => SearchMethod::Metropolis,
+            Self::Brute => SearchMethod::Brute,
         };
         if self == Self::Descent {
-            own.settings = endless(&own.settings);
+            own.settings = without_termination(&own.settings);
         }
         own
     }
 }
 
 /// A descent that no clock ends.
-fn endless(settings: &Settings) -> Settings {
-    Settings {
+fn without_termination(settings: &SearchSettings) -> SearchSettings {
+    SearchSettings {
         temperature: Temperature::new(f64::INFINITY),
         termination: Termination::Relative,
         c: 0.0,
@@ -56,103 +58,115 @@ fn endless(settings: &Settings) -> Settings {
 
 /// The first of some samplers against the others.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Race {
-    pub(super) runners: &'static [Runner],
+pub(super) struct SamplerComparison {
+    pub(super) samplers: &'static [SamplerKind],
     /// Those that the first one must beat.
-    pub(super) rivals: &'static [Runner],
+    pub(super) rivals: &'static [SamplerKind],
     pub(super) lenses: usize,
     pub(super) seeds: u64,
     pub(super) gradients: u64,
 }
 
 /// What became of a lens.
-struct Heat {
-    subject: Subject,
+struct LensComparison {
+    subject: StudyLens,
     /// The loss at the start.
     start: f64,
     /// For every sampler a search of each seed.
-    courses: Vec<(Runner, Vec<Course>)>,
+    courses: Vec<(SamplerKind, Vec<RecordedSearch>)>,
 }
 
-impl Race {
+impl SamplerComparison {
     /// The parts that a claim about most seeds needs: four of five.
-    fn most(&self) -> f64 {
+    fn required_seeds(&self) -> f64 {
         (0.8 * self.seeds as f64).floor()
     }
 
-    pub(super) fn run(&self, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-        let mut outcome = Outcome::default();
+    pub(super) fn run(
+        &self,
+        watch: &mut ProgressFn<'_>,
+    ) -> Result<ExperimentOutcome, ExperimentError> {
+        let mut outcome = ExperimentOutcome::default();
         let mut heats = Vec::new();
         for (i, subject) in self.subjects().iter().enumerate() {
             let [from, to] = [i, i + 1].map(|part| part as f64 / self.lenses as f64);
-            heats.push(self.heat(*subject, Part { from, to, name: subject.name }, watch)?);
+            heats.push(self.compare_lens(
+                *subject,
+                ProgressSpan { from, to, name: subject.name },
+                watch,
+            )?);
         }
         for heat in &heats {
             outcome.claims.extend(self.claims(heat));
             let all = heat.courses.iter().flat_map(|(_, courses)| courses);
-            outcome.rays += all.map(Course::rays).sum::<usize>();
+            outcome.rays += all.map(RecordedSearch::rays).sum::<usize>();
         }
-        outcome.tables.push(ends(&heats));
+        outcome.tables.push(final_table(&heats));
         outcome.tables.push(self.curves(&heats));
-        outcome.pictures.push(Picture { name: "merit", canvas: self.draw(&heats) });
-        outcome.lenses.extend(heats.iter().filter_map(Heat::best));
+        outcome.pictures.push(NamedPlot { name: "merit", canvas: self.draw(&heats) });
+        outcome.lenses.extend(heats.iter().filter_map(LensComparison::best));
         Ok(outcome)
     }
 
     /// The normal lens where only one is asked for.
-    fn subjects(&self) -> &'static [Subject] {
-        if self.lenses == 1 { &SUBJECTS[1..2] } else { &SUBJECTS[..self.lenses] }
+    fn subjects(&self) -> &'static [StudyLens] {
+        if self.lenses == 1 { &STUDY_LENSES[1..2] } else { &STUDY_LENSES[..self.lenses] }
     }
 
-    fn heat(&self, subject: Subject, part: Part<'_>, watch: &mut Watch<'_>) -> Result<Heat, Ended> {
+    fn compare_lens(
+        &self,
+        subject: StudyLens,
+        part: ProgressSpan<'_>,
+        watch: &mut ProgressFn<'_>,
+    ) -> Result<LensComparison, ExperimentError> {
         let start = at_heights(subject.file)?;
         let plan = plan(&start, rules(), self.gradients)?;
         let mut all = Vec::new();
-        for runner in self.runners {
+        for runner in self.samplers {
             for seed in 1..=self.seeds {
-                all.push(Course::new(&start, &runner.plan(&plan, seed))?);
+                all.push(RecordedSearch::new(&start, &runner.plan(&plan, seed))?);
             }
         }
-        finish(&mut all, part, watch)?;
+        run_to_end(&mut all, part, watch)?;
         let loss = all[0].start();
         let mut rest = all.into_iter();
         let of_each =
-            |runner: &Runner| (*runner, rest.by_ref().take(self.seeds as usize).collect());
-        let courses = self.runners.iter().map(of_each).collect();
-        Ok(Heat { subject, start: loss, courses })
+            |runner: &SamplerKind| (*runner, rest.by_ref().take(self.seeds as usize).collect());
+        let courses = self.samplers.iter().map(of_each).collect();
+        Ok(LensComparison { subject, start: loss, courses })
     }
 
-    fn claims(&self, heat: &Heat) -> Vec<Claim> {
-        let first = heat.ends(self.runners[0]);
-        let claim = |rival: &Runner| {
-            let other = heat.ends(*rival);
+    fn claims(&self, heat: &LensComparison) -> Vec<Claim> {
+        let first = heat.final_losses(self.samplers[0]);
+        let claim = |rival: &SamplerKind| {
+            let other = heat.final_losses(*rival);
             let below = first.iter().zip(&other).filter(|(own, other)| own < other).count();
-            let names = [self.runners[0], *rival].map(Runner::name);
+            let names = [self.samplers[0], *rival].map(SamplerKind::name);
             let says = format!(
                 "{}: seeds of {} with which {} ends below {}",
                 heat.subject.name, self.seeds, names[0], names[1]
             );
-            Claim::at_least(says, below as f64, self.most())
+            Claim::at_least(says, below as f64, self.required_seeds())
         };
         self.rivals.iter().map(claim).collect()
     }
 
     /// Where curves are read.
-    fn places(&self) -> impl Iterator<Item = u64> {
+    fn gradient_counts(&self) -> impl Iterator<Item = u64> {
         let limit = self.gradients;
         (0..=POINTS).map(move |i| limit * i / POINTS)
     }
 
-    fn curves(&self, heats: &[Heat]) -> Table {
+    fn curves(&self, heats: &[LensComparison]) -> DataTable {
         let columns = ["lens", "sampler", "gradients", "median", "least", "most"];
-        let mut table = Table::new("curves", &columns);
+        let mut table = DataTable::new("curves", &columns);
         for heat in heats {
             for (runner, courses) in &heat.courses {
-                for gradients in self.places() {
+                for gradients in self.gradient_counts() {
                     let [least, median, most] = spread(courses, gradients);
-                    let words = [heat.subject.name, runner.name()].map(Cell::from);
-                    let numbers = [gradients as f64, median, least, most].map(Cell::from);
-                    table.row(words.into_iter().chain(numbers));
+                    let words = [heat.subject.name, runner.name()].map(TableCell::from);
+                    let numbers = [gradients as f64, median, least, most].map(TableCell::from);
+                    table.push_row(words.into_iter().chain(numbers));
                 }
             }
         }
@@ -160,26 +174,26 @@ impl Race {
     }
 
     /// The best merit over that of the start for every lens: the middle seed, the best and the worst.
-    fn draw(&self, heats: &[Heat]) -> Canvas {
+    fn draw(&self, heats: &[LensComparison]) -> Canvas {
         let rows = heats.len().div_ceil(2) as u32;
         let mut canvas = Canvas::new([1500, 140 + 620 * rows]);
-        for (i, runner) in self.runners.iter().enumerate() {
+        for (i, runner) in self.samplers.iter().enumerate() {
             let x = 120.0 + 340.0 * i as f64;
             let color = PALETTE[i % PALETTE.len()];
             canvas.curve(&[[x, 27.0], [x + 40.0, 27.0]], color, Stroke::Solid);
-            canvas.text([x + 52.0, 20.0], runner.name(), BLACK, Align::Left);
+            canvas.text([x + 52.0, 20.0], runner.name(), BLACK, TextAlign::Left);
         }
         let note = "solid: middle seed; dashed: best and worst";
-        canvas.text([120.0, 52.0], note, BLACK, Align::Left);
+        canvas.text([120.0, 52.0], note, BLACK, TextAlign::Left);
         for (i, heat) in heats.iter().enumerate() {
             let left = 120.0 + 740.0 * (i % 2) as f64;
             let top = 160.0 + 620.0 * (i / 2) as f64;
-            self.draw_heat(&mut canvas, heat, [left, top]);
+            self.draw_lens(&mut canvas, heat, [left, top]);
         }
         canvas
     }
 
-    fn draw_heat(&self, canvas: &mut Canvas, heat: &Heat, [left, top]: [f64; 2]) {
+    fn draw_lens(&self, canvas: &mut Canvas, heat: &LensComparison, [left, top]: [f64; 2]) {
         let all = heat.courses.iter().flat_map(|(_, courses)| courses);
         let lowest = all.map(|course| course.run.best().loss / heat.start);
         let chart = Chart::new(
@@ -193,8 +207,8 @@ impl Race {
             let color = PALETTE[i % PALETTE.len()];
             let strokes = [Stroke::Dashed, Stroke::Solid, Stroke::Dashed];
             for (k, stroke) in strokes.into_iter().enumerate() {
-                let at = |g: u64| chart.place([g as f64, spread(courses, g)[k] / heat.start]);
-                let points: Vec<[f64; 2]> = self.places().map(at).collect();
+                let at = |g: u64| chart.to_pixel([g as f64, spread(courses, g)[k] / heat.start]);
+                let points: Vec<[f64; 2]> = self.gradient_counts().map(at).collect();
                 canvas.curve(&points, color, stroke);
             }
         }
@@ -204,9 +218,9 @@ impl Race {
 /// Places of a curve.
 const POINTS: u64 = 100;
 
-impl Heat {
+impl LensComparison {
     /// The best losses of a sampler, by seed.
-    fn ends(&self, runner: Runner) -> Vec<f64> {
+    fn final_losses(&self, runner: SamplerKind) -> Vec<f64> {
         let own = self.courses.iter().find(|(other, _)| *other == runner);
         own.map_or(Vec::new(), |(_, courses)| courses.iter().map(|c| c.run.best().loss).collect())
     }
@@ -220,31 +234,31 @@ impl Heat {
 }
 
 /// The best losses after so many gradients: least, middle and most of all seeds.
-fn spread(courses: &[Course], gradients: u64) -> [f64; 3] {
+fn spread(courses: &[RecordedSearch], gradients: u64) -> [f64; 3] {
     let mut all: Vec<f64> = courses.iter().map(|course| course.best_after(gradients)).collect();
     all.sort_by(f64::total_cmp);
     [0, all.len() / 2, all.len() - 1].map(|place| all[place])
 }
 
 /// Where every search has ended.
-fn ends(heats: &[Heat]) -> Table {
+fn final_table(heats: &[LensComparison]) -> DataTable {
     let columns =
         ["lens", "sampler", "seed", "gradients", "generations", "start", "best", "elements"];
-    let mut table = Table::new("ends", &columns);
+    let mut table = DataTable::new("ends", &columns);
     for heat in heats {
         for (runner, courses) in &heat.courses {
             for course in courses {
                 let run = &course.run;
-                let words = [heat.subject.name, runner.name()].map(Cell::from);
+                let words = [heat.subject.name, runner.name()].map(TableCell::from);
                 let numbers = [
                     run.settings().seed as f64,
                     run.statistics().gradients as f64,
-                    run.tree().born() as f64,
+                    run.lineage().total() as f64,
                     heat.start,
                     run.best().loss,
                 ];
-                let row = words.into_iter().chain(numbers.map(Cell::from));
-                table.row(row.chain([run.best().topology.as_str().into()]));
+                let row = words.into_iter().chain(numbers.map(TableCell::from));
+                table.push_row(row.chain([run.best().topology.as_str().into()]));
             }
         }
     }
@@ -253,7 +267,7 @@ fn ends(heats: &[Heat]) -> Table {
 
 impl Effort {
     /// How much a race is worth: lenses, seeds, gradients.
-    pub(super) fn race(self) -> (usize, u64, u64) {
-        self.pick((SUBJECTS.len(), 5, 12_000), (1, 2, 200))
+    pub(super) fn comparison_size(self) -> (usize, u64, u64) {
+        self.select((STUDY_LENSES.len(), 5, 12_000), (1, 2, 200))
     }
 }

@@ -6,16 +6,19 @@
 //! radius of each spot about its centroid, the clear area of each pupil. The search asks for sharp
 //! spots with at every field as much light as the mark has there.
 
-use super::course::{Course, finish};
+use super::course::{RecordedSearch, run_to_end};
 use super::{at_heights, rules};
-use crate::experiments::section::Section;
-use crate::experiments::trade::Part;
-use crate::experiments::{Cell, Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch};
+use crate::experiments::section::SectionPlot;
+use crate::experiments::trade::ProgressSpan;
+use crate::experiments::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, TableCell,
+};
 use crate::lens::Lens;
-use crate::picture::{Align, Axis, BLACK, Canvas, Chart, PALETTE};
-use crate::pupil::Bench;
-use crate::search::lens::{Figures, Plan, opened};
-use crate::search::{Rules, Settings};
+use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, TextAlign};
+use crate::pupil::RayModel;
+use crate::search::lens::{LensSummary, SearchPlan, with_open_apertures};
+use crate::search::{SearchRules, SearchSettings};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "teaser",
@@ -32,47 +35,51 @@ const WIDEST: f64 = 26.0;
 /// The light asked for beyond that of the mark: penalties stop short of what they ask for.
 const MORE: f64 = 1.02;
 /// How exact the numbers are, relatively.
-const JUDGED: f64 = 1e-4;
+const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
     let own = at_heights("double_gauss_nikkor_s_50")?;
-    let start = opened(&own, OPENED);
-    let mark = Design::of("mark, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
-    let before = Design::of("start, opened", start.clone())?;
+    let start = with_open_apertures(&own, OPENED);
+    let mark = OverviewLens::of("mark, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
+    let before = OverviewLens::of("start, opened", start.clone())?;
     let shares = mark.lights().zip(before.lights()).map(|(mark, before)| MORE * mark / before);
-    let plan = plan(shares.collect(), effort.pick(560_000, 400));
-    let mut found = vec![Course::new(&start, &plan)?];
-    let part = Part { from: 0.0, to: 1.0, name: "search" };
-    finish(&mut found, part, watch)?;
-    let best = Design::of("found", found[0].run.best().point.clone())?;
-    let designs = [Design::of("start, 1962", own)?, before, best, mark];
-    let mut outcome = Outcome { claims: claims(&designs, &found[0], effort), ..Outcome::default() };
+    let plan = plan(shares.collect(), effort.select(560_000, 400));
+    let mut found = vec![RecordedSearch::new(&start, &plan)?];
+    let part = ProgressSpan { from: 0.0, to: 1.0, name: "search" };
+    run_to_end(&mut found, part, watch)?;
+    let best = OverviewLens::of("found", found[0].run.best().point.clone())?;
+    let designs = [OverviewLens::of("start, 1962", own)?, before, best, mark];
+    let mut outcome = ExperimentOutcome {
+        claims: claims(&designs, &found[0], effort),
+        ..ExperimentOutcome::default()
+    };
     outcome.rays = found[0].rays() + designs.iter().map(|d| d.figures.rays()).sum::<usize>();
     outcome.tables.push(table(&designs));
     outcome.tables.push(course(&found[0]));
-    outcome.pictures.push(Picture { name: "lenses", canvas: draw(&designs)? });
+    outcome.pictures.push(NamedPlot { name: "lenses", canvas: draw(&designs)? });
     outcome.lenses.push(("found".to_owned(), designs[2].lens.clone()));
     Ok(outcome)
 }
 
 /// A search with as many chains as is usual.
-fn plan(shares: Vec<f64>, gradients: u64) -> Plan {
-    let rules = Rules { semi_diameter: Some(WIDEST), ..rules() };
-    let default = Plan::default();
-    let settings = Settings { gradients: Some(gradients), ..default.settings };
-    Plan { light: shares, rules, settings, ..default }
+fn plan(shares: Vec<f64>, gradients: u64) -> SearchPlan {
+    let rules = SearchRules { semi_diameter: Some(WIDEST), ..rules() };
+    let default = SearchPlan::default();
+    let settings = SearchSettings { gradients: Some(gradients), ..default.settings };
+    SearchPlan { light: shares, rules, settings, ..default }
 }
 
 /// A lens with its numbers.
-struct Design {
+struct OverviewLens {
     name: &'static str,
     lens: Lens,
-    figures: Figures,
+    figures: LensSummary,
 }
 
-impl Design {
-    fn of(name: &'static str, lens: Lens) -> Result<Self, Ended> {
-        let figures = Figures::of(&lens, JUDGED).map_err(Ended::from_error)?;
+impl OverviewLens {
+    fn of(name: &'static str, lens: Lens) -> Result<Self, ExperimentError> {
+        let figures =
+            LensSummary::new(&lens, EVALUATION_TOLERANCE).map_err(ExperimentError::from_error)?;
         Ok(Self { name, lens, figures })
     }
 
@@ -96,8 +103,12 @@ impl Design {
     }
 }
 
-fn claims([_, before, found, mark]: &[Design; 4], course: &Course, effort: Effort) -> Vec<Claim> {
-    let um = |design: &Design| 1e3 * design.spot();
+fn claims(
+    [_, before, found, mark]: &[OverviewLens; 4],
+    course: &RecordedSearch,
+    effort: Effort,
+) -> Vec<Claim> {
+    let um = |design: &OverviewLens| 1e3 * design.spot();
     let merits = [course.run.best().loss, course.start()];
     let says = "merit of the lens found, against half of that of the start";
     let mut claims = vec![Claim::at_most(says, merits[0], 0.5 * merits[1]).in_unit("mm^2")];
@@ -113,7 +124,7 @@ fn claims([_, before, found, mark]: &[Design; 4], course: &Course, effort: Effor
     claims
 }
 
-fn table(designs: &[Design]) -> Table {
+fn table(designs: &[OverviewLens]) -> DataTable {
     let columns = [
         "design",
         "elements",
@@ -125,35 +136,35 @@ fn table(designs: &[Design]) -> Table {
         "area_mm2",
         "area_error_mm2",
     ];
-    let mut table = Table::new("designs", &columns);
-    for Design { name, figures, .. } in designs {
+    let mut table = DataTable::new("designs", &columns);
+    for OverviewLens { name, figures, .. } in designs {
         for field in &figures.fields {
             let focal = figures.focal_lengths[0].unwrap_or(f64::NAN);
             let spot = field.spot.map_or([f64::NAN; 2], |spot| [spot.value, spot.error]);
             let whole = [figures.elements as f64, focal, figures.track, field.y];
             let light = [field.light.value, field.light.error];
             let numbers = whole.into_iter().chain(spot).chain(light);
-            table.row(std::iter::once((*name).into()).chain(numbers.map(Cell::from)));
+            table.push_row(std::iter::once((*name).into()).chain(numbers.map(TableCell::from)));
         }
     }
     table
 }
 
 /// The best merit as the search went on.
-fn course(course: &Course) -> Table {
-    let mut table = Table::new("course", &["gradients", "best"]);
+fn course(course: &RecordedSearch) -> DataTable {
+    let mut table = DataTable::new("course", &["gradients", "best"]);
     let mut last = f64::INFINITY;
     for mark in &course.marks {
         if mark.best < last {
             last = mark.best;
-            table.row([mark.gradients as f64, mark.best].map(Cell::from));
+            table.push_row([mark.gradients as f64, mark.best].map(TableCell::from));
         }
     }
     table
 }
 
 /// Every lens with its rays, and its numbers beside it.
-fn draw(designs: &[Design]) -> Result<Canvas, Ended> {
+fn draw(designs: &[OverviewLens]) -> Result<Canvas, ExperimentError> {
     let mut canvas = Canvas::new([1340, 60 + 330 * designs.len() as u32]);
     for (i, design) in designs.iter().enumerate() {
         draw_design(&mut canvas, design, 60.0 + 330.0 * i as f64)?;
@@ -161,19 +172,23 @@ fn draw(designs: &[Design]) -> Result<Canvas, Ended> {
     Ok(canvas)
 }
 
-fn draw_design(canvas: &mut Canvas, design: &Design, top: f64) -> Result<(), Ended> {
-    let bench = Bench::of(&design.lens, 0).map_err(Ended::from_error)?;
-    let section = Section::new(&bench.colors[0].system);
+fn draw_design(
+    canvas: &mut Canvas,
+    design: &OverviewLens,
+    top: f64,
+) -> Result<(), ExperimentError> {
+    let bench = RayModel::from_lens(&design.lens, 0).map_err(ExperimentError::from_error)?;
+    let section = SectionPlot::new(&bench.channels[0].system);
     let [z, y] = section.extent();
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
-    let chart = Chart::new([60.0, top], [760.0, top + 260.0], x, y).to_scale();
+    let chart = Chart::new([60.0, top], [760.0, top + 260.0], x, y).with_equal_scales();
     let (name, figures) = (design.name, &design.figures);
     // The letters of a picture have no bar.
     let topology = figures.topology.replace('|', "-");
     let title = format!("{name}: {} elements, {topology}", figures.elements);
-    canvas.text([60.0, top - 30.0], &title, BLACK, Align::Left);
+    canvas.text([60.0, top - 30.0], &title, BLACK, TextAlign::Left);
     for (i, field) in bench.fields.iter().enumerate() {
-        let launch = bench.launch(*field, bench.primary).map_err(Ended::from_error)?;
+        let launch = bench.launch(*field, bench.primary).map_err(ExperimentError::from_error)?;
         let color = PALETTE[i % PALETTE.len()];
         for ray in -2..=2 {
             section.draw_ray(canvas, &chart, &launch, [0.0, 0.45 * f64::from(ray)], color);
@@ -182,10 +197,10 @@ fn draw_design(canvas: &mut Canvas, design: &Design, top: f64) -> Result<(), End
         let spot = numbers.spot.map_or(f64::NAN, |spot| 1e3 * spot.value);
         let light = numbers.light.value;
         let text = format!("{:.1} deg: {spot:.0} um rms, {light:.0} mm^2", numbers.y);
-        canvas.text([840.0, top + 40.0 + 34.0 * i as f64], &text, color, Align::Left);
+        canvas.text([840.0, top + 40.0 + 34.0 * i as f64], &text, color, TextAlign::Left);
     }
     let all = format!("all: {:.0} um rms, {:.0} mm^2", 1e3 * design.spot(), design.light());
-    canvas.text([840.0, top + 190.0], &all, BLACK, Align::Left);
+    canvas.text([840.0, top + 190.0], &all, BLACK, TextAlign::Left);
     section.draw(canvas, &chart);
     Ok(())
 }

@@ -4,14 +4,15 @@
 //! are the rings of the thesis: a ray shall be somewhere on the one and go on somewhere to the other
 //! (5.36 and 5.37). That loss does not ask for even light, so some parts are brighter than others.
 
-use super::pictures::{row, shades};
-use super::{COLUMNS, Shown, independent, show, task};
+use super::pictures::{draw_row, gray_levels};
+use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
 use crate::experiments::medium::solve;
 use crate::experiments::{
-    Claim, Effort, Ended, Experiment, Outcome, Picture, Table, Watch, medium_pictures,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    ProgressFn, plot_medium,
 };
-use crate::grin::{Exit, Tracer, plan};
-use crate::grin_task::{Goal, Medium, Task};
+use crate::grin::{GrinTracer, RayExit, plan_tracing};
+use crate::grin_task::{GrinField, GrinTask, LightGoal};
 use crate::picture::Canvas;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
@@ -37,19 +38,19 @@ const TOLERANCE: f64 = 1e-3;
 const CELLS: usize = 96;
 const ROOM: f64 = 1.6;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
-    let mut outcome = Outcome::default();
-    let mut table = Table::new("views", &COLUMNS);
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+    let mut outcome = ExperimentOutcome::default();
+    let mut table = DataTable::new("views", &COLUMNS);
     let [least, less] = LEAST;
-    let [quality, correlation] = effort.pick(least, less);
+    let [quality, correlation] = effort.select(least, less);
     for (i, (name, pictures)) in
         [("caustic-near", NEAR), ("caustic-far", FAR)].into_iter().enumerate()
     {
         let part = [0, 1].map(|k| (i + k) as f64 / 3.0);
-        let shown = show(&task(name, effort, 2)?, part, watch)?;
+        let shown = solve_and_evaluate(&task(name, effort, 2)?, part, watch)?;
         shown.rows(&mut table);
         outcome.claims.extend(shown.claims(quality, correlation));
-        outcome.claims.extend(shown.makeable());
+        outcome.claims.extend(shown.manufacturability());
         outcome.pictures.extend(pictures_of(&shown, pictures));
         outcome.rays = outcome.rays.saturating_add(shown.rays());
     }
@@ -61,23 +62,27 @@ fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
 const NEAR: [&str; 2] = ["near", "near-section"];
 const FAR: [&str; 2] = ["far", "far-section"];
 
-fn pictures_of(shown: &Shown, [image, section]: [&'static str; 2]) -> Vec<Picture> {
+fn pictures_of(shown: &EvaluatedField, [image, section]: [&'static str; 2]) -> Vec<NamedPlot> {
     let mut pictures = shown.pictures(&[image]);
-    let of_medium = medium_pictures(shown.runner.task(), shown.runner.best());
+    let of_medium = plot_medium(shown.runner.task(), shown.runner.best());
     pictures
-        .extend(of_medium.into_iter().last().map(|picture| Picture { name: section, ..picture }));
+        .extend(of_medium.into_iter().last().map(|picture| NamedPlot { name: section, ..picture }));
     pictures
 }
 
 /// The rings near and far at once.
-fn rings(outcome: &mut Outcome, effort: Effort, watch: &mut Watch<'_>) -> Result<(), Ended> {
+fn rings(
+    outcome: &mut ExperimentOutcome,
+    effort: Effort,
+    watch: &mut ProgressFn<'_>,
+) -> Result<(), ExperimentError> {
     let task = task("caustic", effort, 2)?;
     let runner = solve(&task, [2.0 / 3.0, 1.0], watch)?;
-    let beam = Beam::behind(&task, runner.best())?;
+    let beam = ExitBeam::behind(&task, runner.best())?;
     let [full, test] = MISSED;
-    let [near, far] = effort.pick(full, test);
-    let Goal::Ring { radius, distance, angle, .. } = task.views[0].goal else {
-        return Err(Ended::Failed("the task `caustic` has no rings".to_owned()));
+    let [near, far] = effort.select(full, test);
+    let LightGoal::Ring { radius, distance, angle, .. } = task.views[0].goal else {
+        return Err(ExperimentError::Failed("the task `caustic` has no rings".to_owned()));
     };
     let missed = rms(beam.radii(distance).iter().map(|r| r - radius));
     let says = "rings: distance from the near one";
@@ -88,43 +93,43 @@ fn rings(outcome: &mut Outcome, effort: Effort, watch: &mut Watch<'_>) -> Result
     let lost = beam.all - beam.rays.len();
     let says = "rings: rays that are left out";
     outcome.claims.push(Claim::at_most(says, lost as f64, 0.0));
-    let mut table = Table::new("planes", &["distance_mm", "radius_mm", "width_mm"]);
+    let mut table = DataTable::new("planes", &["distance_mm", "radius_mm", "width_mm"]);
     for plane in PLANES {
-        let (mean, width) = spread(&beam.radii(plane));
-        table.row([plane.into(), mean.into(), width.into()]);
+        let (mean, width) = mean_and_deviation(&beam.radii(plane));
+        table.push_row([plane.into(), mean.into(), width.into()]);
         if plane >= distance {
             let says =
                 format!("rings: width on a screen {plane} mm behind, in times of the radius");
             let [wide, wider] = WIDTH;
-            outcome.claims.push(Claim::at_most(says, width / mean, effort.pick(wide, wider)));
+            outcome.claims.push(Claim::at_most(says, width / mean, effort.select(wide, wider)));
         }
     }
     outcome.tables.push(table);
-    outcome.pictures.push(Picture { name: "planes", canvas: beam.draw() });
-    let rays = usize::try_from(runner.rays()).unwrap_or(usize::MAX);
+    outcome.pictures.push(NamedPlot { name: "planes", canvas: beam.draw() });
+    let rays = usize::try_from(runner.rays_traced()).unwrap_or(usize::MAX);
     outcome.rays = outcome.rays.saturating_add(rays).saturating_add(beam.all);
     Ok(())
 }
 
 /// Light behind a field, by its rays across the axis of the beam: where they leave, and how fast they
 /// move away.
-struct Beam {
+struct ExitBeam {
     rays: Vec<([f64; 2], [f64; 2])>,
     all: usize,
 }
 
-impl Beam {
+impl ExitBeam {
     /// The light of the first view, which goes along z.
-    fn behind(task: &Task, medium: &Medium) -> Result<Self, Ended> {
-        let task = independent(task);
-        let (space, rays) = task.judging_rays(&task.views[0]);
-        let plan = plan(medium.field(), &space.region(), task.launch, &rays, TOLERANCE);
-        let setup = plan.map_err(Ended::from_error)?.setup;
-        let tracer = Tracer::new(medium.field(), setup).map_err(Ended::from_error)?;
-        let exits = tracer.rays(&rays);
-        let arrived = exits.iter().filter(|exit| exit.fate.arrived() && exit.v.z > 0.0);
+    fn behind(task: &GrinTask, medium: &GrinField) -> Result<Self, ExperimentError> {
+        let task = independent_task(task);
+        let (space, rays) = task.scoring_rays(&task.views[0]);
+        let plan = plan_tracing(medium.field(), &space.region(), task.launch, &rays, TOLERANCE);
+        let setup = plan.map_err(ExperimentError::from_error)?.setup;
+        let tracer = GrinTracer::new(medium.field(), setup).map_err(ExperimentError::from_error)?;
+        let exits = tracer.trace_batch(&rays);
+        let arrived = exits.iter().filter(|exit| exit.fate.has_arrived() && exit.v.z > 0.0);
         let back = space.corners()[1].z;
-        let ray = |exit: &Exit<f64>| {
+        let ray = |exit: &RayExit<f64>| {
             let v = exit.v * (1.0 / exit.v.z);
             let start = exit.x + v * (back - exit.x.z);
             ([start.x, start.y], [v.x, v.y])
@@ -133,13 +138,13 @@ impl Beam {
     }
 
     /// Where the rays are at a distance behind the field.
-    fn at(&self, distance: f64) -> Vec<[f64; 2]> {
+    fn positions(&self, distance: f64) -> Vec<[f64; 2]> {
         let place = |(x, v): &([f64; 2], [f64; 2])| [0, 1].map(|i| x[i] + distance * v[i]);
         self.rays.iter().map(place).collect()
     }
 
     fn radii(&self, distance: f64) -> Vec<f64> {
-        self.at(distance).iter().map(|[x, y]| x.hypot(*y)).collect()
+        self.positions(distance).iter().map(|[x, y]| x.hypot(*y)).collect()
     }
 
     /// The angles of the rays with the axis, in degrees.
@@ -151,22 +156,22 @@ impl Beam {
     fn draw(&self) -> Canvas {
         let panel = |title: String, places: &[[f64; 2]]| {
             let radii: Vec<f64> = places.iter().map(|[x, y]| x.hypot(*y)).collect();
-            let light = gathered(places, ROOM * spread(&radii).0);
+            let light = count_in_cells(places, ROOM * mean_and_deviation(&radii).0);
             // A caustic has peaks that would leave the rest black.
             let shown: Vec<f64> = light.iter().map(|light| light.sqrt()).collect();
             let peak = shown.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-            (title, shades(&shown, CELLS, peak))
+            (title, gray_levels(&shown, CELLS, peak))
         };
         let screens =
-            PLANES.iter().map(|plane| panel(format!("{plane} mm behind"), &self.at(*plane)));
+            PLANES.iter().map(|plane| panel(format!("{plane} mm behind"), &self.positions(*plane)));
         let slopes: Vec<[f64; 2]> = self.rays.iter().map(|(_, v)| *v).collect();
         let panels: Vec<_> = screens.chain([panel("at infinity".to_owned(), &slopes)]).collect();
-        row("the ring on screens behind the field, each as large as its ring", CELLS, &panels)
+        draw_row("the ring on screens behind the field, each as large as its ring", CELLS, &panels)
     }
 }
 
 /// How many places fall into each cell of a square, rows from the bottom.
-fn gathered(places: &[[f64; 2]], half: f64) -> Vec<f64> {
+fn count_in_cells(places: &[[f64; 2]], half: f64) -> Vec<f64> {
     let mut light = vec![0.0; CELLS * CELLS];
     let cell = |x: f64| (x / half + 1.0) * 0.5 * CELLS as f64;
     for place in places {
@@ -180,7 +185,7 @@ fn gathered(places: &[[f64; 2]], half: f64) -> Vec<f64> {
 }
 
 /// Mean and standard deviation.
-fn spread(values: &[f64]) -> (f64, f64) {
+fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     (mean, rms(values.iter().map(|value| value - mean)))
 }

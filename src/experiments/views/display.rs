@@ -4,8 +4,10 @@
 //! steps: with the steps of a coarse level the noise of fresh rays would move every one of their many
 //! coefficients, most of which few rays meet, and undo what the coarse level has found.
 
-use super::{outcome_of, show, task};
-use crate::experiments::{Claim, Effort, Ended, Experiment, Outcome, Watch};
+use super::{outcome_of, solve_and_evaluate, task};
+use crate::experiments::{
+    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn,
+};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.4",
@@ -20,14 +22,14 @@ const NODES: [usize; 2] = [33, 9];
 /// The least quality in dB and the least correlation.
 const LEAST: [[f64; 2]; 2] = [[24.0, 0.97], [14.0, 0.75]];
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
     let task = task("display", effort, 2)?;
-    let shown = show(&task, [0.0, 1.0], watch)?;
+    let shown = solve_and_evaluate(&task, [0.0, 1.0], watch)?;
     let [nodes, few] = NODES;
     let [least, less] = LEAST;
-    let mut outcome = outcome_of(&shown, &["face", "letter"], effort.pick(least, less));
+    let mut outcome = outcome_of(&shown, &["face", "letter"], effort.select(least, less));
     let found = shown.runner.best().nodes();
     let says = "nodes along a side of the best field";
-    outcome.claims.push(Claim::exactly(says, found as f64, effort.pick(nodes, few) as f64));
+    outcome.claims.push(Claim::exactly(says, found as f64, effort.select(nodes, few) as f64));
     Ok(outcome)
 }

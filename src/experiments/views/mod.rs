@@ -9,11 +9,16 @@ pub(super) mod multifocal;
 mod pictures;
 pub(super) mod resolution;
 
-pub use pictures::view_picture;
+pub use pictures::plot_view;
 
-use super::medium::{solve, work};
-use super::{Claim, Effort, Ended, Outcome, Picture, Table, Watch, medium_pictures};
-use crate::grin_task::{self, Goal, Medium, Runner, Seen, Source, Task};
+use super::medium::{solve, solve_from};
+use super::{
+    Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
+    plot_medium,
+};
+use crate::grin_task::{
+    self, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport,
+};
 
 /// Rays along a side of a beam that judges, for each of one that is searched with.
 const FINER: f64 = 1.57;
@@ -23,20 +28,20 @@ const LEFT_OUT: f64 = 1e-3;
 const ROUNDING: f64 = 1e-9;
 
 /// A task that comes with the program.
-fn builtin(name: &str) -> Result<Task, Ended> {
-    let builtin =
-        grin_task::find(name).ok_or_else(|| Ended::Failed(format!("no task `{name}`")))?;
-    builtin.task().map_err(Ended::from_error)
+fn builtin(name: &str) -> Result<GrinTask, ExperimentError> {
+    let builtin = grin_task::find_builtin(name)
+        .ok_or_else(|| ExperimentError::Failed(format!("no task `{name}`")))?;
+    builtin.task().map_err(ExperimentError::from_error)
 }
 
 /// The same task for a test: only its first levels, fewer rays, coarser pictures.
-fn small(mut task: Task, levels: usize) -> Task {
+fn reduced(mut task: GrinTask, levels: usize) -> GrinTask {
     task.levels.truncate(levels);
     for view in &mut task.views {
-        if let Source::Beam { rays, .. } = &mut view.source {
+        if let LightSource::Beam { rays, .. } = &mut view.source {
             *rays = 64;
         }
-        if let Goal::Image { pixels, .. } | Goal::Far { pixels, .. } = &mut view.goal {
+        if let LightGoal::Image { pixels, .. } | LightGoal::Far { pixels, .. } = &mut view.goal {
             *pixels = 32;
         }
     }
@@ -44,10 +49,10 @@ fn small(mut task: Task, levels: usize) -> Task {
 }
 
 /// The same task with rays that no step of its search has, and half of its step.
-fn independent(task: &Task) -> Task {
+fn independent_task(task: &GrinTask) -> GrinTask {
     let mut other = task.clone();
     for view in &mut other.views {
-        if let Source::Beam { rays, .. } = &mut view.source {
+        if let LightSource::Beam { rays, .. } = &mut view.source {
             *rays = (FINER * *rays as f64).round() as usize;
         }
     }
@@ -58,21 +63,25 @@ fn independent(task: &Task) -> Task {
 }
 
 /// A field that was found, and what other rays make of it.
-struct Shown {
-    runner: Runner,
-    seen: Vec<Seen>,
+struct EvaluatedField {
+    runner: GrinOptimizer,
+    seen: Vec<ViewReport>,
 }
 
 /// Works on a task; it is a part of the whole work.
-fn show(task: &Task, part: [f64; 2], watch: &mut Watch<'_>) -> Result<Shown, Ended> {
+fn solve_and_evaluate(
+    task: &GrinTask,
+    part: [f64; 2],
+    watch: &mut ProgressFn<'_>,
+) -> Result<EvaluatedField, ExperimentError> {
     let runner = solve(task, part, watch)?;
-    let seen = look(task, runner.best())?;
-    Ok(Shown { runner, seen })
+    let seen = evaluate(task, runner.best())?;
+    Ok(EvaluatedField { runner, seen })
 }
 
 /// What rays that no search has seen make of a field.
-fn look(task: &Task, medium: &Medium) -> Result<Vec<Seen>, Ended> {
-    independent(task).seen(medium).map_err(Ended::from_error)
+fn evaluate(task: &GrinTask, medium: &GrinField) -> Result<Vec<ViewReport>, ExperimentError> {
+    independent_task(task).report_views(medium).map_err(ExperimentError::from_error)
 }
 
 /// Columns of the table of views.
@@ -89,22 +98,22 @@ const COLUMNS: [&str; 10] = [
     "index_high",
 ];
 
-impl Shown {
+impl EvaluatedField {
     /// Adds a row for every image.
-    fn rows(&self, table: &mut Table) {
+    fn rows(&self, table: &mut DataTable) {
         let task = self.runner.task();
         let extremes = task.extremes(self.runner.best());
         for (view, seen) in task.views.iter().zip(&self.seen) {
             let Some(image) = &seen.image else { continue };
             let counts = seen.result.counts;
-            table.row([
+            table.push_row([
                 view.name.clone().into(),
                 self.runner.best().nodes().into(),
-                seen.result.quality.unwrap_or(f64::NAN).into(),
+                seen.result.psnr.unwrap_or(f64::NAN).into(),
                 image.correlation().into(),
-                image.light().into(),
+                image.light_share().into(),
                 counts.fates.total().into(),
-                (counts.fates.total() - counts.counted()).into(),
+                (counts.fates.total() - counts.valid()).into(),
                 seen.error.unwrap_or(f64::NAN).into(),
                 extremes.low.into(),
                 extremes.high.into(),
@@ -118,13 +127,13 @@ impl Shown {
         for (view, seen) in self.runner.task().views.iter().zip(&self.seen) {
             let Some(image) = &seen.image else { continue };
             let name = &view.name;
-            let found = seen.result.quality.unwrap_or(f64::NAN);
+            let found = seen.result.psnr.unwrap_or(f64::NAN);
             let says = format!("{name}: peak signal to noise, by rays of no step");
             claims.push(Claim::at_least(says, found, quality).in_unit("dB"));
             let says = format!("{name}: correlation with the picture");
             claims.push(Claim::at_least(says, image.correlation(), correlation));
             let counts = seen.result.counts;
-            let left_out = 1.0 - counts.counted() as f64 / counts.fates.total() as f64;
+            let left_out = 1.0 - counts.valid() as f64 / counts.fates.total() as f64;
             let says = format!("{name}: share of the rays that are left out");
             claims.push(Claim::at_most(says, left_out, LEFT_OUT));
         }
@@ -132,7 +141,7 @@ impl Shown {
     }
 
     /// What a maker can make holds for the field.
-    fn makeable(&self) -> [Claim; 2] {
+    fn manufacturability(&self) -> [Claim; 2] {
         let task = self.runner.task();
         let extremes = task.extremes(self.runner.best());
         let [low, high] = [task.limits.low, task.limits.high];
@@ -143,12 +152,12 @@ impl Shown {
     }
 
     /// Its images beside the pictures that are wanted.
-    fn pictures(&self, names: &[&'static str]) -> Vec<Picture> {
+    fn pictures(&self, names: &[&'static str]) -> Vec<NamedPlot> {
         let images = self.seen.iter().filter_map(|seen| Some((seen, seen.image.as_ref()?)));
-        let picture = |((seen, image), name): ((&Seen, _), &&'static str)| {
-            let quality = seen.result.quality.unwrap_or(f64::NAN);
-            let canvas = view_picture(name, image, quality);
-            Picture { name, canvas }
+        let picture = |((seen, image), name): ((&ViewReport, _), &&'static str)| {
+            let quality = seen.result.psnr.unwrap_or(f64::NAN);
+            let canvas = plot_view(name, image, quality);
+            NamedPlot { name, canvas }
         };
         images.zip(names).map(picture).collect()
     }
@@ -156,23 +165,33 @@ impl Shown {
     /// Rays that were traced, forwards.
     fn rays(&self) -> usize {
         let judging: usize = self.seen.iter().map(|seen| seen.result.counts.fates.total()).sum();
-        usize::try_from(self.runner.rays()).unwrap_or(usize::MAX).saturating_add(judging)
+        usize::try_from(self.runner.rays_traced()).unwrap_or(usize::MAX).saturating_add(judging)
     }
 }
 
 /// The outcome of one field that shows images.
-fn outcome_of(shown: &Shown, names: &[&'static str], [quality, correlation]: [f64; 2]) -> Outcome {
-    let mut table = Table::new("views", &COLUMNS);
+fn outcome_of(
+    shown: &EvaluatedField,
+    names: &[&'static str],
+    [quality, correlation]: [f64; 2],
+) -> ExperimentOutcome {
+    let mut table = DataTable::new("views", &COLUMNS);
     shown.rows(&mut table);
     let mut claims = shown.claims(quality, correlation);
-    claims.extend(shown.makeable());
+    claims.extend(shown.manufacturability());
     let mut pictures = shown.pictures(names);
-    pictures.extend(medium_pictures(shown.runner.task(), shown.runner.best()));
-    Outcome { claims, tables: vec![table], pictures, rays: shown.rays(), ..Outcome::default() }
+    pictures.extend(plot_medium(shown.runner.task(), shown.runner.best()));
+    ExperimentOutcome {
+        claims,
+        tables: vec![table],
+        pictures,
+        rays: shown.rays(),
+        ..ExperimentOutcome::default()
+    }
 }
 
 /// A built-in task at full effort; for a test its first levels.
-fn task(name: &str, effort: Effort, levels: usize) -> Result<Task, Ended> {
+fn task(name: &str, effort: Effort, levels: usize) -> Result<GrinTask, ExperimentError> {
     let task = builtin(name)?;
-    Ok(if effort == Effort::Full { task } else { small(task, levels) })
+    Ok(if effort == Effort::Full { task } else { reduced(task, levels) })
 }

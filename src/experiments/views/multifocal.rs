@@ -6,8 +6,10 @@
 //! give, since a ray that is in its place on two of them is where it must be on the third: the
 //! images are less exact than those of one plane.
 
-use super::{Shown, outcome_of, show, task};
-use crate::experiments::{Claim, Effort, Ended, Experiment, Outcome, Watch};
+use super::{EvaluatedField, outcome_of, solve_and_evaluate, task};
+use crate::experiments::{
+    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn,
+};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.6",
@@ -23,22 +25,22 @@ const LEAST: [[f64; 2]; 2] = [[23.0, 0.9], [16.0, 0.6]];
 /// A coarse field is too smooth for what is in focus.
 const BLURRED: f64 = 0.5;
 
-fn run(effort: Effort, watch: &mut Watch<'_>) -> Result<Outcome, Ended> {
+fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
     let task = task("multifocal", effort, 2)?;
-    let shown = show(&task, [0.0, 1.0], watch)?;
+    let shown = solve_and_evaluate(&task, [0.0, 1.0], watch)?;
     let [least, less] = LEAST;
     let names = ["front", "middle", "back"];
-    let mut outcome = outcome_of(&shown, &names, effort.pick(least, less));
-    outcome.claims.extend(own(&shown, effort.pick(1.0, BLURRED)));
+    let mut outcome = outcome_of(&shown, &names, effort.select(least, less));
+    outcome.claims.extend(own_plane_claims(&shown, effort.select(1.0, BLURRED)));
     Ok(outcome)
 }
 
 /// Every image is more like the picture of its own plane than like that of any other.
-fn own(shown: &Shown, least: f64) -> Vec<Claim> {
+fn own_plane_claims(shown: &EvaluatedField, least: f64) -> Vec<Claim> {
     let images: Vec<_> = shown.seen.iter().filter_map(|seen| seen.image.as_ref()).collect();
     let views = &shown.runner.task().views;
     let off = |a: usize, b: usize| {
-        let pairs = images[a].made.iter().zip(&images[b].wanted);
+        let pairs = images[a].formed.iter().zip(&images[b].target);
         pairs.map(|(made, wanted)| (made - wanted) * (made - wanted)).sum::<f64>()
     };
     let claim = |i: usize| {

@@ -1,7 +1,7 @@
 //! Images that light makes, beside the pictures that are wanted.
 
-use crate::grin_task::Image;
-use crate::picture::{Align, BLACK, Canvas, Color, GREY, grey};
+use crate::grin_task::ViewImage;
+use crate::picture::{BLACK, Canvas, Color, GREY, TextAlign, gray_level};
 
 /// About the side of an image, in pixels of the canvas.
 const SIDE: usize = 384;
@@ -10,31 +10,32 @@ const TOP: f64 = 110.0;
 
 /// The picture that is wanted at the left, what light makes of it at the right, both with white for
 /// the brightest place of the former.
-pub fn view_picture(name: &str, image: &Image, quality: f64) -> Canvas {
+pub fn plot_view(name: &str, image: &ViewImage, quality: f64) -> Canvas {
     let correlation = image.correlation();
     let subtitle = format!("{quality:.1} dB, correlation {correlation:.3}");
-    let panels = [("wanted", &image.wanted), ("made", &image.made)];
-    let peak = image.wanted.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let panels = panels.map(|(title, light)| (title.to_owned(), shades(light, image.pixels, peak)));
-    row(&format!("{name}: {subtitle}"), image.pixels, &panels)
+    let panels = [("wanted", &image.target), ("made", &image.formed)];
+    let peak = image.target.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let panels =
+        panels.map(|(title, light)| (title.to_owned(), gray_levels(light, image.pixels, peak)));
+    draw_row(&format!("{name}: {subtitle}"), image.pixels, &panels)
 }
 
 /// Light as shades of grey, rows from the top.
-pub(super) fn shades(light: &[f64], pixels: usize, peak: f64) -> Vec<Color> {
+pub(super) fn gray_levels(light: &[f64], pixels: usize, peak: f64) -> Vec<Color> {
     let rows = light.chunks(pixels.max(1)).rev();
-    rows.flatten().map(|value| grey(value / peak)).collect()
+    rows.flatten().map(|value| gray_level(value / peak)).collect()
 }
 
 /// Square images side by side, each under its title.
-pub(super) fn row(title: &str, pixels: usize, panels: &[(String, Vec<Color>)]) -> Canvas {
+pub(super) fn draw_row(title: &str, pixels: usize, panels: &[(String, Vec<Color>)]) -> Canvas {
     let cell = (SIDE / pixels.max(1)).max(1);
     let side = (cell * pixels) as f64;
     let width = MARGIN + panels.len() as f64 * (side + MARGIN);
     let mut canvas = Canvas::new([width.max(640.0) as u32, (TOP + side + MARGIN) as u32]);
-    canvas.text([MARGIN, 30.0], title, BLACK, Align::Left);
+    canvas.text([MARGIN, 30.0], title, BLACK, TextAlign::Left);
     for (i, (title, colors)) in panels.iter().enumerate() {
         let left = MARGIN + i as f64 * (side + MARGIN);
-        canvas.text([left + 0.5 * side, TOP - 36.0], title, GREY, Align::Middle);
+        canvas.text([left + 0.5 * side, TOP - 36.0], title, GREY, TextAlign::Middle);
         canvas.raster([left, TOP], pixels, cell, colors);
     }
     canvas

@@ -7,7 +7,8 @@ use std::io::{Result, Write};
 /// The text of a value; what is two levels down starts a line, what is deeper shares it.
 pub fn pretty(value: &impl Serialize) -> String {
     let mut bytes = Vec::new();
-    let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, Lines { depth: 0 });
+    let mut serializer =
+        serde_json::Serializer::with_formatter(&mut bytes, JsonLayout { depth: 0 });
     // Writing to memory fails for no lens; an empty text would be refused on reading.
     if value.serialize(&mut serializer).is_err() {
         return String::new();
@@ -16,11 +17,11 @@ pub fn pretty(value: &impl Serialize) -> String {
     String::from_utf8(bytes).unwrap_or_default()
 }
 
-struct Lines {
+struct JsonLayout {
     depth: usize,
 }
 
-impl Formatter for Lines {
+impl Formatter for JsonLayout {
     fn begin_object<W: ?Sized + Write>(&mut self, to: &mut W) -> Result<()> {
         self.depth += 1;
         to.write_all(b"{")

@@ -18,10 +18,10 @@ mod place;
 
 pub use layout::pretty;
 
-use super::error::{FileError, Malformed};
+use super::error::{FileError, ParseError};
 use crate::lens::{
-    Aperture, Fields, Gradient, Law, Lens, Medium, Object, Pickup, Row, Variable, Wavelength,
-    ZoomPosition,
+    Aperture, Fields, GradientIndex, Lens, Medium, Object, Pickup, ProfileLaw, Row, Variable,
+    Wavelength, ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, Error as _, IgnoredAny, MapAccess, Visitor};
@@ -34,9 +34,9 @@ pub const VERSION: u64 = 1;
 
 /// Reads a lens from the text of a native file; `file` is only for the message.
 pub fn read(text: &str, file: &str) -> Result<Lens, FileError> {
-    let malformed = |error: &serde_json::Error| explain(error, text).of(file);
-    let probe: Probe = serde_json::from_str(text).map_err(|e| malformed(&e))?;
-    probe.check(text).map_err(|wrong| wrong.of(file))?;
+    let malformed = |error: &serde_json::Error| translate_error(error, text).in_file(file);
+    let probe: VersionProbe = serde_json::from_str(text).map_err(|e| malformed(&e))?;
+    probe.check(text).map_err(|wrong| wrong.in_file(file))?;
     let lens: Lens = serde_json::from_str(text).map_err(|e| malformed(&e))?;
     lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
     Ok(lens)
@@ -45,12 +45,12 @@ pub fn read(text: &str, file: &str) -> Result<Lens, FileError> {
 /// Reads any other JSON, with errors that name place, found and expected as those of a lens do.
 pub fn read_json<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, FileError> {
     serde_json::from_str(text).map_err(|error| {
-        let Malformed { place, found, expected } = explain(&error, text);
+        let ParseError { place, found, expected } = translate_error(&error, text);
         // A parser looks at the next sign to find that something cannot be read, and has read all of
         // what lacks a key.
         let keys = place::keys(text, error.line(), error.column(), error.is_syntax());
         let place = if keys.is_empty() { place } else { format!("{place}, {keys}") };
-        Malformed { place, found, expected }.of(file)
+        ParseError { place, found, expected }.in_file(file)
     })
 }
 
@@ -61,40 +61,44 @@ pub fn write(lens: &Lens) -> String {
 
 /// The version alone, so that a newer file is refused for its version and not for its keys.
 #[derive(Deserialize)]
-struct Probe {
+struct VersionProbe {
     #[serde(default)]
     aplanat: Option<serde_json::Value>,
     #[serde(flatten)]
     _rest: IgnoredAny,
 }
 
-impl Probe {
-    fn check(&self, text: &str) -> Result<(), Malformed> {
+impl VersionProbe {
+    fn check(&self, text: &str) -> Result<(), ParseError> {
         let expected = format!("`\"aplanat\": {VERSION}`, the version that this program reads");
         match &self.aplanat {
             Some(version) if version.as_u64() == Some(VERSION) => Ok(()),
             Some(version) => {
                 let line = text.lines().position(|l| l.contains("\"aplanat\"")).unwrap_or(0);
                 let place = format!("line {}", line + 1);
-                Err(Malformed { place, found: format!("`\"aplanat\": {version}`"), expected })
+                Err(ParseError { place, found: format!("`\"aplanat\": {version}`"), expected })
             }
             None => {
                 let found = "no key `aplanat`".to_owned();
-                Err(Malformed { place: "line 1".to_owned(), found, expected })
+                Err(ParseError { place: "line 1".to_owned(), found, expected })
             }
         }
     }
 }
 
 /// Splits the parser's message into place, found and expected.
-fn explain(error: &serde_json::Error, text: &str) -> Malformed {
+fn translate_error(error: &serde_json::Error, text: &str) -> ParseError {
     let position = format!(" at line {} column {}", error.line(), error.column());
     let whole = error.to_string();
     let (element, message) = element(whole.strip_suffix(&position).unwrap_or(&whole));
     let place = format!("line {}, column {}{element}", error.line(), error.column());
     if error.is_eof() {
         let found = "the end of the file".to_owned();
-        return Malformed { place, found, expected: "the rest of it; is it truncated?".to_owned() };
+        return ParseError {
+            place,
+            found,
+            expected: "the rest of it; is it truncated?".to_owned(),
+        };
     }
     if error.is_syntax() {
         let found = word_at(text, error.line(), error.column());
@@ -105,7 +109,7 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
         } else {
             format!("JSON ({message})")
         };
-        return Malformed { place, found, expected };
+        return ParseError { place, found, expected };
     }
     let plain = message.replace("expected f64", "expected a number");
     let plain = plain.strip_prefix("invalid type: ").unwrap_or(&plain);
@@ -117,11 +121,11 @@ fn explain(error: &serde_json::Error, text: &str) -> Malformed {
             .replace("unknown field", "the unknown key")
             .replace("unknown variant", "the unknown name"),
     };
-    Malformed { place, found, expected: in_words(expected) }
+    ParseError { place, found, expected: expected_text(expected) }
 }
 
 /// What the parser expects, without the words of the program's types.
-fn in_words(expected: &str) -> String {
+fn expected_text(expected: &str) -> String {
     match expected {
         of if of.starts_with("struct ") => "an object with its keys: {\"key\": ...}",
         "usize" | "u64" | "u32" => "a whole number, 0 or more",
@@ -161,7 +165,7 @@ fn word_at(text: &str, line: usize, column: usize) -> String {
 /// The keys of a lens.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct LensKeys {
+struct LensJson {
     aplanat: u64,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     name: String,
@@ -198,8 +202,8 @@ fn is_air(medium: &Medium) -> bool {
 
 impl Serialize for Lens {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let Self { object, aperture, focus, .. } = *self;
-        LensKeys {
+        let Self { object, aperture, image_solve: focus, .. } = *self;
+        LensJson {
             aplanat: VERSION,
             name: self.name.clone(),
             source: self.source.clone(),
@@ -221,7 +225,7 @@ impl Serialize for Lens {
 
 impl<'de> Deserialize<'de> for Lens {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let keys = LensKeys::deserialize(from)?;
+        let keys = LensJson::deserialize(from)?;
         if keys.aplanat != VERSION {
             let found = format!("version {}, expected {VERSION}", keys.aplanat);
             return Err(D::Error::custom(found));
@@ -239,7 +243,7 @@ impl<'de> Deserialize<'de> for Lens {
             zoom: keys.zoom,
             variables: keys.variables,
             pickups: keys.pickups,
-            focus: keys.focus,
+            image_solve: keys.focus,
         })
     }
 }
@@ -247,7 +251,7 @@ impl<'de> Deserialize<'de> for Lens {
 /// The keys of a surface. A `radius` is read but never written.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RowKeys {
+struct RowJson {
     #[serde(default, skip_serializing, deserialize_with = "given")]
     radius: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "given")]
@@ -282,7 +286,7 @@ fn is_false(value: &bool) -> bool {
     !*value
 }
 
-impl RowKeys {
+impl RowJson {
     /// One over the radius, whichever of the two is given.
     fn curvature(&self) -> Result<f64, &'static str> {
         match (self.curvature, self.radius) {
@@ -298,7 +302,7 @@ impl RowKeys {
 
 impl Serialize for Row {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        RowKeys {
+        RowJson {
             radius: None,
             curvature: (!is_plain_zero(&self.curvature)).then_some(self.curvature),
             conic: self.conic,
@@ -308,7 +312,7 @@ impl Serialize for Row {
             semi_diameter: self.semi_diameter,
             obstruction: self.obstruction,
             stop: self.stop,
-            hyper: self.hyper,
+            hyper: self.hyperhemisphere,
             comment: self.comment.clone(),
         }
         .serialize(to)
@@ -317,13 +321,13 @@ impl Serialize for Row {
 
 impl<'de> Deserialize<'de> for Row {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        from.deserialize_map(RowText)
+        from.deserialize_map(RowVisitor)
     }
 }
 
-struct RowText;
+struct RowVisitor;
 
-impl<'de> Visitor<'de> for RowText {
+impl<'de> Visitor<'de> for RowVisitor {
     type Value = Row;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -331,7 +335,7 @@ impl<'de> Visitor<'de> for RowText {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Row, A::Error> {
-        let keys = RowKeys::deserialize(MapAccessDeserializer::new(map))?;
+        let keys = RowJson::deserialize(MapAccessDeserializer::new(map))?;
         Ok(Row {
             curvature: keys.curvature().map_err(A::Error::custom)?,
             conic: keys.conic,
@@ -341,7 +345,7 @@ impl<'de> Visitor<'de> for RowText {
             semi_diameter: keys.semi_diameter,
             obstruction: keys.obstruction,
             stop: keys.stop,
-            hyper: keys.hyper,
+            hyperhemisphere: keys.hyper,
             comment: keys.comment,
         })
     }
@@ -350,7 +354,7 @@ impl<'de> Visitor<'de> for RowText {
 /// The keys of an object that is not at infinity.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ObjectKeys {
+struct ObjectJson {
     distance: f64,
 }
 
@@ -358,20 +362,20 @@ impl Serialize for Object {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Infinity => to.serialize_str("infinity"),
-            Self::Finite(distance) => entries(to, &[("distance", *distance)]),
+            Self::Finite(distance) => serialize_numbers(to, &[("distance", *distance)]),
         }
     }
 }
 
 impl<'de> Deserialize<'de> for Object {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        from.deserialize_any(ObjectText)
+        from.deserialize_any(ObjectVisitor)
     }
 }
 
-struct ObjectText;
+struct ObjectVisitor;
 
-impl<'de> Visitor<'de> for ObjectText {
+impl<'de> Visitor<'de> for ObjectVisitor {
     type Value = Object;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -387,7 +391,7 @@ impl<'de> Visitor<'de> for ObjectText {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Object, A::Error> {
-        let keys = ObjectKeys::deserialize(MapAccessDeserializer::new(map))?;
+        let keys = ObjectJson::deserialize(MapAccessDeserializer::new(map))?;
         Ok(Object::Finite(keys.distance))
     }
 }
@@ -395,20 +399,20 @@ impl<'de> Visitor<'de> for ObjectText {
 /// The keys of a medium that is not a name.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MediumKeys {
+struct MediumJson {
     nd: Option<f64>,
     vd: Option<f64>,
     index: Option<f64>,
-    gradient: Option<GradientKeys>,
+    gradient: Option<GradientIndexJson>,
 }
 
 /// The keys of a gradient.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct GradientKeys {
+struct GradientIndexJson {
     base: Medium,
     #[serde(default, skip_serializing_if = "is_index")]
-    of: Law,
+    of: ProfileLaw,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     radial: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -416,19 +420,19 @@ struct GradientKeys {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
-fn is_index(law: &Law) -> bool {
-    *law == Law::Index
+fn is_index(law: &ProfileLaw) -> bool {
+    *law == ProfileLaw::Index
 }
 
-impl From<&Gradient> for GradientKeys {
-    fn from(gradient: &Gradient) -> Self {
-        let Gradient { base, law, radial, axial } = gradient.clone();
+impl From<&GradientIndex> for GradientIndexJson {
+    fn from(gradient: &GradientIndex) -> Self {
+        let GradientIndex { base, law, radial, axial } = gradient.clone();
         Self { base, of: law, radial, axial }
     }
 }
 
-impl From<GradientKeys> for Gradient {
-    fn from(GradientKeys { base, of, radial, axial }: GradientKeys) -> Self {
+impl From<GradientIndexJson> for GradientIndex {
+    fn from(GradientIndexJson { base, of, radial, axial }: GradientIndexJson) -> Self {
         Self { base, law: of, radial, axial }
     }
 }
@@ -439,11 +443,11 @@ impl Serialize for Medium {
             Self::Air => to.serialize_none(),
             Self::Mirror => to.serialize_str("mirror"),
             Self::Glass(name) => to.serialize_str(name),
-            Self::Model { nd, vd } => entries(to, &[("nd", *nd), ("vd", *vd)]),
-            Self::Index(index) => entries(to, &[("index", *index)]),
-            Self::Gradient(gradient) => {
+            Self::Model { nd, vd } => serialize_numbers(to, &[("nd", *nd), ("vd", *vd)]),
+            Self::Index(index) => serialize_numbers(to, &[("index", *index)]),
+            Self::Grin(gradient) => {
                 let mut map = to.serialize_map(Some(1))?;
-                map.serialize_entry("gradient", &GradientKeys::from(&**gradient))?;
+                map.serialize_entry("gradient", &GradientIndexJson::from(&**gradient))?;
                 map.end()
             }
         }
@@ -451,7 +455,7 @@ impl Serialize for Medium {
 }
 
 /// An object of numbers.
-fn entries<S: Serializer>(to: S, numbers: &[(&str, f64)]) -> Result<S::Ok, S::Error> {
+fn serialize_numbers<S: Serializer>(to: S, numbers: &[(&str, f64)]) -> Result<S::Ok, S::Error> {
     let mut map = to.serialize_map(Some(numbers.len()))?;
     numbers.iter().try_for_each(|(key, value)| map.serialize_entry(key, value))?;
     map.end()
@@ -459,13 +463,13 @@ fn entries<S: Serializer>(to: S, numbers: &[(&str, f64)]) -> Result<S::Ok, S::Er
 
 impl<'de> Deserialize<'de> for Medium {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        from.deserialize_any(MediumText)
+        from.deserialize_any(MediumVisitor)
     }
 }
 
-struct MediumText;
+struct MediumVisitor;
 
-impl<'de> Visitor<'de> for MediumText {
+impl<'de> Visitor<'de> for MediumVisitor {
     type Value = Medium;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -484,11 +488,11 @@ impl<'de> Visitor<'de> for MediumText {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Medium, A::Error> {
-        let keys = MediumKeys::deserialize(MapAccessDeserializer::new(map))?;
+        let keys = MediumJson::deserialize(MapAccessDeserializer::new(map))?;
         match (keys.nd, keys.vd, keys.index, keys.gradient) {
             (Some(nd), Some(vd), None, None) => Ok(Medium::Model { nd, vd }),
             (None, None, Some(index), None) => Ok(Medium::Index(index)),
-            (None, None, None, Some(keys)) => Ok(Medium::Gradient(Box::new(keys.into()))),
+            (None, None, None, Some(keys)) => Ok(Medium::Grin(Box::new(keys.into()))),
             _ => Err(A::Error::custom(
                 "a glass with other keys, expected {\"nd\", \"vd\"}, {\"index\"} or \
                  {\"gradient\"}",
@@ -540,11 +544,11 @@ mod tests {
         lens.object_medium = Medium::Index(1.33);
         lens.surfaces[0].conic = -0.0;
         lens.surfaces[0].curvature = 5e-324;
-        lens.surfaces[0].hyper = true;
+        lens.surfaces[0].hyperhemisphere = true;
         lens.surfaces[0].obstruction = Some(0.1 + 0.7);
         lens.surfaces[1].obstruction = Some(0.0);
         lens.surfaces[2].asphere = vec![0.1 + 0.2, -1.2345678901234567e-19];
-        lens.focus = Some(0.0);
+        lens.image_solve = Some(0.0);
         let gap = ZoomThickness { surface: 0, thickness: 1e23 };
         let aperture = Some(Aperture::FNumber(2.0));
         lens.zoom = vec![ZoomPosition {

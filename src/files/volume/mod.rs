@@ -10,8 +10,8 @@ mod npz;
 mod raw;
 
 use super::FileError;
-use super::error::Malformed;
-use crate::grin::field::Grid;
+use super::error::ParseError;
+use crate::grin::field::RegularGrid;
 use crate::math::Vec3;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Volume {
     /// Where the nodes stand, in mm.
-    pub grid: Grid<f64>,
+    pub grid: RegularGrid<f64>,
     /// A value for each node, in the order of the grid.
     pub values: Vec<f64>,
 }
@@ -33,20 +33,20 @@ pub fn read_volume(path: &Path) -> Result<Volume, FileError> {
     let bytes = std::fs::read(path)
         .map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
     if bytes.starts_with(b"PK") {
-        return npz::read(&bytes).map_err(|malformed| malformed.of(&file));
+        return npz::read(&bytes).map_err(|malformed| malformed.in_file(&file));
     }
     let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
     if first != Some(&b'{') {
-        let (place, found) = ("its beginning".to_owned(), beginning(&bytes));
+        let (place, found) = ("its beginning".to_owned(), describe_start(&bytes));
         let expected = "NumPy's .npz, an archive that begins with `PK`, or a header of a volume, \
             JSON that begins with `{`";
-        return Err(Malformed { place, found, expected: expected.to_owned() }.of(&file));
+        return Err(ParseError { place, found, expected: expected.to_owned() }.in_file(&file));
     }
     raw::read(path, &bytes)
 }
 
 /// What a file seems to be that is no volume.
-fn beginning(bytes: &[u8]) -> String {
+fn describe_start(bytes: &[u8]) -> String {
     let start = &bytes[..bytes.len().min(16)];
     match std::str::from_utf8(start) {
         _ if bytes.is_empty() => "an empty file".to_owned(),
@@ -74,20 +74,20 @@ pub fn write_volume(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileEr
 }
 
 /// The volume of these numbers; `place` is where they stand.
-fn volume(
+fn checked_volume(
     counts: [usize; 3],
     low: [f64; 3],
     spacing: [f64; 3],
     values: Vec<f64>,
     place: &str,
-) -> Result<Volume, Malformed> {
+) -> Result<Volume, ParseError> {
     let vector = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
     let wrong = |found: String| {
         let expected = "one finite value for each node".to_owned();
-        Err(Malformed { place: place.to_owned(), found, expected })
+        Err(ParseError { place: place.to_owned(), found, expected })
     };
-    match Grid::new(counts, vector(low), vector(spacing)) {
-        Ok(grid) if counts.contains(&0) || grid.nodes() != values.len() => {
+    match RegularGrid::new(counts, vector(low), vector(spacing)) {
+        Ok(grid) if counts.contains(&0) || grid.node_count() != values.len() => {
             wrong(format!("{} values for {counts:?} nodes", values.len()))
         }
         Ok(grid) => match values.iter().position(|value| !value.is_finite()) {
@@ -98,7 +98,7 @@ fn volume(
             }
             None => Ok(Volume { grid, values }),
         },
-        Err(error) => Err(Malformed {
+        Err(error) => Err(ParseError {
             place: place.to_owned(),
             found: error.to_string(),
             expected: "a positive spacing".to_owned(),

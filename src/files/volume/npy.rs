@@ -1,11 +1,11 @@
 //! One array in `NumPy`'s format (NEP 1): a magic string, a header that is a Python dictionary, and the
 //! numbers.
 
-use crate::files::error::Malformed;
+use crate::files::error::ParseError;
 
 /// An array of numbers, the last index running fastest.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Array {
+pub(super) struct NpyArray {
     pub(super) shape: Vec<usize>,
     pub(super) values: Vec<f64>,
 }
@@ -13,24 +13,24 @@ pub(super) struct Array {
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// Reads an array; `name` is what it is called in its file.
-pub(super) fn read(name: &str, bytes: &[u8]) -> Result<Array, Malformed> {
-    let wrong = |found: String, expected: &str| Malformed {
+pub(super) fn read(name: &str, bytes: &[u8]) -> Result<NpyArray, ParseError> {
+    let wrong = |found: String, expected: &str| ParseError {
         place: format!("array {name}"),
         found,
         expected: expected.to_owned(),
     };
-    let (header, data) =
-        split(bytes).ok_or_else(|| wrong("no header of an array".into(), "NumPy's .npy format"))?;
-    let entry = |key| entry(header, key).unwrap_or_default();
+    let (header, data) = split_header(bytes)
+        .ok_or_else(|| wrong("no header of an array".into(), "NumPy's .npy format"))?;
+    let entry = |key| header_entry(header, key).unwrap_or_default();
     let kind = entry("descr").trim_matches(['\'', '"']);
     let numbers: Vec<f64> = match kind {
-        "<f8" => chunks(data, f64::from_le_bytes),
-        "<f4" => chunks(data, |b| f64::from(f32::from_le_bytes(b))),
-        "<i8" => chunks(data, |b| i64::from_le_bytes(b) as f64),
-        "<i4" => chunks(data, |b| f64::from(i32::from_le_bytes(b))),
+        "<f8" => decode(data, f64::from_le_bytes),
+        "<f4" => decode(data, |b| f64::from(f32::from_le_bytes(b))),
+        "<i8" => decode(data, |b| i64::from_le_bytes(b) as f64),
+        "<i4" => decode(data, |b| f64::from(i32::from_le_bytes(b))),
         _ => return Err(wrong(format!("numbers of type {kind}"), "<f8, <f4, <i8 or <i4")),
     };
-    let shape = shape(entry("shape"))
+    let shape = parse_shape(entry("shape"))
         .ok_or_else(|| wrong(format!("shape {}", entry("shape")), "a tuple of counts"))?;
     let count = shape.iter().try_fold(1_usize, |product, n| product.checked_mul(*n));
     if count != Some(numbers.len()) {
@@ -40,12 +40,12 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<Array, Malformed> {
         ));
     }
     let values =
-        if entry("fortran_order") == "True" { reversed(&shape, &numbers) } else { numbers };
-    Ok(Array { shape, values })
+        if entry("fortran_order") == "True" { to_row_major(&shape, &numbers) } else { numbers };
+    Ok(NpyArray { shape, values })
 }
 
 /// The header and the numbers.
-fn split(bytes: &[u8]) -> Option<(&str, &[u8])> {
+fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (version, rest) = rest.split_at_checked(2)?;
     // Version 1 counts the bytes of its header with 2 bytes, later ones with 4.
@@ -61,26 +61,26 @@ fn split(bytes: &[u8]) -> Option<(&str, &[u8])> {
 }
 
 /// The text of an entry of a dictionary of strings, words and tuples.
-fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
+fn header_entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, rest) = header.split_once(&format!("'{key}'"))?;
     let rest = rest.trim_start().strip_prefix(':')?.trim_start();
     let end = if rest.starts_with('(') { rest.find(')')? + 1 } else { rest.find([',', '}'])? };
     Some(rest[..end].trim())
 }
 
-fn shape(tuple: &str) -> Option<Vec<usize>> {
+fn parse_shape(tuple: &str) -> Option<Vec<usize>> {
     let inner = tuple.strip_prefix('(')?.strip_suffix(')')?;
     let counts = inner.split(',').map(str::trim).filter(|count| !count.is_empty());
     counts.map(|count| count.parse().ok()).collect()
 }
 
-fn chunks<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+fn decode<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
     let (whole, _) = data.as_chunks::<N>();
     whole.iter().map(|bytes| number(*bytes)).collect()
 }
 
 /// Numbers whose first index runs fastest, with the last running fastest.
-fn reversed(shape: &[usize], numbers: &[f64]) -> Vec<f64> {
+fn to_row_major(shape: &[usize], numbers: &[f64]) -> Vec<f64> {
     let place = |mut n: usize| {
         let (mut at, mut stride) = (0, numbers.len());
         for count in shape.iter().rev() {

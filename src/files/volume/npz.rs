@@ -1,37 +1,37 @@
 //! A volume in `NumPy`'s `.npz`: an archive of the arrays `index`, `low` and `spacing`.
 
-use super::npy::{self, Array};
-use super::{Volume, volume};
+use super::npy::{self, NpyArray};
+use super::{Volume, checked_volume};
 use crate::files::FileError;
-use crate::files::error::Malformed;
-use crate::files::replace;
+use crate::files::error::ParseError;
+use crate::files::write_atomic;
 use std::io::{Cursor, Read as _, Write as _};
 use std::path::Path;
 use zip::result::ZipResult;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-pub(super) fn read(bytes: &[u8]) -> Result<Volume, Malformed> {
-    let index = array(bytes, "index")?;
-    let (low, spacing) = (triple(bytes, "low")?, triple(bytes, "spacing")?);
+pub(super) fn read(bytes: &[u8]) -> Result<Volume, ParseError> {
+    let index = read_array(bytes, "index")?;
+    let (low, spacing) = (read_triple(bytes, "low")?, read_triple(bytes, "spacing")?);
     let [nz, ny, nx] = index.shape[..] else {
-        return Err(Malformed {
+        return Err(ParseError {
             place: "array index".to_owned(),
             found: format!("shape {:?}", index.shape),
             expected: "three axes: z, y, x".to_owned(),
         });
     };
-    volume([nx, ny, nz], low, spacing, index.values, "array index")
+    checked_volume([nx, ny, nz], low, spacing, index.values, "array index")
 }
 
-fn array(bytes: &[u8], name: &str) -> Result<Array, Malformed> {
+fn read_array(bytes: &[u8], name: &str) -> Result<NpyArray, ParseError> {
     let content = || -> ZipResult<Vec<u8>> {
         let mut archive = ZipArchive::new(Cursor::new(bytes))?;
         let mut content = Vec::new();
         archive.by_name(&format!("{name}.npy"))?.read_to_end(&mut content)?;
         Ok(content)
     };
-    let content = content().map_err(|error| Malformed {
+    let content = content().map_err(|error| ParseError {
         place: format!("array {name}"),
         found: error.to_string(),
         expected: "the arrays index, low and spacing".to_owned(),
@@ -39,9 +39,9 @@ fn array(bytes: &[u8], name: &str) -> Result<Array, Malformed> {
     npy::read(name, &content)
 }
 
-fn triple(bytes: &[u8], name: &str) -> Result<[f64; 3], Malformed> {
-    let values = array(bytes, name)?.values;
-    values.try_into().map_err(|values: Vec<f64>| Malformed {
+fn read_triple(bytes: &[u8], name: &str) -> Result<[f64; 3], ParseError> {
+    let values = read_array(bytes, name)?.values;
+    values.try_into().map_err(|values: Vec<f64>| ParseError {
         place: format!("array {name}"),
         found: format!("{} numbers", values.len()),
         expected: "three: x, y, z".to_owned(),
@@ -53,7 +53,7 @@ pub(super) fn write(path: &Path, volume: &Volume) -> Result<(), FileError> {
         file: path.display().to_string(),
         source: error.into(),
     })?;
-    replace(path, &bytes)
+    write_atomic(path, &bytes)
 }
 
 fn archive(volume: &Volume) -> ZipResult<Vec<u8>> {

@@ -4,17 +4,17 @@
 //! kept, becomes one of the index by `"scale": -1.176e-6, "offset": 1.0003`. Left out, they are 1 and
 //! 0, and the numbers are the values themselves.
 
-use super::{Volume, volume};
+use super::{Volume, checked_volume};
 use crate::files::FileError;
-use crate::files::error::Malformed;
-use crate::files::replace;
+use crate::files::error::ParseError;
+use crate::files::write_atomic;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// What the numbers mean.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
+struct RawHeader {
     /// The version of this format: 1.
     aplanat_volume: u32,
     /// Nodes along x, y and z.
@@ -24,7 +24,7 @@ struct Header {
     /// Between neighbours along x, y and z, in mm.
     spacing: [f64; 3],
     /// How a number is written.
-    numbers: Numbers,
+    numbers: SampleFormat,
     /// The value where the number is 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     offset: f64,
@@ -52,7 +52,7 @@ fn is_zero(value: &f64) -> bool {
 /// How a number is written, with its lowest byte first.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Numbers {
+enum SampleFormat {
     /// `NumPy`'s `uint8`.
     U8,
     /// `NumPy`'s `<u2`.
@@ -63,7 +63,7 @@ enum Numbers {
     F64,
 }
 
-impl Numbers {
+impl SampleFormat {
     fn bytes(self) -> usize {
         match self {
             Self::U8 => 1,
@@ -90,41 +90,41 @@ fn each<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f6
 
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Volume, FileError> {
     let file = path.display().to_string();
-    let header: Header = serde_json::from_slice(bytes).map_err(|error| {
+    let header: RawHeader = serde_json::from_slice(bytes).map_err(|error| {
         let place = format!("line {}, column {}", error.line(), error.column());
         let expected = "a header of a volume, or NumPy's .npz".to_owned();
-        Malformed { place, found: error.to_string(), expected }.of(&file)
+        ParseError { place, found: error.to_string(), expected }.in_file(&file)
     })?;
     if header.aplanat_volume != 1 {
         let found = format!("version {}", header.aplanat_volume);
         let place = "aplanat_volume".to_owned();
-        return Err(Malformed { place, found, expected: "1".to_owned() }.of(&file));
+        return Err(ParseError { place, found, expected: "1".to_owned() }.in_file(&file));
     }
     let data = path.with_file_name(&header.data);
     let bytes = std::fs::read(&data)
         .map_err(|source| FileError::Unreadable { file: data.display().to_string(), source })?;
-    let Header { numbers, offset, scale, .. } = header;
+    let RawHeader { numbers, offset, scale, .. } = header;
     let place = header.data.display().to_string();
     if bytes.len() % numbers.bytes() != 0 {
         let found = format!("{} bytes", bytes.len());
         let expected = format!("a whole number of values of {} bytes", numbers.bytes());
-        return Err(Malformed { place, found, expected }.of(&file));
+        return Err(ParseError { place, found, expected }.in_file(&file));
     }
     let values = numbers.read(&bytes).into_iter().map(|number| offset + scale * number).collect();
-    volume(header.counts, header.low, header.spacing, values, &place)
-        .map_err(|malformed| malformed.of(&file))
+    checked_volume(header.counts, header.low, header.spacing, values, &place)
+        .map_err(|malformed| malformed.in_file(&file))
 }
 
 /// Writes a header and the numbers beside it: both files.
 pub(super) fn write(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
     let data = path.with_extension("raw");
     let (low, spacing) = (volume.grid.low(), volume.grid.spacing());
-    let header = Header {
+    let header = RawHeader {
         aplanat_volume: 1,
         counts: volume.grid.counts(),
         low: [low.x, low.y, low.z],
         spacing: [spacing.x, spacing.y, spacing.z],
-        numbers: Numbers::F64,
+        numbers: SampleFormat::F64,
         offset: 0.0,
         scale: 1.0,
         data: data.file_name().map(PathBuf::from).unwrap_or_default(),
@@ -134,7 +134,7 @@ pub(super) fn write(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileEr
         source: error.into(),
     })?;
     let bytes: Vec<u8> = volume.values.iter().flat_map(|value| value.to_le_bytes()).collect();
-    replace(&data, &bytes)?;
-    replace(path, format!("{text}\n").as_bytes())?;
+    write_atomic(&data, &bytes)?;
+    write_atomic(path, format!("{text}\n").as_bytes())?;
     Ok(vec![path.to_owned(), data])
 }

@@ -1,18 +1,18 @@
 //! Coordinate breaks: a run of them that puts the axis back where it was changes no ray and is
 //! read as planes; any other is refused.
 
-use super::draft::Surface;
-use crate::files::error::Malformed;
+use super::draft::ZemaxSurface;
+use crate::files::error::ParseError;
 use nalgebra::{Rotation3, Vector3};
 
 /// Whether this is a coordinate break.
-pub(super) fn is_break(surface: &Surface) -> bool {
+pub(super) fn is_break(surface: &ZemaxSurface) -> bool {
     surface.kind.0 == "COORDBRK"
 }
 
 /// Refuses the breaks that move or tilt the axis.
-pub(super) fn check(surfaces: &[Surface]) -> Result<(), Malformed> {
-    let mut frame = Frame::default();
+pub(super) fn check_breaks(surfaces: &[ZemaxSurface]) -> Result<(), ParseError> {
+    let mut frame = AxisFrame::default();
     let mut first = None;
     for (number, surface) in surfaces.iter().enumerate() {
         if is_break(surface) {
@@ -25,29 +25,29 @@ pub(super) fn check(surfaces: &[Surface]) -> Result<(), Malformed> {
         if !frame.is_identity() {
             let found = format!("surface {start}, a coordinate break that the next does not undo");
             let expected = "surfaces that are centred on the axis".to_owned();
-            return Err(Malformed { place: format!("line {}", at.kind.1), found, expected });
+            return Err(ParseError { place: format!("line {}", at.kind.1), found, expected });
         }
-        (frame, first) = (Frame::default(), None);
+        (frame, first) = (AxisFrame::default(), None);
     }
     Ok(())
 }
 
 /// Where the axes of the present frame are in the frame before the run: `p = R q + d`.
-struct Frame {
+struct AxisFrame {
     rotation: Rotation3<f64>,
     shift: Vector3<f64>,
 }
 
-impl Default for Frame {
+impl Default for AxisFrame {
     fn default() -> Self {
         Self { rotation: Rotation3::identity(), shift: Vector3::zeros() }
     }
 }
 
-impl Frame {
+impl AxisFrame {
     /// Parameters: 1, 2 decentre; 3, 4, 5 tilts about x, y, z in degrees; 6 zero where the
     /// decentre comes first and the tilts in this order, else the reverse.
-    fn apply(&mut self, surface: &Surface) {
+    fn apply(&mut self, surface: &ZemaxSurface) {
         let value = |index| {
             let found = surface.parameters.iter().rfind(|(i, ..)| *i == index);
             found.map_or(0.0, |(_, value, _)| *value)
@@ -76,13 +76,13 @@ impl Frame {
 mod tests {
     use super::*;
 
-    fn coordinate_break(parameters: [f64; 6]) -> Surface {
+    fn coordinate_break(parameters: [f64; 6]) -> ZemaxSurface {
         let numbered = (1..).zip(parameters).map(|(i, value)| (i, value, 0)).collect();
-        Surface {
+        ZemaxSurface {
             kind: ("COORDBRK".to_owned(), 7),
             parameters: numbered,
             thickness: Some((0.0, 8)),
-            ..Surface::default()
+            ..ZemaxSurface::default()
         }
     }
 
@@ -90,20 +90,21 @@ mod tests {
     fn a_break_and_its_inverse_cancel() {
         let there = coordinate_break([1.0, -2.0, 10.0, 20.0, 30.0, 0.0]);
         let back = coordinate_break([-1.0, 2.0, -10.0, -20.0, -30.0, 1.0]);
-        assert!(check(&[there, back]).is_ok());
-        assert!(check(&[coordinate_break([0.0; 6])]).is_ok());
+        assert!(check_breaks(&[there, back]).is_ok());
+        assert!(check_breaks(&[coordinate_break([0.0; 6])]).is_ok());
     }
 
     #[test]
     fn a_break_that_stays_is_refused() {
         let there = || coordinate_break([0.0, 0.0, 45.0, 0.0, 0.0, 0.0]);
-        let error = check(&[Surface::default(), there(), Surface::default()]).unwrap_err();
+        let error =
+            check_breaks(&[ZemaxSurface::default(), there(), ZemaxSurface::default()]).unwrap_err();
         assert_eq!(error.place, "line 7");
         assert!(error.found.contains("surface 1"));
         // With a surface between them the two tilt that surface.
         let back = || coordinate_break([0.0, 0.0, -45.0, 0.0, 0.0, 1.0]);
-        assert!(check(&[there(), Surface::default(), back()]).is_err());
+        assert!(check_breaks(&[there(), ZemaxSurface::default(), back()]).is_err());
         let same_order = coordinate_break([1.0, 0.0, -45.0, 0.0, 0.0, 0.0]);
-        assert!(check(&[there(), same_order]).is_err());
+        assert!(check_breaks(&[there(), same_order]).is_err());
     }
 }

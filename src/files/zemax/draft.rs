@@ -2,7 +2,7 @@
 
 /// Everything in a file that a lens can be made of.
 #[derive(Debug)]
-pub(super) struct Draft {
+pub(super) struct ZemaxFile {
     /// Millimetres per unit.
     pub(super) unit: f64,
     pub(super) name: String,
@@ -12,13 +12,13 @@ pub(super) struct Draft {
     pub(super) waves: WaveLines,
     /// Names of glass catalogues, in the order in which they are searched.
     pub(super) catalogues: Vec<String>,
-    pub(super) surfaces: Vec<Surface>,
+    pub(super) surfaces: Vec<ZemaxSurface>,
     /// How many configurations there are.
     pub(super) configurations: usize,
-    pub(super) operands: Vec<Operand>,
+    pub(super) operands: Vec<ConfigurationOperand>,
 }
 
-impl Default for Draft {
+impl Default for ZemaxFile {
     fn default() -> Self {
         Self {
             unit: 1.0,
@@ -72,7 +72,7 @@ pub(super) struct WaveLines {
 
 /// One surface block.
 #[derive(Debug, Default)]
-pub(super) struct Surface {
+pub(super) struct ZemaxSurface {
     /// The line of its `SURF`.
     pub(super) line: usize,
     pub(super) stop: Option<usize>,
@@ -88,7 +88,7 @@ pub(super) struct Surface {
     /// Infinite for the word, and the line.
     pub(super) thickness: Option<(f64, usize)>,
     pub(super) glass: Option<GlassLine>,
-    pub(super) semi_diameter: Option<SemiDiameter>,
+    pub(super) semi_diameter: Option<SemiDiameterLine>,
     /// The radius outside which a circular aperture cuts, and its line.
     pub(super) clip: Option<(f64, usize)>,
     /// The radius inside which an aperture or an obscuration cuts, and its line.
@@ -122,7 +122,7 @@ pub(super) struct PickupLine {
 
 /// A semi-diameter and how it came about.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SemiDiameter {
+pub(super) struct SemiDiameterLine {
     pub(super) value: f64,
     /// Whether a person fixed it; else the program computed it.
     pub(super) fixed: bool,
@@ -148,7 +148,7 @@ pub(super) struct GlassLine {
 
 /// One value of the multi-configuration table.
 #[derive(Debug, Clone)]
-pub(super) struct Operand {
+pub(super) struct ConfigurationOperand {
     pub(super) name: String,
     /// Surface or field.
     pub(super) target: usize,

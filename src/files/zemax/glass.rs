@@ -4,59 +4,59 @@
 //! Index and Abbe number on the line may be placeholders and count only where no catalogue has
 //! the name.
 
-use super::draft::{GlassLine, Surface};
-use crate::files::error::Malformed;
-use crate::files::report::Outcome;
+use super::draft::{GlassLine, ZemaxSurface};
+use crate::files::error::ParseError;
+use crate::files::report::ConversionOutcome;
 use crate::lens::Medium;
 use crate::lens::glass::{self, Glass};
 
 /// A medium, how faithful it is, and why.
-pub(super) type Found = (Medium, Outcome, String);
+pub(super) type ImportedMedium = (Medium, ConversionOutcome, String);
 
 /// The medium behind surface `number`.
 pub(super) fn medium(
-    surfaces: &[Surface],
+    surfaces: &[ZemaxSurface],
     number: usize,
     catalogues: &[String],
-) -> Result<Found, Malformed> {
+) -> Result<ImportedMedium, ParseError> {
     let mut at = number;
     // A glass may be picked up from a surface that picks it up itself.
     for _ in 0..=surfaces.len() {
         let line = surfaces.get(at).and_then(|surface| surface.glass.as_ref());
         match line {
-            None => return Ok((Medium::Air, Outcome::Used, String::new())),
+            None => return Ok((Medium::Air, ConversionOutcome::Used, String::new())),
             Some(line) if line.code == 2 => at = line.source.unwrap_or(usize::MAX),
-            Some(line) => return named(line, catalogues),
+            Some(line) => return resolve_glass(line, catalogues),
         }
     }
     let line = surfaces[number].glass.as_ref().map_or(0, |glass| glass.line);
     let found = format!("surface {number}, whose glass is picked up in a circle");
-    Err(wrong(line, found, "a pickup that ends at a glass"))
+    Err(malformed_glass(line, found, "a pickup that ends at a glass"))
 }
 
-fn wrong(line: usize, found: String, expected: &str) -> Malformed {
-    Malformed { place: format!("line {line}"), found, expected: expected.to_owned() }
+fn malformed_glass(line: usize, found: String, expected: &str) -> ParseError {
+    ParseError { place: format!("line {line}"), found, expected: expected.to_owned() }
 }
 
-fn named(line: &GlassLine, catalogues: &[String]) -> Result<Found, Malformed> {
+fn resolve_glass(line: &GlassLine, catalogues: &[String]) -> Result<ImportedMedium, ParseError> {
     let name = line.name.to_ascii_uppercase();
     match (name.as_str(), line.code) {
-        ("MIRROR", _) => return Ok((Medium::Mirror, Outcome::Used, String::new())),
-        ("AIR" | "", _) => return Ok((Medium::Air, Outcome::Used, String::new())),
-        (_, 1) => return Ok(model(line)),
-        _ if name.starts_with("___BLANK") => return Ok(model(line)),
+        ("MIRROR", _) => return Ok((Medium::Mirror, ConversionOutcome::Used, String::new())),
+        ("AIR" | "", _) => return Ok((Medium::Air, ConversionOutcome::Used, String::new())),
+        (_, 1) => return Ok(model_medium(line)),
+        _ if name.starts_with("___BLANK") => return Ok(model_medium(line)),
         _ => {}
     }
-    let exact = in_catalogues(&name, catalogues);
-    let found = exact.map(|glass| (glass, true)).or_else(|| similar(line, catalogues));
+    let exact = find_in_catalogues(&name, catalogues);
+    let found = exact.map(|glass| (glass, true)).or_else(|| find_similar(line, catalogues));
     match found {
-        Some((glass, exact)) => Ok(offset(line, glass, exact)),
-        None => fallback(line),
+        Some((glass, exact)) => Ok(catalogue_medium(line, glass, exact)),
+        None => unlisted_medium(line),
     }
 }
 
 /// The glass of that name, in the first of the catalogues that has it, or in the only one.
-fn in_catalogues(name: &str, catalogues: &[String]) -> Option<&'static Glass> {
+fn find_in_catalogues(name: &str, catalogues: &[String]) -> Option<&'static Glass> {
     let listed = catalogues.iter().find_map(|catalogue| {
         // `OHARA_2021-04` is a state of the catalogue `OHARA`.
         let maker = catalogue.split(['_', '-']).next().unwrap_or_default();
@@ -69,63 +69,64 @@ fn in_catalogues(name: &str, catalogues: &[String]) -> Option<&'static Glass> {
 const PREFIXES: [&str; 5] = ["N-", "S-", "H-", "E-", "J-"];
 
 /// A glass of nearly that name, if the line's own index, where it has one, agrees.
-fn similar(line: &GlassLine, catalogues: &[String]) -> Option<(&'static Glass, bool)> {
+fn find_similar(line: &GlassLine, catalogues: &[String]) -> Option<(&'static Glass, bool)> {
     let name = line.name.to_ascii_uppercase();
-    let with = |prefix: &&str| in_catalogues(&format!("{prefix}{name}"), catalogues);
+    let with = |prefix: &&str| find_in_catalogues(&format!("{prefix}{name}"), catalogues);
     let letters = |name: &str| -> String {
         name.chars().filter(char::is_ascii_alphanumeric).flat_map(char::to_uppercase).collect()
     };
     let spelled = || glass::catalogue().iter().find(|g| letters(&g.name) == letters(&name));
     let found = PREFIXES.iter().find_map(with).or_else(spelled)?;
-    let agrees = placeholder(line) || (found.nd - line.nd).abs() < 1e-3;
+    let agrees = is_placeholder(line) || (found.nd - line.nd).abs() < 1e-3;
     agrees.then_some((found, false))
 }
 
 /// Whether index and Abbe number on the line say nothing.
-fn placeholder(line: &GlassLine) -> bool {
+fn is_placeholder(line: &GlassLine) -> bool {
     line.nd <= 1.0 || (line.nd, line.vd) == (1.5, 40.0)
 }
 
-fn model(line: &GlassLine) -> Found {
+fn model_medium(line: &GlassLine) -> ImportedMedium {
     let medium = if line.vd == 0.0 {
         Medium::Index(line.nd)
     } else {
         Medium::Model { nd: line.nd, vd: line.vd }
     };
     if line.partial == 0.0 {
-        (medium, Outcome::Used, String::new())
+        (medium, ConversionOutcome::Used, String::new())
     } else {
         let note = "the deviation of the partial dispersion is taken as 0";
-        (medium, Outcome::Approximated, note.to_owned())
+        (medium, ConversionOutcome::Approximated, note.to_owned())
     }
 }
 
 /// The catalogue glass; for code 4 a model glass with what is added to its nd and vd.
-fn offset(line: &GlassLine, glass: &Glass, exact: bool) -> Found {
+fn catalogue_medium(line: &GlassLine, glass: &Glass, exact: bool) -> ImportedMedium {
     let full = glass.full_name();
     if line.code == 4 && line.offsets != (0.0, 0.0) {
         let (nd, vd) = (glass.nd + line.offsets.0, glass.vd + line.offsets.1);
         let note = format!("{full} with its offsets as the model glass nd {nd}, vd {vd}");
-        return (Medium::Model { nd, vd }, Outcome::Approximated, note);
+        return (Medium::Model { nd, vd }, ConversionOutcome::Approximated, note);
     }
     let medium = Medium::Glass(full.clone());
     if !exact {
         let note = format!("{full} in place of {}", line.name);
-        return (medium, Outcome::Approximated, note);
+        return (medium, ConversionOutcome::Approximated, note);
     }
-    let far = !placeholder(line) && (glass.nd - line.nd).abs() > 5e-4;
+    let far = !is_placeholder(line) && (glass.nd - line.nd).abs() > 5e-4;
     if far {
         let note = format!("{full} has nd {}, the file says {}", glass.nd, line.nd);
-        return (medium, Outcome::Approximated, note);
+        return (medium, ConversionOutcome::Approximated, note);
     }
-    (medium, Outcome::Used, full)
+    (medium, ConversionOutcome::Used, full)
 }
 
 /// A glass that no catalogue has: its index on the line, or the one in its name.
-fn fallback(line: &GlassLine) -> Result<Found, Malformed> {
-    let numbers = if placeholder(line) { code(&line.name) } else { Some((line.nd, line.vd)) };
+fn unlisted_medium(line: &GlassLine) -> Result<ImportedMedium, ParseError> {
+    let numbers =
+        if is_placeholder(line) { six_digit_code(&line.name) } else { Some((line.nd, line.vd)) };
     let Some((nd, vd)) = numbers else {
-        let similar = glass::similar(&line.name);
+        let similar = glass::similar_names(&line.name);
         let hint = if similar.is_empty() {
             String::new()
         } else {
@@ -133,11 +134,11 @@ fn fallback(line: &GlassLine) -> Result<Found, Malformed> {
         };
         let found = format!("the unknown glass `{}` without an index on its line", line.name);
         let expected = format!("a catalogue glass, or one with nd and vd{hint}");
-        return Err(wrong(line.line, found, &expected));
+        return Err(malformed_glass(line.line, found, &expected));
     };
     let medium = if vd == 0.0 { Medium::Index(nd) } else { Medium::Model { nd, vd } };
     let note = format!("no catalogue has {}: the model glass nd {nd}, vd {vd}", line.name);
-    Ok((medium, Outcome::Approximated, note))
+    Ok((medium, ConversionOutcome::Approximated, note))
 }
 
 /// Whether the glass is no maker's own: crystals, fused silica, plastics.
@@ -146,7 +147,7 @@ pub(super) fn is_general(glass: &Glass) -> bool {
 }
 
 /// `517642` and `517.642`: nd 1.517, vd 64.2.
-fn code(name: &str) -> Option<(f64, f64)> {
+fn six_digit_code(name: &str) -> Option<(f64, f64)> {
     let digits: String = name.chars().filter(|c| *c != '.').collect();
     if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_digit()) {
         return None;
@@ -175,8 +176,8 @@ mod tests {
         }
     }
 
-    fn found(line: GlassLine) -> Result<Found, Malformed> {
-        let surface = Surface { glass: Some(line), ..Surface::default() };
+    fn found(line: GlassLine) -> Result<ImportedMedium, ParseError> {
+        let surface = ZemaxSurface { glass: Some(line), ..ZemaxSurface::default() };
         medium(&[surface], 0, &["OHARA".to_owned(), "SCHOTT".to_owned()])
     }
 
@@ -187,9 +188,9 @@ mod tests {
     #[test]
     fn names_are_found_in_the_catalogues() {
         let (medium, outcome, _) = found(line("N-BK7", 0, 1.5, 40.0)).unwrap();
-        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), Outcome::Used));
+        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), ConversionOutcome::Used));
         let (medium, outcome, note) = found(line("BK7", 0, 1.5168, 64.17)).unwrap();
-        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), Outcome::Approximated));
+        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), ConversionOutcome::Approximated));
         assert_eq!(note, "SCHOTT N-BK7 in place of BK7");
         let (medium, ..) = found(line("n-bk7", 3, 0.0, 0.0)).unwrap();
         assert_eq!(medium, glass("SCHOTT N-BK7"));
@@ -217,13 +218,16 @@ mod tests {
         let (medium, outcome, _) = found(shifted).unwrap();
         let bk7 = glass::find("N-BK7").unwrap();
         assert_eq!(medium, Medium::Model { nd: bk7.nd + 0.001, vd: bk7.vd + 0.2 });
-        assert_eq!(outcome, Outcome::Approximated);
+        assert_eq!(outcome, ConversionOutcome::Approximated);
     }
 
     #[test]
     fn an_unknown_glass_needs_an_index() {
         let (medium, outcome, note) = found(line("XYZ-9", 0, 1.7, 30.0)).unwrap();
-        assert_eq!((medium, outcome), (Medium::Model { nd: 1.7, vd: 30.0 }, Outcome::Approximated));
+        assert_eq!(
+            (medium, outcome),
+            (Medium::Model { nd: 1.7, vd: 30.0 }, ConversionOutcome::Approximated)
+        );
         assert!(note.contains("no catalogue has XYZ-9"));
         for (nd, vd) in [(1.5, 40.0), (0.0, 0.0)] {
             let error = found(line("XYZ-9", 0, nd, vd)).unwrap_err();
@@ -236,9 +240,10 @@ mod tests {
     fn picked_up_glasses_are_followed_and_circles_refused() {
         let pickup = |source| {
             let glass = GlassLine { source: Some(source), ..line("X", 2, 0.0, 0.0) };
-            Surface { glass: Some(glass), ..Surface::default() }
+            ZemaxSurface { glass: Some(glass), ..ZemaxSurface::default() }
         };
-        let end = Surface { glass: Some(line("N-BK7", 0, 0.0, 0.0)), ..Surface::default() };
+        let end =
+            ZemaxSurface { glass: Some(line("N-BK7", 0, 0.0, 0.0)), ..ZemaxSurface::default() };
         let surfaces = [pickup(1), pickup(2), end];
         assert_eq!(medium(&surfaces, 0, &[]).unwrap().0, glass("SCHOTT N-BK7"));
         let circle = [pickup(1), pickup(0)];

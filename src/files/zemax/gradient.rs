@@ -5,8 +5,8 @@
 //! 3 to 5 are radial, 6 to 8 axial (the user guide of `OpticStudio`, "Gradient 3"). Other types are refused
 //! by name, on reading and on writing.
 
-use super::draft::Surface;
-use crate::lens::{Gradient, Law, Medium, Quantity, RADIAL_TERMS};
+use super::draft::ZemaxSurface;
+use crate::lens::{GradientIndex, Medium, ProfileLaw, Quantity, RADIAL_TERMS};
 
 /// What such a surface is called.
 pub(super) const KIND: &str = "GRINSUR3";
@@ -16,7 +16,7 @@ const STEP: f64 = 0.1;
 const TERMS: usize = 3;
 
 /// The gradient behind a surface of that type; lengths are in units of so many mm.
-pub(super) fn medium(surface: &Surface, unit: f64) -> Option<Medium> {
+pub(super) fn medium(surface: &ZemaxSurface, unit: f64) -> Option<Medium> {
     if surface.kind.0 != KIND {
         return None;
     }
@@ -31,11 +31,11 @@ pub(super) fn medium(surface: &Surface, unit: f64) -> Option<Medium> {
     };
     let (radial, axial) = (list(3, |j| 2 * j + 2), list(6, |j| j + 1));
     let base = Medium::Index(value(2));
-    Some(Medium::Gradient(Box::new(Gradient { base, law: Law::Index, radial, axial })))
+    Some(Medium::Grin(Box::new(GradientIndex { base, law: ProfileLaw::Index, radial, axial })))
 }
 
 /// What parameter number `index` of a surface of a type is, if it is one of a gradient.
-pub(super) fn variable(kind: &str, index: usize) -> Option<Quantity> {
+pub(super) fn variable_quantity(kind: &str, index: usize) -> Option<Quantity> {
     match index {
         _ if kind != KIND => None,
         2 => Some(Quantity::Index),
@@ -47,10 +47,10 @@ pub(super) fn variable(kind: &str, index: usize) -> Option<Quantity> {
 
 /// The parameters of a surface with this gradient behind it, by number; `None` for one that the type
 /// cannot say.
-pub(super) fn parameters(gradient: &Gradient) -> Option<Vec<(usize, f64)>> {
+pub(super) fn parameters(gradient: &GradientIndex) -> Option<Vec<(usize, f64)>> {
     let Medium::Index(base) = gradient.base else { return None };
     let fits = |terms: &[f64]| terms.iter().skip(TERMS).all(|term| *term == 0.0);
-    if gradient.law != Law::Index || !fits(&gradient.radial) || !fits(&gradient.axial) {
+    if gradient.law != ProfileLaw::Index || !fits(&gradient.radial) || !fits(&gradient.axial) {
         return None;
     }
     let list = |first: usize, terms: &[f64]| -> Vec<(usize, f64)> {

@@ -1,13 +1,13 @@
 //! A line of a `.zmx` file: a keyword and fields separated by blanks.
 
-use crate::files::error::Malformed;
+use crate::files::error::ParseError;
 
 /// Beyond this no ray can be traced.
-const LARGEST: f64 = 1e100;
+const MAX_NUMBER: f64 = 1e100;
 
 /// One line that is not blank.
 #[derive(Debug, Clone)]
-pub(super) struct Line<'a> {
+pub(super) struct ZemaxLine<'a> {
     /// Its number, counted from 1.
     pub(super) number: usize,
     /// Its first word.
@@ -21,23 +21,23 @@ pub(super) struct Line<'a> {
 }
 
 /// The lines of a text that are not blank.
-pub(super) fn lines(text: &str) -> Vec<Line<'_>> {
-    let mut lines: Vec<Line<'_>> = text.lines().zip(1..).filter_map(line).collect();
-    if decimal_commas(&lines) {
+pub(super) fn lines(text: &str) -> Vec<ZemaxLine<'_>> {
+    let mut lines: Vec<ZemaxLine<'_>> = text.lines().zip(1..).filter_map(parse_line).collect();
+    if has_decimal_commas(&lines) {
         lines.iter_mut().for_each(|line| line.comma = true);
     }
     lines
 }
 
-fn line((text, number): (&str, usize)) -> Option<Line<'_>> {
+fn parse_line((text, number): (&str, usize)) -> Option<ZemaxLine<'_>> {
     let text = text.trim();
     let keyword = text.split_whitespace().next()?;
     let rest = text[keyword.len()..].trim_start();
-    Some(Line { number, keyword, rest, fields: fields(rest), comma: false })
+    Some(ZemaxLine { number, keyword, rest, fields: split_fields(rest), comma: false })
 }
 
 /// Commas are decimal where curvatures or thicknesses have commas and no points.
-fn decimal_commas(lines: &[Line<'_>]) -> bool {
+fn has_decimal_commas(lines: &[ZemaxLine<'_>]) -> bool {
     let lengths = || {
         let geometry = lines.iter().filter(|line| matches!(line.keyword, "CURV" | "DISZ"));
         geometry.filter_map(|line| line.fields.first())
@@ -45,7 +45,7 @@ fn decimal_commas(lines: &[Line<'_>]) -> bool {
     lengths().any(|field| field.contains(',')) && !lengths().any(|field| field.contains('.'))
 }
 
-fn fields(rest: &str) -> Vec<&str> {
+fn split_fields(rest: &str) -> Vec<&str> {
     let mut fields = Vec::new();
     let mut rest = rest.trim_start();
     while !rest.is_empty() {
@@ -59,9 +59,9 @@ fn fields(rest: &str) -> Vec<&str> {
     fields
 }
 
-impl Line<'_> {
+impl ZemaxLine<'_> {
     /// All of it.
-    pub(super) fn text(&self) -> String {
+    pub(super) fn source_text(&self) -> String {
         format!("{} {}", self.keyword, self.rest).trim_end().to_owned()
     }
 
@@ -71,29 +71,29 @@ impl Line<'_> {
     }
 
     /// What is wrong with it.
-    pub(super) fn wrong(&self, found: impl Into<String>, expected: &str) -> Malformed {
-        Malformed { place: self.place(), found: found.into(), expected: expected.to_owned() }
+    pub(super) fn malformed(&self, found: impl Into<String>, expected: &str) -> ParseError {
+        ParseError { place: self.place(), found: found.into(), expected: expected.to_owned() }
     }
 
     /// The number in a field.
-    pub(super) fn number(&self, field: usize) -> Result<f64, Malformed> {
+    pub(super) fn number(&self, field: usize) -> Result<f64, ParseError> {
         let Some(text) = self.fields.get(field) else {
-            let found = format!("`{}` with {} fields", self.text(), self.fields.len());
-            return Err(self.wrong(found, &format!("a number in field {}", field + 1)));
+            let found = format!("`{}` with {} fields", self.source_text(), self.fields.len());
+            return Err(self.malformed(found, &format!("a number in field {}", field + 1)));
         };
         self.parse(text).ok_or_else(|| {
-            let found = format!("`{text}` in `{}`", self.text());
-            self.wrong(found, "a finite number below 1e100")
+            let found = format!("`{text}` in `{}`", self.source_text());
+            self.malformed(found, "a finite number below 1e100")
         })
     }
 
     /// The number in a field, or `default` where the line is shorter.
-    pub(super) fn number_or(&self, field: usize, default: f64) -> Result<f64, Malformed> {
+    pub(super) fn number_or(&self, field: usize, default: f64) -> Result<f64, ParseError> {
         if field < self.fields.len() { self.number(field) } else { Ok(default) }
     }
 
     /// Every field as a number.
-    pub(super) fn numbers(&self) -> Result<Vec<f64>, Malformed> {
+    pub(super) fn numbers(&self) -> Result<Vec<f64>, ParseError> {
         (0..self.fields.len()).map(|field| self.number(field)).collect()
     }
 
@@ -103,12 +103,15 @@ impl Line<'_> {
         clippy::cast_sign_loss,
         reason = "a whole number in range"
     )]
-    pub(super) fn count(&self, field: usize) -> Result<usize, Malformed> {
+    pub(super) fn count(&self, field: usize) -> Result<usize, ParseError> {
         let number = self.number(field)?;
         if number >= 0.0 && number.fract() == 0.0 && number <= f64::from(u32::MAX) {
             return Ok(number as usize);
         }
-        Err(self.wrong(format!("`{number}` in `{}`", self.text()), "a whole number, 0 or more"))
+        Err(self.malformed(
+            format!("`{number}` in `{}`", self.source_text()),
+            "a whole number, 0 or more",
+        ))
     }
 
     /// The number that counts something, if the field is there and holds one.
@@ -117,10 +120,10 @@ impl Line<'_> {
     }
 
     /// The text of a field.
-    pub(super) fn word(&self, field: usize) -> Result<&str, Malformed> {
+    pub(super) fn word(&self, field: usize) -> Result<&str, ParseError> {
         self.fields.get(field).copied().ok_or_else(|| {
-            let found = format!("`{}` with {} fields", self.text(), self.fields.len());
-            self.wrong(found, &format!("a word in field {}", field + 1))
+            let found = format!("`{}` with {} fields", self.source_text(), self.fields.len());
+            self.malformed(found, &format!("a word in field {}", field + 1))
         })
     }
 
@@ -128,7 +131,7 @@ impl Line<'_> {
         let number: f64 =
             if self.comma { text.replace(',', ".").parse() } else { text.parse() }.ok()?;
         // The words `inf` and `nan` parse as numbers too.
-        (number.abs() <= LARGEST).then_some(number)
+        (number.abs() <= MAX_NUMBER).then_some(number)
     }
 }
 

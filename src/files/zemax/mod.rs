@@ -15,8 +15,8 @@ mod write;
 
 pub use write::write;
 
-use super::error::{FileError, Malformed};
-use super::report::Report;
+use super::error::{FileError, ParseError};
+use super::report::ConversionReport;
 use crate::lens::Lens;
 use std::path::Path;
 
@@ -28,9 +28,9 @@ const ZOOM_NAME: &str = "Zoom position: ";
 
 /// Reads a lens from the text of a file; `file` is for messages, and for the name of a lens that
 /// has none.
-pub fn read(text: &str, file: &str) -> Result<(Lens, Report), FileError> {
+pub fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), FileError> {
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
-    let (mut lens, report) = lens(&text).map_err(|wrong| wrong.of(file))?;
+    let (mut lens, report) = parse_lens(&text).map_err(|wrong| wrong.in_file(file))?;
     let path = Path::new(file);
     if lens.name.is_empty() {
         lens.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -40,31 +40,31 @@ pub fn read(text: &str, file: &str) -> Result<(Lens, Report), FileError> {
         lens.source = format!("Imported from {name}");
     }
     lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
-    settle_focus(&mut lens);
+    apply_focus_solve(&mut lens);
     Ok((lens, report))
 }
 
-fn lens(text: &str) -> Result<(Lens, Report), Malformed> {
+fn parse_lens(text: &str) -> Result<(Lens, ConversionReport), ParseError> {
     let (draft, mut report) = parse::parse(text)?;
     if draft.surfaces.is_empty() {
         let expected = "SURF lines: is this a Zemax lens file?".to_owned();
         let found = "no SURF line".to_owned();
-        return Err(Malformed { place: "the whole file".to_owned(), found, expected });
+        return Err(ParseError { place: "the whole file".to_owned(), found, expected });
     }
     let lens = build::build(&draft, &mut report)?;
     Ok((lens, report))
 }
 
 /// Writes the solved gap into the lens, so that its prescription shows where the focus is.
-fn settle_focus(lens: &mut Lens) {
-    if lens.focus.is_none() {
+fn apply_focus_solve(lens: &mut Lens) {
+    if lens.image_solve.is_none() {
         return;
     }
-    let system = lens.system(0, lens.wavelengths[lens.primary()].um);
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um);
     let Some(last) = lens.surfaces.last_mut() else { return };
     match system {
         Ok(system) => last.thickness = system.surfaces[system.surfaces.len() - 2].thickness,
         // No focus can be found, so none is solved for.
-        Err(_) => lens.focus = None,
+        Err(_) => lens.image_solve = None,
     }
 }

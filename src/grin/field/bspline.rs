@@ -1,8 +1,8 @@
 //! Uniform cubic B-splines, and a profile made of them.
 
-use super::cell::{cell, integer};
-use super::{Profile, Profiled, ProfiledColumns};
-use crate::grin::lanes::{Column, LANES};
+use super::cell::{floor_cell, to_index};
+use super::{ProfileFunction, ProfileSample, ProfileSamples};
+use crate::grin::lanes::{LANES, LaneScalars};
 use crate::math::Real;
 
 /// The four cubic B-splines that are not zero in a cell, at `0 ≤ t < 1`; outside that range the
@@ -22,7 +22,7 @@ pub(super) fn basis<R: Real>(t: R) -> [R; 4] {
 
 /// Their derivatives by `t`.
 #[inline(always)]
-pub(super) fn slopes<R: Real>(t: R) -> [R; 4] {
+pub(super) fn basis_slopes<R: Real>(t: R) -> [R; 4] {
     let c = R::from_f64;
     let (u, half) = (R::ONE - t, c(0.5));
     [
@@ -35,7 +35,7 @@ pub(super) fn slopes<R: Real>(t: R) -> [R; 4] {
 
 /// Their second derivatives.
 #[inline(always)]
-pub(super) fn bends<R: Real>(t: R) -> [R; 4] {
+pub(super) fn basis_curvatures<R: Real>(t: R) -> [R; 4] {
     let c = R::from_f64;
     let u = R::ONE - t;
     [u, c(3.0) * t - R::TWO, c(3.0) * u - R::TWO, t]
@@ -67,8 +67,8 @@ impl<R: Real> BSpline<R> {
     #[inline(always)]
     fn locate(&self, s: R) -> (usize, R) {
         let u = (s - self.start) / self.spacing;
-        let first = cell(u.value(), (self.coefficients.len() - 4) as f64);
-        (integer(first), u - R::from_f64(first))
+        let first = floor_cell(u.value(), (self.coefficients.len() - 4) as f64);
+        (to_index(first), u - R::from_f64(first))
     }
 }
 
@@ -80,7 +80,7 @@ fn sum<R: Real>(weights: [R; 4], values: &[R]) -> R {
         + weights[3] * values[3]
 }
 
-impl<R: Real> Profile<R> for BSpline<R> {
+impl<R: Real> ProfileFunction<R> for BSpline<R> {
     fn parameters(&self) -> &[R] {
         &self.coefficients
     }
@@ -90,20 +90,20 @@ impl<R: Real> Profile<R> for BSpline<R> {
     }
 
     #[inline(always)]
-    fn at(&self, s: R) -> Profiled<R> {
+    fn evaluate(&self, s: R) -> ProfileSample<R> {
         let (first, t) = self.locate(s);
         let values = &self.coefficients[first..first + 4];
         let scale = R::ONE / self.spacing;
-        Profiled {
+        ProfileSample {
             value: sum(basis(t), values),
-            slope: sum(slopes(t), values) * scale,
-            bend: sum(bends(t), values) * scale * scale,
+            slope: sum(basis_slopes(t), values) * scale,
+            curvature: sum(basis_curvatures(t), values) * scale * scale,
         }
     }
 
     /// Finds the cells, collects the coefficients, sums: lanes do all but the second.
     #[inline(always)]
-    fn at_all(&self, s: &Column<R>, out: &mut ProfiledColumns<R>) {
+    fn evaluate_block(&self, s: &LaneScalars<R>, out: &mut ProfileSamples<R>) {
         let (mut first, mut t) = ([0; LANES], [R::ZERO; LANES]);
         for lane in 0..LANES {
             (first[lane], t[lane]) = self.locate(s[lane]);
@@ -119,22 +119,22 @@ impl<R: Real> Profile<R> for BSpline<R> {
         for (lane, &t) in t.iter().enumerate() {
             let values = [four[0][lane], four[1][lane], four[2][lane], four[3][lane]];
             out.value[lane] = sum(basis(t), &values);
-            out.slope[lane] = sum(slopes(t), &values) * scale;
-            out.bend[lane] = sum(bends(t), &values) * scale * scale;
+            out.slope[lane] = sum(basis_slopes(t), &values) * scale;
+            out.curvature[lane] = sum(basis_curvatures(t), &values) * scale * scale;
         }
     }
 
     #[inline(always)]
-    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+    fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         let (first, t) = self.locate(s);
         let pull = pull / self.spacing;
-        let (values, slopes) = (basis(t), slopes(t));
+        let (values, slopes) = (basis(t), basis_slopes(t));
         for (q, g) in gradient[first..first + 4].iter_mut().enumerate() {
             *g += weight * values[q] + pull * slopes[q];
         }
     }
 
-    fn knots(&self) -> Option<R> {
+    fn knot_spacing(&self) -> Option<R> {
         Some(self.spacing)
     }
 }

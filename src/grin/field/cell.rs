@@ -1,21 +1,21 @@
 //! Rounding down to a cell, without branches and casts that lanes do not have.
 
 /// The first number whose neighbours are 1 apart.
-const WHOLE: f64 = 4503599627370496.0; // 2⁵²
+const INTEGER_SPACING: f64 = 4503599627370496.0; // 2⁵²
 
 /// The cell of a coordinate counted in cells from the first, kept within `0..=last`; what is not a
 /// number falls into the first.
 #[inline(always)]
-pub(super) fn cell(u: f64, last: f64) -> f64 {
+pub(super) fn floor_cell(u: f64, last: f64) -> f64 {
     let inside = u.max(0.0).min(last);
-    let rounded = (inside + WHOLE) - WHOLE;
+    let rounded = (inside + INTEGER_SPACING) - INTEGER_SPACING;
     if rounded > inside { rounded - 1.0 } else { rounded }
 }
 
 /// A whole number below 2⁵² that is not negative, as an integer: its bits behind the point.
 #[inline(always)]
-pub(super) fn integer(whole: f64) -> usize {
-    ((whole + WHOLE).to_bits() - WHOLE.to_bits()) as usize
+pub(super) fn to_index(whole: f64) -> usize {
+    ((whole + INTEGER_SPACING).to_bits() - INTEGER_SPACING.to_bits()) as usize
 }
 
 #[cfg(test)]
@@ -25,11 +25,11 @@ mod tests {
     #[test]
     fn a_cell_is_the_floor_within_the_grid() {
         for u in [0.0, 0.3, 0.5, 0.999, 1.0, 1.5, 2.0, 2.5, 6.9999999, 7.0, 7.5, 1e300] {
-            assert_eq!(cell(u, 7.0), u.floor().min(7.0), "{u}");
-            assert_eq!(integer(cell(u, 7.0)), (u as usize).min(7), "{u}");
+            assert_eq!(floor_cell(u, 7.0), u.floor().min(7.0), "{u}");
+            assert_eq!(to_index(floor_cell(u, 7.0)), (u as usize).min(7), "{u}");
         }
         for u in [-0.0, -0.5, -1e300, f64::NAN] {
-            assert_eq!(integer(cell(u, 7.0)), 0, "{u}");
+            assert_eq!(to_index(floor_cell(u, 7.0)), 0, "{u}");
         }
     }
 }

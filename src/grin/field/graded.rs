@@ -5,7 +5,7 @@
 //! the hyperbolic secant in place of the radial polynomial. A ray needs `η²` and the force
 //! `η ∇η = ∇(η²)/2` only, so that the square costs no root.
 
-use super::{Profile, Sech};
+use super::{ProfileFunction, Sech};
 use crate::math::{Real, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -14,12 +14,12 @@ pub const RADIAL_TERMS: usize = 6;
 /// How many coefficients of powers of z there may be: z to z⁴.
 pub const AXIAL_TERMS: usize = 4;
 /// All of them, the radial ones first.
-pub const GRADE_TERMS: usize = RADIAL_TERMS + AXIAL_TERMS;
+pub const PROFILE_TERMS: usize = RADIAL_TERMS + AXIAL_TERMS;
 
 /// What the coefficients build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Law {
+pub enum ProfileLaw {
     /// The index: `n = n₀ + Σ aᵢ r²ⁱ + Σ bⱼ zʲ`.
     #[default]
     Index,
@@ -31,11 +31,11 @@ pub enum Law {
 
 /// Coefficients of a gradient, without the index to which they are added.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grade<R> {
+pub struct ProfileCoefficients<R> {
     /// What they build.
-    pub law: Law,
+    pub law: ProfileLaw,
     /// The radial ones, r² to r¹², then the axial ones, z to z⁴.
-    pub terms: [R; GRADE_TERMS],
+    pub terms: [R; PROFILE_TERMS],
     /// Where z = 0 of the polynomial lies, and whether it counts towards +z or −z (±1): the
     /// polynomial is one in `origin + sense z`.
     pub origin: R,
@@ -48,9 +48,9 @@ pub struct Grade<R> {
     pub reach: f64,
 }
 
-impl<R: Real> Grade<R> {
+impl<R: Real> ProfileCoefficients<R> {
     /// Coefficients that count from the vertex in front.
-    pub fn new(law: Law, terms: [R; GRADE_TERMS]) -> Self {
+    pub fn new(law: ProfileLaw, terms: [R; PROFILE_TERMS]) -> Self {
         let count = |part: &[R]| part.iter().rposition(|a| a.value() != 0.0).map_or(0, |i| i + 1);
         let (radial, axial) = terms.split_at(RADIAL_TERMS);
         let used = [count(radial), count(axial)];
@@ -59,7 +59,7 @@ impl<R: Real> Grade<R> {
 
     /// The same with a coefficient that counts even where it is zero.
     #[must_use]
-    pub fn using(mut self, k: usize) -> Self {
+    pub fn with_term(mut self, k: usize) -> Self {
         let (part, count) = if k < RADIAL_TERMS { (0, k + 1) } else { (1, k + 1 - RADIAL_TERMS) };
         self.used[part] = self.used[part].max(count);
         self
@@ -71,14 +71,21 @@ impl<R: Real> Grade<R> {
     }
 
     /// The same with every number mapped.
-    pub fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Grade<S> {
+    pub fn map<S: Real>(&self, f: impl Fn(R) -> S) -> ProfileCoefficients<S> {
         let Self { law, terms, origin, sense, used, reach } = *self;
-        Grade { law, terms: terms.map(&f), origin: f(origin), sense: f(sense), used, reach }
+        ProfileCoefficients {
+            law,
+            terms: terms.map(&f),
+            origin: f(origin),
+            sense: f(sense),
+            used,
+            reach,
+        }
     }
 
     /// The same gradient met from the other end of a gap of this thickness.
     #[must_use]
-    pub fn turned(self, thickness: R) -> Self {
+    pub fn reversed(self, thickness: R) -> Self {
         Self { origin: self.origin + self.sense * thickness, sense: -self.sense, ..self }
     }
 }
@@ -94,11 +101,11 @@ pub struct Force<R> {
 
 /// A gradient with the index to which it is added.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Graded<R> {
+pub struct RotationalProfile<R> {
     /// The index on the axis at z = 0.
     pub base: R,
     /// Everything else.
-    pub grade: Grade<R>,
+    pub coefficients: ProfileCoefficients<R>,
 }
 
 /// A polynomial without a constant term and its first two derivatives.
@@ -114,7 +121,7 @@ fn polynomial<R: Real>(terms: &[R], s: R) -> [R; 3] {
 }
 
 /// `u`, its derivatives by r² and by z, and the second ones.
-struct Built<R> {
+struct ProfileDerivatives<R> {
     value: R,
     by_s: R,
     by_z: R,
@@ -122,34 +129,41 @@ struct Built<R> {
     by_zz: R,
 }
 
-impl<R: Real> Graded<R> {
+impl<R: Real> RotationalProfile<R> {
     fn coordinates(&self, at: Vec3<R>) -> (R, R) {
-        (at.x * at.x + at.y * at.y, self.grade.origin + self.grade.sense * at.z)
+        (at.x * at.x + at.y * at.y, self.coefficients.origin + self.coefficients.sense * at.z)
     }
 
     fn secant(&self) -> Sech<R> {
-        Sech::new(self.base, self.grade.terms[0])
+        Sech::new(self.base, self.coefficients.terms[0])
     }
 
     #[inline(always)]
-    fn build(&self, at: Vec3<R>) -> Built<R> {
+    fn evaluate(&self, at: Vec3<R>) -> ProfileDerivatives<R> {
         let (s, z) = self.coordinates(at);
-        let (radial, axial) = self.grade.terms.split_at(RADIAL_TERMS);
-        let (radial, axial) = (&radial[..self.grade.used[0]], &axial[..self.grade.used[1]]);
-        let [base, by_s, by_ss] = match self.grade.law {
-            Law::Index => add(self.base, polynomial(radial, s)),
-            Law::Square => add(self.base * self.base, polynomial(radial, s)),
-            Law::Sech => {
-                let f = self.secant().at(s);
-                [f.value, f.slope, f.bend]
+        let (radial, axial) = self.coefficients.terms.split_at(RADIAL_TERMS);
+        let (radial, axial) =
+            (&radial[..self.coefficients.used[0]], &axial[..self.coefficients.used[1]]);
+        let [base, by_s, by_ss] = match self.coefficients.law {
+            ProfileLaw::Index => add(self.base, polynomial(radial, s)),
+            ProfileLaw::Square => add(self.base * self.base, polynomial(radial, s)),
+            ProfileLaw::Sech => {
+                let f = self.secant().evaluate(s);
+                [f.value, f.slope, f.curvature]
             }
         };
         let [along, by_z, by_zz] = polynomial(axial, z);
-        Built { value: base + along, by_s, by_z: by_z * self.grade.sense, by_ss, by_zz }
+        ProfileDerivatives {
+            value: base + along,
+            by_s,
+            by_z: by_z * self.coefficients.sense,
+            by_ss,
+            by_zz,
+        }
     }
 
     #[inline(always)]
-    fn climb(at: Vec3<R>, built: &Built<R>) -> Vec3<R> {
+    fn profile_slope(at: Vec3<R>, built: &ProfileDerivatives<R>) -> Vec3<R> {
         let across = built.by_s + built.by_s;
         Vec3::new(at.x * across, at.y * across, built.by_z)
     }
@@ -157,11 +171,11 @@ impl<R: Real> Graded<R> {
     /// `η²` and `η ∇η` at a point.
     #[inline(always)]
     pub fn force(&self, at: Vec3<R>) -> Force<R> {
-        let built = self.build(at);
-        let climb = Self::climb(at, &built);
-        match self.grade.law {
-            Law::Square => Force { square: built.value, force: climb * R::from_f64(0.5) },
-            Law::Index | Law::Sech => {
+        let built = self.evaluate(at);
+        let climb = Self::profile_slope(at, &built);
+        match self.coefficients.law {
+            ProfileLaw::Square => Force { square: built.value, force: climb * R::from_f64(0.5) },
+            ProfileLaw::Index | ProfileLaw::Sech => {
                 Force { square: built.value * built.value, force: climb * built.value }
             }
         }
@@ -169,14 +183,14 @@ impl<R: Real> Graded<R> {
 
     /// The index at a point; not a number where its square is negative.
     pub fn index(&self, at: Vec3<R>) -> R {
-        let value = self.build(at).value;
-        if self.grade.law == Law::Square { value.sqrt() } else { value }
+        let value = self.evaluate(at).value;
+        if self.coefficients.law == ProfileLaw::Square { value.sqrt() } else { value }
     }
 
     /// The derivative of the force along a direction, which is also its transpose.
     #[inline(always)]
-    pub fn bend(&self, at: Vec3<R>, along: Vec3<R>) -> Vec3<R> {
-        let built = self.build(at);
+    pub fn force_derivative(&self, at: Vec3<R>, along: Vec3<R>) -> Vec3<R> {
+        let built = self.evaluate(at);
         let outward = at.x * along.x + at.y * along.y;
         let four = R::from_f64(4.0);
         let (across, radial) = (built.by_s + built.by_s, built.by_ss * outward * four);
@@ -185,10 +199,10 @@ impl<R: Real> Graded<R> {
             along.y * across + at.y * radial,
             along.z * built.by_zz,
         );
-        match self.grade.law {
-            Law::Square => curved * R::from_f64(0.5),
-            Law::Index | Law::Sech => {
-                let climb = Self::climb(at, &built);
+        match self.coefficients.law {
+            ProfileLaw::Square => curved * R::from_f64(0.5),
+            ProfileLaw::Index | ProfileLaw::Sech => {
+                let climb = Self::profile_slope(at, &built);
                 curved * built.value + climb * climb.dot(along)
             }
         }
@@ -197,43 +211,43 @@ impl<R: Real> Graded<R> {
     /// Adds the derivatives of `weight η² + pull · η ∇η` by the index on the axis and by every
     /// coefficient.
     #[inline(always)]
-    pub fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, by: &mut GradeSlopes<R>) {
+    pub fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, by: &mut ProfileGradient<R>) {
         let (s, z) = self.coordinates(at);
-        let built = self.build(at);
+        let built = self.evaluate(at);
         // By the value and by the gradient of u.
-        let (by_value, by_climb) = match self.grade.law {
-            Law::Square => (weight, pull * R::from_f64(0.5)),
-            Law::Index | Law::Sech => {
-                let climb = Self::climb(at, &built);
+        let (by_value, by_climb) = match self.coefficients.law {
+            ProfileLaw::Square => (weight, pull * R::from_f64(0.5)),
+            ProfileLaw::Index | ProfileLaw::Sech => {
+                let climb = Self::profile_slope(at, &built);
                 (R::TWO * weight * built.value + pull.dot(climb), pull * built.value)
             }
         };
         let by_slope = R::TWO * (by_climb.x * at.x + by_climb.y * at.y);
         let (radial, axial) = by.terms.split_at_mut(RADIAL_TERMS);
-        match self.grade.law {
-            Law::Index => by.base += by_value,
-            Law::Square => by.base += R::TWO * self.base * by_value,
-            Law::Sech => {
+        match self.coefficients.law {
+            ProfileLaw::Index => by.base += by_value,
+            ProfileLaw::Square => by.base += R::TWO * self.base * by_value,
+            ProfileLaw::Sech => {
                 let mut pair = [R::ZERO; 2];
-                self.secant().deposit(s, by_value, by_slope, &mut pair);
+                self.secant().accumulate(s, by_value, by_slope, &mut pair);
                 by.base += pair[0];
                 radial[0] += pair[1];
             }
         }
-        if self.grade.law != Law::Sech {
-            powers(s, by_value, by_slope, radial);
+        if self.coefficients.law != ProfileLaw::Sech {
+            accumulate_powers(s, by_value, by_slope, radial);
         }
-        powers(z, by_value, by_climb.z * self.grade.sense, axial);
+        accumulate_powers(z, by_value, by_climb.z * self.coefficients.sense, axial);
     }
 }
 
 /// Derivatives by the numbers of a gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GradeSlopes<R> {
+pub struct ProfileGradient<R> {
     /// By the index on the axis at z = 0.
     pub base: R,
     /// By the coefficients.
-    pub terms: [R; GRADE_TERMS],
+    pub terms: [R; PROFILE_TERMS],
 }
 
 fn add<R: Real>(base: R, [value, slope, bend]: [R; 3]) -> [R; 3] {
@@ -242,7 +256,7 @@ fn add<R: Real>(base: R, [value, slope, bend]: [R; 3]) -> [R; 3] {
 
 /// Adds `value sᵏ + slope k sᵏ⁻¹` for the powers from the first on.
 #[inline(always)]
-fn powers<R: Real>(s: R, value: R, slope: R, by: &mut [R]) {
+fn accumulate_powers<R: Real>(s: R, value: R, slope: R, by: &mut [R]) {
     let (mut power, mut derived) = (s, R::ONE);
     for g in by {
         *g += value * power + slope * derived;
@@ -257,23 +271,28 @@ mod tests {
     use crate::math::Dual;
 
     /// Derivatives by three coordinates, the base and every coefficient.
-    type All = Dual<f64, { 4 + GRADE_TERMS }>;
+    type All = Dual<f64, { 4 + PROFILE_TERMS }>;
 
-    fn graded(law: Law) -> Graded<f64> {
+    fn graded(law: ProfileLaw) -> RotationalProfile<f64> {
         let radial = [-0.09, 0.004, -3e-4, 1e-4, -2e-5, 1e-5];
         let axial = [0.03, -0.02, 0.005, 1e-3];
         let terms = std::array::from_fn(|i| if i < 6 { radial[i] } else { axial[i - 6] });
-        Graded { base: 1.6, grade: Grade::new(law, terms).turned(0.7) }
+        RotationalProfile {
+            base: 1.6,
+            coefficients: ProfileCoefficients::new(law, terms).reversed(0.7),
+        }
     }
 
     #[test]
     fn grin_every_derivative_of_a_graded_profile_is_that_of_dual_numbers() {
         let at = Vec3::new(0.4, -0.7, 1.1);
-        for law in [Law::Index, Law::Square, Law::Sech] {
+        for law in [ProfileLaw::Index, ProfileLaw::Square, ProfileLaw::Sech] {
             let plain = graded(law);
-            let mut dual: Graded<All> =
-                Graded { base: All::variable(1.6, 3), grade: plain.grade.map(All::constant) };
-            for (i, term) in dual.grade.terms.iter_mut().enumerate() {
+            let mut dual: RotationalProfile<All> = RotationalProfile {
+                base: All::variable(1.6, 3),
+                coefficients: plain.coefficients.map(All::constant),
+            };
+            for (i, term) in dual.coefficients.terms.iter_mut().enumerate() {
                 *term = All::variable(term.value, 4 + i);
             }
             let x =
@@ -285,7 +304,7 @@ mod tests {
             let off = half - here.force;
             assert!(off.dot(off).sqrt() < 1e-14, "{law:?} {off:?}");
             let (weight, pull) = (0.3, Vec3::new(0.7, -0.2, 0.9));
-            let bent = plain.bend(at, pull);
+            let bent = plain.force_derivative(at, pull);
             let rows = [force.x, force.y, force.z];
             let expected = |i: usize| {
                 pull.x * rows[0].slope[i] + pull.y * rows[1].slope[i] + pull.z * rows[2].slope[i]
@@ -293,8 +312,8 @@ mod tests {
             for (i, found) in [bent.x, bent.y, bent.z].into_iter().enumerate() {
                 assert!((found - expected(i)).abs() < 1e-13, "{law:?} {i}: {found}");
             }
-            let mut by = GradeSlopes::default();
-            plain.deposit(at, weight, pull, &mut by);
+            let mut by = ProfileGradient::default();
+            plain.accumulate(at, weight, pull, &mut by);
             let all = std::iter::once(by.base).chain(by.terms);
             for (i, found) in all.enumerate() {
                 let expected = weight * square.slope[3 + i] + expected(3 + i);

@@ -1,18 +1,18 @@
 //! Where the values of a sampled field stand: a block of nodes with even spacing on each axis.
 
-use super::cell::{cell, integer};
+use super::cell::{floor_cell, to_index};
 use crate::math::Real;
 use crate::math::Vec3;
 
 /// Nodes on a regular grid. Node `(i, j, k)` stands at `low + (i hx, j hy, k hz)` and has the number
 /// `(k ny + j) nx + i`: x runs fastest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid<R> {
+pub struct RegularGrid<R> {
     counts: [usize; 3],
     low: Vec3<R>,
     spacing: Vec3<R>,
     /// `1/h` on each axis.
-    pub(super) density: Vec3<R>,
+    pub(super) inverse_spacing: Vec3<R>,
 }
 
 /// Why values do not make a sampled field.
@@ -50,7 +50,7 @@ pub enum GridError {
     },
 }
 
-impl<R: Real> Grid<R> {
+impl<R: Real> RegularGrid<R> {
     /// Nodes from the corner `low` on, `spacing` apart.
     ///
     /// # Errors
@@ -65,7 +65,7 @@ impl<R: Real> Grid<R> {
         }
         let one = R::ONE;
         let density = Vec3::new(one / spacing.x, one / spacing.y, one / spacing.z);
-        Ok(Self { counts, low, spacing, density })
+        Ok(Self { counts, low, spacing, inverse_spacing: density })
     }
 
     /// A cube of `count³` nodes from `-half` to `half` on each axis.
@@ -96,7 +96,7 @@ impl<R: Real> Grid<R> {
     }
 
     /// How many nodes there are; the largest number where there are more than that.
-    pub fn nodes(&self) -> usize {
+    pub fn node_count(&self) -> usize {
         let [x, y, z] = self.counts;
         x.saturating_mul(y).saturating_mul(z)
     }
@@ -113,7 +113,7 @@ impl<R: Real> Grid<R> {
     }
 
     /// The smallest spacing.
-    pub(super) fn voxel(&self) -> f64 {
+    pub(super) fn smallest_spacing(&self) -> f64 {
         self.spacing.x.value().min(self.spacing.y.value()).min(self.spacing.z.value())
     }
 
@@ -124,8 +124,8 @@ impl<R: Real> Grid<R> {
                 return Err(GridError::TooFew { axis, found, least });
             }
         }
-        if values.len() != self.nodes() {
-            return Err(GridError::Values { found: values.len(), expected: self.nodes() });
+        if values.len() != self.node_count() {
+            return Err(GridError::Values { found: values.len(), expected: self.node_count() });
         }
         match values.iter().position(|value| !value.is_finite()) {
             Some(node) => Err(GridError::NotANumber { node }),
@@ -135,19 +135,19 @@ impl<R: Real> Grid<R> {
 
     /// The cell of a point, whose support is `width` nodes wide; outside the grid the outermost cell.
     #[inline(always)]
-    pub(super) fn locate(&self, at: Vec3<R>, width: usize) -> Place<R> {
+    pub(super) fn locate(&self, at: Vec3<R>, width: usize) -> GridCell<R> {
         let [nx, ny, nz] = self.counts;
-        let (x, tx) = along(at.x, self.low.x, self.density.x, nx - width);
-        let (y, ty) = along(at.y, self.low.y, self.density.y, ny - width);
-        let (z, tz) = along(at.z, self.low.z, self.density.z, nz - width);
+        let (x, tx) = locate_along(at.x, self.low.x, self.inverse_spacing.x, nx - width);
+        let (y, ty) = locate_along(at.y, self.low.y, self.inverse_spacing.y, ny - width);
+        let (z, tz) = locate_along(at.z, self.low.z, self.inverse_spacing.z, nz - width);
         let first = (z * ny as f64 + y) * nx as f64 + x;
-        Place { cell: [x, y, z], first: integer(first), t: Vec3::new(tx, ty, tz) }
+        GridCell { cell: [x, y, z], first: to_index(first), t: Vec3::new(tx, ty, tz) }
     }
 }
 
 /// Where a point lies in a grid.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place<R> {
+pub(super) struct GridCell<R> {
     /// The cell along each axis, a whole number.
     pub(super) cell: [f64; 3],
     /// The number of the first node that counts.
@@ -158,8 +158,8 @@ pub(super) struct Place<R> {
 
 /// The cell along one axis and the place within it.
 #[inline(always)]
-fn along<R: Real>(x: R, low: R, density: R, last: usize) -> (f64, R) {
+fn locate_along<R: Real>(x: R, low: R, density: R, last: usize) -> (f64, R) {
     let u = (x - low) * density;
-    let i = cell(u.value(), last as f64);
+    let i = floor_cell(u.value(), last as f64);
     (i, u - R::from_f64(i))
 }

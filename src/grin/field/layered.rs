@@ -3,17 +3,17 @@
 //! `η = f(s)` with `s = x² + y² + z²`, `s = x² + y²` or `s = z`. The square of the radius, not the
 //! radius, is the variable, so the axis needs no special case.
 
-use super::{Field, Grain, Hessian, Sample, Samples};
-use crate::grin::lanes::{Column, Columns, LANES, get, put};
+use super::{FieldResolution, Hessian, IndexField, IndexSample, IndexSamples};
+use crate::grin::lanes::{LANES, LaneScalars, LaneVectors, get, put};
 use crate::math::Real;
+use crate::math::SimdWidth;
 use crate::math::Vec3;
-use crate::math::Width;
-use crate::math::widest;
+use crate::math::run_vectorized;
 use std::fmt::Debug;
 
 /// The coordinate that a profile depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Coordinate {
+pub enum ProfileCoordinate {
     /// `s = x² + y² + z²`.
     Sphere,
     /// `s = x² + y²`: a fibre along z.
@@ -22,10 +22,10 @@ pub enum Coordinate {
     Axial,
 }
 
-impl Coordinate {
+impl ProfileCoordinate {
     /// The coordinate and its gradient at a point.
     #[inline(always)]
-    fn at<R: Real>(self, p: Vec3<R>) -> (R, Vec3<R>) {
+    fn value_and_gradient<R: Real>(self, p: Vec3<R>) -> (R, Vec3<R>) {
         match self {
             Self::Sphere => (p.dot(p), p * R::TWO),
             Self::Cylinder => {
@@ -37,7 +37,7 @@ impl Coordinate {
 
     /// The diagonal of its Hessian, which has no mixed terms.
     #[inline(always)]
-    fn curvature<R: Real>(self) -> Vec3<R> {
+    fn hessian_diagonal<R: Real>(self) -> Vec3<R> {
         match self {
             Self::Sphere => Vec3::new(R::TWO, R::TWO, R::TWO),
             Self::Cylinder => Vec3::new(R::TWO, R::TWO, R::ZERO),
@@ -48,104 +48,105 @@ impl Coordinate {
 
 /// A profile at one value of its coordinate: `f`, `df/ds`, `d²f/ds²`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Profiled<R> {
+pub struct ProfileSample<R> {
     /// `f`.
     pub value: R,
     /// `df/ds`.
     pub slope: R,
     /// `d²f/ds²`.
-    pub bend: R,
+    pub curvature: R,
 }
 
 /// The same for a block of rays.
 #[derive(Debug, Clone, Copy)]
-pub struct ProfiledColumns<R> {
+pub struct ProfileSamples<R> {
     /// `f`.
-    pub value: Column<R>,
+    pub value: LaneScalars<R>,
     /// `df/ds`.
-    pub slope: Column<R>,
+    pub slope: LaneScalars<R>,
     /// `d²f/ds²`.
-    pub bend: Column<R>,
+    pub curvature: LaneScalars<R>,
 }
 
 /// The index as a function of one coordinate.
-pub trait Profile<R: Real>: Debug + Send + Sync {
+pub trait ProfileFunction<R: Real>: Debug + Send + Sync {
     /// What an optimiser may change.
     fn parameters(&self) -> &[R];
     /// The same, to be changed.
     fn parameters_mut(&mut self) -> &mut [R];
     /// The profile and its derivatives.
-    fn at(&self, s: R) -> Profiled<R>;
+    fn evaluate(&self, s: R) -> ProfileSample<R>;
     /// Adds `weight ∂f/∂θ + pull ∂f'/∂θ` to the gradient by the parameters.
-    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]);
+    fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]);
     /// [`Self::at`] for a block of rays: the same bits.
     #[inline(always)]
-    fn at_all(&self, s: &Column<R>, out: &mut ProfiledColumns<R>) {
+    fn evaluate_block(&self, s: &LaneScalars<R>, out: &mut ProfileSamples<R>) {
         for (lane, s) in s.iter().enumerate() {
-            let f = self.at(*s);
-            (out.value[lane], out.slope[lane], out.bend[lane]) = (f.value, f.slope, f.bend);
+            let f = self.evaluate(*s);
+            (out.value[lane], out.slope[lane], out.curvature[lane]) =
+                (f.value, f.slope, f.curvature);
         }
     }
     /// Whether one formula holds everywhere; else the distance in `s` between the changes.
-    fn knots(&self) -> Option<R> {
+    fn knot_spacing(&self) -> Option<R> {
         None
     }
 }
 
 /// A field `η = f(s)`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Layered<P> {
+pub struct ProfileField<P> {
     /// What `s` is.
-    pub coordinate: Coordinate,
+    pub coordinate: ProfileCoordinate,
     /// `f`.
     pub profile: P,
 }
 
-impl<P> Layered<P> {
+impl<P> ProfileField<P> {
     /// A ball about the origin.
     pub fn sphere(profile: P) -> Self {
-        Self { coordinate: Coordinate::Sphere, profile }
+        Self { coordinate: ProfileCoordinate::Sphere, profile }
     }
 
     /// A fibre along z.
     pub fn cylinder(profile: P) -> Self {
-        Self { coordinate: Coordinate::Cylinder, profile }
+        Self { coordinate: ProfileCoordinate::Cylinder, profile }
     }
 
     /// Layers across z.
     pub fn axial(profile: P) -> Self {
-        Self { coordinate: Coordinate::Axial, profile }
+        Self { coordinate: ProfileCoordinate::Axial, profile }
     }
 }
 
-impl<P> Layered<P> {
+impl<P> ProfileField<P> {
     /// The Hessian where the coordinate has this gradient.
     #[inline(always)]
-    fn curved<R: Real>(&self, ds: Vec3<R>, slope: R, bend: R) -> Hessian<R> {
+    fn hessian_from<R: Real>(&self, ds: Vec3<R>, slope: R, bend: R) -> Hessian<R> {
         let squares = Vec3::new(ds.x * ds.x, ds.y * ds.y, ds.z * ds.z);
         let products = Vec3::new(ds.y * ds.z, ds.z * ds.x, ds.x * ds.y);
         Hessian {
-            diagonal: squares * bend + self.coordinate.curvature() * slope,
+            diagonal: squares * bend + self.coordinate.hessian_diagonal() * slope,
             mixed: products * bend,
         }
     }
 
     #[inline(always)]
-    fn profiled<R: Real>(&self, at: &Columns<R>) -> ProfiledColumns<R>
+    fn profile_block<R: Real>(&self, at: &LaneVectors<R>) -> ProfileSamples<R>
     where
-        P: Profile<R>,
+        P: ProfileFunction<R>,
     {
         let zero = [R::ZERO; LANES];
-        let (mut s, mut out) = (zero, ProfiledColumns { value: zero, slope: zero, bend: zero });
+        let (mut s, mut out) = (zero, ProfileSamples { value: zero, slope: zero, curvature: zero });
         for (lane, s) in s.iter_mut().enumerate() {
-            *s = self.coordinate.at(get(at, lane)).0;
+            *s = self.coordinate.value_and_gradient(get(at, lane)).0;
         }
-        self.profile.at_all(&s, &mut out);
+        self.profile.evaluate_block(&s, &mut out);
         out
     }
 }
 
-impl<R: Real, P: Profile<R>> Field<R> for Layered<P> {
+impl<R: Real, P: ProfileFunction<R>> IndexField<R> for ProfileField<P> {
     fn parameters(&self) -> &[R] {
         self.profile.parameters()
     }
@@ -155,44 +156,47 @@ impl<R: Real, P: Profile<R>> Field<R> for Layered<P> {
     }
 
     #[inline(always)]
-    fn sample(&self, at: Vec3<R>) -> Sample<R> {
-        let (s, ds) = self.coordinate.at(at);
-        let f = self.profile.at(s);
-        Sample { index: f.value, gradient: ds * f.slope }
+    fn sample(&self, at: Vec3<R>) -> IndexSample<R> {
+        let (s, ds) = self.coordinate.value_and_gradient(at);
+        let f = self.profile.evaluate(s);
+        IndexSample { index: f.value, gradient: ds * f.slope }
     }
 
-    fn samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
-        widest(
-            Width::Bits512,
+    fn sample_block(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
             || {
-                let profiled = self.profiled(at);
+                let profiled = self.profile_block(at);
                 for lane in 0..LANES {
-                    let (_, ds) = self.coordinate.at(get(at, lane));
+                    let (_, ds) = self.coordinate.value_and_gradient(get(at, lane));
                     let gradient = ds * profiled.slope[lane];
-                    out.put(lane, Sample { index: profiled.value[lane], gradient });
+                    out.put(lane, IndexSample { index: profiled.value[lane], gradient });
                 }
             },
         );
     }
 
-    fn samples_and_hessians(
+    fn sample_block_with_hessians(
         &self,
-        at: &Columns<R>,
-        times: &Columns<R>,
-        out: &mut Samples<R>,
-        product: &mut Columns<R>,
+        at: &LaneVectors<R>,
+        times: &LaneVectors<R>,
+        out: &mut IndexSamples<R>,
+        product: &mut LaneVectors<R>,
     ) {
-        widest(
-            Width::Bits512,
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
             || {
-                let profiled = self.profiled(at);
+                let profiled = self.profile_block(at);
                 for lane in 0..LANES {
-                    let (slope, bend) = (profiled.slope[lane], profiled.bend[lane]);
-                    let (_, ds) = self.coordinate.at(get(at, lane));
-                    out.put(lane, Sample { index: profiled.value[lane], gradient: ds * slope });
-                    let hessian = self.curved(ds, slope, bend);
+                    let (slope, bend) = (profiled.slope[lane], profiled.curvature[lane]);
+                    let (_, ds) = self.coordinate.value_and_gradient(get(at, lane));
+                    out.put(
+                        lane,
+                        IndexSample { index: profiled.value[lane], gradient: ds * slope },
+                    );
+                    let hessian = self.hessian_from(ds, slope, bend);
                     put(product, lane, hessian.times(get(times, lane)));
                 }
             },
@@ -201,26 +205,26 @@ impl<R: Real, P: Profile<R>> Field<R> for Layered<P> {
 
     #[inline(always)]
     fn hessian(&self, at: Vec3<R>) -> Hessian<R> {
-        let (s, ds) = self.coordinate.at(at);
-        let f = self.profile.at(s);
-        self.curved(ds, f.slope, f.bend)
+        let (s, ds) = self.coordinate.value_and_gradient(at);
+        let f = self.profile.evaluate(s);
+        self.hessian_from(ds, f.slope, f.curvature)
     }
 
     #[inline(always)]
-    fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
-        let (s, ds) = self.coordinate.at(at);
-        self.profile.deposit(s, weight, pull.dot(ds), gradient);
+    fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
+        let (s, ds) = self.coordinate.value_and_gradient(at);
+        self.profile.accumulate(s, weight, pull.dot(ds), gradient);
     }
 
-    fn grain(&self) -> Grain {
+    fn resolution(&self) -> FieldResolution {
         // At the far end of a radial profile, where its knots lie closest.
-        let voxel = self.profile.knots().map(|knot| {
-            if self.coordinate == Coordinate::Axial {
+        let voxel = self.profile.knot_spacing().map(|knot| {
+            if self.coordinate == ProfileCoordinate::Axial {
                 return knot.value();
             }
             let last = knot.value() * (self.profile.parameters().len() - 3) as f64;
             last.sqrt() - (last - knot.value()).sqrt()
         });
-        Grain { voxel, continuous_force: true }
+        FieldResolution { voxel, continuous_force: true }
     }
 }

@@ -3,7 +3,7 @@
 //! Luneburg, *Mathematical Theory of Optics* (1944). In units of its radius every ray is
 //! `x(σ) = x₀ cos σ + v₀ sin σ`, so at `σ = π/2` it stands at `v₀`: an exact test.
 
-use super::{Profile, Profiled};
+use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
 /// Beyond this multiple of `R²` the profile is constant: a step may end outside, and the root must
@@ -25,7 +25,7 @@ impl<R: Real> Luneburg<R> {
 
     /// `s/R²`, not beyond the cut, and one before it, zero behind.
     #[inline(always)]
-    fn relative(&self, s: R) -> (R, R) {
+    fn clamped_square(&self, s: R) -> (R, R) {
         let [radius] = self.radius;
         let (q, cut) = (s / (radius * radius), R::from_f64(CUT));
         let inside = q < cut;
@@ -33,7 +33,7 @@ impl<R: Real> Luneburg<R> {
     }
 }
 
-impl<R: Real> Profile<R> for Luneburg<R> {
+impl<R: Real> ProfileFunction<R> for Luneburg<R> {
     fn parameters(&self) -> &[R] {
         &self.radius
     }
@@ -43,19 +43,19 @@ impl<R: Real> Profile<R> for Luneburg<R> {
     }
 
     #[inline(always)]
-    fn at(&self, s: R) -> Profiled<R> {
+    fn evaluate(&self, s: R) -> ProfileSample<R> {
         let [radius] = self.radius;
-        let (q, on) = self.relative(s);
+        let (q, on) = self.clamped_square(s);
         let value = (R::TWO - q).sqrt();
         let slope = -(on / (R::TWO * value * radius * radius));
-        Profiled { value, slope, bend: -(slope * slope / value) }
+        ProfileSample { value, slope, curvature: -(slope * slope / value) }
     }
 
     /// `∂f/∂R = q/(f R)` and `∂f'/∂R = (2 + q/f²)/(2 f R³)` with `q = s/R²`.
     #[inline(always)]
-    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+    fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         let [radius] = self.radius;
-        let (q, on) = self.relative(s);
+        let (q, on) = self.clamped_square(s);
         let value = (R::TWO - q).sqrt();
         let by_radius = q / (value * radius);
         let slope_by_radius =

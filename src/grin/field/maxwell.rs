@@ -3,7 +3,7 @@
 //! Maxwell (1854); Born and Wolf, *Principles of Optics*, section 4.2.2. Without a boundary every
 //! ray is a closed orbit.
 
-use super::{Profile, Profiled};
+use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
 /// `f = n₀/(1 + s/R²)`; its parameters are `n₀` and `R`.
@@ -19,7 +19,7 @@ impl<R: Real> Maxwell<R> {
     }
 }
 
-impl<R: Real> Profile<R> for Maxwell<R> {
+impl<R: Real> ProfileFunction<R> for Maxwell<R> {
     fn parameters(&self) -> &[R] {
         &self.parameters
     }
@@ -29,18 +29,18 @@ impl<R: Real> Profile<R> for Maxwell<R> {
     }
 
     #[inline(always)]
-    fn at(&self, s: R) -> Profiled<R> {
+    fn evaluate(&self, s: R) -> ProfileSample<R> {
         let [centre, radius] = self.parameters;
         let square = R::ONE / (radius * radius);
         let part = R::ONE / (R::ONE + s * square);
         let value = centre * part;
         let slope = -(value * part * square);
-        Profiled { value, slope, bend: -(R::TWO * slope * part * square) }
+        ProfileSample { value, slope, curvature: -(R::TWO * slope * part * square) }
     }
 
     /// With `p = 1/(1 + s/R²)`: `∂f/∂R = 2 n₀ p² s/R³`, `∂f'/∂R = 2 n₀ p²/R³ (1 - 2 p s/R²)`.
     #[inline(always)]
-    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+    fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         let [centre, radius] = self.parameters;
         let square = R::ONE / (radius * radius);
         let part = R::ONE / (R::ONE + s * square);

@@ -1,7 +1,7 @@
 //! Fields of refractive index: value, gradient, Hessian, and the transpose onto the parameters.
 //!
 //! To add a kind of field, write its file; a profile in one coordinate needs only a
-//! [`Profile`] of its own.
+//! [`ProfileFunction`] of its own.
 
 mod bspline;
 mod cell;
@@ -18,9 +18,14 @@ mod tricubic;
 mod trilinear;
 
 pub use bspline::BSpline;
-pub use graded::{AXIAL_TERMS, Force, GRADE_TERMS, Grade, GradeSlopes, Graded, Law, RADIAL_TERMS};
-pub use grid::{Grid, GridError};
-pub use layered::{Coordinate, Layered, Profile, Profiled, ProfiledColumns};
+pub use graded::{
+    AXIAL_TERMS, Force, PROFILE_TERMS, ProfileCoefficients, ProfileGradient, ProfileLaw,
+    RADIAL_TERMS, RotationalProfile,
+};
+pub use grid::{GridError, RegularGrid};
+pub use layered::{
+    ProfileCoordinate, ProfileField, ProfileFunction, ProfileSample, ProfileSamples,
+};
 pub use luneburg::Luneburg;
 pub use maxwell::Maxwell;
 pub use parabolic::Parabolic;
@@ -28,18 +33,18 @@ pub use plume::Plume;
 pub use polynomial::Polynomial;
 pub use sech::Sech;
 pub use tricubic::Tricubic;
-pub use trilinear::{Diagonal, Trilinear};
+pub use trilinear::{HessianDiagonal, Trilinear};
 
-use super::lanes::{Column, Columns, LANES, get, put};
+use super::lanes::{LANES, LaneScalars, LaneVectors, get, put};
 use crate::math::Real;
+use crate::math::SimdWidth;
 use crate::math::Vec3;
-use crate::math::Width;
-use crate::math::widest;
+use crate::math::run_vectorized;
 use std::fmt::Debug;
 
 /// The index at a point, and its gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sample<R> {
+pub struct IndexSample<R> {
     /// Refractive index η.
     pub index: R,
     /// ∇η, per unit of length.
@@ -70,7 +75,7 @@ impl<R: Real> Hessian<R> {
 
 /// How a field is built, for the choice of integrator and step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grain {
+pub struct FieldResolution {
     /// Smallest distance over which it may change its formula; none for a field of one formula.
     pub voxel: Option<f64>,
     /// Whether the force `η ∇η` has no jumps.
@@ -82,7 +87,7 @@ pub struct Grain {
 /// It has a value everywhere, also outside the region in which light is traced: a step may end
 /// outside. A block of rays is asked at once; the block forms must give the same bits as the
 /// single ones, and do unless they are overridden.
-pub trait Field<R: Real>: Debug + Send + Sync {
+pub trait IndexField<R: Real>: Debug + Send + Sync {
     /// What an optimiser may change, in the order of the gradient.
     fn parameters(&self) -> &[R];
 
@@ -90,27 +95,27 @@ pub trait Field<R: Real>: Debug + Send + Sync {
     fn parameters_mut(&mut self) -> &mut [R];
 
     /// Index and gradient at a point.
-    fn sample(&self, at: Vec3<R>) -> Sample<R>;
+    fn sample(&self, at: Vec3<R>) -> IndexSample<R>;
 
     /// The second derivatives at a point.
     fn hessian(&self, at: Vec3<R>) -> Hessian<R>;
 
     /// Both at once.
     #[inline(always)]
-    fn sample_and_hessian(&self, at: Vec3<R>) -> (Sample<R>, Hessian<R>) {
+    fn sample_and_hessian(&self, at: Vec3<R>) -> (IndexSample<R>, Hessian<R>) {
         (self.sample(at), self.hessian(at))
     }
 
     /// Adds `weight ∂η/∂θ + pull · ∂∇η/∂θ` to the gradient by the parameters.
-    fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]);
+    fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]);
 
     /// How it is built.
-    fn grain(&self) -> Grain;
+    fn resolution(&self) -> FieldResolution;
 
     /// Index and gradient for a block of rays.
-    fn samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
-        widest(
-            Width::Bits512,
+    fn sample_block(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
             || {
                 for lane in 0..LANES {
@@ -121,15 +126,15 @@ pub trait Field<R: Real>: Debug + Send + Sync {
     }
 
     /// The same, and the Hessian times a vector for each ray.
-    fn samples_and_hessians(
+    fn sample_block_with_hessians(
         &self,
-        at: &Columns<R>,
-        times: &Columns<R>,
-        out: &mut Samples<R>,
-        product: &mut Columns<R>,
+        at: &LaneVectors<R>,
+        times: &LaneVectors<R>,
+        out: &mut IndexSamples<R>,
+        product: &mut LaneVectors<R>,
     ) {
-        widest(
-            Width::Bits512,
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
             || {
                 for lane in 0..LANES {
@@ -142,14 +147,20 @@ pub trait Field<R: Real>: Debug + Send + Sync {
         );
     }
 
-    /// [`Self::deposit`] for a block of rays, in order.
-    fn deposits(&self, at: &Columns<R>, weight: &Column<R>, pull: &Columns<R>, gradient: &mut [R]) {
-        widest(
-            Width::Bits512,
+    /// [`Self::accumulate`] for a block of rays, in order.
+    fn accumulate_block(
+        &self,
+        at: &LaneVectors<R>,
+        weight: &LaneScalars<R>,
+        pull: &LaneVectors<R>,
+        gradient: &mut [R],
+    ) {
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
             || {
                 for (lane, weight) in weight.iter().enumerate() {
-                    self.deposit(get(at, lane), *weight, get(pull, lane), gradient);
+                    self.accumulate(get(at, lane), *weight, get(pull, lane), gradient);
                 }
             },
         );
@@ -159,22 +170,22 @@ pub trait Field<R: Real>: Debug + Send + Sync {
 /// Indices and gradients for a block of rays; a column begins where a line of the cache does.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub struct Samples<R> {
+pub struct IndexSamples<R> {
     /// Refractive index η.
-    pub index: Column<R>,
+    pub index: LaneScalars<R>,
     /// ∇η.
-    pub gradient: Columns<R>,
+    pub gradient: LaneVectors<R>,
 }
 
-impl<R: Real> Default for Samples<R> {
+impl<R: Real> Default for IndexSamples<R> {
     fn default() -> Self {
-        Self { index: [R::ZERO; LANES], gradient: Columns::default() }
+        Self { index: [R::ZERO; LANES], gradient: LaneVectors::default() }
     }
 }
 
-impl<R: Real> Samples<R> {
+impl<R: Real> IndexSamples<R> {
     #[inline(always)]
-    pub(super) fn put(&mut self, lane: usize, sample: Sample<R>) {
+    pub(super) fn put(&mut self, lane: usize, sample: IndexSample<R>) {
         self.index[lane] = sample.index;
         put(&mut self.gradient, lane, sample.gradient);
     }

@@ -3,7 +3,7 @@
 //! With `v_z` constant along a ray, `x(σ) = x₀ cos(n₀ g σ) + v₀ sin(n₀ g σ)/(n₀ g)` across the axis
 //! (Marchand, *Gradient Index Optics*, 1978).
 
-use super::{Profile, Profiled};
+use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
 /// Where `g² s` exceeds this the profile is constant: the root must stay real.
@@ -23,7 +23,7 @@ impl<R: Real> Parabolic<R> {
 
     /// `g² s`, not beyond the cut, and one before it, zero behind.
     #[inline(always)]
-    fn relative(&self, s: R) -> (R, R) {
+    fn clamped_square(&self, s: R) -> (R, R) {
         let [_, g] = self.parameters;
         let (q, cut) = (g * g * s, R::from_f64(CUT));
         let inside = q < cut;
@@ -31,7 +31,7 @@ impl<R: Real> Parabolic<R> {
     }
 }
 
-impl<R: Real> Profile<R> for Parabolic<R> {
+impl<R: Real> ProfileFunction<R> for Parabolic<R> {
     fn parameters(&self) -> &[R] {
         &self.parameters
     }
@@ -41,19 +41,19 @@ impl<R: Real> Profile<R> for Parabolic<R> {
     }
 
     #[inline(always)]
-    fn at(&self, s: R) -> Profiled<R> {
+    fn evaluate(&self, s: R) -> ProfileSample<R> {
         let [axis, g] = self.parameters;
-        let (q, on) = self.relative(s);
+        let (q, on) = self.clamped_square(s);
         let value = axis * (R::ONE - q).sqrt();
         let slope = -(on * axis * axis * g * g / (R::TWO * value));
-        Profiled { value, slope, bend: -(slope * slope / value) }
+        ProfileSample { value, slope, curvature: -(slope * slope / value) }
     }
 
     /// With `w = √(1 - g² s)`: `∂f/∂g = -n₀ g s/w`, `∂f'/∂g = -n₀ g (1 + g² s/(2 w²))/w`.
     #[inline(always)]
-    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+    fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         let [axis, g] = self.parameters;
-        let (q, on) = self.relative(s);
+        let (q, on) = self.clamped_square(s);
         let root = (R::ONE - q).sqrt();
         gradient[0] += weight * root - on * pull * g * g / (R::TWO * root);
         let bracket = R::ONE + q / (R::TWO * root * root);

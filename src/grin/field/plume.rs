@@ -4,30 +4,30 @@
 //! `η = n₀ + s q(p)` with `q = Σ wᵢ exp(-|p - cᵢ|²/2σᵢ²)`: `q` is about 1 where the plume is densest
 //! and below 10⁻⁴ on the surface of its cube. A thin plume, as of hot gas, has `s < 0`.
 
-use super::{Field, Grain, Hessian, Sample};
+use super::{FieldResolution, Hessian, IndexField, IndexSample};
 use crate::math::Real;
 use crate::math::Vec3;
 
 /// A part of the plume, in units of half the side of its cube.
-struct Puff {
+struct GaussianBlob {
     centre: [f64; 3],
     /// Its standard deviation.
     width: f64,
     weight: f64,
 }
 
-const fn puff(centre: [f64; 3], width: f64, weight: f64) -> Puff {
-    Puff { centre, width, weight }
+const fn blob(centre: [f64; 3], width: f64, weight: f64) -> GaussianBlob {
+    GaussianBlob { centre, width, weight }
 }
 
-const PUFFS: [Puff; 7] = [
-    puff([0.00, 0.02, -0.40], 0.13, 0.74),
-    puff([0.06, -0.03, -0.16], 0.15, 0.58),
-    puff([-0.05, 0.06, 0.06], 0.16, 0.46),
-    puff([0.15, 0.05, 0.26], 0.15, 0.51),
-    puff([-0.17, -0.08, 0.34], 0.15, 0.51),
-    puff([0.03, 0.20, 0.38], 0.14, 0.42),
-    puff([0.22, -0.17, 0.04], 0.13, 0.37),
+const BLOBS: [GaussianBlob; 7] = [
+    blob([0.00, 0.02, -0.40], 0.13, 0.74),
+    blob([0.06, -0.03, -0.16], 0.15, 0.58),
+    blob([-0.05, 0.06, 0.06], 0.16, 0.46),
+    blob([0.15, 0.05, 0.26], 0.15, 0.51),
+    blob([-0.17, -0.08, 0.34], 0.15, 0.51),
+    blob([0.03, 0.20, 0.38], 0.14, 0.42),
+    blob([0.22, -0.17, 0.04], 0.13, 0.37),
 ];
 
 /// Beyond this exponent a Gaussian is constant, so that its series stays short.
@@ -45,14 +45,14 @@ pub struct Plume<R> {
 }
 
 /// `q` and its derivatives.
-struct Density<R> {
+struct PlumeDensity<R> {
     value: R,
     gradient: Vec3<R>,
     hessian: Hessian<R>,
 }
 
 /// `e⁻ᵠ` for `φ ≥ 0`. All terms of the series of `e^(φ/64)` are positive, so nothing cancels.
-fn decay<R: Real>(exponent: R) -> R {
+fn exp_negative<R: Real>(exponent: R) -> R {
     let cut = R::from_f64(CUT);
     let small = R::select(exponent < cut, exponent, cut) * R::from_f64(0.5_f64.powi(SQUARINGS));
     let (mut term, mut sum) = (R::ONE, R::ONE);
@@ -71,16 +71,16 @@ impl<R: Real> Plume<R> {
         Self { parameters: [ambient, contrast], half }
     }
 
-    fn density(&self, at: Vec3<R>) -> Density<R> {
+    fn density(&self, at: Vec3<R>) -> PlumeDensity<R> {
         let zero = Hessian::default();
-        let mut sum = Density { value: R::ZERO, gradient: Vec3::default(), hessian: zero };
+        let mut sum = PlumeDensity { value: R::ZERO, gradient: Vec3::default(), hessian: zero };
         let (mut diagonal, mut mixed) = (Vec3::default(), Vec3::default());
-        for Puff { centre: [x, y, z], width, weight } in &PUFFS {
+        for GaussianBlob { centre: [x, y, z], width, weight } in &BLOBS {
             let centre: Vec3<R> = Vec3::from_f64(Vec3::new(*x, *y, *z)) * self.half;
             let width = self.half * R::from_f64(*width);
             let narrow = R::ONE / (width * width);
             let d = at - centre;
-            let value = R::from_f64(*weight) * decay(d.dot(d) * narrow * R::from_f64(0.5));
+            let value = R::from_f64(*weight) * exp_negative(d.dot(d) * narrow * R::from_f64(0.5));
             let (slope, bend) = (value * narrow, value * narrow * narrow);
             sum.value += value;
             sum.gradient = sum.gradient - d * slope;
@@ -93,7 +93,7 @@ impl<R: Real> Plume<R> {
     }
 }
 
-impl<R: Real> Field<R> for Plume<R> {
+impl<R: Real> IndexField<R> for Plume<R> {
     fn parameters(&self) -> &[R] {
         &self.parameters
     }
@@ -102,7 +102,7 @@ impl<R: Real> Field<R> for Plume<R> {
         &mut self.parameters
     }
 
-    fn sample(&self, at: Vec3<R>) -> Sample<R> {
+    fn sample(&self, at: Vec3<R>) -> IndexSample<R> {
         self.sample_and_hessian(at).0
     }
 
@@ -110,22 +110,23 @@ impl<R: Real> Field<R> for Plume<R> {
         self.sample_and_hessian(at).1
     }
 
-    fn sample_and_hessian(&self, at: Vec3<R>) -> (Sample<R>, Hessian<R>) {
+    fn sample_and_hessian(&self, at: Vec3<R>) -> (IndexSample<R>, Hessian<R>) {
         let [ambient, contrast] = self.parameters;
-        let Density { value, gradient, hessian } = self.density(at);
-        let sample = Sample { index: ambient + contrast * value, gradient: gradient * contrast };
+        let PlumeDensity { value, gradient, hessian } = self.density(at);
+        let sample =
+            IndexSample { index: ambient + contrast * value, gradient: gradient * contrast };
         let Hessian { diagonal, mixed } = hessian;
         (sample, Hessian { diagonal: diagonal * contrast, mixed: mixed * contrast })
     }
 
-    fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
+    fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
         let density = self.density(at);
         gradient[0] += weight;
         gradient[1] += weight * density.value + pull.dot(density.gradient);
     }
 
-    fn grain(&self) -> Grain {
-        Grain { voxel: None, continuous_force: true }
+    fn resolution(&self) -> FieldResolution {
+        FieldResolution { voxel: None, continuous_force: true }
     }
 }
 
@@ -137,11 +138,11 @@ mod tests {
     fn the_exponential_is_right_to_rounding_and_ends_quietly() {
         for i in 0..800 {
             let exponent = 0.1 * f64::from(i);
-            let (found, exact) = (decay(exponent), (-exponent).exp());
+            let (found, exact) = (exp_negative(exponent), (-exponent).exp());
             assert!((found - exact).abs() <= 1e-13 * exact, "{exponent}: {found} {exact}");
         }
-        assert_eq!(decay(1e9), decay(CUT));
-        assert!(decay(80.0_f32) > 0.0 && decay(f64::MAX).is_finite());
+        assert_eq!(exp_negative(1e9), exp_negative(CUT));
+        assert!(exp_negative(80.0_f32) > 0.0 && exp_negative(f64::MAX).is_finite());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A profile that is a polynomial: `f = Σ cₖ sᵏ`.
 
-use super::{Profile, Profiled, ProfiledColumns};
-use crate::grin::lanes::{Column, LANES};
+use super::{ProfileFunction, ProfileSample, ProfileSamples};
+use crate::grin::lanes::{LANES, LaneScalars};
 use crate::math::Real;
 
 /// `f = Σ cₖ sᵏ`; the parameters are the coefficients.
@@ -11,7 +11,7 @@ pub struct Polynomial<R> {
     pub coefficients: Vec<R>,
 }
 
-impl<R: Real> Profile<R> for Polynomial<R> {
+impl<R: Real> ProfileFunction<R> for Polynomial<R> {
     fn parameters(&self) -> &[R] {
         &self.coefficients
     }
@@ -22,20 +22,20 @@ impl<R: Real> Profile<R> for Polynomial<R> {
 
     /// Horner's rule for the value and both derivatives.
     #[inline(always)]
-    fn at(&self, s: R) -> Profiled<R> {
+    fn evaluate(&self, s: R) -> ProfileSample<R> {
         let (mut value, mut slope, mut half_bend) = (R::ZERO, R::ZERO, R::ZERO);
         for &c in self.coefficients.iter().rev() {
             half_bend = half_bend * s + slope;
             slope = slope * s + value;
             value = value * s + c;
         }
-        Profiled { value, slope, bend: half_bend + half_bend }
+        ProfileSample { value, slope, curvature: half_bend + half_bend }
     }
 
     /// One coefficient for all rays, then the next.
     #[inline(always)]
-    fn at_all(&self, s: &Column<R>, out: &mut ProfiledColumns<R>) {
-        let ProfiledColumns { value, slope, bend } = out;
+    fn evaluate_block(&self, s: &LaneScalars<R>, out: &mut ProfileSamples<R>) {
+        let ProfileSamples { value, slope, curvature: bend } = out;
         for column in [&mut *value, &mut *slope, &mut *bend] {
             *column = [R::ZERO; LANES];
         }
@@ -52,7 +52,7 @@ impl<R: Real> Profile<R> for Polynomial<R> {
     }
 
     #[inline(always)]
-    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+    fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         // `power` is sᵏ and `slope` its derivative.
         let (mut power, mut slope) = (R::ONE, R::ZERO);
         for g in gradient {

@@ -3,7 +3,7 @@
 //! `η = n₀ / cosh(a r)` (Mikaelian 1951; Marchand, *Gradient Index Optics*, 1978): parallel light
 //! meets the axis at `π/2a`, `3π/2a`, …
 
-use super::{Profile, Profiled};
+use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
 /// Beyond this `(a r)²` the profile is constant, so that the series stays short.
@@ -45,7 +45,7 @@ fn cosh_root<R: Real>(q: R) -> [R; 3] {
 
 impl<R: Real> Sech<R> {
     /// `a² s` not beyond the cut, one before it and zero behind, and `cosh √q` with derivatives.
-    fn parts(&self, s: R) -> (R, R, [R; 3]) {
+    fn cosh_parts(&self, s: R) -> (R, R, [R; 3]) {
         let [_, a] = self.parameters;
         let (q, cut) = (a * a * s, R::from_f64(CUT));
         let inside = q < cut;
@@ -54,7 +54,7 @@ impl<R: Real> Sech<R> {
     }
 }
 
-impl<R: Real> Profile<R> for Sech<R> {
+impl<R: Real> ProfileFunction<R> for Sech<R> {
     fn parameters(&self) -> &[R] {
         &self.parameters
     }
@@ -63,19 +63,19 @@ impl<R: Real> Profile<R> for Sech<R> {
         &mut self.parameters
     }
 
-    fn at(&self, s: R) -> Profiled<R> {
+    fn evaluate(&self, s: R) -> ProfileSample<R> {
         let [axis, a] = self.parameters;
-        let (_, on, [c, c1, c2]) = self.parts(s);
+        let (_, on, [c, c1, c2]) = self.cosh_parts(s);
         let (value, square) = (axis / c, on * a * a);
         let slope = -(value * c1 / c * square);
         let bend = value * square * square * (R::TWO * c1 * c1 / c - c2) / c;
-        Profiled { value, slope, bend }
+        ProfileSample { value, slope, curvature: bend }
     }
 
     /// By `q = a² s`: `df/dq = -n₀ c'/c²`, and `f' = a² df/dq`.
-    fn deposit(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
+    fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         let [axis, a] = self.parameters;
-        let (_, on, [c, c1, c2]) = self.parts(s);
+        let (_, on, [c, c1, c2]) = self.cosh_parts(s);
         let by_q = -(c1 / (c * c));
         let by_q2 = (R::TWO * c1 * c1 / c - c2) / (c * c);
         gradient[0] += weight / c + on * pull * by_q * a * a;

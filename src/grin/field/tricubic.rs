@@ -3,8 +3,8 @@
 //! The coefficients are not values at the nodes. A field with `n` cells on an axis has `n + 3`
 //! coefficients there; the first stands one spacing before the domain.
 
-use super::bspline::{basis, bends, slopes};
-use super::{Field, Grain, Grid, GridError, Hessian, Sample};
+use super::bspline::{basis, basis_curvatures, basis_slopes};
+use super::{FieldResolution, GridError, Hessian, IndexField, IndexSample, RegularGrid};
 use crate::math::Real;
 use crate::math::Vec3;
 
@@ -13,20 +13,20 @@ use crate::math::Vec3;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tricubic<R> {
     /// Counts of coefficients, spacing, and the lower corner of the domain.
-    grid: Grid<R>,
+    grid: RegularGrid<R>,
     coefficients: Vec<R>,
 }
 
 /// Four weights along each axis.
-type Weights<R> = Vec3<[R; 4]>;
+type AxisWeights<R> = Vec3<[R; 4]>;
 
 impl<R: Real> Tricubic<R> {
-    /// The field of these coefficients, in the order of [`Grid`]. `grid.low()` is the lower corner
+    /// The field of these coefficients, in the order of [`RegularGrid`]. `grid.low()` is the lower corner
     /// of the *domain*, which has three cells less than there are coefficients on each axis.
     ///
     /// # Errors
     /// Fewer than four coefficients on an axis, or values that do not fit or are no numbers.
-    pub fn new(grid: Grid<R>, coefficients: Vec<R>) -> Result<Self, GridError> {
+    pub fn new(grid: RegularGrid<R>, coefficients: Vec<R>) -> Result<Self, GridError> {
         grid.check(&coefficients, 4)?;
         Ok(Self { grid, coefficients })
     }
@@ -38,10 +38,10 @@ impl<R: Real> Tricubic<R> {
     ///
     /// # Errors
     /// No cells, or values that are no numbers.
-    pub fn near(cells: usize, half: R, f: impl Fn(Vec3<R>) -> R) -> Result<Self, GridError> {
-        let domain = Grid::cube(cells + 1, half)?;
+    pub fn approximate(cells: usize, half: R, f: impl Fn(Vec3<R>) -> R) -> Result<Self, GridError> {
+        let domain = RegularGrid::cube(cells + 1, half)?;
         let h = domain.spacing().x;
-        let grid = Grid::new([cells + 3; 3], domain.low(), domain.spacing())?;
+        let grid = RegularGrid::new([cells + 3; 3], domain.low(), domain.spacing())?;
         let place = |n: usize| grid.node(n) - Vec3::new(h, h, h);
         let coefficient = |p: Vec3<R>| {
             let centre = f(p);
@@ -55,11 +55,11 @@ impl<R: Real> Tricubic<R> {
             }
             centre - around * R::from_f64(1.0 / 6.0)
         };
-        Self::new(grid, (0..grid.nodes()).map(|n| coefficient(place(n))).collect())
+        Self::new(grid, (0..grid.node_count()).map(|n| coefficient(place(n))).collect())
     }
 
     /// Counts of coefficients, spacing, and the lower corner of the domain.
-    pub fn grid(&self) -> &Grid<R> {
+    pub fn grid(&self) -> &RegularGrid<R> {
         &self.grid
     }
 
@@ -79,7 +79,7 @@ impl<R: Real> Tricubic<R> {
 }
 
 #[inline(always)]
-fn weights<R: Real>(t: Vec3<R>, of: impl Fn(R) -> [R; 4]) -> Weights<R> {
+fn weights<R: Real>(t: Vec3<R>, of: impl Fn(R) -> [R; 4]) -> AxisWeights<R> {
     Vec3::new(of(t.x), of(t.y), of(t.z))
 }
 
@@ -89,7 +89,7 @@ fn sum<R: Real>(weights: [R; 4], values: &[R]) -> R {
         + (weights[2] * values[2] + weights[3] * values[3])
 }
 
-impl<R: Real> Field<R> for Tricubic<R> {
+impl<R: Real> IndexField<R> for Tricubic<R> {
     fn parameters(&self) -> &[R] {
         &self.coefficients
     }
@@ -99,9 +99,9 @@ impl<R: Real> Field<R> for Tricubic<R> {
     }
 
     #[inline(always)]
-    fn sample(&self, at: Vec3<R>) -> Sample<R> {
+    fn sample(&self, at: Vec3<R>) -> IndexSample<R> {
         let (first, t) = self.locate(at);
-        let (b, s) = (weights(t, basis), weights(t, slopes));
+        let (b, s) = (weights(t, basis), weights(t, basis_slopes));
         let (mut index, mut g) = (R::ZERO, Vec3::default());
         for k in 0..4 {
             // The layer: its value, and its slopes along x and y.
@@ -117,8 +117,8 @@ impl<R: Real> Field<R> for Tricubic<R> {
             index += b.z[k] * value;
             g = g + Vec3::new(b.z[k] * dx, b.z[k] * dy, s.z[k] * value);
         }
-        let d = self.grid.density;
-        Sample { index, gradient: Vec3::new(g.x * d.x, g.y * d.y, g.z * d.z) }
+        let d = self.grid.inverse_spacing;
+        IndexSample { index, gradient: Vec3::new(g.x * d.x, g.y * d.y, g.z * d.z) }
     }
 
     #[inline(always)]
@@ -127,9 +127,9 @@ impl<R: Real> Field<R> for Tricubic<R> {
     }
 
     #[inline(always)]
-    fn sample_and_hessian(&self, at: Vec3<R>) -> (Sample<R>, Hessian<R>) {
+    fn sample_and_hessian(&self, at: Vec3<R>) -> (IndexSample<R>, Hessian<R>) {
         let (first, t) = self.locate(at);
-        let (b, s, c) = (weights(t, basis), weights(t, slopes), weights(t, bends));
+        let (b, s, c) = (weights(t, basis), weights(t, basis_slopes), weights(t, basis_curvatures));
         let (mut index, mut g) = (R::ZERO, Vec3::default());
         let (mut diagonal, mut mixed) = (Vec3::default(), Vec3::default());
         for k in 0..4 {
@@ -150,8 +150,8 @@ impl<R: Real> Field<R> for Tricubic<R> {
             diagonal = diagonal + Vec3::new(b.z[k] * dxx, b.z[k] * dyy, c.z[k] * value);
             mixed = mixed + Vec3::new(s.z[k] * dy, s.z[k] * dx, b.z[k] * dxy);
         }
-        let d = self.grid.density;
-        let sample = Sample { index, gradient: Vec3::new(g.x * d.x, g.y * d.y, g.z * d.z) };
+        let d = self.grid.inverse_spacing;
+        let sample = IndexSample { index, gradient: Vec3::new(g.x * d.x, g.y * d.y, g.z * d.z) };
         let hessian = Hessian {
             diagonal: Vec3::new(
                 diagonal.x * d.x * d.x,
@@ -164,10 +164,10 @@ impl<R: Real> Field<R> for Tricubic<R> {
     }
 
     #[inline(always)]
-    fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
+    fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
         let (first, t) = self.locate(at);
-        let (b, s) = (weights(t, basis), weights(t, slopes));
-        let d = self.grid.density;
+        let (b, s) = (weights(t, basis), weights(t, basis_slopes));
+        let d = self.grid.inverse_spacing;
         let pull = Vec3::new(pull.x * d.x, pull.y * d.y, pull.z * d.z);
         for k in 0..4 {
             for j in 0..4 {
@@ -181,7 +181,7 @@ impl<R: Real> Field<R> for Tricubic<R> {
         }
     }
 
-    fn grain(&self) -> Grain {
-        Grain { voxel: Some(self.grid.voxel()), continuous_force: true }
+    fn resolution(&self) -> FieldResolution {
+        FieldResolution { voxel: Some(self.grid.smallest_spacing()), continuous_force: true }
     }
 }

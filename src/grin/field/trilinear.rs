@@ -9,17 +9,19 @@
 //! A block of rays is worked off in three passes, so that lanes do all but the second: find the
 //! voxels, collect the nodes, interpolate.
 
-use super::grid::Place;
-use super::{Field, Grain, Grid, GridError, Hessian, Sample, Samples};
-use crate::grin::lanes::{Column, Columns, LANES, get, put};
+use super::grid::GridCell;
+use super::{
+    FieldResolution, GridError, Hessian, IndexField, IndexSample, IndexSamples, RegularGrid,
+};
+use crate::grin::lanes::{LANES, LaneScalars, LaneVectors, get, put};
 use crate::math::Real;
+use crate::math::SimdWidth;
 use crate::math::Vec3;
-use crate::math::Width;
-use crate::math::widest;
+use crate::math::run_vectorized;
 
 /// What stands on the diagonal of the Hessian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Diagonal {
+pub enum HessianDiagonal {
     /// Zero, as differentiation inside a voxel gives: the exact transpose of the discrete map, for
     /// comparison.
     Exact,
@@ -32,10 +34,10 @@ pub enum Diagonal {
 /// continue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trilinear<R> {
-    grid: Grid<R>,
+    grid: RegularGrid<R>,
     values: Vec<R>,
     /// What stands on the diagonal of the Hessian.
-    pub diagonal: Diagonal,
+    pub diagonal: HessianDiagonal,
 }
 
 /// The eight corners of a voxel: x runs fastest.
@@ -43,10 +45,10 @@ type Corners<R> = [R; 8];
 
 /// The nodes before and behind a voxel on the four lines through its corners along each axis, in the
 /// order x, y, z, the lines in the order of the corners they go through.
-type Outer<R> = [[R; 2]; 12];
+type OuterNodes<R> = [[R; 2]; 12];
 
 /// What the corners of a voxel say at a point, in units of voxels.
-struct Blend<R> {
+struct VoxelSample<R> {
     value: R,
     slope: Vec3<R>,
     mixed: Vec3<R>,
@@ -61,7 +63,7 @@ fn pair<R: Real>(values: &[R], first: usize) -> [R; 2] {
 
 /// Interpolates along x, then y, then z; differences instead of weights, for fewer operations.
 #[inline(always)]
-fn blend<R: Real>(c: &Corners<R>, t: Vec3<R>) -> Blend<R> {
+fn interpolate<R: Real>(c: &Corners<R>, t: Vec3<R>) -> VoxelSample<R> {
     let dx = [c[1] - c[0], c[3] - c[2], c[5] - c[4], c[7] - c[6]];
     let edges = [c[0] + t.x * dx[0], c[2] + t.x * dx[1], c[4] + t.x * dx[2], c[6] + t.x * dx[3]];
     let (dy0, dy1) = (edges[1] - edges[0], edges[3] - edges[2]);
@@ -69,7 +71,7 @@ fn blend<R: Real>(c: &Corners<R>, t: Vec3<R>) -> Blend<R> {
     let (dxy0, dxy1) = (dx[1] - dx[0], dx[3] - dx[2]);
     let (dx0, dx1) = (dx[0] + t.y * dxy0, dx[2] + t.y * dxy1);
     let (dz, dzx, dyz) = (face1 - face0, dx1 - dx0, dy1 - dy0);
-    Blend {
+    VoxelSample {
         value: face0 + t.z * dz,
         slope: Vec3::new(dx0 + t.z * dzx, dy0 + t.z * dyz, dz),
         mixed: Vec3::new(dyz, dzx, dxy0 + t.z * (dxy1 - dxy0)),
@@ -82,7 +84,7 @@ fn blend<R: Real>(c: &Corners<R>, t: Vec3<R>) -> Blend<R> {
 /// interpolated, are `(1-t) before + t behind + (b - a) (1 - 2t) - ((1-t) a + t b)`. Interpolated over
 /// the four edges along an axis, the last two terms are the slope and the value of the blend.
 #[inline(always)]
-fn second_differences<R: Real>(blend: &Blend<R>, outer: Vec3<R>, t: Vec3<R>) -> Vec3<R> {
+fn second_differences<R: Real>(blend: &VoxelSample<R>, outer: Vec3<R>, t: Vec3<R>) -> Vec3<R> {
     let axis = |outer: R, slope: R, t: R| outer + slope * (R::ONE - t - t) - blend.value;
     let slope = blend.slope;
     Vec3::new(axis(outer.x, slope.x, t.x), axis(outer.y, slope.y, t.y), axis(outer.z, slope.z, t.z))
@@ -90,7 +92,7 @@ fn second_differences<R: Real>(blend: &Blend<R>, outer: Vec3<R>, t: Vec3<R>) -> 
 
 /// Interpolates the nodes around a voxel over the four edges of each axis.
 #[inline(always)]
-fn blend_outer<R: Real>(outer: &Outer<R>, t: Vec3<R>) -> Vec3<R> {
+fn interpolate_outer<R: Real>(outer: &OuterNodes<R>, t: Vec3<R>) -> Vec3<R> {
     let lerp = |a: R, b: R, t: R| a + t * (b - a);
     let line = |n: usize, t: R| lerp(outer[n][0], outer[n][1], t);
     let four = |n: usize, along: R, s: R, t: R| {
@@ -104,26 +106,29 @@ fn blend_outer<R: Real>(outer: &Outer<R>, t: Vec3<R>) -> Vec3<R> {
 }
 
 impl<R: Real> Trilinear<R> {
-    /// The field of these values, in the order of [`Grid`], with the smoothed diagonal.
+    /// The field of these values, in the order of [`RegularGrid`], with the smoothed diagonal.
     ///
     /// # Errors
     /// Fewer than two nodes on an axis, or values that do not fit or are no numbers.
-    pub fn new(grid: Grid<R>, values: Vec<R>) -> Result<Self, GridError> {
+    pub fn new(grid: RegularGrid<R>, values: Vec<R>) -> Result<Self, GridError> {
         grid.check(&values, 2)?;
-        Ok(Self { grid, values, diagonal: Diagonal::default() })
+        Ok(Self { grid, values, diagonal: HessianDiagonal::default() })
     }
 
     /// The field that takes these values at the nodes.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn sampled(grid: Grid<R>, value: impl Fn(Vec3<R>) -> R) -> Result<Self, GridError> {
-        let values = (0..grid.nodes()).map(|n| value(grid.node(n))).collect();
+    pub fn from_function(
+        grid: RegularGrid<R>,
+        value: impl Fn(Vec3<R>) -> R,
+    ) -> Result<Self, GridError> {
+        let values = (0..grid.node_count()).map(|n| value(grid.node(n))).collect();
         Self::new(grid, values)
     }
 
     /// Where the nodes stand.
-    pub fn grid(&self) -> &Grid<R> {
+    pub fn grid(&self) -> &RegularGrid<R> {
         &self.grid
     }
 
@@ -147,7 +152,7 @@ impl<R: Real> Trilinear<R> {
     /// The nodes around a voxel, interpolated at the point for each axis; at the rim of the grid,
     /// values that continue the second difference of the next node inwards.
     #[inline(always)]
-    fn outer(&self, place: &Place<R>) -> Vec3<R> {
+    fn outer(&self, place: &GridCell<R>) -> Vec3<R> {
         if self.is_at_rim(place) {
             return self.outer_at_rim(place);
         }
@@ -156,7 +161,7 @@ impl<R: Real> Trilinear<R> {
 
     /// Whether a voxel lacks a neighbour.
     #[inline(always)]
-    fn is_at_rim(&self, place: &Place<R>) -> bool {
+    fn is_at_rim(&self, place: &GridCell<R>) -> bool {
         let [nx, ny, nz] = self.grid.counts();
         let [x, y, z] = place.cell;
         let within = |cell: f64, count: usize| (cell > 0.0) & (cell + 3.0 < count as f64);
@@ -180,12 +185,12 @@ impl<R: Real> Trilinear<R> {
         let [z0, z1] = [across(0, layer), across(row, layer)];
         let (x0, x1, x2, x3) = (along(0), along(row), along(layer), along(both));
         let outer = [x0, x1, x2, x3, y0[0], y0[1], y1[0], y1[1], z0[0], z0[1], z1[0], z1[1]];
-        blend_outer(&outer, t)
+        interpolate_outer(&outer, t)
     }
 
     #[cold]
     #[inline(never)]
-    fn outer_at_rim(&self, place: &Place<R>) -> Vec3<R> {
+    fn outer_at_rim(&self, place: &GridCell<R>) -> Vec3<R> {
         let [_, row, layer, _] = self.strides();
         let starts = [[0, row, layer, layer + row], [0, 1, layer, layer + 1], [0, 1, row, row + 1]];
         let steps = [1, row, layer];
@@ -197,7 +202,7 @@ impl<R: Real> Trilinear<R> {
                 outer[4 * axis + line] = self.neighbours(first, steps[axis], cell, count);
             }
         }
-        blend_outer(&outer, place.t)
+        interpolate_outer(&outer, place.t)
     }
 
     /// The nodes before and behind an edge that begins at node `first`, in cell `cell` of a line.
@@ -217,15 +222,15 @@ impl<R: Real> Trilinear<R> {
     }
 
     #[inline(always)]
-    fn finish(&self, blend: &Blend<R>) -> Sample<R> {
-        let (d, s) = (self.grid.density, blend.slope);
+    fn to_sample(&self, blend: &VoxelSample<R>) -> IndexSample<R> {
+        let (d, s) = (self.grid.inverse_spacing, blend.slope);
         let gradient = Vec3::new(s.x * d.x, s.y * d.y, s.z * d.z);
-        Sample { index: blend.value, gradient }
+        IndexSample { index: blend.value, gradient }
     }
 
     #[inline(always)]
-    fn finish_hessian(&self, mixed: Vec3<R>, diagonal: Vec3<R>) -> Hessian<R> {
-        let d = self.grid.density;
+    fn to_hessian(&self, mixed: Vec3<R>, diagonal: Vec3<R>) -> Hessian<R> {
+        let d = self.grid.inverse_spacing;
         Hessian {
             diagonal: Vec3::new(
                 diagonal.x * d.x * d.x,
@@ -238,8 +243,8 @@ impl<R: Real> Trilinear<R> {
 
     /// What the corners of a voxel get of a deposit.
     #[inline(always)]
-    fn shares(&self, t: Vec3<R>, weight: R, pull: Vec3<R>) -> Corners<R> {
-        let d = self.grid.density;
+    fn corner_shares(&self, t: Vec3<R>, weight: R, pull: Vec3<R>) -> Corners<R> {
+        let d = self.grid.inverse_spacing;
         let (px, py, pz) = (pull.x * d.x, pull.y * d.y, pull.z * d.z);
         let (sy, sz) = (R::ONE - t.y, R::ONE - t.z);
         let pair = |y: R, z: R, py: R, pz: R| {
@@ -254,7 +259,7 @@ impl<R: Real> Trilinear<R> {
     }
 
     #[inline(always)]
-    fn add(&self, first: usize, shares: &Corners<R>, gradient: &mut [R]) {
+    fn add_to_corners(&self, first: usize, shares: &Corners<R>, gradient: &mut [R]) {
         let strides = self.strides();
         let near = &mut gradient[first..][..strides[3] + 2];
         for (n, stride) in strides.into_iter().enumerate() {
@@ -266,7 +271,7 @@ impl<R: Real> Trilinear<R> {
 
 /// Puts the corners of one ray into columns.
 #[inline(always)]
-fn spread<R: Real>(columns: &mut [Column<R>; 8], lane: usize, corners: &Corners<R>) {
+fn scatter<R: Real>(columns: &mut [LaneScalars<R>; 8], lane: usize, corners: &Corners<R>) {
     for (column, corner) in columns.iter_mut().zip(corners) {
         column[lane] = *corner;
     }
@@ -274,35 +279,35 @@ fn spread<R: Real>(columns: &mut [Column<R>; 8], lane: usize, corners: &Corners<
 
 /// Takes the corners of one ray out of columns.
 #[inline(always)]
-fn collect<R: Real>(columns: &[Column<R>; 8], lane: usize) -> Corners<R> {
+fn gather<R: Real>(columns: &[LaneScalars<R>; 8], lane: usize) -> Corners<R> {
     std::array::from_fn(|n| columns[n][lane])
 }
 
 /// The voxels of a block of rays.
 #[derive(Clone, Copy)]
-struct Places<R> {
+struct GridCells<R> {
     cell: [[f64; LANES]; 3],
     first: [usize; LANES],
     at_rim: [bool; LANES],
-    t: Columns<R>,
+    t: LaneVectors<R>,
 }
 
-impl<R: Real> Places<R> {
+impl<R: Real> GridCells<R> {
     #[inline(always)]
-    fn get(&self, lane: usize) -> Place<R> {
+    fn get(&self, lane: usize) -> GridCell<R> {
         let cell = [self.cell[0][lane], self.cell[1][lane], self.cell[2][lane]];
-        Place { cell, first: self.first[lane], t: get(&self.t, lane) }
+        GridCell { cell, first: self.first[lane], t: get(&self.t, lane) }
     }
 }
 
 impl<R: Real> Trilinear<R> {
     #[inline(always)]
-    fn places(&self, at: &Columns<R>) -> Places<R> {
-        let mut places = Places {
+    fn locate_block(&self, at: &LaneVectors<R>) -> GridCells<R> {
+        let mut places = GridCells {
             cell: [[0.0; LANES]; 3],
             first: [0; LANES],
             at_rim: [false; LANES],
-            t: Columns::default(),
+            t: LaneVectors::default(),
         };
         for lane in 0..LANES {
             let place = self.grid.locate(get(at, lane), 2);
@@ -317,18 +322,18 @@ impl<R: Real> Trilinear<R> {
     }
 
     #[inline(always)]
-    fn all_corners(&self, places: &Places<R>) -> [Column<R>; 8] {
+    fn all_corners(&self, places: &GridCells<R>) -> [LaneScalars<R>; 8] {
         let mut all = [[R::ZERO; LANES]; 8];
         for lane in 0..LANES {
-            spread(&mut all, lane, &self.corners(places.first[lane]));
+            scatter(&mut all, lane, &self.corners(places.first[lane]));
         }
         all
     }
 
     #[inline(always)]
-    fn all_outer(&self, places: &Places<R>) -> Columns<R> {
-        let mut all = Columns::default();
-        if self.diagonal == Diagonal::Smoothed {
+    fn all_outer(&self, places: &GridCells<R>) -> LaneVectors<R> {
+        let mut all = LaneVectors::default();
+        if self.diagonal == HessianDiagonal::Smoothed {
             for lane in 0..LANES {
                 let outer = if places.at_rim[lane] {
                     self.outer_at_rim(&places.get(lane))
@@ -342,63 +347,63 @@ impl<R: Real> Trilinear<R> {
     }
 
     #[inline(always)]
-    fn block_samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
-        let places = self.places(at);
+    fn sample_lanes(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
+        let places = self.locate_block(at);
         let corners = self.all_corners(&places);
         for lane in 0..LANES {
-            let corners = collect(&corners, lane);
-            out.put(lane, self.finish(&blend(&corners, get(&places.t, lane))));
+            let corners = gather(&corners, lane);
+            out.put(lane, self.to_sample(&interpolate(&corners, get(&places.t, lane))));
         }
     }
 
     #[inline(always)]
-    fn block_hessians(
+    fn hessian_lanes(
         &self,
-        at: &Columns<R>,
-        times: &Columns<R>,
-        out: &mut Samples<R>,
-        product: &mut Columns<R>,
+        at: &LaneVectors<R>,
+        times: &LaneVectors<R>,
+        out: &mut IndexSamples<R>,
+        product: &mut LaneVectors<R>,
     ) {
-        let places = self.places(at);
+        let places = self.locate_block(at);
         let corners = self.all_corners(&places);
         let outer = self.all_outer(&places);
-        let smoothed = self.diagonal == Diagonal::Smoothed;
+        let smoothed = self.diagonal == HessianDiagonal::Smoothed;
         for lane in 0..LANES {
             let t = get(&places.t, lane);
-            let corners = collect(&corners, lane);
-            let blend = blend(&corners, t);
-            out.put(lane, self.finish(&blend));
+            let corners = gather(&corners, lane);
+            let blend = interpolate(&corners, t);
+            out.put(lane, self.to_sample(&blend));
             let diagonal = if smoothed {
                 second_differences(&blend, get(&outer, lane), t)
             } else {
                 Vec3::default()
             };
-            let hessian = self.finish_hessian(blend.mixed, diagonal);
+            let hessian = self.to_hessian(blend.mixed, diagonal);
             put(product, lane, hessian.times(get(times, lane)));
         }
     }
 
     #[inline(always)]
-    fn block_deposits(
+    fn accumulate_lanes(
         &self,
-        at: &Columns<R>,
-        weight: &Column<R>,
-        pull: &Columns<R>,
+        at: &LaneVectors<R>,
+        weight: &LaneScalars<R>,
+        pull: &LaneVectors<R>,
         gradient: &mut [R],
     ) {
-        let places = self.places(at);
+        let places = self.locate_block(at);
         let mut all = [[R::ZERO; LANES]; 8];
         for (lane, weight) in weight.iter().enumerate() {
-            let shares = self.shares(get(&places.t, lane), *weight, get(pull, lane));
-            spread(&mut all, lane, &shares);
+            let shares = self.corner_shares(get(&places.t, lane), *weight, get(pull, lane));
+            scatter(&mut all, lane, &shares);
         }
         for lane in 0..LANES {
-            self.add(places.first[lane], &collect(&all, lane), gradient);
+            self.add_to_corners(places.first[lane], &gather(&all, lane), gradient);
         }
     }
 }
 
-impl<R: Real> Field<R> for Trilinear<R> {
+impl<R: Real> IndexField<R> for Trilinear<R> {
     fn parameters(&self) -> &[R] {
         &self.values
     }
@@ -407,57 +412,63 @@ impl<R: Real> Field<R> for Trilinear<R> {
         &mut self.values
     }
 
-    fn sample(&self, at: Vec3<R>) -> Sample<R> {
+    fn sample(&self, at: Vec3<R>) -> IndexSample<R> {
         let place = self.grid.locate(at, 2);
-        self.finish(&blend(&self.corners(place.first), place.t))
+        self.to_sample(&interpolate(&self.corners(place.first), place.t))
     }
 
     fn hessian(&self, at: Vec3<R>) -> Hessian<R> {
         let place = self.grid.locate(at, 2);
-        let blend = blend(&self.corners(place.first), place.t);
+        let blend = interpolate(&self.corners(place.first), place.t);
         let diagonal = match self.diagonal {
-            Diagonal::Exact => Vec3::default(),
-            Diagonal::Smoothed => second_differences(&blend, self.outer(&place), place.t),
+            HessianDiagonal::Exact => Vec3::default(),
+            HessianDiagonal::Smoothed => second_differences(&blend, self.outer(&place), place.t),
         };
-        self.finish_hessian(blend.mixed, diagonal)
+        self.to_hessian(blend.mixed, diagonal)
     }
 
-    fn deposit(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
+    fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
         let place = self.grid.locate(at, 2);
-        self.add(place.first, &self.shares(place.t, weight, pull), gradient);
+        self.add_to_corners(place.first, &self.corner_shares(place.t, weight, pull), gradient);
     }
 
-    fn grain(&self) -> Grain {
-        Grain { voxel: Some(self.grid.voxel()), continuous_force: false }
+    fn resolution(&self) -> FieldResolution {
+        FieldResolution { voxel: Some(self.grid.smallest_spacing()), continuous_force: false }
     }
 
-    fn samples(&self, at: &Columns<R>, out: &mut Samples<R>) {
-        widest(
-            Width::Bits512,
+    fn sample_block(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
-            || self.block_samples(at, out),
+            || self.sample_lanes(at, out),
         );
     }
 
-    fn samples_and_hessians(
+    fn sample_block_with_hessians(
         &self,
-        at: &Columns<R>,
-        times: &Columns<R>,
-        out: &mut Samples<R>,
-        product: &mut Columns<R>,
+        at: &LaneVectors<R>,
+        times: &LaneVectors<R>,
+        out: &mut IndexSamples<R>,
+        product: &mut LaneVectors<R>,
     ) {
-        widest(
-            Width::Bits512,
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
-            || self.block_hessians(at, times, out, product),
+            || self.hessian_lanes(at, times, out, product),
         );
     }
 
-    fn deposits(&self, at: &Columns<R>, weight: &Column<R>, pull: &Columns<R>, gradient: &mut [R]) {
-        widest(
-            Width::Bits512,
+    fn accumulate_block(
+        &self,
+        at: &LaneVectors<R>,
+        weight: &LaneScalars<R>,
+        pull: &LaneVectors<R>,
+        gradient: &mut [R],
+    ) {
+        run_vectorized(
+            SimdWidth::Bits512,
             #[inline(always)]
-            || self.block_deposits(at, weight, pull, gradient),
+            || self.accumulate_lanes(at, weight, pull, gradient),
         );
     }
 }

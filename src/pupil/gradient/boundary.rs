@@ -10,25 +10,25 @@
 //! Split at its corners, the edge is smooth along every arc, and Gauss nodes converge spectrally.
 //! Rays are traced backwards, so that the cost does not depend on the number of parameters.
 
-use super::{Cost, Integrand, Warp};
+use super::{Integrand, QuadraticIntegrand, WarpSampling};
 use crate::math::Vec3;
-use crate::pupil::boundary::{Frame, Limit};
-use crate::pupil::lit::Lit;
-use crate::pupil::quadrature::Spoke;
-use crate::pupil::region::Kind;
-use crate::trace::{Gradient, Hurdle, Ray, Rays, Seed};
+use crate::pupil::boundary::{PolarFrame, PupilLimit};
+use crate::pupil::lit::TracedPupil;
+use crate::pupil::quadrature::RadialLine;
+use crate::pupil::region::RegionKind;
+use crate::trace::{AdjointSeed, Ray, RayLimit, Rays, SystemGradient};
 
-impl Lit<'_> {
+impl TracedPupil<'_> {
     /// The integral itself, in mm² of the first vertex plane times the unit of the integrand.
     pub fn integral(&self, cost: &impl Integrand) -> f64 {
         let points = &self.landed.sink;
-        let of = |(i, weight): (usize, f64)| weight * cost.of([points.x[i], points.y[i]]);
-        self.region.launch.area() * self.landed.arrived().map(of).sum::<f64>()
+        let of = |(i, weight): (usize, f64)| weight * cost.value([points.x[i], points.y[i]]);
+        self.region.launch.area() * self.landed.arrivals().map(of).sum::<f64>()
     }
 
     /// The derivative with the motion of the edge, by every number of the system; `None` where the
     /// pupil is not one piece that a point inside sees all of.
-    pub fn boundary_derivative(&self, cost: &impl Integrand) -> Option<Gradient<f64>> {
+    pub fn boundary_derivative(&self, cost: &impl Integrand) -> Option<SystemGradient<f64>> {
         let mut total = self.biased_derivative(cost);
         total.add(&self.edge_motion(cost)?, 1.0);
         Some(total)
@@ -36,33 +36,35 @@ impl Lit<'_> {
 
     /// The integral of `dC/dt` over fixed rays: the derivative without the motion of the edge,
     /// biased wherever something clips.
-    pub fn biased_derivative(&self, cost: &impl Integrand) -> Gradient<f64> {
+    pub fn biased_derivative(&self, cost: &impl Integrand) -> SystemGradient<f64> {
         let (scale, points) = (self.region.launch.area(), &self.landed.sink);
         let seed = |i: usize| {
             let [x, y] = cost.slope([points.x[i], points.y[i]]);
             let weight = scale * self.landed.weights[i];
-            Seed { point: Vec3::new(weight * x, weight * y, 0.0), ..Seed::default() }
+            AdjointSeed { point: Vec3::new(weight * x, weight * y, 0.0), ..AdjointSeed::default() }
         };
-        self.region.launch.color().tracer.gradient(&self.rays, seed)
+        self.region.launch.channel().tracer.gradient(&self.rays, seed)
     }
 
     /// What the motion of the edge contributes: nothing where it is the disc of the pupil, which
     /// does not move; `None` where the edge is not known.
-    pub fn edge_motion(&self, cost: &impl Integrand) -> Option<Gradient<f64>> {
-        let tracer = &self.region.launch.color().tracer;
-        let mut total = Gradient::zero(tracer.surfaces());
+    pub fn edge_motion(&self, cost: &impl Integrand) -> Option<SystemGradient<f64>> {
+        let tracer = &self.region.launch.channel().tracer;
+        let mut total = SystemGradient::zero(tracer.surfaces());
         let frame = match &self.region.kind {
-            Kind::Clear => return Some(total),
-            Kind::Split(boundary) => boundary.frame,
-            Kind::Ragged { ring: Some(ring), .. } => ring.outer.frame,
-            Kind::Ragged { ring: None, .. } | Kind::Dark | Kind::Endless => return None,
+            RegionKind::Clear => return Some(total),
+            RegionKind::StarShaped(boundary) => boundary.frame,
+            RegionKind::Irregular { annulus: Some(ring), .. } => ring.outer.frame,
+            RegionKind::Irregular { annulus: None, .. }
+            | RegionKind::Dark
+            | RegionKind::Unbounded => return None,
         };
-        if self.spokes.is_empty() {
+        if self.radial_lines.is_empty() {
             return None;
         }
         for limit in self.limits() {
-            let Limit::Surface(surface, hurdle) = limit else { continue };
-            let on_limit = self.spokes.iter().filter(|spoke| spoke.edge.limit == limit);
+            let PupilLimit::Surface(surface, hurdle) = limit else { continue };
+            let on_limit = self.radial_lines.iter().filter(|spoke| spoke.edge.limit == limit);
             let moved = on_limit.filter_map(|s| self.edge_ray(cost, &frame, s, (surface, hurdle)));
             let (rays, weights): (Vec<_>, Vec<f64>) = moved.unzip();
             let rays: Rays<f64> = rays.into_iter().collect();
@@ -73,19 +75,19 @@ impl Lit<'_> {
 
     /// The motion of the edge for a search, whatever the form of the pupil: in several pieces
     /// estimated by the warp field, always with the same samples; of a dark pupil the motion of
-    /// [`Lit::area`] times the constant of the cost, which leads back to light.
-    pub fn motion(&self, cost: &Cost) -> Gradient<f64> {
-        if let Some(shadow) = &self.shadow {
+    /// [`TracedPupil::area`] times the constant of the cost, which leads back to light.
+    pub fn robust_edge_motion(&self, cost: &QuadraticIntegrand) -> SystemGradient<f64> {
+        if let Some(shadow) = &self.dark {
             return shadow.derivative(&self.region, cost.constant);
         }
         self.edge_motion(cost)
-            .or_else(|| self.sampled_motion(cost))
-            .unwrap_or_else(|| Gradient::zero(self.region.launch.color().tracer.surfaces()))
+            .or_else(|| self.sampled_edge_motion(cost))
+            .unwrap_or_else(|| SystemGradient::zero(self.region.launch.channel().tracer.surfaces()))
     }
 
     /// What the warp field finds besides the derivative of fixed rays.
-    fn sampled_motion(&self, cost: &Cost) -> Option<Gradient<f64>> {
-        let mut whole = self.region.warp_derivative(cost, Warp::default())?.by;
+    fn sampled_edge_motion(&self, cost: &QuadraticIntegrand) -> Option<SystemGradient<f64>> {
+        let mut whole = self.region.warp_derivative(cost, WarpSampling::default())?.gradient;
         whole.add(&self.biased_derivative(cost), -1.0);
         Some(whole)
     }
@@ -94,20 +96,20 @@ impl Lit<'_> {
     fn edge_ray(
         &self,
         cost: &impl Integrand,
-        frame: &Frame,
-        spoke: &Spoke,
-        (surface, hurdle): (usize, Hurdle),
+        frame: &PolarFrame,
+        spoke: &RadialLine,
+        (surface, hurdle): (usize, RayLimit),
     ) -> Option<(Ray<f64>, f64)> {
         let launch = &self.region.launch;
         let p = frame.point(spoke.azimuth, spoke.edge.radius);
         let ray = launch.ray(p)?;
-        let color = launch.color();
+        let color = launch.channel();
         let landed = color.tracer.land_at_edge(ray, surface, hurdle)?;
-        let slope = color.open.margin(launch.dual_ray(p)?, surface, hurdle)?.slope;
+        let slope = color.unclipped.margin(launch.dual_ray(p)?, surface, hurdle)?.slope;
         let direction = frame.direction(spoke.azimuth);
         let outwards = slope[0] * direction[0] + slope[1] * direction[1];
         let measure = launch.area() * spoke.share * spoke.edge.radius;
-        let weight = -measure * cost.of([landed.x, landed.y]) / outwards;
+        let weight = -measure * cost.value([landed.x, landed.y]) / outwards;
         weight.is_finite().then_some((ray, weight))
     }
 }

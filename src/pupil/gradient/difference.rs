@@ -11,11 +11,11 @@
 //! here knows how a derivative is worked out, which makes it the check of what does, at four edges
 //! and four quadratures a number.
 
-use super::{Cost, Derivative};
-use crate::lens::{Grade, Invalid, Law, RADIAL_TERMS, System};
-use crate::pupil::lit::Lit;
-use crate::pupil::region::{Kind, Region};
-use crate::trace::{Gradient, Slot};
+use super::{PupilDerivative, QuadraticIntegrand};
+use crate::lens::{ProfileCoefficients, ProfileLaw, RADIAL_TERMS, System, SystemError};
+use crate::pupil::lit::TracedPupil;
+use crate::pupil::region::{Region, RegionKind};
+use crate::trace::{SurfaceParameter, SystemGradient};
 
 /// The shorter step against the scale on which a number acts: long enough that rounding of the
 /// integral leaves ten digits, short enough that the fourth power of it is nothing.
@@ -29,27 +29,32 @@ const FLAT: f64 = 1e-2;
 impl Region<'_> {
     /// The derivative of the integral of a cost over this pupil by central differences, at an
     /// order of quadrature; `None` where nothing gets through or nothing limits it.
-    pub fn difference_derivative(&self, cost: &Cost, order: usize) -> Option<Derivative> {
-        if matches!(self.kind, Kind::Dark | Kind::Endless) {
+    pub fn difference_derivative(
+        &self,
+        cost: &QuadraticIntegrand,
+        order: usize,
+    ) -> Option<PupilDerivative> {
+        if matches!(self.kind, RegionKind::Dark | RegionKind::Unbounded) {
             return None;
         }
-        let lit = self.lit(order);
-        let scales = Scales::of(&lit);
-        let mut moved = Moved { region: self, cost, order, rays: self.rays + lit.traced };
-        let system = &self.launch.color().system;
-        let mut found = Derivative::zero(system.surfaces.len());
+        let lit = self.trace_pupil(order);
+        let scales = SurfaceScales::of(&lit);
+        let mut moved =
+            PerturbedIntegral { region: self, cost, order, rays: self.rays + lit.rays_traced };
+        let system = &self.launch.channel().system;
+        let mut found = PupilDerivative::zero(system.surfaces.len());
         let of_index = |system: &mut System<f64>, step: f64| system.index_before += step;
-        [found.by.index_before, found.error.index_before] =
+        [found.gradient.index_before, found.error.index_before] =
             moved.derivative(STEP * system.index_before, of_index);
         for (i, surface) in system.surfaces.iter().enumerate() {
-            for slot in Slot::all().filter(|slot| slot.is_of(surface)) {
+            for slot in SurfaceParameter::all().filter(|slot| slot.exists_on(surface)) {
                 let Some(step) = scales.step(system, i, slot) else { continue };
                 let by_slot = |system: &mut System<f64>, step: f64| {
-                    slot.widen(system, i);
-                    *slot.of(system, i) += step;
+                    slot.promote_shape(system, i);
+                    *slot.value_mut(system, i) += step;
                 };
                 let [by, error] = moved.derivative(step, by_slot);
-                *found.by.surfaces[i].by_mut(slot) = by;
+                *found.gradient.surfaces[i].by_mut(slot) = by;
                 *found.error.surfaces[i].by_mut(slot) = error;
             }
         }
@@ -59,14 +64,14 @@ impl Region<'_> {
 }
 
 /// How far from the axis light meets each surface, in mm.
-struct Scales {
+struct SurfaceScales {
     heights: Vec<f64>,
     widest: f64,
 }
 
-impl Scales {
-    fn of(lit: &Lit<'_>) -> Self {
-        let tracer = &lit.region.launch.color().tracer;
+impl SurfaceScales {
+    fn of(lit: &TracedPupil<'_>) -> Self {
+        let tracer = &lit.region.launch.channel().tracer;
         let mut heights = vec![0.0_f64; tracer.surfaces()];
         for i in 0..lit.rays.len() {
             tracer.visit(lit.rays.get(i), |surface, p| {
@@ -80,22 +85,22 @@ impl Scales {
 
     /// The shorter step of a number: it turns rays by about the same small angle, whatever the
     /// number. `None` for an infinite semi-diameter and where there are no scales.
-    fn step(&self, system: &System<f64>, surface: usize, slot: Slot) -> Option<f64> {
+    fn step(&self, system: &System<f64>, surface: usize, slot: SurfaceParameter) -> Option<f64> {
         let (row, r) = (&system.surfaces[surface], self.heights[surface]);
         let scale = match slot {
-            Slot::Curvature => 1.0 / r,
-            Slot::Conic => 1.0 / (row.shape.curvature() * r).powi(2).max(FLAT),
-            Slot::Term(term) => {
+            SurfaceParameter::Curvature => 1.0 / r,
+            SurfaceParameter::Conic => 1.0 / (row.shape.curvature() * r).powi(2).max(FLAT),
+            SurfaceParameter::AsphereTerm(term) => {
                 let power = 2 * i32::try_from(term).ok()? + 4;
                 1.0 / (f64::from(power) * r.powi(power - 1))
             }
-            Slot::Thickness => self.widest,
-            Slot::Index => row.index,
-            Slot::SemiDiameter => row.semi_diameter,
+            SurfaceParameter::Thickness => self.widest,
+            SurfaceParameter::Index => row.index,
+            SurfaceParameter::SemiDiameter => row.semi_diameter,
             // A change of the index that turns rays by about the same angle.
-            Slot::Grade(k) => {
+            SurfaceParameter::GrinTerm(k) => {
                 let length = row.thickness.abs().max(r);
-                grade_scale(row.graded.as_ref()?, k, r, length)
+                grin_scale(row.grin.as_ref()?, k, r, length)
             }
         };
         let step = STEP * scale;
@@ -105,9 +110,9 @@ impl Scales {
 
 /// What a coefficient of a gradient has to change for the index to change by one part in ten at a
 /// distance from the axis, or from the vertex.
-fn grade_scale(grade: &Grade<f64>, k: usize, r: f64, length: f64) -> f64 {
+fn grin_scale(grade: &ProfileCoefficients<f64>, k: usize, r: f64, length: f64) -> f64 {
     let power = match k.checked_sub(RADIAL_TERMS) {
-        None if grade.law == Law::Sech => return 0.1 / r,
+        None if grade.law == ProfileLaw::Sech => return 0.1 / r,
         None => return 0.1 * r.powi(-2 * (k as i32 + 1)),
         Some(j) => j as i32 + 1,
     };
@@ -115,14 +120,14 @@ fn grade_scale(grade: &Grade<f64>, k: usize, r: f64, length: f64) -> f64 {
 }
 
 /// The integral while the lens moves.
-struct Moved<'a> {
+struct PerturbedIntegral<'a> {
     region: &'a Region<'a>,
-    cost: &'a Cost,
+    cost: &'a QuadraticIntegrand,
     order: usize,
     rays: usize,
 }
 
-impl Moved<'_> {
+impl PerturbedIntegral<'_> {
     /// A derivative and how far it may be wrong: infinitely, where the changed lens has no beam.
     fn derivative(&mut self, step: f64, change: impl Fn(&mut System<f64>, f64)) -> [f64; 2] {
         let mut slope = |h: f64| {
@@ -139,22 +144,26 @@ impl Moved<'_> {
     /// The integral over the pupil of a changed lens; `None` where nothing limits its beam.
     fn integral(&mut self, change: impl FnOnce(&mut System<f64>)) -> Option<f64> {
         let launch = &self.region.launch;
-        let mut system = launch.color().system.clone();
+        let mut system = launch.channel().system.clone();
         change(&mut system);
-        let bench: Result<_, Invalid> = launch.bench.changed(launch.wavelength, system);
+        let bench: Result<_, SystemError> = launch.bench.with_system(launch.wavelength, system);
         let bench = bench.ok()?;
-        let region = Region::new(launch.anchor().launch(&bench));
-        if region.kind == Kind::Endless {
+        let region = Region::new(launch.to_fixed().launch(&bench));
+        if region.kind == RegionKind::Unbounded {
             return None;
         }
-        let lit = region.lit(self.order);
-        self.rays += region.rays + lit.traced;
-        Some(self.cost.over(&lit.moments))
+        let lit = region.trace_pupil(self.order);
+        self.rays += region.rays + lit.rays_traced;
+        Some(self.cost.integrate(&lit.moments))
     }
 }
 
-impl Derivative {
+impl PupilDerivative {
     fn zero(surfaces: usize) -> Self {
-        Self { by: Gradient::zero(surfaces), error: Gradient::zero(surfaces), rays: 0 }
+        Self {
+            gradient: SystemGradient::zero(surfaces),
+            error: SystemGradient::zero(surfaces),
+            rays: 0,
+        }
     }
 }

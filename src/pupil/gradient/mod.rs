@@ -18,18 +18,18 @@ mod difference;
 mod estimator;
 mod warp;
 
-pub use estimator::{Estimator, NoDerivative, differentiate, plan};
-pub use warp::Warp;
+pub use estimator::{DerivativeError, DerivativeEstimator, choose_estimator, differentiate};
+pub use warp::WarpSampling;
 
-use super::moments::Moments;
+use super::moments::PupilMoments;
 use crate::math::Real;
-use crate::trace::{Gradient, Slot};
+use crate::trace::{SurfaceParameter, SystemGradient};
 
 /// What each ray of a pupil contributes by where it lands. Where a pupil is its own mirror image, so
 /// must be the contribution.
 pub trait Integrand: Sync {
     /// The contribution of a ray that lands at a point, in mm on the image plane.
-    fn of<R: Real>(&self, p: [R; 2]) -> R;
+    fn value<R: Real>(&self, p: [R; 2]) -> R;
     /// Its derivative by the point.
     fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2];
 }
@@ -39,7 +39,7 @@ pub trait Integrand: Sync {
 /// The spot (3.24) has `square = 1` about the centroid, which may be held fixed: moving it changes
 /// the integral by nothing in first order. The throughput (3.25) has `constant = −1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cost {
+pub struct QuadraticIntegrand {
     /// From where distances count, in mm on the image plane.
     pub center: [f64; 2],
     /// The factor of the square of the distance.
@@ -48,7 +48,7 @@ pub struct Cost {
     pub constant: f64,
 }
 
-impl Cost {
+impl QuadraticIntegrand {
     /// The square of the distance from a point: the spot (3.24) where that is the centroid.
     pub fn spread(center: [f64; 2]) -> Self {
         Self { center, square: 1.0, constant: 0.0 }
@@ -60,9 +60,9 @@ impl Cost {
     }
 }
 
-impl Integrand for Cost {
+impl Integrand for QuadraticIntegrand {
     #[inline(always)]
-    fn of<R: Real>(&self, p: [R; 2]) -> R {
+    fn value<R: Real>(&self, p: [R; 2]) -> R {
         let [x, y] = [0, 1].map(|i| p[i] - R::from_f64(self.center[i]));
         R::from_f64(self.square) * (x * x + y * y) + R::from_f64(self.constant)
     }
@@ -74,9 +74,9 @@ impl Integrand for Cost {
     }
 }
 
-impl Cost {
+impl QuadraticIntegrand {
     /// Its integral over the light of a pupil.
-    pub fn over(&self, light: &Moments) -> f64 {
+    pub fn integrate(&self, light: &PupilMoments) -> f64 {
         let [x, y] = [0, 1].map(|i| light.centroid[i] - self.center[i]);
         let about_center = light.spread + light.area * (x * x + y * y);
         self.square * about_center + self.constant * light.area
@@ -85,16 +85,16 @@ impl Cost {
 
 /// The derivative of an integral over a pupil.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Derivative {
+pub struct PupilDerivative {
     /// By every number of the system; the integral is in mm² of the first vertex plane.
-    pub by: Gradient<f64>,
+    pub gradient: SystemGradient<f64>,
     /// How far each may be wrong: a standard error, or the difference of two orders.
-    pub error: Gradient<f64>,
+    pub error: SystemGradient<f64>,
     /// Rays traced.
     pub rays: usize,
 }
 
-impl Derivative {
+impl PupilDerivative {
     /// Whether every number is known within a tolerance of the largest of its kind: curvatures,
     /// conic constants, coefficients of each power, thicknesses, indices, semi-diameters.
     pub fn reaches(&self, tolerance: f64) -> bool {
@@ -103,12 +103,12 @@ impl Derivative {
 
     /// By how much the largest error of a kind exceeds what a tolerance allows there, of the
     /// largest number of the kind or of a floor.
-    fn excess(&self, tolerance: f64, floor: impl Fn(Slot) -> f64) -> f64 {
+    fn excess(&self, tolerance: f64, floor: impl Fn(SurfaceParameter) -> f64) -> f64 {
         let excess = |slot| {
             let error = self.error.largest(slot);
-            let scale = self.by.largest(slot).max(floor(slot));
+            let scale = self.gradient.largest(slot).max(floor(slot));
             if error == 0.0 { 0.0 } else { error / (tolerance * scale) }
         };
-        Slot::all().map(excess).fold(0.0, f64::max)
+        SurfaceParameter::all().map(excess).fold(0.0, f64::max)
     }
 }

@@ -25,19 +25,21 @@
 //! but does not move: rays are held in place, the entrance pupil with them. Rays that are aimed at
 //! the stop end at the rim of the stop instead, which moves.
 
-use super::{Derivative, Integrand};
+use super::{Integrand, PupilDerivative};
 use crate::math::{Jet, Real};
 use crate::pupil::Aiming;
-use crate::pupil::boundary::Frame;
+use crate::pupil::boundary::PolarFrame;
 use crate::pupil::launch::Launch;
-use crate::pupil::region::{Kind, Region};
-use crate::pupil::sample::{SplitMix, additive};
-use crate::trace::{Abreast, Gradient, LANES, Points, PupilTracer, Ray, Rays, Sink};
+use crate::pupil::region::{Region, RegionKind};
+use crate::pupil::sample::{SplitMix, additive_sequence};
+use crate::trace::{
+    ImagePoints, JetBlock, LANES, Ray, Rays, SystemGradient, TraceSink, WarpTracer,
+};
 use rayon::prelude::*;
 
 /// How the warp field samples a pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Warp {
+pub struct WarpSampling {
     /// Points of the square around the pupil in which rays are started; a few more where it does
     /// not split into equal replicates.
     pub count: usize,
@@ -45,7 +47,7 @@ pub struct Warp {
     pub seed: u32,
 }
 
-impl Default for Warp {
+impl Default for WarpSampling {
     fn default() -> Self {
         Self { count: 4096, seed: 0 }
     }
@@ -70,7 +72,11 @@ const SQUARES: usize = 24;
 impl Region<'_> {
     /// The derivative of the integral of a cost over this pupil, estimated by the warp field with
     /// its standard error; `None` where nothing gets through or nothing limits it.
-    pub fn warp_derivative(&self, cost: &impl Integrand, sampling: Warp) -> Option<Derivative> {
+    pub fn warp_derivative(
+        &self,
+        cost: &impl Integrand,
+        sampling: WarpSampling,
+    ) -> Option<PupilDerivative> {
         self.warp_derivative_in::<f64>(cost, sampling)
     }
 
@@ -78,20 +84,20 @@ impl Region<'_> {
     pub fn warp_derivative_in<R: Real>(
         &self,
         cost: &impl Integrand,
-        sampling: Warp,
-    ) -> Option<Derivative> {
+        sampling: WarpSampling,
+    ) -> Option<PupilDerivative> {
         let bench = self.launch.bench;
         if bench.aiming == Aiming::Stop {
             let bench = bench.limited_by_stop().ok()?;
             let launch = bench.launch(self.launch.field, self.launch.wavelength).ok()?;
             return Region::new(launch).warp_derivative_in::<R>(cost, sampling);
         }
-        let mut square = self.square()?;
+        let mut square = self.enclosing_frame()?;
         let mut rays = self.rays;
-        let estimator = Estimator::<R, _>::new(&self.launch, cost)?;
+        let estimator = WarpEstimator::<R, _>::new(&self.launch, cost)?;
         for _ in 0..SQUARES {
             let found = estimator.replicates(square, sampling);
-            rays += sampling.each() * REPLICATES;
+            rays += sampling.points_per_replicate() * REPLICATES;
             if let Some(replicates) = found {
                 return Some(derivative(&replicates, rays));
             }
@@ -101,28 +107,30 @@ impl Region<'_> {
     }
 
     /// A frame whose square from −1 to 1 holds all of the pupil and a little more.
-    fn square(&self) -> Option<Frame> {
+    fn enclosing_frame(&self) -> Option<PolarFrame> {
         let frame = match &self.kind {
-            Kind::Clear => Frame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
-            Kind::Split(boundary) => boundary.boxed(self.launch.is_symmetric()),
-            Kind::Ragged { square: (center, half), .. } => {
-                Frame { center: *center, axes: [[*half, 0.0], [0.0, *half]] }
+            RegionKind::Clear => PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
+            RegionKind::StarShaped(boundary) => {
+                boundary.enclosing_square(self.launch.is_symmetric())
             }
-            Kind::Dark | Kind::Endless => return None,
+            RegionKind::Irregular { square: (center, half), .. } => {
+                PolarFrame { center: *center, axes: [[*half, 0.0], [0.0, *half]] }
+            }
+            RegionKind::Dark | RegionKind::Unbounded => return None,
         };
-        Some(Frame { axes: frame.axes.map(|axis| axis.map(|v| MARGIN * v)), ..frame })
+        Some(PolarFrame { axes: frame.axes.map(|axis| axis.map(|v| MARGIN * v)), ..frame })
     }
 }
 
-impl Warp {
+impl WarpSampling {
     /// Points of a replicate.
-    fn each(self) -> usize {
+    fn points_per_replicate(self) -> usize {
         self.count.div_ceil(REPLICATES).max(1)
     }
 }
 
 /// The mean of the replicates and its standard error.
-fn derivative(replicates: &[Gradient<f64>], rays: usize) -> Derivative {
+fn derivative(replicates: &[SystemGradient<f64>], rays: usize) -> PupilDerivative {
     let surfaces = replicates[0].surfaces.len();
     let rows: Vec<Vec<f64>> = replicates.iter().map(|g| g.numbers().collect()).collect();
     let count = rows.len() as f64;
@@ -136,51 +144,55 @@ fn derivative(replicates: &[Gradient<f64>], rays: usize) -> Derivative {
         largest * (column(i).map(square).sum::<f64>() / (count * (count - 1.0))).sqrt()
     };
     let numbers = 0..rows[0].len();
-    Derivative {
-        by: Gradient::from_numbers(surfaces, numbers.clone().map(mean)),
-        error: Gradient::from_numbers(surfaces, numbers.map(error)),
+    PupilDerivative {
+        gradient: SystemGradient::from_numbers(surfaces, numbers.clone().map(mean)),
+        error: SystemGradient::from_numbers(surfaces, numbers.map(error)),
         rays,
     }
 }
 
 /// A pupil and a cost, ready to be sampled.
-struct Estimator<'a, R, C> {
+struct WarpEstimator<'a, R, C> {
     launch: &'a Launch<'a>,
     cost: &'a C,
-    scout: crate::trace::Tracer<R>,
-    tracer: PupilTracer<R>,
+    plain_tracer: crate::trace::Tracer<R>,
+    tracer: WarpTracer<R>,
 }
 
-impl<'a, R: Real, C: Integrand> Estimator<'a, R, C> {
+impl<'a, R: Real, C: Integrand> WarpEstimator<'a, R, C> {
     fn new(launch: &'a Launch<'a>, cost: &'a C) -> Option<Self> {
-        let system = &launch.color().system;
-        let scout = crate::trace::Tracer::new(&system.lift()).ok()?;
-        Some(Self { launch, cost, scout, tracer: PupilTracer::new(system).ok()? })
+        let system = &launch.channel().system;
+        let scout = crate::trace::Tracer::new(&system.cast()).ok()?;
+        Some(Self { launch, cost, plain_tracer: scout, tracer: WarpTracer::new(system).ok()? })
     }
 
     /// The estimates of independent replicates; `None` where light is found so close to the edge
     /// of the square that there may be more outside.
-    fn replicates(&self, square: Frame, sampling: Warp) -> Option<Vec<Gradient<f64>>> {
+    fn replicates(
+        &self,
+        square: PolarFrame,
+        sampling: WarpSampling,
+    ) -> Option<Vec<SystemGradient<f64>>> {
         let mirrored = self.launch.is_symmetric();
-        let each = sampling.each();
+        let each = sampling.points_per_replicate();
         let mut random = SplitMix(u64::from(sampling.seed));
         let shifts: Vec<[f64; 2]> =
             (0..REPLICATES).map(|_| [random.uniform(), random.uniform()]).collect();
         let tasks: Vec<(usize, usize)> = (0..REPLICATES)
             .flat_map(|replicate| (0..each).step_by(CHUNK).map(move |from| (replicate, from)))
             .collect();
-        let parts: Option<Vec<Gradient<f64>>> = tasks
+        let parts: Option<Vec<SystemGradient<f64>>> = tasks
             .par_iter()
             .map(|(replicate, from)| {
                 let point = |i: usize| {
-                    let [u, v] = additive(shifts[*replicate], i);
+                    let [u, v] = additive_sequence(shifts[*replicate], i);
                     [if mirrored { u } else { 2.0 * u - 1.0 }, 2.0 * v - 1.0]
                 };
-                self.part(square, (*from..each.min(from + CHUNK)).map(point))
+                self.partial_sum(square, (*from..each.min(from + CHUNK)).map(point))
             })
             .collect();
         let share = 4.0 * square.area() / each as f64;
-        let mut sums = vec![Gradient::zero(self.tracer.surfaces()); REPLICATES];
+        let mut sums = vec![SystemGradient::zero(self.tracer.surfaces()); REPLICATES];
         for ((replicate, _), part) in tasks.iter().zip(parts?) {
             sums[*replicate].add(&part, share * self.launch.area());
         }
@@ -188,31 +200,39 @@ impl<'a, R: Real, C: Integrand> Estimator<'a, R, C> {
     }
 
     /// The sum of the integrand over some points of the square.
-    fn part(&self, square: Frame, points: impl Iterator<Item = [f64; 2]>) -> Option<Gradient<f64>> {
-        let lit = self.lit(square, points)?;
+    fn partial_sum(
+        &self,
+        square: PolarFrame,
+        points: impl Iterator<Item = [f64; 2]>,
+    ) -> Option<SystemGradient<f64>> {
+        let lit = self.lit_points(square, points)?;
         let disc = self.launch.bench.ends_at_disc().then_some(square);
         let sum = self.tracer.gradient(
             &lit,
             #[inline(always)]
             |[u, v]| self.ray(square, [Jet::variable(u, 0), Jet::variable(v, 1)]),
             #[inline(always)]
-            |points, abreast| weigh(abreast, self.cost, disc, points),
+            |points, abreast| weigh_limits(abreast, self.cost, disc, points),
         );
         let surfaces = sum.surfaces.len();
-        Some(Gradient::from_numbers(surfaces, sum.numbers().map(Real::value)))
+        Some(SystemGradient::from_numbers(surfaces, sum.numbers().map(Real::value)))
     }
 
     /// The points whose rays get through, told by tracing them without derivatives.
-    fn lit(&self, square: Frame, points: impl Iterator<Item = [f64; 2]>) -> Option<Vec<[R; 2]>> {
+    fn lit_points(
+        &self,
+        square: PolarFrame,
+        points: impl Iterator<Item = [f64; 2]>,
+    ) -> Option<Vec<[R; 2]>> {
         let disc = self.launch.bench.ends_at_disc();
         let inside = |p: &[f64; 2]| {
-            let [x, y] = place(square, *p);
+            let [x, y] = pupil_point(square, *p);
             !disc || x * x + y * y <= 1.0
         };
         let points: Vec<[R; 2]> = points.filter(inside).map(|p| p.map(R::from_f64)).collect();
         let rays: Rays<R> = points.iter().map(|p| self.ray(square, *p)).collect();
-        let mut landed = Points::default();
-        self.scout.batch(&rays, &mut landed);
+        let mut landed = ImagePoints::default();
+        self.plain_tracer.trace_batch(&rays, &mut landed);
         let lit = (0..points.len()).filter(|i| landed.fate(*i).is_imaged());
         let points: Vec<[R; 2]> = lit.map(|i| points[i]).collect();
         let outermost = |p: &[R; 2]| p.iter().any(|v| v.value().abs() > OUTERMOST);
@@ -221,20 +241,20 @@ impl<'a, R: Real, C: Integrand> Estimator<'a, R, C> {
 
     /// The ray at a point of the square.
     #[inline(always)]
-    fn ray<S: Real>(&self, square: Frame, p: [S; 2]) -> Ray<S> {
-        self.launch.charted(place(square, p))
+    fn ray<S: Real>(&self, square: PolarFrame, p: [S; 2]) -> Ray<S> {
+        self.launch.mapped_ray(pupil_point(square, p))
     }
 }
 
 /// The pupil coordinates of a point of the square.
 #[inline(always)]
-fn place<R: Real>(square: Frame, [u, v]: [R; 2]) -> [R; 2] {
+fn pupil_point<R: Real>(square: PolarFrame, [u, v]: [R; 2]) -> [R; 2] {
     let [a, b] = square.axes;
     [0, 1].map(|i| R::from_f64(square.center[i]) + R::from_f64(a[i]) * u + R::from_f64(b[i]) * v)
 }
 
 /// The limits of a block of rays against each other, relative to the closest of each.
-struct Balance<R> {
+struct LimitWeights<R> {
     /// `|g|` of the closest limit and its slopes.
     closest: [[R; 3]; LANES],
     /// Σ (closest/|g|)^p.
@@ -247,26 +267,26 @@ struct Balance<R> {
 const EXPONENT: f64 = 5.0;
 
 #[inline(always)]
-fn fifth<R: Real>(v: R) -> R {
+fn fifth_power<R: Real>(v: R) -> R {
     let square = v * v;
     square * square * v
 }
 
 /// Fills in A and B of every limit and the derivative of the cost.
 #[inline(always)]
-fn weigh<R: Real>(
-    abreast: &mut Abreast<R>,
+fn weigh_limits<R: Real>(
+    abreast: &mut JetBlock<R>,
     cost: &impl Integrand,
-    disc: Option<Frame>,
+    disc: Option<PolarFrame>,
     points: &[[R; 2]; LANES],
 ) {
-    let balance = Balance::of(abreast, disc, points);
+    let balance = LimitWeights::of(abreast, disc, points);
     let mut value = [R::ZERO; LANES];
     let mut slope = [[R::ZERO; 2]; LANES];
     for j in 0..LANES {
         let [x, y] = [abreast.landing[0][j], abreast.landing[1][j]];
         let by = cost.slope([x.value, y.value]);
-        value[j] = cost.of([x.value, y.value]);
+        value[j] = cost.value([x.value, y.value]);
         slope[j] = [0, 1].map(|i| by[0] * x.slope[i] + by[1] * y.slope[i]);
         (abreast.by_landing[0][j], abreast.by_landing[1][j]) = (by[0], by[1]);
     }
@@ -277,9 +297,9 @@ fn weigh<R: Real>(
     }
 }
 
-impl<R: Real> Balance<R> {
+impl<R: Real> LimitWeights<R> {
     #[inline(always)]
-    fn of(abreast: &Abreast<R>, disc: Option<Frame>, points: &[[R; 2]; LANES]) -> Self {
+    fn of(abreast: &JetBlock<R>, disc: Option<PolarFrame>, points: &[[R; 2]; LANES]) -> Self {
         let far = [R::from_f64(1e30), R::ZERO, R::ZERO];
         let zero = [R::ZERO; LANES];
         let mut rim = [far; LANES];
@@ -290,7 +310,7 @@ impl<R: Real> Balance<R> {
         for limit in &abreast.limits {
             for (j, limit) in limit.iter().enumerate() {
                 let Jet { value, slope: [x, y], .. } = *limit;
-                balance.approach(j, [distance(value), x, y]);
+                balance.update_closest(j, [distance(value), x, y]);
             }
         }
         for limit in &abreast.limits {
@@ -309,7 +329,7 @@ impl<R: Real> Balance<R> {
     }
 
     #[inline(always)]
-    fn approach(&mut self, j: usize, limit: [R; 3]) {
+    fn update_closest(&mut self, j: usize, limit: [R; 3]) {
         let closer = limit[0] < self.closest[j][0];
         self.closest[j] = [0, 1, 2].map(|i| R::select(closer, limit[i], self.closest[j][i]));
     }
@@ -321,7 +341,7 @@ impl<R: Real> Balance<R> {
         let [closest, cx, cy] = self.closest[j];
         let power = R::from_f64(EXPONENT);
         let (here, there) = (power / distance, power / closest);
-        (fifth(closest / distance), [x * here - cx * there, y * here - cy * there])
+        (fifth_power(closest / distance), [x * here - cx * there, y * here - cy * there])
     }
 
     #[inline(always)]
@@ -335,7 +355,7 @@ impl<R: Real> Balance<R> {
     /// `A` and the two numbers of `B` of a limit.
     #[inline(always)]
     fn share(&self, j: usize, limit: Jet<R>, cost: R, slope: [R; 2]) -> [R; 3] {
-        let Jet { value: g, slope: [x, y], bend: [xx, xy, yy] } = limit;
+        let Jet { value: g, slope: [x, y], hessian: [xx, xy, yy] } = limit;
         let (weight, [lx, ly]) = self.weight(j, [distance(g), x, y]);
         let weight = weight / self.total[j];
         // ∇ŵ = ŵ (∇ log w − Σ ŵ ∇ log w)
@@ -362,8 +382,8 @@ fn distance<R: Real>(g: R) -> R {
 
 /// The unit disc of the pupil as a limit `(|p|² − 1)/2`: its distance and its slopes.
 #[inline(always)]
-fn disc_limit<R: Real>(frame: Frame, point: [R; 2]) -> [R; 3] {
-    let p = place(frame, point);
+fn disc_limit<R: Real>(frame: PolarFrame, point: [R; 2]) -> [R; 3] {
+    let p = pupil_point(frame, point);
     let [a, b] = frame.axes.map(|axis| axis.map(R::from_f64));
     let g = (p[0] * p[0] + p[1] * p[1] - R::ONE) * R::from_f64(0.5);
     [distance(g), p[0] * a[0] + p[1] * a[1], p[0] * b[0] + p[1] * b[1]]
@@ -374,13 +394,14 @@ mod tests {
     use super::*;
     use crate::lens::{Shape, Surface, System};
     use crate::math::{Dual, Vec3};
-    use crate::pupil::Cost;
-    use crate::trace::{Hurdle, Slot, Tracer};
+    use crate::pupil::QuadraticIntegrand;
+    use crate::trace::{RayLimit, SurfaceParameter, Tracer};
 
     /// By x, by y, and by a number of the lens.
     type Dual3 = Dual<f64, 3>;
 
-    const COST: Cost = Cost { center: [0.3, -0.2], square: 0.7, constant: 0.4 };
+    const COST: QuadraticIntegrand =
+        QuadraticIntegrand { center: [0.3, -0.2], square: 0.7, constant: 0.4 };
 
     /// A surface of every form, a plane into air, and a mirror; the rims of the first asphere and of
     /// the image are wider than their conic.
@@ -388,7 +409,16 @@ mod tests {
         let surface = |shape, thickness, index, semi_diameter| {
             let (obstruction, mirror, hyper) = (0.0, false, false);
             let graded = None;
-            Surface { shape, thickness, index, graded, semi_diameter, obstruction, mirror, hyper }
+            Surface {
+                shape,
+                thickness,
+                index,
+                grin: graded,
+                semi_diameter,
+                obstruction,
+                mirror,
+                hyperhemisphere: hyper,
+            }
         };
         let terms = [1e-5, -3e-8, 0.0, 1e-12, 0.0, 0.0, 0.0];
         let mut surfaces = vec![
@@ -422,17 +452,17 @@ mod tests {
             let r = surface.semi_diameter;
             let n2 = before * before;
             match (hurdle, surface.shape) {
-                (Hurdle::Rim, _) => limits.push(-margin / (r * r * Dual3::TWO)),
-                (Hurdle::Obstruction, _) => {
+                (RayLimit::Rim, _) => limits.push(-margin / (r * r * Dual3::TWO)),
+                (RayLimit::Obstruction, _) => {
                     let h = surface.obstruction;
                     limits.push(-margin / (h * h * Dual3::TWO));
                 }
-                (Hurdle::Reflection, _) if rarer => limits.push(-margin / n2),
+                (RayLimit::TotalReflection, _) if rarer => limits.push(-margin / n2),
                 // (k·N)² + n'² − n²
-                (Hurdle::Reflection, Shape::Sphere { .. }) => {
+                (RayLimit::TotalReflection, Shape::Sphere { .. }) => {
                     limits.push((surface.index * surface.index - n2 - margin) / n2);
                 }
-                (Hurdle::Miss, Shape::Asphere { .. }) if !rarer => limits.push(-margin / n2),
+                (RayLimit::Miss, Shape::Asphere { .. }) if !rarer => limits.push(-margin / n2),
                 (_, _) => {}
             }
         });
@@ -467,10 +497,10 @@ mod tests {
 
     /// `dC/dt − div(C V)` for one number of the lens, `None` for the index in front, by central
     /// differences of fourth order; and the size of its parts.
-    fn literal(named: Option<(usize, Slot)>, p: [f64; 2]) -> (f64, f64) {
-        let mut system = system().lift::<Dual3>();
+    fn literal(named: Option<(usize, SurfaceParameter)>, p: [f64; 2]) -> (f64, f64) {
+        let mut system = system().cast::<Dual3>();
         let number = match named {
-            Some((i, slot)) => slot.of(&mut system, i),
+            Some((i, slot)) => slot.value_mut(&mut system, i),
             None => &mut system.index_before,
         };
         *number = Dual3::variable(number.value, 2);
@@ -490,12 +520,12 @@ mod tests {
 
     #[test]
     fn aperture_aware_one_adjoint_gives_every_warp_field() {
-        let tracer = PupilTracer::<f64>::new(&system()).unwrap();
+        let tracer = WarpTracer::<f64>::new(&system()).unwrap();
         for p in [[0.4, 0.9], [-3.1, 2.2], [5.5, -1.7]] {
             let found = tracer.gradient(
                 &[p],
                 |[x, y]| ray([Jet::variable(x, 0), Jet::variable(y, 1)]),
-                |points, abreast| weigh(abreast, &COST, None, points),
+                |points, abreast| weigh_limits(abreast, &COST, None, points),
             );
             let check = |name: String, found: f64, named| {
                 let (expected, size) = literal(named, p);
@@ -507,19 +537,19 @@ mod tests {
                 let surface = &system().surfaces[i];
                 let check = |slot, found| check(format!("{slot:?} {i}"), found, Some((i, slot)));
                 if surface.shape != Shape::Plane {
-                    check(Slot::Curvature, by.curvature);
+                    check(SurfaceParameter::Curvature, by.curvature);
                 }
                 if !matches!(surface.shape, Shape::Plane | Shape::Sphere { .. }) {
-                    check(Slot::Conic, by.conic);
+                    check(SurfaceParameter::Conic, by.conic);
                 }
                 if matches!(surface.shape, Shape::Asphere { .. }) {
-                    (0..7).for_each(|t| check(Slot::Term(t), by.terms[t]));
+                    (0..7).for_each(|t| check(SurfaceParameter::AsphereTerm(t), by.terms[t]));
                 }
-                check(Slot::Thickness, by.thickness);
+                check(SurfaceParameter::Thickness, by.thickness);
                 if !surface.mirror {
-                    check(Slot::Index, by.index);
+                    check(SurfaceParameter::Index, by.index);
                 }
-                check(Slot::SemiDiameter, by.semi_diameter);
+                check(SurfaceParameter::SemiDiameter, by.semi_diameter);
             }
         }
     }

@@ -2,23 +2,23 @@
 
 use super::goal::focal_length_of;
 use super::open::with_open_rims;
-use crate::lens::{Lens, Medium, Parameter, Quantity, focus_gap};
-use crate::search::{Random, Rules};
+use crate::lens::{Lens, Medium, Parameter, Quantity, paraxial_image_distance};
+use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 
 /// No gap is drawn longer than this part of the focal length.
-const LONGEST: f64 = 0.2;
+const MAX_GAP: f64 = 0.2;
 /// Curvatures are drawn up to this over the focal length.
-const STEEPEST: f64 = 4.0;
+const MAX_CURVATURE: f64 = 4.0;
 /// A drawn lens is scaled to its focal length by no more than this.
-const SCALED: f64 = 4.0;
+const MAX_RESCALING: f64 = 4.0;
 
 /// A lens of the structure of `lens`, whose variables are those that are free: curvatures and gaps
 /// drawn uniformly, all of it scaled to a focal length in mm, the image at the focus, rims as open
 /// as it leaves room for. None where it does not focus.
-pub(super) fn drawn(
+pub(super) fn random_lens(
     lens: &Lens,
-    rules: &Rules,
+    rules: &SearchRules,
     focal_length: f64,
     random: &mut Random,
 ) -> Option<Lens> {
@@ -27,11 +27,11 @@ pub(super) fn drawn(
     let scattered: Vec<Parameter> = lens.variables.iter().map(|v| v.parameter).collect();
     for parameter in &scattered {
         let range = match parameter.quantity {
-            Quantity::Curvature => [-STEEPEST / focal_length, STEEPEST / focal_length],
+            Quantity::Curvature => [-MAX_CURVATURE / focal_length, MAX_CURVATURE / focal_length],
             Quantity::Thickness | Quantity::ZoomThickness(_) => {
                 let is_glass = lens.surfaces[parameter.surface].medium != Medium::Air;
                 let [min, _] = if is_glass { rules.glass_center } else { rules.air_center };
-                [min, min.max(LONGEST * focal_length)]
+                [min, min.max(MAX_GAP * focal_length)]
             }
             _ => continue,
         };
@@ -39,7 +39,7 @@ pub(super) fn drawn(
     }
     let drawn = drawn.with_pickups().ok()?;
     let factor = focal_length / focal_length_of(&drawn)?;
-    if !(1.0 / SCALED..=SCALED).contains(&factor) {
+    if !(1.0 / MAX_RESCALING..=MAX_RESCALING).contains(&factor) {
         return None;
     }
     let mut scaled = drawn.clone();
@@ -53,9 +53,9 @@ pub(super) fn drawn(
             _ => continue,
         };
     }
-    let system = scaled.system(0, scaled.wavelengths[scaled.primary()].um).ok()?;
+    let system = scaled.resolve(0, scaled.wavelengths[scaled.primary()].um).ok()?;
     let last = Parameter::new(scaled.surfaces.len() - 1, Quantity::Thickness);
-    let gap = focus_gap(&system, scaled.object);
+    let gap = paraxial_image_distance(&system, scaled.object);
     if !(gap > 0.0) {
         return None;
     }

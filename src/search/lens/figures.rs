@@ -4,13 +4,13 @@
 use super::goal::focal_length_of;
 use crate::analysis::{Estimate, Spot, spots};
 use crate::lens::{Lens, at_zoom};
-use crate::pupil::{Accuracy, Bench, BenchError};
+use crate::pupil::{Accuracy, RayModel, RayModelError};
 use crate::search::element;
 use serde::Serialize;
 
 /// A lens in numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figures {
+pub struct LensSummary {
     /// The focal length at every zoom position, in mm; none for an afocal lens.
     pub focal_lengths: Vec<Option<f64>>,
     /// How many pieces of glass there are.
@@ -20,12 +20,12 @@ pub struct Figures {
     /// From the first vertex to the image, in mm, as it is written.
     pub track: f64,
     /// Every field of every zoom position.
-    pub fields: Vec<FieldFigures>,
+    pub fields: Vec<FieldSummary>,
 }
 
 /// A field in numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FieldFigures {
+pub struct FieldSummary {
     /// The zoom position.
     pub zoom: usize,
     /// The field, counted from 0.
@@ -42,29 +42,30 @@ pub struct FieldFigures {
     pub light: Estimate,
 }
 
-impl Figures {
+impl LensSummary {
     /// The figures of a lens, the radius of every spot good to a tolerance.
     ///
     /// # Errors
     /// A lens that cannot be set up.
-    pub fn of(lens: &Lens, tolerance: f64) -> Result<Self, BenchError> {
+    pub fn new(lens: &Lens, tolerance: f64) -> Result<Self, RayModelError> {
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let mut fields = Vec::new();
         let mut focal_lengths = Vec::new();
         for zoom in 0..lens.zoom_positions() {
-            let bench = Bench::of(lens, zoom)?;
+            let bench = RayModel::from_lens(lens, zoom)?;
             focal_lengths.push(focal_length_of(&at_zoom(lens, zoom)));
             for (i, spot) in spots(&bench, accuracy).into_iter().enumerate() {
                 let spot = spot.ok();
-                let light = spot.as_ref().map_or(Estimate::new(0.0, 0.0, 0), |s| light(s, &bench));
+                let light =
+                    spot.as_ref().map_or(Estimate::new(0.0, 0.0, 0), |s| mean_light(s, &bench));
                 let (x, y) = (bench.fields[i].x, bench.fields[i].y);
                 let spot = spot.map(|spot| spot.rms);
-                fields.push(FieldFigures { zoom, field: i, x, y, spot, light });
+                fields.push(FieldSummary { zoom, field: i, x, y, spot, light });
             }
         }
         Ok(Self {
             focal_lengths,
-            elements: element::pieces(lens),
+            elements: element::piece_count(lens),
             topology: element::topology(lens),
             track: lens.surfaces.iter().map(|row| row.thickness).sum(),
             fields,
@@ -78,10 +79,10 @@ impl Figures {
 }
 
 /// The mean area over the colours by weight; a dark colour has none.
-fn light(spot: &Spot, bench: &Bench) -> Estimate {
-    let total: f64 = bench.colors.iter().map(|color| color.weight).sum();
+fn mean_light(spot: &Spot, bench: &RayModel) -> Estimate {
+    let total: f64 = bench.channels.iter().map(|color| color.weight).sum();
     let mut light = Estimate::new(0.0, 0.0, 0);
-    for (color, found) in bench.colors.iter().zip(&spot.colors) {
+    for (color, found) in bench.channels.iter().zip(&spot.channels) {
         if let Ok(found) = found {
             let share = color.weight / total;
             light.value += share * found.light.value;

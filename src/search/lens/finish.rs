@@ -4,13 +4,13 @@
 //! A penalty stops short of its limit where the rest of the goal pulls the other way. So the limits
 //! are drawn tighter by a margin that grows until all of them are kept.
 
-use super::{Figures, LensLandscape, NoLandscape, missed};
+use super::{LandscapeError, LensLandscape, LensSummary, describe_violation};
 use crate::lens::{Lens, Medium, glass};
-use crate::merit::{Margin, Term, Weighted, margins};
-use crate::optimize::Memory;
-use crate::pupil::{Bench, Pattern, Region};
-use crate::search::element::{Make, elements};
-use crate::search::{Landscape as _, Rules};
+use crate::merit::{ConstraintMargin, Term, WeightedTerm, constraint_margins};
+use crate::optimize::DescentState;
+use crate::pupil::{PupilPattern, RayModel, Region};
+use crate::search::element::{ElementKind, elements};
+use crate::search::{Landscape as _, SearchRules};
 use serde::Serialize;
 
 /// How often the limits are drawn tighter.
@@ -18,40 +18,40 @@ const ROUNDS: i32 = 6;
 /// Local moves of a round.
 const MOVES: usize = 40;
 /// How much tighter a limit is drawn in the first round: mm, or parts of a share or ratio.
-const TIGHTER: [f64; 2] = [2e-3, 2e-3];
+const MARGIN_STEP: [f64; 2] = [2e-3, 2e-3];
 /// The weight of a limit grows by this factor each round.
-const HARDER: f64 = 4.0;
+const WEIGHT_GROWTH: f64 = 4.0;
 /// Two samplings of a spot or a pupil that agree to this share confirm each other.
-const CONFIRMED: f64 = 0.02;
+const AGREEMENT: f64 = 0.02;
 /// Rays of the second sampling, for every field and colour.
-const SECOND: Pattern = Pattern::Sobol { count: 1 << 14, seed: 1 };
+const CROSS_CHECK_PATTERN: PupilPattern = PupilPattern::Sobol { count: 1 << 14, seed: 1 };
 /// The tolerance of the first one.
-const FIRST: f64 = 1e-4;
+const FIRST_TOLERANCE: f64 = 1e-4;
 
 /// A lens that was finished, as far as that went.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finished {
+pub struct FinalizedLens {
     /// The lens.
     pub lens: Lens,
     /// Glasses that were exchanged.
-    pub glasses: Vec<Exchanged>,
+    pub glasses: Vec<GlassSubstitution>,
     /// Glasses that the rules do not list, behind or in front of surfaces that are to be left alone.
-    pub unlisted: Vec<Unlisted>,
+    pub unlisted: Vec<UnlistedGlass>,
     /// Surfaces in front of gradients: no catalogue has such a medium, and each stays what it was.
     pub gradients: Vec<usize>,
     /// Everything that is limited.
-    pub limits: Vec<Margin>,
+    pub limits: Vec<ConstraintMargin>,
     /// The light of every field, in mm², and what it may not be less than.
-    pub light: Vec<Margin>,
+    pub light: Vec<ConstraintMargin>,
     /// Sharpness and light.
-    pub figures: Figures,
+    pub figures: LensSummary,
     /// The same by other rays.
-    pub confirmed: Vec<Confirmed>,
+    pub confirmed: Vec<CrossCheck>,
 }
 
 /// A glass that the rules do not list, and that stays.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Unlisted {
+pub struct UnlistedGlass {
     /// The surface in front of it.
     pub surface: usize,
     /// The glass.
@@ -60,7 +60,7 @@ pub struct Unlisted {
 
 /// A glass that no catalogue has or the rules do not list, and what is used in its place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Exchanged {
+pub struct GlassSubstitution {
     /// The surface in front of it.
     pub surface: usize,
     /// Index and Abbe number that it had; no Abbe number for a constant index.
@@ -73,7 +73,7 @@ pub struct Exchanged {
 
 /// A field by two samplings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Confirmed {
+pub struct CrossCheck {
     /// The zoom position.
     pub zoom: usize,
     /// The field.
@@ -86,16 +86,16 @@ pub struct Confirmed {
     pub agrees: bool,
 }
 
-impl Finished {
+impl FinalizedLens {
     /// What fails, in words; nothing where the lens can be made.
     pub fn failures(&self) -> Vec<String> {
-        let limits = self.limits.iter().chain(&self.light).filter(|limit| limit.room() < 0.0);
+        let limits = self.limits.iter().chain(&self.light).filter(|limit| limit.slack() < 0.0);
         let doubts = self.confirmed.iter().filter(|field| !field.agrees);
-        let doubt = |field: &Confirmed| {
-            let Confirmed { zoom, field, .. } = field;
+        let doubt = |field: &CrossCheck| {
+            let CrossCheck { zoom, field, .. } = field;
             format!("field {field} at zoom {zoom}: two samplings of the pupil disagree")
         };
-        limits.map(missed).chain(doubts.map(doubt)).collect()
+        limits.map(describe_violation).chain(doubts.map(doubt)).collect()
     }
 }
 
@@ -103,11 +103,11 @@ impl Finished {
 ///
 /// # Errors
 /// A lens without merit, or one for which no glass is allowed.
-pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLandscape> {
-    let (mut lens, glasses, unlisted) = with_real_glasses(lens, &landscape.rules)?;
+pub fn finalize(landscape: &LensLandscape, lens: &Lens) -> Result<FinalizedLens, LandscapeError> {
+    let (mut lens, glasses, unlisted) = with_catalogue_glasses(lens, &landscape.rules)?;
     for round in 0..ROUNDS {
-        let tight = landscape.tightened(round);
-        let (mut memory, mut at) = (Memory::default(), lens.clone());
+        let tight = landscape.tighten(round);
+        let (mut memory, mut at) = (DescentState::default(), lens.clone());
         let mut best = tight.loss(&at);
         for _ in 0..MOVES {
             let (there, loss, _) = tight.descend(&at, &mut memory);
@@ -119,16 +119,16 @@ pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLand
         }
         let light = landscape.light_margins(&lens)?;
         let limits = landscape.limits(&lens)?;
-        if limits.iter().chain(&light).all(|limit| limit.room() >= 0.0) {
+        if limits.iter().chain(&light).all(|limit| limit.slack() >= 0.0) {
             break;
         }
     }
-    let figures = Figures::of(&lens, FIRST)?;
-    Ok(Finished {
+    let figures = LensSummary::new(&lens, FIRST_TOLERANCE)?;
+    Ok(FinalizedLens {
         limits: landscape.limits(&lens)?,
         light: landscape.light_margins(&lens)?,
-        confirmed: confirmed(&lens, &figures)?,
-        gradients: gradients(&lens),
+        confirmed: cross_check(&lens, &figures)?,
+        gradients: gradient_surfaces(&lens),
         glasses,
         unlisted,
         figures,
@@ -138,22 +138,25 @@ pub fn finish(landscape: &LensLandscape, lens: &Lens) -> Result<Finished, NoLand
 
 impl LensLandscape {
     /// Everything that the goal limits, and the number of elements.
-    pub(super) fn limits(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
-        let mut limits = vec![self.count(lens)];
-        limits.extend(margins(lens, self.goal.terms.iter().map(|w| w.term))?);
+    pub(super) fn limits(&self, lens: &Lens) -> Result<Vec<ConstraintMargin>, LandscapeError> {
+        let mut limits = vec![self.element_count_margin(lens)];
+        limits.extend(constraint_margins(lens, self.goal.terms.iter().map(|w| w.term))?);
         Ok(limits)
     }
 
     /// The light of every field and colour against what the goal says that it keeps.
-    pub(super) fn light_margins(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
+    pub(super) fn light_margins(
+        &self,
+        lens: &Lens,
+    ) -> Result<Vec<ConstraintMargin>, LandscapeError> {
         let share = self.goal.terms.iter().find_map(|w| match w.term {
             Term::Light(share) => Some(share),
             _ => None,
         });
         let Some(share) = share else { return Ok(Vec::new()) };
-        let areas = self.merit(lens, FIRST)?.sampled();
+        let areas = self.merit(lens, FIRST_TOLERANCE)?.spot_samplings();
         let before = self.light.iter().flatten();
-        let margin = |(spot, before): (&crate::merit::Sampled, &f64)| Margin {
+        let margin = |(spot, before): (&crate::merit::SpotSampling, &f64)| ConstraintMargin {
             term: "light",
             surface: Some(spot.field),
             zoom: spot.zoom,
@@ -165,10 +168,10 @@ impl LensLandscape {
     }
 
     /// The same landscape with its limits drawn tighter, and weighted more.
-    fn tightened(&self, round: i32) -> Self {
-        let [mm, part] = TIGHTER.map(|first| first * f64::from(round + 1));
-        let harder = HARDER.powi(round);
-        let tighter = |w: &Weighted| {
+    fn tighten(&self, round: i32) -> Self {
+        let [mm, part] = MARGIN_STEP.map(|first| first * f64::from(round + 1));
+        let harder = WEIGHT_GROWTH.powi(round);
+        let tighter = |w: &WeightedTerm| {
             let term = match w.term {
                 Term::GlassCenter { min, max } => {
                     Term::GlassCenter { min: min + mm, max: max - mm }
@@ -181,9 +184,9 @@ impl LensLandscape {
                 Term::BackFocus(min) => Term::BackFocus(min + mm),
                 Term::Steepness(max) => Term::Steepness(max * (1.0 - part)),
                 Term::Light(share) => Term::Light(share * (1.0 + part)),
-                other => return Weighted { term: other, ..*w },
+                other => return WeightedTerm { term: other, ..*w },
             };
-            Weighted { term, weight: w.weight * harder }
+            WeightedTerm { term, weight: w.weight * harder }
         };
         let mut tight = self.clone();
         tight.goal.terms = self.goal.terms.iter().map(tighter).collect();
@@ -191,45 +194,48 @@ impl LensLandscape {
     }
 }
 
-fn gradients(lens: &Lens) -> Vec<usize> {
-    let is_one = |i: &usize| matches!(lens.surfaces[*i].medium, Medium::Gradient(_));
+fn gradient_surfaces(lens: &Lens) -> Vec<usize> {
+    let is_one = |i: &usize| matches!(lens.surfaces[*i].medium, Medium::Grin(_));
     (0..lens.surfaces.len()).filter(is_one).collect()
 }
 
 /// The lens with every model glass, and every glass that the rules do not list, replaced by the
 /// nearest one that they allow; those beside surfaces that are to be left alone stay.
-fn with_real_glasses(
+fn with_catalogue_glasses(
     lens: &Lens,
-    rules: &Rules,
-) -> Result<(Lens, Vec<Exchanged>, Vec<Unlisted>), NoLandscape> {
+    rules: &SearchRules,
+) -> Result<(Lens, Vec<GlassSubstitution>, Vec<UnlistedGlass>), LandscapeError> {
     let mut real = lens.clone();
     let (mut exchanged, mut unlisted) = (Vec::new(), Vec::new());
     let rows = lens.surfaces.len();
-    for element in elements(lens).iter().filter(|e| matches!(e.make, Make::Glass(_))) {
+    for element in elements(lens).iter().filter(|e| matches!(e.kind, ElementKind::Glass(_))) {
         for surface in element.first..element.last {
             let was = match &lens.surfaces[surface].medium {
                 Medium::Model { nd, vd } => (*nd, (*vd > 0.0).then_some(*vd)),
                 Medium::Index(n) => (*n, None),
-                Medium::Glass(name) => match glass::find(name).filter(|g| !listed(g, rules)) {
-                    Some(glass) if rules.allow(surface, rows) && rules.allow(surface + 1, rows) => {
+                Medium::Glass(name) => match glass::find(name).filter(|g| !is_listed(g, rules)) {
+                    Some(glass)
+                        if rules.may_change(surface, rows)
+                            && rules.may_change(surface + 1, rows) =>
+                    {
                         (glass.nd, Some(glass.vd))
                     }
                     Some(glass) => {
-                        unlisted.push(Unlisted { surface, glass: glass.full_name() });
+                        unlisted.push(UnlistedGlass { surface, glass: glass.full_name() });
                         continue;
                     }
                     None => continue,
                 },
-                Medium::Air | Medium::Mirror | Medium::Gradient(_) => continue,
+                Medium::Air | Medium::Mirror | Medium::Grin(_) => continue,
             };
-            let found = nearest(was, lens, rules).ok_or_else(|| NoLandscape::Setting {
+            let found = nearest_glass(was, lens, rules).ok_or_else(|| LandscapeError::Setting {
                 what: "the list of glasses",
                 found: rules.glasses.join(", "),
                 expected: "one with data at every wavelength of the lens",
             })?;
             let glass = found.full_name();
             real.surfaces[surface].medium = Medium::Glass(glass.clone());
-            exchanged.push(Exchanged { surface, was, glass, is: (found.nd, found.vd) });
+            exchanged.push(GlassSubstitution { surface, was, glass, is: (found.nd, found.vd) });
         }
     }
     // An index that came from a catalogue is no variable any more.
@@ -240,40 +246,40 @@ fn with_real_glasses(
 }
 
 /// Glasses that differ by this much in index and Abbe number are about equally unlike.
-const ALIKE: [f64; 2] = [0.01, 1.0];
+const GLASS_DISTANCE_UNIT: [f64; 2] = [0.01, 1.0];
 
-fn listed(glass: &glass::Glass, rules: &Rules) -> bool {
-    rules.lists(&glass.full_name())
+fn is_listed(glass: &glass::Glass, rules: &SearchRules) -> bool {
+    rules.allows_glass(&glass.full_name())
 }
 
-fn nearest(
+fn nearest_glass(
     (nd, vd): (f64, Option<f64>),
     lens: &Lens,
-    rules: &Rules,
+    rules: &SearchRules,
 ) -> Option<&'static glass::Glass> {
     let allowed = |glass: &&glass::Glass| {
-        listed(glass, rules) && lens.wavelengths.iter().all(|w| glass.index(w.um).is_some())
+        is_listed(glass, rules) && lens.wavelengths.iter().all(|w| glass.index(w.um).is_some())
     };
     let distance = |glass: &glass::Glass| {
-        let off = vd.map_or(0.0, |vd| (glass.vd - vd) / ALIKE[1]);
-        ((glass.nd - nd) / ALIKE[0]).hypot(off)
+        let off = vd.map_or(0.0, |vd| (glass.vd - vd) / GLASS_DISTANCE_UNIT[1]);
+        ((glass.nd - nd) / GLASS_DISTANCE_UNIT[0]).hypot(off)
     };
     let all = glass::catalogue().iter().filter(allowed);
     all.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// Every field by Sobol points over a disc that holds its pupil, rays of their own.
-fn confirmed(lens: &Lens, figures: &Figures) -> Result<Vec<Confirmed>, NoLandscape> {
+fn cross_check(lens: &Lens, figures: &LensSummary) -> Result<Vec<CrossCheck>, LandscapeError> {
     let mut all = Vec::new();
     for first in &figures.fields {
-        let bench = Bench::of(lens, first.zoom)?;
+        let bench = RayModel::from_lens(lens, first.zoom)?;
         let field = bench.fields[first.field];
-        let total: f64 = bench.colors.iter().map(|color| color.weight).sum();
+        let total: f64 = bench.channels.iter().map(|color| color.weight).sum();
         let (mut light, mut sum, mut mean, mut square) = (0.0, 0.0, [0.0; 2], 0.0);
-        for (i, color) in bench.colors.iter().enumerate() {
+        for (i, color) in bench.channels.iter().enumerate() {
             let Ok(launch) = bench.launch(field, i) else { continue };
             let region = Region::new(launch);
-            let moments = region.moments(&region.sampled(SECOND));
+            let moments = region.moments(&region.pattern_nodes(CROSS_CHECK_PATTERN));
             let share = color.weight / total;
             light += share * moments.area;
             if moments.area > 0.0 {
@@ -285,10 +291,10 @@ fn confirmed(lens: &Lens, figures: &Figures) -> Result<Vec<Confirmed>, NoLandsca
         }
         let [x, y] = mean.map(|m| m / sum);
         let spot = (square / sum - x * x - y * y).max(0.0).sqrt();
-        let close = |a: f64, b: f64| (a - b).abs() <= CONFIRMED * b.abs();
+        let close = |a: f64, b: f64| (a - b).abs() <= AGREEMENT * b.abs();
         let sharp = first.spot.is_none_or(|first| close(spot, first.value));
         let agrees = sharp && close(light, first.light.value);
-        all.push(Confirmed { zoom: first.zoom, field: first.field, spot, light, agrees });
+        all.push(CrossCheck { zoom: first.zoom, field: first.field, spot, light, agrees });
     }
     Ok(all)
 }

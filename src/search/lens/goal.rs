@@ -1,10 +1,10 @@
 //! What a search asks of a lens where the person does not say: (4.6), and what a factory can make.
 
-use super::NoLandscape;
+use super::LandscapeError;
 use crate::lens::Lens;
-use crate::merit::{Goal, PupilEdge, Term, Weighted};
+use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use crate::paraxial::{Beam, first_order};
-use crate::search::Rules;
+use crate::search::SearchRules;
 
 /// The radius of a spot, relative to the focal length, that is given away for all of the light.
 const LIGHT_IN_SPOT: f64 = 0.02;
@@ -21,11 +21,11 @@ const ROOM: f64 = 0.8;
 /// A lens without first-order data.
 pub fn goal(
     lens: &Lens,
-    rules: &Rules,
+    rules: &SearchRules,
     focal_length: Option<f64>,
     light: f64,
-) -> Result<Goal, NoLandscape> {
-    let sensible = Goal::sensible(lens)?;
+) -> Result<Goal, LandscapeError> {
+    let sensible = Goal::default_for(lens)?;
     let own = sensible.terms.iter().find_map(|w| match w.term {
         Term::FocalLength(focal) => Some(focal),
         _ => None,
@@ -33,9 +33,9 @@ pub fn goal(
     let track: f64 = lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
     let focal = focal_length.or(own);
     let size = focal.map_or(track, f64::abs);
-    let mut terms = vec![Weighted { term: Term::Spot, weight: 1.0 }];
-    terms.extend(focal.map(|f| Weighted { term: Term::FocalLength(f), weight: 1e-2 }));
-    terms.push(Weighted { term: Term::Light(light), weight: (LIGHT_IN_SPOT * size).powi(2) });
+    let mut terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
+    terms.extend(focal.map(|f| WeightedTerm { term: Term::FocalLength(f), weight: 1e-2 }));
+    terms.push(WeightedTerm { term: Term::Light(light), weight: (LIGHT_IN_SPOT * size).powi(2) });
     let rear = lens.surfaces.last().map_or(0.0, |row| row.thickness);
     let [min, max] = rules.glass_center;
     terms.push(one(Term::GlassCenter { min, max }));
@@ -47,24 +47,24 @@ pub fn goal(
     terms.push(one(Term::BackFocus(rules.back_focus.unwrap_or(ROOM * rear))));
     // A rim that stands for a tenth of a focal length.
     let steep = Term::Steepness(rules.steepness);
-    terms.push(Weighted { term: steep, weight: (0.1 * size).powi(2) });
+    terms.push(WeightedTerm { term: steep, weight: (0.1 * size).powi(2) });
     terms.extend(rules.semi_diameter.map(|max| one(Term::SemiDiameter { min: 0.0, max })));
     Ok(Goal { terms, pupil: PupilEdge::Moving, zoom_ratios: sensible.zoom_ratios })
 }
 
-fn one(term: Term) -> Weighted {
-    Weighted { term, weight: 1.0 }
+fn one(term: Term) -> WeightedTerm {
+    WeightedTerm { term, weight: 1.0 }
 }
 
 /// The focal length of a lens at its first zoom position, in mm; none for an afocal one.
 pub(super) fn focal_length_of(lens: &Lens) -> Option<f64> {
-    let system = lens.system(0, lens.wavelengths[lens.primary()].um).ok()?;
-    let efl = first_order(&system, &Beam::of(lens, 0)).ok()?.efl?;
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
+    let efl = first_order(&system, &Beam::for_lens(lens, 0)).ok()?.efl?;
     efl.is_finite().then_some(efl)
 }
 
 /// What lengths of a lens are compared with: its focal length, or the length of an afocal one.
-pub(super) fn size(lens: &Lens) -> f64 {
+pub(super) fn reference_length(lens: &Lens) -> f64 {
     let track = || lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>();
     focal_length_of(lens).map_or_else(track, f64::abs).max(f64::MIN_POSITIVE)
 }

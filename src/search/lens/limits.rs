@@ -1,22 +1,22 @@
 //! What is asked for and not kept: by how much a lens breaks its limits, and limits that no lens
 //! keeps, which a search would chase in vain.
 
-use super::{LensLandscape, NoLandscape};
+use super::{LandscapeError, LensLandscape};
 use crate::lens::{Lens, Medium, Object, glass};
-use crate::math::brief;
-use crate::merit::{Margin, MeritError, Term, TermValue};
-use crate::search::{Rules, element};
+use crate::math::format_short;
+use crate::merit::{ConstraintMargin, MeritError, Term, TermValue};
+use crate::search::{SearchRules, element};
 use std::f64::consts::PI;
 
 /// Light that is less than asked for by this part is as much, by two samplings of its pupil.
-const AS_BRIGHT: f64 = 1e-3;
+const LIGHT_TOLERANCE: f64 = 1e-3;
 
 impl LensLandscape {
     /// How many elements a lens has, and may have.
-    pub(super) fn count(&self, lens: &Lens) -> Margin {
+    pub(super) fn element_count_margin(&self, lens: &Lens) -> ConstraintMargin {
         let [min, max] = self.rules.elements.map(|count| Some(count as f64));
-        let value = element::pieces(lens) as f64;
-        Margin { term: "elements", surface: None, zoom: 0, value, min, max }
+        let value = element::piece_count(lens) as f64;
+        ConstraintMargin { term: "elements", surface: None, zoom: 0, value, min, max }
     }
 
     /// Every limit that a lens breaks, the number of its elements and the light of its fields among
@@ -24,10 +24,11 @@ impl LensLandscape {
     ///
     /// # Errors
     /// A lens that cannot be set up.
-    pub fn broken(&self, lens: &Lens) -> Result<Vec<Margin>, NoLandscape> {
-        let dark = |light: &Margin| -light.room() > AS_BRIGHT * light.min.unwrap_or(0.0);
+    pub fn violations(&self, lens: &Lens) -> Result<Vec<ConstraintMargin>, LandscapeError> {
+        let dark =
+            |light: &ConstraintMargin| -light.slack() > LIGHT_TOLERANCE * light.min.unwrap_or(0.0);
         let mut broken = self.limits(lens)?;
-        broken.retain(|limit| limit.room() < 0.0);
+        broken.retain(|limit| limit.slack() < 0.0);
         broken.extend(self.light_margins(lens)?.into_iter().filter(dark));
         Ok(broken)
     }
@@ -37,51 +38,51 @@ impl LensLandscape {
     ///
     /// # Errors
     /// A lens without merit.
-    pub fn terms(&self, lens: &Lens) -> Result<Vec<TermValue>, MeritError> {
+    pub fn term_values(&self, lens: &Lens) -> Result<Vec<TermValue>, MeritError> {
         let merit = self.merit(lens, self.local.tolerance)?;
         merit.terms(&merit.values(lens))
     }
 
     /// Refuses limits that no lens keeps.
-    pub(super) fn check_possible(&self) -> Result<(), NoLandscape> {
+    pub(super) fn check_feasible(&self) -> Result<(), LandscapeError> {
         self.check_rims()?;
         self.check_track()
     }
 
     /// A beam from infinity is as large at the first rim as at the first vertex plane.
-    fn check_rims(&self) -> Result<(), NoLandscape> {
-        let most = self.first(|term| match term {
+    fn check_rims(&self) -> Result<(), LandscapeError> {
+        let most = self.find_in_goal(|term| match term {
             Term::SemiDiameter { max, .. } => Some(max),
             _ => None,
         });
-        let share = self.first(|term| match term {
+        let share = self.find_in_goal(|term| match term {
             Term::Light(share) => Some(share),
             _ => None,
         });
         let (Some(most), Some(share)) = (most, share) else { return Ok(()) };
         let light = share * self.light.iter().flatten().copied().fold(0.0, f64::max);
         let rim = (light / PI).sqrt();
-        if self.start.object != Object::Infinity || most >= (1.0 - AS_BRIGHT) * rim {
+        if self.start.object != Object::Infinity || most >= (1.0 - LIGHT_TOLERANCE) * rim {
             return Ok(());
         }
-        let (most, light, rim) = (brief(most), short(light), short(rim));
-        Err(NoLandscape::Impossible(format!(
+        let (most, light, rim) = (format_short(most), format_limit(light), format_limit(rim));
+        Err(LandscapeError::Impossible(format!(
             "semi-diameters of {most} mm at most; the light that is asked for, {light} mm^2, needs \
              {rim} mm at the first surface"
         )))
     }
 
     /// As few elements as there may be, as thin as they may be, and the room behind them.
-    fn check_track(&self) -> Result<(), NoLandscape> {
-        let most = self.first(|term| match term {
+    fn check_track(&self) -> Result<(), LandscapeError> {
+        let most = self.find_in_goal(|term| match term {
             Term::TotalTrack(max) => Some(max),
             _ => None,
         });
-        let room = self.first(|term| match term {
+        let room = self.find_in_goal(|term| match term {
             Term::BackFocus(min) => Some(min.max(0.0)),
             _ => None,
         });
-        let thin = self.first(|term| match term {
+        let thin = self.find_in_goal(|term| match term {
             Term::GlassCenter { min, .. } => Some(min),
             _ => None,
         });
@@ -93,42 +94,42 @@ impl LensLandscape {
         if most >= least {
             return Ok(());
         }
-        let [most, least, room, thin] = [most, least, room, thin].map(short);
-        Err(NoLandscape::Impossible(format!(
+        let [most, least, room, thin] = [most, least, room, thin].map(format_limit);
+        Err(LandscapeError::Impossible(format!(
             "a track of {most} mm at most; {pieces} pieces of glass of {thin} mm and a back focus \
              of {room} mm need {least} mm"
         )))
     }
 
     /// What the first term of a kind asks for.
-    fn first(&self, number: impl Fn(Term) -> Option<f64>) -> Option<f64> {
+    fn find_in_goal(&self, number: impl Fn(Term) -> Option<f64>) -> Option<f64> {
         self.goal.terms.iter().find_map(|weighted| number(weighted.term))
     }
 }
 
 /// A limit that is not kept, in words.
-pub fn missed(limit: &Margin) -> String {
+pub fn describe_violation(limit: &ConstraintMargin) -> String {
     let of = if limit.term == "light" { "field" } else { "surface" };
     let place = limit.surface.map_or(String::new(), |i| format!(", {of} {i}"));
     let zoom = if limit.zoom == 0 { String::new() } else { format!(", zoom {}", limit.zoom) };
-    let (name, value) = (limit.term.replace('_', " "), short(limit.value));
+    let (name, value) = (limit.term.replace('_', " "), format_limit(limit.value));
     let bound = match (limit.min, limit.max) {
-        (Some(min), _) if limit.value < min => format!("at least {}", short(min)),
-        (_, Some(max)) => format!("at most {}", short(max)),
+        (Some(min), _) if limit.value < min => format!("at least {}", format_limit(min)),
+        (_, Some(max)) => format!("at most {}", format_limit(max)),
         _ => "a number".to_owned(),
     };
     format!("{name}{place}{zoom}: {value} instead of {bound}")
 }
 
 /// Refuses a list of glasses of which none has an index at every wavelength of the lens.
-pub(super) fn check_glasses(lens: &Lens, rules: &Rules) -> Result<(), NoLandscape> {
+pub(super) fn check_glasses(lens: &Lens, rules: &SearchRules) -> Result<(), LandscapeError> {
     let reaches =
         |glass: &glass::Glass| lens.wavelengths.iter().all(|w| glass.index(w.um).is_some());
     let mut listed = rules.glasses.iter().filter_map(|name| glass::find(name));
     if rules.glasses.is_empty() || listed.any(reaches) {
         return Ok(());
     }
-    Err(NoLandscape::Setting {
+    Err(LandscapeError::Setting {
         what: "the list of glasses",
         found: rules.glasses.join(", "),
         expected: "one with data at every wavelength of the lens",
@@ -136,7 +137,7 @@ pub(super) fn check_glasses(lens: &Lens, rules: &Rules) -> Result<(), NoLandscap
 }
 
 /// Four decimals, none for a whole number, or an exponent where they say nothing.
-fn short(value: f64) -> String {
+fn format_limit(value: f64) -> String {
     let size = value.abs();
     if size < 1e9 && value.fract() == 0.0 {
         format!("{value:.0}")

@@ -10,7 +10,7 @@ use crate::lens::{Aperture, Lens, Medium, Parameter, Quantity, Row, Variable};
 ///
 /// Its light is what the rims let through.
 #[must_use]
-pub fn opened(lens: &Lens, limit: f64) -> Lens {
+pub fn with_open_apertures(lens: &Lens, limit: f64) -> Lens {
     let mut open = lens.clone();
     let stop = open.stop().unwrap_or(0);
     let plane = is_diaphragm(lens, stop);
@@ -38,7 +38,7 @@ fn is_diaphragm(lens: &Lens, i: usize) -> bool {
         && row.asphere.is_empty()
         && row.medium == lens.surfaces[i - 1].medium
         && row.medium != Medium::Mirror
-        && !matches!(&row.medium, Medium::Gradient(gradient) if gradient.is_axial())
+        && !matches!(&row.medium, Medium::Grin(gradient) if gradient.is_axial())
 }
 
 /// Joins the gaps on both sides of a surface that does nothing.
@@ -82,21 +82,21 @@ pub(super) fn with_open_rims(mut lens: Lens, limit: f64) -> Lens {
 
 fn open_rims(lens: &mut Lens, limit: f64) {
     let fixed = |row: &Row| !row.asphere.is_empty() || row.medium == Medium::Mirror;
-    let graded = |row: &Row| matches!(row.medium, Medium::Gradient(_));
+    let graded = |row: &Row| matches!(row.medium, Medium::Grin(_));
     let mut behind = false;
     for row in &mut lens.surfaces {
         let face = behind || graded(row);
         behind = graded(row);
         if !fixed(row) {
             let known = row.semi_diameter.filter(|rim| face && *rim < limit);
-            row.semi_diameter = Some(known.unwrap_or(limit).min(edge_of(row)));
+            row.semi_diameter = Some(known.unwrap_or(limit).min(surface_edge(row)));
         }
     }
     for i in 0..lens.surfaces.len() - 1 {
         let positions = 0..lens.zoom_positions();
         let gaps = positions.map(|zoom| lens.thickness_at(i, zoom).unwrap_or(0.0));
         let gap = gaps.fold(f64::INFINITY, f64::min);
-        let meet = where_they_meet(&lens.surfaces[i], &lens.surfaces[i + 1], gap);
+        let meet = contact_height(&lens.surfaces[i], &lens.surfaces[i + 1], gap);
         for row in &mut lens.surfaces[i..=i + 1] {
             if !fixed(row) {
                 row.semi_diameter = row.semi_diameter.map(|rim| rim.min(meet));
@@ -114,14 +114,14 @@ fn open_rims(lens: &mut Lens, limit: f64) {
 }
 
 /// Where a sphere or ellipsoid ends, in mm from the axis.
-fn edge_of(row: &Row) -> f64 {
+fn surface_edge(row: &Row) -> f64 {
     let square = (1.0 + row.conic) * row.curvature * row.curvature;
     if square > 0.0 { 1.0 / square.sqrt() } else { f64::INFINITY }
 }
 
 /// How far from the axis two surfaces touch; the end of the smaller one where they do not.
-fn where_they_meet(before: &Row, behind: &Row, gap: f64) -> f64 {
-    let end = edge_of(before).min(edge_of(behind)).min(FAR);
+fn contact_height(before: &Row, behind: &Row, gap: f64) -> f64 {
+    let end = surface_edge(before).min(surface_edge(behind)).min(FAR);
     let room = |height: f64| gap + sag(behind, height) - sag(before, height);
     if room(end) >= 0.0 {
         return f64::INFINITY;

@@ -1,16 +1,19 @@
 //! A whole search of a lens, in one call.
 
-use super::{LensLandscape, Local, NoLandscape, goal};
+use super::{DescentSettings, LandscapeError, LensLandscape, goal};
 use crate::lens::Lens;
 use crate::merit::Goal;
-use crate::search::{Event, Kind, Rules, Run, RunOf, SearchError, Settings, Temperature};
+use crate::search::{
+    MutationKind, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn, SearchSettings,
+    Temperature,
+};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Everything that a search of a lens depends on besides the lens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Plan {
+pub struct SearchPlan {
     /// What is asked for; none asks for what [`goal()`] does.
     pub goal: Option<Goal>,
     /// The focal length in mm that the usual goal asks for; none for what the lens has.
@@ -19,63 +22,64 @@ pub struct Plan {
     /// each field.
     pub light: Vec<f64>,
     /// What may be done, and what a factory can make.
-    pub rules: Rules,
+    pub rules: SearchRules,
     /// How lenses descend.
-    pub local: Local,
+    pub local: DescentSettings,
     /// How the search goes.
-    pub settings: Settings,
+    pub settings: SearchSettings,
 }
 
-impl Default for Plan {
+impl Default for SearchPlan {
     fn default() -> Self {
         Self {
             goal: None,
             focal_length: None,
             light: vec![1.0],
-            rules: Rules::default(),
-            local: Local::default(),
-            settings: Settings::default(),
+            rules: SearchRules::default(),
+            local: DescentSettings::default(),
+            settings: SearchSettings::default(),
         }
     }
 }
 
 /// Why there is no search.
 #[derive(Debug, thiserror::Error)]
-pub enum NoSearch {
+pub enum SearchSetupError {
     /// The lens, the goal or the rules.
     #[error(transparent)]
-    Landscape(#[from] NoLandscape),
+    Landscape(#[from] LandscapeError),
     /// The settings, or a checkpoint.
     #[error(transparent)]
     Search(#[from] SearchError),
 }
 
-impl Plan {
+impl SearchPlan {
     /// The landscape that is searched.
     ///
     /// # Errors
     /// A lens without merit, rules or settings without meaning, limits that no lens keeps.
-    pub fn landscape(&self, lens: &Lens) -> Result<LensLandscape, NoLandscape> {
+    pub fn landscape(&self, lens: &Lens) -> Result<LensLandscape, LandscapeError> {
         let (common, each) = match self.light[..] {
             [share] => (share, &[][..]),
             _ => (1.0, &self.light[..]),
         };
-        let rules = self.rules.checked()?;
+        let rules = self.rules.normalize()?;
         let usual = || goal(lens, &rules, self.focal_length, common);
         let goal = self.goal.clone().map_or_else(usual, Ok)?;
-        let landscape = LensLandscape::new(lens, &goal, &rules, &self.local)?.asking_each(each)?;
-        landscape.check_possible()?;
+        let landscape =
+            LensLandscape::new(lens, &goal, &rules, &self.local)?.with_field_light(each)?;
+        landscape.check_feasible()?;
         Ok(landscape)
     }
 
     /// The settings, with the temperature that this landscape calls for where none is given, and
     /// without draws from anywhere where the rules forbid them.
-    pub fn settings(&self, landscape: &LensLandscape) -> Settings {
-        let usual = || Temperature::halving(landscape.scale());
+    pub fn settings(&self, landscape: &LensLandscape) -> SearchSettings {
+        let usual = || Temperature::at_half_density(landscape.loss_scale());
         let temperature = self.settings.temperature.unwrap_or_else(usual);
-        let forbidden = self.rules.weight(Kind::Global) == 0.0;
+        let forbidden = self.rules.weight(MutationKind::Global) == 0.0;
         let gamma = if forbidden { 0.0 } else { self.settings.gamma };
-        Settings { temperature: Some(temperature), gamma, ..self.settings.clone() }
+        SearchSettings { temperature: Some(temperature), gamma, ..self.settings.clone() }
     }
 }
 
@@ -86,13 +90,13 @@ impl Plan {
 /// A lens without merit, rules or settings without meaning.
 pub fn run(
     lens: &Lens,
-    plan: &Plan,
-    mut watch: impl FnMut(&RunOf<LensLandscape>, &[Event]) -> ControlFlow<()>,
-) -> Result<RunOf<LensLandscape>, NoSearch> {
+    plan: &SearchPlan,
+    mut watch: impl FnMut(&SearchRunOn<LensLandscape>, &[SearchEvent]) -> ControlFlow<()>,
+) -> Result<SearchRunOn<LensLandscape>, SearchSetupError> {
     let landscape = plan.landscape(lens)?;
     let start = landscape.start().clone();
-    let mut run = Run::new(&landscape, start, &plan.settings(&landscape))?;
-    while run.over().is_none() {
+    let mut run = SearchRun::new(&landscape, start, &plan.settings(&landscape))?;
+    while run.end_reason().is_none() {
         let events = run.round(&landscape);
         if watch(&run, &events).is_break() {
             break;

@@ -3,11 +3,11 @@
 
 use super::LensLandscape;
 use crate::lens::{Lens, Parameter, Quantity, RADIAL_TERMS};
-use crate::merit::Detail;
-use crate::search::Slope;
+use crate::merit::DerivativeLevel;
+use crate::search::LossGradient;
 
 /// What a change of one means for a number of a lens of some size in mm: they bend rays about alike.
-fn unit(parameter: Parameter, size: f64) -> f64 {
+fn langevin_unit(parameter: Parameter, size: f64) -> f64 {
     match parameter.quantity {
         Quantity::Curvature => 0.5 / size,
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.02 * size,
@@ -21,13 +21,14 @@ fn unit(parameter: Parameter, size: f64) -> f64 {
     }
 }
 
-pub(super) fn slope(landscape: &LensLandscape, lens: &Lens) -> Option<Slope> {
+pub(super) fn loss_gradient(landscape: &LensLandscape, lens: &Lens) -> Option<LossGradient> {
     let merit = landscape.merit(lens, landscape.local.tolerance).ok()?;
-    let values = merit.values(&landscape.freed(lens));
-    let sum = merit.sum(&values, Detail::Gradient).ok()?;
-    let unit = |i: usize| unit(merit.variables()[i].parameter, landscape.freedom.size);
+    let values = merit.values(&landscape.with_variables(lens));
+    let sum = merit.evaluate(&values, DerivativeLevel::Gradient).ok()?;
+    let unit =
+        |i: usize| langevin_unit(merit.variables()[i].parameter, landscape.variable_rules.size);
     let units: Vec<f64> = (0..values.len()).map(unit).collect();
-    Some(Slope {
+    Some(LossGradient {
         loss: sum.value,
         values: values.iter().zip(&units).map(|(value, unit)| value / unit).collect(),
         gradient: sum.gradient.iter().zip(&units).map(|(slope, unit)| slope * unit).collect(),
@@ -35,13 +36,13 @@ pub(super) fn slope(landscape: &LensLandscape, lens: &Lens) -> Option<Slope> {
 }
 
 pub(super) fn with_values(landscape: &LensLandscape, lens: &Lens, values: &[f64]) -> Option<Lens> {
-    let free = landscape.freed(lens);
+    let free = landscape.with_variables(lens);
     if free.variables.len() != values.len() {
         return None;
     }
     let mut there = lens.clone();
     for (variable, value) in free.variables.iter().zip(values) {
-        let value = value * unit(variable.parameter, landscape.freedom.size);
+        let value = value * langevin_unit(variable.parameter, landscape.variable_rules.size);
         let inside = variable.min.is_none_or(|min| value >= min)
             && variable.max.is_none_or(|max| value <= max);
         if !inside || !there.set(variable.parameter, value) {

@@ -5,21 +5,26 @@
 //! wide, as the rim of that surface asks. (The thesis draws curvatures around 0 and puts the singlet
 //! in contact, where it would cut into every surface that is bent towards it.)
 
-use super::chance::{Length, allowed, coin, log_normal, normal, pick};
-use super::draft::{Back, Draft, Scene, filling, hangs, is_gap, is_solved, sense, shortest};
-use super::{Kind, remove};
+use super::chance::{
+    ShiftedExponential, bernoulli, choose, normal_log_density, sample_normal, usable_glasses,
+};
+use super::draft::{
+    MutationContext, MutationDraft, ReverseMove, has_pickup, has_solve, is_gap, light_direction,
+    medium_after, shortest_gap,
+};
+use super::{MutationKind, remove};
 use crate::lens::glass::Glass;
 use crate::lens::{Lens, Medium, Object, Row};
-use crate::search::element::{filled, pieces};
-use crate::search::projection::Map;
-use crate::search::{Random, Rules};
+use crate::search::element::{glass_gaps, piece_count};
+use crate::search::projection::ProjectionMap;
+use crate::search::{Random, SearchRules};
 
 /// How often the rest of the lens keeps its place where the gap has room; else it makes way.
-pub(super) const KEEPS: f64 = 0.9;
+pub(super) const KEEP_PROBABILITY: f64 = 0.9;
 
 /// Where a singlet may come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct SingletSite {
     /// The surface in front of the air gap; none for the space in front of the lens.
     pub(super) gap: Option<usize>,
     /// Whether it stands close to that surface, else close to the next one.
@@ -37,7 +42,7 @@ pub(super) struct Neighbour {
 
 /// The random numbers of a new singlet.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Singlet {
+pub(super) struct SingletParameters {
     pub(super) curvatures: [f64; 2],
     pub(super) thickness: f64,
     /// The air between it and the surface to which it is close.
@@ -45,25 +50,25 @@ pub(super) struct Singlet {
 }
 
 /// Where singlets may come.
-pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Place>, String> {
+pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<SingletSite>, String> {
     let most = rules.elements[1];
-    if pieces(lens) + 1 > most {
-        return Err(format!("the lens has {} elements, the rules allow {most}", pieces(lens)));
+    if piece_count(lens) + 1 > most {
+        return Err(format!("the lens has {} elements, the rules allow {most}", piece_count(lens)));
     }
-    let glass = filled(lens);
+    let glass = glass_gaps(lens);
     let rows = lens.surfaces.len();
     let mut found = Vec::new();
     if rules.kept[0] == 0 && !glass[0] {
-        found.push(Place { gap: None, behind: false });
+        found.push(SingletSite { gap: None, behind: false });
     }
-    for row in (0..rows).filter(|row| !glass[row + 1] && rules.allow(*row, rows)) {
+    for row in (0..rows).filter(|row| !glass[row + 1] && rules.may_change(*row, rows)) {
         let last = row + 1 == rows;
-        if !(last || rules.allow(row + 1, rows)) || hangs(lens, row, is_gap) {
+        if !(last || rules.may_change(row + 1, rows)) || has_pickup(lens, row, is_gap) {
             continue;
         }
-        found.push(Place { gap: Some(row), behind: true });
+        found.push(SingletSite { gap: Some(row), behind: true });
         if !last {
-            found.push(Place { gap: Some(row), behind: false });
+            found.push(SingletSite { gap: Some(row), behind: false });
         }
     }
     if found.is_empty() {
@@ -73,7 +78,7 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Place>, String> {
     }
 }
 
-impl Place {
+impl SingletSite {
     fn neighbour(self) -> Neighbour {
         let row = match self.gap {
             Some(gap) if self.behind => gap,
@@ -84,13 +89,18 @@ impl Place {
     }
 }
 
-impl Singlet {
-    fn draw(scene: &Scene<'_>, neighbour: Neighbour, random: &mut Random) -> Self {
+impl SingletParameters {
+    fn draw(scene: &MutationContext<'_>, neighbour: Neighbour, random: &mut Random) -> Self {
         let mean = scene.lens.surfaces[neighbour.row].curvature;
-        let mut curvature = || mean + normal(scene.bend(), random);
+        let mut curvature = || mean + sample_normal(scene.curvature_deviation(), random);
         let curvatures = [curvature(), curvature()];
-        let (thickness, air) =
-            lengths(&scene.lens, neighbour, curvatures, scene.rules, scene.size());
+        let (thickness, air) = length_distributions(
+            &scene.lens,
+            neighbour,
+            curvatures,
+            scene.rules,
+            scene.size_ratio(),
+        );
         Self { curvatures, thickness: thickness.draw(random), air: air.draw(random) }
     }
 
@@ -100,12 +110,13 @@ impl Singlet {
         &self,
         lens: &Lens,
         neighbour: Neighbour,
-        rules: &Rules,
+        rules: &SearchRules,
         scale: f64,
     ) -> Option<f64> {
         let mean = lens.surfaces.get(neighbour.row)?.curvature;
-        let (thickness, air) = lengths(lens, neighbour, self.curvatures, rules, scale / 50.0);
-        let bends = self.curvatures.map(|c| log_normal(c - mean, 0.25 / scale));
+        let (thickness, air) =
+            length_distributions(lens, neighbour, self.curvatures, rules, scale / 50.0);
+        let bends = self.curvatures.map(|c| normal_log_density(c - mean, 0.25 / scale));
         let lengths = thickness.log_density(self.thickness)? + air.log_density(self.air)?;
         Some(bends[0] + bends[1] + lengths)
     }
@@ -117,17 +128,17 @@ impl Singlet {
 
 /// What the thickness of a singlet and the air beside it are drawn from: as much as the rules ask
 /// for on the axis and, up to the rim of the neighbour, off it.
-fn lengths(
+fn length_distributions(
     lens: &Lens,
     neighbour: Neighbour,
     [front, rear]: [f64; 2],
-    rules: &Rules,
+    rules: &SearchRules,
     size: f64,
-) -> (Length, Length) {
+) -> (ShiftedExponential, ShiftedExponential) {
     let Neighbour { row, behind } = neighbour;
     let beside = lens.surfaces[row].curvature;
     let rim = lens.surfaces[row].semi_diameter.unwrap_or(0.0);
-    let sense = sense(lens, if behind { row } else { row.saturating_sub(1) });
+    let sense = light_direction(lens, if behind { row } else { row.saturating_sub(1) });
     // How much narrower than on the axis a gap is at the rim.
     let narrower = |first: f64, second: f64| {
         let (first, second) = (sag(first, rim), sag(second, rim));
@@ -139,7 +150,7 @@ fn lengths(
     };
     let thickness = least(rules.glass_center, rules.glass_edge, narrower(front, rear));
     let air = least(rules.air_center, rules.air_edge, narrower(from, to));
-    (Length::new(thickness, 0.75 * size), Length::new(air, 0.1 * size))
+    (ShiftedExponential::new(thickness, 0.75 * size), ShiftedExponential::new(air, 0.1 * size))
 }
 
 /// The sag of a sphere at a height, or where it ends before.
@@ -149,14 +160,19 @@ fn sag(curvature: f64, height: f64) -> f64 {
 }
 
 /// How likely the rest of the lens keeps its place: never where there is no room.
-pub(super) fn keeps(lens: &Lens, gap: Option<usize>, rules: &Rules, length: f64) -> f64 {
+pub(super) fn keep_probability(
+    lens: &Lens,
+    gap: Option<usize>,
+    rules: &SearchRules,
+    length: f64,
+) -> f64 {
     let room = |gap: usize| has_choice(lens, gap) && has_room(lens, gap, rules, length);
-    if gap.is_some_and(room) { KEEPS } else { 0.0 }
+    if gap.is_some_and(room) { KEEP_PROBABILITY } else { 0.0 }
 }
 
 /// Whether a gap could take a length in and still be one, on the axis and at the rim.
-pub(super) fn has_room(lens: &Lens, gap: usize, rules: &Rules, length: f64) -> bool {
-    let left = shortest(lens, gap) - length;
+pub(super) fn has_room(lens: &Lens, gap: usize, rules: &SearchRules, length: f64) -> bool {
+    let left = shortest_gap(lens, gap) - length;
     if gap + 1 == lens.surfaces.len() {
         return left >= rules.back_focus.unwrap_or(0.0);
     }
@@ -164,7 +180,7 @@ pub(super) fn has_room(lens: &Lens, gap: usize, rules: &Rules, length: f64) -> b
     let rims = [front, rear].map(|row| row.semi_diameter.unwrap_or(f64::INFINITY));
     let rim = rims[0].min(rims[1]);
     let narrower = if rim.is_finite() {
-        sense(lens, gap) * (sag(front.curvature, rim) - sag(rear.curvature, rim))
+        light_direction(lens, gap) * (sag(front.curvature, rim) - sag(rear.curvature, rim))
     } else {
         0.0
     };
@@ -173,21 +189,25 @@ pub(super) fn has_room(lens: &Lens, gap: usize, rules: &Rules, length: f64) -> b
 
 /// Whether a gap has a length of its own that could become shorter.
 pub(super) fn has_choice(lens: &Lens, gap: usize) -> bool {
-    !is_solved(lens, gap)
+    !has_solve(lens, gap)
 }
 
 /// Adds a singlet.
-pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+pub(super) fn draw(
+    scene: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, String> {
     let places = places(&scene.lens, scene.rules)?;
-    let glasses = allowed(&scene.lens, scene.rules);
-    let place = pick(&places, random).copied().ok_or("no place")?;
-    let glass = pick(&glasses, random).copied().ok_or("no glass of the rules has an index here")?;
-    let singlet = Singlet::draw(scene, place.neighbour(), random);
-    let keeping = keeps(&scene.lens, place.gap, scene.rules, singlet.length());
-    let kept = coin(keeping, random);
-    let mut draft = scene.draft(places.len());
+    let glasses = usable_glasses(&scene.lens, scene.rules);
+    let place = choose(&places, random).copied().ok_or("no place")?;
+    let glass =
+        choose(&glasses, random).copied().ok_or("no glass of the rules has an index here")?;
+    let singlet = SingletParameters::draw(scene, place.neighbour(), random);
+    let keeping = keep_probability(&scene.lens, place.gap, scene.rules, singlet.length());
+    let kept = bernoulli(keeping, random);
+    let mut draft = scene.start_draft(places.len());
     let first = insert(&mut draft, place, glass, singlet, kept)?;
-    draft.map = Map::Along;
+    draft.map = ProjectionMap::AlongNormals;
     draft.fresh = vec![first];
     draft.rimless = vec![first, first + 1];
     draft.what = format!("added a singlet of {} before surface {first}", glass.full_name());
@@ -197,22 +217,25 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
         .map(|log| log - (glasses.len() as f64).ln() + chosen.ln());
     let finite = place.gap.is_none() && scene.lens.object != Object::Infinity;
     draft.back = there.filter(|_| !finite).map(|there| {
-        Back::by(Kind::RemoveSinglet, remove::log_chance(&draft.lens, first, kept) - there)
+        ReverseMove::new(
+            MutationKind::RemoveSinglet,
+            remove::log_chance(&draft.lens, first, kept) - there,
+        )
     });
     Ok(draft)
 }
 
 /// Puts the rows of a singlet in, and says which is the first.
 fn insert(
-    draft: &mut Draft,
-    place: Place,
+    draft: &mut MutationDraft,
+    place: SingletSite,
     glass: &Glass,
-    singlet: Singlet,
+    singlet: SingletParameters,
     kept: bool,
 ) -> Result<usize, String> {
     let first = place.gap.map_or(0, |gap| gap + 1);
     let (sense, air) = match place.gap {
-        Some(gap) => (sense(&draft.lens, gap), filling(&draft.lens, gap)),
+        Some(gap) => (light_direction(&draft.lens, gap), medium_after(&draft.lens, gap)),
         None => (1.0, draft.lens.object_medium.clone()),
     };
     let front = Row {
@@ -231,7 +254,7 @@ fn insert(
     draft.insert(first + 1, rear);
     let mut new = vec![first, first + 1];
     match place.gap {
-        None => away(&mut draft.lens.object, singlet.length())?,
+        None => shorten_object_distance(&mut draft.lens.object, singlet.length())?,
         Some(gap) => {
             let rest = if place.behind { first + 1 } else { gap };
             if place.behind {
@@ -244,12 +267,12 @@ fn insert(
             }
         }
     }
-    draft.settle(&new);
+    draft.inherit_variables(&new);
     Ok(first)
 }
 
 /// Moves the first vertex towards an object that stays where it is.
-fn away(object: &mut Object, length: f64) -> Result<(), String> {
+fn shorten_object_distance(object: &mut Object, length: f64) -> Result<(), String> {
     if let Object::Finite(distance) = object {
         let left = *distance - length;
         if *distance > 0.0 && left <= 0.0 {

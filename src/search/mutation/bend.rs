@@ -1,20 +1,20 @@
 //! Every curvature of an element changes by as much: a thin one keeps its power.
 
-use super::Kind;
-use super::chance::{coin, normal, pick};
-use super::draft::{Back, Draft, Scene, hangs};
+use super::MutationKind;
+use super::chance::{bernoulli, choose, sample_normal};
+use super::draft::{MutationContext, MutationDraft, ReverseMove, has_pickup};
 use crate::lens::{Lens, Parameter, Quantity};
-use crate::search::element::{Element, Make, elements};
-use crate::search::projection::Map;
-use crate::search::{Random, Rules};
+use crate::search::element::{Element, ElementKind, elements};
+use crate::search::projection::ProjectionMap;
+use crate::search::{Random, SearchRules};
 
 /// Which elements may be bent.
-pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String> {
+pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
     let rows = lens.surfaces.len();
     let may = |e: &Element| {
-        let glass = matches!(e.make, Make::Glass(_));
-        let free = (e.first..=e.last).all(|row| rules.allow(row, rows));
-        let bends = |row| !hangs(lens, row, |q| q == Quantity::Curvature);
+        let glass = matches!(e.kind, ElementKind::Glass(_));
+        let free = (e.first..=e.last).all(|row| rules.may_change(row, rows));
+        let bends = |row| !has_pickup(lens, row, |q| q == Quantity::Curvature);
         glass && free && (e.first..=e.last).all(bends)
     };
     let found: Vec<_> = elements(lens).into_iter().filter(may).collect();
@@ -26,25 +26,28 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String>
 }
 
 /// Bends an element.
-pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+pub(super) fn draw(
+    scene: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, String> {
     let places = places(&scene.lens, scene.rules)?;
-    let element = pick(&places, random).copied().ok_or("no place")?;
-    let by = normal(scene.bend(), random);
-    let mut draft = scene.draft(places.len());
+    let element = choose(&places, random).copied().ok_or("no place")?;
+    let by = sample_normal(scene.curvature_deviation(), random);
+    let mut draft = scene.start_draft(places.len());
     for row in element.first..=element.last {
         draft.lens.surfaces[row].curvature += by;
         draft.origins[row].curvature = None;
-        inside(&draft.lens, row)?;
+        check_bounds(&draft.lens, row)?;
     }
-    draft.map = either(random);
-    draft.back = Some(Back::by(Kind::Bend, 0.0));
+    draft.map = random_projection_map(random);
+    draft.back = Some(ReverseMove::new(MutationKind::Bend, 0.0));
     let Element { first, last, .. } = element;
     draft.what = format!("bent the element of surfaces {first} to {last} by {by:.5}/mm");
     Ok(draft)
 }
 
 /// Refuses a curvature that its variable does not allow.
-fn inside(lens: &Lens, row: usize) -> Result<(), String> {
+fn check_bounds(lens: &Lens, row: usize) -> Result<(), String> {
     let curvature = lens.surfaces[row].curvature;
     let Some(variable) = lens.variable(Parameter::new(row, Quantity::Curvature)) else {
         return Ok(());
@@ -59,6 +62,6 @@ fn inside(lens: &Lens, row: usize) -> Result<(), String> {
 
 /// A mutation that is its own way back is projected one way or the other, so that each undoes the
 /// other.
-pub(super) fn either(random: &mut Random) -> Map {
-    if coin(0.5, random) { Map::Closest } else { Map::Along }
+pub(super) fn random_projection_map(random: &mut Random) -> ProjectionMap {
+    if bernoulli(0.5, random) { ProjectionMap::Nearest } else { ProjectionMap::AlongNormals }
 }

@@ -2,20 +2,20 @@
 
 use crate::lens::Lens;
 use crate::lens::glass::{self, Glass};
-use crate::search::{Random, Rules};
+use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
 
 /// `least` and more, falling off with a mean excess, up to `most`: every length that the rules allow
 /// can be drawn, so that every element could have been added.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Length {
+pub(super) struct ShiftedExponential {
     least: f64,
     range: f64,
     mean: f64,
 }
 
-impl Length {
+impl ShiftedExponential {
     pub(super) fn new([least, most]: [f64; 2], mean: f64) -> Self {
         Self { least, range: (most - least).max(0.0), mean }
     }
@@ -39,29 +39,29 @@ impl Length {
 }
 
 /// A normally distributed number around 0.
-pub(super) fn normal(deviation: f64, random: &mut Random) -> f64 {
+pub(super) fn sample_normal(deviation: f64, random: &mut Random) -> f64 {
     deviation * random.sample::<f64, _>(StandardNormal)
 }
 
 /// The logarithm of its density.
-pub(super) fn log_normal(value: f64, deviation: f64) -> f64 {
+pub(super) fn normal_log_density(value: f64, deviation: f64) -> f64 {
     let t = value / deviation;
     -0.5 * t * t - deviation.ln() - 0.5 * std::f64::consts::TAU.ln()
 }
 
 /// True as often as said.
-pub(super) fn coin(chance: f64, random: &mut Random) -> bool {
+pub(super) fn bernoulli(chance: f64, random: &mut Random) -> bool {
     random.random::<f64>() < chance
 }
 
 /// One of several, all alike; none of none.
-pub(super) fn pick<'a, T>(all: &'a [T], random: &mut Random) -> Option<&'a T> {
+pub(super) fn choose<'a, T>(all: &'a [T], random: &mut Random) -> Option<&'a T> {
     if all.is_empty() { None } else { all.get(random.random_range(0..all.len())) }
 }
 
 /// The glasses that new elements may be made of: those of the rules that have an index at every
 /// wavelength of the lens.
-pub(super) fn allowed(lens: &Lens, rules: &Rules) -> Vec<&'static Glass> {
+pub(super) fn usable_glasses(lens: &Lens, rules: &SearchRules) -> Vec<&'static Glass> {
     let reaches = |glass: &&'static Glass| {
         let [low, high] = glass.range_um;
         lens.wavelengths.iter().all(|w| (low..=high).contains(&w.um))

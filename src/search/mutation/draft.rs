@@ -1,105 +1,105 @@
 //! A lens while it is being changed: where each number came from travels with the rows.
 
-use super::Kind;
-use super::add::{Neighbour, Singlet};
-use crate::lens::{Lens, Medium, Parameter, Quantity, Row, ZoomThickness, free};
-use crate::search::Rules;
-use crate::search::projection::{Map, Origin, scale};
+use super::MutationKind;
+use super::add::{Neighbour, SingletParameters};
+use crate::lens::{Lens, Medium, Parameter, Quantity, Row, ZoomThickness, add_variable};
+use crate::search::SearchRules;
+use crate::search::projection::{ProjectionMap, RowOrigin, scale};
 
 /// What a mutation is drawn from.
 #[derive(Debug)]
-pub(super) struct Scene<'a> {
+pub(super) struct MutationContext<'a> {
     /// The lens, with the values of what follows other numbers written into it.
     pub(super) lens: Lens,
-    pub(super) rules: &'a Rules,
+    pub(super) rules: &'a SearchRules,
     /// A length of the order of the focal length, in mm.
     pub(super) scale: f64,
 }
 
 /// How the way back is found.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Back {
+pub(super) struct ReverseMove {
     /// The kind of the mutation that leads back.
-    pub(super) kind: Kind,
+    pub(super) kind: MutationKind,
     /// The logarithm of the density of its draws over that of the draws that led here, times the
     /// determinant of the map between the numbers; without kinds, places and the projection.
-    pub(super) log: f64,
+    pub(super) log_density_ratio: f64,
     /// A choice of the way back that depends on how long a gap is at the end.
-    pub(super) room: Option<Room>,
+    pub(super) spacing: Option<SpacingChoice>,
     /// The singlet that the way back draws, whose density depends on its neighbour at the end.
-    pub(super) singlet: Option<New>,
+    pub(super) singlet: Option<SingletProposal>,
 }
 
-impl Back {
+impl ReverseMove {
     /// A way back without choices.
-    pub(super) fn by(kind: Kind, log: f64) -> Self {
-        Self { kind, log, room: None, singlet: None }
+    pub(super) fn new(kind: MutationKind, log: f64) -> Self {
+        Self { kind, log_density_ratio: log, spacing: None, singlet: None }
     }
 }
 
 /// A singlet that could be drawn for a lens of a scale.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct New {
-    pub(super) singlet: Singlet,
+pub(super) struct SingletProposal {
+    pub(super) singlet: SingletParameters,
     pub(super) neighbour: Neighbour,
     pub(super) scale: f64,
 }
 
 /// The gap of a new element, in the lens without it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Room {
+pub(super) struct SpacingChoice {
     pub(super) gap: usize,
     /// What the element takes of it, in mm.
     pub(super) length: f64,
     /// Whether the rest of the lens keeps its place.
-    pub(super) kept: bool,
+    pub(super) keeps_rest: bool,
 }
 
 /// A lens that a mutation has changed, before it is projected and repaired.
 #[derive(Debug)]
-pub(super) struct Draft {
+pub(super) struct MutationDraft {
     pub(super) lens: Lens,
-    pub(super) origins: Vec<Origin>,
+    pub(super) origins: Vec<RowOrigin>,
     pub(super) what: String,
     /// Rows behind which there is new glass.
     pub(super) fresh: Vec<usize>,
     /// Rows whose semi-diameters are to be found.
     pub(super) rimless: Vec<usize>,
-    pub(super) map: Map,
+    pub(super) map: ProjectionMap,
     /// In how many places the mutation could have been made.
     pub(super) places: usize,
-    pub(super) back: Option<Back>,
+    pub(super) back: Option<ReverseMove>,
 }
 
-impl<'a> Scene<'a> {
-    pub(super) fn new(lens: Lens, rules: &'a Rules, scale: f64) -> Self {
+impl<'a> MutationContext<'a> {
+    pub(super) fn new(lens: Lens, rules: &'a SearchRules, scale: f64) -> Self {
         Self { lens, rules, scale }
     }
 
     /// How much larger than a lens of 50 mm it is: random lengths are drawn for that one.
-    pub(super) fn size(&self) -> f64 {
+    pub(super) fn size_ratio(&self) -> f64 {
         self.scale / 50.0
     }
 
     /// The standard deviation of a random curvature: 0.005/mm for a lens of 50 mm.
-    pub(super) fn bend(&self) -> f64 {
+    pub(super) fn curvature_deviation(&self) -> f64 {
         0.25 / self.scale
     }
 
     /// The scale of the lens after a mutation: the same where it is projected.
-    pub(super) fn scale_of(&self, mutated: &Lens) -> Option<f64> {
+    pub(super) fn scale_after(&self, mutated: &Lens) -> Option<f64> {
         if self.rules.projection { Some(self.scale) } else { scale(mutated).ok() }
     }
 
-    pub(super) fn draft(&self, places: usize) -> Draft {
-        let origin = |row| Origin { curvature: Some((row, 1.0)), gap: Some(row) };
-        Draft {
+    pub(super) fn start_draft(&self, places: usize) -> MutationDraft {
+        let origin = |row| RowOrigin { curvature: Some((row, 1.0)), gap: Some(row) };
+        MutationDraft {
             lens: self.lens.clone(),
             origins: (0..self.lens.surfaces.len()).map(origin).collect(),
             what: String::new(),
             fresh: Vec::new(),
             rimless: Vec::new(),
-            map: Map::Closest,
+            map: ProjectionMap::Nearest,
             places,
             back: None,
         }
@@ -117,50 +117,50 @@ pub(super) fn is_of_medium(quantity: Quantity) -> bool {
 }
 
 /// Whether a pickup has to do with a quantity of a row.
-pub(super) fn hangs(lens: &Lens, row: usize, is_it: impl Fn(Quantity) -> bool) -> bool {
+pub(super) fn has_pickup(lens: &Lens, row: usize, is_it: impl Fn(Quantity) -> bool) -> bool {
     let concerned = |p: Parameter| p.surface == row && is_it(p.quantity);
     lens.pickups.iter().any(|pickup| concerned(pickup.parameter) || concerned(pickup.source))
 }
 
 /// Whether a gap has its own thickness at some zoom position.
-pub(super) fn zooms(lens: &Lens, row: usize) -> bool {
+pub(super) fn is_zoomed(lens: &Lens, row: usize) -> bool {
     lens.zoom.iter().any(|position| position.thicknesses.iter().any(|gap| gap.surface == row))
 }
 
 /// Whether a surface is a sphere or plane and nothing else.
 pub(super) fn is_plain(row: &Row) -> bool {
     let figured = row.conic != 0.0 || row.asphere.iter().any(|a| *a != 0.0);
-    !figured && !row.hyper && row.obstruction.is_none()
+    !figured && !row.hyperhemisphere && row.obstruction.is_none()
 }
 
 /// The shortest that a gap is at any zoom position, counted along the light.
-pub(super) fn shortest(lens: &Lens, row: usize) -> f64 {
+pub(super) fn shortest_gap(lens: &Lens, row: usize) -> f64 {
     let gaps = (0..lens.zoom_positions()).filter_map(|zoom| lens.thickness_at(row, zoom));
-    let sense = sense(lens, row);
+    let sense = light_direction(lens, row);
     gaps.fold(f64::INFINITY, |least, gap| least.min(sense * gap))
 }
 
 /// The sign of lengths behind a row: −1 where light runs back.
-pub(super) fn sense(lens: &Lens, row: usize) -> f64 {
+pub(super) fn light_direction(lens: &Lens, row: usize) -> f64 {
     if crate::search::element::is_backwards(lens, row) { -1.0 } else { 1.0 }
 }
 
 /// Whether the focus decides a gap.
-pub(super) fn is_solved(lens: &Lens, row: usize) -> bool {
-    lens.focus.is_some() && row + 1 == lens.surfaces.len()
+pub(super) fn has_solve(lens: &Lens, row: usize) -> bool {
+    lens.image_solve.is_some() && row + 1 == lens.surfaces.len()
 }
 
 /// What fills the gap behind a row, seen through mirrors.
-pub(super) fn filling(lens: &Lens, row: usize) -> Medium {
+pub(super) fn medium_after(lens: &Lens, row: usize) -> Medium {
     let media = lens.surfaces[..=row].iter().rev().map(|row| &row.medium);
     media.chain([&lens.object_medium]).find(|m| **m != Medium::Mirror).cloned().unwrap_or_default()
 }
 
-impl Draft {
+impl MutationDraft {
     /// Puts a row in front of row `at`; its numbers come from nowhere.
     pub(super) fn insert(&mut self, at: usize, row: Row) {
         self.lens.surfaces.insert(at, row);
-        self.origins.insert(at, Origin::default());
+        self.origins.insert(at, RowOrigin::default());
         self.lens.renumber_rows(|row| Some(if row < at { row } else { row + 1 }));
     }
 
@@ -178,7 +178,7 @@ impl Draft {
     /// The gap behind row `from`, its name in variables and at zoom positions included, becomes the
     /// one behind row `to`, which loses its own.
     pub(super) fn move_gap(&mut self, from: usize, to: usize) {
-        self.forget_gap(to);
+        self.drop_gap_references(to);
         self.lens.surfaces[to].thickness = self.lens.surfaces[from].thickness;
         self.origins[to].gap = self.origins[from].gap.take();
         self.lens.map_parameters(|p| {
@@ -193,7 +193,7 @@ impl Draft {
     }
 
     /// Forgets what names the gap behind a row.
-    pub(super) fn forget_gap(&mut self, row: usize) {
+    pub(super) fn drop_gap_references(&mut self, row: usize) {
         self.lens.map_parameters(|p| (p.surface != row || !is_gap(p.quantity)).then_some(p));
         for position in &mut self.lens.zoom {
             position.thicknesses.retain(|gap| gap.surface != row);
@@ -201,13 +201,13 @@ impl Draft {
     }
 
     /// Forgets the variables that some quantities of a row are.
-    pub(super) fn forget(&mut self, row: usize, is_it: impl Fn(Quantity) -> bool) {
+    pub(super) fn drop_parameters(&mut self, row: usize, is_it: impl Fn(Quantity) -> bool) {
         self.lens.map_parameters(|p| (p.surface != row || !is_it(p.quantity)).then_some(p));
     }
 
     /// Makes a gap longer by so much along the light, at every zoom position.
     pub(super) fn lengthen(&mut self, row: usize, by: f64) {
-        let by = by * sense(&self.lens, row);
+        let by = by * light_direction(&self.lens, row);
         self.lens.surfaces[row].thickness += by;
         for gap in self.lens.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
             if gap.surface == row {
@@ -219,7 +219,7 @@ impl Draft {
     /// Adds the gap behind row `from` to the one behind row `to`, position by position.
     pub(super) fn add_gap(&mut self, to: usize, from: usize) {
         let lens = &mut self.lens;
-        let zooming = [to, from].map(|row| zooms(lens, row));
+        let zooming = [to, from].map(|row| is_zoomed(lens, row));
         let sums: Vec<f64> = (0..lens.zoom.len())
             .map(|zoom| [to, from].iter().filter_map(|row| lens.thickness_at(*row, zoom)).sum())
             .collect();
@@ -234,13 +234,13 @@ impl Draft {
 
     /// Makes the numbers of new rows variables where the lens has some of their kind, and widens
     /// bounds that the numbers of other rows have left: the mutation has changed what they mean.
-    pub(super) fn settle(&mut self, rows: &[usize]) {
+    pub(super) fn inherit_variables(&mut self, rows: &[usize]) {
         let has = |quantity| self.lens.variables.iter().any(|v| v.parameter.quantity == quantity);
         let kinds = [Quantity::Curvature, Quantity::Thickness].map(|q| (q, has(q)));
         for (row, (quantity, wanted)) in rows.iter().flat_map(|row| kinds.map(|kind| (*row, kind)))
         {
             if wanted {
-                free(&mut self.lens, Parameter::new(row, quantity));
+                add_variable(&mut self.lens, Parameter::new(row, quantity));
             }
         }
         self.drop_solved();
@@ -256,7 +256,7 @@ impl Draft {
     /// A last gap that the focus decides is no variable.
     fn drop_solved(&mut self) {
         let last = self.lens.surfaces.len() - 1;
-        if is_solved(&self.lens, last) {
+        if has_solve(&self.lens, last) {
             self.lens
                 .variables
                 .retain(|v| v.parameter.surface != last || !is_gap(v.parameter.quantity));

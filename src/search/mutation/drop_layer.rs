@@ -1,19 +1,21 @@
 //! A cemented group loses its first or last piece; the air takes its place.
 
-use super::chance::pick;
-use super::draft::{Draft, Scene, hangs, is_gap, is_of_medium, is_solved, sense};
+use super::chance::choose;
+use super::draft::{
+    MutationContext, MutationDraft, has_pickup, has_solve, is_gap, is_of_medium, light_direction,
+};
 use crate::lens::Lens;
-use crate::search::element::{Element, Make, elements, pieces};
-use crate::search::{Random, Rules};
+use crate::search::element::{Element, ElementKind, elements, piece_count};
+use crate::search::{Random, SearchRules};
 
 /// A group and whether its first or its last piece goes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Layer {
+pub(super) struct GroupEnd {
     group: Element,
     front: bool,
 }
 
-impl Layer {
+impl GroupEnd {
     /// The surface that goes.
     fn outer(self) -> usize {
         if self.front { self.group.first } else { self.group.last }
@@ -26,13 +28,16 @@ impl Layer {
 }
 
 /// Which layers may go.
-pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Layer>, String> {
+pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<GroupEnd>, String> {
     let least = rules.elements[0];
-    if pieces(lens) < least + 1 {
-        return Err(format!("the lens has {} elements, the rules ask for {least}", pieces(lens)));
+    if piece_count(lens) < least + 1 {
+        return Err(format!(
+            "the lens has {} elements, the rules ask for {least}",
+            piece_count(lens)
+        ));
     }
-    let groups = elements(lens).into_iter().filter(|e| matches!(e.make, Make::Glass(2..)));
-    let layers = groups.flat_map(|group| [true, false].map(|front| Layer { group, front }));
+    let groups = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(2..)));
+    let layers = groups.flat_map(|group| [true, false].map(|front| GroupEnd { group, front }));
     let found: Vec<_> = layers.filter(|layer| may_go(lens, *layer, rules)).collect();
     if found.is_empty() {
         return Err("no cemented group whose outer piece may go".to_owned());
@@ -40,41 +45,45 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Layer>, String> {
     Ok(found)
 }
 
-fn may_go(lens: &Lens, layer: Layer, rules: &Rules) -> bool {
+fn may_go(lens: &Lens, layer: GroupEnd, rules: &SearchRules) -> bool {
     let rows = lens.surfaces.len();
     let Element { first, last, .. } = layer.group;
     let inner = if layer.front { first + 1 } else { last - 1 };
-    let free = [layer.outer(), inner].iter().all(|row| rules.allow(*row, rows));
-    let near = layer.gap().is_none_or(|gap| rules.allow(gap, rows) && !hangs(lens, gap, is_gap));
+    let free = [layer.outer(), inner].iter().all(|row| rules.may_change(*row, rows));
+    let near =
+        layer.gap().is_none_or(|gap| rules.may_change(gap, rows) && !has_pickup(lens, gap, is_gap));
     let glass = if layer.front { first } else { last - 1 };
     let of_glass = |q| is_gap(q) || is_of_medium(q);
-    let followed = hangs(lens, layer.outer(), |_| true) || hangs(lens, glass, of_glass);
+    let followed = has_pickup(lens, layer.outer(), |_| true) || has_pickup(lens, glass, of_glass);
     free && near && !followed
 }
 
 /// Drops a layer.
-pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+pub(super) fn draw(
+    scene: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, String> {
     let places = places(&scene.lens, scene.rules)?;
-    let layer = pick(&places, random).copied().ok_or("no place")?;
-    let mut draft = scene.draft(places.len());
+    let layer = choose(&places, random).copied().ok_or("no place")?;
+    let mut draft = scene.start_draft(places.len());
     let outer = layer.outer();
     let place = if layer.front { "front" } else { "rear" };
     draft.what = format!("dropped the {place} piece of the group at surface {}", layer.group.first);
     let glass = if layer.front { outer } else { outer - 1 };
-    let length = scene.lens.surfaces[glass].thickness * sense(&scene.lens, glass);
-    if let Some(gap) = layer.gap().filter(|gap| !is_solved(&scene.lens, *gap)) {
+    let length = scene.lens.surfaces[glass].thickness * light_direction(&scene.lens, glass);
+    if let Some(gap) = layer.gap().filter(|gap| !has_solve(&scene.lens, *gap)) {
         draft.lengthen(gap, length);
     }
-    strip(&mut draft, layer);
+    remove_piece(&mut draft, layer);
     Ok(draft)
 }
 
-fn strip(draft: &mut Draft, layer: Layer) {
+fn remove_piece(draft: &mut MutationDraft, layer: GroupEnd) {
     let outer = layer.outer();
     let inner = if layer.front { outer + 1 } else { outer - 1 };
     let gone = draft.lens.surfaces[outer].clone();
     if !layer.front {
-        draft.forget(inner, is_of_medium);
+        draft.drop_parameters(inner, is_of_medium);
         draft.move_gap(outer, inner);
         draft.lens.surfaces[inner].medium = gone.medium;
     }
@@ -83,5 +92,5 @@ fn strip(draft: &mut Draft, layer: Layer) {
         (rim.stop, rim.semi_diameter) = (true, gone.semi_diameter);
     }
     draft.remove(outer);
-    draft.settle(&[]);
+    draft.inherit_variables(&[]);
 }

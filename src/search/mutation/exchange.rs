@@ -1,29 +1,29 @@
 //! A piece of glass of the catalogue is made of another one with nearly the same index and Abbe
 //! number.
 
-use super::Kind;
-use super::bend::either;
-use super::chance::{allowed, pick};
-use super::draft::{Back, Draft, Scene};
+use super::MutationKind;
+use super::bend::random_projection_map;
+use super::chance::{choose, usable_glasses};
+use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Lens, Medium};
-use crate::search::element::{Make, elements};
-use crate::search::{Random, Rules};
+use crate::search::element::{ElementKind, elements};
+use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 
 /// How far neighbours are in index.
-const INDEX: f64 = 0.02;
+const INDEX_DEVIATION: f64 = 0.02;
 
 /// How far neighbours are in Abbe number.
-const ABBE: f64 = 3.0;
+const ABBE_DEVIATION: f64 = 3.0;
 
 /// Rows with a glass of the catalogue behind them.
-pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
+pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
     let rows = lens.surfaces.len();
-    let elements = elements(lens).into_iter().filter(|e| matches!(e.make, Make::Glass(_)));
+    let elements = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(_)));
     let free: Vec<usize> = elements
         .flat_map(|e| e.first..e.last)
-        .filter(|row| rules.allow(*row, rows) && rules.allow(row + 1, rows))
+        .filter(|row| rules.may_change(*row, rows) && rules.may_change(row + 1, rows))
         .collect();
     let of = |is_it: fn(&Medium) -> bool| {
         free.iter().copied().filter(move |row| is_it(&lens.surfaces[*row].medium))
@@ -33,7 +33,7 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
         return Ok(found);
     }
     let none = "no glass of the catalogue that may be exchanged";
-    let graded = of(|medium| matches!(medium, Medium::Gradient(_))).next();
+    let graded = of(|medium| matches!(medium, Medium::Grin(_))).next();
     Err(graded.map_or(none.to_owned(), |row| {
         format!(
             "{none}: the medium behind surface {row} is a gradient, which has no neighbour there"
@@ -42,8 +42,8 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
 }
 
 /// How readily one glass becomes the other.
-fn nearness(a: &Glass, b: &Glass) -> f64 {
-    let (index, abbe) = ((a.nd - b.nd) / INDEX, (a.vd - b.vd) / ABBE);
+fn glass_similarity(a: &Glass, b: &Glass) -> f64 {
+    let (index, abbe) = ((a.nd - b.nd) / INDEX_DEVIATION, (a.vd - b.vd) / ABBE_DEVIATION);
     (-0.5 * (index * index + abbe * abbe)).exp()
 }
 
@@ -52,18 +52,21 @@ fn is_same(a: &Glass, b: &Glass) -> bool {
 }
 
 /// Makes a piece of another glass.
-pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+pub(super) fn draw(
+    scene: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, String> {
     let places = places(&scene.lens, scene.rules)?;
-    let row = pick(&places, random).copied().ok_or("no place")?;
+    let row = choose(&places, random).copied().ok_or("no place")?;
     let Medium::Glass(name) = &scene.lens.surfaces[row].medium else {
         return Err("no glass of the catalogue".to_owned());
     };
     let old = glass::find(name).ok_or("an unknown glass")?;
-    let all = allowed(&scene.lens, scene.rules);
+    let all = usable_glasses(&scene.lens, scene.rules);
     let choice: Vec<_> =
-        all.into_iter().filter(|glass| !touches(&scene.lens, row, glass)).collect();
+        all.into_iter().filter(|glass| !is_cemented_to(&scene.lens, row, glass)).collect();
     let weight =
-        |from: &Glass, to: &Glass| if is_same(from, to) { 0.0 } else { nearness(from, to) };
+        |from: &Glass, to: &Glass| if is_same(from, to) { 0.0 } else { glass_similarity(from, to) };
     let sum = |from: &Glass| choice.iter().map(|to| weight(from, to)).sum::<f64>();
     let mut left = random.random::<f64>() * sum(old);
     let chosen = choice.iter().find(|to| {
@@ -71,20 +74,20 @@ pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, Stri
         left < 0.0
     });
     let new = *chosen.ok_or_else(|| format!("no other glass of the rules is near {name}"))?;
-    let mut draft = scene.draft(places.len());
+    let mut draft = scene.start_draft(places.len());
     draft.lens.surfaces[row].medium = Medium::Glass(new.full_name());
     draft.fresh = vec![row];
-    draft.map = either(random);
+    draft.map = random_projection_map(random);
     let known = choice.iter().any(|glass| is_same(glass, old));
     // The nearness is the same in both directions, what it is compared with is not.
     let log = sum(old).ln() - sum(new).ln();
-    draft.back = known.then_some(Back::by(Kind::ExchangeGlass, log));
+    draft.back = known.then_some(ReverseMove::new(MutationKind::ExchangeGlass, log));
     draft.what = format!("exchanged {name} behind surface {row} for {}", new.full_name());
     Ok(draft)
 }
 
 /// Whether a glass is cemented to this piece: an interface between the two would do nothing.
-fn touches(lens: &Lens, row: usize, glass: &Glass) -> bool {
+fn is_cemented_to(lens: &Lens, row: usize, glass: &Glass) -> bool {
     let beside = [row.checked_sub(1), Some(row + 1)];
     beside.into_iter().flatten().any(|near| match &lens.surfaces[near].medium {
         Medium::Glass(name) => glass::find(name).is_some_and(|found| is_same(found, glass)),

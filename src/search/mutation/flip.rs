@@ -1,25 +1,27 @@
 //! An element is turned around, and what fills it with it: a gradient along the axis is written from
 //! its other end.
 
-use super::Kind;
-use super::bend::either;
-use super::chance::pick;
-use super::draft::{Back, Draft, Scene, hangs, is_gap, is_of_medium, zooms};
-use crate::lens::{Gradient, Lens, Medium, Quantity, RADIAL_TERMS};
-use crate::search::element::{Element, Make, elements};
-use crate::search::projection::Origin;
-use crate::search::{Random, Rules};
+use super::MutationKind;
+use super::bend::random_projection_map;
+use super::chance::choose;
+use super::draft::{
+    MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_of_medium, is_zoomed,
+};
+use crate::lens::{GradientIndex, Lens, Medium, Quantity, RADIAL_TERMS};
+use crate::search::element::{Element, ElementKind, elements};
+use crate::search::projection::RowOrigin;
+use crate::search::{Random, SearchRules};
 
 /// Which elements may be turned.
-pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String> {
+pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
     let rows = lens.surfaces.len();
     let may = |e: &Element| {
-        let free = (e.first..=e.last).all(|row| rules.allow(row, rows));
-        matches!(e.make, Make::Glass(_)) && free
+        let free = (e.first..=e.last).all(|row| rules.may_change(row, rows));
+        matches!(e.kind, ElementKind::Glass(_)) && free
     };
     let (mut found, mut graded) = (Vec::new(), None);
     for element in elements(lens).into_iter().filter(may) {
-        match (element.first..element.last).find_map(|row| held(lens, row)) {
+        match (element.first..element.last).find_map(|row| why_not_reversible(lens, row)) {
             None => found.push(element),
             why => graded = graded.or(why),
         }
@@ -33,22 +35,22 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<Element>, String>
 }
 
 /// The gradient behind a row, if it varies along the axis.
-fn along(lens: &Lens, row: usize) -> Option<&Gradient> {
+fn axial_gradient_behind(lens: &Lens, row: usize) -> Option<&GradientIndex> {
     match &lens.surfaces[row].medium {
-        Medium::Gradient(gradient) if gradient.is_axial() => Some(gradient),
+        Medium::Grin(gradient) if gradient.is_axial() => Some(gradient),
         _ => None,
     }
 }
 
 /// Why what fills a gap cannot be turned, if so.
-fn held(lens: &Lens, row: usize) -> Option<String> {
-    let gradient = along(lens, row)?;
+fn why_not_reversible(lens: &Lens, row: usize) -> Option<String> {
+    let gradient = axial_gradient_behind(lens, row)?;
     let medium = format!("the medium behind surface {row} is a gradient along the axis");
-    if zooms(lens, row) {
+    if is_zoomed(lens, row) {
         Some(format!("{medium} whose length moves with the zoom"))
-    } else if hangs(lens, row, |q| is_gap(q) || is_of_medium(q)) {
+    } else if has_pickup(lens, row, |q| is_gap(q) || is_of_medium(q)) {
         Some(format!("{medium}, and a pickup has to do with it"))
-    } else if gradient.turned(lens.surfaces[row].thickness).is_none() {
+    } else if gradient.reversed(lens.surfaces[row].thickness).is_none() {
         Some(format!("{medium}, which from its other end has no base that a glass has"))
     } else {
         None
@@ -56,33 +58,36 @@ fn held(lens: &Lens, row: usize) -> Option<String> {
 }
 
 /// Turns an element around.
-pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+pub(super) fn draw(
+    scene: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, String> {
     let places = places(&scene.lens, scene.rules)?;
-    let Element { first, last, .. } = pick(&places, random).copied().ok_or("no place")?;
-    let mut draft = scene.draft(places.len());
-    draft.lens.turn_rows(first, last);
+    let Element { first, last, .. } = choose(&places, random).copied().ok_or("no place")?;
+    let mut draft = scene.start_draft(places.len());
+    draft.lens.reverse_rows(first, last);
     for row in first..=last {
         let gap = if row < last { first + last - 1 - row } else { last };
         let curvature = Some((first + last - row, -1.0));
-        draft.origins[row] = Origin { curvature, gap: Some(gap) };
+        draft.origins[row] = RowOrigin { curvature, gap: Some(gap) };
     }
     let mirrored: Vec<usize> =
-        (first..last).filter(|row| along(&draft.lens, *row).is_some()).collect();
-    mirrored.iter().for_each(|row| mirror(&mut draft.lens, *row));
-    draft.map = either(random);
+        (first..last).filter(|row| axial_gradient_behind(&draft.lens, *row).is_some()).collect();
+    mirrored.iter().for_each(|row| reverse_axial_gradient(&mut draft.lens, *row));
+    draft.map = random_projection_map(random);
     // The projection changes how long such a gap is, so that turning it back leads elsewhere.
-    draft.back = mirrored.is_empty().then_some(Back::by(Kind::Flip, 0.0));
+    draft.back = mirrored.is_empty().then_some(ReverseMove::new(MutationKind::Flip, 0.0));
     draft.what = format!("turned the element of surfaces {first} to {last} around");
     Ok(draft)
 }
 
 /// Writes a gradient along the axis from its other end. Its numbers that are held are held at what
 /// they are now, the bounds of the others make room.
-fn mirror(lens: &mut Lens, row: usize) {
+fn reverse_axial_gradient(lens: &mut Lens, row: usize) {
     let length = lens.surfaces[row].thickness;
-    let turned = along(lens, row).and_then(|gradient| gradient.turned(length));
+    let turned = axial_gradient_behind(lens, row).and_then(|gradient| gradient.reversed(length));
     let Some(turned) = turned else { return };
-    lens.surfaces[row].medium = Medium::Gradient(Box::new(turned));
+    lens.surfaces[row].medium = Medium::Grin(Box::new(turned));
     let axial = |q| matches!(q, Quantity::Gradient(k) if k >= RADIAL_TERMS);
     let values: Vec<_> = lens.variables.iter().map(|v| lens.get(v.parameter)).collect();
     for (variable, value) in lens.variables.iter_mut().zip(values) {

@@ -1,23 +1,26 @@
 //! Two neighbours become one cemented group: their facing surfaces become one of the mean curvature,
 //! and the air between them goes.
 
-use super::Kind;
-use super::chance::pick;
-use super::draft::{Back, Draft, Scene, hangs, is_gap, is_of_medium, is_plain, sense, zooms};
-use super::split::Cut;
+use super::MutationKind;
+use super::chance::choose;
+use super::draft::{
+    MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_of_medium, is_plain,
+    is_zoomed, light_direction,
+};
+use super::split::SplitDraw;
 use crate::lens::{Lens, Parameter};
-use crate::search::element::{Make, elements};
-use crate::search::{Random, Rules};
+use crate::search::element::{ElementKind, elements};
+use crate::search::{Random, SearchRules};
 
 /// More pieces than this are not cemented together.
-pub(super) const PIECES: usize = 3;
+pub(super) const MAX_PIECES: usize = 3;
 
 /// The last surfaces of elements that may be glued to the next one.
-pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
+pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
     let elements = elements(lens);
     let neighbours = elements.windows(2).filter(|pair| pair[0].last + 1 == pair[1].first);
-    let small = neighbours.filter(|pair| match (pair[0].make, pair[1].make) {
-        (Make::Glass(a), Make::Glass(b)) => a + b <= PIECES,
+    let small = neighbours.filter(|pair| match (pair[0].kind, pair[1].kind) {
+        (ElementKind::Glass(a), ElementKind::Glass(b)) => a + b <= MAX_PIECES,
         _ => false,
     });
     let found: Vec<usize> =
@@ -30,39 +33,42 @@ pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
     Ok(found)
 }
 
-fn may_join(lens: &Lens, row: usize, rules: &Rules) -> bool {
+fn may_join(lens: &Lens, row: usize, rules: &SearchRules) -> bool {
     let rows = lens.surfaces.len();
     let facing = [row, row + 1];
-    let free = facing.iter().all(|r| rules.allow(*r, rows) && is_plain(&lens.surfaces[*r]));
-    let followed = hangs(lens, row, |_| true) || hangs(lens, row + 1, |q| !is_gap(q));
-    let moves = zooms(lens, row) || zooms(lens, row + 1);
+    let free = facing.iter().all(|r| rules.may_change(*r, rows) && is_plain(&lens.surfaces[*r]));
+    let followed = has_pickup(lens, row, |_| true) || has_pickup(lens, row + 1, |q| !is_gap(q));
+    let moves = is_zoomed(lens, row) || is_zoomed(lens, row + 1);
     let differ = lens.surfaces[row - 1].medium != lens.surfaces[row + 1].medium;
     free && !followed && !moves && differ
 }
 
 /// Glues two neighbours.
-pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+pub(super) fn draw(
+    scene: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, String> {
     let places = places(&scene.lens, scene.rules)?;
-    let row = pick(&places, random).copied().ok_or("no place")?;
+    let row = choose(&places, random).copied().ok_or("no place")?;
     let [front, rear] = [row, row + 1].map(|r| scene.lens.surfaces[r].curvature);
-    let cut = Cut {
+    let cut = SplitDraw {
         difference: 0.5 * (front - rear),
-        air: scene.lens.surfaces[row].thickness * sense(&scene.lens, row),
+        air: scene.lens.surfaces[row].thickness * light_direction(&scene.lens, row),
     };
-    let mut draft = scene.draft(places.len());
-    join(&mut draft, row, 0.5 * (front + rear));
-    let scale = scene.scale_of(&draft.lens);
+    let mut draft = scene.start_draft(places.len());
+    merge_surfaces(&mut draft, row, 0.5 * (front + rear));
+    let scale = scene.scale_after(&draft.lens);
     let there = scale.and_then(|scale| cut.log_density(scene.rules, scale));
     // Mean and half difference of two numbers: the determinant is 1/2.
-    draft.back = there.map(|draws| Back::by(Kind::Split, draws - 2f64.ln()));
+    draft.back = there.map(|draws| ReverseMove::new(MutationKind::Split, draws - 2f64.ln()));
     draft.what = format!("glued surfaces {row} and {} together", row + 1);
     Ok(draft)
 }
 
 /// Makes one surface of two.
-fn join(draft: &mut Draft, row: usize, curvature: f64) {
+fn merge_surfaces(draft: &mut MutationDraft, row: usize, curvature: f64) {
     let next = draft.lens.surfaces[row + 1].clone();
-    draft.forget(row + 1, |q| !is_gap(q) && !is_of_medium(q));
+    draft.drop_parameters(row + 1, |q| !is_gap(q) && !is_of_medium(q));
     draft.move_gap(row + 1, row);
     draft.lens.map_parameters(|p| {
         let of_glass = p.surface == row + 1 && is_of_medium(p.quantity);
@@ -80,10 +86,10 @@ fn join(draft: &mut Draft, row: usize, curvature: f64) {
     surface.stop |= next.stop;
     draft.origins[row].curvature = None;
     draft.remove(row + 1);
-    draft.settle(&[]);
+    draft.inherit_variables(&[]);
 }
 
 /// Whether the surfaces on both sides of the gap behind a row may be glued.
-pub(super) fn can(lens: &Lens, row: usize, rules: &Rules) -> bool {
+pub(super) fn can_glue(lens: &Lens, row: usize, rules: &SearchRules) -> bool {
     places(lens, rules).is_ok_and(|places| places.contains(&row))
 }

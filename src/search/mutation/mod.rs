@@ -18,18 +18,18 @@ mod remove;
 mod split;
 mod stop;
 
-use super::projection::{Unprojectable, project, scale};
+use super::projection::{ProjectionError, project, scale};
 use super::repair::repair;
-use super::{Mutated, Projection, Random, Rules};
+use super::{MutatedPoint, Projection, Random, SearchRules};
 use crate::lens::Lens;
-use draft::{Back, Draft, New, Room, Scene};
+use draft::{MutationContext, MutationDraft, ReverseMove, SingletProposal, SpacingChoice};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
 /// A kind of mutation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum MutationKind {
     /// A new element in an air gap.
     AddSinglet,
     /// An element less.
@@ -52,7 +52,7 @@ pub enum Kind {
     Global,
 }
 
-impl Kind {
+impl MutationKind {
     /// Every kind that changes a lens, in the order in which they are shown.
     pub const MUTATIONS: [Self; 9] = [
         Self::AddSinglet,
@@ -86,27 +86,27 @@ impl Kind {
 /// Why a mutation does not apply to a lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{kind}: {why}", kind = .kind.name())]
-pub struct Refusal {
+pub struct MutationError {
     /// Which mutation.
-    pub kind: Kind,
+    pub kind: MutationKind,
     /// Why not.
     pub why: String,
 }
 
-impl Refusal {
+impl MutationError {
     /// A mutation that does not apply, and why.
-    pub fn new(kind: Kind, why: impl Into<String>) -> Self {
+    pub fn new(kind: MutationKind, why: impl Into<String>) -> Self {
         Self { kind, why: why.into() }
     }
 }
 
 /// A lens after a mutation.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mutant {
+pub struct MutatedLens {
     /// The lens.
     pub lens: Lens,
     /// What was done.
-    pub kind: Kind,
+    pub kind: MutationKind,
     /// What was done, where, in words.
     pub what: String,
     /// The rows behind which there is new glass.
@@ -119,9 +119,9 @@ pub struct Mutant {
     pub log_ratio: Option<f64>,
 }
 
-impl From<Mutant> for Mutated<Lens> {
-    fn from(mutant: Mutant) -> Self {
-        let Mutant { lens, kind, what, projection, log_ratio, .. } = mutant;
+impl From<MutatedLens> for MutatedPoint<Lens> {
+    fn from(mutant: MutatedLens) -> Self {
+        let MutatedLens { lens, kind, what, projection, log_ratio, .. } = mutant;
         let what = match projection {
             Some(projection) => format!("{what}; {projection}"),
             None => what,
@@ -135,16 +135,20 @@ impl From<Mutant> for Mutated<Lens> {
 /// # Errors
 /// Why the kind that was drawn does not apply; a sampler that needs the densities right counts that
 /// as a move that was rejected.
-pub fn propose(lens: &Lens, rules: &Rules, random: &mut Random) -> Result<Mutant, Refusal> {
-    let sum: f64 = Kind::MUTATIONS.iter().map(|kind| rules.weight(*kind).max(0.0)).sum();
+pub fn propose(
+    lens: &Lens,
+    rules: &SearchRules,
+    random: &mut Random,
+) -> Result<MutatedLens, MutationError> {
+    let sum: f64 = MutationKind::MUTATIONS.iter().map(|kind| rules.weight(*kind).max(0.0)).sum();
     let mut left = random.random::<f64>() * sum;
-    for kind in Kind::MUTATIONS {
+    for kind in MutationKind::MUTATIONS {
         left -= rules.weight(kind).max(0.0);
         if left < 0.0 {
             return mutate(kind, lens, rules, random);
         }
     }
-    Err(Refusal::new(Kind::MUTATIONS[0], "every kind of mutation has weight 0"))
+    Err(MutationError::new(MutationKind::MUTATIONS[0], "every kind of mutation has weight 0"))
 }
 
 /// A mutation of a kind at an element drawn uniformly.
@@ -152,46 +156,46 @@ pub fn propose(lens: &Lens, rules: &Rules, random: &mut Random) -> Result<Mutant
 /// # Errors
 /// Why it does not apply to this lens, or led to what is none.
 pub fn mutate(
-    kind: Kind,
+    kind: MutationKind,
     lens: &Lens,
-    rules: &Rules,
+    rules: &SearchRules,
     random: &mut Random,
-) -> Result<Mutant, Refusal> {
-    let refuse = |why: String| Refusal { kind, why };
+) -> Result<MutatedLens, MutationError> {
+    let refuse = |why: String| MutationError { kind, why };
     let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
     let Some(mutation) = mutation else { return Err(refuse("is no change of a lens".into())) };
     lens.check().map_err(|error| refuse(error.to_string()))?;
     let resolved = lens.with_pickups().map_err(|error| refuse(error.to_string()))?;
     let size = match scale(&resolved) {
         Ok(size) => size,
-        Err(Unprojectable::Afocal(_)) if !rules.projection => length(&resolved),
+        Err(ProjectionError::Afocal(_)) if !rules.projection => half_track(&resolved),
         Err(why) => return Err(refuse(why.to_string())),
     };
-    let scene = Scene::new(resolved, rules, size);
+    let scene = MutationContext::new(resolved, rules, size);
     let draft = (mutation.draw)(&scene, random).map_err(refuse)?;
-    finished(&scene, kind, draft).map_err(refuse)
+    complete(&scene, kind, draft).map_err(refuse)
 }
 
 /// What a kind of mutation does.
-struct Mutation {
-    kind: Kind,
+struct MutationOperator {
+    kind: MutationKind,
     /// In how many places of a lens it could be made.
-    places: fn(&Lens, &Rules) -> Result<usize, String>,
-    draw: fn(&Scene<'_>, &mut Random) -> Result<Draft, String>,
+    places: fn(&Lens, &SearchRules) -> Result<usize, String>,
+    draw: fn(&MutationContext<'_>, &mut Random) -> Result<MutationDraft, String>,
 }
 
 macro_rules! mutations {
     ($($kind:ident: $module:ident,)*) => {
-        [$(Mutation {
-            kind: Kind::$kind,
+        [$(MutationOperator {
+            kind: MutationKind::$kind,
             places: |lens, rules| $module::places(lens, rules).map(|places| places.len()),
             draw: $module::draw,
         },)*]
     };
 }
 
-/// Every mutation, in the order of [`Kind::MUTATIONS`].
-const MUTATIONS: [Mutation; 9] = mutations! {
+/// Every mutation, in the order of [`MutationKind::MUTATIONS`].
+const MUTATIONS: [MutationOperator; 9] = mutations! {
     AddSinglet: add,
     RemoveSinglet: remove,
     Glue: glue,
@@ -204,14 +208,18 @@ const MUTATIONS: [Mutation; 9] = mutations! {
 };
 
 /// Half the length of a lens: what stands in for the focal length of an afocal one.
-fn length(lens: &Lens) -> f64 {
+fn half_track(lens: &Lens) -> f64 {
     let track: f64 = lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
     (0.5 * track).max(1.0)
 }
 
 /// Projects and repairs a draft.
-fn finished(scene: &Scene<'_>, kind: Kind, draft: Draft) -> Result<Mutant, String> {
-    let Draft { lens, origins, what, fresh, rimless, map, places, back } = draft;
+fn complete(
+    scene: &MutationContext<'_>,
+    kind: MutationKind,
+    draft: MutationDraft,
+) -> Result<MutatedLens, String> {
+    let MutationDraft { lens, origins, what, fresh, rimless, map, places, back } = draft;
     let (mut lens, projection, stretch) = if scene.rules.projection {
         let found = project(&scene.lens, &lens, &origins, scene.rules, map, back.is_some());
         let found = found.map_err(|why| format!("{what}, but {why}"))?;
@@ -224,33 +232,42 @@ fn finished(scene: &Scene<'_>, kind: Kind, draft: Draft) -> Result<Mutant, Strin
     let log_ratio = back.zip(stretch).and_then(|(back, stretch)| {
         log_ratio(scene.rules, &lens, kind, places, back).map(|log| log + stretch)
     });
-    Ok(Mutant { lens, kind, what, fresh, projection, log_ratio })
+    Ok(MutatedLens { lens, kind, what, fresh, projection, log_ratio })
 }
 
 /// The logarithm of the density of the way back over that of the way there, without the projection.
-fn log_ratio(rules: &Rules, lens: &Lens, kind: Kind, places: usize, back: Back) -> Option<f64> {
+fn log_ratio(
+    rules: &SearchRules,
+    lens: &Lens,
+    kind: MutationKind,
+    places: usize,
+    back: ReverseMove,
+) -> Option<f64> {
     let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == back.kind)?;
     let places_back = (mutation.places)(lens, rules).ok()?;
-    let choice = match back.room {
+    let choice = match back.spacing {
         None => 1.0,
-        Some(room) => chance_of(room, lens, rules)?,
+        Some(room) => choice_probability(room, lens, rules)?,
     };
     let drawn = match back.singlet {
         None => 0.0,
-        Some(New { singlet, neighbour, scale }) => {
+        Some(SingletProposal { singlet, neighbour, scale }) => {
             singlet.log_density(lens, neighbour, rules, scale)?
         }
     };
     let kinds = rules.weight(back.kind) / rules.weight(kind);
-    let log =
-        kinds.ln() + (places as f64 / places_back as f64).ln() + choice.ln() + drawn + back.log;
+    let log = kinds.ln()
+        + (places as f64 / places_back as f64).ln()
+        + choice.ln()
+        + drawn
+        + back.log_density_ratio;
     log.is_finite().then_some(log)
 }
 
 /// How likely the way back would make the same choice of keeping the rest of the lens in its place;
 /// none where it could not.
-fn chance_of(room: Room, lens: &Lens, rules: &Rules) -> Option<f64> {
-    let keeps = add::keeps(lens, Some(room.gap), rules, room.length);
-    let chance = if room.kept { keeps } else { 1.0 - keeps };
+fn choice_probability(room: SpacingChoice, lens: &Lens, rules: &SearchRules) -> Option<f64> {
+    let keeps = add::keep_probability(lens, Some(room.gap), rules, room.length);
+    let chance = if room.keeps_rest { keeps } else { 1.0 - keeps };
     (chance > 0.0).then_some(chance)
 }

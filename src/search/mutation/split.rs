@@ -1,17 +1,20 @@
 //! A cemented interface becomes an air gap between two surfaces of nearly its curvature.
 
-use super::Kind;
-use super::chance::{Length, log_normal, normal, pick};
-use super::draft::{Back, Draft, Scene, hangs, is_of_medium, is_plain, sense};
+use super::MutationKind;
+use super::chance::{ShiftedExponential, choose, normal_log_density, sample_normal};
+use super::draft::{
+    MutationContext, MutationDraft, ReverseMove, has_pickup, is_of_medium, is_plain,
+    light_direction,
+};
 use super::glue;
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row};
-use crate::search::element::{Make, elements};
-use crate::search::projection::Map;
-use crate::search::{Random, Rules};
+use crate::search::element::{ElementKind, elements};
+use crate::search::projection::ProjectionMap;
+use crate::search::{Random, SearchRules};
 
 /// The random numbers of a new air gap.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cut {
+pub(super) struct SplitDraw {
     /// Half the difference of the curvatures in front and behind.
     pub(super) difference: f64,
     /// The air between them.
@@ -19,57 +22,60 @@ pub(super) struct Cut {
 }
 
 /// Cemented interfaces that may be split.
-pub(super) fn places(lens: &Lens, rules: &Rules) -> Result<Vec<usize>, String> {
+pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
     let rows = lens.surfaces.len();
-    let cemented = elements(lens).into_iter().filter(|e| matches!(e.make, Make::Glass(_)));
+    let cemented = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(_)));
     let inner = cemented.flat_map(|element| element.first + 1..element.last);
     let found: Vec<usize> = inner
-        .filter(|row| rules.allow(*row, rows) && is_plain(&lens.surfaces[*row]))
-        .filter(|row| !hangs(lens, *row, |q| q == Quantity::Curvature))
+        .filter(|row| rules.may_change(*row, rows) && is_plain(&lens.surfaces[*row]))
+        .filter(|row| !has_pickup(lens, *row, |q| q == Quantity::Curvature))
         .collect();
     if found.is_empty() { Err("no plain cemented interface".to_owned()) } else { Ok(found) }
 }
 
-impl Cut {
-    fn lengths(rules: &Rules, scale: f64) -> Length {
-        Length::new(rules.air_center, 0.5 * scale / 50.0)
+impl SplitDraw {
+    fn air_distribution(rules: &SearchRules, scale: f64) -> ShiftedExponential {
+        ShiftedExponential::new(rules.air_center, 0.5 * scale / 50.0)
     }
 
     /// A tenth of the spread of a new element's curvatures: the two parts have strong power.
-    fn spread(scale: f64) -> f64 {
+    fn curvature_deviation(scale: f64) -> f64 {
         0.025 / scale
     }
 
-    fn draw(scene: &Scene<'_>, random: &mut Random) -> Self {
-        let difference = normal(Self::spread(scene.scale), random);
-        Self { difference, air: Self::lengths(scene.rules, scene.scale).draw(random) }
+    fn draw(scene: &MutationContext<'_>, random: &mut Random) -> Self {
+        let difference = sample_normal(Self::curvature_deviation(scene.scale), random);
+        Self { difference, air: Self::air_distribution(scene.rules, scene.scale).draw(random) }
     }
 
-    pub(super) fn log_density(&self, rules: &Rules, scale: f64) -> Option<f64> {
-        let air = Self::lengths(rules, scale).log_density(self.air)?;
-        Some(air + log_normal(self.difference, Self::spread(scale)))
+    pub(super) fn log_density(&self, rules: &SearchRules, scale: f64) -> Option<f64> {
+        let air = Self::air_distribution(rules, scale).log_density(self.air)?;
+        Some(air + normal_log_density(self.difference, Self::curvature_deviation(scale)))
     }
 }
 
 /// Splits a cemented interface.
-pub(super) fn draw(scene: &Scene<'_>, random: &mut Random) -> Result<Draft, String> {
+pub(super) fn draw(
+    scene: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, String> {
     let places = places(&scene.lens, scene.rules)?;
-    let row = pick(&places, random).copied().ok_or("no place")?;
-    let cut = Cut::draw(scene, random);
-    let mut draft = scene.draft(places.len());
-    open(&mut draft, row, cut);
-    draft.map = Map::Along;
+    let row = choose(&places, random).copied().ok_or("no place")?;
+    let cut = SplitDraw::draw(scene, random);
+    let mut draft = scene.start_draft(places.len());
+    insert_air_gap(&mut draft, row, cut);
+    draft.map = ProjectionMap::AlongNormals;
     draft.what = format!("split the cemented surface {row}");
     let there = cut.log_density(scene.rules, scene.scale);
-    let back = |there: f64| Back::by(Kind::Glue, 2f64.ln() - there);
-    draft.back = there.filter(|_| glue::can(&draft.lens, row, scene.rules)).map(back);
+    let back = |there: f64| ReverseMove::new(MutationKind::Glue, 2f64.ln() - there);
+    draft.back = there.filter(|_| glue::can_glue(&draft.lens, row, scene.rules)).map(back);
     Ok(draft)
 }
 
 /// Makes two surfaces of one.
-fn open(draft: &mut Draft, row: usize, cut: Cut) {
+fn insert_air_gap(draft: &mut MutationDraft, row: usize, cut: SplitDraw) {
     let joint = draft.lens.surfaces[row].clone();
-    let sense = sense(&draft.lens, row);
+    let sense = light_direction(&draft.lens, row);
     let rear = Row {
         curvature: joint.curvature - cut.difference,
         stop: false,
@@ -87,5 +93,5 @@ fn open(draft: &mut Draft, row: usize, cut: Cut) {
     front.medium = Medium::Air;
     front.thickness = sense * cut.air;
     draft.origins[row].curvature = None;
-    draft.settle(&[row, row + 1]);
+    draft.inherit_variables(&[row, row + 1]);
 }

@@ -1,20 +1,22 @@
 //! That the model of the projection is what first-order optics says of a lens with gradients, its
 //! derivatives those of its values.
 
-use super::model::{Coordinate, Model, scale};
-use super::numbers;
-use crate::lens::{Gradient, Law, Lens, Medium, Object, Quantity, ZoomPosition, ZoomThickness};
+use super::free_parameters;
+use super::model::{MarginalRayModel, ProjectionCoordinate, scale};
+use crate::lens::{
+    GradientIndex, Lens, Medium, Object, ProfileLaw, Quantity, ZoomPosition, ZoomThickness,
+};
 use crate::math::Dual;
 use crate::paraxial::{paraxial_ray, signed_indices};
 
 fn bundled(name: &str) -> Lens {
-    let found = crate::files::library().iter().find(|bundled| bundled.name == name).unwrap();
+    let found = crate::files::bundled_lenses().iter().find(|bundled| bundled.name == name).unwrap();
     crate::files::native::read(found.text, name).unwrap()
 }
 
-fn graded(law: Law, radial: &[f64], axial: &[f64]) -> Medium {
+fn graded(law: ProfileLaw, radial: &[f64], axial: &[f64]) -> Medium {
     let base = Medium::Index(1.62);
-    Medium::Gradient(Box::new(Gradient {
+    Medium::Grin(Box::new(GradientIndex {
         base,
         law,
         radial: radial.to_vec(),
@@ -23,10 +25,10 @@ fn graded(law: Law, radial: &[f64], axial: &[f64]) -> Medium {
 }
 
 /// A triplet two of whose elements are gradients, one of them along the axis.
-fn triplet(law: Law, object: Object) -> Lens {
+fn triplet(law: ProfileLaw, object: Object) -> Lens {
     let mut lens = bundled("cooke_triplet_100_f27");
     lens.variables.clear();
-    let radial = if law == Law::Sech { 0.01 } else { -2e-4 };
+    let radial = if law == ProfileLaw::Sech { 0.01 } else { -2e-4 };
     let glass: Vec<usize> =
         (0..lens.surfaces.len()).filter(|i| lens.surfaces[*i].medium != Medium::Air).collect();
     lens.surfaces[glass[0]].medium = graded(law, &[radial], &[]);
@@ -37,9 +39,9 @@ fn triplet(law: Law, object: Object) -> Lens {
 
 /// The triplet at two lengths of a gradient.
 fn zoom() -> Lens {
-    let mut lens = triplet(Law::Index, Object::Infinity);
+    let mut lens = triplet(ProfileLaw::Index, Object::Infinity);
     let row = (0..lens.surfaces.len())
-        .rfind(|i| matches!(lens.surfaces[*i].medium, Medium::Gradient(_)))
+        .rfind(|i| matches!(lens.surfaces[*i].medium, Medium::Grin(_)))
         .unwrap();
     let at = |by: f64| ZoomPosition {
         thicknesses: vec![ZoomThickness {
@@ -61,7 +63,7 @@ fn behind_a_mirror() -> Lens {
     (plate.curvature, plate.conic, plate.stop) = (0.0, 0.0, false);
     plate.asphere.clear();
     plate.obstruction = None;
-    plate.medium = graded(Law::Index, &[-1e-8], &[1e-5]);
+    plate.medium = graded(ProfileLaw::Index, &[-1e-8], &[1e-5]);
     plate.thickness = -300.0;
     let mut face = plate.clone();
     (face.medium, face.thickness) = (Medium::Air, 0.5 * gap + 300.0);
@@ -72,26 +74,26 @@ fn behind_a_mirror() -> Lens {
 }
 
 fn lenses() -> Vec<Lens> {
-    let laws = [Law::Index, Law::Square, Law::Sech];
+    let laws = [ProfileLaw::Index, ProfileLaw::Square, ProfileLaw::Sech];
     let mut all: Vec<Lens> = laws.map(|law| triplet(law, Object::Infinity)).into();
-    all.push(triplet(Law::Index, Object::Finite(700.0)));
+    all.push(triplet(ProfileLaw::Index, Object::Finite(700.0)));
     all.extend([zoom(), behind_a_mirror()]);
     all.extend(["grin_rod_melles_griot", "wood_lens_60", "axial_gradient_singlet_50"].map(bundled));
     all
 }
 
 /// A lens as a function of every curvature and gap, in the steps of the projection.
-fn model(lens: &Lens) -> (Model, Vec<Coordinate>) {
+fn model(lens: &Lens) -> (MarginalRayModel, Vec<ProjectionCoordinate>) {
     let scale = scale(lens).unwrap();
-    let coordinate = |new: crate::lens::Parameter| Coordinate {
+    let coordinate = |new: crate::lens::Parameter| ProjectionCoordinate {
         old: new,
         new,
         sign: 1.0,
         value: lens.get(new).unwrap(),
         step: if new.quantity == Quantity::Curvature { 0.3 / scale } else { 0.01 * scale },
     };
-    let coordinates: Vec<_> = numbers(lens).into_iter().map(coordinate).collect();
-    let model = Model::new(lens, lens, &coordinates, scale, |c| (c.new, 1.0)).unwrap();
+    let coordinates: Vec<_> = free_parameters(lens).into_iter().map(coordinate).collect();
+    let model = MarginalRayModel::new(lens, lens, &coordinates, scale, |c| (c.new, 1.0)).unwrap();
     (model, coordinates)
 }
 
@@ -108,7 +110,7 @@ fn what_is_kept_is_what_first_order_optics_says() {
             }
             let values = model.values(&vec![z; coordinates.len()]);
             for zoom in 0..lens.zoom_positions() {
-                let system = moved.system(zoom, um).unwrap();
+                let system = moved.resolve(zoom, um).unwrap();
                 let (height, slope) = match lens.object {
                     Object::Infinity => (1.0, 0.0),
                     Object::Finite(distance) => (1.0, 1.0 / distance),

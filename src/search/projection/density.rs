@@ -6,7 +6,7 @@
 //! whole Jacobian the determinant is `det(J₀ Jᵀ) / det[I − H, −Jᵀ; J, 0]`, since bordering the block
 //! with the right side and eliminating it from there leaves only `J₀ Jᵀ`.
 
-use super::model::Model;
+use super::model::MarginalRayModel;
 use crate::math::Dual;
 use nalgebra::{DMatrix, DVector};
 
@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 /// it is singular.
 pub(super) fn log_determinant(
     before: &DMatrix<f64>,
-    model: &Model,
+    model: &MarginalRayModel,
     at: &[f64],
     multipliers: &DVector<f64>,
 ) -> Option<f64> {
@@ -27,7 +27,7 @@ pub(super) fn log_determinant(
 }
 
 fn block(
-    model: &Model,
+    model: &MarginalRayModel,
     at: &[f64],
     multipliers: &DVector<f64>,
     jacobian: &DMatrix<f64>,

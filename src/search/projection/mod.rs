@@ -17,13 +17,13 @@ mod density;
 mod model;
 mod solve;
 
-use super::Rules;
-use super::element::filled;
-use crate::lens::{Lens, LensError, NumberKind, Parameter, Quantity, vary};
+use super::SearchRules;
+use super::element::glass_gaps;
+use crate::lens::{Lens, LensError, Parameter, ParameterKind, Quantity, add_variables};
 pub(super) use model::scale;
-use model::{Coordinate, Model};
+use model::{MarginalRayModel, ProjectionCoordinate};
 use serde::Serialize;
-use solve::{Bounds, Solution};
+use solve::{CoordinateBounds, ProjectionSolution};
 use std::fmt::{self, Display};
 
 /// What a projection did.
@@ -52,7 +52,7 @@ impl Display for Projection {
 
 /// Why a lens cannot be made to focus as another one does.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Unprojectable {
+pub enum ProjectionError {
     /// Nothing to keep.
     #[error("the lens is afocal at zoom position {0}: it has no focal length to keep")]
     Afocal(usize),
@@ -72,16 +72,16 @@ pub enum Unprojectable {
 
 /// Which way leads to a lens with the same focus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Map {
+pub(super) enum ProjectionMap {
     /// To the nearest one.
-    Closest,
+    Nearest,
     /// Along the normals of the lens before the mutation.
-    Along,
+    AlongNormals,
 }
 
 /// Where the numbers of a row come from.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Origin {
+pub(super) struct RowOrigin {
     /// The row of the lens before the mutation whose curvature it has, and the sign with which;
     /// none for one that the mutation made and that is kept.
     pub(super) curvature: Option<(usize, f64)>,
@@ -91,7 +91,7 @@ pub(super) struct Origin {
 
 /// A projected lens.
 #[derive(Debug)]
-pub(super) struct Projected {
+pub(super) struct ProjectedLens {
     pub(super) lens: Lens,
     pub(super) report: Projection,
     /// The logarithm of the determinant of the map; none where the way back does not lead back.
@@ -104,17 +104,21 @@ pub(super) struct Projected {
 pub(super) fn project(
     before: &Lens,
     mutated: &Lens,
-    origins: &[Origin],
-    rules: &Rules,
-    map: Map,
+    origins: &[RowOrigin],
+    rules: &SearchRules,
+    map: ProjectionMap,
     reversible: bool,
-) -> Result<Projected, Unprojectable> {
-    let pair = Pair::new(before, mutated, origins, rules)?;
-    let mapped = if map == Map::Along && reversible { pair.along().ok() } else { None };
+) -> Result<ProjectedLens, ProjectionError> {
+    let pair = ProjectionPair::new(before, mutated, origins, rules)?;
+    let mapped = if map == ProjectionMap::AlongNormals && reversible {
+        pair.along_normals().ok()
+    } else {
+        None
+    };
     let solution = mapped.map_or_else(|| pair.nearest(map), Ok)?;
     let exact = reversible && solution.exact;
     let log_determinant = if exact { pair.log_determinant(map, &solution) } else { None };
-    Ok(Projected {
+    Ok(ProjectedLens {
         lens: pair.lens(mutated, &solution),
         report: pair.report(&solution),
         log_determinant,
@@ -123,26 +127,26 @@ pub(super) fn project(
 
 /// A lens before and after a mutation, as functions of the numbers that both have, counted from
 /// what they are right after the mutation and in their own steps.
-struct Pair {
-    coordinates: Vec<Coordinate>,
-    old: Model,
-    new: Model,
+struct ProjectionPair {
+    coordinates: Vec<ProjectionCoordinate>,
+    old: MarginalRayModel,
+    new: MarginalRayModel,
     target: Vec<f64>,
     /// What the rules allow.
-    limits: Bounds,
+    limits: CoordinateBounds,
 }
 
-impl Pair {
+impl ProjectionPair {
     fn new(
         before: &Lens,
         mutated: &Lens,
-        origins: &[Origin],
-        rules: &Rules,
-    ) -> Result<Self, Unprojectable> {
+        origins: &[RowOrigin],
+        rules: &SearchRules,
+    ) -> Result<Self, ProjectionError> {
         let scale = scale(before)?.log2().round().exp2();
         let coordinates = coordinates(before, mutated, origins, rules, scale);
-        let old = Model::new(before, before, &coordinates, scale, |c| (c.old, c.sign))?;
-        let new = Model::new(mutated, before, &coordinates, scale, |c| (c.new, 1.0))?;
+        let old = MarginalRayModel::new(before, before, &coordinates, scale, |c| (c.old, c.sign))?;
+        let new = MarginalRayModel::new(mutated, before, &coordinates, scale, |c| (c.new, 1.0))?;
         let target = old.values(&vec![0.0; coordinates.len()]);
         let limits = limits(mutated, &coordinates, rules);
         Ok(Self { coordinates, old, new, target, limits })
@@ -153,65 +157,65 @@ impl Pair {
     }
 
     /// The nearest lens; where another one was asked for, it is not exact.
-    fn nearest(&self, map: Map) -> Result<Solution, Unprojectable> {
+    fn nearest(&self, map: ProjectionMap) -> Result<ProjectionSolution, ProjectionError> {
         let found = solve::nearest(&self.new, &self.zero(), &self.target, &self.bounds())?;
-        Ok(Solution { exact: found.exact && map == Map::Closest, ..found })
+        Ok(ProjectionSolution { exact: found.exact && map == ProjectionMap::Nearest, ..found })
     }
 
-    fn along(&self) -> Result<Solution, Unprojectable> {
+    fn along_normals(&self) -> Result<ProjectionSolution, ProjectionError> {
         let normals = self.old.jacobian(&self.zero());
-        solve::along(&self.new, &normals, &self.zero(), &self.target, &self.bounds())
+        solve::along_normals(&self.new, &normals, &self.zero(), &self.target, &self.bounds())
     }
 
     /// How far the numbers may move; one that is outside of the rules may not go farther.
-    fn bounds(&self) -> Bounds {
-        self.limits.around(&self.zero())
+    fn bounds(&self) -> CoordinateBounds {
+        self.limits.widen_to_include(&self.zero())
     }
 
     /// The way back starts where the way there ended, with the other map and the lenses exchanged.
-    fn leads_back(&self, map: Map, there: &Solution) -> bool {
-        let bounds = self.limits.around(&there.at);
+    fn is_reversible(&self, map: ProjectionMap, there: &ProjectionSolution) -> bool {
+        let bounds = self.limits.widen_to_include(&there.at);
         let target = self.new.values(&there.at);
         let back = match map {
-            Map::Along => solve::nearest(&self.old, &there.at, &target, &bounds),
-            Map::Closest => {
+            ProjectionMap::AlongNormals => solve::nearest(&self.old, &there.at, &target, &bounds),
+            ProjectionMap::Nearest => {
                 let normals = self.new.jacobian(&there.at);
-                solve::along(&self.old, &normals, &there.at, &target, &bounds)
+                solve::along_normals(&self.old, &normals, &there.at, &target, &bounds)
             }
         };
         back.is_ok_and(|back| back.exact && back.at.iter().all(|z| z.abs() < 1e-6))
     }
 
-    fn log_determinant(&self, map: Map, there: &Solution) -> Option<f64> {
-        if !self.leads_back(map, there) {
+    fn log_determinant(&self, map: ProjectionMap, there: &ProjectionSolution) -> Option<f64> {
+        if !self.is_reversible(map, there) {
             return None;
         }
         let zero = self.zero();
         let (old, new) = (self.old.jacobian(&zero), self.new.jacobian(&there.at));
         match map {
-            Map::Closest => {
+            ProjectionMap::Nearest => {
                 density::log_determinant(&old, &self.new, &there.at, &there.multipliers)
             }
-            Map::Along => {
+            ProjectionMap::AlongNormals => {
                 let multipliers = -&there.multipliers;
                 density::log_determinant(&new, &self.old, &zero, &multipliers).map(|log| -log)
             }
         }
     }
 
-    fn lens(&self, mutated: &Lens, solution: &Solution) -> Lens {
+    fn lens(&self, mutated: &Lens, solution: &ProjectionSolution) -> Lens {
         let mut lens = mutated.clone();
         for (coordinate, z) in self.coordinates.iter().zip(&solution.at) {
             if *z != 0.0 {
                 let value = coordinate.value + coordinate.step * z;
-                lens.set(coordinate.new, rounded_into(mutated, coordinate.new, value));
+                lens.set(coordinate.new, clamp_to_variable(mutated, coordinate.new, value));
             }
         }
         // A lens that has a model has pickups that can be followed.
         if lens.pickups.is_empty() { lens } else { lens.with_pickups().unwrap_or(lens) }
     }
 
-    fn report(&self, solution: &Solution) -> Projection {
+    fn report(&self, solution: &ProjectionSolution) -> Projection {
         let (mut curvature, mut distance) = (0.0f64, 0.0f64);
         for (coordinate, z) in self.coordinates.iter().zip(&solution.at) {
             let of_kind = match coordinate.new.quantity {
@@ -225,17 +229,17 @@ impl Pair {
 }
 
 /// A value that rounding may have brought out of the bounds of its variable.
-fn rounded_into(lens: &Lens, parameter: Parameter, value: f64) -> f64 {
+fn clamp_to_variable(lens: &Lens, parameter: Parameter, value: f64) -> f64 {
     let Some(variable) = lens.variable(parameter) else { return value };
     let value = variable.min.map_or(value, |min| value.max(min));
     variable.max.map_or(value, |max| value.min(max))
 }
 
 /// Every curvature and distance of a lens that does not follow another number.
-fn numbers(lens: &Lens) -> Vec<Parameter> {
+fn free_parameters(lens: &Lens) -> Vec<Parameter> {
     let mut freed = lens.clone();
     freed.variables.clear();
-    vary(&mut freed, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
+    add_variables(&mut freed, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
     freed.variables.iter().map(|variable| variable.parameter).collect()
 }
 
@@ -243,14 +247,14 @@ fn numbers(lens: &Lens) -> Vec<Parameter> {
 fn coordinates(
     before: &Lens,
     mutated: &Lens,
-    origins: &[Origin],
-    rules: &Rules,
+    origins: &[RowOrigin],
+    rules: &SearchRules,
     scale: f64,
-) -> Vec<Coordinate> {
-    let known = numbers(before);
+) -> Vec<ProjectionCoordinate> {
+    let known = free_parameters(before);
     let rows = mutated.surfaces.len();
     let mut found = Vec::new();
-    for new in numbers(mutated) {
+    for new in free_parameters(mutated) {
         let origin = origins[new.surface];
         let (from, step) = match new.quantity {
             Quantity::Curvature => (origin.curvature, 0.3 / scale),
@@ -259,20 +263,24 @@ fn coordinates(
         let Some((row, sign)) = from else { continue };
         let old = Parameter::new(row, new.quantity);
         let value = mutated.get(new).unwrap_or(0.0);
-        if known.contains(&old) && rules.allow(new.surface, rows) {
-            found.push(Coordinate { old, new, sign, value, step });
+        if known.contains(&old) && rules.may_change(new.surface, rows) {
+            found.push(ProjectionCoordinate { old, new, sign, value, step });
         }
     }
     found
 }
 
 /// What the rules and the variables of the lens allow each number, in its own steps.
-fn limits(lens: &Lens, coordinates: &[Coordinate], rules: &Rules) -> Bounds {
-    let glass = filled(lens);
-    let range = |c: &Coordinate| {
+fn limits(
+    lens: &Lens,
+    coordinates: &[ProjectionCoordinate],
+    rules: &SearchRules,
+) -> CoordinateBounds {
+    let glass = glass_gaps(lens);
+    let range = |c: &ProjectionCoordinate| {
         let (mut low, mut high) = match c.new.quantity {
-            Quantity::Curvature => curvatures(lens, c.new.surface, rules),
-            _ => distances(lens, c.new.surface, glass[c.new.surface + 1], rules),
+            Quantity::Curvature => curvature_range(lens, c.new.surface, rules),
+            _ => distance_range(lens, c.new.surface, glass[c.new.surface + 1], rules),
         };
         if let Some(variable) = lens.variable(c.new) {
             low = variable.min.map_or(low, |min| low.max(min));
@@ -280,16 +288,16 @@ fn limits(lens: &Lens, coordinates: &[Coordinate], rules: &Rules) -> Bounds {
         }
         [(low - c.value) / c.step, (high - c.value) / c.step]
     };
-    Bounds::new(coordinates.iter().map(range).collect())
+    CoordinateBounds::new(coordinates.iter().map(range).collect())
 }
 
-fn curvatures(lens: &Lens, surface: usize, rules: &Rules) -> (f64, f64) {
+fn curvature_range(lens: &Lens, surface: usize, rules: &SearchRules) -> (f64, f64) {
     let rim = lens.surfaces[surface].semi_diameter.unwrap_or(0.0);
     let most = if rim > 0.0 { rules.steepness / rim } else { f64::INFINITY };
     (-most, most)
 }
 
-fn distances(lens: &Lens, surface: usize, glass: bool, rules: &Rules) -> (f64, f64) {
+fn distance_range(lens: &Lens, surface: usize, glass: bool, rules: &SearchRules) -> (f64, f64) {
     let last = surface + 1 == lens.surfaces.len();
     let (low, high) = match (last, glass) {
         (true, _) => (rules.back_focus.unwrap_or(0.0), f64::INFINITY),

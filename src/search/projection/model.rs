@@ -2,19 +2,19 @@
 //! backwards for its derivatives by all numbers at once.
 //!
 //! Backwards, `∂/∂d = ȳ nu/n'` and `∂/∂c = −n̄u y (n' − n)`. Through a gradient the ray goes by the
-//! matrix of its [`Slab`], backwards by the transpose, and a longer gap lets both numbers grow as the
+//! matrix of its [`ParaxialGrin`], backwards by the transpose, and a longer gap lets both numbers grow as the
 //! equations say: `∂/∂d = ȳ nu/n + n̄u (c/n) y` at its end, and `n̄u y c dn/dz` where a gradient along
 //! the axis meets the next surface with another index.
 
-use super::Unprojectable;
-use crate::lens::{Graded, Lens, LensError, Object, Parameter, Quantity, Slab};
+use super::ProjectionError;
+use crate::lens::{Lens, LensError, Object, Parameter, ParaxialGrin, Quantity, RotationalProfile};
 use crate::math::Real;
 use crate::paraxial::signed_indices;
 use nalgebra::DMatrix;
 
 /// A number that the lenses before and after a mutation share.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Coordinate {
+pub(super) struct ProjectionCoordinate {
     pub(super) old: Parameter,
     pub(super) new: Parameter,
     /// The sign of the new number over the old one: a turned surface has the other one.
@@ -27,16 +27,16 @@ pub(super) struct Coordinate {
 
 /// What a coordinate moves, and by how much.
 #[derive(Debug, Clone, Copy)]
-enum Reach {
+enum CoordinateEffect {
     Curvature { row: usize, factor: f64 },
     Gap { zoom: usize, row: usize, factor: f64 },
 }
 
 /// A lens at one zoom position and the start of its marginal ray.
 #[derive(Debug, Clone)]
-struct Position {
+struct ZoomModel {
     indices: Vec<f64>,
-    gradients: Vec<Option<Graded<f64>>>,
+    gradients: Vec<Option<RotationalProfile<f64>>>,
     gaps: Vec<f64>,
     height: f64,
     slope: f64,
@@ -44,10 +44,10 @@ struct Position {
 
 /// Height and slope of the marginal ray at the image, as functions of coordinates.
 #[derive(Debug, Clone)]
-pub(super) struct Model {
-    positions: Vec<Position>,
+pub(super) struct MarginalRayModel {
+    positions: Vec<ZoomModel>,
     curvatures: Vec<f64>,
-    reaches: Vec<Vec<Reach>>,
+    effects: Vec<Vec<CoordinateEffect>>,
     /// Whether the last gap follows the focus, so that the height at the image says nothing.
     solved: bool,
     /// What a slope is multiplied with.
@@ -55,20 +55,20 @@ pub(super) struct Model {
 }
 
 /// The paraxial ray at each surface, with the image behind.
-struct Ray<R> {
+struct MarginalRayTrace<R> {
     heights: Vec<R>,
     /// Optical slopes behind each surface.
     slopes: Vec<R>,
     /// The same in front of the next one, and the index there.
     ends: Vec<(R, R)>,
     /// What fills a gap that is no glass.
-    slabs: Vec<Option<Slab<R>>>,
+    slabs: Vec<Option<ParaxialGrin<R>>>,
 }
 
-fn positions(lens: &Lens, reference: &Lens) -> Result<Vec<Position>, LensError> {
+fn zoom_models(lens: &Lens, reference: &Lens) -> Result<Vec<ZoomModel>, LensError> {
     let um = lens.wavelengths[lens.primary()].um;
     let position = |zoom: usize| {
-        let system = lens.system(zoom, um)?;
+        let system = lens.resolve(zoom, um)?;
         let rows = lens.surfaces.len();
         let mut indices = signed_indices(&system);
         indices.truncate(rows + 1);
@@ -80,7 +80,7 @@ fn positions(lens: &Lens, reference: &Lens) -> Result<Vec<Position>, LensError> 
             }
             _ => (1.0, 0.0),
         };
-        Ok(Position { indices, gradients, gaps, height, slope })
+        Ok(ZoomModel { indices, gradients, gaps, height, slope })
     };
     (0..lens.zoom_positions()).map(position).collect()
 }
@@ -88,8 +88,8 @@ fn positions(lens: &Lens, reference: &Lens) -> Result<Vec<Position>, LensError> 
 /// A length of the order of the focal length that paraxially equal lenses share: the focal length,
 /// or for a finite object the one that a thin lens of the same magnification would have; the
 /// smallest over the zoom positions.
-pub(in crate::search) fn scale(lens: &Lens) -> Result<f64, Unprojectable> {
-    let model = Model::new(lens, lens, &[], 1.0, |c| (c.new, 1.0))?;
+pub(in crate::search) fn scale(lens: &Lens) -> Result<f64, ProjectionError> {
+    let model = MarginalRayModel::new(lens, lens, &[], 1.0, |c| (c.new, 1.0))?;
     let mut smallest = f64::INFINITY;
     for (zoom, position) in model.positions.iter().enumerate() {
         let ray = model.ray(zoom, &model.curvatures, &position.gaps);
@@ -101,49 +101,49 @@ pub(in crate::search) fn scale(lens: &Lens) -> Result<f64, Unprojectable> {
         let track: f64 = position.gaps.iter().map(|gap| gap.abs()).sum();
         let power = slope * track.max(1e-3);
         if !(power > 1e-7 && length.is_finite() && length > 0.0) {
-            return Err(Unprojectable::Afocal(zoom));
+            return Err(ProjectionError::Afocal(zoom));
         }
         smallest = smallest.min(length);
     }
     Ok(smallest)
 }
 
-impl Model {
+impl MarginalRayModel {
     /// A lens as a function of coordinates; `which` says what a coordinate is called in it and
     /// with which sign. The marginal ray starts from the object with the slope that reaches 1 mm at
     /// the first vertex of the `reference`.
     pub(super) fn new(
         lens: &Lens,
         reference: &Lens,
-        coordinates: &[Coordinate],
+        coordinates: &[ProjectionCoordinate],
         scale: f64,
-        which: impl Fn(&Coordinate) -> (Parameter, f64),
+        which: impl Fn(&ProjectionCoordinate) -> (Parameter, f64),
     ) -> Result<Self, LensError> {
-        let reach = |coordinate: &Coordinate| {
+        let reach = |coordinate: &ProjectionCoordinate| {
             let (parameter, sign) = which(coordinate);
-            reaches(lens, parameter, sign * coordinate.step)
+            effects_of(lens, parameter, sign * coordinate.step)
         };
         Ok(Self {
-            positions: positions(lens, reference)?,
+            positions: zoom_models(lens, reference)?,
             curvatures: lens.surfaces.iter().map(|row| row.curvature).collect(),
-            reaches: coordinates.iter().map(reach).collect(),
-            solved: lens.focus.is_some(),
+            effects: coordinates.iter().map(reach).collect(),
+            solved: lens.image_solve.is_some(),
             scale,
         })
     }
 
     /// How many numbers are kept.
     pub(super) fn constraints(&self) -> usize {
-        self.positions.len() * self.kept()
+        self.positions.len() * self.constraints_per_zoom()
     }
 
-    fn kept(&self) -> usize {
+    fn constraints_per_zoom(&self) -> usize {
         if self.solved { 1 } else { 2 }
     }
 
     /// The kept numbers: for every zoom position the slope, and the height unless it is solved.
     pub(super) fn values(&self, at: &[f64]) -> Vec<f64> {
-        let (curvatures, gaps) = self.moved(at);
+        let (curvatures, gaps) = self.curvatures_and_gaps(at);
         let mut values = Vec::with_capacity(self.constraints());
         for (zoom, gaps) in gaps.iter().enumerate() {
             let ray = self.ray(zoom, &curvatures, gaps);
@@ -158,16 +158,16 @@ impl Model {
 
     /// Their derivatives by the coordinates, a row for each kept number.
     pub(super) fn jacobian(&self, at: &[f64]) -> DMatrix<f64> {
-        let (curvatures, gaps) = self.moved(at);
+        let (curvatures, gaps) = self.curvatures_and_gaps(at);
         let mut jacobian = DMatrix::zeros(self.constraints(), at.len());
         for (zoom, gaps) in gaps.iter().enumerate() {
             let ray = self.ray(zoom, &curvatures, gaps);
-            for kept in 0..self.kept() {
+            for kept in 0..self.constraints_per_zoom() {
                 let seed = if kept == 0 { (0.0, self.scale) } else { (1.0, 0.0) };
                 let (by_curvature, by_gap) = self.adjoint(zoom, &ray, &curvatures, gaps, seed);
-                let row = zoom * self.kept() + kept;
-                for (column, reaches) in self.reaches.iter().enumerate() {
-                    jacobian[(row, column)] = gathered(reaches, zoom, &by_curvature, &by_gap);
+                let row = zoom * self.constraints_per_zoom() + kept;
+                for (column, reaches) in self.effects.iter().enumerate() {
+                    jacobian[(row, column)] = sum_effects(reaches, zoom, &by_curvature, &by_gap);
                 }
             }
         }
@@ -176,39 +176,43 @@ impl Model {
 
     /// The gradient of the kept numbers, each times its multiplier, over any number type.
     pub(super) fn weighted_gradient<R: Real>(&self, at: &[R], multipliers: &[f64]) -> Vec<R> {
-        let (curvatures, gaps) = self.moved(at);
+        let (curvatures, gaps) = self.curvatures_and_gaps(at);
         let mut gradient = vec![R::ZERO; at.len()];
         for (zoom, gaps) in gaps.iter().enumerate() {
             let ray = self.ray(zoom, &curvatures, gaps);
-            let first = zoom * self.kept();
+            let first = zoom * self.constraints_per_zoom();
             let slope = R::from_f64(multipliers[first] * self.scale);
             let height = if self.solved { 0.0 } else { multipliers[first + 1] };
             let seed = (R::from_f64(height), slope);
             let (by_curvature, by_gap) = self.adjoint(zoom, &ray, &curvatures, gaps, seed);
-            for (sum, reaches) in gradient.iter_mut().zip(&self.reaches) {
-                *sum += gathered(reaches, zoom, &by_curvature, &by_gap);
+            for (sum, reaches) in gradient.iter_mut().zip(&self.effects) {
+                *sum += sum_effects(reaches, zoom, &by_curvature, &by_gap);
             }
         }
         gradient
     }
 
     /// Curvatures, and gaps by zoom position.
-    fn moved<R: Real>(&self, at: &[R]) -> (Vec<R>, Vec<Vec<R>>) {
+    fn curvatures_and_gaps<R: Real>(&self, at: &[R]) -> (Vec<R>, Vec<Vec<R>>) {
         let lifted = |numbers: &[f64]| numbers.iter().map(|v| R::from_f64(*v)).collect::<Vec<R>>();
         let mut curvatures = lifted(&self.curvatures);
         let mut gaps: Vec<_> = self.positions.iter().map(|p| lifted(&p.gaps)).collect();
-        for (reaches, z) in self.reaches.iter().zip(at) {
+        for (reaches, z) in self.effects.iter().zip(at) {
             for reach in reaches {
                 match *reach {
-                    Reach::Curvature { row, factor } => curvatures[row] += *z * R::from_f64(factor),
-                    Reach::Gap { zoom, row, factor } => gaps[zoom][row] += *z * R::from_f64(factor),
+                    CoordinateEffect::Curvature { row, factor } => {
+                        curvatures[row] += *z * R::from_f64(factor)
+                    }
+                    CoordinateEffect::Gap { zoom, row, factor } => {
+                        gaps[zoom][row] += *z * R::from_f64(factor)
+                    }
                 }
             }
         }
         (curvatures, gaps)
     }
 
-    fn ray<R: Real>(&self, zoom: usize, curvatures: &[R], gaps: &[R]) -> Ray<R> {
+    fn ray<R: Real>(&self, zoom: usize, curvatures: &[R], gaps: &[R]) -> MarginalRayTrace<R> {
         let position = &self.positions[zoom];
         let (mut heights, mut slopes) =
             (Vec::with_capacity(gaps.len() + 1), Vec::with_capacity(gaps.len()));
@@ -222,7 +226,7 @@ impl Model {
             slopes.push(nu);
             let slab = position.slab(i, *d);
             if let Some(slab) = &slab {
-                (y, nu) = slab.pass(y, nu);
+                (y, nu) = slab.transfer(y, nu);
                 before = slab.index_behind;
             } else {
                 y += *d * nu / behind;
@@ -232,14 +236,14 @@ impl Model {
             slabs.push(slab);
         }
         heights.push(y);
-        Ray { heights, slopes, ends, slabs }
+        MarginalRayTrace { heights, slopes, ends, slabs }
     }
 
     /// The derivatives of `seed · (height, slope)` at the image by every curvature and gap.
     fn adjoint<R: Real>(
         &self,
         zoom: usize,
-        ray: &Ray<R>,
+        ray: &MarginalRayTrace<R>,
         curvatures: &[R],
         gaps: &[R],
         (mut height, mut slope): (R, R),
@@ -252,9 +256,9 @@ impl Model {
         for i in (0..gaps.len()).rev() {
             let behind = R::from_f64(position.indices[i + 1]);
             if let Some(slab) = &ray.slabs[i] {
-                let (y, nu) = slab.growth(ray.heights[i + 1], ray.ends[i].0);
-                by_gap[i] = height * y + slope * nu + by_index * slab.climb;
-                (height, slope) = slab.pass_back(height, slope);
+                let (y, nu) = slab.thickness_derivative(ray.heights[i + 1], ray.ends[i].0);
+                by_gap[i] = height * y + slope * nu + by_index * slab.index_slope;
+                (height, slope) = slab.transfer_transposed(height, slope);
             } else {
                 let reduced = height / behind;
                 by_gap[i] = reduced * ray.slopes[i];
@@ -273,44 +277,54 @@ impl Model {
     }
 }
 
-impl Position {
+impl ZoomModel {
     /// What fills the gap behind a row, where that is a gradient.
-    fn slab<R: Real>(&self, row: usize, thickness: R) -> Option<Slab<R>> {
-        let Graded { base, grade } = self.gradients[row]?;
-        let field = Graded { base: R::from_f64(base), grade: grade.map(R::from_f64) };
-        Some(Slab::passed(&field, thickness, R::from_f64(self.indices[row + 1])))
+    fn slab<R: Real>(&self, row: usize, thickness: R) -> Option<ParaxialGrin<R>> {
+        let RotationalProfile { base, coefficients: grade } = self.gradients[row]?;
+        let field =
+            RotationalProfile { base: R::from_f64(base), coefficients: grade.map(R::from_f64) };
+        Some(ParaxialGrin::directed(&field, thickness, R::from_f64(self.indices[row + 1])))
     }
 }
 
 /// The derivative along one coordinate at a zoom position.
-fn gathered<R: Real>(reaches: &[Reach], at_zoom: usize, by_curvature: &[R], by_gap: &[R]) -> R {
+fn sum_effects<R: Real>(
+    reaches: &[CoordinateEffect],
+    at_zoom: usize,
+    by_curvature: &[R],
+    by_gap: &[R],
+) -> R {
     let mut sum = R::ZERO;
     for reach in reaches {
         match *reach {
-            Reach::Curvature { row, factor } => sum += by_curvature[row] * R::from_f64(factor),
-            Reach::Gap { zoom, row, factor } if zoom == at_zoom => {
+            CoordinateEffect::Curvature { row, factor } => {
+                sum += by_curvature[row] * R::from_f64(factor)
+            }
+            CoordinateEffect::Gap { zoom, row, factor } if zoom == at_zoom => {
                 sum += by_gap[row] * R::from_f64(factor);
             }
-            Reach::Gap { .. } => {}
+            CoordinateEffect::Gap { .. } => {}
         }
     }
     sum
 }
 
 /// What a number moves, itself and what follows it.
-fn reaches(lens: &Lens, parameter: Parameter, factor: f64) -> Vec<Reach> {
+fn effects_of(lens: &Lens, parameter: Parameter, factor: f64) -> Vec<CoordinateEffect> {
     let moving =
-        if lens.pickups.is_empty() { vec![(parameter, 1.0)] } else { lens.followers(parameter) };
+        if lens.pickups.is_empty() { vec![(parameter, 1.0)] } else { lens.dependents(parameter) };
     let mut found = Vec::with_capacity(moving.len());
     for (moved, share) in moving {
         let (row, factor) = (moved.surface, factor * share);
         match moved.quantity {
-            Quantity::Curvature => found.push(Reach::Curvature { row, factor }),
-            Quantity::ZoomThickness(zoom) => found.push(Reach::Gap { zoom, row, factor }),
+            Quantity::Curvature => found.push(CoordinateEffect::Curvature { row, factor }),
+            Quantity::ZoomThickness(zoom) => {
+                found.push(CoordinateEffect::Gap { zoom, row, factor })
+            }
             Quantity::Thickness => {
                 let shared = |zoom: &usize| !has_own(lens, *zoom, row);
                 let zooms = (0..lens.zoom_positions()).filter(shared);
-                found.extend(zooms.map(|zoom| Reach::Gap { zoom, row, factor }));
+                found.extend(zooms.map(|zoom| CoordinateEffect::Gap { zoom, row, factor }));
             }
             _ => {}
         }

@@ -1,34 +1,34 @@
 //! Newton's method on the few kept numbers: to the nearest lens, or along given directions.
 
-use super::Unprojectable;
-use super::model::Model;
+use super::ProjectionError;
+use super::model::MarginalRayModel;
 use nalgebra::{DMatrix, DVector};
 
 /// More steps than this are a failure.
-const STEPS: usize = 15;
+const MAX_STEPS: usize = 15;
 
 /// What counts as kept.
 const TOLERANCE: f64 = 1e-12;
 
 /// Steps that turn a lens on the constraint into the nearest one; each costs about a microsecond.
-const POLISHING: usize = 60;
+const MAX_POLISHING_STEPS: usize = 60;
 
 /// How far coordinates may move.
 #[derive(Debug, Clone)]
-pub(super) struct Bounds(Vec<[f64; 2]>);
+pub(super) struct CoordinateBounds(Vec<[f64; 2]>);
 
-impl Bounds {
+impl CoordinateBounds {
     pub(super) fn new(ranges: Vec<[f64; 2]>) -> Self {
         Self(ranges)
     }
 
     /// The same, but for numbers that are outside already: those may stay where they are.
-    pub(super) fn around(&self, at: &[f64]) -> Self {
+    pub(super) fn widen_to_include(&self, at: &[f64]) -> Self {
         let widened = |([low, high], z): (&[f64; 2], &f64)| [low.min(*z), high.max(*z)];
         Self(self.0.iter().zip(at).map(widened).collect())
     }
 
-    fn hold(&self, at: &DVector<f64>) -> bool {
+    fn contain(&self, at: &DVector<f64>) -> bool {
         at.iter().zip(&self.0).all(|(z, [low, high])| (*low..=*high).contains(z))
     }
 
@@ -47,7 +47,7 @@ impl Bounds {
 
 /// Coordinates at which the kept numbers have their target.
 #[derive(Debug, Clone)]
-pub(super) struct Solution {
+pub(super) struct ProjectionSolution {
     pub(super) at: Vec<f64>,
     /// How much of each direction was needed.
     pub(super) multipliers: DVector<f64>,
@@ -58,13 +58,13 @@ pub(super) struct Solution {
     pub(super) exact: bool,
 }
 
-struct Problem<'a> {
-    model: &'a Model,
+struct ProjectionProblem<'a> {
+    model: &'a MarginalRayModel,
     target: &'a [f64],
 }
 
-impl Problem<'_> {
-    fn missing(&self, at: &DVector<f64>) -> DVector<f64> {
+impl ProjectionProblem<'_> {
+    fn residual(&self, at: &DVector<f64>) -> DVector<f64> {
         let values = self.model.values(at.as_slice());
         DVector::from_iterator(values.len(), self.target.iter().zip(&values).map(|(t, v)| t - v))
     }
@@ -97,20 +97,20 @@ fn multipliers(jacobian: &DMatrix<f64>, missing: &DVector<f64>) -> Option<DVecto
 /// bound left there; then, where none did, `z ← z₀ + Jᵀ (J Jᵀ)⁻¹ (c + J (z − z₀))` until the way is
 /// along the normals, which is where (4.22) has its solution.
 pub(super) fn nearest(
-    model: &Model,
+    model: &MarginalRayModel,
     start: &[f64],
     target: &[f64],
-    bounds: &Bounds,
-) -> Result<Solution, Unprojectable> {
-    let problem = Problem { model, target };
-    let mut reached = feasible(&problem, DVector::from_column_slice(start), bounds)?;
+    bounds: &CoordinateBounds,
+) -> Result<ProjectionSolution, ProjectionError> {
+    let problem = ProjectionProblem { model, target };
+    let mut reached = find_feasible(&problem, DVector::from_column_slice(start), bounds)?;
     let start = DVector::from_column_slice(start);
     if !reached.exact {
         return Ok(reached);
     }
-    match polished(&problem, &start, &reached) {
-        Some((at, multipliers)) if bounds.hold(&at) => {
-            reached.error = largest(&problem.missing(&at));
+    match polish(&problem, &start, &reached) {
+        Some((at, multipliers)) if bounds.contain(&at) => {
+            reached.error = largest(&problem.residual(&at));
             reached.at = at.as_slice().to_vec();
             reached.multipliers = multipliers;
         }
@@ -119,21 +119,21 @@ pub(super) fn nearest(
     Ok(reached)
 }
 
-fn feasible(
-    problem: &Problem<'_>,
+fn find_feasible(
+    problem: &ProjectionProblem<'_>,
     mut at: DVector<f64>,
-    bounds: &Bounds,
-) -> Result<Solution, Unprojectable> {
+    bounds: &CoordinateBounds,
+) -> Result<ProjectionSolution, ProjectionError> {
     let count = at.len();
     let mut stopped = vec![false; count];
-    let mut missing = problem.missing(&at);
-    for steps in 0..=STEPS {
+    let mut missing = problem.residual(&at);
+    for steps in 0..=MAX_STEPS {
         let error = largest(&missing);
         if error <= problem.tolerance() {
             let exact = !stopped.iter().any(|s| *s);
             let at = at.as_slice().to_vec();
             let multipliers = DVector::zeros(missing.len());
-            return Ok(Solution { at, multipliers, steps, error, exact });
+            return Ok(ProjectionSolution { at, multipliers, steps, error, exact });
         }
         let mut jacobian = problem.model.jacobian(at.as_slice());
         for i in (0..count).filter(|i| stopped[*i]) {
@@ -141,33 +141,33 @@ fn feasible(
         }
         let held = stopped.iter().filter(|s| **s).count();
         let cause =
-            if held > 0 { Unprojectable::Bounds(held, count) } else { Unprojectable::Singular };
+            if held > 0 { ProjectionError::Bounds(held, count) } else { ProjectionError::Singular };
         let Some(multipliers) = multipliers(&jacobian, &missing) else { return Err(cause) };
         let step = jacobian.transpose() * multipliers;
-        let Some((next, left)) = shortened(problem, &at, &step, error, bounds) else {
+        let Some((next, left)) = shorten_step(problem, &at, &step, error, bounds) else {
             return Err(cause);
         };
         left.into_iter().for_each(|i| stopped[i] = true);
         at = next;
-        missing = problem.missing(&at);
+        missing = problem.residual(&at);
     }
-    Err(Unprojectable::Steps(STEPS))
+    Err(ProjectionError::Steps(MAX_STEPS))
 }
 
 /// The longest of the step and its halves that brings the differences down, or that reaches a
 /// bound first.
-fn shortened(
-    problem: &Problem<'_>,
+fn shorten_step(
+    problem: &ProjectionProblem<'_>,
     at: &DVector<f64>,
     step: &DVector<f64>,
     error: f64,
-    bounds: &Bounds,
+    bounds: &CoordinateBounds,
 ) -> Option<(DVector<f64>, Vec<usize>)> {
     let mut length = 1.0;
     for _ in 0..10 {
         let mut next = at + step * length;
         let left = bounds.clamp(&mut next);
-        let found = largest(&problem.missing(&next));
+        let found = largest(&problem.residual(&next));
         if found < error || !left.is_empty() && found.is_finite() {
             return Some((next, left));
         }
@@ -176,21 +176,21 @@ fn shortened(
     None
 }
 
-fn polished(
-    problem: &Problem<'_>,
+fn polish(
+    problem: &ProjectionProblem<'_>,
     start: &DVector<f64>,
-    reached: &Solution,
+    reached: &ProjectionSolution,
 ) -> Option<(DVector<f64>, DVector<f64>)> {
     let mut at = DVector::from_column_slice(&reached.at);
-    for _ in 0..POLISHING {
+    for _ in 0..MAX_POLISHING_STEPS {
         let jacobian = problem.model.jacobian(at.as_slice());
-        let wanted = problem.missing(&at) + &jacobian * (&at - start);
+        let wanted = problem.residual(&at) + &jacobian * (&at - start);
         let multipliers = multipliers(&jacobian, &wanted)?;
         let next = start + jacobian.transpose() * &multipliers;
         let change = largest(&(&next - &at));
         at = next;
         if change <= 1e-13 * (1.0 + largest(&at)) {
-            let kept = largest(&problem.missing(&at)) <= 1e2 * problem.tolerance();
+            let kept = largest(&problem.residual(&at)) <= 1e2 * problem.tolerance();
             return kept.then_some((at, multipliers));
         }
     }
@@ -199,34 +199,34 @@ fn polished(
 
 /// The coordinates `start + Nᵀ λ` at which the kept numbers have their target, with the rows of
 /// `N` as directions.
-pub(super) fn along(
-    model: &Model,
+pub(super) fn along_normals(
+    model: &MarginalRayModel,
     normals: &DMatrix<f64>,
     start: &[f64],
     target: &[f64],
-    bounds: &Bounds,
-) -> Result<Solution, Unprojectable> {
-    let problem = Problem { model, target };
+    bounds: &CoordinateBounds,
+) -> Result<ProjectionSolution, ProjectionError> {
+    let problem = ProjectionProblem { model, target };
     let start = DVector::from_column_slice(start);
     let place = |multipliers: &DVector<f64>| &start + normals.transpose() * multipliers;
     let mut multipliers = DVector::zeros(normals.nrows());
     let mut at = place(&multipliers);
-    for steps in 0..=STEPS {
-        let missing = problem.missing(&at);
+    for steps in 0..=MAX_STEPS {
+        let missing = problem.residual(&at);
         let error = largest(&missing);
         if error <= problem.tolerance() {
-            if !bounds.hold(&at) {
-                return Err(Unprojectable::Bounds(0, at.len()));
+            if !bounds.contain(&at) {
+                return Err(ProjectionError::Bounds(0, at.len()));
             }
             let at = at.as_slice().to_vec();
-            return Ok(Solution { at, multipliers, steps, error, exact: true });
+            return Ok(ProjectionSolution { at, multipliers, steps, error, exact: true });
         }
         let square = model.jacobian(at.as_slice()) * normals.transpose();
-        let step = square.lu().solve(&missing).ok_or(Unprojectable::Singular)?;
+        let step = square.lu().solve(&missing).ok_or(ProjectionError::Singular)?;
         let halves = (0..10).map(|halvings| &multipliers + &step * 0.5f64.powi(halvings));
-        let better = |tried: &DVector<f64>| largest(&problem.missing(&place(tried))) < error;
-        multipliers = halves.into_iter().find(better).ok_or(Unprojectable::Singular)?;
+        let better = |tried: &DVector<f64>| largest(&problem.residual(&place(tried))) < error;
+        multipliers = halves.into_iter().find(better).ok_or(ProjectionError::Singular)?;
         at = place(&multipliers);
     }
-    Err(Unprojectable::Steps(STEPS))
+    Err(ProjectionError::Steps(MAX_STEPS))
 }

@@ -1,28 +1,28 @@
 //! What a session does with a gradient-index field: it passes wishes on and says news.
 
-use super::{Event, Session};
-use crate::session::forming::{Form, Told};
+use super::{Session, SessionEvent};
+use crate::session::forming::{GrinCommand, Told};
 use crate::session::view::Severity;
-use crate::session::worker::Standing;
+use crate::session::worker::RunStatus;
 
 impl Session {
-    pub(super) fn form(&mut self, wish: Form) {
-        if let Err(why) = self.forming.obey(wish) {
+    pub(super) fn form(&mut self, wish: GrinCommand) {
+        if let Err(why) = self.forming.handle(wish) {
             self.say(Severity::Warning, why);
         }
     }
 
     pub(super) fn hear_forming(&mut self, told: Told) {
         match told {
-            Told::Now(_, standing) => self.events.push(Event::Formed(standing)),
+            Told::Now(_, standing) => self.events.push(SessionEvent::Formed(standing)),
             Told::NotOpened(_, why) | Told::NotWritten(why) => self.say(Severity::Error, why),
             Told::Failed(_, why) => {
                 self.say(Severity::Error, why);
-                self.events.push(Event::Formed(Standing::Stopped));
+                self.events.push(SessionEvent::Formed(RunStatus::Stopped));
             }
             Told::Written(path, report) => {
                 self.say(Severity::Note, report);
-                self.events.push(Event::Saved(path));
+                self.events.push(SessionEvent::Saved(path));
             }
         }
     }

@@ -3,30 +3,32 @@
 mod exploring;
 mod forming;
 
-use super::analyst::{Analyst, Request, Results, Savings};
+use super::analyst::{AnalysisResults, Analyst, EffectTiming, Request};
 use super::command::{Command, Edit};
-use super::edit::edited;
-use super::explorations::ExplorationDesk;
-use super::forming::FormingDesk;
-use super::fronts::FrontDesk;
-use super::history::History;
-use super::laboratory::{Laboratory, Stage};
+use super::edit::apply_edit;
+use super::explorations::StructureSearchState;
+use super::forming::GrinState;
+use super::fronts::ParetoState;
+use super::history::UndoStack;
+use super::laboratory::{ExperimentStatus, ExperimentWorker};
 use super::sweeper::Told;
-use super::view::{Message, Settings, Severity, View};
-use super::worker::{News, Search, Standing, Starter, Task, Worker};
-use crate::experiments::{self, Effort, Report};
+use super::view::{AnalysisSettings, Message, SessionView, Severity};
+use super::worker::{
+    News, OptimizationRequest, OptimizationSnapshot, OptimizerFactory, RunStatus, Worker,
+};
+use crate::experiments::{self, Effort, ExperimentReport};
 use crate::files;
 use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::optimize;
-use crate::optimize::Method;
+use crate::optimize::DescentMethod;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What happened.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Event {
+pub enum SessionEvent {
     /// The design or a setting is another; the view has this version.
     Changed(u64),
     /// A lens was read from this file.
@@ -44,11 +46,11 @@ pub enum Event {
     /// It ended by itself; its result can be taken.
     SearchFinished,
     /// The sweep of a front stands so.
-    Front(Standing),
+    Front(RunStatus),
     /// The search over structure stands so.
-    Explored(Standing),
+    Explored(RunStatus),
     /// A gradient-index field was opened, or the search for it stands so.
-    Formed(Standing),
+    Formed(RunStatus),
     /// Something to tell the person.
     Said(Message),
 }
@@ -63,31 +65,31 @@ const MESSAGES: usize = 200;
 pub struct Session {
     lens: Arc<Lens>,
     version: u64,
-    history: History,
+    history: UndoStack,
     path: Option<PathBuf>,
     /// The lens as its file has it.
     saved: Arc<Lens>,
-    settings: Settings,
+    settings: AnalysisSettings,
     /// The surface that every panel points out.
     selected: Option<usize>,
     messages: Vec<Message>,
     analyst: Analyst,
     worker: Worker,
-    fronts: FrontDesk,
-    explorations: ExplorationDesk,
-    forming: FormingDesk,
+    fronts: ParetoState,
+    explorations: StructureSearchState,
+    forming: GrinState,
     /// A lens that is shown in place of the design.
     candidate: Option<Arc<Lens>>,
     /// Computes the numbers of that lens, or of the one that the search shows.
     follower: Analyst,
     /// That lens, and what the numbers were asked for with.
-    followed: Option<(Arc<Lens>, Settings)>,
-    laboratory: Laboratory,
+    followed: Option<(Arc<Lens>, AnalysisSettings)>,
+    laboratory: ExperimentWorker,
     /// How many searches were begun.
     searches: u64,
     /// The last search, if its result is neither taken nor thrown away.
     search: Option<u64>,
-    events: Vec<Event>,
+    events: Vec<SessionEvent>,
 }
 
 impl Session {
@@ -96,20 +98,20 @@ impl Session {
     /// # Errors
     /// A lens that cannot be used, or a system that can start no thread.
     pub fn new(lens: Lens, wake: impl Fn() + Send + Clone + 'static) -> io::Result<Self> {
-        let start = |task: &Task| {
+        let start = |task: &OptimizationRequest| {
             let started = optimize::start(task.method, &task.lens, &task.goal, task.tolerance);
             started.map_err(|why| why.to_string())
         };
-        Self::with_starter(lens, Box::new(start), wake)
+        Self::with_optimizer(lens, Box::new(start), wake)
     }
 
     /// The same with another way to begin searches.
     ///
     /// # Errors
     /// As [`Session::new`].
-    pub fn with_starter(
+    pub fn with_optimizer(
         lens: Lens,
-        start: Box<Starter>,
+        start: Box<OptimizerFactory>,
         wake: impl Fn() + Send + Clone + 'static,
     ) -> io::Result<Self> {
         lens.check().map_err(io::Error::other)?;
@@ -118,19 +120,19 @@ impl Session {
             saved: Arc::clone(&lens),
             lens,
             version: 1,
-            history: History::default(),
+            history: UndoStack::default(),
             path: None,
-            settings: Settings::default(),
+            settings: AnalysisSettings::default(),
             selected: None,
             messages: Vec::new(),
-            analyst: Analyst::spawn(Savings::Measured, wake.clone())?,
-            follower: Analyst::spawn(Savings::Left, wake.clone())?,
+            analyst: Analyst::spawn(EffectTiming::Measured, wake.clone())?,
+            follower: Analyst::spawn(EffectTiming::Skipped, wake.clone())?,
             followed: None,
-            laboratory: Laboratory::spawn(wake.clone())?,
+            laboratory: ExperimentWorker::spawn(wake.clone())?,
             worker: Worker::spawn(start, wake.clone())?,
-            fronts: FrontDesk::spawn(wake.clone())?,
-            explorations: ExplorationDesk::spawn(wake.clone())?,
-            forming: FormingDesk::spawn(wake)?,
+            fronts: ParetoState::spawn(wake.clone())?,
+            explorations: StructureSearchState::spawn(wake.clone())?,
+            forming: GrinState::spawn(wake)?,
             candidate: None,
             searches: 0,
             search: None,
@@ -141,10 +143,10 @@ impl Session {
     }
 
     /// Does what a command says and tells what happened.
-    pub fn apply(&mut self, command: Command) -> Vec<Event> {
+    pub fn apply(&mut self, command: Command) -> Vec<SessionEvent> {
         match command {
             Command::Edit(edit) => self.edit(&edit),
-            Command::Settle => self.history.settle(),
+            Command::CommitEdit => self.history.commit(),
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),
             Command::New(lens) => self.start_with(*lens, None),
@@ -156,31 +158,31 @@ impl Session {
             Command::Resume => self.worker.resume(),
             Command::Step => self.worker.step(),
             Command::Stop => self.worker.stop(),
-            Command::Take => self.take(),
-            Command::Discard => self.discard(),
-            Command::StartFront { settings, compare } => {
+            Command::AcceptResult => self.take(),
+            Command::DiscardResult => self.discard(),
+            Command::StartPareto { settings, compare } => {
                 self.fronts.start(&self.lens, settings, compare);
             }
-            Command::PauseFront => self.fronts.stand(Standing::Paused),
-            Command::ResumeFront => self.fronts.stand(Standing::Running),
-            Command::StopFront => self.fronts.stand(Standing::Stopped),
-            Command::ClearFronts => self.fronts.clear(),
-            Command::ExportFront(folder) => self.export_front(folder),
-            Command::Explore(wish) => self.explore(wish),
-            Command::Form(wish) => self.form(wish),
+            Command::PausePareto => self.fronts.stand(RunStatus::Paused),
+            Command::ResumePareto => self.fronts.stand(RunStatus::Running),
+            Command::StopPareto => self.fronts.stand(RunStatus::Stopped),
+            Command::ClearPareto => self.fronts.clear(),
+            Command::ExportPareto(folder) => self.export_front(folder),
+            Command::StructureSearch(wish) => self.explore(wish),
+            Command::Grin(wish) => self.form(wish),
             Command::Preview(lens) => self.candidate = lens.map(|lens| Arc::new(*lens)),
-            Command::TakePreview => self.take_preview(),
+            Command::AcceptPreview => self.take_preview(),
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
             Command::ShowZoom(zoom) => self.show_zoom(zoom),
             Command::ShowRays(rays) => self.set_up(|settings| settings.rays = rays.min(MOST_RAYS)),
-            Command::Choose(effect, choice) => self.set_up(|s| s.choices.choose(effect, choice)),
+            Command::SetEffect(effect, choice) => self.set_up(|s| s.overrides.set(effect, choice)),
             Command::ShowPupils(shown) => self.set_up(|settings| settings.pupils = shown),
             Command::ShowPupilWavelength(wavelength) => {
                 self.set_up(|settings| settings.pupil_wavelength = wavelength);
             }
-            Command::Experiment { id, effort } => self.experiment(&id, effort),
+            Command::StartExperiment { id, effort } => self.experiment(&id, effort),
             Command::CancelExperiment => self.laboratory.cancel(),
-            Command::CloseExperiment => self.laboratory.put_away(),
+            Command::DismissExperiment => self.laboratory.dismiss(),
             Command::SaveExperiment(folder) => self.save_experiment(&folder),
             Command::Select(surface) => self.selected = surface,
             Command::ClearMessages => self.messages.clear(),
@@ -189,39 +191,39 @@ impl Session {
     }
 
     /// What happened since the last call, in the background too.
-    pub fn poll(&mut self) -> Vec<Event> {
+    pub fn poll(&mut self) -> Vec<SessionEvent> {
         for news in self.worker.news() {
             self.hear(news);
         }
-        for told in self.fronts.told() {
+        for told in self.fronts.drain_events() {
             self.hear_front(told);
         }
-        self.fronts.keep_up(&self.lens);
-        for told in self.explorations.told() {
+        self.fronts.sync(&self.lens);
+        for told in self.explorations.drain_events() {
             self.hear_exploration(told);
         }
-        self.explorations.keep_up(&self.lens);
-        for told in self.forming.told() {
+        self.explorations.sync(&self.lens);
+        for told in self.forming.drain_events() {
             self.hear_forming(told);
         }
-        self.forming.keep_up();
+        self.forming.sync();
         self.follow();
         std::mem::take(&mut self.events)
     }
 
     /// A snapshot for panels.
-    pub fn view(&self) -> View {
-        View {
+    pub fn view(&self) -> SessionView {
+        SessionView {
             lens: Arc::clone(&self.lens),
             version: self.version,
             results: self.analyst.results(),
-            search: self.search(),
-            fronts: self.fronts.view(),
-            explorations: self.explorations.view(),
-            forming: self.forming.view(),
-            candidate: self.candidate.clone(),
-            preview: self.preview(),
-            trial: self.laboratory.trial(),
+            optimization: self.search(),
+            pareto: self.fronts.view(),
+            structure_search: self.explorations.view(),
+            grin: self.forming.view(),
+            preview_lens: self.candidate.clone(),
+            preview_results: self.preview(),
+            experiment: self.laboratory.run(),
             messages: self.messages.clone(),
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),
@@ -238,7 +240,7 @@ impl Session {
     }
 
     /// The newest numbers, maybe of an older version.
-    pub fn results(&self) -> Option<Arc<Results>> {
+    pub fn results(&self) -> Option<Arc<AnalysisResults>> {
         self.analyst.results()
     }
 
@@ -247,15 +249,17 @@ impl Session {
         !Arc::ptr_eq(&self.lens, &self.saved) && self.lens != self.saved
     }
 
-    fn search(&self) -> Option<Arc<Search>> {
+    fn search(&self) -> Option<Arc<OptimizationSnapshot>> {
         self.worker.search().filter(|search| Some(search.number) == self.search)
     }
 
     /// The lens that is shown in place of the design, and what numbers of it are known by: the
     /// number of the search that it belongs to, or 0.
     fn followed(&self) -> Option<(u64, Arc<Lens>)> {
-        let explored = || self.explorations.shown().map(|(number, lens)| (EXPLORED | number, lens));
-        let search = || self.search().map(|search| (search.number, Arc::clone(search.shown())));
+        let explored =
+            || self.explorations.previewed().map(|(number, lens)| (EXPLORED | number, lens));
+        let search =
+            || self.search().map(|search| (search.number, Arc::clone(search.displayed_lens())));
         self.candidate.clone().map(|lens| (0, lens)).or_else(explored).or_else(search)
     }
 
@@ -275,18 +279,18 @@ impl Session {
     }
 
     /// The numbers of the lens that is shown in place of the design, if there are any yet.
-    fn preview(&self) -> Option<Arc<Results>> {
+    fn preview(&self) -> Option<Arc<AnalysisResults>> {
         let (number, _) = self.followed()?;
         self.follower.results().filter(|results| results.version == number)
     }
 
     fn edit(&mut self, edit: &Edit) {
         let cell = edit.cell();
-        let base = self.history.before_typing(cell).unwrap_or(&self.lens);
-        match edited(base, edit) {
+        let base = self.history.before_edit(cell).unwrap_or(&self.lens);
+        match apply_edit(base, edit) {
             Ok(lens) if lens == *self.lens => {}
             Ok(lens) => {
-                self.history.note(Arc::clone(&self.lens), edit.title(), cell);
+                self.history.push(Arc::clone(&self.lens), edit.title(), cell);
                 self.show(Arc::new(lens));
             }
             Err(why) => self.say(Severity::Warning, why.to_string()),
@@ -317,7 +321,7 @@ impl Session {
     fn renew(&mut self) {
         self.version += 1;
         self.ask();
-        self.events.push(Event::Changed(self.version));
+        self.events.push(SessionEvent::Changed(self.version));
     }
 
     fn ask(&self) {
@@ -334,7 +338,7 @@ impl Session {
             self.messages.remove(0);
         }
         self.messages.push(message.clone());
-        self.events.push(Event::Said(message));
+        self.events.push(SessionEvent::Said(message));
     }
 
     /// Replaces the design by another one with a history of its own.
@@ -345,7 +349,7 @@ impl Session {
         self.discard();
         self.fronts.clear();
         let lens = Arc::new(lens);
-        self.history = History::default();
+        self.history = UndoStack::default();
         self.saved = Arc::clone(&lens);
         self.path = path;
         self.settings.zoom = 0;
@@ -358,12 +362,12 @@ impl Session {
         match files::open(path) {
             Ok(opened) => {
                 // A foreign file is not written to under its own name without asking.
-                let own = (opened.format == files::Format::Native).then(|| path.to_owned());
+                let own = (opened.format == files::LensFormat::Native).then(|| path.to_owned());
                 self.start_with(opened.lens, own);
                 if let Some(report) = opened.report {
                     self.say(Severity::Note, format!("imported {}\n{report}", path.display()));
                 }
-                self.events.push(Event::Opened(path.to_owned()));
+                self.events.push(SessionEvent::Opened(path.to_owned()));
             }
             Err(why) => self.say(Severity::Error, why.to_string()),
         }
@@ -375,10 +379,10 @@ impl Session {
             return self.say(Severity::Warning, text.to_owned());
         };
         match files::save(&self.lens, &path) {
-            Ok(saved) if saved.format == files::Format::Native => {
+            Ok(saved) if saved.format == files::LensFormat::Native => {
                 self.saved = Arc::clone(&self.lens);
                 self.path = Some(path.clone());
-                self.events.push(Event::Saved(path));
+                self.events.push(SessionEvent::Saved(path));
             }
             // A foreign file may hold less than the lens, which stays unsaved.
             Ok(saved) => self.exported(&path, saved),
@@ -399,16 +403,16 @@ impl Session {
         let proof = saved.proof.map(|p| p.to_string());
         let parts = [head, proof, saved.report.map(|r| r.to_string())];
         self.say(Severity::Note, parts.into_iter().flatten().collect::<Vec<_>>().join("\n"));
-        self.events.push(Event::Saved(path.to_owned()));
+        self.events.push(SessionEvent::Saved(path.to_owned()));
     }
 
-    fn optimize(&mut self, method: Method, goal: Goal) {
+    fn optimize(&mut self, method: DescentMethod, goal: Goal) {
         self.discard();
         self.candidate = None;
         self.searches += 1;
         self.search = Some(self.searches);
         let (lens, tolerance) = (Arc::clone(&self.lens), self.settings.tolerance);
-        self.worker.start(self.searches, Task { method, lens, goal, tolerance });
+        self.worker.start(self.searches, OptimizationRequest { method, lens, goal, tolerance });
     }
 
     /// Makes the best lens of the search the design, as one step.
@@ -419,7 +423,7 @@ impl Session {
         };
         match carried(&search, &self.lens) {
             Ok(lens) => {
-                self.history.note(
+                self.history.push(
                     Arc::clone(&self.lens),
                     "take the search's lens".to_owned(),
                     None,
@@ -443,7 +447,7 @@ impl Session {
         match lens.check() {
             Ok(()) => {
                 let title = "take a lens of the front".to_owned();
-                self.history.note(Arc::clone(&self.lens), title, None);
+                self.history.push(Arc::clone(&self.lens), title, None);
                 self.show(Arc::new(lens));
             }
             Err(why) => self.say(Severity::Warning, why.to_string()),
@@ -460,15 +464,15 @@ impl Session {
 
     fn hear_front(&mut self, told: Told) {
         match told {
-            Told::Now(_, standing) => self.events.push(Event::Front(standing)),
+            Told::Now(_, standing) => self.events.push(SessionEvent::Front(standing)),
             Told::Failed(_, why) => {
                 self.say(Severity::Error, format!("no front: {why}"));
-                self.events.push(Event::Front(Standing::Stopped));
+                self.events.push(SessionEvent::Front(RunStatus::Stopped));
             }
             Told::Written(folder, files) => {
                 let text = format!("{files} files of the front written to {}", folder.display());
                 self.say(Severity::Note, text);
-                self.events.push(Event::Saved(folder));
+                self.events.push(SessionEvent::Saved(folder));
             }
             Told::NotWritten(why) => self.say(Severity::Error, why),
         }
@@ -476,8 +480,8 @@ impl Session {
 
     /// Saves searches over structure in a folder from now on, where they have no other place, and
     /// offers to go on with the one that was left there.
-    pub fn keep_searches_in(&mut self, folder: impl Into<PathBuf>) {
-        self.explorations.keep_in(folder.into());
+    pub fn set_save_folder(&mut self, folder: impl Into<PathBuf>) {
+        self.explorations.set_save_folder(folder.into());
     }
 
     fn discard(&mut self) {
@@ -487,16 +491,16 @@ impl Session {
 
     fn hear(&mut self, news: News) {
         let (number, event) = match news {
-            News::Started(number) => (number, Event::SearchStarted),
-            News::Paused(number) => (number, Event::SearchPaused),
-            News::Resumed(number) => (number, Event::SearchResumed),
-            News::Stopped(number) => (number, Event::SearchStopped),
-            News::Finished(number) => (number, Event::SearchFinished),
+            News::Started(number) => (number, SessionEvent::SearchStarted),
+            News::Paused(number) => (number, SessionEvent::SearchPaused),
+            News::Resumed(number) => (number, SessionEvent::SearchResumed),
+            News::Stopped(number) => (number, SessionEvent::SearchStopped),
+            News::Finished(number) => (number, SessionEvent::SearchFinished),
             News::Failed(number, why) => {
                 if Some(number) == self.search {
                     self.say(Severity::Error, why);
                 }
-                (number, Event::SearchStopped)
+                (number, SessionEvent::SearchStopped)
             }
         };
         if Some(number) == self.search {
@@ -506,18 +510,19 @@ impl Session {
 
     fn experiment(&mut self, id: &str, effort: Effort) {
         match experiments::find(id) {
-            Some(study) => self.laboratory.begin(study, effort),
+            Some(study) => self.laboratory.start(study, effort),
             None => self.say(Severity::Warning, format!("there is no experiment `{id}`")),
         }
     }
 
     fn save_experiment(&mut self, folder: &Path) {
-        let trial = self.laboratory.trial();
-        let Some(Stage::Done(report)) = trial.as_deref().map(|trial| &trial.stage) else {
+        let trial = self.laboratory.run();
+        let Some(ExperimentStatus::Done(report)) = trial.as_deref().map(|trial| &trial.status)
+        else {
             let text = "there is no experiment whose results could be saved";
             return self.say(Severity::Warning, text.to_owned());
         };
-        let mut report = Report::clone(report);
+        let mut report = ExperimentReport::clone(report);
         let made = std::fs::create_dir_all(folder).map_err(|why| why.to_string());
         let written = made.and_then(|()| report.write(folder).map_err(|why| why.to_string()));
         match written {
@@ -550,7 +555,7 @@ impl Session {
     }
 
     /// Changes a setting; the same setting again changes nothing.
-    fn set_up(&mut self, change: impl FnOnce(&mut Settings)) {
+    fn set_up(&mut self, change: impl FnOnce(&mut AnalysisSettings)) {
         let before = self.settings.clone();
         change(&mut self.settings);
         if self.settings != before {
@@ -564,9 +569,9 @@ const MOST_RAYS: usize = 2000;
 
 /// The best lens of a search; where the design was edited meanwhile, the design with the numbers
 /// that the search changed.
-fn carried(search: &Search, design: &Arc<Lens>) -> Result<Lens, String> {
+fn carried(search: &OptimizationSnapshot, design: &Arc<Lens>) -> Result<Lens, String> {
     let best = &search.best;
-    if Arc::ptr_eq(&search.task.lens, design) {
+    if Arc::ptr_eq(&search.request.lens, design) {
         return Ok(Lens::clone(best));
     }
     let same_rows =
@@ -575,23 +580,23 @@ fn carried(search: &Search, design: &Arc<Lens>) -> Result<Lens, String> {
         return Err("the design has other surfaces now than when the search began".to_owned());
     }
     let mut lens = Lens::clone(design);
-    for variable in &search.task.lens.variables {
+    for variable in &search.request.lens.variables {
         if let Some(value) = best.get(variable.parameter) {
             lens.set(variable.parameter, value);
         }
     }
-    let lens = edited(&lens, &Edit::SetName(design.name.clone()));
+    let lens = apply_edit(&lens, &Edit::SetName(design.name.clone()));
     lens.map_err(|why| format!("the result does not fit the design as it is now: {why}"))
 }
 
-impl Search {
+impl OptimizationSnapshot {
     /// The lens to look at: the current one while it searches, the best one afterwards.
-    pub fn shown(&self) -> &Arc<Lens> {
-        if self.is_under_way() { &self.current } else { &self.best }
+    pub fn displayed_lens(&self) -> &Arc<Lens> {
+        if self.is_active() { &self.current } else { &self.best }
     }
 
     /// Whether it takes steps or can go on.
-    pub fn is_under_way(&self) -> bool {
-        self.standing.can_go_on()
+    pub fn is_active(&self) -> bool {
+        self.status.is_active()
     }
 }

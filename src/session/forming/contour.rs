@@ -24,13 +24,13 @@ pub(super) fn contours(
     let (first, last) = ((low / spacing).ceil() as i64, (high / spacing).floor() as i64);
     let of = |n: i64| {
         let level = n as f64 * spacing;
-        Contour { level, pieces: pieces(values, size, frame, level) }
+        Contour { level, pieces: level_set(values, size, frame, level) }
     };
     (first..=last).map(of).filter(|contour| !contour.pieces.is_empty()).collect()
 }
 
 /// Straight pieces of where a raster has a value.
-pub(super) fn pieces(
+pub(super) fn level_set(
     values: &[f64],
     [width, height]: [usize; 2],
     frame: [[f64; 2]; 2],

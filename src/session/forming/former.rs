@@ -3,14 +3,14 @@
 //! The search takes the same steps as one without a window: looking at it, holding it and writing
 //! it change nothing. A panic inside ends the search and not the session: what was found stays.
 
-use super::subject::{Origin, Subject};
+use super::subject::{DocumentSource, GrinDocument};
 use crate::files;
 use crate::grin::Integrator;
-use crate::grin_task::{Medium, Progress, Runner, Space};
+use crate::grin_task::{Domain, GrinField, GrinOptimizer, GrinProgress};
 use crate::session::background::{Background, Outbox, Work, guarded, pool};
-use crate::session::clock::{Pace, Timed, timed};
+use crate::session::clock::{Throttle, Timed, time};
 use crate::session::slot::Slot;
-use crate::session::worker::Standing;
+use crate::session::worker::RunStatus;
 use rayon::ThreadPool;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,23 +22,23 @@ const BETWEEN: Duration = Duration::from_millis(100);
 /// How many points of the history are kept; beyond that every second one goes.
 const HISTORY: usize = 3000;
 /// Most nodes along a side of a volume that is written.
-pub const MOST_NODES: usize = 513;
+pub const MAX_NODES: usize = 513;
 
 /// What is open, and how far its search is.
 #[derive(Debug, Clone)]
-pub struct Formation {
+pub struct GrinRun {
     /// Which of the session it is, counted from 1.
     pub number: u64,
     /// How the search stands; one that waits for its first step is held, a volume has none.
-    pub standing: Standing,
+    pub status: RunStatus,
     /// What is open.
-    pub subject: Arc<Subject>,
+    pub document: Arc<GrinDocument>,
     /// The field to look at: the current one as long as the search can go on, then the best one.
-    pub medium: Arc<Medium>,
+    pub field: Arc<GrinField>,
     /// What the last step did; `None` before the first.
-    pub progress: Option<Progress>,
+    pub progress: Option<GrinProgress>,
     /// The loss against the step, at most a few thousand points of the whole way.
-    pub history: Arc<Vec<Loss>>,
+    pub history: Arc<Vec<LossSample>>,
     /// Rays traced for the loss so far, each with its way back.
     pub rays: u64,
     /// The time that the steps took, in seconds, pauses apart.
@@ -52,7 +52,7 @@ pub struct Formation {
 
 /// A point of the history.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Loss {
+pub struct LossSample {
     /// Steps so far.
     pub step: usize,
     /// The loss of the field by the rays of this step.
@@ -63,26 +63,26 @@ pub struct Loss {
     pub level: usize,
 }
 
-impl Formation {
-    fn new(number: u64, subject: Subject, runner: Option<&Runner>) -> Self {
-        let standing = if runner.is_some() { Standing::Paused } else { Standing::Stopped };
+impl GrinRun {
+    fn new(number: u64, subject: GrinDocument, runner: Option<&GrinOptimizer>) -> Self {
+        let standing = if runner.is_some() { RunStatus::Paused } else { RunStatus::Stopped };
         Self {
             number,
-            standing,
-            medium: Arc::new(subject.start.clone()),
-            subject: Arc::new(subject),
+            status: standing,
+            field: Arc::new(subject.start.clone()),
+            document: Arc::new(subject),
             progress: None,
             history: Arc::default(),
             rays: 0,
             seconds: 0.0,
             saved: false,
-            tracing: runner.map(Runner::tracing),
+            tracing: runner.map(GrinOptimizer::tracing),
         }
     }
 
     /// Whether it takes steps or can.
-    pub fn is_under_way(&self) -> bool {
-        self.standing.can_go_on()
+    pub fn is_active(&self) -> bool {
+        self.status.is_active()
     }
 
     /// Whether a field has been formed that is in no file as it is.
@@ -92,14 +92,14 @@ impl Formation {
 
     /// Whether there is a search that has not taken a step yet.
     pub fn is_ready(&self) -> bool {
-        self.is_under_way() && self.progress.is_none()
+        self.is_active() && self.progress.is_none()
     }
 }
 
 /// What happened; most of it carries the number of what it happened to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::session) enum Told {
-    Now(u64, Standing),
+    Now(u64, RunStatus),
     /// It could not be opened: what was open stays so.
     NotOpened(u64, String),
     Failed(u64, String),
@@ -110,9 +110,9 @@ pub(in crate::session) enum Told {
 /// What the thread is told.
 #[derive(Debug)]
 enum Order {
-    Open(u64, Origin),
+    Open(u64, DocumentSource),
     Start,
-    Stand(Standing),
+    Stand(RunStatus),
     Write(PathBuf, usize),
     Close,
 }
@@ -121,7 +121,7 @@ enum Order {
 #[derive(Debug)]
 pub(super) struct Former {
     thread: Background<Order, Told>,
-    shown: Slot<Formation>,
+    shown: Slot<GrinRun>,
 }
 
 impl Former {
@@ -129,13 +129,13 @@ impl Former {
         let shown = Slot::default();
         let place = shown.clone();
         let desk = |outbox| {
-            let pace = Pace::new(BETWEEN);
+            let pace = Throttle::new(BETWEEN);
             Desk { outbox, shown: place, pool: None, pace, run: None }
         };
         Ok(Self { thread: Background::spawn("form", wake, desk)?, shown })
     }
 
-    pub(super) fn open(&self, number: u64, origin: Origin) {
+    pub(super) fn open(&self, number: u64, origin: DocumentSource) {
         self.thread.tell(Order::Open(number, origin));
     }
 
@@ -145,7 +145,7 @@ impl Former {
     }
 
     /// Holds the search, lets it go on or ends it, after its step.
-    pub(super) fn stand(&self, standing: Standing) {
+    pub(super) fn stand(&self, standing: RunStatus) {
         self.thread.tell(Order::Stand(standing));
     }
 
@@ -159,7 +159,7 @@ impl Former {
     }
 
     /// How far it is.
-    pub(super) fn formation(&self) -> Option<Arc<Formation>> {
+    pub(super) fn formation(&self) -> Option<Arc<GrinRun>> {
         self.shown.latest()
     }
 
@@ -172,17 +172,17 @@ impl Former {
 /// What the thread works with.
 struct Desk {
     outbox: Outbox<Told>,
-    shown: Slot<Formation>,
+    shown: Slot<GrinRun>,
     /// Threads of its own, from the first search on: what is looked at does not queue behind it.
     pool: Option<ThreadPool>,
-    pace: Pace,
+    pace: Throttle,
     run: Option<Run>,
 }
 
 /// What is open.
 struct Run {
-    runner: Option<Runner>,
-    state: Formation,
+    runner: Option<GrinOptimizer>,
+    state: GrinRun,
     /// Every so many steps there is a point of the history.
     stride: usize,
 }
@@ -191,18 +191,18 @@ impl Work for Desk {
     type Order = Order;
 
     fn is_running(&self) -> bool {
-        self.run.as_ref().is_some_and(|run| run.state.standing == Standing::Running)
+        self.run.as_ref().is_some_and(|run| run.state.status == RunStatus::Running)
     }
 
     fn obey(&mut self, order: Order) {
         match order {
-            Order::Open(number, origin) => match guarded(|| Subject::open(&origin)) {
+            Order::Open(number, origin) => match guarded(|| GrinDocument::open(&origin)) {
                 Ok((subject, runner)) => self.show(number, subject, runner),
                 Err(why) => self.outbox.emit(Told::NotOpened(number, why)),
             },
             Order::Start => self.start(),
             Order::Stand(standing) => {
-                if self.run.as_ref().is_some_and(|run| run.state.is_under_way()) {
+                if self.run.as_ref().is_some_and(|run| run.state.is_active()) {
                     self.stand(standing);
                 }
             }
@@ -214,8 +214,8 @@ impl Work for Desk {
     fn advance(&mut self) {
         let (Some(run), Some(pool)) = (&mut self.run, &self.pool) else { return };
         match guarded(|| run.step(pool)) {
-            Ok(true) => self.stand(Standing::Finished),
-            Ok(false) if self.pace.is_due() => {
+            Ok(true) => self.stand(RunStatus::Finished),
+            Ok(false) if self.pace.ready() => {
                 self.shown.set(run.look());
                 self.outbox.wake();
             }
@@ -226,9 +226,9 @@ impl Work for Desk {
 }
 
 impl Desk {
-    fn show(&mut self, number: u64, subject: Subject, runner: Option<Runner>) {
-        let state = Formation::new(number, subject, runner.as_ref());
-        let standing = state.standing;
+    fn show(&mut self, number: u64, subject: GrinDocument, runner: Option<GrinOptimizer>) {
+        let state = GrinRun::new(number, subject, runner.as_ref());
+        let standing = state.status;
         self.shown.set(state.clone());
         self.run = Some(Run { runner, state, stride: 1 });
         self.outbox.emit(Told::Now(number, standing));
@@ -244,25 +244,25 @@ impl Desk {
             run.restart()
         });
         match begun {
-            Ok(()) => self.stand(Standing::Running),
+            Ok(()) => self.stand(RunStatus::Running),
             Err(why) => self.give_up(why),
         }
     }
 
     /// Lets the search stand otherwise, shows it and says so.
-    fn stand(&mut self, standing: Standing) {
+    fn stand(&mut self, standing: RunStatus) {
         let Some(run) = &mut self.run else { return };
         // The best field is known once the one that it is stopped at is judged.
         let settled = match (&mut run.runner, standing) {
-            (Some(runner), Standing::Stopped) => {
-                guarded(|| runner.settle().map_err(|why| why.to_string()))
+            (Some(runner), RunStatus::Stopped) => {
+                guarded(|| runner.finish().map_err(|why| why.to_string()))
             }
             _ => Ok(()),
         };
         if let Err(why) = settled {
             return self.give_up(why);
         }
-        run.state.standing = standing;
+        run.state.status = standing;
         let number = run.state.number;
         self.shown.set(run.look());
         self.outbox.emit(Told::Now(number, standing));
@@ -270,7 +270,7 @@ impl Desk {
 
     fn give_up(&mut self, why: String) {
         let Some(run) = &mut self.run else { return };
-        run.state.standing = Standing::Stopped;
+        run.state.status = RunStatus::Stopped;
         let number = run.state.number;
         self.shown.set(run.look());
         self.outbox.emit(Told::Failed(number, why));
@@ -296,12 +296,12 @@ impl Desk {
 impl Run {
     /// Makes ready for the first step.
     fn restart(&mut self) -> Result<(), String> {
-        let Some(task) = &self.state.subject.task else {
+        let Some(task) = &self.state.document.task else {
             return Err("a volume has no task to work on".to_owned());
         };
         if self.state.progress.is_some() {
-            let runner = Runner::new(task).map_err(|why| why.to_string())?;
-            self.state.medium = Arc::new(runner.current().clone());
+            let runner = GrinOptimizer::new(task).map_err(|why| why.to_string())?;
+            self.state.field = Arc::new(runner.current().clone());
             self.runner = Some(runner);
             self.state.progress = None;
             self.state.history = Arc::default();
@@ -314,7 +314,7 @@ impl Run {
     /// Whether the step was the last one.
     fn step(&mut self, pool: &ThreadPool) -> Result<bool, String> {
         let Some(runner) = &mut self.runner else { return Ok(true) };
-        let Timed { value, ms } = timed(|| pool.install(|| runner.step()));
+        let Timed { value, ms } = time(|| pool.install(|| runner.step()));
         let progress = value.map_err(|why| why.to_string())?;
         let finished = progress.finished;
         self.state.seconds += 1e-3 * ms;
@@ -324,11 +324,11 @@ impl Run {
         Ok(finished)
     }
 
-    fn note(&mut self, progress: &Progress) {
-        let Progress { step, loss, best, level, finished, .. } = *progress;
+    fn note(&mut self, progress: &GrinProgress) {
+        let GrinProgress { step, loss, best, level, finished, .. } = *progress;
         let history = Arc::make_mut(&mut self.state.history);
         if finished || step.is_multiple_of(self.stride) {
-            history.push(Loss { step, current: loss, best, level });
+            history.push(LossSample { step, current: loss, best, level });
         }
         if history.len() > HISTORY {
             self.stride *= 2;
@@ -337,14 +337,14 @@ impl Run {
     }
 
     /// Takes over what the search has found.
-    fn look(&mut self) -> Formation {
+    fn look(&mut self) -> GrinRun {
         if let Some(runner) = &self.runner {
-            let under_way = self.state.is_under_way();
+            let under_way = self.state.is_active();
             let medium = if under_way { runner.current() } else { runner.best() };
-            if *self.state.medium != *medium {
-                self.state.medium = Arc::new(medium.clone());
+            if *self.state.field != *medium {
+                self.state.field = Arc::new(medium.clone());
             }
-            self.state.rays = runner.rays();
+            self.state.rays = runner.rays_traced();
             self.state.tracing = Some(runner.tracing());
         }
         self.state.clone()
@@ -358,15 +358,15 @@ impl Run {
         if !known("npz") && !known("json") {
             return Err(format!("{}: expected a name that ends in .npz or .json", path.display()));
         }
-        if !(2..=MOST_NODES).contains(&nodes) {
-            return Err(format!("{nodes} nodes along a side: expected 2 to {MOST_NODES}"));
+        if !(2..=MAX_NODES).contains(&nodes) {
+            return Err(format!("{nodes} nodes along a side: expected 2 to {MAX_NODES}"));
         }
-        let subject = &self.state.subject;
-        let medium = self.runner.as_ref().map_or(&subject.start, Runner::best);
+        let subject = &self.state.document;
+        let medium = self.runner.as_ref().map_or(&subject.start, GrinOptimizer::best);
         let volume = match &subject.task {
             Some(task) => task.volume(medium, nodes),
             // The nodes are written as they are, whatever the space.
-            None => medium.volume(Space::Cube { half: 1.0 }, nodes),
+            None => medium.volume(Domain::Cube { half: 1.0 }, nodes),
         };
         let volume = volume.map_err(|why| why.to_string())?;
         let files = files::write_volume(path, &volume).map_err(|why| why.to_string())?;

@@ -14,18 +14,18 @@ mod wish;
 
 pub use contour::Contour;
 pub(super) use former::Told;
-pub use former::{Formation, Loss, MOST_NODES};
-pub use sight::{Quantity, Sight};
-pub use slice::{Profile, Slice};
-pub use subject::{Origin, Subject};
-pub use wish::Form;
+pub use former::{GrinRun, LossSample, MAX_NODES};
+pub use sight::{SliceQuantity, SliceSettings};
+pub use slice::{IndexProfile, Slice};
+pub use subject::{DocumentSource, GrinDocument};
+pub use wish::GrinCommand;
 
-use super::clock::{Pace, Timed, timed};
-use super::worker::Standing;
-use crate::grin_task::{Medium, Seen};
+use super::clock::{Throttle, Timed, time};
+use super::worker::RunStatus;
+use crate::grin_task::{GrinField, ViewReport};
 use former::Former;
-use observer::Observer;
-use slice::{Wanted, slice};
+use observer::LatestRequestWorker;
+use slice::{SliceRequest, compute_slice};
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
@@ -35,44 +35,44 @@ const BETWEEN: Duration = Duration::from_secs(1);
 
 /// All light of a task in a field, and how long that took.
 #[derive(Debug, Clone)]
-pub struct Sighting {
+pub struct GrinAnalysis {
     /// The task.
-    pub subject: Arc<Subject>,
+    pub document: Arc<GrinDocument>,
     /// The field.
-    pub medium: Arc<Medium>,
+    pub field: Arc<GrinField>,
     /// Every view of the task.
-    pub views: Timed<Vec<Seen>>,
+    pub views: Timed<Vec<ViewReport>>,
 }
 
 /// What is known about the gradient-index field.
 #[derive(Debug, Clone, Default)]
-pub struct Forming {
+pub struct GrinView {
     /// What is open, and how far its search is.
-    pub run: Option<Arc<Formation>>,
+    pub run: Option<Arc<GrinRun>>,
     /// Whether something is being opened.
     pub opening: bool,
     /// Whether a field is being written.
     pub writing: bool,
     /// How the search will stand once its step is done, where it was told so.
-    pub pending: Option<Standing>,
+    pub pending: Option<RunStatus>,
     /// Why the last thing could not be opened, or why its search broke.
-    pub failed: Option<String>,
+    pub error: Option<String>,
     /// How it is looked at.
-    pub sight: Sight,
+    pub slice_settings: SliceSettings,
     /// Whether it is looked at.
-    pub watched: bool,
+    pub is_active: bool,
     /// The newest slice, maybe of a step or a sight before; or why there is none.
     pub slice: Option<Arc<Result<Slice, String>>>,
     /// All light of the task, maybe some steps before; or why that cannot be seen.
-    pub sighting: Option<Arc<Result<Sighting, String>>>,
+    pub analysis: Option<Arc<Result<GrinAnalysis, String>>>,
 }
 
 /// What a session keeps of it.
 #[derive(Debug)]
-pub(super) struct FormingDesk {
+pub(super) struct GrinState {
     former: Former,
-    slicer: Observer<Wanted, Slice>,
-    viewer: Observer<(Arc<Subject>, Arc<Medium>), Sighting>,
+    slicer: LatestRequestWorker<SliceRequest, Slice>,
+    viewer: LatestRequestWorker<(Arc<GrinDocument>, Arc<GrinField>), GrinAnalysis>,
     /// How many were asked for.
     count: u64,
     /// What is open.
@@ -80,84 +80,88 @@ pub(super) struct FormingDesk {
     /// What was asked for and is not open yet.
     opening: Option<u64>,
     writing: bool,
-    pending: Option<Standing>,
-    failed: Option<String>,
-    sight: Sight,
-    watched: bool,
+    pending: Option<RunStatus>,
+    error: Option<String>,
+    slice_settings: SliceSettings,
+    is_active: bool,
     /// The slice and the field whose light was asked for.
-    asked: Option<Wanted>,
-    followed: Option<Arc<Medium>>,
-    pace: Pace,
+    asked: Option<SliceRequest>,
+    followed: Option<Arc<GrinField>>,
+    pace: Throttle,
 }
 
-impl FormingDesk {
+impl GrinState {
     pub(super) fn spawn(wake: impl Fn() + Send + Clone + 'static) -> io::Result<Self> {
         Ok(Self {
             former: Former::spawn(wake.clone())?,
-            slicer: Observer::spawn("slice", wake.clone(), |wanted| Ok(slice(wanted)))?,
-            viewer: Observer::spawn("light", wake, |(subject, medium)| sighting(&subject, medium))?,
+            slicer: LatestRequestWorker::spawn("slice", wake.clone(), |wanted| {
+                Ok(compute_slice(wanted))
+            })?,
+            viewer: LatestRequestWorker::spawn("light", wake, |(subject, medium)| {
+                sighting(&subject, medium)
+            })?,
             count: 0,
             number: None,
             opening: None,
             writing: false,
             pending: None,
-            failed: None,
-            sight: Sight::default(),
-            watched: false,
+            error: None,
+            slice_settings: SliceSettings::default(),
+            is_active: false,
             asked: None,
             followed: None,
-            pace: Pace::new(BETWEEN),
+            pace: Throttle::new(BETWEEN),
         })
     }
 
     /// Does what a person asks for; why that cannot be done.
-    pub(super) fn obey(&mut self, wish: Form) -> Result<(), String> {
+    pub(super) fn handle(&mut self, wish: GrinCommand) -> Result<(), String> {
         match wish {
-            Form::Open(Some(path)) => self.open(Origin::File(path)),
-            Form::Builtin(name) => self.open(Origin::Builtin(name)),
-            Form::Start => self.start()?,
-            Form::Pause => self.stand(Standing::Paused),
-            Form::Resume => self.stand(Standing::Running),
-            Form::Stop => self.stand(Standing::Stopped),
-            Form::Save { path: Some(path), nodes } => {
+            GrinCommand::OpenFile(Some(path)) => self.open(DocumentSource::File(path)),
+            GrinCommand::OpenBuiltin(name) => self.open(DocumentSource::Builtin(name)),
+            GrinCommand::Start => self.start()?,
+            GrinCommand::Pause => self.stand(RunStatus::Paused),
+            GrinCommand::Resume => self.stand(RunStatus::Running),
+            GrinCommand::Stop => self.stand(RunStatus::Stopped),
+            GrinCommand::Save { path: Some(path), nodes } => {
                 self.writing = true;
                 self.former.write(path, nodes);
             }
-            Form::Open(None) | Form::Save { path: None, .. } => {
+            GrinCommand::OpenFile(None) | GrinCommand::Save { path: None, .. } => {
                 return Err("no file was named".to_owned());
             }
-            Form::Close => self.close(),
-            Form::Look(sight) => {
+            GrinCommand::Close => self.close(),
+            GrinCommand::SetSlice(sight) => {
                 let run = self.run();
-                self.sight = run.map_or(sight, |run| run.subject.held(sight));
+                self.slice_settings = run.map_or(sight, |run| run.document.clamp_slice(sight));
             }
-            Form::Watch(watched) => self.watched = watched,
+            GrinCommand::SetActive(watched) => self.is_active = watched,
         }
         Ok(())
     }
 
-    fn open(&mut self, origin: Origin) {
+    fn open(&mut self, origin: DocumentSource) {
         self.count += 1;
         self.opening = Some(self.count);
-        self.failed = None;
+        self.error = None;
         self.former.open(self.count, origin);
     }
 
     fn start(&mut self) -> Result<(), String> {
         let run = self.run().ok_or("there is no task to work on; open one first")?;
-        if run.subject.task.is_none() {
+        if run.document.task.is_none() {
             return Err("a volume has no task to work on".to_owned());
         }
-        self.failed = None;
-        self.pending = Some(Standing::Running);
+        self.error = None;
+        self.pending = Some(RunStatus::Running);
         self.former.start();
         Ok(())
     }
 
     /// Lets the search stand otherwise once its step is done; one that has ended stays so.
-    fn stand(&mut self, standing: Standing) {
-        let is_starting = self.pending == Some(Standing::Running);
-        if is_starting || self.run().is_some_and(|run| run.is_under_way()) {
+    fn stand(&mut self, standing: RunStatus) {
+        let is_starting = self.pending == Some(RunStatus::Running);
+        if is_starting || self.run().is_some_and(|run| run.is_active()) {
             self.pending = Some(standing);
             self.former.stand(standing);
         }
@@ -168,13 +172,13 @@ impl FormingDesk {
         self.number = None;
         self.opening = None;
         self.pending = None;
-        self.failed = None;
+        self.error = None;
         self.asked = None;
         self.followed = None;
     }
 
     /// What happened since the last look to what is open or being opened.
-    pub(super) fn told(&mut self) -> Vec<Told> {
+    pub(super) fn drain_events(&mut self) -> Vec<Told> {
         let mut told = self.former.told();
         told.retain(|told| match told {
             Told::Now(number, _) | Told::NotOpened(number, _) | Told::Failed(number, _) => {
@@ -191,17 +195,17 @@ impl FormingDesk {
             Told::Now(number, standing) => {
                 if self.opening == Some(*number) {
                     self.opened(*number);
-                } else if Some(*standing) == self.pending || !standing.can_go_on() {
+                } else if Some(*standing) == self.pending || !standing.is_active() {
                     self.pending = None;
                 }
             }
             Told::NotOpened(_, why) => {
                 self.opening = None;
-                self.failed = Some(why.clone());
+                self.error = Some(why.clone());
             }
             Told::Failed(_, why) => {
                 self.pending = None;
-                self.failed = Some(why.clone());
+                self.error = Some(why.clone());
             }
             Told::Written(..) | Told::NotWritten(_) => self.writing = false,
         }
@@ -214,73 +218,73 @@ impl FormingDesk {
         self.asked = None;
         self.followed = None;
         if let Some(run) = self.run() {
-            self.sight = run.subject.first_sight();
+            self.slice_settings = run.document.default_slice();
         }
     }
 
     /// Asks for what is to be seen, while somebody looks.
-    pub(super) fn keep_up(&mut self) {
-        let Some(run) = self.run().filter(|_| self.watched) else { return };
-        let (subject, medium) = (Arc::clone(&run.subject), Arc::clone(&run.medium));
-        let wanted = Wanted { subject, medium, sight: self.sight };
-        if !self.asked.as_ref().is_some_and(|asked| asked.is(&wanted)) {
+    pub(super) fn sync(&mut self) {
+        let Some(run) = self.run().filter(|_| self.is_active) else { return };
+        let (subject, medium) = (Arc::clone(&run.document), Arc::clone(&run.field));
+        let wanted = SliceRequest { subject, medium, sight: self.slice_settings };
+        if !self.asked.as_ref().is_some_and(|asked| asked.matches(&wanted)) {
             self.asked = Some(wanted.clone());
-            self.slicer.ask(wanted);
+            self.slicer.request(wanted);
         }
         self.follow(&run);
     }
 
     /// Asks for all light of the task: seldom while the field changes all the time.
-    fn follow(&mut self, run: &Formation) {
-        let known = self.followed.as_ref().is_some_and(|known| Arc::ptr_eq(known, &run.medium));
-        if known || run.subject.task.is_none() {
+    fn follow(&mut self, run: &GrinRun) {
+        let known = self.followed.as_ref().is_some_and(|known| Arc::ptr_eq(known, &run.field));
+        if known || run.document.task.is_none() {
             return;
         }
         let busy = self.followed.is_some() && self.sighting().is_none();
-        let is_running = run.standing == Standing::Running;
-        if !is_running || !busy && self.pace.is_due() {
-            self.followed = Some(Arc::clone(&run.medium));
-            self.viewer.ask((Arc::clone(&run.subject), Arc::clone(&run.medium)));
+        let is_running = run.status == RunStatus::Running;
+        if !is_running || !busy && self.pace.ready() {
+            self.followed = Some(Arc::clone(&run.field));
+            self.viewer.request((Arc::clone(&run.document), Arc::clone(&run.field)));
         }
     }
 
-    fn run(&self) -> Option<Arc<Formation>> {
+    fn run(&self) -> Option<Arc<GrinRun>> {
         self.former.formation().filter(|run| self.number == Some(run.number))
     }
 
-    pub(super) fn view(&self) -> Forming {
+    pub(super) fn view(&self) -> GrinView {
         let run = self.run();
         let is_of = |slice: &Slice| {
-            run.as_ref().is_some_and(|run| Arc::ptr_eq(&slice.subject, &run.subject))
+            run.as_ref().is_some_and(|run| Arc::ptr_eq(&slice.document, &run.document))
         };
-        let slice = self.slicer.answer().filter(|_| self.asked.is_some());
+        let slice = self.slicer.latest().filter(|_| self.asked.is_some());
         let slice = slice.filter(|slice| slice.as_ref().as_ref().map_or(true, is_of));
-        Forming {
+        GrinView {
             opening: self.opening.is_some(),
             writing: self.writing,
             pending: self.pending,
-            failed: self.failed.clone(),
-            sight: self.sight,
-            watched: self.watched,
+            error: self.error.clone(),
+            slice_settings: self.slice_settings,
+            is_active: self.is_active,
             slice,
-            sighting: self.sighting(),
+            analysis: self.sighting(),
             run,
         }
     }
 
     /// The newest answer about all light, if it is of what is open.
-    fn sighting(&self) -> Option<Arc<Result<Sighting, String>>> {
+    fn sighting(&self) -> Option<Arc<Result<GrinAnalysis, String>>> {
         let run = self.run()?;
-        let is_of = |seen: &Sighting| Arc::ptr_eq(&seen.subject, &run.subject);
-        let answer = self.viewer.answer().filter(|_| self.followed.is_some());
+        let is_of = |seen: &GrinAnalysis| Arc::ptr_eq(&seen.document, &run.document);
+        let answer = self.viewer.latest().filter(|_| self.followed.is_some());
         answer.filter(|answer| answer.as_ref().as_ref().map_or(true, is_of))
     }
 }
 
 /// Follows all light of a task.
-fn sighting(subject: &Arc<Subject>, medium: Arc<Medium>) -> Result<Sighting, String> {
+fn sighting(subject: &Arc<GrinDocument>, medium: Arc<GrinField>) -> Result<GrinAnalysis, String> {
     let Some(task) = &subject.task else { return Err("a volume has no light".to_owned()) };
-    let Timed { value, ms } = timed(|| task.seen(&medium));
+    let Timed { value, ms } = time(|| task.report_views(&medium));
     let value = value.map_err(|why| why.to_string())?;
-    Ok(Sighting { subject: Arc::clone(subject), medium, views: Timed { value, ms } })
+    Ok(GrinAnalysis { document: Arc::clone(subject), field: medium, views: Timed { value, ms } })
 }

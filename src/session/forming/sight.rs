@@ -1,15 +1,15 @@
 //! How a person looks at a field: which slice, which quantity, how many rays.
 
-use crate::grin_task::{Axis, Plane};
+use crate::grin_task::{SlicePlane, SpatialAxis};
 use serde::{Deserialize, Serialize};
 
 /// Most rays of each view in a slice.
-pub(super) const MOST_RAYS: usize = 60;
+pub(super) const MAX_RAYS: usize = 60;
 
 /// What a slice shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Quantity {
+pub enum SliceQuantity {
     /// The refractive index.
     Index,
     /// How steep it is, in 1/mm.
@@ -20,7 +20,7 @@ pub enum Quantity {
     Error,
 }
 
-impl Quantity {
+impl SliceQuantity {
     /// Every quantity.
     pub const ALL: [Self; 4] = [Self::Index, Self::Slope, Self::Change, Self::Error];
 
@@ -42,18 +42,18 @@ impl Quantity {
 
 /// How a person looks at a field.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Sight {
+pub struct SliceSettings {
     /// The slice.
-    pub plane: Plane,
+    pub plane: SlicePlane,
     /// What it shows.
-    pub quantity: Quantity,
+    pub quantity: SliceQuantity,
     /// Most rays of each view.
     pub rays: usize,
 }
 
-impl Default for Sight {
+impl Default for SliceSettings {
     fn default() -> Self {
-        let plane = Plane { axis: Axis::Y, depth: 0.0 };
-        Self { plane, quantity: Quantity::Index, rays: 11 }
+        let plane = SlicePlane { axis: SpatialAxis::Y, depth: 0.0 };
+        Self { plane, quantity: SliceQuantity::Index, rays: 11 }
     }
 }

@@ -1,12 +1,14 @@
 //! A slice through a field: a quantity on a raster, its contours, the rays near it, and a profile.
 
-use super::contour::{Contour, contours, pieces};
-use super::sight::{Quantity, Sight};
-use super::subject::Subject;
-use crate::grin::Field;
-use crate::grin_task::{Axis, Difference, FieldKind, Medium, Plane, Ways};
+use super::contour::{Contour, contours, level_set};
+use super::sight::{SliceQuantity, SliceSettings};
+use super::subject::GrinDocument;
+use crate::grin::IndexField;
+use crate::grin_task::{
+    FieldDifference, FieldRepresentation, GrinField, RayPaths, SlicePlane, SpatialAxis,
+};
 use crate::math::Vec3;
-use crate::session::clock::timed;
+use crate::session::clock::time;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -24,21 +26,21 @@ const FLAT: f64 = 1e-12;
 
 /// What is looked at.
 #[derive(Debug, Clone)]
-pub(super) struct Wanted {
-    pub(super) subject: Arc<Subject>,
-    pub(super) medium: Arc<Medium>,
-    pub(super) sight: Sight,
+pub(super) struct SliceRequest {
+    pub(super) subject: Arc<GrinDocument>,
+    pub(super) medium: Arc<GrinField>,
+    pub(super) sight: SliceSettings,
 }
 
 /// A slice through a field.
 #[derive(Debug, Clone)]
 pub struct Slice {
     /// What it is of.
-    pub subject: Arc<Subject>,
+    pub document: Arc<GrinDocument>,
     /// The field.
-    pub medium: Arc<Medium>,
+    pub field: Arc<GrinField>,
     /// How it is looked at.
-    pub sight: Sight,
+    pub settings: SliceSettings,
     /// The lower left and the upper right corner of its picture, in mm.
     pub frame: [[f64; 2]; 2],
     /// Cells to the right and up.
@@ -56,13 +58,13 @@ pub struct Slice {
     /// Straight pieces of the boundary between the space and air, in mm, apart from the frame.
     pub rim: Vec<[[f64; 2]; 2]>,
     /// Rays near the slice; empty for a volume.
-    pub ways: Vec<Ways>,
+    pub paths: Vec<RayPaths>,
     /// Why there are none.
-    pub no_ways: Option<String>,
+    pub paths_error: Option<String>,
     /// The index along a line.
-    pub profile: Profile,
+    pub profile: IndexProfile,
     /// The difference from the field that is known to be the answer.
-    pub difference: Option<Difference>,
+    pub difference: Option<FieldDifference>,
     /// How long its parts took, in milliseconds: the raster with contours and profile, the rays,
     /// and the difference.
     pub ms: [f64; 3],
@@ -70,35 +72,35 @@ pub struct Slice {
 
 /// The index along a line: the distance in mm, and the index.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Profile {
+pub struct IndexProfile {
     /// Along which coordinate.
     pub along: &'static str,
     /// Of the field.
-    pub now: Vec<[f64; 2]>,
+    pub current: Vec<[f64; 2]>,
     /// Of the field at the start; empty for a volume.
     pub start: Vec<[f64; 2]>,
     /// Of the field that is known to be the answer; empty where none is.
-    pub exact: Vec<[f64; 2]>,
+    pub reference: Vec<[f64; 2]>,
 }
 
 /// Lays a slice.
-pub(super) fn slice(wanted: Wanted) -> Slice {
-    let Wanted { subject, medium, sight } = wanted;
-    let drawn = timed(|| Raster::of(&subject, &medium, sight));
-    let ways = timed(|| match &subject.task {
-        Some(task) if sight.rays > 0 => task.ways(&medium, sight.plane, sight.rays),
+pub(super) fn compute_slice(wanted: SliceRequest) -> Slice {
+    let SliceRequest { subject, medium, sight } = wanted;
+    let drawn = time(|| SliceRaster::of(&subject, &medium, sight));
+    let ways = time(|| match &subject.task {
+        Some(task) if sight.rays > 0 => task.ray_paths(&medium, sight.plane, sight.rays),
         _ => Ok(Vec::new()),
     });
-    let difference = timed(|| {
-        let (task, exact) = (subject.task.as_ref()?, subject.exact.as_ref()?);
+    let difference = time(|| {
+        let (task, exact) = (subject.task.as_ref()?, subject.reference.as_ref()?);
         task.difference_from(&medium, &**exact).ok()
     });
-    let Raster { frame, size, values, range, contours, spacing, rim, profile } = drawn.value;
+    let SliceRaster { frame, size, values, range, contours, spacing, rim, profile } = drawn.value;
     let no_ways = ways.value.as_ref().err().map(ToString::to_string);
     Slice {
-        subject,
-        medium,
-        sight,
+        document: subject,
+        field: medium,
+        settings: sight,
         frame,
         size,
         values,
@@ -106,8 +108,8 @@ pub(super) fn slice(wanted: Wanted) -> Slice {
         contours,
         spacing,
         rim,
-        ways: ways.value.unwrap_or_default(),
-        no_ways,
+        paths: ways.value.unwrap_or_default(),
+        paths_error: no_ways,
         profile,
         difference: difference.value,
         ms: [drawn.ms, ways.ms, difference.ms],
@@ -115,7 +117,7 @@ pub(super) fn slice(wanted: Wanted) -> Slice {
 }
 
 /// The part of a slice that needs no rays.
-struct Raster {
+struct SliceRaster {
     frame: [[f64; 2]; 2],
     size: [usize; 2],
     values: Vec<f64>,
@@ -123,12 +125,12 @@ struct Raster {
     contours: Vec<Contour>,
     spacing: f64,
     rim: Vec<[[f64; 2]; 2]>,
-    profile: Profile,
+    profile: IndexProfile,
 }
 
-impl Raster {
-    fn of(subject: &Subject, medium: &Medium, sight: Sight) -> Self {
-        let frame = subject.corners.map(|corner| sight.plane.seen(corner));
+impl SliceRaster {
+    fn of(subject: &GrinDocument, medium: &GrinField, sight: SliceSettings) -> Self {
+        let frame = subject.corners.map(|corner| sight.plane.project(corner));
         let size = cells(frame);
         let quantity = |p: Vec3<f64>| value(subject, medium, sight.quantity, p);
         let at = |n: usize| {
@@ -136,7 +138,7 @@ impl Raster {
                 let [low, high] = [frame[0][axis], frame[1][axis]];
                 low + (high - low) * (i as f64 + 0.5) / size[axis] as f64
             };
-            sight.plane.at([share(n % size[0], 0), share(n / size[0], 1)])
+            sight.plane.point([share(n % size[0], 0), share(n / size[0], 1)])
         };
         let seen = |p: Vec3<f64>| if subject.contains(p) { quantity(p) } else { f64::NAN };
         let count = size[0] * size[1];
@@ -146,21 +148,21 @@ impl Raster {
         let range = range(values.iter().chain(&everywhere), sight.quantity.is_difference());
         let spacing = round((range[1] - range[0]) / CONTOURS);
         let contours = contours(&values, size, frame, range, spacing);
-        let rim = pieces(&heights, size, frame, 0.0);
+        let rim = level_set(&heights, size, frame, 0.0);
         let profile = profile(subject, medium, sight.plane);
         Self { frame, size, values, range, contours, spacing, rim, profile }
     }
 }
 
 /// A quantity at a point.
-fn value(subject: &Subject, medium: &Medium, quantity: Quantity, p: Vec3<f64>) -> f64 {
+fn value(subject: &GrinDocument, medium: &GrinField, quantity: SliceQuantity, p: Vec3<f64>) -> f64 {
     let sample = medium.field().sample(p);
-    let less = |other: &dyn Field<f64>| sample.index - other.sample(p).index;
+    let less = |other: &dyn IndexField<f64>| sample.index - other.sample(p).index;
     match quantity {
-        Quantity::Index => sample.index,
-        Quantity::Slope => sample.gradient.dot(sample.gradient).sqrt(),
-        Quantity::Change => less(subject.start.field()),
-        Quantity::Error => subject.exact.as_ref().map_or(f64::NAN, |exact| less(&**exact)),
+        SliceQuantity::Index => sample.index,
+        SliceQuantity::Slope => sample.gradient.dot(sample.gradient).sqrt(),
+        SliceQuantity::Change => less(subject.start.field()),
+        SliceQuantity::Error => subject.reference.as_ref().map_or(f64::NAN, |exact| less(&**exact)),
     }
 }
 
@@ -213,16 +215,16 @@ fn round(length: f64) -> f64 {
 }
 
 /// The index along a radius, of a spline in it; else along the line through the middle of a slice.
-fn profile(subject: &Subject, medium: &Medium, plane: Plane) -> Profile {
+fn profile(subject: &GrinDocument, medium: &GrinField, plane: SlicePlane) -> IndexProfile {
     let radius = subject.task.as_ref().and_then(|task| radius(task.field));
     let [across, above] = plane.axis.across();
     let middle = subject.middle(above);
-    let ends = radius.map_or_else(|| subject.depths(across), |radius| [0.0, radius]);
+    let ends = radius.map_or_else(|| subject.depth_range(across), |radius| [0.0, radius]);
     let place = |t: f64| match radius {
         Some(_) => Vec3::new(t, 0.0, 0.0),
-        None => plane.at([t, middle]),
+        None => plane.point([t, middle]),
     };
-    let of = |field: &dyn Field<f64>| -> Vec<[f64; 2]> {
+    let of = |field: &dyn IndexField<f64>| -> Vec<[f64; 2]> {
         let at = |i: usize| ends[0] + (ends[1] - ends[0]) * i as f64 / POINTS as f64;
         let seen = |t: &f64| radius.is_some() || subject.contains(place(*t));
         let index = |t: f64| [t, field.sample(place(t)).index];
@@ -230,34 +232,36 @@ fn profile(subject: &Subject, medium: &Medium, plane: Plane) -> Profile {
         points.filter(|[_, index]| index.is_finite()).collect()
     };
     let start = subject.task.as_ref().map(|_| of(subject.start.field()));
-    let exact = subject.exact.as_ref().map(|exact| of(&**exact));
-    Profile {
+    let exact = subject.reference.as_ref().map(|exact| of(&**exact));
+    IndexProfile {
         along: if radius.is_some() { "r" } else { across.name() },
-        now: of(medium.field()),
+        current: of(medium.field()),
         start: start.unwrap_or_default(),
-        exact: exact.unwrap_or_default(),
+        reference: exact.unwrap_or_default(),
     }
 }
 
 /// Where a spline in one coordinate ends.
-fn radius(kind: FieldKind) -> Option<f64> {
+fn radius(kind: FieldRepresentation) -> Option<f64> {
     match kind {
-        FieldKind::Sphere { radius } | FieldKind::Cylinder { radius } => Some(radius),
-        FieldKind::Trilinear { .. } | FieldKind::Tricubic { .. } => None,
+        FieldRepresentation::Sphere { radius } | FieldRepresentation::Cylinder { radius } => {
+            Some(radius)
+        }
+        FieldRepresentation::Trilinear { .. } | FieldRepresentation::Tricubic { .. } => None,
     }
 }
 
-impl Wanted {
+impl SliceRequest {
     /// Whether both are the same field, looked at in the same way.
-    pub(super) fn is(&self, other: &Self) -> bool {
+    pub(super) fn matches(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.medium, &other.medium) && self.sight == other.sight
     }
 }
 
 impl Slice {
     /// The axes that point right and up.
-    pub const fn axes(&self) -> [Axis; 2] {
-        self.sight.plane.axis.across()
+    pub const fn axes(&self) -> [SpatialAxis; 2] {
+        self.settings.plane.axis.across()
     }
 }
 

@@ -1,10 +1,13 @@
 //! What is open: a design task in a gradient-index field, or a volume to look at.
 
-use super::sight::{MOST_RAYS, Quantity, Sight};
+use super::sight::{MAX_RAYS, SliceQuantity, SliceSettings};
 use crate::files;
 use crate::grin::field::Trilinear;
-use crate::grin::{Field, Region};
-use crate::grin_task::{self, Axis, Exact, FieldKind, Medium, Plane, Runner, Space, Task};
+use crate::grin::{GrinRegion, IndexField};
+use crate::grin_task::{
+    self, Domain, FieldRepresentation, GrinField, GrinOptimizer, GrinTask, ReferenceField,
+    SlicePlane, SpatialAxis,
+};
 use crate::math::Vec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -14,7 +17,7 @@ const ROUGH: f64 = 0.1;
 
 /// Where something open comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Origin {
+pub enum DocumentSource {
     /// It comes with the program, under this name.
     Builtin(String),
     /// This file.
@@ -23,46 +26,49 @@ pub enum Origin {
 
 /// A task or a volume.
 #[derive(Debug)]
-pub struct Subject {
+pub struct GrinDocument {
     /// What it is called.
     pub name: String,
     /// Where it comes from.
-    pub origin: Origin,
+    pub source: DocumentSource,
     /// The task; `None` for a volume.
-    pub task: Option<Task>,
+    pub task: Option<GrinTask>,
     /// The field at the start, or that of the volume.
-    pub start: Medium,
+    pub start: GrinField,
     /// The corners of the smallest box around all that light passes, or around the volume, in mm.
     pub corners: [Vec3<f64>; 2],
     /// Where light bends; everywhere where there is none.
-    pub(super) regions: Vec<Region<f64>>,
+    pub(super) regions: Vec<GrinRegion<f64>>,
     /// The field that is known to be the answer.
-    pub(super) exact: Option<Box<dyn Field<f64>>>,
+    pub(super) reference: Option<Box<dyn IndexField<f64>>>,
 }
 
-impl Subject {
+impl GrinDocument {
     /// Reads a task or a volume and makes ready to search; why that cannot be done.
-    pub(super) fn open(origin: &Origin) -> Result<(Self, Option<Runner>), String> {
+    pub(super) fn open(origin: &DocumentSource) -> Result<(Self, Option<GrinOptimizer>), String> {
         match origin {
-            Origin::Builtin(name) => {
-                let builtin = grin_task::find(name);
+            DocumentSource::Builtin(name) => {
+                let builtin = grin_task::find_builtin(name);
                 let builtin = builtin.ok_or_else(|| format!("there is no task `{name}`"))?;
                 let task = builtin.task().map_err(|why| why.to_string())?;
                 Self::of_task(task, origin, name)
             }
-            Origin::File(path) => Self::from_file(path, origin),
+            DocumentSource::File(path) => Self::from_file(path, origin),
         }
     }
 
     /// A file is known by what is in it: a volume of `NumPy` is an archive, all else is JSON.
-    fn from_file(path: &Path, origin: &Origin) -> Result<(Self, Option<Runner>), String> {
+    fn from_file(
+        path: &Path,
+        origin: &DocumentSource,
+    ) -> Result<(Self, Option<GrinOptimizer>), String> {
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|why| format!("{file}: cannot be read: {why}"))?;
         let text = std::str::from_utf8(&bytes).ok().filter(|_| !bytes.starts_with(b"PK"));
         let json: Option<Value> = text.and_then(|text| serde_json::from_str(text).ok());
         let has = |key: &str| json.as_ref().is_some_and(|json| json.get(key).is_some());
         if let Some(text) = text.filter(|_| has("aplanat_grin")) {
-            let task = grin_task::read(text, &file).map_err(|why| why.to_string())?;
+            let task = grin_task::read_task(text, &file).map_err(|why| why.to_string())?;
             return Self::of_task(task, origin, &file);
         }
         if bytes.starts_with(b"PK") || has("aplanat_volume") {
@@ -75,27 +81,31 @@ impl Subject {
         ))
     }
 
-    fn of_task(task: Task, origin: &Origin, file: &str) -> Result<(Self, Option<Runner>), String> {
-        let runner = Runner::new(&task).map_err(|why| format!("{file}: {why}"))?;
-        let exact = task.exact.as_ref().map(Exact::field::<f64>).transpose();
+    fn of_task(
+        task: GrinTask,
+        origin: &DocumentSource,
+        file: &str,
+    ) -> Result<(Self, Option<GrinOptimizer>), String> {
+        let runner = GrinOptimizer::new(&task).map_err(|why| format!("{file}: {why}"))?;
+        let exact = task.exact.as_ref().map(ReferenceField::field::<f64>).transpose();
         let exact = exact.map_err(|why| format!("{file}, exact: {why}"))?;
         let spaces = || task.views.iter().map(|view| view.space.unwrap_or(task.space));
-        let all = spaces().map(Space::corners).fold(task.space.corners(), around);
-        let end = end(task.field);
-        let regions = spaces().chain([task.space]).map(|space| cut(space, end)).collect();
+        let all = spaces().map(Domain::corners).fold(task.space.corners(), union_box);
+        let end = field_domain(task.field);
+        let regions = spaces().chain([task.space]).map(|space| intersection(space, end)).collect();
         let subject = Self {
             name: task.name.clone(),
-            origin: origin.clone(),
+            source: origin.clone(),
             start: runner.current().clone(),
-            corners: within(all, end.corners()),
+            corners: common_box(all, end.corners()),
             regions,
-            exact,
+            reference: exact,
             task: Some(task),
         };
         Ok((subject, Some(runner)))
     }
 
-    fn of_volume(path: &Path, origin: &Origin) -> Result<Self, String> {
+    fn of_volume(path: &Path, origin: &DocumentSource) -> Result<Self, String> {
         let files::Volume { grid, values } =
             files::read_volume(path).map_err(|why| why.to_string())?;
         let field = Trilinear::new(grid, values);
@@ -106,117 +116,123 @@ impl Subject {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
         Ok(Self {
             name: name.unwrap_or_default(),
-            origin: origin.clone(),
+            source: origin.clone(),
             task: None,
-            start: Medium::Trilinear(field),
+            start: GrinField::Trilinear(field),
             corners: [low, high],
             regions: Vec::new(),
-            exact: None,
+            reference: None,
         })
     }
 
     /// Whether the field that is known to be the answer stands in the task.
-    pub fn has_exact(&self) -> bool {
-        self.exact.is_some()
+    pub fn has_reference(&self) -> bool {
+        self.reference.is_some()
     }
 
     /// Whether a slice can show a quantity.
-    pub fn shows(&self, quantity: Quantity) -> bool {
+    pub fn supports(&self, quantity: SliceQuantity) -> bool {
         match quantity {
-            Quantity::Index | Quantity::Slope => true,
-            Quantity::Change => self.task.is_some(),
-            Quantity::Error => self.has_exact(),
+            SliceQuantity::Index | SliceQuantity::Slope => true,
+            SliceQuantity::Change => self.task.is_some(),
+            SliceQuantity::Error => self.has_reference(),
         }
     }
 
     /// From where to where slices across an axis can be laid, in mm.
-    pub fn depths(&self, axis: Axis) -> [f64; 2] {
-        self.corners.map(|corner| axis.of(corner))
+    pub fn depth_range(&self, axis: SpatialAxis) -> [f64; 2] {
+        self.corners.map(|corner| axis.component(corner))
     }
 
     /// Whether a point belongs to what is looked at.
     pub fn contains(&self, point: Vec3<f64>) -> bool {
         let [low, high] = self.corners;
-        let within = Axis::ALL.iter().all(|axis| {
-            let at = axis.of(point);
-            at >= axis.of(low) && at <= axis.of(high)
+        let within = SpatialAxis::ALL.iter().all(|axis| {
+            let at = axis.component(point);
+            at >= axis.component(low) && at <= axis.component(high)
         });
         within && self.height(point) < 0.0
     }
 
     /// Negative where light bends, whatever the corners.
     pub(super) fn height(&self, point: Vec3<f64>) -> f64 {
-        let heights = self.regions.iter().map(|region| region.height(point));
+        let heights = self.regions.iter().map(|region| region.level(point));
         heights.reduce(f64::min).unwrap_or(-1.0)
     }
 
     /// The slice through the middle across the axis that most of the light crosses least.
-    pub(super) fn first_sight(&self) -> Sight {
-        let share = |axis: Axis| -> f64 {
+    pub(super) fn default_slice(&self) -> SliceSettings {
+        let share = |axis: SpatialAxis| -> f64 {
             let Some(task) = &self.task else { return 0.0 };
             let views = task.views.iter().filter(|view| view.weight > 0.0);
             let nearest = views.map(|view| {
-                let rays = task.judging_rays(view).1;
-                let share = |v: Vec3<f64>| axis.of(v).abs() / v.dot(v).sqrt();
+                let rays = task.scoring_rays(view).1;
+                let share = |v: Vec3<f64>| axis.component(v).abs() / v.dot(v).sqrt();
                 rays.iter().map(|ray| share(ray.v)).fold(f64::INFINITY, f64::min)
             });
             nearest.sum()
         };
         // In this order where several will do: a drawing with the light to the right comes first.
-        let order = [Axis::Y, Axis::X, Axis::Z];
+        let order = [SpatialAxis::Y, SpatialAxis::X, SpatialAxis::Z];
         // Beams of even directions are in no plane quite as much as in another.
-        let rough = |axis: &Axis| (share(*axis) / ROUGH).round();
+        let rough = |axis: &SpatialAxis| (share(*axis) / ROUGH).round();
         let axis = order.into_iter().min_by(|a, b| rough(a).total_cmp(&rough(b)));
-        let axis = axis.unwrap_or(Axis::Y);
-        self.held(Sight { plane: Plane { axis, depth: self.middle(axis) }, ..Sight::default() })
+        let axis = axis.unwrap_or(SpatialAxis::Y);
+        self.clamp_slice(SliceSettings {
+            plane: SlicePlane { axis, depth: self.middle(axis) },
+            ..SliceSettings::default()
+        })
     }
 
     /// The origin where it lies inside, else the middle.
-    pub fn middle(&self, axis: Axis) -> f64 {
-        let [low, high] = self.depths(axis);
+    pub fn middle(&self, axis: SpatialAxis) -> f64 {
+        let [low, high] = self.depth_range(axis);
         if low < 0.0 && 0.0 < high { 0.0 } else { 0.5 * (low + high) }
     }
 
     /// The same sight within what there is to see.
-    pub(super) fn held(&self, sight: Sight) -> Sight {
-        let [low, high] = self.depths(sight.plane.axis);
+    pub(super) fn clamp_slice(&self, sight: SliceSettings) -> SliceSettings {
+        let [low, high] = self.depth_range(sight.plane.axis);
         let depth = sight.plane.depth;
         let depth = if depth.is_finite() { depth.clamp(low, high) } else { 0.5 * (low + high) };
-        let quantity = if self.shows(sight.quantity) { sight.quantity } else { Quantity::Index };
-        let plane = Plane { depth, ..sight.plane };
-        Sight { plane, quantity, rays: sight.rays.min(MOST_RAYS) }
+        let quantity =
+            if self.supports(sight.quantity) { sight.quantity } else { SliceQuantity::Index };
+        let plane = SlicePlane { depth, ..sight.plane };
+        SliceSettings { plane, quantity, rays: sight.rays.min(MAX_RAYS) }
     }
 }
 
 /// Where a field ends: beyond it, it is only continued so that a step of a ray may end there.
-fn end(kind: FieldKind) -> Space {
+fn field_domain(kind: FieldRepresentation) -> Domain {
     match kind {
-        FieldKind::Trilinear { half } | FieldKind::Tricubic { half } => Space::Cube { half },
-        FieldKind::Sphere { radius } => Space::Ball { radius },
-        FieldKind::Cylinder { radius } => {
-            Space::Rod { radius, from: f64::NEG_INFINITY, to: f64::INFINITY }
+        FieldRepresentation::Trilinear { half } | FieldRepresentation::Tricubic { half } => {
+            Domain::Cube { half }
+        }
+        FieldRepresentation::Sphere { radius } => Domain::Ball { radius },
+        FieldRepresentation::Cylinder { radius } => {
+            Domain::Rod { radius, from: f64::NEG_INFINITY, to: f64::INFINITY }
         }
     }
 }
 
 /// What is in both spaces.
-fn cut(space: Space, end: Space) -> Region<f64> {
+fn intersection(space: Domain, end: Domain) -> GrinRegion<f64> {
     let (mut both, other) = (space.region(), end.region());
-    [both.low, both.high] = within([both.low, both.high], [other.low, other.high]);
+    [both.low, both.high] = common_box([both.low, both.high], [other.low, other.high]);
     both.faces.extend(other.faces);
     both
 }
 
-fn each(of: fn(f64, f64) -> f64, a: Vec3<f64>, b: Vec3<f64>) -> Vec3<f64> {
+fn componentwise(of: fn(f64, f64) -> f64, a: Vec3<f64>, b: Vec3<f64>) -> Vec3<f64> {
     Vec3::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
 }
 
 /// The corners of the box around two boxes.
-fn around(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
-    [each(f64::min, a[0], b[0]), each(f64::max, a[1], b[1])]
+fn union_box(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
+    [componentwise(f64::min, a[0], b[0]), componentwise(f64::max, a[1], b[1])]
 }
 
 /// The corners of what is in both boxes.
-fn within(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
-    [each(f64::max, a[0], b[0]), each(f64::min, a[1], b[1])]
+fn common_box(a: [Vec3<f64>; 2], b: [Vec3<f64>; 2]) -> [Vec3<f64>; 2] {
+    [componentwise(f64::max, a[0], b[0]), componentwise(f64::min, a[1], b[1])]
 }

@@ -1,17 +1,17 @@
 //! What a person asks of the gradient-index field that is open.
 
-use super::sight::Sight;
+use super::sight::SliceSettings;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A wish about the field that is open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Form {
+pub enum GrinCommand {
     /// Open a task or a volume from a file, in place of what is open.
-    Open(Option<PathBuf>),
+    OpenFile(Option<PathBuf>),
     /// Open a task that comes with the program.
-    Builtin(String),
+    OpenBuiltin(String),
     /// Search for the field of the task from its beginning.
     Start,
     /// Hold the search after its present step.
@@ -30,7 +30,7 @@ pub enum Form {
     /// Close what is open.
     Close,
     /// Look at it so.
-    Look(Sight),
+    SetSlice(SliceSettings),
     /// Whether it is looked at: what nobody sees is not computed.
-    Watch(bool),
+    SetActive(bool),
 }

@@ -21,7 +21,7 @@ use super::{Camera, Scene, gpu, software};
 
 /// What draws the scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Backing {
+pub enum RenderBackend {
     /// The graphics card, or software that stands in for one.
     Gpu,
     /// The processor, where the window has come up without wgpu.
@@ -30,13 +30,13 @@ pub enum Backing {
 
 /// All on which a drawn picture depends.
 #[derive(Clone, Debug)]
-struct Key {
+struct CanvasKey {
     scene: Arc<Scene>,
     camera: Camera,
     size: [u32; 2],
 }
 
-impl PartialEq for Key {
+impl PartialEq for CanvasKey {
     /// The scene is compared by its address, which cannot be another's while the key holds it.
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.scene, &other.scene)
@@ -46,21 +46,21 @@ impl PartialEq for Key {
 }
 
 /// A place in the window that shows a scene.
-pub struct Canvas {
+pub struct SceneCanvas {
     name: &'static str,
-    drawn: Option<(Key, TextureHandle)>,
+    texture: Option<(CanvasKey, TextureHandle)>,
 }
 
-impl std::fmt::Debug for Canvas {
+impl std::fmt::Debug for SceneCanvas {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Canvas").field("name", &self.name).finish_non_exhaustive()
     }
 }
 
-impl Canvas {
+impl SceneCanvas {
     /// A canvas; no two of one window share a name.
     pub const fn new(name: &'static str) -> Self {
-        Self { name, drawn: None }
+        Self { name, texture: None }
     }
 
     /// Shows a scene in a part of the window. The camera counts the window's real pixels.
@@ -68,7 +68,7 @@ impl Canvas {
         &mut self,
         ui: &Ui,
         rect: Rect,
-        backing: Backing,
+        backing: RenderBackend,
         scene: &Arc<Scene>,
         camera: Camera,
     ) {
@@ -78,25 +78,26 @@ impl Canvas {
         if size.contains(&0) {
             return;
         }
-        let key = Key { scene: Arc::clone(scene), camera, size };
+        let key = CanvasKey { scene: Arc::clone(scene), camera, size };
         match backing {
-            Backing::Gpu => {
-                let callback = Callback::new_paint_callback(rect, Drawn { name: self.name, key });
+            RenderBackend::Gpu => {
+                let callback =
+                    Callback::new_paint_callback(rect, SceneCallback { name: self.name, key });
                 ui.painter().add(callback);
             }
-            Backing::Software => self.show_texture(ui, rect, key),
+            RenderBackend::Software => self.show_texture(ui, rect, key),
         }
     }
 
-    fn show_texture(&mut self, ui: &Ui, rect: Rect, key: Key) {
-        if self.drawn.as_ref().is_none_or(|(drawn, _)| *drawn != key) {
+    fn show_texture(&mut self, ui: &Ui, rect: Rect, key: CanvasKey) {
+        if self.texture.as_ref().is_none_or(|(drawn, _)| *drawn != key) {
             let picture = software::draw(&key.scene, key.camera, key.size);
             let size = key.size.map(|n| n as usize);
             let image = ColorImage::from_rgba_premultiplied(size, &picture.rgba);
             let texture = ui.ctx().load_texture(self.name, image, TextureOptions::NEAREST);
-            self.drawn = Some((key, texture));
+            self.texture = Some((key, texture));
         }
-        if let Some((_, texture)) = &self.drawn {
+        if let Some((_, texture)) = &self.texture {
             let all = Rect::from_min_max(Pos2::ZERO, egui::pos2(1.0, 1.0));
             ui.painter().image(texture.id(), rect, all, egui::Color32::WHITE);
         }
@@ -110,12 +111,12 @@ fn pixels(rect: Rect, per_point: f32) -> [u32; 2] {
 }
 
 /// Asks the window's renderer to show a scene.
-struct Drawn {
+struct SceneCallback {
     name: &'static str,
-    key: Key,
+    key: CanvasKey,
 }
 
-impl CallbackTrait for Drawn {
+impl CallbackTrait for SceneCallback {
     fn prepare(
         &self,
         device: &Device,
@@ -124,7 +125,7 @@ impl CallbackTrait for Drawn {
         encoder: &mut CommandEncoder,
         resources: &mut CallbackResources,
     ) -> Vec<CommandBuffer> {
-        if let Some(easel) = resources.get_mut::<Easel>() {
+        if let Some(easel) = resources.get_mut::<GpuCache>() {
             easel.refresh(device, encoder, self);
         }
         Vec::new()
@@ -136,35 +137,35 @@ impl CallbackTrait for Drawn {
         pass: &mut RenderPass<'static>,
         resources: &CallbackResources,
     ) {
-        if let Some(easel) = resources.get::<Easel>() {
+        if let Some(easel) = resources.get::<GpuCache>() {
             easel.show(pass, self.name);
         }
     }
 }
 
 /// The window's drawings on the graphics card.
-struct Easel {
-    renderer: gpu::Renderer,
+struct GpuCache {
+    renderer: gpu::SceneRenderer,
     pipeline: RenderPipeline,
-    drawn: HashMap<&'static str, (Key, BindGroup)>,
+    textures: HashMap<&'static str, (CanvasKey, BindGroup)>,
 }
 
 /// Lets the canvases of a window use its graphics card.
-pub fn install(state: &RenderState) {
-    let easel = Easel {
-        renderer: gpu::Renderer::new(&state.device),
+pub fn install_gpu_cache(state: &RenderState) {
+    let easel = GpuCache {
+        renderer: gpu::SceneRenderer::new(&state.device),
         pipeline: show_pipeline(&state.device, state.target_format),
-        drawn: HashMap::new(),
+        textures: HashMap::new(),
     };
     state.renderer.write().callback_resources.insert(easel);
 }
 
-impl Easel {
-    fn refresh(&mut self, device: &Device, encoder: &mut CommandEncoder, wish: &Drawn) {
-        if self.drawn.get(wish.name).is_some_and(|(key, _)| *key == wish.key) {
+impl GpuCache {
+    fn refresh(&mut self, device: &Device, encoder: &mut CommandEncoder, wish: &SceneCallback) {
+        if self.textures.get(wish.name).is_some_and(|(key, _)| *key == wish.key) {
             return;
         }
-        let Key { scene, camera, size } = &wish.key;
+        let CanvasKey { scene, camera, size } = &wish.key;
         let texture = self.renderer.draw(device, encoder, scene, *camera, *size);
         let view = texture.create_view(&TextureViewDescriptor::default());
         let group = device.create_bind_group(&BindGroupDescriptor {
@@ -175,11 +176,11 @@ impl Easel {
                 resource: BindingResource::TextureView(&view),
             }],
         });
-        self.drawn.insert(wish.name, (wish.key.clone(), group));
+        self.textures.insert(wish.name, (wish.key.clone(), group));
     }
 
     fn show(&self, pass: &mut RenderPass<'static>, name: &str) {
-        if let Some((_, group)) = self.drawn.get(name) {
+        if let Some((_, group)) = self.textures.get(name) {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, group, &[]);
             pass.draw(0..3, 0..1);

@@ -21,14 +21,14 @@ use wgpu::{
     VertexState, VertexStepMode, include_wgsl,
 };
 
-use super::{Camera, Colour, Corner, Picture, Scene, Segment};
+use super::{Camera, Rgba, RgbaImage, Scene, Segment, TriangleVertex};
 
 /// Drawings keep colours as a person picks them: blending happens on the stored values.
 pub const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
 /// Why a drawing could not be fetched from the graphics card.
 #[derive(Debug, Error)]
-pub enum Error {
+pub enum GpuError {
     /// No graphics card and no software in its place.
     #[error("no graphics adapter: {0}")]
     Adapter(#[from] RequestAdapterError),
@@ -46,37 +46,37 @@ pub enum Error {
     Range(#[from] MapRangeError),
     /// The card never answered.
     #[error("the graphics card never reported that a drawing is done")]
-    Silent,
+    NoAnswer,
 }
 
 /// What the shader knows of the camera.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct View {
-    centre: Vec2,
+struct ViewUniform {
+    center: Vec2,
     size: Vec2,
     scale: f32,
     // The size of a uniform is a multiple of eight bytes.
     padding: f32,
 }
 
-impl View {
+impl ViewUniform {
     fn new(camera: Camera, size: [u32; 2]) -> Self {
         let (centre, scale) = camera.to_f32();
         let [width, height] = size.map(|n| n as f32);
-        Self { centre, size: Vec2::new(width, height), scale, padding: 0.0 }
+        Self { center: centre, size: Vec2::new(width, height), scale, padding: 0.0 }
     }
 }
 
 /// The two programs that draw a scene.
 #[derive(Debug)]
-pub struct Renderer {
+pub struct SceneRenderer {
     triangles: RenderPipeline,
     segments: RenderPipeline,
-    views: BindGroupLayout,
+    view_layout: BindGroupLayout,
 }
 
-impl Renderer {
+impl SceneRenderer {
     /// Compiles the programs.
     pub fn new(device: &Device) -> Self {
         let module = device.create_shader_module(include_wgsl!("scene.wgsl"));
@@ -93,8 +93,8 @@ impl Renderer {
                 count: None,
             }],
         });
-        let pipeline = |shape: &Shape<'_>| pipeline(device, &module, &views, shape);
-        Self { triangles: pipeline(&TRIANGLES), segments: pipeline(&SEGMENTS), views }
+        let pipeline = |shape: &PrimitivePipeline<'_>| pipeline(device, &module, &views, shape);
+        Self { triangles: pipeline(&TRIANGLES), segments: pipeline(&SEGMENTS), view_layout: views }
     }
 
     /// Draws a scene into a new texture of `size` pixels.
@@ -106,12 +106,12 @@ impl Renderer {
         camera: Camera,
         size: [u32; 2],
     ) -> Texture {
-        let texture = target(device, size);
+        let texture = render_target(device, size);
         let view = texture.create_view(&TextureViewDescriptor::default());
-        let group = self.bind(device, View::new(camera, size));
-        let corners = vertices(device, &scene.corners);
-        let segments = vertices(device, &scene.segments);
-        let mut pass = begin(encoder, &view, scene.background);
+        let group = self.bind_view(device, ViewUniform::new(camera, size));
+        let corners = vertex_buffer(device, &scene.vertices);
+        let segments = vertex_buffer(device, &scene.segments);
+        let mut pass = begin_pass(encoder, &view, scene.background);
         pass.set_bind_group(0, &group, &[]);
         if let Some((buffer, count)) = corners {
             pass.set_pipeline(&self.triangles);
@@ -127,7 +127,7 @@ impl Renderer {
         texture
     }
 
-    fn bind(&self, device: &Device, view: View) -> BindGroup {
+    fn bind_view(&self, device: &Device, view: ViewUniform) -> BindGroup {
         let buffer = device.create_buffer_init(&BufferInitDescriptor {
             label: Some("scene view"),
             contents: bytemuck::bytes_of(&view),
@@ -135,32 +135,32 @@ impl Renderer {
         });
         device.create_bind_group(&BindGroupDescriptor {
             label: Some("scene view"),
-            layout: &self.views,
+            layout: &self.view_layout,
             entries: &[BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
         })
     }
 }
 
 /// How one kind of shape reaches its program.
-struct Shape<'a> {
+struct PrimitivePipeline<'a> {
     vertex: &'a str,
     fragment: &'a str,
     topology: PrimitiveTopology,
     buffer: VertexBufferLayout<'a>,
 }
 
-const TRIANGLES: Shape<'_> = Shape {
+const TRIANGLES: PrimitivePipeline<'_> = PrimitivePipeline {
     vertex: "corner",
     fragment: "triangle",
     topology: PrimitiveTopology::TriangleList,
     buffer: VertexBufferLayout {
-        array_stride: size_of::<Corner>() as u64,
+        array_stride: size_of::<TriangleVertex>() as u64,
         step_mode: VertexStepMode::Vertex,
         attributes: &attributes![0 => Float32x2, 1 => Unorm8x4],
     },
 };
 
-const SEGMENTS: Shape<'_> = Shape {
+const SEGMENTS: PrimitivePipeline<'_> = PrimitivePipeline {
     vertex: "quad",
     fragment: "segment",
     topology: PrimitiveTopology::TriangleStrip,
@@ -175,7 +175,7 @@ fn pipeline(
     device: &Device,
     module: &ShaderModule,
     views: &BindGroupLayout,
-    shape: &Shape<'_>,
+    shape: &PrimitivePipeline<'_>,
 ) -> RenderPipeline {
     let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
         label: Some(shape.fragment),
@@ -209,7 +209,7 @@ fn pipeline(
     })
 }
 
-fn target(device: &Device, [width, height]: [u32; 2]) -> Texture {
+fn render_target(device: &Device, [width, height]: [u32; 2]) -> Texture {
     device.create_texture(&TextureDescriptor {
         label: Some("scene"),
         size: Extent3d { width, height, depth_or_array_layers: 1 },
@@ -225,7 +225,7 @@ fn target(device: &Device, [width, height]: [u32; 2]) -> Texture {
 }
 
 /// A buffer with some shapes and their number; none where there are none.
-fn vertices<T: Pod>(device: &Device, shapes: &[T]) -> Option<(Buffer, u32)> {
+fn vertex_buffer<T: Pod>(device: &Device, shapes: &[T]) -> Option<(Buffer, u32)> {
     let count = u32::try_from(shapes.len()).ok().filter(|&count| count > 0)?;
     let buffer = device.create_buffer_init(&BufferInitDescriptor {
         label: Some("scene shapes"),
@@ -235,10 +235,10 @@ fn vertices<T: Pod>(device: &Device, shapes: &[T]) -> Option<(Buffer, u32)> {
     Some((buffer, count))
 }
 
-fn begin<'a>(
+fn begin_pass<'a>(
     encoder: &'a mut CommandEncoder,
     view: &TextureView,
-    background: Colour,
+    background: Rgba,
 ) -> RenderPass<'a> {
     let [r, g, b, a] = background.map(|byte| f64::from(byte) / 255.0);
     encoder.begin_render_pass(&RenderPassDescriptor {
@@ -259,7 +259,7 @@ fn begin<'a>(
 /// A device without a window, with all that its adapter can do.
 ///
 /// A software adapter serves as well as a graphics card.
-pub async fn headless() -> Result<(Device, Queue), Error> {
+pub async fn headless_device() -> Result<(Device, Queue), GpuError> {
     let instance = Instance::new(InstanceDescriptor::new_without_display_handle());
     let adapter = instance.request_adapter(&RequestAdapterOptions::default()).await?;
     let descriptor =
@@ -268,14 +268,14 @@ pub async fn headless() -> Result<(Device, Queue), Error> {
 }
 
 /// Draws a scene without a window and fetches the picture.
-pub fn picture(
+pub fn render_image(
     (device, queue): &(Device, Queue),
     scene: &Scene,
     camera: Camera,
     size: [u32; 2],
-) -> Result<Picture, Error> {
+) -> Result<RgbaImage, GpuError> {
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
-    let texture = Renderer::new(device).draw(device, &mut encoder, scene, camera, size);
+    let texture = SceneRenderer::new(device).draw(device, &mut encoder, scene, camera, size);
     let stride = (4 * size[0]).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
     let buffer = device.create_buffer(&BufferDescriptor {
         label: Some("picture"),
@@ -291,20 +291,20 @@ pub fn picture(
         texture.size(),
     );
     queue.submit([encoder.finish()]);
-    let bytes = read(device, &buffer)?;
+    let bytes = read_buffer(device, &buffer)?;
     let rows = bytes.chunks_exact(stride as usize);
     let rgba = rows.flat_map(|row| &row[..4 * size[0] as usize]).copied().collect();
-    Ok(Picture { size, rgba })
+    Ok(RgbaImage { size, rgba })
 }
 
-fn read(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, Error> {
+fn read_buffer(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, GpuError> {
     let (done, mapped) = std::sync::mpsc::channel();
     buffer.map_async(MapMode::Read, .., move |result| {
         // Nobody listens only if waiting failed, which is then the error.
         drop(done.send(result));
     });
     device.poll(PollType::wait_indefinitely())?;
-    mapped.try_recv().map_err(|_unanswered| Error::Silent)??;
+    mapped.try_recv().map_err(|_unanswered| GpuError::NoAnswer)??;
     let bytes = buffer.get_mapped_range(..)?.to_vec();
     buffer.unmap();
     Ok(bytes)

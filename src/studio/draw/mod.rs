@@ -3,7 +3,7 @@
 //!
 //! The slow drawing is the specification of the fast one and the picture where no graphics card
 //! can be had. Function names and formulas in `scene.wgsl` equal those of [`software`]. A drawn
-//! scene is kept in a texture of its own ([`Canvas`]), and while scene, camera and size stay the
+//! scene is kept in a texture of its own ([`SceneCanvas`]), and while scene, camera and size stay the
 //! same, only that texture is shown.
 //!
 //! Lengths are millimetres, widths are pixels; x points right and y up.
@@ -15,14 +15,14 @@ mod scene;
 pub mod software;
 mod stage;
 
-pub use camera::{Bounds, Camera, round_length};
-pub use canvas::{Backing, Canvas, install};
-pub use scene::{Colour, Corner, Scene, Segment};
-pub use stage::{Shown, Stage, length_text};
+pub use camera::{BoundingBox, Camera, round_length_below};
+pub use canvas::{RenderBackend, SceneCanvas, install_gpu_cache};
+pub use scene::{Rgba, Scene, Segment, TriangleVertex};
+pub use stage::{SceneResponse, SceneView, length_text};
 
 /// A drawn scene: rows from the top, four bytes a pixel, colour multiplied by alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct RgbaImage {
     /// Width and height in pixels.
     pub size: [u32; 2],
     /// Red, green, blue, alpha of each pixel.

@@ -2,19 +2,19 @@
 
 use glam::{DVec2, Vec2};
 
-use super::Bounds;
+use super::BoundingBox;
 
 /// Red, green, blue and alpha as a person picks them: sRGB, colour not multiplied by alpha.
-pub type Colour = [u8; 4];
+pub type Rgba = [u8; 4];
 
 /// One corner of a filled triangle.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub struct Corner {
+pub struct TriangleVertex {
     /// Where it is, mm.
-    pub at: Vec2,
+    pub position: Vec2,
     /// Its colour; the three corners of a triangle share one.
-    pub colour: Colour,
+    pub color: Rgba,
 }
 
 /// A straight line with flat ends, or, where both ends are the same point, a round dot.
@@ -28,39 +28,39 @@ pub struct Segment {
     /// Width of the line or diameter of the dot, px.
     pub width: f32,
     /// Its colour.
-    pub colour: Colour,
+    pub color: Rgba,
 }
 
 /// Everything in one picture. Points that are not finite are left out as they are added.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// What lies behind everything.
-    pub background: Colour,
+    pub background: Rgba,
     /// Filled triangles, three corners each.
-    pub corners: Vec<Corner>,
+    pub vertices: Vec<TriangleVertex>,
     /// Lines and dots, later ones over earlier ones.
     pub segments: Vec<Segment>,
 }
 
 impl Scene {
     /// A scene with nothing in it yet.
-    pub fn on(background: Colour) -> Self {
+    pub fn on(background: Rgba) -> Self {
         Self { background, ..Self::default() }
     }
 
     /// One line from end to end.
-    pub fn line(&mut self, from: DVec2, to: DVec2, width: f32, colour: Colour) {
+    pub fn line(&mut self, from: DVec2, to: DVec2, width: f32, colour: Rgba) {
         let (from, to) = (from.as_vec2(), to.as_vec2());
         if from.is_finite() && to.is_finite() {
-            self.segments.push(Segment { from, to, width, colour });
+            self.segments.push(Segment { from, to, width, color: colour });
         }
     }
 
     /// Lines from point to point; points in line with their neighbours need no joint.
-    pub fn polyline(&mut self, points: &[DVec2], width: f32, colour: Colour) {
+    pub fn polyline(&mut self, points: &[DVec2], width: f32, colour: Rgba) {
         let Some(&(mut start)) = points.first() else { return };
         for (i, &end) in points.iter().enumerate().skip(1) {
-            let goes_on = points.get(i + 1).is_some_and(|&next| in_line(start, end, next));
+            let goes_on = points.get(i + 1).is_some_and(|&next| is_straight(start, end, next));
             if !goes_on && start != end {
                 self.line(start, end, width, colour);
                 start = end;
@@ -69,7 +69,7 @@ impl Scene {
     }
 
     /// Lines from point to point and back to the first.
-    pub fn outline(&mut self, points: &[DVec2], width: f32, colour: Colour) {
+    pub fn outline(&mut self, points: &[DVec2], width: f32, colour: Rgba) {
         self.polyline(points, width, colour);
         if let (Some(&last), Some(&first)) = (points.last(), points.first()) {
             self.polyline(&[last, first], width, colour);
@@ -77,35 +77,35 @@ impl Scene {
     }
 
     /// A round dot.
-    pub fn dot(&mut self, at: DVec2, diameter: f32, colour: Colour) {
+    pub fn dot(&mut self, at: DVec2, diameter: f32, colour: Rgba) {
         self.line(at, at, diameter, colour);
     }
 
     /// The area between two curves with the same number of points: a lens between its surfaces.
-    pub fn strip(&mut self, left: &[DVec2], right: &[DVec2], colour: Colour) {
+    pub fn strip(&mut self, left: &[DVec2], right: &[DVec2], colour: Rgba) {
         for (l, r) in left.windows(2).zip(right.windows(2)) {
             self.triangle([l[0], r[0], l[1]], colour);
             self.triangle([l[1], r[0], r[1]], colour);
         }
     }
 
-    fn triangle(&mut self, corners: [DVec2; 3], colour: Colour) {
-        let corners = corners.map(|at| Corner { at: at.as_vec2(), colour });
-        if corners.iter().all(|corner| corner.at.is_finite()) {
-            self.corners.extend(corners);
+    fn triangle(&mut self, corners: [DVec2; 3], colour: Rgba) {
+        let corners = corners.map(|at| TriangleVertex { position: at.as_vec2(), color: colour });
+        if corners.iter().all(|corner| corner.position.is_finite()) {
+            self.vertices.extend(corners);
         }
     }
 
     /// The smallest upright box around everything; none where nothing is drawn.
-    pub fn bounds(&self) -> Option<Bounds> {
-        let corners = self.corners.iter().map(|corner| corner.at);
+    pub fn bounds(&self) -> Option<BoundingBox> {
+        let corners = self.vertices.iter().map(|corner| corner.position);
         let ends = self.segments.iter().flat_map(|segment| [segment.from, segment.to]);
-        Bounds::around(corners.chain(ends).map(Vec2::as_dvec2))
+        BoundingBox::around(corners.chain(ends).map(Vec2::as_dvec2))
     }
 }
 
 /// Whether the way from `a` to `c` passes straight through `b`.
-fn in_line(a: DVec2, b: DVec2, c: DVec2) -> bool {
+fn is_straight(a: DVec2, b: DVec2, c: DVec2) -> bool {
     let (first, second) = (b - a, c - b);
     let size = first.length() * second.length();
     first.perp_dot(second).abs() <= 1e-12 * size && first.dot(second) >= 0.0
@@ -115,7 +115,7 @@ fn in_line(a: DVec2, b: DVec2, c: DVec2) -> bool {
 mod tests {
     use super::*;
 
-    const BLUE: Colour = [0, 0, 255, 255];
+    const BLUE: Rgba = [0, 0, 255, 255];
 
     #[test]
     fn points_that_are_not_finite_are_left_out() {
@@ -124,7 +124,7 @@ mod tests {
         scene.line(DVec2::ZERO, DVec2::new(1e300, 1.0), 1.0, BLUE);
         scene.strip(&[DVec2::ZERO, DVec2::Y], &[DVec2::X, DVec2::INFINITY], BLUE);
         assert_eq!(scene.segments.len(), 0);
-        assert_eq!(scene.corners.len(), 3, "the finite half of the strip stays");
+        assert_eq!(scene.vertices.len(), 3, "the finite half of the strip stays");
     }
 
     #[test]

@@ -11,38 +11,39 @@ use std::ops::Range;
 
 use glam::{Vec2, Vec4};
 
-use super::{Camera, Colour, Corner, Picture, Scene, Segment};
+use super::{Camera, Rgba, RgbaImage, Scene, Segment, TriangleVertex};
 
 /// Below this a line has no direction and is a dot.
 const DOT: f32 = 1e-3; // px
 
 /// Draws a scene into a picture of `size` pixels.
-pub fn draw(scene: &Scene, camera: Camera, size: [u32; 2]) -> Picture {
-    let mut paper = Paper::new(size, camera, scene.background);
-    for corners in scene.corners.chunks_exact(3) {
+pub fn draw(scene: &Scene, camera: Camera, size: [u32; 2]) -> RgbaImage {
+    let mut paper = PixelBuffer::new(size, camera, scene.background);
+    for corners in scene.vertices.chunks_exact(3) {
         paper.triangle(corners);
     }
     for segment in &scene.segments {
         paper.segment(segment);
     }
-    paper.picture
+    paper.image
 }
 
-struct Paper {
-    picture: Picture,
+struct PixelBuffer {
+    image: RgbaImage,
     camera: Camera,
 }
 
-impl Paper {
-    fn new(size: [u32; 2], camera: Camera, background: Colour) -> Self {
+impl PixelBuffer {
+    fn new(size: [u32; 2], camera: Camera, background: Rgba) -> Self {
         let pixels = size[0] as usize * size[1] as usize;
         let colour = to_bytes(premultiplied(background));
-        Self { picture: Picture { size, rgba: colour.repeat(pixels) }, camera }
+        Self { image: RgbaImage { size, rgba: colour.repeat(pixels) }, camera }
     }
 
-    fn triangle(&mut self, corners: &[Corner]) {
-        let points = [corners[0].at, corners[1].at, corners[2].at].map(|at| self.to_px(at));
-        let colour = premultiplied(corners[0].colour);
+    fn triangle(&mut self, corners: &[TriangleVertex]) {
+        let points = [corners[0].position, corners[1].position, corners[2].position]
+            .map(|at| self.to_px(at));
+        let colour = premultiplied(corners[0].color);
         let [a, b, c] = points;
         for row in self.rows(a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)) {
             if let Some((from, to)) = triangle_span(points, row as f32 + 0.5) {
@@ -56,7 +57,7 @@ impl Paper {
     fn segment(&mut self, segment: &Segment) {
         let (a, b) = (self.to_px(segment.from), self.to_px(segment.to));
         let half = 0.5 * segment.width;
-        let colour = premultiplied(segment.colour);
+        let colour = premultiplied(segment.color);
         for row in self.rows(a.y.min(b.y) - half - 1.0, a.y.max(b.y) + half + 1.0) {
             let y = row as f32 + 0.5;
             let (from, to) = segment_span(a, b, half, y);
@@ -69,32 +70,32 @@ impl Paper {
 
     fn to_px(&self, mm: Vec2) -> Vec2 {
         let (centre, scale) = self.camera.to_f32();
-        let [width, height] = self.picture.size.map(|n| n as f32);
+        let [width, height] = self.image.size.map(|n| n as f32);
         let d = (mm - centre) * scale;
         Vec2::new(0.5 * width + d.x, 0.5 * height - d.y)
     }
 
     fn rows(&self, from: f32, to: f32) -> Range<u32> {
-        centres(from, to, self.picture.size[1])
+        pixel_centers(from, to, self.image.size[1])
     }
 
     fn columns(&self, from: f32, to: f32) -> Range<u32> {
-        centres(from, to, self.picture.size[0])
+        pixel_centers(from, to, self.image.size[0])
     }
 
     fn blend(&mut self, column: u32, row: u32, source: Vec4) {
         if source.w <= 0.0 {
             return;
         }
-        let start = 4 * (row as usize * self.picture.size[0] as usize + column as usize);
-        let pixel = &mut self.picture.rgba[start..start + 4];
+        let start = 4 * (row as usize * self.image.size[0] as usize + column as usize);
+        let pixel = &mut self.image.rgba[start..start + 4];
         let below = Vec4::new(pixel[0].into(), pixel[1].into(), pixel[2].into(), pixel[3].into());
         pixel.copy_from_slice(&to_bytes(source + below * ((1.0 - source.w) / 255.0)));
     }
 }
 
 /// The pixels whose centres lie from `from` up to, not at, `to`.
-fn centres(from: f32, to: f32, count: u32) -> Range<u32> {
+fn pixel_centers(from: f32, to: f32, count: u32) -> Range<u32> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let index = |x: f32| ((x - 0.5).ceil() as u32).min(count);
     index(from)..index(to)
@@ -123,13 +124,13 @@ fn segment_span(a: Vec2, b: Vec2, half: f32, y: f32) -> (f32, f32) {
         return (a.x - reach, a.x + reach);
     }
     let axis = (b - a) / length;
-    let across = between(axis.y, (a.y - y) * axis.x, -reach, reach);
-    let along = between(axis.x, (y - a.y) * axis.y, -0.5, length + 0.5);
+    let across = interval_where(axis.y, (a.y - y) * axis.x, -reach, reach);
+    let along = interval_where(axis.x, (y - a.y) * axis.y, -0.5, length + 0.5);
     (a.x + across.0.max(along.0), a.x + across.1.min(along.1))
 }
 
 /// The x between which `slope * x + offset` lies between `low` and `high`.
-fn between(slope: f32, offset: f32, low: f32, high: f32) -> (f32, f32) {
+fn interval_where(slope: f32, offset: f32, low: f32, high: f32) -> (f32, f32) {
     if slope.abs() < 1e-6 {
         let everywhere = low <= offset && offset <= high;
         return if everywhere { (f32::MIN, f32::MAX) } else { (f32::MAX, f32::MIN) };
@@ -154,7 +155,7 @@ fn overlap(x: f32, low: f32, high: f32) -> f32 {
     ((x + 0.5).min(high) - (x - 0.5).max(low)).max(0.0)
 }
 
-fn premultiplied(colour: Colour) -> Vec4 {
+fn premultiplied(colour: Rgba) -> Vec4 {
     let [red, green, blue, alpha] = colour.map(|byte| f32::from(byte) / 255.0);
     Vec4::new(red * alpha, green * alpha, blue * alpha, alpha)
 }
@@ -170,12 +171,12 @@ mod tests {
 
     use super::*;
 
-    const WHITE: Colour = [255; 4];
+    const WHITE: Rgba = [255; 4];
     /// One pixel a millimetre, the origin in the middle.
-    const PLAIN: Camera = Camera { centre: DVec2::ZERO, scale: 1.0 };
+    const PLAIN: Camera = Camera { center: DVec2::ZERO, scale: 1.0 };
 
     /// The sum of all alphas, in whole pixels.
-    fn ink(picture: &Picture) -> f64 {
+    fn ink(picture: &RgbaImage) -> f64 {
         picture.rgba.chunks_exact(4).map(|pixel| f64::from(pixel[3]) / 255.0).sum()
     }
 

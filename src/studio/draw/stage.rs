@@ -9,7 +9,7 @@ use eframe::egui::{
 };
 use glam::DVec2;
 
-use super::{Backing, Bounds, Camera, Canvas, Scene, round_length};
+use super::{BoundingBox, Camera, RenderBackend, Scene, SceneCanvas, round_length_below};
 
 /// Free room around a fitted scene.
 const MARGIN: f64 = 24.0; // points
@@ -20,32 +20,32 @@ const NOTCH: f64 = 1.2;
 
 /// A part of a panel that shows a scene; it remembers where one looks.
 #[derive(Debug)]
-pub struct Stage {
-    canvas: Canvas,
+pub struct SceneView {
+    canvas: SceneCanvas,
     /// Where a person has moved to; none while the whole scene is shown.
-    moved: Option<Camera>,
+    user_camera: Option<Camera>,
 }
 
-impl Stage {
+impl SceneView {
     /// A stage; no two of one window share a name.
     pub const fn new(name: &'static str) -> Self {
-        Self { canvas: Canvas::new(name), moved: None }
+        Self { canvas: SceneCanvas::new(name), user_camera: None }
     }
 
     /// Shows the whole scene again.
     pub const fn fit(&mut self) {
-        self.moved = None;
+        self.user_camera = None;
     }
 
     /// Shows a scene in all the room that is left. `whole` is what *fit* shows.
     pub fn show(
         &mut self,
         ui: &mut Ui,
-        backing: Backing,
+        backing: RenderBackend,
         scene: &Arc<Scene>,
-        whole: Bounds,
+        whole: BoundingBox,
         label: &str,
-    ) -> Shown {
+    ) -> SceneResponse {
         self.show_over(ui, backing, (scene, whole), label, |_, _| {})
     }
 
@@ -54,18 +54,18 @@ impl Stage {
     pub fn show_over(
         &mut self,
         ui: &mut Ui,
-        backing: Backing,
-        (scene, whole): (&Arc<Scene>, Bounds),
+        backing: RenderBackend,
+        (scene, whole): (&Arc<Scene>, BoundingBox),
         label: &str,
-        below: impl FnOnce(&Ui, &Shown),
-    ) -> Shown {
+        below: impl FnOnce(&Ui, &SceneResponse),
+    ) -> SceneResponse {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, label));
         let per_point = f64::from(ui.ctx().pixels_per_point());
         let size = per_point * DVec2::new(rect.width().into(), rect.height().into());
         let fitted = Camera::fit(whole, size, MARGIN * per_point);
-        let camera = self.look_around(ui, &response, fitted, size, per_point);
-        let shown = Shown { response, camera, per_point };
+        let camera = self.navigate(ui, &response, fitted, size, per_point);
+        let shown = SceneResponse { response, camera, per_point };
         below(ui, &shown);
         self.canvas.show(ui, rect, backing, scene, camera);
         // The camera counts real pixels, the bar points.
@@ -73,7 +73,7 @@ impl Stage {
         shown
     }
 
-    fn look_around(
+    fn navigate(
         &mut self,
         ui: &Ui,
         response: &Response,
@@ -84,19 +84,19 @@ impl Stage {
         if response.double_clicked() {
             self.fit();
         }
-        let mut camera = self.moved.unwrap_or(fitted);
+        let mut camera = self.user_camera.unwrap_or(fitted);
         if response.dragged() {
-            camera = camera.dragged(per_point * points(response.drag_delta()));
+            camera = camera.dragged(per_point * to_dvec(response.drag_delta()));
         }
         if let Some(pointer) = response.hover_pos() {
-            let factor = zoom(ui);
+            let factor = zoom_factor(ui);
             if factor != 1.0 {
-                let px = per_point * points(pointer - response.rect.min);
+                let px = per_point * to_dvec(pointer - response.rect.min);
                 camera = camera.zoomed(factor, px, size);
             }
         }
-        if camera != self.moved.unwrap_or(fitted) {
-            self.moved = Some(camera);
+        if camera != self.user_camera.unwrap_or(fitted) {
+            self.user_camera = Some(camera);
         }
         camera
     }
@@ -104,27 +104,27 @@ impl Stage {
 
 /// A scene as it is shown.
 #[derive(Debug)]
-pub struct Shown {
+pub struct SceneResponse {
     /// Where it is.
     pub response: Response,
     camera: Camera,
     per_point: f64,
 }
 
-impl Shown {
+impl SceneResponse {
     fn size(&self) -> DVec2 {
-        self.per_point * points(self.response.rect.size())
+        self.per_point * to_dvec(self.response.rect.size())
     }
 
     /// The point of the plane under the pointer, and how long a point of the screen is there.
     pub fn pointer(&self) -> Option<(DVec2, f64)> {
         let at = self.response.hover_pos()?;
-        let px = self.per_point * points(at - self.response.rect.min);
+        let px = self.per_point * to_dvec(at - self.response.rect.min);
         Some((self.camera.to_mm(px, self.size()), self.per_point / self.camera.scale))
     }
 
     /// Where a point of the plane is on the screen.
-    pub fn on_screen(&self, mm: DVec2) -> egui::Pos2 {
+    pub fn to_screen(&self, mm: DVec2) -> egui::Pos2 {
         let px = self.camera.to_px(mm, self.size()) / self.per_point;
         #[expect(clippy::cast_possible_truncation, reason = "a place on the screen")]
         let offset = egui::vec2(px.x as f32, px.y as f32);
@@ -132,14 +132,14 @@ impl Shown {
     }
 }
 
-fn points(v: egui::Vec2) -> DVec2 {
+fn to_dvec(v: egui::Vec2) -> DVec2 {
     DVec2::new(v.x.into(), v.y.into())
 }
 
 /// By how much the wheel or two fingers bring the scene nearer.
 ///
 /// The events themselves are read: the smoothed ones would draw the scene ten times for a notch.
-fn zoom(ui: &Ui) -> f64 {
+fn zoom_factor(ui: &Ui) -> f64 {
     ui.input(|input| {
         input.events.iter().fold(1.0, |factor, event| match event {
             Event::Zoom(nearer) => factor * f64::from(*nearer),
@@ -159,7 +159,7 @@ fn zoom(ui: &Ui) -> f64 {
 /// Draws a bar of a round length and says how long it is. `scale` is in points per mm.
 fn scale_bar(ui: &Ui, rect: Rect, scale: f64) {
     let room = (BAR.0 * rect.width()).min(BAR.1);
-    let length = round_length(f64::from(room) / scale);
+    let length = round_length_below(f64::from(room) / scale);
     #[expect(clippy::cast_possible_truncation, reason = "at most 160 points")]
     let width = (length * scale) as f32;
     let left = rect.left_bottom() + egui::vec2(10.0, -10.0);

@@ -4,16 +4,16 @@ use eframe::egui::{
     Align, Align2, Layout as Arrange, Rect, TextStyle, Ui, UiBuilder, Vec2, pos2, vec2,
 };
 
-use crate::studio::draw::{length_text, round_length};
+use crate::studio::draw::{length_text, round_length_below};
 
 /// The room that the words of a cell take, in points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Words {
+pub(super) struct CellLayout {
     pub(super) above: f32,
     pub(super) below: f32,
 }
 
-impl Words {
+impl CellLayout {
     /// Cells that fill a part of the window, their pictures as large as can be.
     pub(super) fn cells(self, rect: Rect, count: usize) -> Vec<Rect> {
         let size = |columns: usize| {
@@ -55,7 +55,7 @@ impl Words {
 }
 
 /// Shows something in a part of the window and nothing beyond it.
-pub(super) fn within(ui: &mut Ui, rect: Rect, show: impl FnOnce(&mut Ui)) {
+pub(super) fn show_within(ui: &mut Ui, rect: Rect, show: impl FnOnce(&mut Ui)) {
     let builder = UiBuilder::new().max_rect(rect).layout(Arrange::top_down(Align::Min));
     ui.scope_builder(builder, |ui| {
         ui.set_clip_rect(rect.expand(2.0).intersect(ui.clip_rect()));
@@ -65,8 +65,8 @@ pub(super) fn within(ui: &mut Ui, rect: Rect, show: impl FnOnce(&mut Ui)) {
 
 /// A bar of a round length in a corner of a picture, with its length: at most a share of the
 /// width. `scale` is in points per mm.
-pub(super) fn bar(ui: &Ui, picture: Rect, scale: f64, share: f64) {
-    let length = round_length(share * f64::from(picture.width()) / scale);
+pub(super) fn scale_bar(ui: &Ui, picture: Rect, scale: f64, share: f64) {
+    let length = round_length_below(share * f64::from(picture.width()) / scale);
     #[expect(clippy::cast_possible_truncation, reason = "a part of the picture's width")]
     let width = (length * scale) as f32;
     let color = ui.visuals().strong_text_color();

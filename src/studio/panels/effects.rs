@@ -2,30 +2,32 @@
 
 use eframe::egui::{Align, Color32, ComboBox, Frame, Layout, Margin, RichText, ScrollArea, Ui};
 
-use super::{Panel, no_numbers, shown};
-use crate::effects::{Choice, Decision, Plan};
-use crate::session::{Command, View};
+use super::{Panel, displayed_results, show_missing_results};
+use crate::effects::{EffectDecision, EffectOverride, EffectPlan};
+use crate::session::{Command, SessionView};
 use crate::studio::number;
-use crate::studio::wording::{capital, counted_from_one};
+use crate::studio::wording::{capitalize, counted_from_one};
 
 /// The panel.
 #[derive(Debug)]
-pub struct Effects;
+pub struct EffectsPanel;
 
-impl Panel for Effects {
+impl Panel for EffectsPanel {
     fn title(&self) -> &'static str {
         "Effects"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        let Some((_, numbers)) = shown(view) else { return no_numbers(ui, view) };
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+        let Some((_, numbers)) = displayed_results(view) else {
+            return show_missing_results(ui, view);
+        };
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             table(ui, &numbers.plan.value, view, wishes);
         });
     }
 }
 
-fn table(ui: &mut Ui, plan: &Plan, view: &View, wishes: &mut Vec<Command>) {
+fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, wishes: &mut Vec<Command>) {
     ui.spacing_mut().item_spacing.y = 1.0;
     for (i, decision) in plan.decisions.iter().enumerate() {
         let striped = if i % 2 == 0 { ui.visuals().faint_bg_color } else { Color32::TRANSPARENT };
@@ -33,14 +35,14 @@ fn table(ui: &mut Ui, plan: &Plan, view: &View, wishes: &mut Vec<Command>) {
         Frame::new().fill(striped).inner_margin(margin).show(ui, |ui| {
             ui.set_min_width(ui.available_width());
             ui.horizontal(|ui| {
-                state(ui, decision);
-                ui.strong(capital(decision.effect.name()));
-                let chosen = view.settings.choices.of(decision.effect);
-                choice(ui, decision, chosen, wishes);
+                state_label(ui, decision);
+                ui.strong(capitalize(decision.effect.name()));
+                let chosen = view.settings.overrides.get(decision.effect);
+                override_menu(ui, decision, chosen, wishes);
             });
-            let reason = capital(&counted_from_one(&decision.reason));
+            let reason = capitalize(&counted_from_one(&decision.reason));
             ui.label(RichText::new(reason).small());
-            ui.label(RichText::new(numbers(decision)).small().weak()).on_hover_text(
+            ui.label(RichText::new(reason_text(decision)).small().weak()).on_hover_text(
                 "What changes if the effect is left out, above what that is needed, and the share \
                  of the time of tracing that leaving it out saves",
             );
@@ -49,7 +51,7 @@ fn table(ui: &mut Ui, plan: &Plan, view: &View, wishes: &mut Vec<Command>) {
 }
 
 /// Whether the effect is computed.
-fn state(ui: &mut Ui, decision: &Decision) {
+fn state_label(ui: &mut Ui, decision: &EffectDecision) {
     let visuals = ui.visuals();
     let (text, color) = if decision.computed {
         ("on", visuals.hyperlink_color)
@@ -59,35 +61,40 @@ fn state(ui: &mut Ui, decision: &Decision) {
     ui.label(RichText::new(text).monospace().color(color));
 }
 
-fn choice(ui: &mut Ui, decision: &Decision, old: Choice, wishes: &mut Vec<Command>) {
+fn override_menu(
+    ui: &mut Ui,
+    decision: &EffectDecision,
+    old: EffectOverride,
+    wishes: &mut Vec<Command>,
+) {
     let mut chosen = old;
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let combo = ComboBox::from_id_salt(decision.effect.name()).width(56.0);
-        let combo = combo.selected_text(name(chosen)).show_ui(ui, |ui| {
-            for choice in [Choice::Auto, Choice::On, Choice::Off] {
-                ui.selectable_value(&mut chosen, choice, name(choice));
+        let combo = combo.selected_text(override_name(chosen)).show_ui(ui, |ui| {
+            for choice in [EffectOverride::Auto, EffectOverride::On, EffectOverride::Off] {
+                ui.selectable_value(&mut chosen, choice, override_name(choice));
             }
         });
         let label = format!("Choice of {}", decision.effect.name());
         combo.response.accessible_name(label).on_hover_text("Auto follows the plan for this lens");
     });
     if chosen != old {
-        wishes.push(Command::Choose(decision.effect, chosen));
+        wishes.push(Command::SetEffect(decision.effect, chosen));
     }
 }
 
-const fn name(choice: Choice) -> &'static str {
+const fn override_name(choice: EffectOverride) -> &'static str {
     match choice {
-        Choice::Auto => "Auto",
-        Choice::On => "On",
-        Choice::Off => "Off",
+        EffectOverride::Auto => "Auto",
+        EffectOverride::On => "On",
+        EffectOverride::Off => "Off",
     }
 }
 
 /// The number that the decision rests on, its limit, and the time at stake.
-fn numbers(decision: &Decision) -> String {
-    let digits = |value: f64| number::show_digits(value, 3);
-    let Decision { error, limit, unit, saves, .. } = decision;
+fn reason_text(decision: &EffectDecision) -> String {
+    let digits = |value: f64| number::format_digits(value, 3);
+    let EffectDecision { error, limit, unit, saves, .. } = decision;
     let rests = format!("{} {unit}, limit {} {unit}", digits(*error), digits(*limit));
     if *saves <= 0.0 {
         return rests;

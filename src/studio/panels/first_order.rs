@@ -4,29 +4,31 @@ use eframe::egui::{
     Align, Color32, Frame, Grid, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui,
 };
 
-use super::{Panel, no_numbers, shown};
+use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::Lens;
-use crate::paraxial::{FirstOrder, Pupil, Seidel, SeidelSums};
-use crate::session::{Command, View};
+use crate::paraxial::{FirstOrder, ParaxialPupil, Seidel, SeidelSums};
+use crate::session::{Command, SessionView};
 use crate::studio::number;
 
 /// The panel.
 #[derive(Debug)]
-pub struct FirstOrderData;
+pub struct FirstOrderPanel;
 
-impl Panel for FirstOrderData {
+impl Panel for FirstOrderPanel {
     fn title(&self) -> &'static str {
         "First order"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, _wishes: &mut Vec<Command>) {
-        let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _wishes: &mut Vec<Command>) {
+        let Some((results, numbers)) = displayed_results(view) else {
+            return show_missing_results(ui, view);
+        };
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            data(ui, &results.lens, numbers.first());
+            data(ui, &results.lens, numbers.first_order());
             ui.add_space(6.0);
             ScrollArea::horizontal().show(ui, |ui| match &numbers.seidel.value {
                 Some(seidel) => sums(ui, &results.lens, seidel),
-                None if numbers.bench.value.is_graded() => drop(ui.weak(
+                None if numbers.bench.value.has_grin() => drop(ui.weak(
                     "No third-order sums: those of a gradient-index medium are not implemented",
                 )),
                 None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
@@ -36,11 +38,11 @@ impl Panel for FirstOrderData {
 }
 
 /// A name, a value with its unit, and what it means.
-struct Line(&'static str, String, &'static str);
+struct DataLine(&'static str, String, &'static str);
 
 fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
     ui.spacing_mut().item_spacing.y = 1.0;
-    for (i, Line(name, value, meaning)) in lines(lens, first).into_iter().enumerate() {
+    for (i, DataLine(name, value, meaning)) in lines(lens, first).into_iter().enumerate() {
         let striped = if i % 2 == 0 { ui.visuals().faint_bg_color } else { Color32::TRANSPARENT };
         // The scroll bar floats over the right end.
         let margin = Margin { left: 3, right: 10, top: 1, bottom: 1 };
@@ -53,15 +55,23 @@ fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
     }
 }
 
-fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<Line> {
+fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
     let track: f64 = lens.surfaces.iter().map(|row| row.thickness).sum();
     let petzval = (first.petzval_sum != 0.0).then(|| -1.0 / first.petzval_sum);
     vec![
-        Line("Focal length", mm(first.efl), "Equivalent focal length, one over the power"),
-        Line("Back focal length", mm(first.bfl), "From the last vertex to the back focal point"),
-        Line("Front focal length", mm(first.ffl), "From the first vertex to the front focal point"),
-        Line("F-number", plain(first.f_number), "Focal length over entrance pupil diameter"),
-        Line(
+        DataLine("Focal length", mm(first.efl), "Equivalent focal length, one over the power"),
+        DataLine(
+            "Back focal length",
+            mm(first.bfl),
+            "From the last vertex to the back focal point",
+        ),
+        DataLine(
+            "Front focal length",
+            mm(first.ffl),
+            "From the first vertex to the front focal point",
+        ),
+        DataLine("F-number", plain(first.f_number), "Focal length over entrance pupil diameter"),
+        DataLine(
             "Working f-number",
             plain(first.working_f_number),
             "One over twice the numerical aperture in the image space",
@@ -70,35 +80,42 @@ fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<Line> {
         pupil_size("Entrance pupil size", first.entrance_pupil),
         pupil_place("Exit pupil at", first.exit_pupil, "From the last vertex"),
         pupil_size("Exit pupil size", first.exit_pupil),
-        Line(
+        DataLine(
             "Stop semi-diameter",
             mm(Some(first.stop_semi_diameter)),
             "Height of the marginal ray at the stop",
         ),
-        Line("Image behind focus", mm(first.image_defocus), "Image plane from the paraxial image"),
-        Line("Magnification", plain(first.magnification), "None for an object at infinity"),
-        Line("Lagrange invariant", mm(first.lagrange), "n (ū y − u ȳ), the same everywhere"),
-        Line("Petzval radius", mm(petzval), "Radius of the image surface without astigmatism"),
-        Line("Total track", mm(Some(track)), "From the first vertex to the image, as written"),
+        DataLine(
+            "Image behind focus",
+            mm(first.image_defocus),
+            "Image plane from the paraxial image",
+        ),
+        DataLine("Magnification", plain(first.magnification), "None for an object at infinity"),
+        DataLine("Lagrange invariant", mm(first.lagrange), "n (ū y − u ȳ), the same everywhere"),
+        DataLine("Petzval radius", mm(petzval), "Radius of the image surface without astigmatism"),
+        DataLine("Total track", mm(Some(track)), "From the first vertex to the image, as written"),
     ]
 }
 
-fn pupil_place(name: &'static str, pupil: Pupil<f64>, from: &'static str) -> Line {
+fn pupil_place(name: &'static str, pupil: ParaxialPupil<f64>, from: &'static str) -> DataLine {
     let place = pupil.position.map_or_else(|| "Infinity".to_owned(), |z| mm(Some(z)));
-    Line(name, place, from)
+    DataLine(name, place, from)
 }
 
-fn pupil_size(name: &'static str, pupil: Pupil<f64>) -> Line {
+fn pupil_size(name: &'static str, pupil: ParaxialPupil<f64>) -> DataLine {
     let size = pupil.diameter.map_or_else(|| "telecentric".to_owned(), |d| mm(Some(d)));
-    Line(name, size, "Its diameter")
+    DataLine(name, size, "Its diameter")
 }
 
 fn plain(value: Option<f64>) -> String {
-    value.map_or_else(|| "none".to_owned(), |value| number::show_digits(value, 6))
+    value.map_or_else(|| "none".to_owned(), |value| number::format_digits(value, 6))
 }
 
 fn mm(value: Option<f64>) -> String {
-    value.map_or_else(|| "none".to_owned(), |value| format!("{} mm", number::show_digits(value, 6)))
+    value.map_or_else(
+        || "none".to_owned(),
+        |value| format!("{} mm", number::format_digits(value, 6)),
+    )
 }
 
 /// The columns of the sums and what they stand for.

@@ -8,14 +8,16 @@ use std::sync::Arc;
 use eframe::egui::{Align, ComboBox, DragValue, Layout as Arrange, RichText, Stroke, Ui};
 use glam::DVec2;
 
-use super::{Panel, field_name, no_numbers, shown, swatch, zoom_name};
+use super::{Panel, displayed_results, field_name, show_missing_results, swatch, zoom_name};
 use crate::lens::System;
 use crate::math::Vec3;
-use crate::session::{Command, DrawnRay, Layout, Numbers, Results, View, fresh_glass};
-use crate::studio::draw::{Backing, Bounds, Colour, Scene, Shown, Stage};
+use crate::session::{
+    Analyses, AnalysisResults, Command, LayoutRay, RayLayout, SessionView, added_glass,
+};
+use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
-use crate::studio::section::Section;
+use crate::studio::section::LensSection;
 use crate::trace::Fates;
 
 /// How near the pointer must be to a surface to name it, in points.
@@ -23,91 +25,92 @@ const NEAR: f64 = 6.0;
 
 /// The panel.
 #[derive(Debug)]
-pub struct LensLayout {
-    backing: Backing,
-    stage: Stage,
-    drawing: Option<Drawing>,
+pub struct LayoutPanel {
+    backing: RenderBackend,
+    scene_view: SceneView,
+    drawing: Option<LayoutDrawing>,
 }
 
 /// What is drawn, and from what it was.
 #[derive(Debug)]
-struct Drawing {
-    source: Source,
+struct LayoutDrawing {
+    source: LayoutKey,
     scene: Arc<Scene>,
-    whole: Bounds,
+    full_view: BoundingBox,
     system: System<f64>,
     reached: Vec<f64>,
     fates: Fates,
     /// Fields without rays, and why.
-    dark: Vec<(usize, String)>,
+    fields_without_rays: Vec<(usize, String)>,
     /// How many pieces of glass the design does not have.
-    fresh: usize,
+    added_glass: usize,
 }
 
 /// All on which a drawing depends.
 #[derive(Debug, Clone)]
-struct Source {
+struct LayoutKey {
     /// What is drawn.
-    shown: Arc<Results>,
+    results: Arc<AnalysisResults>,
     /// The design, drawn faintly below the lens of a search.
-    ghost: Option<Arc<Results>>,
+    reference: Option<Arc<AnalysisResults>>,
     palette: Palette,
 }
 
-impl PartialEq for Source {
+impl PartialEq for LayoutKey {
     /// Results are compared by address, which cannot be another's while they are held.
     fn eq(&self, other: &Self) -> bool {
-        let ghost = match (&self.ghost, &other.ghost) {
+        let ghost = match (&self.reference, &other.reference) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
             (None, None) => true,
             _ => false,
         };
-        ghost && Arc::ptr_eq(&self.shown, &other.shown) && self.palette == other.palette
+        ghost && Arc::ptr_eq(&self.results, &other.results) && self.palette == other.palette
     }
 }
 
-impl LensLayout {
+impl LayoutPanel {
     /// An empty panel.
-    pub const fn new(backing: Backing) -> Self {
-        Self { backing, stage: Stage::new("layout"), drawing: None }
+    pub const fn new(backing: RenderBackend) -> Self {
+        Self { backing, scene_view: SceneView::new("layout"), drawing: None }
     }
 }
 
-impl Panel for LensLayout {
+impl Panel for LayoutPanel {
     fn title(&self) -> &'static str {
         "Layout"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
         self.refresh(ui, view);
         self.header(ui, view, wishes);
-        let Some(drawing) = &self.drawing else { return no_numbers(ui, view) };
+        let Some(drawing) = &self.drawing else { return show_missing_results(ui, view) };
         let label = format!("Section of {}", view.lens.name);
-        let shown = self.stage.show(ui, self.backing, &drawing.scene, drawing.whole, &label);
-        let near = drawing.name_surface(ui, view, &shown);
+        let shown =
+            self.scene_view.show(ui, self.backing, &drawing.scene, drawing.full_view, &label);
+        let near = drawing.highlight_surface(ui, view, &shown);
         if shown.response.clicked() && near != view.selected {
             wishes.push(Command::Select(near));
         }
     }
 }
 
-impl LensLayout {
-    fn refresh(&mut self, ui: &Ui, view: &View) {
-        let Some(source) = Source::of(ui, view) else {
+impl LayoutPanel {
+    fn refresh(&mut self, ui: &Ui, view: &SessionView) {
+        let Some(source) = LayoutKey::of(ui, view) else {
             self.drawing = None;
             return;
         };
         if self.drawing.as_ref().is_none_or(|drawing| drawing.source != source) {
-            self.drawing = Drawing::new(source);
+            self.drawing = LayoutDrawing::new(source);
         }
     }
 
-    fn header(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    fn header(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
         ui.horizontal(|ui| {
             self.legend(ui, view);
             ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
                 if ui.button("Fit").on_hover_text("Show the whole lens (double click)").clicked() {
-                    self.stage.fit();
+                    self.scene_view.fit();
                 }
                 rays(ui, view, wishes);
                 zoom_position(ui, view, wishes);
@@ -116,8 +119,8 @@ impl LensLayout {
     }
 
     /// The colours of the fields, and what became of the rays.
-    fn legend(&self, ui: &mut Ui, view: &View) {
-        let palette = Palette::of(ui.visuals());
+    fn legend(&self, ui: &mut Ui, view: &SessionView) {
+        let palette = Palette::for_visuals(ui.visuals());
         let fields = view.lens.fields_at(view.settings.zoom);
         for (i, field) in fields.values.iter().enumerate() {
             let color = color32(palette.field(i));
@@ -126,24 +129,24 @@ impl LensLayout {
             ui.add_space(4.0);
         }
         let Some(drawing) = &self.drawing else { return };
-        if let Some(text) = losses(drawing.fates) {
-            let color = color32(palette.lost);
+        if let Some(text) = losses_text(drawing.fates) {
+            let color = color32(palette.lost_ray);
             swatch(ui, color);
             ui.label(RichText::new(text).color(color))
                 .on_hover_text("Rays are drawn to the place where they are lost, with a dot there");
         }
-        if drawing.fresh > 0 {
-            swatch(ui, color32(palette.fresh).to_opaque());
+        if drawing.added_glass > 0 {
+            swatch(ui, color32(palette.added_glass).to_opaque());
             ui.label("new glass").on_hover_text("Glass that the design does not have");
         }
-        for (field, why) in &drawing.dark {
+        for (field, why) in &drawing.fields_without_rays {
             ui.colored_label(ui.visuals().warn_fg_color, format!("Field {}: {why}", field + 1));
         }
     }
 }
 
 /// How many rays are lost, by cause; nothing where none is.
-fn losses(fates: Fates) -> Option<String> {
+fn losses_text(fates: Fates) -> Option<String> {
     let causes = [
         (fates.clipped, "clipped"),
         (fates.missed, "missed a surface"),
@@ -155,7 +158,7 @@ fn losses(fates: Fates) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{} of {} rays", parts.join(", "), fates.total()))
 }
 
-fn rays(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+fn rays(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     let mut count = view.settings.rays;
     let drag = DragValue::new(&mut count).range(1..=501).speed(0.2).suffix(" rays");
     let drag = ui.add(drag).accessible_name("Rays of each field");
@@ -164,7 +167,7 @@ fn rays(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
     }
 }
 
-fn zoom_position(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+fn zoom_position(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     let lens = &view.lens;
     if lens.zoom_positions() < 2 {
         return;
@@ -183,27 +186,27 @@ fn zoom_position(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
     }
 }
 
-impl Source {
-    fn of(ui: &Ui, view: &View) -> Option<Self> {
-        let shown = Arc::clone(shown(view)?.0);
+impl LayoutKey {
+    fn of(ui: &Ui, view: &SessionView) -> Option<Self> {
+        let shown = Arc::clone(displayed_results(view)?.0);
         let ghost = view.results.clone().filter(|design| !Arc::ptr_eq(design, &shown));
-        Some(Self { shown, ghost, palette: Palette::of(ui.visuals()) })
+        Some(Self { results: shown, reference: ghost, palette: Palette::for_visuals(ui.visuals()) })
     }
 }
 
-impl Drawing {
-    fn new(source: Source) -> Option<Self> {
-        let numbers = source.shown.numbers.as_ref().ok()?;
+impl LayoutDrawing {
+    fn new(source: LayoutKey) -> Option<Self> {
+        let numbers = source.results.analyses.as_ref().ok()?;
         let (bench, layout) = (&numbers.bench.value, &numbers.layout.value);
         let palette = source.palette;
-        let system = bench.colors[bench.primary].system.clone();
-        let section = Section::new(&system, &layout.reached);
+        let system = bench.channels[bench.primary].system.clone();
+        let section = LensSection::new(&system, &layout.ray_heights);
         let mut scene = Scene::on(palette.background);
-        if let Some(Ok(design)) = source.ghost.as_ref().map(|ghost| &ghost.numbers) {
-            draw_ghost(&mut scene, design, &palette);
+        if let Some(Ok(design)) = source.reference.as_ref().map(|ghost| &ghost.analyses) {
+            draw_reference(&mut scene, design, &palette);
         }
         let fresh =
-            source.ghost.as_ref().map(|design| fresh_glass(&source.shown.lens, &design.lens));
+            source.reference.as_ref().map(|design| added_glass(&source.results.lens, &design.lens));
         let fresh = fresh.unwrap_or_default();
         section.draw_glass(&mut scene, &palette, &fresh);
         layout.rays.iter().for_each(|ray| draw_ray(&mut scene, ray, &palette));
@@ -211,11 +214,11 @@ impl Drawing {
         draw_image(&mut scene, &section, layout, &palette);
         Some(Self {
             scene: Arc::new(scene),
-            whole: whole(&section, layout)?,
-            reached: layout.reached.clone(),
+            full_view: full_view(&section, layout)?,
+            reached: layout.ray_heights.clone(),
             fates: layout.fates,
-            dark: layout.dark.clone(),
-            fresh: fresh.len(),
+            fields_without_rays: layout.errors.clone(),
+            added_glass: fresh.len(),
             system,
             source,
         })
@@ -223,14 +226,19 @@ impl Drawing {
 
     /// Draws the selected surface and the one under the pointer bold; the latter is named and
     /// given back, the image plane excepted.
-    fn name_surface(&self, ui: &Ui, view: &View, shown: &Shown) -> Option<usize> {
-        let section = Section::new(&self.system, &self.reached);
+    fn highlight_surface(
+        &self,
+        ui: &Ui,
+        view: &SessionView,
+        shown: &SceneResponse,
+    ) -> Option<usize> {
+        let section = LensSection::new(&self.system, &self.reached);
         let count = self.system.surfaces.len();
         let near = shown.pointer().and_then(|(at, mm)| section.surface_near(at, NEAR * mm));
         let selected = view.selected.filter(|surface| *surface < count && near != view.selected);
         for surface in selected.into_iter().chain(near) {
             let curve = section.outline_of(surface);
-            let curve = curve.into_iter().map(|mm| shown.on_screen(mm)).collect();
+            let curve = curve.into_iter().map(|mm| shown.to_screen(mm)).collect();
             let stroke = Stroke::new(2.5, ui.visuals().selection.stroke.color);
             ui.painter_at(shown.response.rect).line(curve, stroke);
         }
@@ -239,71 +247,76 @@ impl Drawing {
         (near < view.lens.surfaces.len()).then_some(near)
     }
 
-    fn describe(&self, view: &View, surface: usize) -> String {
+    fn describe(&self, view: &SessionView, surface: usize) -> String {
         let Some(row) = view.lens.surfaces.get(surface) else { return "Image plane".to_owned() };
         let shape = &self.system.surfaces[surface].shape;
-        let radius = number::show(number::radius(shape.curvature()));
+        let radius = number::format_number(number::radius(shape.curvature()));
         let stop = if row.stop { ", the stop" } else { "" };
         let first = format!("Surface {}, radius {radius} mm{stop}", surface + 1);
         let limit = row.semi_diameter.map(|limit| {
-            format!("\nsemi-diameter {} mm: rays beyond it are clipped", number::show(limit))
+            format!(
+                "\nsemi-diameter {} mm: rays beyond it are clipped",
+                number::format_number(limit)
+            )
         });
         let reached = self
             .reached
             .get(surface)
-            .map(|height| format!("\nrays reach {} mm", number::show_digits(*height, 5)));
+            .map(|height| format!("\nrays reach {} mm", number::format_digits(*height, 5)));
         first + &limit.unwrap_or_default() + &reached.unwrap_or_default()
     }
 }
 
 /// The outlines of the design, to compare with.
-fn draw_ghost(scene: &mut Scene, design: &Numbers, palette: &Palette) {
+fn draw_reference(scene: &mut Scene, design: &Analyses, palette: &Palette) {
     let bench = &design.bench.value;
-    let system = &bench.colors[bench.primary].system;
-    Section::new(system, &design.layout.value.reached).draw_ghost(scene, palette.faint);
+    let system = &bench.channels[bench.primary].system;
+    LensSection::new(system, &design.layout.value.ray_heights).draw_ghost(scene, palette.faint);
 }
 
 /// The lowest and the highest place of the image plane that rays reach, with some room.
-fn image(layout: &Layout) -> Option<(f64, f64)> {
+fn image_extent(layout: &RayLayout) -> Option<(f64, f64)> {
     let arrived = layout.rays.iter().filter(|ray| ray.path.fate.is_imaged());
     let ends = arrived.filter_map(|ray| Some(DVec2::splat(ray.path.points.last()?.y)));
-    let Bounds { min, max } = Bounds::around(ends)?;
+    let BoundingBox { min, max } = BoundingBox::around(ends)?;
     let room = 0.06 * (max.y - min.y);
     Some((min.y - room, max.y + room))
 }
 
-fn draw_image(scene: &mut Scene, section: &Section<'_>, layout: &Layout, palette: &Palette) {
+fn draw_image(scene: &mut Scene, section: &LensSection<'_>, layout: &RayLayout, palette: &Palette) {
     let z = section.image();
-    let (low, high) = image(layout).unwrap_or_default();
+    let (low, high) = image_extent(layout).unwrap_or_default();
     let reach = low.abs().max(high.abs()).max(section.highest());
     let (low, high) = (low.min(-0.4 * reach), high.max(0.4 * reach));
     scene.line(DVec2::new(z, low), DVec2::new(z, high), 1.5, palette.strong);
 }
 
 /// What *fit* shows: the lens, the image and where the rays come from.
-fn whole(section: &Section<'_>, layout: &Layout) -> Option<Bounds> {
+fn full_view(section: &LensSection<'_>, layout: &RayLayout) -> Option<BoundingBox> {
     let lens = section.bounds()?;
     let z = section.image();
-    let ends = image(layout).map(|(low, high)| [DVec2::new(z, low), DVec2::new(z, high)]);
+    let ends = image_extent(layout).map(|(low, high)| [DVec2::new(z, low), DVec2::new(z, high)]);
     let high = 1.4 * section.highest();
     let starts = layout.rays.iter().filter_map(|ray| ray.path.points.first());
     let starts = starts.map(|start| DVec2::new(start.z, start.y.clamp(-high, high)));
-    Bounds::around([lens.min, lens.max].into_iter().chain(ends.into_iter().flatten()).chain(starts))
+    BoundingBox::around(
+        [lens.min, lens.max].into_iter().chain(ends.into_iter().flatten()).chain(starts),
+    )
 }
 
 /// A ray in the colour of its field; a lost one in red to the dot where it ends.
-fn draw_ray(scene: &mut Scene, ray: &DrawnRay, palette: &Palette) {
+fn draw_ray(scene: &mut Scene, ray: &LayoutRay, palette: &Palette) {
     let points: Vec<DVec2> =
         ray.path.points.iter().map(|p: &Vec3<f64>| DVec2::new(p.z, p.y)).collect();
     if ray.path.fate.is_imaged() {
         return scene.polyline(&points, 1.0, with_alpha(palette.field(ray.field), 190));
     }
-    scene.polyline(&points, 1.0, with_alpha(palette.lost, 110));
+    scene.polyline(&points, 1.0, with_alpha(palette.lost_ray, 110));
     if let Some(end) = points.last() {
-        scene.dot(*end, 5.0, palette.lost);
+        scene.dot(*end, 5.0, palette.lost_ray);
     }
 }
 
-const fn with_alpha([r, g, b, _]: Colour, alpha: u8) -> Colour {
+const fn with_alpha([r, g, b, _]: Rgba, alpha: u8) -> Rgba {
     [r, g, b, alpha]
 }

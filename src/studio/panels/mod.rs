@@ -12,29 +12,29 @@ mod search;
 pub(super) mod slice;
 mod spot;
 
-pub use effects::Effects;
-pub use first_order::FirstOrderData;
-pub use layout::LensLayout;
-pub use optimizer::Optimizer;
-pub use pareto::ParetoFront;
-pub use prescription::Prescription;
-pub(super) use prescription::first_field;
-pub use pupil::Pupils;
-pub use search::StructureSearch;
-pub use slice::GrinSlice;
-pub use spot::SpotDiagram;
+pub use effects::EffectsPanel;
+pub use first_order::FirstOrderPanel;
+pub use layout::LayoutPanel;
+pub use optimizer::OptimizerPanel;
+pub use pareto::ParetoPanel;
+pub use prescription::PrescriptionPanel;
+pub(super) use prescription::first_radius_field;
+pub use pupil::PupilPanel;
+pub use search::SearchPanel;
+pub use slice::GrinPanel;
+pub use spot::SpotPanel;
 
 use std::sync::Arc;
 
 use eframe::egui::{Color32, Context, Sense, Ui, vec2};
 use serde::{Deserialize, Serialize};
 
-use super::draw::Backing;
+use super::draw::RenderBackend;
 use super::number;
-use super::wording::{capital, counted_from_one};
+use super::wording::{capitalize, counted_from_one};
 use crate::analysis::{Estimate, Spot};
-use crate::lens::{Field, FieldKind, Lens, NumberKind, vary};
-use crate::session::{Command, Edit, Numbers, Results, View};
+use crate::lens::{FieldKind, FieldPoint, Lens, ParameterKind, add_variables};
+use crate::session::{Analyses, AnalysisResults, Command, Edit, SessionView};
 
 /// A part of the window. It shows a view and writes down wishes; it changes nothing.
 pub trait Panel {
@@ -42,7 +42,7 @@ pub trait Panel {
     fn title(&self) -> &'static str;
 
     /// Shows it.
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>);
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>);
 
     /// Whether something is being typed into it.
     fn is_typing(&self, _context: &Context) -> bool {
@@ -53,7 +53,7 @@ pub trait Panel {
 /// Which panel; what a saved arrangement of the window remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum PanelKind {
     /// The lens in section, with its rays.
     Layout,
     /// A slice through a gradient-index field, as it is formed.
@@ -76,7 +76,7 @@ pub enum Kind {
     Effects,
 }
 
-impl Kind {
+impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
     pub const ALL: [Self; 10] = [
         Self::Layout,
@@ -92,46 +92,46 @@ impl Kind {
     ];
 
     /// A new panel of this kind.
-    pub fn panel(self, backing: Backing) -> Box<dyn Panel> {
+    pub fn panel(self, backing: RenderBackend) -> Box<dyn Panel> {
         match self {
-            Self::Layout => Box::new(LensLayout::new(backing)),
-            Self::Slice => Box::new(GrinSlice::new(backing)),
-            Self::Prescription => Box::new(Prescription::default()),
-            Self::Spot => Box::new(SpotDiagram::new(backing)),
-            Self::Pupil => Box::new(Pupils::default()),
-            Self::Optimizer => Box::new(Optimizer::default()),
-            Self::Pareto => Box::new(ParetoFront::default()),
-            Self::Search => Box::new(StructureSearch::default()),
-            Self::FirstOrder => Box::new(FirstOrderData),
-            Self::Effects => Box::new(Effects),
+            Self::Layout => Box::new(LayoutPanel::new(backing)),
+            Self::Slice => Box::new(GrinPanel::new(backing)),
+            Self::Prescription => Box::new(PrescriptionPanel::default()),
+            Self::Spot => Box::new(SpotPanel::new(backing)),
+            Self::Pupil => Box::new(PupilPanel::default()),
+            Self::Optimizer => Box::new(OptimizerPanel::default()),
+            Self::Pareto => Box::new(ParetoPanel::default()),
+            Self::Search => Box::new(SearchPanel::default()),
+            Self::FirstOrder => Box::new(FirstOrderPanel),
+            Self::Effects => Box::new(EffectsPanel),
         }
     }
 }
 
 /// The newest numbers, if the lens has any.
-fn numbers(view: &View) -> Option<&Numbers> {
-    view.results.as_ref()?.numbers.as_ref().ok()
+fn design_results(view: &SessionView) -> Option<&Analyses> {
+    view.results.as_ref()?.analyses.as_ref().ok()
 }
 
 /// The results that drawings show: those of the search where there are any, else the design's.
-fn shown(view: &View) -> Option<(&Arc<Results>, &Numbers)> {
-    let results = view.preview.as_ref().or(view.results.as_ref())?;
-    Some((results, results.numbers.as_ref().ok()?))
+fn displayed_results(view: &SessionView) -> Option<(&Arc<AnalysisResults>, &Analyses)> {
+    let results = view.preview_results.as_ref().or(view.results.as_ref())?;
+    Some((results, results.analyses.as_ref().ok()?))
 }
 
 /// The share of the pupil through which a field is lit.
-fn lit(spot: Option<&Spot>) -> f64 {
-    let colors = spot.iter().flat_map(|spot| &spot.colors).flatten();
+fn pupil_share(spot: Option<&Spot>) -> f64 {
+    let colors = spot.iter().flat_map(|spot| &spot.channels).flatten();
     colors.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI
 }
 
 /// The light of a lens: the mean area of its pupils in mm², over fields and wavelengths by weight.
-fn light(numbers: &Numbers) -> f64 {
+fn mean_pupil_area(numbers: &Analyses) -> f64 {
     let bench = &numbers.bench.value;
     let (mut sum, mut weights) = (0.0, 0.0);
     for (spot, field) in numbers.spots.value.iter().zip(&bench.fields) {
-        for (i, color) in bench.colors.iter().enumerate() {
-            let lit = spot.as_ref().ok().and_then(|spot| spot.colors[i].as_ref().ok());
+        for (i, color) in bench.channels.iter().enumerate() {
+            let lit = spot.as_ref().ok().and_then(|spot| spot.channels[i].as_ref().ok());
             let weight = field.weight * color.weight;
             sum += weight * lit.map_or(0.0, |color| color.light.value);
             weights += weight;
@@ -141,9 +141,9 @@ fn light(numbers: &Numbers) -> f64 {
 }
 
 /// The edit that lets the optimizer change some kinds of numbers too.
-fn freed(lens: &Lens, kinds: &[NumberKind]) -> Edit {
+fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
     let mut freed = lens.clone();
-    vary(&mut freed, kinds);
+    add_variables(&mut freed, kinds);
     Edit::SetVariables(freed.variables)
 }
 
@@ -153,7 +153,7 @@ fn relative_error(estimate: Estimate) -> String {
     if !share.is_finite() {
         String::new()
     } else if share >= 5e-5 {
-        format!(" ± {} %", number::show_digits(100.0 * share, 2))
+        format!(" ± {} %", number::format_digits(100.0 * share, 2))
     } else {
         format!(" ± {share:.0e}")
     }
@@ -166,9 +166,9 @@ fn swatch(ui: &mut Ui, color: Color32) {
 }
 
 /// Says why there are no numbers, where there are none.
-fn no_numbers(ui: &mut Ui, view: &View) {
-    let why = match view.results.as_deref().map(|results| &results.numbers) {
-        Some(Err(why)) => capital(&counted_from_one(why)),
+fn show_missing_results(ui: &mut Ui, view: &SessionView) {
+    let why = match view.results.as_deref().map(|results| &results.analyses) {
+        Some(Err(why)) => capitalize(&counted_from_one(why)),
         _ => "Computing…".to_owned(),
     };
     ui.weak(why);
@@ -183,13 +183,13 @@ fn zoom_name(lens: &Lens, position: usize) -> String {
 }
 
 /// A field point as it is read: `14°`, `20 mm`, with both coordinates where it has two.
-fn field_name(kind: FieldKind, field: Field) -> String {
+fn field_name(kind: FieldKind, field: FieldPoint) -> String {
     let unit = if kind == FieldKind::Angle { "°" } else { " mm" };
-    let y = number::show_digits(field.y, 4);
+    let y = number::format_digits(field.y, 4);
     if field.x == 0.0 {
         return format!("{y}{unit}");
     }
-    format!("({}, {y}){unit}", number::show_digits(field.x, 4))
+    format!("({}, {y}){unit}", number::format_digits(field.x, 4))
 }
 
 /// A mark of an axis that shows decades.

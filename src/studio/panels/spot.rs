@@ -11,12 +11,14 @@ use eframe::egui::{
 };
 use glam::DVec2;
 
-use super::cells::{Words, bar, within};
-use super::{Panel, field_name, lit, no_numbers, relative_error, shown, swatch};
+use super::cells::{CellLayout, scale_bar, show_within};
+use super::{
+    Panel, displayed_results, field_name, pupil_share, relative_error, show_missing_results, swatch,
+};
 use crate::analysis::{Estimate, Spot};
 use crate::lens::Fields;
-use crate::session::{Command, Numbers, Results, View};
-use crate::studio::draw::{Backing, Camera, Canvas, Scene};
+use crate::session::{Analyses, AnalysisResults, Command, SessionView};
+use crate::studio::draw::{Camera, RenderBackend, Scene, SceneCanvas};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
@@ -24,26 +26,26 @@ use crate::studio::palette::{Palette, color32};
 const TOLERANCES: [(f64, &str); 3] = [(1e-2, "1 %"), (1e-3, "0.1 %"), (1e-6, "1e-6")];
 
 /// The field of a cell above, three lines of numbers below.
-const WORDS: Words = Words { above: 20.0, below: 47.0 };
+const WORDS: CellLayout = CellLayout { above: 20.0, below: 47.0 };
 
 /// The panel.
 #[derive(Debug)]
-pub struct SpotDiagram {
-    backing: Backing,
-    canvas: Canvas,
-    drawing: Option<(Source, Arc<Scene>)>,
+pub struct SpotPanel {
+    backing: RenderBackend,
+    canvas: SceneCanvas,
+    drawing: Option<(SpotKey, Arc<Scene>)>,
 }
 
 /// All on which the drawn dots depend.
 #[derive(Debug)]
-struct Source {
-    results: Arc<Results>,
+struct SpotKey {
+    results: Arc<AnalysisResults>,
     cells: Vec<Rect>,
     palette: Palette,
     per_point: f32,
 }
 
-impl PartialEq for Source {
+impl PartialEq for SpotKey {
     /// Results are compared by address, which cannot be another's while they are held.
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.results, &other.results)
@@ -53,47 +55,49 @@ impl PartialEq for Source {
     }
 }
 
-impl SpotDiagram {
+impl SpotPanel {
     /// An empty panel.
-    pub const fn new(backing: Backing) -> Self {
-        Self { backing, canvas: Canvas::new("spots"), drawing: None }
+    pub const fn new(backing: RenderBackend) -> Self {
+        Self { backing, canvas: SceneCanvas::new("spots"), drawing: None }
     }
 }
 
-impl Panel for SpotDiagram {
+impl Panel for SpotPanel {
     fn title(&self) -> &'static str {
         "Spot diagram"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
         header(ui, view, wishes);
-        let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
+        let Some((results, numbers)) = displayed_results(view) else {
+            return show_missing_results(ui, view);
+        };
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, "Spots"));
         let cells = WORDS.cells(rect, numbers.spots.value.len());
         self.draw(ui, rect, results, numbers, &cells);
         for (i, cell) in cells.iter().enumerate() {
             let fields = results.lens.fields_at(results.settings.zoom);
-            words(ui, *cell, fields, numbers, i);
+            labels(ui, *cell, fields, numbers, i);
         }
-        scale_bar(ui, &cells, half_width(numbers));
+        draw_scale_bar(ui, &cells, half_width(numbers));
     }
 }
 
-impl SpotDiagram {
+impl SpotPanel {
     fn draw(
         &mut self,
         ui: &Ui,
         rect: Rect,
-        results: &Arc<Results>,
-        numbers: &Numbers,
+        results: &Arc<AnalysisResults>,
+        numbers: &Analyses,
         cells: &[Rect],
     ) {
         let per_point = ui.ctx().pixels_per_point();
-        let palette = Palette::of(ui.visuals());
+        let palette = Palette::for_visuals(ui.visuals());
         let relative = |cell: &Rect| WORDS.picture(*cell).translate(-rect.min.to_vec2());
         let cells = cells.iter().map(relative).collect();
-        let source = Source { results: Arc::clone(results), cells, palette, per_point };
+        let source = SpotKey { results: Arc::clone(results), cells, palette, per_point };
         if self.drawing.as_ref().is_none_or(|(drawn, _)| *drawn != source) {
             let scene = Arc::new(scene(ui, &source, numbers));
             self.drawing = Some((source, scene));
@@ -101,14 +105,14 @@ impl SpotDiagram {
         let Some((_, scene)) = &self.drawing else { return };
         // The scene is in points from the upper left corner, y up.
         let centre = DVec2::new(f64::from(rect.width()), -f64::from(rect.height())) / 2.0;
-        let camera = Camera { centre, scale: per_point.into() };
+        let camera = Camera { center: centre, scale: per_point.into() };
         self.canvas.show(ui, rect, self.backing, scene, camera);
     }
 }
 
-fn header(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+fn header(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     ui.horizontal(|ui| {
-        let palette = Palette::of(ui.visuals());
+        let palette = Palette::for_visuals(ui.visuals());
         for wavelength in &view.lens.wavelengths {
             swatch(ui, color32(palette.wavelength(wavelength.um)));
             ui.label(format!("{:.0} nm", 1e3 * wavelength.um));
@@ -119,7 +123,7 @@ fn header(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
     });
 }
 
-fn tolerance(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+fn tolerance(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     let mut chosen = view.settings.tolerance;
     let known = TOLERANCES.iter().find(|(error, _)| *error == chosen);
     let text = known.map_or_else(|| format!("{chosen:e}"), |(_, name)| (*name).to_owned());
@@ -139,14 +143,14 @@ fn tolerance(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
 }
 
 /// Half of what the side of every picture shows, in mm.
-fn half_width(numbers: &Numbers) -> f64 {
+fn half_width(numbers: &Analyses) -> f64 {
     let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let widest = lit.map(|spot| spot.radius.value).fold(0.0, f64::max);
     let airy = numbers.airy.unwrap_or(0.0);
     1.12 * if widest > 0.0 { widest.max(1.1 * airy) } else { airy.max(1e-3) }
 }
 
-fn scene(ui: &Ui, source: &Source, numbers: &Numbers) -> Scene {
+fn scene(ui: &Ui, source: &SpotKey, numbers: &Analyses) -> Scene {
     let palette = source.palette;
     let background = ui.visuals().panel_fill.to_srgba_unmultiplied();
     let mut scene = Scene::on(background);
@@ -154,7 +158,8 @@ fn scene(ui: &Ui, source: &Source, numbers: &Numbers) -> Scene {
     for (field, cell) in source.cells.iter().enumerate() {
         let centre = DVec2::new(cell.center().x.into(), -f64::from(cell.center().y));
         let scale = 0.5 * f64::from(cell.width()) / half;
-        let frame = Frame { centre, half: 0.5 * f64::from(cell.width()), palette, scale };
+        let frame =
+            SpotFrame { center: centre, half: 0.5 * f64::from(cell.width()), palette, scale };
         frame.draw(&mut scene);
         if let Some(airy) = numbers.airy {
             frame.draw_airy(&mut scene, airy, source.per_point);
@@ -167,17 +172,17 @@ fn scene(ui: &Ui, source: &Source, numbers: &Numbers) -> Scene {
 }
 
 /// The square of one field.
-struct Frame {
-    centre: DVec2,
+struct SpotFrame {
+    center: DVec2,
     half: f64,
     palette: Palette,
     /// Points per mm.
     scale: f64,
 }
 
-impl Frame {
+impl SpotFrame {
     fn draw(&self, scene: &mut Scene) {
-        let corner = |x: f64, y: f64| self.centre + self.half * DVec2::new(x, y);
+        let corner = |x: f64, y: f64| self.center + self.half * DVec2::new(x, y);
         let background = self.palette.background;
         let left = [corner(-1.0, -1.0), corner(-1.0, 1.0)];
         scene.strip(&left, &[corner(1.0, -1.0), corner(1.0, 1.0)], background);
@@ -190,7 +195,7 @@ impl Frame {
     fn draw_airy(&self, scene: &mut Scene, radius: f64, per_point: f32) {
         let radius = radius * self.scale;
         let dashes = ((TAU * radius / 7.0) as usize).clamp(8, 90);
-        let at = |turn: f64| self.centre + radius * DVec2::from_angle(TAU * turn);
+        let at = |turn: f64| self.center + radius * DVec2::from_angle(TAU * turn);
         if radius > 1.4 * self.half {
             return;
         }
@@ -205,14 +210,14 @@ impl Frame {
     fn draw_dots(
         &self,
         scene: &mut Scene,
-        numbers: &Numbers,
+        numbers: &Analyses,
         spot: &Spot,
         field: usize,
         per_point: f32,
     ) {
-        let colors = &numbers.bench.value.colors;
+        let colors = &numbers.bench.value.channels;
         let mut scatters: Vec<_> =
-            numbers.scatter.value.iter().filter(|scatter| scatter.field == field).collect();
+            numbers.spot_points.value.iter().filter(|scatter| scatter.field == field).collect();
         let um = |wavelength: usize| colors[wavelength].um;
         scatters.sort_by(|a, b| um(b.wavelength).total_cmp(&um(a.wavelength)));
         let centroid = DVec2::new(spot.centroid[0].value, spot.centroid[1].value);
@@ -221,7 +226,7 @@ impl Frame {
             for point in &scatter.points {
                 let from = self.scale * (DVec2::from(*point) - centroid);
                 if from.abs().max_element() <= self.half {
-                    scene.dot(self.centre + from, 2.4 * per_point, [r, g, b, 205]);
+                    scene.dot(self.center + from, 2.4 * per_point, [r, g, b, 205]);
                 }
             }
         }
@@ -229,15 +234,15 @@ impl Frame {
 }
 
 /// The words of a cell: its field above the picture, its numbers below.
-fn words(ui: &mut Ui, cell: Rect, fields: &Fields, numbers: &Numbers, field: usize) {
+fn labels(ui: &mut Ui, cell: Rect, fields: &Fields, numbers: &Analyses, field: usize) {
     let spot = &numbers.spots.value[field];
-    within(ui, WORDS.above(cell), |ui| {
+    show_within(ui, WORDS.above(cell), |ui| {
         ui.horizontal(|ui| {
-            name(ui, fields, field);
-            clipped(ui, lit(spot.as_ref().ok()));
+            field_label(ui, fields, field);
+            clipped_label(ui, pupil_share(spot.as_ref().ok()));
         });
     });
-    within(ui, WORDS.below(cell), |ui| {
+    show_within(ui, WORDS.below(cell), |ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
         match spot {
             Ok(spot) => radii(ui, spot),
@@ -249,8 +254,8 @@ fn words(ui: &mut Ui, cell: Rect, fields: &Fields, numbers: &Numbers, field: usi
     });
 }
 
-fn name(ui: &mut Ui, fields: &Fields, field: usize) {
-    let palette = Palette::of(ui.visuals());
+fn field_label(ui: &mut Ui, fields: &Fields, field: usize) {
+    let palette = Palette::for_visuals(ui.visuals());
     let Some(point) = fields.values.get(field) else { return };
     let color = color32(palette.field(field));
     swatch(ui, color);
@@ -258,7 +263,7 @@ fn name(ui: &mut Ui, fields: &Fields, field: usize) {
 }
 
 /// How much of the pupil is lit, where it is clipped.
-fn clipped(ui: &mut Ui, lit: f64) {
+fn clipped_label(ui: &mut Ui, lit: f64) {
     if lit < 0.995 {
         let text = RichText::new(format!("{:.0} % of pupil", 100.0 * lit)).small();
         ui.label(text.weak()).on_hover_text(
@@ -280,12 +285,12 @@ fn radii(ui: &mut Ui, spot: &Spot) {
 
 /// A length with its relative error.
 fn in_um(estimate: Estimate) -> String {
-    let value = number::show_digits(1e3 * estimate.value, 4);
+    let value = number::format_digits(1e3 * estimate.value, 4);
     format!("{value} µm{}", relative_error(estimate))
 }
 
 /// The scale of all cells, in the first one.
-fn scale_bar(ui: &Ui, cells: &[Rect], half: f64) {
+fn draw_scale_bar(ui: &Ui, cells: &[Rect], half: f64) {
     let Some(first) = cells.first().map(|cell| WORDS.picture(*cell)) else { return };
-    bar(ui, first, 0.5 * f64::from(first.width()) / half, 0.4);
+    scale_bar(ui, first, 0.5 * f64::from(first.width()) / half, 0.4);
 }

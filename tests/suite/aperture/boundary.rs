@@ -2,7 +2,7 @@
 
 use super::{Case, GROUPS, cases, exact, group};
 use crate::reference::Worst;
-use aplanat::pupil::{Cost, Region};
+use aplanat::pupil::{QuadraticIntegrand, Region};
 use serde_json::Value;
 
 /// Of the largest component of a group.
@@ -16,7 +16,7 @@ fn aperture_gradients_by_boundary_match_every_case() {
     for case in cases() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
-        let moments = region.lit(ORDER).moments;
+        let moments = region.trace_pupil(ORDER).moments;
         let name = case.name();
         for (key, got) in [
             ("area", moments.area),
@@ -35,11 +35,11 @@ fn aperture_gradients_by_boundary_match_every_case() {
 fn compare(
     case: &Case,
     region: &Region<'_>,
-    (cost, expected): (Cost, &Value),
+    (cost, expected): (QuadraticIntegrand, &Value),
     term: &str,
     worst: &mut Worst,
 ) {
-    let found = region.lit(ORDER).boundary_derivative(&cost).unwrap();
+    let found = region.trace_pupil(ORDER).boundary_derivative(&cost).unwrap();
     for name in GROUPS {
         let expected = exact(expected, name);
         let largest = expected.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));

@@ -4,11 +4,12 @@
 use super::cases;
 use crate::reference::Worst;
 use aplanat::files;
-use aplanat::lens::Field;
+use aplanat::lens::FieldPoint;
 use aplanat::pupil::{
-    Accuracy, Bench, Cost, Derivative, Estimator, Launch, Region, differentiate, plan,
+    Accuracy, DerivativeEstimator, Launch, PupilDerivative, QuadraticIntegrand, RayModel, Region,
+    choose_estimator, differentiate,
 };
-use aplanat::trace::{Gradient, Slot};
+use aplanat::trace::{SurfaceParameter, SystemGradient};
 use std::path::PathBuf;
 
 /// Of the largest of a kind of numbers; what central differences leave of fifteen digits.
@@ -24,13 +25,13 @@ const CASES: [(&str, usize, [f64; 2]); 4] = [
     ("zoom_nikkor_28_80", 1, [0.0, 1.0]),
 ];
 
-fn bench(name: &str, zoom: usize) -> Bench {
+fn bench(name: &str, zoom: usize) -> RayModel {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("lenses/{name}.json"));
-    Bench::of(&files::open(&path).unwrap().lens, zoom).unwrap()
+    RayModel::from_lens(&files::open(&path).unwrap().lens, zoom).unwrap()
 }
 
-fn launch(bench: &Bench, part: f64) -> Launch<'_> {
-    let field = Field { x: 0.0, y: part * bench.beam.edge, weight: 1.0 };
+fn launch(bench: &RayModel, part: f64) -> Launch<'_> {
+    let field = FieldPoint { x: 0.0, y: part * bench.beam.edge, weight: 1.0 };
     bench.launch(field, bench.primary).unwrap()
 }
 
@@ -39,12 +40,12 @@ fn launch(bench: &Bench, part: f64) -> Launch<'_> {
 pub(super) fn compare(
     worst: &mut Worst,
     (tolerance, floor): (f64, f64),
-    [got, exact]: [&Gradient<f64>; 2],
+    [got, exact]: [&SystemGradient<f64>; 2],
     what: &str,
 ) {
-    for slot in Slot::all() {
+    for slot in SurfaceParameter::all() {
         let scale = tolerance * exact.largest(slot).max(floor);
-        for (i, (got, exact)) in got.group(slot).zip(exact.group(slot)).enumerate() {
+        for (i, (got, exact)) in got.of_kind(slot).zip(exact.of_kind(slot)).enumerate() {
             let place = format!("{slot:?} {i} of {what}: {got:e}, {exact:e}");
             worst.note(got, exact, scale, place);
         }
@@ -58,14 +59,15 @@ fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_foun
         let bench = bench(name, zoom);
         for part in fields {
             let region = Region::new(launch(&bench, part));
-            let lit = region.lit(ORDER);
-            for (term, cost) in
-                [("spot", Cost::spread(lit.moments.centroid)), ("throughput", Cost::throughput())]
-            {
+            let lit = region.trace_pupil(ORDER);
+            for (term, cost) in [
+                ("spot", QuadraticIntegrand::spread(lit.moments.centroid)),
+                ("throughput", QuadraticIntegrand::throughput()),
+            ] {
                 let differences = region.difference_derivative(&cost, ORDER).unwrap();
                 let found = lit.boundary_derivative(&cost).unwrap();
                 let what = format!("{term} of {name}, zoom {zoom}, field {part}");
-                compare(&mut worst, (TOLERANCE, 0.0), [&found, &differences.by], &what);
+                compare(&mut worst, (TOLERANCE, 0.0), [&found, &differences.gradient], &what);
             }
         }
     }
@@ -73,8 +75,9 @@ fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_foun
 }
 
 /// Errors that are larger than stated, in parts of what is stated.
-fn beyond(found: &Derivative, exact: &Gradient<f64>, slot: Slot) -> f64 {
-    let errors = found.by.group(slot).zip(exact.group(slot)).zip(found.error.group(slot));
+fn beyond(found: &PupilDerivative, exact: &SystemGradient<f64>, slot: SurfaceParameter) -> f64 {
+    let errors =
+        found.gradient.of_kind(slot).zip(exact.of_kind(slot)).zip(found.error.of_kind(slot));
     let floor = 1e-12 * exact.largest(slot).max(1.0);
     errors.map(|((got, exact), error)| (got - exact).abs() / (error + floor)).fold(0.0, f64::max)
 }
@@ -84,22 +87,24 @@ fn aperture_gradients_are_as_good_as_asked_for_and_as_stated() {
     for case in cases() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
-        let lit = region.lit(10);
-        for cost in [Cost::spread(lit.moments.centroid), Cost::throughput()] {
+        let lit = region.trace_pupil(10);
+        for cost in
+            [QuadraticIntegrand::spread(lit.moments.centroid), QuadraticIntegrand::throughput()]
+        {
             let exact = lit.boundary_derivative(&cost).unwrap();
             for (estimator, tolerance, standard_errors) in [
-                (Estimator::Boundary, 1e-3, 1.0),
-                (Estimator::Boundary, 1e-7, 1.0),
-                (Estimator::Difference, 1e-4, 1.0),
-                (Estimator::Warp, 0.2, 6.0),
+                (DerivativeEstimator::Boundary, 1e-3, 1.0),
+                (DerivativeEstimator::Boundary, 1e-7, 1.0),
+                (DerivativeEstimator::Difference, 1e-4, 1.0),
+                (DerivativeEstimator::Warp, 0.2, 6.0),
             ] {
-                let asked = Accuracy { tolerance, most_rays: 4_000_000 };
+                let asked = Accuracy { tolerance, max_rays: 4_000_000 };
                 let found = differentiate(&region, &cost, estimator, asked).unwrap();
                 let what = format!("{estimator} to {tolerance:e} of {cost:?}, {}", case.name());
                 // Numbers without an effect keep some noise.
-                let reached = found.reaches(tolerance) || estimator == Estimator::Warp;
+                let reached = found.reaches(tolerance) || estimator == DerivativeEstimator::Warp;
                 assert!(reached, "{what}: {} rays", found.rays);
-                for slot in Slot::all() {
+                for slot in SurfaceParameter::all() {
                     let beyond = beyond(&found, &exact, slot);
                     assert!(beyond <= standard_errors, "{what}, {slot:?}: {beyond}");
                 }
@@ -115,12 +120,12 @@ fn aperture_gradients_stop_where_the_rays_run_out_and_say_so() {
     let region = Region::new(case.launch(&bench));
     let (cost, _) = case.spot();
     for (estimator, most_rays) in [
-        (Estimator::Biased, 10_000),
-        (Estimator::Boundary, 10_000),
-        (Estimator::Warp, 10_000),
-        (Estimator::Difference, 1_000_000),
+        (DerivativeEstimator::Biased, 10_000),
+        (DerivativeEstimator::Boundary, 10_000),
+        (DerivativeEstimator::Warp, 10_000),
+        (DerivativeEstimator::Difference, 1_000_000),
     ] {
-        let asked = Accuracy { tolerance: 1e-16, most_rays };
+        let asked = Accuracy { tolerance: 1e-16, max_rays: most_rays };
         let found = differentiate(&region, &cost, estimator, asked).unwrap();
         assert!(found.rays <= most_rays, "{estimator}: {}", found.rays);
         assert!(found.reaches(1.0) && !found.reaches(1e-16), "{estimator}");
@@ -132,8 +137,8 @@ fn an_aperture_in_one_piece_calls_for_its_boundary() {
     for case in cases() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
-        let (estimator, reason) = plan(&region, Accuracy::default()).unwrap();
-        assert_eq!(estimator, Estimator::Boundary, "{reason}");
+        let (estimator, reason) = choose_estimator(&region, Accuracy::default()).unwrap();
+        assert_eq!(estimator, DerivativeEstimator::Boundary, "{reason}");
         assert!(reason.contains("one piece"), "{reason}");
     }
 }

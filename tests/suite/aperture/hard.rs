@@ -4,20 +4,21 @@
 use super::cases;
 use super::estimators::compare;
 use crate::reference::Worst;
-use aplanat::lens::{Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::lens::{Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System};
 use aplanat::math::Vec3;
 use aplanat::paraxial::Beam;
 use aplanat::pupil::{
-    Accuracy, Aiming, Bench, Cost, Derivative, Estimator, Kind, Launch, Limit, NoDerivative,
-    Region, Warp, differentiate, plan,
+    Accuracy, Aiming, DerivativeError, DerivativeEstimator, Launch, PupilDerivative, PupilLimit,
+    QuadraticIntegrand, RayModel, Region, RegionKind, WarpSampling, choose_estimator,
+    differentiate,
 };
-use aplanat::trace::{Gradient, Hurdle, Ray, Slot, Tracer};
+use aplanat::trace::{Ray, RayLimit, SurfaceParameter, SystemGradient, Tracer};
 use std::f64::consts::PI;
 
 /// What central differences leave of fifteen digits.
 const TOLERANCE: f64 = 1e-7;
 const ORDER: usize = 8;
-const ASKED: Accuracy = Accuracy { tolerance: 1e-2, most_rays: 400_000 };
+const ASKED: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 400_000 };
 
 /// Curvature, thickness, index behind and semi-diameter.
 type Row = (f64, f64, f64, f64);
@@ -31,8 +32,8 @@ fn system(rows: &[Row], stop: usize) -> System<f64> {
         semi_diameter,
         obstruction: 0.0,
         mirror: false,
-        hyper: false,
-        graded: None,
+        hyperhemisphere: false,
+        grin: None,
     };
     let image = (0.0, 0.0, 1.0, f64::INFINITY);
     let surfaces = rows.iter().copied().chain([image]).map(surface).collect();
@@ -40,7 +41,7 @@ fn system(rows: &[Row], stop: usize) -> System<f64> {
 }
 
 /// A system limited by its rims, for a beam from infinity.
-fn bench(system: System<f64>) -> Bench {
+fn bench(system: System<f64>) -> RayModel {
     let rim = system.surfaces[system.stop.unwrap_or(0)].semi_diameter;
     let beam = Beam {
         object: Object::Infinity,
@@ -48,46 +49,55 @@ fn bench(system: System<f64>) -> Bench {
         field: FieldKind::Angle,
         edge: 1.0,
     };
-    Bench::new(vec![(0.5876, 1.0, system)], 0, beam, Aiming::Paraxial).unwrap()
+    RayModel::from_systems(vec![(0.5876, 1.0, system)], 0, beam, Aiming::Paraxial).unwrap()
 }
 
-fn launch(bench: &Bench, degrees: f64) -> Launch<'_> {
-    bench.launch(Field { x: 0.0, y: degrees, weight: 1.0 }, 0).unwrap()
+fn launch(bench: &RayModel, degrees: f64) -> Launch<'_> {
+    bench.launch(FieldPoint { x: 0.0, y: degrees, weight: 1.0 }, 0).unwrap()
 }
 
-fn costs(region: &Region<'_>) -> [Cost; 2] {
-    [Cost::spread(region.lit(4).moments.centroid), Cost::throughput()]
+fn costs(region: &Region<'_>) -> [QuadraticIntegrand; 2] {
+    [
+        QuadraticIntegrand::spread(region.trace_pupil(4).moments.centroid),
+        QuadraticIntegrand::throughput(),
+    ]
 }
 
-fn is_finite(derivative: &Derivative) -> bool {
-    let Derivative { by, error, .. } = derivative;
+fn is_finite(derivative: &PupilDerivative) -> bool {
+    let PupilDerivative { gradient: by, error, .. } = derivative;
     by.numbers().chain(error.numbers()).all(f64::is_finite)
 }
 
 /// All estimators agree: boundary with differences to `tolerance`, the warp field with both within
 /// six of its standard errors, and no number is not one.
-fn all_agree(what: &str, bench: &Bench, degrees: f64, tolerance: f64) {
+fn all_agree(what: &str, bench: &RayModel, degrees: f64, tolerance: f64) {
     let region = Region::new(launch(bench, degrees));
     let mut worst = Worst::default();
     for cost in costs(&region) {
         let what = format!("{what}, {cost:?}");
-        let exact = region.lit(ORDER).boundary_derivative(&cost).unwrap();
+        let exact = region.trace_pupil(ORDER).boundary_derivative(&cost).unwrap();
         let differences = region.difference_derivative(&cost, ORDER).unwrap();
         assert!(is_finite(&differences), "{what}");
         // Derivatives of this size by a millimetre, with pupils of about ten, are small.
-        let floor = 0.1 * cost.over(&region.lit(4).moments).abs();
-        compare(&mut worst, (tolerance, floor), [&exact, &differences.by], &what);
+        let floor = 0.1 * cost.integrate(&region.trace_pupil(4).moments).abs();
+        compare(&mut worst, (tolerance, floor), [&exact, &differences.gradient], &what);
         by_warp_too(&what, &region, &cost, &exact);
     }
     worst.check(what, 1.0);
 }
 
-fn by_warp_too(what: &str, region: &Region<'_>, cost: &Cost, exact: &Gradient<f64>) {
-    let found = region.warp_derivative(cost, Warp { count: 16_384, seed: 3 }).unwrap();
+fn by_warp_too(
+    what: &str,
+    region: &Region<'_>,
+    cost: &QuadraticIntegrand,
+    exact: &SystemGradient<f64>,
+) {
+    let found = region.warp_derivative(cost, WarpSampling { count: 16_384, seed: 3 }).unwrap();
     assert!(is_finite(&found), "{what}");
-    for slot in Slot::all() {
+    for slot in SurfaceParameter::all() {
         let floor = 1e-3 * exact.largest(slot) + 1e-9;
-        let pairs = found.by.group(slot).zip(exact.group(slot)).zip(found.error.group(slot));
+        let pairs =
+            found.gradient.of_kind(slot).zip(exact.of_kind(slot)).zip(found.error.of_kind(slot));
         for (i, ((got, exact), error)) in pairs.enumerate() {
             let off = (got - exact).abs();
             assert!(
@@ -99,10 +109,10 @@ fn by_warp_too(what: &str, region: &Region<'_>, cost: &Cost, exact: &Gradient<f6
 }
 
 /// The largest difference between two derivatives, each against the largest of its kind.
-fn off(found: &Gradient<f64>, exact: &Gradient<f64>) -> f64 {
-    let off = found.joined(exact, |a, b| (a - b).abs());
+fn off(found: &SystemGradient<f64>, exact: &SystemGradient<f64>) -> f64 {
+    let off = found.zip_with(exact, |a, b| (a - b).abs());
     let ratio = |slot| off.largest(slot) / exact.largest(slot);
-    Slot::all().map(ratio).filter(|ratio| !ratio.is_nan()).fold(0.0, f64::max)
+    SurfaceParameter::all().map(ratio).filter(|ratio| !ratio.is_nan()).fold(0.0, f64::max)
 }
 
 #[test]
@@ -122,15 +132,20 @@ fn aperture_gradients_converge_where_a_grazing_edge_meets_a_rim() {
         system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter *= factor);
         let bench = bench(system);
         let region = Region::new(launch(&bench, degrees));
-        let Kind::Split(boundary) = &region.kind else { panic!("{:?}", region.kind) };
+        let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
         let arcs = boundary.arcs.iter().map(|arc| arc.limit);
-        assert_eq!(arcs.clone().any(Limit::is_grazing), grazes, "{:?}", arcs.collect::<Vec<_>>());
+        assert_eq!(
+            arcs.clone().any(PupilLimit::is_grazing),
+            grazes,
+            "{:?}",
+            arcs.collect::<Vec<_>>()
+        );
         for cost in costs(&region) {
-            let at = |order| region.lit(order).boundary_derivative(&cost).unwrap();
+            let at = |order| region.trace_pupil(order).boundary_derivative(&cost).unwrap();
             let exact = at(11);
             let differences = region.difference_derivative(&cost, 10).unwrap();
             let errors = [4, 6, 8, 10].map(|order| off(&at(order), &exact));
-            let checked = off(&differences.by, &exact);
+            let checked = off(&differences.gradient, &exact);
             let shown = errors.map(|error| format!("{error:.1e}")).join(", ");
             let what = format!("rims times {factor} at {degrees}, square {}", cost.square);
             let what = format!("{what}: orders 4, 6, 8, 10 {shown}; differences {checked:.1e}");
@@ -149,13 +164,15 @@ fn aperture_gradients_with_two_limits_at_once_share_them() {
     let rows = [(0.0, 5.0, 1.0, 4.0), (0.0, 10.0, 1.0, 4.0)];
     let bench = bench(system(&rows, 0));
     let region = Region::new(launch(&bench, 0.0));
-    let cost = Cost::throughput();
+    let cost = QuadraticIntegrand::throughput();
     let exact = -std::f64::consts::TAU * 4.0;
-    for estimator in [Estimator::Boundary, Estimator::Difference, Estimator::Warp] {
+    for estimator in
+        [DerivativeEstimator::Boundary, DerivativeEstimator::Difference, DerivativeEstimator::Warp]
+    {
         let found = differentiate(&region, &cost, estimator, ASKED).unwrap();
         assert!(is_finite(&found), "{estimator}");
-        let sum: f64 = found.by.group(Slot::SemiDiameter).sum();
-        let error: f64 = found.error.group(Slot::SemiDiameter).sum();
+        let sum: f64 = found.gradient.of_kind(SurfaceParameter::SemiDiameter).sum();
+        let error: f64 = found.error.of_kind(SurfaceParameter::SemiDiameter).sum();
         assert!((sum - exact).abs() < 6.0 * error + 1e-6, "{estimator}: {sum} +- {error}, {exact}");
     }
 }
@@ -168,8 +185,8 @@ fn aperture_gradients_hold_at_a_critical_angle() {
     for degrees in [0.0, 5.0] {
         let bench = bench(system.clone());
         let region = Region::new(launch(&bench, degrees));
-        let Kind::Split(boundary) = &region.kind else { panic!("{:?}", region.kind) };
-        assert_eq!(boundary.arcs[0].limit, Limit::Surface(1, Hurdle::Reflection));
+        let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
+        assert_eq!(boundary.arcs[0].limit, PupilLimit::Surface(1, RayLimit::TotalReflection));
         all_agree("a critical angle", &bench, degrees, 1e-6);
     }
 }
@@ -184,11 +201,11 @@ fn aperture_gradients_hold_where_rays_miss_a_sphere() {
     // where two limits vanish at once, edges and corners are not known to rounding.
     for degrees in [0.0, 3.0, 20.0] {
         let region = Region::new(launch(&bench, degrees));
-        let lit = region.lit(4);
-        let Kind::Split(boundary) = &region.kind else { panic!("{:?}", region.kind) };
-        let ends = |hurdle| boundary.arcs.iter().any(|a| a.limit == Limit::Surface(1, hurdle));
-        assert!(ends(Hurdle::Miss) && (degrees == 0.0 || ends(Hurdle::Equator)));
-        let found = lit.boundary_derivative(&Cost::throughput()).unwrap();
+        let lit = region.trace_pupil(4);
+        let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
+        let ends = |hurdle| boundary.arcs.iter().any(|a| a.limit == PupilLimit::Surface(1, hurdle));
+        assert!(ends(RayLimit::Miss) && (degrees == 0.0 || ends(RayLimit::Equator)));
+        let found = lit.boundary_derivative(&QuadraticIntegrand::throughput()).unwrap();
         assert_eq!(found.surfaces[1].semi_diameter, 0.0);
         all_agree("a missed sphere", &bench, degrees, 1e-4);
     }
@@ -218,14 +235,14 @@ fn aperture_gradients_of_no_light_are_an_error_that_says_what_to_do() {
         [(&clipped, 30.0, "clipped by surface 1"), (&closed, 0.0, "open the stop")]
     {
         let region = Region::new(launch(bench, degrees));
-        let dark = plan(&region, ASKED).unwrap_err();
+        let dark = choose_estimator(&region, ASKED).unwrap_err();
         assert!(
-            matches!(dark, NoDerivative::Dark(..)) && dark.to_string().contains(says),
+            matches!(dark, DerivativeError::Dark(..)) && dark.to_string().contains(says),
             "{dark}"
         );
-        for estimator in Estimator::ALL {
+        for estimator in DerivativeEstimator::ALL {
             assert_eq!(
-                differentiate(&region, &Cost::throughput(), estimator, ASKED),
+                differentiate(&region, &QuadraticIntegrand::throughput(), estimator, ASKED),
                 Err(dark.clone())
             );
         }
@@ -264,30 +281,36 @@ fn aperture_gradients_of_a_pupil_in_pieces_come_from_the_warp_field() {
     let system = system(&rows, 2);
     let bench = bench(system.clone());
     let region = Region::new(launch(&bench, 0.0));
-    assert!(matches!(region.kind, Kind::Ragged { pieces: 2, .. }), "{:?}", region.kind);
-    let asked = Accuracy { tolerance: 1e-6, most_rays: 100_000 };
-    let (estimator, reason) = plan(&region, asked).unwrap();
-    assert_eq!(estimator, Estimator::Warp, "{reason}");
+    assert!(matches!(region.kind, RegionKind::Irregular { pieces: 2, .. }), "{:?}", region.kind);
+    let asked = Accuracy { tolerance: 1e-6, max_rays: 100_000 };
+    let (estimator, reason) = choose_estimator(&region, asked).unwrap();
+    assert_eq!(estimator, DerivativeEstimator::Warp, "{reason}");
     assert!(reason.contains("2 pieces") && reason.contains("1e-6"), "{reason}");
-    let refused = differentiate(&region, &Cost::throughput(), Estimator::Boundary, ASKED);
-    assert!(matches!(refused, Err(NoDerivative::NotStarShaped(_))), "{refused:?}");
-    let found = differentiate(&region, &Cost::throughput(), estimator, ASKED).unwrap();
+    let refused = differentiate(
+        &region,
+        &QuadraticIntegrand::throughput(),
+        DerivativeEstimator::Boundary,
+        ASKED,
+    );
+    assert!(matches!(refused, Err(DerivativeError::NotStarShaped(_))), "{refused:?}");
+    let found =
+        differentiate(&region, &QuadraticIntegrand::throughput(), estimator, ASKED).unwrap();
     for (slot, surface) in [
-        (Slot::SemiDiameter, 2),
-        (Slot::Curvature, 0),
-        (Slot::Curvature, 1),
-        (Slot::Thickness, 0),
-        (Slot::Index, 0),
+        (SurfaceParameter::SemiDiameter, 2),
+        (SurfaceParameter::Curvature, 0),
+        (SurfaceParameter::Curvature, 1),
+        (SurfaceParameter::Thickness, 0),
+        (SurfaceParameter::Index, 0),
     ] {
         let changed = |step: f64| {
             let mut system = system.clone();
-            *slot.of(&mut system, surface) += step;
+            *slot.value_mut(&mut system, surface) += step;
             area_of_zones(&system)
         };
-        let step = 1e-5 * *slot.of(&mut system.clone(), surface);
+        let step = 1e-5 * *slot.value_mut(&mut system.clone(), surface);
         let exact = -(changed(step) - changed(-step)) / (2.0 * step);
         let (got, error) =
-            (found.by.surfaces[surface].by(slot), found.error.surfaces[surface].by(slot));
+            (found.gradient.surfaces[surface].by(slot), found.error.surfaces[surface].by(slot));
         assert!(
             (got - exact).abs() <= 6.0 * error,
             "{slot:?} {surface}: {got} +- {error}, {exact}"
@@ -304,13 +327,17 @@ fn aperture_gradients_of_a_ring_move_both_of_its_edges() {
     let bench = bench(system);
     for degrees in [0.0, 2.0, 6.0] {
         let region = Region::new(launch(&bench, degrees));
-        assert!(matches!(region.kind, Kind::Ragged { ring: Some(_), .. }), "{:?}", region.kind);
-        let (estimator, reason) = plan(&region, ASKED).unwrap();
-        assert!(estimator == Estimator::Boundary && reason.contains("ring"), "{reason}");
-        let light = Cost::throughput();
-        let sampled = differentiate(&region, &light, Estimator::Warp, ASKED).unwrap();
-        let exact = region.lit(ORDER).boundary_derivative(&light).unwrap();
-        let numbers = sampled.by.numbers().zip(exact.numbers()).zip(sampled.error.numbers());
+        assert!(
+            matches!(region.kind, RegionKind::Irregular { annulus: Some(_), .. }),
+            "{:?}",
+            region.kind
+        );
+        let (estimator, reason) = choose_estimator(&region, ASKED).unwrap();
+        assert!(estimator == DerivativeEstimator::Boundary && reason.contains("ring"), "{reason}");
+        let light = QuadraticIntegrand::throughput();
+        let sampled = differentiate(&region, &light, DerivativeEstimator::Warp, ASKED).unwrap();
+        let exact = region.trace_pupil(ORDER).boundary_derivative(&light).unwrap();
+        let numbers = sampled.gradient.numbers().zip(exact.numbers()).zip(sampled.error.numbers());
         // What is exactly zero is rounding in both.
         let rounding = 1e-15 * exact.numbers().map(f64::abs).fold(0.0, f64::max);
         for ((sampled, exact), error) in numbers {
@@ -319,10 +346,10 @@ fn aperture_gradients_of_a_ring_move_both_of_its_edges() {
         }
         let mut worst = Worst::default();
         for cost in costs(&region) {
-            let exact = region.lit(ORDER).boundary_derivative(&cost).unwrap();
+            let exact = region.trace_pupil(ORDER).boundary_derivative(&cost).unwrap();
             let differences = region.difference_derivative(&cost, ORDER).unwrap();
             let what = format!("a ring at {degrees}, {cost:?}");
-            compare(&mut worst, (TOLERANCE, 1e-3), [&exact, &differences.by], &what);
+            compare(&mut worst, (TOLERANCE, 1e-3), [&exact, &differences.gradient], &what);
         }
         worst.check("aperture gradients of a ring", 1.0);
     }
@@ -340,18 +367,20 @@ fn aperture_gradients_scale_with_the_lens_over_a_hundred_decades() {
         }
         bench(system)
     };
-    let derivatives = |bench: &Bench| -> Vec<(&'static str, f64, Gradient<f64>)> {
+    let derivatives = |bench: &RayModel| -> Vec<(&'static str, f64, SystemGradient<f64>)> {
         let region = Region::new(launch(bench, 14.0));
-        let center = region.lit(4).moments.centroid;
+        let center = region.trace_pupil(4).moments.centroid;
         let mut found = Vec::new();
-        for (cost, power) in [(Cost::spread(center), 4), (Cost::throughput(), 2)] {
-            let boundary = region.lit(4).boundary_derivative(&cost).unwrap();
-            let warp = region.warp_derivative(&cost, Warp { count: 512, seed: 1 }).unwrap();
+        for (cost, power) in
+            [(QuadraticIntegrand::spread(center), 4), (QuadraticIntegrand::throughput(), 2)]
+        {
+            let boundary = region.trace_pupil(4).boundary_derivative(&cost).unwrap();
+            let warp = region.warp_derivative(&cost, WarpSampling { count: 512, seed: 1 }).unwrap();
             let difference = region.difference_derivative(&cost, 4).unwrap();
             assert!(is_finite(&warp) && is_finite(&difference));
             found.push(("boundary", f64::from(power), boundary));
-            found.push(("warp", f64::from(power), warp.by));
-            found.push(("difference", f64::from(power), difference.by));
+            found.push(("warp", f64::from(power), warp.gradient));
+            found.push(("difference", f64::from(power), difference.gradient));
         }
         found
     };
@@ -369,7 +398,7 @@ fn aperture_gradients_scale_with_the_lens_over_a_hundred_decades() {
 }
 
 /// The derivatives of an integral with a power of a length, of a lens scaled back to its size.
-fn unscaled(gradient: &Gradient<f64>, scale: f64, power: f64) -> Gradient<f64> {
+fn unscaled(gradient: &SystemGradient<f64>, scale: f64, power: f64) -> SystemGradient<f64> {
     let mut back = gradient.clone();
     let whole = scale.powf(-power);
     back.index_before *= whole;
@@ -388,13 +417,13 @@ fn aperture_gradients_by_the_warp_field_are_the_same_in_single_precision() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
         for cost in costs(&region) {
-            let sampling = Warp { count: 4096, seed: 5 };
+            let sampling = WarpSampling { count: 4096, seed: 5 };
             let double = region.warp_derivative(&cost, sampling).unwrap();
             let single = region.warp_derivative_in::<f32>(&cost, sampling).unwrap();
             assert!(is_finite(&single));
-            for slot in Slot::all() {
+            for slot in SurfaceParameter::all() {
                 let error = double.error.largest(slot);
-                let off = double.by.joined(&single.by, |a, b| (a - b).abs());
+                let off = double.gradient.zip_with(&single.gradient, |a, b| (a - b).abs());
                 assert!(off.largest(slot) <= 0.5 * error, "{}, {slot:?}", case.name());
             }
         }
@@ -411,6 +440,7 @@ fn an_aperture_of_one_axial_ray_is_dark_and_rays_along_the_axis_are_harmless() {
     single.surfaces[1].semi_diameter = 0.0;
     let pinhole = bench(single);
     let region = Region::new(launch(&pinhole, 0.0));
-    let dark = differentiate(&region, &Cost::throughput(), Estimator::Warp, ASKED);
-    assert!(matches!(dark, Err(NoDerivative::Dark(..))), "{dark:?}");
+    let dark =
+        differentiate(&region, &QuadraticIntegrand::throughput(), DerivativeEstimator::Warp, ASKED);
+    assert!(matches!(dark, Err(DerivativeError::Dark(..))), "{dark:?}");
 }

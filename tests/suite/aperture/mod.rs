@@ -6,10 +6,10 @@ mod hard;
 mod warp;
 
 use crate::reference::{count, number, numbers, read};
-use aplanat::lens::{Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::lens::{Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System};
 use aplanat::paraxial::Beam;
-use aplanat::pupil::{Aiming, Bench, Cost, Launch};
-use aplanat::trace::{Gradient, SurfaceGradient};
+use aplanat::pupil::{Aiming, Launch, QuadraticIntegrand, RayModel};
+use aplanat::trace::{SurfaceGradient, SystemGradient};
 use serde_json::Value;
 
 /// A lens and a field with the exact integrals.
@@ -56,12 +56,12 @@ impl Case {
         System { index_before: number(&lens["index_before_first"]), surfaces, stop }
     }
 
-    pub(crate) fn bench(&self) -> Bench {
+    pub(crate) fn bench(&self) -> RayModel {
         self.bench_of(self.system())
     }
 
     /// A changed system with the field of the case.
-    pub(crate) fn bench_of(&self, system: System<f64>) -> Bench {
+    pub(crate) fn bench_of(&self, system: System<f64>) -> RayModel {
         let edge = self.number("field_deg");
         let rim = system.surfaces[system.stop.unwrap_or(0)].semi_diameter;
         let beam = Beam {
@@ -70,22 +70,22 @@ impl Case {
             field: FieldKind::Angle,
             edge,
         };
-        Bench::new(vec![(0.5876, 1.0, system)], 0, beam, Aiming::Paraxial).unwrap()
+        RayModel::from_systems(vec![(0.5876, 1.0, system)], 0, beam, Aiming::Paraxial).unwrap()
     }
 
-    pub(crate) fn launch<'a>(&self, bench: &'a Bench) -> Launch<'a> {
-        let field = Field { x: 0.0, y: self.number("field_deg"), weight: 1.0 };
+    pub(crate) fn launch<'a>(&self, bench: &'a RayModel) -> Launch<'a> {
+        let field = FieldPoint { x: 0.0, y: self.number("field_deg"), weight: 1.0 };
         bench.launch(field, 0).unwrap()
     }
 
     /// The spot about the exact centroid, and the exact derivative of its integral.
-    pub(crate) fn spot(&self) -> (Cost, &Value) {
-        (Cost::spread([0.0, self.number("centroid_y")]), &self.data["d_L_spot"])
+    pub(crate) fn spot(&self) -> (QuadraticIntegrand, &Value) {
+        (QuadraticIntegrand::spread([0.0, self.number("centroid_y")]), &self.data["d_L_spot"])
     }
 
     /// The throughput and the exact derivative of its integral.
-    pub(crate) fn throughput(&self) -> (Cost, &Value) {
-        (Cost::throughput(), &self.data["d_L_throughput"])
+    pub(crate) fn throughput(&self) -> (QuadraticIntegrand, &Value) {
+        (QuadraticIntegrand::throughput(), &self.data["d_L_throughput"])
     }
 }
 
@@ -93,7 +93,7 @@ impl Case {
 pub(crate) const GROUPS: [&str; 3] = ["curvature", "thickness", "semi_diameter"];
 
 /// A group of a derivative.
-pub(crate) fn group(gradient: &Gradient<f64>, name: &str) -> Vec<f64> {
+pub(crate) fn group(gradient: &SystemGradient<f64>, name: &str) -> Vec<f64> {
     let of = |surface: &SurfaceGradient<f64>| match name {
         "curvature" => surface.curvature,
         "thickness" => surface.thickness,
@@ -117,7 +117,7 @@ pub(crate) fn image() -> Surface<f64> {
         semi_diameter: f64::INFINITY,
         obstruction: 0.0,
         mirror: false,
-        hyper: false,
-        graded: None,
+        hyperhemisphere: false,
+        grin: None,
     }
 }

@@ -1,10 +1,12 @@
 //! The warp field against the exact derivatives, and where it has to stay finite.
 
 use super::{Case, GROUPS, cases, exact, group, image};
-use aplanat::lens::{Aperture, Field, FieldKind, Object, Shape, Surface, System};
+use aplanat::lens::{Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System};
 use aplanat::paraxial::Beam;
-use aplanat::pupil::{Aiming, Bench, Cost, Derivative, Kind, Region, Warp};
-use aplanat::trace::Gradient;
+use aplanat::pupil::{
+    Aiming, PupilDerivative, QuadraticIntegrand, RayModel, Region, RegionKind, WarpSampling,
+};
+use aplanat::trace::SystemGradient;
 use serde_json::Value;
 
 /// A Student t of seven degrees of freedom (eight replicates) is beyond this once in 270 000; there
@@ -15,13 +17,13 @@ const FARTHEST: f64 = 12.0;
 const BEYOND: f64 = 0.06;
 
 /// Estimate, standard error and exact value of every number of a group.
-fn compare(found: &Derivative, expected: &Value, name: &str) -> Vec<[f64; 3]> {
-    let (by, error) = (group(&found.by, name), group(&found.error, name));
+fn compare(found: &PupilDerivative, expected: &Value, name: &str) -> Vec<[f64; 3]> {
+    let (by, error) = (group(&found.gradient, name), group(&found.error, name));
     let each = by.into_iter().zip(error).zip(exact(expected, name));
     each.filter_map(|((by, error), exact)| Some([by, error, exact?])).collect()
 }
 
-fn objectives(case: &Case) -> [(&'static str, (Cost, &Value)); 2] {
+fn objectives(case: &Case) -> [(&'static str, (QuadraticIntegrand, &Value)); 2] {
     [("spot", case.spot()), ("throughput", case.throughput())]
 }
 
@@ -41,7 +43,7 @@ fn aperture_gradients_by_the_warp_field_are_within_their_standard_errors() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
         for (seed, (what, (cost, expected))) in objectives(&case).into_iter().enumerate() {
-            let sampling = Warp { count: 8192, seed: seed as u32 + 1 };
+            let sampling = WarpSampling { count: 8192, seed: seed as u32 + 1 };
             let found = region.warp_derivative(&cost, sampling).unwrap();
             for name in GROUPS {
                 let rows = compare(&found, expected, name);
@@ -72,8 +74,10 @@ fn aperture_gradients_by_the_warp_field_have_no_bias() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
         for (what, (cost, expected)) in objectives(&case) {
-            let estimates: Vec<Derivative> = (0..SEEDS)
-                .map(|seed| region.warp_derivative(&cost, Warp { count: 256, seed }).unwrap())
+            let estimates: Vec<PupilDerivative> = (0..SEEDS)
+                .map(|seed| {
+                    region.warp_derivative(&cost, WarpSampling { count: 256, seed }).unwrap()
+                })
                 .collect();
             for name in GROUPS {
                 let columns: Vec<_> =
@@ -106,8 +110,8 @@ fn farther(a: (f64, String), b: (f64, String)) -> (f64, String) {
     if b.0 <= a.0 { a } else { b }
 }
 
-fn bits(found: &Derivative) -> Vec<u64> {
-    found.by.numbers().chain(found.error.numbers()).map(f64::to_bits).collect()
+fn bits(found: &PupilDerivative) -> Vec<u64> {
+    found.gradient.numbers().chain(found.error.numbers()).map(f64::to_bits).collect()
 }
 
 #[test]
@@ -117,7 +121,7 @@ fn aperture_gradients_by_the_warp_field_do_not_depend_on_threads() {
     let region = Region::new(case.launch(&bench));
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let sampling = Warp { count: 8 * 5000, seed: 3 };
+        let sampling = WarpSampling { count: 8 * 5000, seed: 3 };
         bits(&pool.install(|| region.warp_derivative(&case.spot().0, sampling)).unwrap())
     };
     assert!(on(1) == on(2));
@@ -129,29 +133,29 @@ fn aperture_gradients_by_the_warp_field_hold_in_single_precision() {
         let bench = case.bench();
         let region = Region::new(case.launch(&bench));
         for (what, (cost, _)) in objectives(&case) {
-            let sampling = Warp { count: 2048, seed: 5 };
+            let sampling = WarpSampling { count: 2048, seed: 5 };
             let double = region.warp_derivative(&cost, sampling).unwrap();
             let single = region.warp_derivative_in::<f32>(&cost, sampling).unwrap();
-            assert!(single.by.numbers().all(f64::is_finite), "{}", case.name());
+            assert!(single.gradient.numbers().all(f64::is_finite), "{}", case.name());
             for name in GROUPS {
-                let (a, b) = (group(&double.by, name), group(&single.by, name));
+                let (a, b) = (group(&double.gradient, name), group(&single.gradient, name));
                 let off = norm(a.iter().zip(&b).map(|(a, b)| a - b));
                 let error = norm(group(&double.error, name).into_iter());
                 // What is exactly zero is rounding in both.
-                let rounding = 1e-6 * norm(double.by.numbers());
+                let rounding = 1e-6 * norm(double.gradient.numbers());
                 assert!(off <= error + rounding, "{} {what} {name}: {off} {error}", case.name());
             }
         }
     }
 }
 
-fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> Bench {
+fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> RayModel {
     let beam = Beam { object: Object::Infinity, aperture, field: FieldKind::Angle, edge };
-    Bench::new(vec![(0.5876, 1.0, system)], 0, beam, aiming).unwrap()
+    RayModel::from_systems(vec![(0.5876, 1.0, system)], 0, beam, aiming).unwrap()
 }
 
-fn region(bench: &Bench) -> Region<'_> {
-    let field = Field { x: 0.0, y: bench.beam.edge, weight: 1.0 };
+fn region(bench: &RayModel) -> Region<'_> {
+    let field = FieldPoint { x: 0.0, y: bench.beam.edge, weight: 1.0 };
     Region::new(bench.launch(field, 0).unwrap())
 }
 
@@ -162,11 +166,11 @@ fn aperture_gradients_where_a_disc_ends_the_beam_have_no_motion_of_it() {
     system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = f64::INFINITY);
     let bench = bench(system, Aperture::EntrancePupilDiameter(12.0), 3.0, Aiming::Paraxial);
     let region = region(&bench);
-    assert_eq!(region.kind, Kind::Clear);
-    for cost in [Cost::spread([0.0, 2.3]), Cost::throughput()] {
-        let found = region.warp_derivative(&cost, Warp { count: 8192, seed: 2 }).unwrap();
-        let exact = region.lit(8).biased_derivative(&cost);
-        let rows = found.by.numbers().zip(found.error.numbers()).zip(exact.numbers());
+    assert_eq!(region.kind, RegionKind::Clear);
+    for cost in [QuadraticIntegrand::spread([0.0, 2.3]), QuadraticIntegrand::throughput()] {
+        let found = region.warp_derivative(&cost, WarpSampling { count: 8192, seed: 2 }).unwrap();
+        let exact = region.trace_pupil(8).biased_derivative(&cost);
+        let rows = found.gradient.numbers().zip(found.error.numbers()).zip(exact.numbers());
         for ((by, error), exact) in rows {
             assert!((by - exact).abs() <= 6.0 * error + 1e-9 * exact.abs(), "{by} {error} {exact}");
         }
@@ -177,10 +181,11 @@ fn aperture_gradients_where_a_disc_ends_the_beam_have_no_motion_of_it() {
 fn aperture_gradients_of_rays_aimed_at_the_stop_move_with_its_rim() {
     for case in [&cases()[1], &cases()[4]] {
         let plain = case.bench();
-        let system = plain.colors[0].system.clone();
+        let system = plain.channels[0].system.clone();
         let bench = bench(system, plain.beam.aperture, plain.beam.edge, Aiming::Stop);
         let (cost, expected) = case.throughput();
-        let found = region(&bench).warp_derivative(&cost, Warp { count: 8192, seed: 4 }).unwrap();
+        let found =
+            region(&bench).warp_derivative(&cost, WarpSampling { count: 8192, seed: 4 }).unwrap();
         for name in GROUPS {
             for row in compare(&found, expected, name) {
                 assert!(errors_off(row) <= FARTHEST, "{name} {row:?}");
@@ -204,14 +209,17 @@ fn aperture_gradients_scale_with_the_lens() {
         }
         let bench = case.bench_of(system);
         let launch = case.launch(&bench);
-        let cost = Cost { center: [0.0, case.number("centroid_y") * scale], ..case.spot().0 };
-        Region::new(launch).warp_derivative(&cost, Warp { count: 1024, seed: 1 }).unwrap()
+        let cost = QuadraticIntegrand {
+            center: [0.0, case.number("centroid_y") * scale],
+            ..case.spot().0
+        };
+        Region::new(launch).warp_derivative(&cost, WarpSampling { count: 1024, seed: 1 }).unwrap()
     };
     let unit = found(1.0);
     for scale in [1e-50, 1e-20, 1e-3, 1e20, 1e50] {
         let scaled = found(scale);
         for (name, powers) in [("curvature", 5), ("thickness", 3), ("semi_diameter", 3)] {
-            for (of, with) in [(&unit.by, &scaled.by), (&unit.error, &scaled.error)] {
+            for (of, with) in [(&unit.gradient, &scaled.gradient), (&unit.error, &scaled.error)] {
                 let (a, b) = (group(of, name), group(with, name));
                 let size = norm(a.iter().copied());
                 for (a, b) in a.iter().zip(b) {
@@ -237,16 +245,16 @@ fn aperture_gradients_move_the_shadow_of_an_obstruction() {
     let benches = [case.bench(), changed(|surface| surface.semi_diameter = 3.0)];
     for cost in [case.spot().0, case.throughput().0] {
         let region = Region::new(case.launch(&obstructed));
-        let found = region.warp_derivative(&cost, Warp { count: 8192, seed: 6 }).unwrap();
+        let found = region.warp_derivative(&cost, WarpSampling { count: 8192, seed: 6 }).unwrap();
         let [mut exact, shadow] = [0, 1].map(|i| {
             let region = Region::new(case.launch(&benches[i]));
-            region.lit(10).boundary_derivative(&cost).unwrap()
+            region.trace_pupil(10).boundary_derivative(&cost).unwrap()
         });
         let rim = exact.surfaces[0].semi_diameter;
         exact.add(&shadow, -1.0);
         exact.surfaces[0].semi_diameter = rim;
         for name in GROUPS {
-            let (by, error) = (group(&found.by, name), group(&found.error, name));
+            let (by, error) = (group(&found.gradient, name), group(&found.error, name));
             for (i, exact) in group(&exact, name).into_iter().enumerate() {
                 let off = (by[i] - exact).abs();
                 println!("{name} {i}: {} {exact}, {:.1} errors", by[i], off / error[i]);
@@ -266,7 +274,7 @@ fn system(rows: &[(f64, f64, f64, f64)]) -> System<f64> {
     System { index_before: 1.0, surfaces, stop: Some(0) }
 }
 
-fn all_finite(gradient: &Gradient<f64>) -> bool {
+fn all_finite(gradient: &SystemGradient<f64>) -> bool {
     gradient.numbers().all(f64::is_finite)
 }
 
@@ -297,13 +305,13 @@ fn aperture_gradients_by_the_warp_field_are_finite_in_hard_cases() {
     for (name, rows, aperture, edge) in hard {
         let bench = bench(system(rows), aperture, edge, Aiming::Paraxial);
         let region = region(&bench);
-        for cost in [Cost::spread([0.0; 2]), Cost::throughput()] {
-            let sampling = Warp { count: 4096, seed: 9 };
+        for cost in [QuadraticIntegrand::spread([0.0; 2]), QuadraticIntegrand::throughput()] {
+            let sampling = WarpSampling { count: 4096, seed: 9 };
             let double = region.warp_derivative(&cost, sampling);
             let single = region.warp_derivative_in::<f32>(&cost, sampling);
             assert_eq!(double.is_none(), name == "no light", "{name} {:?}", region.kind);
             for found in [double, single].into_iter().flatten() {
-                assert!(all_finite(&found.by) && all_finite(&found.error), "{name}");
+                assert!(all_finite(&found.gradient) && all_finite(&found.error), "{name}");
             }
         }
     }

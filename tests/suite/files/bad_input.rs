@@ -7,7 +7,7 @@ use aplanat::lens::{Aperture, Lens};
 use std::fs;
 
 fn double_gauss() -> Lens {
-    native::read(files::library()[0].text, "a.json").unwrap()
+    native::read(files::bundled_lenses()[0].text, "a.json").unwrap()
 }
 
 fn refusal(bytes: &[u8], name: &str) -> String {
@@ -42,7 +42,7 @@ fn what_is_no_lens_is_called_what_it_is() {
 
 #[test]
 fn a_native_file_cut_anywhere_is_refused() {
-    let text = files::library()[0].text.trim_end();
+    let text = files::bundled_lenses()[0].text.trim_end();
     for end in (1..text.len()).step_by(7) {
         let message = refusal(&text.as_bytes()[..end], "a.json");
         assert!(message.starts_with("a.json, line ") && message.contains("expected"), "{message}");

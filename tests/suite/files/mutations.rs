@@ -76,7 +76,7 @@ fn spoiled(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 /// Each library lens in JSON, in Zemax in 8 bits and in UTF-16, and the foreign files.
 fn seeds() -> Vec<Vec<u8>> {
     let mut seeds: Vec<Vec<u8>> = FOREIGN.iter().map(|name| foreign(name)).collect();
-    for bundled in files::library() {
+    for bundled in files::bundled_lenses() {
         let lens = native::read(bundled.text, bundled.name).unwrap();
         let (text, _) = zemax::write(&lens).unwrap();
         seeds.push(bundled.text.as_bytes().to_vec());

@@ -1,14 +1,14 @@
 //! A lens that goes out and comes back is the same lens, to the last bit.
 
 use super::{FOREIGN, folder, foreign};
-use aplanat::files::{self, Outcome, native};
+use aplanat::files::{self, ConversionOutcome, native};
 use aplanat::lens::{
-    Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
+    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
 };
 use std::fs;
 
 fn library() -> impl Iterator<Item = (&'static str, Lens)> {
-    files::library().iter().map(|b| (b.name, native::read(b.text, b.name).unwrap()))
+    files::bundled_lenses().iter().map(|b| (b.name, native::read(b.text, b.name).unwrap()))
 }
 
 /// The lens without what a Zemax file has no room for.
@@ -86,7 +86,7 @@ fn what_an_export_cannot_hold_is_in_its_report() {
     let folder = folder("losses");
     let (_, mut lens) = library().next().unwrap();
     let conic = |surface| Parameter::new(surface, Quantity::Conic);
-    lens.focus = Some(0.1);
+    lens.image_solve = Some(0.1);
     lens.variables.retain(|v| v.parameter.surface == 0);
     lens.pickups =
         vec![Pickup { parameter: conic(1), source: conic(2), scale: 1.0, offset: -0.25 }];
@@ -94,13 +94,13 @@ fn what_an_export_cannot_hold_is_in_its_report() {
     let target = folder.join("a.zmx");
     let report = files::save(&lens, &target).unwrap().report.unwrap();
     let row = |text: &str| report.rows.iter().find(|row| row.text.contains(text)).unwrap();
-    assert_eq!(row("focus solve").outcome, Outcome::Approximated);
-    assert_eq!(row("pickup: conic constant of surface 1").outcome, Outcome::Approximated);
-    assert_eq!(row("variable: curvature of surface 0").outcome, Outcome::Dropped);
-    assert_eq!(row("model glass after surface 4").outcome, Outcome::Approximated);
+    assert_eq!(row("focus solve").outcome, ConversionOutcome::Approximated);
+    assert_eq!(row("pickup: conic constant of surface 1").outcome, ConversionOutcome::Approximated);
+    assert_eq!(row("variable: curvature of surface 0").outcome, ConversionOutcome::Dropped);
+    assert_eq!(row("model glass after surface 4").outcome, ConversionOutcome::Approximated);
     let back = files::open(&target).unwrap().lens;
     assert_eq!(back.surfaces[1].conic, -0.25);
-    assert!(back.focus.is_none() && back.pickups.is_empty());
+    assert!(back.image_solve.is_none() && back.pickups.is_empty());
     fs::remove_dir_all(folder).unwrap();
 }
 
@@ -112,11 +112,12 @@ fn an_export_that_would_trace_differently_is_not_written() {
     // the far half of the sphere, which counts only here.
     lens.variables.clear();
     lens.surfaces.truncate(1);
-    lens.surfaces[0] = Row { curvature: -0.05, stop: true, hyper: true, ..Row::default() };
+    lens.surfaces[0] =
+        Row { curvature: -0.05, stop: true, hyperhemisphere: true, ..Row::default() };
     lens.object = Object::Finite(20.0 + 20.0 / 1.5);
     lens.object_medium = Medium::Index(1.5);
     lens.aperture = Aperture::ObjectNa(1.45);
-    let height = Field { x: 0.0, y: 0.0, weight: 1.0 };
+    let height = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
     lens.fields = Fields { kind: FieldKind::ObjectHeight, values: vec![height] };
     let target = folder.join("a.zmx");
     fs::write(&target, "old").unwrap();

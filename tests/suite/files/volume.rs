@@ -2,14 +2,16 @@
 
 use super::folder;
 use aplanat::files::{Volume, read_volume, write_volume};
-use aplanat::grin::field::{Grid, Trilinear};
+use aplanat::grin::field::{RegularGrid, Trilinear};
 use aplanat::math::Vec3;
 use std::path::Path;
 
 fn example() -> Volume {
-    let grid = Grid::new([4, 3, 2], Vec3::new(-1.0, 0.5, 0.0), Vec3::new(0.1, 0.2, 1.0 / 3.0));
+    let grid =
+        RegularGrid::new([4, 3, 2], Vec3::new(-1.0, 0.5, 0.0), Vec3::new(0.1, 0.2, 1.0 / 3.0));
     let grid = grid.unwrap();
-    let values = (0..grid.nodes()).map(|n| 1.0 + (n as f64 * 0.618034).fract() / 3.0).collect();
+    let values =
+        (0..grid.node_count()).map(|n| 1.0 + (n as f64 * 0.618034).fract() / 3.0).collect();
     Volume { grid, values }
 }
 
@@ -33,7 +35,7 @@ fn grin_volumes_of_numpy_are_read_in_any_order_and_precision() {
     assert_eq!(volume.grid.low(), Vec3::new(-1.0, 0.0, 2.0));
     assert_eq!(volume.grid.spacing(), Vec3::new(0.5, 0.25, 0.125));
     // a[k, j, i] = 1 + k + j/4 + i/16
-    for n in 0..volume.grid.nodes() {
+    for n in 0..volume.grid.node_count() {
         let (i, j, k) = (n % 4, n / 4 % 3, n / 12);
         let value = 1.0 + k as f64 + j as f64 / 4.0 + i as f64 / 16.0;
         assert_eq!(volume.values[n], value, "{i} {j} {k}");

@@ -1,7 +1,7 @@
 //! What a Zemax file means, keyword by keyword, on files of our own.
 
 use super::foreign;
-use aplanat::files::{self, FileError, Opened, Outcome, Report};
+use aplanat::files::{self, ConversionOutcome, ConversionReport, FileError, OpenedLens};
 use aplanat::lens::{
     Aperture, FieldKind, Lens, Medium, Object, Parameter, Pickup, Quantity, Variable,
 };
@@ -10,7 +10,7 @@ fn achromat() -> String {
     String::from_utf8(foreign("achromat.zmx")).unwrap()
 }
 
-fn open(bytes: &[u8]) -> Result<Opened, FileError> {
+fn open(bytes: &[u8]) -> Result<OpenedLens, FileError> {
     files::parse(bytes, "folder/a.zmx")
 }
 
@@ -19,7 +19,7 @@ fn lens(text: &str) -> Lens {
 }
 
 /// The achromat with something replaced.
-fn changed(from: &str, to: &str) -> Result<Opened, FileError> {
+fn changed(from: &str, to: &str) -> Result<OpenedLens, FileError> {
     let text = achromat();
     assert!(text.contains(from), "{from}");
     open(text.replacen(from, to, 1).as_bytes())
@@ -29,7 +29,7 @@ fn refusal(from: &str, to: &str) -> String {
     changed(from, to).unwrap_err().to_string()
 }
 
-fn outcome<'a>(report: &'a Report, text: &str) -> (Outcome, &'a str) {
+fn outcome<'a>(report: &'a ConversionReport, text: &str) -> (ConversionOutcome, &'a str) {
     let row = report.rows.iter().find(|row| row.text.starts_with(text)).unwrap();
     (row.outcome, &row.note)
 }
@@ -86,7 +86,7 @@ fn the_achromat_is_what_its_file_says() {
     let bounded = Variable { parameter: thickness, min: Some(2.0), max: Some(9.0) };
     let expected = [free(curvature(0)), bounded, free(curvature(1)), free(curvature(2))];
     assert_eq!(lens.variables, expected);
-    assert_eq!(lens.focus, Some(0.0));
+    assert_eq!(lens.image_solve, Some(0.0));
     let check = &opened.checks[0];
     assert!((check.efl.unwrap() - 80.5879).abs() < 1e-4, "{check}");
     assert!((check.bfl.unwrap() - 76.4807).abs() < 1e-4, "{check}");
@@ -98,16 +98,16 @@ fn the_report_says_what_became_of_every_line() {
     let text = achromat();
     let report = open(text.as_bytes()).unwrap().report.unwrap();
     assert_eq!(report.rows.len(), text.lines().count());
-    assert_eq!(outcome(&report, "ENPD").0, Outcome::Used);
-    assert_eq!(outcome(&report, "COFN").0, Outcome::Preserved);
-    assert_eq!(outcome(&report, "EFFL").0, Outcome::Preserved);
-    assert_eq!(outcome(&report, "VCYN").0, Outcome::Dropped);
-    assert_eq!(outcome(&report, "WAVM 3").0, Outcome::Used);
-    assert_eq!(outcome(&report, "WAVM 4").0, Outcome::Preserved); // padding
+    assert_eq!(outcome(&report, "ENPD").0, ConversionOutcome::Used);
+    assert_eq!(outcome(&report, "COFN").0, ConversionOutcome::Preserved);
+    assert_eq!(outcome(&report, "EFFL").0, ConversionOutcome::Preserved);
+    assert_eq!(outcome(&report, "VCYN").0, ConversionOutcome::Dropped);
+    assert_eq!(outcome(&report, "WAVM 3").0, ConversionOutcome::Used);
+    assert_eq!(outcome(&report, "WAVM 4").0, ConversionOutcome::Preserved); // padding
     let fixed: Vec<_> =
         report.rows.iter().filter(|row| row.text.starts_with("DIAM 8.6 1")).collect();
-    assert_eq!(fixed[0].outcome, Outcome::Used); // beside an aperture that clips
-    assert_eq!(fixed[1].outcome, Outcome::Approximated);
+    assert_eq!(fixed[0].outcome, ConversionOutcome::Used); // beside an aperture that clips
+    assert_eq!(fixed[1].outcome, ConversionOutcome::Approximated);
     let json = serde_json::to_value(&report).unwrap();
     assert_eq!(json["rows"][6]["outcome"], "used");
     assert_eq!(json["rows"][6]["line"], 7);
@@ -156,7 +156,7 @@ fn configurations_solves_and_pickups_are_read() {
     // The coordinate breaks cancel and stay as planes.
     assert_eq!(lens.surfaces.len(), 8);
     assert_eq!((lens.surfaces[2].curvature, &lens.surfaces[2].medium), (0.0, &Medium::Air));
-    assert_eq!(outcome(&report, "TYPE COORDBRK").0, Outcome::Approximated);
+    assert_eq!(outcome(&report, "TYPE COORDBRK").0, ConversionOutcome::Approximated);
     let glass = Medium::Model { nd: 1.62, vd: 60.3 };
     assert_eq!((&lens.surfaces[4].medium, &lens.surfaces[6].medium), (&glass, &glass));
     let pickup = |to, from, quantity, scale| Pickup {
@@ -174,8 +174,8 @@ fn configurations_solves_and_pickups_are_read() {
     let free = |surface, quantity| lens.variable(Parameter::new(surface, quantity)).is_some();
     assert!((0..3).all(|zoom| free(1, Quantity::ZoomThickness(zoom))));
     assert!(free(4, Quantity::Curvature) && free(4, Quantity::Index));
-    assert_eq!(lens.focus, Some(0.0));
-    assert_eq!(outcome(&report, "CRVT").0, Outcome::Dropped);
+    assert_eq!(lens.image_solve, Some(0.0));
+    assert_eq!(outcome(&report, "CRVT").0, ConversionOutcome::Dropped);
     assert_eq!(opened.checks.len(), 3);
     assert_eq!(Some(lens.surfaces[7].thickness), opened.checks[0].bfl);
 }
@@ -226,15 +226,24 @@ fn obscurations_and_inner_radii_obstruct() {
         let line = to.trim().lines().next().unwrap().trim().to_owned();
         (sizes, outcome(&report, &line).0, outcome(&report, "DIAM 8.6 1").0)
     };
-    let (used, dropped) = (Outcome::Used, Outcome::Dropped);
+    let (used, dropped) = (ConversionOutcome::Used, ConversionOutcome::Dropped);
     assert_eq!(read("  CLAP 2.5 8.6 0"), ((Some(2.5), Some(8.6)), used, used));
     assert_eq!(read("  FLAP 0 8.6 0"), ((None, Some(8.6)), used, used));
     // A semi-diameter that a person fixed is only drawn there.
-    assert_eq!(read("  OBSC 0 2.5 0"), ((Some(2.5), Some(8.6)), used, Outcome::Approximated));
+    assert_eq!(
+        read("  OBSC 0 2.5 0"),
+        ((Some(2.5), Some(8.6)), used, ConversionOutcome::Approximated)
+    );
     // That of an obscuration is often its own size.
-    assert_eq!(read("  OBSC 0 8.6 0"), ((Some(8.6), None), used, Outcome::Preserved));
-    assert_eq!(read("  OBSC 1 2.5 0"), ((None, Some(8.6)), dropped, Outcome::Approximated));
-    assert_eq!(read("  SQAP 1 2.5 0"), ((None, Some(8.6)), dropped, Outcome::Approximated));
+    assert_eq!(read("  OBSC 0 8.6 0"), ((Some(8.6), None), used, ConversionOutcome::Preserved));
+    assert_eq!(
+        read("  OBSC 1 2.5 0"),
+        ((None, Some(8.6)), dropped, ConversionOutcome::Approximated)
+    );
+    assert_eq!(
+        read("  SQAP 1 2.5 0"),
+        ((None, Some(8.6)), dropped, ConversionOutcome::Approximated)
+    );
     let both = read("  CLAP 1 8.6 0\r\n  OBSC 0 2.5 0").0;
     assert_eq!(both, (Some(2.5), Some(8.6)));
     let inches = achromat().replace("UNIT MM", "UNIT IN").replace("CLAP 0 8.6", "CLAP 1 8.6");
@@ -245,7 +254,7 @@ fn obscurations_and_inner_radii_obstruct() {
     }
     let at_image = achromat().replace("  DIAM 3.6 0", "  OBSC 0 1 0\r\n  DIAM 3.6 0");
     let report = open(at_image.as_bytes()).unwrap().report.unwrap();
-    assert_eq!(outcome(&report, "OBSC").0, Outcome::Dropped);
+    assert_eq!(outcome(&report, "OBSC").0, ConversionOutcome::Dropped);
 }
 
 #[test]
@@ -270,7 +279,7 @@ fn solves_that_cannot_be_kept_are_frozen_and_said_so() {
         let opened = changed(from, to).unwrap_or_else(|error| panic!("{to}: {error}"));
         let report = opened.report.unwrap();
         let (outcome, found) = outcome(&report, to);
-        assert_eq!(outcome, Outcome::Approximated, "{to}");
+        assert_eq!(outcome, ConversionOutcome::Approximated, "{to}");
         assert!(found.contains(note), "{to}: {found}");
         assert!(opened.lens.pickups.is_empty());
     }

@@ -1,9 +1,10 @@
 //! Lenses found again from what they do to rays.
 
 use super::{until, vec3};
-use aplanat::grin::field::{BSpline, Layered, Profile};
+use aplanat::grin::field::{BSpline, ProfileField, ProfileFunction};
 use aplanat::grin::{
-    Adam, Field, Integrator, LastStep, Launch, Lbfgs, Limits, Ray, Region, Seed, Setup, Tracer,
+    Adam, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField, Integrator, LastStep, LaunchMode,
+    Lbfgs, ParameterBounds, RayAdjoint,
 };
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::FRAC_PI_2;
@@ -11,27 +12,27 @@ use std::f64::consts::FRAC_PI_2;
 /// The last coefficient of a spline stands beyond the rim, where the index would fall below 1.
 const RANGE: [f64; 2] = [0.7, 2.0];
 
-fn ball(coefficients: Vec<f64>) -> Layered<BSpline<f64>> {
-    Layered::sphere(BSpline::new(0.0, 1.0, coefficients).unwrap())
+fn ball(coefficients: Vec<f64>) -> ProfileField<BSpline<f64>> {
+    ProfileField::sphere(BSpline::new(0.0, 1.0, coefficients).unwrap())
 }
 
-fn fibre(coefficients: Vec<f64>) -> Layered<BSpline<f64>> {
-    Layered::cylinder(BSpline::new(0.0, 1.0, coefficients).unwrap())
+fn fibre(coefficients: Vec<f64>) -> ProfileField<BSpline<f64>> {
+    ProfileField::cylinder(BSpline::new(0.0, 1.0, coefficients).unwrap())
 }
 
 /// Parallel meridional rays at even heights up to `edge`.
-fn fan(count: usize, edge: f64, z: f64) -> Vec<Ray<f64>> {
+fn fan(count: usize, edge: f64, z: f64) -> Vec<GrinRay<f64>> {
     let height = |i: usize| edge * (i as f64 + 0.5) / count as f64;
-    let ray = |i: usize| Ray { x: vec3([height(i), 0.0, z]), v: vec3([0.0, 0.0, 1.0]) };
+    let ray = |i: usize| GrinRay { x: vec3([height(i), 0.0, z]), v: vec3([0.0, 0.0, 1.0]) };
     (0..count).map(ray).collect()
 }
 
 /// The relative L2 error of a profile in `s = r²` over the unit ball.
-fn error(field: &Layered<BSpline<f64>>, exact: impl Fn(f64) -> f64) -> f64 {
+fn error(field: &ProfileField<BSpline<f64>>, exact: impl Fn(f64) -> f64) -> f64 {
     let (mut difference, mut norm) = (0.0, 0.0);
     for i in 0..200 {
         let r = (f64::from(i) + 0.5) / 200.0;
-        let (got, exact) = (field.profile.at(r * r).value, exact(r));
+        let (got, exact) = (field.profile.evaluate(r * r).value, exact(r));
         difference += r * r * (got - exact).powi(2);
         norm += r * r * exact * exact;
     }
@@ -41,25 +42,25 @@ fn error(field: &Layered<BSpline<f64>>, exact: impl Fn(f64) -> f64) -> f64 {
 /// What each ray misses the target by, and how that changes with each parameter: one adjoint for
 /// each row. The last row holds `η` at the rim.
 fn rows(
-    field: &Layered<BSpline<f64>>,
-    setup: &Setup<f64>,
-    rays: &[Ray<f64>],
+    field: &ProfileField<BSpline<f64>>,
+    setup: &GrinSetup<f64>,
+    rays: &[GrinRay<f64>],
     target: [f64; 3],
 ) -> (DVector<f64>, DMatrix<f64>) {
-    let tracer = Tracer::new(field, setup.clone()).unwrap();
+    let tracer = GrinTracer::new(field, setup.clone()).unwrap();
     let (mut misses, mut slopes) = (Vec::new(), Vec::new());
     for ray in rays {
-        let exit = tracer.ray(ray);
+        let exit = tracer.trace(ray);
         let miss = exit.x - vec3(target);
         for (miss, axis) in [(miss.x, [1.0, 0.0, 0.0]), (miss.z, [0.0, 0.0, 1.0])] {
-            let seed = Seed { x: vec3(axis), ..Seed::default() };
+            let seed = RayAdjoint { x: vec3(axis), ..RayAdjoint::default() };
             misses.push(miss);
-            slopes.extend(tracer.taped_gradient(&[*ray], &[exit], &[seed]).parameters);
+            slopes.extend(tracer.tape_gradient(&[*ray], &[exit], &[seed]).parameters);
         }
     }
-    misses.push(field.profile.at(1.0).value - 1.0);
+    misses.push(field.profile.evaluate(1.0).value - 1.0);
     let mut rim = vec![0.0; field.parameters().len()];
-    field.profile.deposit(1.0, 1.0, 0.0, &mut rim);
+    field.profile.accumulate(1.0, 1.0, 0.0, &mut rim);
     slopes.extend(rim);
     let count = misses.len();
     (DVector::from_vec(misses), DMatrix::from_row_slice(count, field.parameters().len(), &slopes))
@@ -67,7 +68,7 @@ fn rows(
 
 #[test]
 fn grin_luneburg_is_found_again_from_its_focus() {
-    let region = Region::ball(1.0);
+    let region = GrinRegion::ball(1.0);
     let setup = until(Integrator::BlanesMoan, 0.12, region, LastStep::Fractional);
     let rays = fan(60, 0.995, -1.5);
     let mut field = ball(vec![1.0; 9]);
@@ -103,36 +104,36 @@ fn grin_luneburg_is_found_again_from_its_focus() {
 #[test]
 fn grin_the_best_fibre_is_the_hyperbolic_secant() {
     let focus = FRAC_PI_2;
-    let region = Region::rod(1.5, -1.0, focus);
+    let region = GrinRegion::rod(1.5, -1.0, focus);
     let setup = until(Integrator::BlanesMoan, 0.2, region, LastStep::Fractional);
-    let setup = Setup { launch: Launch::Scaled, ..setup };
+    let setup = GrinSetup { launch: LaunchMode::Scaled, ..setup };
     let rays = fan(40, 0.95, 0.0);
     let sech = |r: f64| 1f64.cosh() / r.cosh(); // a = π / (2 focus) = 1, and 1 at the rim
     let mut parameters = vec![1.2; 7];
-    let limits = Limits::even(7, RANGE, 0.05);
+    let limits = ParameterBounds::uniform(7, RANGE, 0.05);
     let (mut descent, mut last, mut evaluations) = (Lbfgs::default(), f64::INFINITY, 0);
     for _ in 0..600 {
         let done = descent.step(&mut parameters, &limits, |p| {
             let field = fibre(p.to_vec());
-            let tracer = Tracer::new(&field, setup.clone()).unwrap();
+            let tracer = GrinTracer::new(&field, setup.clone()).unwrap();
             let outcome = tracer.loss_and_gradient(&rays, |_, exit| {
                 let x = exit.x.x;
-                (x * x, Seed { x: vec3([2.0 * x, 0.0, 0.0]), ..Seed::default() })
+                (x * x, RayAdjoint { x: vec3([2.0 * x, 0.0, 0.0]), ..RayAdjoint::default() })
             });
             let mut gradient = outcome.gradient.parameters;
-            let miss = field.profile.at(1.0).value - 1.0;
-            field.profile.deposit(1.0, 2.0 * miss, 0.0, &mut gradient);
+            let miss = field.profile.evaluate(1.0).value - 1.0;
+            field.profile.accumulate(1.0, 2.0 * miss, 0.0, &mut gradient);
             (outcome.loss + miss * miss, gradient)
         });
         (last, evaluations) = (done.value, evaluations + done.evaluations);
-        if done.finished {
+        if done.converged {
             break;
         }
     }
     let field = fibre(parameters);
     let heights = (0..95).map(|i| 0.01 * f64::from(i));
     let worst =
-        heights.map(|r| (field.profile.at(r * r).value - sech(r)).abs()).fold(0.0, f64::max);
+        heights.map(|r| (field.profile.evaluate(r * r).value - sech(r)).abs()).fold(0.0, f64::max);
     let spot = (last / 40.0).sqrt();
     println!(
         "fibre: spot {spot:.1e}, index {worst:.1e} from the secant, {evaluations} evaluations"
@@ -147,7 +148,7 @@ fn grin_descent_keeps_to_its_limits_and_says_when_it_ends() {
         let (a, b) = (p[0] + p[1] - 1.0, p[0] - p[1]);
         (a * a + 100.0 * b * b, vec![2.0 * a + 200.0 * b, 2.0 * a - 200.0 * b])
     };
-    let limits = Limits::even(2, [1.0, 1.5], 0.05);
+    let limits = ParameterBounds::uniform(2, [1.0, 1.5], 0.05);
     let (mut lbfgs, mut p) = (Lbfgs::default(), vec![1.4, 1.2]);
     let mut before = p.clone();
     let ended = (0..100).any(|_| {
@@ -155,7 +156,7 @@ fn grin_descent_keeps_to_its_limits_and_says_when_it_ends() {
         let change = p.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(change <= 0.05 + 1e-15 && p.iter().all(|v| *v >= 1.0));
         before.clone_from(&p);
-        done.finished
+        done.converged
     });
     assert!(ended && (p[0] - 1.0).abs() < 1e-9 && (p[1] - 1.0).abs() < 1e-9, "{p:?}");
     let (mut adam, mut p) = (Adam::new(0.02), vec![1.4, 1.2]);
@@ -165,7 +166,7 @@ fn grin_descent_keeps_to_its_limits_and_says_when_it_ends() {
     });
     assert!(p.iter().all(|v| *v < 1.01), "{p:?}");
     let mut asked = vec![0.3, f64::NAN, 9.0, 1.2];
-    let limits = Limits::even(4, [1.0, 1.5], 0.05);
+    let limits = ParameterBounds::uniform(4, [1.0, 1.5], 0.05);
     assert_eq!(limits.project(&mut asked), 3);
     assert_eq!(asked, [1.0, 1.0, 1.5, 1.2]);
 }

@@ -2,27 +2,28 @@
 //! precision where every step ends on a plane of the grid.
 
 use super::{bowl, length, until, vec3};
-use aplanat::grin::field::{Grid, Layered, Parabolic, Tricubic, Trilinear};
+use aplanat::grin::field::{Parabolic, ProfileField, RegularGrid, Tricubic, Trilinear};
 use aplanat::grin::{
-    Exit, Fate, Field, Integrator, LastStep, Launch, Outcome, Ray, Region, Seed, Setup, Tracer,
+    GrinFate, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField, Integrator, LastStep,
+    LaunchMode, LossAndGradient, RayAdjoint, RayExit,
 };
 use aplanat::math::{Real, Vec3};
 
 /// `η² = 2.25 (1 − 0.16 r²)`: 1.5 on the axis, so that the index jumps at every boundary.
-fn fibre() -> Layered<Parabolic<f64>> {
-    Layered::cylinder(Parabolic::new(1.5, 0.4))
+fn fibre() -> ProfileField<Parabolic<f64>> {
+    ProfileField::cylinder(Parabolic::new(1.5, 0.4))
 }
 
-fn block() -> Region<f64> {
-    Region::rod(1.2, -1.0, 1.0)
+fn block() -> GrinRegion<f64> {
+    GrinRegion::rod(1.2, -1.0, 1.0)
 }
 
-fn into_block(last: LastStep, launch: Launch) -> Setup<f64> {
-    Setup { launch, ..until(Integrator::BlanesMoan, 0.05, block(), last) }
+fn into_block(last: LastStep, launch: LaunchMode) -> GrinSetup<f64> {
+    GrinSetup { launch, ..until(Integrator::BlanesMoan, 0.05, block(), last) }
 }
 
-fn slanted() -> Vec<Ray<f64>> {
-    let ray = |x: f64, y: f64, a: f64, b: f64| Ray {
+fn slanted() -> Vec<GrinRay<f64>> {
+    let ray = |x: f64, y: f64, a: f64, b: f64| GrinRay {
         x: vec3([x, y, -1.6]),
         v: vec3([a, b, (1.0 - a * a - b * b).sqrt()]),
     };
@@ -31,7 +32,7 @@ fn slanted() -> Vec<Ray<f64>> {
 
 /// What the equations say of a ray that comes with `|v| = 1`, whatever the index is: `x″ = −(n g)² x`
 /// across the axis and `v_z` constant.
-fn exact(ray: &Ray<f64>) -> (Vec3<f64>, Vec3<f64>) {
+fn exact(ray: &GrinRay<f64>) -> (Vec3<f64>, Vec3<f64>) {
     let entry = ray.x + ray.v * ((-1.0 - ray.x.z) / ray.v.z);
     let (rate, sigma) = (1.5 * 0.4, 2.0 / ray.v.z);
     let (sine, cosine) = (rate * sigma).sin_cos();
@@ -45,10 +46,12 @@ fn grin_a_ray_used_as_given_takes_no_notice_of_the_jump_it_enters_by() {
     let field = fibre();
     let rays = slanted();
     for (last, tolerance) in [(LastStep::Fractional, 1e-9), (LastStep::BrokenLine, 2e-2)] {
-        let exits = Tracer::new(&field, into_block(last, Launch::AsGiven)).unwrap().rays(&rays);
+        let exits = GrinTracer::new(&field, into_block(last, LaunchMode::AsGiven))
+            .unwrap()
+            .trace_batch(&rays);
         for (ray, exit) in rays.iter().zip(&exits) {
             let (x, v) = exact(ray);
-            assert_eq!(exit.fate, Fate::Left);
+            assert_eq!(exit.fate, GrinFate::Left);
             let off = length(exit.x - x).max(length(exit.v - v));
             assert!(off < tolerance, "{last:?}: {off:e}");
             // Nothing bends it at the far face either: what it had too little of, it still lacks.
@@ -65,10 +68,13 @@ fn grin_a_ray_used_as_given_takes_no_notice_of_the_jump_it_enters_by() {
 fn grin_each_way_to_enter_a_jump_is_what_its_name_says() {
     let field = fibre();
     let rays = slanted();
-    let exits =
-        |launch| Tracer::new(&field, into_block(LastStep::Fractional, launch)).unwrap().rays(&rays);
+    let exits = |launch| {
+        GrinTracer::new(&field, into_block(LastStep::Fractional, launch))
+            .unwrap()
+            .trace_batch(&rays)
+    };
     let [given, scaled, refracted] =
-        [Launch::AsGiven, Launch::Scaled, Launch::Refracted].map(exits);
+        [LaunchMode::AsGiven, LaunchMode::Scaled, LaunchMode::Refracted].map(exits);
     for i in 0..rays.len() {
         assert!(given[i].excess.abs() > 1.0, "{}", given[i].excess);
         assert!(scaled[i].excess.abs() < 1e-8 && refracted[i].excess.abs() < 1e-8);
@@ -83,8 +89,12 @@ fn grin_each_way_to_enter_a_jump_is_what_its_name_says() {
     assert!(off > 1e-3, "{off:e}");
 }
 
-fn outcome(field: &dyn Field<f64>, setup: Setup<f64>, rays: &[Ray<f64>]) -> Outcome<f64> {
-    Tracer::new(field, setup).unwrap().loss_and_gradient(rays, |_, exit| bowl(exit))
+fn outcome(
+    field: &dyn IndexField<f64>,
+    setup: GrinSetup<f64>,
+    rays: &[GrinRay<f64>],
+) -> LossAndGradient<f64> {
+    GrinTracer::new(field, setup).unwrap().loss_and_gradient(rays, |_, exit| bowl(exit))
 }
 
 /// What enters by a jump as given depends on the field inside alone; that is what the adjoint says,
@@ -92,16 +102,16 @@ fn outcome(field: &dyn Field<f64>, setup: Setup<f64>, rays: &[Ray<f64>]) -> Outc
 #[test]
 fn grin_the_gradient_of_rays_used_as_given_across_a_jump_agrees_with_differences() {
     let rays = slanted();
-    for region in [block(), Region::ball(1.05)] {
+    for region in [block(), GrinRegion::ball(1.05)] {
         for last in [LastStep::Fractional, LastStep::BrokenLine] {
-            let setup = || Setup {
-                launch: Launch::AsGiven,
+            let setup = || GrinSetup {
+                launch: LaunchMode::AsGiven,
                 // Not a whole number of steps: where one comes or goes, a broken line jumps.
                 ..until(Integrator::BlanesMoan, 0.0487, region.clone(), last)
             };
             let found = outcome(&fibre(), setup(), &rays);
-            assert_eq!(found.fates.of(Fate::Left), rays.len());
-            let loss = |field: &Layered<Parabolic<f64>>, rays: &[Ray<f64>]| {
+            assert_eq!(found.fates.count_of(GrinFate::Left), rays.len());
+            let loss = |field: &ProfileField<Parabolic<f64>>, rays: &[GrinRay<f64>]| {
                 outcome(field, setup(), rays).loss
             };
             let h = 1e-6;
@@ -135,8 +145,8 @@ fn grin_the_gradient_of_rays_used_as_given_across_a_jump_agrees_with_differences
 }
 
 /// Rays along z through nodes of the grid, beside them, and on its planes in x alone.
-fn on_planes<R: Real>(shift: f64) -> Vec<Ray<R>> {
-    let at = |x: f64, y: f64| Ray {
+fn on_planes<R: Real>(shift: f64) -> Vec<GrinRay<R>> {
+    let at = |x: f64, y: f64| GrinRay {
         x: Vec3::from_f64(vec3([x + shift, y + shift, -1.0])),
         v: Vec3::from_f64(vec3([0.0, 0.0, 1.0])),
     };
@@ -144,20 +154,25 @@ fn on_planes<R: Real>(shift: f64) -> Vec<Ray<R>> {
 }
 
 fn voxels<R: Real>() -> Trilinear<R> {
-    let grid = Grid::cube(33, R::ONE).unwrap();
+    let grid = RegularGrid::cube(33, R::ONE).unwrap();
     let value = |i: usize| R::from_f64(1.0 + 2e-3 * (i as f64 * 0.754878).fract());
     Trilinear::new(grid, (0..33usize.pow(3)).map(value).collect()).unwrap()
 }
 
 fn smooth<R: Real>() -> Tricubic<R> {
     let spread = |p: Vec3<R>| R::from_f64(1.2) - p.dot(p) * R::from_f64(0.02);
-    Tricubic::near(32, R::ONE, spread).unwrap()
+    Tricubic::approximate(32, R::ONE, spread).unwrap()
 }
 
-fn traced<R: Real>(field: &dyn Field<R>, step: f64, rays: &[Ray<R>]) -> Outcome<R> {
-    let setup = until(Integrator::LeapfrogDkd, step, Region::cube(R::ONE), LastStep::BrokenLine);
-    let outcome = Tracer::new(field, setup).unwrap().loss_and_gradient(rays, |_, exit| {
-        if exit.fate.arrived() { bowl(exit) } else { (R::ONE, Seed::default()) }
+fn traced<R: Real>(
+    field: &dyn IndexField<R>,
+    step: f64,
+    rays: &[GrinRay<R>],
+) -> LossAndGradient<R> {
+    let setup =
+        until(Integrator::LeapfrogDkd, step, GrinRegion::cube(R::ONE), LastStep::BrokenLine);
+    let outcome = GrinTracer::new(field, setup).unwrap().loss_and_gradient(rays, |_, exit| {
+        if exit.fate.has_arrived() { bowl(exit) } else { (R::ONE, RayAdjoint::default()) }
     });
     assert!(outcome.loss.is_finite());
     assert!(outcome.gradient.parameters.iter().all(|g| g.is_finite()));
@@ -165,8 +180,8 @@ fn traced<R: Real>(field: &dyn Field<R>, step: f64, rays: &[Ray<R>]) -> Outcome<
 }
 
 /// How far exits and gradients of single precision are off, and its retrace error in steps.
-fn off(single: &Outcome<f32>, double: &Outcome<f64>) -> [f64; 3] {
-    let place = |e: &Exit<f32>| Vec3::new(e.x.x, e.x.y, e.x.z).value();
+fn off(single: &LossAndGradient<f32>, double: &LossAndGradient<f64>) -> [f64; 3] {
+    let place = |e: &RayExit<f32>| Vec3::new(e.x.x, e.x.y, e.x.z).value();
     let pairs = single.exits.iter().zip(&double.exits);
     let worst = pairs.map(|(a, b)| length(place(a) - b.x)).fold(0.0, f64::max);
     let (mut square, mut norm) = (0.0, 0.0);
@@ -203,7 +218,12 @@ fn grin_single_precision_along_grid_planes_loses_digits_and_no_ray() {
         assert!(place < 5e-6 && gradient < 1e-4, "{name}: {place:e} {gradient:e}");
         assert!(retrace < 1e-3 && retrace_smooth < 1e-3, "{name}: {retrace:e} {retrace_smooth:e}");
         for outcome in [rough, smoothed] {
-            assert_eq!(outcome.fates.of(Fate::Left), rays.len(), "{name}: {:?}", outcome.fates);
+            assert_eq!(
+                outcome.fates.count_of(GrinFate::Left),
+                rays.len(),
+                "{name}: {:?}",
+                outcome.fates
+            );
         }
     }
 }

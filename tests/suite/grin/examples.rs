@@ -4,15 +4,15 @@
 use super::lens::{lens_of, ray, system};
 use crate::merit::bundled;
 use aplanat::lens::{Lens, Medium, Parameter, Quantity, RADIAL_TERMS};
-use aplanat::merit::{Goal, PupilEdge, Term, Weighted};
-use aplanat::optimize::{Method, start};
+use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use aplanat::optimize::{DescentMethod, start};
 use aplanat::paraxial::{Beam, first_order, paraxial_ray};
-use aplanat::search::lens::Figures;
+use aplanat::search::lens::LensSummary;
 use aplanat::trace::{Ray, Tracer};
 
 /// The RMS radius of the spot on the axis, in mm.
 fn spot(lens: &Lens) -> f64 {
-    Figures::of(lens, 1e-4).unwrap().fields[0].spot.unwrap().value
+    LensSummary::new(lens, 1e-4).unwrap().fields[0].spot.unwrap().value
 }
 
 /// The lens after a descent to a sharp spot on the axis.
@@ -20,9 +20,9 @@ fn sharpest(mut lens: Lens, free: &[Parameter]) -> Lens {
     lens.variables.clear();
     lens.fields.values.truncate(1);
     free.iter().for_each(|p| crate::merit::vary(&mut lens, p.surface, p.quantity));
-    let terms = vec![Weighted { term: Term::Spot, weight: 1.0 }];
+    let terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
     let goal = Goal { terms, zoom_ratios: Vec::new(), pupil: PupilEdge::Kept };
-    let mut search = start(Method::DampedLeastSquares, &lens, &goal, 1e-6).unwrap();
+    let mut search = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-6).unwrap();
     for _ in 0..60 {
         if search.step().finished {
             break;
@@ -53,10 +53,10 @@ fn grin_example_a_gradient_along_the_axis_takes_spherical_aberration_away() {
 #[test]
 fn grin_example_a_plane_plate_has_the_focal_length_of_woods_formula() {
     let lens = bundled("wood_lens_60");
-    let Medium::Gradient(gradient) = &lens.surfaces[0].medium else { panic!() };
+    let Medium::Grin(gradient) = &lens.surfaces[0].medium else { panic!() };
     let (n, length) = (1.6, lens.surfaces[0].thickness);
     let g = (-2.0 * gradient.radial[0] / n).sqrt();
-    let first = first_order(&system(&lens), &Beam::of(&lens, 0)).unwrap();
+    let first = first_order(&system(&lens), &Beam::for_lens(&lens, 0)).unwrap();
     let power = n * g * (g * length).sin();
     assert!((first.efl.unwrap() * power - 1.0).abs() < 1e-12);
     assert!((first.bfl.unwrap() * power / (g * length).cos() - 1.0).abs() < 1e-12);
@@ -108,11 +108,11 @@ fn grin_example_first_order_data_behind_a_mirror_are_those_of_rays_near_the_axis
         assert!(off.abs() < 1e-6, "{radial} {axial}: slope {off:e}");
         // The focus solve is the same ray.
         let mut focused = lens.clone();
-        focused.focus = Some(0.0);
+        focused.image_solve = Some(0.0);
         let solved = super::lens::system(&focused);
         let ray = paraxial_ray(&solved, 1.0, 0.0);
         assert!(ray.heights[image].abs() < 1e-12, "{}", ray.heights[image]);
-        let first = first_order(&solved, &Beam::of(&focused, 0)).unwrap();
+        let first = first_order(&solved, &Beam::for_lens(&focused, 0)).unwrap();
         assert!(first.image_defocus.unwrap().abs() < 1e-9);
     }
 }
@@ -120,7 +120,8 @@ fn grin_example_first_order_data_behind_a_mirror_are_those_of_rays_near_the_axis
 /// What a plate adds to the Petzval sum does not depend on which way light goes through it.
 #[test]
 fn grin_example_the_petzval_sum_of_a_plate_is_the_same_both_ways() {
-    let sum = |lens: &Lens| first_order(&system(lens), &Beam::of(lens, 0)).unwrap().petzval_sum;
+    let sum =
+        |lens: &Lens| first_order(&system(lens), &Beam::for_lens(lens, 0)).unwrap().petzval_sum;
     let plate = |radial: f64| sum(&folded(radial, 0.0)) - sum(&folded(-1e-12, 0.0));
     let exact = 2.0 * 1e-3 * 6.0 / (1.6 * 1.6);
     assert!((plate(-1e-3) - exact).abs() < 1e-9, "{} {exact}", plate(-1e-3));

@@ -4,10 +4,10 @@
 use super::{Kind, vec3};
 use crate::grin::kinds;
 use aplanat::grin::field::{
-    Diagonal, Grid, GridError, Layered, Luneburg, Maxwell, Parabolic, Polynomial, Samples, Sech,
-    Tricubic, Trilinear,
+    GridError, HessianDiagonal, IndexSamples, Luneburg, Maxwell, Parabolic, Polynomial,
+    ProfileField, RegularGrid, Sech, Tricubic, Trilinear,
 };
-use aplanat::grin::{Columns, Field, LANES};
+use aplanat::grin::{IndexField, LANES, LaneVectors};
 use aplanat::math::{Dual, Vec3};
 
 /// Points inside every field, none on a face of a voxel.
@@ -57,7 +57,7 @@ fn grin_deposits_are_the_transpose_of_the_derivative_by_the_parameters() {
         for (n, p) in points().into_iter().enumerate() {
             let (weight, pull) = (0.7, vec3([0.3, -0.5, 0.2]));
             let mut gradient = vec![0.0; plain.parameters().len()];
-            plain.deposit(p, weight, pull, &mut gradient);
+            plain.accumulate(p, weight, pull, &mut gradient);
             let direction = |i: usize| ((i + n) as f64 * 0.618034).fract() - 0.4;
             let moved = kind.field::<Slope>(|i, value| Slope { value, slope: [direction(i)] });
             let exact = moved.sample(Vec3::from_f64(p));
@@ -74,12 +74,12 @@ fn grin_deposits_are_the_transpose_of_the_derivative_by_the_parameters() {
 #[test]
 fn grin_blocks_give_the_bits_of_single_points() {
     for kind in kinds() {
-        for diagonal in [Diagonal::Exact, Diagonal::Smoothed] {
+        for diagonal in [HessianDiagonal::Exact, HessianDiagonal::Smoothed] {
             let field = Kind { diagonal, ..kind }.field::<f64>(|_, value| value);
             // Some of them outside.
             let points: Vec<_> = points().iter().map(|p| *p * 1.6).collect();
             let columns = |f: &dyn Fn(usize) -> Vec3<f64>| {
-                let mut c = Columns::default();
+                let mut c = LaneVectors::default();
                 for lane in 0..LANES {
                     (c.x[lane], c.y[lane], c.z[lane]) = (f(lane).x, f(lane).y, f(lane).z);
                 }
@@ -88,13 +88,13 @@ fn grin_blocks_give_the_bits_of_single_points() {
             let at = columns(&|lane| points[lane]);
             let times = columns(&|lane| vec3([0.1 * lane as f64, 1.0, -0.3]));
             let weight: [f64; LANES] = std::array::from_fn(|lane| 1.0 - 0.1 * lane as f64);
-            let (mut samples, mut again) = (Samples::default(), Samples::default());
-            let mut product = Columns::default();
-            field.samples(&at, &mut samples);
-            field.samples_and_hessians(&at, &times, &mut again, &mut product);
+            let (mut samples, mut again) = (IndexSamples::default(), IndexSamples::default());
+            let mut product = LaneVectors::default();
+            field.sample_block(&at, &mut samples);
+            field.sample_block_with_hessians(&at, &times, &mut again, &mut product);
             let mut deposits = vec![0.0; field.parameters().len()];
             let mut single = deposits.clone();
-            field.deposits(&at, &weight, &times, &mut deposits);
+            field.accumulate_block(&at, &weight, &times, &mut deposits);
             for (lane, p) in points.iter().enumerate() {
                 let sample = field.sample(*p);
                 let bent = field.hessian(*p).times(vec3([0.1 * lane as f64, 1.0, -0.3]));
@@ -104,7 +104,7 @@ fn grin_blocks_give_the_bits_of_single_points() {
                 }
                 assert_eq!(product.z[lane], bent.z, "{}", kind.name);
                 let pull = vec3([times.x[lane], times.y[lane], times.z[lane]]);
-                field.deposit(*p, weight[lane], pull, &mut single);
+                field.accumulate(*p, weight[lane], pull, &mut single);
             }
             assert_eq!(deposits, single, "{}", kind.name);
         }
@@ -115,8 +115,8 @@ fn grin_blocks_give_the_bits_of_single_points() {
 fn grin_the_smoothed_diagonal_is_exact_for_a_quadratic_up_to_the_rim() {
     let f = |p: Vec3<f64>| 1.2 + 0.3 * p.x * p.x - 0.2 * p.y * p.y + 0.1 * p.z * p.z + p.x * p.y;
     for counts in [[3, 4, 5], [9, 3, 6]] {
-        let grid = Grid::new(counts, vec3([-1.0; 3]), vec3([0.31, 0.5, 0.4])).unwrap();
-        let field = Trilinear::sampled(grid, f).unwrap();
+        let grid = RegularGrid::new(counts, vec3([-1.0; 3]), vec3([0.31, 0.5, 0.4])).unwrap();
+        let field = Trilinear::from_function(grid, f).unwrap();
         for p in points() {
             let d = field.hessian(p).diagonal;
             close(d.x, 0.6, "along x");
@@ -124,22 +124,22 @@ fn grin_the_smoothed_diagonal_is_exact_for_a_quadratic_up_to_the_rim() {
             close(d.z, 0.2, "along z");
         }
     }
-    let flat = Trilinear::sampled(Grid::cube(2, 1.0).unwrap(), f).unwrap();
+    let flat = Trilinear::from_function(RegularGrid::cube(2, 1.0).unwrap(), f).unwrap();
     assert!(flat.hessian(vec3([0.1, 0.2, 0.3])).diagonal.x.abs() < 1e-14);
 }
 
 #[test]
 fn grin_lenses_have_their_textbook_indices() {
     let at = |r: f64| vec3([0.6 * r, 0.0, 0.8 * r]);
-    let luneburg = Layered::sphere(Luneburg::new(2.0));
+    let luneburg = ProfileField::sphere(Luneburg::new(2.0));
     close(luneburg.sample(at(0.0)).index, 2f64.sqrt(), "luneburg centre");
     close(luneburg.sample(at(2.0)).index, 1.0, "luneburg rim");
-    let maxwell = Layered::sphere(Maxwell::new(2.0, 3.0));
+    let maxwell = ProfileField::sphere(Maxwell::new(2.0, 3.0));
     close(maxwell.sample(at(3.0)).index, 1.0, "maxwell rim");
-    let parabolic = Layered::cylinder(Parabolic::new(1.5, 0.5));
+    let parabolic = ProfileField::cylinder(Parabolic::new(1.5, 0.5));
     let r = vec3([0.3, 0.4, 7.0]);
     close(parabolic.sample(r).index, 1.5 * (1.0 - 0.25 * 0.25f64).sqrt(), "parabolic");
-    let sech = Layered::cylinder(Sech::new(1.6, 2.0));
+    let sech = ProfileField::cylinder(Sech::new(1.6, 2.0));
     for r in [0.0f64, 1e-9, 0.1, 1.0, 3.0] {
         let exact = 1.6 / (2.0 * r).cosh();
         close(sech.sample(vec3([0.0, r, 1.0])).index, exact, "sech");
@@ -150,7 +150,7 @@ fn grin_lenses_have_their_textbook_indices() {
 fn grin_a_tricubic_field_comes_near_a_function_with_the_fourth_order() {
     let f = |p: Vec3<f64>| 1.5 / (1.0 + 0.4 * p.dot(p));
     let worst = |cells: usize| {
-        let field = Tricubic::near(cells, 1.0, f).unwrap();
+        let field = Tricubic::approximate(cells, 1.0, f).unwrap();
         let error = |p: &Vec3<f64>| (field.sample(*p).index - f(*p)).abs();
         points().iter().map(error).fold(0.0, f64::max)
     };
@@ -161,7 +161,7 @@ fn grin_a_tricubic_field_comes_near_a_function_with_the_fourth_order() {
 #[test]
 fn grin_volumes_that_hold_nothing_are_refused_and_one_voxel_is_enough() {
     let low = vec3([0.0; 3]);
-    let grid = |n| Grid::new([n, 2, 2], low, vec3([1.0; 3])).unwrap();
+    let grid = |n| RegularGrid::new([n, 2, 2], low, vec3([1.0; 3])).unwrap();
     let few = |found| GridError::TooFew { axis: 'x', found, least: 2 };
     assert_eq!(Trilinear::<f64>::new(grid(0), vec![]).unwrap_err(), few(0));
     assert_eq!(Trilinear::new(grid(1), vec![1.0; 4]).unwrap_err(), few(1));
@@ -171,9 +171,9 @@ fn grin_volumes_that_hold_nothing_are_refused_and_one_voxel_is_enough() {
     values[5] = f64::NAN;
     let nan = GridError::NotANumber { node: 5 };
     assert_eq!(Trilinear::new(grid(2), values).unwrap_err(), nan);
-    let flat = Grid::new([2; 3], low, vec3([1.0, 0.0, 1.0])).unwrap_err();
+    let flat = RegularGrid::new([2; 3], low, vec3([1.0, 0.0, 1.0])).unwrap_err();
     assert_eq!(flat, GridError::Extent { axis: 'y' });
-    assert!(Grid::cube(1, 1.0).is_err() && Tricubic::near(0, 1.0, |_| 1.0).is_err());
+    assert!(RegularGrid::cube(1, 1.0).is_err() && Tricubic::approximate(0, 1.0, |_| 1.0).is_err());
     let one = Trilinear::new(grid(2), vec![1.5; 8]).unwrap();
     assert_eq!(one.sample(vec3([0.3, 0.9, 0.1])).index, 1.5);
 }
@@ -185,10 +185,10 @@ fn grin_no_field_panics_or_loses_its_numbers_far_away() {
         for p in [[1e3, -1e3, 1e3], [1e200, 0.0, 0.0], [f64::NAN; 3], [f64::INFINITY; 3]] {
             let sample = field.sample(vec3(p));
             let _ = field.hessian(vec3(p));
-            field.deposit(vec3(p), 1.0, vec3(p), &mut vec![0.0; field.parameters().len()]);
+            field.accumulate(vec3(p), 1.0, vec3(p), &mut vec![0.0; field.parameters().len()]);
             assert!(p[0] != 1e3 || sample.index.is_finite(), "{}", kind.name);
         }
     }
-    let constant = Layered::axial(Polynomial { coefficients: vec![1.5] });
+    let constant = ProfileField::axial(Polynomial { coefficients: vec![1.5] });
     assert_eq!(constant.sample(vec3([0.0, 0.0, 9.0])).gradient, Vec3::default());
 }

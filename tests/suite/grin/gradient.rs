@@ -3,9 +3,10 @@
 
 use super::{Kind, beam, bowl, kinds, length, steps, until, vec3};
 use crate::reference::Worst;
-use aplanat::grin::field::Diagonal;
+use aplanat::grin::field::HessianDiagonal;
 use aplanat::grin::{
-    Exit, Face, Field, Integrator, LastStep, Launch, Outcome, Ray, Region, Seed, Setup, Tracer,
+    Face, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField, Integrator, LastStep, LaunchMode,
+    LossAndGradient, RayAdjoint, RayExit,
 };
 use aplanat::math::{Dual, Real, Vec3};
 use rayon::ThreadPoolBuilder;
@@ -13,11 +14,11 @@ use rayon::ThreadPoolBuilder;
 type Slope = Dual<f64, 1>;
 
 /// Ways to trace, each a little different.
-fn setups<R: Real>(integrator: Integrator) -> Vec<(&'static str, Setup<R>)> {
+fn setups<R: Real>(integrator: Integrator) -> Vec<(&'static str, GrinSetup<R>)> {
     let c = R::from_f64;
-    let ball = || Region::ball(c(0.95));
+    let ball = || GrinRegion::ball(c(0.95));
     let slab = || {
-        let mut slab = Region::rod(c(3.0), c(-0.77), c(0.81));
+        let mut slab = GrinRegion::rod(c(3.0), c(-0.77), c(0.81));
         slab.faces.push(Face::sphere(c(1.4)));
         slab
     };
@@ -26,43 +27,47 @@ fn setups<R: Real>(integrator: Integrator) -> Vec<(&'static str, Setup<R>)> {
     let broken = || until(integrator, 0.08, slab(), LastStep::BrokenLine);
     vec![
         ("steps", steps(integrator, 0.08, 17)),
-        ("steps, scaled", Setup { launch: Launch::Scaled, ..steps(integrator, 0.08, 17) }),
+        ("steps, scaled", GrinSetup { launch: LaunchMode::Scaled, ..steps(integrator, 0.08, 17) }),
         ("fractional", fractional()),
         ("broken", broken()),
         (
             "fractional, scaled, screen",
-            Setup { launch: Launch::Scaled, screen: Some(screen), ..fractional() },
+            GrinSetup { launch: LaunchMode::Scaled, screen: Some(screen), ..fractional() },
         ),
         (
             "fractional, refracted, screen",
-            Setup { launch: Launch::Refracted, screen: Some(screen), ..fractional() },
+            GrinSetup { launch: LaunchMode::Refracted, screen: Some(screen), ..fractional() },
         ),
         (
             "broken, refracted, round screen",
-            Setup { launch: Launch::Refracted, screen: Some(Face::sphere(c(3.0))), ..broken() },
+            GrinSetup {
+                launch: LaunchMode::Refracted,
+                screen: Some(Face::sphere(c(3.0))),
+                ..broken()
+            },
         ),
     ]
 }
 
 /// Rays from outside, from inside, and from inside to the side.
-fn rays() -> Vec<Ray<f64>> {
+fn rays() -> Vec<GrinRay<f64>> {
     vec![
-        Ray { x: vec3([0.21, -0.13, -1.7]), v: vec3([0.03, 0.06, 1.0]) },
-        Ray { x: vec3([-0.42, 0.33, -1.5]), v: vec3([0.17, -0.05, 0.98]) },
-        Ray { x: vec3([0.11, 0.23, -0.37]), v: vec3([-0.12, 0.31, 1.01]) },
+        GrinRay { x: vec3([0.21, -0.13, -1.7]), v: vec3([0.03, 0.06, 1.0]) },
+        GrinRay { x: vec3([-0.42, 0.33, -1.5]), v: vec3([0.17, -0.05, 0.98]) },
+        GrinRay { x: vec3([0.11, 0.23, -0.37]), v: vec3([-0.12, 0.31, 1.01]) },
     ]
 }
 
 /// The derivative of the loss along one direction of parameters and starts, forwards.
-fn forward(kind: &Kind, setup: Setup<Slope>) -> f64 {
+fn forward(kind: &Kind, setup: GrinSetup<Slope>) -> f64 {
     let carry = |seed: usize, value: f64| Slope { value, slope: [direction(seed, value)] };
     let field = kind.field::<Slope>(carry);
-    let tracer = Tracer::new(&*field, setup).unwrap();
+    let tracer = GrinTracer::new(&*field, setup).unwrap();
     let vector =
         |v: Vec3<f64>, n: usize| Vec3::new(carry(n, v.x), carry(n + 1, v.y), carry(n + 2, v.z));
-    let ray = |(i, ray): (usize, Ray<f64>)| {
+    let ray = |(i, ray): (usize, GrinRay<f64>)| {
         let (x, v) = (vector(ray.x, 1000 + 6 * i), vector(ray.v, 1003 + 6 * i));
-        bowl(&tracer.ray(&Ray { x, v })).0.slope[0]
+        bowl(&tracer.trace(&GrinRay { x, v })).0.slope[0]
     };
     rays().into_iter().enumerate().map(ray).sum()
 }
@@ -72,7 +77,7 @@ fn direction(n: usize, _: f64) -> f64 {
 }
 
 /// The same from the gradient.
-fn backward(outcome: &Outcome<f64>) -> f64 {
+fn backward(outcome: &LossAndGradient<f64>) -> f64 {
     let parameters = &outcome.gradient.parameters;
     let by_parameters: f64 =
         parameters.iter().enumerate().map(|(n, g)| g * direction(n, 0.0)).sum();
@@ -94,9 +99,14 @@ fn grin_every_integrator_end_and_start_has_its_exact_adjoint() {
             for kind in kinds() {
                 let place = format!("{}, {name}, {}", integrator.name(), kind.name);
                 let field = kind.field::<f64>(|_, value| value);
-                let tracer = Tracer::new(&*field, plain.clone()).unwrap();
+                let tracer = GrinTracer::new(&*field, plain.clone()).unwrap();
                 let outcome = tracer.loss_and_gradient(&rays(), |_, exit| bowl(exit));
-                assert_eq!(outcome.fates.arrived(), rays().len(), "{place}: {:?}", outcome.fates);
+                assert_eq!(
+                    outcome.fates.arrived_count(),
+                    rays().len(),
+                    "{place}: {:?}",
+                    outcome.fates
+                );
                 let exact = forward(&kind, carried.clone());
                 worst.note(backward(&outcome), exact, exact.abs().max(1.0), place);
             }
@@ -106,18 +116,18 @@ fn grin_every_integrator_end_and_start_has_its_exact_adjoint() {
 }
 
 /// A field, a way to trace, and rays.
-type Scene = (Box<dyn Field<f64>>, Setup<f64>, Vec<Ray<f64>>);
+type Scene = (Box<dyn IndexField<f64>>, GrinSetup<f64>, Vec<GrinRay<f64>>);
 
 /// A strongly bent trilinear field with a batch through it.
 fn trilinear() -> Scene {
     let trilinear = kinds().into_iter().find(|kind| kind.name == "trilinear").unwrap();
-    let kind = Kind { diagonal: Diagonal::Smoothed, ..trilinear };
-    let region = Region::cube(0.9);
+    let kind = Kind { diagonal: HessianDiagonal::Smoothed, ..trilinear };
+    let region = GrinRegion::cube(0.9);
     let setup = until(Integrator::LeapfrogDkd, 0.0487, region, LastStep::BrokenLine);
     (kind.field(|_, value| value), setup, beam(20, 0.8, -1.3))
 }
 
-fn seeds(exits: &[Exit<f64>]) -> Vec<Seed<f64>> {
+fn seeds(exits: &[RayExit<f64>]) -> Vec<RayAdjoint<f64>> {
     exits.iter().map(|exit| bowl(exit).1).collect()
 }
 
@@ -130,15 +140,15 @@ fn grin_retraced_and_taped_gradients_agree_and_only_the_tape_grows() {
         let (field, setup, rays) = trilinear();
         let mut bytes = Vec::new();
         for step in [0.0487, 0.0487 / 4.0] {
-            let setup = Setup {
-                launch: Launch::Refracted,
+            let setup = GrinSetup {
+                launch: LaunchMode::Refracted,
                 ..until(integrator, step, setup_region(&setup), last)
             };
-            let tracer = Tracer::new(&*field, setup).unwrap();
-            let mut exits = tracer.rays(&rays);
+            let tracer = GrinTracer::new(&*field, setup).unwrap();
+            let mut exits = tracer.trace_batch(&rays);
             let seeds = seeds(&exits);
             let gradient = tracer.gradient(&rays, &mut exits, &seeds);
-            let taped = tracer.taped_gradient(&rays, &exits, &seeds);
+            let taped = tracer.tape_gradient(&rays, &exits, &seeds);
             let norm = taped.parameters.iter().map(|g| g * g).sum::<f64>().sqrt();
             for (a, b) in gradient.parameters.iter().zip(&taped.parameters) {
                 assert!((a - b).abs() < 1e-11 * norm, "{a} {b}");
@@ -160,36 +170,36 @@ fn grin_retraced_and_taped_gradients_agree_and_only_the_tape_grows() {
     }
 }
 
-fn setup_region(setup: &Setup<f64>) -> Region<f64> {
+fn setup_region(setup: &GrinSetup<f64>) -> GrinRegion<f64> {
     match &setup.end {
-        aplanat::grin::End::Boundary { region, .. } => region.clone(),
-        aplanat::grin::End::Steps(_) => Region::cube(1.0),
+        aplanat::grin::EndCondition::Boundary { region, .. } => region.clone(),
+        aplanat::grin::EndCondition::Steps(_) => GrinRegion::cube(1.0),
     }
 }
 
 #[test]
 fn grin_the_same_bits_on_any_number_of_threads_and_one_by_one() {
     let (field, setup, rays) = trilinear();
-    let tracer = Tracer::new(&*field, setup).unwrap();
+    let tracer = GrinTracer::new(&*field, setup).unwrap();
     let on = |threads: usize| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| tracer.loss_and_gradient(&rays, |_, exit| bowl(exit)))
     };
     let one = on(1);
-    assert!(one.fates.arrived() > 300, "{:?}", one.fates);
+    assert!(one.fates.arrived_count() > 300, "{:?}", one.fates);
     assert_eq!(one, on(2));
     assert_eq!(one, on(5));
     for (ray, exit) in rays.iter().zip(&one.exits) {
-        assert_eq!(tracer.ray(ray), *exit);
+        assert_eq!(tracer.trace(ray), *exit);
     }
 }
 
 #[test]
 fn grin_a_path_shows_every_step_and_ends_at_the_exit() {
     let (field, setup, rays) = trilinear();
-    let tracer = Tracer::new(&*field, setup).unwrap();
-    let (points, exit) = tracer.path(&rays[150]);
-    assert_eq!(exit, tracer.ray(&rays[150]));
+    let tracer = GrinTracer::new(&*field, setup).unwrap();
+    let (points, exit) = tracer.trace_path(&rays[150]);
+    assert_eq!(exit, tracer.trace(&rays[150]));
     assert_eq!(points.len(), exit.steps as usize);
     assert!((points[0].x.z + 0.9).abs() < 1e-12);
     let rises = points.windows(2).all(|pair| pair[1].path > pair[0].path);

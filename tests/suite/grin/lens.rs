@@ -3,11 +3,14 @@
 
 use aplanat::files::native;
 use aplanat::lens::{
-    GRADE_TERMS, Grade, Law, Lens, Medium, Parameter, Quantity, RADIAL_TERMS, Surface, System,
+    Lens, Medium, PROFILE_TERMS, Parameter, ProfileCoefficients, ProfileLaw, Quantity,
+    RADIAL_TERMS, Surface, System,
 };
 use aplanat::math::{Dual, Real, Vec3};
 use aplanat::paraxial::{Beam, first_order};
-use aplanat::trace::{Fate, Gradient, Hits, Ray, Rays, Seed, Sink, Slot, Tracer};
+use aplanat::trace::{
+    AdjointSeed, Fate, Landings, Ray, Rays, SurfaceParameter, SystemGradient, TraceSink, Tracer,
+};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A lens of these rows, at infinity, with an entrance pupil.
@@ -31,7 +34,7 @@ fn rod(law: &str, base: f64, radial: &[f64], length: f64) -> Lens {
 }
 
 pub(crate) fn system(lens: &Lens) -> System<f64> {
-    lens.system(0, 0.5875618).unwrap_or_else(|error| panic!("{error}"))
+    lens.resolve(0, 0.5875618).unwrap_or_else(|error| panic!("{error}"))
 }
 
 pub(crate) fn ray(x: f64, y: f64, l: f64, m: f64) -> Ray<f64> {
@@ -66,15 +69,16 @@ fn grin_lens_a_gradient_that_varies_nowhere_is_glass_bit_for_bit() {
     let mut glass = zero.clone();
     glass.surfaces[0].medium = Medium::Index(1.6);
     assert_eq!(system(&zero), system(&glass));
-    let (mut a, mut b) = (Hits::default(), Hits::default());
-    Tracer::new(&system(&zero)).unwrap().batch(&rays(), &mut a);
-    Tracer::new(&system(&glass)).unwrap().batch(&rays(), &mut b);
+    let (mut a, mut b) = (Landings::default(), Landings::default());
+    Tracer::new(&system(&zero)).unwrap().trace_batch(&rays(), &mut a);
+    Tracer::new(&system(&glass)).unwrap().trace_batch(&rays(), &mut b);
     assert_eq!(a, b);
-    assert!(Tracer::new(&system(&zero)).unwrap().gap_plans().is_empty());
+    assert!(Tracer::new(&system(&zero)).unwrap().grin_step_plans().is_empty());
     // Forced through the steps it is glass but for rounding.
     let mut forced = system(&zero);
-    forced.surfaces[0].graded = Some(Grade::new(Law::Index, [0.0; GRADE_TERMS]));
-    Tracer::new(&forced).unwrap().batch(&rays(), &mut b);
+    forced.surfaces[0].grin =
+        Some(ProfileCoefficients::new(ProfileLaw::Index, [0.0; PROFILE_TERMS]));
+    Tracer::new(&forced).unwrap().trace_batch(&rays(), &mut b);
     for i in 0..rays().len() {
         for (a, b) in [(&a.x, &b.x), (&a.y, &b.y), (&a.m, &b.m), (&a.opl, &b.opl)] {
             assert!((a[i] - b[i]).abs() < 1e-14, "{} {}", a[i], b[i]);
@@ -93,7 +97,7 @@ fn grin_lens_a_rod_has_the_focal_length_of_its_pitch() {
         for pitch in [0.25, 0.4, 0.1, 0.75, 1.1] {
             let length: f64 = 2.0 * PI / g * pitch;
             let lens = rod(law, n, &radial, length);
-            let data = first_order(&system(&lens), &Beam::of(&lens, 0)).unwrap();
+            let data = first_order(&system(&lens), &Beam::for_lens(&lens, 0)).unwrap();
             let phase = g * length;
             let efl = 1.0 / (n * g * phase.sin());
             let bfl = phase.cos() / (n * g * phase.sin());
@@ -105,7 +109,7 @@ fn grin_lens_a_rod_has_the_focal_length_of_its_pitch() {
         }
         // Half a pitch turns the picture upside down and has no power.
         let half = rod(law, n, &radial, PI / g);
-        let data = first_order(&system(&half), &Beam::of(&half, 0)).unwrap();
+        let data = first_order(&system(&half), &Beam::for_lens(&half, 0)).unwrap();
         assert!(data.power.abs() < 1e-13, "{law}: {}", data.power);
         assert!((data.marginal.heights[1] + 1.0).abs() < 1e-12);
     }
@@ -216,7 +220,7 @@ fn grin_lens_layers_keep_the_sine_times_the_index() {
             assert!((landing.ray.direction.y - sine).abs() < 1e-10);
         }
         // The first-order shift of a plate is the integral of 1/n.
-        let data = first_order(&system(&lens), &Beam::of(&lens, 0)).unwrap();
+        let data = first_order(&system(&lens), &Beam::for_lens(&lens, 0)).unwrap();
         let reduced = integral(length, |z| 1.0 / index(z));
         let slanted = aplanat::paraxial::paraxial_ray(&system(&lens), 0.0, 1.0);
         let off = slanted.heights[1] - reduced;
@@ -226,18 +230,24 @@ fn grin_lens_layers_keep_the_sine_times_the_index() {
 }
 
 /// Every number of a surface that a ray depends on, with a step for differences.
-fn numbers(surface: &Surface<f64>) -> Vec<(Slot, f64)> {
-    let mut all = vec![(Slot::Thickness, 1e-3), (Slot::Index, 1e-4), (Slot::Curvature, 1e-4)];
-    if Slot::Conic.is_of(surface) {
-        all.push((Slot::Conic, 1e-2));
+fn numbers(surface: &Surface<f64>) -> Vec<(SurfaceParameter, f64)> {
+    let mut all = vec![
+        (SurfaceParameter::Thickness, 1e-3),
+        (SurfaceParameter::Index, 1e-4),
+        (SurfaceParameter::Curvature, 1e-4),
+    ];
+    if SurfaceParameter::Conic.exists_on(surface) {
+        all.push((SurfaceParameter::Conic, 1e-2));
     }
-    if Slot::Term(0).is_of(surface) {
-        all.extend((0..3).map(|t| (Slot::Term(t), 1e-4 * 0.2_f64.powi(2 * t as i32))));
+    if SurfaceParameter::AsphereTerm(0).exists_on(surface) {
+        all.extend(
+            (0..3).map(|t| (SurfaceParameter::AsphereTerm(t), 1e-4 * 0.2_f64.powi(2 * t as i32))),
+        );
     }
-    for k in (0..GRADE_TERMS).filter(|k| Slot::Grade(*k).is_of(surface)) {
+    for k in (0..PROFILE_TERMS).filter(|k| SurfaceParameter::GrinTerm(*k).exists_on(surface)) {
         let power = if k < RADIAL_TERMS { 2 * k as i32 + 2 } else { (k - RADIAL_TERMS) as i32 + 1 };
         // Short enough that the plan of the steps stays the same.
-        all.push((Slot::Grade(k), 1e-4 * 0.5_f64.powi(power)));
+        all.push((SurfaceParameter::GrinTerm(k), 1e-4 * 0.5_f64.powi(power)));
     }
     all
 }
@@ -250,8 +260,8 @@ fn loss<R: Real>(p: Vec3<R>, d: Vec3<R>, opl: R) -> R {
 }
 
 /// Its slopes.
-fn seed(p: Vec3<f64>, d: Vec3<f64>) -> Seed<f64> {
-    Seed {
+fn seed(p: Vec3<f64>, d: Vec3<f64>) -> AdjointSeed<f64> {
+    AdjointSeed {
         point: Vec3::new(2.0 * p.x + 0.7 * p.y, 0.7 * p.x + 0.4, 0.0),
         direction: Vec3::new(3.0 * d.y, 3.0 * d.x + 2.0 * d.y, -0.5),
         opl: 0.3,
@@ -272,11 +282,11 @@ fn grin_lens_every_derivative_of_a_ray_is_that_of_differences_and_of_duals() {
     for lens in gradients() {
         let system = system(&lens);
         let rays = rays();
-        let mut hits = Hits::default();
+        let mut hits = Landings::default();
         let tracer = Tracer::new(&system).unwrap();
-        tracer.batch(&rays, &mut hits);
+        tracer.trace_batch(&rays, &mut hits);
         assert_eq!(hits.fates().imaged, rays.len());
-        let at = |h: &Hits<f64>, i: usize| {
+        let at = |h: &Landings<f64>, i: usize| {
             let p = Vec3::new(h.x[i], h.y[i], h.z[i]);
             (p, Vec3::new(h.l[i], h.m[i], h.n[i]), h.opl[i])
         };
@@ -285,8 +295,8 @@ fn grin_lens_every_derivative_of_a_ray_is_that_of_differences_and_of_duals() {
             seed(p, d)
         });
         let value = |system: &System<f64>| -> f64 {
-            let mut hits = Hits::default();
-            Tracer::new(system).unwrap().batch(&rays, &mut hits);
+            let mut hits = Landings::default();
+            Tracer::new(system).unwrap().trace_batch(&rays, &mut hits);
             (0..rays.len()).map(|i| at(&hits, i)).map(|(p, d, o)| loss(p, d, o)).sum()
         };
         let size = found.numbers().fold(0.0, |m: f64, v| m.max(v.abs()));
@@ -294,12 +304,13 @@ fn grin_lens_every_derivative_of_a_ray_is_that_of_differences_and_of_duals() {
             for (slot, step) in numbers(&system.surfaces[surface]) {
                 let moved = |h: f64| {
                     let mut system = system.clone();
-                    slot.widen(&mut system, surface);
-                    *slot.of(&mut system, surface) += h;
+                    slot.promote_shape(&mut system, surface);
+                    *slot.value_mut(&mut system, surface) += h;
                     value(&system)
                 };
                 // The plan is made for the coefficients that count.
-                if let (Slot::Grade(k), Some(grade)) = (slot, system.surfaces[surface].graded)
+                if let (SurfaceParameter::GrinTerm(k), Some(grade)) =
+                    (slot, system.surfaces[surface].grin)
                     && grade.terms[k] == 0.0
                 {
                     let by = found.surfaces[surface].by(slot);
@@ -324,11 +335,11 @@ fn grin_lens_every_derivative_of_a_ray_is_that_of_differences_and_of_duals() {
     println!("worst against differences {worst:.1e}");
 }
 
-fn by_dual(system: &System<f64>, surface: usize, slot: Slot, rays: &Rays<f64>) -> f64 {
+fn by_dual(system: &System<f64>, surface: usize, slot: SurfaceParameter, rays: &Rays<f64>) -> f64 {
     type D = Dual<f64, 1>;
-    let mut dual: System<D> = system.lift();
-    slot.widen(&mut dual, surface);
-    slot.of(&mut dual, surface).slope[0] = 1.0;
+    let mut dual: System<D> = system.cast();
+    slot.promote_shape(&mut dual, surface);
+    slot.value_mut(&mut dual, surface).slope[0] = 1.0;
     let tracer = Tracer::new(&dual).unwrap();
     let of = |i: usize| {
         let ray = rays.get(i);
@@ -350,17 +361,18 @@ fn grin_lens_batches_single_rays_and_threads_give_the_same_bits() {
                 ray(x, y, 0.0, 0.02)
             })
             .collect();
-        let (mut a, mut b) = (Hits::default(), Hits::default());
-        tracer.batch(&many, &mut a);
-        tracer.batch_parallel(&many, &mut b);
+        let (mut a, mut b) = (Landings::default(), Landings::default());
+        tracer.trace_batch(&many, &mut a);
+        tracer.trace_batch_parallel(&many, &mut b);
         assert_eq!(a, b);
         for i in 0..many.len() {
             let landing = tracer.trace(many.get(i));
             assert_eq!((landing.fate, landing.opl), (a.fate(i), a.opl[i]));
             assert_eq!((landing.ray.point.x, landing.ray.point.y), (a.x[i], a.y[i]));
         }
-        let one = |_: usize| Seed { point: Vec3::new(1.0, 0.5, 0.0), ..Seed::default() };
-        let serial: Gradient<f64> = tracer.gradient(&many, one);
+        let one =
+            |_: usize| AdjointSeed { point: Vec3::new(1.0, 0.5, 0.0), ..AdjointSeed::default() };
+        let serial: SystemGradient<f64> = tracer.gradient(&many, one);
         assert_eq!(serial, tracer.gradient_parallel(&many, one));
     }
 }
@@ -370,7 +382,7 @@ fn grin_lens_the_plan_keeps_its_tolerance() {
     for lens in gradients() {
         let mut system = system(&lens);
         let tracer = Tracer::new(&system).unwrap();
-        for plan in tracer.gap_plans() {
+        for plan in tracer.grin_step_plans() {
             assert!(plan.error <= plan.tolerance && plan.steps.is_power_of_two(), "{plan:?}");
             println!("{plan:?}");
         }
@@ -380,7 +392,9 @@ fn grin_lens_the_plan_keeps_its_tolerance() {
         let half = Surface {
             shape: aplanat::lens::Shape::Plane,
             thickness: 0.5 * first.thickness,
-            graded: first.graded.map(|grade| Grade { origin: 0.5 * first.thickness, ..grade }),
+            grin: first
+                .grin
+                .map(|grade| ProfileCoefficients { origin: 0.5 * first.thickness, ..grade }),
             ..first
         };
         system.surfaces[0].thickness *= 0.5;

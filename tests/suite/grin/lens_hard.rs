@@ -2,18 +2,23 @@
 //! never arrive, gaps of no length, strong gradients, clipped pupils, single precision, files.
 
 use super::lens::{busy, lens_of, ray, system};
-use aplanat::effects::{self, Choice, Choices, Effect, Task};
+use aplanat::effects::{self, Effect, EffectOverride, EffectOverrides, TracePurpose};
 use aplanat::files::{self, native};
 use aplanat::lens::{
-    GRADE_TERMS, Grade, Law, Lens, Medium, NumberKind, Parameter, Quantity, Shape, System,
-    Variable, ZoomPosition, ZoomThickness, vary,
+    Lens, Medium, PROFILE_TERMS, Parameter, ParameterKind, ProfileCoefficients, ProfileLaw,
+    Quantity, Shape, System, Variable, ZoomPosition, ZoomThickness, add_variables,
 };
 use aplanat::math::{Real, Vec3};
-use aplanat::merit::{Goal, Merit, PupilEdge, Term, Weighted};
-use aplanat::optimize::{Method, start};
+use aplanat::merit::{Goal, Merit, PupilEdge, Term, WeightedTerm};
+use aplanat::optimize::{DescentMethod, start};
 use aplanat::paraxial::{Beam, first_order};
-use aplanat::pupil::{Accuracy, Aiming, Bench, Cost, Estimator, Kind, Region, differentiate};
-use aplanat::trace::{Fate, Gradient, Hits, Hurdle, Ray, Rays, Sink, Slot, Tracer};
+use aplanat::pupil::{
+    Accuracy, Aiming, DerivativeEstimator, QuadraticIntegrand, RayModel, Region, RegionKind,
+    differentiate,
+};
+use aplanat::trace::{
+    Fate, Landings, Ray, RayLimit, Rays, SurfaceParameter, SystemGradient, TraceSink, Tracer,
+};
 
 /// A parabolic rod of half a pitch: what enters on the axis leaves on it.
 fn half_pitch(semi_diameter: f64) -> Lens {
@@ -42,7 +47,7 @@ fn grin_lens_a_ray_that_swings_out_too_far_leaves_through_the_side() {
         assert_eq!(tracer.trace(slanted(sine)).fate, fate, "{sine}");
         let mut side = None;
         tracer.margins(slanted(sine), |i, hurdle, margin| {
-            if hurdle == Hurdle::Side {
+            if hurdle == RayLimit::Side {
                 side = Some((i, margin));
             }
         });
@@ -51,7 +56,7 @@ fn grin_lens_a_ray_that_swings_out_too_far_leaves_through_the_side() {
         assert!(surface == 1 && (margin - exact).abs() < 1e-8, "{margin} {exact}");
     }
     // Without a rim nothing is lost.
-    let open = Tracer::new(&system(&half_pitch(1.0))).unwrap().opened();
+    let open = Tracer::new(&system(&half_pitch(1.0))).unwrap().without_rims();
     assert!(open.trace(slanted(0.55)).fate.is_imaged());
 }
 
@@ -77,8 +82,8 @@ fn grin_lens_a_ray_that_cannot_go_on_turns_round() {
     assert_eq!(tracer.trace(ray(0.0, 0.0, 0.0, 0.55)).fate, Fate::Imaged);
     assert_eq!(tracer.trace(ray(0.0, 0.0, 0.0, 0.65)).fate, Fate::TotalReflection(1));
     let rays: Rays<f64> = [0.9, 0.3].into_iter().map(|m| ray(0.0, 0.0, 0.0, m)).collect();
-    let mut hits = Hits::default();
-    tracer.batch(&rays, &mut hits);
+    let mut hits = Landings::default();
+    tracer.trace_batch(&rays, &mut hits);
     assert_eq!((hits.fate(0), hits.x[0], hits.opl[0]), (Fate::Turned(1), 0.0, 0.0));
     assert_eq!((hits.fates().turned, hits.fates().imaged, hits.fates().total()), (1, 1, 2));
     let path = tracer.path(ray(0.0, 0.0, 0.0, 0.9));
@@ -92,12 +97,13 @@ fn grin_lens_a_ray_that_cannot_go_on_turns_round() {
 #[test]
 fn grin_lens_light_where_there_is_no_index_ends_by_name() {
     // Far outside any glass the polynomial falls to zero and below.
-    for law in [Law::Index, Law::Square] {
+    for law in [ProfileLaw::Index, ProfileLaw::Square] {
         let mut system = system(&half_pitch(0.5));
-        let mut terms = [0.0; GRADE_TERMS];
+        let mut terms = [0.0; PROFILE_TERMS];
         terms[0] = 0.3;
         terms[1] = -0.5;
-        system.surfaces[0].graded = Some(Grade { reach: 0.5, ..Grade::new(law, terms) });
+        system.surfaces[0].grin =
+            Some(ProfileCoefficients { reach: 0.5, ..ProfileCoefficients::new(law, terms) });
         for surface in &mut system.surfaces {
             surface.semi_diameter = f64::INFINITY;
         }
@@ -117,7 +123,7 @@ fn grin_lens_an_index_below_one_and_gradients_too_strong_are_refused_by_name() {
     let mut lens = half_pitch(1.0);
     let parameter = Parameter::new(0, Quantity::Gradient(0));
     assert!(lens.set(parameter, -2.0));
-    let message = lens.system(0, 0.5876).unwrap_err().to_string();
+    let message = lens.resolve(0, 0.5876).unwrap_err().to_string();
     assert!(message.contains("the gradient after surface 0 falls to the index 0.7"), "{message}");
     // Thirty thousand turns on the way.
     let strong = lens_of(
@@ -129,7 +135,8 @@ fn grin_lens_an_index_below_one_and_gradients_too_strong_are_refused_by_name() {
     let message = Tracer::new(&system(&strong)).unwrap_err().to_string();
     assert!(message.contains("after surface 0 is too strong for 4096 steps"), "{message}");
     let mut bad = system(&half_pitch(1.0));
-    bad.surfaces[0].graded = Some(Grade::new(Law::Index, [f64::NAN; GRADE_TERMS]));
+    bad.surfaces[0].grin =
+        Some(ProfileCoefficients::new(ProfileLaw::Index, [f64::NAN; PROFILE_TERMS]));
     assert!(Tracer::new(&bad).unwrap_err().to_string().contains("gradient coefficient"));
 }
 
@@ -160,9 +167,9 @@ fn grin_lens_gaps_without_length_and_crossing_faces_are_traced() {
     );
     let tracer = Tracer::new(&system(&crossing)).unwrap();
     let landing = tracer.trace(ray(0.0, 1.5, 0.0, 0.0));
-    assert!(landing.fate.is_imaged() && landing.backwards == Some(1), "{landing:?}");
+    assert!(landing.fate.is_imaged() && landing.first_backward_surface == Some(1), "{landing:?}");
     let mut glass = system(&crossing);
-    glass.surfaces[0].graded = None;
+    glass.surfaces[0].grin = None;
     let straight = Tracer::new(&glass).unwrap().trace(ray(0.0, 1.5, 0.0, 0.0));
     assert!((landing.ray.point.y - straight.ray.point.y).abs() < 0.2);
 }
@@ -171,7 +178,7 @@ fn grin_lens_gaps_without_length_and_crossing_faces_are_traced() {
 fn grin_lens_single_precision_is_good_to_its_digits() {
     let lens = busy("index", &[-0.01, 2e-4], &[0.01, -0.002]);
     let exact = Tracer::new(&system(&lens)).unwrap();
-    let rough = Tracer::<f32>::new(&system(&lens).lift()).unwrap();
+    let rough = Tracer::<f32>::new(&system(&lens).cast()).unwrap();
     for at in [ray(0.3, 0.9, 0.02, -0.03), ray(0.0, 0.0, 0.0, 0.1), ray(-0.7, 0.2, 0.1, 0.0)] {
         let cast = |v: Vec3<f64>| Vec3::new(v.x as f32, v.y as f32, v.z as f32);
         let landing = rough.trace(Ray { point: cast(at.point), direction: cast(at.direction) });
@@ -194,13 +201,13 @@ fn clipped() -> Lens {
 }
 
 /// The derivative along the edge of a pupil against that by differences, for every number.
-fn agree(region: &Region<'_>, cost: &Cost) -> Gradient<f64> {
+fn agree(region: &Region<'_>, cost: &QuadraticIntegrand) -> SystemGradient<f64> {
     const ORDER: usize = 7;
-    let edge = region.lit(ORDER).boundary_derivative(cost).unwrap();
-    let found = region.difference_derivative(cost, ORDER).unwrap().by;
+    let edge = region.trace_pupil(ORDER).boundary_derivative(cost).unwrap();
+    let found = region.difference_derivative(cost, ORDER).unwrap().gradient;
     let mut worst: f64 = 0.0;
-    for (i, surface) in region.launch.color().system.surfaces.iter().enumerate() {
-        for slot in Slot::all().filter(|slot| slot.is_of(surface)) {
+    for (i, surface) in region.launch.channel().system.surfaces.iter().enumerate() {
+        for slot in SurfaceParameter::all().filter(|slot| slot.exists_on(surface)) {
             let (a, b) = (edge.surfaces[i].by(slot), found.surfaces[i].by(slot));
             let scale = found.largest(slot);
             let off = if a == b { 0.0 } else { (a - b).abs() / scale };
@@ -215,18 +222,21 @@ fn agree(region: &Region<'_>, cost: &Cost) -> Gradient<f64> {
 #[test]
 fn grin_lens_the_edge_of_a_pupil_moves_with_every_number() {
     let lens = clipped();
-    let bench = Bench::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
+    let bench = RayModel::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
     let region = Region::new(bench.launch(lens.fields.values[1], 0).unwrap());
-    let Kind::Split(boundary) = &region.kind else { panic!("{:?}", region.kind) };
+    let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
     assert!(boundary.arcs.len() > 1, "{} arcs", boundary.arcs.len());
-    for cost in [Cost::throughput(), Cost::spread(region.lit(4).moments.centroid)] {
+    for cost in [
+        QuadraticIntegrand::throughput(),
+        QuadraticIntegrand::spread(region.trace_pupil(4).moments.centroid),
+    ] {
         agree(&region, &cost);
     }
     let refused = differentiate(
         &region,
-        &Cost::throughput(),
-        Estimator::Warp,
-        Accuracy { tolerance: 1e-2, most_rays: 10_000 },
+        &QuadraticIntegrand::throughput(),
+        DerivativeEstimator::Warp,
+        Accuracy { tolerance: 1e-2, max_rays: 10_000 },
     );
     let message = refused.unwrap_err().to_string();
     assert!(message.contains("has no warp field; expected `boundary`"), "{message}");
@@ -239,9 +249,9 @@ fn grin_lens_the_side_of_a_rod_limits_its_pupil() {
     lens.surfaces[1].semi_diameter = Some(0.97);
     lens.aperture = aplanat::lens::Aperture::StopSemiDiameter(1.0);
     lens.fields.values[1].y = 20.0;
-    let bench = Bench::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
+    let bench = RayModel::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
     let region = Region::new(bench.launch(lens.fields.values[1], 0).unwrap());
-    let edge = agree(&region, &Cost::throughput());
+    let edge = agree(&region, &QuadraticIntegrand::throughput());
     // It is the side that clips, and a wider rod lets more light through.
     assert!(edge.surfaces[0].semi_diameter < -0.1, "{}", edge.surfaces[0].semi_diameter);
 }
@@ -258,7 +268,7 @@ fn step(quantity: Quantity) -> f64 {
 #[test]
 fn grin_lens_every_term_has_the_derivative_of_its_value_by_the_gradient() {
     let mut lens = busy("index", &[-0.01, 2e-4], &[0.01, -0.002]);
-    lens.focus = Some(0.0);
+    lens.image_solve = Some(0.0);
     for (surface, quantity) in [
         (0, Quantity::Gradient(0)),
         (0, Quantity::Gradient(1)),
@@ -296,8 +306,8 @@ fn grin_lens_a_gradient_moves_with_the_zoom() {
     };
     lens.zoom = vec![at(3.0), at(3.5)];
     let lengths = [0, 1].map(|zoom| {
-        let system = lens.system(zoom, 0.5875618).unwrap();
-        first_order(&system, &Beam::of(&lens, zoom)).unwrap().efl.unwrap()
+        let system = lens.resolve(zoom, 0.5875618).unwrap();
+        first_order(&system, &Beam::for_lens(&lens, zoom)).unwrap().efl.unwrap()
     });
     assert!((lengths[0] - lengths[1]).abs() > 1e-3);
     crate::merit::vary(&mut lens, 0, Quantity::ZoomThickness(1));
@@ -320,19 +330,19 @@ fn grin_lens_a_search_finds_the_term_in_r4_that_sharpens_a_rod() {
         r#"{"entrance_pupil_diameter": 2.4}"#,
     );
     lens.fields.values.truncate(1);
-    lens.focus = Some(0.0);
+    lens.image_solve = Some(0.0);
     lens.variables = vec![Variable {
         parameter: Parameter::new(0, Quantity::Gradient(1)),
         min: None,
         max: None,
     }];
     let goal = Goal {
-        terms: vec![Weighted { term: Term::Spot, weight: 1.0 }],
+        terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
         zoom_ratios: Vec::new(),
         pupil: PupilEdge::Kept,
     };
     let before = Merit::new(&lens, &goal, 1e-6).unwrap().terms(&[0.0]).unwrap()[0].value.sqrt();
-    let mut search = start(Method::DampedLeastSquares, &lens, &goal, 1e-6).unwrap();
+    let mut search = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-6).unwrap();
     for _ in 0..40 {
         if search.step().finished {
             break;
@@ -355,7 +365,7 @@ fn grin_lens_files_are_exact_and_say_what_is_wrong() {
         busy("sech", &[0.1], &[]),
         busy("index", &[], &[-1.5e-7]),
     ] {
-        vary(&mut lens, &[NumberKind::Gradients]);
+        add_variables(&mut lens, &[ParameterKind::GrinCoefficients]);
         assert!(lens.variables.len() >= 3);
         let text = native::write(&lens);
         let back = native::read(&text, "a.json").unwrap();
@@ -390,8 +400,8 @@ fn grin_lens_files_are_exact_and_say_what_is_wrong() {
 #[test]
 fn grin_lens_the_bundled_rod_is_that_of_the_catalogue() {
     let lens = files::open("lenses/grin_rod_melles_griot.json").unwrap().lens;
-    let system = lens.system(0, 0.63).unwrap();
-    let data = first_order(&system, &Beam::of(&lens, 0)).unwrap();
+    let system = lens.resolve(0, 0.63).unwrap();
+    let data = first_order(&system, &Beam::for_lens(&lens, 0)).unwrap();
     let (n, g, length) = (1.608_f64, 0.339_f64, lens.surfaces[0].thickness);
     let (sin, cos) = (g * length).sin_cos();
     assert!((data.efl.unwrap() - 1.0 / (n * g * sin)).abs() < 1e-9);
@@ -399,31 +409,32 @@ fn grin_lens_the_bundled_rod_is_that_of_the_catalogue() {
     // The catalogue's own rod of 5.37 mm: its pitch, and the distance of its focus from its face.
     let mut rod = lens;
     rod.surfaces[0].thickness = 5.37;
-    rod.focus = None;
-    let data = first_order(&rod.system(0, 0.63).unwrap(), &Beam::of(&rod, 0)).unwrap();
+    rod.image_solve = None;
+    let data = first_order(&rod.resolve(0, 0.63).unwrap(), &Beam::for_lens(&rod, 0)).unwrap();
     assert!((g * 5.37 / std::f64::consts::TAU - 0.29).abs() < 5e-3);
     assert!((data.bfl.unwrap().abs() - 0.46).abs() < 0.01, "{:?}", data.bfl);
 }
 
 #[test]
 fn grin_lens_effects_say_what_a_gradient_costs_and_leave_out_none() {
-    let task = Task::Spot(1e-2);
-    let planned = |lens: &Lens, choices: &Choices| {
-        effects::plan(&effects::survey(lens, 0).unwrap(), task, choices)
+    let task = TracePurpose::Spot(1e-2);
+    let planned = |lens: &Lens, choices: &EffectOverrides| {
+        effects::plan(&effects::measure_effects(lens, 0).unwrap(), task, choices)
     };
     let rod = files::open("lenses/grin_rod_melles_griot.json").unwrap().lens;
-    let auto = planned(&rod, &Choices::default());
-    let decision = auto.of(Effect::Gradient).unwrap();
+    let auto = planned(&rod, &EffectOverrides::default());
+    let decision = auto.decision(Effect::Gradient).unwrap();
     assert!(decision.computed && decision.surfaces == [0], "{decision:?}");
     assert!(decision.reason.contains("steps"), "{}", decision.reason);
-    let off = planned(&rod, &Choices::default().with(Effect::Gradient, Choice::Off));
-    let bench = effects::bench(&rod, 0, &off).unwrap();
-    assert!(!bench.is_graded() && effects::bench(&rod, 0, &auto).unwrap().is_graded());
+    let off =
+        planned(&rod, &EffectOverrides::default().with(Effect::Gradient, EffectOverride::Off));
+    let bench = effects::build_ray_model(&rod, 0, &off).unwrap();
+    assert!(!bench.has_grin() && effects::build_ray_model(&rod, 0, &auto).unwrap().has_grin());
     let even = busy("index", &[0.0], &[]);
     let mut even = even;
     even.surfaces[1].medium = Medium::Index(1.55);
-    let decision = planned(&even, &Choices::default());
-    let decision = decision.of(Effect::Gradient).unwrap();
+    let decision = planned(&even, &EffectOverrides::default());
+    let decision = decision.decision(Effect::Gradient).unwrap();
     assert!(!decision.computed && decision.surfaces.is_empty(), "{decision:?}");
 }
 
@@ -434,7 +445,7 @@ fn grin_lens_met_from_behind_light_retraces_its_way() {
     assert!(there.fate.is_imaged());
     let last = system.surfaces.len() - 2;
     let back = system.reversed(1.0);
-    assert!(back.surfaces[last - 1].graded.is_some() && back.surfaces[0].graded.is_none());
+    assert!(back.surfaces[last - 1].grin.is_some() && back.surfaces[0].grin.is_none());
     // From the image back to where it came from: the reversed lens lies the other way round.
     let turned = |v: Vec3<f64>| Vec3::new(v.x, v.y, -v.z);
     let start = turned(there.ray.point) - Vec3::new(0.0, 0.0, system.surfaces[last].thickness);
@@ -454,6 +465,6 @@ fn grin_lens_a_gap_needs_two_refracting_faces() {
     assert!(Tracer::new(&system).unwrap_err().to_string().contains("touches a mirror"));
     system.surfaces[1].mirror = false;
     system.surfaces[0].shape = Shape::Sphere { curvature: 0.1 };
-    system.surfaces[0].hyper = true;
+    system.surfaces[0].hyperhemisphere = true;
     assert!(Tracer::new(&system).unwrap_err().to_string().contains("hyper-hemisphere"));
 }

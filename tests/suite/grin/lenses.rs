@@ -2,21 +2,22 @@
 
 use super::{length, steps, until, vec3};
 use aplanat::grin::field::{
-    BSpline, Diagonal, Grid, Layered, Luneburg, Maxwell, Parabolic, Polynomial, Sech, Tricubic,
-    Trilinear,
+    BSpline, HessianDiagonal, Luneburg, Maxwell, Parabolic, Polynomial, ProfileField, RegularGrid,
+    Sech, Tricubic, Trilinear,
 };
 use aplanat::grin::{
-    Exit, Face, Fate, Field, Integrator, LastStep, Launch, Ray, Region, Seed, Setup, Tracer,
+    Face, GrinFate, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField, Integrator, LastStep,
+    LaunchMode, RayAdjoint, RayExit,
 };
 use aplanat::math::Vec3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Rays onto the unit Luneburg lens from its left, each starting on its surface.
-fn onto_unit_ball() -> Vec<Ray<f64>> {
+fn onto_unit_ball() -> Vec<GrinRay<f64>> {
     let ray = |i: usize| {
         let (r, angle) = (0.9 * ((i as f64 + 0.5) / 40.0).sqrt(), i as f64 * 2.399963);
         let (x, y) = (r * angle.cos(), r * angle.sin());
-        Ray { x: vec3([x, y, -(1.0 - r * r).sqrt()]), v: vec3([0.0, 0.0, 1.0]) }
+        GrinRay { x: vec3([x, y, -(1.0 - r * r).sqrt()]), v: vec3([0.0, 0.0, 1.0]) }
     };
     (0..40).map(ray).collect()
 }
@@ -28,17 +29,17 @@ fn rms(errors: impl ExactSizeIterator<Item = f64>) -> f64 {
 
 /// The rms error of `x(π/2) = v₀` in the Luneburg lens.
 fn luneburg_error(integrator: Integrator, count: u32) -> f64 {
-    let field = Layered::sphere(Luneburg::new(1.0));
+    let field = ProfileField::sphere(Luneburg::new(1.0));
     let setup = steps(integrator, FRAC_PI_2 / f64::from(count), count);
     let rays = onto_unit_ball();
-    let exits = Tracer::new(&field, setup).unwrap().rays(&rays);
+    let exits = GrinTracer::new(&field, setup).unwrap().trace_batch(&rays);
     rms(exits.iter().zip(&rays).map(|(exit, ray)| length(exit.x - ray.v)))
 }
 
 #[test]
 fn grin_luneburg_focuses_with_the_order_of_each_integrator() {
     for integrator in Integrator::ALL {
-        let kicks = integrator.kicks() as u32;
+        let kicks = integrator.kicks_per_step() as u32;
         let (coarse, fine) =
             (luneburg_error(integrator, 48 / kicks), luneburg_error(integrator, 192 / kicks));
         let order = (coarse / fine).log2() / 2.0;
@@ -55,15 +56,15 @@ fn grin_luneburg_focuses_with_the_order_of_each_integrator() {
 
 #[test]
 fn grin_every_path_through_luneburg_to_its_focus_is_equally_long() {
-    let field = Layered::sphere(Luneburg::new(1.0));
+    let field = ProfileField::sphere(Luneburg::new(1.0));
     let plane: Vec<_> = onto_unit_ball()
         .iter()
-        .map(|ray| Ray { x: vec3([ray.x.x, ray.x.y, -1.0]), ..*ray })
+        .map(|ray| GrinRay { x: vec3([ray.x.x, ray.x.y, -1.0]), ..*ray })
         .collect();
-    let region = Region::ball(1.0);
+    let region = GrinRegion::ball(1.0);
     let setup = until(Integrator::BlanesMoan, 0.05, region, LastStep::Fractional);
-    for exit in Tracer::new(&field, setup).unwrap().rays(&plane) {
-        assert_eq!(exit.fate, Fate::Left);
+    for exit in GrinTracer::new(&field, setup).unwrap().trace_batch(&plane) {
+        assert_eq!(exit.fate, GrinFate::Left);
         assert!(length(exit.x - vec3([0.0, 0.0, 1.0])) < 2e-8, "{:?}", exit.x);
         assert!((exit.path - 1.0 - FRAC_PI_2).abs() < 2e-9, "{}", exit.path);
         assert!(exit.excess.abs() < 1e-7, "{}", exit.excess);
@@ -88,12 +89,14 @@ fn half_orbit(angle: f64) -> f64 {
 
 #[test]
 fn grin_maxwell_images_a_point_onto_its_antipode() {
-    let field = Layered::sphere(Maxwell::new(2.0, 1.0));
+    let field = ProfileField::sphere(Maxwell::new(2.0, 1.0));
     for angle in [0.0f64, 0.3, 0.7, 1.1, 1.3] {
         let sigma = half_orbit(angle);
         let setup = steps(Integrator::BlanesMoan, sigma / 40.0, 40);
         let v = vec3([angle.cos(), angle.sin() * 0.6, angle.sin() * 0.8]);
-        let exit = Tracer::new(&field, setup).unwrap().ray(&Ray { x: vec3([-1.0, 0.0, 0.0]), v });
+        let exit = GrinTracer::new(&field, setup)
+            .unwrap()
+            .trace(&GrinRay { x: vec3([-1.0, 0.0, 0.0]), v });
         assert!(length(exit.x - vec3([1.0, 0.0, 0.0])) < 2e-7, "{angle}: {:?}", exit.x);
     }
 }
@@ -101,18 +104,18 @@ fn grin_maxwell_images_a_point_onto_its_antipode() {
 #[test]
 fn grin_a_fibre_of_ten_thousand_periods_stays_a_sinusoid() {
     let (axis, g) = (1.5, 0.5);
-    let field = Layered::cylinder(Parabolic::new(axis, g));
-    let ray = Ray { x: vec3([0.5, 0.1, 0.0]), v: vec3([0.0, 0.3, 1.0]) };
+    let field = ProfileField::cylinder(Parabolic::new(axis, g));
+    let ray = GrinRay { x: vec3([0.5, 0.1, 0.0]), v: vec3([0.0, 0.3, 1.0]) };
     let index = field.sample(ray.x).index;
     let vz = (index * index - 0.09).sqrt();
-    let ray = Ray { v: vec3([0.0, 0.3, vz]), ..ray };
+    let ray = GrinRay { v: vec3([0.0, 0.3, vz]), ..ray };
     let (periods, per_period) = (10_000, 50);
     let sigma = 2.0 * PI / (axis * g) * f64::from(periods);
     let count = periods * per_period;
     let setup = steps(Integrator::Pefrl, sigma / f64::from(count), count);
-    let tracer = Tracer::new(&field, setup).unwrap();
+    let tracer = GrinTracer::new(&field, setup).unwrap();
     let outcome = tracer.loss_and_gradient(&[ray], |_, exit| {
-        (exit.x.x, Seed { x: vec3([1.0, 0.0, 0.0]), ..Seed::default() })
+        (exit.x.x, RayAdjoint { x: vec3([1.0, 0.0, 0.0]), ..RayAdjoint::default() })
     });
     let exit = outcome.exits[0];
     // The phase drifts by a fixed amount each period; the orbit stays.
@@ -131,29 +134,31 @@ fn grin_a_fibre_of_ten_thousand_periods_stays_a_sinusoid() {
 #[test]
 fn grin_the_secant_fibre_refocuses_every_meridional_ray() {
     let a = 1.0;
-    let field = Layered::cylinder(Sech::new(1.6, a));
+    let field = ProfileField::cylinder(Sech::new(1.6, a));
     let rays: Vec<_> = (1..20)
-        .map(|i| Ray { x: vec3([0.05 * f64::from(i), 0.0, 0.0]), v: vec3([0.0, 0.0, 1.0]) })
+        .map(|i| GrinRay { x: vec3([0.05 * f64::from(i), 0.0, 0.0]), v: vec3([0.0, 0.0, 1.0]) })
         .collect();
     for focus in [1.0, 3.0, 5.0] {
-        let region = Region::rod(2.0, -1.0, focus * FRAC_PI_2 / a);
+        let region = GrinRegion::rod(2.0, -1.0, focus * FRAC_PI_2 / a);
         let setup = until(Integrator::BlanesMoan, 0.1, region, LastStep::Fractional);
-        let setup = Setup { launch: Launch::Scaled, ..setup };
-        let exits = Tracer::new(&field, setup).unwrap().rays(&rays);
+        let setup = GrinSetup { launch: LaunchMode::Scaled, ..setup };
+        let exits = GrinTracer::new(&field, setup).unwrap().trace_batch(&rays);
         let worst = exits.iter().map(|exit| exit.x.x.abs()).fold(0.0, f64::max);
         println!("secant fibre, focus {focus}: farthest ray {worst:.1e} from the axis");
-        assert!(exits.iter().all(|exit| exit.fate == Fate::Left) && worst < 2e-5);
+        assert!(exits.iter().all(|exit| exit.fate == GrinFate::Left) && worst < 2e-5);
     }
 }
 
 /// `w · x` at `π/2` in the Luneburg lens, which is `w · v₀` whatever the start: the gradient by the
 /// start must be 0, and `w` by the velocity.
-fn luneburg_by_start(field: &dyn Field<f64>, integrator: Integrator, count: u32) -> [f64; 2] {
+fn luneburg_by_start(field: &dyn IndexField<f64>, integrator: Integrator, count: u32) -> [f64; 2] {
     let w = vec3([0.3, 1.0, -0.4]);
     let setup = steps(integrator, FRAC_PI_2 / f64::from(count), count);
-    let ray = Ray { x: vec3([-0.75f64.sqrt(), 0.4, 0.3]), v: vec3([1.0, 0.0, 0.0]) };
-    let loss = |_: usize, exit: &Exit<f64>| (w.dot(exit.x), Seed { x: w, ..Seed::default() });
-    let outcome = Tracer::new(field, setup).unwrap().loss_and_gradient(&[ray], loss);
+    let ray = GrinRay { x: vec3([-0.75f64.sqrt(), 0.4, 0.3]), v: vec3([1.0, 0.0, 0.0]) };
+    let loss = |_: usize, exit: &RayExit<f64>| {
+        (w.dot(exit.x), RayAdjoint { x: w, ..RayAdjoint::default() })
+    };
+    let outcome = GrinTracer::new(field, setup).unwrap().loss_and_gradient(&[ray], loss);
     let start = outcome.gradient.starts[0];
     [length(start.x), length(start.v - w)]
 }
@@ -161,13 +166,14 @@ fn luneburg_by_start(field: &dyn Field<f64>, integrator: Integrator, count: u32)
 #[test]
 fn grin_the_trilinear_adjoint_is_wrong_for_the_lens_and_smooth_fields_are_right() {
     let index = |p: Vec3<f64>| (2.0 - p.dot(p).min(1.9)).sqrt();
-    let mut trilinear = Trilinear::sampled(Grid::cube(65, 1.1).unwrap(), index).unwrap();
+    let mut trilinear =
+        Trilinear::from_function(RegularGrid::cube(65, 1.1).unwrap(), index).unwrap();
     let smoothed = luneburg_by_start(&trilinear, Integrator::LeapfrogDkd, 500);
-    trilinear.diagonal = Diagonal::Exact;
+    trilinear.diagonal = HessianDiagonal::Exact;
     let exact = luneburg_by_start(&trilinear, Integrator::LeapfrogDkd, 500);
-    let tricubic = Tricubic::near(64, 1.1, index).unwrap();
+    let tricubic = Tricubic::approximate(64, 1.1, index).unwrap();
     let tricubic = luneburg_by_start(&tricubic, Integrator::BlanesMoan, 40);
-    let closed = Layered::sphere(Luneburg::new(1.0));
+    let closed = ProfileField::sphere(Luneburg::new(1.0));
     let closed = luneburg_by_start(&closed, Integrator::BlanesMoan, 16);
     println!("|dL/dx0| should be 0, |dL/dv0 - w| should be 0:");
     for (name, [x, v]) in [
@@ -217,19 +223,21 @@ fn luneburg_spline(cells: usize) -> BSpline<f64> {
 #[test]
 fn grin_no_smooth_luneburg_lens_moves_its_focus_with_the_start_of_a_ray() {
     let index = |p: Vec3<f64>| (2.0 - p.dot(p).min(1.9)).sqrt();
-    let fields: [(&str, Box<dyn Field<f64>>); 4] = [
-        ("closed form", Box::new(Layered::sphere(Luneburg::new(1.0)))),
-        ("polynomial in r², 14 terms", Box::new(Layered::sphere(luneburg_polynomial(14)))),
-        ("b-spline in r², 32 cells", Box::new(Layered::sphere(luneburg_spline(32)))),
+    let fields: [(&str, Box<dyn IndexField<f64>>); 4] = [
+        ("closed form", Box::new(ProfileField::sphere(Luneburg::new(1.0)))),
+        ("polynomial in r², 14 terms", Box::new(ProfileField::sphere(luneburg_polynomial(14)))),
+        ("b-spline in r², 32 cells", Box::new(ProfileField::sphere(luneburg_spline(32)))),
         // Along the axes of a grid, where no error averages out: 65 nodes leave 1.7e-4.
-        ("tricubic 97", Box::new(Tricubic::near(96, 1.1, index).unwrap())),
+        ("tricubic 97", Box::new(Tricubic::approximate(96, 1.1, index).unwrap())),
     ];
     let w = vec3([0.3, 1.0, -0.4]);
-    let loss = |_: usize, exit: &Exit<f64>| (w.dot(exit.x), Seed { x: w, ..Seed::default() });
+    let loss = |_: usize, exit: &RayExit<f64>| {
+        (w.dot(exit.x), RayAdjoint { x: w, ..RayAdjoint::default() })
+    };
     for (name, field) in fields {
         let setup = steps(Integrator::BlanesMoan, FRAC_PI_2 / 40.0, 40);
         let outcome =
-            Tracer::new(&*field, setup).unwrap().loss_and_gradient(&onto_unit_ball(), loss);
+            GrinTracer::new(&*field, setup).unwrap().loss_and_gradient(&onto_unit_ball(), loss);
         let worst = outcome.gradient.starts.iter().map(|start| length(start.x)).fold(0.0, f64::max);
         println!("{name}: |dL/dx0| at most {worst:.1e} of 40 rays");
         assert!(worst < 1e-4, "{name}: {worst:e}");
@@ -238,13 +246,13 @@ fn grin_no_smooth_luneburg_lens_moves_its_focus_with_the_start_of_a_ray() {
 
 #[test]
 fn grin_a_ball_of_glass_refracts_as_snell_says() {
-    let field = Layered::sphere(Polynomial { coefficients: vec![1.5] });
+    let field = ProfileField::sphere(Polynomial { coefficients: vec![1.5] });
     let screen = Face::plane(vec3([0.0, 0.0, 1.0]), 3.0);
-    let setup = until(Integrator::LeapfrogDkd, 0.05, Region::ball(1.0), LastStep::Fractional);
-    let glass = Setup { launch: Launch::Refracted, screen: Some(screen), ..setup.clone() };
+    let setup = until(Integrator::LeapfrogDkd, 0.05, GrinRegion::ball(1.0), LastStep::Fractional);
+    let glass = GrinSetup { launch: LaunchMode::Refracted, screen: Some(screen), ..setup.clone() };
     for h in [0.0f64, 0.2, 0.5, 0.9] {
-        let ray = Ray { x: vec3([h, 0.0, -4.0]), v: vec3([0.0, 0.0, 1.0]) };
-        let exit = Tracer::new(&field, glass.clone()).unwrap().ray(&ray);
+        let ray = GrinRay { x: vec3([h, 0.0, -4.0]), v: vec3([0.0, 0.0, 1.0]) };
+        let exit = GrinTracer::new(&field, glass.clone()).unwrap().trace(&ray);
         // Two equal refractions about the centre: the deviation is 2 (α - β).
         let (alpha, beta) = (h.asin(), (h / 1.5).asin());
         let direction = -2.0 * (alpha - beta);
@@ -257,7 +265,7 @@ fn grin_a_ball_of_glass_refracts_as_snell_says() {
         assert!((exit.path - path).abs() < 1e-12, "{h}: {} {path}", exit.path);
     }
     // Without refraction the jump shows itself.
-    let ray = Ray { x: vec3([0.2, 0.0, -4.0]), v: vec3([0.0, 0.0, 1.0]) };
-    let exit = Tracer::new(&field, setup).unwrap().ray(&ray);
+    let ray = GrinRay { x: vec3([0.2, 0.0, -4.0]), v: vec3([0.0, 0.0, 1.0]) };
+    let exit = GrinTracer::new(&field, setup).unwrap().trace(&ray);
     assert!((exit.excess - (1.0 - 2.25)).abs() < 1e-12);
 }

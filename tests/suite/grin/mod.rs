@@ -14,10 +14,13 @@ mod reference;
 mod speed;
 
 use aplanat::grin::field::{
-    BSpline, Coordinate, Diagonal, Grid, Layered, Luneburg, Maxwell, Parabolic, Plume, Polynomial,
-    Sech, Tricubic, Trilinear,
+    BSpline, HessianDiagonal, Luneburg, Maxwell, Parabolic, Plume, Polynomial, ProfileCoordinate,
+    ProfileField, RegularGrid, Sech, Tricubic, Trilinear,
 };
-use aplanat::grin::{End, Exit, Field, Integrator, LastStep, Launch, Ray, Region, Seed, Setup};
+use aplanat::grin::{
+    EndCondition, GrinRay, GrinRegion, GrinSetup, IndexField, Integrator, LastStep, LaunchMode,
+    RayAdjoint, RayExit,
+};
 use aplanat::math::{Real, Vec3};
 
 /// A vector of plain numbers.
@@ -30,24 +33,30 @@ pub(crate) fn length(v: Vec3<f64>) -> f64 {
 }
 
 /// Rays that end after so many steps.
-pub(crate) fn steps<R: Real>(integrator: Integrator, step: f64, count: u32) -> Setup<R> {
-    let (step, launch, end) = (R::from_f64(step), Launch::AsGiven, End::Steps(count));
-    Setup { integrator, step, launch, end, screen: None }
+pub(crate) fn steps<R: Real>(integrator: Integrator, step: f64, count: u32) -> GrinSetup<R> {
+    let (step, launch, end) = (R::from_f64(step), LaunchMode::AsGiven, EndCondition::Steps(count));
+    GrinSetup { integrator, step, launch, end, screen: None }
 }
 
 /// Rays that end at a boundary.
 pub(crate) fn until<R: Real>(
     integrator: Integrator,
     step: f64,
-    region: Region<R>,
+    region: GrinRegion<R>,
     last: LastStep,
-) -> Setup<R> {
-    let end = End::Boundary { region, last, limit: 100_000 };
-    Setup { integrator, step: R::from_f64(step), launch: Launch::AsGiven, end, screen: None }
+) -> GrinSetup<R> {
+    let end = EndCondition::Boundary { region, last, limit: 100_000 };
+    GrinSetup {
+        integrator,
+        step: R::from_f64(step),
+        launch: LaunchMode::AsGiven,
+        end,
+        screen: None,
+    }
 }
 
 /// A smooth loss with every kind of derivative.
-pub(crate) fn bowl<R: Real>(exit: &Exit<R>) -> (R, Seed<R>) {
+pub(crate) fn bowl<R: Real>(exit: &RayExit<R>) -> (R, RayAdjoint<R>) {
     let c = R::from_f64;
     let (dx, dv) = (
         exit.x - Vec3::from_f64(vec3([0.9375, 0.1875, -0.125])),
@@ -55,14 +64,14 @@ pub(crate) fn bowl<R: Real>(exit: &Exit<R>) -> (R, Seed<R>) {
     );
     let dp = exit.path - c(1.3);
     let loss = dx.dot(dx) + c(0.5) * dv.dot(dv) + c(0.3) * dp * dp;
-    (loss, Seed { x: dx * c(2.0), v: dv, path: c(0.6) * dp })
+    (loss, RayAdjoint { x: dx * c(2.0), v: dv, path: c(0.6) * dp })
 }
 
 /// Rays from a square of side `2 half` at `z`, towards +z, a little off the grid.
-pub(crate) fn beam(count: usize, half: f64, z: f64) -> Vec<Ray<f64>> {
+pub(crate) fn beam(count: usize, half: f64, z: f64) -> Vec<GrinRay<f64>> {
     let at = |i: usize| half * (2.0 * (i as f64 + 0.5137) / count as f64 - 1.0);
     let ray =
-        |n: usize| Ray { x: vec3([at(n % count), at(n / count), z]), v: vec3([0.0, 0.0, 1.0]) };
+        |n: usize| GrinRay { x: vec3([at(n % count), at(n / count), z]), v: vec3([0.0, 0.0, 1.0]) };
     (0..count * count).map(ray).collect()
 }
 
@@ -70,42 +79,45 @@ pub(crate) fn beam(count: usize, half: f64, z: f64) -> Vec<Ray<f64>> {
 #[derive(Clone, Copy)]
 pub(crate) struct Kind {
     pub(crate) name: &'static str,
-    pub(crate) coordinate: Coordinate,
-    pub(crate) diagonal: Diagonal,
+    pub(crate) coordinate: ProfileCoordinate,
+    pub(crate) diagonal: HessianDiagonal,
 }
 
 /// Every kind of field, the grids with the exact diagonal.
 pub(crate) fn kinds() -> Vec<Kind> {
-    let kind = |name, coordinate| Kind { name, coordinate, diagonal: Diagonal::Exact };
+    let kind = |name, coordinate| Kind { name, coordinate, diagonal: HessianDiagonal::Exact };
     let mut kinds = vec![
-        kind("polynomial", Coordinate::Sphere),
-        kind("polynomial", Coordinate::Cylinder),
-        kind("polynomial", Coordinate::Axial),
+        kind("polynomial", ProfileCoordinate::Sphere),
+        kind("polynomial", ProfileCoordinate::Cylinder),
+        kind("polynomial", ProfileCoordinate::Axial),
     ];
     let spheres =
         ["b-spline", "luneburg", "maxwell", "parabolic", "plume", "sech", "trilinear", "tricubic"];
-    kinds.extend(spheres.map(|name| kind(name, Coordinate::Sphere)));
-    kinds.push(kind("b-spline", Coordinate::Cylinder));
+    kinds.extend(spheres.map(|name| kind(name, ProfileCoordinate::Sphere)));
+    kinds.push(kind("b-spline", ProfileCoordinate::Cylinder));
     kinds
 }
 
 impl Kind {
     /// The field, each parameter from its number and its value.
-    pub(crate) fn field<R: Real>(&self, parameter: impl Fn(usize, f64) -> R) -> Box<dyn Field<R>> {
+    pub(crate) fn field<R: Real>(
+        &self,
+        parameter: impl Fn(usize, f64) -> R,
+    ) -> Box<dyn IndexField<R>> {
         let coordinate = self.coordinate;
-        let mut field: Box<dyn Field<R>> = match self.name {
-            "polynomial" => Box::new(Layered { coordinate, profile: polynomial() }),
-            "b-spline" => Box::new(Layered { coordinate, profile: bspline() }),
+        let mut field: Box<dyn IndexField<R>> = match self.name {
+            "polynomial" => Box::new(ProfileField { coordinate, profile: polynomial() }),
+            "b-spline" => Box::new(ProfileField { coordinate, profile: bspline() }),
             "luneburg" => {
-                Box::new(Layered { coordinate, profile: Luneburg::new(R::from_f64(1.5)) })
+                Box::new(ProfileField { coordinate, profile: Luneburg::new(R::from_f64(1.5)) })
             }
             "maxwell" => {
                 let profile = Maxwell::new(R::from_f64(1.7), R::from_f64(1.9));
-                Box::new(Layered { coordinate, profile })
+                Box::new(ProfileField { coordinate, profile })
             }
             "parabolic" => {
                 let profile = Parabolic::new(R::from_f64(1.5), R::from_f64(0.4));
-                Box::new(Layered { coordinate, profile })
+                Box::new(ProfileField { coordinate, profile })
             }
             "plume" => {
                 let c = R::from_f64;
@@ -113,14 +125,14 @@ impl Kind {
             }
             "sech" => {
                 let profile = Sech::new(R::from_f64(1.6), R::from_f64(0.5));
-                Box::new(Layered { coordinate, profile })
+                Box::new(ProfileField { coordinate, profile })
             }
             "trilinear" => Box::new(self.trilinear()),
             "tricubic" => {
                 let two = R::from_f64(2.0 / 3.0);
                 let low = -R::ONE;
                 let low = Vec3::new(low, low, low);
-                let grid = Grid::new([6, 7, 6], low, Vec3::new(two, two, two)).unwrap();
+                let grid = RegularGrid::new([6, 7, 6], low, Vec3::new(two, two, two)).unwrap();
                 Box::new(Tricubic::new(grid, wavy(6 * 7 * 6)).unwrap())
             }
             other => panic!("{other}"),
@@ -134,7 +146,8 @@ impl Kind {
     fn trilinear<R: Real>(&self) -> Trilinear<R> {
         let low = Vec3::from_f64(vec3([-1.0, -1.1, -1.2]));
         let spacing = Vec3::from_f64(vec3([0.5, 0.44, 0.4]));
-        let mut field = Trilinear::new(Grid::new([5, 6, 7], low, spacing).unwrap(), wavy(210));
+        let mut field =
+            Trilinear::new(RegularGrid::new([5, 6, 7], low, spacing).unwrap(), wavy(210));
         if let Ok(field) = &mut field {
             field.diagonal = self.diagonal;
         }

@@ -3,23 +3,23 @@
 
 use super::chain::settings;
 use super::rugged::{Rugged, START, STEPS};
-use aplanat::search::{Method, Over, Run, RunOf, Settings};
+use aplanat::search::{RunEnd, SearchMethod, SearchRun, SearchRunOn, SearchSettings};
 use std::fs;
 use std::path::PathBuf;
 
-fn begin(settings: &Settings) -> RunOf<Rugged> {
-    Run::new(&Rugged::default(), START, settings).unwrap()
+fn begin(settings: &SearchSettings) -> SearchRunOn<Rugged> {
+    SearchRun::new(&Rugged::default(), START, settings).unwrap()
 }
 
-fn of(method: Method, gradients: u64) -> Settings {
-    Settings { gradients: Some(gradients), ..settings(method) }
+fn of(method: SearchMethod, gradients: u64) -> SearchSettings {
+    SearchSettings { gradients: Some(gradients), ..settings(method) }
 }
 
 /// Runs to the end.
-fn whole(settings: &Settings) -> (RunOf<Rugged>, Over) {
+fn whole(settings: &SearchSettings) -> (SearchRunOn<Rugged>, RunEnd) {
     let mut run = begin(settings);
     loop {
-        if let Some(over) = run.over() {
+        if let Some(over) = run.end_reason() {
             return (run, over);
         }
         run.round(&Rugged::default());
@@ -29,13 +29,13 @@ fn whole(settings: &Settings) -> (RunOf<Rugged>, Over) {
 #[test]
 fn a_budget_is_used_up_and_not_exceeded() {
     for gradients in [1, 2, 3, 4, 7, 19, 20, 21, 50, 137, 1000] {
-        for method in [Method::Restore, Method::Metropolis] {
+        for method in [SearchMethod::Restore, SearchMethod::Metropolis] {
             let (run, over) = whole(&of(method, gradients));
             let made = run.statistics().gradients;
-            assert_eq!((over, made), (Over::Gradients, gradients), "{method:?}");
+            assert_eq!((over, made), (RunEnd::Gradients, gradients), "{method:?}");
         }
-        let (run, over) = whole(&of(Method::Brute, gradients));
-        assert_eq!(over, Over::Done);
+        let (run, over) = whole(&of(SearchMethod::Brute, gradients));
+        assert_eq!(over, RunEnd::Done);
         assert!(run.statistics().gradients <= gradients, "{:?}", run.statistics());
         assert!(run.statistics().gradients + 4 > gradients, "{:?}", run.statistics());
     }
@@ -43,7 +43,7 @@ fn a_budget_is_used_up_and_not_exceeded() {
 
 #[test]
 fn threads_share_what_is_left_alike() {
-    for method in [Method::Restore, Method::Metropolis, Method::Brute] {
+    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute] {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| whole(&of(method, 137)).0)
@@ -55,7 +55,7 @@ fn threads_share_what_is_left_alike() {
 #[test]
 fn moves_are_shortened_only_at_the_end() {
     let (mut short, mut long) =
-        (begin(&of(Method::Restore, 137)), begin(&of(Method::Restore, 1000)));
+        (begin(&of(SearchMethod::Restore, 137)), begin(&of(SearchMethod::Restore, 1000)));
     let round = short.settings().chains * STEPS;
     let mut rounds = 0;
     while short.statistics().gradients + round as u64 <= 137 {
@@ -74,14 +74,14 @@ fn a_run_that_is_taken_up_again_shares_what_is_left_alike() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("search").join("budget");
     fs::create_dir_all(&folder).unwrap();
     let path = folder.join("run.json");
-    for method in [Method::Restore, Method::Metropolis, Method::Brute] {
+    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute] {
         let settings = of(method, 137);
         let (undisturbed, _) = whole(&settings);
         let mut run = begin(&settings);
-        while run.over().is_none() {
+        while run.end_reason().is_none() {
             run.round(&Rugged::default());
             run.save(&Rugged::default(), &path).unwrap();
-            run = Run::load(&Rugged::default(), &settings, &path).unwrap();
+            run = SearchRun::load(&Rugged::default(), &settings, &path).unwrap();
         }
         assert!(run == undisturbed, "{method:?}");
     }
@@ -89,11 +89,11 @@ fn a_run_that_is_taken_up_again_shares_what_is_left_alike() {
 
 #[test]
 fn the_best_point_is_always_among_what_was_found() {
-    let mut run = begin(&of(Method::Restore, 2000));
+    let mut run = begin(&of(SearchMethod::Restore, 2000));
     let mut running = 0;
-    while run.over().is_none() {
+    while run.end_reason().is_none() {
         run.round(&Rugged::default());
-        let found = run.found();
+        let found = run.found_points();
         assert_eq!(found[0].entry.loss, run.best().loss);
         assert!(found.is_sorted_by(|a, b| a.entry.loss <= b.entry.loss));
         assert!(found[1..].iter().all(|other| !other.running));
@@ -101,7 +101,8 @@ fn the_best_point_is_always_among_what_was_found() {
         assert_eq!(found.len(), kept + usize::from(found[0].running));
         if found[0].running {
             running += 1;
-            let lives = run.chains().iter().any(|chain| chain.number() == found[0].entry.number);
+            let lives =
+                run.chains().iter().any(|chain| chain.generation() == found[0].entry.number);
             assert!(lives, "generation {}", found[0].entry.number);
         }
     }

@@ -3,31 +3,38 @@
 
 use super::rugged::{Fault, Rugged, START, Spot};
 use aplanat::search::{
-    Ended, Event, Kind, Method, Over, Run, RunOf, SearchError, Settings, Steer, Temperature,
-    Termination,
+    DescentEnd, MutationKind, RunEnd, SearchError, SearchEvent, SearchMethod, SearchRun,
+    SearchRunOn, SearchSettings, SteerCommand, Temperature, Termination,
 };
 use std::collections::BTreeSet;
 
-const METHODS: [Method; 3] = [Method::Restore, Method::Metropolis, Method::Brute];
+const METHODS: [SearchMethod; 3] =
+    [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute];
 
-pub(super) fn settings(method: Method) -> Settings {
-    Settings { method, seed: 7, gradients: Some(20_000), longest: 60, ..Settings::default() }
+pub(super) fn settings(method: SearchMethod) -> SearchSettings {
+    SearchSettings {
+        method,
+        seed: 7,
+        gradients: Some(20_000),
+        longest: 60,
+        ..SearchSettings::default()
+    }
 }
 
-fn begin(settings: &Settings) -> RunOf<Rugged> {
-    Run::new(&Rugged::default(), START, settings).unwrap()
+fn begin(settings: &SearchSettings) -> SearchRunOn<Rugged> {
+    SearchRun::new(&Rugged::default(), START, settings).unwrap()
 }
 
-fn rounds(run: &mut RunOf<Rugged>, landscape: &Rugged, count: usize) {
+fn rounds(run: &mut SearchRunOn<Rugged>, landscape: &Rugged, count: usize) {
     for _ in 0..count {
         run.round(landscape);
     }
 }
 
 /// Runs to the end; none comes later than this.
-fn to_the_end(run: &mut RunOf<Rugged>, landscape: &Rugged) -> Over {
+fn to_the_end(run: &mut SearchRunOn<Rugged>, landscape: &Rugged) -> RunEnd {
     for _ in 0..30_000 {
-        if let Some(over) = run.over() {
+        if let Some(over) = run.end_reason() {
             return over;
         }
         run.round(landscape);
@@ -38,9 +45,9 @@ fn to_the_end(run: &mut RunOf<Rugged>, landscape: &Rugged) -> Over {
 #[test]
 fn a_search_finds_the_best_structure() {
     for termination in [Termination::Ratio, Termination::Relative, Termination::Clocks] {
-        let mut run = begin(&Settings { termination, ..settings(Method::Restore) });
+        let mut run = begin(&SearchSettings { termination, ..settings(SearchMethod::Restore) });
         let over = to_the_end(&mut run, &Rugged::default());
-        assert_eq!(over, Over::Gradients);
+        assert_eq!(over, RunEnd::Gradients);
         let best = run.best();
         assert!(best.point.elements == 6 && best.loss < 0.06, "{termination:?}: {best:?}");
         assert_eq!(run.reservoir().entries().len(), 5);
@@ -52,29 +59,32 @@ fn a_search_finds_the_best_structure() {
 
 #[test]
 fn metropolis_walks_to_better_structures() {
-    let mut settings = settings(Method::Metropolis);
+    let mut settings = settings(SearchMethod::Metropolis);
     settings.metropolis.epsilon = 0.1;
     settings.metropolis.mutation = 0.1;
     let mut run = begin(&settings);
-    assert_eq!(to_the_end(&mut run, &Rugged::default()), Over::Gradients);
+    assert_eq!(to_the_end(&mut run, &Rugged::default()), RunEnd::Gradients);
     assert!(run.best().loss < 0.3 * run.start().loss, "{:?}", run.best());
     let statistics = run.statistics();
     assert!(statistics.rejected > 0 && statistics.rejected < statistics.moves / 2);
-    assert!(statistics.ended[&Ended::Mutated] > 0 && statistics.ended[&Ended::Longest] > 0);
+    assert!(
+        statistics.ended[&DescentEnd::Mutated] > 0 && statistics.ended[&DescentEnd::Longest] > 0
+    );
 }
 
 #[test]
 fn brute_force_tries_each_element_once_each_way() {
-    let mut run = begin(&Settings { gradients: Some(400), ..settings(Method::Brute) });
-    assert_eq!(to_the_end(&mut run, &Rugged::default()), Over::Done);
+    let mut run = begin(&SearchSettings { gradients: Some(400), ..settings(SearchMethod::Brute) });
+    assert_eq!(to_the_end(&mut run, &Rugged::default()), RunEnd::Done);
     // Two elements, one more and one less for each, a hundred gradients for each.
-    let nodes = &run.tree().nodes()[1..];
+    let nodes = &run.lineage().nodes()[1..];
     assert_eq!(nodes.len(), 4);
     for node in nodes {
-        assert_eq!((node.gradients, node.ended), (100, Some(Ended::Budget)), "{node:?}");
+        assert_eq!((node.gradients, node.ended), (100, Some(DescentEnd::Budget)), "{node:?}");
         assert_eq!((node.parent, node.before), (Some(0), Some(run.start().loss)));
     }
-    let tried = [Kind::AddSinglet, Kind::RemoveSinglet].map(|k| run.statistics().kinds[&k].tried);
+    let tried = [MutationKind::AddSinglet, MutationKind::RemoveSinglet]
+        .map(|k| run.statistics().kinds[&k].tried);
     assert_eq!(tried, [2, 2]);
     assert_eq!(run.best().point.elements, 3);
     assert!(run.round(&Rugged::default()).is_empty());
@@ -100,7 +110,7 @@ fn threads_do_not_matter() {
 #[test]
 fn chains_and_seeds_matter() {
     let run = |seed, chains| {
-        let mut run = begin(&Settings { seed, chains, ..settings(Method::Restore) });
+        let mut run = begin(&SearchSettings { seed, chains, ..settings(SearchMethod::Restore) });
         rounds(&mut run, &Rugged::default(), 50);
         run.best().clone()
     };
@@ -109,28 +119,28 @@ fn chains_and_seeds_matter() {
 
 #[test]
 fn the_tree_tells_every_descent() {
-    let mut run = begin(&settings(Method::Restore));
+    let mut run = begin(&settings(SearchMethod::Restore));
     let (mut born, mut ended) = (BTreeSet::from([0]), BTreeSet::new());
     let mut best = run.best().loss;
     for _ in 0..200 {
         for event in run.round(&Rugged::default()) {
             match event {
-                Event::Born(number) => assert!(born.insert(number)),
-                Event::Ended(number) => assert!(ended.insert(number)),
-                Event::Best(_) => best = f64::NAN,
+                SearchEvent::Started(number) => assert!(born.insert(number)),
+                SearchEvent::Ended(number) => assert!(ended.insert(number)),
+                SearchEvent::NewBest(_) => best = f64::NAN,
             }
         }
         assert!(best.is_nan() || best == run.best().loss, "a best that nothing told");
         best = run.best().loss;
     }
-    let tree = run.tree();
-    assert_eq!(tree.born(), born.len() as u64);
+    let tree = run.lineage();
+    assert_eq!(tree.total(), born.len() as u64);
     for node in tree.nodes() {
         assert_eq!(node.ended.is_some(), ended.contains(&node.number));
         assert_eq!(node.offer.is_some(), node.ended.is_some() || node.number == 0);
         assert!(node.descended <= node.mutated && node.gradients == 5 * node.moves);
         assert!(node.parent.is_none_or(|parent| parent < node.number));
-        let drawn = node.kind == Some(Kind::Global) || node.number == 0;
+        let drawn = node.kind == Some(MutationKind::Global) || node.number == 0;
         assert_eq!(node.before.is_none(), drawn);
     }
     let statistics = run.statistics();
@@ -146,19 +156,19 @@ fn the_tree_tells_every_descent() {
 
 #[test]
 fn a_long_run_remembers_little_but_all_ancestors() {
-    let settings = Settings {
+    let settings = SearchSettings {
         remembered: 20,
         moves: Some(8000),
         gradients: None,
-        ..settings(Method::Restore)
+        ..settings(SearchMethod::Restore)
     };
     let mut run = begin(&settings);
-    assert_eq!(to_the_end(&mut run, &Rugged::default()), Over::Moves);
-    let tree = run.tree();
-    assert!(tree.born() > 300, "{}", tree.born());
+    assert_eq!(to_the_end(&mut run, &Rugged::default()), RunEnd::Moves);
+    let tree = run.lineage();
+    assert!(tree.total() > 300, "{}", tree.total());
     let mut kept = BTreeSet::new();
     for entry in run.reservoir().entries() {
-        let line: Vec<u64> = tree.line(entry.number).map(|node| node.number).collect();
+        let line: Vec<u64> = tree.ancestry(entry.number).map(|node| node.number).collect();
         let oldest = tree.node(*line.last().unwrap()).unwrap();
         assert!(oldest.parent.is_none(), "the line of {} ends at {oldest:?}", entry.number);
         kept.extend(line);
@@ -173,7 +183,7 @@ fn a_long_run_remembers_little_but_all_ancestors() {
 #[test]
 fn a_start_that_is_worth_nothing_is_refused() {
     for (fault, loss) in [(Fault::NotANumber, "NaN"), (Fault::Infinite, "inf")] {
-        let refused = Run::new(&Rugged::with(fault), START, &Settings::default());
+        let refused = SearchRun::new(&Rugged::with(fault), START, &SearchSettings::default());
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(loss), "{message}");
     }
@@ -182,14 +192,14 @@ fn a_start_that_is_worth_nothing_is_refused() {
 #[test]
 fn descents_into_nothing_end_and_are_not_taken() {
     for fault in [Fault::DescentLost, Fault::DescentInfinite] {
-        for method in [Method::Restore, Method::Brute] {
+        for method in [SearchMethod::Restore, SearchMethod::Brute] {
             let landscape = Rugged::with(fault);
-            let mut run = Run::new(&landscape, START, &settings(method)).unwrap();
+            let mut run = SearchRun::new(&landscape, START, &settings(method)).unwrap();
             rounds(&mut run, &landscape, 100);
             assert!(run.best().loss <= run.start().loss);
-            assert!(run.statistics().ended[&Ended::Lost] > 3);
+            assert!(run.statistics().ended[&DescentEnd::Lost] > 3);
             assert!(run.reservoir().entries().iter().all(|entry| entry.loss.is_finite()));
-            assert!(run.tree().nodes().iter().all(|node| node.descended.is_finite()));
+            assert!(run.lineage().nodes().iter().all(|node| node.descended.is_finite()));
         }
     }
 }
@@ -198,13 +208,14 @@ fn descents_into_nothing_end_and_are_not_taken() {
 fn a_search_without_mutations_comes_to_an_end() {
     for fault in [Fault::AllRefused, Fault::AllWorthless] {
         let landscape = Rugged::with(fault);
-        let settings = Settings { gamma: 0.0, ..settings(Method::Restore) };
-        let mut run = Run::new(&landscape, START, &settings).unwrap();
-        assert_eq!(to_the_end(&mut run, &landscape), Over::Stuck, "{fault:?}");
-        assert_eq!(run.tree().born(), 1);
-        assert!(run.statistics().kinds[&Kind::AddSinglet].refused.len() <= 2);
-        let mut brute = Run::new(&landscape, START, &self::settings(Method::Brute)).unwrap();
-        assert_eq!(to_the_end(&mut brute, &landscape), Over::Done);
+        let settings = SearchSettings { gamma: 0.0, ..settings(SearchMethod::Restore) };
+        let mut run = SearchRun::new(&landscape, START, &settings).unwrap();
+        assert_eq!(to_the_end(&mut run, &landscape), RunEnd::Stuck, "{fault:?}");
+        assert_eq!(run.lineage().total(), 1);
+        assert!(run.statistics().kinds[&MutationKind::AddSinglet].refused.len() <= 2);
+        let mut brute =
+            SearchRun::new(&landscape, START, &self::settings(SearchMethod::Brute)).unwrap();
+        assert_eq!(to_the_end(&mut brute, &landscape), RunEnd::Done);
     }
 }
 
@@ -213,7 +224,7 @@ fn every_temperature_is_sound() {
     for value in [0.0, 1e-300, 1e300, f64::INFINITY] {
         for method in METHODS {
             let temperature = Temperature::new(value);
-            let mut run = begin(&Settings { temperature, ..settings(method) });
+            let mut run = begin(&SearchSettings { temperature, ..settings(method) });
             rounds(&mut run, &Rugged::default(), 200);
             assert_eq!(run.temperature().value(), value);
             assert!(run.best().loss < run.start().loss, "{method:?} at {value}");
@@ -226,7 +237,7 @@ fn flat_and_huge_losses_are_sound() {
     for fault in [Fault::Flat, Fault::Huge] {
         for method in METHODS {
             let landscape = Rugged::with(fault);
-            let mut run = Run::new(&landscape, START, &settings(method)).unwrap();
+            let mut run = SearchRun::new(&landscape, START, &settings(method)).unwrap();
             rounds(&mut run, &landscape, 200);
             assert!(run.temperature().value() > 0.0 && run.best().loss.is_finite());
             assert!(run.statistics().moves > 10);
@@ -236,7 +247,7 @@ fn flat_and_huge_losses_are_sound() {
 
 #[test]
 fn a_reservoir_and_a_chain_of_one_search_too() {
-    let one = Settings { reservoir: 1, chains: 1, ..settings(Method::Restore) };
+    let one = SearchSettings { reservoir: 1, chains: 1, ..settings(SearchMethod::Restore) };
     let mut run = begin(&one);
     to_the_end(&mut run, &Rugged::default());
     assert_eq!(run.reservoir().entries().len(), 1);
@@ -245,63 +256,64 @@ fn a_reservoir_and_a_chain_of_one_search_too() {
 
 #[test]
 fn settings_that_make_no_sense_are_refused_by_name() {
-    let good = Settings::default();
+    let good = SearchSettings::default();
     let wrong = [
-        ("chains", Settings { chains: 0, ..good.clone() }),
-        ("reservoir", Settings { reservoir: 0, ..good.clone() }),
-        ("longest", Settings { longest: 0, ..good.clone() }),
-        ("gamma", Settings { gamma: 1.1, ..good.clone() }),
-        ("gamma", Settings { gamma: f64::NAN, ..good.clone() }),
-        ("c", Settings { c: -0.1, ..good.clone() }),
-        ("c", Settings { c: f64::INFINITY, ..good.clone() }),
-        ("reheat", Settings { reheat: 0.0, ..good.clone() }),
-        ("gradients", Settings { method: Method::Brute, gradients: None, ..good }),
+        ("chains", SearchSettings { chains: 0, ..good.clone() }),
+        ("reservoir", SearchSettings { reservoir: 0, ..good.clone() }),
+        ("longest", SearchSettings { longest: 0, ..good.clone() }),
+        ("gamma", SearchSettings { gamma: 1.1, ..good.clone() }),
+        ("gamma", SearchSettings { gamma: f64::NAN, ..good.clone() }),
+        ("c", SearchSettings { c: -0.1, ..good.clone() }),
+        ("c", SearchSettings { c: f64::INFINITY, ..good.clone() }),
+        ("reheat", SearchSettings { reheat: 0.0, ..good.clone() }),
+        ("gradients", SearchSettings { method: SearchMethod::Brute, gradients: None, ..good }),
     ];
     for (name, settings) in wrong {
-        let error = Run::new(&Rugged::default(), START, &settings).unwrap_err();
+        let error = SearchRun::new(&Rugged::default(), START, &settings).unwrap_err();
         let named = matches!(&error, SearchError::Setting { name: found, .. } if *found == name);
         assert!(named, "{name}: {error}");
     }
-    let unknown = serde_json::from_str::<Settings>(r#"{"seed": 1, "heat": 2}"#).unwrap_err();
+    let unknown = serde_json::from_str::<SearchSettings>(r#"{"seed": 1, "heat": 2}"#).unwrap_err();
     assert!(unknown.to_string().contains("heat"), "{unknown}");
 }
 
 #[test]
 fn a_pinned_branch_is_what_regenerations_begin_from() {
     let landscape = Rugged::default();
-    let mut run = begin(&settings(Method::Restore));
+    let mut run = begin(&settings(SearchMethod::Restore));
     rounds(&mut run, &landscape, 150);
-    let pinned = run.tree().nodes().iter().rev().find(|node| node.ended.is_some()).unwrap().number;
-    run.steer(&landscape, Steer::Pin(pinned)).unwrap();
-    let born = run.tree().born();
+    let pinned =
+        run.lineage().nodes().iter().rev().find(|node| node.ended.is_some()).unwrap().number;
+    run.steer(&landscape, SteerCommand::Pin(pinned)).unwrap();
+    let born = run.lineage().total();
     rounds(&mut run, &landscape, 150);
-    let young = |run: &RunOf<Rugged>, from: u64| -> Vec<Option<u64>> {
-        let nodes = run.tree().nodes().iter().filter(|node| node.number >= from);
+    let young = |run: &SearchRunOn<Rugged>, from: u64| -> Vec<Option<u64>> {
+        let nodes = run.lineage().nodes().iter().filter(|node| node.number >= from);
         nodes.map(|node| node.parent).collect()
     };
     let parents = young(&run, born);
     assert!(parents.len() > 10 && parents.iter().all(|parent| *parent == Some(pinned)));
-    run.steer(&landscape, Steer::Unpin).unwrap();
-    let born = run.tree().born();
+    run.steer(&landscape, SteerCommand::Unpin).unwrap();
+    let born = run.lineage().total();
     rounds(&mut run, &landscape, 150);
     assert!(young(&run, born).iter().any(|parent| *parent != Some(pinned)));
-    let error = run.steer(&landscape, Steer::Pin(1_000_000)).unwrap_err();
-    assert!(matches!(error, SearchError::Forgotten { number: 1_000_000, .. }));
+    let error = run.steer(&landscape, SteerCommand::Pin(1_000_000)).unwrap_err();
+    assert!(matches!(error, SearchError::UnknownGeneration { number: 1_000_000, .. }));
 }
 
 #[test]
 fn a_forbidden_kind_is_not_tried() {
     let landscape = Rugged::default();
-    let mut run = begin(&Settings { gamma: 0.5, ..settings(Method::Restore) });
-    for kind in [Kind::AddSinglet, Kind::Global] {
-        run.steer(&landscape, Steer::Weight(kind, 0.0)).unwrap();
+    let mut run = begin(&SearchSettings { gamma: 0.5, ..settings(SearchMethod::Restore) });
+    for kind in [MutationKind::AddSinglet, MutationKind::Global] {
+        run.steer(&landscape, SteerCommand::Weight(kind, 0.0)).unwrap();
     }
     rounds(&mut run, &landscape, 100);
-    let kinds: Vec<Kind> = run.statistics().kinds.keys().copied().collect();
-    assert_eq!(kinds, [Kind::RemoveSinglet, Kind::Bend]);
+    let kinds: Vec<MutationKind> = run.statistics().kinds.keys().copied().collect();
+    assert_eq!(kinds, [MutationKind::RemoveSinglet, MutationKind::Bend]);
     let before = run.clone();
     for weight in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(run.steer(&landscape, Steer::Weight(Kind::Bend, weight)).is_err());
+        assert!(run.steer(&landscape, SteerCommand::Weight(MutationKind::Bend, weight)).is_err());
     }
     assert!(run == before);
 }
@@ -309,16 +321,16 @@ fn a_forbidden_kind_is_not_tried() {
 #[test]
 fn heat_and_stop_are_obeyed() {
     let landscape = Rugged::default();
-    let mut run = begin(&settings(Method::Restore));
+    let mut run = begin(&settings(SearchMethod::Restore));
     let first = run.temperature().value();
-    run.steer(&landscape, Steer::Reheat).unwrap();
+    run.steer(&landscape, SteerCommand::Reheat).unwrap();
     assert_eq!(run.temperature().value(), 2.0 * first);
-    run.steer(&landscape, Steer::Temperature(Temperature::new(0.0).unwrap())).unwrap();
-    run.steer(&landscape, Steer::Reheat).unwrap();
+    run.steer(&landscape, SteerCommand::Temperature(Temperature::new(0.0).unwrap())).unwrap();
+    run.steer(&landscape, SteerCommand::Reheat).unwrap();
     assert_eq!(run.temperature().value(), 0.0);
-    run.steer(&landscape, Steer::Stop).unwrap();
-    assert_eq!((run.over(), run.round(&landscape)), (Some(Over::Stopped), Vec::new()));
-    run.steer(&landscape, Steer::Resume).unwrap();
+    run.steer(&landscape, SteerCommand::Stop).unwrap();
+    assert_eq!((run.end_reason(), run.round(&landscape)), (Some(RunEnd::Stopped), Vec::new()));
+    run.steer(&landscape, SteerCommand::Resume).unwrap();
     run.round(&landscape);
     assert_eq!(run.statistics().rounds, 1);
 }
@@ -326,13 +338,13 @@ fn heat_and_stop_are_obeyed() {
 #[test]
 fn the_best_point_of_a_living_descent_can_be_pinned() {
     let landscape = Rugged::default();
-    let mut run = begin(&Settings { c: 0.0, ..settings(Method::Restore) });
+    let mut run = begin(&SearchSettings { c: 0.0, ..settings(SearchMethod::Restore) });
     rounds(&mut run, &landscape, 3);
     let (best, loss): (Spot, f64) = {
         let (best, loss) = run.chains()[0].best().unwrap();
         (best.clone(), loss)
     };
-    run.steer(&landscape, Steer::Pin(0)).unwrap();
+    run.steer(&landscape, SteerCommand::Pin(0)).unwrap();
     let pinned = run.pinned().unwrap();
     assert!(pinned.point == best && pinned.loss == loss && loss < run.start().loss);
 }

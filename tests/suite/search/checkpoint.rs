@@ -2,7 +2,9 @@
 
 use super::chain::settings;
 use super::rugged::{Fault, Rugged, START};
-use aplanat::search::{Method, Run, RunOf, SearchError, Settings, Steer, Temperature};
+use aplanat::search::{
+    SearchError, SearchMethod, SearchRun, SearchRunOn, SearchSettings, SteerCommand, Temperature,
+};
 use serde_json::Value;
 use std::fs;
 use std::path::PathBuf;
@@ -14,8 +16,8 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-fn after(rounds: usize, settings: &Settings) -> RunOf<Rugged> {
-    let mut run = Run::new(&Rugged::default(), START, settings).unwrap();
+fn after(rounds: usize, settings: &SearchSettings) -> SearchRunOn<Rugged> {
+    let mut run = SearchRun::new(&Rugged::default(), START, settings).unwrap();
     (0..rounds).for_each(|_| drop(run.round(&Rugged::default())));
     run
 }
@@ -23,14 +25,14 @@ fn after(rounds: usize, settings: &Settings) -> RunOf<Rugged> {
 #[test]
 fn a_run_goes_on_bit_for_bit() {
     let path = folder("resume").join("run.json");
-    for method in [Method::Restore, Method::Metropolis, Method::Brute] {
+    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute] {
         for value in [None, Some(0.0), Some(f64::INFINITY)] {
             let temperature = value.and_then(Temperature::new);
-            let settings = Settings { temperature, remembered: 30, ..settings(method) };
+            let settings = SearchSettings { temperature, remembered: 30, ..settings(method) };
             let whole = after(200, &settings);
             after(100, &settings).save(&Rugged::default(), &path).unwrap();
-            let mut resumed: RunOf<Rugged> =
-                Run::load(&Rugged::default(), &settings, &path).unwrap();
+            let mut resumed: SearchRunOn<Rugged> =
+                SearchRun::load(&Rugged::default(), &settings, &path).unwrap();
             (0..100).for_each(|_| drop(resumed.round(&Rugged::default())));
             assert!(resumed == whole, "{method:?} at {value:?}");
             assert!(whole.statistics().moves > 300);
@@ -42,32 +44,36 @@ fn a_run_goes_on_bit_for_bit() {
 fn a_hand_on_the_run_is_in_its_file() {
     let path = folder("steered").join("run.json");
     let landscape = Rugged::default();
-    let mut run = after(40, &settings(Method::Restore));
-    for steer in [Steer::Pin(0), Steer::Reheat, Steer::Stop] {
+    let mut run = after(40, &settings(SearchMethod::Restore));
+    for steer in [SteerCommand::Pin(0), SteerCommand::Reheat, SteerCommand::Stop] {
         run.steer(&landscape, steer).unwrap();
     }
     run.save(&landscape, &path).unwrap();
-    assert!(Run::load(&landscape, run.settings(), &path).unwrap() == run);
+    assert!(SearchRun::load(&landscape, run.settings(), &path).unwrap() == run);
 }
 
 #[test]
 fn ends_may_move_and_nothing_else() {
     let path = folder("settings").join("run.json");
     let landscape = Rugged::default();
-    let first = settings(Method::Restore);
+    let first = settings(SearchMethod::Restore);
     after(10, &first).save(&landscape, &path).unwrap();
-    let load = |settings: &Settings| Run::load(&landscape, settings, &path);
-    let later = Settings { gradients: None, moves: Some(50), ..first.clone() };
+    let load = |settings: &SearchSettings| SearchRun::load(&landscape, settings, &path);
+    let later = SearchSettings { gradients: None, moves: Some(50), ..first.clone() };
     assert_eq!(load(&later).unwrap().settings(), &later);
     let others = [
-        ("settings.seed", "7", Settings { seed: 8, ..first.clone() }),
-        ("settings.gamma", "0.02", Settings { gamma: 0.5, ..first.clone() }),
-        ("settings.chains", "4", Settings { chains: 2, ..first.clone() }),
-        ("settings.method", "restore", Settings { method: Method::Metropolis, ..first.clone() }),
+        ("settings.seed", "7", SearchSettings { seed: 8, ..first.clone() }),
+        ("settings.gamma", "0.02", SearchSettings { gamma: 0.5, ..first.clone() }),
+        ("settings.chains", "4", SearchSettings { chains: 2, ..first.clone() }),
+        (
+            "settings.method",
+            "restore",
+            SearchSettings { method: SearchMethod::Metropolis, ..first.clone() },
+        ),
         (
             "settings.temperature",
             "null",
-            Settings { temperature: Temperature::new(2.0), ..first.clone() },
+            SearchSettings { temperature: Temperature::new(2.0), ..first.clone() },
         ),
     ];
     for (name, found, other) in others {
@@ -75,18 +81,18 @@ fn ends_may_move_and_nothing_else() {
         assert!(message.contains(name) && message.contains(found), "{message}");
     }
     let elsewhere = Rugged::with(Fault::Flat);
-    let message = Run::load(&elsewhere, &first, &path).unwrap_err().to_string();
+    let message = SearchRun::load(&elsewhere, &first, &path).unwrap_err().to_string();
     assert!(message.contains("landscape.fault is \"Nothing\" there"), "{message}");
 }
 
 #[test]
 fn brute_force_has_divided_its_gradients() {
     let path = folder("brute").join("run.json");
-    let first = settings(Method::Brute);
+    let first = settings(SearchMethod::Brute);
     after(3, &first).save(&Rugged::default(), &path).unwrap();
-    let more = Settings { gradients: Some(40_000), ..first };
-    let error =
-        Run::<_, super::rugged::Momentum>::load(&Rugged::default(), &more, &path).unwrap_err();
+    let more = SearchSettings { gradients: Some(40_000), ..first };
+    let error = SearchRun::<_, super::rugged::Momentum>::load(&Rugged::default(), &more, &path)
+        .unwrap_err();
     assert!(error.to_string().contains("settings.gradients"), "{error}");
 }
 
@@ -94,13 +100,14 @@ fn brute_force_has_divided_its_gradients() {
 fn a_damaged_file_is_refused() {
     let folder = folder("damaged");
     let (good, bad) = (folder.join("good.json"), folder.join("bad.json"));
-    let first = settings(Method::Restore);
+    let first = settings(SearchMethod::Restore);
     after(30, &first).save(&Rugged::default(), &good).unwrap();
     let bytes = fs::read(&good).unwrap();
     let text = String::from_utf8(bytes.clone()).unwrap();
     let load = |bytes: &[u8]| {
         fs::write(&bad, bytes).unwrap();
-        let loaded: Result<RunOf<Rugged>, _> = Run::load(&Rugged::default(), &first, &bad);
+        let loaded: Result<SearchRunOn<Rugged>, _> =
+            SearchRun::load(&Rugged::default(), &first, &bad);
         loaded.unwrap_err()
     };
     let mut damaged: Vec<Vec<u8>> =
@@ -118,16 +125,22 @@ fn a_damaged_file_is_refused() {
     }
     let newer = text.replacen("\"aplanat_search\":1", "\"aplanat_search\":2", 1);
     let error = load(newer.as_bytes());
-    assert!(matches!(error, SearchError::Version { found: 2, expected: 1, .. }), "{error}");
-    let missing =
-        Run::<_, super::rugged::Momentum>::load(&Rugged::default(), &first, &folder.join("none"));
+    assert!(
+        matches!(error, SearchError::UnsupportedVersion { found: 2, expected: 1, .. }),
+        "{error}"
+    );
+    let missing = SearchRun::<_, super::rugged::Momentum>::load(
+        &Rugged::default(),
+        &first,
+        &folder.join("none"),
+    );
     assert!(matches!(missing, Err(SearchError::File(_))));
 }
 
 #[test]
 fn what_cannot_be_written_leaves_what_was_there() {
     let folder = folder("unwritable");
-    let run = after(5, &settings(Method::Restore));
+    let run = after(5, &settings(SearchMethod::Restore));
     assert!(run.save(&Rugged::default(), &folder).is_err());
     let path = folder.join("run.json");
     run.save(&Rugged::default(), &path).unwrap();

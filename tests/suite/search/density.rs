@@ -11,12 +11,12 @@ fn at(value: f64) -> Temperature {
 #[test]
 fn a_temperature_gives_the_start_a_density_of_one_half() {
     for loss in [1e-300, 0.7225, 3.0, 1e300] {
-        let density = Temperature::halving(loss).density(loss);
+        let density = Temperature::at_half_density(loss).density(loss);
         assert!((density - 0.5).abs() < 1e-15, "{loss}: {density}");
     }
-    assert_eq!(Temperature::halving(-3.0).density(-3.0), 2.0);
+    assert_eq!(Temperature::at_half_density(-3.0).density(-3.0), 2.0);
     for loss in [0.0, f64::INFINITY, f64::NAN] {
-        assert_eq!(Temperature::halving(loss).value(), 1.0);
+        assert_eq!(Temperature::at_half_density(loss).value(), 1.0);
     }
 }
 
@@ -52,14 +52,14 @@ fn chances_follow_the_printed_formulas() {
 
 #[test]
 fn a_descent_that_stands_still_at_one_half_lasts_eleven_moves() {
-    let chance = Termination::Ratio.chance(Temperature::halving(0.7), 0.05, 0.7, 0.7);
+    let chance = Termination::Ratio.chance(Temperature::at_half_density(0.7), 0.05, 0.7, 0.7);
     assert!((1.0 / chance - 11.0).abs() < 1e-9);
 }
 
 #[test]
 fn far_below_its_constant_a_descent_ends_unless_it_is_relative() {
     // A mutation of fifteen times the loss, and a move that takes a third of it away.
-    let temperature = Temperature::halving(1.0);
+    let temperature = Temperature::at_half_density(1.0);
     let chance = |rule: Termination| rule.chance(temperature, 0.05, 15.0, 10.0);
     assert!(chance(Termination::Ratio) > 0.95, "{}", chance(Termination::Ratio));
     assert_eq!((chance(Termination::Relative), chance(Termination::Clocks)), (0.0, 0.0));

@@ -6,19 +6,21 @@ use super::projection::assert_equivalent;
 use super::{generous, seeded};
 use crate::merit::bundled;
 use aplanat::lens::{
-    Gradient, Law, Lens, Medium, Parameter, Pickup, Quantity, RADIAL_TERMS, Variable,
+    GradientIndex, Lens, Medium, Parameter, Pickup, ProfileLaw, Quantity, RADIAL_TERMS, Variable,
 };
 use aplanat::math::Vec3;
-use aplanat::search::lens::{LensLandscape, Plan, finish, opened, run};
-use aplanat::search::{Kind, Landscape, Rules, RunOf, Settings, mutate, propose};
+use aplanat::search::lens::{LensLandscape, SearchPlan, finalize, run, with_open_apertures};
+use aplanat::search::{
+    Landscape, MutationKind, SearchRules, SearchRunOn, SearchSettings, mutate, propose,
+};
 use std::ops::ControlFlow;
 
 const EXAMPLES: [&str; 3] = ["grin_rod_melles_griot", "wood_lens_60", "axial_gradient_singlet_50"];
 
 fn medium(radial: &[f64], axial: &[f64]) -> Medium {
-    Medium::Gradient(Box::new(Gradient {
+    Medium::Grin(Box::new(GradientIndex {
         base: Medium::Index(1.62),
-        law: Law::Index,
+        law: ProfileLaw::Index,
         radial: radial.to_vec(),
         axial: axial.to_vec(),
     }))
@@ -38,7 +40,7 @@ fn busy() -> Lens {
 }
 
 fn is_graded(lens: &Lens) -> bool {
-    lens.surfaces.iter().any(|row| matches!(row.medium, Medium::Gradient(_)))
+    lens.surfaces.iter().any(|row| matches!(row.medium, Medium::Grin(_)))
 }
 
 /// A flagged number, bounded or not.
@@ -48,11 +50,16 @@ fn flag(lens: &mut Lens, surface: usize, quantity: Quantity, bounds: [Option<f64
 }
 
 /// The rules of a lens of millimetres.
-fn small() -> Rules {
-    Rules { glass_center: [0.1, 10.0], glass_edge: 0.05, air_center: [0.01, 10.0], ..generous() }
+fn small() -> SearchRules {
+    SearchRules {
+        glass_center: [0.1, 10.0],
+        glass_edge: 0.05,
+        air_center: [0.01, 10.0],
+        ..generous()
+    }
 }
 
-fn rules(name: &str) -> Rules {
+fn rules(name: &str) -> SearchRules {
     if name == EXAMPLES[0] { small() } else { generous() }
 }
 
@@ -62,7 +69,7 @@ fn no_gradient_is_taken_for_afocal() {
         let lens = bundled(name);
         let mut random = seeded(21);
         let mut made = 0;
-        for kind in Kind::MUTATIONS.repeat(8) {
+        for kind in MutationKind::MUTATIONS.repeat(8) {
             match mutate(kind, &lens, &rules(name), &mut random) {
                 Ok(mutant) => {
                     assert_equivalent(&lens, &mutant);
@@ -80,10 +87,11 @@ fn no_gradient_is_taken_for_afocal() {
 
 #[test]
 fn a_hundred_mutations_in_a_row_keep_a_lens_with_gradients_a_lens() {
-    let mut starts: Vec<(Lens, Rules)> = EXAMPLES.map(|name| (bundled(name), rules(name))).into();
+    let mut starts: Vec<(Lens, SearchRules)> =
+        EXAMPLES.map(|name| (bundled(name), rules(name))).into();
     starts.push((busy(), generous()));
     for (start, rules) in starts {
-        let rules = Rules { elements: [1, 6], ..rules };
+        let rules = SearchRules { elements: [1, 6], ..rules };
         let mut random = seeded(22);
         let (mut lens, mut made, mut graded) = (start.clone(), 0, 0);
         for _ in 0..2000 {
@@ -110,7 +118,7 @@ fn a_hundred_mutations_in_a_row_keep_a_lens_with_gradients_a_lens() {
 
 /// The index on the axis of the gradient behind a row, at places from its front vertex.
 fn along(lens: &Lens, row: usize) -> Vec<f64> {
-    let system = lens.system(0, lens.wavelengths[lens.primary()].um).unwrap();
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap();
     let field = system.gradient(row).unwrap();
     let at = |i: i32| f64::from(i) / 8.0 * lens.surfaces[row].thickness;
     (0..=8).map(|i| field.index(Vec3::new(0.3, 0.1, at(i)))).collect()
@@ -119,8 +127,8 @@ fn along(lens: &Lens, row: usize) -> Vec<f64> {
 /// Turns an element around without moving anything else.
 fn flipped(lens: &Lens, row: usize) -> Lens {
     let rows = lens.surfaces.len();
-    let rules = Rules { projection: false, ..generous() }.touching(row, row + 1, rows);
-    mutate(Kind::Flip, lens, &rules, &mut seeded(1)).unwrap().lens
+    let rules = SearchRules { projection: false, ..generous() }.restricted_to(row, row + 1, rows);
+    mutate(MutationKind::Flip, lens, &rules, &mut seeded(1)).unwrap().lens
 }
 
 #[test]
@@ -160,8 +168,8 @@ fn a_gradient_along_the_axis_is_turned_with_its_element() {
 fn what_turning_an_element_has_no_way_back_is_said_to_have_none() {
     let ratio = |axial: &[f64]| {
         let (lens, row) = triplet(&[-2e-4], axial);
-        let rules = generous().touching(row, row + 1, lens.surfaces.len());
-        let turned = |seed| mutate(Kind::Flip, &lens, &rules, &mut seeded(seed));
+        let rules = generous().restricted_to(row, row + 1, lens.surfaces.len());
+        let turned = |seed| mutate(MutationKind::Flip, &lens, &rules, &mut seeded(seed));
         let ratios: Vec<_> = (0..20).filter_map(|seed| turned(seed).ok()).collect();
         assert!(!ratios.is_empty());
         ratios.into_iter().filter_map(|mutant| mutant.log_ratio).count()
@@ -170,27 +178,28 @@ fn what_turning_an_element_has_no_way_back_is_said_to_have_none() {
     assert_eq!(ratio(&[-0.004]), 0, "the gap may have another length then");
 }
 
-fn refused(kind: Kind, lens: &Lens) -> String {
+fn refused(kind: MutationKind, lens: &Lens) -> String {
     mutate(kind, lens, &generous(), &mut seeded(1)).unwrap_err().why
 }
 
 #[test]
 fn what_cannot_be_done_with_a_gradient_is_refused_by_name() {
     let lens = bundled("axial_gradient_singlet_50");
-    let why = refused(Kind::ExchangeGlass, &lens);
+    let why = refused(MutationKind::ExchangeGlass, &lens);
     assert!(why.contains("behind surface 0 is a gradient, which has no neighbour"), "{why}");
     // The dispersion of a glass stays at its own end.
     let dispersive = |axial: f64, base: &str| {
         let mut lens = bundled("axial_gradient_singlet_50");
-        let Medium::Gradient(gradient) = &mut lens.surfaces[0].medium else { panic!() };
+        let Medium::Grin(gradient) = &mut lens.surfaces[0].medium else { panic!() };
         gradient.base = Medium::Glass(base.to_owned());
         gradient.axial = vec![axial];
         lens
     };
-    let why = refused(Kind::Flip, &dispersive(-0.0122, "SCHOTT SF5"));
+    let why = refused(MutationKind::Flip, &dispersive(-0.0122, "SCHOTT SF5"));
     assert!(why.contains("is a gradient along the axis, which from its other end"), "{why}");
     assert!(
-        mutate(Kind::Flip, &dispersive(0.0, "SCHOTT SF5"), &generous(), &mut seeded(1)).is_ok()
+        mutate(MutationKind::Flip, &dispersive(0.0, "SCHOTT SF5"), &generous(), &mut seeded(1))
+            .is_ok()
     );
     let mut followed = lens.clone();
     followed.variables.clear();
@@ -200,17 +209,17 @@ fn what_cannot_be_done_with_a_gradient_is_refused_by_name() {
         scale: -0.4,
         offset: 0.0,
     });
-    let why = refused(Kind::Flip, &followed);
+    let why = refused(MutationKind::Flip, &followed);
     assert!(why.contains("along the axis, and a pickup has to do with it"), "{why}");
     // A secant with something added to it is no secant from its other end.
     let mut secant = lens.clone();
-    let Medium::Gradient(gradient) = &mut secant.surfaces[0].medium else { panic!() };
-    (gradient.law, gradient.radial) = (Law::Sech, vec![0.01]);
-    assert!(refused(Kind::Flip, &secant).contains("from its other end"));
+    let Medium::Grin(gradient) = &mut secant.surfaces[0].medium else { panic!() };
+    (gradient.law, gradient.radial) = (ProfileLaw::Sech, vec![0.01]);
+    assert!(refused(MutationKind::Flip, &secant).contains("from its other end"));
     // Elsewhere in the lens the same is done.
     let (mut lens, _) = triplet(&[], &[-0.004]);
     lens.surfaces[0].medium = Medium::Glass("SCHOTT N-SK16".to_owned());
-    assert!(mutate(Kind::ExchangeGlass, &lens, &generous(), &mut seeded(1)).is_ok());
+    assert!(mutate(MutationKind::ExchangeGlass, &lens, &generous(), &mut seeded(1)).is_ok());
 }
 
 /// The flagged coefficients of gradients, with their values.
@@ -230,27 +239,28 @@ fn flagged_coefficients_go_where_their_medium_goes() {
         flag(&mut lens, row - 1, quantity, [None, None]);
     }
     let all = flagged(&lens);
-    let only = |first, last, lens: &Lens| generous().touching(first, last, lens.surfaces.len());
+    let only =
+        |first, last, lens: &Lens| generous().restricted_to(first, last, lens.surfaces.len());
     let graded = |lens: &Lens| {
-        let is_one = |i: &usize| matches!(lens.surfaces[*i].medium, Medium::Gradient(_));
+        let is_one = |i: &usize| matches!(lens.surfaces[*i].medium, Medium::Grin(_));
         (0..lens.surfaces.len()).find(is_one).unwrap()
     };
     let at = graded(&lens);
     let glued = (0..40).find_map(|seed| {
-        mutate(Kind::Glue, &lens, &only(at - 2, at + 1, &lens), &mut seeded(seed)).ok()
+        mutate(MutationKind::Glue, &lens, &only(at - 2, at + 1, &lens), &mut seeded(seed)).ok()
     });
     let glued = glued.unwrap().lens;
     assert_eq!(graded(&glued), at - 1);
     assert_eq!(flagged(&glued), all);
     let split = (0..40).find_map(|seed| {
-        mutate(Kind::Split, &glued, &only(at - 2, at, &glued), &mut seeded(seed)).ok()
+        mutate(MutationKind::Split, &glued, &only(at - 2, at, &glued), &mut seeded(seed)).ok()
     });
     let split = split.unwrap().lens;
     assert_eq!((graded(&split), flagged(&split)), (at, all.clone()));
     // Of a group that loses the piece with the gradient nothing stays flagged; else everything.
     let mut lost = 0;
     for seed in 0..20 {
-        match mutate(Kind::DropLayer, &glued, &generous(), &mut seeded(seed)) {
+        match mutate(MutationKind::DropLayer, &glued, &generous(), &mut seeded(seed)) {
             Ok(mutant) => {
                 let expected = if is_graded(&mutant.lens) { all.clone() } else { Vec::new() };
                 assert_eq!(flagged(&mutant.lens), expected, "{}", mutant.what);
@@ -262,10 +272,10 @@ fn flagged_coefficients_go_where_their_medium_goes() {
     assert!((1..20).contains(&lost), "{lost}");
 }
 
-fn whole(lens: &Lens, rules: Rules) -> RunOf<LensLandscape> {
-    let usual = Plan::default().settings;
-    let settings = Settings { gradients: Some(520), chains: 2, seed: 7, c: 0.3, ..usual };
-    let plan = Plan { settings, rules, ..Plan::default() };
+fn whole(lens: &Lens, rules: SearchRules) -> SearchRunOn<LensLandscape> {
+    let usual = SearchPlan::default().settings;
+    let settings = SearchSettings { gradients: Some(520), chains: 2, seed: 7, c: 0.3, ..usual };
+    let plan = SearchPlan { settings, rules, ..SearchPlan::default() };
     run(lens, &plan, |_, _| ControlFlow::Continue(())).unwrap()
 }
 
@@ -275,16 +285,16 @@ fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
     let mut rod = bundled("grin_rod_melles_griot");
     rod.fields.values.truncate(1);
     for (lens, rules) in [
-        (rod, Rules { elements: [1, 4], ..small() }),
-        (bundled("wood_lens_60"), Rules { elements: [1, 4], ..Rules::default() }),
-        (busy(), Rules::default()),
+        (rod, SearchRules { elements: [1, 4], ..small() }),
+        (bundled("wood_lens_60"), SearchRules { elements: [1, 4], ..SearchRules::default() }),
+        (busy(), SearchRules::default()),
     ] {
         let run = whole(&lens, rules);
         let (start, best) = (run.start().loss, run.best().loss);
-        println!("{}: {start:.3e} to {best:.3e}, {} born", lens.name, run.tree().born());
+        println!("{}: {start:.3e} to {best:.3e}, {} born", lens.name, run.lineage().total());
         assert!(best.is_finite() && best < start, "{}: {start} {best}", lens.name);
         assert!(run.statistics().gradients >= 500);
-        for node in run.tree().nodes() {
+        for node in run.lineage().nodes() {
             assert_lens(&node.point);
         }
         let mut tried = 0;
@@ -301,8 +311,8 @@ fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
 #[test]
 fn a_finished_lens_keeps_its_gradients() {
     let (lens, row) = triplet(&[-2e-4], &[-0.004]);
-    let landscape = Plan::default().landscape(&lens).unwrap();
-    let done = finish(&landscape, landscape.start()).unwrap();
+    let landscape = SearchPlan::default().landscape(&lens).unwrap();
+    let done = finalize(&landscape, landscape.start()).unwrap();
     assert_eq!(done.gradients, [row]);
     assert_eq!(done.lens.surfaces[row].medium, lens.surfaces[row].medium);
     assert_eq!(done.glasses.len(), 2, "the model glasses are exchanged, and they alone");
@@ -312,7 +322,7 @@ fn a_finished_lens_keeps_its_gradients() {
 #[test]
 fn nothing_is_opened_where_a_gradient_is_not_known() {
     let (lens, row) = triplet(&[-2e-4], &[-0.004]);
-    let open = opened(&lens, 30.0);
+    let open = with_open_apertures(&lens, 30.0);
     let rims = |lens: &Lens| -> Vec<f64> {
         lens.surfaces.iter().filter_map(|row| row.semi_diameter).collect()
     };
@@ -323,7 +333,7 @@ fn nothing_is_opened_where_a_gradient_is_not_known() {
     assert!(after[row - 1] <= before[row] && after[row] <= before[row + 1], "{after:?}");
     assert_lens(&open);
     // So no plate is opened to where its index would fall below 1.
-    let plate = opened(&bundled("wood_lens_60"), 40.0);
+    let plate = with_open_apertures(&bundled("wood_lens_60"), 40.0);
     assert_eq!(rims(&plate), [7.5, 8.0]);
-    assert!(plate.system(0, 0.5875618).is_ok());
+    assert!(plate.resolve(0, 0.5875618).is_ok());
 }

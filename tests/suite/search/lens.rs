@@ -4,13 +4,18 @@
 use super::super::merit::bundled;
 use super::seeded;
 use aplanat::lens::{
-    Field, FieldKind, Fields, Lens, Medium, Parameter, Quantity, Variable, Wavelength,
+    FieldKind, FieldPoint, Fields, Lens, Medium, Parameter, Quantity, Variable, Wavelength,
 };
 use aplanat::math::quadrature::gauss_legendre;
-use aplanat::merit::{Goal, PupilEdge, Term, Weighted};
-use aplanat::optimize::{Memory, Method};
-use aplanat::search::lens::{Figures, LensLandscape, Local, Plan, finish, goal, opened, run};
-use aplanat::search::{Kind, Landscape, Rules, RunOf, Settings, Temperature};
+use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use aplanat::optimize::{DescentMethod, DescentState};
+use aplanat::search::lens::{
+    DescentSettings, LensLandscape, LensSummary, SearchPlan, finalize, goal, run,
+    with_open_apertures,
+};
+use aplanat::search::{
+    Landscape, MutationKind, SearchRules, SearchRunOn, SearchSettings, Temperature,
+};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
@@ -20,11 +25,11 @@ fn wide_open() -> Lens {
     let mut lens = bundled("double_gauss_nikkor_s_50");
     lens.variables.clear();
     let angle = |height: f64| (height / 50.0).atan().to_degrees();
-    let field = |height| Field { x: 0.0, y: angle(height), weight: 1.0 };
+    let field = |height| FieldPoint { x: 0.0, y: angle(height), weight: 1.0 };
     let values = [0.0, 7.0, 14.0, 21.0].map(field).to_vec();
     lens.fields = Fields { kind: FieldKind::Angle, values };
     lens.wavelengths = vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }];
-    opened(&lens, 20.0)
+    with_open_apertures(&lens, 20.0)
 }
 
 /// A triplet in one colour.
@@ -34,13 +39,14 @@ fn triplet() -> Lens {
     lens
 }
 
-fn plan(gradients: u64) -> Plan {
-    let usual = Plan::default().settings;
-    let settings = Settings { gradients: Some(gradients), chains: 3, seed: 5, c: 0.3, ..usual };
-    Plan { settings, ..Plan::default() }
+fn plan(gradients: u64) -> SearchPlan {
+    let usual = SearchPlan::default().settings;
+    let settings =
+        SearchSettings { gradients: Some(gradients), chains: 3, seed: 5, c: 0.3, ..usual };
+    SearchPlan { settings, ..SearchPlan::default() }
 }
 
-fn whole(lens: &Lens, plan: &Plan) -> RunOf<LensLandscape> {
+fn whole(lens: &Lens, plan: &SearchPlan) -> SearchRunOn<LensLandscape> {
     run(lens, plan, |_, _| ControlFlow::Continue(())).unwrap()
 }
 
@@ -48,7 +54,7 @@ fn whole(lens: &Lens, plan: &Plan) -> RunOf<LensLandscape> {
 /// Gauss nodes in the square of the radius, and so loses a part of the outermost one.
 #[test]
 fn the_start_is_that_of_the_thesis() {
-    let figures = Figures::of(&wide_open(), 1e-5).unwrap();
+    let figures = LensSummary::new(&wide_open(), 1e-5).unwrap();
     assert!((figures.focal_lengths[0].unwrap() - 50.16).abs() < 0.01);
     assert_eq!(figures.topology, "1|2|stop|2|1|1");
     // Clear areas in mm² and RMS radii in mm that its program reaches there.
@@ -70,13 +76,13 @@ fn the_start_is_that_of_the_thesis() {
 fn a_move_depends_on_lens_and_memory_alone() {
     let lens = wide_open();
     let landscape = plan(1).landscape(&lens).unwrap();
-    let (mut at, mut memory) = (landscape.start().clone(), Memory::default());
+    let (mut at, mut memory) = (landscape.start().clone(), DescentState::default());
     let before = landscape.loss(&at);
     let mut loss = before;
     for _ in 0..14 {
         let written = serde_json::to_string(&(&at, &memory)).unwrap();
         let (there, found, gradients) = landscape.descend(&at, &mut memory);
-        let (read, mut remembered): (Lens, Memory) = serde_json::from_str(&written).unwrap();
+        let (read, mut remembered): (Lens, DescentState) = serde_json::from_str(&written).unwrap();
         let again = landscape.descend(&read, &mut remembered);
         assert_eq!((&there, found.to_bits()), (&again.0, again.1.to_bits()));
         assert_eq!((memory.clone(), gradients), (remembered, again.2));
@@ -85,9 +91,9 @@ fn a_move_depends_on_lens_and_memory_alone() {
     println!("loss {before:.5} to {loss:.5}");
     assert!(loss < 0.01 * before);
     assert_eq!(loss, landscape.loss(&at), "the loss of a move is that of the lens where it ends");
-    let descended = Figures::of(&at, 1e-4).unwrap();
-    let start = Figures::of(&lens, 1e-4).unwrap();
-    let square = |figures: &Figures| {
+    let descended = LensSummary::new(&at, 1e-4).unwrap();
+    let start = LensSummary::new(&lens, 1e-4).unwrap();
+    let square = |figures: &LensSummary| {
         figures.fields.iter().map(|field| field.spot.unwrap().value.powi(2)).sum::<f64>()
     };
     assert!(square(&descended) < 0.25 * square(&start));
@@ -106,8 +112,9 @@ fn a_search_is_the_same_on_one_thread_and_on_two() {
     let (one, two) = (on(1), on(2));
     assert_eq!(one, two);
     assert!(one.best().loss < 0.1 * one.start().loss);
-    assert!(one.tree().born() > 3);
-    let other = Plan { settings: Settings { seed: 6, ..plan(80).settings }, ..plan(80) };
+    assert!(one.lineage().total() > 3);
+    let other =
+        SearchPlan { settings: SearchSettings { seed: 6, ..plan(80).settings }, ..plan(80) };
     assert_ne!(whole(&lens, &other).best().point, one.best().point);
 }
 
@@ -115,7 +122,7 @@ fn a_search_is_the_same_on_one_thread_and_on_two() {
 fn searches_at_both_ends_of_their_settings_stay_finite() {
     let lens = triplet();
     let base = plan(120);
-    let with = |change: &dyn Fn(&mut Settings)| {
+    let with = |change: &dyn Fn(&mut SearchSettings)| {
         let mut plan = base.clone();
         change(&mut plan.settings);
         plan
@@ -127,8 +134,8 @@ fn searches_at_both_ends_of_their_settings_stay_finite() {
         with(&|s| s.reservoir = 1),
         with(&|s| s.gamma = 1.0),
         with(&|s| (s.c, s.chains) = (0.0, 1)),
-        with(&|s| s.method = aplanat::search::Method::Metropolis),
-        with(&|s| s.method = aplanat::search::Method::Brute),
+        with(&|s| s.method = aplanat::search::SearchMethod::Metropolis),
+        with(&|s| s.method = aplanat::search::SearchMethod::Brute),
     ] {
         let run = whole(&lens, &plan);
         assert!(run.best().loss.is_finite() && run.best().loss <= run.start().loss);
@@ -147,14 +154,18 @@ fn forbidden_kinds_are_not_tried_and_elements_are_counted() {
     plan.settings.gamma = 0.0;
     plan.settings.c = 0.5;
     plan.rules.elements = [3, 4];
-    let tried = [Kind::AddSinglet, Kind::RemoveSinglet];
-    let forbidden = Kind::MUTATIONS.into_iter().filter(|kind| !tried.contains(kind));
+    let tried = [MutationKind::AddSinglet, MutationKind::RemoveSinglet];
+    let forbidden = MutationKind::MUTATIONS.into_iter().filter(|kind| !tried.contains(kind));
     plan.rules.weights = forbidden.map(|kind| (kind, 0.0)).collect();
     let run = whole(&lens, &plan);
-    assert!(run.tree().born() > 4);
+    assert!(run.lineage().total() > 4);
     assert!(run.statistics().kinds.keys().all(|kind| tried.contains(kind)));
-    for node in run.tree().nodes() {
-        assert!((3..=4).contains(&aplanat::search::element::pieces(&node.point)), "{}", node.what);
+    for node in run.lineage().nodes() {
+        assert!(
+            (3..=4).contains(&aplanat::search::element::piece_count(&node.point)),
+            "{}",
+            node.what
+        );
     }
 }
 
@@ -177,7 +188,7 @@ fn numbers_that_are_not_flagged_stay_as_they_are() {
     let start = run.start().point.variables.iter().filter(held).count();
     assert!(start > rows);
     let mut kept = 0;
-    for node in run.tree().nodes() {
+    for node in run.lineage().nodes() {
         for variable in node.point.variables.iter().filter(held) {
             assert_eq!(node.point.get(variable.parameter), variable.min, "{}", node.what);
             kept += 1;
@@ -191,10 +202,10 @@ fn numbers_that_are_not_flagged_stay_as_they_are() {
 fn a_start_without_light_is_refused_or_led_to_light() {
     let mut lens = wide_open();
     let stop = lens.stop().unwrap();
-    let sharp = vec![Weighted { term: Term::Spot, weight: 1.0 }];
+    let sharp = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
     let only = Goal { terms: sharp, pupil: PupilEdge::Moving, zoom_ratios: Vec::new() };
     lens.surfaces[stop + 1].semi_diameter = Some(0.0);
-    let dark = Plan { goal: Some(only), ..plan(40) };
+    let dark = SearchPlan { goal: Some(only), ..plan(40) };
     let refusal = run(&lens, &dark, |_, _| ControlFlow::Continue(())).unwrap_err();
     assert!(refusal.to_string().contains("no light gets through"), "{refusal}");
     match run(&lens, &plan(60), |_, _| ControlFlow::Continue(())) {
@@ -206,13 +217,14 @@ fn a_start_without_light_is_refused_or_led_to_light() {
 #[test]
 fn a_merit_beyond_all_numbers_is_refused() {
     let lens = wide_open();
-    let terms = vec![Weighted { term: Term::FocalLength(-1e200), weight: 1e200 }];
+    let terms = vec![WeightedTerm { term: Term::FocalLength(-1e200), weight: 1e200 }];
     let absurd = Goal { terms, pupil: PupilEdge::Moving, zoom_ratios: Vec::new() };
-    let plan = Plan { goal: Some(absurd), ..plan(40) };
+    let plan = SearchPlan { goal: Some(absurd), ..plan(40) };
     let refusal = run(&lens, &plan, |_, _| ControlFlow::Continue(())).unwrap_err();
     assert!(refusal.to_string().contains("finite") || refusal.to_string().contains("loss"));
-    let local = Local { tolerance: 0.0, ..Local::default() };
-    let refusal = run(&lens, &Plan { local, goal: None, ..plan }, |_, _| ControlFlow::Break(()));
+    let local = DescentSettings { tolerance: 0.0, ..DescentSettings::default() };
+    let refusal =
+        run(&lens, &SearchPlan { local, goal: None, ..plan }, |_, _| ControlFlow::Break(()));
     assert!(refusal.unwrap_err().to_string().contains("tolerance"));
 }
 
@@ -220,9 +232,9 @@ fn a_merit_beyond_all_numbers_is_refused() {
 fn a_zoom_lens_in_three_colours_descends() {
     let lens = bundled("zoom_nikkor_28_80");
     // A published zoom lies in a narrow valley: the first few dampings are too small for it.
-    let local = Local { steps: 12, tolerance: 0.03, ..Local::default() };
-    let landscape = Plan { local, ..Plan::default() }.landscape(&lens).unwrap();
-    let mut memory = Memory::default();
+    let local = DescentSettings { steps: 12, tolerance: 0.03, ..DescentSettings::default() };
+    let landscape = SearchPlan { local, ..SearchPlan::default() }.landscape(&lens).unwrap();
+    let mut memory = DescentState::default();
     let start = landscape.start();
     let (there, loss, gradients) = landscape.descend(start, &mut memory);
     assert!(gradients > 0 && loss < landscape.loss(start));
@@ -233,11 +245,11 @@ fn a_zoom_lens_in_three_colours_descends() {
 fn lenses_from_anywhere_have_the_focal_length_and_pass_light() {
     let mut free = triplet();
     free.variables.clear();
-    let landscape = Plan::default().landscape(&free).unwrap();
+    let landscape = SearchPlan::default().landscape(&free).unwrap();
     let mut random = seeded(3);
     for _ in 0..3 {
         let drawn = landscape.draw(&mut random).unwrap();
-        let focal = Figures::of(&drawn, 1e-2).unwrap().focal_lengths[0].unwrap();
+        let focal = LensSummary::new(&drawn, 1e-2).unwrap().focal_lengths[0].unwrap();
         assert!((focal / 100.0 - 1.0).abs() < 0.02, "{focal}");
         assert_eq!(landscape.topology(&drawn), landscape.topology(landscape.start()));
         assert!(landscape.loss(&drawn).is_finite());
@@ -250,21 +262,23 @@ fn a_finished_lens_can_be_made() {
     let mut lens = triplet();
     lens.variables.clear();
     lens.surfaces[0].medium = Medium::Model { nd: 1.6204, vd: 60.3 };
-    let rules = Rules { glass_edge: 1.2, air_edge: 0.2, ..Rules::default() };
+    let rules = SearchRules { glass_edge: 1.2, air_edge: 0.2, ..SearchRules::default() };
     let wanted = goal(&lens, &rules, None, 0.98).unwrap();
-    let landscape = LensLandscape::new(&lens, &wanted, &rules, &Local::default()).unwrap();
-    let finished = finish(&landscape, landscape.start()).unwrap();
+    let landscape =
+        LensLandscape::new(&lens, &wanted, &rules, &DescentSettings::default()).unwrap();
+    let finished = finalize(&landscape, landscape.start()).unwrap();
     assert_eq!(finished.failures(), Vec::<String>::new());
     assert_eq!(finished.glasses.len(), 3, "an old prescription knows index and Abbe number only");
     let glass = &finished.glasses[0];
     assert!((glass.is.0 - 1.6204).abs() < 2e-3 && (glass.is.1 - 60.3).abs() < 1.0, "{glass:?}");
     assert!(finished.limits.iter().filter(|limit| limit.term == "glass_edge").count() == 3);
-    assert!(finished.limits.iter().all(|limit| limit.room() >= 0.0));
+    assert!(finished.limits.iter().all(|limit| limit.slack() >= 0.0));
     finished.lens.check().unwrap();
-    let impossible = Rules { track: Some(20.0), ..rules };
+    let impossible = SearchRules { track: Some(20.0), ..rules };
     let wanted = goal(&lens, &impossible, None, 0.98).unwrap();
-    let landscape = LensLandscape::new(&lens, &wanted, &impossible, &Local::default()).unwrap();
-    let failures = finish(&landscape, landscape.start()).unwrap().failures();
+    let landscape =
+        LensLandscape::new(&lens, &wanted, &impossible, &DescentSettings::default()).unwrap();
+    let failures = finalize(&landscape, landscape.start()).unwrap().failures();
     assert!(failures.iter().any(|failure| failure.contains("total track")), "{failures:?}");
 }
 
@@ -272,12 +286,12 @@ fn a_finished_lens_can_be_made() {
 fn adam_and_coarse_beginnings_descend_too() {
     let lens = wide_open();
     for local in [
-        Local { method: Method::Adam, ..Local::default() },
-        Local { coarse: 0.1, coarse_steps: 60, ..Local::default() },
-        Local { rims: false, ..Local::default() },
+        DescentSettings { method: DescentMethod::Adam, ..DescentSettings::default() },
+        DescentSettings { coarse: 0.1, coarse_steps: 60, ..DescentSettings::default() },
+        DescentSettings { rims: false, ..DescentSettings::default() },
     ] {
-        let landscape = Plan { local, ..plan(1) }.landscape(&lens).unwrap();
-        let (mut at, mut memory) = (landscape.start().clone(), Memory::default());
+        let landscape = SearchPlan { local, ..plan(1) }.landscape(&lens).unwrap();
+        let (mut at, mut memory) = (landscape.start().clone(), DescentState::default());
         let before = landscape.loss(&at);
         let mut after = before;
         for _ in 0..6 {
@@ -291,7 +305,7 @@ fn adam_and_coarse_beginnings_descend_too() {
 fn every_field_may_be_asked_for_its_own_light() {
     let lens = wide_open();
     let asking = |light: &[f64]| {
-        let plan = Plan { light: light.to_vec(), ..plan(1) };
+        let plan = SearchPlan { light: light.to_vec(), ..plan(1) };
         plan.landscape(&lens).map(|landscape| landscape.loss(landscape.start()))
     };
     let usual = asking(&[1.0]).unwrap();

@@ -14,7 +14,7 @@ mod rugged;
 mod rules;
 mod sampling;
 
-use aplanat::search::{Random, Rules};
+use aplanat::search::{Random, SearchRules};
 use rand::SeedableRng as _;
 
 fn seeded(seed: u64) -> Random {
@@ -22,6 +22,6 @@ fn seeded(seed: u64) -> Random {
 }
 
 /// Rules that let every lens of the library change.
-fn generous() -> Rules {
-    Rules { elements: [1, 24], ..Rules::default() }
+fn generous() -> SearchRules {
+    SearchRules { elements: [1, 24], ..SearchRules::default() }
 }

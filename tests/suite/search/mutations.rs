@@ -4,10 +4,12 @@
 use super::{generous, seeded};
 use crate::merit::bundled;
 use aplanat::files;
-use aplanat::lens::{Field, Lens, Medium, NumberKind, Parameter, Pickup, Quantity, System, vary};
-use aplanat::pupil::{Bench, Region};
-use aplanat::search::element::{elements, pieces, topology};
-use aplanat::search::{Kind, Mutant, Rules, mutate, propose};
+use aplanat::lens::{
+    FieldPoint, Lens, Medium, Parameter, ParameterKind, Pickup, Quantity, System, add_variables,
+};
+use aplanat::pupil::{RayModel, Region};
+use aplanat::search::element::{elements, piece_count, topology};
+use aplanat::search::{MutatedLens, MutationKind, SearchRules, mutate, propose};
 
 /// A lens is one at every zoom position: it can be resolved, and no surfaces cross within the rims of
 /// both.
@@ -15,7 +17,7 @@ pub(super) fn assert_lens(lens: &Lens) {
     lens.check().unwrap();
     let um = lens.wavelengths[lens.primary()].um;
     for zoom in 0..lens.zoom_positions() {
-        let system = lens.system(zoom, um).unwrap();
+        let system = lens.resolve(zoom, um).unwrap();
         for gap in 0..lens.surfaces.len() - 1 {
             assert_apart(&system, gap);
         }
@@ -39,10 +41,10 @@ fn assert_apart(system: &System<f64>, gap: usize) {
 
 #[test]
 fn every_kind_on_every_lens_leaves_a_lens_or_a_reason() {
-    for entry in files::library() {
+    for entry in files::bundled_lenses() {
         let lens = bundled(entry.name);
         let mut random = seeded(1);
-        for kind in Kind::MUTATIONS.repeat(8) {
+        for kind in MutationKind::MUTATIONS.repeat(8) {
             match mutate(kind, &lens, &generous(), &mut random) {
                 Ok(mutant) => {
                     assert_lens(&mutant.lens);
@@ -63,79 +65,84 @@ fn the_pattern_of_glass_and_air_is_read_from_the_rows() {
     assert_eq!(pattern("achromat_ac254_100"), "stop|2");
     assert_eq!(pattern("telescope_rc_f8"), "stop|m|m");
     assert_eq!(pattern("telephoto_nikkor_135_f28"), "1|1|stop|2|1");
-    assert_eq!(pieces(&bundled("heliar_100_f45")), 5);
+    assert_eq!(piece_count(&bundled("heliar_100_f45")), 5);
 }
 
 #[test]
 fn each_kind_changes_the_pattern_as_it_says() {
     let lens = bundled("double_gauss_nikkor_s_50");
-    let after = |kind: Kind, seed: u64| {
+    let after = |kind: MutationKind, seed: u64| {
         let mutant = mutate(kind, &lens, &generous(), &mut seeded(seed)).unwrap();
-        (topology(&mutant.lens), pieces(&mutant.lens), mutant)
+        (topology(&mutant.lens), piece_count(&mutant.lens), mutant)
     };
     for seed in 0..12 {
-        let (_, count, mutant) = after(Kind::AddSinglet, seed);
+        let (_, count, mutant) = after(MutationKind::AddSinglet, seed);
         assert_eq!((count, mutant.fresh.len()), (8, 1));
         assert_eq!(mutant.lens.surfaces.len(), lens.surfaces.len() + 2);
-        let (_, count, _) = after(Kind::RemoveSinglet, seed);
+        let (_, count, _) = after(MutationKind::RemoveSinglet, seed);
         assert_eq!(count, 6);
-        let (pattern, count, _) = after(Kind::Glue, seed);
+        let (pattern, count, _) = after(MutationKind::Glue, seed);
         assert_eq!(count, 7);
         assert!(["3|stop|2|1|1", "1|2|stop|3|1", "1|2|stop|2|2"].contains(&&*pattern));
-        let (pattern, count, _) = after(Kind::Split, seed);
+        let (pattern, count, _) = after(MutationKind::Split, seed);
         assert_eq!(count, 7);
         assert!(["1|1|1|stop|2|1|1", "1|2|stop|1|1|1|1"].contains(&&*pattern), "{pattern}");
-        let (_, count, _) = after(Kind::DropLayer, seed);
+        let (_, count, _) = after(MutationKind::DropLayer, seed);
         assert_eq!(count, 6);
-        for kind in [Kind::Bend, Kind::Flip, Kind::ExchangeGlass] {
+        for kind in [MutationKind::Bend, MutationKind::Flip, MutationKind::ExchangeGlass] {
             assert_eq!(after(kind, seed).0, "1|2|stop|2|1|1");
         }
-        assert_eq!(after(Kind::MoveStop, seed).2.lens.surfaces.len(), lens.surfaces.len());
+        assert_eq!(after(MutationKind::MoveStop, seed).2.lens.surfaces.len(), lens.surfaces.len());
     }
 }
 
 #[test]
 fn limits_of_the_rules_are_reasons() {
     let lens = bundled("double_gauss_nikkor_s_50");
-    let refused = |kind: Kind, rules: Rules| {
+    let refused = |kind: MutationKind, rules: SearchRules| {
         mutate(kind, &lens, &rules, &mut seeded(1)).unwrap_err().to_string()
     };
-    let full = Rules { elements: [2, 7], ..Rules::default() };
+    let full = SearchRules { elements: [2, 7], ..SearchRules::default() };
     assert_eq!(
-        refused(Kind::AddSinglet, full),
+        refused(MutationKind::AddSinglet, full),
         "add singlet: the lens has 7 elements, the rules allow 7"
     );
-    let least = Rules { elements: [7, 9], ..Rules::default() };
-    assert!(refused(Kind::RemoveSinglet, least.clone()).contains("the rules ask for 7"));
-    assert!(refused(Kind::DropLayer, least).contains("the rules ask for 7"));
-    let held = Rules { kept: [13, 0], ..Rules::default() };
-    for kind in Kind::MUTATIONS {
+    let least = SearchRules { elements: [7, 9], ..SearchRules::default() };
+    assert!(refused(MutationKind::RemoveSinglet, least.clone()).contains("the rules ask for 7"));
+    assert!(refused(MutationKind::DropLayer, least).contains("the rules ask for 7"));
+    let held = SearchRules { kept: [13, 0], ..SearchRules::default() };
+    for kind in MutationKind::MUTATIONS {
         assert!(mutate(kind, &lens, &held, &mut seeded(1)).is_err(), "{kind:?}");
     }
-    let short = Rules { track: Some(10.0), ..Rules::default() };
-    let longer =
-        (0..20).filter_map(|seed| mutate(Kind::AddSinglet, &lens, &short, &mut seeded(seed)).err());
+    let short = SearchRules { track: Some(10.0), ..SearchRules::default() };
+    let longer = (0..20).filter_map(|seed| {
+        mutate(MutationKind::AddSinglet, &lens, &short, &mut seeded(seed)).err()
+    });
     assert!(longer.into_iter().all(|refusal| refusal.why.contains("mm long")));
 }
 
 #[test]
 fn the_only_element_stays() {
     let lens = bundled("singlet_la1131");
-    let rules = Rules { elements: [0, 8], ..Rules::default() };
-    let refusal = mutate(Kind::RemoveSinglet, &lens, &rules, &mut seeded(1)).unwrap_err();
+    let rules = SearchRules { elements: [0, 8], ..SearchRules::default() };
+    let refusal = mutate(MutationKind::RemoveSinglet, &lens, &rules, &mut seeded(1)).unwrap_err();
     assert!(refusal.why.contains("no singlet that may go"), "{refusal}");
 }
 
 #[test]
 fn a_forbidden_kind_is_not_proposed() {
     let lens = bundled("double_gauss_nikkor_s_50");
-    let weights = Kind::MUTATIONS.map(|kind| (kind, f64::from(u8::from(kind == Kind::Flip))));
-    let only = Rules { weights: weights.to_vec(), ..generous() };
+    let weights =
+        MutationKind::MUTATIONS.map(|kind| (kind, f64::from(u8::from(kind == MutationKind::Flip))));
+    let only = SearchRules { weights: weights.to_vec(), ..generous() };
     let mut random = seeded(2);
     for _ in 0..20 {
-        assert_eq!(propose(&lens, &only, &mut random).unwrap().kind, Kind::Flip);
+        assert_eq!(propose(&lens, &only, &mut random).unwrap().kind, MutationKind::Flip);
     }
-    let none = Rules { weights: Kind::MUTATIONS.map(|kind| (kind, 0.0)).to_vec(), ..generous() };
+    let none = SearchRules {
+        weights: MutationKind::MUTATIONS.map(|kind| (kind, 0.0)).to_vec(),
+        ..generous()
+    };
     assert!(propose(&lens, &none, &mut random).is_err());
 }
 
@@ -148,11 +155,11 @@ fn elements_of_the_same_glass_are_not_glued() {
     for row in [0, 2, 4] {
         lens.surfaces[row].medium = glass.clone();
     }
-    let refusal = mutate(Kind::Glue, &lens, &generous(), &mut seeded(1)).unwrap_err();
+    let refusal = mutate(MutationKind::Glue, &lens, &generous(), &mut seeded(1)).unwrap_err();
     assert!(refusal.why.contains("different glass"), "{refusal}");
     // An index that is the same by chance makes an interface without effect, and still a lens.
     lens.surfaces[2].medium = Medium::Model { nd: 1.5168, vd: 64.17 };
-    let mutant = mutate(Kind::Glue, &lens, &generous(), &mut seeded(1));
+    let mutant = mutate(MutationKind::Glue, &lens, &generous(), &mut seeded(1));
     mutant.into_iter().for_each(|mutant| assert_lens(&mutant.lens));
 }
 
@@ -160,15 +167,15 @@ fn elements_of_the_same_glass_are_not_glued() {
 fn only_listed_glasses_are_used() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let glasses = vec!["SCHOTT N-BK7".to_owned(), "SCHOTT N-SF6".to_owned()];
-    let rules = Rules { glasses: glasses.clone(), ..generous() };
+    let rules = SearchRules { glasses: glasses.clone(), ..generous() };
     let mut random = seeded(3);
     for _ in 0..20 {
-        let mutant = mutate(Kind::AddSinglet, &lens, &rules, &mut random).unwrap();
+        let mutant = mutate(MutationKind::AddSinglet, &lens, &rules, &mut random).unwrap();
         let Medium::Glass(name) = &mutant.lens.surfaces[mutant.fresh[0]].medium else { panic!() };
         assert!(glasses.contains(name), "{name}");
     }
-    let unknown = Rules { glasses: vec!["NO SUCH".to_owned()], ..generous() };
-    assert!(mutate(Kind::AddSinglet, &lens, &unknown, &mut random).is_err());
+    let unknown = SearchRules { glasses: vec!["NO SUCH".to_owned()], ..generous() };
+    assert!(mutate(MutationKind::AddSinglet, &lens, &unknown, &mut random).is_err());
 }
 
 #[test]
@@ -180,16 +187,21 @@ fn aspheres_and_mirrors_survive() {
     for (name, count) in [("phone_us7558005_1", 8), ("double_gauss_canon_fd50_f12", 1)] {
         let lens = bundled(name);
         assert_eq!(figured(&lens), count);
-        for kind in [Kind::AddSinglet, Kind::Bend, Kind::Flip, Kind::MoveStop] {
+        for kind in [
+            MutationKind::AddSinglet,
+            MutationKind::Bend,
+            MutationKind::Flip,
+            MutationKind::MoveStop,
+        ] {
             let mutant = mutate(kind, &lens, &generous(), &mut seeded(4)).unwrap();
             assert_eq!(figured(&mutant.lens), count, "{name}: {}", mutant.what);
         }
     }
     let telescope = bundled("telescope_rc_f8");
-    let rules = Rules { elements: [0, 4], ..Rules::default() };
+    let rules = SearchRules { elements: [0, 4], ..SearchRules::default() };
     let mut random = seeded(5);
     for _ in 0..30 {
-        let mutant = mutate(Kind::AddSinglet, &telescope, &rules, &mut random).unwrap();
+        let mutant = mutate(MutationKind::AddSinglet, &telescope, &rules, &mut random).unwrap();
         assert_lens(&mutant.lens);
         assert_eq!(elements(&mutant.lens).len(), 3);
         let mirrors = mutant.lens.surfaces.iter().filter(|row| row.medium == Medium::Mirror);
@@ -201,7 +213,7 @@ fn aspheres_and_mirrors_survive() {
 fn what_follows_another_number_goes_on_following_it() {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.variables.clear();
-    vary(&mut lens, &[NumberKind::Curvatures]);
+    add_variables(&mut lens, &[ParameterKind::Curvatures]);
     let follows = |surface, source| Pickup {
         parameter: Parameter::new(surface, Quantity::Curvature),
         source: Parameter::new(source, Quantity::Curvature),
@@ -211,7 +223,7 @@ fn what_follows_another_number_goes_on_following_it() {
     lens.variables.retain(|v| v.parameter.surface < 9);
     lens.pickups = vec![follows(9, 1), follows(10, 0)];
     let mut random = seeded(6);
-    for kind in Kind::MUTATIONS.repeat(10) {
+    for kind in MutationKind::MUTATIONS.repeat(10) {
         let Ok(mutant) = mutate(kind, &lens, &generous(), &mut random) else { continue };
         assert_lens(&mutant.lens);
         assert_eq!(mutant.lens.pickups.len(), 2, "{}", mutant.what);
@@ -234,7 +246,12 @@ fn same(a: &Lens, b: &Lens) -> bool {
 
 /// Some draw of the mutation that undoes it leads back with a ratio that cancels. Other draws may
 /// lead to the same lens on other ways, as an element that goes with the air behind it.
-fn assert_undone(lens: &Lens, there: &Mutant, back: Kind, rules: &Rules) -> bool {
+fn assert_undone(
+    lens: &Lens,
+    there: &MutatedLens,
+    back: MutationKind,
+    rules: &SearchRules,
+) -> bool {
     let Some(log) = there.log_ratio else { return false };
     let mut others = Vec::new();
     for seed in 0..400 {
@@ -252,14 +269,17 @@ fn assert_undone(lens: &Lens, there: &Mutant, back: Kind, rules: &Rules) -> bool
 
 #[test]
 fn a_mutation_and_the_one_that_undoes_it_are_a_reversible_pair() {
-    let rules = Rules { weights: vec![(Kind::AddSinglet, 3.0), (Kind::Split, 0.5)], ..generous() };
+    let rules = SearchRules {
+        weights: vec![(MutationKind::AddSinglet, 3.0), (MutationKind::Split, 0.5)],
+        ..generous()
+    };
     for name in ["heliar_100_f45", "achromat_ac254_100", "tessar_50_f28"] {
         let mut lens = bundled(name);
         lens.variables.clear();
         for (there, back) in [
-            (Kind::AddSinglet, Kind::RemoveSinglet),
-            (Kind::Split, Kind::Glue),
-            (Kind::Flip, Kind::Flip),
+            (MutationKind::AddSinglet, MutationKind::RemoveSinglet),
+            (MutationKind::Split, MutationKind::Glue),
+            (MutationKind::Flip, MutationKind::Flip),
         ] {
             let undone = (0..10).filter(|seed| {
                 let mutant = mutate(there, &lens, &rules, &mut seeded(*seed)).unwrap();
@@ -275,14 +295,14 @@ fn a_mutation_and_the_one_that_undoes_it_are_a_reversible_pair() {
 #[test]
 fn without_projection_numbers_stay() {
     let lens = bundled("heliar_100_f45");
-    let rules = Rules { projection: false, ..generous() };
-    let mutant = mutate(Kind::Bend, &lens, &rules, &mut seeded(1)).unwrap();
+    let rules = SearchRules { projection: false, ..generous() };
+    let mutant = mutate(MutationKind::Bend, &lens, &rules, &mut seeded(1)).unwrap();
     assert_eq!((mutant.projection, mutant.log_ratio), (None, Some(0.0)));
-    let mutant = mutate(Kind::AddSinglet, &lens, &rules, &mut seeded(1)).unwrap();
+    let mutant = mutate(MutationKind::AddSinglet, &lens, &rules, &mut seeded(1)).unwrap();
     assert!(mutant.log_ratio.is_some());
     for seed in 0..10 {
-        let mutant = mutate(Kind::Split, &lens, &rules, &mut seeded(seed)).unwrap();
-        assert!(assert_undone(&lens, &mutant, Kind::Glue, &rules));
+        let mutant = mutate(MutationKind::Split, &lens, &rules, &mut seeded(seed)).unwrap();
+        assert!(assert_undone(&lens, &mutant, MutationKind::Glue, &rules));
     }
 }
 
@@ -295,7 +315,7 @@ fn size(lens: &Lens) -> usize {
 
 fn chain(name: &str, moves: usize) {
     let start = bundled(name);
-    let rules = Rules { elements: [2, 10], ..Rules::default() };
+    let rules = SearchRules { elements: [2, 10], ..SearchRules::default() };
     let mut random = seeded(2026);
     let (mut lens, mut refused, mut made, mut most) = (start.clone(), 0, 0, 0);
     for number in 0..moves {
@@ -328,9 +348,9 @@ fn a_hundred_thousand_mutations_leave_a_lens() {
 
 /// The share of its axial pupil that a lens lets through at the wavelength of its focal length.
 fn clear(lens: &Lens) -> f64 {
-    let bench = Bench::of(lens, 0).unwrap();
-    let axis = Field { x: 0.0, y: 0.0, weight: 1.0 };
-    Region::new(bench.launch(axis, bench.primary).unwrap()).lit(4).area()
+    let bench = RayModel::from_lens(lens, 0).unwrap();
+    let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
+    Region::new(bench.launch(axis, bench.primary).unwrap()).trace_pupil(4).signed_area()
 }
 
 /// A new element shall not be punished for light that only its rims took away.
@@ -341,13 +361,13 @@ fn a_new_element_lets_the_light_through() {
     {
         let lens = bundled(name);
         let (mut random, before) = (seeded(5), clear(&lens));
-        for kind in [Kind::AddSinglet, Kind::Split, Kind::Glue] {
+        for kind in [MutationKind::AddSinglet, MutationKind::Split, MutationKind::Glue] {
             let mutants =
                 (0..60).filter_map(|_| mutate(kind, &lens, &generous(), &mut random).ok());
             let shares: Vec<f64> = mutants.map(|m| clear(&m.lens) / before).collect();
             let sound = shares.iter().filter(|share| **share > 0.9).count();
             println!("{name}: {}: {sound} of {} keep their light", kind.name(), shares.len());
-            assert!(kind == Kind::Glue || 2 * sound > shares.len());
+            assert!(kind == MutationKind::Glue || 2 * sound > shares.len());
         }
     }
 }

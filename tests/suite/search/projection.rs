@@ -4,17 +4,17 @@
 use super::{generous, seeded};
 use crate::merit::bundled;
 use aplanat::files;
-use aplanat::lens::{Lens, NumberKind, Parameter, Quantity, Row, Variable, vary};
+use aplanat::lens::{Lens, Parameter, ParameterKind, Quantity, Row, Variable, add_variables};
 use aplanat::lens::{Medium, Object};
 use aplanat::paraxial::{paraxial_ray, signed_indices};
-use aplanat::search::{Kind, Mutant, Mutated, Rules, mutate};
+use aplanat::search::{MutatedLens, MutatedPoint, MutationKind, SearchRules, mutate};
 use nalgebra::DMatrix;
 
 /// Height and `nu` of the marginal ray at the image, at every zoom position.
 fn kept(lens: &Lens) -> Vec<[f64; 2]> {
     let um = lens.wavelengths[lens.primary()].um;
     let at = |zoom: usize| {
-        let system = lens.system(zoom, um).unwrap();
+        let system = lens.resolve(zoom, um).unwrap();
         let (height, slope) = match lens.object {
             Object::Infinity => (1.0, 0.0),
             Object::Finite(distance) => (distance, 1.0),
@@ -26,7 +26,7 @@ fn kept(lens: &Lens) -> Vec<[f64; 2]> {
     (0..lens.zoom_positions()).map(at).collect()
 }
 
-pub(super) fn assert_equivalent(before: &Lens, mutant: &Mutant) {
+pub(super) fn assert_equivalent(before: &Lens, mutant: &MutatedLens) {
     for (was, is) in kept(before).iter().zip(kept(&mutant.lens)) {
         let start = match before.object {
             Object::Infinity => 1.0,
@@ -42,10 +42,10 @@ pub(super) fn assert_equivalent(before: &Lens, mutant: &Mutant) {
 #[test]
 fn a_mutated_lens_focuses_as_before() {
     let mut made = 0;
-    for entry in files::library() {
+    for entry in files::bundled_lenses() {
         let lens = bundled(entry.name);
         let mut random = seeded(11);
-        for kind in Kind::MUTATIONS.repeat(6) {
+        for kind in MutationKind::MUTATIONS.repeat(6) {
             if let Ok(mutant) = mutate(kind, &lens, &generous(), &mut random) {
                 assert_equivalent(&lens, &mutant);
                 made += 1;
@@ -58,10 +58,10 @@ fn a_mutated_lens_focuses_as_before() {
 #[test]
 fn a_solved_focus_stays_solved() {
     let mut lens = bundled("double_gauss_rudolph_50");
-    lens.focus = Some(-0.05);
+    lens.image_solve = Some(-0.05);
     lens.variables.clear();
     let mut random = seeded(12);
-    for kind in Kind::MUTATIONS.repeat(5) {
+    for kind in MutationKind::MUTATIONS.repeat(5) {
         if let Ok(mutant) = mutate(kind, &lens, &generous(), &mut random) {
             assert_equivalent(&lens, &mutant);
         }
@@ -74,7 +74,12 @@ fn a_solved_focus_stays_solved() {
 fn every_mutation_of_the_double_gauss_is_projected_in_a_few_steps() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let mut random = seeded(13);
-    let kinds = [Kind::AddSinglet, Kind::RemoveSinglet, Kind::Glue, Kind::Split];
+    let kinds = [
+        MutationKind::AddSinglet,
+        MutationKind::RemoveSinglet,
+        MutationKind::Glue,
+        MutationKind::Split,
+    ];
     let mut steps = Vec::new();
     for kind in kinds.repeat(30) {
         let mutant = mutate(kind, &lens, &generous(), &mut random).unwrap();
@@ -89,10 +94,10 @@ fn every_mutation_of_the_double_gauss_is_projected_in_a_few_steps() {
 fn an_afocal_lens_has_nothing_to_keep() {
     let mut lens = bundled("singlet_la1131");
     lens.surfaces[0].curvature = 0.0;
-    let refusal = mutate(Kind::AddSinglet, &lens, &generous(), &mut seeded(1)).unwrap_err();
+    let refusal = mutate(MutationKind::AddSinglet, &lens, &generous(), &mut seeded(1)).unwrap_err();
     assert!(refusal.why.contains("afocal"), "{refusal}");
-    let free = Rules { projection: false, ..generous() };
-    assert!(mutate(Kind::AddSinglet, &lens, &free, &mut seeded(1)).is_ok());
+    let free = SearchRules { projection: false, ..generous() };
+    assert!(mutate(MutationKind::AddSinglet, &lens, &free, &mut seeded(1)).is_ok());
 }
 
 #[test]
@@ -100,8 +105,8 @@ fn a_distance_alone_cannot_keep_the_focal_length() {
     let mut lens = bundled("singlet_la1131");
     lens.surfaces[1].thickness -= 10.0;
     lens.surfaces.push(Row { thickness: 10.0, ..Row::default() });
-    let rules = Rules { kept: [2, 0], ..generous() };
-    let refusal = mutate(Kind::AddSinglet, &lens, &rules, &mut seeded(1)).unwrap_err();
+    let rules = SearchRules { kept: [2, 0], ..generous() };
+    let refusal = mutate(MutationKind::AddSinglet, &lens, &rules, &mut seeded(1)).unwrap_err();
     assert!(refusal.why.contains("cannot keep focal length and focus apart"), "{refusal}");
 }
 
@@ -109,12 +114,12 @@ fn a_distance_alone_cannot_keep_the_focal_length() {
 fn numbers_at_their_bounds_stop_the_projection() {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.variables.clear();
-    vary(&mut lens, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
     let values: Vec<_> = lens.variables.iter().map(|v| lens.get(v.parameter)).collect();
     for (variable, value) in lens.variables.iter_mut().zip(values) {
         (variable.min, variable.max) = (value, value);
     }
-    let refusal = mutate(Kind::AddSinglet, &lens, &generous(), &mut seeded(3)).unwrap_err();
+    let refusal = mutate(MutationKind::AddSinglet, &lens, &generous(), &mut seeded(3)).unwrap_err();
     assert!(refusal.why.contains("bounds"), "{refusal}");
     // With the same numbers held but for a few, those do it alone.
     for surface in [0, 4, 10] {
@@ -122,7 +127,7 @@ fn numbers_at_their_bounds_stop_the_projection() {
         let variable = lens.variables.iter_mut().find(|v| v.parameter == parameter).unwrap();
         *variable = Variable { parameter, min: None, max: None };
     }
-    let mutant = mutate(Kind::AddSinglet, &lens, &generous(), &mut seeded(3)).unwrap();
+    let mutant = mutate(MutationKind::AddSinglet, &lens, &generous(), &mut seeded(3)).unwrap();
     assert_equivalent(&lens, &mutant);
     assert!(mutant.projection.unwrap().distance < 1e-12);
 }
@@ -134,7 +139,7 @@ fn a_curvature_may_cross_zero() {
     let mut random = seeded(5);
     let mut crossed = 0;
     for _ in 0..40 {
-        let mutant = mutate(Kind::Bend, &lens, &generous(), &mut random).unwrap();
+        let mutant = mutate(MutationKind::Bend, &lens, &generous(), &mut random).unwrap();
         assert_equivalent(&lens, &mutant);
         crossed += usize::from(mutant.lens.surfaces[1].curvature < 0.0);
     }
@@ -145,7 +150,7 @@ fn a_curvature_may_cross_zero() {
 fn numbers(lens: &Lens) -> Vec<Parameter> {
     let mut lens = lens.clone();
     lens.variables.clear();
-    vary(&mut lens, &[NumberKind::Curvatures, NumberKind::Thicknesses]);
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
     lens.variables.iter().map(|v| v.parameter).collect()
 }
 
@@ -155,7 +160,7 @@ fn stretch(lens: &Lens, seed: u64) -> f64 {
     let known = numbers(lens);
     let step = |p: &Parameter| if p.quantity == Quantity::Curvature { 1e-2 } else { 1.0 };
     let at = |moved: &Lens| {
-        let mutant = mutate(Kind::Flip, moved, &generous(), &mut seeded(seed)).unwrap();
+        let mutant = mutate(MutationKind::Flip, moved, &generous(), &mut seeded(seed)).unwrap();
         let value = |p: &Parameter| mutant.lens.get(*p).unwrap() / step(p);
         known.iter().map(value).collect::<Vec<f64>>()
     };
@@ -184,7 +189,7 @@ fn the_determinant_of_the_projection_agrees_with_differences() {
         lens.variables.clear();
         let (mut compared, mut largest) = (0, 0.0f64);
         for seed in 0..12 {
-            let mutant = mutate(Kind::Flip, &lens, &generous(), &mut seeded(seed)).unwrap();
+            let mutant = mutate(MutationKind::Flip, &lens, &generous(), &mut seeded(seed)).unwrap();
             let Some(exact) = mutant.log_ratio else { continue };
             let error = (exact - stretch(&lens, seed)).abs();
             assert!(error < 1e-5 * (1.0 + exact.abs()), "{name}, seed {seed}: {exact} {error:e}");
@@ -201,7 +206,7 @@ fn a_zoom_lens_keeps_every_position() {
     let mut random = seeded(7);
     let mut made = 0;
     for _ in 0..20 {
-        let mutant = mutate(Kind::AddSinglet, &lens, &generous(), &mut random).unwrap();
+        let mutant = mutate(MutationKind::AddSinglet, &lens, &generous(), &mut random).unwrap();
         assert_equivalent(&lens, &mutant);
         let glass = mutant
             .fresh
@@ -216,11 +221,11 @@ fn a_zoom_lens_keeps_every_position() {
 fn the_family_tells_how_a_lens_was_projected() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let mut random = seeded(3);
-    let new = mutate(Kind::AddSinglet, &lens, &Rules::default(), &mut random);
-    let told: Mutated<Lens> = new.unwrap().into();
+    let new = mutate(MutationKind::AddSinglet, &lens, &SearchRules::default(), &mut random);
+    let told: MutatedPoint<Lens> = new.unwrap().into();
     assert!(told.what.contains("; kept in focus in"), "{}", told.what);
-    let rules = Rules { projection: false, ..Rules::default() };
-    let new = mutate(Kind::AddSinglet, &lens, &rules, &mut random);
-    let told: Mutated<Lens> = new.unwrap().into();
+    let rules = SearchRules { projection: false, ..SearchRules::default() };
+    let new = mutate(MutationKind::AddSinglet, &lens, &rules, &mut random);
+    let told: MutatedPoint<Lens> = new.unwrap().into();
     assert!(!told.what.contains("kept in focus"), "{}", told.what);
 }

@@ -1,9 +1,9 @@
 //! The best points, at most one of each topology, no point twice.
 
-use aplanat::search::{Entry, Offer, Reservoir};
+use aplanat::search::{OfferOutcome, Reservoir, ReservoirEntry};
 
-fn entry(number: u64, loss: f64, topology: &str) -> Entry<u64> {
-    Entry { number, loss, topology: topology.to_owned(), outside: 0, point: number }
+fn entry(number: u64, loss: f64, topology: &str) -> ReservoirEntry<u64> {
+    ReservoirEntry { number, loss, topology: topology.to_owned(), outside: 0, point: number }
 }
 
 fn numbers(reservoir: &Reservoir<u64>) -> Vec<u64> {
@@ -16,11 +16,14 @@ fn numbers(reservoir: &Reservoir<u64>) -> Vec<u64> {
 fn a_full_reservoir_gives_up_its_worst() {
     let mut reservoir = Reservoir::new(3, true);
     for (i, topology) in ["a", "b", "c"].into_iter().enumerate() {
-        assert_eq!(reservoir.offer(entry(i as u64, 3.0 - i as f64, topology)), Offer::Entered);
+        assert_eq!(
+            reservoir.offer(entry(i as u64, 3.0 - i as f64, topology)),
+            OfferOutcome::Entered
+        );
     }
-    assert_eq!(reservoir.offer(entry(3, 3.0, "d")), Offer::BehindAll);
-    assert_eq!(reservoir.offer(entry(4, 2.5, "e")), Offer::Replaced(0));
-    assert_eq!(reservoir.offer(entry(5, 0.5, "f")), Offer::Replaced(4));
+    assert_eq!(reservoir.offer(entry(3, 3.0, "d")), OfferOutcome::BehindAll);
+    assert_eq!(reservoir.offer(entry(4, 2.5, "e")), OfferOutcome::Replaced(0));
+    assert_eq!(reservoir.offer(entry(5, 0.5, "f")), OfferOutcome::Replaced(4));
     assert_eq!(numbers(&reservoir), [1, 2, 5]);
     assert_eq!(reservoir.best().unwrap().number, 5);
 }
@@ -30,18 +33,18 @@ fn a_twin_replaces_only_its_twin_and_only_if_it_is_better() {
     let mut reservoir = Reservoir::new(3, true);
     reservoir.offer(entry(0, 1.0, "a"));
     reservoir.offer(entry(1, 9.0, "b"));
-    assert_eq!(reservoir.offer(entry(2, 1.0, "a")), Offer::BehindTwin(0));
-    assert_eq!(reservoir.offer(entry(3, 0.9, "a")), Offer::Replaced(0));
-    assert_eq!(reservoir.offer(entry(4, 5.0, "a")), Offer::BehindTwin(3));
+    assert_eq!(reservoir.offer(entry(2, 1.0, "a")), OfferOutcome::BehindTwin(0));
+    assert_eq!(reservoir.offer(entry(3, 0.9, "a")), OfferOutcome::Replaced(0));
+    assert_eq!(reservoir.offer(entry(4, 5.0, "a")), OfferOutcome::BehindTwin(3));
     assert_eq!(numbers(&reservoir), [1, 3]);
 }
 
 #[test]
 fn topologies_may_not_matter() {
     let mut reservoir = Reservoir::new(2, false);
-    assert_eq!(reservoir.offer(entry(0, 1.0, "a")), Offer::Entered);
-    assert_eq!(reservoir.offer(entry(1, 2.0, "a")), Offer::Entered);
-    assert_eq!(reservoir.offer(entry(2, 1.5, "a")), Offer::Replaced(1));
+    assert_eq!(reservoir.offer(entry(0, 1.0, "a")), OfferOutcome::Entered);
+    assert_eq!(reservoir.offer(entry(1, 2.0, "a")), OfferOutcome::Entered);
+    assert_eq!(reservoir.offer(entry(2, 1.5, "a")), OfferOutcome::Replaced(1));
 }
 
 #[test]
@@ -49,8 +52,8 @@ fn the_same_point_is_never_in_twice() {
     for one_per_topology in [true, false] {
         let mut reservoir = Reservoir::new(4, one_per_topology);
         reservoir.offer(entry(0, 1.0, "a"));
-        let same = Entry { number: 7, loss: 0.5, ..entry(0, 1.0, "b") };
-        assert_eq!(reservoir.offer(same), Offer::Same(0));
+        let same = ReservoirEntry { number: 7, loss: 0.5, ..entry(0, 1.0, "b") };
+        assert_eq!(reservoir.offer(same), OfferOutcome::Same(0));
         assert_eq!(reservoir.entries().len(), 1);
     }
 }
@@ -61,8 +64,8 @@ fn a_reservoir_of_one_holds_the_best() {
         let mut reservoir = Reservoir::new(size, true);
         assert!(reservoir.best().is_none());
         reservoir.offer(entry(0, 2.0, "a"));
-        assert_eq!(reservoir.offer(entry(1, 3.0, "b")), Offer::BehindAll);
-        assert_eq!(reservoir.offer(entry(2, 1.0, "b")), Offer::Replaced(0));
+        assert_eq!(reservoir.offer(entry(1, 3.0, "b")), OfferOutcome::BehindAll);
+        assert_eq!(reservoir.offer(entry(2, 1.0, "b")), OfferOutcome::Replaced(0));
         assert_eq!(numbers(&reservoir), [2]);
     }
 }
@@ -71,7 +74,7 @@ fn a_reservoir_of_one_holds_the_best() {
 fn what_is_worth_nothing_does_not_enter() {
     let mut reservoir = Reservoir::new(2, true);
     for loss in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert_eq!(reservoir.offer(entry(0, loss, "a")), Offer::Worthless);
+        assert_eq!(reservoir.offer(entry(0, loss, "a")), OfferOutcome::Worthless);
     }
     assert!(reservoir.entries().is_empty());
 }
@@ -79,12 +82,12 @@ fn what_is_worth_nothing_does_not_enter() {
 /// A structure that is asked for is better than one that is not, whatever the losses.
 #[test]
 fn the_nearer_structure_is_the_better_one() {
-    let far = |outside, entry| Entry { outside, ..entry };
+    let far = |outside, entry| ReservoirEntry { outside, ..entry };
     let mut reservoir = Reservoir::new(2, true);
     reservoir.offer(far(2, entry(0, 0.1, "a")));
     reservoir.offer(far(1, entry(1, 5.0, "b")));
     assert_eq!(reservoir.best().unwrap().number, 1);
-    assert_eq!(reservoir.offer(far(3, entry(2, 0.0, "c"))), Offer::BehindAll);
-    assert_eq!(reservoir.offer(far(0, entry(3, 9.0, "d"))), Offer::Replaced(0));
+    assert_eq!(reservoir.offer(far(3, entry(2, 0.0, "c"))), OfferOutcome::BehindAll);
+    assert_eq!(reservoir.offer(far(0, entry(3, 9.0, "d"))), OfferOutcome::Replaced(0));
     assert_eq!(reservoir.best().unwrap().number, 3);
 }

@@ -1,6 +1,8 @@
 //! A landscape of several structures with several minima each, and what can go wrong in one.
 
-use aplanat::search::{Kind, Landscape, Mutated, Random, Refusal, Slope, Weights};
+use aplanat::search::{
+    Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
+};
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
@@ -60,12 +62,17 @@ impl Rugged {
         2.0 * x + 2.0 * (4.0 * x).sin()
     }
 
-    fn mutated(&self, spot: &Spot, kind: Kind, noise: f64) -> Result<Mutated<Spot>, Refusal> {
-        let refused = |why: &str| Err(Refusal { kind, why: why.to_owned() });
+    fn mutated(
+        &self,
+        spot: &Spot,
+        kind: MutationKind,
+        noise: f64,
+    ) -> Result<MutatedPoint<Spot>, MutationError> {
+        let refused = |why: &str| Err(MutationError { kind, why: why.to_owned() });
         let elements = match kind {
-            Kind::AddSinglet if spot.elements < 8 => spot.elements + 1,
-            Kind::RemoveSinglet if spot.elements > 1 => spot.elements - 1,
-            Kind::Bend => spot.elements,
+            MutationKind::AddSinglet if spot.elements < 8 => spot.elements + 1,
+            MutationKind::RemoveSinglet if spot.elements > 1 => spot.elements - 1,
+            MutationKind::Bend => spot.elements,
             _ => return refused("there are too many or too few"),
         };
         if self.fault == Fault::AllRefused {
@@ -73,7 +80,7 @@ impl Rugged {
         }
         let x = if self.fault == Fault::AllWorthless { f64::INFINITY } else { spot.x + noise };
         let what = format!("{} at {elements}", kind.name());
-        Ok(Mutated { point: Spot { elements, x }, kind, what, log_ratio: Some(0.0) })
+        Ok(MutatedPoint { point: Spot { elements, x }, kind, what, log_ratio: Some(0.0) })
     }
 }
 
@@ -115,9 +122,12 @@ impl Landscape for Rugged {
         (next, loss, steps)
     }
 
-    fn draw(&self, random: &mut Random) -> Result<Spot, Refusal> {
+    fn draw(&self, random: &mut Random) -> Result<Spot, MutationError> {
         if self.fault == Fault::AllRefused {
-            return Err(Refusal { kind: Kind::Global, why: "nothing to draw".to_owned() });
+            return Err(MutationError {
+                kind: MutationKind::Global,
+                why: "nothing to draw".to_owned(),
+            });
         }
         Ok(Spot { elements: random.random_range(1..=8), x: random.random_range(-4.0..4.0) })
     }
@@ -125,10 +135,10 @@ impl Landscape for Rugged {
     fn mutate(
         &self,
         spot: &Spot,
-        weights: &Weights,
+        weights: &MutationWeights,
         random: &mut Random,
-    ) -> Result<Mutated<Spot>, Refusal> {
-        let kinds = [Kind::AddSinglet, Kind::RemoveSinglet, Kind::Bend];
+    ) -> Result<MutatedPoint<Spot>, MutationError> {
+        let kinds = [MutationKind::AddSinglet, MutationKind::RemoveSinglet, MutationKind::Bend];
         let sum: f64 = kinds.iter().map(|kind| weights.of(*kind)).sum();
         let mut left = random.random::<f64>() * sum;
         let drawn = kinds.into_iter().find(|kind| {
@@ -136,7 +146,8 @@ impl Landscape for Rugged {
             left < 0.0
         });
         let noise = random.sample::<f64, _>(StandardNormal);
-        let forbidden = Refusal { kind: Kind::Bend, why: "all are forbidden".to_owned() };
+        let forbidden =
+            MutationError { kind: MutationKind::Bend, why: "all are forbidden".to_owned() };
         self.mutated(spot, drawn.ok_or(forbidden)?, noise)
     }
 
@@ -144,11 +155,11 @@ impl Landscape for Rugged {
         format!("{} elements", spot.elements)
     }
 
-    fn about(&self) -> serde_json::Value {
+    fn fingerprint(&self) -> serde_json::Value {
         serde_json::to_value(self).unwrap()
     }
 
-    fn elements(&self, spot: &Spot) -> usize {
+    fn element_count(&self, spot: &Spot) -> usize {
         spot.elements
     }
 
@@ -156,15 +167,15 @@ impl Landscape for Rugged {
         &self,
         spot: &Spot,
         element: usize,
-        kind: Kind,
+        kind: MutationKind,
         _random: &mut Random,
-    ) -> Result<Mutated<Spot>, Refusal> {
+    ) -> Result<MutatedPoint<Spot>, MutationError> {
         self.mutated(spot, kind, 0.1 * element as f64)
     }
 
-    fn slope(&self, spot: &Spot) -> Option<Slope> {
+    fn loss_gradient(&self, spot: &Spot) -> Option<LossGradient> {
         let gradient = vec![Self::slope_at(spot.x)];
-        Some(Slope { loss: self.loss(spot), values: vec![spot.x], gradient })
+        Some(LossGradient { loss: self.loss(spot), values: vec![spot.x], gradient })
     }
 
     fn with_values(&self, spot: &Spot, values: &[f64]) -> Option<Spot> {

@@ -3,46 +3,54 @@
 
 use super::super::merit::bundled;
 use aplanat::lens::{Lens, Medium};
-use aplanat::search::lens::{LensLandscape, Plan, finish, missed, run};
-use aplanat::search::{Kind, Landscape as _, Rules, Settings};
+use aplanat::search::lens::{LensLandscape, SearchPlan, describe_violation, finalize, run};
+use aplanat::search::{Landscape as _, MutationKind, SearchRules, SearchSettings};
 use std::ops::ControlFlow;
 
 fn triplet() -> Lens {
     bundled("cooke_triplet_100_f27")
 }
 
-fn under(lens: &Lens, rules: Rules) -> Result<LensLandscape, String> {
-    let plan = Plan { rules, ..Plan::default() };
+fn under(lens: &Lens, rules: SearchRules) -> Result<LensLandscape, String> {
+    let plan = SearchPlan { rules, ..SearchPlan::default() };
     plan.landscape(lens).map_err(|refusal| refusal.to_string())
 }
 
 #[test]
 fn every_rule_is_checked_by_name() {
-    let usual = Rules::default;
+    let usual = SearchRules::default;
     let (nan, infinite) = (f64::NAN, f64::INFINITY);
-    let bad: [(&str, &str, Rules); 22] = [
-        ("elements", "[4, 2]", Rules { elements: [4, 2], ..usual() }),
-        ("kept", "[3, 5]", Rules { kept: [3, 5], ..usual() }),
-        ("kept", "7 of the lens", Rules { kept: [usize::MAX, usize::MAX], ..usual() }),
-        ("bend", "-1", Rules { weights: vec![(Kind::Bend, -1.0)], ..usual() }),
-        ("flip", "NaN", Rules { weights: vec![(Kind::Flip, nan)], ..usual() }),
-        ("global draw", "gamma", Rules { weights: vec![(Kind::Global, 2.0)], ..usual() }),
-        ("bend", "twice", Rules { weights: vec![(Kind::Bend, 1.0); 2], ..usual() }),
-        ("glass_center", "[3, 1]", Rules { glass_center: [3.0, 1.0], ..usual() }),
-        ("glass_center", "[-1, 1]", Rules { glass_center: [-1.0, 1.0], ..usual() }),
-        ("glass_center", "inf", Rules { glass_center: [1.0, infinite], ..usual() }),
-        ("air_center", "NaN", Rules { air_center: [nan, 1.0], ..usual() }),
-        ("glass_edge", "-0.1", Rules { glass_edge: -0.1, ..usual() }),
-        ("air_edge", "NaN", Rules { air_edge: nan, ..usual() }),
-        ("steepness", "0", Rules { steepness: 0.0, ..usual() }),
-        ("semi_diameter", "-1e300", Rules { semi_diameter: Some(-1e300), ..usual() }),
-        ("track", "NaN", Rules { track: Some(nan), ..usual() }),
-        ("track", "0", Rules { track: Some(0.0), ..usual() }),
-        ("back_focus", "-1", Rules { back_focus: Some(-1.0), ..usual() }),
-        ("back_focus", "inf", Rules { back_focus: Some(infinite), ..usual() }),
-        ("glasses[0]", "SCHOTT N-BK7", Rules { glasses: vec!["BK7".into()], ..usual() }),
-        ("glasses[1]", "N-BK77", Rules { glasses: vec!["F2".into(), "N-BK77".into()], ..usual() }),
-        ("glasses[0]", "``", Rules { glasses: vec![String::new()], ..usual() }),
+    let bad: [(&str, &str, SearchRules); 22] = [
+        ("elements", "[4, 2]", SearchRules { elements: [4, 2], ..usual() }),
+        ("kept", "[3, 5]", SearchRules { kept: [3, 5], ..usual() }),
+        ("kept", "7 of the lens", SearchRules { kept: [usize::MAX, usize::MAX], ..usual() }),
+        ("bend", "-1", SearchRules { weights: vec![(MutationKind::Bend, -1.0)], ..usual() }),
+        ("flip", "NaN", SearchRules { weights: vec![(MutationKind::Flip, nan)], ..usual() }),
+        (
+            "global draw",
+            "gamma",
+            SearchRules { weights: vec![(MutationKind::Global, 2.0)], ..usual() },
+        ),
+        ("bend", "twice", SearchRules { weights: vec![(MutationKind::Bend, 1.0); 2], ..usual() }),
+        ("glass_center", "[3, 1]", SearchRules { glass_center: [3.0, 1.0], ..usual() }),
+        ("glass_center", "[-1, 1]", SearchRules { glass_center: [-1.0, 1.0], ..usual() }),
+        ("glass_center", "inf", SearchRules { glass_center: [1.0, infinite], ..usual() }),
+        ("air_center", "NaN", SearchRules { air_center: [nan, 1.0], ..usual() }),
+        ("glass_edge", "-0.1", SearchRules { glass_edge: -0.1, ..usual() }),
+        ("air_edge", "NaN", SearchRules { air_edge: nan, ..usual() }),
+        ("steepness", "0", SearchRules { steepness: 0.0, ..usual() }),
+        ("semi_diameter", "-1e300", SearchRules { semi_diameter: Some(-1e300), ..usual() }),
+        ("track", "NaN", SearchRules { track: Some(nan), ..usual() }),
+        ("track", "0", SearchRules { track: Some(0.0), ..usual() }),
+        ("back_focus", "-1", SearchRules { back_focus: Some(-1.0), ..usual() }),
+        ("back_focus", "inf", SearchRules { back_focus: Some(infinite), ..usual() }),
+        ("glasses[0]", "SCHOTT N-BK7", SearchRules { glasses: vec!["BK7".into()], ..usual() }),
+        (
+            "glasses[1]",
+            "N-BK77",
+            SearchRules { glasses: vec!["F2".into(), "N-BK77".into()], ..usual() },
+        ),
+        ("glasses[0]", "``", SearchRules { glasses: vec![String::new()], ..usual() }),
     ];
     for (name, word, rules) in bad {
         let refusal = under(&triplet(), rules).unwrap_err();
@@ -52,18 +60,18 @@ fn every_rule_is_checked_by_name() {
         }
         assert!(refusal.len() < 250, "{refusal}");
     }
-    assert!(under(&triplet(), Rules { kept: [3, 4], ..usual() }).is_ok());
+    assert!(under(&triplet(), SearchRules { kept: [3, 4], ..usual() }).is_ok());
 }
 
 #[test]
 fn glasses_are_known_by_short_names_too() {
     let names = ["n-bk7", "SCHOTT N-BK7", "schott f2"].map(str::to_owned);
-    let rules = Rules { glasses: names.to_vec(), ..Rules::default() };
+    let rules = SearchRules { glasses: names.to_vec(), ..SearchRules::default() };
     let landscape = under(&triplet(), rules).unwrap();
     assert_eq!(landscape.rules().glasses, ["SCHOTT N-BK7", "SCHOTT F2"]);
     let mut infrared = triplet();
     infrared.wavelengths[0].um = 9.0;
-    let rules = Rules { glasses: vec!["N-BK7".into()], ..Rules::default() };
+    let rules = SearchRules { glasses: vec!["N-BK7".into()], ..SearchRules::default() };
     for row in &mut infrared.surfaces {
         if row.medium != Medium::Air {
             row.medium = Medium::Index(1.6);
@@ -83,9 +91,9 @@ fn a_list_of_glasses_binds_what_the_start_is_made_of() {
     }
     let glasses = ["N-LAK9", "F2", "N-SSK2"].map(str::to_owned).to_vec();
     let finished = |kept| {
-        let rules = Rules { glasses: glasses.clone(), kept, ..Rules::default() };
+        let rules = SearchRules { glasses: glasses.clone(), kept, ..SearchRules::default() };
         let landscape = under(&lens, rules).unwrap();
-        finish(&landscape, &lens).unwrap()
+        finalize(&landscape, &lens).unwrap()
     };
     let glass = |lens: &Lens, row: usize| match &lens.surfaces[row].medium {
         Medium::Glass(name) => name.clone(),
@@ -106,17 +114,18 @@ fn a_list_of_glasses_binds_what_the_start_is_made_of() {
 fn limits_that_no_lens_keeps_are_refused() {
     let lens = triplet();
     let refusal = |rules| under(&lens, rules).unwrap_err();
-    let narrow = refusal(Rules { semi_diameter: Some(5.0), ..Rules::default() });
+    let narrow = refusal(SearchRules { semi_diameter: Some(5.0), ..SearchRules::default() });
     assert!(narrow.contains("semi-diameters of 5 mm") && narrow.contains("18."), "{narrow}");
-    let short = refusal(Rules { track: Some(1.0), ..Rules::default() });
+    let short = refusal(SearchRules { track: Some(1.0), ..SearchRules::default() });
     assert!(short.contains("a track of 1 mm"), "{short}");
-    let long = refusal(Rules { back_focus: Some(1000.0), ..Rules::default() });
+    let long = refusal(SearchRules { back_focus: Some(1000.0), ..SearchRules::default() });
     assert!(long.contains("back focus of 1000 mm"), "{long}");
     // What is hard but may be possible is not refused.
-    let rules = Rules { semi_diameter: Some(19.0), track: Some(85.0), ..Rules::default() };
+    let rules =
+        SearchRules { semi_diameter: Some(19.0), track: Some(85.0), ..SearchRules::default() };
     let landscape = under(&lens, rules).unwrap();
-    let broken = landscape.broken(landscape.start()).unwrap();
-    let words: Vec<String> = broken.iter().map(missed).collect();
+    let broken = landscape.violations(landscape.start()).unwrap();
+    let words: Vec<String> = broken.iter().map(describe_violation).collect();
     let long = "total track: 119.07";
     assert!(words.iter().any(|words| words.starts_with(long)), "{words:?}");
     assert!(broken.iter().all(|limit| limit.term != "light"), "{words:?}");
@@ -124,8 +133,8 @@ fn limits_that_no_lens_keeps_are_refused() {
 
 #[test]
 fn a_merit_is_the_sum_of_its_terms() {
-    let landscape = under(&triplet(), Rules::default()).unwrap();
-    let terms = landscape.terms(landscape.start()).unwrap();
+    let landscape = under(&triplet(), SearchRules::default()).unwrap();
+    let terms = landscape.term_values(landscape.start()).unwrap();
     let sum: f64 = terms.iter().map(|term| term.weight * term.value).sum();
     assert!((sum / landscape.loss(landscape.start()) - 1.0).abs() < 1e-12);
 }
@@ -134,20 +143,24 @@ fn a_merit_is_the_sum_of_its_terms() {
 #[test]
 fn too_many_elements_become_fewer() {
     let lens = bundled("double_gauss_nikkor_s_50");
-    let rules = Rules { elements: [1, 5], ..Rules::default() };
-    let settings = Settings { gradients: Some(600), c: 0.3, seed: 2, ..Settings::default() };
-    let plan = Plan { rules, settings, ..Plan::default() };
+    let rules = SearchRules { elements: [1, 5], ..SearchRules::default() };
+    let settings =
+        SearchSettings { gradients: Some(600), c: 0.3, seed: 2, ..SearchSettings::default() };
+    let plan = SearchPlan { rules, settings, ..SearchPlan::default() };
     let landscape = plan.landscape(&lens).unwrap();
-    assert_eq!(landscape.outside(landscape.start()), 2);
+    assert_eq!(landscape.structure_violation(landscape.start()), 2);
     let words: Vec<String> =
-        landscape.broken(landscape.start()).unwrap().iter().map(missed).collect();
+        landscape.violations(landscape.start()).unwrap().iter().map(describe_violation).collect();
     assert!(words.iter().any(|words| words.starts_with("elements: 7")), "{words:?}");
     let found = run(&lens, &plan, |_, _| ControlFlow::Continue(())).unwrap();
-    assert_eq!(landscape.outside(&found.best().point), 0);
+    assert_eq!(landscape.structure_violation(&found.best().point), 0);
     assert_eq!(found.statistics().gradients, 600);
     assert!(found.reservoir().entries().iter().any(|entry| entry.outside == 0));
-    let asked = Rules::default().holding(12);
-    assert_eq!((asked.elements, Rules::default().holding(7).elements), ([2, 12], [2, 8]));
-    let said = Rules { elements: [3, 4], ..Rules::default() };
-    assert_eq!(said.holding(12).elements, [3, 4]);
+    let asked = SearchRules::default().admit_element_count(12);
+    assert_eq!(
+        (asked.elements, SearchRules::default().admit_element_count(7).elements),
+        ([2, 12], [2, 8])
+    );
+    let said = SearchRules { elements: [3, 4], ..SearchRules::default() };
+    assert_eq!(said.admit_element_count(12).elements, [3, 4]);
 }

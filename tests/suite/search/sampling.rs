@@ -1,8 +1,8 @@
 //! What the samplers sample, on the toy of thin singlets, where everything can be computed.
 
-use aplanat::search::clocks::{Clocks, Rate, Regeneration, Traceable};
-use aplanat::search::toy::Toy;
-use aplanat::search::{Landscape, Method, Random, Run, Settings, Temperature};
+use aplanat::search::clocks::{CompetingClocks, KnownDensity, Regeneration, RegenerationRate};
+use aplanat::search::toy::ToyLandscape;
+use aplanat::search::{Landscape, Random, SearchMethod, SearchRun, SearchSettings, Temperature};
 use rand::SeedableRng as _;
 
 fn warm() -> Temperature {
@@ -15,7 +15,12 @@ fn hot() -> Temperature {
 }
 
 /// The mean of a function over the gaps of so many singlets times their volume: midpoint rule.
-fn integral(toy: &Toy, singlets: usize, cells: usize, function: impl Fn(&Vec<f64>) -> f64) -> f64 {
+fn integral(
+    toy: &ToyLandscape,
+    singlets: usize,
+    cells: usize,
+    function: impl Fn(&Vec<f64>) -> f64,
+) -> f64 {
     let ranges = toy.ranges(singlets);
     let place = |index: usize, i: usize| {
         let cell = (index / cells.pow(i as u32)) % cells;
@@ -27,15 +32,15 @@ fn integral(toy: &Toy, singlets: usize, cells: usize, function: impl Fn(&Vec<f64
     sum * ranges.iter().map(|range| range[1] - range[0]).product::<f64>() / count as f64
 }
 
-fn target(toy: &Toy, gaps: &Vec<f64>) -> f64 {
+fn target(toy: &ToyLandscape, gaps: &Vec<f64>) -> f64 {
     warm().density(toy.loss(gaps))
 }
 
 #[test]
 fn the_gradient_of_the_toy_is_one() {
-    let toy = Toy::either();
+    let toy = ToyLandscape::one_or_two_singlets();
     for gaps in [vec![43.0], vec![12.0, 31.0], vec![40.0, 2.0]] {
-        let slope = toy.slope(&gaps).unwrap();
+        let slope = toy.loss_gradient(&gaps).unwrap();
         for i in 0..gaps.len() {
             let at = |step: f64| {
                 let mut moved = gaps.clone();
@@ -51,11 +56,13 @@ fn the_gradient_of_the_toy_is_one() {
 #[test]
 fn no_density_is_lost_by_gradient_steps() {
     // What arrives everywhere is what was anywhere: the way back and its determinant are right.
-    for (singlets, toy, cells) in [(1, Toy::one(), 20_000), (2, Toy::two(), 400)] {
+    for (singlets, toy, cells) in
+        [(1, ToyLandscape::one_singlet(), 20_000), (2, ToyLandscape::two_singlets(), 400)]
+    {
         let all = integral(&toy, singlets, cells, |gaps| target(&toy, gaps));
-        let arrived = integral(&toy, singlets, cells, |gaps| toy.arriving(gaps, warm()));
+        let arrived = integral(&toy, singlets, cells, |gaps| toy.arrival_density(gaps, warm()));
         assert!((arrived / all - 1.0).abs() < 2e-3, "{singlets}: {arrived} of {all}");
-        let drawn = integral(&toy, singlets, 50, |gaps| toy.density_of_draw(gaps));
+        let drawn = integral(&toy, singlets, 50, |gaps| toy.draw_density(gaps));
         assert!((drawn - 1.0).abs() < 1e-12);
     }
 }
@@ -63,11 +70,11 @@ fn no_density_is_lost_by_gradient_steps() {
 #[test]
 fn the_exact_rate_keeps_the_balance_everywhere() {
     // Arrivals and regenerations make up for what leaves: π (1 + κ) = πP + C μ with C = ∫ π κ.
-    let toy = Toy::one();
+    let toy = ToyLandscape::one_singlet();
     let c = 6.0;
     let kappa = |gaps: &Vec<f64>| {
         let density = target(&toy, gaps);
-        toy.arriving(gaps, warm()) / density - 1.0 + c * toy.density_of_draw(gaps) / density
+        toy.arrival_density(gaps, warm()) / density - 1.0 + c * toy.draw_density(gaps) / density
     };
     let leaving = integral(&toy, 1, 20_000, |gaps| target(&toy, gaps) * kappa(gaps));
     assert!((leaving / c - 1.0).abs() < 1e-3, "{leaving}");
@@ -78,11 +85,13 @@ fn the_exact_rate_keeps_the_balance_everywhere() {
 fn two_clocks_give_every_place_its_time() {
     // With endless heat the printed rate is C everywhere: a time of 1/(1 + C) on average, and the
     // part C/(1 + C) of all places regenerates.
-    let toy = Toy::one();
+    let toy = ToyLandscape::one_singlet();
     let hot = Temperature::new(f64::INFINITY).unwrap();
     let (c, count) = (0.5, 100_000);
     let random = Random::seed_from_u64(3);
-    let clocks = Clocks::new(&toy, hot, Rate::Printed(c), Regeneration::Draw, random).unwrap();
+    let clocks =
+        CompetingClocks::new(&toy, hot, RegenerationRate::AsPrinted(c), Regeneration::Draw, random)
+            .unwrap();
     let (mut time, mut square, mut ended) = (0.0, 0.0, 0);
     for sample in clocks.take(count) {
         time += sample.weight;
@@ -98,9 +107,16 @@ fn two_clocks_give_every_place_its_time() {
 
 #[test]
 fn a_rate_of_zero_never_ends_a_descent() {
-    let toy = Toy::one();
+    let toy = ToyLandscape::one_singlet();
     let random = Random::seed_from_u64(5);
-    let clocks = Clocks::new(&toy, warm(), Rate::Printed(0.0), Regeneration::Draw, random).unwrap();
+    let clocks = CompetingClocks::new(
+        &toy,
+        warm(),
+        RegenerationRate::AsPrinted(0.0),
+        Regeneration::Draw,
+        random,
+    )
+    .unwrap();
     let samples: Vec<_> = clocks.take(500).collect();
     assert!(samples.iter().all(|sample| sample.weight.is_finite() && !sample.regenerates));
 }
@@ -108,28 +124,28 @@ fn a_rate_of_zero_never_ends_a_descent() {
 /// Many chains of Metropolis and Hastings on a toy: for each the mean of a function of its points,
 /// the first fifth of them left out.
 fn walked(
-    (toy, start): (&Toy, Vec<f64>),
+    (toy, start): (&ToyLandscape, Vec<f64>),
     temperature: Temperature,
     [chains, rounds]: [usize; 2],
     function: impl Fn(&Vec<f64>) -> f64,
 ) -> Vec<f64> {
-    let mut settings = Settings {
-        method: Method::Metropolis,
+    let mut settings = SearchSettings {
+        method: SearchMethod::Metropolis,
         temperature: Some(temperature),
         chains,
         gradients: None,
         longest: 10_000,
-        ..Settings::default()
+        ..SearchSettings::default()
     };
     settings.metropolis.epsilon = 8.0;
     settings.metropolis.mutation = 0.3;
-    let mut run = Run::new(toy, start, &settings).unwrap();
+    let mut run = SearchRun::new(toy, start, &settings).unwrap();
     let mut sums = vec![0.0; chains];
     for round in 0..rounds {
         run.round(toy);
         if round >= rounds / 5 {
             for (sum, chain) in sums.iter_mut().zip(run.chains()) {
-                *sum += function(chain.place().unwrap().0);
+                *sum += function(chain.position().unwrap().0);
             }
         }
     }
@@ -147,7 +163,7 @@ fn deviation(values: &[f64], expected: f64) -> f64 {
 
 #[test]
 fn metropolis_samples_its_target_within_a_structure() {
-    let toy = Toy::one();
+    let toy = ToyLandscape::one_singlet();
     let spread = |gaps: &Vec<f64>| (gaps[0] - 50.0).powi(2);
     let all = integral(&toy, 1, 20_000, |gaps| target(&toy, gaps));
     let expected = integral(&toy, 1, 20_000, |gaps| spread(gaps) * target(&toy, gaps)) / all;
@@ -160,7 +176,8 @@ fn metropolis_samples_its_target_within_a_structure() {
 #[test]
 fn metropolis_jumps_between_structures_as_often_as_it_should() {
     let ranges = [[5.0, 10.0], [0.0, 60.0]];
-    let toy = Toy { alone: ranges[1], pair: ranges, ..Toy::either() };
+    let toy =
+        ToyLandscape { alone: ranges[1], pair: ranges, ..ToyLandscape::one_or_two_singlets() };
     let volume =
         |singlets, cells| integral(&toy, singlets, cells, |gaps| hot().density(toy.loss(gaps)));
     let (one, two) = (volume(1, 20_000), volume(2, 400));

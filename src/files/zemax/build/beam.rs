@@ -1,20 +1,20 @@
 //! Aperture, fields and wavelengths.
 
-use crate::files::error::Malformed;
-use crate::files::report::{Outcome, Report};
-use crate::files::zemax::draft::{ApertureLine, Draft};
+use crate::files::error::ParseError;
+use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::zemax::draft::{ApertureLine, ZemaxFile};
 use crate::lens::glass;
-use crate::lens::{Aperture, Field, FieldKind, Fields, Lens, Medium, Object, Wavelength};
+use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Wavelength};
 use crate::paraxial::{Beam, first_order};
 
 /// The aperture of the whole lens.
 pub(super) fn aperture(
-    draft: &Draft,
+    draft: &ZemaxFile,
     stop: usize,
     object_medium: &Medium,
-) -> Result<Aperture, Malformed> {
+) -> Result<Aperture, ParseError> {
     let wrong = |line: usize, found: String, expected: &str| {
-        Err(Malformed { place: format!("line {line}"), found, expected: expected.to_owned() })
+        Err(ParseError { place: format!("line {line}"), found, expected: expected.to_owned() })
     };
     let Some((aperture, line)) = draft.aperture else {
         let line = draft.surfaces[0].line;
@@ -37,20 +37,20 @@ pub(super) fn aperture(
 
 /// The f-number of a finite object may be that of the lens for an object at infinity; here it is
 /// the working one, so the pupil's diameter says the same.
-pub(super) fn infinite_f_number(draft: &Draft, lens: &mut Lens, report: &mut Report) {
+pub(super) fn infinite_f_number(draft: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
     let Some((ApertureLine::FNumber { value, working: false }, line)) = draft.aperture else {
         return;
     };
     if lens.object == Object::Infinity {
         return;
     }
-    let system = lens.system(0, lens.wavelengths[lens.primary()].um).ok();
-    let data = system.and_then(|system| first_order(&system, &Beam::of(lens, 0)).ok());
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok();
+    let data = system.and_then(|system| first_order(&system, &Beam::for_lens(lens, 0)).ok());
     let Some(efl) = data.and_then(|data| data.efl) else { return };
     let diameter = efl.abs() / value;
     lens.aperture = Aperture::EntrancePupilDiameter(diameter);
     let note = format!("as the entrance pupil diameter {diameter} mm");
-    report.amend(line, Outcome::Approximated, note);
+    report.amend(line, ConversionOutcome::Approximated, note);
 }
 
 fn index(medium: &Medium) -> f64 {
@@ -58,12 +58,12 @@ fn index(medium: &Medium) -> f64 {
         Medium::Air | Medium::Mirror => 1.0,
         Medium::Index(n) | Medium::Model { nd: n, .. } => *n,
         Medium::Glass(name) => glass::find(name).map_or(1.0, |glass| glass.nd),
-        Medium::Gradient(gradient) => index(&gradient.base),
+        Medium::Grin(gradient) => index(&gradient.base),
     }
 }
 
 /// The field points: as many as the file counts, or in older files up to the last that is not 0.
-pub(super) fn fields(draft: &Draft) -> Result<Fields, Malformed> {
+pub(super) fn fields(draft: &ZemaxFile) -> Result<Fields, ParseError> {
     let lines = &draft.fields;
     let (kind, line) = lines.kind.unwrap_or((0, 0));
     let given = lines.x.len().max(lines.y.len()).max(1);
@@ -71,8 +71,8 @@ pub(super) fn fields(draft: &Draft) -> Result<Fields, Malformed> {
     let count = lines.count.unwrap_or(last(&lines.x).max(last(&lines.y))).min(given);
     let at = |values: &[f64], i: usize, default: f64| values.get(i).copied().unwrap_or(default);
     let scale = if matches!(kind, 0 | 4) { 1.0 } else { draft.unit };
-    let values: Vec<Field> = (0..count)
-        .map(|i| Field {
+    let values: Vec<FieldPoint> = (0..count)
+        .map(|i| FieldPoint {
             x: at(&lines.x, i, 0.0) * scale,
             y: at(&lines.y, i, 0.0) * scale,
             weight: at(&lines.weights, i, 1.0),
@@ -81,7 +81,7 @@ pub(super) fn fields(draft: &Draft) -> Result<Fields, Malformed> {
     if kind == 4 && values.iter().any(|field| field.x != 0.0) {
         let found = "theodolite angles with fields in x".to_owned();
         let expected = "field angles (FTYP 0)".to_owned();
-        return Err(Malformed { place: format!("line {line}"), found, expected });
+        return Err(ParseError { place: format!("line {line}"), found, expected });
     }
     let kind = match kind {
         1 => FieldKind::ObjectHeight,
@@ -96,9 +96,9 @@ const PADDING: (f64, f64) = (0.55, 1.0);
 
 /// The wavelengths: as many as the file counts, or all in front of the padding.
 pub(super) fn wavelengths(
-    draft: &Draft,
-    report: &mut Report,
-) -> Result<Vec<Wavelength>, Malformed> {
+    draft: &ZemaxFile,
+    report: &mut ConversionReport,
+) -> Result<Vec<Wavelength>, ParseError> {
     let lines = &draft.waves;
     let mut numbered = lines.numbered.clone();
     numbered.sort_by_key(|(index, ..)| *index);
@@ -112,16 +112,20 @@ pub(super) fn wavelengths(
     let unpadded = (all.len() - padding).max(1);
     all.truncate(lines.count.unwrap_or(unpadded));
     for (.., line) in numbered.iter().skip(all.len()) {
-        report.amend(*line, Outcome::Preserved, "beyond the wavelengths that count");
+        report.amend(*line, ConversionOutcome::Preserved, "beyond the wavelengths that count");
     }
     if all.is_empty() {
         let place = format!("line {}", draft.surfaces[0].line);
         let found = "no wavelengths before it".to_owned();
-        return Err(Malformed { place, found, expected: "WAVM lines".to_owned() });
+        return Err(ParseError { place, found, expected: "WAVM lines".to_owned() });
     }
     let primary = lines.primary.filter(|(index, _)| (1..=all.len()).contains(index));
     if let (None, Some((_, line))) = (primary, lines.primary) {
-        report.amend(line, Outcome::Approximated, "no such wavelength: the middle one is primary");
+        report.amend(
+            line,
+            ConversionOutcome::Approximated,
+            "no such wavelength: the middle one is primary",
+        );
     }
     let marked = |i| primary.is_some_and(|(index, _)| index == i + 1);
     let waves = all.into_iter().enumerate();

@@ -8,22 +8,22 @@ mod row;
 mod solve;
 mod zoom;
 
-use super::draft::Draft;
+use super::draft::ZemaxFile;
 use super::{breaks, glass, gradient};
-use crate::files::error::Malformed;
-use crate::files::report::{Outcome, Report};
+use crate::files::error::ParseError;
+use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, Medium, Object, Row};
 
 /// Makes a lens of the draft and says in the report what could not be kept.
-pub(super) fn build(draft: &Draft, report: &mut Report) -> Result<Lens, Malformed> {
-    complete(draft)?;
-    breaks::check(&draft.surfaces)?;
+pub(super) fn build(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Lens, ParseError> {
+    check_complete(draft)?;
+    breaks::check_breaks(&draft.surfaces)?;
     let stop = stop(draft)?;
     let object = object(draft)?;
     let object_medium = object_medium(draft, report)?;
     let surfaces = rows(draft, stop, report)?;
     let aperture = beam::aperture(draft, stop, &object_medium)?;
-    let (name, source, notes, zoom_names) = texts(draft);
+    let (name, source, notes, zoom_names) = split_notes(draft);
     let mut lens = Lens {
         name,
         source,
@@ -37,20 +37,20 @@ pub(super) fn build(draft: &Draft, report: &mut Report) -> Result<Lens, Malforme
         zoom: Vec::new(),
         variables: Vec::new(),
         pickups: Vec::new(),
-        focus: None,
+        image_solve: None,
     };
-    image(draft, report);
-    zoom::positions(draft, &mut lens, &zoom_names, report)?;
-    solve::solves(draft, &mut lens, report);
+    report_image(draft, report);
+    zoom::add_positions(draft, &mut lens, &zoom_names, report)?;
+    solve::add_solves(draft, &mut lens, report);
     beam::infinite_f_number(draft, &mut lens, report);
     Ok(lens)
 }
 
 /// Refuses a file that ends too early.
-fn complete(draft: &Draft) -> Result<(), Malformed> {
+fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
     let surfaces = &draft.surfaces;
     let wrong = |line, found: String, expected: &str| {
-        Err(Malformed { place: format!("line {line}"), found, expected: expected.to_owned() })
+        Err(ParseError { place: format!("line {line}"), found, expected: expected.to_owned() })
     };
     for (number, surface) in surfaces.iter().enumerate() {
         let curvature = surface.curvature.is_some() || number == 0;
@@ -75,12 +75,12 @@ fn complete(draft: &Draft) -> Result<(), Malformed> {
 }
 
 /// The surface of the file that is the stop.
-fn stop(draft: &Draft) -> Result<usize, Malformed> {
+fn stop(draft: &ZemaxFile) -> Result<usize, ParseError> {
     let surfaces = &draft.surfaces;
     let numbered = surfaces.iter().enumerate();
     let mut stops = numbered.filter_map(|(number, surface)| Some((number, surface.stop?)));
     let wrong = |place: String, found: String| {
-        Err(Malformed {
+        Err(ParseError {
             place,
             found,
             expected: "exactly one STOP, between object and image".to_owned(),
@@ -100,26 +100,26 @@ fn stop(draft: &Draft) -> Result<usize, Malformed> {
 }
 
 /// A thickness on the object from which on it counts as infinite.
-const FAR: f64 = 1e10;
+const INFINITE_DISTANCE: f64 = 1e10;
 
-fn object(draft: &Draft) -> Result<Object, Malformed> {
+fn object(draft: &ZemaxFile) -> Result<Object, ParseError> {
     let (distance, line) = draft.surfaces[0].thickness.unwrap_or((f64::INFINITY, 0));
-    if distance.abs() >= FAR {
+    if distance.abs() >= INFINITE_DISTANCE {
         return Ok(Object::Infinity);
     }
     if distance == 0.0 {
         let expected = "a distance other than 0, or INFINITY".to_owned();
         let found = "an object at the first surface".to_owned();
-        return Err(Malformed { place: format!("line {line}"), found, expected });
+        return Err(ParseError { place: format!("line {line}"), found, expected });
     }
     Ok(Object::Finite(distance * draft.unit))
 }
 
-fn object_medium(draft: &Draft, report: &mut Report) -> Result<Medium, Malformed> {
+fn object_medium(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Medium, ParseError> {
     let (medium, outcome, note) = glass::medium(&draft.surfaces, 0, &draft.catalogues)?;
     if let Some(glass) = &draft.surfaces[0].glass {
         if medium == Medium::Mirror {
-            report.amend(glass.line, Outcome::Dropped, "the object is no mirror here");
+            report.amend(glass.line, ConversionOutcome::Dropped, "the object is no mirror here");
             return Ok(Medium::Air);
         }
         report.amend(glass.line, outcome, note);
@@ -127,7 +127,11 @@ fn object_medium(draft: &Draft, report: &mut Report) -> Result<Medium, Malformed
     Ok(medium)
 }
 
-fn rows(draft: &Draft, stop: usize, report: &mut Report) -> Result<Vec<Row>, Malformed> {
+fn rows(
+    draft: &ZemaxFile,
+    stop: usize,
+    report: &mut ConversionReport,
+) -> Result<Vec<Row>, ParseError> {
     // What fills the present gap; a coordinate break has the same on both sides.
     let mut gap = Medium::Air;
     let mut rows = Vec::with_capacity(draft.surfaces.len() - 2);
@@ -147,31 +151,35 @@ fn rows(draft: &Draft, stop: usize, report: &mut Report) -> Result<Vec<Row>, Mal
 }
 
 /// The image is a plane without a row: says what else the file makes of it.
-fn image(draft: &Draft, report: &mut Report) {
+fn report_image(draft: &ZemaxFile, report: &mut ConversionReport) {
     for surface in [draft.surfaces.first(), draft.surfaces.last()].into_iter().flatten() {
         if let Some((curvature, line)) = surface.curvature
             && curvature != 0.0
         {
-            report.amend(line, Outcome::Dropped, "object and image are planes here");
+            report.amend(line, ConversionOutcome::Dropped, "object and image are planes here");
         }
         if let Some(given) = surface.semi_diameter {
-            report.amend(given.line, Outcome::Preserved, "object and image clip nothing here");
+            report.amend(
+                given.line,
+                ConversionOutcome::Preserved,
+                "object and image clip nothing here",
+            );
         }
         for (_, line) in surface.clip.into_iter().chain(surface.obstruction) {
-            report.amend(line, Outcome::Dropped, "object and image clip nothing here");
+            report.amend(line, ConversionOutcome::Dropped, "object and image clip nothing here");
         }
         let terms = surface.parameters.iter().chain(&surface.extra);
         for (_, _, line) in terms.filter(|(_, value, _)| *value != 0.0) {
-            report.amend(*line, Outcome::Dropped, "object and image are planes here");
+            report.amend(*line, ConversionOutcome::Dropped, "object and image are planes here");
         }
     }
     if let Some(glass) = draft.surfaces.last().and_then(|surface| surface.glass.as_ref()) {
-        report.amend(glass.line, Outcome::Dropped, "nothing lies behind the image here");
+        report.amend(glass.line, ConversionOutcome::Dropped, "nothing lies behind the image here");
     }
 }
 
 /// Name, source, notes, and the names of the zoom positions, as our own exports write them.
-fn texts(draft: &Draft) -> (String, String, String, Vec<String>) {
+fn split_notes(draft: &ZemaxFile) -> (String, String, String, Vec<String>) {
     let mut source = String::new();
     let mut zoom = Vec::new();
     let mut notes: Vec<&str> = Vec::new();

@@ -1,10 +1,10 @@
 //! One surface between object and image.
 
-use crate::files::error::Malformed;
-use crate::files::report::{Outcome, Report};
+use crate::files::error::ParseError;
+use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::breaks;
-use crate::files::zemax::draft::{ApertureLine, Draft, Surface};
-use crate::files::zemax::shape::{self, Form};
+use crate::files::zemax::draft::{ApertureLine, ZemaxFile, ZemaxSurface};
+use crate::files::zemax::shape::{self, ZemaxShape};
 use crate::lens::{Medium, Row};
 
 /// A gap from which on it counts as infinite, which only that behind the object may be.
@@ -12,22 +12,22 @@ const INFINITE: f64 = 1e18;
 
 /// The row of surface `number`.
 pub(super) fn row(
-    draft: &Draft,
+    draft: &ZemaxFile,
     number: usize,
     stop: usize,
     medium: Medium,
-    report: &mut Report,
-) -> Result<Row, Malformed> {
+    report: &mut ConversionReport,
+) -> Result<Row, ParseError> {
     let surface = &draft.surfaces[number];
     let form = if breaks::is_break(surface) {
         let note = "this run of coordinate breaks changes nothing; read as planes";
-        report.amend(surface.kind.1, Outcome::Approximated, note);
-        Form::default()
+        report.amend(surface.kind.1, ConversionOutcome::Approximated, note);
+        ZemaxShape::default()
     } else {
-        shape::form(surface, number)?
+        shape::surface_shape(surface, number)?
     };
     if let Some((line, note)) = form.note {
-        report.amend(line, Outcome::Used, note);
+        report.amend(line, ConversionOutcome::Used, note);
     }
     let unit = draft.unit;
     let scaled =
@@ -41,24 +41,29 @@ pub(super) fn row(
         semi_diameter: semi_diameter(draft, number, stop, report).map(|radius| radius * unit),
         obstruction: surface.obstruction.map(|(radius, _)| radius * unit),
         stop: number == stop,
-        hyper: false,
+        hyperhemisphere: false,
         comment: surface.comment.clone(),
     })
 }
 
-fn thickness(surface: &Surface, number: usize) -> Result<f64, Malformed> {
+fn thickness(surface: &ZemaxSurface, number: usize) -> Result<f64, ParseError> {
     let (thickness, line) = surface.thickness.unwrap_or((0.0, surface.line));
     if thickness.abs() < INFINITE {
         return Ok(thickness);
     }
     let found = format!("an infinite thickness after surface {number}");
     let expected = "INFINITY only behind the object".to_owned();
-    Err(Malformed { place: format!("line {line}"), found, expected })
+    Err(ParseError { place: format!("line {line}"), found, expected })
 }
 
 /// What clips there: a circular aperture. A fixed semi-diameter is only drawn there and clips here,
 /// an automatic one is wide enough for every ray.
-fn semi_diameter(draft: &Draft, number: usize, stop: usize, report: &mut Report) -> Option<f64> {
+fn semi_diameter(
+    draft: &ZemaxFile,
+    number: usize,
+    stop: usize,
+    report: &mut ConversionReport,
+) -> Option<f64> {
     let surface = &draft.surfaces[number];
     if let Some((radius, _)) = surface.clip {
         return Some(radius);
@@ -70,15 +75,15 @@ fn semi_diameter(draft: &Draft, number: usize, stop: usize, report: &mut Report)
     }
     if given.fixed && surface.obstruction.is_some_and(|(inner, _)| inner >= given.value) {
         let note = "the size of the obscuration, which is drawn; nothing is clipped outside it";
-        report.amend(given.line, Outcome::Preserved, note);
+        report.amend(given.line, ConversionOutcome::Preserved, note);
         return None;
     }
     if given.fixed && given.value > 0.0 {
         let note = "clips here; in the file it is only drawn";
-        report.amend(given.line, Outcome::Approximated, note);
+        report.amend(given.line, ConversionOutcome::Approximated, note);
         return Some(given.value);
     }
     let note = "found automatically there; nothing is clipped here";
-    report.amend(given.line, Outcome::Preserved, note);
+    report.amend(given.line, ConversionOutcome::Preserved, note);
     None
 }

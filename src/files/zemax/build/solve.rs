@@ -1,73 +1,82 @@
 //! Variables, pickups and the focus solve.
 
-use crate::files::report::{Outcome, Report};
-use crate::files::zemax::draft::{CurvatureSolve, Draft, PickupLine, Surface};
+use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::zemax::draft::{CurvatureSolve, PickupLine, ZemaxFile, ZemaxSurface};
 use crate::files::zemax::gradient;
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 
 /// Gives the lens what its numbers follow.
-pub(super) fn solves(draft: &Draft, lens: &mut Lens, report: &mut Report) {
+pub(super) fn add_solves(draft: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
     for row in 0..lens.surfaces.len() {
         let surface = &draft.surfaces[row + 1];
-        focus(surface, row, lens, report);
+        add_focus_solve(surface, row, lens, report);
         match surface.curvature_solve {
             CurvatureSolve::Fixed => {}
-            CurvatureSolve::Variable => free(lens, row, Quantity::Curvature),
+            CurvatureSolve::Variable => add_variable(lens, row, Quantity::Curvature),
             CurvatureSolve::Pickup(line) => {
                 let offset = line.offset / draft.unit;
-                follow(lens, row, Quantity::Curvature, PickupLine { offset, ..line }, report);
+                add_pickup(lens, row, Quantity::Curvature, PickupLine { offset, ..line }, report);
             }
         }
         thickness(draft, row, lens, report);
         if surface.variable_conic.is_some() {
-            free(lens, row, Quantity::Conic);
+            add_variable(lens, row, Quantity::Conic);
         }
         terms(surface, row, lens, report);
         if surface.glass.as_ref().is_some_and(|glass| glass.variable_index) {
-            free(lens, row, Quantity::Index);
+            add_variable(lens, row, Quantity::Index);
         }
     }
 }
 
 /// The paraxial marginal ray at height 0 in the image is the focus solve; others are kept at their
 /// present value.
-fn focus(surface: &Surface, row: usize, lens: &mut Lens, report: &mut Report) {
+fn add_focus_solve(
+    surface: &ZemaxSurface,
+    row: usize,
+    lens: &mut Lens,
+    report: &mut ConversionReport,
+) {
     let Some((height, zone, line)) = surface.marginal_height else { return };
     if row + 1 == lens.surfaces.len() && height == 0.0 && zone == 0.0 {
-        lens.focus = Some(0.0);
-        report.amend(line, Outcome::Used, "the last gap is solved for the paraxial focus");
+        lens.image_solve = Some(0.0);
+        report.amend(
+            line,
+            ConversionOutcome::Used,
+            "the last gap is solved for the paraxial focus",
+        );
     } else {
         let note = "only the paraxial focus of the last gap is solved here; kept as it is";
-        report.amend(line, Outcome::Approximated, note);
+        report.amend(line, ConversionOutcome::Approximated, note);
     }
 }
 
 /// Makes a number variable, if the lens has it and nothing else sets it.
-fn free(lens: &mut Lens, surface: usize, quantity: Quantity) {
+fn add_variable(lens: &mut Lens, surface: usize, quantity: Quantity) {
     let parameter = Parameter::new(surface, quantity);
     if lens.get(parameter).is_some() && lens.variable(parameter).is_none() {
         lens.variables.push(Variable { parameter, min: None, max: None });
     }
 }
 
-fn thickness(draft: &Draft, row: usize, lens: &mut Lens, report: &mut Report) {
+fn thickness(draft: &ZemaxFile, row: usize, lens: &mut Lens, report: &mut ConversionReport) {
     let surface = &draft.surfaces[row + 1];
-    let solved = lens.focus.is_some() && row + 1 == lens.surfaces.len();
+    let solved = lens.image_solve.is_some() && row + 1 == lens.surfaces.len();
     if solved {
         let pickup = surface.thickness_pickup.map(|pickup| pickup.line);
         let variable = surface.variable_thickness.map(|(.., line)| line);
         for line in pickup.into_iter().chain(variable) {
-            report.amend(line, Outcome::Dropped, "the gap is solved for the focus");
+            report.amend(line, ConversionOutcome::Dropped, "the gap is solved for the focus");
         }
         return;
     }
     if let Some(line) = surface.thickness_pickup {
         let offset = line.offset * draft.unit;
-        follow(lens, row, Quantity::Thickness, PickupLine { offset, ..line }, report);
+        add_pickup(lens, row, Quantity::Thickness, PickupLine { offset, ..line }, report);
         return;
     }
     let Some((low, high, line)) = surface.variable_thickness else { return };
-    free(lens, row, Quantity::Thickness);
+    add_variable(lens, row, Quantity::Thickness);
     let (low, high) = (low * draft.unit, high * draft.unit);
     let value = lens.surfaces[row].thickness;
     if low < high && (low..=high).contains(&value) {
@@ -75,26 +84,32 @@ fn thickness(draft: &Draft, row: usize, lens: &mut Lens, report: &mut Report) {
             (variable.min, variable.max) = (Some(low), Some(high));
         }
     } else if (low, high) != (0.0, 0.0) {
-        report.amend(line, Outcome::Approximated, "variable, without its bounds");
+        report.amend(line, ConversionOutcome::Approximated, "variable, without its bounds");
     }
 }
 
 /// Parameter i of an even asphere is the coefficient of r^(2i); those of a gradient have places of
 /// their own.
-fn terms(surface: &Surface, row: usize, lens: &mut Lens, report: &mut Report) {
+fn terms(surface: &ZemaxSurface, row: usize, lens: &mut Lens, report: &mut ConversionReport) {
     for &(index, line) in &surface.variable_parameters {
         if surface.kind.0 == "EVENASPH" && (2..=8).contains(&index) {
-            free(lens, row, Quantity::Asphere(index - 2));
-        } else if let Some(quantity) = gradient::variable(&surface.kind.0, index) {
-            free(lens, row, quantity);
+            add_variable(lens, row, Quantity::Asphere(index - 2));
+        } else if let Some(quantity) = gradient::variable_quantity(&surface.kind.0, index) {
+            add_variable(lens, row, quantity);
         } else {
-            report.amend(line, Outcome::Dropped, "this parameter cannot vary here");
+            report.amend(line, ConversionOutcome::Dropped, "this parameter cannot vary here");
         }
     }
 }
 
 /// A pickup counts where it gives the value that is there; else the value counts.
-fn follow(lens: &mut Lens, row: usize, quantity: Quantity, line: PickupLine, report: &mut Report) {
+fn add_pickup(
+    lens: &mut Lens,
+    row: usize,
+    quantity: Quantity,
+    line: PickupLine,
+    report: &mut ConversionReport,
+) {
     let parameter = Parameter::new(row, quantity);
     let source = line.surface.checked_sub(1).map(|surface| Parameter::new(surface, quantity));
     let found = source.and_then(|source| lens.get(source).map(|value| (source, value)));
@@ -108,12 +123,12 @@ fn follow(lens: &mut Lens, row: usize, quantity: Quantity, line: PickupLine, rep
             } else {
                 let note =
                     format!("the pickup gives {given}, the file has {present}, which is kept");
-                report.amend(line.line, Outcome::Approximated, note);
+                report.amend(line.line, ConversionOutcome::Approximated, note);
             }
         }
         _ => {
             let note = "a pickup from a surface that is not there; the present value is kept";
-            report.amend(line.line, Outcome::Approximated, note);
+            report.amend(line.line, ConversionOutcome::Approximated, note);
         }
     }
 }

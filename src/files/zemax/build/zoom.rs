@@ -1,38 +1,38 @@
 //! The multi-configuration table: one zoom position a configuration.
 
-use crate::files::error::Malformed;
-use crate::files::report::{Outcome, Report};
-use crate::files::zemax::draft::{Draft, Operand};
+use crate::files::error::ParseError;
+use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::zemax::draft::{ConfigurationOperand, ZemaxFile};
 use crate::lens::{
     Aperture, FieldKind, Lens, Object, Parameter, Quantity, Variable, ZoomPosition, ZoomThickness,
 };
 use std::collections::BTreeMap;
 
 /// Gives the lens its zoom positions, if the file has more than one configuration.
-pub(super) fn positions(
-    draft: &Draft,
+pub(super) fn add_positions(
+    draft: &ZemaxFile,
     lens: &mut Lens,
     names: &[String],
-    report: &mut Report,
-) -> Result<(), Malformed> {
+    report: &mut ConversionReport,
+) -> Result<(), ParseError> {
     if draft.configurations < 2 {
         return Ok(());
     }
-    complete(draft)?;
+    check_complete(draft)?;
     let name = |i: usize| names.get(i).cloned().unwrap_or_default();
     lens.zoom = (0..draft.configurations)
         .map(|i| ZoomPosition { name: name(i), ..ZoomPosition::default() })
         .collect();
     for operand in &draft.operands {
         if let Err(why) = apply(draft.unit, lens, operand) {
-            report.amend(operand.line, Outcome::Dropped, why);
+            report.amend(operand.line, ConversionOutcome::Dropped, why);
         }
     }
     Ok(())
 }
 
 /// Refuses an operand that has no value at some configuration.
-fn complete(draft: &Draft) -> Result<(), Malformed> {
+fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
     let mut values: BTreeMap<(&str, usize), (usize, usize)> = BTreeMap::new();
     for operand in &draft.operands {
         let (count, line) = values.entry((&operand.name, operand.target)).or_default();
@@ -44,14 +44,14 @@ fn complete(draft: &Draft) -> Result<(), Malformed> {
             let found =
                 format!("{count} values of {name} {target} for {configurations} configurations");
             let expected = "one for each; is the file truncated?".to_owned();
-            return Err(Malformed { place: format!("line {line}"), found, expected });
+            return Err(ParseError { place: format!("line {line}"), found, expected });
         }
     }
     Ok(())
 }
 
 /// Writes one value into its position, or says why it cannot.
-fn apply(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+fn apply(unit: f64, lens: &mut Lens, operand: &ConfigurationOperand) -> Result<(), &'static str> {
     let zoom = operand.configuration - 1;
     match operand.name.as_str() {
         "THIC" => thickness(unit, lens, operand),
@@ -68,7 +68,11 @@ fn apply(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static s
     }
 }
 
-fn thickness(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+fn thickness(
+    unit: f64,
+    lens: &mut Lens,
+    operand: &ConfigurationOperand,
+) -> Result<(), &'static str> {
     let surface = match operand.target.checked_sub(1) {
         None => return Err("the object does not move with the zoom position here"),
         Some(surface) if surface < lens.surfaces.len() => surface,
@@ -91,7 +95,11 @@ fn thickness(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'stat
 }
 
 /// The value means whatever the aperture of the lens is given by.
-fn aperture(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+fn aperture(
+    unit: f64,
+    lens: &mut Lens,
+    operand: &ConfigurationOperand,
+) -> Result<(), &'static str> {
     let value = operand.value;
     if lens.object != Object::Infinity && matches!(lens.aperture, Aperture::FNumber(_)) {
         return Err("the f-number of a finite object does not change with the zoom position here");
@@ -109,7 +117,7 @@ fn aperture(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'stati
     Ok(())
 }
 
-fn field(unit: f64, lens: &mut Lens, operand: &Operand) -> Result<(), &'static str> {
+fn field(unit: f64, lens: &mut Lens, operand: &ConfigurationOperand) -> Result<(), &'static str> {
     let position = &mut lens.zoom[operand.configuration - 1];
     let fields = position.fields.get_or_insert_with(|| lens.fields.clone());
     let scale = if fields.kind == FieldKind::Angle { 1.0 } else { unit };

@@ -1,12 +1,15 @@
 //! The header: title, unit, aperture, fields, wavelengths, glass catalogues.
 
-use super::{Verdict, dropped, preserved, used};
-use crate::files::error::Malformed;
-use crate::files::zemax::draft::{ApertureLine, Draft};
-use crate::files::zemax::line::Line;
+use super::{LineOutcome, dropped, preserved, used};
+use crate::files::error::ParseError;
+use crate::files::zemax::draft::{ApertureLine, ZemaxFile};
+use crate::files::zemax::line::ZemaxLine;
 
 /// Reads a line of the header; `None` where it is none.
-pub(super) fn read(draft: &mut Draft, line: &Line<'_>) -> Result<Option<Verdict>, Malformed> {
+pub(super) fn read(
+    draft: &mut ZemaxFile,
+    line: &ZemaxLine<'_>,
+) -> Result<Option<LineOutcome>, ParseError> {
     let verdict = match line.keyword {
         "MODE" => mode(line)?,
         "UNIT" => unit(draft, line)?,
@@ -35,41 +38,41 @@ pub(super) fn read(draft: &mut Draft, line: &Line<'_>) -> Result<Option<Verdict>
     Ok(Some(verdict))
 }
 
-fn text(to: &mut String, rest: &str) -> Verdict {
+fn text(to: &mut String, rest: &str) -> LineOutcome {
     rest.clone_into(to);
     used()
 }
 
-/// `NOTE 0 text`; the number is the kind of note.
-fn note(draft: &mut Draft, line: &Line<'_>) -> Verdict {
+/// `NOTE 0 source_text`; the number is the kind of note.
+fn note(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> LineOutcome {
     let (kind, text) = line.rest.split_once(char::is_whitespace).unwrap_or((line.rest, ""));
     let numbered = kind.parse::<u32>().is_ok();
     draft.notes.push(if numbered { text.trim().to_owned() } else { line.rest.to_owned() });
     used()
 }
 
-fn mode(line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn mode(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     if line.word(0)?.eq_ignore_ascii_case("SEQ") {
         return Ok(used());
     }
     let expected = "MODE SEQ: only sequential lenses can be traced here, in which light meets the \
                     surfaces in their order";
-    Err(line.wrong(format!("`{}`", line.text()), expected))
+    Err(line.malformed(format!("`{}`", line.source_text()), expected))
 }
 
-fn unit(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn unit(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     draft.unit = match line.word(0)?.to_ascii_uppercase().as_str() {
         "MM" => 1.0,
         "CM" => 10.0,
         "IN" | "INCH" => 25.4,
         "FT" => 304.8,
         "M" | "METER" | "METERS" => 1000.0,
-        other => return Err(line.wrong(format!("unit `{other}`"), "MM, CM, IN, FT or M")),
+        other => return Err(line.malformed(format!("unit `{other}`"), "MM, CM, IN, FT or M")),
     };
     Ok(used())
 }
 
-fn aperture(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn aperture(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     if draft.aperture.is_some() {
         return Ok(dropped("a second aperture; the first one counts"));
     }
@@ -86,7 +89,7 @@ fn aperture(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
 }
 
 /// Temperature in °C, pressure in atmospheres, and whether indices are adjusted to them.
-fn environment(line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn environment(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let standard = line.number_or(0, 20.0)? == 20.0 && line.number_or(1, 1.0)? == 1.0;
     let adjusted = line.number_or(2, 0.0)? != 0.0;
     Ok(if adjusted && !standard {
@@ -96,10 +99,10 @@ fn environment(line: &Line<'_>) -> Result<Verdict, Malformed> {
     })
 }
 
-fn field_type(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn field_type(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let kind = line.count(0)?;
     if kind > 4 {
-        return Err(line.wrong(format!("field type {kind}"), "0 to 4"));
+        return Err(line.malformed(format!("field type {kind}"), "0 to 4"));
     }
     draft.fields.kind = Some((kind, line.number));
     // Older files have one or two fields; a count of 0 says nothing.
@@ -112,7 +115,7 @@ fn field_type(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> 
     })
 }
 
-fn field_values(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn field_values(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let fields = &mut draft.fields;
     let values = line.numbers()?;
     match line.keyword {
@@ -126,7 +129,7 @@ fn field_values(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed
     Ok(used())
 }
 
-fn waves(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn waves(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let waves = &mut draft.waves;
     match line.keyword {
         "WAVM" => {
@@ -139,7 +142,7 @@ fn waves(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
     Ok(used())
 }
 
-fn vignetting(line: &Line<'_>) -> Verdict {
+fn vignetting(line: &ZemaxLine<'_>) -> LineOutcome {
     if (0..line.fields.len()).all(|field| line.number(field).is_ok_and(|value| value == 0.0)) {
         preserved()
     } else {

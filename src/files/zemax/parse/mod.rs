@@ -6,43 +6,43 @@
 mod header;
 mod surface;
 
-use super::draft::{Draft, Operand};
-use super::line::{self, Line};
-use crate::files::error::Malformed;
-use crate::files::report::{Outcome, Report, ReportRow};
+use super::draft::{ConfigurationOperand, ZemaxFile};
+use super::line::{self, ZemaxLine};
+use crate::files::error::ParseError;
+use crate::files::report::{ConversionOutcome, ConversionReport, ConversionRow};
 
 /// What became of a line.
-pub(super) struct Verdict {
-    outcome: Outcome,
+pub(super) struct LineOutcome {
+    outcome: ConversionOutcome,
     note: String,
 }
 
-fn used() -> Verdict {
-    Verdict { outcome: Outcome::Used, note: String::new() }
+fn used() -> LineOutcome {
+    LineOutcome { outcome: ConversionOutcome::Used, note: String::new() }
 }
 
-fn preserved() -> Verdict {
-    Verdict { outcome: Outcome::Preserved, note: String::new() }
+fn preserved() -> LineOutcome {
+    LineOutcome { outcome: ConversionOutcome::Preserved, note: String::new() }
 }
 
-fn approximated(note: impl Into<String>) -> Verdict {
-    Verdict { outcome: Outcome::Approximated, note: note.into() }
+fn approximated(note: impl Into<String>) -> LineOutcome {
+    LineOutcome { outcome: ConversionOutcome::Approximated, note: note.into() }
 }
 
-fn dropped(note: impl Into<String>) -> Verdict {
-    Verdict { outcome: Outcome::Dropped, note: note.into() }
+fn dropped(note: impl Into<String>) -> LineOutcome {
+    LineOutcome { outcome: ConversionOutcome::Dropped, note: note.into() }
 }
 
 /// Reads every line.
-pub(super) fn parse(text: &str) -> Result<(Draft, Report), Malformed> {
-    let mut reader = Reader::default();
+pub(super) fn parse(text: &str) -> Result<(ZemaxFile, ConversionReport), ParseError> {
+    let mut reader = ZemaxReader::default();
     for line in line::lines(text) {
-        let Verdict { outcome, note } = reader.read(&line)?;
-        reader.report.rows.push(ReportRow {
+        let LineOutcome { outcome, note } = reader.read(&line)?;
+        reader.report.rows.push(ConversionRow {
             outcome,
             line: Some(line.number),
             keyword: line.keyword.to_owned(),
-            text: line.text(),
+            text: line.source_text(),
             note,
         });
     }
@@ -50,17 +50,17 @@ pub(super) fn parse(text: &str) -> Result<(Draft, Report), Malformed> {
 }
 
 #[derive(Default)]
-struct Reader {
-    draft: Draft,
-    report: Report,
+struct ZemaxReader {
+    draft: ZemaxFile,
+    report: ConversionReport,
     /// Whether the lines belong to the last surface.
     in_surface: bool,
     /// Whether the multi-configuration table has begun.
     in_table: bool,
 }
 
-impl Reader {
-    fn read(&mut self, line: &Line<'_>) -> Result<Verdict, Malformed> {
+impl ZemaxReader {
+    fn read(&mut self, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
         if line.keyword == "SURF" {
             self.in_surface = true;
             return surface::begin(&mut self.draft, line);
@@ -82,23 +82,24 @@ impl Reader {
         match self.draft.surfaces.last_mut() {
             Some(surface) if self.in_surface => surface::read(surface, line),
             None if surface::KEYWORDS.contains(&line.keyword) => {
-                Err(line.wrong(format!("`{}` before the first SURF", line.text()), "SURF 0"))
+                Err(line
+                    .malformed(format!("`{}` before the first SURF", line.source_text()), "SURF 0"))
             }
             _ => Ok(preserved()),
         }
     }
 
-    fn configurations(&mut self, line: &Line<'_>) -> Result<Verdict, Malformed> {
+    fn configurations(&mut self, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
         self.draft.configurations = line.count(0)?.max(1);
-        if self.draft.configurations > MOST_CONFIGURATIONS {
+        if self.draft.configurations > MAX_CONFIGURATIONS {
             let found = format!("{} configurations", self.draft.configurations);
-            return Err(line.wrong(found, &format!("at most {MOST_CONFIGURATIONS}")));
+            return Err(line.malformed(found, &format!("at most {MAX_CONFIGURATIONS}")));
         }
         Ok(used())
     }
 
-    fn operand(&mut self, line: &Line<'_>) -> Result<Verdict, Malformed> {
-        let operand = Operand {
+    fn operand(&mut self, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+        let operand = ConfigurationOperand {
             name: line.keyword.to_owned(),
             target: line.count(0)?,
             configuration: line.count(1)?,
@@ -113,7 +114,7 @@ impl Reader {
         Ok(used())
     }
 
-    fn other_operand(&self) -> Verdict {
+    fn other_operand(&self) -> LineOutcome {
         if self.draft.configurations == 1 {
             return preserved();
         }
@@ -122,7 +123,7 @@ impl Reader {
 }
 
 /// More than any zoom lens has, few enough to list.
-const MOST_CONFIGURATIONS: usize = 1000;
+const MAX_CONFIGURATIONS: usize = 1000;
 
 /// The operands of the multi-configuration table that are read.
 const TABLE: &[&str] = &["THIC", "APER", "XFIE", "YFIE", "SDIA"];

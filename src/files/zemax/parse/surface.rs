@@ -1,11 +1,11 @@
 //! The lines of a surface.
 
-use super::{Verdict, approximated, dropped, preserved, used};
-use crate::files::error::Malformed;
+use super::{LineOutcome, approximated, dropped, preserved, used};
+use crate::files::error::ParseError;
 use crate::files::zemax::draft::{
-    CurvatureSolve, Draft, GlassLine, PickupLine, SemiDiameter, Surface,
+    CurvatureSolve, GlassLine, PickupLine, SemiDiameterLine, ZemaxFile, ZemaxSurface,
 };
-use crate::files::zemax::line::Line;
+use crate::files::zemax::line::ZemaxLine;
 
 /// The keywords that make no sense outside a surface.
 pub(super) const KEYWORDS: &[&str] = &[
@@ -13,17 +13,25 @@ pub(super) const KEYWORDS: &[&str] = &[
 ];
 
 /// `SURF k`: surfaces come in order, from 0.
-pub(super) fn begin(draft: &mut Draft, line: &Line<'_>) -> Result<Verdict, Malformed> {
+pub(super) fn begin(
+    draft: &mut ZemaxFile,
+    line: &ZemaxLine<'_>,
+) -> Result<LineOutcome, ParseError> {
     let expected = draft.surfaces.len();
     if line.count(0)? != expected {
-        return Err(line.wrong(format!("`{}`", line.text()), &format!("SURF {expected}")));
+        return Err(
+            line.malformed(format!("`{}`", line.source_text()), &format!("SURF {expected}"))
+        );
     }
-    draft.surfaces.push(Surface { line: line.number, ..Surface::default() });
+    draft.surfaces.push(ZemaxSurface { line: line.number, ..ZemaxSurface::default() });
     Ok(used())
 }
 
 /// Reads one line of a surface.
-pub(super) fn read(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+pub(super) fn read(
+    surface: &mut ZemaxSurface,
+    line: &ZemaxLine<'_>,
+) -> Result<LineOutcome, ParseError> {
     match line.keyword {
         "STOP" => surface.stop = Some(line.number),
         "TYPE" => surface.kind = (line.word(0)?.to_ascii_uppercase(), line.number),
@@ -48,13 +56,13 @@ pub(super) fn read(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Ma
             surface.marginal_height = Some((height, zone, line.number));
         }
         "PZUP" => return thickness_pickup(surface, line),
-        _ => return rare(line),
+        _ => return read_other(line),
     }
     Ok(used())
 }
 
 /// What changes rays and has no place in a lens here, and whatever else there is.
-fn rare(line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn read_other(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let zeros = |from| (from..line.fields.len()).all(|field| line.number(field) == Ok(0.0));
     Ok(match line.keyword {
         "SQAP" | "ELAP" | "OBDC" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
@@ -64,8 +72,8 @@ fn rare(line: &Line<'_>) -> Result<Verdict, Malformed> {
             approximated("the value that is solved for is kept as it is")
         }
         "SCBD" if !zeros(1) => {
-            let found = format!("a tilted or decentred surface (`{}`)", line.text());
-            return Err(line.wrong(found, "surfaces that are centred on the axis"));
+            let found = format!("a tilted or decentred surface (`{}`)", line.source_text());
+            return Err(line.malformed(found, "surfaces that are centred on the axis"));
         }
         _ => preserved(),
     })
@@ -86,7 +94,7 @@ const SOLVES: [&str; 11] = [
     "macro",
 ];
 
-fn curvature(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn curvature(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     surface.curvature = Some((line.number(0)?, line.number));
     surface.curvature_solve = CurvatureSolve::Fixed;
     match line.count_if_any(1).unwrap_or(0) {
@@ -108,14 +116,14 @@ fn curvature(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malforme
     Ok(used())
 }
 
-fn thickness(line: &Line<'_>) -> Result<f64, Malformed> {
+fn thickness(line: &ZemaxLine<'_>) -> Result<f64, ParseError> {
     let word = line.word(0)?;
     let infinite = ["INFINITY", "INF"].iter().any(|name| word.eq_ignore_ascii_case(name));
     if infinite { Ok(f64::INFINITY) } else { line.number(0) }
 }
 
 /// `GLAS name code pickup nd vd dPgF v_nd v_vd v_dPgF p1 p2`.
-fn glass(line: &Line<'_>) -> Result<GlassLine, Malformed> {
+fn glass(line: &ZemaxLine<'_>) -> Result<GlassLine, ParseError> {
     let number = |field| line.number_or(field, 0.0);
     Ok(GlassLine {
         name: line.word(0)?.to_owned(),
@@ -130,16 +138,16 @@ fn glass(line: &Line<'_>) -> Result<GlassLine, Malformed> {
     })
 }
 
-fn semi_diameter(line: &Line<'_>) -> Result<SemiDiameter, Malformed> {
+fn semi_diameter(line: &ZemaxLine<'_>) -> Result<SemiDiameterLine, ParseError> {
     let value = line.number(0)?;
     if value < 0.0 {
-        return Err(line.wrong(format!("a semi-diameter of {value}"), "zero or more"));
+        return Err(line.malformed(format!("a semi-diameter of {value}"), "zero or more"));
     }
-    Ok(SemiDiameter { value, fixed: line.number_or(1, 0.0)? == 1.0, line: line.number })
+    Ok(SemiDiameterLine { value, fixed: line.number_or(1, 0.0)? == 1.0, line: line.number })
 }
 
 /// `CLAP rmin rmax`, `FLAP rmin rmax`: what lies inside the one and outside the other is cut.
-fn clip(surface: &mut Surface, line: &Line<'_>) -> Result<(), Malformed> {
+fn clip(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> Result<(), ParseError> {
     let (inner, outer) = radii(line)?;
     if surface.clip.is_none_or(|(other, _)| outer < other) {
         surface.clip = Some((outer, line.number));
@@ -149,7 +157,10 @@ fn clip(surface: &mut Surface, line: &Line<'_>) -> Result<(), Malformed> {
 }
 
 /// `OBSC rmin rmax`: what lies between is cut.
-fn obscuration(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn obscuration(
+    surface: &mut ZemaxSurface,
+    line: &ZemaxLine<'_>,
+) -> Result<LineOutcome, ParseError> {
     let (inner, outer) = radii(line)?;
     if inner > 0.0 {
         return Ok(dropped("a ring that is dark with light inside cannot be had here"));
@@ -159,24 +170,27 @@ fn obscuration(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malfor
 }
 
 /// The two radii of a circular aperture.
-fn radii(line: &Line<'_>) -> Result<(f64, f64), Malformed> {
+fn radii(line: &ZemaxLine<'_>) -> Result<(f64, f64), ParseError> {
     let (inner, outer) = (line.number(0)?, line.number(1)?);
     if inner >= 0.0 && (outer > inner || (inner, outer) == (0.0, 0.0)) {
         return Ok((inner, outer));
     }
     let found = format!("an aperture from {inner} to {outer}");
-    Err(line.wrong(found, "radii of zero or more, the inner one smaller"))
+    Err(line.malformed(found, "radii of zero or more, the inner one smaller"))
 }
 
 /// Darkens the middle as far as the widest of its obstructions.
-fn obstruct(surface: &mut Surface, radius: f64, line: &Line<'_>) {
+fn obstruct(surface: &mut ZemaxSurface, radius: f64, line: &ZemaxLine<'_>) {
     if radius > surface.obstruction.map_or(0.0, |(other, _)| other) {
         surface.obstruction = Some((radius, line.number));
     }
 }
 
 /// `PZUP surface scale offset column`.
-fn thickness_pickup(surface: &mut Surface, line: &Line<'_>) -> Result<Verdict, Malformed> {
+fn thickness_pickup(
+    surface: &mut ZemaxSurface,
+    line: &ZemaxLine<'_>,
+) -> Result<LineOutcome, ParseError> {
     if line.number_or(3, 0.0)? != 0.0 {
         return Ok(approximated("a pickup from another column is kept at its present value"));
     }

@@ -1,7 +1,7 @@
 //! The header: title, aperture, catalogues, fields, wavelengths.
 
-use super::{Export, number, numbers, one_line};
-use crate::files::report::Outcome;
+use super::{ZemaxWriter, number, numbers, one_line};
+use crate::files::report::ConversionOutcome;
 use crate::files::zemax::glass as there;
 use crate::files::zemax::{SOURCE, ZOOM_NAME};
 use crate::lens::glass;
@@ -10,7 +10,7 @@ use crate::lens::{Aperture, FieldKind, Medium, Object};
 /// How many field points a file has room for at least.
 const FIELD_SLOTS: usize = 12;
 
-impl Export {
+impl ZemaxWriter {
     pub(super) fn header(&mut self) {
         self.line("VERS 240130 21 31000");
         self.line("MODE SEQ");
@@ -95,7 +95,7 @@ impl Export {
         }
         if count > FIELD_SLOTS {
             let note = format!("older versions of the program read {FIELD_SLOTS}");
-            self.note(Outcome::Approximated, format!("fields: {count} points"), note);
+            self.record(ConversionOutcome::Approximated, format!("fields: {count} points"), note);
         }
     }
 

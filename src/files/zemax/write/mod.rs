@@ -7,29 +7,32 @@ mod header;
 mod surface;
 mod table;
 
-use crate::files::report::{Outcome, Report};
+use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, LensError, Quantity, ZoomThickness};
 
 /// The text of the file and what could not be said in it.
-pub fn write(lens: &Lens) -> Result<(String, Report), LensError> {
+pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
-    let mut export =
-        Export { lens: lens.with_pickups()?, text: String::new(), report: Report::default() };
-    export.flatten();
-    export.settle_focus();
+    let mut export = ZemaxWriter {
+        lens: lens.with_pickups()?,
+        text: String::new(),
+        report: ConversionReport::default(),
+    };
+    export.flatten_single_position();
+    export.apply_focus_solve();
     export.header();
     export.surfaces();
     export.table();
-    export.losses();
+    export.report_losses();
     Ok((export.text, export.report))
 }
 
 /// A file on its way.
-struct Export {
+struct ZemaxWriter {
     /// The lens, with every pickup and the focus worked out.
     lens: Lens,
     text: String,
-    report: Report,
+    report: ConversionReport,
 }
 
 /// A number in the fewest digits that read back to the same bits.
@@ -51,29 +54,34 @@ fn one_line(text: &str) -> String {
     text.split(['\n', '\r']).map(str::trim).collect::<Vec<_>>().join(" ").trim().to_owned()
 }
 
-impl Export {
+impl ZemaxWriter {
     fn line(&mut self, text: impl AsRef<str>) {
         self.text.push_str(text.as_ref().trim_end());
         self.text.push_str("\r\n");
     }
 
     /// A line of a surface.
-    fn inner(&mut self, text: impl AsRef<str>) {
+    fn surface_line(&mut self, text: impl AsRef<str>) {
         self.text.push_str("  ");
         self.line(text);
     }
 
-    fn note(&mut self, outcome: Outcome, what: impl AsRef<str>, note: impl Into<String>) {
+    fn record(
+        &mut self,
+        outcome: ConversionOutcome,
+        what: impl AsRef<str>,
+        note: impl Into<String>,
+    ) {
         self.report.add(outcome, what.as_ref(), note);
     }
 
     /// Whether the last gap is solved for the focus there too.
     fn has_focus_solve(&self) -> bool {
-        self.lens.focus == Some(0.0)
+        self.lens.image_solve == Some(0.0)
     }
 
     /// Makes one zoom position the lens itself: a single configuration is no zoom lens there.
-    fn flatten(&mut self) {
+    fn flatten_single_position(&mut self) {
         if self.lens.zoom.len() != 1 {
             return;
         }
@@ -89,17 +97,17 @@ impl Export {
         self.lens.variables.retain(|variable| !moves(variable.parameter));
         self.lens.pickups.retain(|pickup| !moves(pickup.parameter) && !moves(pickup.source));
         let note = "one position is written as a lens that does not zoom";
-        self.note(Outcome::Approximated, "zoom positions: 1", note);
+        self.record(ConversionOutcome::Approximated, "zoom positions: 1", note);
     }
 
     /// Writes the solved last gap into the lens, at every zoom position where it is not solved
     /// there too.
-    fn settle_focus(&mut self) {
-        let Some(offset) = self.lens.focus else { return };
+    fn apply_focus_solve(&mut self) {
+        let Some(offset) = self.lens.image_solve else { return };
         let primary = self.lens.wavelengths[self.lens.primary()].um;
         let last = self.lens.surfaces.len() - 1;
         let solved = |lens: &Lens, zoom| {
-            lens.system(zoom, primary).ok().map(|system| system.surfaces[last].thickness)
+            lens.resolve(zoom, primary).ok().map(|system| system.surfaces[last].thickness)
         };
         let gaps: Vec<Option<f64>> =
             (0..self.lens.zoom_positions()).map(|zoom| solved(&self.lens, zoom)).collect();
@@ -115,22 +123,30 @@ impl Export {
         }
         if offset != 0.0 {
             let note = "no solve there displaces the focus: the last gap is what it is now";
-            self.note(Outcome::Approximated, format!("focus solve displaced by {offset} mm"), note);
+            self.record(
+                ConversionOutcome::Approximated,
+                format!("focus solve displaced by {offset} mm"),
+                note,
+            );
         }
     }
 
     /// What has no place in the file, or another one.
-    fn losses(&mut self) {
+    fn report_losses(&mut self) {
         let lens = self.lens.clone();
         let clipping = lens.surfaces.iter().filter(|row| row.semi_diameter.is_some()).count();
         if clipping > 0 {
             let note = "semi-diameters alone clip nothing there: written with circular apertures";
-            self.note(Outcome::Used, format!("{clipping} semi-diameters that clip"), note);
+            self.record(
+                ConversionOutcome::Used,
+                format!("{clipping} semi-diameters that clip"),
+                note,
+            );
         }
         let obstructing = lens.surfaces.iter().filter(|row| row.obstruction.is_some()).count();
         if obstructing > 0 {
             let note = "written as obscurations, or as inner radii of the circular apertures";
-            self.note(Outcome::Used, format!("{obstructing} obstructions"), note);
+            self.record(ConversionOutcome::Used, format!("{obstructing} obstructions"), note);
         }
         for variable in &lens.variables {
             let what = format!("variable: {}", variable.parameter);
@@ -138,10 +154,16 @@ impl Export {
             let both = variable.min.is_some() && variable.max.is_some();
             match variable.parameter.quantity {
                 Quantity::SemiDiameter => {
-                    self.note(Outcome::Dropped, what, "semi-diameters do not vary there");
+                    self.record(
+                        ConversionOutcome::Dropped,
+                        what,
+                        "semi-diameters do not vary there",
+                    );
                 }
                 Quantity::Thickness if both => {}
-                _ if bounded => self.note(Outcome::Dropped, what, "its bounds; it stays variable"),
+                _ if bounded => {
+                    self.record(ConversionOutcome::Dropped, what, "its bounds; it stays variable")
+                }
                 _ => {}
             }
         }
@@ -151,7 +173,11 @@ impl Export {
                 matches!(pickup.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
             if !(like && there) {
                 let what = format!("pickup: {} from the {}", pickup.parameter, pickup.source);
-                self.note(Outcome::Approximated, what, "its present value, without the pickup");
+                self.record(
+                    ConversionOutcome::Approximated,
+                    what,
+                    "its present value, without the pickup",
+                );
             }
         }
     }

@@ -1,13 +1,13 @@
 //! The surfaces, with the object in front and the image behind.
 
-use super::{Export, number, numbers, one_line};
-use crate::files::report::Outcome;
+use super::{ZemaxWriter, number, numbers, one_line};
+use crate::files::report::ConversionOutcome;
 use crate::files::zemax::glass as there;
 use crate::files::zemax::gradient;
 use crate::lens::glass;
 use crate::lens::{Aperture, Medium, Object, Parameter, Pickup, Quantity, Row};
 
-impl Export {
+impl ZemaxWriter {
     pub(super) fn surfaces(&mut self) {
         self.object();
         for i in 0..self.lens.surfaces.len() {
@@ -30,48 +30,48 @@ impl Export {
 
     /// Object or image.
     fn plane(&mut self, thickness: &str) {
-        self.inner("TYPE STANDARD");
-        self.inner("CURV 0.0 0 0 0 0 \"\"");
-        self.inner(format!("DISZ {thickness}"));
-        self.inner("DIAM 0 0 0 0 1 \"\"");
+        self.surface_line("TYPE STANDARD");
+        self.surface_line("CURV 0.0 0 0 0 0 \"\"");
+        self.surface_line(format!("DISZ {thickness}"));
+        self.surface_line("DIAM 0 0 0 0 1 \"\"");
     }
 
     fn row(&mut self, i: usize) {
         let row = self.lens.surfaces[i].clone();
         self.line(format!("SURF {}", i + 1));
         if row.stop {
-            self.inner("STOP");
+            self.surface_line("STOP");
         }
         let aspheric = row.asphere.iter().any(|a| *a != 0.0);
         let graded = self.gradient(i, aspheric);
-        self.inner(match (aspheric, graded.is_some()) {
+        self.surface_line(match (aspheric, graded.is_some()) {
             (true, _) => "TYPE EVENASPH".to_owned(),
             (false, true) => format!("TYPE {}", gradient::KIND),
             (false, false) => "TYPE STANDARD".to_owned(),
         });
         if !row.comment.is_empty() {
-            self.inner(format!("COMM {}", one_line(&row.comment)));
+            self.surface_line(format!("COMM {}", one_line(&row.comment)));
         }
         self.curvature(i, row.curvature);
         if row.conic != 0.0 {
-            self.inner(format!("CONI {}", number(row.conic)));
+            self.surface_line(format!("CONI {}", number(row.conic)));
         }
         if self.is_variable(i, Quantity::Conic) {
-            self.inner("VCON");
+            self.surface_line("VCON");
         }
         if aspheric {
             self.terms(i, &row.asphere);
         }
         let mut varying = Vec::new();
         for (number, value) in graded.iter().flatten() {
-            self.inner(format!("PARM {number} {}", super::number(*value)));
-            let quantity = gradient::variable(gradient::KIND, *number);
+            self.surface_line(format!("PARM {number} {}", super::number(*value)));
+            let quantity = gradient::variable_quantity(gradient::KIND, *number);
             if quantity.is_some_and(|quantity| self.is_variable(i, quantity)) {
                 varying.push(*number);
             }
         }
         for number in varying {
-            self.inner(format!("VPAR {number}"));
+            self.surface_line(format!("VPAR {number}"));
         }
         self.thickness(i, row.thickness);
         let variable = self.is_variable(i, Quantity::Index);
@@ -79,16 +79,16 @@ impl Export {
             self.glass(&row.medium, &format!("after surface {i}"), variable);
         }
         self.semi_diameter(&row);
-        if row.hyper {
+        if row.hyperhemisphere {
             let note = "the far half of the surface counts there or not, as the program decides";
-            self.note(Outcome::Dropped, format!("hyper of surface {i}"), note);
+            self.record(ConversionOutcome::Dropped, format!("hyper of surface {i}"), note);
         }
     }
 
     /// The parameters of a surface whose gap is a gradient that the format can say.
     fn gradient(&self, i: usize, aspheric: bool) -> Option<Vec<(usize, f64)>> {
         match &self.lens.surfaces[i].medium {
-            Medium::Gradient(gradient) if !aspheric => gradient::parameters(gradient),
+            Medium::Grin(gradient) if !aspheric => gradient::parameters(gradient),
             _ => None,
         }
     }
@@ -113,35 +113,35 @@ impl Export {
             None if self.is_variable(i, Quantity::Curvature) => "1 0 0 0".to_owned(),
             None => "0 0 0 0".to_owned(),
         };
-        self.inner(format!("CURV {} {solve} \"\"", number(curvature)));
+        self.surface_line(format!("CURV {} {solve} \"\"", number(curvature)));
     }
 
     /// Parameter 1 belongs to r², which a conic has already.
     fn terms(&mut self, i: usize, asphere: &[f64]) {
-        self.inner("PARM 1 0.0");
+        self.surface_line("PARM 1 0.0");
         for (term, a) in asphere.iter().enumerate() {
-            self.inner(format!("PARM {} {}", term + 2, number(*a)));
+            self.surface_line(format!("PARM {} {}", term + 2, number(*a)));
         }
         for term in 0..crate::lens::ASPHERE_TERMS {
             if self.is_variable(i, Quantity::Asphere(term)) {
-                self.inner(format!("VPAR {}", term + 2));
+                self.surface_line(format!("VPAR {}", term + 2));
             }
         }
     }
 
     fn thickness(&mut self, i: usize, thickness: f64) {
-        self.inner(format!("DISZ {}", number(thickness)));
+        self.surface_line(format!("DISZ {}", number(thickness)));
         let parameter = Parameter::new(i, Quantity::Thickness);
         if self.has_focus_solve() && i + 1 == self.lens.surfaces.len() {
-            self.inner("MAZH 0 0");
+            self.surface_line("MAZH 0 0");
         } else if let Some(pickup) = self.pickup(i, Quantity::Thickness) {
             let surface = pickup.source.surface + 1;
             let line = format!("PZUP {surface} {} 0", numbers([pickup.scale, pickup.offset]));
-            self.inner(line);
+            self.surface_line(line);
         } else if let Some(variable) = self.lens.variable(parameter).copied() {
             let bounds = variable.min.zip(variable.max).filter(|(low, high)| low < high);
             let (low, high) = bounds.unwrap_or((0.0, 0.0));
-            self.inner(format!("VDSZ {}", numbers([low, high])));
+            self.surface_line(format!("VDSZ {}", numbers([low, high])));
         }
     }
 
@@ -149,22 +149,25 @@ impl Export {
         let vary = i32::from(variable);
         match medium {
             Medium::Air => {}
-            Medium::Mirror => self.inner("GLAS MIRROR 0 0 1.5 40 0 0 0 0 0 0"),
+            Medium::Mirror => self.surface_line("GLAS MIRROR 0 0 1.5 40 0 0 0 0 0 0"),
             Medium::Index(n) => {
-                self.inner(format!("GLAS ___BLANK 1 0 {} 0 {vary} 0 0 0 0", numbers([*n, 0.0])));
+                self.surface_line(format!(
+                    "GLAS ___BLANK 1 0 {} 0 {vary} 0 0 0 0",
+                    numbers([*n, 0.0])
+                ));
             }
             Medium::Model { nd, vd } => {
                 let line = format!("GLAS ___BLANK 1 0 {} 0 {vary} 0 0 0 0", numbers([*nd, *vd]));
-                self.inner(line);
+                self.surface_line(line);
                 let note = "each program has its own dispersion formula for nd and vd";
-                self.note(Outcome::Approximated, format!("model glass {place}"), note);
+                self.record(ConversionOutcome::Approximated, format!("model glass {place}"), note);
             }
             Medium::Glass(name) => self.catalogue_glass(name, place),
-            Medium::Gradient(gradient) => {
+            Medium::Grin(gradient) => {
                 self.glass(&gradient.base, place, variable);
                 let note = "only r^2 to r^6 and z to z^3 of an index without dispersion behind a conic \
                             can be written: its coefficients are left out";
-                self.note(Outcome::Dropped, format!("gradient {place}"), note);
+                self.record(ConversionOutcome::Dropped, format!("gradient {place}"), note);
             }
         }
     }
@@ -173,10 +176,10 @@ impl Export {
         let Some(glass) = glass::find(name) else { return };
         let bare: String = glass.name.split_whitespace().collect();
         let values = numbers([glass.nd, glass.vd]);
-        self.inner(format!("GLAS {bare} 0 0 {values} 0 0 0 0 0 0"));
+        self.surface_line(format!("GLAS {bare} 0 0 {values} 0 0 0 0 0 0"));
         if there::is_general(glass) {
             let note = "not a maker's own: its data in the other program may differ";
-            self.note(Outcome::Approximated, format!("glass {place}: {name}"), note);
+            self.record(ConversionOutcome::Approximated, format!("glass {place}: {name}"), note);
         }
     }
 
@@ -188,19 +191,19 @@ impl Export {
             _ => row.semi_diameter,
         };
         match aperture {
-            Some(radius) => self.inner(format!("DIAM {} 1 0 0 1 \"\"", number(radius))),
-            None => self.inner("DIAM 0 0 0 0 1 \"\""),
+            Some(radius) => self.surface_line(format!("DIAM {} 1 0 0 1 \"\"", number(radius))),
+            None => self.surface_line("DIAM 0 0 0 0 1 \"\""),
         }
         let inner = row.obstruction.filter(|radius| *radius > 0.0);
         match (row.semi_diameter, inner) {
             (Some(outer), Some(inner)) => self.clap(&number(inner), outer),
             (Some(outer), None) => self.clap("0", outer),
-            (None, Some(inner)) => self.inner(format!("OBSC 0 {} 0", number(inner))),
+            (None, Some(inner)) => self.surface_line(format!("OBSC 0 {} 0", number(inner))),
             (None, None) => {}
         }
     }
 
     fn clap(&mut self, inner: &str, outer: f64) {
-        self.inner(format!("CLAP {inner} {} 0", number(outer)));
+        self.surface_line(format!("CLAP {inner} {} 0", number(outer)));
     }
 }

@@ -1,11 +1,11 @@
 //! The multi-configuration table: all positions of one operand, then the next.
 
-use super::{Export, number};
-use crate::files::report::Outcome;
+use super::{ZemaxWriter, number};
+use crate::files::report::ConversionOutcome;
 use crate::lens::{Aperture, Fields, Parameter, Quantity};
 use std::mem::discriminant;
 
-impl Export {
+impl ZemaxWriter {
     pub(super) fn table(&mut self) {
         let positions = self.lens.zoom.len();
         if positions == 0 {
@@ -56,7 +56,7 @@ impl Export {
         }
         if all.iter().any(|aperture| discriminant(aperture) != discriminant(&base)) {
             let note = "apertures of different kinds: that of the lens holds at every position";
-            self.note(Outcome::Dropped, "apertures of the zoom positions", note);
+            self.record(ConversionOutcome::Dropped, "apertures of the zoom positions", note);
             return;
         }
         let values: Vec<(f64, bool)> = all.into_iter().map(|a| (size(a), false)).collect();
@@ -76,12 +76,12 @@ impl Export {
         if !all.iter().all(|fields| alike(fields, &base)) {
             let note =
                 "fields of another kind, number or weight: those of the lens hold everywhere";
-            self.note(Outcome::Dropped, "fields of the zoom positions", note);
+            self.record(ConversionOutcome::Dropped, "fields of the zoom positions", note);
             return;
         }
         let any_x = all.iter().flat_map(|fields| &fields.values).any(|field| field.x != 0.0);
         for i in 0..base.values.len() {
-            let column = |f: fn(&crate::lens::Field) -> f64| -> Vec<(f64, bool)> {
+            let column = |f: fn(&crate::lens::FieldPoint) -> f64| -> Vec<(f64, bool)> {
                 all.iter().map(|fields| (f(&fields.values[i]), false)).collect()
             };
             if any_x {

@@ -3,19 +3,19 @@
 use eframe::egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::path::PathBuf;
 
-use super::terms::{self, asks_for_more, hint, reading, targets, title, unit};
-use crate::lens::{Aperture, Lens, NumberKind, Quantity};
-use crate::merit::{Goal, PupilEdge, Term, Weighted};
-use crate::session::{Command, Edit, Search, View, evaluate};
-use crate::studio::field::{Drafts, Field, Place};
+use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
+use crate::lens::{Aperture, Lens, ParameterKind, Quantity};
+use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use crate::session::{Command, Edit, OptimizationSnapshot, SessionView, evaluate};
+use crate::studio::field::{EditBuffers, InputPlacement, TextInput};
 use crate::studio::number;
-use crate::studio::panels::{field_name, freed};
+use crate::studio::panels::{add_variables_edit, field_name};
 
 /// The terms of the panel.
 #[derive(Debug, Default)]
-pub(super) struct Aims {
-    terms: Vec<Aim>,
-    pupil: PupilEdge,
+pub(super) struct MeritEditor {
+    terms: Vec<MeritRow>,
+    edge: PupilEdge,
     zoom_ratios: Vec<f64>,
     /// The lens for which they were proposed.
     lens: Option<(String, Option<PathBuf>, usize)>,
@@ -23,9 +23,9 @@ pub(super) struct Aims {
 
 /// A term, and whether it counts.
 #[derive(Debug, Clone, Copy)]
-struct Aim {
-    counts: bool,
-    weighted: Weighted,
+struct MeritRow {
+    active: bool,
+    weighted: WeightedTerm,
 }
 
 /// Both ways to treat the edge of the pupil, each with what it means.
@@ -43,22 +43,22 @@ const EDGES: [(PupilEdge, &str, &str); 2] = [
     ),
 ];
 
-impl Aims {
+impl MeritEditor {
     /// Proposes what a designer would ask of a lens first, once for each lens.
-    pub(super) fn keep_up(&mut self, view: &View) {
+    pub(super) fn sync(&mut self, view: &SessionView) {
         let lens = Some((view.lens.name.clone(), view.path.clone(), view.lens.zoom.len()));
         if self.lens == lens {
             return;
         }
-        let goal = Goal::sensible(&view.lens).unwrap_or_else(|_| Goal {
-            terms: vec![Weighted { term: Term::Spot, weight: 1.0 }],
+        let goal = Goal::default_for(&view.lens).unwrap_or_else(|_| Goal {
+            terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
             pupil: PupilEdge::default(),
             zoom_ratios: Vec::new(),
         });
-        let aim = |weighted: Weighted| Aim { counts: true, weighted };
+        let aim = |weighted: WeightedTerm| MeritRow { active: true, weighted };
         *self = Self {
             terms: goal.terms.into_iter().map(aim).collect(),
-            pupil: self.pupil,
+            edge: self.edge,
             zoom_ratios: goal.zoom_ratios,
             lens,
         };
@@ -67,38 +67,38 @@ impl Aims {
     /// What the search is to aim at.
     pub(super) fn goal(&self) -> Goal {
         Goal {
-            terms: self.counting().collect(),
-            pupil: self.pupil,
+            terms: self.active_terms().collect(),
+            pupil: self.edge,
             zoom_ratios: self.zoom_ratios.clone(),
         }
     }
 
     /// The terms that count.
-    fn counting(&self) -> impl Iterator<Item = Weighted> {
-        self.terms.iter().filter(|aim| aim.counts).map(|aim| aim.weighted)
+    fn active_terms(&self) -> impl Iterator<Item = WeightedTerm> {
+        self.terms.iter().filter(|aim| aim.active).map(|aim| aim.weighted)
     }
 
     /// The choice of how the edge of the pupil is treated.
-    pub(super) fn pupil(&mut self, ui: &mut Ui) {
+    pub(super) fn edge_choice(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             ui.weak("Pupil edge");
             for (edge, text, what) in EDGES {
-                ui.radio_value(&mut self.pupil, edge, text).on_hover_text(what);
+                ui.radio_value(&mut self.edge, edge, text).on_hover_text(what);
             }
         });
-        let chosen = EDGES.iter().find(|(edge, ..)| *edge == self.pupil);
+        let chosen = EDGES.iter().find(|(edge, ..)| *edge == self.edge);
         ui.label(RichText::new(chosen.map_or("", |(.., what)| what)).small().weak());
     }
 
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
-        view: &View,
-        drafts: &mut Drafts,
+        view: &SessionView,
+        drafts: &mut EditBuffers,
         wishes: &mut Vec<Command>,
     ) {
-        self.advice(ui, &view.lens, wishes);
-        let search = view.search.as_deref();
+        self.warnings(ui, &view.lens, wishes);
+        let search = view.optimization.as_deref();
         let mut unwanted = None;
         Grid::new("terms").num_columns(6).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
             for (text, what) in [("Term", ""), ("Weight", ""), ("Target", "")] {
@@ -119,22 +119,22 @@ impl Aims {
         if let Some(i) = unwanted {
             self.terms.remove(i);
         }
-        self.add(ui, view);
+        self.add_menu(ui, view);
     }
 
     /// What stands in the way of the light that is asked for, each with the remedy.
-    fn advice(&mut self, ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
+    fn warnings(&mut self, ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
         let more: Vec<&str> = self
-            .counting()
-            .filter(|weighted| asks_for_more(weighted.term))
+            .active_terms()
+            .filter(|weighted| can_ask_for_more_light(weighted.term))
             .map(|weighted| title(weighted.term))
             .collect();
-        let about_light = self.counting().any(|weighted| weighted.term.is_about_light());
-        if about_light && self.pupil == PupilEdge::Kept {
+        let about_light = self.active_terms().any(|weighted| weighted.term.concerns_light());
+        if about_light && self.edge == PupilEdge::Kept {
             let what = "Kept rays tell nothing about light: those terms are counted but do not \
                         guide the search.";
-            if remedy(ui, what, "Follow the edge", EDGES[0].2) {
-                self.pupil = PupilEdge::Moving;
+            if warning_with_fix(ui, what, "Follow the edge", EDGES[0].2) {
+                self.edge = PupilEdge::Moving;
             }
         }
         if more.is_empty() {
@@ -148,7 +148,7 @@ impl Aims {
             );
             let hint = "Makes the rim of the stop, as large as the beam is there now, the aperture \
                         of the lens: one undo step";
-            if remedy(ui, &what, "Limit the beam by the stop", hint) {
+            if warning_with_fix(ui, &what, "Limit the beam by the stop", hint) {
                 wishes.push(Edit::LimitByStop.into());
             }
         }
@@ -157,23 +157,23 @@ impl Aims {
             let what = format!("{asked}: no semi-diameter is variable, so rims stay as they are.");
             let hint = "Lets the optimizer change every semi-diameter that is written: one undo \
                         step";
-            if remedy(ui, &what, "Free the semi-diameters", hint) {
-                wishes.push(freed(lens, &[NumberKind::SemiDiameters]).into());
+            if warning_with_fix(ui, &what, "Free the semi-diameters", hint) {
+                wishes.push(add_variables_edit(lens, &[ParameterKind::SemiDiameters]).into());
             }
         }
     }
 
     /// A menu of the terms that are not there yet.
-    fn add(&mut self, ui: &mut Ui, view: &View) {
+    fn add_menu(&mut self, ui: &mut Ui, view: &SessionView) {
         ui.menu_button("Add a term", |ui| {
             let there =
                 |term: Term| self.terms.iter().any(|aim| aim.weighted.term.name() == term.name());
-            let every = terms::every(view).into_iter();
-            let missing: Vec<Weighted> = every.filter(|new| !there(new.term)).collect();
+            let every = terms::default_terms(view).into_iter();
+            let missing: Vec<WeightedTerm> = every.filter(|new| !there(new.term)).collect();
             for weighted in missing {
                 let button = ui.button(title(weighted.term));
                 if button.on_hover_text(hint(weighted.term)).clicked() {
-                    self.terms.push(Aim { counts: true, weighted });
+                    self.terms.push(MeritRow { active: true, weighted });
                     ui.close();
                 }
             }
@@ -188,7 +188,7 @@ fn is_limited_by_stop(lens: &Lens) -> bool {
 }
 
 /// A warning and the button that removes its reason.
-fn remedy(ui: &mut Ui, what: &str, button: &str, hint: &str) -> bool {
+fn warning_with_fix(ui: &mut Ui, what: &str, button: &str, hint: &str) -> bool {
     let text = RichText::new(what).small().color(ui.visuals().warn_fg_color);
     ui.horizontal_wrapped(|ui| {
         ui.label(text);
@@ -204,11 +204,11 @@ fn heading(ui: &mut Ui, text: &str, what: &str) {
     }
 }
 
-impl Aim {
+impl MeritRow {
     /// Shows it; says whether it is to go.
-    fn ui(&mut self, ui: &mut Ui, view: &View, drafts: &mut Drafts) -> bool {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, drafts: &mut EditBuffers) -> bool {
         let term = self.weighted.term;
-        ui.checkbox(&mut self.counts, title(term)).on_hover_text(hint(term));
+        ui.checkbox(&mut self.active, title(term)).on_hover_text(hint(term));
         let name = format!("Weight of {}", title(term));
         number_field(ui, drafts, &name, &mut self.weighted.weight, 58.0);
         ui.horizontal(|ui| {
@@ -220,16 +220,16 @@ impl Aim {
                 number_field(ui, drafts, &name, value, width);
             }
             ui.weak(unit(term));
-            self.field(ui, view);
+            self.field_choice(ui, view);
         });
-        if let Some(search) = view.search.as_deref() {
-            self.readings(ui, search);
+        if let Some(search) = view.optimization.as_deref() {
+            self.value_cells(ui, search);
         }
         ui.small_button("×").on_hover_text("Take the term out of the goal").clicked()
     }
 
     /// The choice of the field where the term is about one.
-    fn field(&mut self, ui: &mut Ui, view: &View) {
+    fn field_choice(&mut self, ui: &mut Ui, view: &SessionView) {
         let Term::RelativeIllumination { field, .. } = &mut self.weighted.term else { return };
         let fields = view.lens.fields_at(view.settings.zoom);
         let name = |i: usize| {
@@ -247,13 +247,13 @@ impl Aim {
     }
 
     /// What the search has made of it.
-    fn readings(&self, ui: &mut Ui, search: &Search) {
-        let asked = search.task.goal.terms.iter();
+    fn value_cells(&self, ui: &mut Ui, search: &OptimizationSnapshot) {
+        let asked = search.request.goal.terms.iter();
         let term = asked.map(|w| w.term).find(|t| t.name() == self.weighted.term.name());
-        for values in [&search.before, &search.terms] {
+        for values in [&search.initial_terms, &search.best_terms] {
             let value = term.and_then(|term| {
                 let value = values.iter().find(|value| value.term == term.name())?;
-                Some(reading(term, value.value))
+                Some(value_text(term, value.value))
             });
             ui.label(value.unwrap_or_default());
         }
@@ -261,20 +261,26 @@ impl Aim {
 }
 
 /// A number that belongs to the panel itself.
-fn number_field(ui: &mut Ui, drafts: &mut Drafts, name: &str, value: &mut f64, width: f32) {
+fn number_field(ui: &mut Ui, drafts: &mut EditBuffers, name: &str, value: &mut f64, width: f32) {
     let id = Id::unique(("optimizer", name));
-    let shown = number::show_digits(*value, 4);
-    let field = Field { name, shown: &shown, hint: "", align: Align::Max, place: Place::Form };
+    let shown = number::format_digits(*value, 4);
+    let field = TextInput {
+        name,
+        value: &shown,
+        hint: "",
+        align: Align::Max,
+        placement: InputPlacement::Form,
+    };
     let layout = Arrange::left_to_right(Align::Center);
     let size = vec2(width, ui.spacing().interact_size.y);
     let entry = ui.allocate_ui_with_layout(size, layout, |ui| drafts.show(ui, id, field));
-    let Some(text) = entry.inner.typed else { return };
+    let Some(text) = entry.inner.submitted else { return };
     match evaluate(&text, *value) {
         Ok(new) if new.is_finite() => {
             *value = new;
             drafts.accept(id);
         }
-        Ok(new) => drafts.refuse(id, format!("{name} is {new}; expected a finite number")),
-        Err(why) => drafts.refuse(id, why.to_string()),
+        Ok(new) => drafts.reject(id, format!("{name} is {new}; expected a finite number")),
+        Err(why) => drafts.reject(id, why.to_string()),
     }
 }

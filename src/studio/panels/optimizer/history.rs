@@ -3,13 +3,13 @@
 use eframe::egui::{Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, Plot, PlotPoints};
 
-use crate::session::{HistoryPoint, Search};
+use crate::session::{MeritSample, OptimizationSnapshot};
 use crate::studio::panels::decade_name;
 
 /// Plots the merit of the current and of the best lens, decades up and steps across.
-pub(super) fn plot(ui: &mut Ui, search: &Search) {
+pub(super) fn plot(ui: &mut Ui, search: &OptimizationSnapshot) {
     let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
-    let curve = |merit: fn(&HistoryPoint) -> f64| -> PlotPoints<'static> {
+    let curve = |merit: fn(&MeritSample) -> f64| -> PlotPoints<'static> {
         let points = search.history.iter().map(|point| [point.step as f64, decade(merit(point))]);
         points.filter(|[_, y]| y.is_finite()).collect()
     };

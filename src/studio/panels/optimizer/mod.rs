@@ -10,13 +10,13 @@ use eframe::egui::{
     Button, ComboBox, Context, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui,
 };
 
-use super::{Panel, light};
-use crate::optimize::Method;
-use crate::session::{Command, Numbers, Search, Standing, View};
-use crate::studio::field::Drafts;
+use super::{Panel, mean_pupil_area};
+use crate::optimize::DescentMethod;
+use crate::session::{Analyses, Command, OptimizationSnapshot, RunStatus, SessionView};
+use crate::studio::field::EditBuffers;
 use crate::studio::number;
-use crate::studio::wording::{capital, counted_from_one};
-use goal::Aims;
+use crate::studio::wording::{capitalize, counted_from_one};
+use goal::MeritEditor;
 
 /// How high the merit history is, in points; less where there is little room.
 const HISTORY: f32 = 130.0;
@@ -25,21 +25,21 @@ const NO_VARIABLES: &str = "No number is variable: press the badge beside one in
 
 /// The panel.
 #[derive(Debug, Default)]
-pub struct Optimizer {
-    method: Method,
-    aims: Aims,
-    drafts: Drafts,
+pub struct OptimizerPanel {
+    method: DescentMethod,
+    merit: MeritEditor,
+    drafts: EditBuffers,
 }
 
-impl Panel for Optimizer {
+impl Panel for OptimizerPanel {
     fn title(&self) -> &'static str {
         "Optimizer"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        self.aims.keep_up(view);
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+        self.merit.sync(view);
         self.controls(ui, view, wishes);
-        if let Some(search) = view.search.as_deref() {
+        if let Some(search) = view.optimization.as_deref() {
             progress(ui, view, search);
             let frame = Frame::new().inner_margin(Margin { right: 10, ..Margin::ZERO });
             let plot = Side::bottom("merit history").frame(frame).show_separator_line(false);
@@ -50,7 +50,7 @@ impl Panel for Optimizer {
             ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            self.aims.ui(ui, view, &mut self.drafts, wishes);
+            self.merit.ui(ui, view, &mut self.drafts, wishes);
         });
     }
 
@@ -59,14 +59,14 @@ impl Panel for Optimizer {
     }
 }
 
-impl Optimizer {
-    fn controls(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        let standing = view.search.as_ref().map(|search| search.standing);
-        let paused = standing == Some(Standing::Paused);
-        let under_way = paused || standing == Some(Standing::Running);
+impl OptimizerPanel {
+    fn controls(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+        let standing = view.optimization.as_ref().map(|search| search.status);
+        let paused = standing == Some(RunStatus::Paused);
+        let under_way = paused || standing == Some(RunStatus::Running);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            self.begin(ui, view, under_way, wishes);
+            self.start_button(ui, view, under_way, wishes);
             let hold = if paused {
                 ("Resume", Command::Resume, "Let the search go on")
             } else {
@@ -79,13 +79,13 @@ impl Optimizer {
                 (
                     "Take",
                     standing.is_some(),
-                    Command::Take,
+                    Command::AcceptResult,
                     "Make the best lens of the search the design, as one undo step",
                 ),
                 (
                     "Discard",
                     standing.is_some(),
-                    Command::Discard,
+                    Command::DiscardResult,
                     "End the search and throw its result away",
                 ),
             ];
@@ -96,10 +96,16 @@ impl Optimizer {
             }
         });
         self.method(ui, under_way);
-        ui.add_enabled_ui(!under_way, |ui| self.aims.pupil(ui));
+        ui.add_enabled_ui(!under_way, |ui| self.merit.edge_choice(ui));
     }
 
-    fn begin(&self, ui: &mut Ui, view: &View, under_way: bool, wishes: &mut Vec<Command>) {
+    fn start_button(
+        &self,
+        ui: &mut Ui,
+        view: &SessionView,
+        under_way: bool,
+        wishes: &mut Vec<Command>,
+    ) {
         let ready = !under_way && !view.lens.variables.is_empty();
         let fill = ui.visuals().selection.bg_fill;
         let text = RichText::new("Optimize").strong();
@@ -107,7 +113,7 @@ impl Optimizer {
         let button = button.on_hover_text("Search for a better lens in the background, on a copy");
         let why = if under_way { "A search is under way" } else { NO_VARIABLES };
         if button.on_disabled_hover_text(why).clicked() {
-            let goal = self.aims.goal();
+            let goal = self.merit.goal();
             wishes.push(Command::Optimize { method: self.method, goal });
         }
     }
@@ -115,15 +121,15 @@ impl Optimizer {
     fn method(&mut self, ui: &mut Ui, under_way: bool) {
         ui.horizontal(|ui| {
             ui.weak("Method");
-            ui.add_enabled_ui(!under_way, |ui| methods(ui, &mut self.method));
+            ui.add_enabled_ui(!under_way, |ui| method_menu(ui, &mut self.method));
         });
     }
 }
 
-pub(super) fn methods(ui: &mut Ui, chosen: &mut Method) {
+pub(super) fn method_menu(ui: &mut Ui, chosen: &mut DescentMethod) {
     let combo = ComboBox::from_id_salt("method").selected_text(chosen.name()).width(160.0);
     let combo = combo.show_ui(ui, |ui| {
-        for method in [Method::DampedLeastSquares, Method::Adam] {
+        for method in [DescentMethod::DampedLeastSquares, DescentMethod::Adam] {
             ui.selectable_value(chosen, method, method.name());
         }
     });
@@ -131,12 +137,12 @@ pub(super) fn methods(ui: &mut Ui, chosen: &mut Method) {
 }
 
 /// How the search stands, and the numbers a designer reads first, before and after.
-fn progress(ui: &mut Ui, view: &View, search: &Search) {
-    let standing = match search.standing {
-        Standing::Running => "Running",
-        Standing::Paused => "Paused",
-        Standing::Stopped => "Stopped",
-        Standing::Finished => "Finished",
+fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
+    let standing = match search.status {
+        RunStatus::Running => "Running",
+        RunStatus::Paused => "Paused",
+        RunStatus::Stopped => "Stopped",
+        RunStatus::Finished => "Finished",
     };
     let step = search.progress.as_ref().map_or(0, |progress| progress.step);
     ui.horizontal(|ui| {
@@ -147,35 +153,35 @@ fn progress(ui: &mut Ui, view: &View, search: &Search) {
             ui.label(format!("merit {:.3e} to {:.3e}", first.current, last.best));
         }
     });
-    ui.label(changes(view).join(", ")).on_hover_text(
+    ui.label(changes_text(view).join(", ")).on_hover_text(
         "Mean RMS radius of the spots, focal length, and the mean area of the pupils that gets \
          through: of the design and of the lens that the search shows",
     );
     let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
     if let Some(why) = refused {
-        let text = RichText::new(capital(&counted_from_one(why))).small();
+        let text = RichText::new(capitalize(&counted_from_one(why))).small();
         ui.label(text.color(ui.visuals().warn_fg_color))
             .on_hover_text("Steps that would make the lens invalid are refused and shortened");
     }
 }
 
 /// Spots and focal length of the design and of the lens that the search shows.
-pub(super) fn changes(view: &View) -> Vec<String> {
-    let short = |value: f64| number::show_digits(value, 4);
+pub(super) fn changes_text(view: &SessionView) -> Vec<String> {
+    let short = |value: f64| number::format_digits(value, 4);
     let mut texts = Vec::new();
-    let before = view.results.as_ref().and_then(|results| results.numbers.as_ref().ok());
-    let after = view.preview.as_ref().and_then(|results| results.numbers.as_ref().ok());
+    let before = view.results.as_ref().and_then(|results| results.analyses.as_ref().ok());
+    let after = view.preview_results.as_ref().and_then(|results| results.analyses.as_ref().ok());
     let (Some(before), Some(after)) = (before, after) else { return texts };
     if let (Some(old), Some(new)) = (mean_spot(before), mean_spot(after)) {
         texts.push(format!("mean RMS {} to {} µm", short(1e3 * old), short(1e3 * new)));
     }
-    if let (Some(old), Some(new)) = (before.first().efl, after.first().efl) {
+    if let (Some(old), Some(new)) = (before.first_order().efl, after.first_order().efl) {
         texts.push(format!("f {} to {} mm", short(old), short(new)));
     }
     // A search that does not ask for light may buy sharpness with it: it is told beside the spots.
-    let (old, new) = (light(before), light(after));
+    let (old, new) = (mean_pupil_area(before), mean_pupil_area(after));
     if old > 0.0 {
-        let change = number::show_digits(100.0 * (new / old - 1.0), 3);
+        let change = number::format_digits(100.0 * (new / old - 1.0), 3);
         let sign = if new > old { "+" } else { "" };
         texts.push(format!("light {} to {} mm² ({sign}{change} %)", short(old), short(new)));
     }
@@ -183,7 +189,7 @@ pub(super) fn changes(view: &View) -> Vec<String> {
 }
 
 /// The mean RMS radius of the fields with light, in mm.
-fn mean_spot(numbers: &Numbers) -> Option<f64> {
+fn mean_spot(numbers: &Analyses) -> Option<f64> {
     let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
     (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)

@@ -3,10 +3,10 @@
 use std::f64::consts::PI;
 
 use crate::lens::Lens;
-use crate::merit::{Term, Weighted};
-use crate::session::{Numbers, View};
+use crate::merit::{Term, WeightedTerm};
+use crate::session::{Analyses, SessionView};
 use crate::studio::number;
-use crate::studio::panels::{light, numbers};
+use crate::studio::panels::{design_results, mean_pupil_area};
 
 /// The radius of a spot, relative to the focal length, that is given away for all of the light: the
 /// same exchange as in [`Goal::sensible`](crate::merit::Goal::sensible).
@@ -124,12 +124,12 @@ pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
 }
 
 /// The value of a term as it is easiest to read.
-pub(super) fn reading(term: Term, value: f64) -> String {
-    let short = |value: f64| number::show_digits(value, 3);
+pub(super) fn value_text(term: Term, value: f64) -> String {
+    let short = |value: f64| number::format_digits(value, 3);
     let root = value.max(0.0).sqrt();
     match term {
         Term::SpotIntegral => format!("{} mm⁴", short(value)),
-        Term::Throughput => format!("{} mm²", number::show_digits(-value, 4)),
+        Term::Throughput => format!("{} mm²", number::format_digits(-value, 4)),
         Term::ThroughputLoss(_) => format!("{} %", short(100.0 * value)),
         _ if root == 0.0 => "met".to_owned(),
         Term::Light(_) | Term::RelativeIllumination { .. } => {
@@ -143,7 +143,7 @@ pub(super) fn reading(term: Term, value: f64) -> String {
 }
 
 /// Whether it may want more light than the lens has.
-pub(super) fn asks_for_more(term: Term) -> bool {
+pub(super) fn can_ask_for_more_light(term: Term) -> bool {
     match term {
         Term::Light(share) => share > 1.0,
         Term::Throughput | Term::ThroughputLoss(_) | Term::FNumber(_) => true,
@@ -153,11 +153,11 @@ pub(super) fn asks_for_more(term: Term) -> bool {
 
 /// Every term, with targets that the lens meets now or nearly so, and weights that stand in
 /// proportion to its spots.
-pub(super) fn every(view: &View) -> Vec<Weighted> {
-    let now = Now::of(view);
-    let plain = |term| Weighted { term, weight: 1.0 };
-    let in_spots = |term, weight| Weighted { term, weight };
-    let Now { size, track, .. } = now;
+pub(super) fn default_terms(view: &SessionView) -> Vec<WeightedTerm> {
+    let now = CurrentValues::of(view);
+    let plain = |term| WeightedTerm { term, weight: 1.0 };
+    let in_spots = |term, weight| WeightedTerm { term, weight };
+    let CurrentValues { size, track, .. } = now;
     let given_away = (LIGHT_IN_SPOT * size).powi(2);
     let field = view.lens.fields_at(view.settings.zoom).values.len().saturating_sub(1);
     vec![
@@ -185,7 +185,7 @@ pub(super) fn every(view: &View) -> Vec<Weighted> {
 }
 
 /// What the lens is like now; plain guesses where it has no numbers.
-struct Now {
+struct CurrentValues {
     efl: f64,
     /// The focal length without its sign.
     size: f64,
@@ -201,13 +201,13 @@ struct Now {
     rims: [f64; 2],
 }
 
-impl Now {
-    fn of(view: &View) -> Self {
-        let numbers = numbers(view);
+impl CurrentValues {
+    fn of(view: &SessionView) -> Self {
+        let numbers = design_results(view);
         let positive = |value: Option<f64>, otherwise: f64| {
             value.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(otherwise)
         };
-        let efl = numbers.and_then(|numbers| numbers.first().efl).unwrap_or(100.0);
+        let efl = numbers.and_then(|numbers| numbers.first_order().efl).unwrap_or(100.0);
         let size = positive(Some(efl.abs()), 100.0);
         let axis = positive(numbers.and_then(on_axis), 0.01 * size * size);
         let rims = || view.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
@@ -220,7 +220,7 @@ impl Now {
             efl,
             size,
             track: view.lens.surfaces.iter().map(|row| row.thickness.abs()).sum(),
-            light: positive(numbers.map(light), axis),
+            light: positive(numbers.map(mean_pupil_area), axis),
             f_number: size / (2.0 * (axis / PI).sqrt()),
             spot: positive(numbers.and_then(mean_square), 1e-6 * size * size),
             steepest: steep(&view.lens),
@@ -230,25 +230,25 @@ impl Now {
 }
 
 /// The area of the pupil on the axis in mm², the mean over wavelengths.
-fn on_axis(numbers: &Numbers) -> Option<f64> {
+fn on_axis(numbers: &Analyses) -> Option<f64> {
     let bench = &numbers.bench.value;
     let spots = numbers.spots.value.iter().flatten();
     let spot = spots.into_iter().find(|spot| spot.field.x == 0.0 && spot.field.y == 0.0)?;
-    let weights: f64 = bench.colors.iter().map(|color| color.weight).sum();
-    let lit = spot.colors.iter().zip(&bench.colors);
+    let weights: f64 = bench.channels.iter().map(|color| color.weight).sum();
+    let lit = spot.channels.iter().zip(&bench.channels);
     let area = lit.filter_map(|(spot, color)| Some(color.weight * spot.as_ref().ok()?.light.value));
     Some(area.sum::<f64>() / weights)
 }
 
-fn mean_square(numbers: &Numbers) -> Option<f64> {
+fn mean_square(numbers: &Analyses) -> Option<f64> {
     let squares: Vec<f64> =
         numbers.spots.value.iter().flatten().map(|spot| spot.rms.value.powi(2)).collect();
     (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64)
 }
 
 /// A term with numbers as a person would write them.
-fn rounded(mut weighted: Weighted) -> Weighted {
-    let short = |value: f64| number::show_digits(value, 4).parse().unwrap_or(value);
+fn rounded(mut weighted: WeightedTerm) -> WeightedTerm {
+    let short = |value: f64| number::format_digits(value, 4).parse().unwrap_or(value);
     weighted.weight = short(weighted.weight);
     for (_, target) in targets(&mut weighted.term) {
         *target = short(*target);

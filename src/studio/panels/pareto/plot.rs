@@ -10,8 +10,8 @@ use egui_plot::{
 };
 
 use super::words;
-use crate::optimize::pareto::{Design, Front};
-use crate::session::{FrontRun, View};
+use crate::optimize::pareto::{Front, ParetoPoint};
+use crate::session::{ParetoRun, SessionView};
 
 /// How near the pointer must be to a point to mean it, in points of the screen.
 const NEAR: f32 = 14.0;
@@ -19,29 +19,29 @@ const NEAR: f32 = 14.0;
 const MARGIN: f64 = 0.06;
 
 /// A lens that was clicked.
-pub(super) struct Clicked {
-    pub(super) design: Design,
-    pub(super) twice: bool,
+pub(super) struct ClickedDesign {
+    pub(super) design: ParetoPoint,
+    pub(super) double: bool,
 }
 
 /// Light in mm² and spot in µm.
-fn place(design: &Design) -> [f64; 2] {
+fn plot_point(design: &ParetoPoint) -> [f64; 2] {
     [design.light, 1e3 * design.spot]
 }
 
-fn places(front: &Front) -> Vec<[f64; 2]> {
-    front.designs().iter().map(place).collect()
+fn plot_points(front: &Front) -> Vec<[f64; 2]> {
+    front.points().iter().map(plot_point).collect()
 }
 
 /// Shows the plane in all the room that is left; the lens that was clicked, if one was.
 pub(super) fn plot(
     ui: &mut Ui,
-    view: &View,
-    run: &FrontRun,
-    chosen: Option<&Design>,
+    view: &SessionView,
+    run: &ParetoRun,
+    chosen: Option<&ParetoPoint>,
     fitted: &mut bool,
-) -> Option<Clicked> {
-    let colors = Colors::of(ui);
+) -> Option<ClickedDesign> {
+    let colors = ParetoColors::of(ui);
     let bounds = bounds(view, run);
     let light = AxisHints::new_x().label("light, mm²").label_spacing(24.0..=44.0);
     let plot = Plot::new("front")
@@ -68,7 +68,7 @@ pub(super) fn plot(
     if response.dragged() || response.hovered() && ui.input(|input| input.zoom_delta() != 1.0) {
         *fitted = false;
     }
-    let label = format!("Front of {} lenses, spot against light", run.main.front.designs().len());
+    let label = format!("Front of {} lenses, spot against light", run.main.front.points().len());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
     let (design, at) = nearest(view, run, response.hover_pos()?, &shown.transform)?;
     let ring = ui.visuals().selection.stroke;
@@ -77,37 +77,37 @@ pub(super) fn plot(
     let twice = response.double_clicked_by(PointerButton::Primary);
     response
         .on_hover_cursor(CursorIcon::PointingHand)
-        .on_hover_text_at_pointer(words::worth(design, &run.start));
-    (clicked || twice).then(|| Clicked { design: design.clone(), twice })
+        .on_hover_text_at_pointer(words::design_text(design, &run.start));
+    (clicked || twice).then(|| ClickedDesign { design: design.clone(), double: twice })
 }
 
 /// The lens nearest to a place on the screen: of the front, of the biased one, of earlier ones.
 fn nearest<'a>(
-    view: &'a View,
-    run: &'a FrontRun,
+    view: &'a SessionView,
+    run: &'a ParetoRun,
     pointer: Pos2,
     transform: &PlotTransform,
-) -> Option<(&'a Design, Pos2)> {
-    let earlier = view.fronts.earlier.iter().flat_map(|run| run.main.front.designs());
-    let biased = run.biased.iter().flat_map(|leg| leg.front.designs());
-    let all = run.main.front.designs().iter().chain(biased).chain(earlier);
-    let on_screen = |design: &'a Design| {
-        let [x, y] = place(design);
+) -> Option<(&'a ParetoPoint, Pos2)> {
+    let earlier = view.pareto.earlier.iter().flat_map(|run| run.main.front.points());
+    let biased = run.biased.iter().flat_map(|leg| leg.front.points());
+    let all = run.main.front.points().iter().chain(biased).chain(earlier);
+    let on_screen = |design: &'a ParetoPoint| {
+        let [x, y] = plot_point(design);
         (design, transform.position_from_point(&PlotPoint::new(x, y)))
     };
-    let distance = |(_, at): &(&Design, Pos2)| at.distance(pointer);
+    let distance = |(_, at): &(&ParetoPoint, Pos2)| at.distance(pointer);
     let near = all.map(on_screen).filter(|found| distance(found) < NEAR);
     near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// The range of both axes that shows all fronts, the start and the design. What was tried on the
 /// way may lie far outside.
-fn bounds(view: &View, run: &FrontRun) -> [RangeInclusive<f64>; 2] {
+fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
     let legs = std::iter::once(&run.main).chain(&run.biased);
-    let legs = legs.chain(view.fronts.earlier.iter().map(|run| &run.main));
-    let mut points: Vec<[f64; 2]> = legs.flat_map(|leg| places(&leg.front)).collect();
-    points.push(place(&run.start));
-    points.extend(here(view));
+    let legs = legs.chain(view.pareto.earlier.iter().map(|run| &run.main));
+    let mut points: Vec<[f64; 2]> = legs.flat_map(|leg| plot_points(&leg.front)).collect();
+    points.push(plot_point(&run.start));
+    points.extend(design_point(view));
     [0, 1].map(|axis| {
         let values = points.iter().map(|point| point[axis]).filter(|value| value.is_finite());
         let (low, high) = values
@@ -119,68 +119,68 @@ fn bounds(view: &View, run: &FrontRun) -> [RangeInclusive<f64>; 2] {
 }
 
 /// Where the design stands.
-fn here(view: &View) -> Option<[f64; 2]> {
-    let judged = view.fronts.here.as_deref()?;
-    Some(place(judged.found.as_ref().ok()?))
+fn design_point(view: &SessionView) -> Option<[f64; 2]> {
+    let judged = view.pareto.current_design.as_deref()?;
+    Some(plot_point(judged.score.as_ref().ok()?))
 }
 
 /// What the plane is coloured with.
-struct Colors {
+struct ParetoColors {
     front: Color32,
-    kept: Color32,
+    biased: Color32,
     faint: Color32,
     strong: Color32,
-    chosen: Color32,
+    selected: Color32,
 }
 
-impl Colors {
+impl ParetoColors {
     fn of(ui: &Ui) -> Self {
         let visuals = ui.visuals();
         Self {
             front: visuals.hyperlink_color,
-            kept: visuals.weak_text_color(),
+            biased: visuals.weak_text_color(),
             faint: visuals.weak_text_color().gamma_multiply(0.45),
             strong: visuals.strong_text_color(),
-            chosen: visuals.warn_fg_color,
+            selected: visuals.warn_fg_color,
         }
     }
 }
 
 fn draw(
     plot: &mut PlotUi<'_>,
-    view: &View,
-    run: &FrontRun,
-    chosen: Option<&Design>,
-    colors: &Colors,
+    view: &SessionView,
+    run: &ParetoRun,
+    chosen: Option<&ParetoPoint>,
+    colors: &ParetoColors,
 ) {
     let tried: Vec<[f64; 2]> =
-        run.leg().tried.iter().map(|[spot, light]| [*light, 1e3 * spot]).collect();
+        run.current_pass().evaluated.iter().map(|[spot, light]| [*light, 1e3 * spot]).collect();
     plot.points(Points::new("tried", tried).radius(1.2).color(colors.faint).allow_hover(false));
-    for earlier in &view.fronts.earlier {
+    for earlier in &view.pareto.earlier {
         let name = format!("run {}: {:.4}", earlier.number, earlier.main.hypervolume);
         curve(plot, &name, &earlier.main.front, colors.faint, LineStyle::Solid);
     }
     if let Some(biased) = &run.biased {
         let name = format!("pupils kept: {:.4}", biased.hypervolume);
-        curve(plot, &name, &biased.front, colors.kept, LineStyle::dashed_dense());
+        curve(plot, &name, &biased.front, colors.biased, LineStyle::dashed_dense());
     }
     let name = format!("run {}: {:.4}", run.number, run.main.hypervolume);
     curve(plot, &name, &run.main.front, colors.front, LineStyle::Solid);
-    let start = Points::new("start", vec![place(&run.start)]).shape(MarkerShape::Cross);
+    let start = Points::new("start", vec![plot_point(&run.start)]).shape(MarkerShape::Cross);
     plot.points(start.radius(5.0).color(colors.strong).allow_hover(false));
-    if let Some(here) = here(view) {
+    if let Some(here) = design_point(view) {
         ring(plot, "design", here, 6.0, colors.strong);
     }
     if let Some(chosen) = chosen {
-        ring(plot, "shown lens", place(chosen), 8.0, colors.chosen);
+        ring(plot, "shown lens", plot_point(chosen), 8.0, colors.selected);
     }
 }
 
 /// A front as connected points.
 fn curve(plot: &mut PlotUi<'_>, name: &str, front: &Front, color: Color32, style: LineStyle) {
-    let line = Line::new(name, PlotPoints::from(places(front))).color(color).width(1.2);
+    let line = Line::new(name, PlotPoints::from(plot_points(front))).color(color).width(1.2);
     plot.line(line.style(style).allow_hover(false));
-    plot.points(Points::new(name, places(front)).color(color).radius(2.6).allow_hover(false));
+    plot.points(Points::new(name, plot_points(front)).color(color).radius(2.6).allow_hover(false));
 }
 
 fn ring(plot: &mut PlotUi<'_>, name: &str, at: [f64; 2], radius: f32, color: Color32) {

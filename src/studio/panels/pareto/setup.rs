@@ -4,31 +4,31 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{DragValue, Ui};
 
-use crate::optimize::pareto::Settings;
-use crate::session::{Command, View};
-use crate::studio::panels::numbers;
-use crate::studio::panels::optimizer::methods;
+use crate::optimize::pareto::ParetoSettings;
+use crate::session::{Command, SessionView};
+use crate::studio::panels::design_results;
+use crate::studio::panels::optimizer::method_menu;
 
 /// The settings that a person sees.
 #[derive(Debug, Default)]
-pub(super) struct Setup {
-    settings: Settings,
+pub(super) struct ParetoSetup {
+    settings: ParetoSettings,
     compare: bool,
 }
 
-impl Setup {
+impl ParetoSetup {
     /// The wish for a sweep.
     pub(super) fn command(&self) -> Command {
-        Command::StartFront { settings: self.settings.clone(), compare: self.compare }
+        Command::StartPareto { settings: self.settings.clone(), compare: self.compare }
     }
 
-    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View) {
-        let Settings { points, steps, blur, method, .. } = &mut self.settings;
+    pub(super) fn ui(&mut self, ui: &mut Ui, view: &SessionView) {
+        let ParetoSettings { points, steps, blur, method, .. } = &mut self.settings;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             count(ui, "points", points, 1..=200, "How many weights between sharpness and light");
             count(ui, "steps each", steps, 1..=100_000, "No more steps than this for every weight");
-            methods(ui, method);
+            method_menu(ui, method);
         });
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
@@ -72,8 +72,8 @@ fn blur(ui: &mut Ui, name: &str, share: &mut f64, um: f64, range: RangeInclusive
 }
 
 /// The focal length in mm; for a lens without one its length, as the sweep takes it.
-fn focal_length(view: &View) -> f64 {
-    let efl = numbers(view).and_then(|numbers| numbers.first().efl).map(f64::abs);
+fn focal_length(view: &SessionView) -> f64 {
+    let efl = design_results(view).and_then(|numbers| numbers.first_order().efl).map(f64::abs);
     let length = || view.lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
     efl.filter(|efl| efl.is_finite() && *efl > 0.0).unwrap_or_else(length)
 }

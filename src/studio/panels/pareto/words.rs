@@ -3,16 +3,16 @@
 use eframe::egui::{Label, RichText, Ui};
 
 use crate::lens::{Lens, Quantity};
-use crate::optimize::pareto::Design;
-use crate::session::{FrontRun, Standing, View};
+use crate::optimize::pareto::ParetoPoint;
+use crate::session::{ParetoRun, RunStatus, SessionView};
 use crate::studio::number;
-use crate::studio::wording::{capital, counted_from_one, standing};
+use crate::studio::wording::{capitalize, counted_from_one, status_text};
 
 /// What a sweep may change, and what it takes as it is.
-pub(super) fn free(ui: &mut Ui, view: &View) {
-    let lens = view.fronts.run.as_ref().filter(|run| run.is_under_way());
+pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {
+    let lens = view.pareto.run.as_ref().filter(|run| run.is_active());
     let free = match lens {
-        Some(run) => counted(&run.start.lens),
+        Some(run) => variables_by_kind(&run.start.lens),
         None if view.lens.variables.is_empty() => {
             "all curvatures, gaps and semi-diameters".to_owned()
         }
@@ -30,7 +30,7 @@ pub(super) fn free(ui: &mut Ui, view: &View) {
 }
 
 /// How many numbers of each kind are free.
-fn counted(lens: &Lens) -> String {
+fn variables_by_kind(lens: &Lens) -> String {
     let kinds = [
         ("curvatures", Quantity::Curvature),
         ("gaps", Quantity::Thickness),
@@ -47,9 +47,9 @@ fn counted(lens: &Lens) -> String {
 }
 
 /// How far the run is.
-pub(super) fn progress(run: &FrontRun, pending: Option<Standing>) -> String {
-    let standing = standing(run.standing, pending);
-    let leg = run.leg();
+pub(super) fn progress_text(run: &ParetoRun, pending: Option<RunStatus>) -> String {
+    let standing = status_text(run.status, pending);
+    let leg = run.current_pass();
     let kept = if run.biased.is_some() { ", pupils kept" } else { "" };
     let rate = leg.done as f64 / leg.seconds;
     let rate = if rate.is_finite() { format!(", {rate:.0} steps/s") } else { String::new() };
@@ -58,9 +58,9 @@ pub(super) fn progress(run: &FrontRun, pending: Option<Standing>) -> String {
 }
 
 /// How many lenses there are, and how much their fronts cover.
-pub(super) fn volumes(ui: &mut Ui, run: &FrontRun) {
+pub(super) fn hypervolume_label(ui: &mut Ui, run: &ParetoRun) {
     let main = &run.main;
-    let (lenses, tried) = (main.front.designs().len(), main.tried.len());
+    let (lenses, tried) = (main.front.points().len(), main.evaluated.len());
     let volume = main.hypervolume;
     let kept = run.biased.as_ref();
     let kept = kept.map(|leg| format!(", {:.4} with pupils kept", leg.hypervolume));
@@ -69,18 +69,18 @@ pub(super) fn volumes(ui: &mut Ui, run: &FrontRun) {
         "The area that the front covers in the plane of spot and light, against twice the spot of \
          the lens at the start, in multiples of the start's spot times its light: larger is better",
     );
-    if let Some(why) = &run.leg().refused {
-        let text = RichText::new(capital(&counted_from_one(why))).small();
+    if let Some(why) = &run.current_pass().rejection {
+        let text = RichText::new(capitalize(&counted_from_one(why))).small();
         ui.label(text.color(ui.visuals().warn_fg_color))
             .on_hover_text("A weight that could not be searched for is left out");
     }
 }
 
 /// What the lens that was clicked is worth, with errors.
-pub(super) fn chosen(ui: &mut Ui, run: &FrontRun, chosen: Option<&Design>) {
+pub(super) fn selection_label(ui: &mut Ui, run: &ParetoRun, chosen: Option<&ParetoPoint>) {
     match chosen {
         Some(design) => {
-            ui.add(Label::new(worth(design, &run.start).replace('\n', ", ")).wrap());
+            ui.add(Label::new(design_text(design, &run.start).replace('\n', ", ")).wrap());
         }
         None => {
             ui.weak("Click a point to see its lens in every panel; the design stays.");
@@ -89,14 +89,14 @@ pub(super) fn chosen(ui: &mut Ui, run: &FrontRun, chosen: Option<&Design>) {
 }
 
 /// What a lens is worth, a line a number.
-pub(super) fn worth(design: &Design, start: &Design) -> String {
+pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
     let spot = with_error(1e3 * design.spot, 1e3 * design.spot_error);
     let light = with_error(design.light, design.light_error);
-    let percent = number::show_digits(100.0 * design.light / start.light, 4);
+    let percent = number::format_digits(100.0 * design.light / start.light, 4);
     let blur = match design.weight {
         None => "start of the sweep".to_owned(),
         Some(0.0) => "found without a weight for light".to_owned(),
-        Some(weight) => format!("rim blur {} µm", number::show_digits(1e3 * weight.sqrt(), 3)),
+        Some(weight) => format!("rim blur {} µm", number::format_digits(1e3 * weight.sqrt(), 3)),
     };
     format!(
         "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{blur}\n{} rays",
@@ -106,5 +106,5 @@ pub(super) fn worth(design: &Design, start: &Design) -> String {
 
 /// A number with its error, both to the digits that the error leaves.
 fn with_error(value: f64, error: f64) -> String {
-    format!("{} ± {}", number::show_digits(value, 5), number::show_digits(error, 1))
+    format!("{} ± {}", number::format_digits(value, 5), number::format_digits(error, 1))
 }

@@ -5,7 +5,7 @@ use crate::session::Edit;
 
 /// Something to do with a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Action {
+pub(super) enum RowAction {
     InsertBefore,
     InsertAfter,
     Remove,
@@ -14,10 +14,15 @@ pub(super) enum Action {
 }
 
 /// Everything that can be done, in the order in which it is shown.
-pub(super) const ALL: [Action; 5] =
-    [Action::InsertBefore, Action::InsertAfter, Action::Remove, Action::Flip, Action::Stop];
+pub(super) const ALL: [RowAction; 5] = [
+    RowAction::InsertBefore,
+    RowAction::InsertAfter,
+    RowAction::Remove,
+    RowAction::Flip,
+    RowAction::Stop,
+];
 
-impl Action {
+impl RowAction {
     /// What a button says.
     pub(super) const fn title(self) -> &'static str {
         match self {
@@ -43,12 +48,12 @@ impl Action {
     /// The edit that does it; `None` where it makes no sense.
     pub(super) fn edit(self, lens: &Lens, row: usize) -> Option<Edit> {
         match self {
-            Self::InsertBefore => Some(insert(lens, row)),
-            Self::InsertAfter => Some(insert(lens, row + 1)),
+            Self::InsertBefore => Some(insert_edit(lens, row)),
+            Self::InsertAfter => Some(insert_edit(lens, row + 1)),
             Self::Remove => Some(Edit::RemoveRow(row)),
             Self::Flip => {
-                let (first, last) = element(lens, row)?;
-                Some(Edit::FlipRows { first, last })
+                let (first, last) = element_around(lens, row)?;
+                Some(Edit::ReverseRows { first, last })
             }
             Self::Stop => (!lens.surfaces.get(row)?.stop).then_some(Edit::SetStop(row)),
         }
@@ -56,7 +61,7 @@ impl Action {
 }
 
 /// A plane surface that divides the gap in front of row `at` and leaves the light as it is.
-fn insert(lens: &Lens, at: usize) -> Edit {
+fn insert_edit(lens: &Lens, at: usize) -> Edit {
     let before = at.checked_sub(1).and_then(|i| lens.surfaces.get(i));
     let medium = before.map_or(&lens.object_medium, |row| &row.medium);
     let medium = if *medium == Medium::Mirror { Medium::Air } else { medium.clone() };
@@ -66,7 +71,7 @@ fn insert(lens: &Lens, at: usize) -> Edit {
 }
 
 /// The first and the last surface of the glass to which a surface belongs, cemented ones together.
-fn element(lens: &Lens, row: usize) -> Option<(usize, usize)> {
+fn element_around(lens: &Lens, row: usize) -> Option<(usize, usize)> {
     let filled = |gap: usize| {
         lens.surfaces.get(gap).is_some_and(|r| !matches!(r.medium, Medium::Air | Medium::Mirror))
     };
@@ -82,7 +87,7 @@ mod tests {
     use crate::files;
 
     fn double_gauss() -> Lens {
-        let bundled = &files::library()[0];
+        let bundled = &files::bundled_lenses()[0];
         files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens
     }
 
@@ -91,22 +96,22 @@ mod tests {
         let lens = double_gauss();
         let glass = |row: &Row| !matches!(row.medium, Medium::Air);
         let first = lens.surfaces.iter().position(glass).unwrap();
-        let (start, end) = element(&lens, first).unwrap();
-        assert!((start..=end).all(|row| element(&lens, row) == Some((start, end))));
+        let (start, end) = element_around(&lens, first).unwrap();
+        assert!((start..=end).all(|row| element_around(&lens, row) == Some((start, end))));
     }
 
     #[test]
     fn a_surface_in_air_has_nothing_to_flip() {
         let lens = double_gauss();
         let stop = lens.stop().unwrap();
-        let alone = element(&lens, stop).is_none();
-        assert_eq!(Action::Flip.edit(&lens, stop).is_none(), alone);
+        let alone = element_around(&lens, stop).is_none();
+        assert_eq!(RowAction::Flip.edit(&lens, stop).is_none(), alone);
     }
 
     #[test]
     fn an_inserted_surface_leaves_the_light_as_it_is() {
         let lens = double_gauss();
-        let Edit::InsertRow { at: 1, row } = insert(&lens, 1) else { unreachable!() };
+        let Edit::InsertRow { at: 1, row } = insert_edit(&lens, 1) else { unreachable!() };
         assert_eq!(row.medium, lens.surfaces[0].medium);
         assert_eq!((row.curvature, row.thickness), (0.0, 0.0));
     }

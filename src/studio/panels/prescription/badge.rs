@@ -7,7 +7,7 @@ use eframe::egui::{
 
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 use crate::session::{Command, Edit, evaluate};
-use crate::studio::field::{Drafts, Field, Place};
+use crate::studio::field::{EditBuffers, InputPlacement, TextInput};
 use crate::studio::number;
 use crate::studio::wording::counted_from_one;
 
@@ -16,44 +16,44 @@ pub(super) const WIDTH: f32 = 18.0;
 
 /// What decides a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Decides {
-    Nobody,
-    Optimizer(Variable),
-    Another(Pickup),
-    Focus(f64),
+pub(super) enum ParameterStatus {
+    Fixed,
+    Variable(Variable),
+    Pickup(Pickup),
+    ImageSolve(f64),
 }
 
-impl Decides {
+impl ParameterStatus {
     /// What decides a number of a lens.
     pub(super) fn of(lens: &Lens, parameter: Parameter) -> Self {
         let last = parameter.surface + 1 == lens.surfaces.len();
         let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
-        if let Some(offset) = lens.focus.filter(|_| last && gap) {
-            return Self::Focus(offset);
+        if let Some(offset) = lens.image_solve.filter(|_| last && gap) {
+            return Self::ImageSolve(offset);
         }
         if let Some(pickup) = lens.pickups.iter().find(|p| p.parameter == parameter) {
-            return Self::Another(*pickup);
+            return Self::Pickup(*pickup);
         }
-        lens.variable(parameter).map_or(Self::Nobody, |variable| Self::Optimizer(*variable))
+        lens.variable(parameter).map_or(Self::Fixed, |variable| Self::Variable(*variable))
     }
 
     const fn letter(self) -> &'static str {
         match self {
-            Self::Nobody => "·",
-            Self::Optimizer(_) => "V",
-            Self::Another(_) => "P",
-            Self::Focus(_) => "S",
+            Self::Fixed => "·",
+            Self::Variable(_) => "V",
+            Self::Pickup(_) => "P",
+            Self::ImageSolve(_) => "S",
         }
     }
 
     fn hint(self) -> String {
         match self {
-            Self::Nobody => "Fixed. Press to let the optimizer change it (Ctrl+Shift+V).".into(),
-            Self::Optimizer(_) => "Variable: the optimizer may change it. Press to fix it; \
+            Self::Fixed => "Fixed. Press to let the optimizer change it (Ctrl+Shift+V).".into(),
+            Self::Variable(_) => "Variable: the optimizer may change it. Press to fix it; \
                                    press the right button for bounds."
                 .into(),
-            Self::Another(p) => counted_from_one(&format!("Pickup: it follows the {}.", p.source)),
-            Self::Focus(_) => "Solved for the paraxial focus. Press to change that.".into(),
+            Self::Pickup(p) => counted_from_one(&format!("Pickup: it follows the {}.", p.source)),
+            Self::ImageSolve(_) => "Solved for the paraxial focus. Press to change that.".into(),
         }
     }
 }
@@ -64,17 +64,17 @@ pub(super) fn show(
     ui: &mut Ui,
     lens: &Lens,
     parameter: Parameter,
-    drafts: &mut Drafts,
+    drafts: &mut EditBuffers,
     wishes: &mut Vec<Command>,
 ) {
-    let decides = Decides::of(lens, parameter);
-    let name = format!("{} variable", super::table::name_of(parameter));
+    let decides = ParameterStatus::of(lens, parameter);
+    let name = format!("{} variable", super::table::parameter_name(parameter));
     let button = badge(ui, decides).accessible_name(name);
-    let simple = matches!(decides, Decides::Nobody | Decides::Optimizer(_));
+    let simple = matches!(decides, ParameterStatus::Fixed | ParameterStatus::Variable(_));
     if simple && button.clicked() {
-        wishes.push(toggled(decides, parameter).into());
+        wishes.push(toggle_edit(decides, parameter).into());
     }
-    let menu = Menu { lens, parameter, decides };
+    let menu = StatusMenu { lens, parameter, status: decides };
     let popup = if simple { Popup::context_menu(&button) } else { Popup::menu(&button) };
     popup
         .close_behavior(PopupCloseBehavior::CloseOnClickOutside)
@@ -83,19 +83,19 @@ pub(super) fn show(
 }
 
 /// The edit that frees a fixed number and fixes a free one.
-pub(super) fn toggled(decides: Decides, parameter: Parameter) -> Edit {
+pub(super) fn toggle_edit(decides: ParameterStatus, parameter: Parameter) -> Edit {
     match decides {
-        Decides::Optimizer(_) => Edit::Fix(parameter),
-        _ => Edit::Free(Variable { parameter, min: None, max: None }),
+        ParameterStatus::Variable(_) => Edit::RemoveVariable(parameter),
+        _ => Edit::AddVariable(Variable { parameter, min: None, max: None }),
     }
 }
 
-fn badge(ui: &mut Ui, decides: Decides) -> Response {
+fn badge(ui: &mut Ui, decides: ParameterStatus) -> Response {
     let visuals = ui.visuals();
     let (fill, text) = match decides {
-        Decides::Nobody => (Color32::TRANSPARENT, visuals.weak_text_color()),
-        Decides::Optimizer(_) => (accent(visuals), Color32::WHITE),
-        Decides::Another(_) | Decides::Focus(_) => {
+        ParameterStatus::Fixed => (Color32::TRANSPARENT, visuals.weak_text_color()),
+        ParameterStatus::Variable(_) => (accent(visuals), Color32::WHITE),
+        ParameterStatus::Pickup(_) | ParameterStatus::ImageSolve(_) => {
             (visuals.widgets.inactive.bg_fill, visuals.strong_text_color())
         }
     };
@@ -116,55 +116,60 @@ fn accent(visuals: &Visuals) -> Color32 {
 }
 
 /// The menu of a badge.
-struct Menu<'a> {
+struct StatusMenu<'a> {
     lens: &'a Lens,
     parameter: Parameter,
-    decides: Decides,
+    status: ParameterStatus,
 }
 
-impl Menu<'_> {
-    fn ui(&self, ui: &mut Ui, drafts: &mut Drafts, wishes: &mut Vec<Command>) {
+impl StatusMenu<'_> {
+    fn ui(&self, ui: &mut Ui, drafts: &mut EditBuffers, wishes: &mut Vec<Command>) {
         ui.set_width(210.0);
-        ui.strong(super::table::name_of(self.parameter));
+        ui.strong(super::table::parameter_name(self.parameter));
         self.choices(ui, wishes);
-        match self.decides {
-            Decides::Optimizer(variable) => self.bounds(ui, variable, drafts, wishes),
-            Decides::Another(pickup) => self.pickup(ui, pickup, drafts, wishes),
-            Decides::Focus(offset) => self.offset(ui, offset, drafts, wishes),
-            Decides::Nobody => {}
+        match self.status {
+            ParameterStatus::Variable(variable) => self.bounds_lines(ui, variable, drafts, wishes),
+            ParameterStatus::Pickup(pickup) => self.pickup_lines(ui, pickup, drafts, wishes),
+            ParameterStatus::ImageSolve(offset) => self.offset_line(ui, offset, drafts, wishes),
+            ParameterStatus::Fixed => {}
         }
     }
 
     fn choices(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
-        let decides = self.decides;
+        let decides = self.status;
         let mut choice = |ui: &mut Ui, on: bool, text: &str, edits: Vec<Edit>| {
             if ui.selectable_label(on, text).clicked() && !on {
                 wishes.extend(edits.into_iter().map(Command::Edit));
                 ui.close();
             }
         };
-        let free = Edit::Free(Variable { parameter: self.parameter, min: None, max: None });
-        let mut freed = self.undone();
+        let free = Edit::AddVariable(Variable { parameter: self.parameter, min: None, max: None });
+        let mut freed = self.release_edits();
         freed.push(free);
-        choice(ui, decides == Decides::Nobody, "Fixed", self.undone());
-        choice(ui, matches!(decides, Decides::Optimizer(_)), "Variable", freed);
+        choice(ui, decides == ParameterStatus::Fixed, "Fixed", self.release_edits());
+        choice(ui, matches!(decides, ParameterStatus::Variable(_)), "Variable", freed);
         if let Some(pickup) = self.new_pickup() {
             let edits = vec![Edit::SetPickup(pickup)];
-            choice(ui, matches!(decides, Decides::Another(_)), "Pickup", edits);
+            choice(ui, matches!(decides, ParameterStatus::Pickup(_)), "Pickup", edits);
         }
         if self.is_last_gap() {
-            let edits = vec![Edit::SetFocus(Some(0.0))];
-            choice(ui, matches!(decides, Decides::Focus(_)), "Solve: paraxial focus", edits);
+            let edits = vec![Edit::SetFocusSolve(Some(0.0))];
+            choice(
+                ui,
+                matches!(decides, ParameterStatus::ImageSolve(_)),
+                "Solve: paraxial focus",
+                edits,
+            );
         }
     }
 
     /// The edits that leave the number to nobody.
-    fn undone(&self) -> Vec<Edit> {
-        match self.decides {
-            Decides::Nobody => Vec::new(),
-            Decides::Optimizer(_) => vec![Edit::Fix(self.parameter)],
-            Decides::Another(_) => vec![Edit::RemovePickup(self.parameter)],
-            Decides::Focus(_) => vec![Edit::SetFocus(None)],
+    fn release_edits(&self) -> Vec<Edit> {
+        match self.status {
+            ParameterStatus::Fixed => Vec::new(),
+            ParameterStatus::Variable(_) => vec![Edit::RemoveVariable(self.parameter)],
+            ParameterStatus::Pickup(_) => vec![Edit::RemovePickup(self.parameter)],
+            ParameterStatus::ImageSolve(_) => vec![Edit::SetFocusSolve(None)],
         }
     }
 
@@ -183,11 +188,11 @@ impl Menu<'_> {
             && self.parameter.surface + 1 == self.lens.surfaces.len()
     }
 
-    fn bounds(
+    fn bounds_lines(
         &self,
         ui: &mut Ui,
         variable: Variable,
-        drafts: &mut Drafts,
+        drafts: &mut EditBuffers,
         wishes: &mut Vec<Command>,
     ) {
         ui.separator();
@@ -199,67 +204,90 @@ impl Menu<'_> {
             }
         };
         ui.weak(format!("Bounds, {unit}; empty for none"));
-        let limit =
-            |text: &str| if text.trim().is_empty() { Some(None) } else { value(text).map(Some) };
-        if let Some(min) = self.line(ui, "Minimum", variable.min, drafts, limit) {
-            wishes.push(Edit::Free(Variable { min, ..variable }).into());
+        let limit = |text: &str| {
+            if text.trim().is_empty() { Some(None) } else { parse_value(text).map(Some) }
+        };
+        if let Some(min) = self.number_line(ui, "Minimum", variable.min, drafts, limit) {
+            wishes.push(Edit::AddVariable(Variable { min, ..variable }).into());
         }
-        if let Some(max) = self.line(ui, "Maximum", variable.max, drafts, limit) {
-            wishes.push(Edit::Free(Variable { max, ..variable }).into());
+        if let Some(max) = self.number_line(ui, "Maximum", variable.max, drafts, limit) {
+            wishes.push(Edit::AddVariable(Variable { max, ..variable }).into());
         }
     }
 
-    fn pickup(&self, ui: &mut Ui, pickup: Pickup, drafts: &mut Drafts, wishes: &mut Vec<Command>) {
+    fn pickup_lines(
+        &self,
+        ui: &mut Ui,
+        pickup: Pickup,
+        drafts: &mut EditBuffers,
+        wishes: &mut Vec<Command>,
+    ) {
         ui.separator();
         let row = |text: &str| text.trim().parse().ok().filter(|n| (1..=1000).contains(n));
         let surface = Some((pickup.source.surface + 1) as f64);
         let mut set = |pickup: Pickup| wishes.push(Edit::SetPickup(pickup).into());
-        if let Some(number) = self.line(ui, "From surface", surface, drafts, row) {
+        if let Some(number) = self.number_line(ui, "From surface", surface, drafts, row) {
             let number: usize = number;
             set(Pickup { source: Parameter { surface: number - 1, ..pickup.source }, ..pickup });
         }
-        if let Some(scale) = self.line(ui, "Scale", Some(pickup.scale), drafts, value) {
+        if let Some(scale) = self.number_line(ui, "Scale", Some(pickup.scale), drafts, parse_value)
+        {
             set(Pickup { scale, ..pickup });
         }
-        if let Some(offset) = self.line(ui, "Offset", Some(pickup.offset), drafts, value) {
+        if let Some(offset) =
+            self.number_line(ui, "Offset", Some(pickup.offset), drafts, parse_value)
+        {
             set(Pickup { offset, ..pickup });
         }
     }
 
-    fn offset(&self, ui: &mut Ui, offset: f64, drafts: &mut Drafts, wishes: &mut Vec<Command>) {
+    fn offset_line(
+        &self,
+        ui: &mut Ui,
+        offset: f64,
+        drafts: &mut EditBuffers,
+        wishes: &mut Vec<Command>,
+    ) {
         ui.separator();
-        if let Some(offset) = self.line(ui, "Displaced by, mm", Some(offset), drafts, value) {
-            wishes.push(Edit::SetFocus(Some(offset)).into());
+        if let Some(offset) =
+            self.number_line(ui, "Displaced by, mm", Some(offset), drafts, parse_value)
+        {
+            wishes.push(Edit::SetFocusSolve(Some(offset)).into());
         }
     }
 
     /// A name and a field; gives the value once one is typed that `read` understands.
-    fn line<T>(
+    fn number_line<T>(
         &self,
         ui: &mut Ui,
         name: &str,
         shown: Option<f64>,
-        drafts: &mut Drafts,
+        drafts: &mut EditBuffers,
         read: impl Fn(&str) -> Option<T>,
     ) -> Option<T> {
         let id = Id::unique((self.parameter, name));
-        let shown = shown.map(number::show).unwrap_or_default();
+        let shown = shown.map(number::format_number).unwrap_or_default();
         let entry = ui.horizontal(|ui| {
             ui.label(name);
-            let field =
-                Field { name, shown: &shown, hint: "none", align: Align::Max, place: Place::Form };
+            let field = TextInput {
+                name,
+                value: &shown,
+                hint: "none",
+                align: Align::Max,
+                placement: InputPlacement::Form,
+            };
             drafts.show(ui, id, field)
         });
-        let text = entry.inner.typed?;
+        let text = entry.inner.submitted?;
         let read = read(&text);
         match read {
             Some(_) => drafts.accept(id),
-            None => drafts.refuse(id, format!("`{text}` is no number that fits here")),
+            None => drafts.reject(id, format!("`{text}` is no number that fits here")),
         }
         read
     }
 }
 
-fn value(text: &str) -> Option<f64> {
+fn parse_value(text: &str) -> Option<f64> {
     evaluate(text, 0.0).ok().filter(|value| value.is_finite())
 }

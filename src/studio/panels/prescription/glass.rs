@@ -1,35 +1,37 @@
 //! A medium as text: a catalogue name, `nd vd`, an index, `mirror`, or nothing for air.
 
-use crate::lens::{Gradient, Law, Medium, glass};
+use crate::lens::{GradientIndex, Medium, ProfileLaw, glass};
 use crate::studio::number;
 
 /// How many glasses are proposed while one types.
 const PROPOSALS: usize = 8;
 
 /// What a cell shows.
-pub(super) fn show(medium: &Medium) -> String {
+pub(super) fn format_medium(medium: &Medium) -> String {
     match medium {
         Medium::Air => String::new(),
         Medium::Glass(name) => name.clone(),
-        Medium::Model { nd, vd } => format!("{} {}", number::show(*nd), number::show(*vd)),
-        Medium::Index(n) => number::show(*n),
+        Medium::Model { nd, vd } => {
+            format!("{} {}", number::format_number(*nd), number::format_number(*vd))
+        }
+        Medium::Index(n) => number::format_number(*n),
         Medium::Mirror => "MIRROR".to_owned(),
-        Medium::Gradient(gradient) => show_gradient(gradient),
+        Medium::Grin(gradient) => show_gradient(gradient),
     }
 }
 
 /// `gradient 1.6 r -0.01 0.0002 z 0.01`, with `square` or `sech` in front of the glass.
-fn show_gradient(gradient: &Gradient) -> String {
+fn show_gradient(gradient: &GradientIndex) -> String {
     let law = match gradient.law {
-        Law::Index => "",
-        Law::Square => "square ",
-        Law::Sech => "sech ",
+        ProfileLaw::Index => "",
+        ProfileLaw::Square => "square ",
+        ProfileLaw::Sech => "sech ",
     };
     let list = |name: &str, terms: &[f64]| {
         let words = terms.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
         if terms.is_empty() { String::new() } else { format!(" {name} {words}") }
     };
-    let base = show(&gradient.base);
+    let base = format_medium(&gradient.base);
     format!("gradient {law}{base}{}{}", list("r", &gradient.radial), list("z", &gradient.axial))
 }
 
@@ -37,11 +39,11 @@ fn show_gradient(gradient: &Gradient) -> String {
 fn parse_gradient(text: &str) -> Option<Medium> {
     let mut words = text.strip_prefix("gradient ")?.split_whitespace().peekable();
     let law = match words.peek() {
-        Some(&"square") => Law::Square,
-        Some(&"sech") => Law::Sech,
-        _ => Law::Index,
+        Some(&"square") => ProfileLaw::Square,
+        Some(&"sech") => ProfileLaw::Sech,
+        _ => ProfileLaw::Index,
     };
-    if law != Law::Index {
+    if law != ProfileLaw::Index {
         words.next();
     }
     let mut parts: [Vec<&str>; 3] = Default::default();
@@ -55,12 +57,12 @@ fn parse_gradient(text: &str) -> Option<Medium> {
     }
     let numbers = |words: &[&str]| words.iter().map(|word| word.parse().ok()).collect();
     let (radial, axial): (Option<Vec<f64>>, _) = (numbers(&parts[1]), numbers(&parts[2]));
-    let base = parse(&parts[0].join(" "));
-    Some(Medium::Gradient(Box::new(Gradient { base, law, radial: radial?, axial: axial? })))
+    let base = parse_medium(&parts[0].join(" "));
+    Some(Medium::Grin(Box::new(GradientIndex { base, law, radial: radial?, axial: axial? })))
 }
 
 /// What a cell means. A name that is in no catalogue is kept, so that the lens can say so.
-pub(super) fn parse(text: &str) -> Medium {
+pub(super) fn parse_medium(text: &str) -> Medium {
     let text = text.trim();
     if text.is_empty() || text.eq_ignore_ascii_case("air") {
         return Medium::Air;
@@ -86,7 +88,7 @@ pub(super) fn parse(text: &str) -> Medium {
 }
 
 /// Glasses whose names go on like what was typed, then those that contain it.
-pub(super) fn proposals(text: &str) -> Vec<String> {
+pub(super) fn suggestions(text: &str) -> Vec<String> {
     let wanted = text.trim().to_uppercase();
     if wanted.is_empty() || wanted.starts_with(['.', '1']) {
         return Vec::new();
@@ -101,7 +103,7 @@ pub(super) fn proposals(text: &str) -> Vec<String> {
 }
 
 /// The index and Abbe number of a glass, for a tooltip.
-pub(super) fn describe(medium: &Medium) -> String {
+pub(super) fn describe_medium(medium: &Medium) -> String {
     match medium {
         Medium::Air => "Air, index 1. Type a catalogue name such as N-BK7, index and Abbe number \
                         such as 1.62 36.4, an index, or mirror."
@@ -113,15 +115,15 @@ pub(super) fn describe(medium: &Medium) -> String {
         Medium::Model { nd, vd } => format!("Model glass: nd {nd}, vd {vd}"),
         Medium::Index(n) => format!("Index {n} at every wavelength"),
         Medium::Mirror => "A mirror: the gap behind it is filled like the one before it".to_owned(),
-        Medium::Gradient(gradient) => format!(
+        Medium::Grin(gradient) => format!(
             "A gradient of the {} on this glass: coefficients of r^2, r^4, ... after `r`, of z, z^2, \
              ... after `z`, which counts from this surface. {}",
             match gradient.law {
-                Law::Index => "index",
-                Law::Square => "square of the index",
-                Law::Sech => "index as a hyperbolic secant, its constant after `r`,",
+                ProfileLaw::Index => "index",
+                ProfileLaw::Square => "square of the index",
+                ProfileLaw::Sech => "index as a hyperbolic secant, its constant after `r`,",
             },
-            describe(&gradient.base)
+            describe_medium(&gradient.base)
         ),
     }
 }
@@ -130,9 +132,9 @@ pub(super) fn describe(medium: &Medium) -> String {
 mod tests {
     use super::*;
 
-    fn gradient(law: Law, base: Medium, radial: &[f64], axial: &[f64]) -> Medium {
+    fn gradient(law: ProfileLaw, base: Medium, radial: &[f64], axial: &[f64]) -> Medium {
         let (radial, axial) = (radial.to_vec(), axial.to_vec());
-        Medium::Gradient(Box::new(Gradient { base, law, radial, axial }))
+        Medium::Grin(Box::new(GradientIndex { base, law, radial, axial }))
     }
 
     #[test]
@@ -143,20 +145,20 @@ mod tests {
             Medium::Index(1.5),
             Medium::Model { nd: 1.62, vd: 36.4 },
             Medium::Glass("SCHOTT N-BK7".into()),
-            gradient(Law::Index, Medium::Index(1.6), &[-0.01, 2e-7], &[0.1 + 0.2]),
-            gradient(Law::Sech, Medium::Glass("SCHOTT N-BK7".into()), &[0.3], &[]),
-            gradient(Law::Square, Medium::Model { nd: 1.62, vd: 36.4 }, &[], &[-0.5]),
+            gradient(ProfileLaw::Index, Medium::Index(1.6), &[-0.01, 2e-7], &[0.1 + 0.2]),
+            gradient(ProfileLaw::Sech, Medium::Glass("SCHOTT N-BK7".into()), &[0.3], &[]),
+            gradient(ProfileLaw::Square, Medium::Model { nd: 1.62, vd: 36.4 }, &[], &[-0.5]),
         ];
         for medium in media {
-            assert_eq!(parse(&show(&medium)), medium);
+            assert_eq!(parse_medium(&format_medium(&medium)), medium);
         }
     }
 
     #[test]
     fn a_glass_is_found_without_its_maker_and_proposed_while_typing() {
-        assert_eq!(parse("n-bk7"), Medium::Glass("SCHOTT N-BK7".into()));
-        assert_eq!(parse("n-bk99"), Medium::Glass("n-bk99".into()));
-        assert!(proposals("n-bk").contains(&"SCHOTT N-BK7".to_owned()));
-        assert!(proposals("").is_empty() && proposals("1.5").is_empty());
+        assert_eq!(parse_medium("n-bk7"), Medium::Glass("SCHOTT N-BK7".into()));
+        assert_eq!(parse_medium("n-bk99"), Medium::Glass("n-bk99".into()));
+        assert!(suggestions("n-bk").contains(&"SCHOTT N-BK7".to_owned()));
+        assert!(suggestions("").is_empty() && suggestions("1.5").is_empty());
     }
 }

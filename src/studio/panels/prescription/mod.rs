@@ -13,43 +13,43 @@ mod variables;
 use eframe::egui::{Button, Context, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
 use super::Panel;
-use crate::session::{Command, View};
-use crate::studio::field::{Drafts, error_color};
-use actions::Action;
-use table::Table;
+use crate::session::{Command, SessionView};
+use crate::studio::field::{EditBuffers, error_color};
+use actions::RowAction;
+use table::PrescriptionTable;
 
 /// The panel.
 #[derive(Debug, Default)]
-pub struct Prescription {
-    drafts: Drafts,
+pub struct PrescriptionPanel {
+    buffers: EditBuffers,
 }
 
-impl Panel for Prescription {
+impl Panel for PrescriptionPanel {
     fn title(&self) -> &'static str {
         "Prescription"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
         keys(ui, view, wishes);
         toolbar(ui, view, wishes);
-        self.complaint(ui);
-        Table { view, drafts: &mut self.drafts, wishes }.show(ui);
+        self.error_line(ui);
+        PrescriptionTable { view, buffers: &mut self.buffers, commands: wishes }.show(ui);
     }
 
     fn is_typing(&self, context: &Context) -> bool {
-        self.drafts.is_typing(context)
+        self.buffers.is_typing(context)
     }
 }
 
 /// The field of the first radius.
-pub(in crate::studio) fn first_field() -> Id {
-    table::first_field()
+pub(in crate::studio) fn first_radius_field() -> Id {
+    table::first_radius_field()
 }
 
-impl Prescription {
+impl PrescriptionPanel {
     /// The last text that was refused, where it can be read in full.
-    fn complaint(&self, ui: &mut Ui) {
-        let Some(why) = self.drafts.complaint() else { return };
+    fn error_line(&self, ui: &mut Ui) {
+        let Some(why) = self.buffers.last_error() else { return };
         let frame = Frame::new().inner_margin(Margin::symmetric(4, 2));
         SidePanel::bottom("complaint").frame(frame).show_separator_line(false).show(ui, |ui| {
             ui.label(RichText::new(why).color(error_color(ui)));
@@ -58,18 +58,19 @@ impl Prescription {
 }
 
 /// Insert and Delete work on the selected row while no text is being edited.
-fn keys(ui: &Ui, view: &View, wishes: &mut Vec<Command>) {
+fn keys(ui: &Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     let Some(row) = view.selected.filter(|_| !ui.ctx().egui_wants_keyboard_input()) else {
         return;
     };
-    for (key, action) in [(Key::Delete, Action::Remove), (Key::Insert, Action::InsertBefore)] {
+    for (key, action) in [(Key::Delete, RowAction::Remove), (Key::Insert, RowAction::InsertBefore)]
+    {
         if ui.input(|input| input.key_pressed(key)) {
             wishes.extend(action.edit(&view.lens, row).map(Command::Edit));
         }
     }
 }
 
-fn toolbar(ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+fn toolbar(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     let lens = &view.lens;
     ui.horizontal(|ui| {
         for action in actions::ALL {

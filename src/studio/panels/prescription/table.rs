@@ -6,22 +6,22 @@ use eframe::egui::{
 };
 use egui_extras::{Column as Width, TableBuilder, TableRow};
 
-use super::badge::{self, Decides};
+use super::badge::{self, ParameterStatus};
 use super::{actions, glass};
 use crate::lens::{Lens, Medium, Object, Parameter, Quantity};
-use crate::session::{Command, Edit, View, edited, evaluate};
-use crate::studio::field::{Drafts, Field as Cell, Place};
+use crate::session::{Command, Edit, SessionView, apply_edit, evaluate};
+use crate::studio::field::{EditBuffers, InputPlacement, TextInput as Cell};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
-use crate::studio::panels::numbers;
-use crate::studio::wording::{capital, counted_from_one};
+use crate::studio::panels::design_results;
+use crate::studio::wording::{capitalize, counted_from_one};
 
 /// How high a row is, in points.
 const ROW: f32 = 21.0;
 
 /// What a cell holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Column {
+pub(super) enum TableColumn {
     Radius,
     Thickness,
     Glass,
@@ -31,7 +31,7 @@ pub(super) enum Column {
     Comment,
 }
 
-impl Column {
+impl TableColumn {
     const fn title(self) -> &'static str {
         match self {
             Self::Radius => "Radius",
@@ -87,7 +87,7 @@ impl Column {
     }
 
     /// The number in a row of this column; none where it holds text.
-    fn parameter(self, view: &View, surface: usize) -> Option<Parameter> {
+    fn parameter(self, view: &SessionView, surface: usize) -> Option<Parameter> {
         let quantity = match self {
             Self::Radius => Quantity::Curvature,
             Self::Thickness => thickness_at(&view.lens, surface, view.settings.zoom),
@@ -109,7 +109,7 @@ fn thickness_at(lens: &Lens, surface: usize, zoom: usize) -> Quantity {
 }
 
 /// What a number is called in the window, where surfaces are counted from 1.
-pub(super) fn name_of(parameter: Parameter) -> String {
+pub(super) fn parameter_name(parameter: Parameter) -> String {
     let what = match parameter.quantity {
         Quantity::Curvature => "Radius",
         Quantity::Thickness | Quantity::ZoomThickness(_) => "Thickness",
@@ -117,19 +117,19 @@ pub(super) fn name_of(parameter: Parameter) -> String {
         Quantity::Conic => "Conic",
         Quantity::Index => "Index",
         Quantity::Gradient(_) => "Gradient",
-        Quantity::Asphere(term) => Column::Asphere(term).title(),
+        Quantity::Asphere(term) => TableColumn::Asphere(term).title(),
     };
     format!("{what} of surface {}", parameter.surface + 1)
 }
 
 /// The table for one frame.
-pub(super) struct Table<'a> {
-    pub(super) view: &'a View,
-    pub(super) drafts: &'a mut Drafts,
-    pub(super) wishes: &'a mut Vec<Command>,
+pub(super) struct PrescriptionTable<'a> {
+    pub(super) view: &'a SessionView,
+    pub(super) buffers: &'a mut EditBuffers,
+    pub(super) commands: &'a mut Vec<Command>,
 }
 
-impl Table<'_> {
+impl PrescriptionTable<'_> {
     pub(super) fn show(mut self, ui: &mut Ui) {
         let columns = columns(&self.view.lens);
         ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
@@ -150,7 +150,7 @@ impl Table<'_> {
         });
     }
 
-    fn row(&mut self, mut row: TableRow<'_, '_>, columns: &[Column]) {
+    fn row(&mut self, mut row: TableRow<'_, '_>, columns: &[TableColumn]) {
         let index = row.index();
         if index == 0 {
             self.object_row(&mut row, columns);
@@ -161,36 +161,36 @@ impl Table<'_> {
         }
     }
 
-    fn object_row(&mut self, row: &mut TableRow<'_, '_>, columns: &[Column]) {
+    fn object_row(&mut self, row: &mut TableRow<'_, '_>, columns: &[TableColumn]) {
         row.col(|ui| {
             row_name(ui, "OBJ").on_hover_text("The object: row 0");
         });
         for column in columns {
             row.col(|ui| match column {
-                Column::Thickness => self.object_distance(ui),
-                Column::Glass => self.object_medium(ui),
+                TableColumn::Thickness => self.object_distance_cell(ui),
+                TableColumn::Glass => self.object_medium_cell(ui),
                 _ => {}
             });
         }
     }
 
-    fn image_row(&self, row: &mut TableRow<'_, '_>, columns: &[Column]) {
+    fn image_row(&self, row: &mut TableRow<'_, '_>, columns: &[TableColumn]) {
         row.col(|ui| {
             row_name(ui, "IMA").on_hover_text("The image plane: no surface of the lens");
         });
         for column in columns {
             row.col(|ui| match column {
-                Column::Radius => still(ui, "Infinity", badge::WIDTH),
-                Column::SemiDiameter => {
-                    let reached = self.reached(self.view.lens.surfaces.len());
-                    still(ui, &reached, badge::WIDTH);
+                TableColumn::Radius => read_only_cell(ui, "Infinity", badge::WIDTH),
+                TableColumn::SemiDiameter => {
+                    let reached = self.reached_text(self.view.lens.surfaces.len());
+                    read_only_cell(ui, &reached, badge::WIDTH);
                 }
                 _ => {}
             });
         }
     }
 
-    fn surface_row(&mut self, row: &mut TableRow<'_, '_>, surface: usize, columns: &[Column]) {
+    fn surface_row(&mut self, row: &mut TableRow<'_, '_>, surface: usize, columns: &[TableColumn]) {
         row.set_selected(self.view.selected == Some(surface));
         row.col(|ui| self.surface_name(ui, surface));
         for column in columns {
@@ -203,11 +203,11 @@ impl Table<'_> {
         }
     }
 
-    fn cell(&mut self, ui: &mut Ui, column: Column, surface: usize) {
+    fn cell(&mut self, ui: &mut Ui, column: TableColumn, surface: usize) {
         match column {
-            Column::Glass => self.glass(ui, surface),
-            Column::Comment => self.comment(ui, surface),
-            _ => self.number(ui, column, surface),
+            TableColumn::Glass => self.glass_cell(ui, surface),
+            TableColumn::Comment => self.comment_cell(ui, surface),
+            _ => self.number_cell(ui, column, surface),
         }
     }
 
@@ -218,7 +218,7 @@ impl Table<'_> {
         let chosen = self.view.selected == Some(surface);
         let label = ui.selectable_label(chosen, text).accessible_name(row_label(surface));
         if label.clicked() || label.secondary_clicked() {
-            self.wishes.push(Command::Select(Some(surface)));
+            self.commands.push(Command::Select(Some(surface)));
         }
         label.context_menu(|ui| self.row_menu(ui, surface));
         label.on_hover_text(format!(
@@ -233,35 +233,35 @@ impl Table<'_> {
             let edit = action.edit(&self.view.lens, surface);
             let button = Button::new(action.title());
             if ui.add_enabled(edit.is_some(), button).on_hover_text(action.hint()).clicked() {
-                self.wishes.extend(edit.map(Command::Edit));
+                self.commands.extend(edit.map(Command::Edit));
                 ui.close();
             }
         }
         ui.separator();
-        let hyper = self.view.lens.surfaces[surface].hyper;
+        let hyper = self.view.lens.surfaces[surface].hyperhemisphere;
         if ui.selectable_label(hyper, "Hyper-hemisphere").clicked() {
-            self.wishes.push(Edit::SetHyper { surface, hyper: !hyper }.into());
+            self.commands.push(Edit::SetHyperhemisphere { surface, hyper: !hyper }.into());
             ui.close();
         }
     }
 
-    fn number(&mut self, ui: &mut Ui, column: Column, surface: usize) {
+    fn number_cell(&mut self, ui: &mut Ui, column: TableColumn, surface: usize) {
         let Some(parameter) = column.parameter(self.view, surface) else { return };
-        let limit = column == Column::SemiDiameter;
-        let (name, shown) = (name_of(parameter), self.shown(parameter));
-        let hint = if limit { self.reached(surface) } else { String::new() };
+        let limit = column == TableColumn::SemiDiameter;
+        let (name, shown) = (parameter_name(parameter), self.value_text(parameter));
+        let hint = if limit { self.reached_text(surface) } else { String::new() };
         let cell = Cell {
             name: &name,
-            shown: &shown,
+            value: &shown,
             hint: &hint,
             align: Align::Max,
-            place: Place::Table,
+            placement: InputPlacement::Table,
         };
         let place = (column, surface);
-        let response = self.field(ui, place, cell, |text| Ok(typed(parameter, text)));
+        let response = self.text_cell(ui, place, cell, |text| Ok(typed_edit(parameter, text)));
         // A rim that is not written has nothing to vary.
         if self.view.lens.get(parameter).is_some() || !limit {
-            badge::show(ui, &self.view.lens, parameter, self.drafts, self.wishes);
+            badge::show(ui, &self.view.lens, parameter, self.buffers, self.commands);
             self.toggle_by_key(ui, &response, parameter);
         }
         if limit {
@@ -270,55 +270,64 @@ impl Table<'_> {
     }
 
     /// What a number cell shows: radius for curvature, the solved gap where it is solved.
-    fn shown(&self, parameter: Parameter) -> String {
+    fn value_text(&self, parameter: Parameter) -> String {
         let value = self.view.lens.get(parameter);
         match parameter.quantity {
-            Quantity::Curvature => number::show(number::radius(value.unwrap_or(0.0))),
-            Quantity::SemiDiameter => value.map(number::show).unwrap_or_default(),
+            Quantity::Curvature => number::format_number(number::radius(value.unwrap_or(0.0))),
+            Quantity::SemiDiameter => value.map(number::format_number).unwrap_or_default(),
             _ => {
-                let solved = matches!(Decides::of(&self.view.lens, parameter), Decides::Focus(_));
+                let solved = matches!(
+                    ParameterStatus::of(&self.view.lens, parameter),
+                    ParameterStatus::ImageSolve(_)
+                );
                 let gap = solved.then(|| self.traced_gap(parameter.surface)).flatten();
-                number::show(gap.or(value).unwrap_or(0.0))
+                number::format_number(gap.or(value).unwrap_or(0.0))
             }
         }
     }
 
     /// The gap behind a surface as it was traced.
     fn traced_gap(&self, surface: usize) -> Option<f64> {
-        let bench = &numbers(self.view)?.bench.value;
-        bench.colors[bench.primary].system.surfaces.get(surface).map(|s| s.thickness)
+        let bench = &design_results(self.view)?.bench.value;
+        bench.channels[bench.primary].system.surfaces.get(surface).map(|s| s.thickness)
     }
 
     /// How far from the axis the drawn rays meet a surface.
-    fn reached(&self, surface: usize) -> String {
-        let numbers = numbers(self.view).filter(|_| self.view.is_current());
-        let reached = numbers.and_then(|n| n.layout.value.reached.get(surface).copied());
+    fn reached_text(&self, surface: usize) -> String {
+        let numbers = design_results(self.view).filter(|_| self.view.is_current());
+        let reached = numbers.and_then(|n| n.layout.value.ray_heights.get(surface).copied());
         reached.map(|height| format!("{height:.3}")).unwrap_or_default()
     }
 
     fn toggle_by_key(&mut self, ui: &Ui, field: &Response, parameter: Parameter) {
         let keys = Modifiers::COMMAND | Modifiers::SHIFT;
         if field.has_focus() && ui.input_mut(|input| input.consume_key(keys, Key::V)) {
-            let decides = Decides::of(&self.view.lens, parameter);
-            self.wishes.push(badge::toggled(decides, parameter).into());
+            let decides = ParameterStatus::of(&self.view.lens, parameter);
+            self.commands.push(badge::toggle_edit(decides, parameter).into());
         }
     }
 
-    fn glass(&mut self, ui: &mut Ui, surface: usize) {
+    fn glass_cell(&mut self, ui: &mut Ui, surface: usize) {
         let medium = &self.view.lens.surfaces[surface].medium;
-        let (name, shown) = (format!("Glass of surface {}", surface + 1), glass::show(medium));
-        let cell =
-            Cell { name: &name, shown: &shown, hint: "", align: Align::Min, place: Place::Table };
-        let edit = move |text: &str| Edit::SetMedium { surface, medium: glass::parse(text) };
-        let field = self.field(ui, (Column::Glass, surface), cell, |text| Ok(edit(text)));
-        self.propose(&field, edit);
-        field.on_hover_text(glass::describe(medium));
+        let (name, shown) =
+            (format!("Glass of surface {}", surface + 1), glass::format_medium(medium));
+        let cell = Cell {
+            name: &name,
+            value: &shown,
+            hint: "",
+            align: Align::Min,
+            placement: InputPlacement::Table,
+        };
+        let edit = move |text: &str| Edit::SetMedium { surface, medium: glass::parse_medium(text) };
+        let field = self.text_cell(ui, (TableColumn::Glass, surface), cell, |text| Ok(edit(text)));
+        self.suggest_glasses(&field, edit);
+        field.on_hover_text(glass::describe_medium(medium));
     }
 
     /// Proposes glasses below a cell into which a name is typed.
-    fn propose(&mut self, field: &Response, edit: impl Fn(&str) -> Edit) {
-        let typing = self.drafts.text(field.id).filter(|_| field.has_focus());
-        let proposals = typing.map(glass::proposals).unwrap_or_default();
+    fn suggest_glasses(&mut self, field: &Response, edit: impl Fn(&str) -> Edit) {
+        let typing = self.buffers.text(field.id).filter(|_| field.has_focus());
+        let proposals = typing.map(glass::suggestions).unwrap_or_default();
         if proposals.is_empty() {
             return;
         }
@@ -327,34 +336,39 @@ impl Table<'_> {
             for name in proposals {
                 // Taken as the button goes down: its release comes after the typing has ended.
                 if ui.selectable_label(false, &name).is_pointer_button_down_on() {
-                    self.drafts.accept(field.id);
-                    self.wishes.push(edit(&name).into());
+                    self.buffers.accept(field.id);
+                    self.commands.push(edit(&name).into());
                 }
             }
         });
     }
 
-    fn comment(&mut self, ui: &mut Ui, surface: usize) {
+    fn comment_cell(&mut self, ui: &mut Ui, surface: usize) {
         let shown = self.view.lens.surfaces[surface].comment.clone();
         let name = format!("Remark on surface {}", surface + 1);
-        let cell =
-            Cell { name: &name, shown: &shown, hint: "", align: Align::Min, place: Place::Table };
+        let cell = Cell {
+            name: &name,
+            value: &shown,
+            hint: "",
+            align: Align::Min,
+            placement: InputPlacement::Table,
+        };
         let edit = |text: &str| Ok(Edit::SetComment { surface, text: text.to_owned() });
-        self.field(ui, (Column::Comment, surface), cell, edit);
+        self.text_cell(ui, (TableColumn::Comment, surface), cell, edit);
     }
 
-    fn object_distance(&mut self, ui: &mut Ui) {
+    fn object_distance_cell(&mut self, ui: &mut Ui) {
         let old = match self.view.lens.object {
             Object::Infinity => f64::INFINITY,
             Object::Finite(distance) => distance,
         };
-        let shown = number::show(old);
+        let shown = number::format_number(old);
         let cell = Cell {
             name: "Object distance",
-            shown: &shown,
+            value: &shown,
             hint: "",
             align: Align::Max,
-            place: Place::Table,
+            placement: InputPlacement::Table,
         };
         let object = |distance: f64| {
             if distance.is_infinite() { Object::Infinity } else { Object::Finite(distance) }
@@ -363,27 +377,27 @@ impl Table<'_> {
             let distance = evaluate(text, old).map_err(|why| why.to_string())?;
             Ok(Edit::SetObject(object(distance)))
         };
-        self.field(ui, (Column::Thickness, OBJECT), cell, edit);
+        self.text_cell(ui, (TableColumn::Thickness, OBJECT), cell, edit);
     }
 
-    fn object_medium(&mut self, ui: &mut Ui) {
-        let shown = glass::show(&self.view.lens.object_medium);
+    fn object_medium_cell(&mut self, ui: &mut Ui) {
+        let shown = glass::format_medium(&self.view.lens.object_medium);
         let cell = Cell {
             name: "Medium of the object",
-            shown: &shown,
+            value: &shown,
             hint: "",
             align: Align::Min,
-            place: Place::Table,
+            placement: InputPlacement::Table,
         };
-        let edit = |text: &str| Ok(Edit::SetObjectMedium(glass::parse(text)));
-        self.field(ui, (Column::Glass, OBJECT), cell, edit);
+        let edit = |text: &str| Ok(Edit::SetObjectMedium(glass::parse_medium(text)));
+        self.text_cell(ui, (TableColumn::Glass, OBJECT), cell, edit);
     }
 
     /// A cell: what is typed becomes an edit, if the lens can be that.
-    fn field(
+    fn text_cell(
         &mut self,
         ui: &mut Ui,
-        (column, row): (Column, usize),
+        (column, row): (TableColumn, usize),
         cell: Cell<'_>,
         edit: impl Fn(&str) -> Result<Edit, String>,
     ) -> Response {
@@ -391,13 +405,13 @@ impl Table<'_> {
         let room = if column.has_badge() { badge::WIDTH } else { 0.0 };
         let size = vec2(ui.available_width() - room, ui.available_height());
         let layout = Layout::left_to_right(Align::Center);
-        let entry = ui.allocate_ui_with_layout(size, layout, |ui| self.drafts.show(ui, id, cell));
+        let entry = ui.allocate_ui_with_layout(size, layout, |ui| self.buffers.show(ui, id, cell));
         let entry = entry.inner;
         // Consumed, so that the next cell does not end its typing by the same key.
         let left = entry.response.lost_focus();
         let enter = left && ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Enter));
-        let fits = match entry.typed {
-            Some(text) => self.take(id, edit(&text)),
+        let fits = match entry.submitted {
+            Some(text) => self.try_edit(id, edit(&text)),
             None => true,
         };
         if enter {
@@ -409,19 +423,19 @@ impl Table<'_> {
     }
 
     /// Wishes for an edit, if the lens can be that; otherwise the cell says why not.
-    fn take(&mut self, id: Id, edit: Result<Edit, String>) -> bool {
+    fn try_edit(&mut self, id: Id, edit: Result<Edit, String>) -> bool {
         let tried = edit.and_then(|edit| {
-            let lens = edited(&self.view.lens, &edit);
+            let lens = apply_edit(&self.view.lens, &edit);
             lens.map(|_| edit).map_err(|why| why.to_string())
         });
         match tried {
             Ok(edit) => {
-                self.drafts.accept(id);
-                self.wishes.extend([Command::Edit(edit), Command::Settle]);
+                self.buffers.accept(id);
+                self.commands.extend([Command::Edit(edit), Command::CommitEdit]);
                 true
             }
             Err(why) => {
-                self.drafts.refuse(id, capital(&counted_from_one(&why)));
+                self.buffers.reject(id, capitalize(&counted_from_one(&why)));
                 false
             }
         }
@@ -432,16 +446,16 @@ impl Table<'_> {
 const OBJECT: usize = usize::MAX;
 
 /// The field of the first radius.
-pub(super) fn first_field() -> Id {
-    cell_id(Column::Radius, 0)
+pub(super) fn first_radius_field() -> Id {
+    cell_id(TableColumn::Radius, 0)
 }
 
-fn cell_id(column: Column, row: usize) -> Id {
+fn cell_id(column: TableColumn, row: usize) -> Id {
     Id::unique(("prescription cell", column, row))
 }
 
 /// What is typed into the cell of a number; a curvature is typed as its radius.
-fn typed(parameter: Parameter, text: &str) -> Edit {
+fn typed_edit(parameter: Parameter, text: &str) -> Edit {
     let text = text.to_owned();
     match parameter {
         Parameter { surface, quantity: Quantity::Curvature } => Edit::TypeRadius { surface, text },
@@ -450,16 +464,21 @@ fn typed(parameter: Parameter, text: &str) -> Edit {
 }
 
 /// The columns of a lens: those of aspheres only where there are some.
-fn columns(lens: &Lens) -> Vec<Column> {
-    let mut columns =
-        vec![Column::Radius, Column::Thickness, Column::Glass, Column::SemiDiameter, Column::Conic];
+fn columns(lens: &Lens) -> Vec<TableColumn> {
+    let mut columns = vec![
+        TableColumn::Radius,
+        TableColumn::Thickness,
+        TableColumn::Glass,
+        TableColumn::SemiDiameter,
+        TableColumn::Conic,
+    ];
     let terms = lens.surfaces.iter().map(|row| row.asphere.len()).max().unwrap_or(0);
-    columns.extend((0..terms).map(Column::Asphere));
-    columns.push(Column::Comment);
+    columns.extend((0..terms).map(TableColumn::Asphere));
+    columns.push(TableColumn::Comment);
     columns
 }
 
-fn header(mut row: TableRow<'_, '_>, columns: &[Column]) {
+fn header(mut row: TableRow<'_, '_>, columns: &[TableColumn]) {
     row.col(|ui| {
         ui.add_space(6.0);
         ui.weak("Surf").on_hover_text("Counted from 1, as designers do; files count from 0");
@@ -467,7 +486,7 @@ fn header(mut row: TableRow<'_, '_>, columns: &[Column]) {
     for column in columns {
         row.col(|ui| {
             let room = if column.has_badge() { badge::WIDTH } else { 0.0 };
-            let left = matches!(column, Column::Glass | Column::Comment);
+            let left = matches!(column, TableColumn::Glass | TableColumn::Comment);
             let layout = if left {
                 Layout::left_to_right(Align::Center)
             } else {
@@ -492,7 +511,7 @@ fn row_label(surface: usize) -> String {
 }
 
 /// A value that nobody can type.
-fn still(ui: &mut Ui, text: &str, room: f32) {
+fn read_only_cell(ui: &mut Ui, text: &str, room: f32) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         ui.add_space(room + 5.0);
         ui.weak(text);
@@ -501,11 +520,11 @@ fn still(ui: &mut Ui, text: &str, room: f32) {
 
 /// The tint of a row: blue for glass, green for a mirror.
 fn tint(ui: &Ui, medium: &Medium) -> Option<Color32> {
-    let palette = Palette::of(ui.visuals());
+    let palette = Palette::for_visuals(ui.visuals());
     let [r, g, b, _] = match medium {
         Medium::Air => return None,
         Medium::Mirror => palette.mirror,
-        Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) | Medium::Gradient(_) => {
+        Medium::Glass(_) | Medium::Model { .. } | Medium::Index(_) | Medium::Grin(_) => {
             palette.glass
         }
     };

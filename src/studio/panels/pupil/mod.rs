@@ -12,81 +12,83 @@ use eframe::egui::{
     Align, ComboBox, Id, Layout as Arrange, Rect, Response, Sense, Ui, UiBuilder, WidgetInfo, vec2,
 };
 
-use super::cells::{Words, bar, within};
-use super::{Panel, no_numbers, shown, swatch, zoom_name};
-use crate::analysis::{Form, Pupil};
-use crate::pupil::{Bench, Limit};
-use crate::session::{self, Command, Numbers, Results, Timed, View};
+use super::cells::{CellLayout, scale_bar, show_within};
+use super::{Panel, displayed_results, show_missing_results, swatch, zoom_name};
+use crate::analysis::{FieldPupil, PupilShape};
+use crate::pupil::{PupilLimit, RayModel};
+use crate::session::{self, Analyses, AnalysisResults, Command, SessionView, Timed};
 use crate::studio::palette::{Palette, color32};
-use crate::studio::wording::{capital, counted_from_one};
-use picture::{Picture, Window};
+use crate::studio::wording::{capitalize, counted_from_one};
+use picture::{PupilPicture, PupilWindow};
 
 /// The field of a cell above, four lines of numbers below; more where a pupil has more limits than
 /// fit in one.
-const WORDS: Words = Words { above: 20.0, below: 62.0 };
+const WORDS: CellLayout = CellLayout { above: 20.0, below: 62.0 };
 const LINE: f32 = 14.0;
 /// The scale bar is at most this share of a picture's width, to stand in its corner.
 const BAR: f64 = 0.3;
 
 /// The panel.
 #[derive(Debug, Default)]
-pub struct Pupils {
+pub struct PupilPanel {
     /// Limits in the order in which they have turned up, so that none changes its colour while the
     /// lens is bent.
-    known: Vec<Limit>,
+    known_limits: Vec<PupilLimit>,
     /// How many surfaces the lens has that they belong to.
     surfaces: usize,
 }
 
-impl Panel for Pupils {
+impl Panel for PupilPanel {
     fn title(&self) -> &'static str {
         "Pupil"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        let Some((results, numbers)) = shown(view) else { return no_numbers(ui, view) };
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+        let Some((results, numbers)) = displayed_results(view) else {
+            return show_missing_results(ui, view);
+        };
         let Some(pupils) = &numbers.pupils else {
             ui.weak("Computing…");
             return;
         };
         let pupils = &pupils.value;
-        self.learn(pupils, results.lens.surfaces.len());
+        self.remember_limits(pupils, results.lens.surfaces.len());
         header(ui, view, pupils, wishes);
-        let shown = Shown { known: &self.known, view, results, numbers, pupils };
+        let shown = PupilView { known_limits: &self.known_limits, view, results, numbers, pupils };
         let all = ui.available_rect_before_wrap();
         let (above, below) = all.split_top_bottom_at_y(all.bottom() - rims::height(ui, &shown));
         ui.scope_builder(UiBuilder::new().max_rect(above), |ui| {
             shown.legend(ui, wishes);
             shown.pictures(ui, wishes);
         });
-        within(ui, below, |ui| rims::strip(ui, &shown, wishes));
+        show_within(ui, below, |ui| rims::show_table(ui, &shown, wishes));
     }
 }
 
-impl Pupils {
+impl PupilPanel {
     /// Notes limits that were not there before.
-    fn learn(&mut self, pupils: &session::Pupils, surfaces: usize) {
+    fn remember_limits(&mut self, pupils: &session::FieldPupils, surfaces: usize) {
         if self.surfaces != surfaces {
-            *self = Self { known: Vec::new(), surfaces };
+            *self = Self { known_limits: Vec::new(), surfaces };
         }
         for limit in limits(pupils) {
-            if !self.known.contains(&limit) {
-                self.known.push(limit);
+            if !self.known_limits.contains(&limit) {
+                self.known_limits.push(limit);
             }
         }
     }
 }
 
 /// All limits of all pupils, from the first surface to the last, the disc in front.
-fn limits(pupils: &session::Pupils) -> Vec<Limit> {
-    let sides = pupils.fields.iter().filter_map(|pupil| match &pupil.value.form {
-        Form::Outlined(outline) => Some(&outline.sides),
+fn limits(pupils: &session::FieldPupils) -> Vec<PupilLimit> {
+    let sides = pupils.fields.iter().filter_map(|pupil| match &pupil.value.shape {
+        PupilShape::Outlined(outline) => Some(&outline.sides),
         _ => None,
     });
-    let mut limits: Vec<Limit> = sides.flatten().map(|side| side.limit).collect();
+    let mut limits: Vec<PupilLimit> = sides.flatten().map(|side| side.limit).collect();
     limits.sort_by_key(|limit| match limit {
-        Limit::Surface(surface, hurdle) => Some((*surface, *hurdle)),
-        Limit::Disc | Limit::Unaimed => None,
+        PupilLimit::Surface(surface, hurdle) => Some((*surface, *hurdle)),
+        PupilLimit::Disc | PupilLimit::Unaimed => None,
     });
     limits.dedup();
     limits
@@ -98,11 +100,16 @@ const HINT: &str = "Shaded: rays that get through. Coloured: what ends them. Das
      over from another. Cross: the centroid. In the plane through the first vertex, seen along the \
      axis; where the field reaches beyond 45°, seen along the beam of each field instead.";
 
-fn header(ui: &mut Ui, view: &View, pupils: &session::Pupils, wishes: &mut Vec<Command>) {
+fn header(
+    ui: &mut Ui,
+    view: &SessionView,
+    pupils: &session::FieldPupils,
+    wishes: &mut Vec<Command>,
+) {
     ui.horizontal(|ui| {
         wavelength(ui, view, pupils.wavelength, wishes);
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
-            let across = pupils.fields.iter().any(|pupil| pupil.value.across);
+            let across = pupils.fields.iter().any(|pupil| pupil.value.across_beam);
             let plane = if across { "across the beam" } else { "in the plane of the first vertex" };
             ui.weak(plane).on_hover_text(HINT);
             if view.lens.zoom_positions() > 1 {
@@ -113,8 +120,8 @@ fn header(ui: &mut Ui, view: &View, pupils: &session::Pupils, wishes: &mut Vec<C
 }
 
 /// The choice of the wavelength; its name where there is no choice.
-fn wavelength(ui: &mut Ui, view: &View, shown: usize, wishes: &mut Vec<Command>) {
-    let palette = Palette::of(ui.visuals());
+fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, wishes: &mut Vec<Command>) {
+    let palette = Palette::for_visuals(ui.visuals());
     let waves = &view.lens.wavelengths;
     let name =
         |i: usize| waves.get(i).map_or_else(String::new, |wave| format!("{:.1} nm", 1e3 * wave.um));
@@ -140,39 +147,39 @@ fn wavelength(ui: &mut Ui, view: &View, shown: usize, wishes: &mut Vec<Command>)
 }
 
 /// What is shown in one frame.
-struct Shown<'a> {
-    known: &'a [Limit],
-    view: &'a View,
-    results: &'a Results,
-    numbers: &'a Numbers,
-    pupils: &'a session::Pupils,
+struct PupilView<'a> {
+    known_limits: &'a [PupilLimit],
+    view: &'a SessionView,
+    results: &'a AnalysisResults,
+    numbers: &'a Analyses,
+    pupils: &'a session::FieldPupils,
 }
 
-impl Shown<'_> {
-    fn bench(&self) -> &Bench {
+impl PupilView<'_> {
+    fn bench(&self) -> &RayModel {
         &self.numbers.bench.value
     }
 
     /// A limit as the window counts surfaces.
-    fn name(&self, limit: Limit) -> String {
+    fn limit_name(&self, limit: PupilLimit) -> String {
         counted_from_one(&self.bench().limit_name(limit))
     }
 
-    fn color(&self, palette: &Palette, limit: Limit) -> eframe::egui::Color32 {
-        if limit == Limit::Disc {
+    fn limit_color(&self, palette: &Palette, limit: PupilLimit) -> eframe::egui::Color32 {
+        if limit == PupilLimit::Disc {
             return color32(palette.strong);
         }
-        let surfaces = || self.known.iter().filter(|limit| **limit != Limit::Disc);
+        let surfaces = || self.known_limits.iter().filter(|limit| **limit != PupilLimit::Disc);
         color32(palette.limit(surfaces().position(|known| *known == limit).unwrap_or(0)))
     }
 
     /// Whether a limit belongs to the surface that is pointed out.
-    fn is_selected(&self, limit: Limit) -> bool {
+    fn is_selected(&self, limit: PupilLimit) -> bool {
         limit.surface().is_some() && limit.surface() == self.view.selected
     }
 
     /// Points a limit's surface out, or no longer.
-    fn select(&self, limit: Limit, wishes: &mut Vec<Command>) {
+    fn select(&self, limit: PupilLimit, wishes: &mut Vec<Command>) {
         let surface = limit.surface();
         let wanted = surface.filter(|surface| self.view.selected != Some(*surface));
         if surface.is_some() {
@@ -182,12 +189,13 @@ impl Shown<'_> {
 
     /// The colours of the limits; a click points out the surface.
     fn legend(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
-        let palette = Palette::of(ui.visuals());
+        let palette = Palette::for_visuals(ui.visuals());
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
             for limit in limits(self.pupils) {
-                let (color, name) = (self.color(&palette, limit), capital(&self.name(limit)));
-                let label = words::entry(ui, color, name, self.is_selected(limit));
+                let (color, name) =
+                    (self.limit_color(&palette, limit), capitalize(&self.limit_name(limit)));
+                let label = words::limit_button(ui, color, name, self.is_selected(limit));
                 if label.on_hover_text(words::hint(limit)).clicked() {
                     self.select(limit, wishes);
                 }
@@ -196,29 +204,29 @@ impl Shown<'_> {
     }
 
     /// The room for the words of all cells, and the cells.
-    fn room(&self, ui: &Ui, rect: Rect) -> (Words, Vec<Rect>) {
+    fn layout_cells(&self, ui: &Ui, rect: Rect) -> (CellLayout, Vec<Rect>) {
         let fields = &self.pupils.fields;
         let cells = WORDS.cells(rect, fields.len());
-        let lines = |(pupil, cell): (&Timed<Pupil>, &Rect)| {
+        let lines = |(pupil, cell): (&Timed<FieldPupil>, &Rect)| {
             self.lines(ui, &pupil.value, WORDS.below(*cell).width())
         };
         let most = fields.iter().zip(&cells).map(lines).max().unwrap_or(1);
         let below = WORDS.below + LINE * (most - 1) as f32;
-        let words = Words { below, ..WORDS };
+        let words = CellLayout { below, ..WORDS };
         (words, words.cells(rect, fields.len()))
     }
 
     fn pictures(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
         let (rect, _) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
-        let (words, cells) = self.room(ui, rect);
+        let (words, cells) = self.layout_cells(ui, rect);
         let Some(first) = cells.first() else { return };
-        let window = Window::of(self.pupils);
+        let window = PupilWindow::around_pupils(self.pupils);
         let all = self.pupils.fields.iter().zip(&cells).enumerate();
         let pictures: Vec<_> = all
             .map(|(i, (pupil, cell))| {
                 let rect = words.picture(*cell);
-                let response = self.touch(ui, rect, i, &pupil.value);
-                (Picture::new(&pupil.value, &window, i, rect), response)
+                let response = self.interact(ui, rect, i, &pupil.value);
+                (PupilPicture::new(&pupil.value, &window, i, rect), response)
             })
             .collect();
         let pointed = pictures.iter().find_map(|(picture, response)| {
@@ -233,17 +241,17 @@ impl Shown<'_> {
         }
         let bold = |limit| self.is_selected(limit) || pointed.is_some_and(|p| p.2 == limit);
         for ((i, cell), (picture, _)) in cells.iter().enumerate().zip(&pictures) {
-            picture.paint(ui, |palette, limit| self.color(palette, limit), bold);
-            within(ui, words.above(*cell), |ui| self.title(ui, i));
+            picture.paint(ui, |palette, limit| self.limit_color(palette, limit), bold);
+            show_within(ui, words.above(*cell), |ui| self.title(ui, i));
             self.message(ui, picture.rect, picture.pupil);
-            within(ui, words.below(*cell), |ui| self.numbers(ui, i));
+            show_within(ui, words.below(*cell), |ui| self.numbers(ui, i));
         }
         let first = words.picture(*first);
-        bar(ui, first, window.scale(first), BAR);
+        scale_bar(ui, first, window.scale(first), BAR);
     }
 
     /// Where a picture is touched, by the name that a screen reader gives it.
-    fn touch(&self, ui: &Ui, rect: Rect, field: usize, pupil: &Pupil) -> Response {
+    fn interact(&self, ui: &Ui, rect: Rect, field: usize, pupil: &FieldPupil) -> Response {
         let id = Id::unique("pupil").with(field);
         let response = ui.interact(rect, id, Sense::click());
         let name = format!("Pupil of field {}: {}", field + 1, self.summary(pupil));

@@ -9,8 +9,8 @@ use eframe::egui::{
 };
 use egui_extras::{Column as Width, TableBuilder, TableRow};
 
-use super::Shown;
-use crate::analysis::{Estimate, RimEffect, Rims};
+use super::PupilView;
+use crate::analysis::{Estimate, RimSensitivities, RimSensitivity};
 use crate::session::Command;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -39,20 +39,20 @@ const HINT: &str = "What each rim would do if its semi-diameter were 0.1 mm larg
 
 /// The two numbers of a rim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum SensitivityKind {
     Light,
     Blur,
 }
 
 /// A group of two columns: all fields, or one.
-struct Group<'a> {
+struct FieldColumns<'a> {
     name: String,
-    rims: Result<&'a Rims, String>,
+    rims: Result<&'a RimSensitivities, String>,
 }
 
 /// What the table shows.
-struct Table<'a> {
-    groups: Vec<Group<'a>>,
+struct SensitivityTable<'a> {
+    groups: Vec<FieldColumns<'a>>,
     /// The mean area of the pupils in mm², of which light is a share.
     area: f64,
     /// The largest change of each kind.
@@ -61,20 +61,23 @@ struct Table<'a> {
 }
 
 /// How high the table below the pictures is: nothing where there is nothing to tell.
-pub(super) fn height(ui: &Ui, shown: &Shown<'_>) -> f32 {
+pub(super) fn height(ui: &Ui, shown: &PupilView<'_>) -> f32 {
     let Some(all) = &shown.pupils.all_rims else { return 0.0 };
-    let whole = TITLE + HEAD + ROW * felt(&Table::new(shown, all), all).len().max(1) as f32 + 8.0;
+    let whole = TITLE
+        + HEAD
+        + ROW * limiting_surfaces(&SensitivityTable::new(shown, all), all).len().max(1) as f32
+        + 8.0;
     let room = ui.available_height() - PICTURES;
     // Where there is little room the pictures come first, and the title stands for the table.
     if room < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(room) }
 }
 
 /// The table below the pictures, as high as there is room.
-pub(super) fn strip(ui: &mut Ui, shown: &Shown<'_>, wishes: &mut Vec<Command>) {
+pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, wishes: &mut Vec<Command>) {
     let Some(all) = &shown.pupils.all_rims else { return };
     let room = ui.available_height();
-    let table = Table::new(shown, all);
-    let felt = felt(&table, all);
+    let table = SensitivityTable::new(shown, all);
+    let felt = limiting_surfaces(&table, all);
     ui.separator();
     ui.spacing_mut().item_spacing.y = 1.0;
     title(ui, shown, all, &felt);
@@ -89,14 +92,14 @@ pub(super) fn strip(ui: &mut Ui, shown: &Shown<'_>, wishes: &mut Vec<Command>) {
 }
 
 /// The surfaces at whose rim some ray ends.
-fn felt(table: &Table<'_>, all: &Rims) -> Vec<usize> {
-    (0..all.surfaces.len()).filter(|i| table.is_felt(*i)).collect()
+fn limiting_surfaces(table: &SensitivityTable<'_>, all: &RimSensitivities) -> Vec<usize> {
+    (0..all.surfaces.len()).filter(|i| table.limits_rays(*i)).collect()
 }
 
-fn title(ui: &mut Ui, shown: &Shown<'_>, all: &Rims, felt: &[usize]) {
+fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, felt: &[usize]) {
     ui.horizontal(|ui| {
         ui.strong("+0.1 mm of semi-diameter").on_hover_text(HINT);
-        let others = others(felt, shown.results.lens.surfaces.len());
+        let others = remaining_surfaces(felt, shown.results.lens.surfaces.len());
         if !others.is_empty() {
             let text = format!("no ray ends at {others}");
             ui.label(RichText::new(text).small().weak());
@@ -108,37 +111,38 @@ fn title(ui: &mut Ui, shown: &Shown<'_>, all: &Rims, felt: &[usize]) {
     });
 }
 
-impl<'a> Table<'a> {
-    fn new(shown: &'a Shown<'_>, all: &'a Rims) -> Self {
+impl<'a> SensitivityTable<'a> {
+    fn new(shown: &'a PupilView<'_>, all: &'a RimSensitivities) -> Self {
         let fields = shown.results.lens.fields_at(shown.results.settings.zoom);
-        let mut groups = vec![Group { name: "All fields".to_owned(), rims: Ok(all) }];
+        let mut groups = vec![FieldColumns { name: "All fields".to_owned(), rims: Ok(all) }];
         for (point, rims) in fields.values.iter().zip(&shown.pupils.rims.value) {
             let name = field_name(fields.kind, *point);
-            groups.push(Group { name, rims: rims.as_ref().map_err(ToString::to_string) });
+            groups.push(FieldColumns { name, rims: rims.as_ref().map_err(ToString::to_string) });
         }
         let mut table =
             Self { groups, area: all.area, largest: [0.0; 2], selected: shown.view.selected };
-        table.largest = [Kind::Light, Kind::Blur].map(|kind| table.largest_of(kind));
+        table.largest =
+            [SensitivityKind::Light, SensitivityKind::Blur].map(|kind| table.largest_of(kind));
         table
     }
 
-    fn largest_of(&self, kind: Kind) -> f64 {
+    fn largest_of(&self, kind: SensitivityKind) -> f64 {
         let known = self.groups.iter().filter_map(|group| group.rims.as_ref().ok());
         let effects = known.flat_map(|rims| &rims.surfaces);
         effects.map(|effect| self.change(effect, kind).value.abs()).fold(0.0, f64::max)
     }
 
     /// Whether a rim does something at some field.
-    fn is_felt(&self, surface: usize) -> bool {
+    fn limits_rays(&self, surface: usize) -> bool {
         let mut known = self.groups.iter().filter_map(|group| group.rims.as_ref().ok());
-        known.any(|rims| rims.surfaces[surface].is_felt())
+        known.any(|rims| rims.surfaces[surface].is_significant())
     }
 
     /// The change for one step: of the light in per cent, of the radius in µm.
-    fn change(&self, effect: &RimEffect, kind: Kind) -> Estimate {
+    fn change(&self, effect: &RimSensitivity, kind: SensitivityKind) -> Estimate {
         let (number, scale) = match kind {
-            Kind::Light => (effect.area, 100.0 * STEP / self.area),
-            Kind::Blur => (effect.rms, 1e3 * STEP),
+            SensitivityKind::Light => (effect.area, 100.0 * STEP / self.area),
+            SensitivityKind::Blur => (effect.rms, 1e3 * STEP),
         };
         Estimate::new(scale * number.value, scale * number.error, number.rays)
     }
@@ -166,11 +170,11 @@ impl<'a> Table<'a> {
 
     fn head(&self, mut row: TableRow<'_, '_>) {
         row.col(|ui| {
-            lines(ui, "", "Surface", Align2::LEFT_CENTER);
+            two_lines(ui, "", "Surface", Align2::LEFT_CENTER);
         });
         for group in &self.groups {
             for (name, unit) in [(group.name.as_str(), "light, %"), ("", "RMS, µm")] {
-                row.col(|ui| lines(ui, name, unit, Align2::RIGHT_CENTER));
+                row.col(|ui| two_lines(ui, name, unit, Align2::RIGHT_CENTER));
             }
         }
     }
@@ -188,7 +192,7 @@ impl<'a> Table<'a> {
             ui.painter().text(at, Align2::LEFT_CENTER, surface + 1, font, color);
         });
         for group in &self.groups {
-            for kind in [Kind::Light, Kind::Blur] {
+            for kind in [SensitivityKind::Light, SensitivityKind::Blur] {
                 row.col(|ui| self.cell(ui, group, surface, kind));
             }
         }
@@ -198,7 +202,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn cell(&self, ui: &Ui, group: &Group<'_>, surface: usize, kind: Kind) {
+    fn cell(&self, ui: &Ui, group: &FieldColumns<'_>, surface: usize, kind: SensitivityKind) {
         let rect = ui.max_rect();
         let Ok(rims) = &group.rims else { return };
         let change = self.change(&rims.surfaces[surface], kind);
@@ -223,14 +227,14 @@ impl<'a> Table<'a> {
         format!(
             "Rim of surface {} by 0.1 mm: light {} %, RMS {} µm",
             surface + 1,
-            of(Kind::Light),
-            of(Kind::Blur)
+            of(SensitivityKind::Light),
+            of(SensitivityKind::Blur)
         )
     }
 
     /// A rim with the errors of its numbers.
     fn details(&self, surface: usize) -> String {
-        let line = |group: &Group<'_>| match &group.rims {
+        let line = |group: &FieldColumns<'_>| match &group.rims {
             Ok(rims) => {
                 let of = |kind, unit| {
                     let change = self.change(&rims.surfaces[surface], kind);
@@ -239,7 +243,8 @@ impl<'a> Table<'a> {
                     }
                     format!("{} ± {:.0e} {unit}", signed(change.value), change.error)
                 };
-                let (light, blur) = (of(Kind::Light, "%"), of(Kind::Blur, "µm"));
+                let (light, blur) =
+                    (of(SensitivityKind::Light, "%"), of(SensitivityKind::Blur, "µm"));
                 format!("{}: light {light}, RMS {blur}", group.name)
             }
             Err(why) => format!("{}: {why}", group.name),
@@ -254,9 +259,9 @@ impl<'a> Table<'a> {
 }
 
 /// More light is for the better, and a smaller spot.
-fn color(ui: &Ui, kind: Kind, change: f64) -> Color32 {
-    let palette = Palette::of(ui.visuals());
-    let better = (change > 0.0) == (kind == Kind::Light);
+fn color(ui: &Ui, kind: SensitivityKind, change: f64) -> Color32 {
+    let palette = Palette::for_visuals(ui.visuals());
+    let better = (change > 0.0) == (kind == SensitivityKind::Light);
     color32(if better { palette.better } else { palette.worse })
 }
 
@@ -273,7 +278,7 @@ fn arrow(ui: &Ui, middle: Pos2, share: f64, color: Color32) {
 }
 
 /// Two lines at the head of a column.
-fn lines(ui: &Ui, above: &str, below: &str, align: Align2) {
+fn two_lines(ui: &Ui, above: &str, below: &str, align: Align2) {
     let rect = ui.max_rect();
     let (upper, lower) = rect.split_top_bottom_at_fraction(0.5);
     let font = TextStyle::Small.resolve(ui.style());
@@ -294,11 +299,11 @@ fn lines(ui: &Ui, above: &str, below: &str, align: Align2) {
 /// A number with its sign.
 fn signed(value: f64) -> String {
     let sign = if value > 0.0 { "+" } else { "" };
-    format!("{sign}{}", number::show_digits(value, 3))
+    format!("{sign}{}", number::format_digits(value, 3))
 }
 
 /// The surfaces that are not among some, as the window counts them: `2 to 5, 7 to 10`.
-fn others(felt: &[usize], count: usize) -> String {
+fn remaining_surfaces(felt: &[usize], count: usize) -> String {
     let mut ranges: Vec<RangeInclusive<usize>> = Vec::new();
     for surface in (0..count).filter(|i| !felt.contains(i)).map(|i| i + 1) {
         match ranges.last_mut() {
@@ -320,8 +325,8 @@ mod tests {
 
     #[test]
     fn surfaces_without_effect_are_told_in_ranges() {
-        assert_eq!(others(&[0, 5, 10], 11), "2 to 5, 7 to 10");
-        assert_eq!(others(&[2], 4), "1, 2, 4");
-        assert_eq!(others(&[0, 1], 2), "");
+        assert_eq!(remaining_surfaces(&[0, 5, 10], 11), "2 to 5, 7 to 10");
+        assert_eq!(remaining_surfaces(&[2], 4), "1, 2, 4");
+        assert_eq!(remaining_surfaces(&[0, 1], 2), "");
     }
 }

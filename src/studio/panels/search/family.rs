@@ -11,24 +11,24 @@ use eframe::egui::{
 use super::thumbnail::Thumbnails;
 use super::{lenses, marks, words};
 use crate::lens::Lens;
-use crate::search::{Node, Offer};
-use crate::session::{Exploration, View};
+use crate::search::{LineageNode, OfferOutcome};
+use crate::session::{SessionView, StructureSearchSnapshot};
 
 /// How many of the last generations the tree shows, besides the line of the one that is chosen.
-const SHOWN: usize = 80;
+const MAX_NODES: usize = 80;
 /// How near the pointer must be to a generation to mean it.
 const NEAR: f32 = 10.0;
 /// How high the tree is.
 const HEIGHT: f32 = 120.0;
 
-type Generation = Arc<Node<Arc<Lens>>>;
+type Generation = Arc<LineageNode<Arc<Lens>>>;
 
 /// Shows the tree; the generation that was clicked, if one was.
-pub(super) fn picture(ui: &mut Ui, run: &Exploration, number: u64) -> Option<u64> {
-    let line: Vec<u64> = run.line(number).map(|node| node.number).collect();
-    let first = run.family.len().saturating_sub(SHOWN);
+pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> Option<u64> {
+    let line: Vec<u64> = run.ancestry(number).map(|node| node.number).collect();
+    let first = run.lineage.len().saturating_sub(MAX_NODES);
     let shown: Vec<&Generation> = run
-        .family
+        .lineage
         .iter()
         .enumerate()
         .filter(|(i, node)| *i >= first || line.contains(&node.number))
@@ -38,7 +38,7 @@ pub(super) fn picture(ui: &mut Ui, run: &Exploration, number: u64) -> Option<u64
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let label = format!("Family tree of {} generations", shown.len());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
-    let places = places(&shown, rect.shrink2(vec2(8.0, 8.0)));
+    let places = node_positions(&shown, rect.shrink2(vec2(8.0, 8.0)));
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     let place_of = |wanted: u64| {
@@ -54,7 +54,7 @@ pub(super) fn picture(ui: &mut Ui, run: &Exploration, number: u64) -> Option<u64
         }
     }
     for (node, at) in shown.iter().zip(&places) {
-        let kept = node.offer.is_some_and(Offer::entered);
+        let kept = node.offer.is_some_and(OfferOutcome::is_accepted);
         let radius = if kept { 4.2 } else { 2.4 };
         painter.circle_filled(*at, radius, marks::color(ui.visuals(), node.kind));
     }
@@ -68,7 +68,12 @@ pub(super) fn picture(ui: &mut Ui, run: &Exploration, number: u64) -> Option<u64
         .min_by(|(_, a), (_, b)| a.distance(pointer).total_cmp(&b.distance(pointer)));
     let (node, at) = near.filter(|(_, at)| at.distance(pointer) < NEAR)?;
     painter.circle_stroke(*at, 6.5, ui.visuals().selection.stroke);
-    let text = format!("Lens {}\n{}\n{}", node.number, words::what(node), words::fate(node));
+    let text = format!(
+        "Lens {}\n{}\n{}",
+        node.number,
+        words::mutation_text(node),
+        words::outcome_text(node)
+    );
     let response =
         response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text_at_pointer(text);
     response.clicked().then_some(node.number)
@@ -79,7 +84,7 @@ fn faint(ui: &Ui) -> Color32 {
 }
 
 /// Where each generation stands: in the order of birth, the better the lower.
-fn places(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
+fn node_positions(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
     let height = |node: &Generation| {
         let merit = node.descended;
         if merit > 0.0 && merit.is_finite() { Some(merit.log10()) } else { None }
@@ -97,15 +102,15 @@ fn places(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
 }
 
 /// The ancestors of a lens in words, the youngest first; the one that was clicked.
-pub(super) fn line(
+pub(super) fn ancestors(
     ui: &mut Ui,
-    view: &View,
-    run: &Exploration,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
     number: u64,
     thumbnails: &mut Thumbnails,
 ) -> Option<u64> {
     let mut clicked = None;
-    let generations: Vec<&Generation> = run.line(number).collect();
+    let generations: Vec<&Generation> = run.ancestry(number).collect();
     if generations.is_empty() {
         ui.weak(format!("Lens {number} is not remembered any more."));
     }
@@ -119,7 +124,7 @@ pub(super) fn line(
             if response.on_hover_cursor(CursorIcon::PointingHand).clicked() {
                 clicked = Some(node.number);
             }
-            ui.vertical(|ui| generation(ui, node));
+            ui.vertical(|ui| generation_text(ui, node));
         });
     }
     let oldest = generations.last();
@@ -129,17 +134,17 @@ pub(super) fn line(
     clicked
 }
 
-fn generation(ui: &mut Ui, node: &Generation) {
+fn generation_text(ui: &mut Ui, node: &Generation) {
     ui.spacing_mut().item_spacing.y = 1.0;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         if let Some(kind) = node.kind {
-            marks::sign(ui, kind);
+            marks::symbol(ui, kind);
         }
         ui.add(Label::new(RichText::new(format!("Lens {}", node.number)).strong()));
-        ui.add(Label::new(words::what(node)).wrap());
+        ui.add(Label::new(words::mutation_text(node)).wrap());
     });
-    for text in words::fate(node).lines() {
+    for text in words::outcome_text(node).lines() {
         ui.add(Label::new(RichText::new(text).small().weak()).wrap());
     }
 }

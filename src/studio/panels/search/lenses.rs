@@ -8,10 +8,12 @@ use eframe::egui::{
 };
 
 use super::thumbnail::Thumbnails;
-use super::{wish, words};
+use super::{search_command, words};
 use crate::lens::Lens;
-use crate::search::Steer;
-use crate::session::{Command, Exploration, Explore, Found, View};
+use crate::search::SteerCommand;
+use crate::session::{
+    Command, FoundLens, SessionView, StructureSearchCommand, StructureSearchSnapshot,
+};
 
 /// The smallest card.
 const CARD: Vec2 = vec2(148.0, 112.0);
@@ -21,16 +23,16 @@ const WORDS: f32 = 30.0;
 /// Shows the lenses that are kept, best first, the best one first of all; the one that was clicked.
 pub(super) fn cards(
     ui: &mut Ui,
-    view: &View,
-    run: &Exploration,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
     chosen: Option<u64>,
     thumbnails: &mut Thumbnails,
 ) -> Option<u64> {
     let same =
-        |found: &Arc<Found>| (found.number, found.merit) == (run.best.number, run.best.merit);
+        |found: &Arc<FoundLens>| (found.number, found.merit) == (run.best.number, run.best.merit);
     let is_kept = run.reservoir.iter().any(same);
     let best = (!is_kept).then_some(&run.best);
-    let shown: Vec<&Arc<Found>> = best.into_iter().chain(&run.reservoir).collect();
+    let shown: Vec<&Arc<FoundLens>> = best.into_iter().chain(&run.reservoir).collect();
     let room = ui.available_width();
     let gap = 4.0;
     let columns = ((room + gap) / (CARD.x + gap)).floor().max(1.0);
@@ -42,8 +44,10 @@ pub(super) fn cards(
         ui.horizontal(|ui| {
             for found in row {
                 let number = found.number;
-                let look =
-                    Look { strong: Some(number) == chosen, pinned: run.pinned == Some(number) };
+                let look = CardStyle {
+                    selected: Some(number) == chosen,
+                    pinned: run.pinned == Some(number),
+                };
                 if card(ui, view, found, size, look, thumbnails).clicked() {
                     clicked = Some(number);
                 }
@@ -55,26 +59,26 @@ pub(super) fn cards(
 
 /// How a card stands out.
 #[derive(Clone, Copy)]
-struct Look {
-    strong: bool,
+struct CardStyle {
+    selected: bool,
     pinned: bool,
 }
 
 fn card(
     ui: &mut Ui,
-    view: &View,
-    found: &Found,
+    view: &SessionView,
+    found: &FoundLens,
     size: Vec2,
-    look: Look,
+    look: CardStyle,
     thumbnails: &mut Thumbnails,
 ) -> Response {
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
-    let text = words::worth(found);
+    let text = words::lens_text(found);
     let pinned = if look.pinned { ", pinned" } else { "" };
     let label = format!("Lens {}{pinned}: {}", found.number, text.replace('\n', ", "));
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
     let visuals = ui.visuals();
-    let stroke = if look.strong {
+    let stroke = if look.selected {
         Stroke::new(2.0, visuals.selection.stroke.color)
     } else if response.hovered() || response.has_focus() {
         visuals.widgets.hovered.bg_stroke
@@ -111,7 +115,7 @@ pub(super) fn paint(
     thumbnails: &mut Thumbnails,
 ) {
     let all = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-    if let Some(texture) = thumbnails.of(ui, lens, design, rect.size()) {
+    if let Some(texture) = thumbnails.texture(ui, lens, design, rect.size()) {
         ui.painter().image(texture.id(), rect, all, Color32::WHITE);
     }
 }
@@ -119,31 +123,35 @@ pub(super) fn paint(
 /// Take, pin, export; whether the design is shown again.
 pub(super) fn actions(
     ui: &mut Ui,
-    view: &View,
-    run: &Exploration,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
     number: u64,
     wishes: &mut Vec<Command>,
 ) -> bool {
     let pinned = run.pinned == Some(number);
     let pin = if pinned {
-        ("Unpin", Explore::Steer(Steer::Unpin), "Mutate any of the lenses that are kept again")
+        (
+            "Unpin",
+            StructureSearchCommand::Control(SteerCommand::Unpin),
+            "Mutate any of the lenses that are kept again",
+        )
     } else {
         (
             "Pin",
-            Explore::Steer(Steer::Pin(number)),
+            StructureSearchCommand::Control(SteerCommand::Pin(number)),
             "Let every new descent begin from this lens from now on",
         )
     };
-    let exporting = view.explorations.exporting.contains(&number);
+    let exporting = view.structure_search.exporting.contains(&number);
     let take =
         format!("Make lens {number} the design in place of {}, one undo step", view.lens.name);
     let buttons = [
-        ("Take", true, Explore::Take(number), take.as_str()),
-        (pin.0, run.is_under_way(), pin.1, pin.2),
+        ("Take", true, StructureSearchCommand::Accept(number), take.as_str()),
+        (pin.0, run.is_active(), pin.1, pin.2),
         (
             if exporting { "Finishing…" } else { "Export…" },
             !exporting,
-            Explore::Export { number, path: None },
+            StructureSearchCommand::Export { number, path: None },
             "Write this lens with glasses of the catalogue, every limit of the factory kept; one \
              that does not get there is refused with the limit that fails",
         ),
@@ -153,10 +161,10 @@ pub(super) fn actions(
         ui.spacing_mut().item_spacing.x = 4.0;
         for (text, enabled, explore, hint) in buttons {
             if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
-                wishes.push(wish(explore));
+                wishes.push(search_command(explore));
             }
         }
-        let shown = view.candidate.is_some();
+        let shown = view.preview_lens.is_some();
         let button = ui.add_enabled(shown, Button::new("Back to the design"));
         back = button.on_hover_text("Show the design again in all panels").clicked();
     });

@@ -2,13 +2,13 @@
 
 use eframe::egui::{DragValue, Ui};
 
-use crate::lens::{Field, Lens};
+use crate::lens::{FieldPoint, Lens};
 use crate::studio::panels::field_name;
 
 /// One share for all fields, or one for each of them; more than nothing, 1 for as much as at the start.
 pub(super) fn shares(ui: &mut Ui, light: &mut Vec<f64>, lens: &Lens) {
     let fields = common_fields(lens);
-    fit(light, fields.len());
+    match_length(light, fields.len());
     ui.vertical(|ui| {
         ui.horizontal(|ui| {
             if let [all] = &mut light[..] {
@@ -24,18 +24,18 @@ pub(super) fn shares(ui: &mut Ui, light: &mut Vec<f64>, lens: &Lens) {
             }
         }
         if light.len() > 1 {
-            ui.horizontal_wrapped(|ui| of_each(ui, light, &fields, lens));
+            ui.horizontal_wrapped(|ui| field_shares(ui, light, &fields, lens));
         }
     });
 }
 
 /// As many shares as a lens has fields, or one, as a search wants them.
-pub(super) fn fitting(mut light: Vec<f64>, lens: &Lens) -> Vec<f64> {
-    fit(&mut light, common_fields(lens).len());
+pub(super) fn matching_fields(mut light: Vec<f64>, lens: &Lens) -> Vec<f64> {
+    match_length(&mut light, common_fields(lens).len());
     light
 }
 
-fn of_each(ui: &mut Ui, light: &mut [f64], fields: &[Field], lens: &Lens) {
+fn field_shares(ui: &mut Ui, light: &mut [f64], fields: &[FieldPoint], lens: &Lens) {
     for (value, field) in light.iter_mut().zip(fields) {
         let name = field_name(lens.fields.kind, *field);
         share(ui, &format!("Least light at {name}"), value, "This field keeps at least this share");
@@ -53,14 +53,14 @@ fn share(ui: &mut Ui, name: &str, value: &mut f64, hint: &str) {
 }
 
 /// The fields of a lens that has the same ones at all zoom positions; none of any other.
-fn common_fields(lens: &Lens) -> Vec<Field> {
+fn common_fields(lens: &Lens) -> Vec<FieldPoint> {
     let own = &lens.fields;
     let same = (0..lens.zoom_positions()).all(|zoom| lens.fields_at(zoom) == own);
     if same { own.values.clone() } else { Vec::new() }
 }
 
 /// Shares of a lens with another number of fields count for all alike.
-fn fit(light: &mut Vec<f64>, fields: usize) {
+fn match_length(light: &mut Vec<f64>, fields: usize) {
     if light.is_empty() || (light.len() > 1 && light.len() != fields) {
         *light = vec![mean(light)];
     }

@@ -3,11 +3,11 @@
 use eframe::egui::{ComboBox, Grid, Ui};
 
 use super::setup::{drag, length, optional};
-use crate::search::lens::Plan;
-use crate::search::{Rules, Termination};
+use crate::search::lens::SearchPlan;
+use crate::search::{SearchRules, Termination};
 
 /// The limits of the factory.
-pub(super) fn factory(ui: &mut Ui, rules: &mut Rules) {
+pub(super) fn limits_section(ui: &mut Ui, rules: &mut SearchRules) {
     ui.collapsing("What the factory can make", |ui| {
         Grid::new("factory").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
             let ranges = [
@@ -36,12 +36,12 @@ pub(super) fn factory(ui: &mut Ui, rules: &mut Rules) {
             let hint = "The largest curvature times semi-diameter; 1 is a hemisphere";
             drag(ui, "Steepness", &mut rules.steepness, 0.01..=1.0, 0.005, hint);
             ui.end_row();
-            optionals(ui, rules);
+            optional_limits(ui, rules);
         });
     });
 }
 
-fn optionals(ui: &mut Ui, rules: &mut Rules) {
+fn optional_limits(ui: &mut Ui, rules: &mut SearchRules) {
     let limits = [
         ("Semi-diameter", "Largest semi-diameter", &mut rules.semi_diameter, 50.0),
         ("Total track", "Longest track", &mut rules.track, 200.0),
@@ -65,7 +65,7 @@ const ENDS: [(Termination, &str, &str); 3] = [
 ];
 
 /// How the sampler goes.
-pub(super) fn sampler(ui: &mut Ui, plan: &mut Plan) {
+pub(super) fn sampler_section(ui: &mut Ui, plan: &mut SearchPlan) {
     let (settings, local) = (&mut plan.settings, &mut plan.local);
     ui.collapsing("How it samples", |ui| {
         Grid::new("sampler").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {

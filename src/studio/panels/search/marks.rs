@@ -3,27 +3,27 @@
 use eframe::egui::{Color32, Sense, Shape, Stroke, Ui, Visuals, pos2, vec2};
 use egui_plot::MarkerShape;
 
-use crate::search::Kind;
+use crate::search::MutationKind;
 use crate::studio::palette::{Palette, color32};
 
 /// Every kind, in the order in which they are shown.
-pub(super) fn kinds() -> impl Iterator<Item = Kind> {
-    Kind::MUTATIONS.into_iter().chain([Kind::Global])
+pub(super) fn kinds() -> impl Iterator<Item = MutationKind> {
+    MutationKind::MUTATIONS.into_iter().chain([MutationKind::Global])
 }
 
 /// The place of a kind among all.
-fn index(kind: Kind) -> usize {
+fn index(kind: MutationKind) -> usize {
     kinds().position(|other| other == kind).unwrap_or(0)
 }
 
 /// The colour of a kind; the strong one for the start.
-pub(super) fn color(visuals: &Visuals, kind: Option<Kind>) -> Color32 {
-    let palette = Palette::of(visuals);
+pub(super) fn color(visuals: &Visuals, kind: Option<MutationKind>) -> Color32 {
+    let palette = Palette::for_visuals(visuals);
     kind.map_or_else(|| visuals.strong_text_color(), |kind| color32(palette.mutation(index(kind))))
 }
 
 /// The shape of a kind.
-pub(super) fn shape(kind: Kind) -> MarkerShape {
+pub(super) fn shape(kind: MutationKind) -> MarkerShape {
     const SHAPES: [MarkerShape; 10] = [
         MarkerShape::Up,
         MarkerShape::Down,
@@ -44,7 +44,7 @@ const PLUS: [[f32; 4]; 2] = [[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]];
 const CROSS: [[f32; 4]; 2] = [[-0.8, -0.8, 0.8, 0.8], [-0.8, 0.8, 0.8, -0.8]];
 
 /// The mark of a kind, in a line of text.
-pub(super) fn sign(ui: &mut Ui, kind: Kind) {
+pub(super) fn symbol(ui: &mut Ui, kind: MutationKind) {
     let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), Sense::hover());
     let (center, color) = (rect.center(), color(ui.visuals(), Some(kind)));
     let corner = |x: f32, y: f32| pos2(center.x + 4.5 * x, center.y + 4.5 * y);

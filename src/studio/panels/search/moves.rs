@@ -2,11 +2,11 @@
 
 use eframe::egui::{DragValue, Grid, RichText, Ui};
 
-use super::{marks, wish};
-use crate::search::{Kind, Steer, Tally};
-use crate::session::{Command, Exploration, Explore};
+use super::{marks, search_command};
+use crate::search::{MutationKind, MutationStatistics, SteerCommand};
+use crate::session::{Command, StructureSearchCommand, StructureSearchSnapshot};
 use crate::studio::number;
-use crate::studio::wording::{capital, counted_from_one};
+use crate::studio::wording::{capitalize, counted_from_one};
 
 const HEADINGS: [(&str, &str); 7] = [
     ("Mutation", ""),
@@ -19,7 +19,7 @@ const HEADINGS: [(&str, &str); 7] = [
 ];
 
 /// The table of all kinds.
-pub(super) fn table(ui: &mut Ui, run: &Exploration, wishes: &mut Vec<Command>) {
+pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, wishes: &mut Vec<Command>) {
     Grid::new("moves").num_columns(HEADINGS.len()).spacing([9.0, 3.0]).striped(true).show(
         ui,
         |ui| {
@@ -36,53 +36,56 @@ pub(super) fn table(ui: &mut Ui, run: &Exploration, wishes: &mut Vec<Command>) {
             }
         },
     );
-    reasons(ui, run);
+    refusal_summary(ui, run);
 }
 
-fn row(ui: &mut Ui, run: &Exploration, kind: Kind, wishes: &mut Vec<Command>) {
+fn row(ui: &mut Ui, run: &StructureSearchSnapshot, kind: MutationKind, wishes: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        marks::sign(ui, kind);
+        marks::symbol(ui, kind);
         ui.label(kind.name());
     });
     let mut weight = run.weights.of(kind);
     let drag = DragValue::new(&mut weight).range(0.0..=100.0).speed(0.02).max_decimals(2);
     let name = format!("Weight of {}", kind.name());
-    let drag = ui.add_enabled(run.is_under_way(), drag).accessible_name(&name);
+    let drag = ui.add_enabled(run.is_active(), drag).accessible_name(&name);
     if drag.changed() {
-        wishes.push(wish(Explore::Steer(Steer::Weight(kind, weight))));
+        wishes.push(search_command(StructureSearchCommand::Control(SteerCommand::Weight(
+            kind, weight,
+        ))));
     }
     let tally = run.statistics.kinds.get(&kind).cloned().unwrap_or_default();
     ui.label(tally.tried.to_string());
-    refusals(ui, kind, &tally);
+    refusal_cell(ui, kind, &tally);
     ui.label(format!("{} of {}", tally.improved, tally.ended));
     ui.label(tally.entered.to_string());
-    let life = tally.lifetime().map(|moves| number::show_digits(moves, 3));
+    let life = tally.mean_moves().map(|moves| number::format_digits(moves, 3));
     ui.label(life.unwrap_or_else(|| "–".to_owned()));
 }
 
-fn refusals(ui: &mut Ui, kind: Kind, tally: &Tally) {
+fn refusal_cell(ui: &mut Ui, kind: MutationKind, tally: &MutationStatistics) {
     let refused: u64 = tally.refused.values().sum();
     let label = ui.label((refused + tally.rejected).to_string());
-    if let Some((why, count)) = commonest(tally) {
+    if let Some((why, count)) = most_common_refusal(tally) {
         let why = counted_from_one(why);
-        label.on_hover_text(format!("{} was refused {count} times: {why}", capital(kind.name())));
+        label
+            .on_hover_text(format!("{} was refused {count} times: {why}", capitalize(kind.name())));
     }
 }
 
-fn commonest(tally: &Tally) -> Option<(&str, u64)> {
+fn most_common_refusal(tally: &MutationStatistics) -> Option<(&str, u64)> {
     let most = tally.refused.iter().max_by_key(|(_, count)| **count);
     most.map(|(why, count)| (why.as_str(), *count))
 }
 
 /// The commonest reason of each kind, in words.
-fn reasons(ui: &mut Ui, run: &Exploration) {
+fn refusal_summary(ui: &mut Ui, run: &StructureSearchSnapshot) {
     ui.add_space(6.0);
     for kind in marks::kinds() {
         let tally = run.statistics.kinds.get(&kind);
-        if let Some((why, count)) = tally.and_then(commonest) {
+        if let Some((why, count)) = tally.and_then(most_common_refusal) {
             let text = format!("{}, {count} × refused: {}", kind.name(), counted_from_one(why));
-            ui.label(RichText::new(capital(&text)).small().weak());
+            ui.label(RichText::new(capitalize(&text)).small().weak());
         }
     }
 }

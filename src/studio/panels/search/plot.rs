@@ -5,7 +5,7 @@ use eframe::egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points};
 
 use super::{marks, words};
-use crate::session::{Exploration, Mark, Moment, View};
+use crate::session::{DescentMark, HistorySample, SessionView, StructureSearchSnapshot};
 use crate::studio::panels::decade_name;
 
 /// How near the pointer must be to a mark to mean it, in points of the screen.
@@ -18,14 +18,14 @@ const AXIS: f32 = 40.0;
 /// Shows both; the generation of the mark that was clicked, if one was.
 pub(super) fn plots(
     ui: &mut Ui,
-    view: &View,
-    run: &Exploration,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
     chosen: Option<u64>,
 ) -> Option<u64> {
-    let chain = view.explorations.followed.unwrap_or(0);
+    let chain = view.structure_search.previewed_chain.unwrap_or(0);
     let height = (0.3 * ui.available_height()).clamp(80.0, 260.0);
-    let clicked = merit(ui, run, chain, chosen, height);
-    elements(ui, run, chain);
+    let clicked = merit_plot(ui, run, chain, chosen, height);
+    elements_plot(ui, run, chain);
     legend(ui, run);
     clicked
 }
@@ -48,9 +48,9 @@ fn decade(merit: f64) -> Option<f64> {
     (merit > 0.0 && merit.is_finite()).then(|| merit.log10())
 }
 
-fn merit(
+fn merit_plot(
     ui: &mut Ui,
-    run: &Exploration,
+    run: &StructureSearchSnapshot,
     chain: usize,
     chosen: Option<u64>,
     height: f32,
@@ -64,18 +64,19 @@ fn merit(
     let shown = plot.show(ui, |plot| {
         let faint = visuals.weak_text_color().gamma_multiply(0.4);
         for other in (0..run.chains.len()).filter(|other| *other != chain) {
-            plot.line(Line::new("chain", of_chain(run, other)).color(faint).width(0.8));
+            plot.line(Line::new("chain", chain_curve(run, other)).color(faint).width(0.8));
         }
         let weak = visuals.weak_text_color();
-        plot.line(Line::new("followed chain", of_chain(run, chain)).color(weak).width(1.2));
-        start(plot, run, visuals.warn_fg_color);
+        plot.line(Line::new("followed chain", chain_curve(run, chain)).color(weak).width(1.2));
+        start_line(plot, run, visuals.warn_fg_color);
         let best = run.history.moments.iter();
         let best: PlotPoints<'_> =
             best.filter_map(|m| Some([m.round as f64, decade(m.best)?])).collect();
         plot.line(Line::new("best", best).color(visuals.hyperlink_color).width(2.0));
-        mutations(plot, run, &visuals);
+        mutation_marks(plot, run, &visuals);
         if let Some(mark) = run.history.marks.iter().find(|mark| Some(mark.number) == chosen) {
-            let ring = Points::new("chosen", at(mark).into_iter().collect::<PlotPoints<'_>>());
+            let ring =
+                Points::new("chosen", mark_point(mark).into_iter().collect::<PlotPoints<'_>>());
             plot.points(ring.radius(7.0).filled(false).color(visuals.strong_text_color()));
         }
     });
@@ -83,11 +84,11 @@ fn merit(
     let (moments, mutations) = (history.moments.len(), history.marks.len());
     let label = format!("Merit against iterations: {moments} moments, {mutations} descents");
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
-    pick(ui, run, &shown)
+    hovered_mark(ui, run, &shown)
 }
 
 /// The merit of the start across all iterations.
-fn start(plot: &mut PlotUi<'_>, run: &Exploration, color: eframe::egui::Color32) {
+fn start_line(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, color: eframe::egui::Color32) {
     let (first, last) = (run.history.moments.first(), run.history.moments.last());
     if let (Some(first), Some(last), Some(y)) = (first, last, decade(run.start.merit)) {
         let ends = vec![[first.round as f64, y], [last.round as f64, y]];
@@ -96,25 +97,29 @@ fn start(plot: &mut PlotUi<'_>, run: &Exploration, color: eframe::egui::Color32)
     }
 }
 
-fn of_chain(run: &Exploration, chain: usize) -> PlotPoints<'static> {
-    let merit = |moment: &Moment| {
+fn chain_curve(run: &StructureSearchSnapshot, chain: usize) -> PlotPoints<'static> {
+    let merit = |moment: &HistorySample| {
         let (merit, _) = moment.chains.get(chain).copied().flatten()?;
         Some([moment.round as f64, decade(merit)?])
     };
     run.history.moments.iter().filter_map(merit).collect()
 }
 
-fn at(mark: &Mark) -> Option<[f64; 2]> {
+fn mark_point(mark: &DescentMark) -> Option<[f64; 2]> {
     Some([mark.round as f64, decade(mark.merit)?])
 }
 
 /// Every mutation where it led; what was kept in the end is larger.
-fn mutations(plot: &mut PlotUi<'_>, run: &Exploration, visuals: &eframe::egui::Visuals) {
+fn mutation_marks(
+    plot: &mut PlotUi<'_>,
+    run: &StructureSearchSnapshot,
+    visuals: &eframe::egui::Visuals,
+) {
     for kind in marks::kinds() {
         for (entered, radius) in [(false, 2.6), (true, 4.8)] {
             let of_kind = run.history.marks.iter();
             let of_kind = of_kind.filter(|m| m.kind == Some(kind) && m.entered == entered);
-            let places: Vec<[f64; 2]> = of_kind.filter_map(at).collect();
+            let places: Vec<[f64; 2]> = of_kind.filter_map(mark_point).collect();
             if !places.is_empty() {
                 let color = marks::color(visuals, Some(kind));
                 let points = Points::new(kind.name(), places).shape(marks::shape(kind));
@@ -125,13 +130,14 @@ fn mutations(plot: &mut PlotUi<'_>, run: &Exploration, visuals: &eframe::egui::V
 }
 
 /// Tells what the mark under the pointer is; its generation where it was clicked.
-fn pick(ui: &Ui, run: &Exploration, shown: &PlotResponse<()>) -> Option<u64> {
+fn hovered_mark(ui: &Ui, run: &StructureSearchSnapshot, shown: &PlotResponse<()>) -> Option<u64> {
     let pointer = shown.response.hover_pos()?;
-    let on_screen = |mark: &Mark| {
-        let [x, y] = at(mark)?;
+    let on_screen = |mark: &DescentMark| {
+        let [x, y] = mark_point(mark)?;
         Some(shown.transform.position_from_point(&PlotPoint::new(x, y)))
     };
-    let distance = |mark: &&Mark| on_screen(mark).map_or(f32::INFINITY, |p| p.distance(pointer));
+    let distance =
+        |mark: &&DescentMark| on_screen(mark).map_or(f32::INFINITY, |p| p.distance(pointer));
     let marks = run.history.marks.iter();
     let mark = marks.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     if distance(&mark) > NEAR {
@@ -142,18 +148,27 @@ fn pick(ui: &Ui, run: &Exploration, shown: &PlotResponse<()>) -> Option<u64> {
         ui.painter_at(shown.response.rect).circle_stroke(place, 7.0, ring);
     }
     let text = match run.node(mark.number) {
-        Some(node) => format!("Lens {}\n{}\n{}", node.number, words::what(node), words::fate(node)),
+        Some(node) => format!(
+            "Lens {}\n{}\n{}",
+            node.number,
+            words::mutation_text(node),
+            words::outcome_text(node)
+        ),
         None => {
-            format!("Lens {}, forgotten since; merit {}", mark.number, words::merit(mark.merit))
+            format!(
+                "Lens {}, forgotten since; merit {}",
+                mark.number,
+                words::merit_text(mark.merit)
+            )
         }
     };
     let response = shown.response.clone().on_hover_text_at_pointer(text);
     let clicked = response.clicked_by(PointerButton::Primary);
-    clicked.then_some(mark.number).filter(|number| run.lens_of(*number).is_some())
+    clicked.then_some(mark.number).filter(|number| run.lens_by_number(*number).is_some())
 }
 
 /// How many elements the lens of the chain has.
-fn elements(ui: &mut Ui, run: &Exploration, chain: usize) {
+fn elements_plot(ui: &mut Ui, run: &StructureSearchSnapshot, chain: usize) {
     let steps: Vec<[f64; 2]> = run
         .history
         .moments
@@ -177,7 +192,7 @@ fn elements(ui: &mut Ui, run: &Exploration, chain: usize) {
         if low <= high {
             plot.set_plot_bounds_y(low - 0.7..=high + 0.7);
         }
-        plot.line(Line::new("elements", stairs(&steps)).color(line).width(1.5));
+        plot.line(Line::new("elements", step_curve(&steps)).color(line).width(1.5));
     });
     let now = steps.last().map_or(0.0, |[_, count]| *count);
     let label = format!("Elements of chain {} against iterations: {now} now", chain + 1);
@@ -185,7 +200,7 @@ fn elements(ui: &mut Ui, run: &Exploration, chain: usize) {
 }
 
 /// A number stays what it was until the next moment.
-fn stairs(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
+fn step_curve(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut stairs: Vec<[f64; 2]> = Vec::with_capacity(2 * steps.len());
     for step in steps {
         if let Some([_, count]) = stairs.last().copied()
@@ -199,12 +214,12 @@ fn stairs(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// The marks of the kinds that have occurred.
-fn legend(ui: &mut Ui, run: &Exploration) {
+fn legend(ui: &mut Ui, run: &StructureSearchSnapshot) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         for kind in marks::kinds() {
             if run.history.marks.iter().any(|mark| mark.kind == Some(kind)) {
-                marks::sign(ui, kind);
+                marks::symbol(ui, kind);
                 ui.label(RichText::new(kind.name()).small());
                 ui.add_space(4.0);
             }

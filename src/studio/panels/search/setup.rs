@@ -7,89 +7,95 @@ use eframe::egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
 
 use super::{light, limits, marks};
 use crate::lens::{Lens, Medium};
-use crate::search::element::pieces;
-use crate::search::{Kind, Method, Rules, Settings};
-use crate::session::{Quest, View};
+use crate::search::element::piece_count;
+use crate::search::{MutationKind, SearchMethod, SearchRules, SearchSettings};
+use crate::session::{SessionView, StructureSearchRequest};
 
 /// The settings that a person sees.
 #[derive(Debug)]
-pub(super) struct Setup {
-    quest: Quest,
+pub(super) struct SearchSetup {
+    request: StructureSearchRequest,
     /// Whether a person has said how many elements there may be.
-    counted: bool,
+    element_count_edited: bool,
     /// Whether new glass is one of those that the design is made of.
-    own_glasses: bool,
+    design_glasses_only: bool,
     /// The gradients that brute force divides among its mutations.
-    gradients: u64,
+    brute_force_gradients: u64,
     /// What stands in a field that is switched off.
-    asleep: Asleep,
+    disabled: DisabledValues,
 }
 
 /// Values of limits that do not count at the moment.
 #[derive(Debug)]
-struct Asleep {
+struct DisabledValues {
     minutes: f64,
     moves: u64,
     open: f64,
     focal_length: f64,
 }
 
-impl Default for Setup {
+impl Default for SearchSetup {
     fn default() -> Self {
-        let asleep = Asleep { minutes: 10.0, moves: 1000, open: 30.0, focal_length: 50.0 };
-        let mut quest = Quest::default();
-        quest.plan.settings = Settings { gradients: None, ..quest.plan.settings };
-        Self { quest, counted: false, own_glasses: false, gradients: 10_000, asleep }
+        let asleep = DisabledValues { minutes: 10.0, moves: 1000, open: 30.0, focal_length: 50.0 };
+        let mut quest = StructureSearchRequest::default();
+        quest.plan.settings = SearchSettings { gradients: None, ..quest.plan.settings };
+        Self {
+            request: quest,
+            element_count_edited: false,
+            design_glasses_only: false,
+            brute_force_gradients: 10_000,
+            disabled: asleep,
+        }
     }
 }
 
-const METHODS: [(Method, &str, &str); 3] = [
+const METHODS: [(SearchMethod, &str, &str); 3] = [
     (
-        Method::Restore,
+        SearchMethod::Restore,
         "RESTORE",
         "Descents that end by chance and begin again from a mutation of a lens that is kept",
     ),
     (
-        Method::Metropolis,
+        SearchMethod::Metropolis,
         "Metropolis-Hastings",
         "Noisy gradient steps and reversible mutations, each accepted or not",
     ),
     (
-        Method::Brute,
+        SearchMethod::Brute,
         "Brute force",
         "After each element one more and each element less, descended for as long",
     ),
 ];
 
-impl Setup {
+impl SearchSetup {
     /// What is asked for, for the design as it is.
-    pub(super) fn quest(&self, view: &View) -> Quest {
-        let mut quest = self.quest.clone();
-        quest.plan.light = light::fitting(quest.plan.light, &view.lens);
-        if self.own_glasses {
+    pub(super) fn request(&self, view: &SessionView) -> StructureSearchRequest {
+        let mut quest = self.request.clone();
+        quest.plan.light = light::matching_fields(quest.plan.light, &view.lens);
+        if self.design_glasses_only {
             quest.plan.rules.glasses = glasses(&view.lens);
         }
-        if quest.plan.settings.method == Method::Brute {
-            quest.plan.settings.gradients = Some(self.gradients);
+        if quest.plan.settings.method == SearchMethod::Brute {
+            quest.plan.settings.gradients = Some(self.brute_force_gradients);
         }
         quest
     }
 
-    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View) {
-        free(ui, &view.lens, &mut self.quest.free);
+    pub(super) fn ui(&mut self, ui: &mut Ui, view: &SessionView) {
+        variables_choice(ui, &view.lens, &mut self.request.free);
         Grid::new("search setup").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
-            self.sampler(ui);
-            self.structure(ui, view);
-            self.aims(ui, &view.lens);
-            self.end(ui);
+            self.method_rows(ui);
+            self.structure_rows(ui, view);
+            self.merit_rows(ui, &view.lens);
+            self.limit_rows(ui);
         });
-        limits::factory(ui, &mut self.quest.plan.rules);
-        self.weights(ui);
-        limits::sampler(ui, &mut self.quest.plan);
+        limits::limits_section(ui, &mut self.request.plan.rules);
+        self.weights_section(ui);
+        limits::sampler_section(ui, &mut self.request.plan);
     }
 
-    fn sampler(&mut self, ui: &mut Ui) {
-        let settings = &mut self.quest.plan.settings;
+    fn method_rows(&mut self, ui: &mut Ui) {
+        let settings = &mut self.request.plan.settings;
         ui.weak("Method");
         let name = METHODS.iter().find(|(method, ..)| *method == settings.method);
         let combo = ComboBox::from_id_salt("search method").width(150.0);
@@ -111,10 +117,11 @@ impl Setup {
         ui.end_row();
     }
 
-    fn structure(&mut self, ui: &mut Ui, view: &View) {
-        let rules = &mut self.quest.plan.rules;
-        if !self.counted {
-            rules.elements = Rules::default().holding(pieces(&view.lens)).elements;
+    fn structure_rows(&mut self, ui: &mut Ui, view: &SessionView) {
+        let rules = &mut self.request.plan.rules;
+        if !self.element_count_edited {
+            rules.elements =
+                SearchRules::default().admit_element_count(piece_count(&view.lens)).elements;
         }
         ui.weak("Elements").on_hover_text("How many pieces of glass a lens may have");
         ui.horizontal(|ui| {
@@ -123,19 +130,20 @@ impl Setup {
                 drag(ui, "Fewest elements", min, 1..=*max, 0.05, "The fewest pieces of glass");
             ui.weak("to");
             let most = drag(ui, "Most elements", max, *min..=40, 0.05, "The most pieces of glass");
-            self.counted |= fewest || most;
-            ui.weak(format!("({} now)", pieces(&view.lens)));
+            self.element_count_edited |= fewest || most;
+            ui.weak(format!("({} now)", piece_count(&view.lens)));
         });
         ui.end_row();
         ui.weak("Untouched").on_hover_text("Surfaces that mutations leave alone");
-        untouched(ui, &mut rules.kept, view.lens.surfaces.len());
+        fixed_ends(ui, &mut rules.kept, view.lens.surfaces.len());
         ui.end_row();
         ui.weak("New glass");
         ui.horizontal(|ui| {
             let hint = "New elements are made of any glass of the catalogue";
-            ui.radio_value(&mut self.own_glasses, false, "of the catalogue").on_hover_text(hint);
+            ui.radio_value(&mut self.design_glasses_only, false, "of the catalogue")
+                .on_hover_text(hint);
             let hint = "New elements are made of the glasses that the design is made of";
-            ui.radio_value(&mut self.own_glasses, true, "of this lens").on_hover_text(hint);
+            ui.radio_value(&mut self.design_glasses_only, true, "of this lens").on_hover_text(hint);
         });
         ui.end_row();
         ui.weak("Mutations");
@@ -146,14 +154,14 @@ impl Setup {
         ui.end_row();
     }
 
-    fn aims(&mut self, ui: &mut Ui, lens: &Lens) {
-        let quest = &mut self.quest;
+    fn merit_rows(&mut self, ui: &mut Ui, lens: &Lens) {
+        let quest = &mut self.request;
         ui.weak("Light");
         light::shares(ui, &mut quest.plan.light, lens);
         ui.end_row();
         ui.weak("Focal length");
         let hint = "Ask for another focal length than that of the design";
-        let asleep = &mut self.asleep;
+        let asleep = &mut self.disabled;
         optional(
             ui,
             "Another focal length",
@@ -174,9 +182,9 @@ impl Setup {
         ui.end_row();
     }
 
-    fn end(&mut self, ui: &mut Ui) {
-        let Self { quest, asleep, gradients, .. } = self;
-        if quest.plan.settings.method == Method::Brute {
+    fn limit_rows(&mut self, ui: &mut Ui) {
+        let Self { request: quest, disabled: asleep, brute_force_gradients: gradients, .. } = self;
+        if quest.plan.settings.method == SearchMethod::Brute {
             ui.weak("Gradients");
             let hint = "They are divided among all mutations";
             drag(ui, "Gradients of brute force", gradients, 1..=u64::MAX, 100.0, hint);
@@ -203,12 +211,12 @@ impl Setup {
         ui.end_row();
     }
 
-    fn weights(&mut self, ui: &mut Ui) {
-        let weights = &mut self.quest.plan.rules.weights;
+    fn weights_section(&mut self, ui: &mut Ui) {
+        let weights = &mut self.request.plan.rules.weights;
         ui.collapsing("How often each mutation is tried", |ui| {
             Grid::new("weights").num_columns(4).spacing([8.0, 3.0]).show(ui, |ui| {
-                for (i, kind) in Kind::MUTATIONS.into_iter().enumerate() {
-                    weight(ui, weights, kind);
+                for (i, kind) in MutationKind::MUTATIONS.into_iter().enumerate() {
+                    weight_field(ui, weights, kind);
                     (i % 2 == 1).then(|| ui.end_row());
                 }
             });
@@ -217,9 +225,9 @@ impl Setup {
 }
 
 /// How often a kind is tried.
-fn weight(ui: &mut Ui, weights: &mut Vec<(Kind, f64)>, kind: Kind) {
+fn weight_field(ui: &mut Ui, weights: &mut Vec<(MutationKind, f64)>, kind: MutationKind) {
     ui.horizontal(|ui| {
-        marks::sign(ui, kind);
+        marks::symbol(ui, kind);
         ui.label(kind.name());
     });
     let listed = weights.iter().find(|(other, _)| *other == kind);
@@ -232,7 +240,7 @@ fn weight(ui: &mut Ui, weights: &mut Vec<(Kind, f64)>, kind: Kind) {
 }
 
 /// What a search may change, and what it takes as it is.
-fn free(ui: &mut Ui, lens: &Lens, free: &mut bool) {
+fn variables_choice(ui: &mut Ui, lens: &Lens, free: &mut bool) {
     let count = lens.variables.len();
     if count > 0 {
         ui.checkbox(free, "Free every curvature and gap").on_hover_text(
@@ -268,7 +276,7 @@ fn glasses(lens: &Lens) -> Vec<String> {
 }
 
 /// How many surfaces at both ends mutations leave alone.
-fn untouched(ui: &mut Ui, [front, rear]: &mut [usize; 2], count: usize) {
+fn fixed_ends(ui: &mut Ui, [front, rear]: &mut [usize; 2], count: usize) {
     ui.horizontal(|ui| {
         let hint = "Mutations leave so many surfaces at this end alone: a group stays what it is";
         drag(ui, "Untouched at the front", front, 0..=count, 0.05, hint);

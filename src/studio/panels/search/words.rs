@@ -2,20 +2,23 @@
 
 use eframe::egui::{Label, Ui};
 
-use crate::optimize::pareto::Design;
-use crate::search::element::pieces;
-use crate::search::{Ended, Node, Offer, Over};
-use crate::session::{Checkpoint, Ending, Exploration, Found, Judged, Standing, View};
+use crate::optimize::pareto::ParetoPoint;
+use crate::search::element::piece_count;
+use crate::search::{DescentEnd, LineageNode, OfferOutcome, RunEnd};
+use crate::session::{
+    CheckpointStatus, EndReason, FoundLens, RunStatus, ScoredLens, SessionView,
+    StructureSearchSnapshot,
+};
 use crate::studio::number;
-use crate::studio::panels::optimizer::changes;
+use crate::studio::panels::optimizer::changes_text;
 use crate::studio::wording::{self, counted_from_one};
 
 fn short(value: f64) -> String {
-    number::show_digits(value, 4)
+    number::format_digits(value, 4)
 }
 
 /// A merit as it is read.
-pub(super) fn merit(value: f64) -> String {
+pub(super) fn merit_text(value: f64) -> String {
     if value.is_finite() { short(value) } else { "worthless".to_owned() }
 }
 
@@ -25,28 +28,28 @@ fn counted(count: u64, what: &str) -> String {
 }
 
 /// How the search stands, and what it has come to.
-pub(super) fn standing(run: &Exploration, pending: Option<Standing>) -> String {
-    let why = match run.over {
-        Some(Ending::Time) => ": its time is up",
-        Some(Ending::Over(Over::Moves | Over::Gradients)) => ": its limit is reached",
-        Some(Ending::Over(Over::Done)) => ": everything is tried",
-        Some(Ending::Over(Over::Stuck)) => ": no mutation applies any more",
-        Some(Ending::Over(Over::Stopped)) | None => "",
+pub(super) fn status_text(run: &StructureSearchSnapshot, pending: Option<RunStatus>) -> String {
+    let why = match run.end_reason {
+        Some(EndReason::TimeLimit) => ": its time is up",
+        Some(EndReason::Sampler(RunEnd::Moves | RunEnd::Gradients)) => ": its limit is reached",
+        Some(EndReason::Sampler(RunEnd::Done)) => ": everything is tried",
+        Some(EndReason::Sampler(RunEnd::Stuck)) => ": no mutation applies any more",
+        Some(EndReason::Sampler(RunEnd::Stopped)) | None => "",
     };
-    let standing = wording::standing(run.standing, pending);
-    let (from, to) = (merit(run.start.merit), merit(run.best.merit));
+    let standing = wording::status_text(run.status, pending);
+    let (from, to) = (merit_text(run.start.merit), merit_text(run.best.merit));
     format!("{standing}{why}, merit {from} to {to}")
 }
 
 /// How much it has done, and how fast.
-pub(super) fn speed(run: &Exploration) -> String {
+pub(super) fn speed_text(run: &StructureSearchSnapshot) -> String {
     let done = &run.statistics;
     let rate = run.gradients as f64 / run.seconds;
     let rate = if rate.is_finite() && rate > 0.0 {
         format!(
             ", {} gradients/s ({} ms each)",
-            number::show_digits(rate, 3),
-            number::show_digits(1e3 / rate, 3)
+            number::format_digits(rate, 3),
+            number::format_digits(1e3 / rate, 3)
         )
     } else {
         String::new()
@@ -56,11 +59,11 @@ pub(super) fn speed(run: &Exploration) -> String {
         done.moves,
         done.gradients,
         run.rays,
-        time(run.seconds)
+        duration_text(run.seconds)
     )
 }
 
-fn time(seconds: f64) -> String {
+fn duration_text(seconds: f64) -> String {
     if seconds < 120.0 {
         format!("{seconds:.1} s")
     } else if seconds < 7200.0 {
@@ -71,14 +74,14 @@ fn time(seconds: f64) -> String {
 }
 
 /// That a lens breaks so many limits.
-pub(super) fn broken(lens: &str, count: usize) -> String {
+pub(super) fn violations_text(lens: &str, count: usize) -> String {
     let limits = if count == 1 { "limit" } else { "limits" };
     format!("The {lens} breaks {count} {limits}: what is exported has to keep them")
 }
 
 /// Where the search is saved; whether that failed.
-pub(super) fn saved(checkpoint: &Checkpoint) -> (String, bool) {
-    if let Some(why) = &checkpoint.failed {
+pub(super) fn checkpoint_text(checkpoint: &CheckpointStatus) -> (String, bool) {
+    if let Some(why) = &checkpoint.error {
         return (format!("Not saved: {why}"), true);
     }
     let name = checkpoint.path.as_ref().and_then(|path| path.file_name());
@@ -92,13 +95,13 @@ pub(super) fn saved(checkpoint: &Checkpoint) -> (String, bool) {
 }
 
 /// What a lens is worth: a line a number.
-pub(super) fn worth(found: &Found) -> String {
-    let merit = merit(found.merit);
+pub(super) fn lens_text(found: &FoundLens) -> String {
+    let merit = merit_text(found.merit);
     let elements = found.elements;
-    let design = found.judged.as_ref().map(|judged| &judged.found);
+    let design = found.score.as_ref().map(|judged| &judged.score);
     match design {
-        Some(Ok(Design { spot, light, .. })) => {
-            let [spot, light] = [1e3 * spot, *light].map(|v| number::show_digits(v, 3));
+        Some(Ok(ParetoPoint { spot, light, .. })) => {
+            let [spot, light] = [1e3 * spot, *light].map(|v| number::format_digits(v, 3));
             format!("{spot} µm, {light} mm²\n{elements} elements, {merit}")
         }
         Some(Err(why)) => format!("{elements} elements, {merit}\n{}", counted_from_one(why)),
@@ -107,21 +110,27 @@ pub(super) fn worth(found: &Found) -> String {
 }
 
 /// A lens beside the design: sharpness, light, elements.
-pub(super) fn compared(ui: &mut Ui, view: &View, run: &Exploration, number: u64) {
-    let Some(lens) = run.lens_of(number) else { return };
+pub(super) fn comparison(
+    ui: &mut Ui,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
+    number: u64,
+) {
+    let Some(lens) = run.lens_by_number(number) else { return };
     let mut parts = Vec::new();
     let found = run.reservoir.iter().chain([&run.best, &run.start]);
-    let found =
-        found.filter(|found| found.number == number).find_map(|found| found.judged.as_ref());
-    let pair = found.and_then(design).zip(view.explorations.here.as_deref().and_then(design));
+    let found = found.filter(|found| found.number == number).find_map(|found| found.score.as_ref());
+    let pair = found
+        .and_then(scored_design)
+        .zip(view.structure_search.current_design.as_deref().and_then(scored_design));
     match pair {
         Some((new, own)) => {
-            parts.push(change("RMS", 1e3 * own.spot, 1e3 * new.spot, "µm"));
-            parts.push(change("light", own.light, new.light, "mm²"));
+            parts.push(change_text("RMS", 1e3 * own.spot, 1e3 * new.spot, "µm"));
+            parts.push(change_text("light", own.light, new.light, "mm²"));
         }
-        None => parts.extend(changes(view)),
+        None => parts.extend(changes_text(view)),
     }
-    let (new, own) = (pieces(lens), pieces(&view.lens));
+    let (new, own) = (piece_count(lens), piece_count(&view.lens));
     parts.push(format!("elements {own} to {new}"));
     let text = format!("Lens {number}: {}", parts.join(", "));
     ui.add(Label::new(text).wrap()).on_hover_text(
@@ -130,18 +139,18 @@ pub(super) fn compared(ui: &mut Ui, view: &View, run: &Exploration, number: u64)
     );
 }
 
-fn design(judged: &Judged) -> Option<&Design> {
-    judged.found.as_ref().ok()
+fn scored_design(judged: &ScoredLens) -> Option<&ParetoPoint> {
+    judged.score.as_ref().ok()
 }
 
-fn change(name: &str, old: f64, new: f64, unit: &str) -> String {
-    let percent = number::show_digits(100.0 * (new / old - 1.0), 3);
+fn change_text(name: &str, old: f64, new: f64, unit: &str) -> String {
+    let percent = number::format_digits(100.0 * (new / old - 1.0), 3);
     let sign = if new > old { "+" } else { "" };
     format!("{name} {} to {} {unit} ({sign}{percent} %)", short(old), short(new))
 }
 
 /// What a generation is: the mutation in words.
-pub(super) fn what<P>(node: &Node<P>) -> String {
+pub(super) fn mutation_text<P>(node: &LineageNode<P>) -> String {
     let what = counted_from_one(&node.what);
     match node.kind {
         Some(kind) => format!("{}: {what}", kind.name()),
@@ -150,32 +159,32 @@ pub(super) fn what<P>(node: &Node<P>) -> String {
 }
 
 /// What became of a generation: merits, moves, what ended it, whether it was kept.
-pub(super) fn fate<P>(node: &Node<P>) -> String {
-    let before = node.before.map(|before| format!("{} before, ", merit(before)));
+pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
+    let before = node.before.map(|before| format!("{} before, ", merit_text(before)));
     let merits = format!(
         "merit {}{} after the mutation, {} after the descent",
         before.unwrap_or_default(),
-        merit(node.mutated),
-        merit(node.descended)
+        merit_text(node.mutated),
+        merit_text(node.descended)
     );
     let end = match node.ended {
         None => "it goes on",
-        Some(Ended::Clock) => "the clock ended it",
-        Some(Ended::Longest) => "it had its longest time",
-        Some(Ended::Lost) => "it lost all light",
-        Some(Ended::Mutated) => "a mutation was accepted",
-        Some(Ended::Budget) => "its gradients were used up",
+        Some(DescentEnd::Clock) => "the clock ended it",
+        Some(DescentEnd::Longest) => "it had its longest time",
+        Some(DescentEnd::Lost) => "it lost all light",
+        Some(DescentEnd::Mutated) => "a mutation was accepted",
+        Some(DescentEnd::Budget) => "its gradients were used up",
     };
     let kept = match node.offer {
         None => String::new(),
-        Some(Offer::Entered) => "; kept".to_owned(),
-        Some(Offer::Replaced(other)) => format!("; kept in place of lens {other}"),
-        Some(Offer::Same(other)) => format!("; the same as lens {other}"),
-        Some(Offer::BehindTwin(other)) => {
+        Some(OfferOutcome::Entered) => "; kept".to_owned(),
+        Some(OfferOutcome::Replaced(other)) => format!("; kept in place of lens {other}"),
+        Some(OfferOutcome::Same(other)) => format!("; the same as lens {other}"),
+        Some(OfferOutcome::BehindTwin(other)) => {
             format!("; not kept: lens {other} of the same pattern is no worse")
         }
-        Some(Offer::BehindAll) => "; not kept: all that are kept are no worse".to_owned(),
-        Some(Offer::Worthless) => "; not kept: it is worth nothing".to_owned(),
+        Some(OfferOutcome::BehindAll) => "; not kept: all that are kept are no worse".to_owned(),
+        Some(OfferOutcome::Worthless) => "; not kept: it is worth nothing".to_owned(),
     };
     let (moves, gradients) = (counted(node.moves, "move"), counted(node.gradients, "gradient"));
     let chain = node.chain + 1;

@@ -5,36 +5,38 @@ use eframe::egui::{
     ScrollArea, Slider, Ui,
 };
 
-use super::picture::Picture;
-use super::{wish, words};
-use crate::grin_task::{Axis, BUILTIN, FieldKind, Plane};
-use crate::session::{Command, Form, Formation, MOST_NODES, Quantity, Sight, Standing, View};
+use super::picture::SlicePicture;
+use super::{grin_command, words};
+use crate::grin_task::{BUILTIN_TASKS, FieldRepresentation, SlicePlane, SpatialAxis};
+use crate::session::{
+    Command, GrinCommand, GrinRun, MAX_NODES, RunStatus, SessionView, SliceQuantity, SliceSettings,
+};
 
 /// Nodes along a side of a written volume, where the field is a spline, unless it is changed.
-pub(in crate::studio) const NODES: usize = 65;
+pub(in crate::studio) const DEFAULT_NODES: usize = 65;
 
 /// The tasks that come with the program, and how volumes are written.
 #[derive(Debug)]
-pub(super) struct Tasks {
-    known: Vec<Known>,
+pub(super) struct TaskMenu {
+    builtin: Vec<BuiltinEntry>,
     nodes: usize,
 }
 
 /// A task that comes with the program.
 #[derive(Debug)]
-struct Known {
+struct BuiltinEntry {
     key: &'static str,
     title: String,
     notes: String,
 }
 
-impl Tasks {
+impl TaskMenu {
     pub(super) fn new() -> Self {
-        let known = BUILTIN.iter().filter_map(|builtin| {
+        let known = BUILTIN_TASKS.iter().filter_map(|builtin| {
             let task = builtin.task().ok()?;
-            Some(Known { key: builtin.name, title: task.name, notes: task.notes })
+            Some(BuiltinEntry { key: builtin.name, title: task.name, notes: task.notes })
         });
-        Self { known: known.collect(), nodes: NODES }
+        Self { builtin: known.collect(), nodes: DEFAULT_NODES }
     }
 
     /// The list of all tasks, where nothing is open.
@@ -42,9 +44,9 @@ impl Tasks {
         ui.label(what);
         ui.add_space(6.0);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            for Known { key, title, notes } in &self.known {
+            for BuiltinEntry { key, title, notes } in &self.builtin {
                 if ui.add(Button::new(title).min_size([280.0, 0.0].into())).clicked() {
-                    wishes.push(wish(Form::Builtin((*key).to_owned())));
+                    wishes.push(grin_command(GrinCommand::OpenBuiltin((*key).to_owned())));
                 }
                 ui.add(Label::new(RichText::new(notes).small().weak()).wrap());
                 ui.add_space(3.0);
@@ -53,52 +55,55 @@ impl Tasks {
     }
 
     /// The buttons.
-    pub(super) fn bar(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
+    pub(super) fn bar(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             self.open(ui, view, wishes);
-            let Some(run) = view.forming.run.as_deref() else { return };
-            if run.subject.task.is_some() {
-                hand(ui, view, run, wishes);
+            let Some(run) = view.grin.run.as_deref() else { return };
+            if run.document.task.is_some() {
+                run_controls(ui, view, run, wishes);
             }
             self.save(ui, run, wishes);
             if ui.button("Close").on_hover_text("Close it; what is not saved is lost").clicked() {
-                wishes.push(wish(Form::Close));
+                wishes.push(grin_command(GrinCommand::Close));
             }
-            name(ui, run);
+            document_name(ui, run);
         });
     }
 
-    fn open(&self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        ui.add_enabled_ui(!view.forming.opening, |ui| {
+    fn open(&self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+        ui.add_enabled_ui(!view.grin.opening, |ui| {
             ui.menu_button("Open task", |ui| self.menu(ui, wishes));
             let hint = "Open a task (.json), a volume of NumPy (.npz), or one of raw numbers with \
                 a header (.json)";
             if ui.button("Open file…").on_hover_text(hint).clicked() {
-                wishes.push(wish(Form::Open(None)));
+                wishes.push(grin_command(GrinCommand::OpenFile(None)));
             }
         });
     }
 
     fn menu(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
         ui.set_min_width(250.0);
-        for Known { key, title, notes } in &self.known {
+        for BuiltinEntry { key, title, notes } in &self.builtin {
             if ui.button(title).on_hover_text(notes).clicked() {
-                wishes.push(wish(Form::Builtin((*key).to_owned())));
+                wishes.push(grin_command(GrinCommand::OpenBuiltin((*key).to_owned())));
                 ui.close();
             }
         }
     }
 
-    fn save(&mut self, ui: &mut Ui, run: &Formation, wishes: &mut Vec<Command>) {
+    fn save(&mut self, ui: &mut Ui, run: &GrinRun, wishes: &mut Vec<Command>) {
         let hint = "Write the best field as a volume for a printer: .npz for Python, or .json with \
             the numbers beside it in .raw";
         if ui.button("Save volume…").on_hover_text(hint).clicked() {
-            wishes.push(wish(Form::Save { path: None, nodes: self.nodes }));
+            wishes.push(grin_command(GrinCommand::Save { path: None, nodes: self.nodes }));
         }
-        let kind = run.subject.task.as_ref().map(|task| task.field);
-        if matches!(kind, Some(FieldKind::Sphere { .. } | FieldKind::Cylinder { .. })) {
-            let drag = DragValue::new(&mut self.nodes).range(2..=MOST_NODES).suffix("³ nodes");
+        let kind = run.document.task.as_ref().map(|task| task.field);
+        if matches!(
+            kind,
+            Some(FieldRepresentation::Sphere { .. } | FieldRepresentation::Cylinder { .. })
+        ) {
+            let drag = DragValue::new(&mut self.nodes).range(2..=MAX_NODES).suffix("³ nodes");
             ui.add(drag.speed(0.3))
                 .on_hover_text("Nodes along a side of the saved volume")
                 .accessible_name("Nodes of the saved volume");
@@ -107,50 +112,50 @@ impl Tasks {
 }
 
 /// What is open, in the room that is left.
-fn name(ui: &mut Ui, run: &Formation) {
-    let name = &run.subject.name;
-    let notes = run.subject.task.as_ref().map_or("", |task| task.notes.as_str());
+fn document_name(ui: &mut Ui, run: &GrinRun) {
+    let name = &run.document.name;
+    let notes = run.document.task.as_ref().map_or("", |task| task.notes.as_str());
     let label = ui.add(Label::new(RichText::new(name).strong()).truncate());
     label.on_hover_text(if notes.is_empty() { name } else { notes });
 }
 
 /// Begins, holds and ends the search.
-fn hand(ui: &mut Ui, view: &View, run: &Formation, wishes: &mut Vec<Command>) {
+fn run_controls(ui: &mut Ui, view: &SessionView, run: &GrinRun, wishes: &mut Vec<Command>) {
     let fill = ui.visuals().selection.bg_fill;
-    let (text, hint) = if run.is_under_way() {
+    let (text, hint) = if run.is_active() {
         ("Optimize", "Form the field in the background; watch it in the slice")
     } else {
         ("Start over", "Form the field again from the beginning; this one is lost unless saved")
     };
-    let begins = run.is_ready() || !run.is_under_way();
-    let begins = begins && view.forming.pending.is_none() && !view.forming.opening;
+    let begins = run.is_ready() || !run.is_active();
+    let begins = begins && view.grin.pending.is_none() && !view.grin.opening;
     let start = Button::new(RichText::new(text).strong()).fill(fill);
     if ui.add_enabled(begins, start).on_hover_text(hint).clicked() {
-        wishes.push(wish(Form::Start));
+        wishes.push(grin_command(GrinCommand::Start));
     }
-    let hold = if run.standing == Standing::Paused && !run.is_ready() {
-        ("Go on", Form::Resume, "Let the search go on")
+    let hold = if run.status == RunStatus::Paused && !run.is_ready() {
+        ("Go on", GrinCommand::Resume, "Let the search go on")
     } else {
-        ("Pause", Form::Pause, "Hold the search after its present step")
+        ("Pause", GrinCommand::Pause, "Hold the search after its present step")
     };
-    let under_way = run.is_under_way() && !run.is_ready();
-    let buttons = [hold, ("Stop", Form::Stop, "End the search and show its best field")];
+    let under_way = run.is_active() && !run.is_ready();
+    let buttons = [hold, ("Stop", GrinCommand::Stop, "End the search and show its best field")];
     for (text, form, hint) in buttons {
         if ui.add_enabled(under_way, Button::new(text)).on_hover_text(hint).clicked() {
-            wishes.push(wish(form));
+            wishes.push(grin_command(form));
         }
     }
 }
 
 /// How far the search is.
-pub(super) fn progress(ui: &mut Ui, view: &View, run: &Formation) {
-    let text = words::standing(run, view.forming.pending);
+pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
+    let text = words::status_text(run, view.grin.pending);
     match &run.progress {
         Some(progress) => {
             let share = if progress.finished {
                 1.0
             } else {
-                progress.step as f32 / progress.most.max(1) as f32
+                progress.step as f32 / progress.max_steps.max(1) as f32
             };
             ui.add(ProgressBar::new(share).desired_height(16.0).corner_radius(2).text(text));
         }
@@ -161,20 +166,20 @@ pub(super) fn progress(ui: &mut Ui, view: &View, run: &Formation) {
 }
 
 /// Which slice, what it shows, how many rays.
-pub(super) fn sight(
+pub(super) fn slice_controls(
     ui: &mut Ui,
-    view: &View,
-    run: &Formation,
-    picture: &mut Picture,
+    view: &SessionView,
+    run: &GrinRun,
+    picture: &mut SlicePicture,
     wishes: &mut Vec<Command>,
 ) {
-    let old = view.forming.sight;
+    let old = view.grin.slice_settings;
     let mut sight = old;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        plane(ui, run, &mut sight);
-        quantity(ui, run, &mut sight);
-        if run.subject.task.is_some() {
+        plane_choice(ui, run, &mut sight);
+        quantity_choice(ui, run, &mut sight);
+        if run.document.task.is_some() {
             let drag = DragValue::new(&mut sight.rays).range(0..=60).speed(0.1).suffix(" rays");
             ui.add(drag)
                 .on_hover_text(
@@ -190,23 +195,23 @@ pub(super) fn sight(
         });
     });
     if sight != old {
-        wishes.push(wish(Form::Look(sight)));
+        wishes.push(grin_command(GrinCommand::SetSlice(sight)));
     }
 }
 
-fn plane(ui: &mut Ui, run: &Formation, sight: &mut Sight) {
+fn plane_choice(ui: &mut Ui, run: &GrinRun, sight: &mut SliceSettings) {
     ui.weak("Slice across");
-    for axis in Axis::ALL {
+    for axis in SpatialAxis::ALL {
         let [right, up] = axis.across();
         let hint =
             format!("Across {}: {} points right, {} up", axis.name(), right.name(), up.name());
         let button = Button::selectable(sight.plane.axis == axis, axis.name());
         let button = ui.add(button).on_hover_text(hint);
         if button.clicked() && sight.plane.axis != axis {
-            sight.plane = Plane { axis, depth: run.subject.middle(axis) };
+            sight.plane = SlicePlane { axis, depth: run.document.middle(axis) };
         }
     }
-    let [low, high] = run.subject.depths(sight.plane.axis);
+    let [low, high] = run.document.depth_range(sight.plane.axis);
     ui.spacing_mut().slider_width = 120.0;
     let name = format!("{} =", sight.plane.axis.name());
     ui.weak(name);
@@ -215,10 +220,10 @@ fn plane(ui: &mut Ui, run: &Formation, sight: &mut Sight) {
     slider.on_hover_text("Where the slice is laid").accessible_name("Depth of the slice");
 }
 
-fn quantity(ui: &mut Ui, run: &Formation, sight: &mut Sight) {
+fn quantity_choice(ui: &mut Ui, run: &GrinRun, sight: &mut SliceSettings) {
     let combo = ComboBox::from_id_salt("quantity of the slice").width(180.0);
     let combo = combo.selected_text(sight.quantity.name()).show_ui(ui, |ui| {
-        for quantity in Quantity::ALL.into_iter().filter(|of| run.subject.shows(*of)) {
+        for quantity in SliceQuantity::ALL.into_iter().filter(|of| run.document.supports(*of)) {
             ui.selectable_value(&mut sight.quantity, quantity, quantity.name());
         }
     });

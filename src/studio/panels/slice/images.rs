@@ -7,60 +7,60 @@ use eframe::egui::{
 };
 
 use super::words;
-use crate::grin_task::Image;
-use crate::session::{Formation, Sighting, View};
+use crate::grin_task::ViewImage;
+use crate::session::{GrinAnalysis, GrinRun, SessionView};
 
 /// The images as the graphics card has them.
 #[derive(Default)]
-pub(super) struct Images {
-    drawn: Option<Drawn>,
+pub(super) struct ViewImages {
+    cached: Option<CachedImages>,
 }
 
 /// What is drawn, and from what it was.
-struct Drawn {
-    source: Arc<Result<Sighting, String>>,
-    pairs: Vec<Pair>,
+struct CachedImages {
+    source: Arc<Result<GrinAnalysis, String>>,
+    pairs: Vec<ImagePair>,
 }
 
 /// A picture and what the light makes of it, of a view.
-struct Pair {
+struct ImagePair {
     view: usize,
     textures: [TextureHandle; 2],
 }
 
-impl std::fmt::Debug for Images {
+impl std::fmt::Debug for ViewImages {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Images").finish_non_exhaustive()
     }
 }
 
-impl Images {
+impl ViewImages {
     /// Shows them one above the other.
-    pub(super) fn ui(&mut self, ui: &mut Ui, view: &View, run: &Formation) {
-        let Some(source) = &view.forming.sighting else {
+    pub(super) fn ui(&mut self, ui: &mut Ui, view: &SessionView, run: &GrinRun) {
+        let Some(source) = &view.grin.analysis else {
             ui.weak("Following all light…");
             return;
         };
         let Ok(sighting) = source.as_ref() else { return };
-        if !self.drawn.as_ref().is_some_and(|old| Arc::ptr_eq(&old.source, source)) {
-            let pairs = pairs(ui, sighting);
-            self.drawn = Some(Drawn { source: Arc::clone(source), pairs });
+        if !self.cached.as_ref().is_some_and(|old| Arc::ptr_eq(&old.source, source)) {
+            let pairs = image_pairs(ui, sighting);
+            self.cached = Some(CachedImages { source: Arc::clone(source), pairs });
         }
-        let Some(Drawn { pairs, .. }) = &self.drawn else { return };
+        let Some(CachedImages { pairs, .. }) = &self.cached else { return };
         if pairs.is_empty() {
             ui.weak("No view of this task makes an image.");
             return;
         }
         for pair in pairs {
-            let name = run.subject.task.as_ref().and_then(|task| task.views.get(pair.view));
+            let name = run.document.task.as_ref().and_then(|task| task.views.get(pair.view));
             let name = name.map_or("", |view| view.name.as_str());
-            ui.label(words::image(name, &sighting.views.value[pair.view]));
+            ui.label(words::image_text(name, &sighting.views.value[pair.view]));
             pair.ui(ui, name);
         }
     }
 }
 
-impl Pair {
+impl ImagePair {
     /// Shows both side by side.
     fn ui(&self, ui: &mut Ui, name: &str) {
         let side = (0.5 * (ui.available_width() - 10.0)).clamp(60.0, 320.0);
@@ -78,23 +78,30 @@ impl Pair {
     }
 }
 
-fn pairs(ui: &Ui, sighting: &Sighting) -> Vec<Pair> {
+fn image_pairs(ui: &Ui, sighting: &GrinAnalysis) -> Vec<ImagePair> {
     let views = sighting.views.value.iter().enumerate();
     let images = views.filter_map(|(view, seen)| Some((view, seen.image.as_ref()?)));
-    let pair = |(view, image): (usize, &Image)| {
+    let pair = |(view, image): (usize, &ViewImage)| {
         // Both to one scale: the brightest of the picture is white.
-        let white = image.wanted.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let white = image.target.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let texture = |what: &str, values: &[f64]| {
             let name = format!("{what} {view}");
-            ui.ctx().load_texture(name, grey(values, image.pixels, white), TextureOptions::NEAREST)
+            ui.ctx().load_texture(
+                name,
+                gray_image(values, image.pixels, white),
+                TextureOptions::NEAREST,
+            )
         };
-        Pair { view, textures: [texture("wanted", &image.wanted), texture("made", &image.made)] }
+        ImagePair {
+            view,
+            textures: [texture("wanted", &image.target), texture("made", &image.formed)],
+        }
     };
     images.map(pair).collect()
 }
 
 /// Light in grey, rows from the top.
-fn grey(values: &[f64], pixels: usize, white: f64) -> ColorImage {
+fn gray_image(values: &[f64], pixels: usize, white: f64) -> ColorImage {
     let pixel = |n: usize| {
         let value = values[(pixels - 1 - n / pixels) * pixels + n % pixels];
         Color32::from_gray((255.0 * (value / white).clamp(0.0, 1.0)).round() as u8)

@@ -5,7 +5,7 @@ use eframe::egui::{WidgetInfo, pos2};
 
 use super::words;
 use crate::session::Slice;
-use crate::studio::draw::Colour;
+use crate::studio::draw::Rgba;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::swatch;
@@ -19,11 +19,11 @@ const MARKS: usize = 5;
 const PIECES: usize = 64;
 
 /// Contours, and what labels stand on: seen on every colour of a slice.
-pub(super) const CONTOUR: Colour = [0, 0, 0, 120];
-pub(super) const PLATE: Color32 = Color32::from_black_alpha(150);
+pub(super) const CONTOUR: Rgba = [0, 0, 0, 120];
+pub(super) const LABEL_BACKGROUND: Color32 = Color32::from_black_alpha(150);
 
 /// Rays of views in their order, on dark and on light, and told apart by colour-blind eyes.
-const BRIGHT: [Colour; 6] = [
+const BRIGHT_RAYS: [Rgba; 6] = [
     [255, 255, 255, 255],
     [255, 170, 60, 255],
     [120, 215, 255, 255],
@@ -31,7 +31,7 @@ const BRIGHT: [Colour; 6] = [
     [170, 255, 150, 255],
     [255, 235, 130, 255],
 ];
-const DEEP: [Colour; 6] = [
+const DARK_RAYS: [Rgba; 6] = [
     [20, 20, 20, 255],
     [190, 60, 0, 255],
     [0, 70, 190, 255],
@@ -41,28 +41,28 @@ const DEEP: [Colour; 6] = [
 ];
 
 /// The colour of the rays of a view.
-pub(super) const fn ray(view: usize, dark: bool) -> Colour {
-    if dark { BRIGHT[view % BRIGHT.len()] } else { DEEP[view % DEEP.len()] }
+pub(super) const fn ray_color(view: usize, dark: bool) -> Rgba {
+    if dark { BRIGHT_RAYS[view % BRIGHT_RAYS.len()] } else { DARK_RAYS[view % DARK_RAYS.len()] }
 }
 
 /// The rim of a ray, by which it is seen on every colour of a slice.
-pub(super) const fn rim(dark: bool) -> Colour {
+pub(super) const fn ray_outline(dark: bool) -> Rgba {
     if dark { [0, 0, 0, 150] } else { [255, 255, 255, 170] }
 }
 
 /// The colour of a value of a slice.
-pub(super) fn color(slice: &Slice, value: f64, dark: bool) -> [u8; 3] {
+pub(super) fn value_color(slice: &Slice, value: f64, dark: bool) -> [u8; 3] {
     let [low, high] = slice.range;
-    if slice.sight.quantity.is_difference() {
-        return ramp::about_zero(if high > 0.0 { value / high } else { 0.0 }, dark);
+    if slice.settings.quantity.is_difference() {
+        return ramp::diverging(if high > 0.0 { value / high } else { 0.0 }, dark);
     }
-    ramp::rising(if high > low { (value - low) / (high - low) } else { 0.5 })
+    ramp::sequential(if high > low { (value - low) / (high - low) } else { 0.5 })
 }
 
 /// The strip of colours with its numbers.
-pub(super) fn colors(ui: &mut Ui, rect: Rect, slice: &Slice) {
+pub(super) fn color_bar(ui: &mut Ui, rect: Rect, slice: &Slice) {
     let response = ui.allocate_rect(rect, Sense::hover());
-    let text = words::scale(slice);
+    let text = words::color_scale_text(slice);
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &text));
     response.on_hover_text(&text);
     let [low, high] = slice.range;
@@ -77,7 +77,7 @@ pub(super) fn colors(ui: &mut Ui, rect: Rect, slice: &Slice) {
     let mut mesh = Mesh::default();
     for i in 0..PIECES {
         let [below, above] = [i, i + 1].map(|i| i as f32 / PIECES as f32);
-        let [r, g, b] = color(slice, value(0.5 * (below + above)), dark);
+        let [r, g, b] = value_color(slice, value(0.5 * (below + above)), dark);
         let piece =
             Rect::from_min_max(pos2(strip.left(), place(above)), pos2(strip.right(), place(below)));
         mesh.add_colored_rect(piece, Color32::from_rgb(r, g, b));
@@ -91,34 +91,34 @@ pub(super) fn colors(ui: &mut Ui, rect: Rect, slice: &Slice) {
     for i in 0..marks {
         let share = if marks > 1 { i as f32 / (marks - 1) as f32 } else { 0.5 };
         let at = pos2(strip.right() + 4.0, place(share));
-        let text = number::show_digits(value(share), digits);
+        let text = number::format_digits(value(share), digits);
         painter.text(at, Align2::LEFT_CENTER, text, font.clone(), ui.visuals().text_color());
     }
 }
 
 /// The views whose rays are drawn, how far they are off the slice, and those that do not count.
-pub(super) fn rays(ui: &mut Ui, slice: &Slice) {
+pub(super) fn ray_legend(ui: &mut Ui, slice: &Slice) {
     let visuals = ui.visuals();
     let (weak, error) = (visuals.weak_text_color(), visuals.error_fg_color);
-    let (dark, lost) = (visuals.dark_mode, color32(Palette::of(visuals).lost));
+    let (dark, lost) = (visuals.dark_mode, color32(Palette::for_visuals(visuals).lost_ray));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(RichText::new(words::shown(slice)).small().color(weak));
-        let task = slice.subject.task.as_ref();
-        for ways in slice.ways.iter().filter(|ways| !ways.ways.is_empty()) {
+        ui.label(RichText::new(words::slice_text(slice)).small().color(weak));
+        let task = slice.document.task.as_ref();
+        for ways in slice.paths.iter().filter(|ways| !ways.paths.is_empty()) {
             let name = task.and_then(|task| task.views.get(ways.view)).map(|view| &view.name);
             ui.add_space(4.0);
-            swatch(ui, color32(ray(ways.view, dark)));
-            let text = words::rays(name.map_or("", String::as_str), ways);
-            ui.label(RichText::new(text).small()).on_hover_text(words::off(ways));
-            if let Some(text) = words::left_out(ways) {
+            swatch(ui, color32(ray_color(ways.view, dark)));
+            let text = words::rays_text(name.map_or("", String::as_str), ways);
+            ui.label(RichText::new(text).small()).on_hover_text(words::distance_text(ways));
+            if let Some(text) = words::excluded_text(ways) {
                 swatch(ui, lost);
                 ui.label(RichText::new(text).small().color(lost)).on_hover_text(
                     "Rays that do not count are drawn to where they end, with a dot there",
                 );
             }
         }
-        if let Some(why) = &slice.no_ways {
+        if let Some(why) = &slice.paths_error {
             ui.colored_label(error, why);
         }
     });

@@ -11,34 +11,34 @@ mod picture;
 mod plots;
 mod words;
 
-pub(in crate::studio) use controls::NODES;
+pub(in crate::studio) use controls::DEFAULT_NODES;
 
 use eframe::egui::{Button, Frame, Margin, Panel as Side, ScrollArea, Ui};
 
 use super::Panel;
-use crate::grin_task::View as TaskView;
+use crate::grin_task::LightView as TaskView;
 use crate::math::Vec3;
-use crate::session::{Command, Form, Formation, View};
-use crate::studio::draw::Backing;
-use crate::studio::wording::capital;
-use controls::Tasks;
-use images::Images;
-use picture::Picture;
+use crate::session::{Command, GrinCommand, GrinRun, SessionView};
+use crate::studio::draw::RenderBackend;
+use crate::studio::wording::capitalize;
+use controls::TaskMenu;
+use images::ViewImages;
+use picture::SlicePicture;
 
 /// What the panel is about, before anything is open.
-const WHAT: &str = "Which field of refractive index bends light as a task wants it? Open a task and \
+const INTRODUCTION: &str = "Which field of refractive index bends light as a task wants it? Open a task and \
     press Optimize: the field forms while you look at a slice of it, with rays through it. A volume \
     from a file is shown alike. Nothing is computed before something is open.";
 
 /// The width of the numbers beside the picture; with less room than the second number they stand
 /// below it, and with less height than the third there are none.
-const NUMBERS: f32 = 330.0;
-const ROOMY: f32 = 640.0;
-const HIGH: f32 = 240.0;
+const SIDE_WIDTH: f32 = 330.0;
+const MIN_WIDTH: f32 = 640.0;
+const MIN_HEIGHT: f32 = 240.0;
 
 /// A page of the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Page {
+enum GrinPage {
     /// The light of every view, and what the tracing costs.
     #[default]
     Light,
@@ -50,88 +50,92 @@ enum Page {
     Images,
 }
 
-const PAGES: [(Page, &str, &str); 4] = [
-    (Page::Light, "Light", "Every view: spot or image, rays and those left out, error and time"),
-    (Page::Loss, "Loss", "The loss against the steps of the search"),
-    (Page::Profile, "Profile", "The index along the radius, or along a line through the slice"),
-    (Page::Images, "Images", "What light makes on screens beside what is wanted there"),
+const PAGES: [(GrinPage, &str, &str); 4] = [
+    (
+        GrinPage::Light,
+        "Light",
+        "Every view: spot or image, rays and those left out, error and time",
+    ),
+    (GrinPage::Loss, "Loss", "The loss against the steps of the search"),
+    (GrinPage::Profile, "Profile", "The index along the radius, or along a line through the slice"),
+    (GrinPage::Images, "Images", "What light makes on screens beside what is wanted there"),
 ];
 
 /// The panel.
 #[derive(Debug)]
-pub struct GrinSlice {
-    tasks: Tasks,
-    picture: Picture,
-    images: Images,
-    page: Page,
+pub struct GrinPanel {
+    tasks: TaskMenu,
+    picture: SlicePicture,
+    images: ViewImages,
+    page: GrinPage,
     /// A place that was clicked, whatever slice is shown.
     pinned: Option<Vec3<f64>>,
     /// What the panel was turned to last.
-    shown: Option<u64>,
+    shown_run: Option<u64>,
 }
 
-impl GrinSlice {
+impl GrinPanel {
     /// An empty panel.
-    pub fn new(backing: Backing) -> Self {
+    pub fn new(backing: RenderBackend) -> Self {
         Self {
-            tasks: Tasks::new(),
-            picture: Picture::new(backing),
-            images: Images::default(),
-            page: Page::default(),
+            tasks: TaskMenu::new(),
+            picture: SlicePicture::new(backing),
+            images: ViewImages::default(),
+            page: GrinPage::default(),
             pinned: None,
-            shown: None,
+            shown_run: None,
         }
     }
 }
 
-impl Panel for GrinSlice {
+impl Panel for GrinPanel {
     fn title(&self) -> &'static str {
         "GRIN slice"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &View, wishes: &mut Vec<Command>) {
-        self.turn(view);
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+        self.sync_page(view);
         self.tasks.bar(ui, view, wishes);
-        if let Some(why) = &view.forming.failed {
-            ui.colored_label(ui.visuals().error_fg_color, capital(why));
+        if let Some(why) = &view.grin.error {
+            ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
         }
-        let Some(run) = view.forming.run.clone() else {
-            if view.forming.opening {
+        let Some(run) = view.grin.run.clone() else {
+            if view.grin.opening {
                 ui.weak("Opening…");
             } else {
-                self.tasks.list(ui, WHAT, wishes);
+                self.tasks.list(ui, INTRODUCTION, wishes);
             }
             return;
         };
         controls::progress(ui, view, &run);
-        controls::sight(ui, view, &run, &mut self.picture, wishes);
-        self.beside(ui, view, &run);
+        controls::slice_controls(ui, view, &run, &mut self.picture, wishes);
+        self.side_panel(ui, view, &run);
         self.picture(ui, view, &run);
     }
 }
 
-impl GrinSlice {
+impl GrinPanel {
     /// Turns to what is newly open.
-    fn turn(&mut self, view: &View) {
-        let number = view.forming.run.as_ref().map(|run| run.number);
-        if number != self.shown {
-            self.shown = number;
+    fn sync_page(&mut self, view: &SessionView) {
+        let number = view.grin.run.as_ref().map(|run| run.number);
+        if number != self.shown_run {
+            self.shown_run = number;
             self.pinned = None;
             self.picture.fit();
-            self.page = if view.forming.run.as_ref().is_some_and(|run| run.subject.task.is_none()) {
-                Page::Profile
+            self.page = if view.grin.run.as_ref().is_some_and(|run| run.document.task.is_none()) {
+                GrinPage::Profile
             } else {
-                Page::Light
+                GrinPage::Light
             };
         }
     }
 
     /// The numbers, beside the picture or below it, where there is room.
-    fn beside(&mut self, ui: &mut Ui, view: &View, run: &Formation) {
+    fn side_panel(&mut self, ui: &mut Ui, view: &SessionView, run: &GrinRun) {
         let frame = Frame::new().inner_margin(Margin { left: 8, top: 2, ..Margin::ZERO });
-        let side = if ui.available_width() >= ROOMY {
-            Side::right("numbers of the field").default_size(NUMBERS).size_range(240.0..=560.0)
-        } else if ui.available_height() >= HIGH {
+        let side = if ui.available_width() >= MIN_WIDTH {
+            Side::right("numbers of the field").default_size(SIDE_WIDTH).size_range(240.0..=560.0)
+        } else if ui.available_height() >= MIN_HEIGHT {
             let half = 0.45 * ui.available_height();
             Side::bottom("numbers below the field").exact_size(half)
         } else {
@@ -142,28 +146,28 @@ impl GrinSlice {
             let scroll =
                 ScrollArea::vertical().id_salt(self.page as u8).auto_shrink([false, false]);
             scroll.show(ui, |ui| match self.page {
-                Page::Light => words::light(ui, view, run),
-                Page::Loss => plots::loss(ui, run),
-                Page::Profile => plots::profile(ui, view),
-                Page::Images => self.images.ui(ui, view, run),
+                GrinPage::Light => words::light_page(ui, view, run),
+                GrinPage::Loss => plots::loss_plot(ui, run),
+                GrinPage::Profile => plots::profile_plot(ui, view),
+                GrinPage::Images => self.images.ui(ui, view, run),
             });
         });
     }
 
-    fn pages(&mut self, ui: &mut Ui, run: &Formation) {
-        let task = run.subject.task.as_ref();
+    fn pages(&mut self, ui: &mut Ui, run: &GrinRun) {
+        let task = run.document.task.as_ref();
         let is_image = |view: &TaskView| view.goal.is_image();
         let has_images = task.is_some_and(|task| task.views.iter().any(is_image));
-        if self.page == Page::Images && !has_images {
-            self.page = Page::Light;
+        if self.page == GrinPage::Images && !has_images {
+            self.page = GrinPage::Light;
         }
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             for (page, name, hint) in PAGES {
                 let enabled = match page {
-                    Page::Profile => true,
-                    Page::Light | Page::Loss => task.is_some(),
-                    Page::Images => has_images,
+                    GrinPage::Profile => true,
+                    GrinPage::Light | GrinPage::Loss => task.is_some(),
+                    GrinPage::Images => has_images,
                 };
                 let button = Button::selectable(self.page == page, name);
                 if ui.add_enabled(enabled, button).on_hover_text(hint).clicked() {
@@ -174,14 +178,14 @@ impl GrinSlice {
         ui.separator();
     }
 
-    fn picture(&mut self, ui: &mut Ui, view: &View, run: &Formation) {
-        match view.forming.slice.as_deref() {
+    fn picture(&mut self, ui: &mut Ui, view: &SessionView, run: &GrinRun) {
+        match view.grin.slice.as_deref() {
             Some(Ok(slice)) => {
-                words::pinned(ui, run, &mut self.pinned);
+                words::pinned_line(ui, run, &mut self.pinned);
                 self.picture.ui(ui, view, slice, &mut self.pinned);
             }
             Some(Err(why)) => {
-                ui.colored_label(ui.visuals().error_fg_color, capital(why));
+                ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
             }
             None => {
                 ui.weak("Laying the slice…");
@@ -191,6 +195,6 @@ impl GrinSlice {
 }
 
 /// The wish for something of the field.
-fn wish(form: Form) -> Command {
-    Command::Form(form)
+fn grin_command(form: GrinCommand) -> Command {
+    Command::Grin(form)
 }

@@ -9,97 +9,97 @@ use eframe::egui::{
 use glam::DVec2;
 
 use super::{legend, words};
-use crate::grin_task::Way;
+use crate::grin_task::RayPath;
 use crate::math::Vec3;
-use crate::session::{Slice, View};
-use crate::studio::draw::{Backing, Bounds, Colour, Scene, Shown, Stage};
+use crate::session::{SessionView, Slice};
+use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
 /// Two labels of contours are at least so far apart, in points.
-const APART: egui::Vec2 = egui::vec2(44.0, 16.0);
+const LABEL_SPACING: egui::Vec2 = egui::vec2(44.0, 16.0);
 /// The room around the whole slice and its rays, as a share of their size.
 const ROOM: f64 = 0.01;
 
 /// The drawing of a slice.
 #[derive(Debug)]
-pub(super) struct Picture {
-    backing: Backing,
-    stage: Stage,
-    drawing: Option<Drawing>,
+pub(super) struct SlicePicture {
+    backing: RenderBackend,
+    scene_view: SceneView,
+    drawing: Option<SliceDrawing>,
 }
 
 /// What is drawn, and from what it was.
-struct Drawing {
+struct SliceDrawing {
     slice: Arc<Result<Slice, String>>,
     dark: bool,
     scene: Arc<Scene>,
-    whole: Bounds,
+    full_view: BoundingBox,
     colors: TextureHandle,
 }
 
-impl std::fmt::Debug for Drawing {
+impl std::fmt::Debug for SliceDrawing {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Drawing").field("whole", &self.whole).finish_non_exhaustive()
+        f.debug_struct("Drawing").field("whole", &self.full_view).finish_non_exhaustive()
     }
 }
 
-impl Picture {
-    pub(super) const fn new(backing: Backing) -> Self {
-        Self { backing, stage: Stage::new("slice"), drawing: None }
+impl SlicePicture {
+    pub(super) const fn new(backing: RenderBackend) -> Self {
+        Self { backing, scene_view: SceneView::new("slice"), drawing: None }
     }
 
     /// Shows the whole slice again.
     pub(super) const fn fit(&mut self) {
-        self.stage.fit();
+        self.scene_view.fit();
     }
 
     /// Shows a slice in all the room that is left; a click pins a place.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
-        view: &View,
+        view: &SessionView,
         slice: &Slice,
         pinned: &mut Option<Vec3<f64>>,
     ) {
-        let Some(source) = &view.forming.slice else { return };
+        let Some(source) = &view.grin.slice else { return };
         let dark = ui.visuals().dark_mode;
-        let is_drawn = |old: &Drawing| Arc::ptr_eq(&old.slice, source) && old.dark == dark;
+        let is_drawn = |old: &SliceDrawing| Arc::ptr_eq(&old.slice, source) && old.dark == dark;
         if !self.drawing.as_ref().is_some_and(is_drawn) {
-            self.drawing = Some(Drawing::new(ui, Arc::clone(source), slice));
+            self.drawing = Some(SliceDrawing::new(ui, Arc::clone(source), slice));
         }
-        legend::rays(ui, slice);
+        legend::ray_legend(ui, slice);
         let Some(drawing) = &self.drawing else { return };
         let all = ui.available_rect_before_wrap();
         let split = (all.right() - legend::WIDTH).max(all.left() + 1.0);
         let room = Rect::from_min_max(all.min, pos2(split, all.bottom()));
         ui.scope_builder(UiBuilder::new().max_rect(room), |ui| {
-            let label = words::label(slice);
-            let drawn = (&drawing.scene, drawing.whole);
-            let below = |ui: &Ui, shown: &Shown| drawing.paint_colors(ui, shown, slice);
-            let shown = self.stage.show_over(ui, self.backing, drawn, &label, below);
+            let label = words::slice_name(slice);
+            let drawn = (&drawing.scene, drawing.full_view);
+            let below = |ui: &Ui, shown: &SceneResponse| drawing.paint_colors(ui, shown, slice);
+            let shown = self.scene_view.show_over(ui, self.backing, drawn, &label, below);
             contour_labels(ui, &shown, slice);
             probe(ui, &shown, slice, pinned);
         });
-        legend::colors(ui, Rect::from_min_max(pos2(split, all.top()), all.max), slice);
+        legend::color_bar(ui, Rect::from_min_max(pos2(split, all.top()), all.max), slice);
     }
 }
 
-impl Drawing {
+impl SliceDrawing {
     fn new(ui: &Ui, source: Arc<Result<Slice, String>>, slice: &Slice) -> Self {
         let dark = ui.visuals().dark_mode;
-        let scene = scene(slice, &Palette::of(ui.visuals()), dark);
+        let scene = scene(slice, &Palette::for_visuals(ui.visuals()), dark);
         let colors = ui.ctx().load_texture("slice", image(slice, dark), TextureOptions::LINEAR);
-        let whole = whole(slice);
-        Self { slice: source, dark, scene: Arc::new(scene), whole, colors }
+        let whole = full_view(slice);
+        Self { slice: source, dark, scene: Arc::new(scene), full_view: whole, colors }
     }
 
     /// The colours of the cells, under the scene.
-    fn paint_colors(&self, ui: &Ui, shown: &Shown, slice: &Slice) {
+    fn paint_colors(&self, ui: &Ui, shown: &SceneResponse, slice: &Slice) {
         let painter = ui.painter_at(shown.response.rect);
-        let ground = color32(Palette::of(ui.visuals()).background);
+        let ground = color32(Palette::for_visuals(ui.visuals()).background);
         painter.rect_filled(shown.response.rect, 0.0, ground);
-        let [low, high] = slice.frame.map(|corner| shown.on_screen(DVec2::from(corner)));
+        let [low, high] = slice.frame.map(|corner| shown.to_screen(DVec2::from(corner)));
         let all = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         let place = Rect::from_two_pos(low, high);
         painter.image(self.colors.id(), place, all, Color32::WHITE);
@@ -114,28 +114,29 @@ fn image(slice: &Slice, dark: bool) -> ColorImage {
         if !value.is_finite() {
             return Color32::TRANSPARENT;
         }
-        let [r, g, b] = legend::color(slice, value, dark);
+        let [r, g, b] = legend::value_color(slice, value, dark);
         Color32::from_rgb(r, g, b)
     };
     ColorImage::new(slice.size, (0..width * height).map(pixel).collect())
 }
 
 /// What *fit* shows: the slice, and its rays from before they enter to their screens.
-fn whole(slice: &Slice) -> Bounds {
-    let rays = slice.ways.iter().flat_map(|ways| &ways.ways).filter(|way| way.excluded().is_none());
+fn full_view(slice: &Slice) -> BoundingBox {
+    let rays =
+        slice.paths.iter().flat_map(|ways| &ways.paths).filter(|way| way.excluded().is_none());
     let ends = rays.flat_map(|way| way.points.first().into_iter().chain(way.points.last()));
-    let ends = ends.map(|end| DVec2::from(slice.sight.plane.seen(*end)));
+    let ends = ends.map(|end| DVec2::from(slice.settings.plane.project(*end)));
     let corners = slice.frame.map(DVec2::from);
-    let Bounds { min, max } = Bounds::around(corners.into_iter().chain(ends))
-        .unwrap_or(Bounds { min: corners[0], max: corners[1] });
+    let BoundingBox { min, max } = BoundingBox::around(corners.into_iter().chain(ends))
+        .unwrap_or(BoundingBox { min: corners[0], max: corners[1] });
     let room = ROOM * (max - min);
-    Bounds { min: min - room, max: max + room }
+    BoundingBox { min: min - room, max: max + room }
 }
 
 /// Contours, the boundary of the space, and rays.
 fn scene(slice: &Slice, palette: &Palette, dark: bool) -> Scene {
     let mut scene = Scene::on([0; 4]);
-    let line = |scene: &mut Scene, pieces: &[[[f64; 2]; 2]], width: f32, colour: Colour| {
+    let line = |scene: &mut Scene, pieces: &[[[f64; 2]; 2]], width: f32, colour: Rgba| {
         pieces.iter().for_each(|[a, b]| scene.line((*a).into(), (*b).into(), width, colour));
     };
     for contour in &slice.contours {
@@ -145,16 +146,17 @@ fn scene(slice: &Slice, palette: &Palette, dark: bool) -> Scene {
     let [[left, low], [right, high]] = slice.frame;
     let corners = [[left, low], [right, low], [right, high], [left, high]].map(DVec2::from);
     scene.outline(&corners, 1.0, palette.faint);
-    for ways in &slice.ways {
-        let colours = [legend::ray(ways.view, dark), palette.lost, legend::rim(dark)];
-        ways.ways.iter().for_each(|way| draw_way(&mut scene, slice, way, colours));
+    for ways in &slice.paths {
+        let colours =
+            [legend::ray_color(ways.view, dark), palette.lost_ray, legend::ray_outline(dark)];
+        ways.paths.iter().for_each(|way| draw_ray_path(&mut scene, slice, way, colours));
     }
     scene
 }
 
 /// A ray with a rim, legible on every colour; an excluded one in red to the dot where it ends.
-fn draw_way(scene: &mut Scene, slice: &Slice, way: &Way, [ray, lost, rim]: [Colour; 3]) {
-    let seen = |point: &Vec3<f64>| DVec2::from(slice.sight.plane.seen(*point));
+fn draw_ray_path(scene: &mut Scene, slice: &Slice, way: &RayPath, [ray, lost, rim]: [Rgba; 3]) {
+    let seen = |point: &Vec3<f64>| DVec2::from(slice.settings.plane.project(*point));
     let points: Vec<DVec2> = way.points.iter().map(seen).collect();
     let counts = way.excluded().is_none();
     let colour = if counts { ray } else { lost };
@@ -166,30 +168,30 @@ fn draw_way(scene: &mut Scene, slice: &Slice, way: &Way, [ray, lost, rim]: [Colo
 }
 
 /// The level of each contour, on it, where there is room.
-fn contour_labels(ui: &Ui, shown: &Shown, slice: &Slice) {
+fn contour_labels(ui: &Ui, shown: &SceneResponse, slice: &Slice) {
     let rect = shown.response.rect;
     let painter = ui.painter_at(rect);
     let font = TextStyle::Small.resolve(ui.style());
     let mut taken: Vec<egui::Pos2> = Vec::new();
     for contour in &slice.contours {
         let middle = |[a, b]: &[[f64; 2]; 2]| 0.5 * (DVec2::from(*a) + DVec2::from(*b));
-        let places = contour.pieces.iter().map(|piece| shown.on_screen(middle(piece)));
+        let places = contour.pieces.iter().map(|piece| shown.to_screen(middle(piece)));
         let inside = places.filter(|at| rect.shrink(12.0).contains(*at));
         let free = inside.filter(|at| {
             taken.iter().all(|other| {
                 let apart = (*at - *other).abs();
-                apart.x > APART.x || apart.y > APART.y
+                apart.x > LABEL_SPACING.x || apart.y > LABEL_SPACING.y
             })
         });
         // Along the diagonal up to the right, so that the labels of circles stand in a row.
         let ahead = |at: &egui::Pos2| at.x - at.y;
         if let Some(at) = free.max_by(|a, b| ahead(a).total_cmp(&ahead(b))) {
-            let level = tidy(contour.level, slice.spacing);
+            let level = rounded_level(contour.level, slice.spacing);
             let digits = number::digits_between(level, slice.spacing, 5);
-            let text = number::show_digits(level, digits);
+            let text = number::format_digits(level, digits);
             let galley = painter.layout_no_wrap(text, font.clone(), Color32::WHITE);
             let place = Align2::CENTER_CENTER.anchor_size(at, galley.size());
-            painter.rect_filled(place.expand2(egui::vec2(2.0, 0.0)), 2.0, legend::PLATE);
+            painter.rect_filled(place.expand2(egui::vec2(2.0, 0.0)), 2.0, legend::LABEL_BACKGROUND);
             painter.galley(place.min, galley, Color32::WHITE);
             taken.push(at);
         }
@@ -197,28 +199,28 @@ fn contour_labels(ui: &Ui, shown: &Shown, slice: &Slice) {
 }
 
 /// A multiple of a spacing without the rounding of the product.
-fn tidy(level: f64, spacing: f64) -> f64 {
+fn rounded_level(level: f64, spacing: f64) -> f64 {
     if level.abs() < 1e-6 * spacing { 0.0 } else { level }
 }
 
 /// Reads the field under the pointer; a click pins the place.
-fn probe(ui: &Ui, shown: &Shown, slice: &Slice, pinned: &mut Option<Vec3<f64>>) {
+fn probe(ui: &Ui, shown: &SceneResponse, slice: &Slice, pinned: &mut Option<Vec3<f64>>) {
     let painter = ui.painter_at(shown.response.rect);
     let strong = Stroke::new(1.5, Color32::WHITE);
     if let Some(point) = *pinned {
-        let at = shown.on_screen(slice.sight.plane.seen(point).into());
-        painter.circle(at, 4.5, legend::PLATE, strong);
+        let at = shown.to_screen(slice.settings.plane.project(point).into());
+        painter.circle(at, 4.5, legend::LABEL_BACKGROUND, strong);
     }
     let Some((at, _)) = shown.pointer() else { return };
-    let point = slice.sight.plane.at(at.into());
+    let point = slice.settings.plane.point(at.into());
     if shown.response.clone().on_hover_cursor(CursorIcon::Crosshair).clicked() {
         *pinned = Some(point);
     }
-    let text = words::probe(&slice.subject, &slice.medium, point);
+    let text = words::probe_text(&slice.document, &slice.field, point);
     let font = TextStyle::Small.resolve(ui.style());
     let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
     let corner = shown.response.rect.right_bottom() - egui::vec2(8.0, 8.0);
     let place = Align2::RIGHT_BOTTOM.anchor_size(corner, galley.size());
-    painter.rect_filled(place.expand(4.0), 3.0, legend::PLATE);
+    painter.rect_filled(place.expand(4.0), 3.0, legend::LABEL_BACKGROUND);
     painter.galley(place.min, galley, Color32::WHITE);
 }

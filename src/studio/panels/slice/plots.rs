@@ -4,7 +4,7 @@ use eframe::egui::{Role, Ui, WidgetInfo, vec2};
 use egui_plot::{AxisHints, Corner, Legend, Line, LineStyle, Plot, VLine};
 
 use super::words;
-use crate::session::{Formation, Loss, View};
+use crate::session::{GrinRun, LossSample, SessionView};
 use crate::studio::panels::decade_name;
 
 /// What lies in a corner: up to this part of the width and the height from it.
@@ -54,14 +54,14 @@ fn plot(ui: &Ui, name: &str, legend: Corner) -> Plot<'static> {
 
 /// The loss of the current and of the best field, decades up and steps across; a line where the
 /// field becomes finer.
-pub(super) fn loss(ui: &mut Ui, run: &Formation) {
+pub(super) fn loss_plot(ui: &mut Ui, run: &GrinRun) {
     if run.history.is_empty() {
         ui.weak("No step has been taken yet: press Optimize.");
         return;
     }
-    ui.label(words::losses(run));
+    ui.label(words::losses_text(run));
     let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
-    let curve = |loss: fn(&Loss) -> f64| -> Vec<[f64; 2]> {
+    let curve = |loss: fn(&LossSample) -> f64| -> Vec<[f64; 2]> {
         let points = run.history.iter().map(|point| [point.step as f64, decade(loss(point))]);
         points.filter(|[_, y]| y.is_finite()).collect()
     };
@@ -87,17 +87,17 @@ pub(super) fn loss(ui: &mut Ui, run: &Formation) {
 }
 
 /// The index along a line, with the exact one and the one at the start beside it.
-pub(super) fn profile(ui: &mut Ui, view: &View) {
-    let Some(Ok(slice)) = view.forming.slice.as_deref() else {
+pub(super) fn profile_plot(ui: &mut Ui, view: &SessionView) {
+    let Some(Ok(slice)) = view.grin.slice.as_deref() else {
         ui.weak("Laying the slice…");
         return;
     };
     let profile = &slice.profile;
-    ui.label(words::profile(slice));
+    ui.label(words::profile_text(slice));
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.strong_text_color());
     let now = visuals.hyperlink_color;
-    let curves = [&profile.start, &profile.now, &profile.exact];
+    let curves = [&profile.start, &profile.current, &profile.reference];
     let corner = free_corner(curves.into_iter().map(Vec::as_slice));
     let along = AxisHints::new_x().label(format!("{}, mm", profile.along));
     let plot = plot(ui, "profile of the field", corner)
@@ -112,9 +112,9 @@ pub(super) fn profile(ui: &mut Ui, view: &View) {
         if !profile.start.is_empty() {
             plot.line(line("start", &profile.start).color(weak).width(1.0));
         }
-        plot.line(line("index", &profile.now).color(now).width(2.0));
-        if !profile.exact.is_empty() {
-            let exact = line("exact", &profile.exact).color(strong).width(1.2);
+        plot.line(line("index", &profile.current).color(now).width(2.0));
+        if !profile.reference.is_empty() {
+            let exact = line("exact", &profile.reference).color(strong).width(1.2);
             plot.line(exact.style(LineStyle::dashed_dense()));
         }
     });

@@ -2,15 +2,17 @@
 
 use eframe::egui::{Label, RichText, Ui};
 
-use crate::grin_task::{Axis, Counts, Goal, Medium, Seen, Way, Ways};
+use crate::grin_task::{
+    GrinField, LightGoal, RayCounts, RayPath, RayPaths, SpatialAxis, ViewReport,
+};
 use crate::math::Vec3;
-use crate::session::{Formation, Sighting, Slice, Standing, Subject, View};
-use crate::studio::number::show_digits;
+use crate::session::{GrinAnalysis, GrinDocument, GrinRun, RunStatus, SessionView, Slice};
+use crate::studio::number::format_digits;
 use crate::studio::wording;
 
 /// How the search stands, in one line.
-pub(super) fn standing(run: &Formation, pending: Option<Standing>) -> String {
-    let Some(task) = &run.subject.task else { return volume(run) };
+pub(super) fn status_text(run: &GrinRun, pending: Option<RunStatus>) -> String {
+    let Some(task) = &run.document.task else { return volume_text(run) };
     let Some(progress) = &run.progress else {
         let levels: Vec<String> = task.levels.iter().map(|level| level.nodes.to_string()).collect();
         let steps: usize = task.levels.iter().map(|level| level.steps).sum();
@@ -18,38 +20,38 @@ pub(super) fn standing(run: &Formation, pending: Option<Standing>) -> String {
     };
     format!(
         "{}: step {} of {}, level {} of {} ({} nodes), loss {}{}",
-        wording::standing(run.standing, pending),
+        wording::status_text(run.status, pending),
         progress.step,
-        progress.most,
+        progress.max_steps,
         progress.level + 1,
         task.levels.len(),
         progress.nodes,
-        small(progress.best),
-        unit(run),
+        format_small(progress.best),
+        loss_unit(run),
     )
 }
 
-fn volume(run: &Formation) -> String {
-    let Medium::Trilinear(field) = &*run.medium else { return "A volume".to_owned() };
+fn volume_text(run: &GrinRun) -> String {
+    let GrinField::Trilinear(field) = &*run.field else { return "A volume".to_owned() };
     let [x, y, z] = field.grid().counts();
     let h = field.grid().spacing();
-    let spacing = [h.x, h.y, h.z].map(|h| show_digits(h, 4)).join(" × ");
+    let spacing = [h.x, h.y, h.z].map(|h| format_digits(h, 4)).join(" × ");
     format!("A volume of {x} × {y} × {z} nodes, {spacing} mm apart; there is nothing to optimize")
 }
 
 /// The unit of the loss: a mean square of lengths, unless an image counts.
-fn unit(run: &Formation) -> &'static str {
-    let task = run.subject.task.as_ref();
+fn loss_unit(run: &GrinRun) -> &'static str {
+    let task = run.document.task.as_ref();
     let counted = task.into_iter().flat_map(|task| &task.views).filter(|view| view.weight > 0.0);
-    let is_length = |goal: &Goal| !goal.is_image();
+    let is_length = |goal: &LightGoal| !goal.is_image();
     if counted.into_iter().all(|view| is_length(&view.goal)) { " mm²" } else { "" }
 }
 
 /// The numbers of all light.
-pub(super) fn light(ui: &mut Ui, view: &View, run: &Formation) {
-    let sighting = view.forming.sighting.as_deref();
+pub(super) fn light_page(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
+    let sighting = view.grin.analysis.as_deref();
     match sighting {
-        Some(Ok(sighting)) => views(ui, run, sighting),
+        Some(Ok(sighting)) => view_rows(ui, run, sighting),
         Some(Err(why)) => {
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
@@ -58,7 +60,7 @@ pub(super) fn light(ui: &mut Ui, view: &View, run: &Formation) {
         }
     }
     ui.add_space(4.0);
-    let slice = view.forming.slice.as_deref().and_then(|slice| slice.as_ref().ok());
+    let slice = view.grin.slice.as_deref().and_then(|slice| slice.as_ref().ok());
     if let Some(difference) = slice.and_then(|slice| slice.difference) {
         row(
             ui,
@@ -72,10 +74,10 @@ pub(super) fn light(ui: &mut Ui, view: &View, run: &Formation) {
             alone: its level is held by the boundary only",
         );
     }
-    search(ui, run);
+    cost_rows(ui, run);
     if let Some(Slice { ms: [raster, rays, exact], .. }) = slice {
-        let exact = if run.subject.has_exact() {
-            format!(", exact field {}", show_digits(*exact, 2))
+        let exact = if run.document.has_reference() {
+            format!(", exact field {}", format_digits(*exact, 2))
         } else {
             String::new()
         };
@@ -89,7 +91,7 @@ pub(super) fn light(ui: &mut Ui, view: &View, run: &Formation) {
 }
 
 /// What the search has cost.
-fn search(ui: &mut Ui, run: &Formation) {
+fn cost_rows(ui: &mut Ui, run: &GrinRun) {
     let Some(progress) = &run.progress else { return };
     if run.rays > 0 {
         let each = 1e6 * run.seconds / run.rays as f64;
@@ -98,9 +100,9 @@ fn search(ui: &mut Ui, run: &Formation) {
             "Search",
             &format!(
                 "{} rays and back in {:.1} s, {} µs a ray with all else",
-                count(run.rays),
+                count_text(run.rays),
                 run.seconds,
-                show_digits(each, 3)
+                format_digits(each, 3)
             ),
             "Rays traced for the loss and its gradient; the time of all steps, pauses apart",
         );
@@ -110,27 +112,27 @@ fn search(ui: &mut Ui, run: &Formation) {
         row(
             ui,
             "Last step",
-            &format!("{total} rays, {}", reasons(progress.counts)),
+            &format!("{total} rays, {}", exclusions_text(progress.counts)),
             "What became of the rays of the last step",
         );
     }
 }
 
 /// Every view: what its light does, how well that is known.
-fn views(ui: &mut Ui, run: &Formation, sighting: &Sighting) {
-    let names = run.subject.task.iter().flat_map(|task| &task.views);
+fn view_rows(ui: &mut Ui, run: &GrinRun, sighting: &GrinAnalysis) {
+    let names = run.document.task.iter().flat_map(|task| &task.views);
     for (view, seen) in names.zip(&sighting.views.value) {
         ui.horizontal_wrapped(|ui| {
             ui.strong(&view.name);
-            ui.label(worth(seen));
+            ui.label(result_text(seen));
             if view.weight == 0.0 {
                 ui.weak("only looked at");
             }
         });
         let counts = seen.result.counts;
-        let text = format!("{} rays, {}", counts.fates.total(), reasons(counts));
+        let text = format!("{} rays, {}", counts.fates.total(), exclusions_text(counts));
         ui.label(RichText::new(text).small());
-        ui.add(Label::new(RichText::new(tracing(seen)).small().weak()).wrap());
+        ui.add(Label::new(RichText::new(tracing_text(seen)).small().weak()).wrap());
         ui.add_space(3.0);
     }
     let text = format!("All light in {:.0} ms", sighting.views.ms);
@@ -140,20 +142,20 @@ fn views(ui: &mut Ui, run: &Formation, sighting: &Sighting) {
 }
 
 /// Spot or quality of a view.
-fn worth(seen: &Seen) -> String {
-    match seen.result.quality {
+fn result_text(seen: &ViewReport) -> String {
+    match seen.result.psnr {
         Some(quality) => format!("image {quality:.1} dB PSNR"),
         None if seen.result.spot.is_finite() => {
-            format!("RMS miss {} mm", small(seen.result.spot))
+            format!("RMS miss {} mm", format_small(seen.result.spot))
         }
         None => "no ray counts".to_owned(),
     }
 }
 
 /// How the rays of a view are traced, and how good that is.
-fn tracing(seen: &Seen) -> String {
+fn tracing_text(seen: &ViewReport) -> String {
     let how = seen.integrator.name().replace('_', " ");
-    let how = format!("{how}, step {} mm", small(seen.step));
+    let how = format!("{how}, step {} mm", format_small(seen.step));
     match seen.error {
         Some(error) => {
             format!("{how}; halving it moves {} exits by at most {error:.1e} mm", seen.sample)
@@ -163,14 +165,18 @@ fn tracing(seen: &Seen) -> String {
 }
 
 /// A view's image in one line.
-pub(super) fn image(name: &str, seen: &Seen) -> String {
+pub(super) fn image_text(name: &str, seen: &ViewReport) -> String {
     let counts = seen.result.counts;
-    let quality = seen.result.quality.unwrap_or(f64::NAN);
-    format!("{name}: {quality:.1} dB PSNR, {} rays, {}", counts.fates.total(), reasons(counts))
+    let quality = seen.result.psnr.unwrap_or(f64::NAN);
+    format!(
+        "{name}: {quality:.1} dB PSNR, {} rays, {}",
+        counts.fates.total(),
+        exclusions_text(counts)
+    )
 }
 
 /// Rays that do not count, by reason.
-fn reasons(counts: Counts) -> String {
+fn exclusions_text(counts: RayCounts) -> String {
     let reasons: Vec<String> =
         counts.excluded().map(|(reason, count)| format!("{count} {}", plain(reason))).collect();
     if reasons.is_empty() {
@@ -186,7 +192,7 @@ fn plain(reason: &str) -> String {
 }
 
 /// A large count in groups.
-fn count(number: u64) -> String {
+fn count_text(number: u64) -> String {
     if number < 100_000 { number.to_string() } else { format!("{:.2} M", 1e-6 * number as f64) }
 }
 
@@ -198,50 +204,50 @@ fn row(ui: &mut Ui, name: &str, text: &str, hint: &str) {
 }
 
 /// The losses in one line.
-pub(super) fn losses(run: &Formation) -> String {
+pub(super) fn losses_text(run: &GrinRun) -> String {
     let Some(progress) = &run.progress else { return String::new() };
-    let digits = |loss: f64| if loss.is_finite() { small(loss) } else { "-".to_owned() };
+    let digits = |loss: f64| if loss.is_finite() { format_small(loss) } else { "-".to_owned() };
     format!(
         "Loss {}{} in the last step, {} the best",
         digits(progress.loss),
-        unit(run),
+        loss_unit(run),
         digits(progress.best)
     )
 }
 
 /// What a profile shows.
-pub(super) fn profile(slice: &Slice) -> String {
-    let plane = slice.sight.plane;
+pub(super) fn profile_text(slice: &Slice) -> String {
+    let plane = slice.settings.plane;
     if slice.profile.along == "r" {
         return "Index along the radius".to_owned();
     }
     let [across, above] = plane.axis.across();
-    let middle = slice.subject.middle(above);
+    let middle = slice.document.middle(above);
     format!(
         "Index along {}, at {} = {} mm and {} = {} mm",
         across.name(),
         plane.axis.name(),
-        show_digits(plane.depth, 4),
+        format_digits(plane.depth, 4),
         above.name(),
-        show_digits(middle, 4)
+        format_digits(middle, 4)
     )
 }
 
 /// What a slice is called.
-pub(super) fn label(slice: &Slice) -> String {
-    let plane = slice.sight.plane;
-    let (name, depth) = (plane.axis.name(), show_digits(plane.depth, 4));
+pub(super) fn slice_name(slice: &Slice) -> String {
+    let plane = slice.settings.plane;
+    let (name, depth) = (plane.axis.name(), format_digits(plane.depth, 4));
     format!(
         "Slice of {} at {name} = {depth} mm: {}",
-        slice.subject.name,
-        slice.sight.quantity.name()
+        slice.document.name,
+        slice.settings.quantity.name()
     )
 }
 
 /// What the colours mean.
-pub(super) fn scale(slice: &Slice) -> String {
-    let [low, high] = slice.range.map(|value| show_digits(value, 5));
-    let name = slice.sight.quantity.name();
+pub(super) fn color_scale_text(slice: &Slice) -> String {
+    let [low, high] = slice.range.map(|value| format_digits(value, 5));
+    let name = slice.settings.quantity.name();
     if slice.range[0] < slice.range[1] {
         format!("Colours: {name}, {low} to {high} in the whole field")
     } else {
@@ -250,34 +256,34 @@ pub(super) fn scale(slice: &Slice) -> String {
 }
 
 /// What is shown, and the distance of its contours.
-pub(super) fn shown(slice: &Slice) -> String {
-    let quantity = slice.sight.quantity.name();
-    let [right, up] = slice.axes().map(Axis::name);
+pub(super) fn slice_text(slice: &Slice) -> String {
+    let quantity = slice.settings.quantity.name();
+    let [right, up] = slice.axes().map(SpatialAxis::name);
     let contours = if slice.contours.is_empty() {
         "no contours".to_owned()
     } else {
-        format!("contours {} apart", show_digits(slice.spacing, 2))
+        format!("contours {} apart", format_digits(slice.spacing, 2))
     };
     format!("{quantity}; {contours}; {right} right, {up} up")
 }
 
 /// The rays of a view that are drawn.
-pub(super) fn rays(name: &str, ways: &Ways) -> String {
-    format!("{name}: {}", several(ways.ways.len(), "ray"))
+pub(super) fn rays_text(name: &str, ways: &RayPaths) -> String {
+    format!("{name}: {}", counted(ways.paths.len(), "ray"))
 }
 
 /// How near they are to the slice.
-pub(super) fn off(ways: &Ways) -> String {
+pub(super) fn distance_text(ways: &RayPaths) -> String {
     format!(
         "Projected onto the slice: were they straight, they would stay within {} mm of it",
-        show_digits(ways.off, 2)
+        format_digits(ways.distance, 2)
     )
 }
 
 /// Those of them that do not count, by reason.
-pub(super) fn left_out(ways: &Ways) -> Option<String> {
+pub(super) fn excluded_text(ways: &RayPaths) -> Option<String> {
     let mut reasons: Vec<(&str, usize)> = Vec::new();
-    for reason in ways.ways.iter().filter_map(Way::excluded) {
+    for reason in ways.paths.iter().filter_map(RayPath::excluded) {
         match reasons.iter_mut().find(|(known, _)| *known == reason) {
             Some((_, count)) => *count += 1,
             None => reasons.push((reason, 1)),
@@ -289,28 +295,28 @@ pub(super) fn left_out(ways: &Ways) -> Option<String> {
 }
 
 /// Place and field at a point.
-pub(super) fn probe(subject: &Subject, medium: &Medium, point: Vec3<f64>) -> String {
-    let place = [point.x, point.y, point.z].map(|v| show_digits(v, 4));
+pub(super) fn probe_text(subject: &GrinDocument, medium: &GrinField, point: Vec3<f64>) -> String {
+    let place = [point.x, point.y, point.z].map(|v| format_digits(v, 4));
     let place = format!("x {}  y {}  z {} mm", place[0], place[1], place[2]);
     if !subject.contains(point) {
         return format!("{place}\noutside of the field");
     }
     let sample = medium.field().sample(point);
     let g = sample.gradient;
-    let slope = show_digits(g.dot(g).sqrt(), 4);
-    let parts = [g.x, g.y, g.z].map(|part| show_digits(part, 3)).join(", ");
+    let slope = format_digits(g.dot(g).sqrt(), 4);
+    let parts = [g.x, g.y, g.z].map(|part| format_digits(part, 3)).join(", ");
     format!("{place}\nindex {:.6}\nslope {slope} /mm ({parts})", sample.index)
 }
 
 /// The place that was clicked, live while the field forms.
-pub(super) fn pinned(ui: &mut Ui, run: &Formation, pinned: &mut Option<Vec3<f64>>) {
+pub(super) fn pinned_line(ui: &mut Ui, run: &GrinRun, pinned: &mut Option<Vec3<f64>>) {
     ui.horizontal(|ui| {
         let Some(point) = *pinned else {
             let hint = "The pointer reads the field; a click pins a place, to watch it there";
             ui.label(RichText::new(hint).small().weak());
             return;
         };
-        let text = probe(&run.subject, &run.medium, point).replace('\n', "   ");
+        let text = probe_text(&run.document, &run.field, point).replace('\n', "   ");
         if ui.small_button("Unpin").clicked() {
             *pinned = None;
         }
@@ -319,11 +325,15 @@ pub(super) fn pinned(ui: &mut Ui, run: &Formation, pinned: &mut Option<Vec3<f64>
 }
 
 /// A number that may be very small.
-fn small(value: f64) -> String {
-    if value != 0.0 && value.abs() < 1e-3 { format!("{value:.2e}") } else { show_digits(value, 3) }
+fn format_small(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 {
+        format!("{value:.2e}")
+    } else {
+        format_digits(value, 3)
+    }
 }
 
 /// So many of something.
-fn several(count: usize, what: &str) -> String {
+fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
