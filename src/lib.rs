@@ -18,6 +18,9 @@
 // Numbers without optics: the number types, vectors, roots, quadrature, samplers.
 pub mod math;
 
+// Optimisers as pure numerics: Adam, L-BFGS, Levenberg-Marquardt, conjugate gradients.
+pub mod solve;
+
 // Light in one gradient-index field: fields, ray integrators, their discrete adjoint; knows no lens.
 pub mod grin;
 

@@ -15,7 +15,6 @@
 //! Lengths are in the unit of the field (mm for a lens), `v` has no unit, σ is a length.
 
 mod adjoint;
-mod descent;
 mod exit;
 mod fate;
 pub mod field;
@@ -29,7 +28,6 @@ mod tape;
 mod tracer;
 
 pub use adjoint::RayAdjoint;
-pub use descent::{Adam, Lbfgs, LbfgsStep, ParameterBounds};
 pub use exit::RayExit;
 pub use fate::{GrinFate, GrinFateCounts};
 pub use field::IndexField;

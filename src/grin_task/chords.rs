@@ -8,7 +8,6 @@
 //! idea of Atcheson et al. (ACM TOG 27, 2008), who solve for the three parts of `∇η` one by one and
 //! integrate them: [`StraightRays::reconstruct_by_gradients`].
 
-use super::cgls::cgls;
 use super::check::GrinTaskError;
 use super::measured::measure_targets;
 use super::medium::GrinField;
@@ -18,8 +17,9 @@ use super::source::RaySet;
 use super::space::length;
 use super::task::{GrinTask, InitialField};
 use crate::grin::field::{RegularGrid, Trilinear};
-use crate::grin::{GrinTracer, IndexField, ParameterBounds};
+use crate::grin::{GrinTracer, IndexField};
 use crate::math::Vec3;
+use crate::solve::{ParameterBounds, cgls};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 

@@ -2,11 +2,10 @@
 
 use super::check::GrinTaskError;
 use super::hold::FieldPenalties;
-use super::least_squares::{LevenbergMarquardt, ResidualRows};
 use super::medium::GrinField;
 use super::scene::{LossEvaluation, RayCounts, ViewRays, evaluate, evaluate_rows};
 use super::task::GrinMethod;
-use crate::grin::{Adam, Lbfgs, ParameterBounds};
+use crate::solve::{Adam, Lbfgs, LevenbergMarquardt, ParameterBounds, ResidualRows};
 
 /// Adam's rate falls to this part over the second half of a level.
 const ANNEALED: f64 = 0.1;
@@ -94,16 +93,12 @@ impl FieldSolver {
             Self::Lbfgs(lbfgs) => step_lbfgs(lbfgs, parameters, problem),
             Self::LeastSquares(squares) => {
                 let mut evaluations = 0;
-                let (loss, settled) = squares.step(parameters, limits, |p| {
+                let step = squares.step(parameters, limits, |p| {
                     evaluations += 1;
                     problem.rows(p)
                 })?;
-                Ok(SolverStep {
-                    loss,
-                    counts: RayCounts::default(),
-                    evaluations,
-                    converged: settled,
-                })
+                let counts = RayCounts::default();
+                Ok(SolverStep { loss: step.value, counts, evaluations, converged: step.converged })
             }
         }
     }

@@ -10,7 +10,6 @@
 //! whose equation numbers are given.
 
 mod builtin;
-mod cgls;
 mod check;
 mod chords;
 mod climb;
@@ -21,7 +20,6 @@ mod given;
 mod hold;
 mod image;
 mod kept;
-mod least_squares;
 mod likeness;
 mod measured;
 mod medium;

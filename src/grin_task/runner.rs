@@ -9,7 +9,8 @@ use super::scene::{RayCounts, ViewRays, ViewResult, plan_views, resample_views, 
 use super::source::RaySet;
 use super::task::{GrinTask, InitialField};
 use crate::grin::field::HessianDiagonal;
-use crate::grin::{GrinSetup, Integrator, ParameterBounds};
+use crate::grin::{GrinSetup, Integrator};
+use crate::solve::ParameterBounds;
 
 /// Steps between two looks at how rays are traced, once the field has taken shape.
 const REPLAN_INTERVAL: usize = 16;

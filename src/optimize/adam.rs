@@ -10,11 +10,9 @@ use super::state::OptimizerState;
 use super::{OptimizationProgress, Optimizer};
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError, TermValue};
-use serde::{Deserialize, Serialize};
+use crate::solve::AdamMoments;
 use std::f64::consts::PI;
 
-/// Decay of the mean gradient and of the mean square.
-const DECAY: [f64; 2] = [0.9, 0.999];
 /// The first rate, in scaled variables.
 const RATE: f64 = 0.1;
 /// Below this the search has ended.
@@ -33,40 +31,6 @@ pub(super) enum LearningRate {
     ReduceOnPlateau,
     /// As a cosine, to zero after so many steps.
     CosineAnnealing(usize),
-}
-
-/// The running means of a gradient in scaled variables and of its square.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct AdamMoments {
-    mean: Vec<f64>,
-    square: Vec<f64>,
-    /// Gradients that they have seen.
-    age: i32,
-}
-
-impl AdamMoments {
-    /// Takes a gradient in; the step that follows, in scaled variables. None is taken through a
-    /// bound at which a variable is held.
-    pub(super) fn step(&mut self, gradient: &[f64], state: &OptimizerState, rate: f64) -> Vec<f64> {
-        if self.mean.len() != gradient.len() {
-            *self = Self::default();
-            self.mean.resize(gradient.len(), 0.0);
-            self.square.resize(gradient.len(), 0.0);
-        }
-        self.age = self.age.saturating_add(1);
-        let [b1, b2] = DECAY;
-        let (c1, c2) = (1.0 - b1.powi(self.age), 1.0 - b2.powi(self.age));
-        let held = state.at_bounds(gradient);
-        let step = |i: usize| {
-            let g = gradient[i] * state.scales[i];
-            self.mean[i] = b1 * self.mean[i] + (1.0 - b1) * g;
-            self.square[i] = b2 * self.square[i] + (1.0 - b2) * g * g;
-            let size = (self.square[i] / c2).sqrt();
-            if held[i] || size == 0.0 { 0.0 } else { -rate * (self.mean[i] / c1) / size }
-        };
-        (0..gradient.len()).map(step).collect()
-    }
 }
 
 #[derive(Debug)]
@@ -98,7 +62,7 @@ impl AdamOptimizer {
 
     /// The step in scaled variables.
     fn direction(&mut self) -> Vec<f64> {
-        self.moments.step(&self.gradient, &self.state, self.rate)
+        self.state.adam_step(&mut self.moments, &self.gradient, self.rate)
     }
 
     /// Back to the best lens with half of the rate and fresh moments.

@@ -8,15 +8,9 @@ use super::state::OptimizerState;
 use super::{OptimizationProgress, Optimizer};
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
-use nalgebra::{DMatrix, DVector};
+use crate::solve::{Damping, NielsenDamping, damped_step, predicted_decrease};
+use nalgebra::DVector;
 
-/// The first damping.
-const DAMPING: f64 = 1e-3;
-/// How much more a step is damped after the first one that was no good; twice as much each time.
-const GROWTH: f64 = 2.0;
-const LEAST_DAMPING: f64 = 1e-12;
-/// Above this no step is worth taking.
-const MOST_DAMPING: f64 = 1e10;
 /// Relative improvement below which a step counts as none.
 const SMALLEST_GAIN: f64 = 1e-10;
 /// Relative improvement below which a step hardly gains anything.
@@ -28,8 +22,7 @@ const PATIENCE: usize = 3;
 pub(super) struct LeastSquaresOptimizer {
     state: OptimizerState,
     sum: SumOfSquares,
-    damping: f64,
-    growth: f64,
+    damping: NielsenDamping,
     idle: usize,
     /// When this often the merit was taken, no other damping is tried.
     max_evaluations: usize,
@@ -41,19 +34,19 @@ impl LeastSquaresOptimizer {
         Ok(Self::resume(state, sum, None))
     }
 
-    /// A search that goes on with the damping, and its growth, of one before.
+    /// A search that continues with the damping of a previous one.
     pub(super) fn resume(
         state: OptimizerState,
         sum: SumOfSquares,
-        damping: Option<[f64; 2]>,
+        damping: Option<NielsenDamping>,
     ) -> Self {
-        let [damping, growth] = damping.unwrap_or([DAMPING, GROWTH]);
-        Self { state, sum, damping, growth, idle: 0, max_evaluations: usize::MAX }
+        let damping = damping.unwrap_or_default();
+        Self { state, sum, damping, idle: 0, max_evaluations: usize::MAX }
     }
 
-    /// The damping, and how fast it grows.
-    pub(super) fn damping(&self) -> [f64; 2] {
-        [self.damping, self.growth]
+    /// The damping of the next step.
+    pub(super) fn damping(&self) -> NielsenDamping {
+        self.damping
     }
 
     /// Where it stands.
@@ -77,43 +70,21 @@ impl LeastSquaresOptimizer {
         }
     }
 
-    /// The damped step in scaled variables, and the reduction of the merit that it promises.
+    /// The damped step in scaled variables, and the decrease of the merit that it promises.
     fn proposal(&self) -> Option<(Vec<f64>, f64)> {
         let scales = DVector::from_column_slice(&self.state.scales);
-        let gradient: Vec<f64> = self.sum.gradient.iter().copied().collect();
-        let held = self.state.at_bounds(&gradient);
-        let half = self.sum.gradient.component_mul(&scales) * 0.5;
-        let mut matrix = &self.sum.normal * 1.0;
-        let mut right = -&half;
-        let largest =
-            (0..scales.len()).map(|i| matrix[(i, i)] * scales[i].powi(2)).fold(0.0, f64::max);
-        scale(&mut matrix, &scales);
+        let active = self.state.at_bounds(self.sum.gradient.as_slice());
+        let half_gradient = self.sum.gradient.component_mul(&scales) * 0.5;
+        let mut normal = self.sum.normal.clone();
         for i in 0..scales.len() {
-            if held[i] {
-                matrix.row_mut(i).fill(0.0);
-                matrix.column_mut(i).fill(0.0);
-                matrix[(i, i)] = 1.0;
-                right[i] = 0.0;
-            } else {
-                let floor = 1e-9 * largest;
-                matrix[(i, i)] += self.damping * matrix[(i, i)].max(floor) + f64::MIN_POSITIVE;
+            for j in 0..scales.len() {
+                normal[(i, j)] *= scales[i] * scales[j];
             }
         }
-        let step = matrix.cholesky()?.solve(&right);
-        let promised =
-            -(2.0 * half.dot(&step) + step.dot(&(scaled(&self.sum.normal, &scales) * &step)));
-        Some((step.iter().copied().collect(), promised))
-    }
-
-    fn lower_damping(&mut self, gain: f64) {
-        self.damping =
-            (self.damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 5.0)).max(LEAST_DAMPING);
-        self.growth = GROWTH;
-    }
-
-    fn raise_damping(&mut self) {
-        self.damping *= self.growth;
-        self.growth *= 2.0;
+        let damping = Damping::Marquardt(self.damping.damping);
+        let step = damped_step(&normal, &half_gradient, &active, damping)?;
+        let promised = predicted_decrease(&normal, &half_gradient, &step);
+        Some((step.as_slice().to_vec(), promised))
     }
 
     fn differentiate(&mut self) {
@@ -126,12 +97,12 @@ impl LeastSquaresOptimizer {
     pub(super) fn descend(&mut self) -> f64 {
         let before = self.state.value;
         let mut first = None;
-        while self.damping < MOST_DAMPING {
+        while !self.damping.is_exhausted() {
             if self.state.evaluations >= self.max_evaluations {
                 return 0.0;
             }
             let Some((step, promised)) = self.proposal() else {
-                self.raise_damping();
+                self.damping.raise();
                 continue;
             };
             let length = step.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -142,31 +113,16 @@ impl LeastSquaresOptimizer {
                 self.sum = sum;
                 let gain = (before - self.state.value) / promised.max(f64::MIN_POSITIVE);
                 if accepted < 1.0 {
-                    self.raise_damping();
+                    self.damping.raise();
                 } else {
-                    self.lower_damping(gain.min(1.0));
+                    self.damping.lower(gain.min(1.0));
                 }
                 return if asked > 0.0 { accepted * length / asked } else { 1.0 };
             }
-            self.raise_damping();
+            self.damping.raise();
         }
-        (self.damping, self.growth) = (DAMPING, GROWTH);
+        self.damping = NielsenDamping::default();
         0.0
-    }
-}
-
-/// `S A S` for a diagonal S.
-fn scaled(matrix: &DMatrix<f64>, scales: &DVector<f64>) -> DMatrix<f64> {
-    let mut copy = matrix.clone();
-    scale(&mut copy, scales);
-    copy
-}
-
-fn scale(matrix: &mut DMatrix<f64>, scales: &DVector<f64>) {
-    for i in 0..scales.len() {
-        for j in 0..scales.len() {
-            matrix[(i, j)] *= scales[i] * scales[j];
-        }
     }
 }
 

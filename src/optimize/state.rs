@@ -4,6 +4,7 @@
 use super::OptimizationProgress;
 use crate::lens::{ASPHERE_TERMS, Lens, Medium, Quantity, RADIAL_TERMS, Variable};
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
+use crate::solve::AdamMoments;
 
 /// How often a step is halved before it is given up.
 const MAX_HALVINGS: usize = 12;
@@ -232,6 +233,21 @@ impl OptimizerState {
             down || up
         };
         (0..self.values.len()).map(held).collect()
+    }
+
+    /// The step of Adam in scaled variables, zero for variables at an active bound; updates the
+    /// moments with the gradient.
+    pub(super) fn adam_step(
+        &self,
+        moments: &mut AdamMoments,
+        gradient: &[f64],
+        rate: f64,
+    ) -> Vec<f64> {
+        let scaled: Vec<f64> = gradient.iter().zip(&self.scales).map(|(g, s)| g * s).collect();
+        let mut step = moments.step(&scaled, rate);
+        let active = self.at_bounds(gradient);
+        step.iter_mut().zip(active).filter(|(_, active)| *active).for_each(|(s, _)| *s = 0.0);
+        step
     }
 
     /// The terms of the best lens, by its own rays.

@@ -3,11 +3,11 @@
 //! and taken up again without a trace.
 
 use super::DescentMethod;
-use super::adam::AdamMoments;
 use super::least_squares::LeastSquaresOptimizer;
 use super::state::OptimizerState;
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError};
+use crate::solve::{AdamMoments, NielsenDamping};
 use serde::{Deserialize, Serialize};
 
 /// How a stretch goes.
@@ -30,7 +30,7 @@ pub struct DescentState {
     /// The part of its first rate that Adam has.
     pace: Option<f64>,
     /// The damping of least squares, and how fast it grows.
-    damping: Option<[f64; 2]>,
+    damping: Option<NielsenDamping>,
     /// Steps so far.
     pub steps: usize,
 }
@@ -115,7 +115,7 @@ fn adam(
     let mut gradient = gradient.to_vec();
     for _ in 0..asked.steps {
         let rate = asked.rate * memory.pace.unwrap_or(1.0);
-        let step = memory.moments.step(&gradient, &state, rate);
+        let step = state.adam_step(&mut memory.moments, &gradient, rate);
         let (_, sum) = state.advance(&step, DerivativeLevel::Gradient, |_| true);
         let Some(sum) = sum else {
             memory.restart_slower();

@@ -3,9 +3,10 @@
 use super::{until, vec3};
 use aplanat::grin::field::{BSpline, ProfileField, ProfileFunction};
 use aplanat::grin::{
-    Adam, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField, Integrator, LastStep, LaunchMode,
-    Lbfgs, ParameterBounds, RayAdjoint,
+    GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField, Integrator, LastStep, LaunchMode,
+    RayAdjoint,
 };
+use aplanat::solve::{Adam, Lbfgs, ParameterBounds};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::FRAC_PI_2;
 

@@ -1,0 +1,24 @@
+//! Optimisers as pure numerics, each once: for lenses and fields alike.
+//!
+//! None of them knows what its numbers mean. Each takes one step at a time, so that the caller owns
+//! the loop, and none reads a clock or draws random numbers.
+
+mod adam;
+mod bounds;
+mod cgls;
+mod lbfgs;
+mod levenberg_marquardt;
+
+pub use adam::{Adam, AdamMoments};
+pub use bounds::ParameterBounds;
+pub use cgls::cgls;
+pub use lbfgs::{Lbfgs, LbfgsStep};
+pub use levenberg_marquardt::{
+    Damping, LevenbergMarquardt, LevenbergMarquardtStep, NielsenDamping, ResidualRows, damped_step,
+    predicted_decrease,
+};
+
+/// The scalar product.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
