@@ -14,7 +14,7 @@ use super::{
     ProgressFn, TableCell, report_progress,
 };
 use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign, gray_level};
-use crate::search::clocks::{CompetingClocks, Regeneration, RegenerationRate};
+use crate::search::competing_clocks::{CompetingClocks, Regeneration, RegenerationRate};
 use crate::search::toy::ToyLandscape;
 use crate::search::{Landscape as _, Random, Temperature};
 use rand::SeedableRng as _;

@@ -7,7 +7,7 @@
 use super::clock::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::MeritError;
-use crate::search::lens::{LensLandscape, SearchPlan, SearchSetupError};
+use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
 use crate::search::{SearchError, SearchMethod, SearchRun, SearchSettings};
 use serde::Serialize;
 

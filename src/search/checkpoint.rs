@@ -1,4 +1,4 @@
-//! A run as a file, so that it goes on later as if it had never ended: bit for bit.
+//! Checkpoints: a run as a file, which resumes later bit for bit as if it had not been interrupted.
 
 use super::{Landscape, SearchError, SearchMethod, SearchPoint, SearchRun, SearchSettings};
 use crate::files;
@@ -8,15 +8,15 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// The version of the file; another one is not read.
+/// The version of the file format.
 const VERSION: u32 = 1;
 
-/// The field of [`Landscape::fingerprint`] that says where a search begins, if there is one.
+/// The field of [`Landscape::fingerprint`] that holds the start of the search, if there is one.
 const START: &str = "start";
-/// No more characters of a value that differs are shown.
+/// The maximum number of characters of a value in a message.
 const SHOWN: usize = 60;
 
-/// What every version of the file begins with.
+/// The header that all versions of the file share.
 #[derive(Deserialize)]
 struct CheckpointHeader {
     aplanat_search: u32,
@@ -38,16 +38,16 @@ struct StoredCheckpoint<R> {
     _version: u32,
     landscape: Value,
     run: R,
-    /// What whoever saved it keeps there for himself.
+    /// Data of the program that saved it.
     #[serde(default, rename = "beside")]
     _beside: Value,
 }
 
 impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
-    /// Saves the run; where that fails, what was there before is untouched.
+    /// Saves the run; on failure an existing file is left untouched.
     ///
     /// # Errors
-    /// The system refuses the file, or the run would not read back as it is.
+    /// The file cannot be written, or the run would not read back unchanged.
     pub fn save<L>(&self, landscape: &L, path: &Path) -> Result<(), SearchError>
     where
         L: Landscape<Point = P, Memory = M>,
@@ -55,7 +55,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         self.save_with_sidecar(landscape, path, &Value::Null)
     }
 
-    /// The same with something beside the run, under the name `beside`, on which it does not depend.
+    /// Saves the run together with other data under the key `beside`, on which the run does not
+    /// depend.
     ///
     /// # Errors
     /// As those of [`SearchRun::save`].
@@ -82,13 +83,13 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         Ok(files::write_atomic(path, &bytes)?)
     }
 
-    /// A run that goes on where it was saved, on the same landscape by the same settings; only its
-    /// ends, [`SearchSettings::moves`] and [`SearchSettings::gradients`], may be others, except for brute
-    /// force, which has divided them.
+    /// Loads a run, which continues where it was saved, on the same landscape and with the same
+    /// settings. Only the limits [`SearchSettings::moves`] and [`SearchSettings::gradients`] may
+    /// differ, except for brute force, which has already divided its gradients.
     ///
     /// # Errors
-    /// The file cannot be read, is damaged, of another version, or of another search: the first
-    /// thing that differs is named.
+    /// The file cannot be read, is damaged, has an unknown version, or belongs to another search;
+    /// the first difference is named.
     pub fn load<L>(
         landscape: &L,
         settings: &SearchSettings,
@@ -112,7 +113,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
         read.run.check_consistency().map_err(corrupt)?;
         let about = landscape.fingerprint();
-        // What a search begins with is the first thing to compare: much else follows from it.
+        // The start is compared first: much else follows from it.
         let (start, own_start) = (&read.landscape[START], &about[START]);
         if let Some((name, found, expected)) = first_difference("landscape.start", start, own_start)
         {
@@ -131,7 +132,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         Ok(read.run)
     }
 
-    /// What a file that can be read may still get wrong.
+    /// Checks the consistency of a run that was read.
     fn check_consistency(&self) -> Result<(), String> {
         self.settings.check().map_err(|error| error.to_string())?;
         let numbers = self.tree.nodes().iter().map(|node| node.number);
@@ -148,7 +149,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     }
 }
 
-/// The settings that a run cannot change any more.
+/// The settings that a resumed run may not change.
 fn fixed_settings(settings: &SearchSettings) -> Result<Value, SearchError> {
     let mut fixed = settings.clone();
     if fixed.method != SearchMethod::Brute {
@@ -161,8 +162,8 @@ fn fixed_settings(settings: &SearchSettings) -> Result<Value, SearchError> {
     serde_json::to_value(fixed).map_err(unwritable)
 }
 
-/// The first thing in which two values differ: its name, and what it is in each. Plain values are
-/// compared before lists, since they say it in fewer words.
+/// The first difference of two values: its path and both values. Scalars are compared before arrays
+/// and objects, since they give shorter messages.
 fn first_difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
@@ -188,7 +189,7 @@ fn is_nested(value: &Value) -> bool {
     value.is_object() || value.is_array()
 }
 
-/// A value in a few words.
+/// A value, abbreviated.
 fn abbreviate(value: &Value) -> String {
     if let Value::Array(entries) = value {
         return format!("a list of {}", entries.len());

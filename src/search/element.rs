@@ -1,32 +1,32 @@
-//! Glass rows seen as elements: singlets, cemented groups, mirrors, and what stands between them.
+//! Elements of a lens: singlets, cemented groups and mirrors.
 
 use crate::lens::{Lens, Medium};
 
-/// What an element is made of.
+/// The kind of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ElementKind {
-    /// This many pieces of glass, cemented where there are several, with air on both sides.
+    /// A number of pieces of glass with air on both sides; cemented if more than one.
     Glass(usize),
-    /// Pieces of glass that touch the object or the image, like the oil of a microscope or the cover
-    /// of a detector: mutations leave them alone.
+    /// Pieces of glass in contact with the object or the image, like immersion oil or the cover
+    /// glass of a detector; mutations leave them unchanged.
     Open(usize),
-    /// A mirror, with the glass that it is seen through: mutations leave it alone.
+    /// A mirror, with the pieces of glass in contact with it; mutations leave it unchanged.
     Mirror(usize),
 }
 
-/// Surfaces with nothing but glass between them.
+/// Consecutive surfaces with only glass between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Element {
-    /// What it is made of.
+    /// Its kind.
     pub kind: ElementKind,
-    /// Its first surface, counted from 0.
+    /// Its first surface, a row index from 0.
     pub first: usize,
     /// Its last surface.
     pub last: usize,
 }
 
 impl Element {
-    /// How many pieces of glass it has.
+    /// The number of its pieces of glass.
     pub fn pieces(&self) -> usize {
         match self.kind {
             ElementKind::Glass(pieces)
@@ -35,19 +35,19 @@ impl Element {
         }
     }
 
-    /// Whether it is a single piece of glass in air.
+    /// True if it is a single piece of glass in air.
     pub fn is_singlet(&self) -> bool {
         self.kind == ElementKind::Glass(1)
     }
 
-    /// Whether a surface belongs to it.
+    /// True if a surface belongs to it.
     pub fn contains(&self, surface: usize) -> bool {
         (self.first..=self.last).contains(&surface)
     }
 }
 
-/// Which gaps are glass, the space in front of the first surface first; behind a mirror stands what
-/// stood before it. An index of less than 1.05 is a kind of air.
+/// For each gap, beginning with the object space, true if it is filled with glass; a mirror keeps
+/// the medium in front of it. An index below 1.05 counts as air.
 pub(super) fn glass_gaps(lens: &Lens) -> Vec<bool> {
     let is_glass = |medium: &Medium, before: bool| match medium {
         Medium::Air => false,
@@ -62,13 +62,13 @@ pub(super) fn glass_gaps(lens: &Lens) -> Vec<bool> {
     gaps
 }
 
-/// Whether light runs towards −z in the gap behind a surface.
+/// True if light travels towards −z in the gap behind a surface.
 pub(super) fn is_backwards(lens: &Lens, surface: usize) -> bool {
     let mirrors = lens.surfaces[..=surface].iter().filter(|row| row.medium == Medium::Mirror);
     mirrors.count() % 2 == 1
 }
 
-/// The elements of a lens in the order of its rows; a stop in air is none.
+/// The elements of a lens in the order of its rows; a stop in air is not an element.
 pub fn elements(lens: &Lens) -> Vec<Element> {
     let gaps = glass_gaps(lens);
     let rows = lens.surfaces.len();
@@ -94,13 +94,14 @@ pub fn elements(lens: &Lens) -> Vec<Element> {
     found
 }
 
-/// How many pieces of glass a lens has.
+/// The number of pieces of glass of a lens.
 pub fn piece_count(lens: &Lens) -> usize {
     elements(lens).iter().map(Element::pieces).sum()
 }
 
-/// The pattern of glass and air: the pieces of each element, `stop` where it stands, `m` for a
-/// mirror, as `1|2|stop|2|1`. Signs and sizes of curvatures do not count, nor does which glass it is.
+/// The topology, the pattern of glass and air: the number of pieces of each element, `stop` at its
+/// position, `m` for a mirror, as in `1|2|stop|2|1`. Curvatures and the choice of glass do not
+/// matter.
 pub fn topology(lens: &Lens) -> String {
     let stop = lens.stop();
     let mut parts: Vec<String> = Vec::new();

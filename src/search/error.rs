@@ -1,64 +1,64 @@
-//! Why a search cannot begin, go on, be steered, saved or loaded.
+//! Errors of starting, steering, saving and loading a search.
 
 use crate::files::FileError;
 
-/// Why a search cannot begin, go on, be steered, saved or loaded.
+/// Errors of starting, steering, saving and loading a search.
 #[derive(Debug, thiserror::Error)]
 pub enum SearchError {
-    /// A setting makes no sense.
+    /// A setting is invalid.
     #[error("setting {name}: found {found}; expected {expected}")]
     Setting {
-        /// The setting.
+        /// The name of the setting.
         name: &'static str,
-        /// What it is.
+        /// Its value.
         found: String,
-        /// What it could be.
+        /// The valid values.
         expected: &'static str,
     },
-    /// The start is worth nothing.
+    /// The start has no finite loss.
     #[error("the search cannot begin: the loss of the start is {loss}; expected a number")]
     InvalidStart {
         /// Its loss.
         loss: f64,
     },
-    /// No such generation.
+    /// A generation that does not exist or is no longer remembered.
     #[error("generation {number} is not remembered, of {born} so far")]
     UnknownGeneration {
-        /// The number that was asked for.
+        /// The requested number.
         number: u64,
-        /// How many there have been.
+        /// The number of generations so far.
         born: u64,
     },
-    /// The system refuses a checkpoint.
+    /// The file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A checkpoint would not read back as it is.
+    /// A checkpoint would not read back unchanged.
     #[error("{file}: not saved, since it would not read back as it is: {what}")]
     RoundTripFailed {
         /// The file.
         file: String,
-        /// What would become of it.
+        /// The difference.
         what: String,
     },
-    /// What should be a checkpoint is none, or a damaged one.
+    /// The file is not a checkpoint, or is damaged.
     #[error("{file}: no sound checkpoint of a search: {what}")]
     Corrupt {
         /// The file.
         file: String,
-        /// What is wrong with it, and where.
+        /// The problem and its position.
         what: String,
     },
-    /// A checkpoint was written by another version.
+    /// A checkpoint of a version that this program cannot read.
     #[error("{file}: a checkpoint of version {found}; expected version {expected}")]
     UnsupportedVersion {
         /// The file.
         file: String,
         /// Its version.
         found: u32,
-        /// The version that can be read.
+        /// The newest version that can be read.
         expected: u32,
     },
-    /// A checkpoint belongs to a search from another start.
+    /// A checkpoint of a search from another start.
     #[error(
         "{file}: a checkpoint of another search, from another lens: {name} is {found} there and \
          {expected} here"
@@ -66,23 +66,23 @@ pub enum SearchError {
     OtherStart {
         /// The file.
         file: String,
-        /// What differs: the names on the way to it.
+        /// The path of the first field that differs.
         name: String,
-        /// What it is in the file.
+        /// Its value in the file.
         found: String,
-        /// What it is here.
+        /// Its value in this search.
         expected: String,
     },
-    /// A checkpoint belongs to another search.
+    /// A checkpoint of another search.
     #[error("{file}: a checkpoint of another search: {name} is {found} there and {expected} here")]
     OtherSearch {
         /// The file.
         file: String,
-        /// What differs: the names on the way to it.
+        /// The path of the first field that differs.
         name: String,
-        /// What it is in the file.
+        /// Its value in the file.
         found: String,
-        /// What it is here.
+        /// Its value in this search.
         expected: String,
     },
 }

@@ -1,13 +1,14 @@
-//! What a search walks through.
+//! The problem that a search explores.
 
 use super::{MutationError, MutationKind, MutationWeights, Random};
 use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
 
-/// What a landscape consists of: a lens, or the numbers of a toy problem.
+/// A point of a landscape: a lens, or the numbers of a toy problem.
 ///
-/// A checkpoint keeps it as JSON, which has no word for infinity: a type that can hold one writes
-/// it in another way. A checkpoint that would not read back as it was is refused when it is saved.
+/// Checkpoints store it as JSON, which cannot represent infinity: a type that can hold one
+/// serializes it in another way. A checkpoint that would not read back unchanged is refused on
+/// saving.
 pub trait SearchPoint:
     Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned
 {
@@ -15,26 +16,26 @@ pub trait SearchPoint:
 
 impl<T: Clone + PartialEq + Debug + Send + Sync + Serialize + DeserializeOwned> SearchPoint for T {}
 
-/// Points with a loss, a descent, mutations, and draws from anywhere.
+/// A search problem: points with a loss, local descent, mutations and random draws.
 ///
-/// Every method is a function of its arguments alone: that is what makes runs repeatable, on any
-/// number of threads. A loss that is not finite says that a point is worth nothing.
+/// Every method is a pure function of its arguments: that makes runs reproducible on any number of
+/// threads. A loss that is not finite marks a point without merit.
 pub trait Landscape: Sync {
-    /// A place in it.
+    /// A point.
     type Point: SearchPoint;
-    /// What a descent remembers from one move to the next, like the moments of Adam; the default
-    /// begins a new descent.
+    /// The state that a descent keeps between moves, like the moments of Adam; the default begins a
+    /// new descent.
     type Memory: SearchPoint + Default;
 
-    /// What a point is worth, less being better: (4.6); infinite where it is worth nothing.
+    /// The loss of a point (4.6), smaller being better; infinite for a point without merit.
     fn loss(&self, point: &Self::Point) -> f64;
 
-    /// One local move, of as many gradient steps as the landscape's settings say: (4.12). Returns
-    /// where it leads, its loss there, and how many gradients it took.
+    /// One local move of as many gradient steps as the landscape's settings say (4.12). Returns the
+    /// new point, its loss, and the number of gradients.
     fn descend(&self, point: &Self::Point, memory: &mut Self::Memory) -> (Self::Point, f64, usize);
 
-    /// A local move of no more than so many gradients, at least one: what is left of a budget. A
-    /// landscape whose moves are all as long takes a whole one.
+    /// A local move of at most `most` gradients, but at least one: the rest of a budget. A
+    /// landscape whose moves have a fixed length makes a whole one.
     fn descend_within(
         &self,
         point: &Self::Point,
@@ -44,11 +45,11 @@ pub trait Landscape: Sync {
         self.descend(point, memory)
     }
 
-    /// A point from anywhere: `p_global` of (4.14).
+    /// A random point: `p_global` of (4.14).
     fn draw(&self, random: &mut Random) -> Result<Self::Point, MutationError>;
 
-    /// A mutation of a point, of a kind drawn with these weights times those of the landscape's own
-    /// rules; a weight of 0 forbids a kind.
+    /// A mutation of a point. Its kind is drawn with these weights times those of the landscape's
+    /// own rules; weight 0 excludes a kind.
     fn mutate(
         &self,
         point: &Self::Point,
@@ -56,28 +57,29 @@ pub trait Landscape: Sync {
         random: &mut Random,
     ) -> Result<MutatedPoint<Self::Point>, MutationError>;
 
-    /// What two points of the same structure have in common: a reservoir may hold one of each.
+    /// The topology of a point, the same for all points of one structure: a reservoir may hold one
+    /// of each.
     fn topology(&self, point: &Self::Point) -> String;
 
-    /// How far the structure of a point is from those that are asked for: 0 for one of them. A point
-    /// that is nearer to them is better than any that is farther away, whatever their losses.
+    /// The distance of the structure of a point from the permitted ones; 0 if it is permitted. A
+    /// point with a smaller distance is better than any with a larger one, whatever their losses.
     fn structure_violation(&self, _point: &Self::Point) -> u64 {
         0
     }
 
-    /// What distinguishes this landscape from others, like its rules and its objective: a
-    /// checkpoint made on another one is refused, by the name of the first field that differs. A
-    /// field `start` says where searches begin, and is compared first.
+    /// The data that distinguish this landscape from others, like its rules and its objective. A
+    /// checkpoint of another landscape is refused, naming the first field that differs. The
+    /// optional field `start` holds the start of the search and is compared first.
     fn fingerprint(&self) -> serde_json::Value {
         serde_json::Value::Null
     }
 
-    /// How many elements a point has; brute force adds after each and removes each.
+    /// The number of elements of a point; brute force adds one after each and removes each.
     fn element_count(&self, _point: &Self::Point) -> usize {
         0
     }
 
-    /// The mutation of this kind of one element, counted from 0: brute force asks for
+    /// A mutation of the given kind of one element, indexed from 0. Brute force requests
     /// [`MutationKind::AddSinglet`] and [`MutationKind::RemoveSinglet`].
     fn mutate_at(
         &self,
@@ -89,14 +91,14 @@ pub trait Landscape: Sync {
         Err(MutationError { kind, why: "this landscape has no elements".to_owned() })
     }
 
-    /// Loss and gradient by every variable, in the units in which a descent takes its steps: what
-    /// Langevin steps of Metropolis and Hastings need. None where there is no gradient.
+    /// The loss and its gradient by all variables, in the units of Langevin steps; `None` where
+    /// there is no gradient.
     fn loss_gradient(&self, _point: &Self::Point) -> Option<LossGradient> {
         None
     }
 
-    /// The point with other values of the variables that [`Landscape::loss_gradient`] lists; none where
-    /// they are out of bounds. It may not change them, or the proposal would be another one.
+    /// The point with other values of the variables of [`Landscape::loss_gradient`]; `None` if they
+    /// are out of bounds. Values may not be altered, since that would change the proposal density.
     fn with_values(&self, _point: &Self::Point, _values: &[f64]) -> Option<Self::Point> {
         None
     }
@@ -107,9 +109,9 @@ pub trait Landscape: Sync {
 pub struct LossGradient {
     /// The loss.
     pub loss: f64,
-    /// The variables.
+    /// The values of the variables.
     pub values: Vec<f64>,
-    /// The derivative of the loss by each of them.
+    /// The derivative of the loss by each variable.
     pub gradient: Vec<f64>,
 }
 
@@ -118,12 +120,12 @@ pub struct LossGradient {
 pub struct MutatedPoint<P> {
     /// The point.
     pub point: P,
-    /// What was done.
+    /// The kind of mutation.
     pub kind: MutationKind,
-    /// What was done, where, in words.
+    /// The description of the mutation.
     pub what: String,
-    /// The logarithm of the density of proposing the way back over that of the way there, times
-    /// the determinant of the map: what Metropolis and Hastings need; none where there is no way
-    /// back.
+    /// The logarithm of the ratio of the proposal densities, reverse over forward, times the
+    /// determinant of the map, as Metropolis–Hastings needs it; `None` if the mutation is not
+    /// reversible.
     pub log_ratio: Option<f64>,
 }

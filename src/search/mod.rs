@@ -7,43 +7,32 @@
 //! settings say, whatever the number of threads, and whatever is remembered between two moves can
 //! be written down and read again.
 
-mod chain;
+mod bookkeeping;
 mod checkpoint;
-pub mod clocks;
 pub mod element;
 mod error;
-mod family;
 mod landscape;
-pub mod lens;
-mod metropolis;
+pub mod lens_landscape;
 pub mod mutation;
 mod projection;
-mod record;
-mod repair;
-mod reservoir;
 mod rules;
-mod run;
-mod settings;
-mod statistics;
-mod steer;
-mod temperature;
+mod sampler;
 pub mod toy;
-mod weights;
 
-pub use chain::{Chain, ChainDescent};
+pub use bookkeeping::{
+    DescentEnd, Lineage, LineageNode, MutationStatistics, OfferOutcome, Reservoir, ReservoirEntry,
+    SearchStatistics,
+};
 pub use error::SearchError;
-pub use family::{DescentEnd, Lineage, LineageNode};
 pub use landscape::{Landscape, LossGradient, MutatedPoint, SearchPoint};
-pub use mutation::{MutatedLens, MutationError, MutationKind, mutate, propose};
+pub use mutation::{MutatedLens, MutationError, MutationKind, MutationWeights, mutate, propose};
 pub use projection::{Projection, ProjectionError};
-pub use reservoir::{OfferOutcome, Reservoir, ReservoirEntry};
 pub use rules::{RuleError, SearchRules};
-pub use run::{FoundPoint, RunEnd, SearchEvent, SearchRun, SearchRunOn};
-pub use settings::{LangevinSettings, SearchMethod, SearchSettings};
-pub use statistics::{MutationStatistics, SearchStatistics};
-pub use steer::SteerCommand;
-pub use temperature::{Temperature, Termination};
-pub use weights::MutationWeights;
+pub use sampler::{
+    Chain, ChainDescent, FoundPoint, LangevinSettings, RunEnd, SearchEvent, SearchMethod,
+    SearchRun, SearchRunOn, SearchSettings, SteerCommand, Temperature, Termination,
+    competing_clocks,
+};
 
-/// The source of all chance in a search; its state is part of a checkpoint.
+/// The random number generator of a search; its state is part of a checkpoint.
 pub type Random = rand_xoshiro::Xoshiro256PlusPlus;

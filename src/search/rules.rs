@@ -1,43 +1,45 @@
-//! What a search may do to a lens, and what a factory can make.
+//! The constraints of a search: permitted changes, and the limits of manufacturing.
 
 use super::MutationKind;
 use crate::lens::glass;
 use crate::math::format_short;
 use serde::{Deserialize, Serialize};
 
-/// The limits of a search.
+/// Permitted changes of a lens and the limits of manufacturing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SearchRules {
-    /// The smallest and the largest number of glass elements. From a lens with more or fewer a
-    /// search goes towards them: of two lenses the one that is nearer to them is better.
+    /// The minimum and maximum number of glass elements. A search that starts outside this range
+    /// moves towards it: of two lenses the one nearer to the range is better.
     pub elements: [usize; 2],
-    /// The glasses that new elements may be made of, and those of a finished lens; by maker and name,
-    /// or by name alone where one maker has it. None allows all of the catalogue.
+    /// The glasses of new elements and of a finalized lens, by manufacturer and name, or by name
+    /// alone where it is unique. An empty list permits the whole catalogue.
     pub glasses: Vec<String>,
-    /// How many surfaces at the front and at the rear mutations leave alone. They are counted from
-    /// the ends, so that they stay the same ones while elements come and go between them.
+    /// The number of surfaces at the front and at the rear that mutations leave unchanged. They are
+    /// counted from the ends, so that they stay the same while elements are added and removed
+    /// between them.
     pub kept: [usize; 2],
-    /// How often each kind of mutation is tried, relatively; a kind that is not listed has 1, and 0
-    /// forbids it.
+    /// Relative frequencies of the kinds of mutation; a kind that is not listed has weight 1, and
+    /// weight 0 excludes it.
     pub weights: Vec<(MutationKind, f64)>,
-    /// Whether a mutation is made paraxially equivalent: section 4.5.
+    /// True to make each mutated lens paraxially equivalent to the original (section 4.5).
     pub projection: bool,
-    /// The smallest and largest thickness of glass on the axis, in mm.
+    /// The minimum and maximum centre thickness of glass, in mm.
     pub glass_center: [f64; 2],
-    /// The smallest thickness of glass at the rim, in mm.
+    /// The minimum edge thickness of glass, in mm.
     pub glass_edge: f64,
-    /// The smallest and largest thickness of air on the axis, in mm.
+    /// The minimum and maximum air space on the axis, in mm.
     pub air_center: [f64; 2],
-    /// The smallest thickness of air at the rim, in mm.
+    /// The minimum air space at the edge, in mm.
     pub air_edge: f64,
-    /// The largest `|curvature| × semi-diameter`; 1 is a hemisphere.
+    /// The maximum `|curvature| × semi-diameter`; 1 is a hemisphere.
     pub steepness: f64,
-    /// The largest semi-diameter, in mm; none allows what neighbouring surfaces leave.
+    /// The maximum semi-diameter, in mm; `None` permits whatever the neighbouring surfaces leave
+    /// room for.
     pub semi_diameter: Option<f64>,
-    /// The longest track, from the first vertex to the image, in mm.
+    /// The maximum total track, from the first vertex to the image, in mm.
     pub track: Option<f64>,
-    /// The shortest back focus, in mm.
+    /// The minimum back focal distance, in mm.
     pub back_focus: Option<f64>,
 }
 
@@ -62,27 +64,27 @@ impl Default for SearchRules {
 }
 
 impl SearchRules {
-    /// How often a kind of mutation is tried, relatively.
+    /// The relative frequency of a kind of mutation.
     pub fn weight(&self, kind: MutationKind) -> f64 {
         let listed = self.weights.iter().find(|(listed, _)| *listed == kind);
         listed.map_or(1.0, |(_, weight)| *weight)
     }
 
-    /// The same rules for mutations that touch only the surfaces `first` to `last` of a lens of so
-    /// many rows.
+    /// The same rules restricted to mutations of the surfaces `first` to `last` of a lens with
+    /// `rows` surfaces.
     #[must_use]
     pub fn restricted_to(mut self, first: usize, last: usize, rows: usize) -> Self {
         self.kept = [first, rows.saturating_sub(last + 1)];
         self
     }
 
-    /// Whether mutations may touch a surface of a lens of so many rows.
+    /// True if mutations may change a surface of a lens with `rows` surfaces.
     pub fn may_change(&self, surface: usize, rows: usize) -> bool {
         surface >= self.kept[0] && surface + self.kept[1] < rows
     }
 
-    /// The same rules where nobody has said how many elements there may be: as many as a lens with
-    /// so many has are allowed too.
+    /// The same rules with the default range of elements widened to include `pieces`; a range that
+    /// was set explicitly is kept.
     #[must_use]
     pub fn admit_element_count(mut self, pieces: usize) -> Self {
         if self.elements == Self::default().elements {
@@ -92,15 +94,15 @@ impl SearchRules {
         self
     }
 
-    /// Whether a glass of the catalogue, by its full name, is one of those that are allowed.
+    /// True if a glass of the catalogue, given by its full name, is permitted.
     pub fn allows_glass(&self, glass: &str) -> bool {
         self.glasses.is_empty() || self.glasses.iter().any(|listed| listed == glass)
     }
 
-    /// The same rules with every glass by its full name, each once.
+    /// Checks the rules and replaces every glass by its full name, without duplicates.
     ///
     /// # Errors
-    /// The first rule that makes no sense.
+    /// The first invalid rule.
     pub fn normalize(&self) -> Result<Self, RuleError> {
         self.check_elements()?;
         self.check_weights()?;
@@ -115,10 +117,10 @@ impl SearchRules {
         Ok(Self { glasses, ..self.clone() })
     }
 
-    /// Refuses surfaces that a lens of so many rows does not have.
+    /// Checks that a lens with `rows` surfaces has as many as `kept` names.
     ///
     /// # Errors
-    /// More surfaces are to be left alone than there are.
+    /// More surfaces are named than there are.
     pub fn check_fixed_ends(&self, rows: usize) -> Result<(), RuleError> {
         let [front, rear] = self.kept;
         if front <= rows && rear <= rows - front {
@@ -184,7 +186,7 @@ impl SearchRules {
     }
 }
 
-/// The full name of a glass of the list.
+/// The full name of the glass at index `i` of the list.
 fn full_name(i: usize, name: &str) -> Result<String, RuleError> {
     if let Some(found) = glass::find(name) {
         return Ok(found.full_name());
@@ -198,15 +200,15 @@ fn full_name(i: usize, name: &str) -> Result<String, RuleError> {
     Err(RuleError::new(format!("glasses[{i}]"), format!("`{name}`"), expected))
 }
 
-/// A rule that makes no sense.
+/// An invalid rule.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("rules: {name} is {found}; expected {expected}")]
 pub struct RuleError {
-    /// Which one.
+    /// The rule.
     pub name: String,
-    /// What it is.
+    /// Its value.
     pub found: String,
-    /// What it could be.
+    /// The valid values.
     pub expected: String,
 }
 

@@ -1,11 +1,11 @@
-//! The toy of figure 4.1: one or two thin singlets before a sensor, and only the gaps are free.
+//! The toy problem of figure 4.1: one or two thin singlets in front of a sensor with variable gaps.
 //!
-//! A parallel beam comes in, and its marginal ray meets the sensor at a height `y` from the axis:
-//! `y = a (1 − d/f)` behind one singlet, and `y = a (1 − d₁/f − d₂ (2/f − d₁/f²))` behind two. The
-//! loss is `y²`. Everything that theory speaks of can be computed: the target, the way back of a
-//! gradient step, and the determinant of that way.
+//! The marginal ray of a collimated beam meets the sensor at a height `y` from the axis: `y = a (1
+//! − d/f)` behind one singlet, and `y = a (1 − d₁/f − d₂ (2/f − d₁/f²))` behind two. The loss is
+//! `y²`. All quantities of the theory can be computed: the target density, the inverse of a
+//! gradient step, and its determinant.
 
-use super::clocks::KnownDensity;
+use super::competing_clocks::KnownDensity;
 use super::{
     Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
     Temperature,
@@ -14,32 +14,32 @@ use rand::RngExt as _;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// What a fixed point may still move by, relatively to the box.
+/// The convergence tolerance of the fixed point, relative to the focal length.
 const FIXED_POINT_TOLERANCE: f64 = 1e-14;
 const MAX_ITERATIONS: usize = 400;
 
-/// One or two thin singlets before a sensor; a point is the list of their gaps, in mm, the last one
-/// to the sensor.
+/// One or two thin singlets in front of a sensor. A point is the list of their gaps, in mm, the
+/// last one to the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ToyLandscape {
-    /// Smallest and largest number of singlets, 1 or 2.
+    /// The minimum and maximum number of singlets, 1 or 2.
     pub singlets: [usize; 2],
     /// The focal length of each, in mm.
     pub focal_length: f64,
     /// The height of the marginal ray, in mm.
     pub height: f64,
-    /// The smallest and largest gap behind a lone singlet.
+    /// The minimum and maximum gap behind a single singlet, in mm.
     pub alone: [f64; 2],
-    /// Those behind the first and behind the second of two.
+    /// The minimum and maximum gaps behind the first and the second of two singlets, in mm.
     pub pair: [[f64; 2]; 2],
     /// η of (4.12), in mm² by mm².
     pub rate: f64,
-    /// The standard deviation of a mutation that changes no number of singlets, in mm.
+    /// The standard deviation of a mutation that keeps the number of singlets, in mm.
     pub shift: f64,
 }
 
 impl ToyLandscape {
-    /// One singlet, whose distance from the sensor is free.
+    /// One singlet at a variable distance from the sensor.
     pub fn one_singlet() -> Self {
         Self {
             singlets: [1, 1],
@@ -52,22 +52,22 @@ impl ToyLandscape {
         }
     }
 
-    /// Two singlets, whose distances from each other and from the sensor are free.
+    /// Two singlets with variable distances from each other and from the sensor.
     pub fn two_singlets() -> Self {
         Self { singlets: [2, 2], rate: 1.5, ..Self::one_singlet() }
     }
 
-    /// One singlet or two.
+    /// One or two singlets.
     pub fn one_or_two_singlets() -> Self {
         Self { singlets: [1, 2], ..Self::two_singlets() }
     }
 
-    /// The ranges of the gaps of so many singlets, in mm.
+    /// The ranges of the gaps for a number of singlets, in mm.
     pub fn ranges(&self, singlets: usize) -> Vec<[f64; 2]> {
         if singlets == 1 { vec![self.alone] } else { self.pair.to_vec() }
     }
 
-    /// Where the marginal ray meets the sensor, in mm, and the derivatives by the gaps.
+    /// The height of the marginal ray at the sensor, in mm, and its derivatives by the gaps.
     fn ray(&self, gaps: &[f64]) -> (f64, Vec<f64>) {
         let (a, f) = (self.height, self.focal_length);
         match gaps {
@@ -91,13 +91,13 @@ impl ToyLandscape {
         slopes.into_iter().map(|slope| 2.0 * y * slope).collect()
     }
 
-    /// Where a gradient step leads, bounds aside.
+    /// The point after a gradient step, without regard to bounds.
     fn step(&self, gaps: &[f64]) -> Vec<f64> {
         gaps.iter().zip(self.gradient(gaps)).map(|(gap, g)| gap - self.rate * g).collect()
     }
 
-    /// Where a gradient step came from: the fixed point of `x = y + η ∇L(x)`, the only one where
-    /// the step contracts; none where it does not settle.
+    /// The point before a gradient step: the fixed point of `x = y + η ∇L(x)`, unique where the
+    /// step is a contraction; `None` if the iteration does not converge.
     fn invert_step(&self, gaps: &[f64]) -> Option<Vec<f64>> {
         let mut place = gaps.to_vec();
         let settled = FIXED_POINT_TOLERANCE * self.focal_length;
@@ -137,7 +137,7 @@ impl ToyLandscape {
         ranges.iter().map(|range| random.random_range(range[0]..=range[1])).collect()
     }
 
-    /// One singlet more, in front: the logarithm of the ratio is that of the range of its gap.
+    /// Adds a singlet in front; the logarithm of the density ratio is that of the range of its gap.
     fn add(&self, gaps: &[f64], random: &mut Random) -> MutatedPoint<Vec<f64>> {
         let range = self.pair[0];
         let point = vec![random.random_range(range[0]..=range[1]), gaps[0]];
@@ -177,7 +177,7 @@ impl Landscape for ToyLandscape {
         if self.contains(gaps) { self.ray(gaps).0.powi(2) } else { f64::INFINITY }
     }
 
-    /// A step of plain gradient descent; one that would leave the bounds is not made.
+    /// A step of plain gradient descent; a step that would leave the bounds is not made.
     fn descend(&self, gaps: &Vec<f64>, _memory: &mut ()) -> (Vec<f64>, f64, usize) {
         let next = self.step(gaps);
         let next = if self.contains(&next) { next } else { gaps.clone() };

@@ -8,7 +8,7 @@ use super::worker::RunStatus;
 use crate::lens::Lens;
 use crate::merit::ConstraintMargin;
 use crate::search::element::piece_count;
-use crate::search::lens::LensLandscape;
+use crate::search::lens_landscape::LensLandscape;
 use crate::search::{
     Chain, LineageNode, MutationWeights, ReservoirEntry, RunEnd, SearchRunOn, SearchStatistics,
     Temperature,

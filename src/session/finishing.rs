@@ -5,7 +5,7 @@ use super::background::guarded;
 use crate::files;
 use crate::lens::Lens;
 use crate::merit::ConstraintMargin;
-use crate::search::lens::{
+use crate::search::lens_landscape::{
     CrossCheck, FieldSummary, FinalizedLens, GlassSubstitution, LensLandscape, UnlistedGlass,
     finalize,
 };

@@ -2,7 +2,7 @@
 
 use crate::lens::Lens;
 use crate::search::element::piece_count;
-use crate::search::lens::LensLandscape;
+use crate::search::lens_landscape::LensLandscape;
 use crate::search::{Chain, LineageNode, MutationKind, SearchEvent, SearchRunOn};
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@ use super::finishing::LensFinalizer;
 use crate::files::FileError;
 use crate::lens::Lens;
 use crate::merit::{ConstraintMargin, Goal};
-use crate::search::lens::{
+use crate::search::lens_landscape::{
     DescentSettings, LandscapeError, LensLandscape, SearchPlan, with_open_apertures,
 };
 use crate::search::{

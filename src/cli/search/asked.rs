@@ -5,7 +5,7 @@ use crate::cli::input::{self, Tolerance};
 use crate::cli::output::ShortNumber;
 use crate::lens::{FieldKind, FieldPoint, Fields, Lens, Object, Wavelength};
 use crate::optimize;
-use crate::search::lens::{DescentSettings, SearchPlan, with_open_apertures};
+use crate::search::lens_landscape::{DescentSettings, SearchPlan, with_open_apertures};
 use crate::search::{MutationKind, SearchRules, Temperature, element};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};

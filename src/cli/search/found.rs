@@ -4,7 +4,7 @@ use super::limits::{self, ViolatedLimit};
 use crate::cli::optimize::TermComparison;
 use crate::cli::output::{ShortNumber, TextTable, or_dash};
 use crate::lens::Lens;
-use crate::search::lens::{
+use crate::search::lens_landscape::{
     FieldSummary, FinalizedLens, LandscapeError, LensLandscape, LensSummary, UnlistedGlass,
 };
 use serde::Serialize;

@@ -3,7 +3,7 @@
 
 use crate::cli::output::{ShortNumber, TextTable, or_dash, print_note};
 use crate::merit::ConstraintMargin;
-use crate::search::lens::describe_violation;
+use crate::search::lens_landscape::describe_violation;
 use serde::Serialize;
 use std::fmt;
 

@@ -16,7 +16,7 @@ use super::targets;
 use crate::files;
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
-use crate::search::lens::{LandscapeError, LensLandscape, SearchPlan, finalize};
+use crate::search::lens_landscape::{LandscapeError, LensLandscape, SearchPlan, finalize};
 use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
 use clap::ValueEnum;
 use found::StartAgainstBest;

@@ -6,7 +6,7 @@ use super::limits::ViolatedLimit;
 use crate::cli::failure::CliError;
 use crate::cli::output::{ShortNumber, TextTable};
 use crate::merit::ConstraintMargin;
-use crate::search::lens::{FinalizedLens, LensLandscape};
+use crate::search::lens_landscape::{FinalizedLens, LensLandscape};
 use crate::search::{FoundPoint, MutationStatistics, RunEnd, SearchRunOn};
 use serde::Serialize;
 use std::fmt::{self, Display};

@@ -18,7 +18,7 @@ use crate::merit::{PupilEdge, Term, WeightedTerm};
 use crate::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep, weighted_sum_goal};
 use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, TextAlign};
 use crate::search::SearchRules;
-use crate::search::lens::SearchPlan;
+use crate::search::lens_landscape::SearchPlan;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.7",

@@ -3,7 +3,7 @@
 use crate::experiments::trade::ProgressSpan;
 use crate::experiments::{ExperimentError, ProgressFn, report_progress};
 use crate::lens::Lens;
-use crate::search::lens::{LensLandscape, SearchPlan};
+use crate::search::lens_landscape::{LensLandscape, SearchPlan};
 use crate::search::{MutationKind, SearchRun, SearchRunOn};
 use rayon::prelude::*;
 

@@ -28,7 +28,7 @@ fn relax_term(term: Term, found: &[ConstraintMargin]) -> Term {
 mod tests {
     use super::*;
     use crate::experiments::structure::{STUDY_LENSES, at_heights, rules};
-    use crate::search::lens::goal;
+    use crate::search::lens_landscape::goal;
 
     #[test]
     fn a_lens_keeps_its_own_limits_and_no_others_are_loosened() {

@@ -20,7 +20,7 @@ use super::trade::{focal_length, with_field_angles};
 use super::{ExperimentError, lens};
 use crate::lens::{Lens, at_zoom};
 use crate::pupil::limited_by_stop;
-use crate::search::lens::{SearchPlan, goal};
+use crate::search::lens_landscape::{SearchPlan, goal};
 use crate::search::{SearchRules, SearchSettings};
 
 /// Image heights in mm: from the middle of a full frame nearly to its corner.

@@ -7,7 +7,7 @@ use crate::experiments::{
     Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn, TableCell,
 };
 use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
-use crate::search::lens::SearchPlan;
+use crate::search::lens_landscape::SearchPlan;
 use crate::search::{SearchMethod, SearchSettings, Temperature, Termination};
 
 /// A sampler in a race.

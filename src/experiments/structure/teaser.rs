@@ -17,7 +17,7 @@ use crate::experiments::{
 use crate::lens::Lens;
 use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, TextAlign};
 use crate::pupil::RayModel;
-use crate::search::lens::{LensSummary, SearchPlan, with_open_apertures};
+use crate::search::lens_landscape::{LensSummary, SearchPlan, with_open_apertures};
 use crate::search::{SearchRules, SearchSettings};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {

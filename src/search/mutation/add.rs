@@ -1,42 +1,44 @@
-//! A new singlet in an air gap: close to the surface in front of it or behind it and bent like that
-//! one, in random glass, with little power.
+//! Adds a singlet in an air gap: close to the surface in front of it or behind it, bent like that
+//! surface, of random glass, with little power.
 //!
-//! So it changes little of what the rays do, and clips none: it is as thick, and the air beside it as
-//! wide, as the rim of that surface asks. (The thesis draws curvatures around 0 and puts the singlet
-//! in contact, where it would cut into every surface that is bent towards it.)
+//! So it changes the rays little and clips none: its thickness and the air beside it follow from
+//! the semi-diameter of that surface. (The thesis draws curvatures around 0 and puts the singlet in
+//! contact, where it would intersect every surface that is bent towards it.)
 
-use super::chance::{
+use super::distributions::{
     ShiftedExponential, bernoulli, choose, normal_log_density, sample_normal, usable_glasses,
 };
 use super::draft::{
     MutationContext, MutationDraft, ReverseMove, has_pickup, has_solve, is_gap, light_direction,
     medium_after, shortest_gap,
 };
-use super::{MutationKind, remove};
+use super::kind::MutationKind;
+use super::remove;
 use crate::lens::glass::Glass;
 use crate::lens::{Lens, Medium, Object, Row};
 use crate::search::element::{glass_gaps, piece_count};
 use crate::search::projection::ProjectionMap;
 use crate::search::{Random, SearchRules};
 
-/// How often the rest of the lens keeps its place where the gap has room; else it makes way.
+/// The probability that the rest of the lens keeps its place if the gap has room; otherwise it is
+/// shifted.
 pub(super) const KEEP_PROBABILITY: f64 = 0.9;
 
-/// Where a singlet may come.
+/// A place for a new singlet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SingletSite {
-    /// The surface in front of the air gap; none for the space in front of the lens.
+    /// The surface in front of the air gap; `None` for the space in front of the lens.
     pub(super) gap: Option<usize>,
-    /// Whether it stands close to that surface, else close to the next one.
+    /// True if the singlet is close to that surface, false if it is close to the next one.
     pub(super) behind: bool,
 }
 
-/// The surface to which a singlet is close.
+/// The surface next to a new singlet.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbour {
     /// Its row in the lens without the singlet.
     pub(super) row: usize,
-    /// Whether the singlet stands behind it.
+    /// True if the singlet is behind it.
     pub(super) behind: bool,
 }
 
@@ -45,11 +47,11 @@ pub(super) struct Neighbour {
 pub(super) struct SingletParameters {
     pub(super) curvatures: [f64; 2],
     pub(super) thickness: f64,
-    /// The air between it and the surface to which it is close.
+    /// The air space between it and its neighbour.
     pub(super) air: f64,
 }
 
-/// Where singlets may come.
+/// The places for a new singlet.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<SingletSite>, String> {
     let most = rules.elements[1];
     if piece_count(lens) + 1 > most {
@@ -104,8 +106,8 @@ impl SingletParameters {
         Self { curvatures, thickness: thickness.draw(random), air: air.draw(random) }
     }
 
-    /// The logarithm of the density of these numbers for a lens, without the singlet, of a scale;
-    /// none where they cannot be drawn.
+    /// The logarithm of the density of these numbers for a lens without the singlet and of a scale;
+    /// `None` if they cannot be drawn.
     pub(super) fn log_density(
         &self,
         lens: &Lens,
@@ -126,8 +128,8 @@ impl SingletParameters {
     }
 }
 
-/// What the thickness of a singlet and the air beside it are drawn from: as much as the rules ask
-/// for on the axis and, up to the rim of the neighbour, off it.
+/// The distributions of the thickness of a singlet and of the air space beside it: at least the
+/// minima of the rules on the axis and, up to the semi-diameter of the neighbour, at the edge.
 fn length_distributions(
     lens: &Lens,
     neighbour: Neighbour,
@@ -139,7 +141,7 @@ fn length_distributions(
     let beside = lens.surfaces[row].curvature;
     let rim = lens.surfaces[row].semi_diameter.unwrap_or(0.0);
     let sense = light_direction(lens, if behind { row } else { row.saturating_sub(1) });
-    // How much narrower than on the axis a gap is at the rim.
+    // The reduction of a gap at the edge compared with the axis.
     let narrower = |first: f64, second: f64| {
         let (first, second) = (sag(first, rim), sag(second, rim));
         sense * (first - second)
@@ -153,13 +155,13 @@ fn length_distributions(
     (ShiftedExponential::new(thickness, 0.75 * size), ShiftedExponential::new(air, 0.1 * size))
 }
 
-/// The sag of a sphere at a height, or where it ends before.
+/// The sag of a sphere at a height, or at its equator if that comes first.
 fn sag(curvature: f64, height: f64) -> f64 {
     let t = (curvature * height).clamp(-1.0, 1.0);
     if t == 0.0 { 0.0 } else { t * t / (curvature * (1.0 + (1.0 - t * t).sqrt())) }
 }
 
-/// How likely the rest of the lens keeps its place: never where there is no room.
+/// The probability that the rest of the lens keeps its place; 0 if there is no room.
 pub(super) fn keep_probability(
     lens: &Lens,
     gap: Option<usize>,
@@ -170,7 +172,7 @@ pub(super) fn keep_probability(
     if gap.is_some_and(room) { KEEP_PROBABILITY } else { 0.0 }
 }
 
-/// Whether a gap could take a length in and still be one, on the axis and at the rim.
+/// True if a gap has room for a length, on the axis and at the edge.
 pub(super) fn has_room(lens: &Lens, gap: usize, rules: &SearchRules, length: f64) -> bool {
     let left = shortest_gap(lens, gap) - length;
     if gap + 1 == lens.surfaces.len() {
@@ -187,7 +189,7 @@ pub(super) fn has_room(lens: &Lens, gap: usize, rules: &SearchRules, length: f64
     left >= rules.air_center[0].max(rules.air_edge + narrower)
 }
 
-/// Whether a gap has a length of its own that could become shorter.
+/// True if a gap has a length of its own that can become shorter.
 pub(super) fn has_choice(lens: &Lens, gap: usize) -> bool {
     !has_solve(lens, gap)
 }
@@ -225,7 +227,7 @@ pub(super) fn draw(
     Ok(draft)
 }
 
-/// Puts the rows of a singlet in, and says which is the first.
+/// Inserts the rows of a singlet and returns the first one.
 fn insert(
     draft: &mut MutationDraft,
     place: SingletSite,
@@ -271,7 +273,7 @@ fn insert(
     Ok(first)
 }
 
-/// Moves the first vertex towards an object that stays where it is.
+/// Moves the first vertex towards an object at a fixed position.
 fn shorten_object_distance(object: &mut Object, length: f64) -> Result<(), String> {
     if let Object::Finite(distance) = object {
         let left = *distance - length;

@@ -1,14 +1,15 @@
-//! Every curvature of an element changes by as much: a thin one keeps its power.
+//! Bends an element: all its curvatures change by the same amount, which preserves the power of a
+//! thin one.
 
-use super::MutationKind;
-use super::chance::{bernoulli, choose, sample_normal};
+use super::distributions::{bernoulli, choose, sample_normal};
 use super::draft::{MutationContext, MutationDraft, ReverseMove, has_pickup};
+use super::kind::MutationKind;
 use crate::lens::{Lens, Parameter, Quantity};
 use crate::search::element::{Element, ElementKind, elements};
 use crate::search::projection::ProjectionMap;
 use crate::search::{Random, SearchRules};
 
-/// Which elements may be bent.
+/// The elements that may be bent.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
     let rows = lens.surfaces.len();
     let may = |e: &Element| {
@@ -46,7 +47,7 @@ pub(super) fn draw(
     Ok(draft)
 }
 
-/// Refuses a curvature that its variable does not allow.
+/// Refuses a curvature outside the bounds of its variable.
 fn check_bounds(lens: &Lens, row: usize) -> Result<(), String> {
     let curvature = lens.surfaces[row].curvature;
     let Some(variable) = lens.variable(Parameter::new(row, Quantity::Curvature)) else {
@@ -60,7 +61,7 @@ fn check_bounds(lens: &Lens, row: usize) -> Result<(), String> {
     Err(format!("the curvature of surface {row} would leave the bounds of its variable"))
 }
 
-/// A mutation that is its own way back is projected one way or the other, so that each undoes the
+/// A random projection for a mutation that is its own reverse, so that each of the two undoes the
 /// other.
 pub(super) fn random_projection_map(random: &mut Random) -> ProjectionMap {
     if bernoulli(0.5, random) { ProjectionMap::Nearest } else { ProjectionMap::AlongNormals }

@@ -1,37 +1,38 @@
-//! A lens while it is being changed: where each number came from travels with the rows.
+//! A lens under mutation: the origin of each parameter moves with its row.
 
-use super::MutationKind;
 use super::add::{Neighbour, SingletParameters};
+use super::kind::MutationKind;
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row, ZoomThickness, add_variable};
 use crate::search::SearchRules;
 use crate::search::projection::{ProjectionMap, RowOrigin, scale};
 
-/// What a mutation is drawn from.
+/// The input of a mutation.
 #[derive(Debug)]
 pub(super) struct MutationContext<'a> {
-    /// The lens, with the values of what follows other numbers written into it.
+    /// The lens, with its pickups resolved.
     pub(super) lens: Lens,
     pub(super) rules: &'a SearchRules,
     /// A length of the order of the focal length, in mm.
     pub(super) scale: f64,
 }
 
-/// How the way back is found.
+/// The reverse of a mutation and its proposal density.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ReverseMove {
-    /// The kind of the mutation that leads back.
+    /// The kind of the reverse mutation.
     pub(super) kind: MutationKind,
-    /// The logarithm of the density of its draws over that of the draws that led here, times the
-    /// determinant of the map between the numbers; without kinds, places and the projection.
+    /// The logarithm of the ratio of the densities of the draws, reverse over forward, times the
+    /// determinant of the map between the parameters; without the probabilities of kinds and sites
+    /// and without the projection.
     pub(super) log_density_ratio: f64,
-    /// A choice of the way back that depends on how long a gap is at the end.
+    /// A choice of the reverse mutation that depends on the final length of a gap.
     pub(super) spacing: Option<SpacingChoice>,
-    /// The singlet that the way back draws, whose density depends on its neighbour at the end.
+    /// The singlet that the reverse mutation draws, whose density depends on its final neighbour.
     pub(super) singlet: Option<SingletProposal>,
 }
 
 impl ReverseMove {
-    /// A way back without choices.
+    /// A reverse mutation without choices.
     pub(super) fn new(kind: MutationKind, log: f64) -> Self {
         Self { kind, log_density_ratio: log, spacing: None, singlet: None }
     }
@@ -45,28 +46,28 @@ pub(super) struct SingletProposal {
     pub(super) scale: f64,
 }
 
-/// The gap of a new element, in the lens without it.
+/// The choice whether the rest of the lens keeps its place when an element is added to a gap.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SpacingChoice {
     pub(super) gap: usize,
-    /// What the element takes of it, in mm.
+    /// The length of the element with its air space, in mm.
     pub(super) length: f64,
-    /// Whether the rest of the lens keeps its place.
+    /// True if the rest of the lens keeps its place.
     pub(super) keeps_rest: bool,
 }
 
-/// A lens that a mutation has changed, before it is projected and repaired.
+/// A mutated lens before projection and repair.
 #[derive(Debug)]
 pub(super) struct MutationDraft {
     pub(super) lens: Lens,
     pub(super) origins: Vec<RowOrigin>,
     pub(super) what: String,
-    /// Rows behind which there is new glass.
+    /// Rows with new glass behind them.
     pub(super) fresh: Vec<usize>,
-    /// Rows whose semi-diameters are to be found.
+    /// Rows without a semi-diameter.
     pub(super) rimless: Vec<usize>,
     pub(super) map: ProjectionMap,
-    /// In how many places the mutation could have been made.
+    /// The number of sites where the mutation could have been made.
     pub(super) places: usize,
     pub(super) back: Option<ReverseMove>,
 }
@@ -76,17 +77,17 @@ impl<'a> MutationContext<'a> {
         Self { lens, rules, scale }
     }
 
-    /// How much larger than a lens of 50 mm it is: random lengths are drawn for that one.
+    /// The scale relative to a lens of 50 mm, for which random lengths are defined.
     pub(super) fn size_ratio(&self) -> f64 {
         self.scale / 50.0
     }
 
-    /// The standard deviation of a random curvature: 0.005/mm for a lens of 50 mm.
+    /// The standard deviation of a random curvature in 1/mm: 0.005 for a lens of 50 mm.
     pub(super) fn curvature_deviation(&self) -> f64 {
         0.25 / self.scale
     }
 
-    /// The scale of the lens after a mutation: the same where it is projected.
+    /// The scale of the lens after a mutation; unchanged if it is projected.
     pub(super) fn scale_after(&self, mutated: &Lens) -> Option<f64> {
         if self.rules.projection { Some(self.scale) } else { scale(mutated).ok() }
     }
@@ -106,65 +107,66 @@ impl<'a> MutationContext<'a> {
     }
 }
 
-/// Whether a quantity is the gap behind a row.
+/// True if a quantity is the gap behind a row.
 pub(super) fn is_gap(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Thickness | Quantity::ZoomThickness(_))
 }
 
-/// Whether a quantity belongs to the medium behind a row: the index or a coefficient of a gradient.
+/// True if a quantity belongs to the medium behind a row: the index or a gradient-index
+/// coefficient.
 pub(super) fn is_of_medium(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Index | Quantity::Gradient(_))
 }
 
-/// Whether a pickup has to do with a quantity of a row.
+/// True if a pickup reads or sets a quantity of a row that `is_it` selects.
 pub(super) fn has_pickup(lens: &Lens, row: usize, is_it: impl Fn(Quantity) -> bool) -> bool {
     let concerned = |p: Parameter| p.surface == row && is_it(p.quantity);
     lens.pickups.iter().any(|pickup| concerned(pickup.parameter) || concerned(pickup.source))
 }
 
-/// Whether a gap has its own thickness at some zoom position.
+/// True if a gap has its own thickness at some zoom position.
 pub(super) fn is_zoomed(lens: &Lens, row: usize) -> bool {
     lens.zoom.iter().any(|position| position.thicknesses.iter().any(|gap| gap.surface == row))
 }
 
-/// Whether a surface is a sphere or plane and nothing else.
+/// True if a surface is a plain sphere or plane.
 pub(super) fn is_plain(row: &Row) -> bool {
     let figured = row.conic != 0.0 || row.asphere.iter().any(|a| *a != 0.0);
     !figured && !row.hyperhemisphere && row.obstruction.is_none()
 }
 
-/// The shortest that a gap is at any zoom position, counted along the light.
+/// The minimum length of a gap over the zoom positions, positive along the light.
 pub(super) fn shortest_gap(lens: &Lens, row: usize) -> f64 {
     let gaps = (0..lens.zoom_positions()).filter_map(|zoom| lens.thickness_at(row, zoom));
     let sense = light_direction(lens, row);
     gaps.fold(f64::INFINITY, |least, gap| least.min(sense * gap))
 }
 
-/// The sign of lengths behind a row: −1 where light runs back.
+/// The sign of lengths behind a row: −1 where light travels towards −z.
 pub(super) fn light_direction(lens: &Lens, row: usize) -> f64 {
     if crate::search::element::is_backwards(lens, row) { -1.0 } else { 1.0 }
 }
 
-/// Whether the focus decides a gap.
+/// True if the length of a gap is solved for focus.
 pub(super) fn has_solve(lens: &Lens, row: usize) -> bool {
     lens.image_solve.is_some() && row + 1 == lens.surfaces.len()
 }
 
-/// What fills the gap behind a row, seen through mirrors.
+/// The medium in the gap behind a row; behind a mirror that in front of it.
 pub(super) fn medium_after(lens: &Lens, row: usize) -> Medium {
     let media = lens.surfaces[..=row].iter().rev().map(|row| &row.medium);
     media.chain([&lens.object_medium]).find(|m| **m != Medium::Mirror).cloned().unwrap_or_default()
 }
 
 impl MutationDraft {
-    /// Puts a row in front of row `at`; its numbers come from nowhere.
+    /// Inserts a row in front of row `at`, without an origin.
     pub(super) fn insert(&mut self, at: usize, row: Row) {
         self.lens.surfaces.insert(at, row);
         self.origins.insert(at, RowOrigin::default());
         self.lens.renumber_rows(|row| Some(if row < at { row } else { row + 1 }));
     }
 
-    /// Takes a row out, and all that names it.
+    /// Removes a row with all references to it.
     pub(super) fn remove(&mut self, at: usize) {
         self.lens.surfaces.remove(at);
         self.origins.remove(at);
@@ -175,8 +177,8 @@ impl MutationDraft {
         });
     }
 
-    /// The gap behind row `from`, its name in variables and at zoom positions included, becomes the
-    /// one behind row `to`, which loses its own.
+    /// Moves the gap behind row `from`, with its variables and zoom thicknesses, to row `to`,
+    /// replacing the gap there.
     pub(super) fn move_gap(&mut self, from: usize, to: usize) {
         self.drop_gap_references(to);
         self.lens.surfaces[to].thickness = self.lens.surfaces[from].thickness;
@@ -192,7 +194,7 @@ impl MutationDraft {
         }
     }
 
-    /// Forgets what names the gap behind a row.
+    /// Removes all references to the gap behind a row.
     pub(super) fn drop_gap_references(&mut self, row: usize) {
         self.lens.map_parameters(|p| (p.surface != row || !is_gap(p.quantity)).then_some(p));
         for position in &mut self.lens.zoom {
@@ -200,12 +202,12 @@ impl MutationDraft {
         }
     }
 
-    /// Forgets the variables that some quantities of a row are.
+    /// Removes the variables and pickups of some quantities of a row.
     pub(super) fn drop_parameters(&mut self, row: usize, is_it: impl Fn(Quantity) -> bool) {
         self.lens.map_parameters(|p| (p.surface != row || !is_it(p.quantity)).then_some(p));
     }
 
-    /// Makes a gap longer by so much along the light, at every zoom position.
+    /// Lengthens a gap by `by` mm along the light, at every zoom position.
     pub(super) fn lengthen(&mut self, row: usize, by: f64) {
         let by = by * light_direction(&self.lens, row);
         self.lens.surfaces[row].thickness += by;
@@ -216,7 +218,7 @@ impl MutationDraft {
         }
     }
 
-    /// Adds the gap behind row `from` to the one behind row `to`, position by position.
+    /// Adds the gap behind row `from` to the one behind row `to`, at every zoom position.
     pub(super) fn add_gap(&mut self, to: usize, from: usize) {
         let lens = &mut self.lens;
         let zooming = [to, from].map(|row| is_zoomed(lens, row));
@@ -232,8 +234,9 @@ impl MutationDraft {
         }
     }
 
-    /// Makes the numbers of new rows variables where the lens has some of their kind, and widens
-    /// bounds that the numbers of other rows have left: the mutation has changed what they mean.
+    /// Marks the parameters of new rows as variables if the lens has variables of their kind, and
+    /// widens the bounds of parameters that lie outside, since the mutation has changed their
+    /// meaning.
     pub(super) fn inherit_variables(&mut self, rows: &[usize]) {
         let has = |quantity| self.lens.variables.iter().any(|v| v.parameter.quantity == quantity);
         let kinds = [Quantity::Curvature, Quantity::Thickness].map(|q| (q, has(q)));
@@ -253,7 +256,7 @@ impl MutationDraft {
         }
     }
 
-    /// A last gap that the focus decides is no variable.
+    /// A last gap that is solved for focus is not a variable.
     fn drop_solved(&mut self) {
         let last = self.lens.surfaces.len() - 1;
         if has_solve(&self.lens, last) {

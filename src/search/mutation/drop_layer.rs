@@ -1,6 +1,6 @@
-//! A cemented group loses its first or last piece; the air takes its place.
+//! Removes the first or last piece of a cemented group; air takes its place.
 
-use super::chance::choose;
+use super::distributions::choose;
 use super::draft::{
     MutationContext, MutationDraft, has_pickup, has_solve, is_gap, is_of_medium, light_direction,
 };
@@ -8,7 +8,7 @@ use crate::lens::Lens;
 use crate::search::element::{Element, ElementKind, elements, piece_count};
 use crate::search::{Random, SearchRules};
 
-/// A group and whether its first or its last piece goes.
+/// A cemented group and the end from which a piece is removed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GroupEnd {
     group: Element,
@@ -16,18 +16,18 @@ pub(super) struct GroupEnd {
 }
 
 impl GroupEnd {
-    /// The surface that goes.
+    /// The surface that is removed.
     fn outer(self) -> usize {
         if self.front { self.group.first } else { self.group.last }
     }
 
-    /// The row whose gap takes the place of the glass; none in front of the lens.
+    /// The row whose gap takes the place of the glass; `None` in front of the lens.
     fn gap(self) -> Option<usize> {
         if self.front { self.group.first.checked_sub(1) } else { Some(self.group.last) }
     }
 }
 
-/// Which layers may go.
+/// The pieces that may be removed.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<GroupEnd>, String> {
     let least = rules.elements[0];
     if piece_count(lens) < least + 1 {
@@ -58,7 +58,7 @@ fn may_go(lens: &Lens, layer: GroupEnd, rules: &SearchRules) -> bool {
     free && near && !followed
 }
 
-/// Drops a layer.
+/// Removes a piece.
 pub(super) fn draw(
     scene: &MutationContext<'_>,
     random: &mut Random,

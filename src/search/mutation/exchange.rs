@@ -1,23 +1,22 @@
-//! A piece of glass of the catalogue is made of another one with nearly the same index and Abbe
-//! number.
+//! Exchanges a catalogue glass for one with a similar index and Abbe number.
 
-use super::MutationKind;
 use super::bend::random_projection_map;
-use super::chance::{choose, usable_glasses};
+use super::distributions::{choose, usable_glasses};
 use super::draft::{MutationContext, MutationDraft, ReverseMove};
+use super::kind::MutationKind;
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Lens, Medium};
 use crate::search::element::{ElementKind, elements};
 use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 
-/// How far neighbours are in index.
+/// The standard deviation of the change of index.
 const INDEX_DEVIATION: f64 = 0.02;
 
-/// How far neighbours are in Abbe number.
+/// The standard deviation of the change of the Abbe number.
 const ABBE_DEVIATION: f64 = 3.0;
 
-/// Rows with a glass of the catalogue behind them.
+/// The rows with an exchangeable catalogue glass behind them.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
     let rows = lens.surfaces.len();
     let elements = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(_)));
@@ -41,7 +40,7 @@ pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Str
     }))
 }
 
-/// How readily one glass becomes the other.
+/// The relative probability of exchanging one glass for the other.
 fn glass_similarity(a: &Glass, b: &Glass) -> f64 {
     let (index, abbe) = ((a.nd - b.nd) / INDEX_DEVIATION, (a.vd - b.vd) / ABBE_DEVIATION);
     (-0.5 * (index * index + abbe * abbe)).exp()
@@ -51,7 +50,7 @@ fn is_same(a: &Glass, b: &Glass) -> bool {
     std::ptr::eq(a, b)
 }
 
-/// Makes a piece of another glass.
+/// Exchanges a glass.
 pub(super) fn draw(
     scene: &MutationContext<'_>,
     random: &mut Random,
@@ -79,14 +78,14 @@ pub(super) fn draw(
     draft.fresh = vec![row];
     draft.map = random_projection_map(random);
     let known = choice.iter().any(|glass| is_same(glass, old));
-    // The nearness is the same in both directions, what it is compared with is not.
+    // The similarity is symmetric, its normalization is not.
     let log = sum(old).ln() - sum(new).ln();
     draft.back = known.then_some(ReverseMove::new(MutationKind::ExchangeGlass, log));
     draft.what = format!("exchanged {name} behind surface {row} for {}", new.full_name());
     Ok(draft)
 }
 
-/// Whether a glass is cemented to this piece: an interface between the two would do nothing.
+/// True if the same glass is cemented to this piece: the interface would have no effect.
 fn is_cemented_to(lens: &Lens, row: usize, glass: &Glass) -> bool {
     let beside = [row.checked_sub(1), Some(row + 1)];
     beside.into_iter().flatten().any(|near| match &lens.surfaces[near].medium {

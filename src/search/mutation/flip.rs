@@ -1,18 +1,17 @@
-//! An element is turned around, and what fills it with it: a gradient along the axis is written from
-//! its other end.
+//! Reverses an element with its media: an axial index gradient is expressed from its other end.
 
-use super::MutationKind;
 use super::bend::random_projection_map;
-use super::chance::choose;
+use super::distributions::choose;
 use super::draft::{
     MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_of_medium, is_zoomed,
 };
+use super::kind::MutationKind;
 use crate::lens::{GradientIndex, Lens, Medium, Quantity, RADIAL_TERMS};
 use crate::search::element::{Element, ElementKind, elements};
 use crate::search::projection::RowOrigin;
 use crate::search::{Random, SearchRules};
 
-/// Which elements may be turned.
+/// The elements that may be reversed.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
     let rows = lens.surfaces.len();
     let may = |e: &Element| {
@@ -34,7 +33,7 @@ pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, S
     }
 }
 
-/// The gradient behind a row, if it varies along the axis.
+/// The gradient-index medium behind a row, if its index varies along the axis.
 fn axial_gradient_behind(lens: &Lens, row: usize) -> Option<&GradientIndex> {
     match &lens.surfaces[row].medium {
         Medium::Grin(gradient) if gradient.is_axial() => Some(gradient),
@@ -57,7 +56,7 @@ fn why_not_reversible(lens: &Lens, row: usize) -> Option<String> {
     }
 }
 
-/// Turns an element around.
+/// Reverses an element.
 pub(super) fn draw(
     scene: &MutationContext<'_>,
     random: &mut Random,
@@ -75,14 +74,14 @@ pub(super) fn draw(
         (first..last).filter(|row| axial_gradient_behind(&draft.lens, *row).is_some()).collect();
     mirrored.iter().for_each(|row| reverse_axial_gradient(&mut draft.lens, *row));
     draft.map = random_projection_map(random);
-    // The projection changes how long such a gap is, so that turning it back leads elsewhere.
+    // The projection changes the length of such a gap, so that a second reversal leads elsewhere.
     draft.back = mirrored.is_empty().then_some(ReverseMove::new(MutationKind::Flip, 0.0));
     draft.what = format!("turned the element of surfaces {first} to {last} around");
     Ok(draft)
 }
 
-/// Writes a gradient along the axis from its other end. Its numbers that are held are held at what
-/// they are now, the bounds of the others make room.
+/// Expresses an axial gradient from its other end. Fixed coefficients are fixed at their new
+/// values, the bounds of the others are widened.
 fn reverse_axial_gradient(lens: &mut Lens, row: usize) {
     let length = lens.surfaces[row].thickness;
     let turned = axial_gradient_behind(lens, row).and_then(|gradient| gradient.reversed(length));

@@ -1,21 +1,21 @@
-//! Two neighbours become one cemented group: their facing surfaces become one of the mean curvature,
-//! and the air between them goes.
+//! Cements two neighbouring elements: their facing surfaces are replaced by one of the mean
+//! curvature, and the air gap is removed.
 
-use super::MutationKind;
-use super::chance::choose;
+use super::distributions::choose;
 use super::draft::{
     MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_of_medium, is_plain,
     is_zoomed, light_direction,
 };
+use super::kind::MutationKind;
 use super::split::SplitDraw;
 use crate::lens::{Lens, Parameter};
 use crate::search::element::{ElementKind, elements};
 use crate::search::{Random, SearchRules};
 
-/// More pieces than this are not cemented together.
+/// The maximum number of pieces of a cemented group.
 pub(super) const MAX_PIECES: usize = 3;
 
-/// The last surfaces of elements that may be glued to the next one.
+/// The last surfaces of elements that may be cemented to the next one.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
     let elements = elements(lens);
     let neighbours = elements.windows(2).filter(|pair| pair[0].last + 1 == pair[1].first);
@@ -43,7 +43,7 @@ fn may_join(lens: &Lens, row: usize, rules: &SearchRules) -> bool {
     free && !followed && !moves && differ
 }
 
-/// Glues two neighbours.
+/// Cements two elements.
 pub(super) fn draw(
     scene: &MutationContext<'_>,
     random: &mut Random,
@@ -59,13 +59,13 @@ pub(super) fn draw(
     merge_surfaces(&mut draft, row, 0.5 * (front + rear));
     let scale = scene.scale_after(&draft.lens);
     let there = scale.and_then(|scale| cut.log_density(scene.rules, scale));
-    // Mean and half difference of two numbers: the determinant is 1/2.
+    // The map to mean and half difference has the determinant 1/2.
     draft.back = there.map(|draws| ReverseMove::new(MutationKind::Split, draws - 2f64.ln()));
     draft.what = format!("glued surfaces {row} and {} together", row + 1);
     Ok(draft)
 }
 
-/// Makes one surface of two.
+/// Merges two surfaces.
 fn merge_surfaces(draft: &mut MutationDraft, row: usize, curvature: f64) {
     let next = draft.lens.surfaces[row + 1].clone();
     draft.drop_parameters(row + 1, |q| !is_gap(q) && !is_of_medium(q));
@@ -89,7 +89,7 @@ fn merge_surfaces(draft: &mut MutationDraft, row: usize, curvature: f64) {
     draft.inherit_variables(&[]);
 }
 
-/// Whether the surfaces on both sides of the gap behind a row may be glued.
+/// True if the surfaces on both sides of the gap behind a row may be cemented.
 pub(super) fn can_glue(lens: &Lens, row: usize, rules: &SearchRules) -> bool {
     places(lens, rules).is_ok_and(|places| places.contains(&row))
 }

@@ -1,100 +1,48 @@
-//! Changes of the structure of a lens, one file each, and the list of them.
+//! Mutations: changes of the structure of a lens, one per file, and the list of them.
 //!
-//! A mutation draws a place uniformly and new numbers at random, then the rest of the lens is
-//! projected so that it focuses as before, and at last it is repaired. Where another mutation leads
-//! back, the two are a reversible pair in the sense of Green ("Reversible jump Markov chain Monte
-//! Carlo", Biometrika 82, 1995): the numbers of an element that comes or goes are drawn or
-//! forgotten, all others are mapped one to one, and semi-diameters count as following from them.
+//! A mutation draws a site uniformly and new parameters at random; then the rest of the lens is
+//! projected so that it focuses as before, and finally the lens is repaired. If another mutation
+//! leads back, the two are a reversible pair in the sense of Green ("Reversible jump Markov chain
+//! Monte Carlo", Biometrika 82, 1995): the parameters of an element that is added or removed are
+//! drawn or dropped, all others are mapped one to one, and semi-diameters are treated as dependent.
 
 mod add;
 mod bend;
-mod chance;
+mod distributions;
 mod draft;
 mod drop_layer;
 mod exchange;
 mod flip;
 mod glue;
+mod kind;
 mod remove;
+mod repair;
 mod split;
 mod stop;
+mod weights;
+
+pub use kind::MutationKind;
+pub use weights::MutationWeights;
 
 use super::projection::{ProjectionError, project, scale};
-use super::repair::repair;
 use super::{MutatedPoint, Projection, Random, SearchRules};
 use crate::lens::Lens;
 use draft::{MutationContext, MutationDraft, ReverseMove, SingletProposal, SpacingChoice};
 use rand::RngExt as _;
-use serde::{Deserialize, Serialize};
+use repair::repair;
 
-/// A kind of mutation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MutationKind {
-    /// A new element in an air gap.
-    AddSinglet,
-    /// An element less.
-    RemoveSinglet,
-    /// Two neighbours become one cemented group.
-    Glue,
-    /// A cemented interface becomes an air gap.
-    Split,
-    /// A cemented group loses its outer layer.
-    DropLayer,
-    /// Both curvatures of an element change by as much.
-    Bend,
-    /// An element is turned around.
-    Flip,
-    /// An element is made of a neighbouring glass of the catalogue.
-    ExchangeGlass,
-    /// The stop goes to another gap.
-    MoveStop,
-    /// A lens drawn from anywhere.
-    Global,
-}
-
-impl MutationKind {
-    /// Every kind that changes a lens, in the order in which they are shown.
-    pub const MUTATIONS: [Self; 9] = [
-        Self::AddSinglet,
-        Self::RemoveSinglet,
-        Self::Glue,
-        Self::Split,
-        Self::DropLayer,
-        Self::Bend,
-        Self::Flip,
-        Self::ExchangeGlass,
-        Self::MoveStop,
-    ];
-
-    /// What it is called in menus and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::AddSinglet => "add singlet",
-            Self::RemoveSinglet => "remove singlet",
-            Self::Glue => "glue",
-            Self::Split => "split",
-            Self::DropLayer => "drop layer",
-            Self::Bend => "bend",
-            Self::Flip => "flip",
-            Self::ExchangeGlass => "exchange glass",
-            Self::MoveStop => "move stop",
-            Self::Global => "global draw",
-        }
-    }
-}
-
-/// Why a mutation does not apply to a lens.
+/// A mutation that does not apply to a lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{kind}: {why}", kind = .kind.name())]
 pub struct MutationError {
-    /// Which mutation.
+    /// The kind of mutation.
     pub kind: MutationKind,
-    /// Why not.
+    /// The reason.
     pub why: String,
 }
 
 impl MutationError {
-    /// A mutation that does not apply, and why.
+    /// A mutation that does not apply, with the reason.
     pub fn new(kind: MutationKind, why: impl Into<String>) -> Self {
         Self { kind, why: why.into() }
     }
@@ -105,17 +53,16 @@ impl MutationError {
 pub struct MutatedLens {
     /// The lens.
     pub lens: Lens,
-    /// What was done.
+    /// The kind of mutation.
     pub kind: MutationKind,
-    /// What was done, where, in words.
+    /// The description of the mutation.
     pub what: String,
-    /// The rows behind which there is new glass.
+    /// The rows with new glass behind them.
     pub fresh: Vec<usize>,
-    /// How the lens was made paraxially equivalent to the one before; none where the rules do not
-    /// ask for it.
+    /// The projection to a paraxially equivalent lens; `None` if the rules do not ask for it.
     pub projection: Option<Projection>,
-    /// The logarithm of the density of proposing the way back over that of the way there, times the
-    /// determinant of the map; none where there is no way back.
+    /// The logarithm of the ratio of the proposal densities, reverse over forward, times the
+    /// determinant of the map; `None` if the mutation is not reversible.
     pub log_ratio: Option<f64>,
 }
 
@@ -130,11 +77,10 @@ impl From<MutatedLens> for MutatedPoint<Lens> {
     }
 }
 
-/// A mutation whose kind is drawn by its weight in the rules, at an element drawn uniformly.
+/// Makes a mutation of a kind drawn by the weights of the rules, at a uniformly random site.
 ///
 /// # Errors
-/// Why the kind that was drawn does not apply; a sampler that needs the densities right counts that
-/// as a move that was rejected.
+/// The kind that was drawn does not apply; an exact sampler counts this as a rejected move.
 pub fn propose(
     lens: &Lens,
     rules: &SearchRules,
@@ -151,10 +97,10 @@ pub fn propose(
     Err(MutationError::new(MutationKind::MUTATIONS[0], "every kind of mutation has weight 0"))
 }
 
-/// A mutation of a kind at an element drawn uniformly.
+/// Makes a mutation of a kind at a uniformly random site.
 ///
 /// # Errors
-/// Why it does not apply to this lens, or led to what is none.
+/// The mutation does not apply to this lens, or does not lead to a valid lens.
 pub fn mutate(
     kind: MutationKind,
     lens: &Lens,
@@ -176,10 +122,10 @@ pub fn mutate(
     complete(&scene, kind, draft).map_err(refuse)
 }
 
-/// What a kind of mutation does.
+/// The implementation of a kind of mutation.
 struct MutationOperator {
     kind: MutationKind,
-    /// In how many places of a lens it could be made.
+    /// Counts the sites of a lens where it could be made.
     places: fn(&Lens, &SearchRules) -> Result<usize, String>,
     draw: fn(&MutationContext<'_>, &mut Random) -> Result<MutationDraft, String>,
 }
@@ -194,7 +140,7 @@ macro_rules! mutations {
     };
 }
 
-/// Every mutation, in the order of [`MutationKind::MUTATIONS`].
+/// All mutations, in the order of [`MutationKind::MUTATIONS`].
 const MUTATIONS: [MutationOperator; 9] = mutations! {
     AddSinglet: add,
     RemoveSinglet: remove,
@@ -207,7 +153,7 @@ const MUTATIONS: [MutationOperator; 9] = mutations! {
     MoveStop: stop,
 };
 
-/// Half the length of a lens: what stands in for the focal length of an afocal one.
+/// Half the track of a lens, the scale of an afocal one.
 fn half_track(lens: &Lens) -> f64 {
     let track: f64 = lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
     (0.5 * track).max(1.0)
@@ -235,7 +181,8 @@ fn complete(
     Ok(MutatedLens { lens, kind, what, fresh, projection, log_ratio })
 }
 
-/// The logarithm of the density of the way back over that of the way there, without the projection.
+/// The logarithm of the ratio of the proposal densities, reverse over forward, without the
+/// projection.
 fn log_ratio(
     rules: &SearchRules,
     lens: &Lens,
@@ -264,8 +211,7 @@ fn log_ratio(
     log.is_finite().then_some(log)
 }
 
-/// How likely the way back would make the same choice of keeping the rest of the lens in its place;
-/// none where it could not.
+/// The probability that the reverse mutation makes the same choice of spacing; `None` if it cannot.
 fn choice_probability(room: SpacingChoice, lens: &Lens, rules: &SearchRules) -> Option<f64> {
     let keeps = add::keep_probability(lens, Some(room.gap), rules, room.length);
     let chance = if room.keeps_rest { keeps } else { 1.0 - keeps };

@@ -1,18 +1,18 @@
-//! An element less: what was glass becomes air, or what stood behind moves forward.
+//! Removes a singlet: its glass becomes air, or the rest of the lens moves forward.
 
-use super::MutationKind;
 use super::add::{self, KEEP_PROBABILITY, Neighbour, SingletParameters};
-use super::chance::{bernoulli, choose, usable_glasses};
+use super::distributions::{bernoulli, choose, usable_glasses};
 use super::draft::{
     MutationContext, MutationDraft, ReverseMove, SingletProposal, SpacingChoice, has_pickup,
     has_solve, is_gap, is_plain, is_zoomed, light_direction,
 };
+use super::kind::MutationKind;
 use crate::lens::glass;
 use crate::lens::{Lens, Medium, Object};
 use crate::search::element::{Element, elements, piece_count};
 use crate::search::{Random, SearchRules};
 
-/// Which singlets may go.
+/// The singlets that may be removed.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
     let least = rules.elements[0];
     if piece_count(lens) < least + 1 {
@@ -39,16 +39,16 @@ fn may_go(lens: &Lens, element: &Element, rules: &SearchRules) -> bool {
     element.is_singlet() && rows > 2 && free && !followed && !stop
 }
 
-/// How a singlet is taken out.
+/// The way in which a singlet is removed.
 #[derive(Debug, Clone, Copy)]
 struct RemovalChoice {
-    /// Whether it goes with the air in front of it, else with the air behind it.
+    /// True to remove it with the air in front of it, false with the air behind it.
     front: bool,
-    /// Whether the rest of the lens keeps its place.
+    /// True if the rest of the lens keeps its place.
     keeps_rest: bool,
 }
 
-/// The logarithm of the chance to take the singlet at row `first` out in one of its ways.
+/// The logarithm of the probability of one way of removing the singlet at row `first`.
 pub(super) fn log_chance(lens: &Lens, first: usize, kept: bool) -> f64 {
     let sides = sides(lens, first);
     let choice = match remaining_gap(lens, first) {
@@ -64,14 +64,14 @@ pub(super) fn log_chance(lens: &Lens, first: usize, kept: bool) -> f64 {
     choice.ln() - (sides.len() as f64).ln()
 }
 
-/// The gap whose end stays a gap when the singlet goes; none for the first element.
+/// The gap that remains when the singlet is removed; `None` for the first element.
 fn remaining_gap(lens: &Lens, first: usize) -> Option<usize> {
     let last = first + 1;
     let behind = last + 1 == lens.surfaces.len();
     first.checked_sub(1).map(|before| if behind { last } else { before })
 }
 
-/// Whether it may go with the air in front or behind.
+/// The sides from which air may be removed with it: true for the front.
 fn sides(lens: &Lens, first: usize) -> Vec<bool> {
     let last = first + 1 + 1 == lens.surfaces.len();
     let mut found = Vec::with_capacity(2);
@@ -118,7 +118,7 @@ fn remove_singlet(draft: &mut MutationDraft, first: usize, way: RemovalChoice) {
         let dropped = draft.lens.surfaces[if way.front { gap } else { last }].thickness;
         let both = is_zoomed(&draft.lens, gap) && is_zoomed(&draft.lens, last);
         if way.keeps_rest && (both || is_zoomed(&draft.lens, if way.front { gap } else { last })) {
-            // The gap that goes has several lengths: they are added one by one.
+            // The removed gap has several lengths, which are added position by position.
             draft.add_gap(gap, last);
         } else {
             if way.front {
@@ -137,7 +137,7 @@ fn remove_singlet(draft: &mut MutationDraft, first: usize, way: RemovalChoice) {
     draft.inherit_variables(&[]);
 }
 
-/// The way back: to add the same singlet at the same place.
+/// The reverse: adding the same singlet at the same place.
 fn reverse_move(
     scene: &MutationContext<'_>,
     small: &Lens,

@@ -1,12 +1,12 @@
-//! A cemented interface becomes an air gap between two surfaces of nearly its curvature.
+//! Splits a cemented interface into an air gap between two surfaces of similar curvature.
 
-use super::MutationKind;
-use super::chance::{ShiftedExponential, choose, normal_log_density, sample_normal};
+use super::distributions::{ShiftedExponential, choose, normal_log_density, sample_normal};
 use super::draft::{
     MutationContext, MutationDraft, ReverseMove, has_pickup, is_of_medium, is_plain,
     light_direction,
 };
 use super::glue;
+use super::kind::MutationKind;
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row};
 use crate::search::element::{ElementKind, elements};
 use crate::search::projection::ProjectionMap;
@@ -17,11 +17,11 @@ use crate::search::{Random, SearchRules};
 pub(super) struct SplitDraw {
     /// Half the difference of the curvatures in front and behind.
     pub(super) difference: f64,
-    /// The air between them.
+    /// The air space between them.
     pub(super) air: f64,
 }
 
-/// Cemented interfaces that may be split.
+/// The cemented interfaces that may be split.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
     let rows = lens.surfaces.len();
     let cemented = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(_)));
@@ -38,7 +38,7 @@ impl SplitDraw {
         ShiftedExponential::new(rules.air_center, 0.5 * scale / 50.0)
     }
 
-    /// A tenth of the spread of a new element's curvatures: the two parts have strong power.
+    /// A tenth of that of a new element: the two parts have strong power.
     fn curvature_deviation(scale: f64) -> f64 {
         0.025 / scale
     }
@@ -72,7 +72,7 @@ pub(super) fn draw(
     Ok(draft)
 }
 
-/// Makes two surfaces of one.
+/// Replaces a surface by two.
 fn insert_air_gap(draft: &mut MutationDraft, row: usize, cut: SplitDraw) {
     let joint = draft.lens.surfaces[row].clone();
     let sense = light_direction(&draft.lens, row);

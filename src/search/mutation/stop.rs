@@ -1,19 +1,19 @@
-//! The stop goes to another place in the air: along its gap, or to another one. What passes it on
-//! the axis stays what it was.
+//! Moves the stop along its gap or to another air gap. The axial beam that passes it stays the
+//! same.
 
-use super::MutationKind;
-use super::chance::choose;
+use super::distributions::choose;
 use super::draft::{
     MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_zoomed, light_direction,
     medium_after, shortest_gap,
 };
+use super::kind::MutationKind;
 use crate::lens::{Aperture, Lens, Medium, Object, Row};
 use crate::paraxial::{Beam, first_order};
 use crate::search::element::glass_gaps;
 use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 
-/// The row of a stop that is a plane in air and nothing else.
+/// The row of a stop that is a bare plane in air.
 fn plane_stop(lens: &Lens) -> Option<usize> {
     let stop = lens.stop()?;
     let glass = glass_gaps(lens);
@@ -24,8 +24,8 @@ fn plane_stop(lens: &Lens) -> Option<usize> {
     (bare && air && !mirror).then_some(stop)
 }
 
-/// The gaps, behind these rows of a lens without its stop, to which the stop may go; not the one
-/// behind the last surface, where it would hide the back focus.
+/// The gaps, given by the rows in front of them in a lens without its stop, to which the stop may
+/// move; not the last one, where it would hide the back focal distance.
 fn stop_gaps(bare: &Lens, rules: &SearchRules) -> Vec<usize> {
     let rows = bare.surfaces.len();
     let glass = glass_gaps(bare);
@@ -63,7 +63,7 @@ fn remove_stop(scene: &MutationContext<'_>) -> Result<MutationDraft, String> {
     Ok(draft)
 }
 
-/// In how many places the stop may be put.
+/// The gaps to which the stop may move.
 pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
     let scene = MutationContext::new(lens.clone(), rules, 1.0);
     remove_stop(&scene).map(|bare| stop_gaps(&bare.lens, rules))
@@ -90,8 +90,8 @@ pub(super) fn draw(
     Ok(draft)
 }
 
-/// The place in a gap is a share of it: the determinant of the map is what the gaps' lengths are to
-/// each other. A stop on a glass surface has no way back, nor has one between moving groups.
+/// The position in a gap is a share of its length, so the determinant of the map is the ratio of
+/// the gaps' lengths. A stop on a glass surface has no reverse, nor has one between moving groups.
 fn reverse_move(
     rules: &SearchRules,
     bare: &Lens,
@@ -105,7 +105,7 @@ fn reverse_move(
     possible.then_some(ReverseMove::new(MutationKind::MoveStop, log))
 }
 
-/// Puts a stop `length` behind a row.
+/// Inserts a stop `length` mm behind a row.
 fn insert_stop(draft: &mut MutationDraft, gap: usize, length: f64) {
     let sense = light_direction(&draft.lens, gap);
     let row = Row { medium: medium_after(&draft.lens, gap), stop: true, ..Row::default() };
@@ -116,7 +116,8 @@ fn insert_stop(draft: &mut MutationDraft, gap: usize, length: f64) {
     draft.inherit_variables(&[gap]);
 }
 
-/// Where the size of the stop is the aperture: as large as the axial beam is there now.
+/// If the aperture is the size of the stop, sets it to the height of the axial beam at the new
+/// stop.
 fn rescale_aperture(before: &Lens, lens: &mut Lens) -> Result<(), String> {
     let mut widest = None;
     for zoom in 0..lens.zoom_positions() {
@@ -138,14 +139,15 @@ fn rescale_aperture(before: &Lens, lens: &mut Lens) -> Result<(), String> {
     Ok(())
 }
 
-/// The height of the same axial ray at the new stop over that at the old one.
+/// The ratio of the heights of an axial ray at the new stop and at the old one.
 fn axial_height_ratio(before: &Lens, lens: &Lens, zoom: usize) -> Result<f64, String> {
     let um = lens.wavelengths[lens.primary()].um;
     let height = |lens: &Lens| {
         let system = lens.resolve(zoom, um).map_err(|error| error.to_string())?;
         let beam = Beam { aperture: Aperture::StopSemiDiameter(1.0), ..Beam::for_lens(lens, zoom) };
         let first = first_order(&system, &beam).map_err(|error| error.to_string())?;
-        // A stop of 1 mm stands for a start height of one over what a ray from 1 mm has at the stop.
+        // With a stop of 1 mm, the start height is the inverse of the height at the stop of a ray
+        // from 1 mm.
         Ok::<f64, String>(first.marginal.heights[0].hypot(first.marginal.start_slope))
     };
     let (old, new) = (height(before)?, height(lens)?);

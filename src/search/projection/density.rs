@@ -1,4 +1,4 @@
-//! By how much the projection stretches volumes.
+//! The change of volume by the projection.
 //!
 //! The nearest lens is where `z − z₀ = Jᵀλ` and `g(z) = g₀(z₀)`. Differentiated by `z₀`, with `H` the
 //! sum of the second derivatives of `g` times their multipliers,
@@ -11,8 +11,8 @@ use crate::math::Dual;
 use nalgebra::{DMatrix, DVector};
 
 /// The logarithm of the determinant of the map to the nearest lens, which is `at` with the
-/// `multipliers`; `before` holds the derivatives of the numbers to keep where it starts. None where
-/// it is singular.
+/// `multipliers`; `before` holds the derivatives of the constraints at its start. `None` if it is
+/// singular.
 pub(super) fn log_determinant(
     before: &DMatrix<f64>,
     model: &MarginalRayModel,

@@ -1,21 +1,22 @@
-//! Paraxial projection (Teh, *Computational Lens Design*, section 4.5): after a mutation the numbers
-//! of the rest of the lens move as little as possible so that it focuses as it did before.
+//! Paraxial projection (Teh, *Computational Lens Design*, section 4.5): after a mutation the
+//! parameters of the rest of the lens move as little as possible so that it focuses as it did
+//! before.
 //!
-//! What is kept is (4.22) in full: height and slope of the marginal ray at the image, at every zoom
-//! position; only the slope where the last gap is solved for the focus. Numbers are measured in steps
-//! of `0.3/f` for curvatures and `0.01 f` for distances, else only curvatures would move; `f` is
-//! rounded to a power of two, so that the steps do not change with the lens.
+//! The constraints are (4.22) in full: height and slope of the marginal ray at the image at every
+//! zoom position; only the slope if the last gap is solved for focus. Parameters are measured in
+//! steps of `0.3/f` for curvatures and `0.01 f` for distances, since otherwise only curvatures
+//! would move; `f` is rounded to a power of two, so that the steps do not change with the lens.
 //!
-//! Two maps lead to such a lens, and each is the inverse of the other: one goes to the nearest, along
-//! the normals of the constraint where it arrives; one goes along the normals of the constraint of
-//! the lens from which it starts. That is what makes a mutation and the one that undoes it a
-//! reversible pair. By how much they stretch volumes follows from (4.30), with its factors put right.
+//! Two maps lead to such a lens, and each is the inverse of the other: one goes to the nearest
+//! lens, along the normals of the constraint at its end; one goes along the normals of the
+//! constraint at its start. That makes a mutation and its reverse a reversible pair. The change of
+//! volume follows from (4.30), with its factors corrected.
 
-#[cfg(test)]
-mod checks;
 mod density;
 mod model;
 mod solve;
+#[cfg(test)]
+mod tests;
 
 use super::SearchRules;
 use super::element::glass_gaps;
@@ -26,13 +27,13 @@ use serde::Serialize;
 use solve::{CoordinateBounds, ProjectionSolution};
 use std::fmt::{self, Display};
 
-/// What a projection did.
+/// The outcome of a projection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Projection {
-    /// How many Newton steps it took.
+    /// The number of Newton steps.
     pub steps: usize,
-    /// By how much the marginal ray at the image still differs: its height relative to that at the
-    /// first surface, its slope relative to what it was.
+    /// The remaining error of the marginal ray at the image: of its height relative to that at the
+    /// first surface, and of its slope relative to the original one.
     pub error: f64,
     /// The largest change of a curvature, in 1/mm.
     pub curvature: f64,
@@ -41,7 +42,7 @@ pub struct Projection {
 }
 
 impl Display for Projection {
-    /// What it took, in words.
+    /// Writes the steps and the largest changes.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { steps, curvature, distance, .. } = self;
         let ending = if *steps == 1 { "" } else { "s" };
@@ -50,42 +51,42 @@ impl Display for Projection {
     }
 }
 
-/// Why a lens cannot be made to focus as another one does.
+/// The reasons that a projection fails.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProjectionError {
-    /// Nothing to keep.
+    /// The lens is afocal at this zoom position.
     #[error("the lens is afocal at zoom position {0}: it has no focal length to keep")]
     Afocal(usize),
-    /// No number that may move has an effect of its own on every kept one.
+    /// The variable parameters cannot satisfy all constraints independently.
     #[error("the numbers that may move cannot keep focal length and focus apart")]
     Singular,
-    /// Numbers would have to leave what is allowed.
+    /// Parameters would have to leave their bounds: how many have reached them, and of how many.
     #[error("numbers would have to pass their bounds ({0} of {1} have reached them)")]
     Bounds(usize, usize),
-    /// Not near enough after as many steps as there may be.
+    /// No convergence within this number of steps.
     #[error("it needs more than {0} steps")]
     Steps(usize),
-    /// A lens that cannot be resolved.
+    /// The lens cannot be resolved.
     #[error(transparent)]
     Lens(#[from] LensError),
 }
 
-/// Which way leads to a lens with the same focus.
+/// The map to a lens with the same focus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ProjectionMap {
-    /// To the nearest one.
+    /// To the nearest lens.
     Nearest,
-    /// Along the normals of the lens before the mutation.
+    /// Along the constraint normals of the lens before the mutation.
     AlongNormals,
 }
 
-/// Where the numbers of a row come from.
+/// The origin of the parameters of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct RowOrigin {
-    /// The row of the lens before the mutation whose curvature it has, and the sign with which;
-    /// none for one that the mutation made and that is kept.
+    /// The row of the lens before the mutation that its curvature comes from, and the sign; `None`
+    /// for a curvature that the mutation has set.
     pub(super) curvature: Option<(usize, f64)>,
-    /// The row whose gap it has.
+    /// The row that its gap comes from.
     pub(super) gap: Option<usize>,
 }
 
@@ -94,13 +95,13 @@ pub(super) struct RowOrigin {
 pub(super) struct ProjectedLens {
     pub(super) lens: Lens,
     pub(super) report: Projection,
-    /// The logarithm of the determinant of the map; none where the way back does not lead back.
+    /// The logarithm of the determinant of the map; `None` if the reverse does not lead back.
     pub(super) log_determinant: Option<f64>,
 }
 
-/// Moves the numbers of `mutated` that were in `before` until it focuses as `before` does. The map
-/// that is asked for is tried first; where bounds stop it, the other numbers move on without those
-/// at their bounds, and there is no way back.
+/// Moves the parameters of `mutated` that it shares with `before` until it focuses as `before`
+/// does. The requested map is tried first; if bounds stop it, the parameters at their bounds are
+/// fixed, the others move on, and the mutation is not reversible.
 pub(super) fn project(
     before: &Lens,
     mutated: &Lens,
@@ -125,14 +126,14 @@ pub(super) fn project(
     })
 }
 
-/// A lens before and after a mutation, as functions of the numbers that both have, counted from
-/// what they are right after the mutation and in their own steps.
+/// A lens before and after a mutation, as functions of their shared parameters, measured from their
+/// values right after the mutation in their own steps.
 struct ProjectionPair {
     coordinates: Vec<ProjectionCoordinate>,
     old: MarginalRayModel,
     new: MarginalRayModel,
     target: Vec<f64>,
-    /// What the rules allow.
+    /// The ranges that the rules permit.
     limits: CoordinateBounds,
 }
 
@@ -156,7 +157,7 @@ impl ProjectionPair {
         vec![0.0; self.coordinates.len()]
     }
 
-    /// The nearest lens; where another one was asked for, it is not exact.
+    /// The nearest lens; not exact if another map was requested.
     fn nearest(&self, map: ProjectionMap) -> Result<ProjectionSolution, ProjectionError> {
         let found = solve::nearest(&self.new, &self.zero(), &self.target, &self.bounds())?;
         Ok(ProjectionSolution { exact: found.exact && map == ProjectionMap::Nearest, ..found })
@@ -167,12 +168,13 @@ impl ProjectionPair {
         solve::along_normals(&self.new, &normals, &self.zero(), &self.target, &self.bounds())
     }
 
-    /// How far the numbers may move; one that is outside of the rules may not go farther.
+    /// The bounds; a parameter outside the rules may not move farther out.
     fn bounds(&self) -> CoordinateBounds {
         self.limits.widen_to_include(&self.zero())
     }
 
-    /// The way back starts where the way there ended, with the other map and the lenses exchanged.
+    /// True if the reverse leads back: from the end of the forward map, with the other map and the
+    /// lenses exchanged.
     fn is_reversible(&self, map: ProjectionMap, there: &ProjectionSolution) -> bool {
         let bounds = self.limits.widen_to_include(&there.at);
         let target = self.new.values(&there.at);
@@ -211,7 +213,7 @@ impl ProjectionPair {
                 lens.set(coordinate.new, clamp_to_variable(mutated, coordinate.new, value));
             }
         }
-        // A lens that has a model has pickups that can be followed.
+        // The pickups of a lens with a model can be resolved.
         if lens.pickups.is_empty() { lens } else { lens.with_pickups().unwrap_or(lens) }
     }
 
@@ -228,14 +230,14 @@ impl ProjectionPair {
     }
 }
 
-/// A value that rounding may have brought out of the bounds of its variable.
+/// Clamps a value, which rounding may have moved out of the bounds of its variable.
 fn clamp_to_variable(lens: &Lens, parameter: Parameter, value: f64) -> f64 {
     let Some(variable) = lens.variable(parameter) else { return value };
     let value = variable.min.map_or(value, |min| value.max(min));
     variable.max.map_or(value, |max| value.min(max))
 }
 
-/// Every curvature and distance of a lens that does not follow another number.
+/// All curvatures and distances of a lens that are not picked up from another parameter.
 fn free_parameters(lens: &Lens) -> Vec<Parameter> {
     let mut freed = lens.clone();
     freed.variables.clear();
@@ -243,7 +245,7 @@ fn free_parameters(lens: &Lens) -> Vec<Parameter> {
     freed.variables.iter().map(|variable| variable.parameter).collect()
 }
 
-/// The numbers that both lenses have and the rules allow to move.
+/// The parameters that both lenses share and the rules permit to move.
 fn coordinates(
     before: &Lens,
     mutated: &Lens,
@@ -270,7 +272,7 @@ fn coordinates(
     found
 }
 
-/// What the rules and the variables of the lens allow each number, in its own steps.
+/// The ranges that the rules and the variables of the lens permit, in the steps of the parameters.
 fn limits(
     lens: &Lens,
     coordinates: &[ProjectionCoordinate],

@@ -1,5 +1,5 @@
-//! The marginal ray of a lens as a function of numbers, by y-nu trace: forwards for its value,
-//! backwards for its derivatives by all numbers at once.
+//! The marginal ray of a lens as a function of its parameters, by a y-nu trace: forwards for its
+//! value, backwards for its derivatives by all parameters at once.
 //!
 //! Backwards, `∂/∂d = ȳ nu/n'` and `∂/∂c = −n̄u y (n' − n)`. Through a gradient the ray goes by the
 //! matrix of its [`ParaxialGrin`], backwards by the transpose, and a longer gap lets both numbers grow as the
@@ -12,12 +12,12 @@ use crate::math::Real;
 use crate::paraxial::signed_indices;
 use nalgebra::DMatrix;
 
-/// A number that the lenses before and after a mutation share.
+/// A parameter that the lenses before and after a mutation share.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ProjectionCoordinate {
     pub(super) old: Parameter,
     pub(super) new: Parameter,
-    /// The sign of the new number over the old one: a turned surface has the other one.
+    /// The sign of the new value relative to the old one: −1 for a reversed surface.
     pub(super) sign: f64,
     /// Its value right after the mutation.
     pub(super) value: f64,
@@ -25,7 +25,7 @@ pub(super) struct ProjectionCoordinate {
     pub(super) step: f64,
 }
 
-/// What a coordinate moves, and by how much.
+/// The effect of a coordinate on a curvature or a gap.
 #[derive(Debug, Clone, Copy)]
 enum CoordinateEffect {
     Curvature { row: usize, factor: f64 },
@@ -48,9 +48,10 @@ pub(super) struct MarginalRayModel {
     positions: Vec<ZoomModel>,
     curvatures: Vec<f64>,
     effects: Vec<Vec<CoordinateEffect>>,
-    /// Whether the last gap follows the focus, so that the height at the image says nothing.
+    /// True if the last gap is solved for focus, so that the height at the image is not a
+    /// constraint.
     solved: bool,
-    /// What a slope is multiplied with.
+    /// The factor on slopes.
     scale: f64,
 }
 
@@ -59,9 +60,9 @@ struct MarginalRayTrace<R> {
     heights: Vec<R>,
     /// Optical slopes behind each surface.
     slopes: Vec<R>,
-    /// The same in front of the next one, and the index there.
+    /// Optical slopes in front of the next surface, and the index there.
     ends: Vec<(R, R)>,
-    /// What fills a gap that is no glass.
+    /// The gradient-index medium of a gap, if it is filled with one.
     slabs: Vec<Option<ParaxialGrin<R>>>,
 }
 
@@ -85,9 +86,9 @@ fn zoom_models(lens: &Lens, reference: &Lens) -> Result<Vec<ZoomModel>, LensErro
     (0..lens.zoom_positions()).map(position).collect()
 }
 
-/// A length of the order of the focal length that paraxially equal lenses share: the focal length,
-/// or for a finite object the one that a thin lens of the same magnification would have; the
-/// smallest over the zoom positions.
+/// A length of the order of the focal length, the same for paraxially equivalent lenses: the focal
+/// length, or for a finite object that of a thin lens of the same magnification; the minimum over
+/// the zoom positions.
 pub(in crate::search) fn scale(lens: &Lens) -> Result<f64, ProjectionError> {
     let model = MarginalRayModel::new(lens, lens, &[], 1.0, |c| (c.new, 1.0))?;
     let mut smallest = f64::INFINITY;
@@ -109,9 +110,9 @@ pub(in crate::search) fn scale(lens: &Lens) -> Result<f64, ProjectionError> {
 }
 
 impl MarginalRayModel {
-    /// A lens as a function of coordinates; `which` says what a coordinate is called in it and
-    /// with which sign. The marginal ray starts from the object with the slope that reaches 1 mm at
-    /// the first vertex of the `reference`.
+    /// A lens as a function of coordinates; `which` gives the parameter of a coordinate and its
+    /// sign. The marginal ray starts from the object with the slope that reaches 1 mm at the first
+    /// vertex of the `reference`.
     pub(super) fn new(
         lens: &Lens,
         reference: &Lens,
@@ -132,7 +133,7 @@ impl MarginalRayModel {
         })
     }
 
-    /// How many numbers are kept.
+    /// The number of constraints.
     pub(super) fn constraints(&self) -> usize {
         self.positions.len() * self.constraints_per_zoom()
     }
@@ -141,7 +142,8 @@ impl MarginalRayModel {
         if self.solved { 1 } else { 2 }
     }
 
-    /// The kept numbers: for every zoom position the slope, and the height unless it is solved.
+    /// The constrained quantities: for every zoom position the slope, and the height unless it is
+    /// solved.
     pub(super) fn values(&self, at: &[f64]) -> Vec<f64> {
         let (curvatures, gaps) = self.curvatures_and_gaps(at);
         let mut values = Vec::with_capacity(self.constraints());
@@ -156,7 +158,7 @@ impl MarginalRayModel {
         values
     }
 
-    /// Their derivatives by the coordinates, a row for each kept number.
+    /// The derivatives of the constrained quantities by the coordinates, a row for each quantity.
     pub(super) fn jacobian(&self, at: &[f64]) -> DMatrix<f64> {
         let (curvatures, gaps) = self.curvatures_and_gaps(at);
         let mut jacobian = DMatrix::zeros(self.constraints(), at.len());
@@ -174,7 +176,8 @@ impl MarginalRayModel {
         jacobian
     }
 
-    /// The gradient of the kept numbers, each times its multiplier, over any number type.
+    /// The gradient of the sum of the constrained quantities times their multipliers, over any
+    /// number type.
     pub(super) fn weighted_gradient<R: Real>(&self, at: &[R], multipliers: &[f64]) -> Vec<R> {
         let (curvatures, gaps) = self.curvatures_and_gaps(at);
         let mut gradient = vec![R::ZERO; at.len()];
@@ -278,7 +281,7 @@ impl MarginalRayModel {
 }
 
 impl ZoomModel {
-    /// What fills the gap behind a row, where that is a gradient.
+    /// The gradient-index medium in the gap behind a row, if there is one.
     fn slab<R: Real>(&self, row: usize, thickness: R) -> Option<ParaxialGrin<R>> {
         let RotationalProfile { base, coefficients: grade } = self.gradients[row]?;
         let field =
@@ -309,7 +312,7 @@ fn sum_effects<R: Real>(
     sum
 }
 
-/// What a number moves, itself and what follows it.
+/// The effects of a parameter: on itself and on the parameters that are picked up from it.
 fn effects_of(lens: &Lens, parameter: Parameter, factor: f64) -> Vec<CoordinateEffect> {
     let moving =
         if lens.pickups.is_empty() { vec![(parameter, 1.0)] } else { lens.dependents(parameter) };

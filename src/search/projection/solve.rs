@@ -1,19 +1,20 @@
-//! Newton's method on the few kept numbers: to the nearest lens, or along given directions.
+//! Newton's method for the few constraints: to the nearest lens, or along given directions.
 
 use super::ProjectionError;
 use super::model::MarginalRayModel;
 use nalgebra::{DMatrix, DVector};
 
-/// More steps than this are a failure.
+/// The maximum number of steps.
 const MAX_STEPS: usize = 15;
 
-/// What counts as kept.
+/// The relative tolerance of the constraints.
 const TOLERANCE: f64 = 1e-12;
 
-/// Steps that turn a lens on the constraint into the nearest one; each costs about a microsecond.
+/// The maximum number of steps from a lens that satisfies the constraints to the nearest one; each
+/// costs about a microsecond.
 const MAX_POLISHING_STEPS: usize = 60;
 
-/// How far coordinates may move.
+/// The bounds of the coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct CoordinateBounds(Vec<[f64; 2]>);
 
@@ -22,7 +23,7 @@ impl CoordinateBounds {
         Self(ranges)
     }
 
-    /// The same, but for numbers that are outside already: those may stay where they are.
+    /// The bounds widened to include coordinates that are already outside.
     pub(super) fn widen_to_include(&self, at: &[f64]) -> Self {
         let widened = |([low, high], z): (&[f64; 2], &f64)| [low.min(*z), high.max(*z)];
         Self(self.0.iter().zip(at).map(widened).collect())
@@ -32,7 +33,7 @@ impl CoordinateBounds {
         at.iter().zip(&self.0).all(|(z, [low, high])| (*low..=*high).contains(z))
     }
 
-    /// Brings every coordinate inside and marks those that had left.
+    /// Clamps every coordinate and returns those that were outside.
     fn clamp(&self, at: &mut DVector<f64>) -> Vec<usize> {
         let mut stopped = Vec::new();
         for (i, (z, [low, high])) in at.iter_mut().zip(&self.0).enumerate() {
@@ -45,16 +46,16 @@ impl CoordinateBounds {
     }
 }
 
-/// Coordinates at which the kept numbers have their target.
+/// Coordinates at which the constraints are satisfied.
 #[derive(Debug, Clone)]
 pub(super) struct ProjectionSolution {
     pub(super) at: Vec<f64>,
-    /// How much of each direction was needed.
+    /// The Lagrange multipliers, the coefficients of the normals.
     pub(super) multipliers: DVector<f64>,
     pub(super) steps: usize,
-    /// The largest difference from a target.
+    /// The largest residual.
     pub(super) error: f64,
-    /// Whether it lies where the map says, no bound in its way.
+    /// True if it is the exact value of the map, not limited by a bound.
     pub(super) exact: bool,
 }
 
@@ -69,20 +70,20 @@ impl ProjectionProblem<'_> {
         DVector::from_iterator(values.len(), self.target.iter().zip(&values).map(|(t, v)| t - v))
     }
 
-    /// What rounding leaves of the differences.
+    /// The residual that rounding leaves.
     fn tolerance(&self) -> f64 {
         TOLERANCE * self.target.iter().fold(1.0, |most: f64, t| most.max(t.abs()))
     }
 }
 
 fn largest(vector: &DVector<f64>) -> f64 {
-    // Not a number counts as infinitely far.
+    // NaN counts as infinity.
     vector
         .iter()
         .fold(0.0, |most: f64, v| if v.is_nan() { f64::INFINITY } else { most.max(v.abs()) })
 }
 
-/// Solves `J Jᵀ λ = c`; none where the rows of `J` are nearly dependent.
+/// Solves `J Jᵀ λ = c`; `None` if the rows of `J` are nearly dependent.
 fn multipliers(jacobian: &DMatrix<f64>, missing: &DVector<f64>) -> Option<DVector<f64>> {
     let normal = jacobian * jacobian.transpose();
     let largest = normal.diagonal().max();
@@ -92,10 +93,10 @@ fn multipliers(jacobian: &DMatrix<f64>, missing: &DVector<f64>) -> Option<DVecto
     sound.then(|| factor.solve(missing))
 }
 
-/// The nearest coordinates to `start` at which the kept numbers have their target: steps of
-/// least length `z ← z + Jᵀ (J Jᵀ)⁻¹ c`, halved while the differences grow, coordinates that reach a
-/// bound left there; then, where none did, `z ← z₀ + Jᵀ (J Jᵀ)⁻¹ (c + J (z − z₀))` until the way is
-/// along the normals, which is where (4.22) has its solution.
+/// The nearest coordinates to `start` at which the constraints are satisfied: minimum-norm steps `z
+/// ← z + Jᵀ (J Jᵀ)⁻¹ c`, halved while the residual grows, with coordinates that reach a bound fixed
+/// there; then, if none did, `z ← z₀ + Jᵀ (J Jᵀ)⁻¹ (c + J (z − z₀))` until the displacement is
+/// along the normals, which is the solution of (4.22).
 pub(super) fn nearest(
     model: &MarginalRayModel,
     start: &[f64],
@@ -154,8 +155,7 @@ fn find_feasible(
     Err(ProjectionError::Steps(MAX_STEPS))
 }
 
-/// The longest of the step and its halves that brings the differences down, or that reaches a
-/// bound first.
+/// The longest of the step and its halves that reduces the residual, or that reaches a bound first.
 fn shorten_step(
     problem: &ProjectionProblem<'_>,
     at: &DVector<f64>,
@@ -197,8 +197,8 @@ fn polish(
     None
 }
 
-/// The coordinates `start + Nᵀ λ` at which the kept numbers have their target, with the rows of
-/// `N` as directions.
+/// The coordinates `start + Nᵀ λ` at which the constraints are satisfied, with the rows of `N` as
+/// directions.
 pub(super) fn along_normals(
     model: &MarginalRayModel,
     normals: &DMatrix<f64>,

@@ -7,7 +7,7 @@ use aplanat::lens::{Lens, Medium, Parameter, Quantity, RADIAL_TERMS};
 use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, start};
 use aplanat::paraxial::{Beam, first_order, paraxial_ray};
-use aplanat::search::lens::LensSummary;
+use aplanat::search::lens_landscape::LensSummary;
 use aplanat::trace::{Ray, Tracer};
 
 /// The RMS radius of the spot on the axis, in mm.

@@ -9,7 +9,9 @@ use aplanat::lens::{
     GradientIndex, Lens, Medium, Parameter, Pickup, ProfileLaw, Quantity, RADIAL_TERMS, Variable,
 };
 use aplanat::math::Vec3;
-use aplanat::search::lens::{LensLandscape, SearchPlan, finalize, run, with_open_apertures};
+use aplanat::search::lens_landscape::{
+    LensLandscape, SearchPlan, finalize, run, with_open_apertures,
+};
 use aplanat::search::{
     Landscape, MutationKind, SearchRules, SearchRunOn, SearchSettings, mutate, propose,
 };

@@ -9,7 +9,7 @@ use aplanat::lens::{
 use aplanat::math::quadrature::gauss_legendre;
 use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, DescentState};
-use aplanat::search::lens::{
+use aplanat::search::lens_landscape::{
     DescentSettings, LensLandscape, LensSummary, SearchPlan, finalize, goal, run,
     with_open_apertures,
 };

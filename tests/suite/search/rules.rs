@@ -3,7 +3,9 @@
 
 use super::super::merit::bundled;
 use aplanat::lens::{Lens, Medium};
-use aplanat::search::lens::{LensLandscape, SearchPlan, describe_violation, finalize, run};
+use aplanat::search::lens_landscape::{
+    LensLandscape, SearchPlan, describe_violation, finalize, run,
+};
 use aplanat::search::{Landscape as _, MutationKind, SearchRules, SearchSettings};
 use std::ops::ControlFlow;
 

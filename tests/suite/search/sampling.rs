@@ -1,6 +1,8 @@
 //! What the samplers sample, on the toy of thin singlets, where everything can be computed.
 
-use aplanat::search::clocks::{CompetingClocks, KnownDensity, Regeneration, RegenerationRate};
+use aplanat::search::competing_clocks::{
+    CompetingClocks, KnownDensity, Regeneration, RegenerationRate,
+};
 use aplanat::search::toy::ToyLandscape;
 use aplanat::search::{Landscape, Random, SearchMethod, SearchRun, SearchSettings, Temperature};
 use rand::SeedableRng as _;

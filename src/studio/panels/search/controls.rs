@@ -4,7 +4,7 @@ use eframe::egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui
 
 use super::setup::SearchSetup;
 use super::{search_command, words};
-use crate::search::lens::describe_violation;
+use crate::search::lens_landscape::describe_violation;
 use crate::search::{SteerCommand, Temperature};
 use crate::session::{
     Command, RunStatus, SessionView, StructureSearchCommand, StructureSearchSnapshot,

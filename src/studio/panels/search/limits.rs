@@ -3,7 +3,7 @@
 use eframe::egui::{ComboBox, Grid, Ui};
 
 use super::setup::{drag, length, optional};
-use crate::search::lens::SearchPlan;
+use crate::search::lens_landscape::SearchPlan;
 use crate::search::{SearchRules, Termination};
 
 /// The limits of the factory.

@@ -1,4 +1,4 @@
-//! What new numbers are drawn from, each with its density.
+//! Probability distributions of new parameters, with their densities.
 
 use crate::lens::Lens;
 use crate::lens::glass::{self, Glass};
@@ -6,8 +6,8 @@ use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
 
-/// `least` and more, falling off with a mean excess, up to `most`: every length that the rules allow
-/// can be drawn, so that every element could have been added.
+/// A truncated exponential distribution: lengths from `least` up to a maximum, with a mean excess.
+/// It covers every permitted length, so that every element could have been added.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShiftedExponential {
     least: f64,
@@ -20,7 +20,7 @@ impl ShiftedExponential {
         Self { least, range: (most - least).max(0.0), mean }
     }
 
-    /// The share of the exponential that lies within the range.
+    /// The probability of the untruncated exponential within the range.
     fn share(self) -> f64 {
         -(-self.range / self.mean).exp_m1()
     }
@@ -30,7 +30,7 @@ impl ShiftedExponential {
         self.least + excess.min(self.range)
     }
 
-    /// The logarithm of its density; none where it cannot be drawn.
+    /// The logarithm of the density of a length; `None` if it cannot be drawn.
     pub(super) fn log_density(self, length: f64) -> Option<f64> {
         let excess = length - self.least;
         let possible = (0.0..=self.range).contains(&excess) && self.range > 0.0;
@@ -38,29 +38,29 @@ impl ShiftedExponential {
     }
 }
 
-/// A normally distributed number around 0.
+/// A normal variate with mean 0.
 pub(super) fn sample_normal(deviation: f64, random: &mut Random) -> f64 {
     deviation * random.sample::<f64, _>(StandardNormal)
 }
 
-/// The logarithm of its density.
+/// The logarithm of the normal density with mean 0.
 pub(super) fn normal_log_density(value: f64, deviation: f64) -> f64 {
     let t = value / deviation;
     -0.5 * t * t - deviation.ln() - 0.5 * std::f64::consts::TAU.ln()
 }
 
-/// True as often as said.
+/// A Bernoulli draw: true with probability `chance`.
 pub(super) fn bernoulli(chance: f64, random: &mut Random) -> bool {
     random.random::<f64>() < chance
 }
 
-/// One of several, all alike; none of none.
+/// A uniformly random element; `None` if the slice is empty.
 pub(super) fn choose<'a, T>(all: &'a [T], random: &mut Random) -> Option<&'a T> {
     if all.is_empty() { None } else { all.get(random.random_range(0..all.len())) }
 }
 
-/// The glasses that new elements may be made of: those of the rules that have an index at every
-/// wavelength of the lens.
+/// The glasses of new elements: those of the rules that have an index at every wavelength of the
+/// lens.
 pub(super) fn usable_glasses(lens: &Lens, rules: &SearchRules) -> Vec<&'static Glass> {
     let reaches = |glass: &&'static Glass| {
         let [low, high] = glass.range_um;

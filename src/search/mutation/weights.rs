@@ -1,11 +1,11 @@
-//! How often each kind of mutation is tried.
+//! Relative frequencies of the kinds of mutation.
 
-use super::MutationKind;
+use super::kind::MutationKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How often each kind of mutation is tried, relatively; a kind that is not listed has 1, and 0
-/// forbids it.
+/// Relative frequencies of the kinds of mutation; a kind that is not listed has weight 1, and
+/// weight 0 excludes it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct MutationWeights(BTreeMap<MutationKind, f64>);
@@ -16,7 +16,8 @@ impl MutationWeights {
         self.0.get(&kind).copied().unwrap_or(1.0)
     }
 
-    /// Gives a kind another weight; false, and nothing done, where it is negative or not finite.
+    /// Sets the weight of a kind; returns false and changes nothing if it is negative or not
+    /// finite.
     pub fn set(&mut self, kind: MutationKind, weight: f64) -> bool {
         let sound = weight >= 0.0 && weight.is_finite();
         if sound {

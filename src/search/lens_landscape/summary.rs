@@ -1,5 +1,4 @@
-//! What a lens has come to, in the numbers that a designer compares: sharpness and light of every
-//! field.
+//! The summary of a lens: sharpness and light of every field, and its size.
 
 use super::goal::focal_length_of;
 use crate::analysis::{Estimate, Spot, spots};
@@ -8,45 +7,46 @@ use crate::pupil::{Accuracy, RayModel, RayModelError};
 use crate::search::element;
 use serde::Serialize;
 
-/// A lens in numbers.
+/// The characteristic numbers of a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LensSummary {
-    /// The focal length at every zoom position, in mm; none for an afocal lens.
+    /// The focal length at every zoom position, in mm; `None` for an afocal lens.
     pub focal_lengths: Vec<Option<f64>>,
-    /// How many pieces of glass there are.
+    /// The number of pieces of glass.
     pub elements: usize,
-    /// The pattern of glass and air.
+    /// The topology, the pattern of glass and air.
     pub topology: String,
-    /// From the first vertex to the image, in mm, as it is written.
+    /// The total track from the first vertex to the image, in mm, with the signs of the
+    /// prescription.
     pub track: f64,
-    /// Every field of every zoom position.
+    /// The fields of all zoom positions.
     pub fields: Vec<FieldSummary>,
 }
 
-/// A field in numbers.
+/// The sharpness and light of a field.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldSummary {
-    /// The zoom position.
+    /// The index of the zoom position, from 0.
     pub zoom: usize,
-    /// The field, counted from 0.
+    /// The index of the field, from 0.
     pub field: usize,
     /// Its sagittal coordinate, in the unit of the lens's fields.
     pub x: f64,
     /// Its tangential coordinate.
     pub y: f64,
-    /// The RMS radius of the spot about its centroid, uniform over the pupil, all colours by
-    /// weight, in mm; none without light.
+    /// The RMS radius of the polychromatic spot about its centroid for a uniformly lit pupil, in
+    /// mm; `None` without light.
     pub spot: Option<Estimate>,
-    /// The clear area of the pupil in mm² of the first vertex plane, the mean over the colours by
-    /// weight; 0 without light.
+    /// The clear area of the pupil in mm² of the first vertex plane, averaged over the wavelengths
+    /// by weight; 0 without light.
     pub light: Estimate,
 }
 
 impl LensSummary {
-    /// The figures of a lens, the radius of every spot good to a tolerance.
+    /// The summary of a lens, with the radius of every spot to a relative tolerance.
     ///
     /// # Errors
-    /// A lens that cannot be set up.
+    /// The lens cannot be set up.
     pub fn new(lens: &Lens, tolerance: f64) -> Result<Self, RayModelError> {
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let mut fields = Vec::new();
@@ -72,13 +72,13 @@ impl LensSummary {
         })
     }
 
-    /// Rays that they rest on.
+    /// The number of rays traced for it.
     pub fn rays(&self) -> usize {
         self.fields.iter().map(|f| f.spot.map_or(0, |spot| spot.rays)).sum()
     }
 }
 
-/// The mean area over the colours by weight; a dark colour has none.
+/// The mean pupil area over the wavelengths by weight; a wavelength without light counts as 0.
 fn mean_light(spot: &Spot, bench: &RayModel) -> Estimate {
     let total: f64 = bench.channels.iter().map(|color| color.weight).sum();
     let mut light = Estimate::new(0.0, 0.0, 0);

@@ -1,5 +1,4 @@
-//! What is asked for and not kept: by how much a lens breaks its limits, and limits that no lens
-//! keeps, which a search would chase in vain.
+//! Constraint violations of a lens, and constraints that no lens can satisfy.
 
 use super::{LandscapeError, LensLandscape};
 use crate::lens::{Lens, Medium, Object, glass};
@@ -8,22 +7,22 @@ use crate::merit::{ConstraintMargin, MeritError, Term, TermValue};
 use crate::search::{SearchRules, element};
 use std::f64::consts::PI;
 
-/// Light that is less than asked for by this part is as much, by two samplings of its pupil.
+/// The relative shortfall of light within the sampling error, which does not count as a violation.
 const LIGHT_TOLERANCE: f64 = 1e-3;
 
 impl LensLandscape {
-    /// How many elements a lens has, and may have.
+    /// The number of elements with its permitted range.
     pub(super) fn element_count_margin(&self, lens: &Lens) -> ConstraintMargin {
         let [min, max] = self.rules.elements.map(|count| Some(count as f64));
         let value = element::piece_count(lens) as f64;
         ConstraintMargin { term: "elements", surface: None, zoom: 0, value, min, max }
     }
 
-    /// Every limit that a lens breaks, the number of its elements and the light of its fields among
-    /// them; nothing where it keeps all.
+    /// All constraints that a lens violates, including the number of its elements and the light of
+    /// its fields.
     ///
     /// # Errors
-    /// A lens that cannot be set up.
+    /// The lens cannot be set up.
     pub fn violations(&self, lens: &Lens) -> Result<Vec<ConstraintMargin>, LandscapeError> {
         let dark =
             |light: &ConstraintMargin| -light.slack() > LIGHT_TOLERANCE * light.min.unwrap_or(0.0);
@@ -33,23 +32,23 @@ impl LensLandscape {
         Ok(broken)
     }
 
-    /// What each term of the goal is worth at a lens, by the rays that a search judges it by: weight
-    /// times value, summed, is its loss.
+    /// The values of the terms of the goal, by the same rays as in a search: the loss is the sum of
+    /// weight times value.
     ///
     /// # Errors
-    /// A lens without merit.
+    /// The lens has no merit.
     pub fn term_values(&self, lens: &Lens) -> Result<Vec<TermValue>, MeritError> {
         let merit = self.merit(lens, self.local.tolerance)?;
         merit.terms(&merit.values(lens))
     }
 
-    /// Refuses limits that no lens keeps.
+    /// Refuses constraints that no lens can satisfy.
     pub(super) fn check_feasible(&self) -> Result<(), LandscapeError> {
         self.check_rims()?;
         self.check_track()
     }
 
-    /// A beam from infinity is as large at the first rim as at the first vertex plane.
+    /// A collimated beam is as wide at the first surface as in the first vertex plane.
     fn check_rims(&self) -> Result<(), LandscapeError> {
         let most = self.find_in_goal(|term| match term {
             Term::SemiDiameter { max, .. } => Some(max),
@@ -72,7 +71,8 @@ impl LensLandscape {
         )))
     }
 
-    /// As few elements as there may be, as thin as they may be, and the room behind them.
+    /// The minimum number of elements of minimum thickness and the minimum back focal distance must
+    /// fit into the track.
     fn check_track(&self) -> Result<(), LandscapeError> {
         let most = self.find_in_goal(|term| match term {
             Term::TotalTrack(max) => Some(max),
@@ -101,13 +101,13 @@ impl LensLandscape {
         )))
     }
 
-    /// What the first term of a kind asks for.
+    /// The parameter of the first term of the goal that `number` recognizes.
     fn find_in_goal(&self, number: impl Fn(Term) -> Option<f64>) -> Option<f64> {
         self.goal.terms.iter().find_map(|weighted| number(weighted.term))
     }
 }
 
-/// A limit that is not kept, in words.
+/// The message for a violated constraint.
 pub fn describe_violation(limit: &ConstraintMargin) -> String {
     let of = if limit.term == "light" { "field" } else { "surface" };
     let place = limit.surface.map_or(String::new(), |i| format!(", {of} {i}"));
@@ -121,7 +121,7 @@ pub fn describe_violation(limit: &ConstraintMargin) -> String {
     format!("{name}{place}{zoom}: {value} instead of {bound}")
 }
 
-/// Refuses a list of glasses of which none has an index at every wavelength of the lens.
+/// Refuses a list of glasses none of which has an index at every wavelength of the lens.
 pub(super) fn check_glasses(lens: &Lens, rules: &SearchRules) -> Result<(), LandscapeError> {
     let reaches =
         |glass: &glass::Glass| lens.wavelengths.iter().all(|w| glass.index(w.um).is_some());
@@ -136,7 +136,8 @@ pub(super) fn check_glasses(lens: &Lens, rules: &SearchRules) -> Result<(), Land
     })
 }
 
-/// Four decimals, none for a whole number, or an exponent where they say nothing.
+/// Formats a number with four decimals, without any if it is whole, or with an exponent if it is
+/// very small or large.
 fn format_limit(value: f64) -> String {
     let size = value.abs();
     if size < 1e9 && value.fract() == 0.0 {

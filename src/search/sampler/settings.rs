@@ -1,49 +1,50 @@
-//! How a search goes: everything that a run depends on besides its landscape and its start.
+//! Settings of a search: everything that a run depends on besides its landscape and its start.
 
-use super::{SearchError, Temperature, Termination};
+use super::{Temperature, Termination};
 use crate::math::format_short;
+use crate::search::SearchError;
 use serde::{Deserialize, Serialize};
 
-/// No more chains than this: each takes the memory of a descent, and a turn of every round.
+/// The maximum number of chains: each needs the memory of a descent and a turn in every round.
 const MAX_CHAINS: usize = 1024;
 
-/// How a search goes; the defaults are the thesis's, or say where they are not.
+/// Settings of a search; the defaults are those of the thesis unless stated otherwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SearchSettings {
-    /// The sampler.
+    /// The search method.
     pub method: SearchMethod,
-    /// All chance of a run follows from it.
+    /// The seed of all random numbers of a run.
     pub seed: u64,
-    /// Chains that share the reservoir: a property of the run, whatever the number of threads.
+    /// The number of chains that share the reservoir, independent of the number of threads.
     pub chains: usize,
-    /// How many points the reservoir holds.
+    /// The capacity of the reservoir.
     pub reservoir: usize,
-    /// Whether the reservoir holds at most one point of each topology.
+    /// True to hold at most one point of each topology in the reservoir.
     pub one_per_topology: bool,
-    /// How often a regeneration draws from anywhere: γ of (4.14). The thesis says "small"; 0.02 is
-    /// what its program comes to with a full reservoir.
+    /// The probability that a regeneration draws a random point: γ of (4.14). The thesis says
+    /// "small"; 0.02 is the value of its program with a full reservoir.
     pub gamma: f64,
-    /// How a descent ends.
+    /// The rule that ends descents.
     pub termination: Termination,
-    /// `C` of (4.16) and (4.17): the larger, the shorter descents are. The thesis gives none. With
-    /// 0.05, a descent that stands still at half of the density lasts 11 moves on average.
+    /// `C` of (4.16) and (4.17): the larger, the shorter the descents. The thesis gives no value.
+    /// With 0.05, a descent at a constant loss with density one half lasts 11 moves on average.
     pub c: f64,
-    /// The temperature of (4.7); none is the one that gives the start a density of one half.
+    /// The temperature of (4.7); `None` for the one at which the start has a density of one half.
     pub temperature: Option<Temperature>,
-    /// What a reheat multiplies the temperature with.
+    /// The factor by which a reheat multiplies the temperature.
     pub reheat: f64,
-    /// The longest descent, in local moves: what ends one that no clock ends.
+    /// The maximum length of a descent, in local moves.
     pub longest: usize,
-    /// The run is over after so many local moves of all chains together.
+    /// The maximum number of local moves of all chains together; `None` for no limit.
     pub moves: Option<u64>,
-    /// The run is over after so many gradients of all chains together, and takes no more: in its
-    /// last rounds the chains share what is left, which shortens their moves. Brute force divides
-    /// them among its mutations.
+    /// The maximum number of gradients of all chains together; `None` for no limit. In the last
+    /// rounds the chains share the remaining gradients, which shortens their moves. Brute force
+    /// divides them among its mutations.
     pub gradients: Option<u64>,
-    /// How many generations are remembered besides the ancestors of what is in the reservoir.
+    /// The number of generations that are remembered besides the ancestors of the reservoir.
     pub remembered: usize,
-    /// Langevin steps of Metropolis and Hastings.
+    /// Settings of the Langevin steps of Metropolis–Hastings.
     pub metropolis: LangevinSettings,
 }
 
@@ -70,10 +71,10 @@ impl Default for SearchSettings {
 }
 
 impl SearchSettings {
-    /// Whether a run can go on these settings.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// The first of them that makes no sense, by name.
+    /// The name of the first invalid setting.
     pub fn check(&self) -> Result<(), SearchError> {
         let wrong =
             |name, found: String, expected| Err(SearchError::Setting { name, found, expected });
@@ -114,36 +115,39 @@ impl SearchSettings {
     }
 }
 
-/// A sampler.
+/// The method of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SearchMethod {
-    /// Descents that end by chance and begin again from the reservoir: algorithm 1.
+    /// Descents that end at random and regenerate from the reservoir: algorithm 1, the Restore
+    /// process.
     Restore,
-    /// Langevin steps (4.10) and reversible mutations, each accepted or not: (4.8).
+    /// Metropolis–Hastings with Langevin steps (4.10) and reversible mutations, accepted by (4.8).
     Metropolis,
-    /// After each element of the start one more, and each one less, each descended for as long.
+    /// Brute force: adds an element after each element of the start and removes each one, with
+    /// equally long descents.
     Brute,
 }
 
-/// Langevin steps: (4.10) with a diagonal preconditioner `M`,
-/// `θ' = θ − ε M ∇L min(1, 1/(2 T)) + √(ε M) ξ`, `M = 1 / (√v + floor)`, `v` the mean square of all
-/// gradients so far of this structure.
+/// Langevin steps (4.10) with a diagonal preconditioner `M`: `θ' = θ − ε M ∇L min(1, 1/(2 T)) + √(ε
+/// M) ξ`, `M = 1 / (√v + floor)`, `v` being the mean square of all gradients so far for this
+/// topology.
 ///
-/// The printed step is the Langevin step of temperature ½; any drift samples the target, but one of
-/// a lower temperature than the target's hardly ever leaves its slopes.
+/// The printed step is the Langevin step of temperature ½. Any drift samples the target, but the
+/// drift of a temperature below the target's is rarely accepted.
 ///
-/// A gradient changes that mean by its part of all, so that adaptation fades, which convergence
-/// asks for. Dividing `√v` by the number of gradients would fade too, but let `M` grow to 1/floor
-/// whatever the slope is: steps of `√(ε/floor)`, 3 units of every variable, which nothing accepts.
+/// Each gradient changes the mean in proportion to its share of all gradients, so that the
+/// adaptation fades, as convergence requires. Dividing `√v` by the number of gradients would fade
+/// too, but would let `M` grow to 1/floor whatever the gradient is: steps of `√(ε/floor)`, 3 units
+/// of every variable, which are never accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LangevinSettings {
     /// ε.
     pub epsilon: f64,
-    /// What keeps `M` finite where there is no slope.
+    /// The lower bound of `√v`, which keeps `M` finite where the gradient vanishes.
     pub floor: f64,
-    /// How often a mutation is proposed in place of a step: `1 − β` of (4.9).
+    /// The probability of proposing a mutation instead of a step: `1 − β` of (4.9).
     pub mutation: f64,
 }
 

@@ -1,12 +1,12 @@
-//! What happened in a round is written down: tree, reservoir, statistics, the best point.
+//! Applies the events of a round to lineage, reservoir, statistics and best point.
 
-use super::chain::{LocalMove, TurnEvent};
-use super::reservoir::ReservoirEntry;
-use super::{DescentEnd, Landscape, SearchEvent, SearchPoint, SearchRun};
+use super::{DescentEnd, ReservoirEntry};
+use crate::search::sampler::chain::{LocalMove, TurnEvent};
+use crate::search::{Landscape, SearchEvent, SearchPoint, SearchRun};
 
 impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
-    /// Writes down one thing that happened to a chain.
-    pub(super) fn record<L>(
+    /// Applies one event of a chain.
+    pub(in crate::search) fn record<L>(
         &mut self,
         chain: usize,
         happening: TurnEvent<P>,
@@ -53,9 +53,9 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
     }
 
-    /// Offers the best point of a descent to the reservoir, and writes down how it went; whether it
-    /// is the best of all. Algorithm 1 offers the last point, which is worse where it was a bad
-    /// move that ended the descent.
+    /// Offers the best point of a descent to the reservoir and records the outcome; true if it is
+    /// the best of all. Algorithm 1 offers the last point, which is worse if the descent ended with
+    /// a bad move.
     fn record_end(&mut self, entry: ReservoirEntry<P>, ended: DescentEnd) -> bool {
         *self.statistics.ended.entry(ended).or_default() += 1;
         let (number, loss, point) = (entry.number, entry.loss, entry.point.clone());
@@ -77,7 +77,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         best
     }
 
-    /// Takes a better point as the best.
+    /// Replaces the best point by a better one; true if it is better.
     fn update_best(&mut self, entry: &ReservoirEntry<P>) -> bool {
         let better = entry.is_better_than(&self.best);
         if better {
@@ -86,8 +86,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         better
     }
 
-    /// Whether a descent that goes on has come to the best point so far.
-    pub(super) fn update_best_from_chain<L>(
+    /// Checks if a descent in progress has reached the best point so far.
+    pub(in crate::search) fn update_best_from_chain<L>(
         &mut self,
         chain: usize,
         landscape: &L,
@@ -105,8 +105,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
     }
 
-    /// Forgets generations that matter no more.
-    pub(super) fn prune_lineage(&mut self) {
+    /// Removes generations that are neither recent nor ancestors of anything kept.
+    pub(in crate::search) fn prune_lineage(&mut self) {
         let held = self.reservoir.entries().iter().chain(&self.pinned).chain([&self.best]);
         let held = held.map(|entry| entry.number);
         let living = self.chains.iter().map(|chain| chain.number);

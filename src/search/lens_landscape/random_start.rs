@@ -1,21 +1,21 @@
-//! A lens from anywhere: `p_global` of (4.14).
+//! Random lenses: `p_global` of (4.14).
 
 use super::goal::focal_length_of;
-use super::open::with_open_rims;
+use super::open_apertures::with_open_rims;
 use crate::lens::{Lens, Medium, Parameter, Quantity, paraxial_image_distance};
 use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 
-/// No gap is drawn longer than this part of the focal length.
+/// The maximum random gap, relative to the focal length.
 const MAX_GAP: f64 = 0.2;
-/// Curvatures are drawn up to this over the focal length.
+/// The maximum random curvature, times the focal length.
 const MAX_CURVATURE: f64 = 4.0;
-/// A drawn lens is scaled to its focal length by no more than this.
+/// The maximum factor by which a random lens is scaled to the focal length.
 const MAX_RESCALING: f64 = 4.0;
 
-/// A lens of the structure of `lens`, whose variables are those that are free: curvatures and gaps
-/// drawn uniformly, all of it scaled to a focal length in mm, the image at the focus, rims as open
-/// as it leaves room for. None where it does not focus.
+/// A random lens with the structure of `lens`. Variable curvatures and gaps are drawn uniformly;
+/// then the lens is scaled to a focal length in mm, focused, and its apertures opened as far as
+/// there is room. `None` if it does not focus.
 pub(super) fn random_lens(
     lens: &Lens,
     rules: &SearchRules,

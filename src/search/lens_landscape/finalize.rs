@@ -1,8 +1,9 @@
-//! From a lens that a search has found to one that a factory can make: glasses of the catalogue,
-//! every limit kept and not only penalised, sharpness and light confirmed by other rays.
+//! From the result of a search to a lens that can be manufactured: catalogue glasses, all
+//! constraints satisfied exactly rather than penalized, sharpness and light confirmed by an
+//! independent set of rays.
 //!
-//! A penalty stops short of its limit where the rest of the goal pulls the other way. So the limits
-//! are drawn tighter by a margin that grows until all of them are kept.
+//! A penalty balances the rest of the goal slightly outside its limit. So the limits are tightened
+//! by a margin that grows until all constraints are satisfied.
 
 use super::{LandscapeError, LensLandscape, LensSummary, describe_violation};
 use crate::lens::{Lens, Medium, glass};
@@ -13,81 +14,82 @@ use crate::search::element::{ElementKind, elements};
 use crate::search::{Landscape as _, SearchRules};
 use serde::Serialize;
 
-/// How often the limits are drawn tighter.
+/// The maximum number of rounds, each with tighter limits.
 const ROUNDS: i32 = 6;
-/// Local moves of a round.
+/// Local moves per round.
 const MOVES: usize = 40;
-/// How much tighter a limit is drawn in the first round: mm, or parts of a share or ratio.
+/// The margin by which limits are tightened per round: in mm, and relative for shares and ratios.
 const MARGIN_STEP: [f64; 2] = [2e-3, 2e-3];
-/// The weight of a limit grows by this factor each round.
+/// The factor by which the weights of constraints grow in each round.
 const WEIGHT_GROWTH: f64 = 4.0;
-/// Two samplings of a spot or a pupil that agree to this share confirm each other.
+/// The relative tolerance for the agreement of two samplings.
 const AGREEMENT: f64 = 0.02;
-/// Rays of the second sampling, for every field and colour.
+/// The second sampling, for every field and wavelength.
 const CROSS_CHECK_PATTERN: PupilPattern = PupilPattern::Sobol { count: 1 << 14, seed: 1 };
-/// The tolerance of the first one.
+/// The tolerance of the first sampling.
 const FIRST_TOLERANCE: f64 = 1e-4;
 
-/// A lens that was finished, as far as that went.
+/// The result of finalizing a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FinalizedLens {
     /// The lens.
     pub lens: Lens,
-    /// Glasses that were exchanged.
+    /// The substituted glasses.
     pub glasses: Vec<GlassSubstitution>,
-    /// Glasses that the rules do not list, behind or in front of surfaces that are to be left alone.
+    /// Glasses outside the rules that are retained because they touch surfaces that stay unchanged.
     pub unlisted: Vec<UnlistedGlass>,
-    /// Surfaces in front of gradients: no catalogue has such a medium, and each stays what it was.
+    /// Surfaces in front of gradient-index media, which no catalogue has; each is retained.
     pub gradients: Vec<usize>,
-    /// Everything that is limited.
+    /// The margins of all constraints.
     pub limits: Vec<ConstraintMargin>,
-    /// The light of every field, in mm², and what it may not be less than.
+    /// The pupil area of every field, in mm², with its minimum.
     pub light: Vec<ConstraintMargin>,
-    /// Sharpness and light.
+    /// The summary of the lens.
     pub figures: LensSummary,
-    /// The same by other rays.
+    /// The comparison with an independent set of rays.
     pub confirmed: Vec<CrossCheck>,
 }
 
-/// A glass that the rules do not list, and that stays.
+/// A retained glass outside the rules.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct UnlistedGlass {
-    /// The surface in front of it.
+    /// The surface in front of it, a row index from 0.
     pub surface: usize,
     /// The glass.
     pub glass: String,
 }
 
-/// A glass that no catalogue has or the rules do not list, and what is used in its place.
+/// A substituted glass: a model glass, or one outside the rules.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GlassSubstitution {
-    /// The surface in front of it.
+    /// The surface in front of it, a row index from 0.
     pub surface: usize,
-    /// Index and Abbe number that it had; no Abbe number for a constant index.
+    /// The original refractive index and Abbe number; no Abbe number for a constant index.
     pub was: (f64, Option<f64>),
-    /// The glass of the catalogue.
+    /// The catalogue glass.
     pub glass: String,
     /// Its index and Abbe number.
     pub is: (f64, f64),
 }
 
-/// A field by two samplings.
+/// The cross-check of a field by a second sampling of its pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CrossCheck {
     /// The zoom position.
     pub zoom: usize,
     /// The field.
     pub field: usize,
-    /// The RMS radius of its spot by the second sampling, in mm.
+    /// The RMS spot radius of the second sampling, in mm.
     pub spot: f64,
-    /// The clear area of its pupil by the second sampling, in mm².
+    /// The clear pupil area of the second sampling, in mm².
     pub light: f64,
-    /// Whether both agree with the first.
+    /// True if both agree with the first sampling.
     pub agrees: bool,
 }
 
 impl FinalizedLens {
-    /// What fails, in words; nothing where the lens can be made.
+    /// Messages for all violated constraints and failed cross-checks; empty if the lens can be
+    /// manufactured.
     pub fn failures(&self) -> Vec<String> {
         let limits = self.limits.iter().chain(&self.light).filter(|limit| limit.slack() < 0.0);
         let doubts = self.confirmed.iter().filter(|field| !field.agrees);
@@ -99,10 +101,10 @@ impl FinalizedLens {
     }
 }
 
-/// Makes a lens that can be made of one that a search on this landscape has found.
+/// Turns the result of a search on this landscape into a lens that can be manufactured.
 ///
 /// # Errors
-/// A lens without merit, or one for which no glass is allowed.
+/// The lens has no merit, or no glass is permitted.
 pub fn finalize(landscape: &LensLandscape, lens: &Lens) -> Result<FinalizedLens, LandscapeError> {
     let (mut lens, glasses, unlisted) = with_catalogue_glasses(lens, &landscape.rules)?;
     for round in 0..ROUNDS {
@@ -137,14 +139,14 @@ pub fn finalize(landscape: &LensLandscape, lens: &Lens) -> Result<FinalizedLens,
 }
 
 impl LensLandscape {
-    /// Everything that the goal limits, and the number of elements.
+    /// The margins of all constraints of the goal and of the number of elements.
     pub(super) fn limits(&self, lens: &Lens) -> Result<Vec<ConstraintMargin>, LandscapeError> {
         let mut limits = vec![self.element_count_margin(lens)];
         limits.extend(constraint_margins(lens, self.goal.terms.iter().map(|w| w.term))?);
         Ok(limits)
     }
 
-    /// The light of every field and colour against what the goal says that it keeps.
+    /// The pupil area of every field and wavelength with the minimum of the goal.
     pub(super) fn light_margins(
         &self,
         lens: &Lens,
@@ -167,7 +169,7 @@ impl LensLandscape {
         Ok(areas.iter().zip(before).map(margin).collect())
     }
 
-    /// The same landscape with its limits drawn tighter, and weighted more.
+    /// The same landscape with tighter and more strongly weighted constraints.
     fn tighten(&self, round: i32) -> Self {
         let [mm, part] = MARGIN_STEP.map(|first| first * f64::from(round + 1));
         let harder = WEIGHT_GROWTH.powi(round);
@@ -199,8 +201,8 @@ fn gradient_surfaces(lens: &Lens) -> Vec<usize> {
     (0..lens.surfaces.len()).filter(is_one).collect()
 }
 
-/// The lens with every model glass, and every glass that the rules do not list, replaced by the
-/// nearest one that they allow; those beside surfaces that are to be left alone stay.
+/// Replaces model glasses and glasses outside the rules by the nearest permitted one. Glasses that
+/// touch surfaces that stay unchanged are retained.
 fn with_catalogue_glasses(
     lens: &Lens,
     rules: &SearchRules,
@@ -238,14 +240,14 @@ fn with_catalogue_glasses(
             exchanged.push(GlassSubstitution { surface, was, glass, is: (found.nd, found.vd) });
         }
     }
-    // An index that came from a catalogue is no variable any more.
+    // The index of a catalogue glass is not a variable.
     let exists = |v: &crate::lens::Variable| real.get(v.parameter).is_some();
     let variables = lens.variables.iter().filter(|v| exists(v)).copied().collect();
     real.variables = variables;
     Ok((real, exchanged, unlisted))
 }
 
-/// Glasses that differ by this much in index and Abbe number are about equally unlike.
+/// The differences of index and Abbe number that count as one unit of distance.
 const GLASS_DISTANCE_UNIT: [f64; 2] = [0.01, 1.0];
 
 fn is_listed(glass: &glass::Glass, rules: &SearchRules) -> bool {
@@ -268,7 +270,7 @@ fn nearest_glass(
     all.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// Every field by Sobol points over a disc that holds its pupil, rays of their own.
+/// Evaluates every field again with Sobol points over a disc around its pupil.
 fn cross_check(lens: &Lens, figures: &LensSummary) -> Result<Vec<CrossCheck>, LandscapeError> {
     let mut all = Vec::new();
     for first in &figures.fields {

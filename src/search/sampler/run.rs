@@ -1,88 +1,87 @@
-//! A search that goes on: chains over a shared reservoir, a round at a time.
+//! A search run: chains over a shared reservoir, advanced one round at a time.
 //!
-//! In a round every chain takes its turn, at the same time as the others, reading the reservoir as
-//! it was before; then what happened is written down in the order of the chains. So a run is a
-//! function of its landscape, start and settings, on any number of threads.
+//! In a round all chains take their turns in parallel, reading the reservoir of the previous round;
+//! then their events are applied in the order of the chains. So a run is a function of its
+//! landscape, start and settings, on any number of threads.
 
 use super::chain::{BruteForceJob, Chain, ChainDescent, NewDescent, RoundContext};
-use super::family::{Lineage, LineageNode};
-use super::reservoir::{Reservoir, ReservoirEntry};
-use super::{
-    Landscape, MutationKind, MutationWeights, Random, SearchError, SearchMethod, SearchPoint,
-    SearchSettings, SearchStatistics, Temperature,
+use super::{SearchMethod, SearchSettings, Temperature};
+use crate::search::{
+    Landscape, Lineage, LineageNode, MutationKind, MutationWeights, Random, Reservoir,
+    ReservoirEntry, SearchError, SearchPoint, SearchStatistics,
 };
 use rand::SeedableRng as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 
-/// So many rounds in a row without a move end a run.
+/// The number of consecutive rounds without a move that ends a run.
 const MAX_IDLE_ROUNDS: u64 = 100;
 
-/// The run of a search on some landscape.
+/// The run of a search on a landscape.
 pub type SearchRunOn<L> = SearchRun<<L as Landscape>::Point, <L as Landscape>::Memory>;
 
-/// A search that goes on, with everything that it depends on besides its landscape.
+/// The complete state of a search, except for its landscape.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchRun<P, M> {
-    pub(super) settings: SearchSettings,
-    pub(super) temperature: Temperature,
-    pub(super) weights: MutationWeights,
-    pub(super) pinned: Option<ReservoirEntry<P>>,
-    pub(super) stopped: bool,
-    pub(super) chains: Vec<Chain<P, M>>,
-    pub(super) tree: Lineage<P>,
-    pub(super) start: ReservoirEntry<P>,
-    pub(super) best: ReservoirEntry<P>,
-    pub(super) reservoir: Reservoir<P>,
-    pub(super) statistics: SearchStatistics,
+    pub(in crate::search) settings: SearchSettings,
+    pub(in crate::search) temperature: Temperature,
+    pub(in crate::search) weights: MutationWeights,
+    pub(in crate::search) pinned: Option<ReservoirEntry<P>>,
+    pub(in crate::search) stopped: bool,
+    pub(in crate::search) chains: Vec<Chain<P, M>>,
+    pub(in crate::search) tree: Lineage<P>,
+    pub(in crate::search) start: ReservoirEntry<P>,
+    pub(in crate::search) best: ReservoirEntry<P>,
+    pub(in crate::search) reservoir: Reservoir<P>,
+    pub(in crate::search) statistics: SearchStatistics,
     tasks: VecDeque<BruteForceJob>,
 }
 
-/// Something that happened in a round.
+/// An event of a round.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SearchEvent {
-    /// This generation began.
+    /// This generation began its descent.
     Started(u64),
     /// The descent of this generation ended.
     Ended(u64),
-    /// This generation came to the best loss so far.
+    /// This generation reached the best loss so far.
     NewBest(u64),
 }
 
-/// A point that a run has found.
+/// A point of the result of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoundPoint<'a, P> {
-    /// The point, and what it is worth.
+    /// The point and its loss.
     pub entry: &'a ReservoirEntry<P>,
-    /// Whether its descent still goes on: only what has ended enters the reservoir.
+    /// True while its descent is in progress: only completed descents enter the reservoir.
     pub running: bool,
 }
 
-/// Why a run is over.
+/// The reason for the end of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RunEnd {
-    /// It was stopped.
+    /// It was stopped by the user.
     Stopped,
-    /// It has made as many local moves as its settings say.
+    /// The maximum number of local moves was reached.
     Moves,
-    /// It has taken as many gradients as its settings say.
+    /// The maximum number of gradients was reached.
     Gradients,
-    /// Brute force has tried everything.
+    /// All brute-force jobs are done.
     Done,
-    /// For a hundred rounds nothing was found to begin from.
+    /// No descent could be started for a hundred rounds.
     Stuck,
 }
 
 impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
-    /// A run from a start.
+    /// Creates a run.
     ///
-    /// The first chain descends from the start, and every other one from a mutation of it; all
-    /// chains of Metropolis and Hastings begin at the start.
+    /// The first chain descends from the start, every other one from a mutation of it; all chains
+    /// of Metropolis–Hastings begin at the start.
     ///
     /// # Errors
-    /// A setting makes no sense, or the start is worth nothing.
+    /// A setting is invalid, or the start has no finite loss.
     pub fn new<L>(landscape: &L, start: P, settings: &SearchSettings) -> Result<Self, SearchError>
     where
         L: Landscape<Point = P, Memory = M>,
@@ -121,17 +120,17 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         &self.settings
     }
 
-    /// The present temperature.
+    /// The current temperature.
     pub fn temperature(&self) -> Temperature {
         self.temperature
     }
 
-    /// How often each kind of mutation is tried, relatively to the rules of the landscape.
+    /// The relative frequencies of the kinds of mutation, which multiply those of the landscape.
     pub fn weights(&self) -> &MutationWeights {
         &self.weights
     }
 
-    /// The point that all regenerations begin from; none where they begin from the reservoir.
+    /// The point that all regenerations mutate; `None` if they mutate points of the reservoir.
     pub fn pinned(&self) -> Option<&ReservoirEntry<P>> {
         self.pinned.as_ref()
     }
@@ -141,18 +140,18 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         &self.start
     }
 
-    /// The best point so far, those of descents that go on included.
+    /// The best point so far, including descents in progress.
     pub fn best(&self) -> &ReservoirEntry<P> {
         &self.best
     }
 
-    /// The best points at which descents ended.
+    /// The best points of completed descents.
     pub fn reservoir(&self) -> &Reservoir<P> {
         &self.reservoir
     }
 
-    /// What was found, the best first: the reservoir, and the best point before it where the descent
-    /// that has come to it still goes on.
+    /// The result so far, best first: the points of the reservoir, preceded by the best point if
+    /// its descent is still in progress.
     pub fn found_points(&self) -> Vec<FoundPoint<'_, P>> {
         let kept = self.reservoir.entries();
         let running = kept.iter().all(|entry| self.best.is_better_than(entry));
@@ -165,7 +164,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         found
     }
 
-    /// The family tree.
+    /// The lineage.
     pub fn lineage(&self) -> &Lineage<P> {
         &self.tree
     }
@@ -175,12 +174,12 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         &self.chains
     }
 
-    /// What the run has done so far.
+    /// The counters of the run.
     pub fn statistics(&self) -> &SearchStatistics {
         &self.statistics
     }
 
-    /// Whether the run is over, and why.
+    /// The reason for the end of the run; `None` while it can continue.
     pub fn end_reason(&self) -> Option<RunEnd> {
         let reached = |limit: Option<u64>, count| limit.is_some_and(|limit| count >= limit);
         let SearchSettings { method, moves, gradients, .. } = self.settings;
@@ -201,7 +200,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
     }
 
-    /// One turn of every chain; nothing where the run is over.
+    /// Advances every chain by one turn; does nothing if the run has ended.
     pub fn round<L>(&mut self, landscape: &L) -> Vec<SearchEvent>
     where
         L: Landscape<Point = P, Memory = M>,
@@ -237,9 +236,9 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         events
     }
 
-    /// How many gradients each chain may take in its turn: an equal part of those that are left,
-    /// far more than a turn takes but in the last rounds. Brute force has divided them among its
-    /// mutations.
+    /// The gradient budget of each chain in its turn: an equal part of the remaining gradients, far
+    /// more than a turn takes except in the last rounds. Brute force has divided the gradients
+    /// among its jobs.
     fn gradient_budgets(&self) -> Vec<usize> {
         let SearchSettings { method, gradients, .. } = self.settings;
         let limit = gradients.filter(|_| method != SearchMethod::Brute);
@@ -249,8 +248,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         (0..count).map(|i| usize::try_from(share(i)).unwrap_or(usize::MAX)).collect()
     }
 
-    /// A node that begins.
-    pub(super) fn new_node(&self, chain: usize, birth: NewDescent<P>) -> LineageNode<P> {
+    /// The lineage node of a new descent.
+    pub(in crate::search) fn new_node(&self, chain: usize, birth: NewDescent<P>) -> LineageNode<P> {
         let NewDescent { parent, kind, what, before, loss, point } = birth;
         LineageNode {
             number: self.tree.total(),
@@ -281,7 +280,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
     }
 
-    /// Lets those chains begin that begin at the start.
+    /// Starts the chains that begin at the start.
     fn start_chains(&mut self) {
         let count = match self.settings.method {
             SearchMethod::Restore => 1,
@@ -306,7 +305,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     }
 }
 
-/// Chains with a source of chance each, far apart in one sequence.
+/// The chains, each with its own random number generator, far apart in one sequence.
 fn new_chains<P, M>(settings: &SearchSettings) -> Vec<Chain<P, M>> {
     let mut random = Random::seed_from_u64(settings.seed);
     let mut next = || {
@@ -316,7 +315,7 @@ fn new_chains<P, M>(settings: &SearchSettings) -> Vec<Chain<P, M>> {
     (0..settings.chains).map(|_| next()).collect()
 }
 
-/// What brute force tries: the gradients divided by twice the number of elements.
+/// The jobs of brute force, which divide the gradients by twice the number of elements.
 fn brute_force_jobs(elements: usize, settings: &SearchSettings) -> VecDeque<BruteForceJob> {
     let Some(gradients) = settings.gradients.filter(|_| settings.method == SearchMethod::Brute)
     else {
@@ -325,7 +324,7 @@ fn brute_force_jobs(elements: usize, settings: &SearchSettings) -> VecDeque<Brut
     let budget = (gradients / (2 * elements.max(1) as u64)).max(1);
     let kinds = [MutationKind::AddSinglet, MutationKind::RemoveSinglet];
     let each = |element| kinds.map(|kind| BruteForceJob { element, kind, budget });
-    // Where there is less than a gradient for each, the last mutations have none.
+    // If there are fewer gradients than jobs, the last jobs are dropped.
     let most = usize::try_from(gradients).unwrap_or(usize::MAX);
     (0..elements).flat_map(each).take(most).collect()
 }

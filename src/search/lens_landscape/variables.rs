@@ -1,32 +1,32 @@
-//! Which numbers of a lens a search may change, whatever its structure.
+//! The variables of a lens of any structure in a search.
 //!
-//! The bounds of a variable travel with its row when rows come and go. So what a person wants held
-//! is a variable too, one whose bounds coincide; what has no variable is new, or was never held, and
-//! is free within the rules.
+//! The bounds of a variable move with its row when rows are added or removed. So a parameter that
+//! the user keeps fixed is a variable with equal bounds; a parameter without a variable is new, or
+//! was never fixed, and is free within the rules.
 
 use crate::lens::{Lens, Medium, Parameter, Quantity, Variable, add_variable};
 use crate::search::SearchRules;
 
-/// The numbers that are free besides those that a person has flagged.
+/// The parameters that are variable besides those that the user has marked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct VariableRules {
-    /// What lengths are compared with: the focal length at the start, in mm.
+    /// The reference length: the focal length of the start, in mm.
     pub(super) size: f64,
-    /// Whether rims are free.
+    /// True to vary semi-diameters.
     pub(super) rims: bool,
-    /// Whether the indices of model glasses are free.
+    /// True to vary the indices of model glasses.
     pub(super) indices: bool,
 }
 
-/// No curvature is larger than this over the focal length.
+/// The maximum curvature, times the focal length.
 const MAX_CURVATURE: f64 = 4.0;
-/// No rim is smaller than this part of the focal length.
+/// The minimum semi-diameter, relative to the focal length.
 const MIN_SEMI_DIAMETER: f64 = 0.02;
-/// What a model glass may be made of.
+/// The permitted range of the index of a model glass.
 const MODEL_INDICES: [f64; 2] = [1.45, 1.95];
 
-/// A lens of which a person has flagged some curvatures or gaps keeps the others: they become
-/// variables whose bounds coincide.
+/// If the user has marked some curvatures or gaps as variables, fixes the others: they become
+/// variables with equal bounds.
 pub(super) fn freeze_others(lens: &mut Lens) {
     let about_form = |v: &Variable| is_shape(v.parameter.quantity);
     if !lens.variables.iter().any(about_form) {
@@ -47,7 +47,7 @@ fn is_shape(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Curvature | Quantity::Thickness | Quantity::ZoomThickness(_))
 }
 
-/// Every curvature that bends light and every gap, at each zoom position where it has its own.
+/// All curvatures of refracting surfaces and all gaps, including gaps of single zoom positions.
 fn shape_parameters(lens: &Lens) -> Vec<Parameter> {
     let mut all = lens.clone();
     (all.variables, all.pickups) = (Vec::new(), Vec::new());
@@ -58,8 +58,8 @@ fn shape_parameters(lens: &Lens) -> Vec<Parameter> {
     all.variables.iter().map(|v| v.parameter).collect()
 }
 
-/// The lens with every number flagged that a search may change, and none that is held. A number
-/// that is outside of what it may be stays where it is, and may only come nearer.
+/// The lens with every parameter marked as a variable that a search may change. A parameter that
+/// lies outside its range may stay or move towards it.
 pub(super) fn with_variables(lens: &Lens, rules: &SearchRules, freedom: VariableRules) -> Lens {
     let mut freed = lens.clone();
     let mut wanted = shape_parameters(lens);
@@ -99,7 +99,7 @@ fn bounds(lens: &Lens, rules: &SearchRules, size: f64, parameter: Parameter) -> 
     }
 }
 
-/// Behind a mirror gaps are negative: nothing is said about them there.
+/// Behind a mirror gaps are negative: the rules do not apply to them.
 fn gap_bounds(lens: &Lens, rules: &SearchRules, surface: usize) -> [Option<f64>; 2] {
     if lens.surfaces.iter().any(|row| row.medium == Medium::Mirror) {
         return [None, None];
@@ -115,7 +115,7 @@ fn gap_bounds(lens: &Lens, rules: &SearchRules, surface: usize) -> [Option<f64>;
     }
 }
 
-/// The lens with every variable inside its bounds: what a mutation has moved out comes back.
+/// The lens with every variable clamped to its bounds, which a mutation may have left.
 pub(super) fn clamp_to_bounds(lens: &Lens) -> Lens {
     let mut inside = lens.clone();
     for variable in &lens.variables {

@@ -1,4 +1,4 @@
-//! What a search asks of a lens where the person does not say: (4.6), and what a factory can make.
+//! The default goal of a search: (4.6) with the limits of manufacturing.
 
 use super::LandscapeError;
 use crate::lens::Lens;
@@ -6,19 +6,19 @@ use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use crate::paraxial::{Beam, first_order};
 use crate::search::SearchRules;
 
-/// The radius of a spot, relative to the focal length, that is given away for all of the light.
+/// The spot radius, relative to the focal length, that the loss of all light is worth.
 const LIGHT_IN_SPOT: f64 = 0.02;
-/// Where the rules do not say how long a lens may be, it may grow by this factor.
+/// The factor by which a lens may grow if the rules do not limit its track.
 const GROWTH: f64 = 1.2;
-/// Where the rules do not say how much room there is behind it, this part of it stays.
+/// The part of the back focal distance that is required if the rules do not limit it.
 const ROOM: f64 = 0.8;
 
-/// Sharp spots at a focal length in mm, at every field at least `light` times the light of the lens
-/// at the start, and the limits of the rules as penalties. The focal length of the first zoom
-/// position is asked for; the others keep their ratios to it.
+/// Sharp spots at a focal length in mm, at least `light` times the light of the start at every
+/// field, and the limits of the rules as penalties. The focal length applies to the first zoom
+/// position; the others keep their ratios to it.
 ///
 /// # Errors
-/// A lens without first-order data.
+/// The lens has no first-order data.
 pub fn goal(
     lens: &Lens,
     rules: &SearchRules,
@@ -45,7 +45,7 @@ pub fn goal(
     terms.push(one(Term::AirEdge(rules.air_edge)));
     terms.push(one(Term::TotalTrack(rules.track.unwrap_or(GROWTH * track))));
     terms.push(one(Term::BackFocus(rules.back_focus.unwrap_or(ROOM * rear))));
-    // A rim that stands for a tenth of a focal length.
+    // As if the violation were a tenth of a focal length.
     let steep = Term::Steepness(rules.steepness);
     terms.push(WeightedTerm { term: steep, weight: (0.1 * size).powi(2) });
     terms.extend(rules.semi_diameter.map(|max| one(Term::SemiDiameter { min: 0.0, max })));
@@ -56,14 +56,14 @@ fn one(term: Term) -> WeightedTerm {
     WeightedTerm { term, weight: 1.0 }
 }
 
-/// The focal length of a lens at its first zoom position, in mm; none for an afocal one.
+/// The focal length of a lens at its first zoom position, in mm; `None` for an afocal one.
 pub(super) fn focal_length_of(lens: &Lens) -> Option<f64> {
     let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
     let efl = first_order(&system, &Beam::for_lens(lens, 0)).ok()?.efl?;
     efl.is_finite().then_some(efl)
 }
 
-/// What lengths of a lens are compared with: its focal length, or the length of an afocal one.
+/// The reference length of a lens: its focal length, or its track if it is afocal.
 pub(super) fn reference_length(lens: &Lens) -> f64 {
     let track = || lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>();
     focal_length_of(lens).map_or_else(track, f64::abs).max(f64::MIN_POSITIVE)

@@ -1,18 +1,19 @@
-//! After a mutation: rims where there are none, rims no wider than surfaces allow, and a refusal of
-//! what is no lens.
+//! Repair of a mutated lens: finds missing semi-diameters, trims rims to where surfaces do not
+//! cross, and refuses what is not a lens.
 //!
-//! The rim of a new surface is as wide as the rays are that pass it, and as the edge of its glass and
-//! of the air beside it allow. Old rims become smaller only where their surfaces would cross.
+//! The semi-diameter of a new surface follows from the rays that pass it, limited by the edge
+//! thickness of its glass and of the air beside it. Existing rims shrink only where their surfaces
+//! would cross.
 
-use super::SearchRules;
-use super::element::{glass_gaps, is_backwards};
 use crate::lens::{Lens, Shape, System};
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel, WIDE_AIMING_THRESHOLD};
+use crate::search::SearchRules;
+use crate::search::element::{glass_gaps, is_backwards};
 use crate::trace::{Ray, Tracer};
 
-/// Pupil points whose rays say how wide a beam is; some lie beyond the paraxial pupil, which the
-/// stop clips where it is the limit.
+/// Pupil points of the rays that determine the width of a beam; some lie outside the paraxial
+/// pupil, where the stop clips them if it is the limit.
 const FAN: [[f64; 2]; 13] = [
     [0.0, 0.0],
     [0.0, 0.3],
@@ -29,14 +30,14 @@ const FAN: [[f64; 2]; 13] = [
     [1.0, 0.0],
 ];
 
-/// What is added to the height of the outermost ray, so that it does not end at the rim by rounding.
+/// The factor on the height of the outermost ray, so that rounding does not clip it at the rim.
 const MARGIN: f64 = 1.01;
 
 /// Finds the semi-diameters of the `rimless` rows and trims those of the others.
 ///
 /// # Errors
-/// Why it is no lens: surfaces that cross on the axis, no light, numbers that cannot be traced, a
-/// limit of the rules that the lens `before` had kept, or had broken by less.
+/// The reason that it is not a lens: surfaces that cross on the axis, no light, a system that
+/// cannot be traced, or a limit of the rules that the lens `before` satisfied or violated by less.
 pub(super) fn repair(
     before: &Lens,
     lens: &mut Lens,
@@ -59,7 +60,7 @@ pub(super) fn repair(
     Ok(())
 }
 
-/// No vertex stands in front of the one before it.
+/// Checks that no vertex lies in front of the previous one.
 fn check_vertex_order(lens: &Lens) -> Result<(), String> {
     for row in 0..lens.surfaces.len() - 1 {
         let sense = if is_backwards(lens, row) { -1.0 } else { 1.0 };
@@ -73,7 +74,7 @@ fn check_vertex_order(lens: &Lens) -> Result<(), String> {
     Ok(())
 }
 
-/// The limits of the rules that concern the whole lens.
+/// Checks the limits of the rules on the whole lens.
 fn check_limits(before: &Lens, lens: &Lens, rules: &SearchRules) -> Result<(), String> {
     let last = |lens: &Lens, zoom| lens.thickness_at(lens.surfaces.len() - 1, zoom).unwrap_or(0.0);
     let track = |lens: &Lens, zoom| {
@@ -96,18 +97,18 @@ fn check_limits(before: &Lens, lens: &Lens, rules: &SearchRules) -> Result<(), S
     Ok(())
 }
 
-/// The widest that the rules let a surface be by itself.
+/// The largest semi-diameter that the rules permit for a surface by itself.
 fn largest_semi_diameter(lens: &Lens, row: usize, rules: &SearchRules) -> f64 {
     let curvature = lens.surfaces[row].curvature.abs();
     let steep = if curvature > 0.0 { rules.steepness / curvature } else { f64::INFINITY };
     let rims = lens.surfaces.iter().filter_map(|row| row.semi_diameter);
-    // A beam is no wider than twice the widest surface, wherever in the lens.
+    // A beam is assumed nowhere wider than twice the widest surface.
     let most = rims.fold(0.0, f64::max);
     let natural = if most > 0.0 { 2.0 * most } else { f64::INFINITY };
     steep.min(rules.semi_diameter.unwrap_or(f64::INFINITY)).min(natural)
 }
 
-/// A surface as a form with a rim.
+/// The shape of a surface.
 fn surface_shape(lens: &Lens, row: usize) -> Shape<f64> {
     let row = &lens.surfaces[row];
     let mut terms = [0.0; crate::lens::ASPHERE_TERMS];
@@ -115,8 +116,8 @@ fn surface_shape(lens: &Lens, row: usize) -> Shape<f64> {
     Shape::simplest(row.curvature, row.conic, terms)
 }
 
-/// Makes rims smaller until every gap has its least thickness at the rim: that of the rules beside
-/// new surfaces, none elsewhere.
+/// Shrinks rims until every gap has its minimum edge thickness: that of the rules beside new
+/// surfaces, 0 elsewhere.
 fn trim_rims(lens: &mut Lens, rimless: &[usize], rules: &SearchRules) {
     let glass = glass_gaps(lens);
     for gap in 0..lens.surfaces.len() - 1 {
@@ -128,7 +129,8 @@ fn trim_rims(lens: &mut Lens, rimless: &[usize], rules: &SearchRules) {
         };
         let Some(most) = clear_height(lens, gap, floor) else { continue };
         for (row, new_row) in [gap, gap + 1].into_iter().zip(new) {
-            // The size of the stop is the aperture; beside a new surface only that one gives way.
+            // The size of the stop is the aperture; beside a new surface only the new one gives
+            // way.
             let stays = !new_row && (lens.surfaces[row].stop || new.contains(&true));
             let rim = &mut lens.surfaces[row].semi_diameter;
             if !stays && rim.is_none_or(|rim| rim > most) {
@@ -138,7 +140,7 @@ fn trim_rims(lens: &mut Lens, rimless: &[usize], rules: &SearchRules) {
     }
 }
 
-/// The height up to which a gap is at least as long as the floor; none where it is up to its rim.
+/// The height up to which a gap is at least as long as `floor`; `None` if it is up to the rim.
 fn clear_height(lens: &Lens, gap: usize, floor: f64) -> Option<f64> {
     let rim = |row: usize| lens.surfaces[row].semi_diameter.unwrap_or(f64::INFINITY);
     let rim = rim(gap).min(rim(gap + 1));
@@ -167,7 +169,8 @@ fn clear_height(lens: &Lens, gap: usize, floor: f64) -> Option<f64> {
     Some(low.max(0.0))
 }
 
-/// How far from the axis rays that arrive meet each surface, at any zoom position and field.
+/// The largest height at each surface of rays that reach the image, over all zoom positions and
+/// fields.
 fn ray_extents(lens: &Lens) -> Result<Vec<f64>, String> {
     let mut extents = vec![0.0; lens.surfaces.len() + 1];
     let mut heights = extents.clone();
@@ -185,7 +188,8 @@ fn ray_extents(lens: &Lens) -> Result<Vec<f64>, String> {
     if lit { Ok(extents) } else { Err("no light would get through".to_owned()) }
 }
 
-/// Traces a ray, and widens the extents where it arrives without going backwards.
+/// Traces a ray and, if it reaches the image without travelling backwards, widens the extents; true
+/// if it does.
 fn widen_extents(
     extents: &mut [f64],
     heights: &mut [f64],
@@ -202,7 +206,7 @@ fn widen_extents(
     arrived
 }
 
-/// The lens at its primary wavelength, aimed as wide fields need it.
+/// The ray model at the primary wavelength, with the aiming that wide fields need.
 fn primary_bench(lens: &Lens, zoom: usize) -> Result<RayModel, String> {
     let um = lens.wavelengths[lens.primary()].um;
     let system: System<f64> = lens.resolve(zoom, um).map_err(|error| error.to_string())?;

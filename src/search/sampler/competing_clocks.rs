@@ -1,76 +1,77 @@
-//! The sampler of section 4.4.1: two clocks race at every place, one of rate 1 for the next
-//! gradient step and one of rate κ for a regeneration, and the place counts for as long as the
-//! faster of them took.
+//! The sampler of section 4.4.1 with competing exponential clocks: at every point a clock of rate 1
+//! waits for the next gradient step and a clock of rate κ for a regeneration; the first to ring
+//! decides, and its time is the weight of the point.
 //!
-//! What the process samples depends on κ. Let `πP(θ)` be the density that gradient steps bring to
-//! `θ`. The weighted samples have the density `π` where what comes in is what goes out, and that is
-//! `κ = πP/π − 1 + C μ/π` with any `C` that keeps it positive: (4.11) with `Q* = P* − 1`. A gradient
-//! step is a map `g`, and so `πP(θ) = π(g⁻¹(θ)) / |det Dg|`. Equation (4.13) has no determinant, and
-//! (4.16) has `C` in place of `C μ/π`, which is the same only if regenerations are already drawn
-//! from the target. [`RegenerationRate`] has all of these forms, and figure 4.1 shows which of them sample it.
+//! The distribution that the process samples depends on κ. Let `πP(θ)` be the density that gradient
+//! steps bring to `θ`. The weighted samples have the density `π` if the flow into every point
+//! equals the flow out of it, which gives `κ = πP/π − 1 + C μ/π` with any `C` that keeps it
+//! positive: (4.11) with `Q* = P* − 1`. A gradient step is a map `g`, and so `πP(θ) = π(g⁻¹(θ)) /
+//! |det Dg|`. Equation (4.13) omits the determinant, and (4.16) has `C` in place of `C μ/π`, which
+//! is equivalent only if regenerations are already drawn from the target. [`RegenerationRate`]
+//! offers all of these forms, and figure 4.1 shows which of them sample the target.
 
-use super::reservoir::{Reservoir, ReservoirEntry};
-use super::{Landscape, MutationError, MutationWeights, Random, Temperature};
+use super::Temperature;
+use crate::search::{Landscape, MutationError, MutationWeights, Random, Reservoir, ReservoirEntry};
 use rand::RngExt as _;
 use rand_distr::Exp1;
 use std::mem;
 
-/// How often a regeneration tries to mutate a point before it draws one from anywhere.
+/// Mutations tried by a regeneration before it draws a random point.
 const MAX_ATTEMPTS: usize = 16;
 
-/// A landscape whose densities of draws and of arrivals are known.
+/// A landscape with known densities of random draws and of the points after a local move.
 pub trait KnownDensity: Landscape {
-    /// The density of [`Landscape::draw`]: μ where all regenerations are draws.
+    /// The density of [`Landscape::draw`], which is μ if all regenerations are draws.
     fn draw_density(&self, point: &Self::Point) -> f64;
 
-    /// The density `πP` that a local move brings to a point from all others, itself included.
+    /// The density `πP` that a local move brings to a point from all points, including itself.
     fn arrival_density(&self, point: &Self::Point, temperature: Temperature) -> f64;
 }
 
-/// The rate κ of regenerations, never below 0.
+/// A formula for the regeneration rate κ; negative values are clipped to 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RegenerationRate {
-    /// `πP(θ)/π(θ) − 1 + C μ(θ)/π(θ)`, μ being the draw from anywhere: (4.11).
+    /// `πP(θ)/π(θ) − 1 + C μ(θ)/π(θ)` with μ the density of random draws: (4.11).
     Exact(f64),
-    /// `(π(θ) − π(θ*))/π(θ) + C`, `θ*` being where a step from here leads: (4.16).
+    /// `(π(θ) − π(θ*))/π(θ) + C`, `θ*` being the point after a step from here: (4.16).
     AsPrinted(f64),
-    /// `(π(θ') − π(θ))/π(θ') + C`, `θ'` being where the step came from: the order of algorithm 1. A
-    /// descent that begins came from nowhere, and the first part is 0.
+    /// `(π(θ') − π(θ))/π(θ') + C`, `θ'` being the point before the last step: the order of
+    /// algorithm 1. At the start of a descent the first term is 0.
     PreviousStep(f64),
-    /// `π(θ')/π(θ) − 1 + C μ(θ)/π(θ)`, `θ'` being where the step came from: (4.11) with (4.13). A
-    /// descent that begins came from nowhere, and the first part is 0.
+    /// `π(θ')/π(θ) − 1 + C μ(θ)/π(θ)`, `θ'` being the point before the last step: (4.11) with
+    /// (4.13). At the start of a descent the first term is 0.
     WithoutDeterminant(f64),
 }
 
-/// What a regeneration is.
+/// The distribution of regenerations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regeneration {
-    /// A draw from anywhere.
+    /// A random draw.
     Draw,
-    /// A draw from the target, where no density is above 1: what (4.15) hopes for.
+    /// A draw from the target by rejection, for densities of at most 1: the assumption of (4.15).
     Target,
-    /// (4.14): with the chance `gamma` a draw, else a mutation of one of the best `size` points at
-    /// which descents ended.
+    /// (4.14): with probability `gamma` a random draw, otherwise a mutation of one of the best
+    /// `size` points at which descents ended.
     Reservoir {
         /// γ.
         gamma: f64,
-        /// How many points there may be.
+        /// The capacity of the reservoir.
         size: usize,
     },
 }
 
-/// A place that the process was at.
+/// A visited point with its weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightedSample<P> {
-    /// The place.
+    /// The point.
     pub point: P,
-    /// How long.
+    /// The holding time.
     pub weight: f64,
-    /// Whether a regeneration ended it.
+    /// True if a regeneration followed.
     pub regenerates: bool,
 }
 
-/// The process; an endless iterator over weighted samples.
+/// The sampling process; an infinite iterator over weighted samples.
 #[derive(Debug)]
 pub struct CompetingClocks<'a, L: KnownDensity> {
     landscape: &'a L,
@@ -82,14 +83,14 @@ pub struct CompetingClocks<'a, L: KnownDensity> {
     point: L::Point,
     loss: f64,
     memory: L::Memory,
-    /// The loss before the step that led here.
+    /// The loss before the last step; `None` at the start of a descent.
     previous_loss: Option<f64>,
     clipped_rates: u64,
     regenerations: u64,
 }
 
 impl<'a, L: KnownDensity> CompetingClocks<'a, L> {
-    /// A process that begins with a draw from anywhere.
+    /// A process that begins at a random draw.
     ///
     /// # Errors
     /// The landscape refuses to draw.
@@ -121,13 +122,13 @@ impl<'a, L: KnownDensity> CompetingClocks<'a, L> {
         })
     }
 
-    /// How often κ would have been negative, and was taken as 0: where that is not 0, the weighted
-    /// samples do not have the target's density.
+    /// The number of times that κ would have been negative and was set to 0; if it is not 0, the
+    /// weighted samples do not have the target's density.
     pub fn clipped_rates(&self) -> u64 {
         self.clipped_rates
     }
 
-    /// The rate of regenerations here, `next` being the loss behind the next step.
+    /// The regeneration rate at the current point, `next` being the loss after the next step.
     fn regeneration_rate(&mut self, next: f64) -> f64 {
         let Self { landscape, temperature, loss, ref point, .. } = *self;
         let density = temperature.density(loss);
@@ -175,7 +176,7 @@ impl<'a, L: KnownDensity> CompetingClocks<'a, L> {
         }
     }
 
-    /// Goes to a mutation of any point of the reservoir; whether there was one.
+    /// Moves to a mutation of a random point of the reservoir; true if one was found.
     fn mutate(&mut self) -> bool {
         let weights = MutationWeights::default();
         (0..MAX_ATTEMPTS).any(|_| {

@@ -1,39 +1,39 @@
-//! A hand on a run between two rounds.
+//! User control of a run between rounds.
 
-use super::reservoir::ReservoirEntry;
-use super::{Landscape, MutationKind, SearchError, SearchPoint, SearchRun, Temperature};
+use super::{SearchRun, Temperature};
 use crate::math::format_short;
+use crate::search::{Landscape, MutationKind, ReservoirEntry, SearchError, SearchPoint};
 use serde::{Deserialize, Serialize};
 
-/// What a person tells a run between two rounds. All of it is part of the run's state, and so of
-/// its checkpoints.
+/// A user command to a run, carried out between rounds. Its effects are part of the run's state,
+/// and so of its checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SteerCommand {
-    /// Every regeneration begins with a mutation of this generation's best point; Metropolis and
-    /// Hastings, and brute force, have no regenerations.
+    /// Regenerations mutate the best point of this generation. Metropolis–Hastings and brute force
+    /// have no regenerations.
     Pin(u64),
-    /// Regenerations begin from the reservoir again.
+    /// Regenerations mutate points of the reservoir again.
     Unpin,
-    /// A kind of mutation is tried so often, relatively; 0 forbids it. Of [`MutationKind::Global`] only 0
-    /// or not counts: how often it is tried is γ.
+    /// Sets the relative frequency of a kind of mutation; 0 excludes it. For
+    /// [`MutationKind::Global`] only zero and non-zero are distinguished: its frequency is γ.
     Weight(MutationKind, f64),
-    /// Another temperature.
+    /// Sets the temperature.
     Temperature(Temperature),
-    /// A higher temperature, by the factor of the settings.
+    /// Multiplies the temperature by the factor of the settings.
     Reheat,
-    /// The run is over after this round.
+    /// Stops the run after this round.
     Stop,
-    /// A stopped run goes on.
+    /// Resumes a stopped run.
     Resume,
 }
 
 impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
-    /// Steers the run.
+    /// Carries out a command.
     ///
     /// # Errors
-    /// No such generation is remembered, or a weight is negative or not finite; the run is then as
-    /// it was.
+    /// The generation is not remembered, or a weight is negative or not finite; the run is then
+    /// unchanged.
     pub fn steer<L>(&mut self, landscape: &L, steer: SteerCommand) -> Result<(), SearchError>
     where
         L: Landscape<Point = P, Memory = M>,

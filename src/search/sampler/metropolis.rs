@@ -1,36 +1,38 @@
-//! Metropolis and Hastings: Langevin steps (4.10) and reversible mutations (Green, "Reversible Jump
-//! Markov Chain Monte Carlo Computation and Bayesian Model Determination", Biometrika 1995), each
-//! accepted with the probability (4.8).
+//! Metropolis–Hastings sampling: Langevin steps (4.10) and reversible mutations (Green, "Reversible
+//! Jump Markov Chain Monte Carlo Computation and Bayesian Model Determination", Biometrika 1995),
+//! each accepted with the probability (4.8).
 //!
-//! Here a descent is what lies between two accepted mutations; after as many moves as a descent may
-//! have it is written down, and goes on as the next one.
+//! Here a descent is the part of the chain between two accepted mutations. After the maximum number
+//! of moves of a descent it is recorded and continues as a new one.
 
+use super::LangevinSettings;
 use super::chain::{
     Chain, ChainDescent, LocalMove, NewDescent, RoundContext, TurnEvent, TurnEvents, end_descent,
 };
-use super::{DescentEnd, Landscape, LangevinSettings, LossGradient, Random};
+use crate::search::{DescentEnd, Landscape, LossGradient, Random};
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// Where a walk stands: the structure, variables and gradient.
+/// The state of a Langevin chain: topology, variables and gradient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct LangevinState {
+pub(in crate::search) struct LangevinState {
     topology: String,
     values: Vec<f64>,
     gradient: Vec<f64>,
 }
 
-/// The mean square of all gradients that a chain took of a structure. It outlives the visits: one
-/// that began anew with each would depend on where the visit began, for ever.
+/// The mean square of all gradients that a chain has evaluated for one topology. It is kept between
+/// visits to the topology: a mean that restarted with each visit would depend on where the visit
+/// began, and the adaptation would never fade.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct GradientScale {
+pub(in crate::search) struct GradientScale {
     square: Vec<f64>,
     count: u64,
 }
 
 impl GradientScale {
-    /// Counts a gradient.
+    /// Adds a gradient to the running mean.
     fn add_gradient(&mut self, gradient: &[f64]) {
         if self.square.len() != gradient.len() {
             *self = Self { square: vec![0.0; gradient.len()], count: 0 };
@@ -42,20 +44,21 @@ impl GradientScale {
         }
     }
 
-    /// `ε M` of every variable.
+    /// The variances `ε M` of all variables.
     fn variances(&self, settings: &LangevinSettings) -> Vec<f64> {
         self.square.iter().map(|v| settings.epsilon / (v.sqrt() + settings.floor)).collect()
     }
 }
 
-/// Langevin steps of these variances, which drift down by a part of variance times gradient.
+/// The Langevin proposal distribution: normal, with these variances, around a mean that is shifted
+/// downhill by `drift` × variance × gradient.
 struct LangevinProposal {
     variances: Vec<f64>,
     drift: f64,
 }
 
 impl LangevinProposal {
-    /// Where a step leads without noise.
+    /// The mean of a step.
     fn mean(&self, from: &[f64], gradient: &[f64]) -> Vec<f64> {
         let place = |i: usize| from[i] - self.drift * self.variances[i] * gradient[i];
         (0..from.len()).map(place).collect()
@@ -67,8 +70,8 @@ impl LangevinProposal {
         mean.map(|(place, variance)| place + noise(variance)).collect()
     }
 
-    /// The logarithm of the density of a step from one place to another, up to what both ways
-    /// share.
+    /// The logarithm of the density of a step from one place to another, up to a constant that the
+    /// reverse step shares.
     fn log_density(&self, from: &[f64], gradient: &[f64], to: &[f64]) -> f64 {
         let mean = self.mean(from, gradient);
         let each = |i: usize| (to[i] - mean[i]).powi(2) / self.variances[i];
@@ -77,8 +80,8 @@ impl LangevinProposal {
 }
 
 impl<L: Landscape> RoundContext<'_, L> {
-    /// A mutation or a Langevin step, accepted or not.
-    pub(super) fn metropolis_turn(
+    /// One turn of Metropolis–Hastings: a mutation or a Langevin step, accepted or rejected.
+    pub(in crate::search) fn metropolis_turn(
         &self,
         chain: &mut Chain<L::Point, L::Memory>,
         most: usize,
@@ -106,15 +109,15 @@ impl<L: Landscape> RoundContext<'_, L> {
         }
     }
 
-    /// Where a walk begins; none where there is no gradient.
+    /// The state at a point; `None` where there is no gradient.
     fn initial_state(&self, point: &L::Point) -> Option<LangevinState> {
         let LossGradient { values, gradient, .. } = self.landscape.loss_gradient(point)?;
         let topology = self.landscape.topology(point);
         has_finite_squares(&gradient).then_some(LangevinState { topology, values, gradient })
     }
 
-    /// A Langevin step; whether it was accepted, and the gradients it took. The first one of a walk
-    /// takes two; where only one is left, it stays where it is.
+    /// A Langevin step: true if it was accepted, and the gradients it took. The first step of a
+    /// descent takes two gradients; if the budget has only one left, the point stays.
     fn langevin_step(&self, chain: &mut Chain<L::Point, L::Memory>, most: u64) -> (bool, u64) {
         let Chain { tour: Some(tour), random, scales, .. } = chain else { return (false, 0) };
         let first = u64::from(tour.walk.is_none());
@@ -153,7 +156,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         (accepted, first + 1)
     }
 
-    /// A mutation, which begins the next descent if it is accepted.
+    /// Proposes a mutation, which begins the next descent if it is accepted.
     fn mutation_step(&self, chain: &mut Chain<L::Point, L::Memory>, turn: &mut TurnEvents<L>) {
         let Some(tour) = &chain.tour else { return };
         let before = tour.loss;
@@ -175,7 +178,7 @@ impl<L: Landscape> RoundContext<'_, L> {
     }
 }
 
-/// A long walk is written down and goes on.
+/// Ends a descent of maximum length and continues from its last point as a new one.
 fn continue_as_new_descent<P: Clone, M>(
     chain: &mut Chain<P, M>,
     next: ChainDescent<P, M>,
@@ -189,7 +192,7 @@ fn continue_as_new_descent<P: Clone, M>(
     chain.tour = Some(next);
 }
 
-/// Whether the squares of a gradient are numbers.
+/// True if the squares of all components are finite.
 fn has_finite_squares(gradient: &[f64]) -> bool {
     gradient.iter().all(|g| (g * g).is_finite())
 }

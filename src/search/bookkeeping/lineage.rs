@@ -1,26 +1,27 @@
-//! The family tree: every point that a chain started from, where it came from and what became of it.
+//! The lineage of a search: the start, origin and outcome of every descent.
 
-use super::{MutationKind, OfferOutcome};
+use super::OfferOutcome;
+use crate::search::MutationKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// No line of ancestors is remembered further back.
+/// The maximum number of ancestors that are remembered for one descent.
 const MAX_ANCESTRY: usize = 1000;
 
-/// Where a descent began, and what became of it.
+/// A descent: its origin and its outcome.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LineageNode<P> {
-    /// Its number; the start of the run is 0.
+    /// Its number, the generation; the start of the run is 0.
     pub number: u64,
-    /// The point that it is a mutation of; none for the start and for what was drawn from anywhere.
+    /// The generation whose point was mutated; `None` for the start and for random draws.
     pub parent: Option<u64>,
     /// The chain, counted from 0.
     pub chain: usize,
-    /// The mutation; none for the start.
+    /// The kind of mutation; `None` for the start.
     pub kind: Option<MutationKind>,
-    /// The mutation in words.
+    /// The mutation that it began with.
     pub what: String,
-    /// The loss of the point before the mutation; none where there was none.
+    /// The loss before the mutation; `None` if there was no mutation.
     pub before: Option<f64>,
     /// The loss after the mutation.
     pub mutated: f64,
@@ -30,84 +31,84 @@ pub struct LineageNode<P> {
     pub moves: u64,
     /// Gradients of the descent so far.
     pub gradients: u64,
-    /// What ended the descent; none while it goes on.
+    /// The reason for the end of the descent; `None` while it is in progress.
     pub ended: Option<DescentEnd>,
-    /// What the reservoir said to it; none while the descent goes on.
+    /// The outcome of the offer to the reservoir; `None` while the descent is in progress.
     pub offer: Option<OfferOutcome>,
-    /// Where the descent began while it goes on, then the best point of it.
+    /// The start of the descent while it is in progress, afterwards its best point.
     pub point: P,
 }
 
-/// What ended a descent.
+/// The reason for the end of a descent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DescentEnd {
-    /// The clock of regenerations: chance.
+    /// A random regeneration.
     Clock,
-    /// It was as long as a descent may be.
+    /// The maximum number of moves was reached.
     Longest,
-    /// It went where a loss is no number.
+    /// The loss was not finite.
     Lost,
-    /// A mutation was accepted: Metropolis and Hastings only.
+    /// A mutation was accepted; Metropolis–Hastings only.
     Mutated,
-    /// Its part of the gradients was used up: brute force only.
+    /// The gradient budget was used up; brute force only.
     Budget,
 }
 
-/// The generations of a run. However long it is, only the last ones are remembered, and the
-/// ancestors of those that matter.
+/// The generations of a run. Only the last ones and the ancestors of retained ones are remembered,
+/// however long the run is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lineage<P> {
-    /// In the order of their numbers.
+    /// Sorted by number.
     nodes: Vec<LineageNode<P>>,
     next: u64,
     remembered: usize,
-    /// How many there had been when the last ones were forgotten.
+    /// The total when the tree was last pruned.
     tidied: u64,
 }
 
 impl<P> Lineage<P> {
-    /// A tree without nodes that remembers so many of those that are no ancestors.
-    pub(super) fn new(remembered: usize) -> Self {
+    /// An empty lineage that remembers up to `remembered` generations besides ancestors.
+    pub(in crate::search) fn new(remembered: usize) -> Self {
         Self { nodes: Vec::new(), next: 0, remembered, tidied: 0 }
     }
 
-    /// The nodes that are remembered, in the order of their numbers.
+    /// The remembered generations, sorted by number.
     pub fn nodes(&self) -> &[LineageNode<P>] {
         &self.nodes
     }
 
-    /// How many there have been.
+    /// The total number of generations, including forgotten ones.
     pub fn total(&self) -> u64 {
         self.next
     }
 
-    /// The node of a number, if it is remembered.
+    /// A generation by its number, if it is remembered.
     pub fn node(&self, number: u64) -> Option<&LineageNode<P>> {
         self.index_of(number).map(|place| &self.nodes[place])
     }
 
-    /// A node and its ancestors, youngest first, as far as they are remembered.
+    /// A generation and its remembered ancestors, youngest first.
     pub fn ancestry(&self, number: u64) -> impl Iterator<Item = &LineageNode<P>> {
         let first = self.node(number);
         std::iter::successors(first, |node| node.parent.and_then(|parent| self.node(parent)))
     }
 
-    pub(super) fn node_mut(&mut self, number: u64) -> Option<&mut LineageNode<P>> {
+    pub(in crate::search) fn node_mut(&mut self, number: u64) -> Option<&mut LineageNode<P>> {
         self.index_of(number).map(|place| &mut self.nodes[place])
     }
 
-    /// Adds a node, whose number is given here.
-    pub(super) fn add(&mut self, node: LineageNode<P>) -> u64 {
+    /// Adds a generation and returns its number.
+    pub(in crate::search) fn add(&mut self, node: LineageNode<P>) -> u64 {
         let number = self.next;
         self.nodes.push(LineageNode { number, ..node });
         self.next += 1;
         number
     }
 
-    /// Forgets the oldest generations but those that are held with their ancestors, and those that
-    /// live. It works now and then only: there may be twice as many as are wanted.
-    pub(super) fn prune(
+    /// Removes the oldest generations except those in `held` with their ancestors, and those in
+    /// `living`. It runs only from time to time: up to twice as many as requested are kept.
+    pub(in crate::search) fn prune(
         &mut self,
         held: impl Iterator<Item = u64>,
         living: impl Iterator<Item = u64>,

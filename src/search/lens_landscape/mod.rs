@@ -1,29 +1,29 @@
-//! Lenses as a landscape: what a lens is worth (4.6), how it descends, how it is drawn.
+//! The search problem of lens design: the loss (4.6), descent and mutation of lenses.
 //!
-//! The objective is a [`Goal`] of [`merit`](crate::merit): sharpness, light at every field compared
-//! with the lens at the start, focal length, and the limits of a factory as penalties. A local move
-//! looks for the pupils of the lens anew and takes some steps with derivatives that know that the
-//! pupils move. It is judged by the pupils where it ends; one that has led to something worse is
-//! taken back.
+//! The objective is a [`Goal`] of [`merit`](crate::merit): sharpness, light at every field relative
+//! to the start, focal length, and the limits of manufacturing as penalties. A local move finds the
+//! pupils of the lens anew and takes some optimization steps with derivatives that include the
+//! motion of the pupils. It is evaluated with the pupils of the new lens; a move that made the lens
+//! worse is undone.
 
-mod draw;
-mod figures;
-mod finish;
-mod free;
+mod descent_settings;
+mod finalize;
 mod goal;
-mod limits;
-mod local;
-mod open;
+mod langevin_units;
+mod open_apertures;
 mod plan;
-mod walk;
+mod random_start;
+mod summary;
+mod variables;
+mod violations;
 
-pub use figures::{FieldSummary, LensSummary};
-pub use finish::{CrossCheck, FinalizedLens, GlassSubstitution, UnlistedGlass, finalize};
+pub use descent_settings::DescentSettings;
+pub use finalize::{CrossCheck, FinalizedLens, GlassSubstitution, UnlistedGlass, finalize};
 pub use goal::goal;
-pub use limits::describe_violation;
-pub use local::DescentSettings;
-pub use open::with_open_apertures;
+pub use open_apertures::with_open_apertures;
 pub use plan::{SearchPlan, SearchSetupError, run};
+pub use summary::{FieldSummary, LensSummary};
+pub use violations::describe_violation;
 
 use super::{
     Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
@@ -33,39 +33,39 @@ use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
 use crate::optimize::{DescentState, SegmentResult, SegmentSettings, run_segment};
 use crate::pupil::{RayModelError, limited_by_stop};
-use free::VariableRules;
+use variables::VariableRules;
 
-/// Why a lens cannot be searched from.
+/// The reasons that a lens cannot be the start of a search.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LandscapeError {
-    /// The prescription.
+    /// The prescription is invalid.
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// The beam.
+    /// The ray model cannot be set up.
     #[error(transparent)]
     Bench(#[from] RayModelError),
-    /// Its merit.
+    /// The merit function cannot be evaluated.
     #[error(transparent)]
     Merit(#[from] MeritError),
-    /// A rule without meaning.
+    /// A rule is invalid.
     #[error(transparent)]
     Rule(#[from] RuleError),
-    /// Limits that no lens keeps.
+    /// Constraints that no lens can satisfy.
     #[error("no lens keeps these limits: {0}")]
     Impossible(String),
-    /// A setting without meaning.
+    /// A setting is invalid.
     #[error("{what} is {found}; expected {expected}")]
     Setting {
-        /// Which one.
+        /// The setting.
         what: &'static str,
         /// Its value.
         found: String,
-        /// What it should be.
+        /// The valid values.
         expected: &'static str,
     },
 }
 
-/// Lenses, each worth what a goal says.
+/// The landscape of lenses with a goal as the loss.
 #[derive(Debug, Clone)]
 pub struct LensLandscape {
     start: Lens,
@@ -73,20 +73,20 @@ pub struct LensLandscape {
     rules: SearchRules,
     local: DescentSettings,
     variable_rules: VariableRules,
-    /// The areas of the pupils of the start, by zoom position.
+    /// The reference areas of the pupils, by zoom position: those of the start unless set
+    /// otherwise.
     light: Vec<Vec<f64>>,
-    /// The focal length that is asked for, or that of the start, in mm.
+    /// The target focal length, or that of the start, in mm.
     focal_length: f64,
 }
 
 impl LensLandscape {
-    /// Lenses like this one. It is limited by its stop from now on: an aperture that is a pupil or a
-    /// cone becomes the semi-diameter of the stop. Of the numbers that a person has flagged as
-    /// variables, the bounds hold; where curvatures or gaps are among them, those that are not
-    /// flagged are held.
+    /// The landscape of lenses that start from this one. The start becomes limited by its stop: an
+    /// aperture given as a pupil or cone is replaced by the semi-diameter of the stop. The bounds
+    /// of variables hold; if curvatures or gaps are among the variables, all others stay fixed.
     ///
     /// # Errors
-    /// A lens without merit, or settings without meaning.
+    /// The lens has no merit, or a setting is invalid.
     pub fn new(
         lens: &Lens,
         goal: &Goal,
@@ -96,9 +96,9 @@ impl LensLandscape {
         local.check()?;
         let rules = rules.normalize()?;
         rules.check_fixed_ends(lens.surfaces.len())?;
-        limits::check_glasses(lens, &rules)?;
+        violations::check_glasses(lens, &rules)?;
         let mut start = limited_by_stop(lens)?;
-        free::freeze_others(&mut start);
+        variables::freeze_others(&mut start);
         start.check()?;
         let size = goal::reference_length(&start);
         let asked = goal.terms.iter().find_map(|w| match w.term {
@@ -107,7 +107,7 @@ impl LensLandscape {
         });
         let freedom = VariableRules { size, rims: local.rims, indices: local.indices };
         let merit =
-            Merit::new(&free::with_variables(&start, &rules, freedom), goal, local.tolerance)?;
+            Merit::new(&variables::with_variables(&start, &rules, freedom), goal, local.tolerance)?;
         if merit.variables().is_empty() {
             return Err(MeritError::NoVariables.into());
         }
@@ -122,11 +122,11 @@ impl LensLandscape {
         })
     }
 
-    /// The same landscape, in which what every field had at the start counts as so many times as
-    /// much; no shares leave it as it is.
+    /// The same landscape with the light of every field at the start multiplied by a share; without
+    /// shares it is unchanged.
     ///
     /// # Errors
-    /// Not as many shares as fields, or one that is not positive.
+    /// The number of shares differs from that of the fields, or a share is not positive.
     pub fn with_field_light(mut self, shares: &[f64]) -> Result<Self, LandscapeError> {
         if shares.is_empty() {
             return Ok(self);
@@ -145,10 +145,10 @@ impl LensLandscape {
         Ok(self)
     }
 
-    /// The same landscape with other areas of the pupils to compare with, in mm², by zoom position.
+    /// The same landscape with other reference areas of the pupils, in mm², by zoom position.
     ///
     /// # Errors
-    /// Not as many areas as pupils, or one that is not positive.
+    /// The number of areas differs from that of the pupils, or an area is not positive.
     pub fn with_reference_light(self, light: Vec<Vec<f64>>) -> Result<Self, LandscapeError> {
         let same = |(own, other): (&Vec<f64>, &Vec<f64>)| own.len() == other.len();
         let fits = self.light.len() == light.len() && self.light.iter().zip(&light).all(same);
@@ -164,44 +164,48 @@ impl LensLandscape {
         Ok(Self { light, ..self })
     }
 
-    /// The lens at the start: limited by its stop, held numbers marked by bounds that coincide.
+    /// The start: limited by its stop, with fixed parameters marked by equal bounds.
     pub fn start(&self) -> &Lens {
         &self.start
     }
 
-    /// What is asked for.
+    /// The goal.
     pub fn goal(&self) -> &Goal {
         &self.goal
     }
 
-    /// What may be done.
+    /// The rules.
     pub fn rules(&self) -> &SearchRules {
         &self.rules
     }
 
-    /// The lens with every number flagged that may change.
+    /// The lens with every parameter marked as a variable that may change.
     pub fn with_variables(&self, lens: &Lens) -> Lens {
-        free::with_variables(&free::clamp_to_bounds(lens), &self.rules, self.variable_rules)
+        variables::with_variables(
+            &variables::clamp_to_bounds(lens),
+            &self.rules,
+            self.variable_rules,
+        )
     }
 
-    /// The merit of a lens of any structure, spots good to a tolerance, light compared with that of
-    /// the start.
+    /// The merit function of a lens of any structure, with a relative tolerance of spot radii and
+    /// the light relative to that of the start.
     ///
     /// # Errors
-    /// A lens without merit.
+    /// The lens has no merit.
     pub fn merit(&self, lens: &Lens, tolerance: f64) -> Result<Merit, MeritError> {
         let merit = Merit::new(&self.with_variables(lens), &self.goal, tolerance)?;
         Ok(merit.with_initial_light(&self.light))
     }
 
-    /// Rays of one gradient at a lens; none where it has no merit.
+    /// The number of rays of one gradient at a lens; 0 if it has no merit.
     pub fn rays_per_gradient(&self, lens: &Lens) -> usize {
         let merit = self.merit(lens, self.local.tolerance);
         merit.map_or(0, |merit| merit.spot_samplings().iter().map(|spot| spot.rays).sum())
     }
 
-    /// What losses are compared with: that of the start without the penalties of what no factory
-    /// can make, which a search repairs first of all.
+    /// The reference for losses: that of the start without the penalties of the manufacturing
+    /// limits, which a search reduces first.
     pub fn loss_scale(&self) -> f64 {
         let worth = || {
             let merit = self.merit(&self.start, self.local.tolerance).ok()?;
@@ -214,13 +218,13 @@ impl LensLandscape {
         worth().unwrap_or_else(|| self.loss(&self.start))
     }
 
-    /// What a lens is worth, by its own pupils.
+    /// The loss of a lens with its own pupils.
     fn evaluate(&self, lens: &Lens) -> Result<f64, MeritError> {
         let merit = self.merit(lens, self.local.tolerance)?;
         merit.value(&merit.values(lens))
     }
 
-    /// A local move of no more than so many steps: where it leads, and what that is worth.
+    /// A local move of at most `most` steps: the new lens, its loss, and the number of gradients.
     fn try_move(
         &self,
         lens: &Lens,
@@ -252,10 +256,10 @@ impl LensLandscape {
     }
 }
 
-/// A move may lead to something worse by this part, since the rays of two lenses differ.
+/// The relative increase of the loss that a move may make, since the rays of two lenses differ.
 const SLACK: f64 = 0.05;
 
-/// How often a lens is drawn before it is given up.
+/// The maximum number of random lenses that are tried.
 const MAX_DRAWS: usize = 200;
 
 impl Landscape for LensLandscape {
@@ -285,12 +289,13 @@ impl Landscape for LensLandscape {
     fn draw(&self, random: &mut Random) -> Result<Lens, MutationError> {
         let free = self.with_variables(&self.start);
         for _ in 0..MAX_DRAWS {
-            let Some(mut lens) = draw::random_lens(&free, &self.rules, self.focal_length, random)
+            let Some(mut lens) =
+                random_start::random_lens(&free, &self.rules, self.focal_length, random)
             else {
                 continue;
             };
             lens.variables.clone_from(&self.start.variables);
-            let lens = free::clamp_to_bounds(&lens);
+            let lens = variables::clamp_to_bounds(&lens);
             if self.loss(&lens).is_finite() {
                 return Ok(lens);
             }
@@ -346,7 +351,7 @@ impl Landscape for LensLandscape {
         let Some(element) = element::elements(lens).get(element).copied() else {
             return Err(MutationError::new(kind, "there is no such element"));
         };
-        // Only what lies between these surfaces may change, and it must be allowed anyway.
+        // Only what lies between these surfaces may change, within the rules.
         let (first, last) = match kind {
             MutationKind::AddSinglet => (element.last, element.last + 1),
             _ => (element.first.saturating_sub(1), element.last + 1),
@@ -357,10 +362,10 @@ impl Landscape for LensLandscape {
     }
 
     fn loss_gradient(&self, lens: &Lens) -> Option<LossGradient> {
-        walk::loss_gradient(self, lens)
+        langevin_units::loss_gradient(self, lens)
     }
 
     fn with_values(&self, lens: &Lens, values: &[f64]) -> Option<Lens> {
-        walk::with_values(self, lens, values)
+        langevin_units::with_values(self, lens, values)
     }
 }

@@ -1,10 +1,10 @@
-//! The best points that a search has found, at most one of each topology where that is asked for.
+//! The reservoir: the best points of a search, optionally at most one of each topology.
 
-use super::Landscape;
+use crate::search::Landscape;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// The best points so far, in no particular order.
+/// The best points so far, unordered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reservoir<P> {
     size: usize,
@@ -12,16 +12,16 @@ pub struct Reservoir<P> {
     entries: Vec<ReservoirEntry<P>>,
 }
 
-/// A point of the reservoir.
+/// A point with its loss, topology and generation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReservoirEntry<P> {
-    /// Its number in the family tree.
+    /// Its generation in the lineage.
     pub number: u64,
-    /// What it is worth.
+    /// Its loss.
     pub loss: f64,
-    /// What it has in common with points of the same structure.
+    /// Its topology.
     pub topology: String,
-    /// How far its structure is from those that are asked for; 0 for one of them.
+    /// The distance of its structure from the permitted ones; 0 if it is permitted.
     #[serde(default)]
     pub outside: u64,
     /// The point.
@@ -29,52 +29,51 @@ pub struct ReservoirEntry<P> {
 }
 
 impl<P> ReservoirEntry<P> {
-    /// A point of a landscape.
+    /// The entry of a point of a landscape.
     pub fn new<L: Landscape<Point = P>>(landscape: &L, number: u64, loss: f64, point: P) -> Self {
         let (topology, outside) =
             (landscape.topology(&point), landscape.structure_violation(&point));
         Self { number, loss, topology, outside, point }
     }
 
-    /// Which of two is better: first the one whose structure is nearer to what is asked for, then
-    /// the one of less loss.
+    /// Orders entries from best to worst: first by the structure violation, then by the loss.
     pub fn rank(&self, other: &Self) -> Ordering {
         self.outside.cmp(&other.outside).then(self.loss.total_cmp(&other.loss))
     }
 
-    /// Whether it is better than another one.
+    /// True if it is better than another one.
     pub fn is_better_than(&self, other: &Self) -> bool {
         (self.outside, self.loss) < (other.outside, other.loss)
     }
 }
 
-/// What became of a point that was offered to the reservoir.
+/// The outcome of an offer to the reservoir.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OfferOutcome {
-    /// It is in, and there was room.
+    /// Accepted; there was room.
     Entered,
-    /// It is in, in place of this one.
+    /// Accepted in place of this generation.
     Replaced(u64),
-    /// The same point is in already, under this number.
+    /// Rejected: the same point is already in the reservoir, under this generation.
     Same(u64),
-    /// A point of its topology is in that is no worse.
+    /// Rejected: this generation has the same topology and is at least as good.
     BehindTwin(u64),
-    /// All are no worse.
+    /// Rejected: the reservoir is full and all its points are at least as good.
     BehindAll,
-    /// Its loss is no number.
+    /// Rejected: the loss is not finite.
     Worthless,
 }
 
 impl OfferOutcome {
-    /// Whether the point is in.
+    /// True if the point was accepted.
     pub fn is_accepted(self) -> bool {
         matches!(self, Self::Entered | Self::Replaced(_))
     }
 }
 
 impl<P: Clone + PartialEq> Reservoir<P> {
-    /// A reservoir without points, for at least one.
+    /// An empty reservoir with a capacity of at least 1.
     pub fn new(size: usize, one_per_topology: bool) -> Self {
         Self { size: size.max(1), one_per_topology, entries: Vec::new() }
     }
@@ -84,18 +83,18 @@ impl<P: Clone + PartialEq> Reservoir<P> {
         &self.entries
     }
 
-    /// The best of them, the first of equals; none before the first one entered.
+    /// The best point, the first among equals; `None` if the reservoir is empty.
     pub fn best(&self) -> Option<&ReservoirEntry<P>> {
         self.entries.iter().min_by(|a, b| a.rank(b))
     }
 
-    /// Whether a point of this number is in.
+    /// True if the point of this generation is in the reservoir.
     pub fn contains(&self, number: u64) -> bool {
         self.entries.iter().any(|entry| entry.number == number)
     }
 
-    /// Takes a point in where it is good enough: one of a topology that is in replaces its twin if
-    /// it is better; another one takes the free place, or that of the worst if it is better.
+    /// Offers a point. With one point per topology it replaces the one of the same topology if it
+    /// is better; otherwise it takes a free place, or that of the worst point if it is better.
     pub fn offer(&mut self, entry: ReservoirEntry<P>) -> OfferOutcome {
         if !entry.loss.is_finite() {
             return OfferOutcome::Worthless;

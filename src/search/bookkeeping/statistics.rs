@@ -1,6 +1,7 @@
-//! What a run has done so far, in numbers.
+//! Counters of a run.
 
-use super::{DescentEnd, MutationError, MutationKind};
+use super::DescentEnd;
+use crate::search::{MutationError, MutationKind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -8,59 +9,60 @@ use std::collections::BTreeMap;
 const REASONS: usize = 24;
 const OTHER: &str = "other reasons";
 
-/// What a run has done so far.
+/// Counters of a run: moves, gradients, mutations and descents.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SearchStatistics {
-    /// Rounds of all chains.
+    /// Rounds; in each every chain takes a turn.
     pub rounds: u64,
     /// Local moves of all chains.
     pub moves: u64,
-    /// Moves that led to a loss below that of the start.
+    /// Moves to a loss below that of the start.
     pub better: u64,
-    /// Gradients of all chains.
+    /// Gradients evaluated by all chains.
     pub gradients: u64,
-    /// Langevin steps that were not accepted: Metropolis and Hastings only.
+    /// Rejected Langevin steps; Metropolis–Hastings only.
     pub rejected: u64,
-    /// Rounds in a row in which no chain moved.
+    /// Consecutive rounds without a move.
     pub idle: u64,
-    /// Each kind of mutation that was tried.
+    /// Counters for each kind of mutation that was tried.
     pub kinds: BTreeMap<MutationKind, MutationStatistics>,
-    /// What ended descents.
+    /// The number of descents by the reason for their end.
     pub ended: BTreeMap<DescentEnd, u64>,
 }
 
-/// What became of a kind of mutation.
+/// Counters for one kind of mutation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct MutationStatistics {
-    /// How often it was tried.
+    /// Attempts.
     pub tried: u64,
-    /// How often it was refused, for each reason.
+    /// Refused attempts by reason.
     pub refused: BTreeMap<String, u64>,
-    /// How often Metropolis and Hastings did not accept it.
+    /// Attempts rejected by the Metropolis–Hastings test.
     pub rejected: u64,
-    /// Descents that began with it and have ended.
+    /// Completed descents that began with this mutation.
     pub ended: u64,
-    /// Those of them that came below the loss before the mutation.
+    /// Completed descents that ended below the loss before the mutation.
     pub improved: u64,
-    /// Those of them that entered the reservoir.
+    /// Completed descents that entered the reservoir.
     pub entered: u64,
-    /// Local moves of those descents.
+    /// Local moves of the completed descents.
     pub moves: u64,
 }
 
 impl MutationStatistics {
-    /// Local moves of a descent that began with it, on average; none before the first has ended.
+    /// The mean length of its completed descents in local moves; `None` before the first one has
+    /// ended.
     pub fn mean_moves(&self) -> Option<f64> {
         (self.ended > 0).then(|| self.moves as f64 / self.ended as f64)
     }
 }
 
 impl SearchStatistics {
-    pub(super) fn kind(&mut self, kind: MutationKind) -> &mut MutationStatistics {
+    pub(in crate::search) fn kind(&mut self, kind: MutationKind) -> &mut MutationStatistics {
         self.kinds.entry(kind).or_default()
     }
 
-    pub(super) fn refuse(&mut self, refusal: &MutationError) {
+    pub(in crate::search) fn refuse(&mut self, refusal: &MutationError) {
         let tally = self.kind(refusal.kind);
         tally.tried += 1;
         let known = tally.refused.contains_key(&refusal.why) || tally.refused.len() < REASONS;

@@ -1,33 +1,34 @@
-//! How a lens descends from one move to the next.
+//! Settings of the local moves of a search over lenses.
 
 use super::LandscapeError;
 use crate::math::format_short;
 use crate::optimize::DescentMethod;
 use serde::{Deserialize, Serialize};
 
-/// No more steps than this: nothing ends a search within a move.
+/// The maximum number of steps, since a search cannot be stopped within a move.
 const MAX_STEPS: usize = 10_000;
 
-/// How a lens descends.
+/// Settings of the local moves of a search over lenses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DescentSettings {
-    /// What takes the steps.
+    /// The optimization method.
     pub method: DescentMethod,
-    /// Steps that a local move tries; least squares tries fewer where hardly anything is left to gain.
+    /// The maximum number of steps of a local move; damped least squares takes fewer if it
+    /// converges.
     pub steps: usize,
-    /// The rate of Adam when a descent begins: a step of one alters the residuals by as much as
-    /// they are.
+    /// The initial learning rate of Adam, in units in which a step of 1 changes the residuals by as
+    /// much as they are.
     pub rate: f64,
-    /// The error allowed of the radius of a spot, relatively.
+    /// The relative tolerance of spot radii.
     pub tolerance: f64,
-    /// The same for the first steps of a descent.
+    /// The relative tolerance of spot radii in the first steps of a descent.
     pub coarse: f64,
-    /// For how many steps.
+    /// The number of steps with the coarse tolerance.
     pub coarse_steps: usize,
-    /// Whether rims are free.
+    /// True to vary semi-diameters.
     pub rims: bool,
-    /// Whether the indices of model glasses are free.
+    /// True to vary the indices of model glasses.
     pub indices: bool,
 }
 

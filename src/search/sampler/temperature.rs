@@ -1,40 +1,41 @@
-//! From a loss to a density (4.7), and from densities to the chance that a descent ends.
+//! Temperature: from a loss to a probability density (4.7), and from densities to the probability
+//! that a descent ends.
 //!
-//! Everything is computed from logarithms, so that densities far below the smallest number still
-//! compare. At temperature 0 only the order of two losses is left, at infinite temperature nothing.
+//! Everything is computed from logarithms, so that densities that underflow can still be compared.
+//! At temperature 0 only the order of two losses matters, at infinite temperature nothing.
 
 use crate::math::format_short;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::{self, Display};
 
-/// The temperature of (4.7): 0 or more, infinity included; written as a number or `"infinite"`.
+/// The temperature of (4.7), from 0 to infinity inclusive; serialized as a number or `"infinite"`.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Temperature(f64);
 
 impl Temperature {
-    /// What is no less than 0; none for what is less, or no number.
+    /// A temperature of at least 0; `None` for negative numbers and NaN.
     pub fn new(value: f64) -> Option<Self> {
         (value >= 0.0).then_some(Self(value))
     }
 
-    /// The temperature at which a loss has a density of one half, `|L| / ln 2`; 1 where the loss
-    /// is 0, which no temperature can halve.
+    /// The temperature at which a loss has a density of one half, `|L| / ln 2`; 1 if the loss is 0,
+    /// whose density is 1 at every temperature.
     pub fn at_half_density(loss: f64) -> Self {
         let value = loss.abs() / std::f64::consts::LN_2;
         Self(if value > 0.0 && value.is_finite() { value } else { 1.0 })
     }
 
-    /// The number.
+    /// The value.
     pub fn value(self) -> f64 {
         self.0
     }
 
-    /// So many times as hot, as far as numbers go.
-    pub(super) fn scale_by(self, factor: f64) -> Self {
+    /// The temperature multiplied by a factor; unchanged if the product is not a number.
+    pub(in crate::search) fn scale_by(self, factor: f64) -> Self {
         Self::new(self.0 * factor).unwrap_or(self)
     }
 
-    /// The density (4.7) of a loss, 0 for one that is not finite.
+    /// The density (4.7) of a loss; 0 if the loss is not finite.
     pub fn density(self, loss: f64) -> f64 {
         self.log_density(loss).exp()
     }
@@ -103,33 +104,35 @@ impl<'de> Deserialize<'de> for Temperature {
     }
 }
 
-/// How a descent ends: three readings of the thesis.
+/// The rule that ends descents: three readings of the thesis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Termination {
-    /// Algorithm 1, (4.17): after each move with the chance
-    /// `max(0, (π(θ) − π(θ') + C) / (π(θ) + C)) = max(0, 1 − π(θ') / (π(θ) + C))`. A descent whose
-    /// density is far below `C` ends unless a move multiplies it: bad starts are given up soon.
+    /// Algorithm 1, (4.17): after each move with probability `max(0, (π(θ) − π(θ') + C) / (π(θ) +
+    /// C)) = max(0, 1 − π(θ') / (π(θ) + C))`. A descent whose density is far below `C` ends unless
+    /// a move multiplies it: bad starts are abandoned early.
     Ratio,
-    /// The same with `C π(θ)` in place of `C`: `max(0, 1 − π(θ') / π(θ) / (1 + C))`. How long a
-    /// descent lasts depends on how fast it improves, and not on where it began.
+    /// The same with `C π(θ)` in place of `C`: `max(0, 1 − π(θ') / π(θ) / (1 + C))`. The length of
+    /// a descent depends on how fast it improves, not on where it began.
     Relative,
-    /// The two clocks of section 4.4.1, of rates 1 and `κ = max(0, 1 − π(θ') / π(θ) + C)` (4.16):
-    /// the chance `κ / (1 + κ)`. Even a move into nothing ends a descent half of the time only.
+    /// The competing clocks of section 4.4.1 with rates 1 and `κ = max(0, 1 − π(θ') / π(θ) + C)`
+    /// (4.16): probability `κ / (1 + κ)`. Even a move to density 0 ends a descent only half of the
+    /// time.
     Clocks,
 }
 
 impl Termination {
-    /// The chance that a descent ends after a move from one loss to another.
+    /// The probability that a descent ends after a move from one loss to another.
     ///
-    /// At temperature 0, where densities are gone, all rules only see whether the move improved.
+    /// At temperature 0, where densities vanish, all rules depend only on whether the move
+    /// improved.
     pub fn chance(self, temperature: Temperature, c: f64, before: f64, after: f64) -> f64 {
         let ratio = temperature.log_ratio(before, after).exp();
         match self {
             Self::Ratio if temperature.value() > 0.0 => {
                 let old = temperature.log_density(before);
                 let kept = temperature.log_density(after) - log_sum(old, c.ln());
-                // Both are nothing only without any `C`: then nothing was lost.
+                // Both vanish only if `C` is 0: then nothing was lost.
                 let kept = if kept.is_nan() { 1.0 } else { kept.exp() };
                 (1.0 - kept).max(0.0)
             }

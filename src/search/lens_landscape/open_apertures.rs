@@ -1,14 +1,14 @@
-//! Rims as far open as the lens has room for them: the start of a search that is to find out where
-//! light should be clipped.
+//! Opens apertures as far as the lens has room: the start of a search that is to find where light
+//! should be vignetted.
 
 use crate::lens::{Aperture, Lens, Medium, Parameter, Quantity, Row, Variable};
 
-/// The lens without its diaphragm, every rim as large as its neighbours, the edge of its own sphere
-/// and `limit` leave room for, in mm. Aspheres and mirrors keep their rims, and the faces of gradients
-/// grow no wider: nothing is known about them farther out. The stop goes to the narrowest surface
-/// next to where it stood.
+/// The lens without its diaphragm, with every semi-diameter as large as the neighbouring surfaces,
+/// its own sphere and `limit` permit, in mm. Aspheres and mirrors keep their semi-diameters, and
+/// surfaces of gradient-index media do not grow, since they are not known to be defined farther
+/// out. The stop moves to the smaller surface next to its old position.
 ///
-/// Its light is what the rims let through.
+/// Its light is limited by all semi-diameters.
 #[must_use]
 pub fn with_open_apertures(lens: &Lens, limit: f64) -> Lens {
     let mut open = lens.clone();
@@ -29,7 +29,7 @@ pub fn with_open_apertures(lens: &Lens, limit: f64) -> Lens {
     open
 }
 
-/// Whether a surface is a plane in one medium with surfaces on both sides.
+/// True if a surface is a plane in one medium with surfaces on both sides.
 fn is_diaphragm(lens: &Lens, i: usize) -> bool {
     let row = &lens.surfaces[i];
     let inside = i > 0 && i + 1 < lens.surfaces.len();
@@ -41,7 +41,7 @@ fn is_diaphragm(lens: &Lens, i: usize) -> bool {
         && !matches!(&row.medium, Medium::Grin(gradient) if gradient.is_axial())
 }
 
-/// Joins the gaps on both sides of a surface that does nothing.
+/// Removes a surface without effect and joins the gaps on both sides.
 fn remove_diaphragm(lens: &mut Lens, i: usize) {
     let gap = |lens: &Lens, row: usize| {
         lens.variable(Parameter::new(row, Quantity::Thickness)).map(|v| (v.min, v.max))
@@ -66,8 +66,9 @@ fn remove_diaphragm(lens: &mut Lens, i: usize) {
     }
 }
 
-/// The lens with every rim as large as its neighbours, its own sphere and `limit` allow. Where the
-/// stop is a surface that bends light, the aperture follows its rim; a diaphragm stays as it is.
+/// The lens with every semi-diameter as large as the neighbouring surfaces, its own sphere and
+/// `limit` permit. If the stop is a refracting surface, the aperture follows its semi-diameter; a
+/// diaphragm is unchanged.
 pub(super) fn with_open_rims(mut lens: Lens, limit: f64) -> Lens {
     let stop = lens.stop().unwrap_or(0);
     let diaphragm = is_diaphragm(&lens, stop).then(|| lens.surfaces[stop].semi_diameter);
@@ -113,13 +114,13 @@ fn open_rims(lens: &mut Lens, limit: f64) {
     }
 }
 
-/// Where a sphere or ellipsoid ends, in mm from the axis.
+/// The height at which a sphere or ellipsoid ends, in mm.
 fn surface_edge(row: &Row) -> f64 {
     let square = (1.0 + row.conic) * row.curvature * row.curvature;
     if square > 0.0 { 1.0 / square.sqrt() } else { f64::INFINITY }
 }
 
-/// How far from the axis two surfaces touch; the end of the smaller one where they do not.
+/// The height at which two surfaces touch; infinity if they do not.
 fn contact_height(before: &Row, behind: &Row, gap: f64) -> f64 {
     let end = surface_edge(before).min(surface_edge(behind)).min(FAR);
     let room = |height: f64| gap + sag(behind, height) - sag(before, height);
@@ -134,9 +135,9 @@ fn contact_height(before: &Row, behind: &Row, gap: f64) -> f64 {
     open
 }
 
-/// Farther than this from the axis no surface reaches, in mm.
+/// The largest height that is considered, in mm.
 const FAR: f64 = 1e6;
-/// Halvings until a rim is known to rounding.
+/// Bisections until a height is known to rounding.
 const BISECTIONS: usize = 60;
 
 fn sag(row: &Row, height: f64) -> f64 {

@@ -1,4 +1,4 @@
-//! A whole search of a lens, in one call.
+//! A search of a lens, described by one value and run by one call.
 
 use super::{DescentSettings, LandscapeError, LensLandscape, goal};
 use crate::lens::Lens;
@@ -14,18 +14,18 @@ use std::ops::ControlFlow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SearchPlan {
-    /// What is asked for; none asks for what [`goal()`] does.
+    /// The goal; `None` for the default one, [`goal()`].
     pub goal: Option<Goal>,
-    /// The focal length in mm that the usual goal asks for; none for what the lens has.
+    /// The target focal length of the default goal, in mm; `None` for that of the lens.
     pub focal_length: Option<f64>,
-    /// How much of its light every field keeps by the usual goal: one share for all, or one for
-    /// each field.
+    /// The share of its light that every field keeps under the default goal: one share for all
+    /// fields, or one for each.
     pub light: Vec<f64>,
-    /// What may be done, and what a factory can make.
+    /// Permitted changes and the limits of manufacturing.
     pub rules: SearchRules,
-    /// How lenses descend.
+    /// Settings of the local moves.
     pub local: DescentSettings,
-    /// How the search goes.
+    /// Settings of the search.
     pub settings: SearchSettings,
 }
 
@@ -42,22 +42,23 @@ impl Default for SearchPlan {
     }
 }
 
-/// Why there is no search.
+/// The reasons that a search cannot be set up.
 #[derive(Debug, thiserror::Error)]
 pub enum SearchSetupError {
-    /// The lens, the goal or the rules.
+    /// The lens, the goal or the rules are invalid.
     #[error(transparent)]
     Landscape(#[from] LandscapeError),
-    /// The settings, or a checkpoint.
+    /// The settings or the checkpoint are invalid.
     #[error(transparent)]
     Search(#[from] SearchError),
 }
 
 impl SearchPlan {
-    /// The landscape that is searched.
+    /// The landscape of the search.
     ///
     /// # Errors
-    /// A lens without merit, rules or settings without meaning, limits that no lens keeps.
+    /// The lens has no merit, rules or settings are invalid, or no lens can satisfy the
+    /// constraints.
     pub fn landscape(&self, lens: &Lens) -> Result<LensLandscape, LandscapeError> {
         let (common, each) = match self.light[..] {
             [share] => (share, &[][..]),
@@ -72,8 +73,8 @@ impl SearchPlan {
         Ok(landscape)
     }
 
-    /// The settings, with the temperature that this landscape calls for where none is given, and
-    /// without draws from anywhere where the rules forbid them.
+    /// The settings, with the default temperature of the landscape if none is given, and without
+    /// random draws if the rules exclude them.
     pub fn settings(&self, landscape: &LensLandscape) -> SearchSettings {
         let usual = || Temperature::at_half_density(landscape.loss_scale());
         let temperature = self.settings.temperature.unwrap_or_else(usual);
@@ -83,11 +84,10 @@ impl SearchPlan {
     }
 }
 
-/// Searches from a lens until the settings say that it is over, or `watch` does, which is shown the
-/// run after every round.
+/// Searches from a lens until the run ends or `watch` breaks, which is called after every round.
 ///
 /// # Errors
-/// A lens without merit, rules or settings without meaning.
+/// The lens has no merit, or rules or settings are invalid.
 pub fn run(
     lens: &Lens,
     plan: &SearchPlan,

@@ -1,12 +1,13 @@
-//! Loss and gradient in the units in which Langevin steps are taken: fixed ones, so that a step and
-//! its way back are measured alike.
+//! Loss and gradient in the units of Langevin steps, which are fixed so that a step and its reverse
+//! are measured alike.
 
 use super::LensLandscape;
 use crate::lens::{Lens, Parameter, Quantity, RADIAL_TERMS};
 use crate::merit::DerivativeLevel;
 use crate::search::LossGradient;
 
-/// What a change of one means for a number of a lens of some size in mm: they bend rays about alike.
+/// The unit of a parameter for a lens of a size in mm; units of all parameters deflect rays by
+/// similar amounts.
 fn langevin_unit(parameter: Parameter, size: f64) -> f64 {
     match parameter.quantity {
         Quantity::Curvature => 0.5 / size,

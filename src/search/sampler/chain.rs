@@ -1,81 +1,81 @@
-//! A chain: one descent after another, each a turn at a time.
+//! A Markov chain: one descent after another, each advanced by one local move per turn.
 //!
-//! In its turn a chain reads what all share and changes nothing but itself; what happened is handed
-//! back as a list. So chains take their turns at the same time, and the lists are read in the order
-//! of the chains.
+//! In its turn a chain reads the shared state and changes only itself; what happened is returned as
+//! a list of events. So all chains can take their turns in parallel, and their events are applied
+//! in the order of the chains.
 
 use super::metropolis::{GradientScale, LangevinState};
-use super::reservoir::ReservoirEntry;
-use super::{
+use super::{SearchMethod, SearchSettings, Temperature};
+use crate::search::{
     DescentEnd, Landscape, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
-    Reservoir, SearchMethod, SearchSettings, Temperature,
+    Reservoir, ReservoirEntry,
 };
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How often a turn tries to find a point to begin from.
+/// Attempts per turn to find a point for a new descent.
 const MAX_ATTEMPTS: usize = 16;
 
-/// One of the chains of a run.
+/// One of the Markov chains of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Chain<P, M> {
-    pub(super) random: Random,
-    /// The generation of the present descent, or of the last one.
-    pub(super) number: u64,
-    pub(super) tour: Option<ChainDescent<P, M>>,
-    pub(super) task: Option<BruteForceJob>,
-    pub(super) scales: BTreeMap<String, GradientScale>,
+    pub(in crate::search) random: Random,
+    /// The generation of the current descent, or of the last one.
+    pub(in crate::search) number: u64,
+    pub(in crate::search) tour: Option<ChainDescent<P, M>>,
+    pub(in crate::search) task: Option<BruteForceJob>,
+    pub(in crate::search) scales: BTreeMap<String, GradientScale>,
 }
 
-/// A descent that goes on.
+/// A descent in progress.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChainDescent<P, M> {
-    pub(super) point: P,
-    pub(super) loss: f64,
-    pub(super) memory: M,
-    pub(super) best: P,
-    pub(super) best_loss: f64,
-    pub(super) moves: u64,
-    pub(super) gradients: u64,
-    pub(super) walk: Option<LangevinState>,
+    pub(in crate::search) point: P,
+    pub(in crate::search) loss: f64,
+    pub(in crate::search) memory: M,
+    pub(in crate::search) best: P,
+    pub(in crate::search) best_loss: f64,
+    pub(in crate::search) moves: u64,
+    pub(in crate::search) gradients: u64,
+    pub(in crate::search) walk: Option<LangevinState>,
 }
 
-/// A mutation that brute force descends from.
+/// A mutation that the brute-force method descends from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct BruteForceJob {
-    pub(super) element: usize,
-    pub(super) kind: MutationKind,
-    /// Gradients of its descent.
-    pub(super) budget: u64,
+pub(in crate::search) struct BruteForceJob {
+    pub(in crate::search) element: usize,
+    pub(in crate::search) kind: MutationKind,
+    /// The gradient budget of its descent.
+    pub(in crate::search) budget: u64,
 }
 
 impl<P: Clone, M> Chain<P, M> {
-    /// The generation that it descends from, or last did.
+    /// The generation of the current descent, or of the last one.
     pub fn generation(&self) -> u64 {
         self.number
     }
 
-    /// Where it is, and the loss there; none while it waits for its next start.
+    /// The current point and its loss; `None` between two descents.
     pub fn position(&self) -> Option<(&P, f64)> {
         self.tour.as_ref().map(|tour| (&tour.point, tour.loss))
     }
 
-    /// The best point of its present descent, and the loss there.
+    /// The best point of the current descent and its loss; `None` between two descents.
     pub fn best(&self) -> Option<(&P, f64)> {
         self.tour.as_ref().map(|tour| (&tour.best, tour.best_loss))
     }
 }
 
 impl<P: Clone, M: Default> ChainDescent<P, M> {
-    pub(super) fn new(point: P, loss: f64) -> Self {
+    pub(in crate::search) fn new(point: P, loss: f64) -> Self {
         let best = point.clone();
         let memory = M::default();
         Self { point, loss, memory, best, best_loss: loss, moves: 0, gradients: 0, walk: None }
     }
 
-    /// Goes to a point, which may be worth nothing.
-    pub(super) fn move_to(&mut self, point: P, loss: f64) {
+    /// Moves to a point, whose loss may be infinite or NaN, and keeps track of the best one.
+    pub(in crate::search) fn move_to(&mut self, point: P, loss: f64) {
         if loss < self.best_loss {
             self.best = point.clone();
             self.best_loss = loss;
@@ -85,60 +85,60 @@ impl<P: Clone, M: Default> ChainDescent<P, M> {
     }
 }
 
-/// What all chains share in a round.
+/// The state that all chains read in a round.
 #[derive(Debug)]
-pub(super) struct RoundContext<'a, L: Landscape> {
-    pub(super) landscape: &'a L,
-    pub(super) settings: &'a SearchSettings,
-    pub(super) temperature: Temperature,
-    pub(super) weights: &'a MutationWeights,
-    pub(super) start: &'a ReservoirEntry<L::Point>,
-    pub(super) reservoir: &'a Reservoir<L::Point>,
-    pub(super) pinned: Option<&'a ReservoirEntry<L::Point>>,
+pub(in crate::search) struct RoundContext<'a, L: Landscape> {
+    pub(in crate::search) landscape: &'a L,
+    pub(in crate::search) settings: &'a SearchSettings,
+    pub(in crate::search) temperature: Temperature,
+    pub(in crate::search) weights: &'a MutationWeights,
+    pub(in crate::search) start: &'a ReservoirEntry<L::Point>,
+    pub(in crate::search) reservoir: &'a Reservoir<L::Point>,
+    pub(in crate::search) pinned: Option<&'a ReservoirEntry<L::Point>>,
 }
 
-/// What happened in a turn.
+/// An event of a chain's turn.
 #[derive(Debug)]
-pub(super) enum TurnEvent<P> {
-    /// A mutation does not apply.
+pub(in crate::search) enum TurnEvent<P> {
+    /// A mutation did not apply.
     Refused(MutationError),
-    /// A mutation was not accepted.
+    /// A mutation was rejected by the Metropolis–Hastings test.
     Rejected(MutationKind),
     /// A descent began.
     Started(NewDescent<P>),
-    /// The descent went on.
+    /// The descent made a local move.
     Moved(LocalMove),
-    /// The descent ended, with this best point.
+    /// The descent ended; with its best point.
     Ended { ended: DescentEnd, point: P, loss: f64 },
 }
 
-/// Where a descent begins.
+/// The start of a descent.
 #[derive(Debug)]
-pub(super) struct NewDescent<P> {
-    pub(super) parent: Option<u64>,
-    pub(super) kind: Option<MutationKind>,
-    pub(super) what: String,
-    pub(super) before: Option<f64>,
-    pub(super) loss: f64,
-    pub(super) point: P,
+pub(in crate::search) struct NewDescent<P> {
+    pub(in crate::search) parent: Option<u64>,
+    pub(in crate::search) kind: Option<MutationKind>,
+    pub(in crate::search) what: String,
+    pub(in crate::search) before: Option<f64>,
+    pub(in crate::search) loss: f64,
+    pub(in crate::search) point: P,
 }
 
-/// A local move.
+/// The outcome of a local move.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LocalMove {
-    pub(super) loss: f64,
-    pub(super) best: f64,
-    pub(super) gradients: u64,
-    /// Whether a Langevin step was not accepted.
-    pub(super) rejected: bool,
+pub(in crate::search) struct LocalMove {
+    pub(in crate::search) loss: f64,
+    pub(in crate::search) best: f64,
+    pub(in crate::search) gradients: u64,
+    /// True if it was a Langevin step that was rejected.
+    pub(in crate::search) rejected: bool,
 }
 
-/// Everything that happened in a turn, in order.
-pub(super) type TurnEvents<L> = Vec<TurnEvent<<L as Landscape>::Point>>;
+/// The events of a turn, in order.
+pub(in crate::search) type TurnEvents<L> = Vec<TurnEvent<<L as Landscape>::Point>>;
 
 impl<L: Landscape> RoundContext<'_, L> {
-    /// One turn of a chain, of no more than so many gradients; nothing where it has none.
-    pub(super) fn turn(
+    /// One turn of a chain with a budget of `most` gradients; no events if that is 0.
+    pub(in crate::search) fn turn(
         &self,
         chain: &mut Chain<L::Point, L::Memory>,
         most: usize,
@@ -172,7 +172,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         }
     }
 
-    /// A new start: lines 11 to 14 of algorithm 1.
+    /// Regeneration, lines 11 to 14 of algorithm 1.
     fn regenerate(
         &self,
         random: &mut Random,
@@ -200,7 +200,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         self.new_descent(Some((parent.number, parent.loss)), mutated)
     }
 
-    /// What is mutated: the pinned point, or any of the reservoir, one as likely as the other.
+    /// The point to mutate: the pinned one, or a uniformly random one of the reservoir.
     fn choose_parent(
         &self,
         random: &mut Random,
@@ -214,7 +214,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         self.pinned.or_else(any).ok_or_else(empty)
     }
 
-    /// The mutation that brute force gave to a chain.
+    /// Starts the descent of a brute-force job.
     fn start_job(
         &self,
         task: BruteForceJob,
@@ -227,7 +227,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         birth.map_err(|refusal| turn.push(TurnEvent::Refused(refusal))).ok()
     }
 
-    pub(super) fn new_descent(
+    pub(in crate::search) fn new_descent(
         &self,
         parent: Option<(u64, f64)>,
         new: MutatedPoint<L::Point>,
@@ -242,7 +242,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         Ok(NewDescent { parent, kind: Some(kind), what, before, loss, point })
     }
 
-    /// A local move, and whether the descent ends behind it: lines 2 to 8 of algorithm 1.
+    /// A local move, and the end of the descent if it ends after it: lines 2 to 8 of algorithm 1.
     fn descend(
         &self,
         chain: &mut Chain<L::Point, L::Memory>,
@@ -277,7 +277,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         if !tour.loss.is_finite() {
             Some(DescentEnd::Lost)
         } else if let Some(task) = task {
-            // A descent without gradients would never use its part up.
+            // A descent whose moves take no gradients would never use up its budget.
             let spent = tour.gradients >= task.budget || tour.moves >= task.budget;
             spent.then_some(DescentEnd::Budget)
         } else if random.random::<f64>() < chance {
@@ -288,8 +288,8 @@ impl<L: Landscape> RoundContext<'_, L> {
     }
 }
 
-/// Ends the present descent.
-pub(super) fn end_descent<P: Clone, M>(
+/// Ends the current descent.
+pub(in crate::search) fn end_descent<P: Clone, M>(
     chain: &mut Chain<P, M>,
     ended: DescentEnd,
     turn: &mut Vec<TurnEvent<P>>,

@@ -1,0 +1,15 @@
+//! The samplers: chains of descents and mutations, the run that advances them, and its settings.
+
+pub(super) mod chain;
+pub mod competing_clocks;
+mod metropolis;
+mod run;
+mod settings;
+mod steer;
+mod temperature;
+
+pub use chain::{Chain, ChainDescent};
+pub use run::{FoundPoint, RunEnd, SearchEvent, SearchRun, SearchRunOn};
+pub use settings::{LangevinSettings, SearchMethod, SearchSettings};
+pub use steer::SteerCommand;
+pub use temperature::{Temperature, Termination};
