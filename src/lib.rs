@@ -46,28 +46,28 @@ pub mod pupil;
 // What a designer reads, each number with its error estimate.
 pub mod analysis;
 
-// What "better" means: weighted terms with gradients.
+// The merit function: weighted terms with gradients, constraints, default goals.
 pub mod merit;
 
 // Which physical effects a scene calls for, each decision with the number it rests on.
 pub mod effects;
 
-// Local search: Adam and damped least squares, one step at a time; the front of sharpness and light.
+// Local optimization of a lens, one step at a time; the Pareto front of sharpness against light.
 pub mod optimize;
 
 // Search over structure: a chain that descends, mutates, regenerates; reservoir, family tree.
 pub mod search;
 
-// Plots and images: what a result looks like, as PNG.
-pub mod picture;
+// Charts and images as PNG; knows nothing of what it draws.
+pub mod plot;
 
-// A front of sharpness against light as files: table, picture, lenses.
-pub mod front;
+// Results written as files: the front of sharpness against light as a table, a plot and lenses.
+pub mod report;
 
 // The figures and tables of the thesis as studies that check their own claims.
 pub mod experiments;
 
-// Accuracy against time, throughput, memory.
+// Benchmarks: accuracy against time, throughput, memory.
 pub mod measure;
 
 // One open design: commands, undo, background worker, events. Knows no widgets.

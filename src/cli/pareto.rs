@@ -4,12 +4,12 @@ use super::failure::CliError;
 use super::input::{LensFile, Tolerance};
 use super::optimize::{progress_bar, stop_flag};
 use super::output::{Output, ShortNumber, TextTable};
-use crate::front::{self, ParetoReport};
 use crate::lens::Lens;
 use crate::measure::time_ms;
 use crate::merit::PupilEdge;
 use crate::optimize::DescentMethod;
 use crate::optimize::pareto::{Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
+use crate::report::ParetoReport;
 use clap::ValueEnum;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -70,7 +70,7 @@ impl ParetoArgs {
         let refuse = |cause: ParetoError| CliError::Input(format!("{}: {cause}", opened.file));
         let search = |pupil| self.search(&opened.lens, pupil, &stop).map_err(refuse);
         let (sweep, ms) = search(PupilEdge::Moving)?;
-        let biased = if self.no_biased { None } else { Some(search(PupilEdge::Kept)?) };
+        let biased = if self.no_biased { None } else { Some(search(PupilEdge::Frozen)?) };
         let mut report =
             ParetoSweepReport::new(&sweep, ms, biased.as_ref(), stop.load(Ordering::Relaxed));
         if let Some(folder) = &self.out {
@@ -81,7 +81,7 @@ impl ParetoArgs {
                 tried: sweep.evaluated(),
                 biased: biased.as_ref().map(|(sweep, _)| sweep.front()),
             };
-            let written = front::write(&survey, folder)?;
+            let written = survey.write(folder)?;
             report.files = written.iter().map(|path| path.display().to_string()).collect();
         }
         output.print(&report)

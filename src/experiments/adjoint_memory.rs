@@ -15,7 +15,7 @@ use crate::grin::{
     LastStep, LaunchMode, RayAdjoint, RayExit,
 };
 use crate::math::Vec3;
-use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.3",

@@ -18,7 +18,7 @@ use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength,
     paraxial_image_distance,
 };
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
 use crate::pupil::{QuadraticIntegrand, RayModel, Region};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::lens::FieldPoint;
 use crate::math::Vec3;
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
 use crate::pupil::{Accuracy, ConvergedValues, PupilLimit, PupilOutline, RayModel, Region};
 use crate::trace::{Fate, ImagePoints, Ray, Rays, TraceSink};
 use std::f64::consts::PI;

@@ -4,7 +4,7 @@
 //! hyperbolic secant, which refocuses at one, three and five times that distance; the parabolic
 //! profile has no focus, so it is compared at those planes where its own blur is smallest.
 
-use super::medium::{plot_medium, solve};
+use super::grin_solution::{plot_medium, solve};
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
 };
@@ -14,7 +14,7 @@ use crate::grin::{
 };
 use crate::grin_task::{self, GrinField, GrinTask};
 use crate::math::Vec3;
-use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {

@@ -16,7 +16,7 @@ use super::{
 use crate::lens::{Aperture, FieldKind, FieldPoint, Object, System};
 use crate::math::Real;
 use crate::paraxial::Beam;
-use crate::picture::{BLACK, Canvas, Color, GREY, TextAlign, diverging, gray_level};
+use crate::plot::{BLACK, Canvas, Color, GREY, TextAlign, diverging, gray_level};
 use crate::pupil::{
     Aiming, FixedLaunch, Integrand, PupilPattern, RayModel, Region, RegionKind, TracedPupil,
     WarpSampling,

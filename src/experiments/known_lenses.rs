@@ -5,7 +5,7 @@
 //! jump in its outermost voxels: the shape is found ten times better than the level, and both errors
 //! are told. The figure's own remark, that the difference is largest at the boundary, is this.
 
-use super::medium::{plot_medium, solve};
+use super::grin_solution::{plot_medium, solve};
 use super::{Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
 use crate::grin_task::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
 

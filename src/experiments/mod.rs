@@ -10,27 +10,27 @@ mod adjoint_memory;
 mod aperture_stop;
 mod entrance_pupil;
 mod fibre;
-mod front;
 mod gradient_image;
+mod grin_displays;
+mod grin_solution;
 mod histogram;
 mod known_lenses;
-mod medium;
 mod motion;
 mod outcome;
+mod pareto_front;
 mod plume;
 mod report;
 mod sampling;
 mod section;
+mod sharpness_vs_light;
 mod structure;
-mod trade;
-mod views;
 mod vignetting;
 mod zoom;
 
-pub use medium::plot_medium;
+pub use grin_displays::plot_view;
+pub use grin_solution::plot_medium;
 pub use outcome::{Claim, ClaimRelation, DataTable, ExperimentOutcome, NamedPlot, TableCell};
 pub use report::{ExperimentReport, PhaseTiming};
-pub use views::plot_view;
 
 use crate::files;
 use crate::lens::Lens;
@@ -42,21 +42,21 @@ pub const ALL: &[Experiment] = &[
     aperture_stop::EXPERIMENT,
     entrance_pupil::EXPERIMENT,
     gradient_image::EXPERIMENT,
-    front::EXPERIMENT,
+    pareto_front::EXPERIMENT,
     motion::EXPERIMENT,
     vignetting::EXPERIMENT,
     zoom::EXPERIMENT,
     sampling::EXPERIMENT,
     structure::metropolis::EXPERIMENT,
-    structure::brute::EXPERIMENT,
+    structure::brute_force::EXPERIMENT,
     structure::projection::EXPERIMENT,
-    structure::beyond::EXPERIMENT,
-    structure::teaser::EXPERIMENT,
+    structure::front_with_mutations::EXPERIMENT,
+    structure::overview_figure::EXPERIMENT,
     adjoint_memory::EXPERIMENT,
-    views::display::EXPERIMENT,
-    views::resolution::EXPERIMENT,
-    views::multifocal::EXPERIMENT,
-    views::caustic::EXPERIMENT,
+    grin_displays::display::EXPERIMENT,
+    grin_displays::resolution::EXPERIMENT,
+    grin_displays::multifocal::EXPERIMENT,
+    grin_displays::caustic::EXPERIMENT,
     known_lenses::EXPERIMENT,
     fibre::EXPERIMENT,
     plume::EXPERIMENT,

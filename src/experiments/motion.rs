@@ -6,15 +6,15 @@
 //! length. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that of
 //! the way `s` that the image of the target goes meanwhile, `|sin(π ν s) / (π ν s)|`.
 
-use super::front::{ANGLES, plan};
-use super::trade::{ProgressSpan, focal_length, run_sweep, with_field_angles};
+use super::pareto_front::{ANGLES, plan};
+use super::sharpness_vs_light::{ProgressSpan, focal_length, run_sweep, with_field_angles};
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, lens,
 };
 use crate::lens::Lens;
 use crate::optimize::pareto::ParetoPoint;
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
 use crate::pupil::{RayModel, Region};
 use std::f64::consts::PI;
 

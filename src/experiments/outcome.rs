@@ -1,7 +1,7 @@
 //! What an experiment found: numbers against limits, tables, pictures.
 
 use crate::lens::Lens;
-use crate::picture::Canvas;
+use crate::plot::Canvas;
 use serde::Serialize;
 use std::fmt::{self, Display};
 

@@ -15,7 +15,7 @@
 //! says more about the contrast than about the method: a constant index has 0.0088 of it on the
 //! data of the table at their own scale. Errors in parts of the contrast say what was found.
 
-use super::medium::{plot_medium, solve};
+use super::grin_solution::{plot_medium, solve};
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, TableCell, report_progress,
@@ -26,7 +26,7 @@ use crate::grin_task::{
     ViewMeasurement,
 };
 use crate::math::Vec3;
-use crate::picture::{
+use crate::plot::{
     Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign, gray_level,
 };
 use rayon::prelude::*;

@@ -13,7 +13,7 @@ use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, TableCell, report_progress,
 };
-use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign, gray_level};
+use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign, gray_level};
 use crate::search::competing_clocks::{CompetingClocks, Regeneration, RegenerationRate};
 use crate::search::toy::ToyLandscape;
 use crate::search::{Landscape as _, Random, Temperature};

@@ -1,7 +1,7 @@
 //! A lens in section, as every figure of the thesis shows it: glass, stop, rays.
 
 use crate::lens::System;
-use crate::picture::{BLACK, Canvas, Chart, Color, GREY, Stroke};
+use crate::plot::{BLACK, Canvas, Chart, Color, GREY, Stroke};
 use crate::pupil::Launch;
 
 /// Points of a surface on each side of the axis.

@@ -5,8 +5,8 @@
 //! larger aperture. Of the unbiased front that lens is shown which is brightest at the corner among
 //! those that are no less sharp than the biased one.
 
-use super::front::ANGLES;
-use super::trade::{
+use super::pareto_front::ANGLES;
+use super::sharpness_vs_light::{
     FieldView, ProgressSpan, WeightSweep, field_views, mean_blur_and_light, run_sweep,
     with_field_angles,
 };
@@ -17,7 +17,7 @@ use super::{
 use crate::analysis::{Illumination, illumination};
 use crate::lens::{Lens, Parameter, Quantity, Variable};
 use crate::optimize::pareto::ParetoPoint;
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign, gray_level};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign, gray_level};
 use crate::pupil::{Accuracy, RayModel};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {

@@ -5,7 +5,7 @@
 //! there the groups stand on parabolas through their three places, and the image plane in focus, for
 //! the lens at the start and for the better one alike.
 
-use super::trade::{
+use super::sharpness_vs_light::{
     ProgressSpan, WeightSweep, field_view, mean_blur_and_light, monochromatic, run_sweep,
 };
 use super::{
@@ -16,7 +16,7 @@ use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, at_zoom, paraxial_image_distance,
 };
 use crate::optimize::pareto::ParetoPoint;
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
 use crate::pupil::RayModel;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {

@@ -91,7 +91,7 @@ fn time(
         WeightedTerm { term: Term::Spot, weight: 1.0 },
         WeightedTerm { term: Term::FocalLength(99.5), weight: 1e-2 },
     ];
-    let goal = Goal { terms, pupil: PupilEdge::Kept, zoom_ratios: Vec::new() };
+    let goal = Goal { terms, pupil: PupilEdge::Frozen, zoom_ratios: Vec::new() };
     let mut search = start(method, lens, &goal, TOLERANCE)?;
     let before = search.terms()?;
     let mut times = Vec::with_capacity(steps);

@@ -1,7 +1,7 @@
 //! What a lens is asked for.
 
 use super::MeritError;
-use super::gaps::MinimumThickness;
+use super::constraints::MinimumThickness;
 use crate::lens::{Lens, Object};
 use crate::paraxial::{Beam, first_order};
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,8 @@ pub enum PupilEdge {
     Moving,
     /// The rays that got through when it was last looked for are kept: what most programs do.
     /// Faster, blind to light, biased wherever something clips.
-    Kept,
+    #[serde(rename = "kept")]
+    Frozen,
 }
 
 /// A term and its weight.

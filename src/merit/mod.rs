@@ -12,15 +12,15 @@
 //! sharpness. A goal that keeps its pupils has the usual, biased derivatives.
 
 mod binding;
+mod constraints;
 mod first_order;
-mod gaps;
 mod goal;
 mod light;
 mod sampling;
 mod spot;
 mod sum;
 
-pub use gaps::{ConstraintMargin, constraint_margins};
+pub use constraints::{ConstraintMargin, constraint_margins};
 pub use goal::{Goal, PupilEdge, Term, WeightedTerm};
 pub use sampling::SpotSampling;
 
@@ -344,7 +344,7 @@ impl Merit {
                     first_order::focal_length(scene, target, sum);
                 }
                 term if term.concerns_light() => light::add_light_term(scene, term, sum),
-                term => gaps::add_constraints(scene, term, sum),
+                term => constraints::add_constraints(scene, term, sum),
             }
         }
         Ok(())

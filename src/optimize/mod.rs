@@ -6,10 +6,10 @@
 mod adam;
 mod least_squares;
 pub mod pareto;
+mod segment;
 mod state;
-mod stretch;
 
-pub use stretch::{DescentState, SegmentResult, SegmentSettings, run_segment};
+pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};
 
 use crate::lens::Lens;
 use crate::merit::{Goal, Merit, MeritError, TermValue};

@@ -82,7 +82,8 @@ impl ParetoPoint {
     /// A lens without merit.
     pub fn evaluate(lens: &Lens, weight: Option<f64>, tolerance: f64) -> Result<Self, MeritError> {
         let terms = [Term::Spot, Term::Throughput].map(|term| WeightedTerm { term, weight: 1.0 });
-        let goal = Goal { terms: terms.to_vec(), pupil: PupilEdge::Kept, zoom_ratios: Vec::new() };
+        let goal =
+            Goal { terms: terms.to_vec(), pupil: PupilEdge::Frozen, zoom_ratios: Vec::new() };
         let merit = Merit::new(lens, &goal, tolerance)?;
         let values = merit.terms(&merit.values(lens))?;
         let (square, area) = (&values[0], &values[1]);
@@ -143,6 +144,12 @@ impl Front {
         }
         covered / (spot * light)
     }
+
+    /// The hypervolume relative to a starting lens: up to twice its spot, in multiples of its spot
+    /// times its light.
+    pub fn relative_hypervolume(&self, start: &ParetoPoint) -> f64 {
+        self.hypervolume(REFERENCE_SPOT * start.spot, start.light)
+    }
 }
 
 /// Why there is no front.
@@ -169,6 +176,8 @@ pub enum ParetoError {
     },
 }
 
+/// The largest spot that counts for the hypervolume, relative to that of the starting lens.
+const REFERENCE_SPOT: f64 = 2.0;
 /// How many times the steps of a weight correct the lens at the beginning of a chain.
 const FIRST: usize = 3;
 /// Steps between two looks at the lenses.
@@ -246,7 +255,7 @@ impl ParetoSweep {
         let goal = weighted_sum_goal(&lens, start.light, settings.pupil)?;
         let weights = settings.weights(goal_focal_length(&goal, &lens));
         let last = weights.last().copied().unwrap_or(0.0);
-        let begin = [(last, goal.pupil), (0.0, PupilEdge::Kept)];
+        let begin = [(last, goal.pupil), (0.0, PupilEdge::Frozen)];
         let both = begin.into_iter().flat_map(|begin| [(begin, true), (begin, false)]);
         let chain = |(begin, falling)| SweepChain {
             lens: lens.clone(),
@@ -301,7 +310,7 @@ impl ParetoSweep {
 
     /// The hypervolume of the front against twice the spot of the lens at the start.
     pub fn hypervolume(&self) -> f64 {
-        self.front.hypervolume(2.0 * self.start.spot, self.start.light)
+        self.front.relative_hypervolume(&self.start)
     }
 
     fn total(&self) -> usize {

@@ -9,10 +9,10 @@ use super::clock::{Throttle, Timed, time};
 use super::judged::ScoredLens;
 use super::slot::Slot;
 use super::worker::RunStatus;
-use crate::front::{ParetoReport, hypervolume, write};
 use crate::lens::Lens;
 use crate::merit::PupilEdge;
 use crate::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep, SweepProgress};
+use crate::report::ParetoReport;
 use rayon::ThreadPool;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -111,7 +111,7 @@ impl ParetoPass {
     fn look(&mut self, sweep: &dyn ParetoEngine) {
         self.front = Arc::new(sweep.front().clone());
         self.evaluated = Arc::new(sweep.tried().to_vec());
-        self.hypervolume = hypervolume(&self.front, sweep.start());
+        self.hypervolume = self.front.relative_hypervolume(sweep.start());
     }
 
     /// Takes over what a slice has told.
@@ -298,7 +298,8 @@ impl Work for Desk {
             Err(why) => return self.give_up(why),
         };
         if finished && run.state.compare && run.state.biased.is_none() {
-            let settings = ParetoSettings { pupil: PupilEdge::Kept, ..run.state.settings.clone() };
+            let settings =
+                ParetoSettings { pupil: PupilEdge::Frozen, ..run.state.settings.clone() };
             run.look();
             match guarded(|| (self.begin)(&run.state.lens, &settings)) {
                 Ok(sweep) => {
@@ -324,7 +325,7 @@ impl Desk {
                 let start = Arc::new(sweep.start().clone());
                 let main = ParetoPass::new(sweep.as_ref());
                 let standing = RunStatus::Running;
-                let compare = compare && settings.pupil != PupilEdge::Kept;
+                let compare = compare && settings.pupil != PupilEdge::Frozen;
                 let state = ParetoRun {
                     number,
                     status: standing,
@@ -368,7 +369,7 @@ impl Desk {
                 .outbox
                 .emit(Told::NotWritten("there is no front to export yet".to_owned()));
         };
-        let told = match write(&run.look().survey(), folder) {
+        let told = match run.look().survey().write(folder) {
             Ok(files) => Told::Written(folder.to_owned(), files.len()),
             Err(why) => Told::NotWritten(why.to_string()),
         };

@@ -281,7 +281,7 @@ fn kept_rays_are_said_to_be_blind_to_light() {
     press(&mut harness, "Keep the rays");
     harness.get_by_label_contains("Kept rays tell nothing about light");
     press(&mut harness, "Optimize");
-    assert_eq!(goal_of(&harness.state().wishes).pupil, PupilEdge::Kept);
+    assert_eq!(goal_of(&harness.state().wishes).pupil, PupilEdge::Frozen);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use aplanat::optimize::{DescentMethod, start};
 /// Sharpness alone, with pupils that are kept, or all that a designer would ask for, light among it.
 fn goals(lens: &Lens) -> [Goal; 2] {
     let all = Goal::default_for(lens).unwrap();
-    let mut sharp = Goal { pupil: PupilEdge::Kept, ..all.clone() };
+    let mut sharp = Goal { pupil: PupilEdge::Frozen, ..all.clone() };
     sharp.terms.retain(|weighted| !weighted.term.concerns_light());
     [sharp, all]
 }
@@ -95,7 +95,7 @@ fn a_step_that_kills_a_ray_is_shortened_and_says_so() {
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::BackFocus(400.0), weight: 1.0 }, spot()],
         zoom_ratios: Vec::new(),
-        pupil: PupilEdge::Kept,
+        pupil: PupilEdge::Frozen,
     };
     lens.variables.retain(|v| v.parameter.quantity == Quantity::Curvature);
     let mut optimizer = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();

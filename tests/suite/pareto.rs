@@ -31,7 +31,7 @@ fn swept(pupil: PupilEdge) -> ParetoSweep {
 
 #[test]
 fn a_front_that_sees_light_covers_more_than_one_that_does_not() {
-    let [ours, biased] = [PupilEdge::Moving, PupilEdge::Kept].map(swept);
+    let [ours, biased] = [PupilEdge::Moving, PupilEdge::Frozen].map(swept);
     let [a, b] = [&ours, &biased].map(ParetoSweep::hypervolume);
     println!("hypervolume {a:.4}, biased {b:.4}");
     assert!(a > b);

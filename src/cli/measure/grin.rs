@@ -12,7 +12,7 @@ use crate::measure::{
     GrinBenchmark, GrinCost, GrinCurves, GrinMemory, GrinRow, GrinStarts, Machine, MemoryUse,
     Precision, measure_grin,
 };
-use crate::picture::PALETTE;
+use crate::plot::PALETTE;
 use image::ImageError;
 use serde::Serialize;
 use std::fmt::{self, Display};

@@ -1,9 +1,9 @@
 //! Curves of error against time as a picture: one log-log chart or two side by side.
 
-use crate::picture::{Axis, BLACK, Canvas, Chart as Axes, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart as Axes, TextAlign};
 use image::ImageError;
 
-pub(super) use crate::picture::{Color, Stroke};
+pub(super) use crate::plot::{Color, Stroke};
 
 const SIZE: [u32; 2] = [1800, 900];
 const TOP: f64 = 120.0;

@@ -5,7 +5,7 @@
 //! A Langevin step looks for the pupils of the lens anew, a step of a descent only every twentieth
 //! time: by the clock Metropolis and Hastings are farther behind than here.
 
-use super::race::{SamplerComparison, SamplerKind};
+use super::sampler_comparison::{SamplerComparison, SamplerKind};
 use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {

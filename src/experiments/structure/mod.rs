@@ -7,16 +7,16 @@
 //! which costs all of them the same: one merit with all its derivatives at one lens. A step of damped
 //! least squares costs as many as it tries.
 
-pub(super) mod beyond;
-pub(super) mod brute;
-mod course;
-mod limits;
+pub(super) mod brute_force;
+pub(super) mod front_with_mutations;
 pub(super) mod metropolis;
+pub(super) mod overview_figure;
 pub(super) mod projection;
-mod race;
-pub(super) mod teaser;
+mod recorded_search;
+mod relaxed_limits;
+mod sampler_comparison;
 
-use super::trade::{focal_length, with_field_angles};
+use super::sharpness_vs_light::{focal_length, with_field_angles};
 use super::{ExperimentError, lens};
 use crate::lens::{Lens, at_zoom};
 use crate::pupil::limited_by_stop;
@@ -59,7 +59,7 @@ fn rules() -> SearchRules {
 /// of the light, the limits that the lens keeps.
 fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> Result<SearchPlan, ExperimentError> {
     let usual = goal(start, &rules, None, 1.0).map_err(ExperimentError::from_error)?;
-    let kept = limits::relax_limits(start, &usual).map_err(ExperimentError::from_error)?;
+    let kept = relaxed_limits::relax_limits(start, &usual).map_err(ExperimentError::from_error)?;
     let default = SearchPlan::default();
     let settings = SearchSettings { chains: 1, gradients: Some(gradients), ..default.settings };
     Ok(SearchPlan { goal: Some(kept), rules, settings, ..default })

@@ -10,15 +10,15 @@
 //! Shares of single searches lie anywhere between .02 and .9, so that the means of 24 seeds are
 //! compared: those of 8 have the order wrong in one or two of eight places.
 
-use super::course::{RecordedSearch, RoundRecord, run_to_end};
+use super::recorded_search::{RecordedSearch, RoundRecord, run_to_end};
 use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
-use crate::experiments::trade::ProgressSpan;
+use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, TableCell,
 };
 use crate::optimize::DescentMethod;
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
 use crate::search::{MutationKind, SearchRules};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {

@@ -21,7 +21,7 @@ fn sharpest(mut lens: Lens, free: &[Parameter]) -> Lens {
     lens.fields.values.truncate(1);
     free.iter().for_each(|p| crate::merit::vary(&mut lens, p.surface, p.quantity));
     let terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
-    let goal = Goal { terms, zoom_ratios: Vec::new(), pupil: PupilEdge::Kept };
+    let goal = Goal { terms, zoom_ratios: Vec::new(), pupil: PupilEdge::Frozen };
     let mut search = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-6).unwrap();
     for _ in 0..60 {
         if search.step().finished {

@@ -281,13 +281,13 @@ fn grin_lens_every_term_has_the_derivative_of_its_value_by_the_gradient() {
         crate::merit::vary(&mut lens, surface, quantity);
     }
     for term in [Term::Spot, Term::FocalLength(15.0), Term::Distortion, Term::BackFocus(20.0)] {
-        crate::merit::check(&lens, term, PupilEdge::Kept, step);
+        crate::merit::check(&lens, term, PupilEdge::Frozen, step);
     }
     // A coefficient that is zero and varies makes a gradient of a gap that was none.
     let mut zero = busy("square", &[0.0], &[]);
     crate::merit::vary(&mut zero, 0, Quantity::Gradient(0));
     crate::merit::vary(&mut zero, 0, Quantity::Gradient(7));
-    crate::merit::check(&zero, Term::Spot, PupilEdge::Kept, step);
+    crate::merit::check(&zero, Term::Spot, PupilEdge::Frozen, step);
     let mut clipped = clipped();
     for quantity in [Quantity::Gradient(0), Quantity::Gradient(6), Quantity::SemiDiameter] {
         crate::merit::vary(&mut clipped, 0, quantity);
@@ -312,7 +312,7 @@ fn grin_lens_a_gradient_moves_with_the_zoom() {
     assert!((lengths[0] - lengths[1]).abs() > 1e-3);
     crate::merit::vary(&mut lens, 0, Quantity::ZoomThickness(1));
     crate::merit::vary(&mut lens, 0, Quantity::Gradient(1));
-    crate::merit::check(&lens, Term::Spot, PupilEdge::Kept, step);
+    crate::merit::check(&lens, Term::Spot, PupilEdge::Frozen, step);
 }
 
 #[test]
@@ -339,7 +339,7 @@ fn grin_lens_a_search_finds_the_term_in_r4_that_sharpens_a_rod() {
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
         zoom_ratios: Vec::new(),
-        pupil: PupilEdge::Kept,
+        pupil: PupilEdge::Frozen,
     };
     let before = Merit::new(&lens, &goal, 1e-6).unwrap().terms(&[0.0]).unwrap()[0].value.sqrt();
     let mut search = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-6).unwrap();

@@ -36,7 +36,7 @@ const EDGES: [(PupilEdge, &str, &str); 2] = [
         "Derivatives know that the pupil moves with the lens: unbiased, and light can be asked for.",
     ),
     (
-        PupilEdge::Kept,
+        PupilEdge::Frozen,
         "Keep the rays",
         "The rays of now are kept, as in most programs: faster, but biased wherever something \
          clips, and blind to light.",
@@ -130,7 +130,7 @@ impl MeritEditor {
             .map(|weighted| title(weighted.term))
             .collect();
         let about_light = self.active_terms().any(|weighted| weighted.term.concerns_light());
-        if about_light && self.edge == PupilEdge::Kept {
+        if about_light && self.edge == PupilEdge::Frozen {
             let what = "Kept rays tell nothing about light: those terms are counted but do not \
                         guide the search.";
             if warning_with_fix(ui, what, "Follow the edge", EDGES[0].2) {

@@ -5,13 +5,13 @@
 
 pub(super) mod caustic;
 pub(super) mod display;
+mod image_plots;
 pub(super) mod multifocal;
-mod pictures;
 pub(super) mod resolution;
 
-pub use pictures::plot_view;
+pub use image_plots::plot_view;
 
-use super::medium::{solve, solve_from};
+use super::grin_solution::{solve, solve_from};
 use super::{
     Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
     plot_medium,

@@ -1,7 +1,7 @@
 //! Images that light makes, beside the pictures that are wanted.
 
 use crate::grin_task::ViewImage;
-use crate::picture::{BLACK, Canvas, Color, GREY, TextAlign, gray_level};
+use crate::plot::{BLACK, Canvas, Color, GREY, TextAlign, gray_level};
 
 /// About the side of an image, in pixels of the canvas.
 const SIDE: usize = 384;

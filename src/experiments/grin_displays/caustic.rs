@@ -4,16 +4,16 @@
 //! are the rings of the thesis: a ray shall be somewhere on the one and go on somewhere to the other
 //! (5.36 and 5.37). That loss does not ask for even light, so some parts are brighter than others.
 
-use super::pictures::{draw_row, gray_levels};
+use super::image_plots::{draw_row, gray_levels};
 use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
-use crate::experiments::medium::solve;
+use crate::experiments::grin_solution::solve;
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, plot_medium,
 };
 use crate::grin::{GrinTracer, RayExit, plan_tracing};
 use crate::grin_task::{GrinField, GrinTask, LightGoal};
-use crate::picture::Canvas;
+use crate::plot::Canvas;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.7",

@@ -68,7 +68,7 @@ impl WeightSweep {
     /// The usual search, which cannot see light: one weight is as good as another.
     pub(super) fn biased(&self) -> Self {
         let steps = 2 * self.steps;
-        Self { betas: vec![0.0], steps, pupil: PupilEdge::Kept, ..self.clone() }
+        Self { betas: vec![0.0], steps, pupil: PupilEdge::Frozen, ..self.clone() }
     }
 }
 

@@ -5,7 +5,7 @@ use super::{ExperimentError, NamedPlot, ProgressFn, report_progress};
 use crate::grin::{GrinRay, GrinTracer, IndexField, plan_tracing};
 use crate::grin_task::{GrinField, GrinOptimizer, GrinTask, LightSource};
 use crate::math::Vec3;
-use crate::picture::{Axis, BLACK, Canvas, Chart, GREY, PALETTE, Stroke, TextAlign, gray_level};
+use crate::plot::{Axis, BLACK, Canvas, Chart, GREY, PALETTE, Stroke, TextAlign, gray_level};
 
 /// Cells along a side of the picture of a section.
 const CELLS: usize = 200;

@@ -2,8 +2,8 @@
 
 use super::merit::bundled;
 use aplanat::files;
-use aplanat::front::{ParetoReport, hypervolume, write};
 use aplanat::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep};
+use aplanat::report::ParetoReport;
 
 /// The lens at the start and the front of a short sweep.
 fn swept() -> ParetoSweep {
@@ -20,7 +20,7 @@ fn a_front_is_written_with_every_lens() {
     let biased = Some(sweep.front());
     let (start, front, tried) = (&sweep.start, sweep.front(), sweep.evaluated());
     let survey = ParetoReport { name: "test", start, front, tried, biased };
-    let written = write(&survey, &folder.join("new")).unwrap();
+    let written = survey.write(&folder.join("new")).unwrap();
     let designs = front.points();
     assert!(designs.len() > 1);
     assert_eq!(written.len(), 3 + 2 * designs.len());
@@ -48,7 +48,7 @@ fn a_folder_that_is_a_file_is_named() {
     let start = ParetoPoint::evaluate(&bundled("double_gauss_rudolph_50"), None, 1e-3).unwrap();
     let front = Front::default();
     let survey = ParetoReport { name: "", start: &start, front: &front, tried: &[], biased: None };
-    let why = write(&survey, "Cargo.toml".as_ref()).unwrap_err().to_string();
+    let why = survey.write("Cargo.toml".as_ref()).unwrap_err().to_string();
     assert!(why.starts_with("Cargo.toml: cannot be written"), "{why}");
-    assert_eq!(hypervolume(&front, &start), 0.0);
+    assert_eq!(front.relative_hypervolume(&start), 0.0);
 }

@@ -1,12 +1,12 @@
-//! A front as files: a table of its numbers, a picture, and each of its lenses.
+//! A front of sharpness against light as files: a table, a plot, and each of its lenses.
 //!
-//! One function for the window and the command line, so that both write the same folder:
-//! `front.csv`, `front.png`, `start.json`, and `front_001.json` … by growing light, in the order of
-//! the table; `biased_001.json` … where a front that was found with kept pupils stands beside it.
+//! The window and the command line write the same folder: `front.csv`, `front.png`, `start.json`,
+//! and `front_001.json` … in the order of increasing light, which is that of the table;
+//! `biased_001.json` … if a front with frozen pupils is reported with it.
 
 use crate::files::{self, FileError};
 use crate::optimize::pareto::{Front, ParetoPoint};
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, PALETTE, Stroke, TextAlign};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -25,8 +25,6 @@ pub struct ParetoReport<'a> {
     pub biased: Option<&'a Front>,
 }
 
-/// How much larger than at the start a spot may be to count for the hypervolume.
-const REFERENCE: f64 = 2.0;
 /// The head of the table.
 const HEAD: &str = "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,rays,file\n";
 /// Width and height of the picture, in pixels, and its margins: left, top, right, bottom.
@@ -35,34 +33,29 @@ const MARGINS: [f64; 4] = [110.0, 110.0, 40.0, 90.0];
 /// From one line of the legend to the next, in pixels.
 const LINE: f64 = 22.0;
 
-/// The area that a front covers, in multiples of the spot of the lens at the start times its
-/// light, against twice that spot.
-pub fn hypervolume(front: &Front, start: &ParetoPoint) -> f64 {
-    front.hypervolume(REFERENCE * start.spot, start.light)
-}
-
-/// Writes a front into a folder, which is made if it is not there. Returns the files, the table
-/// first. Files of the same names are replaced, all others stay.
-///
-/// # Errors
-/// A folder or a file that cannot be written; what was written before stays.
-pub fn write(survey: &ParetoReport<'_>, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-    let unwritable = |source| FileError::Unwritable { file: folder.display().to_string(), source };
-    std::fs::create_dir_all(folder).map_err(unwritable)?;
-    let picture = survey.picture().png().map_err(|why| unwritable(io::Error::other(why)))?;
-    let mut written = vec![folder.join("front.csv"), folder.join("front.png")];
-    files::write_atomic(&written[1], &picture)?;
-    for (name, design) in survey.lenses() {
-        let path = folder.join(name);
-        files::save(&design.lens, &path)?;
-        written.push(path);
-    }
-    // The table names the other files: it comes when they are there.
-    files::write_atomic(&written[0], survey.table().as_bytes())?;
-    Ok(written)
-}
-
 impl ParetoReport<'_> {
+    /// Writes the report into a folder, which is created if it does not exist. Returns the files,
+    /// the table first. Files of the same names are replaced, all others stay.
+    ///
+    /// # Errors
+    /// A folder or a file that cannot be written; files written before remain.
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+        let unwritable =
+            |source| FileError::Unwritable { file: folder.display().to_string(), source };
+        std::fs::create_dir_all(folder).map_err(unwritable)?;
+        let plot = self.plot().png().map_err(|why| unwritable(io::Error::other(why)))?;
+        let mut written = vec![folder.join("front.csv"), folder.join("front.png")];
+        files::write_atomic(&written[1], &plot)?;
+        for (name, design) in self.lenses() {
+            let path = folder.join(name);
+            files::save(&design.lens, &path)?;
+            written.push(path);
+        }
+        // The table names the other files, so it is written after them.
+        files::write_atomic(&written[0], self.table().as_bytes())?;
+        Ok(written)
+    }
+
     /// The numbers as comma-separated values, a line for every lens: the start, the front, the
     /// biased front. The lens at the start has no weight.
     pub fn table(&self) -> String {
@@ -88,7 +81,7 @@ impl ParetoReport<'_> {
     }
 
     /// Spot against light: the front over all that was tried, and the biased front in grey.
-    pub fn picture(&self) -> Canvas {
+    pub fn plot(&self) -> Canvas {
         let mut canvas = Canvas::new(SIZE);
         let (front, start) = (places(self.front.points()), place(self.start));
         let biased = places(self.biased.map_or(&[], Front::points));
@@ -111,7 +104,8 @@ impl ParetoReport<'_> {
     }
 
     fn legend(&self, canvas: &mut Canvas) {
-        let volume = |front: &Front| format!("hypervolume {:.4}", hypervolume(front, self.start));
+        let volume =
+            |front: &Front| format!("hypervolume {:.4}", front.relative_hypervolume(self.start));
         let mut lines: Vec<(String, Color)> = vec![
             ("start".to_owned(), BLACK),
             (format!("front, {}", volume(self.front)), PALETTE[1]),

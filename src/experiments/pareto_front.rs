@@ -10,7 +10,7 @@
 //! two-dimensional pupils.
 
 use super::section::SectionPlot;
-use super::trade::{
+use super::sharpness_vs_light::{
     self, FieldView, ProgressSpan, WeightSweep, field_views, run_sweep, with_field_angles,
     with_scaled_aperture,
 };
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::lens::Lens;
 use crate::optimize::pareto::{Front, ParetoPoint};
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
 use crate::pupil::{PupilPattern, RayModel, pattern_points};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -65,7 +65,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
         let span = [i, i + 1].map(|part| part as f64 / count as f64);
         let study = FrontStudy::of(&start, effort, span, watch)?;
         outcome.claims.extend(study.claims(name, authors, &mut outcome.rays)?);
-        outcome.tables.push(trade::table(name, &study.designs(), &mut outcome.rays)?);
+        outcome.tables.push(sharpness_vs_light::table(name, &study.designs(), &mut outcome.rays)?);
         outcome.lenses.extend(study.lenses(name));
         outcome.pictures.push(NamedPlot { name, canvas: study.draw(name, authors)? });
     }
@@ -126,8 +126,7 @@ impl FrontStudy {
         rays: &mut usize,
     ) -> Result<Vec<Claim>, ExperimentError> {
         let Self { start, unbiased, biased } = self;
-        let [front, other] =
-            [unbiased, biased].map(|front| front.hypervolume(2.0 * start.spot, start.light));
+        let [front, other] = [unbiased, biased].map(|front| front.relative_hypervolume(start));
         let beaten = |design: &&ParetoPoint| unbiased.points().iter().any(|u| u.dominates(design));
         let lit = biased.points().iter().filter(|design| design.light >= MIN_LIGHT * start.light);
         let left = lit.filter(|design| !beaten(design)).count();

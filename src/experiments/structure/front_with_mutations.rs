@@ -4,11 +4,11 @@
 //! it, each with the weight and the objective that it was found with, two searches go on for as many
 //! gradients: one mutates, one descends only. The best lens of each joins the front of its side.
 
-use super::course::{RecordedSearch, run_to_end};
-use super::race::SamplerKind;
+use super::recorded_search::{RecordedSearch, run_to_end};
+use super::sampler_comparison::SamplerKind;
 use super::{at_heights, rules};
-use crate::experiments::front::draw_lens_and_spots;
-use crate::experiments::trade::{self, ProgressSpan};
+use crate::experiments::pareto_front::draw_lens_and_spots;
+use crate::experiments::sharpness_vs_light::{self, ProgressSpan};
 use crate::experiments::{
     Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
     report_progress,
@@ -16,7 +16,7 @@ use crate::experiments::{
 use crate::lens::Lens;
 use crate::merit::{PupilEdge, Term, WeightedTerm};
 use crate::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep, weighted_sum_goal};
-use crate::picture::{Axis, BLACK, Canvas, Chart, Color, PALETTE, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, TextAlign};
 use crate::search::SearchRules;
 use crate::search::lens_landscape::SearchPlan;
 
@@ -49,7 +49,11 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     let mut outcome =
         ExperimentOutcome { claims: sides.claims(&sweep, effort), ..ExperimentOutcome::default() };
     outcome.rays = sides.rays;
-    outcome.tables.push(trade::table("designs", &sides.designs(&sweep), &mut outcome.rays)?);
+    outcome.tables.push(sharpness_vs_light::table(
+        "designs",
+        &sides.designs(&sweep),
+        &mut outcome.rays,
+    )?);
     outcome.pictures.push(NamedPlot { name: "front", canvas: sides.draw(&sweep)? });
     outcome.lenses.extend(sides.lenses());
     Ok(outcome)
@@ -128,8 +132,7 @@ impl MutationGain {
     }
 
     fn claims(&self, sweep: &ParetoSweep, effort: Effort) -> Vec<Claim> {
-        let (spot, light) = (2.0 * sweep.start.spot, sweep.start.light);
-        let volume = |front: &Front| front.hypervolume(spot, light);
+        let volume = |front: &Front| front.relative_hypervolume(&sweep.start);
         let fronts = [&self.mutated, &self.descended, sweep.front()];
         let [with, longer, without] = fronts.map(volume);
         let old = self.descended.points();

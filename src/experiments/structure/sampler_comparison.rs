@@ -1,12 +1,12 @@
 //! Samplers side by side: the same lenses, the same objective, as many gradients, several seeds.
 
-use super::course::{RecordedSearch, run_to_end};
+use super::recorded_search::{RecordedSearch, run_to_end};
 use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
-use crate::experiments::trade::ProgressSpan;
+use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{
     Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn, TableCell,
 };
-use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 use crate::search::lens_landscape::SearchPlan;
 use crate::search::{SearchMethod, SearchSettings, Temperature, Termination};
 

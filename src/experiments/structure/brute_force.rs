@@ -6,7 +6,7 @@
 //! from a published lens in a long valley (135 mm) it comes as low as the search, which spends its
 //! gradients on many structures.
 
-use super::race::{SamplerComparison, SamplerKind};
+use super::sampler_comparison::{SamplerComparison, SamplerKind};
 use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {

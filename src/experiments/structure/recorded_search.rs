@@ -1,6 +1,6 @@
 //! Searches that are watched: after every round it is written down how far they are.
 
-use crate::experiments::trade::ProgressSpan;
+use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{ExperimentError, ProgressFn, report_progress};
 use crate::lens::Lens;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan};

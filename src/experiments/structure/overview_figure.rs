@@ -6,16 +6,16 @@
 //! radius of each spot about its centroid, the clear area of each pupil. The search asks for sharp
 //! spots with at every field as much light as the mark has there.
 
-use super::course::{RecordedSearch, run_to_end};
+use super::recorded_search::{RecordedSearch, run_to_end};
 use super::{at_heights, rules};
 use crate::experiments::section::SectionPlot;
-use crate::experiments::trade::ProgressSpan;
+use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, TableCell,
 };
 use crate::lens::Lens;
-use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, TextAlign};
 use crate::pupil::RayModel;
 use crate::search::lens_landscape::{LensSummary, SearchPlan, with_open_apertures};
 use crate::search::{SearchRules, SearchSettings};

@@ -4,14 +4,14 @@
 //! is the exact derivative of what is computed and not of what light does: where the field is fine
 //! and rough it leads the search astray, and the smoothed one is better. A spline has no jumps.
 
-use super::pictures::{draw_row, gray_levels};
+use super::image_plots::{draw_row, gray_levels};
 use super::{builtin, evaluate, reduced, solve_from};
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, report_progress,
 };
 use crate::grin_task::{FieldRepresentation, GrinOptimizer, GrinTask, ViewImage, ViewReport};
-use crate::picture::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.5",
