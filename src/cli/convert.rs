@@ -1,6 +1,6 @@
 //! From one file format to another, with all that was lost on the way.
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::input::check_output_file;
 use super::output::Output;
 use crate::files;

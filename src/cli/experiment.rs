@@ -1,6 +1,6 @@
 //! The figures and tables of the thesis.
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::output::{Output, ShortNumber, TextTable};
 use crate::experiments::{
     self, Claim, Effort, Experiment as Study, ExperimentError, ExperimentProgress,

@@ -1,10 +1,10 @@
 //! The derivative of an integral over the pupil by every number of a lens.
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, TextTable};
 use crate::lens::{Fields, Lens, Medium, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, at_zoom};
-use crate::measure::time_ms;
+use crate::measure::{Integral, time_ms};
 use crate::pupil::{
     Accuracy, DerivativeError, DerivativeEstimator, PupilDerivative, QuadraticIntegrand, RayModel,
     Region, choose_estimator, differentiate, limited_by_stop,
@@ -22,8 +22,8 @@ pub(super) struct GradientArgs {
     lens: LensFile,
 
     /// What is integrated
-    #[arg(long, value_enum, default_value_t = TermName::Spot)]
-    term: TermName,
+    #[arg(long, value_enum, default_value_t = Integral::Spot)]
+    term: Integral,
 
     /// How the motion of the pupil's edge is counted
     #[arg(long, value_enum, default_value_t = Method::Auto)]
@@ -44,16 +44,6 @@ pub(super) struct GradientArgs {
     /// No more rays than this for one field and wavelength
     #[arg(long, default_value_t = 2_000_000, value_name = "N")]
     rays: usize,
-}
-
-/// The integrals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum TermName {
-    /// The square of the distance from the centroid of the spot
-    Spot,
-    /// Minus one: the light that gets through
-    Throughput,
 }
 
 /// The ways to differentiate an integral whose region moves with the lens.
@@ -134,7 +124,7 @@ impl GradientArgs {
 
     /// The cost about the centroid of all wavelengths.
     fn cost(&self, bench: &RayModel, regions: &[Region<'_>]) -> QuadraticIntegrand {
-        if self.term == TermName::Throughput {
+        if self.term == Integral::Throughput {
             return QuadraticIntegrand::throughput();
         }
         let (mut area, mut sum) = (0.0, [0.0; 2]);
@@ -181,7 +171,7 @@ impl IntegralDerivative {
 /// What is printed.
 #[derive(Serialize)]
 struct GradientReport {
-    term: TermName,
+    term: Integral,
     method: &'static str,
     reason: String,
     value: f64,
@@ -251,7 +241,7 @@ impl GradientReport {
             ms,
             d: DerivativeColumns::new(lens, &found.by),
             d_error: DerivativeColumns::new(lens, &found.error),
-            unit: if asked.term == TermName::Spot { "mm^4" } else { "mm^2" },
+            unit: if asked.term == Integral::Spot { "mm^4" } else { "mm^2" },
             coefficients: lens.surfaces.iter().map(|row| coefficient_labels(&row.medium)).collect(),
         }
     }

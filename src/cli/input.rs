@@ -1,8 +1,8 @@
 //! Reading what a subcommand works on.
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::output::print_note;
-use crate::files::{self, ConversionOutcome, FileError, native};
+use crate::files::{self, ConversionOutcome, FileError, json};
 use crate::lens::{FieldKind, FieldPoint, Lens, System};
 use crate::pupil::RayModel;
 use serde::de::DeserializeOwned;
@@ -119,7 +119,7 @@ pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CliError>
     } else {
         std::fs::read_to_string(path).map_err(unreadable)?
     };
-    Ok(native::read_json(&text, &file)?)
+    Ok(json::read_json(&text, &file)?)
 }
 
 /// Refuses a target that surely cannot be written, before the work and not after it.

@@ -9,26 +9,26 @@
 
 mod analyze;
 mod convert;
+mod error;
 mod experiment;
-mod failure;
 mod gradient;
 mod grin;
-mod grin_lines;
-mod grin_report;
 mod info;
 mod input;
 mod measure;
+mod names;
 mod optimize;
 mod output;
+mod output_paths;
 mod pareto;
+mod progress;
 mod search;
-mod targets;
+mod terms;
 mod trace;
-mod vary;
 mod window;
 
 use clap::{Parser, Subcommand};
-use failure::CliError;
+use error::CliError;
 use output::{Output, print_note};
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,21 +1,20 @@
 //! Local optimization: the loop, its progress bar, and saving the best lens whatever ends it.
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::input::{self, LensFile, LoadedLens, Tolerance};
-use super::output::{Output, ShortNumber, TextTable};
-use super::vary::KindName;
-use crate::files::{self, native};
-use crate::lens::{Lens, add_variables};
+use super::names::value_name;
+use super::output::{Output, ShortNumber};
+use super::progress::{progress_bar, stop_flag};
+use super::terms::TermComparison;
+use crate::files::{self, json};
+use crate::lens::{Lens, ParameterKind, add_variables};
 use crate::measure::time_ms;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
 use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer, start};
-use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 /// Optimizes the variables of a lens; Ctrl-C ends it and saves the best lens so far
 #[derive(Debug, clap::Args)]
@@ -29,8 +28,8 @@ pub(super) struct OptimizeArgs {
     out: PathBuf,
 
     /// How to search
-    #[arg(long, value_enum, default_value_t = MethodName::Dls)]
-    method: MethodName,
+    #[arg(long, value_enum, default_value_t = DescentMethod::DampedLeastSquares)]
+    method: DescentMethod,
 
     /// No more steps than this; 100 for dls and 2000 for adam where it is absent
     #[arg(long, value_name = "N")]
@@ -42,7 +41,7 @@ pub(super) struct OptimizeArgs {
 
     /// Kinds of numbers to vary besides the variables of the lens
     #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]
-    vary: Vec<KindName>,
+    vary: Vec<ParameterKind>,
 
     /// What to aim at, as JSON; sharp spots at the focal length it has where it is absent
     #[arg(long, value_name = "FILE")]
@@ -53,29 +52,11 @@ pub(super) struct OptimizeArgs {
     history: Option<PathBuf>,
 }
 
-/// The methods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum MethodName {
-    /// Damped least squares
-    Dls,
-    /// First order, with moments
-    Adam,
-}
-
-impl MethodName {
-    fn method(self) -> DescentMethod {
-        match self {
-            Self::Dls => DescentMethod::DampedLeastSquares,
-            Self::Adam => DescentMethod::Adam,
-        }
-    }
-
-    fn usual_steps(self) -> usize {
-        match self {
-            Self::Dls => 100,
-            Self::Adam => 2000,
-        }
+/// Steps where --steps is absent.
+fn default_steps(method: DescentMethod) -> usize {
+    match method {
+        DescentMethod::DampedLeastSquares => 100,
+        DescentMethod::Adam => 2000,
     }
 }
 
@@ -85,10 +66,10 @@ impl OptimizeArgs {
         input::check_output_file(&self.out, &["json", "zmx"])?;
         self.history.iter().try_for_each(|path| input::check_output_file(path, &["json"]))?;
         let mut lens = opened.lens.clone();
-        add_variables(&mut lens, &KindName::kinds(&self.vary));
+        add_variables(&mut lens, &self.vary);
         let refuse = |source| merit_error(&opened, source);
         let goal = self.goal(&lens).map_err(|e| e.or_else(refuse))?;
-        let started = start(self.method.method(), &lens, &goal, self.error.0);
+        let started = start(self.method, &lens, &goal, self.error.0);
         let mut optimizer = started.map_err(refuse)?;
         let before = optimizer.terms().map_err(refuse)?;
         let light = |lens: &Lens| Merit::new(lens, &goal, self.error.0).map(|m| m.light());
@@ -102,7 +83,7 @@ impl OptimizeArgs {
         if let Some(path) = &self.history {
             files::write_atomic(
                 path,
-                native::pretty(&StepHistory { steps: &search.steps }).as_bytes(),
+                json::pretty(&StepHistory { steps: &search.steps }).as_bytes(),
             )?;
         }
         let found = OptimizeOutcome { search: &search, ms, light, before, after };
@@ -118,7 +99,7 @@ impl OptimizeArgs {
 
     /// Steps until nothing gets better, the steps are used up, or the person has had enough.
     fn search(&self, optimizer: &mut dyn Optimizer) -> OptimizeRun {
-        let most = self.steps.unwrap_or(self.method.usual_steps());
+        let most = self.steps.unwrap_or(default_steps(self.method));
         let stop = stop_flag();
         let bar = progress_bar(most);
         let mut search = OptimizeRun { steps: Vec::new(), ended: OptimizeEnd::Steps };
@@ -169,23 +150,6 @@ fn merit_error(opened: &LoadedLens, source: MeritError) -> CliError {
     }
 }
 
-/// A flag that Ctrl-C raises; a second Ctrl-C does no more than the first.
-pub(super) fn stop_flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
-    if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
-        log::warn!("Ctrl-C will not save the best lens: {error}");
-    }
-    flag
-}
-
-/// A bar on standard error, where that is a terminal.
-pub(super) fn progress_bar(steps: usize) -> ProgressBar {
-    let bar = ProgressBar::new(steps as u64);
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {eta}");
-    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-}
-
 /// How a search went.
 struct OptimizeRun {
     steps: Vec<OptimizationProgress>,
@@ -222,7 +186,7 @@ struct OptimizeOutcome<'a> {
 /// What is printed.
 #[derive(Serialize)]
 struct OptimizeReport {
-    method: MethodName,
+    method: String,
     steps: usize,
     ended: OptimizeEnd,
     ms: f64,
@@ -235,55 +199,6 @@ struct OptimizeReport {
     terms: Vec<TermComparison>,
     variables: Vec<VariableComparison>,
     out: String,
-}
-
-/// A term before and after.
-#[derive(Serialize)]
-pub(super) struct TermComparison {
-    term: &'static str,
-    weight: f64,
-    before: TermEstimate,
-    after: TermEstimate,
-}
-
-#[derive(Serialize)]
-struct TermEstimate {
-    value: f64,
-    error: f64,
-    rays: usize,
-}
-
-impl TermEstimate {
-    fn new(term: &TermValue) -> Self {
-        Self { value: term.value, error: term.error, rays: term.rays }
-    }
-}
-
-impl TermComparison {
-    /// The terms of a goal at two lenses.
-    pub(super) fn compare(before: &[TermValue], after: &[TermValue]) -> Vec<Self> {
-        let term = |(before, after): (&TermValue, &TermValue)| Self {
-            term: before.term,
-            weight: before.weight,
-            before: TermEstimate::new(before),
-            after: TermEstimate::new(after),
-        };
-        before.iter().zip(after).map(term).collect()
-    }
-
-    /// A row for each term.
-    pub(super) fn table(terms: &[Self]) -> TextTable {
-        let mut table =
-            TextTable::new(&["term", "weight", "before", "error", "after", "error", "rays"]);
-        for Self { term, weight, before, after } in terms {
-            let numbers = [*weight, before.value].map(|v| ShortNumber(v).to_string());
-            let start = std::iter::once((*term).to_owned()).chain(numbers);
-            let error = |value: &TermEstimate| format!("{:.1e}", value.error);
-            let rest = [error(before), ShortNumber(after.value).to_string(), error(after)];
-            table.row(start.chain(rest).chain([after.rays.to_string()]));
-        }
-        table
-    }
 }
 
 #[derive(Serialize)]
@@ -304,7 +219,7 @@ impl OptimizeReport {
             after: best.get(v.parameter),
         };
         Self {
-            method: asked.method,
+            method: value_name(&asked.method),
             steps: search.steps.len(),
             ended: search.ended,
             ms,

@@ -1,7 +1,7 @@
 //! Printing a result: text for people, JSON for programs.
 
-use super::failure::CliError;
-use crate::files::native;
+use super::error::CliError;
+use crate::files::json;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::io::{Write as _, stderr, stdout};
@@ -19,7 +19,7 @@ impl Output {
 
     /// Prints a result.
     pub(super) fn print(&self, result: &(impl Serialize + Display)) -> Result<(), CliError> {
-        let text = if self.json { native::pretty(result) } else { result.to_string() };
+        let text = if self.json { json::pretty(result) } else { result.to_string() };
         let mut out = stdout().lock();
         out.write_all(text.as_bytes())?;
         Ok(out.flush()?)

@@ -1,16 +1,15 @@
 //! The front of sharpness against light.
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::input::{LensFile, Tolerance};
-use super::optimize::{progress_bar, stop_flag};
 use super::output::{Output, ShortNumber, TextTable};
+use super::progress::{progress_bar, stop_flag};
 use crate::lens::Lens;
 use crate::measure::time_ms;
 use crate::merit::PupilEdge;
 use crate::optimize::DescentMethod;
 use crate::optimize::pareto::{Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
 use crate::report::ParetoReport;
-use clap::ValueEnum;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -32,8 +31,8 @@ pub(super) struct ParetoArgs {
     points: usize,
 
     /// What descends
-    #[arg(long, value_enum, default_value_t = Descent::Adam)]
-    method: Descent,
+    #[arg(long, value_enum, default_value_t = DescentMethod::Adam)]
+    method: DescentMethod,
 
     /// No more steps than this for each weight; 100 for dls and 500 for adam where it is absent
     #[arg(long, value_name = "N")]
@@ -46,16 +45,6 @@ pub(super) struct ParetoArgs {
     /// Without the same search by biased derivatives, which is made for comparison
     #[arg(long)]
     no_biased: bool,
-}
-
-/// The methods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Descent {
-    /// Damped least squares
-    Dls,
-    /// First order, with moments, annealed
-    Adam,
 }
 
 impl ParetoArgs {
@@ -93,13 +82,13 @@ impl ParetoArgs {
         pupil: PupilEdge,
         stop: &AtomicBool,
     ) -> Result<(ParetoSweep, f64), ParetoError> {
-        let (method, steps) = match self.method {
-            Descent::Dls => (DescentMethod::DampedLeastSquares, 100),
-            Descent::Adam => (DescentMethod::Adam, 500),
+        let steps = match self.method {
+            DescentMethod::DampedLeastSquares => 100,
+            DescentMethod::Adam => 500,
         };
         let settings = ParetoSettings {
             points: self.points,
-            method,
+            method: self.method,
             steps: self.steps.unwrap_or(steps),
             pupil,
             tolerance: self.error.0,

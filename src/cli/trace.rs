@@ -1,12 +1,11 @@
 //! Tracing rays that are given as JSON.
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::input::{self, LensFile};
 use super::output::{Output, ShortNumber, TextTable};
 use crate::math::Vec3;
 use crate::trace::{Fates, Ray, TracedRay, Tracer};
-use serde::de::{SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
@@ -31,7 +30,8 @@ impl TraceArgs {
         let system = opened.system(zoom, Some(wavelength_um))?;
         let refuse = |source| CliError::Rays { file: input::display_name(&self.rays), source };
         let tracer = Tracer::new(&system).map_err(refuse)?;
-        let rays = request.rays.checked().map_err(refuse)?;
+        let rays: Vec<Ray<f64>> = request.rays.into_iter().map(Ray::from).collect();
+        rays.iter().enumerate().try_for_each(|(i, ray)| ray.check(i)).map_err(refuse)?;
         let last = tracer.surfaces() - 1;
         let landings = rays.iter().map(|ray| tracer.trace(*ray));
         let mut fates = Fates::default();
@@ -47,7 +47,7 @@ impl TraceArgs {
 struct RayRequest {
     wavelength_um: Option<f64>,
     zoom: Option<usize>,
-    rays: RayList,
+    rays: Vec<RayJson>,
 }
 
 #[derive(Deserialize)]
@@ -64,56 +64,13 @@ struct RayJson {
     n: f64,
 }
 
-/// Rays, whose errors say which one is wrong.
-struct RayList(Vec<Ray<f64>>);
-
-impl RayList {
-    /// The rays, if every one of them can be traced.
-    fn checked(self) -> Result<Vec<Ray<f64>>, crate::lens::SystemError> {
-        self.0.iter().enumerate().try_for_each(|(i, ray)| ray.check(i))?;
-        Ok(self.0)
+impl From<RayJson> for Ray<f64> {
+    fn from(RayJson { x, y, z, l, m, n }: RayJson) -> Self {
+        Self { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n) }
     }
 }
 
-impl<'de> Deserialize<'de> for RayList {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        from.deserialize_seq(RayListVisitor)
-    }
-}
-
-struct RayListVisitor;
-
-impl<'de> Visitor<'de> for RayListVisitor {
-    type Value = RayList;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("rays, [{\"x\", \"y\", \"z\", \"L\", \"M\", \"N\"}, ...]")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<RayList, A::Error> {
-        let mut rays = Vec::with_capacity(list.size_hint().unwrap_or(0));
-        loop {
-            let next = list.next_element::<RayJson>();
-            let next = next.map_err(|error| numbered(error, rays.len()))?;
-            let Some(RayJson { x, y, z, l, m, n }) = next else { return Ok(RayList(rays)) };
-            rays.push(Ray { point: Vec3::new(x, y, z), direction: Vec3::new(l, m, n) });
-        }
-    }
-}
-
-/// Puts the number of the ray in front of what is wrong with it; a text that is no JSON is wrong as
-/// a whole.
-fn numbered<E: serde::de::Error>(error: E, ray: usize) -> E {
-    let message = error.to_string();
-    let about_a_ray = ["invalid", "unknown", "missing", "duplicate"];
-    if about_a_ray.iter().any(|word| message.starts_with(word)) {
-        E::custom(format!("ray {ray}: {message}"))
-    } else {
-        error
-    }
-}
-
-/// What is printed.
+/// The end of every ray.
 #[derive(Serialize)]
 struct TraceReport {
     wavelength_um: f64,

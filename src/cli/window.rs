@@ -1,6 +1,6 @@
 //! Opening the studio, or saying what works without it.
 
-use super::failure::CliError;
+use super::error::CliError;
 use crate::files;
 use serde_json::Value;
 use std::path::Path;

@@ -152,5 +152,5 @@ fn lens(name: &str) -> Result<Lens, ExperimentError> {
     let bundled = files::bundled_lenses().iter().find(|bundled| bundled.name == name);
     let bundled =
         bundled.ok_or_else(|| ExperimentError::Failed(format!("no lens `{name}` is bundled")))?;
-    files::native::read(bundled.text, name).map_err(ExperimentError::from_error)
+    files::json::read(bundled.text, name).map_err(ExperimentError::from_error)
 }

@@ -1,7 +1,7 @@
 //! An outcome with the experiment that it belongs to: what is printed, shown and written to files.
 
 use super::{Experiment, ExperimentOutcome};
-use crate::files::{self, FileError, native};
+use crate::files::{self, FileError, json};
 use serde::Serialize;
 use std::io;
 use std::path::Path;
@@ -77,6 +77,6 @@ impl ExperimentReport {
         }
         let name = format!("{id}.json");
         self.files.push(name.clone());
-        files::write_atomic(&folder.join(name), native::pretty(self).as_bytes())
+        files::write_atomic(&folder.join(name), json::pretty(self).as_bytes())
     }
 }

@@ -4,25 +4,25 @@
 //! approximated, preserved and dropped; an export is read back and traced before it counts as
 //! written; a file is written beside its target and renamed, so that nothing is lost on the way.
 
+mod atomic;
+mod bundled;
 mod convert;
 mod error;
-mod library;
-pub mod native;
-mod photo;
-mod probe;
+mod grayscale;
+pub mod json;
 mod report;
-mod save;
+mod round_trip;
 mod text;
 mod volume;
 pub mod zemax;
 
+pub use atomic::{check_writable, write_atomic};
+pub use bundled::{BundledLens, bundled_lenses};
 pub use convert::{Conversion, convert};
 pub use error::FileError;
-pub use library::{BundledLens, bundled_lenses};
-pub use photo::{GrayscaleImage, read_grayscale};
-pub use probe::{RoundTripCheck, SelfCheck};
+pub use grayscale::{GrayscaleImage, read_grayscale};
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
-pub use save::{check_writable, write_atomic};
+pub use round_trip::{RoundTripCheck, SelfCheck};
 pub use volume::{Volume, read_volume, write_volume};
 
 use crate::lens::Lens;
@@ -88,12 +88,12 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
     match format.ok_or_else(|| nothing("text that is no lens".to_owned()))? {
         LensFormat::Native => {
             text::require_unicode(bytes).map_err(|wrong| wrong.in_file(name))?;
-            let lens = native::read(&text, name)?;
+            let lens = json::read(&text, name)?;
             Ok(OpenedLens { lens, format: LensFormat::Native, report: None, checks: Vec::new() })
         }
         LensFormat::Zemax => {
             let (lens, report) = zemax::read(&text, name)?;
-            let checks = probe::self_checks(&lens).unwrap_or_default();
+            let checks = round_trip::self_checks(&lens).unwrap_or_default();
             Ok(OpenedLens { lens, format: LensFormat::Zemax, report: Some(report), checks })
         }
     }
@@ -127,7 +127,7 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
         return Err(FileError::NotALens { file, found, expected: "`.json` or `.zmx` to write to" });
     };
     let (bytes, report, proof) = match format {
-        LensFormat::Native => (native::write(lens).into_bytes(), None, None),
+        LensFormat::Native => (json::write(lens).into_bytes(), None, None),
         LensFormat::Zemax => {
             let (bytes, report, proof) = checked_zemax(lens, &file)?;
             (bytes, Some(report), Some(proof))
@@ -146,6 +146,6 @@ fn checked_zemax(
     let (text, report) = zemax::write(lens).map_err(unusable)?;
     let bytes = text::encode_utf16(&text);
     let back = parse(&bytes, file)?;
-    let proof = probe::check_round_trip(lens, &back.lens, file)?;
+    let proof = round_trip::check_round_trip(lens, &back.lens, file)?;
     Ok((bytes, report, proof))
 }

@@ -1,7 +1,7 @@
 //! The tasks that come with the program: the lenses and the plume of the thesis.
 
 use super::task::GrinTask;
-use crate::files::{FileError, native};
+use crate::files::{FileError, json};
 
 /// A task under a name.
 #[derive(Debug, Clone, Copy)]
@@ -56,5 +56,5 @@ pub fn find_builtin(name: &str) -> Option<&'static BuiltinTask> {
 /// # Errors
 /// A text that is no task, with its place.
 pub fn read_task(text: &str, file: &str) -> Result<GrinTask, FileError> {
-    native::read_json(text, file)
+    json::read_json(text, file)
 }

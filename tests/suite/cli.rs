@@ -266,10 +266,10 @@ fn trace_refuses_what_cannot_be_traced() {
     };
     let rays = |last: Value| json!({"rays": [ray(0.0, 0.0, 1.0), last]}).to_string();
     refuse(&rays(ray(0.0, 0.5, 1.0)), &["ray 1", "length"]);
-    refuse(&rays(json!({"x": 0, "y": 0, "z": 0, "L": 0, "M": 0})), &["ray 1", "`N`"]);
+    refuse(&rays(json!({"x": 0, "y": 0, "z": 0, "L": 0, "M": 0})), &["rays[1]", "`N`"]);
     refuse(&rays(ray(1e200, 0.0, 1.0)), &["ray 1", "finite"]);
-    refuse(&rays(json!({"x": "NaN"})), &["ray 1", "NaN"]);
-    refuse(&rays(ray(0.0, 0.0, 1.0)).replace("\"L\"", "\"U\""), &["ray 0", "`U`", "column"]);
+    refuse(&rays(json!({"x": "NaN"})), &["rays[1].x", "NaN"]);
+    refuse(&rays(ray(0.0, 0.0, 1.0)).replace("\"L\"", "\"U\""), &["rays[0]", "`U`", "column"]);
     refuse("{\"rays\": [], \"colour\": 1}", &["`colour`", "wavelength_um"]);
     refuse("{\"rays\": [{\"x\": 1e999}]}", &["range"]);
     refuse("{\"rays\": [", &["end of the file"]);

@@ -14,7 +14,7 @@ const TASK: TracePurpose = TracePurpose::Spot(1e-3);
 fn library() -> impl Iterator<Item = (&'static str, Lens)> {
     files::bundled_lenses()
         .iter()
-        .map(|lens| (lens.name, files::native::read(lens.text, lens.name).unwrap()))
+        .map(|lens| (lens.name, files::json::read(lens.text, lens.name).unwrap()))
 }
 
 fn lens(name: &str) -> Lens {

@@ -34,7 +34,7 @@ fn field() -> Vec<Row> {
         ("luneburg", "/field", json!(3), &["field", "`3`", "an object with one key"]),
         ("luneburg", "/field", json!({}), &["an object with one key"]),
         ("luneburg", "/field", json!({"cubic": 1}), &["field", "cubic", "`tricubic`"]),
-        ("luneburg", "/field/trilinear", json!(1.1), &["field, trilinear", "{\"key\": ...}"]),
+        ("luneburg", "/field/trilinear", json!(1.1), &["field.trilinear", "{\"key\": ...}"]),
         ("luneburg", "/field/trilinear/half", json!(-1), &["field: found -1", "a length above 0"]),
         (
             "luneburg",
@@ -46,10 +46,10 @@ fn field() -> Vec<Row> {
             "luneburg",
             "/field/trilinear/half",
             json!(null),
-            &["field, trilinear, half", "null", "a number"],
+            &["field.trilinear.half", "null", "a number"],
         ),
         ("luneburg", "/space/ball/radius", json!(0), &["space: found 0", "a length above 0"]),
-        ("luneburg", "/space/ball/radius", json!("1"), &["space, ball, radius", "a number"]),
+        ("luneburg", "/space/ball/radius", json!("1"), &["space.ball.radius", "a number"]),
         (
             "fibre",
             "/space/rod/to",
@@ -66,7 +66,7 @@ fn light() -> Vec<Row> {
     vec![
         ("luneburg", "/views", json!([]), &["views: found none", "at least one"]),
         ("luneburg", "/views", json!({}), &["views", "a list"]),
-        ("luneburg", "/views/0", json!(1), &["views, 0", "an object with its keys"]),
+        ("luneburg", "/views/0", json!(1), &["views[0]", "an object with its keys"]),
         (
             "luneburg",
             "/views/0/weight",
@@ -74,7 +74,7 @@ fn light() -> Vec<Row> {
             &["number 0, weight: found -1", "a weight, 0 or more"],
         ),
         ("luneburg", "/views/0/weight", json!(0), &["no weight above 0"]),
-        ("luneburg", "/views/0/source", json!("beam"), &["views, 0, source"]),
+        ("luneburg", "/views/0/source", json!("beam"), &["views[0].source"]),
         (
             "luneburg",
             "/views/0/source/parallel/rays",
@@ -104,7 +104,7 @@ fn light() -> Vec<Row> {
             "luneburg",
             "/views/0/goal",
             json!({"point": [0, 1]}),
-            &["views, 0, goal, point", "length 2"],
+            &["views[0].goal.point", "length 2"],
         ),
         (
             "luneburg",
@@ -231,7 +231,7 @@ fn search() -> Vec<Row> {
             json!(1),
             &["levels, number 0, nodes: found 1", "2 to 513"],
         ),
-        ("luneburg", "/levels/0/nodes", json!(2.5), &["levels, 0, nodes", "a whole number"]),
+        ("luneburg", "/levels/0/nodes", json!(2.5), &["levels[0].nodes", "a whole number"]),
         (
             "luneburg",
             "/exact/luneburg/radius",

@@ -1,9 +1,12 @@
 //! Every lens that comes with the program opens, has the focal length that its source states,
 //! and survives being written and read.
 
-use aplanat::files::{self, BundledLens, native};
-use aplanat::lens::{Aperture, Lens, Object, RotationalProfile, System};
+use aplanat::files::{self, BundledLens, bundled_lenses, json};
+use aplanat::lens::{
+    Aperture, Lens, Object, ParameterKind, RotationalProfile, System, add_variables, at_zoom,
+};
 use aplanat::math::Vec3;
+use aplanat::measure::double_gauss;
 use aplanat::trace::{Ray, Tracer};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -11,7 +14,7 @@ use std::collections::BTreeSet;
 /// The reference prints six or seven digits, and takes catalogue indices rounded to five.
 const DIGITS: f64 = 1e-5;
 
-/// `tests/reference/bundled_lenses.json`.
+/// `tests/reference/library.json`.
 #[derive(Deserialize)]
 struct Table {
     lenses: Vec<Stated>,
@@ -94,14 +97,14 @@ fn at_primary(lens: &Lens, zoom: usize) -> System<f64> {
 #[test]
 fn the_embedded_lenses_are_those_of_the_folder() {
     let embedded: BTreeSet<String> =
-        files::bundled_lenses().iter().map(|b| format!("{}.json", b.name)).collect();
+        bundled_lenses().iter().map(|b| format!("{}.json", b.name)).collect();
     let folder: BTreeSet<String> = std::fs::read_dir("lenses")
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     assert_eq!(embedded, folder);
-    assert_eq!(embedded.len(), files::bundled_lenses().len());
-    for bundled in files::bundled_lenses() {
+    assert_eq!(embedded.len(), bundled_lenses().len());
+    for bundled in bundled_lenses() {
         let text = std::fs::read_to_string(format!("lenses/{}.json", bundled.name)).unwrap();
         assert_eq!(bundled.text, text, "{}: build again", bundled.name);
     }
@@ -110,8 +113,8 @@ fn the_embedded_lenses_are_those_of_the_folder() {
 #[test]
 fn every_lens_has_its_stated_focal_length() {
     let table = table();
-    assert_eq!(table.len(), files::bundled_lenses().len());
-    for bundled in files::bundled_lenses() {
+    assert_eq!(table.len(), bundled_lenses().len());
+    for bundled in bundled_lenses() {
         let lens = opened(bundled);
         let stated = table.iter().find(|stated| stated.lens == bundled.name).unwrap();
         for position in &stated.efl {
@@ -131,11 +134,11 @@ fn every_lens_has_its_stated_focal_length() {
 
 #[test]
 fn every_lens_is_the_same_after_writing_and_reading() {
-    for bundled in files::bundled_lenses() {
+    for bundled in bundled_lenses() {
         let lens = opened(bundled);
-        let text = native::write(&lens);
+        let text = json::write(&lens);
         assert_eq!(text, bundled.text, "{}: not in the form in which it is written", bundled.name);
-        assert_eq!(native::read(&text, bundled.name).unwrap(), lens, "{}", bundled.name);
+        assert_eq!(json::read(&text, bundled.name).unwrap(), lens, "{}", bundled.name);
         assert!(!lens.source.is_empty(), "{}: no source", bundled.name);
     }
 }
@@ -171,7 +174,7 @@ fn half_beam(lens: &Lens, zoom: usize) -> f64 {
 
 #[test]
 fn light_on_the_axis_goes_through_every_lens_at_every_zoom_position() {
-    for bundled in files::bundled_lenses() {
+    for bundled in bundled_lenses() {
         let lens = opened(bundled);
         for zoom in 0..lens.zoom_positions() {
             let tracer = Tracer::new(&at_primary(&lens, zoom)).unwrap();
@@ -187,4 +190,27 @@ fn light_on_the_axis_goes_through_every_lens_at_every_zoom_position() {
             }
         }
     }
+}
+#[test]
+fn a_plane_stop_in_air_is_not_varied() {
+    let mut lens = double_gauss();
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    assert_eq!(lens.variables.len(), 10 + 11);
+    assert!(lens.check().is_ok());
+}
+
+#[test]
+fn a_zoom_lens_at_a_position_is_that_lens() {
+    let zoom = bundled_lenses().iter().find(|b| b.name == "zoom_nikkor_28_80").unwrap();
+    let mut lens = json::read(zoom.text, zoom.name).unwrap();
+    let um = lens.wavelengths[lens.primary()].um;
+    for position in 0..lens.zoom.len() {
+        let single = at_zoom(&lens, position);
+        assert_eq!(single.resolve(0, um).unwrap(), lens.resolve(position, um).unwrap());
+    }
+    add_variables(&mut lens, &[ParameterKind::Thicknesses]);
+    assert!(lens.check().is_ok());
+    let moving = lens.zoom[0].thicknesses.len() * lens.zoom.len();
+    let fixed = lens.surfaces.len() - lens.zoom[0].thicknesses.len();
+    assert_eq!(lens.variables.len(), moving + fixed);
 }

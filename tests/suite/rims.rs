@@ -1,7 +1,7 @@
 //! What the size of every rim does, against lenses with larger and smaller rims.
 
 use aplanat::analysis::{self, RimSensitivities, RimSensitivity};
-use aplanat::files::{bundled_lenses, native};
+use aplanat::files::{bundled_lenses, json};
 use aplanat::lens::{Lens, Parameter, Quantity};
 use aplanat::pupil::{Accuracy, DerivativeError, RayModel};
 
@@ -12,7 +12,7 @@ const LEFT: f64 = 1e-3;
 
 /// The first lens of the library: its rims alone limit the beam.
 fn double_gauss() -> Lens {
-    native::read(bundled_lenses()[0].text, bundled_lenses()[0].name).unwrap()
+    json::read(bundled_lenses()[0].text, bundled_lenses()[0].name).unwrap()
 }
 
 /// Area and RMS radius of a field at the primary wavelength.

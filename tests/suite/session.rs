@@ -21,7 +21,7 @@ use std::time::Duration;
 /// A lens of the library.
 fn lens(name: &str) -> Lens {
     let bundled = files::bundled_lenses().iter().find(|lens| lens.name == name).unwrap();
-    files::native::read(bundled.text, name).unwrap()
+    files::json::read(bundled.text, name).unwrap()
 }
 
 fn double_gauss() -> Lens {

@@ -2,7 +2,7 @@
 
 use super::{AnalysisRun, AtField, FieldOutcome, TextLines, estimate_text, spot};
 use crate::analysis::{AnalysisError, Estimate};
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::output::ShortNumber;
 use crate::lens::{Lens, Parameter, Quantity};
 use crate::measure::time_ms;

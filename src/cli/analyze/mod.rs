@@ -6,7 +6,7 @@ mod focus;
 mod illumination;
 mod spot;
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber};
 use crate::analysis::{AnalysisError, Estimate};

@@ -1,7 +1,7 @@
 //! Which effects a lens calls for, with the time that each decision saves.
 
 use crate::analysis::spots;
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::input::LoadedLens;
 use crate::cli::output::ShortNumber;
 use crate::effects::{

@@ -3,7 +3,7 @@
 mod checks;
 mod effects;
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::input::{LensFile, LoadedLens};
 use super::output::{Output, ShortNumber, TextTable, or_dash};
 use crate::effects::EffectDecision;

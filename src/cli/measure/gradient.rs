@@ -1,9 +1,10 @@
 //! Accuracy of aperture-aware derivatives against time.
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::input::{LensFile, check_output_file};
 use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::progress::with_bar;
 use crate::files;
 use crate::measure::{
     GradientBenchmark, GradientCost, GradientCurves, GradientRow, Integral, Machine, Precision,
@@ -11,7 +12,6 @@ use crate::measure::{
 };
 use crate::pupil::DerivativeEstimator;
 use image::ImageError;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -43,14 +43,9 @@ impl MeasureGradientArgs {
         self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))?;
         opened.bench(self.zoom)?;
         self.field.map(|y| opened.field_at(y, self.zoom)).transpose()?;
-        let bar = ProgressBar::new(0);
-        let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} curves");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let measured = measure_gradients(&opened.lens, self.zoom, self.field, |done, all| {
-            bar.set_length(all as u64);
-            bar.set_position(done as u64);
+        let measured = with_bar("curves", |report| {
+            measure_gradients(&opened.lens, self.zoom, self.field, report)
         });
-        bar.finish_and_clear();
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
         if let Some(path) = &self.plot {
             let png = draw_curves(&measured, &opened.lens.name);

@@ -1,11 +1,11 @@
 //! Light in gradient-index fields: accuracy against time, cost, memory.
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::grin::load_task;
 use crate::cli::input::check_output_file;
-use crate::cli::optimize::progress_bar;
 use crate::cli::output::{Output, TextTable};
+use crate::cli::progress::with_bar;
 use crate::files;
 use crate::grin::Integrator;
 use crate::measure::{
@@ -36,12 +36,7 @@ impl MeasureGrinArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let task = load_task(&self.task)?;
         self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))?;
-        let bar = progress_bar(0);
-        let measured = measure_grin(&task, |done, all| {
-            bar.set_length(all as u64);
-            bar.set_position(done as u64);
-        });
-        bar.finish_and_clear();
+        let measured = with_bar("curves", |report| measure_grin(&task, report));
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", self.task)))?;
         if let Some(path) = &self.plot {
             let png = draw_curves(&measured, &task.name);

@@ -9,7 +9,7 @@ mod spot;
 mod trace;
 mod window;
 
-use super::failure::CliError;
+use super::error::CliError;
 use super::output::Output;
 use clap::Subcommand;
 

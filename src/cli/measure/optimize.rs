@@ -1,6 +1,6 @@
 //! The cost of a step of a search.
 
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::measure::{Machine, StepCosts, measure_step_costs};
 use serde::Serialize;

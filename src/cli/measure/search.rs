@@ -1,6 +1,6 @@
 //! What searches come to in the same time.
 
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::search::SearchPlanArgs;

@@ -1,15 +1,15 @@
 //! Accuracy of a spot against time.
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::input::{LensFile, check_output_file};
 use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::progress::with_bar;
 use crate::files;
 use crate::measure::{
     Machine, Precision, PupilClipping, PupilSampling, SpotCurves, SpotRow, measure_spot_curves,
 };
 use image::ImageError;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -44,14 +44,9 @@ impl MeasureSpotArgs {
         let bench = opened.bench(self.zoom)?;
         let field =
             opened.field_at(self.field.unwrap_or(DEFAULT_ZONE * bench.beam.edge), self.zoom)?;
-        let bar = ProgressBar::new(0);
-        let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} curves");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let curves = measure_spot_curves(&opened.lens, self.zoom, field, |done, all| {
-            bar.set_length(all as u64);
-            bar.set_position(done as u64);
+        let curves = with_bar("curves", |report| {
+            measure_spot_curves(&opened.lens, self.zoom, field, report)
         });
-        bar.finish_and_clear();
         let curves = curves
             .map_err(|e| CliError::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
         if let Some(path) = &self.plot {

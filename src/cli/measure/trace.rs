@@ -1,6 +1,6 @@
 //! The speed of tracing.
 
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::measure::{Machine, MemoryUse, Rounding, Throughput, measure_throughput};
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! What the window costs.
 
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::window;
 use crate::measure::Machine;

@@ -1,26 +1,25 @@
 //! The search over structure: a run that can be stopped, killed and taken up again.
 
-mod asked;
-mod found;
 mod limits;
+mod plan_args;
 mod report;
+mod result;
 
-pub(super) use asked::SearchPlanArgs;
+pub(super) use plan_args::SearchPlanArgs;
 
+use super::error::CliError;
 use super::experiment::create_folder;
-use super::failure::CliError;
 use super::input::{self, LensFile};
-use super::optimize::{progress_bar, stop_flag};
 use super::output::{Output, ShortNumber, print_note};
-use super::targets;
+use super::output_paths;
+use super::progress::{progress_bar, stop_flag};
 use crate::files;
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
 use crate::search::lens_landscape::{LandscapeError, LensLandscape, SearchPlan, finalize};
 use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
-use clap::ValueEnum;
-use found::StartAgainstBest;
 use report::SearchReport;
+use result::StartAgainstBest;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,8 +37,8 @@ pub(super) struct SearchArgs {
     out: Option<PathBuf>,
 
     /// The sampler
-    #[arg(long, value_enum, default_value_t = Sampler::Restore)]
-    method: Sampler,
+    #[arg(long, value_enum, default_value_t = SearchMethod::Restore)]
+    method: SearchMethod,
 
     /// All chance follows from it
     #[arg(long, default_value_t = 1, value_name = "N")]
@@ -79,28 +78,6 @@ pub(super) struct SearchArgs {
 
     #[command(flatten)]
     asked: SearchPlanArgs,
-}
-
-/// The samplers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Sampler {
-    /// Descents that end by chance and begin again from the reservoir
-    Restore,
-    /// Metropolis and Hastings, Langevin steps
-    Metropolis,
-    /// Each element once more and once less
-    Brute,
-}
-
-impl Sampler {
-    fn method(self) -> SearchMethod {
-        match self {
-            Self::Restore => SearchMethod::Restore,
-            Self::Metropolis => SearchMethod::Metropolis,
-            Self::Brute => SearchMethod::Brute,
-        }
-    }
 }
 
 /// Gradients of a search that nothing else ends.
@@ -188,16 +165,16 @@ impl SearchArgs {
         }
         self.out.iter().try_for_each(|path| input::check_output_file(path, &["json", "zmx"]))?;
         self.checkpoint.iter().try_for_each(|path| input::check_output_file(path, &["json"]))?;
-        self.reservoir_dir.iter().try_for_each(|folder| targets::check_folder(folder))?;
+        self.reservoir_dir.iter().try_for_each(|folder| output_paths::check_folder(folder))?;
         let out = self.out.as_deref().map(|path| ("--out", path));
         let checkpoint = self.checkpoint.as_deref().map(|path| ("--checkpoint", path));
         let read = std::iter::once(("the lens", self.lens.path())).chain(self.asked.files());
-        targets::check_distinct(&[out, checkpoint], read)
+        output_paths::check_distinct(&[out, checkpoint], read)
     }
 
     fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
         let mut plan = self.asked.plan(lens)?;
-        plan.settings.method = self.method.method();
+        plan.settings.method = self.method;
         plan.settings.seed = self.seed;
         let usual = if self.minutes.is_none() { Some(DEFAULT_ITERATIONS) } else { None };
         plan.settings.gradients = self.iterations.or(usual);

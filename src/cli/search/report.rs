@@ -1,9 +1,9 @@
 //! What a search prints: the start against the best lens, what there is besides, and what it took.
 
 use super::SearchEnd;
-use super::found::{FinishedReport, StartAgainstBest};
 use super::limits::ViolatedLimit;
-use crate::cli::failure::CliError;
+use super::result::{FinishedReport, StartAgainstBest};
+use crate::cli::error::CliError;
 use crate::cli::output::{ShortNumber, TextTable};
 use crate::merit::ConstraintMargin;
 use crate::search::lens_landscape::{FinalizedLens, LensLandscape};

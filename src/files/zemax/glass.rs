@@ -4,7 +4,7 @@
 //! Index and Abbe number on the line may be placeholders and count only where no catalogue has
 //! the name.
 
-use super::draft::{GlassLine, ZemaxSurface};
+use super::file::{GlassLine, ZemaxSurface};
 use crate::files::error::ParseError;
 use crate::files::report::ConversionOutcome;
 use crate::lens::Medium;

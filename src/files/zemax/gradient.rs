@@ -5,7 +5,7 @@
 //! 3 to 5 are radial, 6 to 8 axial (the user guide of `OpticStudio`, "Gradient 3"). Other types are refused
 //! by name, on reading and on writing.
 
-use super::draft::ZemaxSurface;
+use super::file::ZemaxSurface;
 use crate::lens::{GradientIndex, Medium, ProfileLaw, Quantity, RADIAL_TERMS};
 
 /// What such a surface is called.

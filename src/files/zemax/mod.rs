@@ -3,9 +3,9 @@
 //! There is no public specification; what is known comes from files and from programs that read
 //! them. Every line of a file ends up in the report as used, approximated, preserved or dropped.
 
-mod breaks;
 mod build;
-mod draft;
+mod coordinate_breaks;
+mod file;
 mod glass;
 mod gradient;
 mod line;

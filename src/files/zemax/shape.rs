@@ -1,6 +1,6 @@
 //! Which of the surface types reduce to a conic with a polynomial in r², and to which.
 
-use super::draft::ZemaxSurface;
+use super::file::ZemaxSurface;
 use crate::files::error::ParseError;
 use crate::lens::ASPHERE_TERMS;
 

@@ -11,7 +11,7 @@ use crate::paraxial::{paraxial_ray, signed_indices};
 
 fn bundled(name: &str) -> Lens {
     let found = crate::files::bundled_lenses().iter().find(|bundled| bundled.name == name).unwrap();
-    crate::files::native::read(found.text, name).unwrap()
+    crate::files::json::read(found.text, name).unwrap()
 }
 
 fn graded(law: ProfileLaw, radial: &[f64], axial: &[f64]) -> Medium {

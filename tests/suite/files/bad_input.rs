@@ -2,12 +2,12 @@
 //! and nothing is lost.
 
 use super::folder;
-use aplanat::files::{self, FileError, native};
+use aplanat::files::{self, FileError, json};
 use aplanat::lens::{Aperture, Lens};
 use std::fs;
 
 fn double_gauss() -> Lens {
-    native::read(files::bundled_lenses()[0].text, "a.json").unwrap()
+    json::read(files::bundled_lenses()[0].text, "a.json").unwrap()
 }
 
 fn refusal(bytes: &[u8], name: &str) -> String {
@@ -79,7 +79,7 @@ fn lenses_that_make_no_sense_are_refused_on_reading_and_on_writing() {
             assert!(error.contains(name) && error.contains(expected), "{error}");
             assert!(!folder.join(name).exists());
         }
-        let read = native::read(&native::write(&lens), "a.json");
+        let read = json::read(&json::write(&lens), "a.json");
         assert!(read.is_err(), "{expected}");
     }
     fs::remove_dir_all(folder).unwrap();

@@ -1,7 +1,7 @@
 //! Ten thousand spoiled files: none stops the program, and each ends in a lens or a message.
 
 use super::{FOREIGN, foreign};
-use aplanat::files::{self, native, zemax};
+use aplanat::files::{self, json, zemax};
 
 /// How many files in all.
 const FILES: usize = 10_000;
@@ -77,7 +77,7 @@ fn spoiled(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 fn seeds() -> Vec<Vec<u8>> {
     let mut seeds: Vec<Vec<u8>> = FOREIGN.iter().map(|name| foreign(name)).collect();
     for bundled in files::bundled_lenses() {
-        let lens = native::read(bundled.text, bundled.name).unwrap();
+        let lens = json::read(bundled.text, bundled.name).unwrap();
         let (text, _) = zemax::write(&lens).unwrap();
         seeds.push(bundled.text.as_bytes().to_vec());
         seeds.push(text.encode_utf16().flat_map(u16::to_le_bytes).collect());
@@ -98,8 +98,8 @@ fn no_spoiled_file_stops_the_program() {
             Ok(opened) => {
                 lenses += 1;
                 assert!(opened.lens.check().is_ok());
-                let text = native::write(&opened.lens);
-                assert_eq!(native::read(&text, "a.json").unwrap(), opened.lens);
+                let text = json::write(&opened.lens);
+                assert_eq!(json::read(&text, "a.json").unwrap(), opened.lens);
             }
             Err(error) => {
                 messages += 1;

@@ -1,14 +1,14 @@
 //! A lens that goes out and comes back is the same lens, to the last bit.
 
 use super::{FOREIGN, folder, foreign};
-use aplanat::files::{self, ConversionOutcome, native};
+use aplanat::files::{self, ConversionOutcome, json};
 use aplanat::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
 };
 use std::fs;
 
 fn library() -> impl Iterator<Item = (&'static str, Lens)> {
-    files::bundled_lenses().iter().map(|b| (b.name, native::read(b.text, b.name).unwrap()))
+    files::bundled_lenses().iter().map(|b| (b.name, json::read(b.text, b.name).unwrap()))
 }
 
 /// The lens without what a Zemax file has no room for.
@@ -55,8 +55,8 @@ fn every_foreign_file_is_the_same_after_export_and_import() {
         assert!(saved.proof.unwrap().imaged > 0);
         let back = files::open(&target).unwrap().lens;
         assert_eq!(back, lens, "{name}");
-        assert_eq!(native::write(&back), native::write(&lens), "{name}");
-        let through = files::parse(native::write(&lens).as_bytes(), "a.json").unwrap().lens;
+        assert_eq!(json::write(&back), json::write(&lens), "{name}");
+        let through = files::parse(json::write(&lens).as_bytes(), "a.json").unwrap().lens;
         assert_eq!(through, lens, "{name}");
     }
     fs::remove_dir_all(folder).unwrap();

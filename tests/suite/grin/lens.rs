@@ -1,7 +1,7 @@
 //! A gradient between two surfaces of a prescription: against glass, against rods whose rays are
 //! known in closed form, against layers that keep `n sin θ`, and every derivative against differences.
 
-use aplanat::files::native;
+use aplanat::files::json;
 use aplanat::lens::{
     Lens, Medium, PROFILE_TERMS, Parameter, ProfileCoefficients, ProfileLaw, Quantity,
     RADIAL_TERMS, Surface, System,
@@ -20,7 +20,7 @@ pub(crate) fn lens_of(rows: &str, aperture: &str) -> Lens {
         "fields": {{"kind": "angle", "values": [{{"y": 0.0}}, {{"y": 3.0}}]}},
         "wavelengths": [{{"um": 0.5875618, "primary": true}}], "surfaces": [{rows}]}}"#
     );
-    native::read(&text, "test").unwrap_or_else(|error| panic!("{error}"))
+    json::read(&text, "test").unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A rod with plane faces.

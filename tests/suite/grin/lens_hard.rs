@@ -3,7 +3,7 @@
 
 use super::lens::{busy, lens_of, ray, system};
 use aplanat::effects::{self, Effect, EffectOverride, EffectOverrides, TracePurpose};
-use aplanat::files::{self, native};
+use aplanat::files::{self, json};
 use aplanat::lens::{
     Lens, Medium, PROFILE_TERMS, Parameter, ParameterKind, ProfileCoefficients, ProfileLaw,
     Quantity, Shape, System, Variable, ZoomPosition, ZoomThickness, add_variables,
@@ -367,15 +367,15 @@ fn grin_lens_files_are_exact_and_say_what_is_wrong() {
     ] {
         add_variables(&mut lens, &[ParameterKind::GrinCoefficients]);
         assert!(lens.variables.len() >= 3);
-        let text = native::write(&lens);
-        let back = native::read(&text, "a.json").unwrap();
+        let text = json::write(&lens);
+        let back = json::read(&text, "a.json").unwrap();
         assert_eq!(back, lens);
-        assert_eq!(native::write(&back), text);
+        assert_eq!(json::write(&back), text);
     }
-    let text = native::write(&busy("index", &[-0.01], &[0.01]));
+    let text = json::write(&busy("index", &[-0.01], &[0.01]));
     let message = |from: &str, to: &str| {
         assert!(text.contains(from), "{from} in {text}");
-        native::read(&text.replacen(from, to, 1), "a.json").unwrap_err().to_string()
+        json::read(&text.replacen(from, to, 1), "a.json").unwrap_err().to_string()
     };
     assert!(message("\"radial\"", "\"raidal\"").contains("the unknown key `raidal`"));
     assert!(

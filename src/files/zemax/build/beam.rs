@@ -2,7 +2,7 @@
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::zemax::draft::{ApertureLine, ZemaxFile};
+use crate::files::zemax::file::{ApertureLine, ZemaxFile};
 use crate::lens::glass;
 use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Wavelength};
 use crate::paraxial::{Beam, first_order};

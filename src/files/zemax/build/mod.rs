@@ -8,8 +8,8 @@ mod row;
 mod solve;
 mod zoom;
 
-use super::draft::ZemaxFile;
-use super::{breaks, glass, gradient};
+use super::file::ZemaxFile;
+use super::{coordinate_breaks, glass, gradient};
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, Medium, Object, Row};
@@ -17,7 +17,7 @@ use crate::lens::{Lens, Medium, Object, Row};
 /// Makes a lens of the draft and says in the report what could not be kept.
 pub(super) fn build(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Lens, ParseError> {
     check_complete(draft)?;
-    breaks::check_breaks(&draft.surfaces)?;
+    coordinate_breaks::check_breaks(&draft.surfaces)?;
     let stop = stop(draft)?;
     let object = object(draft)?;
     let object_medium = object_medium(draft, report)?;
@@ -140,7 +140,8 @@ fn rows(
         if let Some(glass) = &draft.surfaces[number].glass {
             report.amend(glass.line, outcome, note);
         }
-        let medium = if breaks::is_break(&draft.surfaces[number]) { gap.clone() } else { medium };
+        let medium =
+            if coordinate_breaks::is_break(&draft.surfaces[number]) { gap.clone() } else { medium };
         let medium = gradient::medium(&draft.surfaces[number], draft.unit).unwrap_or(medium);
         if medium != Medium::Mirror {
             gap = medium.clone();

@@ -2,8 +2,8 @@
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::zemax::breaks;
-use crate::files::zemax::draft::{ApertureLine, ZemaxFile, ZemaxSurface};
+use crate::files::zemax::coordinate_breaks;
+use crate::files::zemax::file::{ApertureLine, ZemaxFile, ZemaxSurface};
 use crate::files::zemax::shape::{self, ZemaxShape};
 use crate::lens::{Medium, Row};
 
@@ -19,7 +19,7 @@ pub(super) fn row(
     report: &mut ConversionReport,
 ) -> Result<Row, ParseError> {
     let surface = &draft.surfaces[number];
-    let form = if breaks::is_break(surface) {
+    let form = if coordinate_breaks::is_break(surface) {
         let note = "this run of coordinate breaks changes nothing; read as planes";
         report.amend(surface.kind.1, ConversionOutcome::Approximated, note);
         ZemaxShape::default()

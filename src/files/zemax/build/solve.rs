@@ -1,7 +1,7 @@
 //! Variables, pickups and the focus solve.
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::zemax::draft::{CurvatureSolve, PickupLine, ZemaxFile, ZemaxSurface};
+use crate::files::zemax::file::{CurvatureSolve, PickupLine, ZemaxFile, ZemaxSurface};
 use crate::files::zemax::gradient;
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 

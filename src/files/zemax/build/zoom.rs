@@ -2,7 +2,7 @@
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::zemax::draft::{ConfigurationOperand, ZemaxFile};
+use crate::files::zemax::file::{ConfigurationOperand, ZemaxFile};
 use crate::lens::{
     Aperture, FieldKind, Lens, Object, Parameter, Quantity, Variable, ZoomPosition, ZoomThickness,
 };

@@ -2,7 +2,7 @@
 
 use super::{LineOutcome, dropped, preserved, used};
 use crate::files::error::ParseError;
-use crate::files::zemax::draft::{ApertureLine, ZemaxFile};
+use crate::files::zemax::file::{ApertureLine, ZemaxFile};
 use crate::files::zemax::line::ZemaxLine;
 
 /// Reads a line of the header; `None` where it is none.

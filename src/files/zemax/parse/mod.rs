@@ -6,7 +6,7 @@
 mod header;
 mod surface;
 
-use super::draft::{ConfigurationOperand, ZemaxFile};
+use super::file::{ConfigurationOperand, ZemaxFile};
 use super::line::{self, ZemaxLine};
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport, ConversionRow};

@@ -2,7 +2,7 @@
 
 use super::{LineOutcome, approximated, dropped, preserved, used};
 use crate::files::error::ParseError;
-use crate::files::zemax::draft::{
+use crate::files::zemax::file::{
     CurvatureSolve, GlassLine, PickupLine, SemiDiameterLine, ZemaxFile, ZemaxSurface,
 };
 use crate::files::zemax::line::ZemaxLine;

@@ -1,13 +1,12 @@
 //! What a search may do and aims at, as arguments.
 
-use crate::cli::failure::CliError;
+use crate::cli::error::CliError;
 use crate::cli::input::{self, Tolerance};
 use crate::cli::output::ShortNumber;
 use crate::lens::{FieldKind, FieldPoint, Fields, Lens, Object, Wavelength};
-use crate::optimize;
+use crate::optimize::DescentMethod;
 use crate::search::lens_landscape::{DescentSettings, SearchPlan, with_open_apertures};
 use crate::search::{MutationKind, SearchRules, Temperature, element};
-use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -99,8 +98,8 @@ pub(in crate::cli) struct SearchPlanArgs {
     gamma: Option<f64>,
 
     /// What takes the local steps
-    #[arg(long, value_enum, default_value_t = Descent::usual())]
-    descent: Descent,
+    #[arg(long, value_enum, default_value_t = DescentSettings::default().method)]
+    descent: DescentMethod,
 
     /// Steps that a local move tries
     #[arg(long, value_name = "N", default_value_t = DescentSettings::default().steps)]
@@ -109,24 +108,6 @@ pub(in crate::cli) struct SearchPlanArgs {
     /// The error allowed of the radius of each spot while searching: `1%` or `1e-2`
     #[arg(long, default_value = "1e-2", value_name = "TOLERANCE")]
     error: Tolerance,
-}
-
-/// What takes the local steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Descent {
-    /// First order, with moments
-    Adam,
-    /// Damped least squares
-    Dls,
-}
-
-impl Descent {
-    fn usual() -> Self {
-        match DescentSettings::default().method {
-            optimize::DescentMethod::Adam => Self::Adam,
-            optimize::DescentMethod::DampedLeastSquares => Self::Dls,
-        }
-    }
 }
 
 /// Two numbers, `4..8`.
@@ -211,10 +192,7 @@ impl SearchPlanArgs {
         plan.local.tolerance = self.error.0;
         plan.local.coarse = self.error.0;
         plan.local.steps = self.steps;
-        plan.local.method = match self.descent {
-            Descent::Adam => optimize::DescentMethod::Adam,
-            Descent::Dls => optimize::DescentMethod::DampedLeastSquares,
-        };
+        plan.local.method = self.descent;
         let settings = &mut plan.settings;
         settings.chains = self.chains.unwrap_or(settings.chains);
         settings.reservoir = self.reservoir.unwrap_or(settings.reservoir);

@@ -1,6 +1,6 @@
 //! What straight lines make of the measurement of a task, beside what its search found.
 
-use super::failure::CliError;
+use crate::cli::error::CliError;
 use crate::grin_task::{GrinField, GrinTask, GrinTaskError, StraightRays};
 use crate::measure::Stopwatch;
 use serde::Serialize;

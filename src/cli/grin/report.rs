@@ -1,7 +1,7 @@
 //! What a search for a gradient-index field prints: what it found, what it keeps, what it took.
 
-use super::grin_lines::StraightRayResult;
-use super::output::{ShortNumber, TextTable};
+use super::straight_rays::StraightRayResult;
+use crate::cli::output::{ShortNumber, TextTable};
 use crate::grin_task::{self, FieldScore, GrinOptimizer, LimitCheck, ViewResult};
 use crate::measure::MemoryUse;
 use serde::Serialize;

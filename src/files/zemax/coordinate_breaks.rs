@@ -1,7 +1,7 @@
 //! Coordinate breaks: a run of them that puts the axis back where it was changes no ray and is
 //! read as planes; any other is refused.
 
-use super::draft::ZemaxSurface;
+use super::file::ZemaxSurface;
 use crate::files::error::ParseError;
 use nalgebra::{Rotation3, Vector3};
 

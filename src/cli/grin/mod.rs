@@ -1,26 +1,29 @@
 //! A design task in a gradient-index field.
 
+mod report;
+mod straight_rays;
+
+use super::error::CliError;
 use super::experiment::create_folder;
-use super::failure::CliError;
-use super::grin_lines::StraightRaySolver;
-use super::grin_report::{GrinCostSummary, GrinReport};
 use super::input::{check_output_file, read_json};
-use super::optimize::{progress_bar, stop_flag};
 use super::output::Output;
-use super::targets::check_distinct;
+use super::output_paths::check_distinct;
+use super::progress::{progress_bar, stop_flag};
 use crate::experiments::{plot_medium, plot_view};
 use crate::files;
 use crate::grin_task::{self, GrinField, GrinOptimizer, GrinTask};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
+use report::{GrinCostSummary, GrinReport};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use straight_rays::StraightRaySolver;
 
 /// Finds the field of refractive index that sends light where a task wants it; Ctrl-C ends the
 /// search and writes the best field
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = include_str!("help/grin.txt"))]
+#[command(after_long_help = include_str!("../help/grin.txt"))]
 pub(super) struct GrinArgs {
     /// The task: a name that comes with the program, or a file .json; a list of names where it is
     /// absent
@@ -219,6 +222,6 @@ struct TaskFile(GrinTask);
 
 impl Display for TaskFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&files::native::pretty(&self.0))
+        f.write_str(&files::json::pretty(&self.0))
     }
 }

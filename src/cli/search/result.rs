@@ -1,8 +1,8 @@
 //! What a search has found: the start against the best lens, and the lens that was finished.
 
 use super::limits::{self, ViolatedLimit};
-use crate::cli::optimize::TermComparison;
 use crate::cli::output::{ShortNumber, TextTable, or_dash};
+use crate::cli::terms::TermComparison;
 use crate::lens::Lens;
 use crate::search::lens_landscape::{
     FieldSummary, FinalizedLens, LandscapeError, LensLandscape, LensSummary, UnlistedGlass,

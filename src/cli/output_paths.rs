@@ -1,6 +1,6 @@
 //! The files that a command writes: none of them is one that it reads, or another one that it writes.
 
-use super::failure::CliError;
+use super::error::CliError;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,89 @@
+//! The names by which options call the choices of the library.
+
+use crate::lens::ParameterKind;
+use crate::measure::Integral;
+use crate::optimize::DescentMethod;
+use crate::search::SearchMethod;
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
+
+/// The name of a choice.
+pub(super) fn value_name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+}
+
+fn value(name: &'static str, help: &'static str) -> Option<PossibleValue> {
+    Some(PossibleValue::new(name).help(help))
+}
+
+impl ValueEnum for DescentMethod {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::DampedLeastSquares, Self::Adam]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::DampedLeastSquares => value("dls", "Damped least squares"),
+            Self::Adam => value("adam", "Adam: first order, with moments"),
+        }
+    }
+}
+
+impl ValueEnum for SearchMethod {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Restore, Self::Metropolis, Self::Brute]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::Restore => {
+                value("restore", "Descents that end at random and restart from the reservoir")
+            }
+            Self::Metropolis => value("metropolis", "Metropolis-Hastings with Langevin steps"),
+            Self::Brute => value("brute", "Each element added and removed once"),
+        }
+    }
+}
+
+impl ValueEnum for ParameterKind {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[
+            Self::Curvatures,
+            Self::Thicknesses,
+            Self::Conics,
+            Self::Aspheres,
+            Self::Indices,
+            Self::SemiDiameters,
+            Self::GrinCoefficients,
+        ]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::Curvatures => value("curvatures", "All curvatures that refract or reflect"),
+            Self::Thicknesses => {
+                value("thicknesses", "All gaps; a gap that zooms, at each zoom position")
+            }
+            Self::Conics => value("conics", "All conic constants other than 0"),
+            Self::Aspheres => value("aspheres", "All asphere coefficients of the file"),
+            Self::Indices => value("indices", "All indices of model glasses and constant media"),
+            Self::SemiDiameters => value("semi-diameters", "All semi-diameters of the file"),
+            Self::GrinCoefficients => {
+                value("gradients", "All coefficients of gradient-index media of the file")
+            }
+        }
+    }
+}
+
+impl ValueEnum for Integral {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Spot, Self::Throughput]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::Spot => value("spot", "The squared distance from the centroid of the spot"),
+            Self::Throughput => value("throughput", "Minus one: the transmitted light"),
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! A surface as JSON, with the gap behind it.
+
+use super::medium::is_air;
+use super::required_number;
+use crate::lens::{Medium, Row};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+
+/// The keys of a surface. A `radius` is read but never written.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RowJson {
+    #[serde(default, skip_serializing, deserialize_with = "required_number")]
+    radius: Option<f64>,
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "required_number"
+    )]
+    curvature: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_plain_zero")]
+    conic: f64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    asphere: Vec<f64>,
+    thickness: f64,
+    #[serde(default, skip_serializing_if = "is_air")]
+    glass: Medium,
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "required_number"
+    )]
+    semi_diameter: Option<f64>,
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "required_number"
+    )]
+    obstruction: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_false")]
+    stop: bool,
+    #[serde(default, skip_serializing_if = "is_false")]
+    hyper: bool,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    comment: String,
+}
+
+/// A zero without sign, so that −0 is written and comes back with its sign.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+fn is_plain_zero(value: &f64) -> bool {
+    value.to_bits() == 0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+fn is_false(value: &bool) -> bool {
+    !*value
+}
+
+impl RowJson {
+    /// One over the radius, whichever of the two is given.
+    fn curvature(&self) -> Result<f64, &'static str> {
+        match (self.curvature, self.radius) {
+            (Some(_), Some(_)) => Err("both `curvature` and `radius`, expected one of them"),
+            (None, Some(0.0)) => {
+                Err("a `radius` of 0, expected another number, or none for a plane")
+            }
+            (None, Some(radius)) => Ok(1.0 / radius),
+            (curvature, None) => Ok(curvature.unwrap_or(0.0)),
+        }
+    }
+}
+
+impl Serialize for Row {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        RowJson {
+            radius: None,
+            curvature: (!is_plain_zero(&self.curvature)).then_some(self.curvature),
+            conic: self.conic,
+            asphere: self.asphere.clone(),
+            thickness: self.thickness,
+            glass: self.medium.clone(),
+            semi_diameter: self.semi_diameter,
+            obstruction: self.obstruction,
+            stop: self.stop,
+            hyper: self.hyperhemisphere,
+            comment: self.comment.clone(),
+        }
+        .serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Row {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_map(RowVisitor)
+    }
+}
+
+struct RowVisitor;
+
+impl<'de> Visitor<'de> for RowVisitor {
+    type Value = Row;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a surface, {\"curvature\", \"thickness\", ...}")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Row, A::Error> {
+        let keys = RowJson::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(Row {
+            curvature: keys.curvature().map_err(A::Error::custom)?,
+            conic: keys.conic,
+            asphere: keys.asphere,
+            thickness: keys.thickness,
+            medium: keys.glass,
+            semi_diameter: keys.semi_diameter,
+            obstruction: keys.obstruction,
+            stop: keys.stop,
+            hyperhemisphere: keys.hyper,
+            comment: keys.comment,
+        })
+    }
+}
