@@ -88,7 +88,7 @@ pub fn measure_effects(lens: &Lens, zoom: usize) -> Result<EffectMeasurements, R
     Ok(EffectMeasurements {
         wavelengths: bench.channels.len(),
         surfaces: system.surfaces.len(),
-        length: length(system),
+        length: system.total_track(),
         smallest_spot: smallest_spot(&bench, &sights),
         dispersion: dispersion(&bench, &sights),
         aspheres: aspheres(&bench, &sights)?,
@@ -111,11 +111,6 @@ fn add_fates(a: Fates, b: Fates) -> Fates {
         turned: a.turned + b.turned,
         trapped: a.trapped + b.trapped,
     }
-}
-
-fn length(system: &System<f64>) -> f64 {
-    let gaps = system.surfaces.iter().take(system.surfaces.len() - 1);
-    gaps.map(|surface| surface.thickness.abs()).sum()
 }
 
 /// The points of the pupil that are looked at; those inside come first.

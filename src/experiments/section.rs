@@ -18,13 +18,7 @@ pub(super) struct SectionPlot<'a> {
 
 impl<'a> SectionPlot<'a> {
     pub(super) fn new(system: &'a System<f64>) -> Self {
-        let mut z = 0.0;
-        let vertices = system.surfaces.iter().map(|surface| {
-            let here = z;
-            z += surface.thickness;
-            here
-        });
-        let vertices = vertices.collect();
+        let vertices = system.vertex_positions();
         let sizes = system.surfaces.iter().map(|surface| surface.semi_diameter);
         let reach = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
         Self { system, vertices, reach }

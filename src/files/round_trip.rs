@@ -2,7 +2,7 @@
 //! pupil, for every field point and zoom position.
 
 use super::FileError;
-use crate::lens::{FieldKind, FieldPoint, Lens, LensError, Object, System};
+use crate::lens::{FieldKind, FieldPoint, Lens, LensError, Object};
 use crate::math::Vec3;
 use crate::paraxial::{Beam, FirstOrder, first_order};
 use crate::trace::{Fate, Ray, Tracer};
@@ -232,14 +232,9 @@ fn self_check(lens: &Lens, zoom: usize) -> Result<SelfCheck, LensError> {
         bfl: data.and_then(|data| data.bfl),
         f_number: data.and_then(|data| data.f_number),
         image_height: chief.and_then(|ray| ray.heights.last().copied()),
-        total_track: track(&system),
+        total_track: system.image_position(),
         rms_spot_um: [0.0, 0.7, 1.0].map(spot),
     })
-}
-
-fn track(system: &System<f64>) -> f64 {
-    let (_image, surfaces) = system.surfaces.split_last().unwrap_or((&system.surfaces[0], &[]));
-    surfaces.iter().map(|surface| surface.thickness).sum()
 }
 
 /// About the centre of the points, in micrometres for millimetres.

@@ -7,12 +7,14 @@
 //! thickness leads to the image plane, which has no row. Curvature is stored, radius is shown.
 
 mod check;
+mod geometry;
 pub mod glass;
 mod gradient;
 mod parameter;
 mod resolve;
 mod reversed;
 mod rows;
+mod surface_number;
 mod system;
 mod vary;
 
@@ -20,6 +22,7 @@ pub use check::LensError;
 pub use gradient::{GradientIndex, ParaxialGrin};
 pub use parameter::{Parameter, Quantity};
 pub use resolve::paraxial_image_distance;
+pub use surface_number::SurfaceNumber;
 pub use system::{Shape, Surface, System, SystemError};
 pub use vary::{ParameterKind, add_variable, add_variables, at_zoom};
 

@@ -1,7 +1,7 @@
 //! From what was written to plain numbers: pickups, glasses, the focus solve.
 
 use super::system::{Shape, Surface, System};
-use super::{ASPHERE_TERMS, Lens, LensError, Medium, Object, Parameter, Pickup, Row, SystemError};
+use super::{Lens, LensError, Medium, Object, Parameter, Pickup, Row, SystemError};
 use super::{glass, gradient};
 use crate::math::Real;
 
@@ -89,10 +89,8 @@ impl Lens {
 
 impl Row {
     fn surface(&self, thickness: f64, index: f64) -> Surface<f64> {
-        let mut terms = [0.0; ASPHERE_TERMS];
-        terms.iter_mut().zip(&self.asphere).for_each(|(to, from)| *to = *from);
         Surface {
-            shape: Shape::simplest(self.curvature, self.conic, terms),
+            shape: self.shape(),
             thickness,
             index,
             grin: None,

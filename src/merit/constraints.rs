@@ -248,7 +248,7 @@ impl ConstrainedQuantity {
                     return R::from_f64(f64::INFINITY);
                 };
                 let sags = sag_at(behind, height) - sag_at(before, height);
-                let sense = if is_backwards(system, gap) { -R::ONE } else { R::ONE };
+                let sense = system.light_direction(gap);
                 along_light(system, gap) + sense * sags
             }
             Self::Track => {
@@ -269,22 +269,16 @@ impl ConstrainedQuantity {
     }
 }
 
-/// The sag at a height, at the edge of the surface where it ends before.
+/// The sag at a distance from the axis, or near the edge of the surface where it ends before.
 fn sag_at<R: Real>(surface: &crate::lens::Surface<R>, height: R) -> R {
-    let (c, k, _) = surface.shape.numbers();
-    let square = (1.0 + k.value()) * c.value() * c.value();
-    let edge = if square > 0.0 { 0.999 / square.sqrt() } else { f64::INFINITY };
+    // The slope of the sag is infinite at the edge itself.
+    let edge = 0.999 * surface.shape.edge();
     let height = if height.value() < edge { height } else { R::from_f64(edge) };
     surface.shape.sag(height * height).map_or(R::ZERO, |(z, _)| z)
 }
 
-fn is_backwards<R>(system: &System<R>, gap: usize) -> bool {
-    system.surfaces[..=gap].iter().filter(|surface| surface.mirror).count() % 2 == 1
-}
-
 fn along_light<R: Real>(system: &System<R>, gap: usize) -> R {
-    let thickness = system.surfaces[gap].thickness;
-    if is_backwards(system, gap) { -thickness } else { thickness }
+    system.light_direction(gap) * system.surfaces[gap].thickness
 }
 
 /// A length of a lens, to be kept on one side of a bound.

@@ -203,7 +203,7 @@ impl Goal {
     pub fn default_for(lens: &Lens) -> Result<Self, MeritError> {
         let focal_lengths = focal_lengths(lens)?;
         let first = focal_lengths[0];
-        let size = first.map_or_else(|| track(lens), f64::abs);
+        let size = first.map_or_else(|| lens.total_track(), f64::abs);
         let mut terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
         if let Some(first) = first {
             terms.push(WeightedTerm { term: Term::FocalLength(first), weight: 1e-2 });
@@ -213,9 +213,9 @@ impl Goal {
         for term in [
             Term::GlassCenter { min: now.glass_center.clamp(0.0, glass), max: 0.5 * size },
             Term::GlassEdge(now.glass_edge.clamp(0.0, 0.8 * glass)),
-            Term::AirCenter { min: now.air_center.clamp(0.0, air), max: 3.0 * track(lens) },
+            Term::AirCenter { min: now.air_center.clamp(0.0, air), max: 3.0 * lens.total_track() },
             Term::AirEdge(now.air_edge.clamp(0.0, 0.5 * air)),
-            Term::TotalTrack(1.2 * track(lens)),
+            Term::TotalTrack(1.2 * lens.total_track()),
         ] {
             terms.push(WeightedTerm { term, weight: 1.0 });
         }
@@ -276,9 +276,4 @@ fn focal_lengths(lens: &Lens) -> Result<Vec<Option<f64>>, MeritError> {
         Ok(first.efl)
     };
     (0..lens.zoom_positions()).map(focal_length).collect()
-}
-
-/// From the first vertex to the image, as the sum of all gaps without sign.
-fn track(lens: &Lens) -> f64 {
-    lens.surfaces.iter().map(|row| row.thickness.abs()).sum()
 }

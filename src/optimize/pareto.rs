@@ -431,7 +431,7 @@ pub fn weighted_sum_goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Go
 
 /// A spot as large as this is not worth the light that a field must keep, in mm.
 fn goal_size(lens: &Lens) -> f64 {
-    1e-3 * lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>()
+    1e-3 * lens.total_track()
 }
 
 /// The focal length that the goal asks for, or the length of an afocal lens.
@@ -440,7 +440,7 @@ fn goal_focal_length(goal: &Goal, lens: &Lens) -> f64 {
         Term::FocalLength(focal) => Some(focal.abs()),
         _ => None,
     });
-    asked.unwrap_or_else(|| lens.surfaces.iter().map(|row| row.thickness.abs()).sum())
+    asked.unwrap_or_else(|| lens.total_track())
 }
 
 /// The lens with everything free that a sweep may change.

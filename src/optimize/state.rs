@@ -269,7 +269,7 @@ fn clamp(variable: &Variable, value: f64) -> f64 {
 /// A change of a variable that bends rays about as much as that of any other: what one step of a
 /// first-order method should be measured in.
 fn scale(lens: &Lens, variable: &Variable) -> f64 {
-    let size = lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>().max(1e-6);
+    let size = lens.total_track().max(1e-6);
     let rim = lens.surfaces[variable.parameter.surface].semi_diameter.unwrap_or(0.1 * size);
     // A rim that is closed is one to be opened, by steps of the size of the others.
     let widest = lens.surfaces.iter().filter_map(|row| row.semi_diameter).fold(0.0, f64::max);

@@ -62,12 +62,6 @@ pub(super) fn glass_gaps(lens: &Lens) -> Vec<bool> {
     gaps
 }
 
-/// True if light travels towards −z in the gap behind a surface.
-pub(super) fn is_backwards(lens: &Lens, surface: usize) -> bool {
-    let mirrors = lens.surfaces[..=surface].iter().filter(|row| row.medium == Medium::Mirror);
-    mirrors.count() % 2 == 1
-}
-
 /// The elements of a lens in the order of its rows; a stop in air is not an element.
 pub fn elements(lens: &Lens) -> Vec<Element> {
     let gaps = glass_gaps(lens);

@@ -14,7 +14,7 @@ const INDEX: f64 = 0.2;
 /// is left where as many pieces as possible are found again in the same order.
 pub fn added_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
     let (rows, old) = (glass_pieces(lens), glass_pieces(own));
-    let size = own.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>();
+    let size = own.total_track();
     let costs = costs(&rows, &old, size);
     let (mut i, mut j) = (rows.len(), old.len());
     let mut fresh = Vec::new();

@@ -80,12 +80,9 @@ impl RayLayout {
 
 /// Where drawn rays begin: in front of everything, mirrors that stand before the first vertex too.
 fn drawing_start(bench: &RayModel) -> f64 {
-    let surfaces = &bench.channels[bench.primary].system.surfaces;
-    let (mut z, mut first, mut last) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for surface in surfaces {
-        (first, last) = (first.min(z), last.max(z));
-        z += surface.thickness;
-    }
+    let positions = bench.channels[bench.primary].system.vertex_positions();
+    let first = positions.iter().copied().fold(0.0, f64::min);
+    let last = positions.iter().copied().fold(0.0, f64::max);
     first - LEAD * (last - first)
 }
 

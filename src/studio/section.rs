@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use super::draw::{BoundingBox, Rgba, Scene};
 use super::palette::{Palette, to_byte};
-use crate::lens::{Shape, System};
+use crate::lens::System;
 
 /// How many straight pieces a surface is drawn with: the sag of a hemisphere of 200 px is then
 /// off by a fiftieth of a pixel.
@@ -25,7 +25,7 @@ pub struct LensSection<'a> {
 impl<'a> LensSection<'a> {
     /// The section of a system. `reached` says how far from the axis rays meet each surface.
     pub fn new(system: &'a System<f64>, reached: &[f64]) -> Self {
-        Self { system, vertices: vertices(system), heights: heights(system, reached) }
+        Self { system, vertices: system.vertex_positions(), heights: heights(system, reached) }
     }
 
     /// What a picture of the whole lens shows: all surfaces and the place of the image.
@@ -149,19 +149,8 @@ impl<'a> LensSection<'a> {
     /// The point of a surface at a height, flat beyond its own semi-diameter.
     fn at(&self, i: usize, height: f64) -> DVec2 {
         let ground = height.abs().min(self.heights[i]);
-        DVec2::new(self.vertices[i] + sag(&self.system.surfaces[i].shape, ground), height)
+        DVec2::new(self.vertices[i] + self.system.surfaces[i].shape.clamped_sag(ground), height)
     }
-}
-
-/// Where each vertex lies on the axis; the first at 0.
-pub fn vertices(system: &System<f64>) -> Vec<f64> {
-    let gaps = system.surfaces.iter().map(|surface| surface.thickness);
-    let ends = gaps.scan(0.0, |z, gap| {
-        let vertex = *z;
-        *z += gap;
-        Some(vertex)
-    });
-    ends.collect()
 }
 
 fn heights(system: &System<f64>, reached: &[f64]) -> Vec<f64> {
@@ -174,20 +163,6 @@ fn heights(system: &System<f64>, reached: &[f64]) -> Vec<f64> {
     own.into_iter().map(|height| height.unwrap_or(usual)).collect()
 }
 
-/// The sag at a height, or at the edge of the surface where it ends before.
-fn sag(shape: &Shape<f64>, height: f64) -> f64 {
-    let at = |height: f64| shape.sag(height * height).map(|(z, _)| z).filter(|z| z.is_finite());
-    if let Some(z) = at(height) {
-        return z;
-    }
-    let (mut inside, mut outside) = (0.0, height);
-    for _ in 0..40 {
-        let middle = 0.5 * (inside + outside);
-        *(if at(middle).is_some() { &mut inside } else { &mut outside }) = middle;
-    }
-    at(inside).unwrap_or(0.0)
-}
-
 /// Denser glass is less transparent: 1.45 half as much as 1.9.
 fn glass_alpha(usual: u8, index: f64) -> u8 {
     let share = ((index - 1.0) / 0.65).clamp(0.4, 2.0);
@@ -197,7 +172,7 @@ fn glass_alpha(usual: u8, index: f64) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lens::Surface;
+    use crate::lens::{Shape, Surface};
 
     fn surface(curvature: f64, thickness: f64, index: f64, semi_diameter: f64) -> Surface<f64> {
         let shape = Shape::Sphere { curvature };
@@ -244,7 +219,7 @@ mod tests {
     #[test]
     fn a_surface_that_ends_early_is_drawn_to_its_edge() {
         let ball = Shape::Sphere { curvature: 0.1 };
-        assert!((sag(&ball, 30.0) - 10.0).abs() < 1e-4);
+        assert!((ball.clamped_sag(30.0) - 10.0).abs() < 1e-4);
     }
 
     #[test]

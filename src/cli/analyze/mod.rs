@@ -105,9 +105,8 @@ impl AnalysisRun {
 
     /// What rounding in `f64` may do to a length that one ray gives.
     fn rounding(&self) -> f64 {
-        let surfaces = &self.bench.channels[self.bench.primary].system.surfaces;
-        let length: f64 = surfaces.iter().map(|surface| surface.thickness.abs()).sum();
-        16.0 * f64::EPSILON * length
+        let system = &self.bench.channels[self.bench.primary].system;
+        16.0 * f64::EPSILON * system.total_track()
     }
 
     /// A length from one ray.

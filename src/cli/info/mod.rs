@@ -154,7 +154,6 @@ impl ZoomReport {
         let system = opened.system(zoom, None)?;
         let undefined = |source| CliError::Paraxial { file: opened.file.clone(), source };
         let data = first_order(&system, &Beam::for_lens(lens, zoom)).map_err(undefined)?;
-        let last = system.surfaces.len() - 1;
         let media: Vec<_> = lens.surfaces.iter().map(|row| row.medium.clone()).collect();
         let (facts, effects) = effects::decisions(opened, zoom)?;
         Ok(Self {
@@ -171,7 +170,7 @@ impl ZoomReport {
             exit_pupil: PupilJson::new(data.exit_pupil),
             stop_surface: system.stop,
             stop_semi_diameter: data.stop_semi_diameter,
-            total_track: system.surfaces[..last].iter().map(|s| s.thickness).sum(),
+            total_track: system.image_position(),
             paraxial_image: data.paraxial_image,
             image_defocus: data.image_defocus,
             magnification: data.magnification,

@@ -30,7 +30,7 @@ pub fn goal(
         Term::FocalLength(focal) => Some(focal),
         _ => None,
     });
-    let track: f64 = lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
+    let track = lens.total_track();
     let focal = focal_length.or(own);
     let size = focal.map_or(track, f64::abs);
     let mut terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
@@ -65,6 +65,5 @@ pub(super) fn focal_length_of(lens: &Lens) -> Option<f64> {
 
 /// The reference length of a lens: its focal length, or its track if it is afocal.
 pub(super) fn reference_length(lens: &Lens) -> f64 {
-    let track = || lens.surfaces.iter().map(|row| row.thickness.abs()).sum::<f64>();
-    focal_length_of(lens).map_or_else(track, f64::abs).max(f64::MIN_POSITIVE)
+    focal_length_of(lens).map_or_else(|| lens.total_track(), f64::abs).max(f64::MIN_POSITIVE)
 }

@@ -1,7 +1,9 @@
 //! Opens apertures as far as the lens has room: the start of a search that is to find where light
 //! should be vignetted.
 
-use crate::lens::{Aperture, Lens, Medium, Parameter, Quantity, Row, Variable};
+use crate::lens::{
+    ASPHERE_TERMS, Aperture, Lens, Medium, Parameter, Quantity, Row, Shape, Variable,
+};
 
 /// The lens without its diaphragm, with every semi-diameter as large as the neighbouring surfaces,
 /// its own sphere and `limit` permit, in mm. Aspheres and mirrors keep their semi-diameters, and
@@ -90,7 +92,7 @@ fn open_rims(lens: &mut Lens, limit: f64) {
         behind = graded(row);
         if !fixed(row) {
             let known = row.semi_diameter.filter(|rim| face && *rim < limit);
-            row.semi_diameter = Some(known.unwrap_or(limit).min(surface_edge(row)));
+            row.semi_diameter = Some(known.unwrap_or(limit).min(conic_shape(row).edge()));
         }
     }
     for i in 0..lens.surfaces.len() - 1 {
@@ -114,16 +116,16 @@ fn open_rims(lens: &mut Lens, limit: f64) {
     }
 }
 
-/// The height at which a sphere or ellipsoid ends, in mm.
-fn surface_edge(row: &Row) -> f64 {
-    let square = (1.0 + row.conic) * row.curvature * row.curvature;
-    if square > 0.0 { 1.0 / square.sqrt() } else { f64::INFINITY }
+/// The form of a surface without the polynomial of an asphere, whose rim is never opened.
+fn conic_shape(row: &Row) -> Shape<f64> {
+    Shape::simplest(row.curvature, row.conic, [0.0; ASPHERE_TERMS])
 }
 
 /// The height at which two surfaces touch; infinity if they do not.
 fn contact_height(before: &Row, behind: &Row, gap: f64) -> f64 {
-    let end = surface_edge(before).min(surface_edge(behind)).min(FAR);
-    let room = |height: f64| gap + sag(behind, height) - sag(before, height);
+    let [before, behind] = [before, behind].map(conic_shape);
+    let end = before.edge().min(behind.edge()).min(FAR);
+    let room = |height: f64| gap + behind.clamped_sag(height) - before.clamped_sag(height);
     if room(end) >= 0.0 {
         return f64::INFINITY;
     }
@@ -139,9 +141,3 @@ fn contact_height(before: &Row, behind: &Row, gap: f64) -> f64 {
 const FAR: f64 = 1e6;
 /// Bisections until a height is known to rounding.
 const BISECTIONS: usize = 60;
-
-fn sag(row: &Row, height: f64) -> f64 {
-    let (c, square) = (row.curvature, height * height);
-    let root = (1.0 - (1.0 + row.conic) * c * c * square).max(0.0).sqrt();
-    c * square / (1.0 + root)
-}

@@ -144,7 +144,7 @@ pub(super) fn shortest_gap(lens: &Lens, row: usize) -> f64 {
 
 /// The sign of lengths behind a row: −1 where light travels towards −z.
 pub(super) fn light_direction(lens: &Lens, row: usize) -> f64 {
-    if crate::search::element::is_backwards(lens, row) { -1.0 } else { 1.0 }
+    lens.light_direction(row)
 }
 
 /// True if the length of a gap is solved for focus.

@@ -155,8 +155,7 @@ const MUTATIONS: [MutationOperator; 9] = mutations! {
 
 /// Half the track of a lens, the scale of an afocal one.
 fn half_track(lens: &Lens) -> f64 {
-    let track: f64 = lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
-    (0.5 * track).max(1.0)
+    (0.5 * lens.total_track()).max(1.0)
 }
 
 /// Projects and repairs a draft.

@@ -5,11 +5,11 @@
 //! thickness of its glass and of the air beside it. Existing rims shrink only where their surfaces
 //! would cross.
 
-use crate::lens::{Lens, Shape, System};
+use crate::lens::{Lens, System};
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel, WIDE_AIMING_THRESHOLD};
 use crate::search::SearchRules;
-use crate::search::element::{glass_gaps, is_backwards};
+use crate::search::element::glass_gaps;
 use crate::trace::{Ray, Tracer};
 
 /// Pupil points of the rays that determine the width of a beam; some lie outside the paraxial
@@ -63,7 +63,7 @@ pub(super) fn repair(
 /// Checks that no vertex lies in front of the previous one.
 fn check_vertex_order(lens: &Lens) -> Result<(), String> {
     for row in 0..lens.surfaces.len() - 1 {
-        let sense = if is_backwards(lens, row) { -1.0 } else { 1.0 };
+        let sense = lens.light_direction(row);
         for zoom in 0..lens.zoom_positions() {
             let gap = sense * lens.thickness_at(row, zoom).unwrap_or(0.0);
             if !(gap >= 0.0) {
@@ -108,14 +108,6 @@ fn largest_semi_diameter(lens: &Lens, row: usize, rules: &SearchRules) -> f64 {
     steep.min(rules.semi_diameter.unwrap_or(f64::INFINITY)).min(natural)
 }
 
-/// The shape of a surface.
-fn surface_shape(lens: &Lens, row: usize) -> Shape<f64> {
-    let row = &lens.surfaces[row];
-    let mut terms = [0.0; crate::lens::ASPHERE_TERMS];
-    terms.iter_mut().zip(&row.asphere).for_each(|(to, from)| *to = *from);
-    Shape::simplest(row.curvature, row.conic, terms)
-}
-
 /// Shrinks rims until every gap has its minimum edge thickness: that of the rules beside new
 /// surfaces, 0 elsewhere.
 fn trim_rims(lens: &mut Lens, rimless: &[usize], rules: &SearchRules) {
@@ -147,10 +139,10 @@ fn clear_height(lens: &Lens, gap: usize, floor: f64) -> Option<f64> {
     if rim == f64::INFINITY {
         return None;
     }
-    let sense = if is_backwards(lens, gap) { -1.0 } else { 1.0 };
+    let sense = lens.light_direction(gap);
     let zooms = (0..lens.zoom_positions()).filter_map(|zoom| lens.thickness_at(gap, zoom));
     let center = zooms.fold(f64::INFINITY, |least, length| least.min(sense * length));
-    let (front, rear) = (surface_shape(lens, gap), surface_shape(lens, gap + 1));
+    let (front, rear) = (lens.surfaces[gap].shape(), lens.surfaces[gap + 1].shape());
     let floor = floor.min(center);
     let is_clear = |height: f64| {
         let square = height * height;

@@ -306,5 +306,5 @@ fn distance_range(lens: &Lens, surface: usize, glass: bool, rules: &SearchRules)
         (false, true) => (rules.glass_center[0], rules.glass_center[1]),
         (false, false) => (rules.air_center[0], rules.air_center[1]),
     };
-    if super::element::is_backwards(lens, surface) { (-high, -low) } else { (low, high) }
+    if lens.light_direction(surface) < 0.0 { (-high, -low) } else { (low, high) }
 }

@@ -219,7 +219,7 @@ impl CurrentValues {
         Self {
             efl,
             size,
-            track: view.lens.surfaces.iter().map(|row| row.thickness.abs()).sum(),
+            track: view.lens.total_track(),
             light: positive(numbers.map(mean_pupil_area), axis),
             f_number: size / (2.0 * (axis / PI).sqrt()),
             spot: positive(numbers.and_then(mean_square), 1e-6 * size * size),

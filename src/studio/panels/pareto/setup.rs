@@ -74,6 +74,6 @@ fn blur(ui: &mut Ui, name: &str, share: &mut f64, um: f64, range: RangeInclusive
 /// The focal length in mm; for a lens without one its length, as the sweep takes it.
 fn focal_length(view: &SessionView) -> f64 {
     let efl = design_results(view).and_then(|numbers| numbers.first_order().efl).map(f64::abs);
-    let length = || view.lens.surfaces.iter().map(|row| row.thickness.abs()).sum();
+    let length = || view.lens.total_track();
     efl.filter(|efl| efl.is_finite() && *efl > 0.0).unwrap_or_else(length)
 }

@@ -1,0 +1,107 @@
+//! Lengths along the axis and sags: geometry that many rooms need.
+
+use super::{Lens, Medium, Row, Shape, System};
+use crate::math::Real;
+
+impl Lens {
+    /// The sum of the absolute thicknesses as written, in mm: the length of the lens from its first
+    /// vertex to the image plane, along the light.
+    pub fn total_track(&self) -> f64 {
+        self.surfaces.iter().map(|row| row.thickness.abs()).sum()
+    }
+
+    /// The direction of the light in the gap behind a surface: 1 towards +z, −1 towards −z, which is
+    /// behind an odd number of mirrors.
+    pub fn light_direction(&self, surface: usize) -> f64 {
+        let mirrors = self.surfaces[..=surface].iter().filter(|row| row.medium == Medium::Mirror);
+        if mirrors.count() % 2 == 0 { 1.0 } else { -1.0 }
+    }
+}
+
+impl<R: Real> System<R> {
+    /// The sum of the absolute thicknesses in front of the last surface, in mm; see
+    /// [`Lens::total_track`].
+    pub fn total_track(&self) -> R {
+        let gaps = self.surfaces.iter().take(self.surfaces.len().saturating_sub(1));
+        gaps.fold(R::ZERO, |sum, surface| sum + surface.thickness.abs())
+    }
+
+    /// The direction of the light in the gap behind a surface, 1 or −1; see
+    /// [`Lens::light_direction`].
+    pub fn light_direction(&self, surface: usize) -> R {
+        let mirrors = self.surfaces[..=surface].iter().filter(|surface| surface.mirror);
+        if mirrors.count() % 2 == 0 { R::ONE } else { -R::ONE }
+    }
+
+    /// The position of every vertex on the axis, in mm from the first one; the last is as a rule
+    /// that of the image plane.
+    pub fn vertex_positions(&self) -> Vec<R> {
+        let gaps = self.surfaces.iter().map(|surface| surface.thickness);
+        let positions = gaps.scan(R::ZERO, |z, gap| {
+            let vertex = *z;
+            *z += gap;
+            Some(vertex)
+        });
+        positions.collect()
+    }
+}
+
+impl System<f64> {
+    /// The position of the last surface on the axis, as a rule the image plane, in mm from the
+    /// first vertex.
+    pub fn image_position(&self) -> f64 {
+        self.surfaces.iter().take(self.surfaces.len().saturating_sub(1)).map(|s| s.thickness).sum()
+    }
+}
+
+impl<R: Real> Shape<R> {
+    /// The distance from the axis in mm at which the conic part of the surface ends, where its
+    /// normal is perpendicular to the axis; infinite for a plane, a paraboloid and a hyperboloid.
+    pub fn edge(&self) -> f64 {
+        let (curvature, conic, _) = self.numbers();
+        let square = (1.0 + conic.value()) * curvature.value() * curvature.value();
+        if square > 0.0 { 1.0 / square.sqrt() } else { f64::INFINITY }
+    }
+}
+
+impl Shape<f64> {
+    /// The sag in mm at a distance from the axis, or at the edge of the surface where it ends
+    /// before.
+    pub fn clamped_sag(&self, height: f64) -> f64 {
+        let height = height.abs().min(self.edge());
+        let (c, conic, terms) = self.numbers();
+        let r2 = height * height;
+        // Rounding may put the edge itself outside.
+        let root = (1.0 - (1.0 + conic) * c * c * r2).max(0.0).sqrt();
+        let polynomial = terms.into_iter().rev().fold(0.0, |sum, a| sum * r2 + a) * r2 * r2;
+        c * r2 / (1.0 + root) + polynomial
+    }
+}
+
+impl Row {
+    /// The form of the surface.
+    pub fn shape(&self) -> Shape<f64> {
+        let mut terms = [0.0; super::ASPHERE_TERMS];
+        terms.iter_mut().zip(&self.asphere).for_each(|(to, from)| *to = *from);
+        Shape::simplest(self.curvature, self.conic, terms)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sag_ends_at_the_edge() {
+        for radius in [0.3, 7.0, 1234.5] {
+            let sphere = Shape::Sphere { curvature: 1.0 / radius };
+            assert!((sphere.edge() / radius - 1.0).abs() < 1e-15);
+            for height in [radius, 2.0 * radius] {
+                assert!((sphere.clamped_sag(height) / radius - 1.0).abs() < 1e-7);
+            }
+            let inside = sphere.sag(0.25 * radius * radius).unwrap().0;
+            assert_eq!(sphere.clamped_sag(-0.5 * radius).to_bits(), inside.to_bits());
+        }
+        assert_eq!(Shape::<f64>::Plane.clamped_sag(1e9), 0.0);
+    }
+}
