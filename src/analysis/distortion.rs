@@ -67,18 +67,18 @@ impl RayModel {
 /// # Errors
 /// Where the chief ray does not reach the image, or the lens has no focal length to compare with.
 pub fn distortion(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
 ) -> Result<Distortion, AnalysisError> {
-    let [x, y] = bench.chief_point(field, wavelength)?;
+    let [x, y] = model.chief_point(field, wavelength)?;
     let ideal =
-        bench.ideal_height(field).filter(|h| h.is_finite()).ok_or(AnalysisError::NoChief)?;
+        model.ideal_height(field).filter(|h| h.is_finite()).ok_or(AnalysisError::NoChief)?;
     let size = field.x.hypot(field.y);
     let height = if size == 0.0 { y } else { (x * field.x + y * field.y) / size };
     let against = |ideal: f64| (ideal != 0.0).then(|| height / ideal - 1.0);
-    let collimated = bench.beam.object == Object::Infinity && bench.beam.field == FieldKind::Angle;
-    let efl = bench.first_order.efl.filter(|_| collimated);
+    let collimated = model.beam.object == Object::Infinity && model.beam.field == FieldKind::Angle;
+    let efl = model.first_order.efl.filter(|_| collimated);
     let f_theta = efl.and_then(|f| against(f * size.to_radians()));
     Ok(Distortion { field, height, ideal, distortion: against(ideal), f_theta })
 }
@@ -89,11 +89,11 @@ pub fn distortion(
 /// # Errors
 /// Where the chief ray does not reach the image.
 pub fn field_curvature(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
 ) -> Result<FieldCurvature, AnalysisError> {
-    let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+    let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
     let landing = launch.unclipped_landing([0.0, 0.0]).ok_or(AnalysisError::NoChief)?;
     let Vec3 { x, y, .. } = landing.ray.point;
     let d = landing.ray.direction;

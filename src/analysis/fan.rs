@@ -29,10 +29,10 @@ pub struct Fan {
 
 /// The fans of a field, one for each wavelength, measured from the chief ray of the primary one;
 /// `count` rays each.
-pub fn fan(bench: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>, AnalysisError> {
-    let chief = bench.chief_point(field, bench.primary)?;
+pub fn fan(model: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>, AnalysisError> {
+    let chief = model.chief_point(field, model.primary)?;
     let one = |wavelength: usize| {
-        let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+        let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
         let point = |pupil: f64, p: [f64; 2]| {
             let landing = launch.ray(p).map(|ray| launch.channel().tracer.trace(ray));
             let arrived = landing.filter(|landing| landing.fate.is_imaged());
@@ -50,5 +50,5 @@ pub fn fan(bench: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>
             sagittal: (0..count).map(|i| point(at(i), [at(i), 0.0])).collect(),
         })
     };
-    (0..bench.channels.len()).map(one).collect()
+    (0..model.channels.len()).map(one).collect()
 }

@@ -24,9 +24,9 @@ pub struct Illumination {
 }
 
 /// The illumination of all fields at a wavelength; a field without light has 0 and says why.
-pub fn illumination(bench: &RayModel, wavelength: usize, accuracy: Accuracy) -> Vec<Illumination> {
+pub fn illumination(model: &RayModel, wavelength: usize, accuracy: Accuracy) -> Vec<Illumination> {
     let cones: Vec<_> =
-        bench.fields.par_iter().map(|field| cone(bench, *field, wavelength, accuracy)).collect();
+        model.fields.par_iter().map(|field| cone(model, *field, wavelength, accuracy)).collect();
     let first = cones.first().and_then(|cone| cone.ok());
     let result = |(field, cone): (&FieldPoint, &Result<Estimate, AnalysisError>)| {
         let light = cone.unwrap_or(Estimate::new(0.0, 0.0, 0));
@@ -37,16 +37,16 @@ pub fn illumination(bench: &RayModel, wavelength: usize, accuracy: Accuracy) -> 
         });
         Illumination { field: *field, cone: light, relative, error: cone.err() }
     };
-    bench.fields.iter().zip(&cones).map(result).collect()
+    model.fields.iter().zip(&cones).map(result).collect()
 }
 
 fn cone(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
-    let region = lit_region(bench, field, wavelength)?;
+    let region = lit_region(model, field, wavelength)?;
     let found = converge(&region, accuracy, |nodes| cone_area(&region, nodes), |cone| *cone);
     let found = found.ok_or(AnalysisError::NoLight)?;
     Ok(Estimate::new(found.values[0], found.errors[0], found.rays))

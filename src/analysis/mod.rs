@@ -68,11 +68,11 @@ pub enum AnalysisError {
 
 /// The rays of a field that get through, if any do.
 pub fn lit_region(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
 ) -> Result<Region<'_>, AnalysisError> {
-    let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+    let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
     let region = Region::new(launch);
     match region.kind {
         RegionKind::Dark => Err(AnalysisError::NoLight),

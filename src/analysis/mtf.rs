@@ -24,13 +24,13 @@ pub struct MtfPoint {
 /// # Errors
 /// Where the field is dark.
 pub fn mtf(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
     frequencies: &[f64],
     accuracy: Accuracy,
 ) -> Result<Vec<MtfPoint>, AnalysisError> {
-    let region = lit_region(bench, field, wavelength)?;
+    let region = lit_region(model, field, wavelength)?;
     let at = |frequency: &f64| {
         let numbers = |nodes: &Nodes| modulation(&region, nodes, *frequency);
         let found =

@@ -83,12 +83,12 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// The pupil of a field at a wavelength; the area is as exact as asked for.
 pub fn pupil(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
 ) -> FieldPupil {
-    match bench.launch(field, wavelength) {
+    match model.launch(field, wavelength) {
         Ok(launch) => from_region(&Region::new(launch), accuracy),
         Err(why) => FieldPupil {
             field,
@@ -153,7 +153,7 @@ fn irregular_shape(
     let step = 2.0 / CELLS as f64;
     let at = |i: usize| half * (step * (i as f64 + 0.5) - 1.0);
     let place = |i: usize| [center[0] + at(i % CELLS), center[1] + at(i / CELLS)];
-    let inside = |p: &[f64; 2]| !launch.bench.ends_at_disc() || p[0].hypot(p[1]) <= 1.0;
+    let inside = |p: &[f64; 2]| !launch.model.ends_at_disc() || p[0].hypot(p[1]) <= 1.0;
     let points: Vec<_> = (0..CELLS * CELLS).map(place).filter(inside).collect();
     let ends = trace_fates(launch, &points);
     let lit = ends.iter().filter(|(_, fate)| fate.is_imaged());

@@ -60,15 +60,15 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// # Errors
 /// A pupil without light or edge.
 pub fn rim_sensitivities(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
 ) -> Result<RimSensitivities, DerivativeError> {
-    if bench.aiming == Aiming::Stop {
-        return rim_sensitivities(&bench.limited_by_stop()?, field, wavelength, accuracy);
+    if model.aiming == Aiming::Stop {
+        return rim_sensitivities(&model.limited_by_stop()?, field, wavelength, accuracy);
     }
-    let region = Region::new(bench.launch(field, wavelength)?);
+    let region = Region::new(model.launch(field, wavelength)?);
     let (estimator, _) = choose_estimator(&region, accuracy)?;
     let accuracy = if estimator == DerivativeEstimator::Warp { SAMPLED_ACCURACY } else { accuracy };
     let lit = region.trace_pupil(ORDER);

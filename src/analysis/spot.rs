@@ -79,14 +79,14 @@ impl Spot {
 }
 
 /// The radius of the first dark ring of a perfect lens with this aperture, in mm.
-pub fn airy_radius(bench: &RayModel) -> Option<f64> {
-    let um = bench.channels[bench.primary].um;
-    bench.first_order.working_f_number.map(|f| 1.22 * um * 1e-3 * f)
+pub fn airy_radius(model: &RayModel) -> Option<f64> {
+    let um = model.channels[model.primary].um;
+    model.first_order.working_f_number.map(|f| 1.22 * um * 1e-3 * f)
 }
 
 /// The spots of all fields, in order.
-pub fn spots(bench: &RayModel, accuracy: Accuracy) -> Vec<Result<Spot, AnalysisError>> {
-    bench.fields.par_iter().map(|field| spot(bench, *field, accuracy)).collect()
+pub fn spots(model: &RayModel, accuracy: Accuracy) -> Vec<Result<Spot, AnalysisError>> {
+    model.fields.par_iter().map(|field| spot(model, *field, accuracy)).collect()
 }
 
 /// The spot of a field in all colours; errors are relative to the RMS radius.
@@ -94,20 +94,20 @@ pub fn spots(bench: &RayModel, accuracy: Accuracy) -> Vec<Result<Spot, AnalysisE
 /// # Errors
 /// Where no colour of the field gets through: see [`AnalysisError`].
 pub fn spot(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     accuracy: Accuracy,
 ) -> Result<Spot, AnalysisError> {
-    let pairs: Vec<_> = (0..bench.channels.len())
+    let pairs: Vec<_> = (0..model.channels.len())
         .into_par_iter()
         .map(|w| {
-            let region = lit_region(bench, field, w)?;
+            let region = lit_region(model, field, w)?;
             let spot = monochromatic_spot(&region, accuracy).ok_or(AnalysisError::NoLight)?;
             Ok((region, spot))
         })
         .collect();
     let lit: Vec<_> = pairs.iter().filter_map(|pair| pair.as_ref().ok()).collect();
-    let Some(shares) = shares(bench, &lit) else {
+    let Some(shares) = shares(model, &lit) else {
         let reason = pairs.iter().find_map(|pair| pair.as_ref().err().copied());
         return Err(reason.unwrap_or(AnalysisError::NoLight));
     };
@@ -124,9 +124,9 @@ pub fn spot(
 }
 
 /// The share of each lit colour in the light: its weight times the area of its pupil.
-fn shares(bench: &RayModel, lit: &[&(Region<'_>, MonochromaticSpot)]) -> Option<Vec<f64>> {
+fn shares(model: &RayModel, lit: &[&(Region<'_>, MonochromaticSpot)]) -> Option<Vec<f64>> {
     let light = |(region, spot): &(Region<'_>, MonochromaticSpot)| {
-        bench.channels[region.launch.wavelength].weight * spot.area.value
+        model.channels[region.launch.wavelength].weight * spot.area.value
     };
     let sum: f64 = lit.iter().map(|pair| light(pair)).sum();
     (sum > 0.0).then(|| lit.iter().map(|pair| light(pair) / sum).collect())
@@ -160,15 +160,15 @@ fn combine_channels(lit: &[&(Region<'_>, MonochromaticSpot)], shares: &[f64]) ->
 
 /// What rounding may do to the place of a ray, in mm: a few units of the last digit of the largest
 /// coordinate on its way. It is the error of whatever a single ray says.
-pub fn rounding_error(bench: &RayModel) -> f64 {
+pub fn rounding_error(model: &RayModel) -> f64 {
     let gaps =
-        bench.channels[bench.primary].system.surfaces.iter().map(|surface| surface.thickness);
-    let heights = bench.first_order.marginal.heights.iter().copied();
+        model.channels[model.primary].system.surfaces.iter().map(|surface| surface.thickness);
+    let heights = model.first_order.marginal.heights.iter().copied();
     8.0 * f64::EPSILON * gaps.chain(heights).fold(0.0, |largest: f64, v| largest.max(v.abs()))
 }
 
 fn monochromatic_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<MonochromaticSpot> {
-    let rounding = rounding_error(region.launch.bench);
+    let rounding = rounding_error(region.launch.model);
     let found = converge(
         region,
         accuracy,

@@ -27,12 +27,12 @@ pub struct Wavefront {
 /// # Errors
 /// Where the field is dark or its chief ray does not reach the image.
 pub fn wavefront(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
 ) -> Result<Wavefront, AnalysisError> {
-    let region = lit_region(bench, field, wavelength)?;
+    let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::new(&region.launch).ok_or(AnalysisError::NoChief)?;
     let rounding = sphere.rounding();
     let scales = |[rms, _]: &[f64; 2]| [rms.max(rounding / accuracy.tolerance); 2];
@@ -48,12 +48,12 @@ pub fn wavefront(
 /// # Errors
 /// Where the field has no rays or its chief ray does not reach the image.
 pub fn path_differences(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
     points: &[[f64; 2]],
 ) -> Result<Vec<Option<f64>>, AnalysisError> {
-    let launch = bench.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+    let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
     let sphere = ReferenceSphere::new(&launch).ok_or(AnalysisError::NoChief)?;
     let at = |p: &[f64; 2]| {
         let ray = launch.ray(*p)?;
@@ -84,7 +84,7 @@ impl ReferenceSphere {
         let system = &launch.channel().system;
         let (middle, direction) = (chief.ray.point.value(), chief.ray.direction.value());
         let last = system.surfaces.len().checked_sub(2)?;
-        let radius = launch.bench.first_order.exit_pupil.position.map(|z| {
+        let radius = launch.model.first_order.exit_pupil.position.map(|z| {
             let pupil = Vec3::new(0.0, 0.0, z - system.surfaces[last].thickness);
             let away = pupil - middle;
             let along = if away.z * direction.z > 0.0 { 1.0 } else { -1.0 };

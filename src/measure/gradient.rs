@@ -12,11 +12,10 @@
 use super::clock::time_ms;
 use super::rates::{TimedCase, time_interleaved};
 use super::spot::Precision;
-use crate::lens::{Aperture, FieldPoint, Lens, Shape, Surface, System, SystemError};
+use crate::lens::{FieldPoint, Lens, Shape, Surface, System, SystemError};
 use crate::math::{Real, Vec3};
-use crate::paraxial::Beam;
 use crate::pupil::{
-    Accuracy, Aiming, DerivativeError, DerivativeEstimator, Integrand, Launch, LaunchError,
+    Accuracy, DerivativeError, DerivativeEstimator, Integrand, Launch, LaunchError,
     PupilDerivative, PupilPattern, QuadraticIntegrand, RayModel, RayModelError, Region,
     WarpSampling, choose_estimator, differentiate,
 };
@@ -222,7 +221,8 @@ pub fn measure_gradients(
     mut report: impl FnMut(usize, usize),
 ) -> Result<GradientBenchmark, GradientBenchmarkError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
-    let bench = limited_by_stop(&RayModel::from_lens(lens, zoom)?, |system| system)?;
+    let limited = RayModel::from_lens(lens, zoom)?.limited_by_stop()?;
+    let bench = with_primary_system(&limited, |system| system)?;
     let field = field.unwrap_or_else(|| most_vignetted(&bench, lens, zoom));
     let axis = area(&bench, 0.0).unwrap_or(f64::NAN);
     let heights = if field == 0.0 { vec![0.0] } else { vec![0.0, field] };
@@ -243,7 +243,7 @@ pub fn measure_gradients(
         fields.push(scene.curves(&exact, axis, rows)?);
     }
     let costs = PLANES.into_iter().map(|planes| {
-        let bench = limited_by_stop(&bench, |system| with_planes(system, planes))?;
+        let bench = with_primary_system(&bench, |system| with_planes(system, planes))?;
         let scene = GradientScene::new(&bench, &pool, field)?;
         let cost = pool.install(|| scene.cost());
         done += 1;
@@ -268,15 +268,14 @@ fn at(y: f64) -> FieldPoint {
     FieldPoint { x: 0.0, y, weight: 1.0 }
 }
 
-/// The lens at its primary wavelength, with light that only its stop and semi-diameters limit.
-fn limited_by_stop(
-    given: &RayModel,
+/// The model at its primary wavelength alone, with a changed system.
+fn with_primary_system(
+    model: &RayModel,
     change: impl FnOnce(System<f64>) -> System<f64>,
 ) -> Result<RayModel, RayModelError> {
-    let color = &given.channels[given.primary];
-    let beam = Beam { aperture: Aperture::StopSemiDiameter(given.stop_radius()), ..given.beam };
-    let aiming = if given.aiming == Aiming::Stop { Aiming::Chief } else { given.aiming };
-    RayModel::from_systems(vec![(color.um, 1.0, change(color.system.clone()))], 0, beam, aiming)
+    let channel = &model.channels[model.primary];
+    let systems = vec![(channel.um, 1.0, change(channel.system.clone()))];
+    RayModel::from_systems(systems, 0, model.beam, model.aiming)
 }
 
 /// The field of the lens with the least light that has some.

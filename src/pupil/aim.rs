@@ -1,8 +1,8 @@
 //! The ray of a field that crosses the stop, or another surface, at a given point: Newton's iteration on the two
 //! coordinates that name the ray, with the derivative from dual numbers.
 
-use super::bench::{Dual2, RayModel};
 use super::launch::{FieldSource, PupilMap};
+use super::ray_model::{Dual2, RayModel};
 use crate::math::Vec3;
 
 /// A ray that crosses a surface where it was asked to.
@@ -41,14 +41,14 @@ const ROUNDING: f64 = 1e-10;
 
 /// The ray of a source that crosses `surface` at `target`, searched from the ray named `guess`.
 pub(super) fn aim_at(
-    bench: &RayModel,
+    model: &RayModel,
     wavelength: usize,
     source: &FieldSource,
     surface: usize,
     guess: [f64; 2],
     target: [f64; 2],
 ) -> Option<AimedRay> {
-    let search = AimSolver { bench, wavelength, source, surface, target };
+    let search = AimSolver { model, wavelength, source, surface, target };
     let mut here = search.evaluate(guess)?;
     for _ in 0..STEPS {
         if here.size == 0.0 {
@@ -69,7 +69,7 @@ pub(super) fn aim_at(
 }
 
 struct AimSolver<'a> {
-    bench: &'a RayModel,
+    model: &'a RayModel,
     wavelength: usize,
     source: &'a FieldSource,
     surface: usize,
@@ -87,15 +87,15 @@ struct AimOffset {
 impl AimSolver<'_> {
     /// The size of the stop, or of the beam where the stop has none.
     fn scale(&self) -> f64 {
-        let stop = self.bench.stop_radius();
+        let stop = self.model.stop_radius();
         let beam =
-            self.bench.first_order.marginal.heights.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+            self.model.first_order.marginal.heights.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
         if stop > 0.0 { stop } else { beam.max(f64::MIN_POSITIVE) }
     }
 
     fn evaluate(&self, q: [f64; 2]) -> Option<AimOffset> {
         let ray = self.source.ray([Dual2::variable(q[0], 0), Dual2::variable(q[1], 1)]);
-        let landing = self.bench.channels[self.wavelength].unclipped.trace_to(ray, self.surface);
+        let landing = self.model.channels[self.wavelength].unclipped.trace_to(ray, self.surface);
         let Vec3 { x, y, .. } = landing.ray.point;
         let offset = [x.value - self.target[0], y.value - self.target[1]];
         let size = offset[0].hypot(offset[1]);

@@ -6,7 +6,7 @@
 //! leads from pupil coordinates to that plane.
 
 use super::aim::{AimedRay, aim_at, solve_2x2};
-use super::bench::{Aiming, Channel, Dual2, RayModel};
+use super::ray_model::{Aiming, Channel, Dual2, RayModel};
 use crate::lens::{FieldKind, FieldPoint, Object};
 use crate::math::Real;
 use crate::math::Vec3;
@@ -125,9 +125,9 @@ pub struct FixedLaunch {
 
 impl FixedLaunch {
     /// The same rays through a lens of the same wavelengths.
-    pub fn launch(self, bench: &RayModel) -> Launch<'_> {
+    pub fn launch(self, model: &RayModel) -> Launch<'_> {
         let Self { field, wavelength, aiming, source, map: chart } = self;
-        Launch { bench, field, wavelength, aiming, source, map: chart }
+        Launch { model, field, wavelength, aiming, source, map: chart }
     }
 }
 
@@ -135,7 +135,7 @@ impl FixedLaunch {
 #[derive(Debug, Clone)]
 pub struct Launch<'a> {
     /// The lens.
-    pub bench: &'a RayModel,
+    pub model: &'a RayModel,
     /// The field.
     pub field: FieldPoint,
     /// Which wavelength.
@@ -147,22 +147,22 @@ pub struct Launch<'a> {
 
 impl<'a> Launch<'a> {
     pub(super) fn new(
-        bench: &'a RayModel,
+        model: &'a RayModel,
         field: FieldPoint,
         wavelength: usize,
         aiming: Aiming,
     ) -> Result<Self, LaunchError> {
-        if wavelength >= bench.channels.len() {
+        if wavelength >= model.channels.len() {
             return Err(LaunchError::NoWavelength);
         }
-        let source = field_source(bench, field).ok_or(LaunchError::NoObjectPoint)?;
-        let chart = paraxial_map(bench, &source);
-        let mut launch = Self { bench, field, wavelength, aiming, source, map: chart };
+        let source = field_source(model, field).ok_or(LaunchError::NoObjectPoint)?;
+        let chart = paraxial_map(model, &source);
+        let mut launch = Self { model, field, wavelength, aiming, source, map: chart };
         match aiming {
             Aiming::Paraxial => {}
             Aiming::Chief | Aiming::Stop => {
                 let chief = launch.chief_ray().ok_or(LaunchError::NotAimed)?;
-                launch.map = chief.pupil_map(bench.stop_radius()).ok_or(LaunchError::NotAimed)?;
+                launch.map = chief.pupil_map(model.stop_radius()).ok_or(LaunchError::NotAimed)?;
             }
         }
         Ok(launch)
@@ -190,7 +190,7 @@ impl<'a> Launch<'a> {
 
     /// The lens at this wavelength.
     pub fn channel(&self) -> &'a Channel {
-        &self.bench.channels[self.wavelength]
+        &self.model.channels[self.wavelength]
     }
 
     /// Whether the rays at `(−px, py)` mirror those at `(px, py)`.
@@ -245,7 +245,7 @@ impl<'a> Launch<'a> {
     /// where that plane stretches the pupils at the edge out of all comparison.
     pub fn is_across_beam(&self) -> bool {
         let FieldSource::Collimated { direction, .. } = self.source else { return false };
-        let beam = &self.bench.beam;
+        let beam = &self.model.beam;
         direction.z <= GRAZING || (beam.field == FieldKind::Angle && beam.edge.abs() > WIDE)
     }
 
@@ -278,7 +278,7 @@ impl<'a> Launch<'a> {
             return Some(self.map.map(variables));
         }
         let found = self.aim(p)?;
-        let chart = found.pupil_map(self.bench.stop_radius())?;
+        let chart = found.pupil_map(self.model.stop_radius())?;
         Some([0, 1].map(|i| Dual2 {
             value: found.q[i],
             slope: [chart.columns[0][i], chart.columns[1][i]],
@@ -288,7 +288,7 @@ impl<'a> Launch<'a> {
     /// Where the ray at these pupil coordinates crosses the stop, clipped by nothing.
     pub fn stop_point(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         let ray = self.source.ray(self.ray_coordinates(p)?.map(Dual2::constant));
-        let landing = self.channel().unclipped.trace_to(ray, self.bench.stop());
+        let landing = self.channel().unclipped.trace_to(ray, self.model.stop());
         let point = landing.ray.point.value();
         landing.fate.is_imaged().then_some([point.x, point.y])
     }
@@ -319,18 +319,18 @@ impl<'a> Launch<'a> {
     }
 
     fn aim(&self, p: [f64; 2]) -> Option<AimedRay> {
-        let radius = self.bench.stop_radius();
+        let radius = self.model.stop_radius();
         let (guess, target) = (self.map.map(p), p.map(|v| v * radius));
-        aim_at(self.bench, self.wavelength, &self.source, self.bench.stop(), guess, target)
+        aim_at(self.model, self.wavelength, &self.source, self.model.stop(), guess, target)
     }
 
     /// The pupil point whose ray, clipped by nothing, goes through the vertex of a surface, inside
     /// the pupil or not; `None` where none was found.
     pub(super) fn through_vertex(&self, surface: usize) -> Option<[f64; 2]> {
-        let (bench, source) = (self.bench, &self.source);
+        let (model, source) = (self.model, &self.source);
         let search = |start: [f64; 2]| {
             let guess = self.map.map(start);
-            aim_at(bench, self.wavelength, source, surface, guess, [0.0; 2])
+            aim_at(model, self.wavelength, source, surface, guess, [0.0; 2])
         };
         let starts = [[0.0, 0.0], [0.0, 0.9], [0.0, -0.9], [0.9, 0.0], [-0.9, 0.0]];
         let q = starts.into_iter().find_map(search)?.q;
@@ -338,9 +338,9 @@ impl<'a> Launch<'a> {
             return self.map.inverse(q);
         }
         let landing =
-            self.channel().unclipped.trace_to(source.ray(q.map(Dual2::constant)), bench.stop());
+            self.channel().unclipped.trace_to(source.ray(q.map(Dual2::constant)), model.stop());
         let point = landing.ray.point.value();
-        let radius = bench.stop_radius();
+        let radius = model.stop_radius();
         landing.fate.is_imaged().then_some([point.x / radius, point.y / radius])
     }
 
@@ -375,12 +375,12 @@ impl<'a> Launch<'a> {
     fn chief_ray_at(&self, walk: &ChiefRayContinuation, fraction: f64) -> Option<AimedRay> {
         let field =
             FieldPoint { x: self.field.x * fraction, y: self.field.y * fraction, ..self.field };
-        let source = field_source(self.bench, field)?;
-        let paraxial = paraxial_map(self.bench, &source);
+        let source = field_source(self.model, field)?;
+        let paraxial = paraxial_map(self.model, &source);
         let shift = walk.predict(fraction);
         let guess = [paraxial.origin[0] + shift[0], paraxial.origin[1] + shift[1]];
         let mut found =
-            aim_at(self.bench, self.wavelength, &source, self.bench.stop(), guess, [0.0; 2])?;
+            aim_at(self.model, self.wavelength, &source, self.model.stop(), guess, [0.0; 2])?;
         found.shift = [found.q[0] - paraxial.origin[0], found.q[1] - paraxial.origin[1]];
         Some(found)
     }
@@ -407,33 +407,33 @@ impl ChiefRayContinuation {
     }
 }
 
-fn field_source(bench: &RayModel, field: FieldPoint) -> Option<FieldSource> {
-    match (bench.beam.field, bench.beam.object) {
+fn field_source(model: &RayModel, field: FieldPoint) -> Option<FieldSource> {
+    match (model.beam.field, model.beam.object) {
         (FieldKind::Angle, Object::Infinity) => {
             let angle = field.x.hypot(field.y).to_radians();
-            collimated_source(bench, field, angle)
+            collimated_source(model, field, angle)
         }
         (FieldKind::ImageHeight, Object::Infinity) => {
-            let index = bench.channels[bench.primary].system.index_before;
-            let slope = field.x.hypot(field.y) * bench.first_order.power / index;
+            let index = model.channels[model.primary].system.index_before;
+            let slope = field.x.hypot(field.y) * model.first_order.power / index;
             let turned =
                 FieldPoint { x: field.x * slope.signum(), y: field.y * slope.signum(), ..field };
             (slope != 0.0 || field.x.hypot(field.y) == 0.0)
-                .then(|| collimated_source(bench, turned, slope.abs().atan()))?
+                .then(|| collimated_source(model, turned, slope.abs().atan()))?
         }
         (FieldKind::ObjectHeight, Object::Finite(distance)) => {
-            Some(point_source(bench, field.x, field.y, distance))
+            Some(point_source(model, field.x, field.y, distance))
         }
         (FieldKind::ImageHeight, Object::Finite(distance)) => {
-            let scale = bench.first_order.magnification?;
-            Some(point_source(bench, field.x / scale, field.y / scale, distance))
+            let scale = model.first_order.magnification?;
+            Some(point_source(model, field.x / scale, field.y / scale, distance))
         }
         (FieldKind::Angle, Object::Finite(distance)) => {
-            let reach = distance + bench.first_order.entrance_pupil.position?;
+            let reach = distance + model.first_order.entrance_pupil.position?;
             let angle = field.x.hypot(field.y);
             let height = -reach * angle.to_radians().tan();
             let [x, y] = field_direction(field, angle).map(|part| part * height);
-            (angle < 90.0).then(|| point_source(bench, x, y, distance))
+            (angle < 90.0).then(|| point_source(model, x, y, distance))
         }
         (FieldKind::ObjectHeight, Object::Infinity) => None,
     }
@@ -444,7 +444,7 @@ fn field_direction(field: FieldPoint, length: f64) -> [f64; 2] {
     if length == 0.0 { [0.0, 1.0] } else { [field.x / length, field.y / length] }
 }
 
-fn collimated_source(bench: &RayModel, field: FieldPoint, angle: f64) -> Option<FieldSource> {
+fn collimated_source(model: &RayModel, field: FieldPoint, angle: f64) -> Option<FieldSource> {
     let (sin, cos) = angle.sin_cos();
     let [tx, ty] = field_direction(field, field.x.hypot(field.y));
     let direction = Vec3::new(sin * tx, sin * ty, cos);
@@ -453,27 +453,27 @@ fn collimated_source(bench: &RayModel, field: FieldPoint, angle: f64) -> Option<
     let turn = 1.0 - cos;
     let e = Vec3::new(1.0 - turn * tx * tx, -turn * tx * ty, -sin * tx);
     let f = Vec3::new(-turn * tx * ty, 1.0 - turn * ty * ty, -sin * ty);
-    let system = &bench.channels[bench.primary].system;
+    let system = &model.channels[model.primary].system;
     let first = &system.surfaces[0];
     let sizes = [first.semi_diameter, 1.0 / first.shape.curvature().abs()];
     let size = sizes.into_iter().filter(|v| v.is_finite()).fold(0.0, f64::max);
-    let pupil = bench.first_order.entrance_pupil.position.unwrap_or(0.0).abs();
-    let ahead = 4.0 * (size + pupil + bench.first_order.marginal.heights[0].abs());
+    let pupil = model.first_order.entrance_pupil.position.unwrap_or(0.0).abs();
+    let ahead = 4.0 * (size + pupil + model.first_order.marginal.heights[0].abs());
     angle.is_finite().then_some(FieldSource::Collimated { direction, across: [e, f], ahead })
 }
 
-fn point_source(bench: &RayModel, x: f64, y: f64, distance: f64) -> FieldSource {
+fn point_source(model: &RayModel, x: f64, y: f64, distance: f64) -> FieldSource {
     let from = Vec3::new(x, y, -distance);
-    match bench.first_order.entrance_pupil.position {
+    match model.first_order.entrance_pupil.position {
         Some(through) => FieldSource::Point { from, through },
         None => FieldSource::Slopes { from },
     }
 }
 
 /// The chart of the paraxial entrance pupil.
-fn paraxial_map(bench: &RayModel, source: &FieldSource) -> PupilMap {
-    let pupil = bench.first_order.entrance_pupil;
-    let marginal = &bench.first_order.marginal;
+fn paraxial_map(model: &RayModel, source: &FieldSource) -> PupilMap {
+    let pupil = model.first_order.entrance_pupil;
+    let marginal = &model.first_order.marginal;
     let radius = pupil.diameter.map_or(marginal.heights[0].abs(), |d| 0.5 * d);
     match source {
         FieldSource::Collimated { across: [e, f], .. } => {

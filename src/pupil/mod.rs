@@ -13,35 +13,24 @@
 //! where rays are aimed at it.
 
 mod aim;
-mod bench;
-mod boundary;
-mod follow;
+mod gauss_rules;
 mod gradient;
 mod launch;
-mod lit;
-mod moments;
-mod outline;
-mod quadrature;
+mod patterns;
+mod ray_model;
 mod region;
-mod ring;
-mod rules;
-mod sample;
-mod shadow;
-mod stopped;
+mod stop_limited;
 
-pub use bench::{Aiming, Channel, Dual2, RayModel, RayModelError, WIDE_AIMING_THRESHOLD};
-pub use boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
 pub use gradient::{
     DerivativeError, DerivativeEstimator, Integrand, PupilDerivative, QuadraticIntegrand,
     WarpSampling, choose_estimator, differentiate,
 };
 pub use launch::{FixedLaunch, Launch, LaunchError};
-pub use lit::TracedPupil;
-pub use moments::PupilMoments;
-pub use outline::{OutlineSide, PupilOutline};
-pub use quadrature::{Accuracy, ConvergedValues, Nodes, TracedNodes, converge};
-pub use region::{Region, RegionKind};
-pub use ring::Annulus;
-pub use sample::{PupilPattern, pattern_points};
-pub use shadow::DarkPupil;
-pub use stopped::limited_by_stop;
+pub use patterns::{PupilPattern, pattern_points};
+pub use ray_model::{Aiming, Channel, Dual2, RayModel, RayModelError, WIDE_AIMING_THRESHOLD};
+pub use region::{
+    Accuracy, Annulus, Boundary, BoundaryArc, ConvergedValues, DarkPupil, EdgePoint, Nodes,
+    OutlineSide, PolarFrame, PupilLimit, PupilMoments, PupilOutline, Region, RegionKind,
+    TracedNodes, TracedPupil, converge,
+};
+pub use stop_limited::limited_by_stop;

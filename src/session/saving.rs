@@ -53,8 +53,8 @@ impl EffectOnOff {
     fn is_same(&self) -> bool {
         let same = |effect: &Effect| self.on.computes(*effect) == self.off.computes(*effect);
         Effect::ALL.iter().all(same)
-            && self.on.plain == self.off.plain
-            && self.on.open == self.off.open
+            && self.on.as_conic == self.off.as_conic
+            && self.on.unclipped == self.off.unclipped
     }
 
     /// The milliseconds that the effect takes, runs with and without it in turn.

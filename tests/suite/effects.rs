@@ -64,7 +64,7 @@ fn chief_change(a: &RayModel, b: &RayModel) -> f64 {
 fn check(name: &str, zoom: usize, lens: &Lens, auto: &EffectPlan, decision: &EffectDecision) {
     let effect = decision.effect;
     let forced = planned(lens, zoom, TASK, &forced(effect, EffectOverride::On));
-    let same = forced.plain == auto.plain && forced.open == auto.open;
+    let same = forced.as_conic == auto.as_conic && forced.unclipped == auto.unclipped;
     if same && Effect::ALL.iter().all(|e| forced.computes(*e) == auto.computes(*e)) {
         return; // It is computed anyway.
     }
@@ -72,10 +72,10 @@ fn check(name: &str, zoom: usize, lens: &Lens, auto: &EffectPlan, decision: &Eff
         (build_ray_model(lens, zoom, &forced).unwrap(), build_ray_model(lens, zoom, auto).unwrap());
     if effect == Effect::Aiming {
         let change = chief_change(&on, &off);
-        assert!(change <= decision.left * (1.0 + 1e-9), "{name} aiming: {change}");
+        assert!(change <= decision.residual * (1.0 + 1e-9), "{name} aiming: {change}");
         return;
     }
-    let allowed = if decision.unit == "mm" { decision.left } else { 0.0 };
+    let allowed = if decision.unit == "mm" { decision.residual } else { 0.0 };
     let (change, error) = change(&on, &off).unwrap_or_else(|| panic!("{name} {effect:?}: dark"));
     assert!(
         change <= allowed + error + 1e-12,
@@ -116,7 +116,7 @@ fn forcing_an_effect_off_changes_no_more_than_its_number() {
         for effect in [Effect::Dispersion, Effect::Asphere, Effect::FiniteObject] {
             let on = planned(&lens, 0, TASK, &forced(effect, EffectOverride::On));
             let off = planned(&lens, 0, TASK, &forced(effect, EffectOverride::Off));
-            let error = off.decision(effect).unwrap().left;
+            let error = off.decision(effect).unwrap().residual;
             let (on, off) =
                 (build_ray_model(&lens, 0, &on).unwrap(), build_ray_model(&lens, 0, &off).unwrap());
             if !error.is_finite() {
@@ -164,11 +164,11 @@ fn a_figuring_that_moves_no_ray_is_left_out_and_one_that_does_is_not() {
     lens.surfaces[8].asphere = vec![1e-6];
     let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
     let asphere = auto.decision(Effect::Asphere).unwrap();
-    assert_eq!((&auto.plain, &asphere.surfaces), (&vec![3], &vec![8]));
-    assert!(asphere.left > 0.0 && asphere.left < asphere.limit, "{asphere:?}");
+    assert_eq!((&auto.as_conic, &asphere.surfaces), (&vec![3], &vec![8]));
+    assert!(asphere.residual > 0.0 && asphere.residual < asphere.limit, "{asphere:?}");
     check("figured double Gauss", 0, &lens, &auto, asphere);
     let traced = planned(&lens, 0, TracePurpose::Trace, &EffectOverrides::default());
-    assert!(traced.plain.len() < 2, "a ray as such is exact");
+    assert!(traced.as_conic.len() < 2, "a ray as such is exact");
     let drawn = planned(&lens, 0, TracePurpose::Layout, &EffectOverrides::default());
     assert!(!drawn.computes(Effect::Dispersion), "nobody sees colours in a drawing of the lens");
 }
@@ -193,7 +193,7 @@ fn a_rim_that_no_ray_reaches_goes_and_the_others_stay() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(50.0);
     let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
-    assert!(auto.open.contains(&0), "{:?}", auto.open);
+    assert!(auto.unclipped.contains(&0), "{:?}", auto.unclipped);
     let clipping = auto.decision(Effect::Clipping).unwrap();
     assert!(clipping.computed && !clipping.surfaces.contains(&0), "{clipping:?}");
 }

@@ -38,7 +38,7 @@ pub(super) fn decisions(
 /// The milliseconds that leaving an effect out saves or would save, where the spots take so many
 /// with what the plan computes.
 fn saved_ms(decision: &EffectDecision, spots_ms: f64) -> f64 {
-    let share = decision.saves.clamp(0.0, 0.99);
+    let share = decision.saved_share.clamp(0.0, 0.99);
     let whole = if decision.computed { spots_ms } else { spots_ms / (1.0 - share) };
     share * whole
 }
@@ -49,6 +49,6 @@ pub(super) fn decision_text(decision: &EffectDecision) -> String {
     let saving = if *computed { "without it" } else { "saves" };
     let ms = decision.saved_ms.unwrap_or(0.0);
     let numbers = format!("{} of {} {unit}", ShortNumber(*error), ShortNumber(*limit));
-    let time = format!("{saving} {:.0} %, {ms:.2} ms", 100.0 * decision.saves);
+    let time = format!("{saving} {:.0} %, {ms:.2} ms", 100.0 * decision.saved_share);
     format!("  {:<18} {verdict}  {reason} ({numbers}; {time})", effect.name())
 }

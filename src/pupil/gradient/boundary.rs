@@ -12,10 +12,7 @@
 
 use super::{Integrand, QuadraticIntegrand, WarpSampling};
 use crate::math::Vec3;
-use crate::pupil::boundary::{PolarFrame, PupilLimit};
-use crate::pupil::lit::TracedPupil;
-use crate::pupil::quadrature::RadialLine;
-use crate::pupil::region::RegionKind;
+use crate::pupil::region::{PolarFrame, PupilLimit, RadialLine, RegionKind, TracedPupil};
 use crate::trace::{AdjointSeed, Ray, RayLimit, Rays, SystemGradient};
 
 impl TracedPupil<'_> {

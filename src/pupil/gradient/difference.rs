@@ -13,8 +13,7 @@
 
 use super::{PupilDerivative, QuadraticIntegrand};
 use crate::lens::{ProfileCoefficients, ProfileLaw, RADIAL_TERMS, System, SystemError};
-use crate::pupil::lit::TracedPupil;
-use crate::pupil::region::{Region, RegionKind};
+use crate::pupil::region::{Region, RegionKind, TracedPupil};
 use crate::trace::{SurfaceParameter, SystemGradient};
 
 /// The shorter step against the scale on which a number acts: long enough that rounding of the
@@ -146,9 +145,9 @@ impl PerturbedIntegral<'_> {
         let launch = &self.region.launch;
         let mut system = launch.channel().system.clone();
         change(&mut system);
-        let bench: Result<_, SystemError> = launch.bench.with_system(launch.wavelength, system);
-        let bench = bench.ok()?;
-        let region = Region::new(launch.to_fixed().launch(&bench));
+        let model: Result<_, SystemError> = launch.model.with_system(launch.wavelength, system);
+        let model = model.ok()?;
+        let region = Region::new(launch.to_fixed().launch(&model));
         if region.kind == RegionKind::Unbounded {
             return None;
         }

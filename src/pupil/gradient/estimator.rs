@@ -3,11 +3,9 @@
 
 use super::{PupilDerivative, QuadraticIntegrand, WarpSampling};
 use crate::lens::{RADIAL_TERMS, SystemError};
-use crate::pupil::bench::Aiming;
 use crate::pupil::launch::LaunchError;
-use crate::pupil::moments::PupilMoments;
-use crate::pupil::quadrature::Accuracy;
-use crate::pupil::region::{Region, RegionKind};
+use crate::pupil::ray_model::Aiming;
+use crate::pupil::region::{Accuracy, PupilMoments, Region, RegionKind};
 use crate::trace::{Fate, SurfaceParameter, SystemGradient, WarpTracer};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -111,9 +109,9 @@ pub fn differentiate(
     asked: Accuracy,
 ) -> Result<PupilDerivative, DerivativeError> {
     let launch = &region.launch;
-    if launch.bench.aiming == Aiming::Stop {
-        let bench = launch.bench.limited_by_stop()?;
-        let limited = Region::new(bench.launch(launch.field, launch.wavelength)?);
+    if launch.model.aiming == Aiming::Stop {
+        let model = launch.model.limited_by_stop()?;
+        let limited = Region::new(model.launch(launch.field, launch.wavelength)?);
         return differentiate(&limited, cost, estimator, asked);
     }
     region.check_edge()?;
@@ -206,7 +204,7 @@ impl Region<'_> {
     fn explain_darkness(&self) -> (String, &'static str) {
         const NEARER: &str = "take a field nearer to the axis or a larger semi-diameter";
         let launch = &self.launch;
-        if launch.bench.stop_radius() == 0.0 {
+        if launch.model.stop_radius() == 0.0 {
             return ("the stop has the radius 0".to_owned(), "open the stop");
         }
         let Some(ray) = launch.ray([0.0; 2]) else {

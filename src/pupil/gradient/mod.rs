@@ -21,8 +21,8 @@ mod warp;
 pub use estimator::{DerivativeError, DerivativeEstimator, choose_estimator, differentiate};
 pub use warp::WarpSampling;
 
-use super::moments::PupilMoments;
 use crate::math::Real;
+use crate::pupil::region::PupilMoments;
 use crate::trace::{SurfaceParameter, SystemGradient};
 
 /// What each ray of a pupil contributes by where it lands. Where a pupil is its own mirror image, so

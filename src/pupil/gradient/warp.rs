@@ -28,10 +28,9 @@
 use super::{Integrand, PupilDerivative};
 use crate::math::{Jet, Real};
 use crate::pupil::Aiming;
-use crate::pupil::boundary::PolarFrame;
 use crate::pupil::launch::Launch;
-use crate::pupil::region::{Region, RegionKind};
-use crate::pupil::sample::{SplitMix, additive_sequence};
+use crate::pupil::patterns::{SplitMix, additive_sequence};
+use crate::pupil::region::{PolarFrame, Region, RegionKind};
 use crate::trace::{
     ImagePoints, JetBlock, LANES, Ray, Rays, SystemGradient, TraceSink, WarpTracer,
 };
@@ -86,10 +85,10 @@ impl Region<'_> {
         cost: &impl Integrand,
         sampling: WarpSampling,
     ) -> Option<PupilDerivative> {
-        let bench = self.launch.bench;
-        if bench.aiming == Aiming::Stop {
-            let bench = bench.limited_by_stop().ok()?;
-            let launch = bench.launch(self.launch.field, self.launch.wavelength).ok()?;
+        let model = self.launch.model;
+        if model.aiming == Aiming::Stop {
+            let model = model.limited_by_stop().ok()?;
+            let launch = model.launch(self.launch.field, self.launch.wavelength).ok()?;
             return Region::new(launch).warp_derivative_in::<R>(cost, sampling);
         }
         let mut square = self.enclosing_frame()?;
@@ -206,7 +205,7 @@ impl<'a, R: Real, C: Integrand> WarpEstimator<'a, R, C> {
         points: impl Iterator<Item = [f64; 2]>,
     ) -> Option<SystemGradient<f64>> {
         let lit = self.lit_points(square, points)?;
-        let disc = self.launch.bench.ends_at_disc().then_some(square);
+        let disc = self.launch.model.ends_at_disc().then_some(square);
         let sum = self.tracer.gradient(
             &lit,
             #[inline(always)]
@@ -224,7 +223,7 @@ impl<'a, R: Real, C: Integrand> WarpEstimator<'a, R, C> {
         square: PolarFrame,
         points: impl Iterator<Item = [f64; 2]>,
     ) -> Option<Vec<[R; 2]>> {
-        let disc = self.launch.bench.ends_at_disc();
+        let disc = self.launch.model.ends_at_disc();
         let inside = |p: &[f64; 2]| {
             let [x, y] = pupil_point(square, *p);
             !disc || x * x + y * y <= 1.0

@@ -7,7 +7,7 @@
 
 use crate::lens::{Lens, System};
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, RayModel, WIDE_AIMING_THRESHOLD};
+use crate::pupil::{Aiming, RayModel};
 use crate::search::SearchRules;
 use crate::search::element::glass_gaps;
 use crate::trace::{Ray, Tracer};
@@ -205,8 +205,6 @@ fn primary_bench(lens: &Lens, zoom: usize) -> Result<RayModel, String> {
     let beam = Beam::for_lens(lens, zoom);
     let bench = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial);
     let mut bench = bench.map_err(|error| error.to_string())?;
-    if bench.stop_miss().is_none_or(|miss| miss > WIDE_AIMING_THRESHOLD) {
-        bench.aiming = Aiming::Chief;
-    }
+    bench.choose_aiming();
     Ok(bench)
 }

@@ -94,12 +94,12 @@ const fn override_name(choice: EffectOverride) -> &'static str {
 /// The number that the decision rests on, its limit, and the time at stake.
 fn reason_text(decision: &EffectDecision) -> String {
     let digits = |value: f64| number::format_digits(value, 3);
-    let EffectDecision { error, limit, unit, saves, .. } = decision;
+    let EffectDecision { error, limit, unit, saved_share, .. } = decision;
     let rests = format!("{} {unit}, limit {} {unit}", digits(*error), digits(*limit));
-    if *saves <= 0.0 {
+    if *saved_share <= 0.0 {
         return rests;
     }
     let verb = if decision.computed { "would save" } else { "saves" };
     let time = decision.saved_ms.map(|ms| format!(" ({ms:.2} ms)")).unwrap_or_default();
-    format!("{rests}; {verb} {:.0} % of tracing{time}", 100.0 * saves)
+    format!("{rests}; {verb} {:.0} % of tracing{time}", 100.0 * saved_share)
 }

@@ -423,18 +423,18 @@ fn grin_lens_effects_say_what_a_gradient_costs_and_leave_out_none() {
     };
     let rod = files::open("lenses/grin_rod_melles_griot.json").unwrap().lens;
     let auto = planned(&rod, &EffectOverrides::default());
-    let decision = auto.decision(Effect::Gradient).unwrap();
+    let decision = auto.decision(Effect::GradientIndex).unwrap();
     assert!(decision.computed && decision.surfaces == [0], "{decision:?}");
     assert!(decision.reason.contains("steps"), "{}", decision.reason);
     let off =
-        planned(&rod, &EffectOverrides::default().with(Effect::Gradient, EffectOverride::Off));
+        planned(&rod, &EffectOverrides::default().with(Effect::GradientIndex, EffectOverride::Off));
     let bench = effects::build_ray_model(&rod, 0, &off).unwrap();
     assert!(!bench.has_grin() && effects::build_ray_model(&rod, 0, &auto).unwrap().has_grin());
     let even = busy("index", &[0.0], &[]);
     let mut even = even;
     even.surfaces[1].medium = Medium::Index(1.55);
     let decision = planned(&even, &EffectOverrides::default());
-    let decision = decision.decision(Effect::Gradient).unwrap();
+    let decision = decision.decision(Effect::GradientIndex).unwrap();
     assert!(!decision.computed && decision.surfaces.is_empty(), "{decision:?}");
 }
 

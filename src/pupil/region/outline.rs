@@ -4,11 +4,13 @@
 //! the smooth curve: the chords of all points and of every other one, extrapolated (Richardson), so
 //! that 128 points give six digits.
 
-use super::bench::{Aiming, RayModel};
-use super::boundary::{Boundary, BoundaryArc, EdgeSearch, GUESS_SPREAD, PupilLimit};
-use super::launch::Launch;
-use super::quadrature::{Accuracy, ConvergedValues, Nodes, converge};
-use super::region::{Region, RegionKind};
+use super::boundary::{Boundary, BoundaryArc, PupilLimit};
+use super::edge_search::{EdgeSearch, GUESS_SPREAD};
+use super::kind::{Region, RegionKind};
+use super::nodes::Nodes;
+use super::quadrature::{Accuracy, ConvergedValues, converge};
+use crate::pupil::launch::Launch;
+use crate::pupil::ray_model::{Aiming, RayModel};
 use crate::trace::RayLimit;
 use std::f64::consts::{PI, TAU};
 

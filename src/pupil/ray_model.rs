@@ -74,24 +74,27 @@ pub struct RayModel {
 }
 
 impl RayModel {
-    /// A lens at a zoom position. Rays are aimed paraxially unless the chief ray of the farthest
-    /// field then misses the centre of the stop by more than a quarter of its radius.
+    /// A lens at a zoom position, aimed as [`choose_aiming`](Self::choose_aiming) decides.
+    ///
+    /// # Errors
+    /// A lens that cannot be resolved, or an aperture without meaning for it.
     pub fn from_lens(lens: &Lens, zoom: usize) -> Result<Self, RayModelError> {
-        let mut bench = Self::with_aiming(lens, zoom, Aiming::Paraxial)?;
-        if bench.stop_miss().is_none_or(|miss| miss > WIDE_AIMING_THRESHOLD) {
-            bench.aiming = Aiming::Chief;
-        }
-        Ok(bench)
+        let mut model = Self::with_aiming(lens, zoom, Aiming::Paraxial)?;
+        model.choose_aiming();
+        Ok(model)
     }
 
-    /// A lens at a zoom position, aimed as said.
+    /// A lens at a zoom position, with a given aiming.
+    ///
+    /// # Errors
+    /// As of [`from_lens`](Self::from_lens).
     pub fn with_aiming(lens: &Lens, zoom: usize, aiming: Aiming) -> Result<Self, RayModelError> {
         let system = |w: &crate::lens::Wavelength| Ok((w.um, w.weight, lens.resolve(zoom, w.um)?));
         let systems: Result<Vec<_>, LensError> = lens.wavelengths.iter().map(system).collect();
-        let mut bench =
+        let mut model =
             Self::from_systems(systems?, lens.primary(), Beam::for_lens(lens, zoom), aiming)?;
-        bench.fields.clone_from(&lens.fields_at(zoom).values);
-        Ok(bench)
+        model.fields.clone_from(&lens.fields_at(zoom).values);
+        Ok(model)
     }
 
     /// Systems at several wavelengths in micrometres, each with its weight.
@@ -147,25 +150,6 @@ impl RayModel {
         seidel(&self.channels[self.primary].system, &self.first_order, outer)
     }
 
-    /// The same beam without a search for the stop: the rim of the stop limits it, where that is
-    /// what the coordinates of the pupil lead to.
-    ///
-    /// # Errors
-    /// Numbers that cannot be traced.
-    pub fn limited_by_stop(&self) -> Result<Self, SystemError> {
-        let (stop, radius) = (self.stop(), self.stop_radius());
-        let color = |color: &Channel| {
-            let mut system = color.system.clone();
-            let rim = &mut system.surfaces[stop].semi_diameter;
-            *rim = rim.min(radius);
-            let tracer = Tracer::new(&system)?;
-            Ok(Channel { system, tracer, ..color.clone() })
-        };
-        let colors: Result<_, SystemError> = self.channels.iter().map(color).collect();
-        let beam = Beam { aperture: Aperture::StopSemiDiameter(radius), ..self.beam };
-        Ok(Self { channels: colors?, beam, aiming: Aiming::Chief, ..self.clone() })
-    }
-
     /// The same beam through a lens that has changed at one wavelength: where its stop limits it,
     /// the stop is as large as that says.
     pub(super) fn with_system(
@@ -173,15 +157,15 @@ impl RayModel {
         wavelength: usize,
         system: System<f64>,
     ) -> Result<Self, SystemError> {
-        let mut bench = self.clone();
-        if let Aperture::StopSemiDiameter(radius) = &mut bench.beam.aperture {
+        let mut model = self.clone();
+        if let Aperture::StopSemiDiameter(radius) = &mut model.beam.aperture {
             *radius = system.surfaces[self.stop()].semi_diameter;
         }
-        let color = &mut bench.channels[wavelength];
+        let color = &mut model.channels[wavelength];
         color.tracer = Tracer::new(&system)?;
         color.unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
         color.system = system;
-        Ok(bench)
+        Ok(model)
     }
 
     /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces
@@ -208,9 +192,20 @@ impl RayModel {
         self.channels[self.primary].system.stop.unwrap_or(0)
     }
 
-    /// By how many stop radii the paraxial chief ray of the farthest field misses the centre of
-    /// the stop; `None` where that ray does not get there.
-    pub fn stop_miss(&self) -> Option<f64> {
+    /// Chooses between paraxial aiming and aiming by the real chief ray: the latter if the paraxial
+    /// chief ray of the farthest field misses the centre of the stop by more than
+    /// [`WIDE_AIMING_THRESHOLD`]. Returns that miss, in stop radii; `None` if the ray does not reach
+    /// the stop.
+    pub fn choose_aiming(&mut self) -> Option<f64> {
+        let miss = self.stop_miss();
+        let wide = miss.is_none_or(|miss| miss > WIDE_AIMING_THRESHOLD);
+        self.aiming = if wide { Aiming::Chief } else { Aiming::Paraxial };
+        miss
+    }
+
+    /// The distance of the paraxial chief ray of the farthest field from the centre of the stop, in
+    /// stop radii; `None` if the ray does not reach the stop.
+    fn stop_miss(&self) -> Option<f64> {
         let edge = FieldPoint { x: 0.0, y: self.beam.edge, weight: 1.0 };
         let launch = Launch::new(self, edge, self.primary, Aiming::Paraxial).ok()?;
         let [x, y] = launch.stop_point([0.0, 0.0])?;

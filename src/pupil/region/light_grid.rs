@@ -4,13 +4,13 @@
 //! where light is, in how many pieces, and whether one point sees all of it; then the edge is
 //! followed from there.
 
-use super::boundary::{
-    Boundary, EdgePoint, EdgeSearch, GUESS_SPREAD, LimitFilter, PolarFrame, margin_minima,
-};
-use super::launch::Launch;
-use super::quadrature::Nodes;
-use super::ring::Annulus;
-use super::sample::{PupilPattern, pattern_points};
+use super::annulus::Annulus;
+use super::boundary::{Boundary, EdgePoint, PolarFrame};
+use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter, margin_minima};
+use super::kind::{Region, RegionKind};
+use super::nodes::Nodes;
+use crate::pupil::launch::Launch;
+use crate::pupil::patterns::{PupilPattern, pattern_points};
 use crate::trace::{ImagePoints, Rays, TraceSink};
 use std::f64::consts::{PI, TAU};
 
@@ -31,46 +31,13 @@ const AZIMUTHS: usize = 24;
 /// How far from the axis light is looked for first where no disc limits the pupil.
 const FIRST_REACH: f64 = 1.6;
 
-/// The form of a pupil.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RegionKind {
-    /// Nothing gets through.
-    Dark,
-    /// The whole disc gets through.
-    Clear,
-    /// One piece, bounded by arcs.
-    StarShaped(Boundary),
-    /// No single point sees all of it, or its edge is noise: it is sampled and clipped.
-    Irregular {
-        /// How many separate pieces were seen.
-        pieces: usize,
-        /// A square that holds all of it: its centre and half of its side.
-        square: ([f64; 2], f64),
-        /// Its two edges, where it is a ring about a shadow: its quadrature lies between them.
-        annulus: Option<Box<Annulus>>,
-    },
-    /// Nothing limits it, so that no beam is defined.
-    Unbounded,
-}
-
-/// The rays of a field at a wavelength that get through.
-#[derive(Debug, Clone)]
-pub struct Region<'a> {
-    /// Where its rays start.
-    pub launch: Launch<'a>,
-    /// Its form.
-    pub kind: RegionKind,
-    /// Rays traced to find it.
-    pub rays: usize,
-}
-
 impl<'a> Region<'a> {
     /// The region of a launch.
     pub fn new(launch: Launch<'a>) -> Self {
-        let disc = launch.bench.ends_at_disc();
+        let disc = launch.model.ends_at_disc();
         let shadows = launch.obstruction_centers();
         let mut rays = 0;
-        if launch.bench.stop_radius() == 0.0 {
+        if launch.model.stop_radius() == 0.0 {
             return Self { launch, kind: RegionKind::Dark, rays };
         }
         if disc && launch.is_clear(&shadows, &mut rays) {
@@ -94,7 +61,7 @@ impl<'a> Region<'a> {
         let frame = match &self.kind {
             RegionKind::Clear => PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
             RegionKind::StarShaped(_) | RegionKind::Irregular { .. }
-                if self.launch.bench.ends_at_disc() =>
+                if self.launch.model.ends_at_disc() =>
             {
                 PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] }
             }
@@ -223,7 +190,7 @@ impl LightGrid {
 
     /// Ever larger grids about the axis until one holds light, and all of it.
     fn scan(launch: &Launch<'_>, cells: usize, widest: f64, rays: &mut usize) -> Option<Self> {
-        let disc = launch.bench.ends_at_disc();
+        let disc = launch.model.ends_at_disc();
         let mut half = if disc { 1.0 } else { FIRST_REACH };
         loop {
             let grid = Self::sample(launch, cells, [0.0; 2], half);
@@ -240,7 +207,7 @@ impl LightGrid {
     fn sample(launch: &Launch<'_>, cells: usize, center: [f64; 2], half: f64) -> Self {
         let lit = vec![false; cells * cells];
         let mut grid = Self { cells, center, half, lit, rays: 0 };
-        let disc = launch.bench.ends_at_disc();
+        let disc = launch.model.ends_at_disc();
         let wanted = |p: [f64; 2]| !disc || p[0].hypot(p[1]) <= 1.0;
         let mirrored = launch.is_symmetric();
         let chosen: Vec<usize> = (0..cells * cells)
@@ -280,7 +247,7 @@ impl LightGrid {
     }
 
     fn classify(&self, launch: &Launch<'_>, shadows: &[Option<[f64; 2]>]) -> RegionKind {
-        if !launch.bench.ends_at_disc() && self.touches_its_edge() {
+        if !launch.model.ends_at_disc() && self.touches_its_edge() {
             return RegionKind::Unbounded;
         }
         let pieces = self.count_pieces();

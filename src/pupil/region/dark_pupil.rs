@@ -5,9 +5,9 @@
 //! that over a coarse grid, the depth of the shadow, has a derivative, and what reduces it lets
 //! light through.
 
-use super::launch::Launch;
-use super::region::{Region, RegionKind};
+use super::kind::{Region, RegionKind};
 use crate::lens::System;
+use crate::pupil::launch::Launch;
 use crate::trace::{Ray, RayLimit, Rays, SystemGradient};
 use std::f64::consts::PI;
 
@@ -114,7 +114,11 @@ impl DarkPupil {
     }
 
     /// The derivative of `factor` times that area by every number of the system.
-    pub(super) fn derivative(&self, region: &Region<'_>, factor: f64) -> SystemGradient<f64> {
+    pub(in crate::pupil) fn derivative(
+        &self,
+        region: &Region<'_>,
+        factor: f64,
+    ) -> SystemGradient<f64> {
         let tracer = &region.launch.channel().tracer;
         let by_depth = -factor * self.ideal_area() / self.rays.len().max(1) as f64;
         let mut total = SystemGradient::zero(tracer.surfaces());

@@ -3,10 +3,11 @@
 //! No point sees all of a ring, but from the middle of the shadow both of its edges are functions
 //! of azimuth. Gauss nodes between them converge as fast as those of a pupil that one point sees.
 
-use super::boundary::{Boundary, EdgeSearch, GUESS_SPREAD, LimitFilter, PolarFrame, PupilLimit};
-use super::launch::Launch;
-use super::quadrature::{Nodes, RadialLine};
-use super::rules::legendre;
+use super::boundary::{Boundary, PolarFrame, PupilLimit};
+use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
+use super::nodes::{Nodes, RadialLine};
+use crate::pupil::gauss_rules::legendre;
+use crate::pupil::launch::Launch;
 use crate::trace::RayLimit;
 use std::f64::consts::PI;
 

@@ -5,26 +5,12 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
 //! is integrated over one half.
 
-use super::boundary::{Boundary, BoundaryArc, EdgePoint, EdgeSearch, GUESS_SPREAD, PolarFrame};
-use super::region::{Region, RegionKind};
-use super::rules::{legendre, radial};
-use super::sample::additive_sequence;
+use super::boundary::Boundary;
+use super::edge_search::{EdgeSearch, GUESS_SPREAD};
+use super::kind::{Region, RegionKind};
+use super::nodes::{Grading, Nodes, RadialLine, clear_nodes, irregular_nodes, line_nodes};
+use crate::pupil::gauss_rules::legendre;
 use crate::trace::{Rays, TraceSink};
-use std::f64::consts::PI;
-
-/// Points of the pupil with their weights.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Nodes {
-    /// Pupil coordinates.
-    pub points: Vec<[f64; 2]>,
-    /// The share of the pupil that each stands for, in pupil coordinates: π for the whole disc.
-    pub weights: Vec<f64>,
-    /// Whether every point stands for its mirror image `(−px, py)` as well; the weights then count
-    /// both.
-    pub mirrored: bool,
-    /// Rays traced to find them.
-    pub rays: usize,
-}
 
 /// What is asked of a result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,93 +38,6 @@ pub struct ConvergedValues<const K: usize> {
     pub rays: usize,
     /// Whether the errors are what was asked for; else the rays ran out.
     pub converged: bool,
-}
-
-/// A radius of a split pupil, from the centre of its frame to its edge.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct RadialLine {
-    pub(super) azimuth: f64,
-    pub(super) edge: EdgePoint,
-    /// Its share of the turn, in the area of the frame.
-    pub(super) share: f64,
-    /// Where a cosine vanishes behind its end, in parts of its length: infinite where none does
-    /// nearby.
-    pub(super) grazing_distance: f64,
-}
-
-/// A cosine that vanishes farther out than this, in parts of the radius, is far away.
-const FAR: f64 = 1.5;
-
-/// The nodes on some radii. Where a cosine vanishes at the edge or close behind it, the image moves
-/// with the root of the distance from there: Gauss nodes in a variable that makes it smooth.
-fn line_nodes(spokes: &[RadialLine], frame: &PolarFrame, radii: usize) -> Nodes {
-    let mut nodes = Nodes::default();
-    for spoke in spokes {
-        let radius = spoke.edge.radius;
-        let sector = spoke.share * radius * radius;
-        let mut add = |r: f64, weight: f64| {
-            nodes.points.push(frame.point(spoke.azimuth, r * radius));
-            nodes.weights.push(sector * weight);
-        };
-        let beyond = spoke.grazing_distance - 1.0;
-        match (spoke.edge.limit.is_grazing(), spoke.grazing_distance < FAR) {
-            (false, false) => radial(radii).iter().for_each(|(r, weight)| add(*r, *weight)),
-            // r = 1 − s²
-            (true, false) => legendre(2 * radii).iter().for_each(|(s, w)| {
-                let r = 1.0 - s * s;
-                add(r, 2.0 * s * r * w);
-            }),
-            // r = 1 + beyond − s²
-            (false, true) => {
-                let [first, last] = [beyond.sqrt(), spoke.grazing_distance.sqrt()];
-                legendre(2 * radii).iter().for_each(|(t, w)| {
-                    let s = first + t * (last - first);
-                    let r = spoke.grazing_distance - s * s;
-                    add(r, 2.0 * s * (last - first) * r * w);
-                });
-            }
-            // r = 1 − beyond sinh² v, for both roots at once
-            (true, true) => {
-                let beyond = beyond.max(f64::EPSILON);
-                let last = (1.0 / beyond).sqrt().asinh();
-                legendre(3 * radii).iter().for_each(|(t, w)| {
-                    let v = t * last;
-                    let r = 1.0 - beyond * v.sinh().powi(2);
-                    add(r, beyond * (2.0 * v).sinh() * last * r * w);
-                });
-            }
-        }
-    }
-    nodes
-}
-
-/// How nodes are drawn to the ends of an arc: next to one along which a cosine vanishes, integrals
-/// along the radius change with the root of the distance from the corner.
-#[derive(Debug, Clone, Copy)]
-struct Grading {
-    from: bool,
-    to: bool,
-}
-
-impl Grading {
-    fn of(arcs: &[BoundaryArc], i: usize, whole: bool) -> Self {
-        let count = arcs.len();
-        let differs =
-            |other: &BoundaryArc| other.limit.is_grazing() && other.limit != arcs[i].limit;
-        let before = if i > 0 || whole { arcs.get((i + count - 1) % count) } else { None };
-        let after = if i + 1 < count || whole { arcs.get((i + 1) % count) } else { None };
-        Self { from: before.is_some_and(differs), to: after.is_some_and(differs) }
-    }
-
-    /// The place between 0 and 1 of a node, and how densely nodes lie there.
-    fn map(self, t: f64) -> (f64, f64) {
-        match (self.from, self.to) {
-            (false, false) => (t, 1.0),
-            (true, false) => (t * t, 2.0 * t),
-            (false, true) => (t * (2.0 - t), 2.0 * (1.0 - t)),
-            (true, true) => (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)),
-        }
-    }
 }
 
 /// Nodes along the radius and along half a turn, of the clear disc.
@@ -202,7 +101,7 @@ impl Region<'_> {
                 (Nodes { mirrored, rays, ..nodes }, spokes.into_iter().flatten().collect())
             }
             RegionKind::Irregular { square, .. } => {
-                let reach = if self.launch.bench.ends_at_disc() { 1.0 } else { f64::INFINITY };
+                let reach = if self.launch.model.ends_at_disc() { 1.0 } else { f64::INFINITY };
                 (irregular_nodes(*square, IRREGULAR_POINTS << (2 * order), reach), Vec::new())
             }
         }
@@ -236,9 +135,22 @@ impl Region<'_> {
         (spokes, search.rays)
     }
 
-    /// Traces nodes; `visit` gets the weight and the number of each ray that arrives in `sink`.
+    /// Traces nodes into a sink.
     pub fn trace<S: TraceSink<f64> + Default>(&self, nodes: &Nodes) -> TracedNodes<S> {
-        let mut landed = TracedNodes { sink: S::default(), weights: Vec::new(), lost: 0 };
+        self.launch_and_trace(nodes).1
+    }
+
+    /// Traces nodes into a sink; returns the rays as they were launched too.
+    pub(super) fn launch_and_trace<S: TraceSink<f64> + Default>(
+        &self,
+        nodes: &Nodes,
+    ) -> (Rays<f64>, TracedNodes<S>) {
+        let mut landed = TracedNodes {
+            sink: S::default(),
+            weights: Vec::new(),
+            lost: 0,
+            mirrored: nodes.mirrored,
+        };
         let mut rays = Rays::with_capacity(nodes.points.len());
         for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
             match self.launch.ray(*p) {
@@ -250,7 +162,7 @@ impl Region<'_> {
             }
         }
         self.launch.channel().tracer.trace_batch(&rays, &mut landed.sink);
-        landed
+        (rays, landed)
     }
 }
 
@@ -261,8 +173,10 @@ pub struct TracedNodes<S> {
     pub sink: S,
     /// The weight of each.
     pub weights: Vec<f64>,
-    /// How many did not even start.
+    /// The number of nodes from which no ray could be launched.
     pub lost: usize,
+    /// True if every ray stands for its mirror image as well; the weights count both.
+    pub mirrored: bool,
 }
 
 impl<S: TraceSink<f64>> TracedNodes<S> {
@@ -271,33 +185,6 @@ impl<S: TraceSink<f64>> TracedNodes<S> {
         let all = self.weights.iter().copied().enumerate();
         all.filter(|(i, _)| self.sink.fate(*i).is_imaged())
     }
-}
-
-fn clear_nodes(order: usize, mirrored: bool) -> Nodes {
-    let azimuths = if mirrored { order } else { 2 * order };
-    let turn = if mirrored { PI } else { 2.0 * PI };
-    let step = turn / azimuths as f64;
-    let mut nodes = Nodes { mirrored, ..Nodes::default() };
-    for (square, share) in legendre(order) {
-        for j in 0..azimuths {
-            let (sin, cos) = (step * (j as f64 + 0.5)).sin_cos();
-            let r = square.sqrt();
-            nodes.points.push([r * sin, r * cos]);
-            nodes.weights.push(PI * share / azimuths as f64);
-        }
-    }
-    nodes
-}
-
-/// An even sequence over a square. Points farther out than `reach`, where no beam is, are left out.
-fn irregular_nodes((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
-    let point = |i: usize| {
-        let u = additive_sequence([0.5; 2], i);
-        [0, 1].map(|k| center[k] + half * (2.0 * u[k] - 1.0))
-    };
-    let weight = 4.0 * half * half / count as f64;
-    let points: Vec<_> = (0..count).map(point).filter(|p| p[0].hypot(p[1]) <= reach).collect();
-    Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
 }
 
 /// The error of clipped points from their last change: four times as many are no more than four

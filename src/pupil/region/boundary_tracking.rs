@@ -1,8 +1,8 @@
 //! Following an edge while the lens moves a little: the same arcs between corners found anew.
 
 use super::boundary::{Boundary, BoundaryArc, PupilLimit};
-use super::launch::Launch;
-use super::region::{Region, RegionKind};
+use super::kind::{Region, RegionKind};
+use crate::pupil::launch::Launch;
 use std::f64::consts::PI;
 
 /// A corner is where both margins vanish, to this part of the pupil's size.

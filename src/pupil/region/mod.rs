@@ -1,0 +1,29 @@
+//! The region of the pupil plane from which the rays of a field get through, and integrals over it.
+//!
+//! A [`Region`] is searched for once: [`RegionKind`] says whether it is the whole disc, one piece
+//! with a [`Boundary`], an [`Annulus`] or irregular. Everything else is computed from it: quadrature
+//! nodes, an outline to draw, traced rays with their moments, and how far a dark pupil is from light.
+
+mod annulus;
+mod boundary;
+mod boundary_tracking;
+mod dark_pupil;
+mod edge_search;
+mod kind;
+mod light_grid;
+mod moments;
+mod nodes;
+mod outline;
+mod quadrature;
+mod traced_pupil;
+
+pub use annulus::Annulus;
+pub use boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
+pub use dark_pupil::DarkPupil;
+pub use kind::{Region, RegionKind};
+pub use moments::PupilMoments;
+pub use nodes::Nodes;
+pub(super) use nodes::RadialLine;
+pub use outline::{OutlineSide, PupilOutline};
+pub use quadrature::{Accuracy, ConvergedValues, TracedNodes, converge};
+pub use traced_pupil::TracedPupil;

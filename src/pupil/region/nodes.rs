@@ -1,0 +1,134 @@
+//! Quadrature nodes of the pupil.
+
+use super::boundary::{BoundaryArc, EdgePoint, PolarFrame};
+use crate::pupil::gauss_rules::{legendre, radial};
+use crate::pupil::patterns::additive_sequence;
+use std::f64::consts::PI;
+
+/// Points of the pupil with their weights.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Nodes {
+    /// Pupil coordinates.
+    pub points: Vec<[f64; 2]>,
+    /// The share of the pupil that each stands for, in pupil coordinates: π for the whole disc.
+    pub weights: Vec<f64>,
+    /// Whether every point stands for its mirror image `(−px, py)` as well; the weights then count
+    /// both.
+    pub mirrored: bool,
+    /// Rays traced to find them.
+    pub rays: usize,
+}
+
+/// A radius of a split pupil, from the centre of its frame to its edge.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::pupil) struct RadialLine {
+    pub(in crate::pupil) azimuth: f64,
+    pub(in crate::pupil) edge: EdgePoint,
+    /// Its share of the turn, in the area of the frame.
+    pub(in crate::pupil) share: f64,
+    /// Where a cosine vanishes behind its end, in parts of its length: infinite where none does
+    /// nearby.
+    pub(in crate::pupil) grazing_distance: f64,
+}
+
+/// A cosine that vanishes farther out than this, in parts of the radius, is far away.
+const FAR: f64 = 1.5;
+
+/// The nodes on some radii. Where a cosine vanishes at the edge or close behind it, the image moves
+/// with the root of the distance from there: Gauss nodes in a variable that makes it smooth.
+pub(super) fn line_nodes(spokes: &[RadialLine], frame: &PolarFrame, radii: usize) -> Nodes {
+    let mut nodes = Nodes::default();
+    for spoke in spokes {
+        let radius = spoke.edge.radius;
+        let sector = spoke.share * radius * radius;
+        let mut add = |r: f64, weight: f64| {
+            nodes.points.push(frame.point(spoke.azimuth, r * radius));
+            nodes.weights.push(sector * weight);
+        };
+        let beyond = spoke.grazing_distance - 1.0;
+        match (spoke.edge.limit.is_grazing(), spoke.grazing_distance < FAR) {
+            (false, false) => radial(radii).iter().for_each(|(r, weight)| add(*r, *weight)),
+            // r = 1 − s²
+            (true, false) => legendre(2 * radii).iter().for_each(|(s, w)| {
+                let r = 1.0 - s * s;
+                add(r, 2.0 * s * r * w);
+            }),
+            // r = 1 + beyond − s²
+            (false, true) => {
+                let [first, last] = [beyond.sqrt(), spoke.grazing_distance.sqrt()];
+                legendre(2 * radii).iter().for_each(|(t, w)| {
+                    let s = first + t * (last - first);
+                    let r = spoke.grazing_distance - s * s;
+                    add(r, 2.0 * s * (last - first) * r * w);
+                });
+            }
+            // r = 1 − beyond sinh² v, for both roots at once
+            (true, true) => {
+                let beyond = beyond.max(f64::EPSILON);
+                let last = (1.0 / beyond).sqrt().asinh();
+                legendre(3 * radii).iter().for_each(|(t, w)| {
+                    let v = t * last;
+                    let r = 1.0 - beyond * v.sinh().powi(2);
+                    add(r, beyond * (2.0 * v).sinh() * last * r * w);
+                });
+            }
+        }
+    }
+    nodes
+}
+
+/// How nodes are drawn to the ends of an arc: next to one along which a cosine vanishes, integrals
+/// along the radius change with the root of the distance from the corner.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grading {
+    from: bool,
+    to: bool,
+}
+
+impl Grading {
+    pub(super) fn of(arcs: &[BoundaryArc], i: usize, whole: bool) -> Self {
+        let count = arcs.len();
+        let differs =
+            |other: &BoundaryArc| other.limit.is_grazing() && other.limit != arcs[i].limit;
+        let before = if i > 0 || whole { arcs.get((i + count - 1) % count) } else { None };
+        let after = if i + 1 < count || whole { arcs.get((i + 1) % count) } else { None };
+        Self { from: before.is_some_and(differs), to: after.is_some_and(differs) }
+    }
+
+    /// The place between 0 and 1 of a node, and how densely nodes lie there.
+    pub(super) fn map(self, t: f64) -> (f64, f64) {
+        match (self.from, self.to) {
+            (false, false) => (t, 1.0),
+            (true, false) => (t * t, 2.0 * t),
+            (false, true) => (t * (2.0 - t), 2.0 * (1.0 - t)),
+            (true, true) => (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)),
+        }
+    }
+}
+
+pub(super) fn clear_nodes(order: usize, mirrored: bool) -> Nodes {
+    let azimuths = if mirrored { order } else { 2 * order };
+    let turn = if mirrored { PI } else { 2.0 * PI };
+    let step = turn / azimuths as f64;
+    let mut nodes = Nodes { mirrored, ..Nodes::default() };
+    for (square, share) in legendre(order) {
+        for j in 0..azimuths {
+            let (sin, cos) = (step * (j as f64 + 0.5)).sin_cos();
+            let r = square.sqrt();
+            nodes.points.push([r * sin, r * cos]);
+            nodes.weights.push(PI * share / azimuths as f64);
+        }
+    }
+    nodes
+}
+
+/// An even sequence over a square. Points farther out than `reach`, where no beam is, are left out.
+pub(super) fn irregular_nodes((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
+    let point = |i: usize| {
+        let u = additive_sequence([0.5; 2], i);
+        [0, 1].map(|k| center[k] + half * (2.0 * u[k] - 1.0))
+    };
+    let weight = 4.0 * half * half / count as f64;
+    let points: Vec<_> = (0..count).map(point).filter(|p| p[0].hypot(p[1]) <= reach).collect();
+    Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
+}
