@@ -11,8 +11,10 @@ mod fan;
 mod illumination;
 mod mtf;
 mod pupil;
+mod ray_layout;
 mod rims;
 mod spot;
+mod spot_points;
 mod wavefront;
 
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
@@ -20,8 +22,10 @@ pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, illumination};
 pub use mtf::{MtfPoint, mtf};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
+pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
 pub use rims::{RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities};
 pub use spot::{MonochromaticSpot, Spot, airy_radius, rounding_error, spot, spots};
+pub use spot_points::{SpotPoints, spot_points};
 pub use wavefront::{Wavefront, path_differences, wavefront};
 
 use crate::lens::FieldPoint;

@@ -6,7 +6,10 @@
 //! Rows are counted from 0. Thickness and medium of a row belong to the gap behind it; the last
 //! thickness leads to the image plane, which has no row. Curvature is stored, radius is shown.
 
+mod blank;
 mod check;
+mod diff;
+mod edit;
 mod geometry;
 pub mod glass;
 mod gradient;
@@ -18,7 +21,10 @@ mod surface_number;
 mod system;
 mod vary;
 
+pub use blank::blank;
 pub use check::LensError;
+pub use diff::added_glass;
+pub use edit::{Edit, EditError, EditedCell, apply_edit};
 pub use gradient::{GradientIndex, ParaxialGrin};
 pub use parameter::{Parameter, Quantity};
 pub use resolve::paraxial_image_distance;

@@ -6,6 +6,7 @@
 
 mod double;
 mod dual;
+pub mod expression;
 mod jet;
 mod lanes;
 pub mod quadrature;

@@ -4,14 +4,14 @@
 //! numbers. Results carry the version of the design that they belong to, and how long each took.
 
 use super::clock::{Timed, now, time};
-use super::layout::{RayLayout, ray_layout};
 use super::pupils::{FieldPupils, field_pupils};
 use super::saving::measure_effect_costs;
-use super::scatter::{SpotPoints, spot_points};
 use super::slot::{LatestRequest, Slot};
 use super::view::AnalysisSettings;
 use crate::analysis;
-use crate::analysis::{AnalysisError, Distortion, Fan, FieldCurvature, Illumination, Spot};
+use crate::analysis::{
+    AnalysisError, Distortion, Fan, FieldCurvature, Illumination, RayLayout, Spot, SpotPoints,
+};
 use crate::effects;
 use crate::effects::{EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
@@ -242,9 +242,9 @@ impl Analyses {
         let go_on = || (!interrupted()).then_some(());
         let b = Arc::clone(&bench.value);
         let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
-        let layout = time(|| ray_layout(&b, settings.rays));
+        let layout = time(|| analysis::ray_layout(&b, settings.rays));
         go_on()?;
-        let scatter = time(|| spot_points(&b));
+        let scatter = time(|| analysis::spot_points(&b));
         go_on()?;
         let spots = time(|| for_each_field(&b, |field| spot_with_time(&b, field, accuracy)));
         go_on()?;

@@ -8,10 +8,7 @@ use super::forming::GrinCommand;
 use super::quest::StructureSearchRequest;
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
-use crate::lens::{
-    Aperture, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, Variable, Wavelength,
-    ZoomPosition,
-};
+use crate::lens::{Edit, Lens};
 use crate::merit::Goal;
 use crate::optimize::{DescentMethod, pareto};
 use crate::search::SteerCommand;
@@ -24,6 +21,9 @@ use std::path::PathBuf;
 pub enum Command {
     /// Change the design: one undo step.
     Edit(Edit),
+    /// Limits the beam by the rim of the stop as it is now, instead of by an ideal entrance pupil: one
+    /// undo step.
+    LimitByStop,
     /// Typing into a cell has ended: the next edit of the same cell is an undo step of its own.
     CommitEdit,
     /// Take back the last step.
@@ -148,212 +148,8 @@ pub enum StructureSearchCommand {
     DismissUnfinished,
 }
 
-/// One change of the design.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Edit {
-    /// Write a number.
-    Set {
-        /// Which.
-        parameter: Parameter,
-        /// Its new value.
-        value: f64,
-    },
-    /// Write what was typed into the cell of a number: see [`evaluate`](super::evaluate).
-    Type {
-        /// Which.
-        parameter: Parameter,
-        /// A number or arithmetic on the old value.
-        text: String,
-    },
-    /// The same for the cell that shows a curvature as a radius; nothing, 0 or `inf` is a plane.
-    TypeRadius {
-        /// The row.
-        surface: usize,
-        /// A number or arithmetic on the old radius.
-        text: String,
-    },
-    /// Limit a surface, or let it clip nothing.
-    SetSemiDiameter {
-        /// The row.
-        surface: usize,
-        /// In mm.
-        value: Option<f64>,
-    },
-    /// Replace all asphere coefficients, r⁴ first.
-    SetAsphere {
-        /// The row.
-        surface: usize,
-        /// The coefficients.
-        terms: Vec<f64>,
-    },
-    /// Fill the gap behind a row with something else, or make the row a mirror.
-    SetMedium {
-        /// The row.
-        surface: usize,
-        /// Glass, air, a mirror.
-        medium: Medium,
-    },
-    /// What lies in front of the first surface.
-    SetObjectMedium(Medium),
-    /// Make this row the aperture stop.
-    SetStop(usize),
-    /// Whether the far half of the sphere counts too.
-    SetHyperhemisphere {
-        /// The row.
-        surface: usize,
-        /// Whether it does.
-        hyper: bool,
-    },
-    /// A remark on a row.
-    SetComment {
-        /// The row.
-        surface: usize,
-        /// The remark.
-        text: String,
-    },
-    /// Replace a whole row.
-    SetRow {
-        /// Which.
-        surface: usize,
-        /// By what.
-        row: Row,
-    },
-    /// Put a row in front of row `at`, or behind the last one.
-    InsertRow {
-        /// Where it will stand.
-        at: usize,
-        /// The row.
-        row: Row,
-    },
-    /// Take a row and the gap behind it out.
-    RemoveRow(usize),
-    /// Turn a group of rows around, so that its last surface comes first.
-    ReverseRows {
-        /// Its first row.
-        first: usize,
-        /// Its last row.
-        last: usize,
-    },
-    /// Multiply every length.
-    Scale(f64),
-    /// What the lens is called.
-    SetName(String),
-    /// Where its numbers come from.
-    SetSource(String),
-    /// Anything else worth knowing.
-    SetNotes(String),
-    /// Where the light comes from.
-    SetObject(Object),
-    /// How wide the beam is.
-    SetAperture(Aperture),
-    /// Limit the beam by the rim of the stop as it is now, instead of by an ideal entrance pupil.
-    LimitByStop,
-    /// The field points.
-    SetFields(Fields),
-    /// The wavelengths.
-    SetWavelengths(Vec<Wavelength>),
-    /// Solve the last gap for the paraxial focus, displaced by so many mm; or no longer, and leave
-    /// the image plane where it is.
-    SetFocusSolve(Option<f64>),
-    /// Let an optimizer change a number, within bounds.
-    AddVariable(Variable),
-    /// Let it no longer.
-    RemoveVariable(Parameter),
-    /// Let an optimizer change these numbers and no others.
-    SetVariables(Vec<Variable>),
-    /// Let a number follow another.
-    SetPickup(Pickup),
-    /// Let it follow no longer; it keeps its value.
-    RemovePickup(Parameter),
-    /// Put a zoom position in front of position `at`, or behind the last one.
-    InsertZoom {
-        /// Where it will stand.
-        at: usize,
-        /// The position.
-        position: ZoomPosition,
-    },
-    /// Take a zoom position out.
-    RemoveZoom(usize),
-    /// Replace a zoom position.
-    SetZoom {
-        /// Which.
-        at: usize,
-        /// By what.
-        position: ZoomPosition,
-    },
-    /// Replace the whole design.
-    Replace(Box<Lens>),
-}
-
 impl From<Edit> for Command {
     fn from(edit: Edit) -> Self {
         Self::Edit(edit)
-    }
-}
-
-/// The cell that an edit writes to; consecutive edits of one cell are one undo step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum EditedCell {
-    Number(Parameter),
-    Comment(usize),
-    Name,
-    Source,
-    Notes,
-}
-
-impl Edit {
-    /// The cell into which a person types or drags with this edit, if it is such a one.
-    pub(super) fn cell(&self) -> Option<EditedCell> {
-        let curvature = |surface| Parameter::new(surface, Quantity::Curvature);
-        match self {
-            Self::Set { parameter, .. } | Self::Type { parameter, .. } => {
-                Some(EditedCell::Number(*parameter))
-            }
-            Self::TypeRadius { surface, .. } => Some(EditedCell::Number(curvature(*surface))),
-            Self::SetComment { surface, .. } => Some(EditedCell::Comment(*surface)),
-            Self::SetName(_) => Some(EditedCell::Name),
-            Self::SetSource(_) => Some(EditedCell::Source),
-            Self::SetNotes(_) => Some(EditedCell::Notes),
-            _ => None,
-        }
-    }
-
-    /// What the edit is called in a menu: `Undo insert surface`.
-    pub fn title(&self) -> String {
-        match self {
-            Self::Set { parameter, .. } | Self::Type { parameter, .. } => parameter.to_string(),
-            Self::TypeRadius { surface, .. } => format!("radius of surface {surface}"),
-            Self::SetSemiDiameter { surface, .. } => format!("semi-diameter of surface {surface}"),
-            Self::SetAsphere { surface, .. } => format!("asphere of surface {surface}"),
-            Self::SetMedium { surface, .. } => format!("glass after surface {surface}"),
-            Self::SetObjectMedium(_) => "object medium".to_owned(),
-            Self::SetStop(surface) => format!("stop to surface {surface}"),
-            Self::SetHyperhemisphere { surface, .. } => format!("far half of surface {surface}"),
-            Self::SetComment { surface, .. } => format!("remark on surface {surface}"),
-            Self::SetRow { surface, .. } => format!("surface {surface}"),
-            Self::InsertRow { at, .. } => format!("insert surface {at}"),
-            Self::RemoveRow(surface) => format!("remove surface {surface}"),
-            Self::ReverseRows { first, last } => format!("flip surfaces {first} to {last}"),
-            Self::Scale(factor) => format!("scale by {factor}"),
-            Self::SetName(_) => "name".to_owned(),
-            Self::SetSource(_) => "source".to_owned(),
-            Self::SetNotes(_) => "notes".to_owned(),
-            Self::SetObject(_) => "object".to_owned(),
-            Self::SetAperture(_) => "aperture".to_owned(),
-            Self::LimitByStop => "limit the beam by the stop".to_owned(),
-            Self::SetFields(_) => "fields".to_owned(),
-            Self::SetWavelengths(_) => "wavelengths".to_owned(),
-            Self::SetFocusSolve(_) => "focus solve".to_owned(),
-            Self::AddVariable(variable) => format!("free the {}", variable.parameter),
-            Self::SetVariables(_) => "variables".to_owned(),
-            Self::RemoveVariable(parameter) => format!("fix the {parameter}"),
-            Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter),
-            Self::RemovePickup(parameter) => format!("no pickup of the {parameter}"),
-            Self::InsertZoom { at, .. } => format!("insert zoom position {at}"),
-            Self::RemoveZoom(at) => format!("remove zoom position {at}"),
-            Self::SetZoom { at, .. } => format!("zoom position {at}"),
-            Self::Replace(_) => "replace the lens".to_owned(),
-        }
     }
 }

@@ -1,7 +1,6 @@
 //! Undo and redo: whole lenses, shared and never copied.
 
-use super::command::EditedCell;
-use crate::lens::Lens;
+use crate::lens::{EditedCell, Lens};
 use std::sync::Arc;
 
 /// How many steps can be taken back.
@@ -24,15 +23,9 @@ struct UndoStep {
 }
 
 impl UndoStack {
-    /// The lens before the typing into this cell began, if that is what the last step was.
-    pub(super) fn before_edit(&self, cell: Option<EditedCell>) -> Option<&Arc<Lens>> {
-        let same = cell.is_some() && self.typing == cell;
-        self.past.last().filter(|_| same).map(|step| &step.lens)
-    }
-
     /// Notes that `lens` was changed by an edit; more typing into one cell is no new step.
     pub(super) fn push(&mut self, lens: Arc<Lens>, title: String, cell: Option<EditedCell>) {
-        let merges = self.before_edit(cell).is_some();
+        let merges = cell.is_some() && self.typing == cell && !self.past.is_empty();
         self.future.clear();
         self.typing = cell;
         if merges {

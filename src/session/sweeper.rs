@@ -403,7 +403,7 @@ impl Run {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::blank;
+    use crate::lens::blank;
     use crate::session::judged::score;
 
     /// Breaks at its third step.

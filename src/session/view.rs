@@ -7,7 +7,7 @@ use super::fronts::ParetoView;
 use super::laboratory::ExperimentRun;
 use super::worker::OptimizationSnapshot;
 use crate::effects::EffectOverrides;
-use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength};
+use crate::lens::{Lens, blank};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -81,16 +81,6 @@ impl SessionView {
     pub fn is_current(&self) -> bool {
         self.results.as_ref().is_some_and(|results| results.version == self.version)
     }
-
-    /// Whether there is a step to take back.
-    pub fn can_undo(&self) -> bool {
-        self.undo.is_some()
-    }
-
-    /// Whether there is a step to do again.
-    pub fn can_redo(&self) -> bool {
-        self.redo.is_some()
-    }
 }
 
 /// What is shown and how exactly.
@@ -142,36 +132,4 @@ pub struct Message {
     pub severity: Severity,
     /// The words.
     pub text: String,
-}
-
-/// A lens to start from: one plane-parallel plate behind the stop.
-pub fn blank() -> Lens {
-    let row = |thickness: f64, medium: Medium, stop: bool| Row {
-        thickness,
-        medium,
-        stop,
-        semi_diameter: Some(10.0),
-        ..Row::default()
-    };
-    Lens {
-        name: "New lens".to_owned(),
-        source: String::new(),
-        notes: String::new(),
-        object: Object::Infinity,
-        object_medium: Medium::Air,
-        aperture: Aperture::EntrancePupilDiameter(10.0),
-        fields: Fields {
-            kind: FieldKind::Angle,
-            values: vec![FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }],
-        },
-        wavelengths: vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }],
-        surfaces: vec![
-            row(5.0, Medium::Glass("SCHOTT N-BK7".to_owned()), true),
-            row(50.0, Medium::Air, false),
-        ],
-        zoom: Vec::new(),
-        variables: Vec::new(),
-        pickups: Vec::new(),
-        image_solve: None,
-    }
 }

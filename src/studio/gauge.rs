@@ -12,8 +12,9 @@ use super::app::Studio;
 use super::draw::RenderBackend;
 use super::shell::{self, AppResult, Persistence, StudioError};
 use super::{first_lens, panels};
+use crate::lens::{Edit, Parameter, Quantity};
 use crate::measure::{age_ms, processor_ms, time_ms};
-use crate::session::{Command, Edit, Session};
+use crate::session::{Command, Session};
 
 /// How many edits are timed.
 const EDITS: usize = 21;
@@ -174,9 +175,11 @@ impl WindowBenchmark {
     }
 
     fn time_edit(&mut self, i: usize) -> f64 {
-        let text = if i.is_multiple_of(2) { "*1.001" } else { "/1.001" };
-        let edit = Edit::TypeRadius { surface: 0, text: text.to_owned() };
         let session = self.studio.session_mut();
+        let curvature = Parameter::new(0, Quantity::Curvature);
+        let factor = if i.is_multiple_of(2) { 1.001 } else { 1.0 / 1.001 };
+        let value = session.lens().get(curvature).unwrap_or(0.0) / factor;
+        let edit = Edit::Set { parameter: curvature, value };
         let ((), ms) = time_ms(|| {
             session.apply(Command::Edit(edit));
             session.apply(Command::CommitEdit);

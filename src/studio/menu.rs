@@ -10,7 +10,8 @@ use super::experiment;
 use super::panels::PanelKind;
 use super::wording::counted_from_one;
 use crate::files::{self, BundledLens};
-use crate::session::{Command, SessionView, blank};
+use crate::lens::blank;
+use crate::session::{Command, SessionView};
 
 /// What the menu asks for.
 #[derive(Debug)]

@@ -28,8 +28,8 @@ use std::path::Path;
 use shell::{Persistence, StudioError};
 
 use crate::files;
-use crate::lens::Lens;
-use crate::session::{Command, Session, blank};
+use crate::lens::{Lens, blank};
+use crate::session::{Command, Session};
 
 /// Opens the studio on a file, or on the first lens that comes with the program, and stays until
 /// the window is closed.

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use aplanat::grin_task::{SlicePlane, SpatialAxis};
+use aplanat::lens::blank;
 use aplanat::session::{
     Command, GrinCommand, GrinView, RunStatus, Session, SessionView, SliceQuantity, SliceSettings,
-    blank,
 };
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::panels::GrinPanel;

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use aplanat::session::{Command, GrinCommand, GrinRun, RunStatus, Session, blank};
+use aplanat::lens::blank;
+use aplanat::session::{Command, GrinCommand, GrinRun, RunStatus, Session};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::shell::Persistence;

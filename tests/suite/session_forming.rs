@@ -7,10 +7,11 @@ use aplanat::grin::field::RegularGrid;
 use aplanat::grin_task::{
     self, GrinField, GrinOptimizer, GrinTask, RefinementLevel, SlicePlane, SpatialAxis,
 };
+use aplanat::lens::blank;
 use aplanat::math::Vec3;
 use aplanat::session::{
     Command, GrinCommand, GrinRun, GrinView, RunStatus, Session, SessionEvent, Severity, Slice,
-    SliceQuantity, SliceSettings, blank,
+    SliceQuantity, SliceSettings,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

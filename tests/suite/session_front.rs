@@ -170,6 +170,6 @@ fn a_sweep_that_cannot_begin_says_why() {
     session.apply(start(SOON, false));
     assert!(session.view().pareto.error.is_none());
     stands(&mut session, RunStatus::Finished);
-    session.apply(Command::New(Box::new(aplanat::session::blank())));
+    session.apply(Command::New(Box::new(aplanat::lens::blank())));
     assert!(session.view().pareto.run.is_none(), "another lens has no front yet");
 }

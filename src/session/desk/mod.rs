@@ -4,8 +4,7 @@ mod exploring;
 mod forming;
 
 use super::analyst::{AnalysisResults, Analyst, EffectTiming, Request};
-use super::command::{Command, Edit};
-use super::edit::apply_edit;
+use super::command::Command;
 use super::explorations::StructureSearchState;
 use super::forming::GrinState;
 use super::fronts::ParetoState;
@@ -18,10 +17,11 @@ use super::worker::{
 };
 use crate::experiments::{self, Effort, ExperimentReport};
 use crate::files;
-use crate::lens::Lens;
+use crate::lens::{Edit, Lens, apply_edit};
 use crate::merit::Goal;
 use crate::optimize;
 use crate::optimize::DescentMethod;
+use crate::pupil::limited_by_stop;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -146,6 +146,7 @@ impl Session {
     pub fn apply(&mut self, command: Command) -> Vec<SessionEvent> {
         match command {
             Command::Edit(edit) => self.edit(&edit),
+            Command::LimitByStop => self.limit_by_stop(),
             Command::CommitEdit => self.history.commit(),
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),
@@ -285,15 +286,29 @@ impl Session {
     }
 
     fn edit(&mut self, edit: &Edit) {
-        let cell = edit.cell();
-        let base = self.history.before_edit(cell).unwrap_or(&self.lens);
-        match apply_edit(base, edit) {
+        match apply_edit(&self.lens, edit) {
             Ok(lens) if lens == *self.lens => {}
             Ok(lens) => {
-                self.history.push(Arc::clone(&self.lens), edit.title(), cell);
+                self.history.push(Arc::clone(&self.lens), edit.title(), edit.cell());
                 self.show(Arc::new(lens));
             }
             Err(why) => self.say(Severity::Warning, why.to_string()),
+        }
+    }
+
+    fn limit_by_stop(&mut self) {
+        let limited = limited_by_stop(&self.lens).map_err(|why| why.to_string());
+        let limited = limited.and_then(|lens| {
+            let replace = Edit::Replace(Box::new(lens));
+            apply_edit(&self.lens, &replace).map_err(|why| why.to_string())
+        });
+        match limited {
+            Ok(lens) => {
+                let title = "limit the beam by the stop".to_owned();
+                self.history.push(Arc::clone(&self.lens), title, None);
+                self.show(Arc::new(lens));
+            }
+            Err(why) => self.say(Severity::Warning, why),
         }
     }
 

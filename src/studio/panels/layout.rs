@@ -9,11 +9,10 @@ use eframe::egui::{Align, ComboBox, DragValue, Layout as Arrange, RichText, Stro
 use glam::DVec2;
 
 use super::{Panel, displayed_results, field_name, show_missing_results, swatch, zoom_name};
-use crate::lens::System;
+use crate::analysis::{LayoutRay, RayLayout};
+use crate::lens::{System, added_glass};
 use crate::math::Vec3;
-use crate::session::{
-    Analyses, AnalysisResults, Command, LayoutRay, RayLayout, SessionView, added_glass,
-};
+use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};

@@ -33,8 +33,8 @@ use super::draw::RenderBackend;
 use super::number;
 use super::wording::{capitalize, counted_from_one};
 use crate::analysis::{Estimate, Spot};
-use crate::lens::{FieldKind, FieldPoint, Lens, ParameterKind, add_variables};
-use crate::session::{Analyses, AnalysisResults, Command, Edit, SessionView};
+use crate::lens::{Edit, FieldKind, FieldPoint, Lens, ParameterKind, add_variables};
+use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 
 /// A part of the window. It shows a view and writes down wishes; it changes nothing.
 pub trait Panel {

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
 use crate::lens::{Aperture, Lens, ParameterKind, Quantity};
+use crate::math::expression::evaluate;
 use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
-use crate::session::{Command, Edit, OptimizationSnapshot, SessionView, evaluate};
+use crate::session::{Command, OptimizationSnapshot, SessionView};
 use crate::studio::field::{EditBuffers, InputPlacement, TextInput};
 use crate::studio::number;
 use crate::studio::panels::{add_variables_edit, field_name};
@@ -149,7 +150,7 @@ impl MeritEditor {
             let hint = "Makes the rim of the stop, as large as the beam is there now, the aperture \
                         of the lens: one undo step";
             if warning_with_fix(ui, &what, "Limit the beam by the stop", hint) {
-                wishes.push(Edit::LimitByStop.into());
+                wishes.push(Command::LimitByStop);
             }
         }
         let rim = |v: &crate::lens::Variable| v.parameter.quantity == Quantity::SemiDiameter;

@@ -1,7 +1,6 @@
 //! What can be done with a row: insert, delete, turn around, make it the stop.
 
-use crate::lens::{Lens, Medium, Row};
-use crate::session::Edit;
+use crate::lens::{Edit, Lens, Medium, Row};
 
 /// Something to do with a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

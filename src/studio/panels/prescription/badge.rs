@@ -5,8 +5,9 @@ use eframe::egui::{
     Ui, Visuals, vec2,
 };
 
-use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
-use crate::session::{Command, Edit, evaluate};
+use crate::lens::{Edit, Lens, Parameter, Pickup, Quantity, Variable};
+use crate::math::expression::evaluate;
+use crate::session::Command;
 use crate::studio::field::{EditBuffers, InputPlacement, TextInput};
 use crate::studio::number;
 use crate::studio::wording::counted_from_one;
@@ -153,7 +154,7 @@ impl StatusMenu<'_> {
             choice(ui, matches!(decides, ParameterStatus::Pickup(_)), "Pickup", edits);
         }
         if self.is_last_gap() {
-            let edits = vec![Edit::SetFocusSolve(Some(0.0))];
+            let edits = vec![Edit::SetImageSolve(Some(0.0))];
             choice(
                 ui,
                 matches!(decides, ParameterStatus::ImageSolve(_)),
@@ -169,7 +170,7 @@ impl StatusMenu<'_> {
             ParameterStatus::Fixed => Vec::new(),
             ParameterStatus::Variable(_) => vec![Edit::RemoveVariable(self.parameter)],
             ParameterStatus::Pickup(_) => vec![Edit::RemovePickup(self.parameter)],
-            ParameterStatus::ImageSolve(_) => vec![Edit::SetFocusSolve(None)],
+            ParameterStatus::ImageSolve(_) => vec![Edit::SetImageSolve(None)],
         }
     }
 
@@ -252,7 +253,7 @@ impl StatusMenu<'_> {
         if let Some(offset) =
             self.number_line(ui, "Displaced by, mm", Some(offset), drafts, parse_value)
         {
-            wishes.push(Edit::SetFocusSolve(Some(offset)).into());
+            wishes.push(Edit::SetImageSolve(Some(offset)).into());
         }
     }
 

@@ -1,5 +1,7 @@
 //! The table of the prescription.
 
+use std::sync::Arc;
+
 use eframe::egui::{
     Align, Button, Color32, Id, Key, Layout, Modifiers, Popup, PopupCloseBehavior, Response,
     RichText, ScrollArea, Ui, vec2,
@@ -8,8 +10,9 @@ use egui_extras::{Column as Width, TableBuilder, TableRow};
 
 use super::badge::{self, ParameterStatus};
 use super::{actions, glass};
-use crate::lens::{Lens, Medium, Object, Parameter, Quantity};
-use crate::session::{Command, Edit, SessionView, apply_edit, evaluate};
+use crate::lens::{Edit, Lens, Medium, Object, Parameter, Quantity, apply_edit};
+use crate::math::expression::evaluate;
+use crate::session::{Command, SessionView};
 use crate::studio::field::{EditBuffers, InputPlacement, TextInput as Cell};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -258,7 +261,8 @@ impl PrescriptionTable<'_> {
             placement: InputPlacement::Table,
         };
         let place = (column, surface);
-        let response = self.text_cell(ui, place, cell, |text| Ok(typed_edit(parameter, text)));
+        let lens = Arc::clone(&self.view.lens);
+        let response = self.text_cell(ui, place, cell, |text| typed_edit(&lens, parameter, text));
         // A rim that is not written has nothing to vary.
         if self.view.lens.get(parameter).is_some() || !limit {
             badge::show(ui, &self.view.lens, parameter, self.buffers, self.commands);
@@ -454,12 +458,23 @@ fn cell_id(column: TableColumn, row: usize) -> Id {
     Id::unique(("prescription cell", column, row))
 }
 
-/// What is typed into the cell of a number; a curvature is typed as its radius.
-fn typed_edit(parameter: Parameter, text: &str) -> Edit {
-    let text = text.to_owned();
-    match parameter {
-        Parameter { surface, quantity: Quantity::Curvature } => Edit::TypeRadius { surface, text },
-        _ => Edit::Type { parameter, text },
+/// The edit of a text that was typed into the cell of a number: a curvature is typed as a radius,
+/// and an empty or infinite semi-diameter removes the limit.
+fn typed_edit(lens: &Lens, parameter: Parameter, text: &str) -> Result<Edit, String> {
+    let (surface, value) = (parameter.surface, lens.get(parameter));
+    let number = |old: f64| evaluate(text, old).map_err(|why| why.to_string());
+    let number_or_infinity =
+        |old: f64| if text.trim().is_empty() { Ok(f64::INFINITY) } else { number(old) };
+    match parameter.quantity {
+        Quantity::Curvature => {
+            let radius = number_or_infinity(number::radius(value.unwrap_or(0.0)))?;
+            Ok(Edit::set_radius(surface, radius))
+        }
+        Quantity::SemiDiameter => {
+            let size = number_or_infinity(value.unwrap_or(f64::INFINITY))?;
+            Ok(Edit::SetSemiDiameter { surface, value: (size != f64::INFINITY).then_some(size) })
+        }
+        _ => Ok(Edit::Set { parameter, value: number(value.unwrap_or(0.0))? }),
     }
 }
 

@@ -2,8 +2,8 @@
 
 use eframe::egui::{Button, Ui};
 
-use crate::lens::{Lens, Medium, Parameter, ParameterKind, Quantity, Variable};
-use crate::session::{Command, Edit};
+use crate::lens::{Edit, Lens, Medium, Parameter, ParameterKind, Quantity, Variable};
+use crate::session::Command;
 use crate::studio::panels::add_variables_edit;
 
 /// What can be freed at once.

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use eframe::egui::{ColorImage, TextureHandle, TextureOptions, Ui, Vec2};
 
-use crate::lens::Lens;
-use crate::session::added_glass;
+use crate::lens::{Lens, added_glass};
 use crate::studio::draw::{BoundingBox, Camera, Scene, software};
 use crate::studio::palette::Palette;
 use crate::studio::section::LensSection;

@@ -1,9 +1,9 @@
-//! Rows come, go and turn around; everything that names a row by its number follows.
+//! Inserting, removing, replacing and reversing rows; parameters that name a row are renumbered.
 
-use super::edit::EditError;
+use super::EditError;
 use crate::lens::{Lens, Medium, PROFILE_TERMS, Parameter, Quantity, Row};
 
-/// Puts a row in front of row `at`. A solved last gap stays with the last row.
+/// Inserts a row in front of row `at`. An image solve stays with the last row.
 pub(super) fn insert(lens: &mut Lens, at: usize, row: &Row) -> Result<(), EditError> {
     let count = lens.surfaces.len();
     if at > count {
@@ -11,7 +11,7 @@ pub(super) fn insert(lens: &mut Lens, at: usize, row: &Row) -> Result<(), EditEr
     }
     let focus = lens.image_solve;
     if at == count {
-        lens.replace_focus_solve()?;
+        lens.replace_image_solve()?;
     }
     lens.surfaces.insert(at, row.clone());
     lens.image_solve = focus;
@@ -19,7 +19,7 @@ pub(super) fn insert(lens: &mut Lens, at: usize, row: &Row) -> Result<(), EditEr
     Ok(())
 }
 
-/// Takes a row out. What followed one of its numbers keeps its value and follows no longer.
+/// Removes a row. A parameter that followed one of its own keeps its value without the pickup.
 pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
     lens.row_mut(surface)?;
     if lens.surfaces.len() == 1 {
@@ -37,7 +37,7 @@ pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
     Ok(())
 }
 
-/// Replaces a row; variables and pickups of numbers that it does not have go.
+/// Replaces a row; variables and pickups of parameters that it does not have are removed.
 pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), EditError> {
     lens.row_mut(surface)?.clone_from(row);
     let gradient = (0..PROFILE_TERMS).map(Quantity::Gradient);
@@ -50,9 +50,9 @@ pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), 
     Ok(())
 }
 
-/// Turns the rows `first` to `last` around: surfaces and the gaps between them in reverse order,
-/// every curvature and asphere coefficient with the other sign. The gap behind the group stays.
-pub(super) fn flip(lens: &mut Lens, first: usize, last: usize) -> Result<(), EditError> {
+/// Reverses the rows `first` to `last`: the surfaces and the gaps between them in reverse order, every
+/// curvature and asphere coefficient with the other sign. The gap after the group stays.
+pub(super) fn reverse(lens: &mut Lens, first: usize, last: usize) -> Result<(), EditError> {
     lens.row_mut(last)?;
     if first > last {
         return Err(EditError::ReversedRange { first, last });

@@ -1,40 +1,42 @@
-//! The rays of the layout, in mm: what a drawing needs and nothing about how it looks.
+//! The rays of a lens drawing, in mm, independent of the drawing.
 
+use crate::lens::Object;
 use crate::math::Vec3;
 use crate::pupil::RayModel;
 use crate::trace::{Fates, RayPolyline};
 
-/// The rays that a layout shows.
+/// Meridional rays through a lens.
 #[derive(Debug, Clone, Default)]
 pub struct RayLayout {
-    /// The rays, field by field, from the lower rim of the pupil to the upper.
+    /// The rays of each field, from the lower edge of the pupil to the upper.
     pub rays: Vec<LayoutRay>,
-    /// How far from the axis these rays meet each surface, the image plane last.
+    /// The largest distance from the axis at which the rays meet each surface, the image plane last, in
+    /// mm.
     pub ray_heights: Vec<f64>,
-    /// How the rays ended.
+    /// The number of rays by their fate.
     pub fates: Fates,
-    /// Fields without rays, and why.
+    /// The fields without rays, each with the reason.
     pub errors: Vec<(usize, String)>,
 }
 
-/// One ray of a layout.
+/// A ray of a layout.
 #[derive(Debug, Clone)]
 pub struct LayoutRay {
-    /// Its field.
+    /// The index of its field.
     pub field: usize,
-    /// Its wavelength.
+    /// The index of its wavelength.
     pub wavelength: usize,
-    /// Where in the pupil it starts, −1 to 1.
+    /// Its relative pupil height, −1 to 1.
     pub pupil: f64,
-    /// Its corners in the frame of the first vertex, from in front of the lens to its end, and how
-    /// it ended.
+    /// Its vertices in the frame of the first surface, from a point in front of the lens to its end,
+    /// and its fate.
     pub path: RayPolyline,
 }
 
-/// How far in front of the lens rays begin, as a share of its length with the way to the image.
+/// The distance in front of the lens at which rays begin, relative to the total track.
 const LEAD: f64 = 0.15;
 
-/// A fan of rays of each field in the meridional plane, at the primary wavelength.
+/// Traces `count` meridional rays of each field at the primary wavelength.
 pub fn ray_layout(bench: &RayModel, count: usize) -> RayLayout {
     let mut layout = RayLayout {
         ray_heights: vec![0.0; bench.channels[bench.primary].tracer.surfaces()],
@@ -59,7 +61,7 @@ pub fn ray_layout(bench: &RayModel, count: usize) -> RayLayout {
     layout
 }
 
-/// Evenly spaced places from one rim of the pupil to the other.
+/// Evenly spaced pupil heights from −1 to 1.
 fn pupil_coordinates(count: usize) -> impl Iterator<Item = f64> {
     let place = move |i: usize| {
         if count < 2 { 0.0 } else { 2.0 * i as f64 / (count - 1) as f64 - 1.0 }
@@ -68,7 +70,7 @@ fn pupil_coordinates(count: usize) -> impl Iterator<Item = f64> {
 }
 
 impl RayLayout {
-    /// Notes how a ray ended and how far from the axis it met each surface.
+    /// Counts the fate of a ray and its heights at the surfaces.
     fn count(&mut self, path: &RayPolyline) {
         self.fates.count(path.fate);
         let met = path.fate.surface().unwrap_or(self.ray_heights.len());
@@ -78,7 +80,7 @@ impl RayLayout {
     }
 }
 
-/// Where drawn rays begin: in front of everything, mirrors that stand before the first vertex too.
+/// The z at which rays begin: in front of all surfaces, also of mirrors before the first vertex.
 fn drawing_start(bench: &RayModel) -> f64 {
     let positions = bench.channels[bench.primary].system.vertex_positions();
     let first = positions.iter().copied().fold(0.0, f64::min);
@@ -86,12 +88,12 @@ fn drawing_start(bench: &RayModel) -> f64 {
     first - LEAD * (last - first)
 }
 
-/// Moves the start of a ray to where drawing begins: the object, or a plane in front of the lens.
+/// Moves the start of a ray to the object or to a plane in front of the lens, whichever is nearer.
 fn extend_backwards(bench: &RayModel, points: &mut [Vec3<f64>], along: Vec3<f64>) {
     let [start, ..] = points else { return };
     let front = drawing_start(bench);
     let from = match bench.beam.object {
-        crate::lens::Object::Finite(distance) if distance > 0.0 => -distance,
+        Object::Finite(distance) if distance > 0.0 => -distance,
         _ => f64::NEG_INFINITY,
     };
     let s = (from.max(front) - start.z) / along.z;

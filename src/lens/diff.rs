@@ -1,17 +1,19 @@
-//! Which glass of a lens is new beside another lens.
+//! The elements that a lens has in addition to another lens.
 
-use crate::lens::{Lens, Medium, Row};
+use super::{Lens, Medium, Row};
 
-/// What it costs to call a piece of glass new, or gone.
+/// The cost of an element that is added or removed.
 const NEW: f64 = 1.0;
-/// Two pieces of one glass are the same piece however they have bent: their shapes only tell which
-/// of several it is.
+/// The largest cost of a change of shape. It is below that of an added element: two elements of the
+/// same glass always match, and their shapes only decide between several candidates.
 const BENT: f64 = 0.9;
-/// Model glasses whose indices differ by this much are as different as glasses can be.
+/// The difference in index from which two model glasses do not match.
 const INDEX: f64 = 0.2;
 
-/// The rows of a lens, counted from 0, behind which there is glass that `own` does not have: what
-/// is left where as many pieces as possible are found again in the same order.
+/// The surfaces of a lens, counted from 0, after which there is an element that `own` does not have.
+///
+/// The elements of both lenses are aligned in their order at the least cost (an edit distance);
+/// elements that match none of `own` are the added ones.
 pub fn added_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
     let (rows, old) = (glass_pieces(lens), glass_pieces(own));
     let size = own.total_track();
@@ -33,7 +35,7 @@ pub fn added_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
     fresh
 }
 
-/// A piece of glass.
+/// An element: the glass after a surface.
 struct GlassPiece<'a> {
     surface: usize,
     medium: &'a Medium,
@@ -59,7 +61,7 @@ fn glass_pieces(lens: &Lens) -> Vec<GlassPiece<'_>> {
         .collect()
 }
 
-/// The least cost of turning the first `j` old pieces into the first `i` new ones.
+/// The least cost of turning the first `j` old elements into the first `i` new ones.
 fn costs(rows: &[GlassPiece<'_>], old: &[GlassPiece<'_>], size: f64) -> Vec<Vec<f64>> {
     let mut costs = vec![vec![0.0; old.len() + 1]; rows.len() + 1];
     for i in 0..=rows.len() {
@@ -78,7 +80,7 @@ fn costs(rows: &[GlassPiece<'_>], old: &[GlassPiece<'_>], size: f64) -> Vec<Vec<
     costs
 }
 
-/// How different two pieces are: 0 to 1 for the same glass, infinite for another one.
+/// The cost of matching two elements: 0 to 1 for the same glass, infinite for different ones.
 fn difference(a: &GlassPiece<'_>, b: &GlassPiece<'_>, size: f64) -> f64 {
     let glass = match (a.medium, b.medium) {
         (Medium::Model { nd: a, .. }, Medium::Model { nd: b, .. }) => {
@@ -96,7 +98,7 @@ fn difference(a: &GlassPiece<'_>, b: &GlassPiece<'_>, size: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::blank;
+    use crate::lens::blank;
 
     fn lens(glasses: &[(&str, f64)]) -> Lens {
         let mut lens = blank();
@@ -111,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_found_again_is_new() {
+    fn elements_without_a_match_are_added() {
         let own = lens(&[("A", 0.02), ("B", 0.01), ("A", -0.03)]);
         let cases = [
             (vec![("A", 0.02), ("B", 0.01), ("A", -0.03)], vec![]),

@@ -1,9 +1,9 @@
-//! Every length of a lens, multiplied.
+//! Scaling a lens: every length times a factor.
 
-use super::edit::EditError;
+use super::EditError;
 use crate::lens::{Aperture, FieldKind, Fields, Lens, Medium, Object, Parameter, Quantity, Row};
 
-/// The power of a length that a number is measured in: mm⁻¹ for a curvature, mm⁻³ for r⁴.
+/// The power of mm in the unit of a parameter: −1 for a curvature, −3 for the coefficient of r⁴.
 fn power(rows: &[Row], parameter: Parameter) -> i32 {
     match parameter.quantity {
         Quantity::Curvature => -1,
@@ -17,7 +17,7 @@ fn power(rows: &[Row], parameter: Parameter) -> i32 {
     }
 }
 
-/// Multiplies every length; angles, f-numbers and apertures by number stay.
+/// Multiplies every length; angles, f-numbers and numerical apertures stay.
 pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
     if !(factor > 0.0 && factor.is_finite()) {
         return Err(EditError::InvalidScale(factor));
@@ -48,7 +48,7 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         position.aperture.iter_mut().for_each(|aperture| scale_aperture(aperture, factor));
         position.fields.iter_mut().for_each(|fields| scale_fields(fields, factor));
     }
-    scale_rules(lens, factor);
+    scale_bounds_and_pickups(lens, factor);
     Ok(())
 }
 
@@ -70,8 +70,8 @@ fn scale_fields(fields: &mut Fields, factor: f64) {
     }
 }
 
-/// Bounds and pickups.
-fn scale_rules(lens: &mut Lens, factor: f64) {
+/// Scales the bounds of variables and the coefficients of pickups.
+fn scale_bounds_and_pickups(lens: &mut Lens, factor: f64) {
     let rows = &lens.surfaces;
     let powers = |parameter| power(rows, parameter);
     for variable in &mut lens.variables {

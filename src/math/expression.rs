@@ -1,39 +1,39 @@
-//! What a person types into a cell: a number, or arithmetic, also on the value that was there.
+//! Numbers and arithmetic as they are typed into a cell.
 //!
-//! `12.5`, `25.4/2`, `(3+4)*2`, `inf`; a leading `*`, `/` or `+` goes on from the old value, and
-//! so does a minus followed by a blank: `- 3` subtracts, `-3` is a negative number. A comma is no
-//! decimal point: `1,500` is refused, so that it is never 1.5.
+//! `12.5`, `25.4/2`, `(3+4)*2`, `inf`. A leading `*`, `/` or `+` applies to the old value, and so does
+//! a minus followed by a blank: `- 3` subtracts, `-3` is a negative number. A comma is no decimal
+//! point: `1,500` is refused, so that it is never taken for 1.5.
 
 use std::iter::Peekable;
 use std::str::Chars;
 
-/// How deep brackets may be nested.
+/// The maximum depth of nested brackets.
 const MAX_DEPTH: usize = 32;
 
-/// Why a text is no number.
+/// A text is no number and no arithmetic.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` is no number; expected one such as 12.5, or arithmetic such as 25.4/2, *2 or +5")]
 pub struct ParseNumberError {
-    /// What was typed.
+    /// The text.
     pub text: String,
 }
 
-/// The number that a text stands for in a cell that shows `old`.
+/// The value of a text that was typed into a cell with the value `old`.
 ///
 /// # Errors
-/// A text that is no number, or arithmetic without a result, such as `0/0`.
+/// A text that is no number, or arithmetic without a value, such as `0/0`.
 pub fn evaluate(text: &str, old: f64) -> Result<f64, ParseNumberError> {
     let trimmed = text.trim();
-    let goes_on = trimmed.starts_with(['*', '/', '+']) || trimmed.starts_with("- ");
+    let continues = trimmed.starts_with(['*', '/', '+']) || trimmed.starts_with("- ");
     let mut reader = ExpressionParser { rest: trimmed.chars().peekable(), depth: 0 };
-    let value = if goes_on { reader.tail(old) } else { reader.sum() };
+    let value = if continues { reader.tail(old) } else { reader.sum() };
     match value {
         Some(value) if reader.rest.next().is_none() && !value.is_nan() => Ok(value),
         _ => Err(ParseNumberError { text: text.to_owned() }),
     }
 }
 
-/// Reads from left to right; `None` where the text stops making sense.
+/// A recursive-descent parser; its methods return `None` at a syntax error.
 struct ExpressionParser<'a> {
     rest: Peekable<Chars<'a>>,
     depth: usize,
@@ -45,7 +45,7 @@ impl ExpressionParser<'_> {
         self.terms(first)
     }
 
-    /// What follows a value that is already there.
+    /// The operators that follow a value.
     fn tail(&mut self, old: f64) -> Option<f64> {
         let first = self.factors(old)?;
         self.terms(first)
@@ -116,7 +116,7 @@ impl ExpressionParser<'_> {
         text.parse().ok()
     }
 
-    /// Whether this sign comes next; if so, it has been read.
+    /// Reads this sign and returns true if it comes next.
     fn takes(&mut self, sign: char) -> bool {
         self.blanks();
         self.rest.next_if_eq(&sign).is_some()
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leading_operator_goes_on_from_the_old_value() {
+    fn a_leading_operator_continues_from_the_old_value() {
         let cases =
             [("*2", 20.0), ("/ 4", 2.5), ("+5", 15.0), ("- 3", 7.0), ("-3", -3.0), ("*2+1", 21.0)];
         for (text, value) in cases {

@@ -1,90 +1,16 @@
-//! What an edit does to a lens: a new lens, or a reason why there is none.
-//!
-//! Nothing here can leave a lens that [`Lens::check`] refuses: the result is checked before it is
-//! given away, and the lens that was there stays what it was.
+//! Carrying out an edit: the changed lens, or the reason why it is refused.
 
-use super::command::Edit;
-use super::rows;
-use super::scale::scale;
-use super::typed::{ParseNumberError, evaluate};
+use super::{Edit, EditError, rows, scale};
 use crate::lens::{
     Aperture, Lens, LensError, Medium, Parameter, Pickup, Quantity, Row, Variable, ZoomPosition,
     ZoomThickness,
 };
-use crate::pupil::{RayModelError, limited_by_stop};
 
-/// Why an edit was refused; the lens is what it was.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum EditError {
-    /// The lens would be one that cannot be used.
-    #[error(transparent)]
-    Lens(#[from] LensError),
-    /// A beam that cannot be set up.
-    #[error(transparent)]
-    Bench(#[from] RayModelError),
-    /// A text that is no number.
-    #[error(transparent)]
-    NoNumber(#[from] ParseNumberError),
-    /// A row that does not exist.
-    #[error("there is no surface {surface}; expected 0 to {last}")]
-    UnknownSurface {
-        /// The row that was named.
-        surface: usize,
-        /// The last one there is.
-        last: usize,
-    },
-    /// A zoom position that does not exist.
-    #[error("there is no zoom position {at}; the lens has {count}")]
-    UnknownZoomPosition {
-        /// The position that was named.
-        at: usize,
-        /// How many there are.
-        count: usize,
-    },
-    /// A number that the lens does not have.
-    #[error("this lens has no {0}")]
-    UnknownParameter(Parameter),
-    /// A number that follows another.
-    #[error("the {0} follows the {1}; remove that pickup first")]
-    PickedUp(Parameter, Parameter),
-    /// The last gap, while it is solved.
-    #[error("the last thickness is solved for the paraxial focus; remove that solve first")]
-    Solved,
-    /// The stop cannot be removed.
-    #[error("surface {0} is the stop; make another surface the stop first")]
-    RemovedStop(usize),
-    /// A lens needs a surface.
-    #[error("the only surface cannot be removed")]
-    OnlySurface,
-    /// A group that ends before it begins.
-    #[error("surfaces {first} to {last} are no group; expected the first one in front")]
-    ReversedRange {
-        /// The first row.
-        first: usize,
-        /// The last row.
-        last: usize,
-    },
-    /// A mirror has no other side.
-    #[error("surface {0} is a mirror; a group with a mirror cannot be turned around")]
-    Mirror(usize),
-    /// What varies along the axis would count from the other vertex.
-    #[error(
-        "the gradient after surface {0} varies along the axis; a group with it cannot be turned \
-         around"
-    )]
-    AxialGrin(usize),
-    /// A scale that leaves no lens.
-    #[error("the scale is {0}; expected a number above 0")]
-    InvalidScale(f64),
-}
-
-/// The lens after an edit.
+/// The lens after an edit. The values of parameters that follow others are up to date in it.
 ///
 /// # Errors
-/// An edit that names what the lens does not have, or that would leave a lens that cannot be used.
-///
-/// What follows another number has its value written into the lens, so that a table of the lens
-/// shows it.
+/// An edit that names a surface, zoom position or parameter that the lens does not have, or that
+/// would leave a lens that cannot be used.
 pub fn apply_edit(lens: &Lens, edit: &Edit) -> Result<Lens, EditError> {
     let mut changed = lens.clone();
     changed.apply(edit)?;
@@ -102,8 +28,6 @@ impl Lens {
     fn apply(&mut self, edit: &Edit) -> Result<(), EditError> {
         match edit {
             Edit::Set { parameter, value } => self.write(*parameter, *value)?,
-            Edit::Type { parameter, text } => self.type_number(*parameter, text)?,
-            Edit::TypeRadius { surface, text } => self.type_radius(*surface, text)?,
             Edit::SetSemiDiameter { surface, value } => self.set_semi_diameter(*surface, *value)?,
             Edit::SetAsphere { surface, terms } => {
                 self.row_mut(*surface)?.asphere.clone_from(terms)
@@ -118,17 +42,16 @@ impl Lens {
             Edit::SetRow { surface, row } => rows::replace(self, *surface, row)?,
             Edit::InsertRow { at, row } => rows::insert(self, *at, row)?,
             Edit::RemoveRow(surface) => rows::remove(self, *surface)?,
-            Edit::ReverseRows { first, last } => rows::flip(self, *first, *last)?,
-            Edit::Scale(factor) => scale(self, *factor)?,
+            Edit::ReverseRows { first, last } => rows::reverse(self, *first, *last)?,
+            Edit::Scale(factor) => scale::scale(self, *factor)?,
             Edit::SetName(text) => self.name.clone_from(text),
             Edit::SetSource(text) => self.source.clone_from(text),
             Edit::SetNotes(text) => self.notes.clone_from(text),
             Edit::SetObject(object) => self.object = *object,
             Edit::SetAperture(aperture) => self.set_aperture(*aperture),
-            Edit::LimitByStop => *self = limited_by_stop(self)?,
             Edit::SetFields(fields) => self.fields.clone_from(fields),
             Edit::SetWavelengths(wavelengths) => self.wavelengths.clone_from(wavelengths),
-            Edit::SetFocusSolve(offset) => self.set_focus_solve(*offset)?,
+            Edit::SetImageSolve(offset) => self.set_image_solve(*offset)?,
             Edit::AddVariable(variable) => self.add_variable(*variable)?,
             Edit::RemoveVariable(parameter) => self.variables.retain(|v| v.parameter != *parameter),
             Edit::SetVariables(variables) => self.variables.clone_from(variables),
@@ -142,19 +65,19 @@ impl Lens {
         Ok(())
     }
 
-    /// A row to be changed.
+    /// The row of a surface.
     pub(super) fn row_mut(&mut self, surface: usize) -> Result<&mut Row, EditError> {
         let last = self.surfaces.len() - 1;
         self.surfaces.get_mut(surface).ok_or(EditError::UnknownSurface { surface, last })
     }
 
-    /// A zoom position to be changed.
+    /// A zoom position.
     fn zoom_mut(&mut self, at: usize) -> Result<&mut ZoomPosition, EditError> {
         let count = self.zoom.len();
         self.zoom.get_mut(at).ok_or(EditError::UnknownZoomPosition { at, count })
     }
 
-    /// Refuses a number that something else decides.
+    /// Refuses a parameter that a pickup or a solve decides.
     fn check_writable(&mut self, parameter: Parameter) -> Result<(), EditError> {
         self.row_mut(parameter.surface)?;
         if let Some(pickup) = self.pickups.iter().find(|p| p.parameter == parameter) {
@@ -176,29 +99,6 @@ impl Lens {
         }
     }
 
-    fn type_number(&mut self, parameter: Parameter, text: &str) -> Result<(), EditError> {
-        self.check_writable(parameter)?;
-        let unlimited = parameter.quantity == Quantity::SemiDiameter;
-        if unlimited && text.trim().is_empty() {
-            return self.set_semi_diameter(parameter.surface, None);
-        }
-        let old = self.get(parameter).or(unlimited.then_some(f64::INFINITY));
-        let value = evaluate(text, old.ok_or(EditError::UnknownParameter(parameter))?)?;
-        if unlimited && value == f64::INFINITY {
-            return self.set_semi_diameter(parameter.surface, None);
-        }
-        self.write(parameter, value)
-    }
-
-    fn type_radius(&mut self, surface: usize, text: &str) -> Result<(), EditError> {
-        let old = self.row_mut(surface)?.curvature;
-        let old = if old == 0.0 { f64::INFINITY } else { 1.0 / old };
-        let plane = text.trim().is_empty();
-        let radius = if plane { f64::INFINITY } else { evaluate(text, old)? };
-        let curvature = if radius == 0.0 { 0.0 } else { 1.0 / radius };
-        self.write(Parameter::new(surface, Quantity::Curvature), curvature)
-    }
-
     fn set_semi_diameter(&mut self, surface: usize, value: Option<f64>) -> Result<(), EditError> {
         let parameter = Parameter::new(surface, Quantity::SemiDiameter);
         if let Some(value) = value {
@@ -210,7 +110,7 @@ impl Lens {
         Ok(())
     }
 
-    /// A glass with a fixed index has none that could vary or be followed.
+    /// Sets the medium; one without an index parameter drops what refers to that parameter.
     fn set_medium(&mut self, surface: usize, medium: &Medium) -> Result<(), EditError> {
         self.row_mut(surface)?.medium.clone_from(medium);
         let index = Parameter::new(surface, Quantity::Index);
@@ -220,13 +120,13 @@ impl Lens {
         Ok(())
     }
 
-    /// Removes a number that goes away from variables and pickups.
+    /// Removes a parameter from the variables and pickups.
     pub(super) fn drop_references(&mut self, parameter: Parameter) {
         self.variables.retain(|v| v.parameter != parameter);
         self.pickups.retain(|p| p.parameter != parameter && p.source != parameter);
     }
 
-    /// Moves the stop. An aperture given by the size of the stop takes that of the new one.
+    /// Moves the stop. An aperture given by the size of the stop takes that of the new stop.
     fn move_stop(&mut self, surface: usize) -> Result<(), EditError> {
         self.row_mut(surface)?;
         for (i, row) in self.surfaces.iter_mut().enumerate() {
@@ -240,7 +140,7 @@ impl Lens {
         Ok(())
     }
 
-    /// Sets the aperture; the size of the stop is that of its row too.
+    /// Sets the aperture; one given by the size of the stop sets the semi-diameter of the stop.
     fn set_aperture(&mut self, aperture: Aperture) {
         self.aperture = aperture;
         if let (Aperture::StopSemiDiameter(size), Some(stop)) = (aperture, self.stop()) {
@@ -265,9 +165,9 @@ impl Lens {
         }
     }
 
-    fn set_focus_solve(&mut self, offset: Option<f64>) -> Result<(), EditError> {
+    fn set_image_solve(&mut self, offset: Option<f64>) -> Result<(), EditError> {
         if offset.is_none() {
-            self.replace_focus_solve()?;
+            self.replace_image_solve()?;
         }
         self.image_solve = offset;
         let last = self.surfaces.len() - 1;
@@ -278,8 +178,8 @@ impl Lens {
         Ok(())
     }
 
-    /// Writes the solved last gap down at every zoom position, and solves it no longer.
-    pub(super) fn replace_focus_solve(&mut self) -> Result<(), EditError> {
+    /// Replaces the image solve by the last thickness that it gives at each zoom position.
+    pub(super) fn replace_image_solve(&mut self) -> Result<(), EditError> {
         if self.image_solve.is_none() {
             return Ok(());
         }
@@ -327,7 +227,7 @@ impl Lens {
         });
     }
 
-    /// Refuses a lens whose pickups, glasses or solves lead to numbers that cannot be traced.
+    /// Refuses a lens that cannot be resolved at some zoom position and wavelength.
     fn check_resolved(&self) -> Result<(), LensError> {
         for zoom in 0..self.zoom_positions() {
             self.wavelengths.iter().try_for_each(|w| self.resolve(zoom, w.um).map(drop))?;

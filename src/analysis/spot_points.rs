@@ -1,25 +1,28 @@
-//! Where the rays of each field land: the dots of a spot diagram.
+//! The points of a spot diagram.
+//!
+//! They illustrate a spot; its RMS radius comes from a quadrature over the pupil (see [`super::spot`])
+//! and not from these rays.
 
 use crate::pupil::{Launch, PupilPattern, RayModel, pattern_points};
 use crate::trace::{Fates, ImagePoints, Rays, TraceSink};
 
-/// The dots of one field at one wavelength.
+/// The image points of one field at one wavelength.
 #[derive(Debug, Clone, Default)]
 pub struct SpotPoints {
-    /// The field.
+    /// The index of the field.
     pub field: usize,
-    /// The wavelength.
+    /// The index of the wavelength.
     pub wavelength: usize,
-    /// Where rays land in the image plane, in mm from the axis.
+    /// The points in the image plane, in mm from the axis.
     pub points: Vec<[f64; 2]>,
-    /// How the rays ended.
+    /// The number of rays by their fate.
     pub fates: Fates,
 }
 
-/// Rings of the pattern: 127 rays a field and wavelength.
+/// The rings of the hexapolar pattern: 127 rays for each field and wavelength.
 const RINGS: usize = 6;
 
-/// The dots of every field and wavelength; a field without rays has none.
+/// The image points of every field and wavelength; a field without light has none.
 pub fn spot_points(bench: &RayModel) -> Vec<SpotPoints> {
     let points = pattern_points(PupilPattern::Hexapolar(RINGS));
     let mut all = Vec::new();

@@ -1,0 +1,214 @@
+//! Edits of a lens: every change that a designer can make, and the lens that follows from it.
+//!
+//! An [`Edit`] either gives another lens that [`Lens::check`] accepts, or an [`EditError`]; the lens
+//! that it was applied to stays as it was. [`apply_edit`] is the only code that carries edits out: a
+//! table cell that tests an entry and the session that changes the design both call it.
+
+mod apply;
+mod error;
+mod rows;
+mod scale;
+
+pub use apply::apply_edit;
+pub use error::EditError;
+
+use super::{
+    Aperture, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, Variable, Wavelength,
+    ZoomPosition,
+};
+use serde::{Deserialize, Serialize};
+
+/// A change of a lens. Surfaces and zoom positions are indices from 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Edit {
+    /// Sets a parameter.
+    Set {
+        /// The parameter.
+        parameter: Parameter,
+        /// The new value, in the unit of the parameter.
+        value: f64,
+    },
+    /// Sets the clear semi-diameter of a surface; without one the surface clips no ray.
+    SetSemiDiameter {
+        /// The surface.
+        surface: usize,
+        /// The semi-diameter, in mm.
+        value: Option<f64>,
+    },
+    /// Replaces all asphere coefficients of a surface.
+    SetAsphere {
+        /// The surface.
+        surface: usize,
+        /// The coefficients of r⁴, r⁶ and so on.
+        terms: Vec<f64>,
+    },
+    /// Sets the medium after a surface, or makes the surface a mirror.
+    SetMedium {
+        /// The surface.
+        surface: usize,
+        /// The medium.
+        medium: Medium,
+    },
+    /// Sets the medium in front of the first surface.
+    SetObjectMedium(Medium),
+    /// Makes a surface the aperture stop.
+    SetStop(usize),
+    /// Sets whether rays may meet the far half of a spherical surface.
+    SetHyperhemisphere {
+        /// The surface.
+        surface: usize,
+        /// True if they may.
+        hyper: bool,
+    },
+    /// Sets the comment on a surface.
+    SetComment {
+        /// The surface.
+        surface: usize,
+        /// The comment.
+        text: String,
+    },
+    /// Replaces a surface and the gap after it.
+    SetRow {
+        /// The surface.
+        surface: usize,
+        /// The new row.
+        row: Row,
+    },
+    /// Inserts a surface and the gap after it.
+    InsertRow {
+        /// The index of the new surface; the number of surfaces appends it.
+        at: usize,
+        /// The new row.
+        row: Row,
+    },
+    /// Removes a surface and the gap after it.
+    RemoveRow(usize),
+    /// Reverses a group of surfaces, so that its last surface comes first.
+    ReverseRows {
+        /// The first surface of the group.
+        first: usize,
+        /// The last surface of the group.
+        last: usize,
+    },
+    /// Multiplies every length by a factor.
+    Scale(f64),
+    /// Sets the name of the lens.
+    SetName(String),
+    /// Sets the source of the prescription.
+    SetSource(String),
+    /// Sets the notes on the lens.
+    SetNotes(String),
+    /// Sets the position of the object.
+    SetObject(Object),
+    /// Sets the aperture of the beam.
+    SetAperture(Aperture),
+    /// Sets the field points.
+    SetFields(Fields),
+    /// Sets the wavelengths.
+    SetWavelengths(Vec<Wavelength>),
+    /// Solves the last thickness for the paraxial image, displaced by this many millimetres. `None`
+    /// removes the solve and leaves the image plane in place.
+    SetImageSolve(Option<f64>),
+    /// Adds a parameter to the variables, or replaces its bounds.
+    AddVariable(Variable),
+    /// Removes a parameter from the variables.
+    RemoveVariable(Parameter),
+    /// Replaces all variables.
+    SetVariables(Vec<Variable>),
+    /// Makes a parameter follow another one.
+    SetPickup(Pickup),
+    /// Removes the pickup of a parameter, which keeps its value.
+    RemovePickup(Parameter),
+    /// Inserts a zoom position.
+    InsertZoom {
+        /// The index of the new position; the number of positions appends it.
+        at: usize,
+        /// The new position.
+        position: ZoomPosition,
+    },
+    /// Removes a zoom position.
+    RemoveZoom(usize),
+    /// Replaces a zoom position.
+    SetZoom {
+        /// The index of the position.
+        at: usize,
+        /// The new position.
+        position: ZoomPosition,
+    },
+    /// Replaces the whole lens.
+    Replace(Box<Lens>),
+}
+
+/// The cell of a table to which an edit writes; consecutive edits of one cell are one undo step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EditedCell {
+    /// The value of a parameter.
+    Number(Parameter),
+    /// The comment on a surface.
+    Comment(usize),
+    /// The name of the lens.
+    Name,
+    /// The source of the prescription.
+    Source,
+    /// The notes on the lens.
+    Notes,
+}
+
+impl Edit {
+    /// Sets the radius of a surface, in mm; 0 and infinity give a plane.
+    pub fn set_radius(surface: usize, radius: f64) -> Self {
+        let value = if radius == 0.0 { 0.0 } else { 1.0 / radius };
+        Self::Set { parameter: Parameter::new(surface, Quantity::Curvature), value }
+    }
+
+    /// The cell to which the edit writes, if it writes to a single one.
+    pub fn cell(&self) -> Option<EditedCell> {
+        match self {
+            Self::Set { parameter, .. } => Some(EditedCell::Number(*parameter)),
+            Self::SetComment { surface, .. } => Some(EditedCell::Comment(*surface)),
+            Self::SetName(_) => Some(EditedCell::Name),
+            Self::SetSource(_) => Some(EditedCell::Source),
+            Self::SetNotes(_) => Some(EditedCell::Notes),
+            _ => None,
+        }
+    }
+
+    /// The title of the edit in a menu, as in `Undo insert surface`.
+    pub fn title(&self) -> String {
+        match self {
+            Self::Set { parameter, .. } => parameter.to_string(),
+            Self::SetSemiDiameter { surface, .. } => format!("semi-diameter of surface {surface}"),
+            Self::SetAsphere { surface, .. } => format!("asphere of surface {surface}"),
+            Self::SetMedium { surface, .. } => format!("glass after surface {surface}"),
+            Self::SetObjectMedium(_) => "object medium".to_owned(),
+            Self::SetStop(surface) => format!("stop to surface {surface}"),
+            Self::SetHyperhemisphere { surface, .. } => {
+                format!("hyperhemisphere of surface {surface}")
+            }
+            Self::SetComment { surface, .. } => format!("comment on surface {surface}"),
+            Self::SetRow { surface, .. } => format!("surface {surface}"),
+            Self::InsertRow { at, .. } => format!("insert surface {at}"),
+            Self::RemoveRow(surface) => format!("remove surface {surface}"),
+            Self::ReverseRows { first, last } => format!("reverse surfaces {first} to {last}"),
+            Self::Scale(factor) => format!("scale by {factor}"),
+            Self::SetName(_) => "name".to_owned(),
+            Self::SetSource(_) => "source".to_owned(),
+            Self::SetNotes(_) => "notes".to_owned(),
+            Self::SetObject(_) => "object".to_owned(),
+            Self::SetAperture(_) => "aperture".to_owned(),
+            Self::SetFields(_) => "fields".to_owned(),
+            Self::SetWavelengths(_) => "wavelengths".to_owned(),
+            Self::SetImageSolve(_) => "image solve".to_owned(),
+            Self::AddVariable(variable) => format!("add the variable {}", variable.parameter),
+            Self::RemoveVariable(parameter) => format!("remove the variable {parameter}"),
+            Self::SetVariables(_) => "variables".to_owned(),
+            Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter),
+            Self::RemovePickup(parameter) => format!("remove the pickup of the {parameter}"),
+            Self::InsertZoom { at, .. } => format!("insert zoom position {at}"),
+            Self::RemoveZoom(at) => format!("remove zoom position {at}"),
+            Self::SetZoom { at, .. } => format!("zoom position {at}"),
+            Self::Replace(_) => "replace the lens".to_owned(),
+        }
+    }
+}
