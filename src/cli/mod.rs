@@ -1,11 +1,12 @@
-//! The headless command line: the same work as in the window, results as text or JSON.
+//! The command line: the same work as in the window, without one; results as text or JSON.
 //!
 //! Results go to standard output; progress and errors go to standard error. The exit status is 0
 //! when the work is done, 1 when it failed, 2 when the input is wrong. An error names the file, the
 //! place in it, what was found and what was expected.
 //!
-//! A subcommand is a file of this folder, a line in `CliCommand` and a line in its `run`. The JSON
-//! that it reads and writes stands in `help/`, which is its `--help` and a part of the README.
+//! A subcommand is a file of this folder, a variant of `CliCommand` and a line in its `run`. The
+//! folder `help/` has the texts that `--help` adds to its options, and the topics of
+//! `aplanat help`.
 
 mod analyze;
 mod convert;
@@ -13,6 +14,7 @@ mod error;
 mod experiment;
 mod gradient;
 mod grin;
+mod help;
 mod info;
 mod input;
 mod measure;
@@ -24,6 +26,8 @@ mod pareto;
 mod progress;
 mod search;
 mod terms;
+#[cfg(test)]
+mod tests;
 mod trace;
 mod window;
 
@@ -33,10 +37,10 @@ use output::{Output, print_note};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Designs lenses by computation. Without arguments, or with just a lens, it opens the studio;
-/// with a subcommand it works without a window or a display.
+/// Designs lenses by computation. Without arguments, or with a lens alone, it opens the studio; a
+/// subcommand needs neither window nor display.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT)]
+#[command(version, after_help = AFTER_HELP, disable_help_subcommand = true)]
 struct CliArgs {
     /// The lens that the studio opens: .json or .zmx
     lens: Option<PathBuf>,
@@ -49,8 +53,10 @@ struct CliArgs {
     command: Option<CliCommand>,
 }
 
-const EXIT: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong.\n\
-    Lengths in mm, angles in degrees, wavelengths in um; surfaces count from 0.";
+const AFTER_HELP: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong.\n\
+    Lengths in mm, angles in degrees, wavelengths in um. Texts count surfaces as the \
+    window does: 0 is\nthe object, 1 the first surface; JSON counts from 0. See `aplanat help \
+    conventions` and `aplanat help\nlens-file`.";
 
 /// Every subcommand.
 #[derive(Debug, Subcommand)]
@@ -66,6 +72,7 @@ enum CliCommand {
     Convert(convert::ConvertArgs),
     Experiment(experiment::ExperimentArgs),
     Measure(measure::MeasureArgs),
+    Help(help::HelpArgs),
 }
 
 impl CliCommand {
@@ -82,17 +89,18 @@ impl CliCommand {
             Self::Convert(convert) => convert.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),
+            Self::Help(help) => help.run(output),
         }
     }
 }
 
-/// Does what the arguments of the process ask for.
+/// Runs the command that the arguments of the process name, or opens the studio.
 pub fn run() -> ExitCode {
     env_logger::init();
     match CliArgs::try_parse() {
         Ok(arguments) => exit_code(arguments.run()),
         Err(usage) => {
-            // Help that nobody reads to its end is no failure.
+            // A reader of the help that closes the pipe early is no failure.
             drop(usage.print());
             ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2))
         }

@@ -88,40 +88,13 @@ impl Drop for Scratch {
 }
 
 #[test]
-fn every_subcommand_has_long_help_with_its_json() {
-    let names = [
-        "info",
-        "trace",
-        "analyze",
-        "gradient",
-        "optimize",
-        "convert",
-        "grin",
-        "experiment",
-        "measure trace",
-        "measure spot",
-        "measure gradient",
-        "measure grin",
-        "measure optimize",
-        "measure window",
-    ];
-    for name in names {
-        let arguments: Vec<&str> = name.split(' ').chain(["--help"]).collect();
-        let help = done(&arguments, "");
-        assert!(help.contains("JSON out (--json)"), "{name}: {help}");
-    }
+fn help_is_printed_for_commands_and_topics() {
     assert!(done(&["--help"], "").contains("Exit status"));
     assert!(done(&["--version"], "").starts_with("aplanat "));
-}
-
-#[test]
-fn the_readme_has_the_json_of_every_subcommand() {
-    let readme = std::fs::read_to_string("README.md").unwrap();
-    for entry in std::fs::read_dir("src/cli/help").unwrap() {
-        let path = entry.unwrap().path();
-        let help = std::fs::read_to_string(&path).unwrap();
-        assert!(readme.contains(&help), "README.md does not have {}", path.display());
-    }
+    assert!(done(&["help"], "").contains("Exit status"));
+    assert_eq!(done(&["help", "measure", "spot"], ""), done(&["measure", "spot", "--help"], ""));
+    assert!(done(&["help", "lens-file"], "").contains("semi_diameter"));
+    refused(2, &["help", "lenses"], "", &["`lenses`", "lens-file", "conventions"]);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Errors of the JSON parser in the words of a lens file: place, found and expected.
 
 use crate::files::error::ParseError;
-use serde::de::{DeserializeOwned, IgnoredAny};
-use serde_json::{Deserializer, Error};
+use serde::de::DeserializeOwned;
+use serde_json::{Deserializer, Error, Value};
 
 /// Parses JSON. An error names the line, the column and the keys that lead to the place, such as
 /// `views[0].source`, where list positions count from 0.
@@ -44,7 +44,7 @@ fn message(error: &Error) -> String {
 
 fn expected_syntax(error: &Error, text: &str) -> String {
     // The parser calls it a syntax error too if sound JSON is given in place of a named variant.
-    if serde_json::from_str::<IgnoredAny>(text).is_ok() {
+    if serde_json::from_str::<Value>(text).is_ok() {
         "a name, or an object with one key".to_owned()
     } else {
         format!("JSON ({})", message(error))

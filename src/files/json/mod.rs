@@ -173,7 +173,10 @@ mod tests {
     #[test]
     fn an_unknown_key_is_named_with_its_place() {
         let text = changed("\"asphere\"", "\"aspheric\"");
-        assert!(text.starts_with("a.json, line 9, column 50, surfaces[2]: found"), "{text}");
+        assert!(
+            text.starts_with("a.json, line 9, column 50, surfaces[2].aspheric: found"),
+            "{text}"
+        );
         assert!(text.contains("the unknown key `aspheric`; expected one of `radius`"), "{text}");
         let text = changed("\"object\"", "\"objekt\"");
         assert!(text.contains("line 2") && text.contains("`objekt`"), "{text}");
