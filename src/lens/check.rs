@@ -1,63 +1,68 @@
-//! What a lens must be before anything is computed from it.
+//! Checks of a lens as written, before anything is computed from it.
 
-use super::{Aperture, FieldKind, Lens, Medium, Object, Parameter, Quantity, SystemError};
+use super::{Aperture, FieldKind, Lens, Medium, MediumPlace, Object};
+use super::{Parameter, Quantity, Row, SurfaceNumber, SystemError};
 use crate::lens::glass;
 use crate::math::format_short;
+use std::fmt;
 
-/// Why a lens cannot be used.
+/// The expected value of a number that is not otherwise limited.
+const FINITE: &str = "a finite number";
+
+/// A fault of a lens that makes it impossible to trace.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LensError {
-    /// The numbers themselves.
+    /// A number cannot be traced with.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// No row is the stop.
+    /// No surface is marked as the stop.
     #[error("no surface is the stop; expected exactly one with `\"stop\": true`")]
     NoStop,
-    /// More than one row is the stop.
+    /// More than one surface is marked as the stop.
     #[error("surfaces {first} and {second} are both the stop; expected exactly one")]
     TwoStops {
         /// The first one.
-        first: usize,
+        first: SurfaceNumber,
         /// The second one.
-        second: usize,
+        second: SurfaceNumber,
     },
-    /// A glass that the catalogue does not have.
-    #[error("surface {surface}: unknown glass `{name}`{}", suggestion(.similar))]
+    /// A glass is not in the catalogue.
+    #[error("unknown glass `{name}` {place}{}", suggestion(.similar))]
     UnknownGlass {
-        /// The row.
-        surface: usize,
-        /// The name.
+        /// The gap.
+        place: MediumPlace,
+        /// The name as written.
         name: String,
-        /// Names that look like it.
+        /// Similar names of the catalogue.
         similar: Vec<String>,
     },
-    /// A wavelength for which a glass has no formula.
+    /// A wavelength lies outside the data of a glass.
     #[error(
-        "surface {surface}: {name} has no index at {um} um; its data end at {low} and {high} um"
+        "{name} {place} has no index at {um} um; expected a wavelength from {low} to {high} um"
     )]
     WavelengthOutOfRange {
-        /// The row.
-        surface: usize,
+        /// The gap.
+        place: MediumPlace,
         /// The glass.
         name: String,
-        /// The wavelength.
+        /// The wavelength, in micrometres.
         um: f64,
-        /// Where its data begin.
+        /// The shortest wavelength of the data, in micrometres.
         low: f64,
-        /// Where they end.
+        /// The longest wavelength of the data, in micrometres.
         high: f64,
     },
-    /// A number that makes no sense where it stands.
+    /// A number is not valid for its quantity.
     #[error("{what} is {}; expected {expected}", format_short(*found))]
     InvalidNumber {
-        /// What it is.
+        /// The name of the number.
         what: String,
         /// The value.
         found: f64,
-        /// What would be right.
+        /// The values that are valid.
         expected: &'static str,
     },
-    /// Something is missing or contradicts something else.
+    /// A part of the lens is missing or contradicts another part.
     #[error("{0}")]
     Inconsistent(String),
 }
@@ -71,7 +76,7 @@ fn suggestion(similar: &[String]) -> String {
 }
 
 fn check_number(
-    what: impl Into<String>,
+    what: impl fmt::Display,
     found: f64,
     right: bool,
     expected: &'static str,
@@ -79,12 +84,15 @@ fn check_number(
     if right && found.is_finite() {
         Ok(())
     } else {
-        Err(LensError::InvalidNumber { what: what.into(), found, expected })
+        Err(LensError::InvalidNumber { what: what.to_string(), found, expected })
     }
 }
 
 impl Lens {
-    /// Refuses a lens that cannot be traced, and says where and why.
+    /// Checks that the lens can be traced.
+    ///
+    /// # Errors
+    /// The first fault found.
     pub fn check(&self) -> Result<(), LensError> {
         if self.surfaces.is_empty() {
             return Err(SystemError::NoSurfaces.into());
@@ -103,74 +111,41 @@ impl Lens {
         let mut stops = self.surfaces.iter().enumerate().filter(|(_, row)| row.stop);
         let Some((first, _)) = stops.next() else { return Err(LensError::NoStop) };
         match stops.next() {
-            Some((second, _)) => Err(LensError::TwoStops { first, second }),
+            Some((second, _)) => {
+                Err(LensError::TwoStops { first: first.into(), second: second.into() })
+            }
             None => Ok(()),
         }
     }
 
     fn check_rows(&self) -> Result<(), LensError> {
         for (i, row) in self.surfaces.iter().enumerate() {
-            check_number(
-                format!("curvature of surface {i}"),
-                row.curvature,
-                true,
-                "a finite number",
-            )?;
-            check_number(
-                format!("conic constant of surface {i}"),
-                row.conic,
-                true,
-                "a finite number",
-            )?;
-            check_number(
-                format!("thickness after surface {i}"),
-                row.thickness,
-                true,
-                "a finite number",
-            )?;
-            if row.asphere.len() > super::ASPHERE_TERMS {
-                return Err(
-                    SystemError::TooManyTerms { surface: i, found: row.asphere.len() }.into()
-                );
-            }
-            for a in &row.asphere {
-                let what = format!("asphere coefficient of surface {i}");
-                check_number(what, *a, true, "a finite number")?;
-            }
-            if let Some(sd) = row.semi_diameter {
-                let what = format!("semi-diameter of surface {i}");
-                check_number(what, sd, sd >= 0.0, "zero or more, in mm")?;
-            }
-            if let Some(inner) = row.obstruction {
-                let what = format!("obstruction of surface {i}");
-                let leaves_light = row.semi_diameter.is_none_or(|sd| inner == 0.0 || inner < sd);
-                let expected = "zero or more and less than the semi-diameter, in mm";
-                check_number(what, inner, inner >= 0.0 && leaves_light, expected)?;
-            }
-            check_medium(i, &row.medium)?;
+            row.check(i)?;
+            check_medium(MediumPlace::behind(i), &row.medium)?;
             self.check_grin(i)?;
         }
         if let Medium::Grin(_) = self.object_medium {
-            let text = "the space of the object is a gradient; expected air, a glass or an index";
+            let text = "object space is a GRIN medium; expected air, a glass or an index";
             return Err(LensError::Inconsistent(text.into()));
         }
-        check_medium(0, &self.object_medium)
+        check_medium(MediumPlace::Object, &self.object_medium)
     }
 
-    /// A gradient needs a face at either end, whether it varies or not.
+    /// Checks that a GRIN medium is followed by a surface that it may touch, whether its index varies
+    /// or not.
     fn check_grin(&self, i: usize) -> Result<(), LensError> {
-        let Medium::Grin(gradient) = &self.surfaces[i].medium else { return Ok(()) };
-        let why = gradient.fault().or_else(|| match self.surfaces.get(i + 1) {
+        let Medium::Grin(grin) = &self.surfaces[i].medium else { return Ok(()) };
+        let why = grin.fault().or_else(|| match self.surfaces.get(i + 1) {
             None => Some("leads to the image; expected a surface behind it".to_owned()),
             Some(next) if next.medium == Medium::Mirror => {
                 Some("ends at a mirror, which is not supported".to_owned())
             }
             Some(next) if next.hyperhemisphere || self.surfaces[i].hyperhemisphere => {
-                Some("touches a hyper-hemisphere, which is not supported".to_owned())
+                Some("touches a hyperhemisphere, which is not supported".to_owned())
             }
             Some(_) => None,
         });
-        why.map_or(Ok(()), |why| Err(SystemError::Grin { surface: i, why }.into()))
+        why.map_or(Ok(()), |why| Err(SystemError::Grin { surface: i.into(), why }.into()))
     }
 
     fn check_object(&self) -> Result<(), LensError> {
@@ -213,8 +188,8 @@ impl Lens {
                 return Err(LensError::Inconsistent(text.into()));
             }
             for field in &fields.values {
-                check_number("field x", field.x, true, "a finite number")?;
-                check_number("field y", field.y, true, "a finite number")?;
+                check_number("field x", field.x, true, FINITE)?;
+                check_number("field y", field.y, true, FINITE)?;
                 check_number("field weight", field.weight, field.weight >= 0.0, "zero or more")?;
                 if fields.kind == FieldKind::Angle {
                     let angle = field.x.hypot(field.y);
@@ -229,8 +204,8 @@ impl Lens {
         for (i, position) in self.zoom.iter().enumerate() {
             for gap in &position.thicknesses {
                 self.row_exists(gap.surface, &format!("zoom position {i}"))?;
-                let what = format!("thickness after surface {} at zoom {i}", gap.surface);
-                check_number(what, gap.thickness, true, "a finite number")?;
+                let what = Parameter::new(gap.surface, Quantity::ZoomThickness(i));
+                check_number(what, gap.thickness, true, FINITE)?;
             }
             if let Some(aperture) = position.aperture {
                 check_aperture(aperture, self.object)?;
@@ -244,14 +219,10 @@ impl Lens {
             self.parameter_exists(variable.parameter, "a variable")?;
             let (min, max) = (variable.min, variable.max);
             let value = self.get(variable.parameter).unwrap_or(0.0);
-            let name = variable.parameter.to_string();
+            let name = variable.parameter;
             if let (Some(low), Some(high)) = (min, max) {
-                check_number(
-                    format!("lower bound of the {name}"),
-                    low,
-                    low <= high,
-                    "at most the upper",
-                )?;
+                let what = format_args!("lower bound of the {name}");
+                check_number(what, low, low <= high, "at most the upper bound")?;
             }
             let inside = min.is_none_or(|low| value >= low) && max.is_none_or(|high| value <= high);
             check_number(name, value, inside, "a value between its bounds")?;
@@ -263,14 +234,14 @@ impl Lens {
         for (i, pickup) in self.pickups.iter().enumerate() {
             self.parameter_exists(pickup.parameter, "a pickup")?;
             self.parameter_exists(pickup.source, "a pickup")?;
-            check_number("pickup scale", pickup.scale, true, "a finite number")?;
-            check_number("pickup offset", pickup.offset, true, "a finite number")?;
+            check_number("pickup scale", pickup.scale, true, FINITE)?;
+            check_number("pickup offset", pickup.offset, true, FINITE)?;
             if self.pickups[..i].iter().any(|other| other.parameter == pickup.parameter) {
                 let text = format!("two pickups set the {}; expected one", pickup.parameter);
                 return Err(LensError::Inconsistent(text));
             }
             if self.variable(pickup.parameter).is_some() {
-                let text = format!("the {} is both variable and a pickup", pickup.parameter);
+                let text = format!("the {} is both a variable and a pickup", pickup.parameter);
                 return Err(LensError::Inconsistent(text));
             }
         }
@@ -281,8 +252,8 @@ impl Lens {
         if surface < self.surfaces.len() {
             return Ok(());
         }
-        let rows = self.surfaces.len();
-        let text = format!("{whose} names surface {surface}; expected 0 to {}", rows - 1);
+        let (surface, rows) = (SurfaceNumber::new(surface), self.surfaces.len());
+        let text = format!("{whose} names surface {surface}; expected 1 to {rows}");
         Err(LensError::Inconsistent(text))
     }
 
@@ -300,37 +271,50 @@ impl Lens {
     }
 }
 
-fn check_medium(surface: usize, medium: &Medium) -> Result<(), LensError> {
+impl Row {
+    /// Checks the numbers of the row with index `i`, but for its medium.
+    fn check(&self, i: usize) -> Result<(), LensError> {
+        let surface = SurfaceNumber::new(i);
+        let named = |quantity| Parameter::new(i, quantity);
+        check_number(named(Quantity::Curvature), self.curvature, true, FINITE)?;
+        check_number(named(Quantity::Conic), self.conic, true, FINITE)?;
+        check_number(named(Quantity::Thickness), self.thickness, true, FINITE)?;
+        let found = self.asphere.len();
+        if found > super::ASPHERE_TERMS {
+            return Err(SystemError::TooManyTerms { surface, found }.into());
+        }
+        for (term, a) in self.asphere.iter().enumerate() {
+            check_number(named(Quantity::Asphere(term)), *a, true, FINITE)?;
+        }
+        if let Some(sd) = self.semi_diameter {
+            check_number(named(Quantity::SemiDiameter), sd, sd >= 0.0, "zero or more, in mm")?;
+        }
+        let Some(inner) = self.obstruction else { return Ok(()) };
+        let transmits = self.semi_diameter.is_none_or(|sd| inner == 0.0 || inner < sd);
+        let expected = "zero or more and less than the semi-diameter, in mm";
+        let what = format_args!("obstruction of surface {surface}");
+        check_number(what, inner, inner >= 0.0 && transmits, expected)
+    }
+}
+
+fn check_medium(place: MediumPlace, medium: &Medium) -> Result<(), LensError> {
     match medium {
         Medium::Air | Medium::Mirror => Ok(()),
         Medium::Glass(name) if glass::find(name).is_some() => Ok(()),
         Medium::Glass(name) => {
             let similar = glass::similar_names(name);
-            Err(LensError::UnknownGlass { surface, name: name.clone(), similar })
+            Err(LensError::UnknownGlass { place, name: name.clone(), similar })
         }
         Medium::Model { nd, vd } => {
             let expected = "a positive index below 10";
-            check_number(
-                format!("nd after surface {surface}"),
-                *nd,
-                *nd > 0.0 && *nd < 10.0,
-                expected,
-            )?;
+            check_number(format_args!("nd {place}"), *nd, *nd > 0.0 && *nd < 10.0, expected)?;
             let expected = "0 (no dispersion) or more than 1";
-            check_number(
-                format!("vd after surface {surface}"),
-                *vd,
-                *vd == 0.0 || *vd > 1.0,
-                expected,
-            )
+            check_number(format_args!("vd {place}"), *vd, *vd == 0.0 || *vd > 1.0, expected)
         }
-        Medium::Index(n) => check_number(
-            format!("index after surface {surface}"),
-            *n,
-            *n > 0.0,
-            "a positive number",
-        ),
-        Medium::Grin(gradient) => check_medium(surface, &gradient.base),
+        Medium::Index(n) => {
+            check_number(format_args!("index {place}"), *n, *n > 0.0, "a positive number")
+        }
+        Medium::Grin(grin) => check_medium(place, &grin.base),
     }
 }
 

@@ -1,25 +1,25 @@
-//! Glass: index against wavelength, by catalogue name or from nd and vd.
+//! Refractive index of glasses as a function of the wavelength, by catalogue name or from nd and vd.
 //!
 //! The catalogue is `assets/glasses.json`, a subset of the refractiveindex.info database (CC0).
-//! Indices are relative to air at about 20 °C, as in the makers' catalogues.
+//! Indices are relative to air at about 20 °C, as in the catalogues of the manufacturers.
 
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// Wavelengths of the spectral lines that index and Abbe number refer to, in micrometres.
+/// Wavelengths in micrometres of the spectral lines to which index and Abbe number refer.
 pub mod line {
-    /// Blue mercury.
+    /// The blue line of mercury.
     pub const G: f64 = 0.4358343;
-    /// Blue hydrogen.
+    /// The blue line of hydrogen.
     pub const F: f64 = 0.4861327;
-    /// Yellow helium.
+    /// The yellow line of helium.
     pub const D: f64 = 0.5875618;
-    /// Red hydrogen.
+    /// The red line of hydrogen.
     pub const C: f64 = 0.6562725;
 }
 
-/// The formula of a catalogue glass, over the wavelength in micrometres.
+/// A dispersion formula, with the wavelength λ in micrometres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DispersionFormula {
@@ -34,24 +34,24 @@ pub enum DispersionFormula {
 /// One glass of the catalogue.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Glass {
-    /// Its name with the maker.
+    /// The name that the manufacturer gives it.
     pub name: String,
-    /// The maker: SCHOTT, OHARA, HOYA, ...
+    /// The manufacturer: SCHOTT, OHARA, HOYA, …
     pub maker: String,
-    /// Index at the d line.
+    /// The index at the d line.
     pub nd: f64,
-    /// Abbe number.
+    /// The Abbe number at the d line.
     pub vd: f64,
     /// The dispersion formula.
     pub formula: DispersionFormula,
-    /// Its coefficients.
+    /// The coefficients of the formula.
     pub coefficients: Vec<f64>,
-    /// Where the formula holds, in micrometres.
+    /// The shortest and the longest wavelength of the formula, in micrometres.
     pub range_um: [f64; 2],
 }
 
 impl Glass {
-    /// The index at a wavelength in micrometres; `None` where the formula does not hold.
+    /// The index at a wavelength in micrometres; `None` outside the range of the formula.
     pub fn index(&self, um: f64) -> Option<f64> {
         let [low, high] = self.range_um;
         if !(low..=high).contains(&um) {
@@ -70,7 +70,7 @@ impl Glass {
         (n2 > 0.0).then(|| n2.sqrt())
     }
 
-    /// Maker and name, as lens files write it.
+    /// The manufacturer and the name, as in lens files.
     pub fn full_name(&self) -> String {
         format!("{} {}", self.maker, self.name)
     }
@@ -91,13 +91,13 @@ pub fn catalogue() -> &'static [Glass] {
     })
 }
 
-/// The glass with this name, `SCHOTT N-BK7` or, where only one maker has it, `N-BK7`; blanks and
-/// case do not matter.
+/// The glass with this name, `SCHOTT N-BK7` or, if only one manufacturer has it, `N-BK7`; blanks and
+/// case are ignored.
 pub fn find(name: &str) -> Option<&'static Glass> {
     names().get(&normalize(name)).copied().flatten()
 }
 
-/// Every name by which a glass is found; none where two makers have the same one.
+/// The glass of every name; `None` for a name that two manufacturers share.
 fn names() -> &'static HashMap<String, Option<&'static Glass>> {
     static NAMES: OnceLock<HashMap<String, Option<&'static Glass>>> = OnceLock::new();
     NAMES.get_or_init(|| {
@@ -113,12 +113,12 @@ fn names() -> &'static HashMap<String, Option<&'static Glass>> {
     })
 }
 
-/// Upper case without blanks.
+/// The name in upper case without blanks.
 fn normalize(name: &str) -> String {
     name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_uppercase).collect()
 }
 
-/// The names nearest to one that was not found, for an error message.
+/// Catalogue names similar to one that was not found, for an error message.
 pub fn similar_names(name: &str) -> Vec<String> {
     let letters = |text: &str| -> String {
         normalize(text).chars().filter(char::is_ascii_alphanumeric).collect()
@@ -132,7 +132,7 @@ pub fn similar_names(name: &str) -> Vec<String> {
 }
 
 /// The index of a model glass at a wavelength in micrometres, from index and Abbe number at the d
-/// line. Conrady's form `n = A + B/λ + C/λ^3.5` through nd, the difference nF − nC, and the
+/// line, by Conrady's form `n = A + B/λ + C/λ^3.5` through nd, the difference nF − nC, and the
 /// partial dispersion of the normal line `PgF = 0.6438 − 0.001682 vd`; constant for `vd = 0`.
 pub fn model_index(nd: f64, vd: f64, um: f64) -> f64 {
     if vd == 0.0 {

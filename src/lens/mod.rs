@@ -1,10 +1,11 @@
 //! The prescription: surfaces, glasses, stop, fields, wavelengths, zoom positions, variables.
 //!
-//! A [`Lens`] is what a person wrote, names and all; a [`System`] is the same lens at one
-//! wavelength and one zoom position: plain numbers, nothing to look up.
+//! A [`Lens`] is the prescription as the designer writes it, with names and glasses; a [`System`] is
+//! the same lens resolved at one wavelength and one zoom position, in plain numbers.
 //!
-//! Rows are counted from 0. Thickness and medium of a row belong to the gap behind it; the last
-//! thickness leads to the image plane, which has no row. Curvature is stored, radius is shown.
+//! Rows have indices from 0; texts number surfaces from 1, as a [`SurfaceNumber`] does. Thickness
+//! and medium of a row belong to the gap behind its surface; the last thickness leads to the image
+//! plane, which has no row. The curvature is stored, the radius is displayed.
 
 mod blank;
 mod check;
@@ -12,25 +13,25 @@ mod diff;
 mod edit;
 mod geometry;
 pub mod glass;
-mod gradient;
+mod grin;
 mod parameter;
 mod resolve;
 mod reversed;
 mod rows;
 mod surface_number;
 mod system;
-mod vary;
+mod variables;
 
 pub use blank::blank;
 pub use check::LensError;
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, apply_edit};
-pub use gradient::{GradientIndex, ParaxialGrin};
+pub use grin::{GradientIndex, ParaxialGrin};
 pub use parameter::{Parameter, Quantity};
 pub use resolve::paraxial_image_distance;
-pub use surface_number::SurfaceNumber;
+pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
-pub use vary::{ParameterKind, add_variable, add_variables, at_zoom};
+pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
 
 pub use crate::grin::field::{
     AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
@@ -38,23 +39,23 @@ pub use crate::grin::field::{
 
 use serde::{Deserialize, Serialize};
 
-/// How many coefficients an even asphere may have: r⁴ to r¹⁶.
+/// The largest number of coefficients of an even asphere, r⁴ to r¹⁶.
 pub const ASPHERE_TERMS: usize = 7;
 
-/// A lens as a designer writes it.
+/// A lens as the designer writes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
-    /// What it is called.
+    /// The name of the lens.
     pub name: String,
-    /// Where the numbers come from.
+    /// The source of the data, such as a patent or a book.
     pub source: String,
-    /// Anything else worth knowing.
+    /// Further remarks.
     pub notes: String,
-    /// Where the light comes from.
+    /// The position of the object.
     pub object: Object,
     /// The medium in front of the first surface.
     pub object_medium: Medium,
-    /// How wide the beam is.
+    /// The system aperture, which sets the width of the beam.
     pub aperture: Aperture,
     /// The field points.
     pub fields: Fields,
@@ -62,18 +63,18 @@ pub struct Lens {
     pub wavelengths: Vec<Wavelength>,
     /// The surfaces in the order in which light meets them.
     pub surfaces: Vec<Row>,
-    /// The zoom positions; empty for a lens that has only one.
+    /// The zoom positions; empty for a lens with a fixed focal length.
     pub zoom: Vec<ZoomPosition>,
-    /// The numbers that an optimizer may change, with their bounds.
+    /// The parameters that an optimizer may change, with their bounds.
     pub variables: Vec<Variable>,
-    /// The numbers that follow others.
+    /// The parameters that follow other parameters.
     pub pickups: Vec<Pickup>,
-    /// Whether the last thickness is solved so that the image plane lies at the paraxial focus,
-    /// displaced by this many millimetres.
+    /// The displacement in mm of the image plane from the paraxial image, to which the last
+    /// thickness is solved; `None` if the last thickness is as written.
     pub image_solve: Option<f64>,
 }
 
-/// Where the object is.
+/// The position of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Object {
     /// At infinity: every field is a collimated beam.
@@ -82,7 +83,7 @@ pub enum Object {
     Finite(f64),
 }
 
-/// What limits the beam on the axis.
+/// The system aperture: the quantity that limits the axial beam.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aperture {
@@ -93,11 +94,11 @@ pub enum Aperture {
     FNumber(f64),
     /// The numerical aperture in object space (finite objects only).
     ObjectNa(f64),
-    /// The semi-diameter of the stop, in mm; the real rays through it are the beam.
+    /// The semi-diameter of the stop in mm; the beam consists of the real rays through it.
     StopSemiDiameter(f64),
 }
 
-/// What a field point is measured in.
+/// The quantity that gives the coordinates of a field point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FieldKind {
@@ -118,7 +119,7 @@ pub struct FieldPoint {
     pub x: f64,
     /// Tangential coordinate, in the unit of the [`FieldKind`].
     pub y: f64,
-    /// Its share in merit functions.
+    /// The weight in merit functions.
     #[serde(default = "one")]
     pub weight: f64,
 }
@@ -127,9 +128,9 @@ pub struct FieldPoint {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fields {
-    /// What the values are measured in.
+    /// The quantity that the coordinates are.
     pub kind: FieldKind,
-    /// The points, in the order in which they are shown.
+    /// The points in the order in which they are displayed.
     pub values: Vec<FieldPoint>,
 }
 
@@ -137,12 +138,12 @@ pub struct Fields {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wavelength {
-    /// In micrometres.
+    /// The wavelength, in micrometres.
     pub um: f64,
-    /// Its share in polychromatic results.
+    /// The weight in polychromatic results.
     #[serde(default = "one")]
     pub weight: f64,
-    /// Whether first-order data and pupils are computed at this one.
+    /// True for the wavelength at which first-order data and pupils are computed.
     #[serde(default, skip_serializing_if = "is_false")]
     pub primary: bool,
 }
@@ -150,60 +151,63 @@ pub struct Wavelength {
 /// One surface and the gap behind it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Row {
-    /// One over the radius, in 1/mm; 0 for a plane.
+    /// The reciprocal of the radius of curvature, in 1/mm; 0 for a plane.
     pub curvature: f64,
     /// The conic constant: 0 a sphere, -1 a paraboloid.
     pub conic: f64,
     /// Coefficients of r⁴, r⁶, ... r¹⁶, in mm⁻³, mm⁻⁵, ...
     pub asphere: Vec<f64>,
-    /// The distance along the axis to the next vertex, or from the last one to the image, in mm.
+    /// The distance along the axis to the next vertex, or from the last one to the image plane, in
+    /// mm.
     pub thickness: f64,
-    /// What fills the gap behind the surface.
+    /// The medium in the gap behind the surface.
     pub medium: Medium,
-    /// Rays that meet the surface farther from the axis are clipped, in mm; `None` clips nothing.
+    /// The radius of the clear aperture in mm; rays that meet the surface farther from the axis are
+    /// clipped. `None` clips nothing.
     pub semi_diameter: Option<f64>,
-    /// Rays that meet the surface nearer to the axis are clipped, in mm: a central obstruction, or
-    /// the hole of a mirror; `None` clips nothing.
+    /// The radius of the central obstruction, or of the hole of a mirror, in mm; rays that meet the
+    /// surface nearer to the axis are clipped. `None` clips nothing.
     pub obstruction: Option<f64>,
-    /// Whether this is the aperture stop.
+    /// True for the aperture stop.
     pub stop: bool,
-    /// Whether the far half of the sphere or ellipsoid counts too (a hyper-hemisphere).
+    /// True for a hyperhemisphere: the far half of the sphere or ellipsoid belongs to the surface
+    /// too.
     pub hyperhemisphere: bool,
     /// A remark on the surface.
     pub comment: String,
 }
 
-/// What fills a gap, or what stands at its beginning.
+/// The medium that fills a gap, or the mirror at its beginning.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Medium {
     /// Air, with index 1.
     #[default]
     Air,
-    /// A glass of the catalogue, by maker and name: `SCHOTT N-BK7`.
+    /// A catalogue glass by maker and name, such as `SCHOTT N-BK7`.
     Glass(String),
-    /// A glass known by its index and Abbe number at the d line.
+    /// A model glass: refractive index and Abbe number at the d line.
     Model {
         /// Index at 587.5618 nm.
         nd: f64,
         /// Abbe number.
         vd: f64,
     },
-    /// The same index at every wavelength.
+    /// A medium with the same index at every wavelength.
     Index(f64),
-    /// The surface is a mirror; the gap is filled with what was before it.
+    /// A mirror; the gap behind it has the same medium as the gap in front.
     Mirror,
-    /// An index that varies from place to place.
+    /// A gradient-index (GRIN) medium.
     Grin(Box<GradientIndex>),
 }
 
-/// One position of a zoom lens: what differs from the prescription.
+/// One position of a zoom lens: the data that differ from the prescription.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields)]
 pub struct ZoomPosition {
-    /// What the position is called.
+    /// The name of the position.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// The thicknesses that move.
+    /// The thicknesses that differ.
     pub thicknesses: Vec<ZoomThickness>,
     /// The aperture at this position, if it differs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -217,38 +221,38 @@ pub struct ZoomPosition {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ZoomThickness {
-    /// The row in front of the gap.
+    /// The index of the row in front of the gap.
     pub surface: usize,
-    /// The gap, in mm.
+    /// The thickness of the gap, in mm.
     pub thickness: f64,
 }
 
-/// A number that an optimizer may change.
+/// A parameter that an optimizer may change.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variable {
-    /// Which number.
+    /// The parameter.
     pub parameter: Parameter,
-    /// It may not become smaller than this.
+    /// The lower bound; `None` for unbounded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
-    /// It may not become larger than this.
+    /// The upper bound; `None` for unbounded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
 }
 
-/// A number that follows another: `offset + scale × source`.
+/// A parameter that follows another one: `offset + scale × source`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pickup {
-    /// The number that follows.
+    /// The parameter that follows.
     pub parameter: Parameter,
-    /// The number that it follows.
+    /// The parameter that it follows.
     pub source: Parameter,
-    /// By what the source is multiplied.
+    /// The factor of the source.
     #[serde(default = "one")]
     pub scale: f64,
-    /// What is added.
+    /// The constant that is added.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub offset: f64,
 }
@@ -268,18 +272,18 @@ fn is_false(value: &bool) -> bool {
 }
 
 impl Lens {
-    /// The row of the aperture stop; `None` where no row is marked.
+    /// The index of the row of the aperture stop; `None` if no row is marked.
     pub fn stop(&self) -> Option<usize> {
         self.surfaces.iter().position(|row| row.stop)
     }
 
-    /// The index of the primary wavelength: the marked one, or the middle one.
+    /// The index of the primary wavelength: the marked one, or else the middle one.
     pub fn primary(&self) -> usize {
         let marked = self.wavelengths.iter().position(|w| w.primary);
         marked.unwrap_or(self.wavelengths.len() / 2)
     }
 
-    /// How many zoom positions there are; one for a lens that does not zoom.
+    /// The number of zoom positions; 1 for a lens with a fixed focal length.
     pub fn zoom_positions(&self) -> usize {
         self.zoom.len().max(1)
     }
@@ -294,7 +298,7 @@ impl Lens {
         self.zoom.get(zoom).and_then(|z| z.fields.as_ref()).unwrap_or(&self.fields)
     }
 
-    /// The variable that frees `parameter`, if it is one.
+    /// The variable of a parameter; `None` if the parameter is not a variable.
     pub fn variable(&self, parameter: Parameter) -> Option<&Variable> {
         self.variables.iter().find(|v| v.parameter == parameter)
     }

@@ -1,10 +1,10 @@
-//! Naming one number of a lens.
+//! The name of one number of a lens, and access to the number by it.
 
-use super::{ASPHERE_TERMS, Aperture, Lens, Medium, RADIAL_TERMS, ZoomThickness};
+use super::{ASPHERE_TERMS, Aperture, Lens, Medium, RADIAL_TERMS, SurfaceNumber, ZoomThickness};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What about a row.
+/// A quantity of a row: a surface and the gap behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -12,34 +12,37 @@ pub enum Quantity {
     Curvature,
     /// The conic constant.
     Conic,
-    /// The asphere coefficient number 0 (r⁴) to 6 (r¹⁶).
+    /// The asphere coefficient with index 0 (r⁴) to 6 (r¹⁶).
     Asphere(usize),
-    /// The gap behind the row, in mm; at every zoom position that does not have its own.
+    /// The thickness of the gap behind the surface in mm, at every zoom position without one of its
+    /// own.
     Thickness,
-    /// The gap behind the row at one zoom position, in mm.
+    /// The thickness of the gap behind the surface at the zoom position with this index, in mm.
     ZoomThickness(usize),
-    /// The index of a model glass or constant medium behind the row; of a gradient that of its
-    /// base.
+    /// The refractive index of a model glass or constant medium behind the surface; of a GRIN medium
+    /// the index of its base.
     Index,
-    /// The coefficient of the gradient behind the row: number 0 (r²) to 5 (r¹²), 6 (z) to 9 (z⁴).
-    Gradient(usize),
+    /// The coefficient of the GRIN medium behind the surface with index 0 (r²) to 5 (r¹²) or
+    /// 6 (z) to 9 (z⁴).
+    #[serde(rename = "gradient")]
+    Grin(usize),
     /// The semi-diameter, in mm.
     SemiDiameter,
 }
 
-/// One number of a lens: a row and what about it.
+/// One number of a lens: a quantity of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
-    /// The row, counted from 0.
+    /// The index of the row.
     pub surface: usize,
-    /// What about it.
+    /// The quantity.
     pub quantity: Quantity,
 }
 
 impl fmt::Display for Parameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let surface = self.surface;
+        let surface = SurfaceNumber::new(self.surface);
         match self.quantity {
             Quantity::Curvature => write!(f, "curvature of surface {surface}"),
             Quantity::Conic => write!(f, "conic constant of surface {surface}"),
@@ -51,9 +54,9 @@ impl fmt::Display for Parameter {
                 write!(f, "thickness after surface {surface} at zoom position {zoom}")
             }
             Quantity::Index => write!(f, "index after surface {surface}"),
-            Quantity::Gradient(k) => match k.checked_sub(RADIAL_TERMS) {
-                None => write!(f, "gradient coefficient {} of r after surface {surface}", k + 1),
-                Some(j) => write!(f, "gradient coefficient {} of z after surface {surface}", j + 1),
+            Quantity::Grin(k) => match k.checked_sub(RADIAL_TERMS) {
+                None => write!(f, "GRIN coefficient {} of r after surface {surface}", k + 1),
+                Some(j) => write!(f, "GRIN coefficient {} of z after surface {surface}", j + 1),
             },
             Quantity::SemiDiameter => write!(f, "semi-diameter of surface {surface}"),
         }
@@ -61,14 +64,14 @@ impl fmt::Display for Parameter {
 }
 
 impl Parameter {
-    /// The parameter of a row.
+    /// A quantity of the row with index `surface`.
     pub const fn new(surface: usize, quantity: Quantity) -> Self {
         Self { surface, quantity }
     }
 }
 
 impl Medium {
-    /// The index that can be changed: of a model glass that at the d line; `None` where it is fixed.
+    /// The index that a parameter can change, of a model glass at the d line; `None` if it is fixed.
     fn index(&self) -> Option<f64> {
         match self {
             Self::Model { nd: n, .. } | Self::Index(n) => Some(*n),
@@ -87,8 +90,8 @@ impl Medium {
 }
 
 impl Lens {
-    /// The value of a parameter as written; `None` where the lens has no such number (no such
-    /// row or zoom position, an index of a catalogue glass, an unlimited semi-diameter).
+    /// The value of a parameter as written; `None` if the lens has no such number (no such row or
+    /// zoom position, the index of a catalogue glass, an unlimited semi-diameter).
     pub fn get(&self, parameter: Parameter) -> Option<f64> {
         let row = self.surfaces.get(parameter.surface)?;
         match parameter.quantity {
@@ -100,7 +103,7 @@ impl Lens {
             Quantity::Thickness => Some(row.thickness),
             Quantity::ZoomThickness(zoom) => self.thickness_at(parameter.surface, zoom),
             Quantity::Index => row.medium.index(),
-            Quantity::Gradient(k) => match &row.medium {
+            Quantity::Grin(k) => match &row.medium {
                 Medium::Grin(gradient) => gradient.term(k),
                 _ => None,
             },
@@ -108,8 +111,8 @@ impl Lens {
         }
     }
 
-    /// Writes a parameter; `false`, and nothing changed, where the lens has no such number.
-    /// The stop's semi-diameter and an aperture given by it are one number: both follow.
+    /// Sets a parameter. Returns `false` and changes nothing if the lens has no such number. The
+    /// semi-diameter of the stop also sets an aperture that is given by it.
     pub fn set(&mut self, parameter: Parameter, value: f64) -> bool {
         let zooms = self.zoom.len();
         let Some(row) = self.surfaces.get_mut(parameter.surface) else { return false };
@@ -131,7 +134,7 @@ impl Lens {
                 Some(n) => *n = value,
                 None => return false,
             },
-            Quantity::Gradient(k) => match &mut row.medium {
+            Quantity::Grin(k) => match &mut row.medium {
                 Medium::Grin(gradient) => return gradient.set_term(k, value),
                 _ => return false,
             },
@@ -145,7 +148,7 @@ impl Lens {
         true
     }
 
-    /// The gap behind a row at a zoom position; `None` where there is no such row.
+    /// The thickness of the gap behind a surface at a zoom position in mm; `None` without that row.
     pub fn thickness_at(&self, surface: usize, zoom: usize) -> Option<f64> {
         let own = self.zoom.get(zoom).and_then(|position| {
             position.thicknesses.iter().find(|gap| gap.surface == surface).map(|gap| gap.thickness)

@@ -1,16 +1,18 @@
-//! From what was written to plain numbers: pickups, glasses, the focus solve.
+//! Resolves a lens to plain numbers: applies pickups, looks up glasses, solves the image distance.
 
 use super::system::{Shape, Surface, System};
-use super::{Lens, LensError, Medium, Object, Parameter, Pickup, Row, SystemError};
-use super::{glass, gradient};
+use super::{Lens, LensError, Medium, MediumPlace, Object, Parameter, Pickup, Row, SystemError};
+use super::{glass, grin};
 use crate::math::Real;
 
 impl Lens {
-    /// The lens at a wavelength in micrometres and a zoom position: plain numbers, with pickups
-    /// applied, the last gap solved where the lens asks for it, and the image plane appended.
+    /// The lens at a zoom position and a wavelength `um` in micrometres as plain numbers, with
+    /// pickups applied, the last thickness solved if the lens has an image solve, and the image
+    /// plane appended.
     ///
     /// # Errors
-    /// Whatever [`Lens::check`] refuses, a wavelength outside a glass's data, no such zoom position.
+    /// A fault found by [`Lens::check`], a wavelength outside the data of a glass, or a zoom position
+    /// that does not exist.
     pub fn resolve(&self, zoom: usize, um: f64) -> Result<System<f64>, LensError> {
         self.check()?;
         if zoom >= self.zoom_positions() {
@@ -31,7 +33,10 @@ impl Lens {
         Ok(system)
     }
 
-    /// The same lens with every pickup's value written into it.
+    /// The same lens with the value of every pickup written into it.
+    ///
+    /// # Errors
+    /// A pickup that depends on itself.
     pub fn with_pickups(&self) -> Result<Self, LensError> {
         let mut lens = self.clone();
         for pickup in self.pickup_order()? {
@@ -41,7 +46,8 @@ impl Lens {
         Ok(lens)
     }
 
-    /// Every number that moves with `parameter` and by how much, itself with factor 1 first.
+    /// Every parameter that changes with `parameter`, with its derivative; `parameter` itself, with
+    /// the derivative 1, is the first.
     pub fn dependents(&self, parameter: Parameter) -> Vec<(Parameter, f64)> {
         let mut moving = vec![(parameter, 1.0)];
         for pickup in self.pickup_order().unwrap_or_default() {
@@ -51,7 +57,7 @@ impl Lens {
         moving
     }
 
-    /// The pickups so that each stands behind those it depends on.
+    /// The pickups in an order in which each follows those that it depends on.
     pub(super) fn pickup_order(&self) -> Result<Vec<Pickup>, LensError> {
         let mut waiting = self.pickups.clone();
         let mut ordered = Vec::with_capacity(waiting.len());
@@ -70,15 +76,15 @@ impl Lens {
     }
 
     fn resolve_unsolved(&self, zoom: usize, um: f64) -> Result<System<f64>, LensError> {
-        let index_before = index(&self.object_medium, 0, um, 1.0)?;
+        let index_before = index(&self.object_medium, MediumPlace::Object, um, 1.0)?;
         let mut surfaces = Vec::with_capacity(self.surfaces.len() + 1);
         let mut current = index_before;
         for (i, row) in self.surfaces.iter().enumerate() {
-            current = index(&row.medium, i, um, current)?;
+            current = index(&row.medium, MediumPlace::behind(i), um, current)?;
             let thickness = self.thickness_at(i, zoom).unwrap_or(row.thickness);
             let mut surface = row.surface(thickness, current);
-            // A gradient that varies nowhere is glass.
-            surface.grin = self.grade(i).filter(|grade| !grade.is_constant());
+            // A GRIN medium with a constant index is homogeneous.
+            surface.grin = self.grin_coefficients(i).filter(|grin| !grin.is_constant());
             check_lowest_index(i, &surface)?;
             surfaces.push(surface);
         }
@@ -102,18 +108,18 @@ impl Row {
     }
 }
 
-/// No glass has an index below 1 where light goes.
-fn check_lowest_index(surface: usize, face: &Surface<f64>) -> Result<(), LensError> {
-    let Some(field) = face.gradient() else { return Ok(()) };
-    let lowest = gradient::lowest_index(&field, face.thickness);
+/// Checks that the index of a GRIN medium is nowhere below 1.
+fn check_lowest_index(i: usize, surface: &Surface<f64>) -> Result<(), LensError> {
+    let Some(profile) = surface.grin_profile() else { return Ok(()) };
+    let lowest = grin::lowest_index(&profile, surface.thickness);
     if lowest >= 1.0 {
         return Ok(());
     }
     let why = format!("falls to the index {lowest:.4} inside; expected 1 or more everywhere");
-    Err(SystemError::Grin { surface, why }.into())
+    Err(SystemError::Grin { surface: i.into(), why }.into())
 }
 
-/// A plane that clips nothing and refracts nothing.
+/// The image plane: an unlimited plane without refraction.
 fn image_plane(index: f64) -> Surface<f64> {
     Surface {
         shape: Shape::Plane,
@@ -127,28 +133,28 @@ fn image_plane(index: f64) -> Surface<f64> {
     }
 }
 
-fn index(medium: &Medium, surface: usize, um: f64, before: f64) -> Result<f64, LensError> {
+fn index(medium: &Medium, place: MediumPlace, um: f64, before: f64) -> Result<f64, LensError> {
     match medium {
         Medium::Air => Ok(1.0),
         Medium::Mirror => Ok(before),
         Medium::Index(n) => Ok(*n),
         Medium::Model { nd, vd } => Ok(glass::model_index(*nd, *vd, um)),
-        Medium::Grin(gradient) => index(&gradient.base, surface, um, before),
+        Medium::Grin(grin) => index(&grin.base, place, um, before),
         Medium::Glass(name) => {
             let Some(found) = glass::find(name) else {
                 let similar = glass::similar_names(name);
-                return Err(LensError::UnknownGlass { surface, name: name.clone(), similar });
+                return Err(LensError::UnknownGlass { place, name: name.clone(), similar });
             };
             found.index(um).ok_or_else(|| {
                 let [low, high] = found.range_um;
-                LensError::WavelengthOutOfRange { surface, name: name.clone(), um, low, high }
+                LensError::WavelengthOutOfRange { place, name: name.clone(), um, low, high }
             })
         }
     }
 }
 
-/// The distance from the last surface before the image plane to the paraxial image, from the
-/// marginal ray `n'u' = nu − y (n' − n) c`; the last thickness itself where there is no image.
+/// The distance in mm from the last surface before the image plane to the paraxial image, from the
+/// marginal ray `n'u' = nu − y (n' − n) c`; the last thickness itself if the image is at infinity.
 ///
 /// The index counts negative behind an odd number of mirrors (Welford, *Aberrations of Optical
 /// Systems*, 1986, section 3.3).
@@ -170,12 +176,12 @@ pub fn paraxial_image_distance<R: Real>(system: &System<R>, object: Object) -> R
         if i == last {
             break;
         }
-        match surface.gradient() {
+        match surface.grin_profile() {
             None => y += surface.thickness * nu / n,
-            Some(field) => {
-                let slab = gradient::ParaxialGrin::directed(&field, surface.thickness, sense);
-                (y, nu) = slab.transfer(y, nu);
-                n = slab.index_behind;
+            Some(profile) => {
+                let gap = grin::ParaxialGrin::directed(&profile, surface.thickness, sense);
+                (y, nu) = gap.transfer(y, nu);
+                n = gap.index_behind;
             }
         }
     }

@@ -1,19 +1,19 @@
-//! A lens met by the light from its other end. What varies along the axis varies the other way, about
-//! the place where its vertex was: derivatives by the thickness of that gap do not know it.
+//! A lens traversed by light from its other end. An axial GRIN profile is reversed about the vertex
+//! where it started; derivatives by the thickness of its gap do not include that.
 
 use super::system::{Shape, Surface, System};
 use crate::math::Real;
 
 impl<R: Real> System<R> {
-    /// The same surfaces met by light that comes from the image: the first vertex is the last one
-    /// before the image plane, and the new image plane stands `distance` mm behind what was the
-    /// first vertex. What was the image plane is left out; it is an object as far in front of the
-    /// new first vertex as the last thickness said.
+    /// The same surfaces traversed by light from the image. The new first vertex is the last one
+    /// before the image plane, and the new image plane lies `distance` mm behind the old first
+    /// vertex. The old image plane is removed: it is now the object, at the distance of the old last
+    /// thickness in front of the new first vertex.
     #[must_use]
     pub fn reversed(&self, distance: R) -> Self {
         let Some((image, surfaces)) = self.surfaces.split_last() else { return self.clone() };
         let mirrors = surfaces.iter().filter(|surface| surface.mirror).count();
-        // Light that travels towards −z at the end already goes the right way.
+        // Light that travels towards −z at the end already has the right direction.
         let turn = if mirrors % 2 == 0 { -R::ONE } else { R::ONE };
         let gap = |i: usize| i.checked_sub(1).map_or(distance, |i| -(turn * surfaces[i].thickness));
         let count = surfaces.len();
@@ -23,7 +23,7 @@ impl<R: Real> System<R> {
             index: self.index_before(i),
             grin: i
                 .checked_sub(1)
-                .and_then(|i| surfaces[i].grin.map(|grade| grade.reversed(surfaces[i].thickness))),
+                .and_then(|i| surfaces[i].grin.map(|grin| grin.reversed(surfaces[i].thickness))),
             ..surfaces[i]
         });
         let plane = Surface { index: self.index_before, thickness: R::ZERO, ..*image };
@@ -36,7 +36,7 @@ impl<R: Real> System<R> {
 }
 
 impl<R: Real> Shape<R> {
-    /// The same form with its sag times `turn`, which is 1 or −1.
+    /// The same form with its sag multiplied by `turn`, which is 1 or −1.
     fn with_sag_sign(self, turn: R) -> Self {
         match self {
             Self::Plane => Self::Plane,

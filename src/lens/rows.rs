@@ -1,9 +1,10 @@
-//! Rows come, go and turn around; everything that names a row by its number follows.
+//! Renumbering and reversing rows, along with the variables, pickups and zoom positions that name
+//! them.
 
 use super::{Lens, Medium, Parameter, Pickup, Quantity, Variable, ZoomThickness};
 
 impl Lens {
-    /// Renames every parameter that a variable or pickup mentions; what has no name any more goes.
+    /// Maps the parameters of all variables and pickups; those mapped to `None` are removed.
     pub fn map_parameters(&mut self, map: impl Fn(Parameter) -> Option<Parameter>) {
         let variable =
             |v: &Variable| map(v.parameter).map(|parameter| Variable { parameter, ..*v });
@@ -15,8 +16,8 @@ impl Lens {
         self.pickups = self.pickups.iter().filter_map(pickup).collect();
     }
 
-    /// Gives every row that variables, pickups and zoom positions name a new number, or none: for
-    /// rows that were put in or taken out.
+    /// Maps the row indices of variables, pickups and zoom positions, for rows that were inserted or
+    /// removed; those mapped to `None` are removed.
     pub fn renumber_rows(&mut self, map: impl Fn(usize) -> Option<usize>) {
         self.map_parameters(|p| map(p.surface).map(|surface| Parameter { surface, ..p }));
         for position in &mut self.zoom {
@@ -27,25 +28,26 @@ impl Lens {
         }
     }
 
-    /// Turns the rows `first` to `last` around: surfaces and the gaps between them in reverse order,
-    /// every curvature and asphere coefficient with the other sign. The gap behind the group stays. A
-    /// gradient along the axis keeps its coefficients, which count from the new surface in front.
+    /// Reverses the group of rows `first` to `last`: surfaces and the gaps between them in reverse
+    /// order, every curvature and asphere coefficient with the opposite sign. The gap behind the
+    /// group stays. An axial GRIN profile keeps its coefficients, which then refer to the new surface
+    /// in front.
     ///
     /// # Panics
-    /// If the rows are no group: `first` behind `last`, or `last` behind the lens.
+    /// If `first` is greater than `last`, or `last` is not a row of the lens.
     pub fn reverse_rows(&mut self, first: usize, last: usize) {
-        let turn = Reversal { first, last };
-        turn.reverse(self);
-        self.map_parameters(|parameter| Some(turn.parameter(parameter)));
-        self.variables.iter_mut().for_each(|variable| turn.swap_bounds(variable));
-        self.pickups.iter_mut().for_each(|pickup| turn.adjust_pickup(pickup));
+        let reversal = Reversal { first, last };
+        reversal.reverse(self);
+        self.map_parameters(|parameter| Some(reversal.parameter(parameter)));
+        self.variables.iter_mut().for_each(|variable| reversal.swap_bounds(variable));
+        self.pickups.iter_mut().for_each(|pickup| reversal.adjust_pickup(pickup));
         for gap in self.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
-            gap.surface = turn.gap(gap.surface);
+            gap.surface = reversal.gap(gap.surface);
         }
     }
 }
 
-/// A group of rows that is turned around.
+/// The reversal of a group of rows.
 #[derive(Clone, Copy)]
 struct Reversal {
     first: usize,
@@ -67,12 +69,12 @@ impl Reversal {
         }
     }
 
-    /// Where a surface goes.
+    /// The new index of a surface.
     fn surface(self, i: usize) -> usize {
         if (self.first..=self.last).contains(&i) { self.first + self.last - i } else { i }
     }
 
-    /// Where a gap goes.
+    /// The new index of a gap.
     fn gap(self, i: usize) -> usize {
         if (self.first..self.last).contains(&i) { self.first + self.last - 1 - i } else { i }
     }
@@ -82,7 +84,7 @@ impl Reversal {
             Quantity::Thickness
             | Quantity::ZoomThickness(_)
             | Quantity::Index
-            | Quantity::Gradient(_) => self.gap(parameter.surface),
+            | Quantity::Grin(_) => self.gap(parameter.surface),
             Quantity::Curvature
             | Quantity::Conic
             | Quantity::Asphere(_)
@@ -91,7 +93,7 @@ impl Reversal {
         Parameter { surface, ..parameter }
     }
 
-    /// Whether a number of the turned lens has the other sign.
+    /// True if a parameter has the opposite sign after the reversal.
     fn changes_sign(self, parameter: Parameter) -> bool {
         (self.first..=self.last).contains(&parameter.surface)
             && matches!(parameter.quantity, Quantity::Curvature | Quantity::Asphere(_))
@@ -114,7 +116,7 @@ impl Reversal {
     }
 }
 
-/// The other sign; a zero keeps its own.
+/// The opposite sign; a zero keeps its own.
 fn negate(value: f64) -> f64 {
     if value == 0.0 { value } else { -value }
 }

@@ -1,4 +1,4 @@
-//! The number of a surface in texts.
+//! Surfaces and gaps in texts.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -42,6 +42,31 @@ impl From<usize> for SurfaceNumber {
 impl fmt::Display for SurfaceNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.index.saturating_add(1).fmt(f)
+    }
+}
+
+/// A gap in a text, as the place of its medium.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MediumPlace {
+    /// The space in front of the first surface.
+    Object,
+    /// The gap behind a surface.
+    After(SurfaceNumber),
+}
+
+impl MediumPlace {
+    /// The gap behind the surface with this index.
+    pub const fn behind(index: usize) -> Self {
+        Self::After(SurfaceNumber::new(index))
+    }
+}
+
+impl fmt::Display for MediumPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Object => f.write_str("in object space"),
+            Self::After(surface) => write!(f, "after surface {surface}"),
+        }
     }
 }
 

@@ -1,12 +1,12 @@
-//! A lens resolved to plain numbers: one wavelength, one zoom position.
+//! A lens resolved to plain numbers, at one wavelength and one zoom position.
 
-use super::{ASPHERE_TERMS, ProfileCoefficients, RotationalProfile};
+use super::{ASPHERE_TERMS, MediumPlace, ProfileCoefficients, RotationalProfile, SurfaceNumber};
 use crate::math::{Real, format_short};
 
 /// The form of a surface: `z = c r² / (1 + √(1 − (1+k) c² r²)) + Σ aⱼ r^(2j+4)`.
 ///
-/// What is left out is not computed: a plane is no sphere, a sphere has no conic constant, and
-/// only an asphere needs an iteration.
+/// Each form computes only what it needs: a sphere has no conic constant, and only an asphere is
+/// intersected by an iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape<R> {
     /// `z = 0`.
@@ -48,20 +48,22 @@ impl<R: Real> Shape<R> {
         }
     }
 
-    /// The simplest form with these numbers, coefficients of r⁴, r⁶, ... as far as there are any.
+    /// The simplest form with these numbers; `terms` are the coefficients of r⁴, r⁶, …, at most
+    /// [`ASPHERE_TERMS`].
     ///
     /// # Errors
-    /// More coefficients than the model has.
+    /// [`SystemError::TooManyTerms`], which names `surface`.
     pub fn new(curvature: R, conic: R, terms: &[R], surface: usize) -> Result<Self, SystemError> {
         if terms.len() > ASPHERE_TERMS {
-            return Err(SystemError::TooManyTerms { surface, found: terms.len() });
+            return Err(SystemError::TooManyTerms { surface: surface.into(), found: terms.len() });
         }
         let mut all = [R::ZERO; ASPHERE_TERMS];
         all[..terms.len()].copy_from_slice(terms);
         Ok(Self::simplest(curvature, conic, all))
     }
 
-    /// Curvature at the vertex, conic constant and polynomial, zero where the form has none.
+    /// The curvature at the vertex in 1/mm, the conic constant and the coefficients of r⁴ to r¹⁶; zero
+    /// where the form has none.
     pub fn numbers(&self) -> (R, R, [R; ASPHERE_TERMS]) {
         match *self {
             Self::Plane => (R::ZERO, R::ZERO, [R::ZERO; ASPHERE_TERMS]),
@@ -71,8 +73,8 @@ impl<R: Real> Shape<R> {
         }
     }
 
-    /// The same surface written as a conic, so that its derivative by the conic constant exists;
-    /// an asphere stays one.
+    /// The same surface as a conic, so that its derivative by the conic constant exists; an asphere
+    /// remains an asphere.
     #[must_use]
     pub fn as_conic(self) -> Self {
         match self {
@@ -84,19 +86,19 @@ impl<R: Real> Shape<R> {
         }
     }
 
-    /// The same surface written as an asphere, so that its derivatives by the coefficients exist.
+    /// The same surface as an asphere, so that its derivatives by the coefficients exist.
     #[must_use]
     pub fn as_asphere(self) -> Self {
         let (curvature, conic, terms) = self.numbers();
         Self::Asphere { curvature, conic, terms }
     }
 
-    /// The curvature at the vertex.
+    /// The curvature at the vertex, in 1/mm.
     pub fn curvature(&self) -> R {
         self.numbers().0
     }
 
-    /// The sag at the square `r2` of the distance from the axis, and its derivative by `r2`;
+    /// The sag in mm at the square `r2` of the distance from the axis, and its derivative by `r2`;
     /// `None` beyond the edge of the surface.
     #[inline(always)]
     pub fn sag(&self, r2: R) -> Option<(R, R)> {
@@ -118,30 +120,31 @@ impl<R: Real> Shape<R> {
     }
 }
 
-/// One surface and the gap behind it, in numbers.
+/// One surface and the gap behind it, in plain numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface<R> {
-    /// Its form.
+    /// The form of the surface.
     pub shape: Shape<R>,
     /// The distance along the axis to the next vertex, in mm; unused at the last surface.
     pub thickness: R,
-    /// The index behind the surface, positive after mirrors too; of a gradient that on the axis at
-    /// the vertex.
+    /// The index behind the surface, positive after mirrors too; of a GRIN medium the index on the
+    /// axis at the vertex.
     pub index: R,
-    /// How the index of the gap varies; `None` for glass.
+    /// The coefficients of the GRIN medium in the gap; `None` for a homogeneous one.
     pub grin: Option<ProfileCoefficients<R>>,
-    /// Rays farther from the axis are clipped, the rim itself passes; infinite where nothing is.
+    /// The radius of the clear aperture in mm; rays farther from the axis are clipped, those exactly
+    /// on the rim pass. Infinite for an unlimited surface.
     pub semi_diameter: R,
-    /// Rays nearer to the axis are clipped, the edge itself passes; 0 where nothing is obstructed.
+    /// The radius of the central obstruction in mm; rays nearer to the axis are clipped, those
+    /// exactly on its edge pass. 0 for none.
     pub obstruction: R,
-    /// Whether it reflects.
+    /// True for a mirror.
     pub mirror: bool,
-    /// Whether the far half of the sphere or ellipsoid counts too.
+    /// True if the far half of the sphere or ellipsoid belongs to the surface too.
     pub hyperhemisphere: bool,
 }
 
-/// A lens in plain numbers. The last surface is where rays are collected, as a rule the image
-/// plane.
+/// A lens in plain numbers. Rays end at the last surface, as a rule the image plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct System<R> {
     /// The index in front of the first surface.
@@ -152,143 +155,142 @@ pub struct System<R> {
     pub stop: Option<usize>,
 }
 
-/// A number that no ray can be traced with.
+/// A system or ray that cannot be traced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SystemError {
-    /// Nothing to trace through.
+    /// There is no surface.
     #[error("the lens has no surfaces")]
     NoSurfaces,
-    /// Not finite, or so large or small that its square is not.
+    /// A number is not finite, or its square would not be.
     #[error(
         "{what} of surface {surface} is {}; expected a finite number below 1e100",
         format_short(*found)
     )]
     NotFinite {
-        /// What about the surface.
+        /// The name of the number.
         what: &'static str,
-        /// The surface, counted from 0.
-        surface: usize,
+        /// The surface.
+        surface: SurfaceNumber,
         /// The value.
         found: f64,
     },
-    /// An index that is not positive.
+    /// A refractive index is not positive.
     #[error("index {place} is {}; expected a positive finite number", format_short(*found))]
     Index {
-        /// `before surface 0` or `after surface 3`.
-        place: String,
+        /// The gap.
+        place: MediumPlace,
         /// The value.
         found: f64,
     },
-    /// A negative semi-diameter, or none.
+    /// A semi-diameter is negative or not a number.
     #[error("semi-diameter of surface {surface} is {found}; expected zero or more")]
     SemiDiameter {
-        /// The surface, counted from 0.
-        surface: usize,
+        /// The surface.
+        surface: SurfaceNumber,
         /// The value.
         found: f64,
     },
-    /// An obstruction that is negative or leaves no light.
+    /// An obstruction is negative or blocks all light.
     #[error(
         "obstruction of surface {surface} is {found}; expected zero or more, and less than the \
          semi-diameter {semi_diameter}"
     )]
     Obstruction {
-        /// The surface, counted from 0.
-        surface: usize,
+        /// The surface.
+        surface: SurfaceNumber,
         /// The value.
         found: f64,
         /// The semi-diameter.
         semi_diameter: f64,
     },
-    /// More coefficients than the model has.
+    /// A surface has more asphere coefficients than [`ASPHERE_TERMS`].
     #[error("surface {surface} has {found} asphere coefficients; expected at most 7 (r^4 to r^16)")]
     TooManyTerms {
-        /// The surface, counted from 0.
-        surface: usize,
-        /// How many there are.
+        /// The surface.
+        surface: SurfaceNumber,
+        /// The number of coefficients.
         found: usize,
     },
-    /// A gradient where none can be traced.
-    #[error("the gradient after surface {surface} {why}")]
+    /// A GRIN medium cannot be traced.
+    #[error("the GRIN medium after surface {surface} {why}")]
     Grin {
-        /// The surface, counted from 0.
-        surface: usize,
-        /// Why not.
+        /// The surface in front of it.
+        surface: SurfaceNumber,
+        /// The reason, as the rest of a sentence.
         why: String,
     },
-    /// A ray that starts nowhere or goes nowhere.
+    /// The start or the direction of a ray is not valid.
     #[error("ray {ray}: {found}; expected a finite start and a direction of length 1 within 1e-9")]
     Ray {
-        /// Which ray of the batch, counted from 0.
+        /// The index of the ray in its batch.
         ray: usize,
-        /// What is wrong with it.
+        /// The fault.
         found: String,
     },
 }
 
-/// Beyond this the squares that tracing needs are no longer finite.
+/// The largest magnitude whose square, which tracing needs, is finite with certainty.
 const LARGEST: f64 = 1e100;
 
 fn check_finite(what: &'static str, surface: usize, found: f64) -> Result<(), SystemError> {
     if found.abs() <= LARGEST {
         Ok(())
     } else {
-        Err(SystemError::NotFinite { what, surface, found })
+        Err(SystemError::NotFinite { what, surface: surface.into(), found })
     }
 }
 
-fn check_index(place: impl FnOnce() -> String, found: f64) -> Result<(), SystemError> {
-    if found > 0.0 && found <= LARGEST {
-        Ok(())
-    } else {
-        Err(SystemError::Index { place: place(), found })
-    }
+fn check_index(place: MediumPlace, found: f64) -> Result<(), SystemError> {
+    if found > 0.0 && found <= LARGEST { Ok(()) } else { Err(SystemError::Index { place, found }) }
 }
 
 impl<R: Real> System<R> {
-    /// Refuses numbers that no ray can be traced with.
+    /// Checks that rays can be traced through the system.
+    ///
+    /// # Errors
+    /// The first number that makes that impossible.
     pub fn check(&self) -> Result<(), SystemError> {
         if self.surfaces.is_empty() {
             return Err(SystemError::NoSurfaces);
         }
-        check_index(|| "before surface 0".to_owned(), self.index_before.value())?;
+        check_index(MediumPlace::Object, self.index_before.value())?;
         self.surfaces.iter().enumerate().try_for_each(|(i, surface)| surface.check(i))?;
-        let mut graded = (0..self.surfaces.len()).filter(|i| self.surfaces[*i].grin.is_some());
-        graded.try_for_each(|i| self.check_grin(i))
+        let mut gaps = (0..self.surfaces.len()).filter(|i| self.surfaces[*i].grin.is_some());
+        gaps.try_for_each(|i| self.check_grin(i))
     }
 
-    /// A gradient needs two faces: refracting ones that no ray meets from behind their equator.
+    /// Checks that a GRIN medium lies between two refracting surfaces without a far half.
     fn check_grin(&self, i: usize) -> Result<(), SystemError> {
-        let refuse = |why: &str| Err(SystemError::Grin { surface: i, why: why.to_owned() });
+        let refuse = |why: &str| Err(SystemError::Grin { surface: i.into(), why: why.to_owned() });
         match (&self.surfaces[i], self.surfaces.get(i + 1)) {
             (_, None) => refuse("has no surface behind it"),
-            (face, Some(next)) if face.mirror || next.mirror => {
-                refuse("touches a mirror, which is not supported; expected refracting faces")
+            (front, Some(back)) if front.mirror || back.mirror => {
+                refuse("touches a mirror, which is not supported; expected refracting surfaces")
             }
-            (face, Some(next)) if face.hyperhemisphere || next.hyperhemisphere => refuse(
-                "touches a hyper-hemisphere, which is not supported; expected faces on this side \
-                 of their equator",
+            (front, Some(back)) if front.hyperhemisphere || back.hyperhemisphere => refuse(
+                "touches a hyperhemisphere, which is not supported; expected surfaces that end at \
+                 their equator",
             ),
             _ => Ok(()),
         }
     }
 
-    /// The gradient in the gap behind a surface, if there is one.
-    pub fn gradient(&self, surface: usize) -> Option<RotationalProfile<R>> {
-        self.surfaces.get(surface)?.gradient()
+    /// The index profile of the gap behind a surface; `None` for a homogeneous medium.
+    pub fn grin_profile(&self, surface: usize) -> Option<RotationalProfile<R>> {
+        self.surfaces.get(surface)?.grin_profile()
     }
 
-    /// Whether any gap is filled with a gradient.
+    /// True if any gap is filled with a GRIN medium.
     pub fn has_grin(&self) -> bool {
         self.surfaces.iter().any(|surface| surface.grin.is_some())
     }
 
-    /// The same numbers as another number type, without derivatives.
+    /// The same system over another number type, without derivatives.
     pub fn cast<S: Real>(&self) -> System<S> {
-        let lift = |value: R| S::from_f64(value.value());
+        let cast = |value: R| S::from_f64(value.value());
         System {
-            index_before: lift(self.index_before),
-            surfaces: self.surfaces.iter().map(|surface| surface.map(lift)).collect(),
+            index_before: cast(self.index_before),
+            surfaces: self.surfaces.iter().map(|surface| surface.map(cast)).collect(),
             stop: self.stop,
         }
     }
@@ -306,37 +308,34 @@ impl<R: Real> Surface<R> {
         check_finite("conic constant", i, conic.value())?;
         terms.iter().try_for_each(|a| check_finite("asphere coefficient", i, a.value()))?;
         check_finite("thickness", i, self.thickness.value())?;
-        check_index(|| format!("after surface {i}"), self.index.value())?;
+        check_index(MediumPlace::behind(i), self.index.value())?;
         if let Some(grade) = &self.grin {
-            grade
-                .terms
-                .iter()
-                .try_for_each(|a| check_finite("gradient coefficient", i, a.value()))?;
+            grade.terms.iter().try_for_each(|a| check_finite("GRIN coefficient", i, a.value()))?;
         }
         let (semi_diameter, obstruction) = (self.semi_diameter.value(), self.obstruction.value());
         if !(semi_diameter >= 0.0) {
-            return Err(SystemError::SemiDiameter { surface: i, found: semi_diameter });
+            return Err(SystemError::SemiDiameter { surface: i.into(), found: semi_diameter });
         }
         let leaves_light = obstruction > 0.0 && obstruction < semi_diameter;
         if obstruction == 0.0 || leaves_light && obstruction <= LARGEST {
             Ok(())
         } else {
-            Err(SystemError::Obstruction { surface: i, found: obstruction, semi_diameter })
+            Err(SystemError::Obstruction { surface: i.into(), found: obstruction, semi_diameter })
         }
     }
 
-    /// The gradient in the gap behind, if there is one.
-    pub fn gradient(&self) -> Option<RotationalProfile<R>> {
+    /// The index profile of the gap behind the surface; `None` for a homogeneous medium.
+    pub fn grin_profile(&self) -> Option<RotationalProfile<R>> {
         self.grin.map(|grade| RotationalProfile { base: self.index, coefficients: grade })
     }
 
-    /// Takes away what clips: rim and obstruction.
+    /// Removes what clips: the clear aperture and the obstruction.
     pub fn remove_apertures(&mut self) {
         self.semi_diameter = R::from_f64(f64::INFINITY);
         self.obstruction = R::ZERO;
     }
 
-    /// The same surface with every number mapped.
+    /// The same surface with every number mapped by `f`.
     pub fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Surface<S> {
         let shape = match self.shape {
             Shape::Plane => Shape::Plane,
@@ -352,7 +351,7 @@ impl<R: Real> Surface<R> {
             shape,
             thickness: f(self.thickness),
             index: f(self.index),
-            grin: self.grin.map(|grade| grade.map(&f)),
+            grin: self.grin.map(|grin| grin.map(&f)),
             semi_diameter: f(self.semi_diameter),
             obstruction: f(self.obstruction),
             mirror: self.mirror,

@@ -270,7 +270,7 @@ fn bind_parameters(
                 Quantity::Thickness if !own_gap => SurfaceParameter::Thickness,
                 Quantity::ZoomThickness(z) if z == zoom => SurfaceParameter::Thickness,
                 Quantity::Index => SurfaceParameter::Index,
-                Quantity::Gradient(k) => SurfaceParameter::GrinTerm(k),
+                Quantity::Grin(k) => SurfaceParameter::GrinTerm(k),
                 Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
                     SurfaceParameter::SemiDiameter
                 }
@@ -284,7 +284,7 @@ fn bind_parameters(
             for surface in followers_of_index(lens, surface, slot) {
                 if let SurfaceParameter::GrinTerm(_) = slot {
                     let graded = &mut system.surfaces[surface].grin;
-                    *graded = graded.or_else(|| lens.grade(surface));
+                    *graded = graded.or_else(|| lens.grin_coefficients(surface));
                 }
                 slot.promote_shape(system, surface);
                 let now = *slot.value_mut(system, surface);

@@ -285,7 +285,7 @@ fn scale(lens: &Lens, variable: &Variable) -> f64 {
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.1 * rim,
         Quantity::Index => 0.1,
         // As much index at the rim, or at the other face.
-        Quantity::Gradient(k) => match &lens.surfaces[variable.parameter.surface].medium {
+        Quantity::Grin(k) => match &lens.surfaces[variable.parameter.surface].medium {
             Medium::Grin(gradient) => {
                 let length = if k < RADIAL_TERMS { rim } else { size };
                 0.02 * length.powi(gradient.power(k))

@@ -39,7 +39,7 @@ pub(super) fn paraxial_grins<R: Real>(system: &System<R>) -> Vec<Option<Paraxial
     let indices = signed_indices(system);
     let gaps = system.surfaces.iter().zip(&indices[1..]);
     gaps.map(|(surface, n)| {
-        surface.gradient().map(|field| ParaxialGrin::directed(&field, surface.thickness, *n))
+        surface.grin_profile().map(|field| ParaxialGrin::directed(&field, surface.thickness, *n))
     })
     .collect()
 }

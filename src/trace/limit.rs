@@ -168,7 +168,7 @@ impl<R: Real> WarpTracer<R> {
     pub fn new(system: &System<f64>) -> Result<Self, SystemError> {
         if let Some(surface) = system.surfaces.iter().position(|s| s.grin.is_some()) {
             let why = "has no warp field; expected `boundary` or `difference`".to_owned();
-            return Err(SystemError::Grin { surface, why });
+            return Err(SystemError::Grin { surface: surface.into(), why });
         }
         let outward = Tracer::new(&system.cast::<Jet<R>>())?;
         let kinds = [

@@ -72,7 +72,7 @@ impl<R: Real> Tracer<R> {
     fn fill_grin_gaps(&mut self, system: &System<R>) -> Result<(), SystemError> {
         for (i, surface) in system.surfaces.iter().enumerate() {
             let faces = self.interfaces.get(i).zip(self.interfaces.get(i + 1));
-            let gap = match (surface.gradient(), faces) {
+            let gap = match (surface.grin_profile(), faces) {
                 (Some(field), Some((front, back))) => {
                     let (gap, plan) = GrinGap::new(field, i, [front, back])?;
                     self.step_plans.push(plan);

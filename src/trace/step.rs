@@ -108,7 +108,7 @@ fn choose_steps(
     } else {
         format!("is too strong for {MAX_STEPS} steps")
     };
-    Err(SystemError::Grin { surface, why })
+    Err(SystemError::Grin { surface: surface.into(), why })
 }
 
 /// The fewest steps that are worth a trial: light may turn by a third of a right angle or so in one,

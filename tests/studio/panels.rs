@@ -79,7 +79,7 @@ fn a_glass_that_nobody_makes_is_refused_with_its_surface() {
     let mut harness = prescription();
     type_into(&mut harness, "Glass of surface 3", "SCHOTT BK7", Key::Enter);
     assert_eq!(harness.state().wishes, []);
-    harness.get_by_label_contains("Surface 3: unknown glass `SCHOTT BK7`; similar names");
+    harness.get_by_label_contains("Unknown glass `SCHOTT BK7` after surface 3; similar names");
 }
 
 #[test]

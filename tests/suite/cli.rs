@@ -179,7 +179,7 @@ fn a_lens_with_a_gradient_has_every_page() {
     let derivatives = done(&["gradient", WOOD, "--field", "2"], "");
     assert!(derivatives.contains("gradient after surface 0, coefficient of"), "{derivatives}");
     assert!(derivatives.contains("r^12") && derivatives.contains("z^4"), "{derivatives}");
-    refused(1, &["gradient", WOOD, "--method", "warp"], "", &["surface 0 has no warp field"]);
+    refused(1, &["gradient", WOOD, "--method", "warp"], "", &["surface 1 has no warp field"]);
 }
 
 #[test]

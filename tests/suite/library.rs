@@ -58,7 +58,7 @@ fn focal_lengths(system: &System<f64>) -> (f64, f64) {
         nu -= y * (behind - n) * surface.shape.curvature();
         n = behind;
         last_height = y;
-        if let Some(field) = surface.gradient() {
+        if let Some(field) = surface.grin_profile() {
             (y, nu) = through(&field, surface.thickness, y, nu);
             n = sense * field.index(Vec3::new(0.0, 0.0, surface.thickness));
         } else {

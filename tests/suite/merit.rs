@@ -100,7 +100,7 @@ fn step(quantity: Quantity) -> f64 {
         | Quantity::Thickness
         | Quantity::ZoomThickness(_)
         | Quantity::SemiDiameter => 1e-2,
-        Quantity::Index | Quantity::Gradient(_) => 1e-4,
+        Quantity::Index | Quantity::Grin(_) => 1e-4,
     }
 }
 

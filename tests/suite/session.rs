@@ -254,7 +254,7 @@ fn consecutive_edits_of_one_cell_are_one_step() {
 #[test]
 fn refused_edits_leave_the_design_and_say_why() {
     let cases = [
-        (Edit::Set { parameter: GAP, value: f64::NAN }, "thickness after surface 1 is NaN"),
+        (Edit::Set { parameter: GAP, value: f64::NAN }, "thickness after surface 2 is NaN"),
         (Edit::Set { parameter: Parameter::new(99, Quantity::Conic), value: 0.0 }, "no surface 99"),
         (Edit::SetSemiDiameter { surface: 0, value: Some(-1.0) }, "expected zero or more"),
         (Edit::SetMedium { surface: 0, medium: Medium::Glass("N-BK77".into()) }, "unknown glass"),

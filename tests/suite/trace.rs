@@ -250,7 +250,7 @@ fn obstructions_that_leave_no_light_are_refused() {
         system.surfaces[2].obstruction = wrong;
         system.surfaces[2].semi_diameter = semi_diameter;
         let error = Tracer::new(&system).unwrap_err().to_string();
-        assert!(error.starts_with("obstruction of surface 2 is "), "{error}");
+        assert!(error.starts_with("obstruction of surface 3 is "), "{error}");
     }
     let mut system = system();
     (system.surfaces[2].obstruction, system.surfaces[2].semi_diameter) = (0.0, 0.0);

@@ -226,9 +226,9 @@ mod tests {
         assert!(changed("\"infinity\"", "\"far\"").contains("\"far\"; expected \"infinity\" or"));
         assert!(changed(", \"stop\": true", "").contains("no surface is the stop"));
         let text = changed("\"semi_diameter\": 9.0", "\"stop\": true");
-        assert!(text.contains("surfaces 0 and 1 are both the stop"), "{text}");
+        assert!(text.contains("surfaces 1 and 2 are both the stop"), "{text}");
         let text = changed("9.0", "-9.0");
-        assert!(text.contains("semi-diameter of surface 0 is -9; expected zero or more"), "{text}");
+        assert!(text.contains("semi-diameter of surface 1 is -9; expected zero or more"), "{text}");
         let text = changed("N-BAK4", "N-BAK99");
         assert!(text.contains("unknown glass `SCHOTT N-BAK99`"), "{text}");
     }

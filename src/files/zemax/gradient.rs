@@ -39,8 +39,8 @@ pub(super) fn variable_quantity(kind: &str, index: usize) -> Option<Quantity> {
     match index {
         _ if kind != KIND => None,
         2 => Some(Quantity::Index),
-        3..=5 => Some(Quantity::Gradient(index - 3)),
-        6..=8 => Some(Quantity::Gradient(RADIAL_TERMS + index - 6)),
+        3..=5 => Some(Quantity::Grin(index - 3)),
+        6..=8 => Some(Quantity::Grin(RADIAL_TERMS + index - 6)),
         _ => None,
     }
 }

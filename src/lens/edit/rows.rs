@@ -40,7 +40,7 @@ pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
 /// Replaces a row; variables and pickups of parameters that it does not have are removed.
 pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), EditError> {
     lens.row_mut(surface)?.clone_from(row);
-    let gradient = (0..PROFILE_TERMS).map(Quantity::Gradient);
+    let gradient = (0..PROFILE_TERMS).map(Quantity::Grin);
     for quantity in [Quantity::Index, Quantity::SemiDiameter].into_iter().chain(gradient) {
         let parameter = Parameter::new(surface, quantity);
         if lens.get(parameter).is_none() {

@@ -10,7 +10,7 @@ fn power(rows: &[Row], parameter: Parameter) -> i32 {
         Quantity::Conic | Quantity::Index => 0,
         Quantity::Asphere(term) => -(2 * term as i32 + 3),
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 1,
-        Quantity::Gradient(k) => match &rows[parameter.surface].medium {
+        Quantity::Grin(k) => match &rows[parameter.surface].medium {
             Medium::Grin(gradient) => gradient.power(k),
             _ => 0,
         },

@@ -15,7 +15,7 @@ fn langevin_unit(parameter: Parameter, size: f64) -> f64 {
         Quantity::Conic => 1.0,
         Quantity::Asphere(term) => 0.05 / (0.2 * size).powi(2 * term as i32 + 3),
         Quantity::Index => 0.1,
-        Quantity::Gradient(k) => {
+        Quantity::Grin(k) => {
             let power = if k < RADIAL_TERMS { 2 * k + 2 } else { k - RADIAL_TERMS + 1 };
             0.02 / (0.2 * size).powi(power as i32)
         }

@@ -115,7 +115,7 @@ pub(super) fn is_gap(quantity: Quantity) -> bool {
 /// True if a quantity belongs to the medium behind a row: the index or a gradient-index
 /// coefficient.
 pub(super) fn is_of_medium(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Index | Quantity::Gradient(_))
+    matches!(quantity, Quantity::Index | Quantity::Grin(_))
 }
 
 /// True if a pickup reads or sets a quantity of a row that `is_it` selects.

@@ -87,7 +87,7 @@ fn reverse_axial_gradient(lens: &mut Lens, row: usize) {
     let turned = axial_gradient_behind(lens, row).and_then(|gradient| gradient.reversed(length));
     let Some(turned) = turned else { return };
     lens.surfaces[row].medium = Medium::Grin(Box::new(turned));
-    let axial = |q| matches!(q, Quantity::Gradient(k) if k >= RADIAL_TERMS);
+    let axial = |q| matches!(q, Quantity::Grin(k) if k >= RADIAL_TERMS);
     let values: Vec<_> = lens.variables.iter().map(|v| lens.get(v.parameter)).collect();
     for (variable, value) in lens.variables.iter_mut().zip(values) {
         let parameter = variable.parameter;

@@ -74,7 +74,7 @@ fn zoom_models(lens: &Lens, reference: &Lens) -> Result<Vec<ZoomModel>, LensErro
         let mut indices = signed_indices(&system);
         indices.truncate(rows + 1);
         let gaps = system.surfaces[..rows].iter().map(|surface| surface.thickness).collect();
-        let gradients = (0..rows).map(|row| system.gradient(row)).collect();
+        let gradients = (0..rows).map(|row| system.grin_profile(row)).collect();
         let (height, slope) = match (lens.object, reference.object) {
             (Object::Finite(here), Object::Finite(there)) => {
                 (here / there.abs(), indices[0] / there.abs())

@@ -58,16 +58,16 @@ fn lenses_that_make_no_sense_are_refused_on_reading_and_on_writing() {
     let wrong: [(&str, Spoil); 9] = [
         ("the lens has no surfaces", |lens| lens.surfaces.clear()),
         ("no surface is the stop", |lens| lens.surfaces[5].stop = false),
-        ("surfaces 2 and 5 are both the stop", |lens| lens.surfaces[2].stop = true),
-        ("semi-diameter of surface 3 is -1", |lens| lens.surfaces[3].semi_diameter = Some(-1.0)),
-        ("obstruction of surface 3 is -1", |lens| lens.surfaces[3].obstruction = Some(-1.0)),
-        ("obstruction of surface 3 is inf", |lens| {
+        ("surfaces 3 and 6 are both the stop", |lens| lens.surfaces[2].stop = true),
+        ("semi-diameter of surface 4 is -1", |lens| lens.surfaces[3].semi_diameter = Some(-1.0)),
+        ("obstruction of surface 4 is -1", |lens| lens.surfaces[3].obstruction = Some(-1.0)),
+        ("obstruction of surface 4 is inf", |lens| {
             lens.surfaces[3].obstruction = Some(f64::INFINITY);
         }),
-        ("obstruction of surface 3 is 99; expected zero or more and less than", |lens| {
+        ("obstruction of surface 4 is 99; expected zero or more and less than", |lens| {
             lens.surfaces[3].obstruction = Some(99.0);
         }),
-        ("curvature of surface 0 is NaN", |lens| lens.surfaces[0].curvature = f64::NAN),
+        ("curvature of surface 1 is NaN", |lens| lens.surfaces[0].curvature = f64::NAN),
         ("f-number is inf", |lens| lens.aperture = Aperture::FNumber(f64::INFINITY)),
     ];
     for (expected, spoil) in wrong {

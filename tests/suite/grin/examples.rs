@@ -42,7 +42,7 @@ fn grin_example_a_gradient_along_the_axis_takes_spherical_aberration_away() {
     println!("on the axis {:.2} um of glass, {:.4} um with the gradient", 1e3 * plain, 1e3 * with);
     assert!(with < 1e-3 * plain && plain > 0.04, "{with} {plain}");
     // From glass a descent comes to the same gradient.
-    let slope = Parameter::new(0, Quantity::Gradient(RADIAL_TERMS));
+    let slope = Parameter::new(0, Quantity::Grin(RADIAL_TERMS));
     let mut weak = graded.clone();
     assert!(weak.set(slope, -0.004) && weak.set(image, 46.3));
     let found = sharpest(weak, &[slope, image]);
@@ -66,7 +66,7 @@ fn grin_example_a_plane_plate_has_the_focal_length_of_woods_formula() {
     // The term in r⁴ is what makes it sharp.
     let image = Parameter::new(1, Quantity::Thickness);
     let mut parabola = lens.clone();
-    assert!(parabola.set(Parameter::new(0, Quantity::Gradient(1)), 0.0));
+    assert!(parabola.set(Parameter::new(0, Quantity::Grin(1)), 0.0));
     let without = spot(&sharpest(parabola, &[image]));
     let with = spot(&lens);
     println!("on the axis {:.2} um of a parabola, {:.4} um", 1e3 * without, 1e3 * with);

@@ -409,16 +409,16 @@ fn grin_lens_the_plan_keeps_its_tolerance() {
 #[test]
 fn grin_lens_parameters_are_named_and_set() {
     let mut lens = busy("index", &[-0.01], &[0.01]);
-    let radial = Parameter::new(0, Quantity::Gradient(0));
-    let axial = Parameter::new(0, Quantity::Gradient(7));
+    let radial = Parameter::new(0, Quantity::Grin(0));
+    let axial = Parameter::new(0, Quantity::Grin(7));
     assert_eq!((lens.get(radial), lens.get(axial)), (Some(-0.01), Some(0.0)));
     assert!(lens.set(axial, -0.002) && lens.set(Parameter::new(0, Quantity::Index), 1.63));
     assert_eq!(
         (lens.get(axial), lens.get(Parameter::new(0, Quantity::Index))),
         (Some(-0.002), Some(1.63))
     );
-    assert_eq!(axial.to_string(), "gradient coefficient 2 of z after surface 0");
-    assert!(!lens.set(Parameter::new(3, Quantity::Gradient(0)), 1.0));
-    assert_eq!(lens.get(Parameter::new(0, Quantity::Gradient(10))), None);
+    assert_eq!(axial.to_string(), "GRIN coefficient 2 of z after surface 1");
+    assert!(!lens.set(Parameter::new(3, Quantity::Grin(0)), 1.0));
+    assert_eq!(lens.get(Parameter::new(0, Quantity::Grin(10))), None);
     assert_eq!(Fate::Turned(2).surface(), Some(2));
 }

@@ -121,10 +121,13 @@ fn grin_lens_light_where_there_is_no_index_ends_by_name() {
 #[test]
 fn grin_lens_an_index_below_one_and_gradients_too_strong_are_refused_by_name() {
     let mut lens = half_pitch(1.0);
-    let parameter = Parameter::new(0, Quantity::Gradient(0));
+    let parameter = Parameter::new(0, Quantity::Grin(0));
     assert!(lens.set(parameter, -2.0));
     let message = lens.resolve(0, 0.5876).unwrap_err().to_string();
-    assert!(message.contains("the gradient after surface 0 falls to the index 0.7"), "{message}");
+    assert!(
+        message.contains("the GRIN medium after surface 1 falls to the index 0.7"),
+        "{message}"
+    );
     // Thirty thousand turns on the way.
     let strong = lens_of(
         r#"{"thickness": 500.0, "glass": {"gradient": {"base": {"index": 1.6}, "of": "sech",
@@ -133,7 +136,7 @@ fn grin_lens_an_index_below_one_and_gradients_too_strong_are_refused_by_name() {
         r#"{"entrance_pupil_diameter": 0.001}"#,
     );
     let message = Tracer::new(&system(&strong)).unwrap_err().to_string();
-    assert!(message.contains("after surface 0 is too strong for 4096 steps"), "{message}");
+    assert!(message.contains("after surface 1 is too strong for 4096 steps"), "{message}");
     let mut bad = system(&half_pitch(1.0));
     bad.surfaces[0].grin =
         Some(ProfileCoefficients::new(ProfileLaw::Index, [f64::NAN; PROFILE_TERMS]));
@@ -259,8 +262,8 @@ fn grin_lens_the_side_of_a_rod_limits_its_pupil() {
 fn step(quantity: Quantity) -> f64 {
     match quantity {
         Quantity::Curvature | Quantity::Index => 1e-4,
-        Quantity::Gradient(1) => 1e-6,
-        Quantity::Gradient(_) => 1e-5,
+        Quantity::Grin(1) => 1e-6,
+        Quantity::Grin(_) => 1e-5,
         _ => 1e-3,
     }
 }
@@ -270,10 +273,10 @@ fn grin_lens_every_term_has_the_derivative_of_its_value_by_the_gradient() {
     let mut lens = busy("index", &[-0.01, 2e-4], &[0.01, -0.002]);
     lens.image_solve = Some(0.0);
     for (surface, quantity) in [
-        (0, Quantity::Gradient(0)),
-        (0, Quantity::Gradient(1)),
-        (0, Quantity::Gradient(6)),
-        (1, Quantity::Gradient(0)),
+        (0, Quantity::Grin(0)),
+        (0, Quantity::Grin(1)),
+        (0, Quantity::Grin(6)),
+        (1, Quantity::Grin(0)),
         (0, Quantity::Index),
         (0, Quantity::Thickness),
         (1, Quantity::Curvature),
@@ -285,11 +288,11 @@ fn grin_lens_every_term_has_the_derivative_of_its_value_by_the_gradient() {
     }
     // A coefficient that is zero and varies makes a gradient of a gap that was none.
     let mut zero = busy("square", &[0.0], &[]);
-    crate::merit::vary(&mut zero, 0, Quantity::Gradient(0));
-    crate::merit::vary(&mut zero, 0, Quantity::Gradient(7));
+    crate::merit::vary(&mut zero, 0, Quantity::Grin(0));
+    crate::merit::vary(&mut zero, 0, Quantity::Grin(7));
     crate::merit::check(&zero, Term::Spot, PupilEdge::Frozen, step);
     let mut clipped = clipped();
-    for quantity in [Quantity::Gradient(0), Quantity::Gradient(6), Quantity::SemiDiameter] {
+    for quantity in [Quantity::Grin(0), Quantity::Grin(6), Quantity::SemiDiameter] {
         crate::merit::vary(&mut clipped, 0, quantity);
     }
     for term in [Term::Spot, Term::Throughput] {
@@ -311,7 +314,7 @@ fn grin_lens_a_gradient_moves_with_the_zoom() {
     });
     assert!((lengths[0] - lengths[1]).abs() > 1e-3);
     crate::merit::vary(&mut lens, 0, Quantity::ZoomThickness(1));
-    crate::merit::vary(&mut lens, 0, Quantity::Gradient(1));
+    crate::merit::vary(&mut lens, 0, Quantity::Grin(1));
     crate::merit::check(&lens, Term::Spot, PupilEdge::Frozen, step);
 }
 
@@ -331,11 +334,8 @@ fn grin_lens_a_search_finds_the_term_in_r4_that_sharpens_a_rod() {
     );
     lens.fields.values.truncate(1);
     lens.image_solve = Some(0.0);
-    lens.variables = vec![Variable {
-        parameter: Parameter::new(0, Quantity::Gradient(1)),
-        min: None,
-        max: None,
-    }];
+    lens.variables =
+        vec![Variable { parameter: Parameter::new(0, Quantity::Grin(1)), min: None, max: None }];
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
         zoom_ratios: Vec::new(),
@@ -350,7 +350,7 @@ fn grin_lens_a_search_finds_the_term_in_r4_that_sharpens_a_rod() {
     }
     let best = search.best();
     let after = search.terms().unwrap()[0].value.sqrt();
-    let found = best.get(Parameter::new(0, Quantity::Gradient(1))).unwrap();
+    let found = best.get(Parameter::new(0, Quantity::Grin(1))).unwrap();
     println!("RMS radius {before:.2e} to {after:.2e} mm, r^4 {found:.3e}");
     assert!(after < 0.1 * before, "{before} {after}");
     // 5/24 n g⁴ is that of the secant; the plane face wants a little less.
@@ -466,5 +466,5 @@ fn grin_lens_a_gap_needs_two_refracting_faces() {
     system.surfaces[1].mirror = false;
     system.surfaces[0].shape = Shape::Sphere { curvature: 0.1 };
     system.surfaces[0].hyperhemisphere = true;
-    assert!(Tracer::new(&system).unwrap_err().to_string().contains("hyper-hemisphere"));
+    assert!(Tracer::new(&system).unwrap_err().to_string().contains("hyperhemisphere"));
 }

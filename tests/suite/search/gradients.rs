@@ -121,7 +121,7 @@ fn a_hundred_mutations_in_a_row_keep_a_lens_with_gradients_a_lens() {
 /// The index on the axis of the gradient behind a row, at places from its front vertex.
 fn along(lens: &Lens, row: usize) -> Vec<f64> {
     let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap();
-    let field = system.gradient(row).unwrap();
+    let field = system.grin_profile(row).unwrap();
     let at = |i: i32| f64::from(i) / 8.0 * lens.surfaces[row].thickness;
     (0..=8).map(|i| field.index(Vec3::new(0.3, 0.1, at(i)))).collect()
 }
@@ -141,7 +141,7 @@ fn a_gradient_along_the_axis_is_turned_with_its_element() {
         (vec![-2e-4, 1e-7], vec![-0.004, 3e-4, -2e-5, 1e-6]),
     ] {
         let (mut lens, row) = triplet(&radial, &axial);
-        let [first, second] = [0, 1].map(|k| Quantity::Gradient(RADIAL_TERMS + k));
+        let [first, second] = [0, 1].map(|k| Quantity::Grin(RADIAL_TERMS + k));
         flag(&mut lens, row, first, [Some(-0.01), Some(0.0)]);
         let held = lens.get(Parameter::new(row, second));
         flag(&mut lens, row, second, [held, held]);
@@ -206,7 +206,7 @@ fn what_cannot_be_done_with_a_gradient_is_refused_by_name() {
     let mut followed = lens.clone();
     followed.variables.clear();
     followed.pickups.push(Pickup {
-        parameter: Parameter::new(0, Quantity::Gradient(RADIAL_TERMS)),
+        parameter: Parameter::new(0, Quantity::Grin(RADIAL_TERMS)),
         source: Parameter::new(0, Quantity::Curvature),
         scale: -0.4,
         offset: 0.0,
@@ -226,7 +226,7 @@ fn what_cannot_be_done_with_a_gradient_is_refused_by_name() {
 
 /// The flagged coefficients of gradients, with their values.
 fn flagged(lens: &Lens) -> Vec<(Quantity, f64)> {
-    let of_medium = |q| matches!(q, Quantity::Gradient(_) | Quantity::Index);
+    let of_medium = |q| matches!(q, Quantity::Grin(_) | Quantity::Index);
     let flagged = lens.variables.iter().filter(|v| of_medium(v.parameter.quantity));
     flagged.map(|v| (v.parameter.quantity, lens.get(v.parameter).unwrap())).collect()
 }
@@ -237,7 +237,7 @@ fn flagged_coefficients_go_where_their_medium_goes() {
     let (mut lens, row) = triplet(&[-2e-4], &[-0.004]);
     lens.surfaces.remove(row - 1);
     (lens.surfaces[0].stop, lens.surfaces[row - 2].thickness) = (true, 3.0);
-    for quantity in [Quantity::Index, Quantity::Gradient(0), Quantity::Gradient(RADIAL_TERMS)] {
+    for quantity in [Quantity::Index, Quantity::Grin(0), Quantity::Grin(RADIAL_TERMS)] {
         flag(&mut lens, row - 1, quantity, [None, None]);
     }
     let all = flagged(&lens);

@@ -200,7 +200,7 @@ impl StatusMenu<'_> {
         let unit = match self.parameter.quantity {
             Quantity::Curvature => "curvature, 1/mm",
             Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => "mm",
-            Quantity::Conic | Quantity::Asphere(_) | Quantity::Index | Quantity::Gradient(_) => {
+            Quantity::Conic | Quantity::Asphere(_) | Quantity::Index | Quantity::Grin(_) => {
                 "number"
             }
         };

@@ -119,7 +119,7 @@ pub(super) fn parameter_name(parameter: Parameter) -> String {
         Quantity::SemiDiameter => "Semi-diameter",
         Quantity::Conic => "Conic",
         Quantity::Index => "Index",
-        Quantity::Gradient(_) => "Gradient",
+        Quantity::Grin(_) => "Gradient",
         Quantity::Asphere(term) => TableColumn::Asphere(term).title(),
     };
     format!("{what} of surface {}", parameter.surface + 1)

@@ -1,28 +1,28 @@
-//! Which numbers of a lens are free.
+//! Choosing the variables of a lens, and reducing a zoom lens to one position.
 
 use super::{Lens, Medium, Parameter, Pickup, Quantity, Variable};
 
-/// A kind of number that an optimizer may change.
+/// A kind of parameter that an optimizer may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterKind {
-    /// Every curvature with a medium of its own behind it.
+    /// The curvature of every surface that refracts or reflects.
     Curvatures,
-    /// Every gap, at each zoom position by itself where it moves.
+    /// Every thickness; separately at each zoom position at which it differs.
     Thicknesses,
     /// Every conic constant that is not 0.
     Conics,
-    /// Every asphere coefficient that is written.
+    /// Every asphere coefficient that is written in the prescription.
     Aspheres,
     /// Every index of a model glass or constant medium.
     Indices,
-    /// Every semi-diameter that is written.
+    /// Every semi-diameter that is written in the prescription.
     SemiDiameters,
-    /// Every coefficient of a gradient that is written.
+    /// Every GRIN coefficient that is written in the prescription.
     GrinCoefficients,
 }
 
-/// Frees every number of some kinds that does not follow another one; what is a variable already
-/// keeps its bounds.
+/// Makes every parameter of the given kinds a variable, as [`add_variable`] does; existing variables
+/// keep their bounds.
 pub fn add_variables(lens: &mut Lens, kinds: &[ParameterKind]) {
     let chosen: Vec<Parameter> = kinds.iter().flat_map(|kind| parameters(lens, *kind)).collect();
     for parameter in chosen {
@@ -30,7 +30,8 @@ pub fn add_variables(lens: &mut Lens, kinds: &[ParameterKind]) {
     }
 }
 
-/// Makes a number a variable, unless it is one, follows another number or does not exist.
+/// Makes a parameter a variable without bounds; an existing variable keeps its bounds. Returns
+/// `false` if the parameter follows a pickup, is solved or does not exist.
 pub fn add_variable(lens: &mut Lens, parameter: Parameter) -> bool {
     let follows = lens.pickups.iter().any(|pickup| pickup.parameter == parameter);
     if follows || is_solved(lens, parameter) || lens.get(parameter).is_none() {
@@ -42,7 +43,7 @@ pub fn add_variable(lens: &mut Lens, parameter: Parameter) -> bool {
     true
 }
 
-/// Whether it is the last gap and the focus decides it.
+/// True for the last thickness of a lens with an image solve.
 fn is_solved(lens: &Lens, parameter: Parameter) -> bool {
     let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
     lens.image_solve.is_some() && gap && parameter.surface + 1 == lens.surfaces.len()
@@ -73,25 +74,25 @@ fn parameters(lens: &Lens, kind: ParameterKind) -> Vec<Parameter> {
     }
 }
 
-/// Whether light changes its direction at a surface.
+/// True if light changes its direction at a surface.
 fn refracts(lens: &Lens, surface: usize) -> bool {
     let before = match surface.checked_sub(1) {
         Some(before) => &lens.surfaces[before].medium,
         None => &lens.object_medium,
     };
     let behind = &lens.surfaces[surface].medium;
-    // A gradient along the axis begins anew behind each surface.
-    let starts = matches!(behind, Medium::Grin(gradient) if gradient.is_axial());
+    // An axial profile starts anew behind each surface.
+    let starts = matches!(behind, Medium::Grin(grin) if grin.is_axial());
     *behind == Medium::Mirror || before != behind || starts
 }
 
-/// The coefficients of the gradient behind a surface.
+/// The GRIN coefficients behind a surface.
 fn grin_parameters(lens: &Lens, surface: usize) -> Vec<Parameter> {
-    let Medium::Grin(gradient) = &lens.surfaces[surface].medium else { return Vec::new() };
-    gradient.written_terms().map(|k| Parameter::new(surface, Quantity::Gradient(k))).collect()
+    let Medium::Grin(grin) = &lens.surfaces[surface].medium else { return Vec::new() };
+    grin.written_terms().map(|k| Parameter::new(surface, Quantity::Grin(k))).collect()
 }
 
-/// The numbers that say how wide a gap is: one, or one for each zoom position.
+/// The thickness parameters of a gap: the common one, and those of zoom positions that differ.
 fn thickness_parameters(lens: &Lens, surface: usize) -> Vec<Parameter> {
     let own = |zoom: &usize| lens.zoom[*zoom].thicknesses.iter().any(|gap| gap.surface == surface);
     let moving: Vec<usize> = (0..lens.zoom.len()).filter(own).collect();
@@ -101,7 +102,7 @@ fn thickness_parameters(lens: &Lens, surface: usize) -> Vec<Parameter> {
     fixed.into_iter().chain(own).collect()
 }
 
-/// The lens at one of its zoom positions, as if it had no others.
+/// The lens at one of its zoom positions, as a lens with a fixed focal length.
 pub fn at_zoom(lens: &Lens, zoom: usize) -> Lens {
     let mut single = lens.clone();
     single.zoom.clear();
@@ -110,7 +111,7 @@ pub fn at_zoom(lens: &Lens, zoom: usize) -> Lens {
     for (i, row) in single.surfaces.iter_mut().enumerate() {
         row.thickness = lens.thickness_at(i, zoom).unwrap_or(row.thickness);
     }
-    // What follows a gap of another position, or is followed by one, keeps its value.
+    // A pickup to or from a thickness of another position is dropped.
     let here = |parameter: Parameter| match parameter.quantity {
         Quantity::ZoomThickness(z) if z == zoom => {
             Some(Parameter::new(parameter.surface, Quantity::Thickness))

@@ -1,4 +1,5 @@
-//! A gradient-index medium as it is written: a glass and how its index varies from place to place.
+//! Gradient-index (GRIN) media as written: a base glass and the coefficients of its index profile;
+//! and their first-order optics.
 
 use super::{Lens, Medium, Row};
 use crate::grin::field::{
@@ -6,35 +7,37 @@ use crate::grin::field::{
 };
 use crate::math::{Real, Vec3};
 
-/// A gradient: the index of a glass on the axis at the vertex in front, plus polynomials in r² and
-/// in z, which counts from that vertex (see [`ProfileLaw`] for what they build).
+/// A gradient-index medium: the index of a base glass on the axis at the vertex in front, and
+/// polynomials in r² and in z, the distance from that vertex (see [`ProfileLaw`]).
 ///
-/// The glass has its dispersion; the coefficients are the same at every wavelength.
+/// The base has its dispersion; the coefficients are the same at every wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GradientIndex {
     /// The glass on the axis at z = 0: a catalogue glass, a model glass or an index.
     pub base: Medium,
-    /// What the coefficients build.
+    /// The function of the coefficients that gives the index.
     pub law: ProfileLaw,
-    /// Coefficients of r², r⁴, … r¹²; of the secant its constant alone, in 1/mm.
+    /// The coefficients of r², r⁴, … r¹²; for the hyperbolic secant its constant alone, in 1/mm.
     pub radial: Vec<f64>,
-    /// Coefficients of z, z², z³, z⁴.
+    /// The coefficients of z, z², z³, z⁴.
     pub axial: Vec<f64>,
 }
 
 impl GradientIndex {
-    /// All coefficients, zero where none is written.
+    /// All coefficients; those that are not written are zero.
     pub fn terms(&self) -> [f64; PROFILE_TERMS] {
         std::array::from_fn(|k| self.term(k).unwrap_or(0.0))
     }
 
-    /// Coefficient number `k`: 0 (r²) to 5 (r¹²), 6 (z) to 9 (z⁴); `None` where the law has none.
+    /// The coefficient with index `k`: 0 (r²) to 5 (r¹²), 6 (z) to 9 (z⁴); `None` if the law has no
+    /// such coefficient.
     pub fn term(&self, k: usize) -> Option<f64> {
         let (list, place) = self.locate(k)?;
         Some([&self.radial, &self.axial][list].get(place).copied().unwrap_or(0.0))
     }
 
-    /// Writes a coefficient; `false` where the law has none.
+    /// Sets the coefficient with index `k`. Returns `false` and changes nothing if the law has no
+    /// such coefficient.
     pub fn set_term(&mut self, k: usize, value: f64) -> bool {
         let Some((list, place)) = self.locate(k) else { return false };
         let terms = if list == 0 { &mut self.radial } else { &mut self.axial };
@@ -45,7 +48,7 @@ impl GradientIndex {
         true
     }
 
-    /// Which of the two lists holds a coefficient, and where.
+    /// The list (0 radial, 1 axial) that holds a coefficient, and its index there.
     fn locate(&self, k: usize) -> Option<(usize, usize)> {
         let radial = if self.law == ProfileLaw::Sech { 1 } else { RADIAL_TERMS };
         match k {
@@ -55,12 +58,12 @@ impl GradientIndex {
         }
     }
 
-    /// The coefficients that are written, by number.
+    /// The indices of the coefficients that are written.
     pub fn written_terms(&self) -> impl Iterator<Item = usize> {
         (0..self.radial.len()).chain((0..self.axial.len()).map(|j| RADIAL_TERMS + j))
     }
 
-    /// The power of a length that coefficient number `k` is measured in: −2 for that of r².
+    /// The power of mm in the unit of the coefficient with index `k`: −2 for that of r².
     pub fn power(&self, k: usize) -> i32 {
         match k {
             0 if self.law == ProfileLaw::Sech => -1,
@@ -69,20 +72,20 @@ impl GradientIndex {
         }
     }
 
-    /// Whether the index is the same everywhere: then it is glass.
+    /// True if the index is the same everywhere, so that the medium is homogeneous.
     pub fn is_constant(&self) -> bool {
         self.terms().iter().all(|term| *term == 0.0)
     }
 
-    /// Whether the index varies along the axis.
+    /// True if the index varies along the axis.
     pub fn is_axial(&self) -> bool {
         self.axial.iter().any(|term| *term != 0.0)
     }
 
-    /// The same medium met from the other end of a gap of this length: with `s = length − z`,
-    /// `Σ bⱼ zʲ = Σ bⱼ lengthʲ + Σ b'ₖ sᵏ`, where `b'ₖ = (−1)ᵏ Σⱼ C(j, k) bⱼ lengthʲ⁻ᵏ`. The constant goes
-    /// into the index of the base; `None` where that has dispersion, which the sum does not share, or
-    /// where the law multiplies it by something else.
+    /// The same medium described from the other end of a gap of this length in mm: with
+    /// `s = length − z`, `Σ bⱼ zʲ = Σ bⱼ lengthʲ + Σ b'ₖ sᵏ`, where
+    /// `b'ₖ = (−1)ᵏ Σⱼ C(j, k) bⱼ lengthʲ⁻ᵏ`. The constant is added to the index of the base; `None` if
+    /// the base has dispersion, which the constant has not, or if the law does not add the two.
     #[must_use]
     pub fn reversed(&self, length: f64) -> Option<Self> {
         if !self.is_axial() {
@@ -101,7 +104,7 @@ impl GradientIndex {
         Some(Self { base, axial: terms, ..self.clone() })
     }
 
-    /// The base with a constant added to what the coefficients build.
+    /// The base for a constant `by` added to the polynomials.
     fn base_plus(&self, by: f64) -> Option<Medium> {
         if by == 0.0 {
             return Some(self.base.clone());
@@ -125,7 +128,7 @@ impl GradientIndex {
         }
     }
 
-    /// What is wrong with it, if anything.
+    /// The first fault of the medium, as the rest of a sentence.
     pub(super) fn fault(&self) -> Option<String> {
         let radial = if self.law == ProfileLaw::Sech { 1 } else { RADIAL_TERMS };
         if self.radial.len() > radial {
@@ -147,32 +150,33 @@ impl GradientIndex {
         }
     }
 
-    /// What a system is traced with where it varies; `gap_radius` is how far from the axis it is used.
-    pub(super) fn grade(&self, reach: f64) -> ProfileCoefficients<f64> {
+    /// The coefficients for tracing rays up to the distance `reach` in mm from the axis.
+    pub(super) fn coefficients(&self, reach: f64) -> ProfileCoefficients<f64> {
         ProfileCoefficients { reach, ..ProfileCoefficients::new(self.law, self.terms()) }
     }
 }
 
 impl Lens {
-    /// The coefficients of the gradient behind a row, even where all are zero.
-    pub fn grade(&self, surface: usize) -> Option<ProfileCoefficients<f64>> {
+    /// The coefficients of the GRIN medium behind a surface, even if all are zero; `None` for another
+    /// medium.
+    pub fn grin_coefficients(&self, surface: usize) -> Option<ProfileCoefficients<f64>> {
         let row = self.surfaces.get(surface)?;
-        let Medium::Grin(gradient) = &row.medium else { return None };
-        Some(gradient.grade(gap_radius(row, self.surfaces.get(surface + 1))))
+        let Medium::Grin(grin) = &row.medium else { return None };
+        Some(grin.coefficients(gap_radius(row, self.surfaces.get(surface + 1))))
     }
 }
 
-/// How far from the axis the gap between two rows is used: the wider of the two rims.
+/// The radius in mm of the gap between two surfaces: the larger of the two semi-diameters.
 pub(super) fn gap_radius(front: &Row, back: Option<&Row>) -> f64 {
-    let of = |row: &Row| row.semi_diameter.unwrap_or(f64::INFINITY);
-    back.map_or(f64::INFINITY, |back| of(front).max(of(back)))
+    let radius = |row: &Row| row.semi_diameter.unwrap_or(f64::INFINITY);
+    back.map_or(f64::INFINITY, |back| radius(front).max(radius(back)))
 }
 
-/// Places at which the index is looked at, from the axis to the rim and from face to face.
+/// The number of samples of the index from the axis to the rim, and from surface to surface.
 const INDEX_SAMPLES: usize = 17;
 
-/// The lowest index of a gradient between z = 0 and `length`, up to its reach or, where that is not
-/// known, on the axis.
+/// The lowest index of a profile between z = 0 and `length`, up to its radius or, if that is
+/// infinite, on the axis.
 pub(super) fn lowest_index(field: &RotationalProfile<f64>, length: f64) -> f64 {
     let reach = if field.coefficients.reach.is_finite() { field.coefficients.reach } else { 0.0 };
     let share = |i: usize| i as f64 / (INDEX_SAMPLES - 1) as f64;
@@ -180,7 +184,7 @@ pub(super) fn lowest_index(field: &RotationalProfile<f64>, length: f64) -> f64 {
         Vec3::new(reach * share(i % INDEX_SAMPLES), 0.0, length * share(i / INDEX_SAMPLES))
     };
     let all = (0..INDEX_SAMPLES * INDEX_SAMPLES).map(|i| field.index(place(i)));
-    // Not a number is lower than any.
+    // NaN counts as 0.
     all.fold(f64::INFINITY, |low, n| {
         if n >= low {
             low
@@ -192,42 +196,43 @@ pub(super) fn lowest_index(field: &RotationalProfile<f64>, length: f64) -> f64 {
     })
 }
 
-/// What paraxial rays need to know of a gradient at a place on its axis: the index `n` there, and
-/// `c` of the force `n ∂n/∂r = c r` across the axis.
+/// The index `n` at a point of the axis, and the constant `c` of the force `n ∂n/∂r = c r` across
+/// the axis.
 fn on_axis<R: Real>(field: &RotationalProfile<R>, z: R) -> (R, R) {
     let at = Vec3::new(R::ZERO, R::ZERO, z);
     let across = Vec3::new(R::ONE, R::ZERO, R::ZERO);
     (field.index(at), field.force_derivative(at, across).x)
 }
 
-/// Slabs of a gap in which the paraxial equations are solved: enough for twelve digits of whatever
-/// a rod of a few pitches does. A gradient across the axis alone is exact in one.
+/// The steps in which the paraxial equations are solved: enough for twelve digits in a rod of a few
+/// pitches. A purely radial profile is exact in one step.
 const MAGNUS_STEPS: usize = 128;
 
-/// A gap filled with a gradient, for paraxial rays. Where light runs towards −z, its index and the
-/// optical slope count negative.
+/// The first-order optics of a gap with a GRIN medium. For light that travels towards −z, its index
+/// and the optical slope are negative.
 #[derive(Debug, Clone, Copy)]
 pub struct ParaxialGrin<R> {
-    /// The index on the axis at its end.
+    /// The index on the axis at the end of the gap.
     pub index_behind: R,
-    /// By how much that grows with the thickness, in 1/mm.
+    /// The derivative of that index by the thickness, in 1/mm.
     pub index_slope: R,
-    /// The derivative of the optical slope at its end by the thickness, for a height of 1.
+    /// The derivative of the optical slope at the end by the thickness, at a height of 1 mm.
     pub force_constant: R,
-    /// From height and optical slope `n u` at its beginning to those at its end: `[[A, B], [C, D]]`.
+    /// The matrix `[[A, B], [C, D]]` from height and optical slope `n u` at the start of the gap to
+    /// those at its end.
     pub matrix: [[R; 2]; 2],
-    /// What it adds to the Petzval sum, `−∫ 2 n₁/n² dz` where `n = n₀ + n₁ r²`.
+    /// The contribution to the Petzval sum, `−∫ 2 n₁/n² dz` with `n = n₀ + n₁ r²`, in 1/mm.
     pub petzval: R,
 }
 
 impl<R: Real> ParaxialGrin<R> {
-    /// Solves `dy/dz = p/n`, `dp/dz = (c/n) y` through a gap of this thickness: Magnus's series to
-    /// fourth order with two Gauss points a slab (Blanes, Casas, Oteo and Ros, Phys. Rep. 470, 2009,
-    /// eq. 253), which for constant coefficients is the matrix of cosines and sines itself.
+    /// Solves `dy/dz = p/n`, `dp/dz = (c/n) y` through a gap of this thickness in mm, by Magnus's
+    /// series to fourth order with two Gauss points a step (Blanes, Casas, Oteo and Ros, Phys. Rep.
+    /// 470, 2009, eq. 253); exact for constant coefficients.
     pub fn new(field: &RotationalProfile<R>, thickness: R) -> Self {
         let (index_behind, c) = on_axis(field, thickness);
         let at_end = field.force(Vec3::new(R::ZERO, R::ZERO, thickness));
-        let mut slab = Self {
+        let mut gap = Self {
             index_behind,
             index_slope: at_end.force.z / index_behind,
             force_constant: c / index_behind,
@@ -235,20 +240,20 @@ impl<R: Real> ParaxialGrin<R> {
             petzval: R::ZERO,
         };
         if field.coefficients.used[1] == 0 {
-            slab.solve_radial(thickness);
+            gap.solve_radial(thickness);
         } else {
-            slab.solve_axial(field, thickness);
+            gap.solve_axial(field, thickness);
         }
-        slab
+        gap
     }
 
-    /// A gap filled with a gradient, passed by light that runs towards −z where `sense` is below 0.
+    /// The same for light that travels towards −z if `sense` is negative.
     pub fn directed(field: &RotationalProfile<R>, thickness: R, sense: R) -> Self {
-        let slab = Self::new(field, thickness);
-        if sense < R::ZERO { slab.reversed() } else { slab }
+        let gap = Self::new(field, thickness);
+        if sense < R::ZERO { gap.reversed() } else { gap }
     }
 
-    /// The same for light that runs towards −z, through a gap whose thickness is negative.
+    /// The same gap for light that travels towards −z; its thickness is negative.
     #[must_use]
     fn reversed(self) -> Self {
         let [[a, b], [c, d]] = self.matrix;
@@ -261,7 +266,7 @@ impl<R: Real> ParaxialGrin<R> {
         }
     }
 
-    /// All of a gap along which nothing changes: the matrix of one slab, squared again and again.
+    /// Solves a gap without variation along the axis: the matrix of one step, squared repeatedly.
     fn solve_radial(&mut self, thickness: R) {
         let (n, pull) = (self.index_behind, self.force_constant);
         let h = thickness * R::from_f64(1.0 / MAGNUS_STEPS as f64);
@@ -272,6 +277,7 @@ impl<R: Real> ParaxialGrin<R> {
         self.petzval = -(pull / (n * n) * thickness);
     }
 
+    /// Solves a gap whose index varies along the axis.
     fn solve_axial(&mut self, field: &RotationalProfile<R>, thickness: R) {
         let h = thickness * R::from_f64(1.0 / MAGNUS_STEPS as f64);
         let half = R::from_f64(0.5);
@@ -288,27 +294,27 @@ impl<R: Real> ParaxialGrin<R> {
         }
     }
 
-    /// Height and optical slope at its end.
+    /// Height in mm and optical slope at the end of the gap.
     pub fn transfer(&self, y: R, nu: R) -> (R, R) {
         let [[a, b], [c, d]] = self.matrix;
         (a * y + b * nu, c * y + d * nu)
     }
 
-    /// The transpose: from the derivatives by height and optical slope at its end to those by both
-    /// at its beginning.
+    /// The transposed transfer: from the derivatives by height and optical slope at the end of the
+    /// gap to those by both at its start.
     pub fn transfer_transposed(&self, by_y: R, by_nu: R) -> (R, R) {
         let [[a, b], [c, d]] = self.matrix;
         (a * by_y + c * by_nu, b * by_y + d * by_nu)
     }
 
-    /// What height and optical slope at its end grow by with its thickness: `p/n` and `(c/n) y`, the
-    /// equations themselves.
+    /// The derivatives of height and optical slope at the end of the gap by its thickness, `p/n` and
+    /// `(c/n) y`.
     pub fn thickness_derivative(&self, y: R, nu: R) -> (R, R) {
         (nu / self.index_behind, self.force_constant * y)
     }
 }
 
-/// `exp [[m, b], [c, −m]]` by its series, which needs few terms for the short slabs it is for.
+/// `exp [[m, b], [c, −m]]` by its series, which needs few terms for a short step.
 fn matrix_exponential<R: Real>(m: R, b: R, c: R) -> [[R; 2]; 2] {
     let q = m * m + b * c;
     // cosh √q and sinh √q / √q.
@@ -327,6 +333,7 @@ fn matrix_exponential<R: Real>(m: R, b: R, c: R) -> [[R; 2]; 2] {
     [[even + odd * m, odd * b], [odd * c, even - odd * m]]
 }
 
+/// The product of two matrices.
 fn matrix_product<R: Real>(a: [[R; 2]; 2], b: [[R; 2]; 2]) -> [[R; 2]; 2] {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
 }
