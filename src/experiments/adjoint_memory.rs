@@ -1,9 +1,9 @@
-//! Figure 5.3: the memory of a gradient through a grid. Reverse mode keeps a path that grows with
-//! the steps, the adjoint traces rays back and keeps none; both give the same numbers.
+//! Figure 5.3: the memory of a gradient through a grid. Reverse mode stores a path that grows with
+//! the number of steps; the adjoint retraces the rays and stores none. Both give the same gradient.
 //!
-//! The stored path is the least that reverse mode can do with, 24 bytes for each step: programs
-//! that record every operation keep about ten times as much. Bytes are counted; what both take in
-//! time is measured by `aplanat measure grin`.
+//! The stored path is the minimum for reverse mode, 24 bytes per step: programs that record every
+//! operation store about ten times as much. Bytes are counted here; `aplanat measure grin` measures
+//! the time of both.
 
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
@@ -25,12 +25,12 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Steps a voxel.
+/// The numbers of steps per voxel.
 const FINENESS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
-/// A difference that rounding explains.
+/// The largest relative difference attributed to rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// What one gradient keeps, in bytes.
+/// The memory of one gradient, in bytes.
 struct AdjointMemoryRow {
     nodes: usize,
     steps: f64,

@@ -1,13 +1,13 @@
-//! Figure 3.3: the stop of a lens that should only be sharp closes to a pinhole, if the gradient
-//! knows that the pupil has an edge.
+//! Figure 3.3: the stop of a lens that is optimised for sharpness alone closes to a pinhole if the
+//! gradient includes the motion of the pupil edge.
 //!
 //! Two singlets around a stop, `C = |p − o|²` with `o` the middle of the sensor, and the stop's
 //! semi-diameter `R` the only variable. The image point of a ray does not depend on `R`, so that
-//! the biased gradient (3.15) is zero and nothing moves. The unbiased one (3.16) is
+//! the biased gradient (3.15) is zero and the stop does not change. The unbiased one (3.16) is
 //! `dL/dR = 2π r r' C(rim)` with `r` the radius of the pupil: positive, and the stop closes.
 //!
-//! The image plane stands behind the paraxial focus. In front of it there is a zone that crosses the
-//! axis in the plane, where `C(rim) = 0` and descent would come to rest.
+//! The image plane is behind the paraxial focus. In front of it a zone of rays would cross the axis
+//! in the plane, where `C(rim) = 0` and the descent would stop.
 
 use super::section::SectionPlot;
 use super::{
@@ -38,22 +38,23 @@ const SURFACES: [[f64; 4]; 5] = [
     [-1.0 / 70.0, 0.0, 13.0, 1.0],
 ];
 const STOP: usize = 2;
-/// The semi-diameter of the stop at the start, in mm.
+/// The initial semi-diameter of the stop, in mm.
 const START: f64 = 9.0;
-/// How far the image plane stands behind the paraxial focus, in mm.
+/// The distance of the image plane behind the paraxial focus, in mm.
 const BEHIND_FOCUS: f64 = 1.0;
 const AXIS: FieldPoint = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
 
-/// Adam's rate in mm, and how often it steps.
+/// The rate of Adam in mm, and its number of steps.
 const RATE: f64 = 0.2;
 const STEPS: usize = 4000;
 const FEW_STEPS: usize = 2000;
-/// The stop cannot close further than this, in mm.
+/// The minimum semi-diameter of the stop, in mm.
 const CLOSED: f64 = 0.01;
-/// Order of quadrature: eight digits are plenty for a descent, and the checks raise it.
+/// The order of quadrature: it gives eight digits, ample for a descent; the checks use a higher
+/// one.
 const ORDER: usize = 4;
 const HIGH_ORDER: usize = 8;
-/// A pinhole is what is left when the stop has closed to this part.
+/// The stop counts as a pinhole below this fraction of its initial semi-diameter.
 const PINHOLE: f64 = 0.1;
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -73,7 +74,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     Ok(outcome)
 }
 
-/// Which derivative by the radius is followed.
+/// The derivative by the radius that the descent uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum GradientKind {
     Unbiased,
@@ -153,7 +154,7 @@ impl StopObjective {
     }
 }
 
-/// What a descent went through: the radius and the objective at every step.
+/// The history of a descent: the radius and the objective at every step.
 struct StopDescent {
     radii: Vec<f64>,
     blurs: Vec<f64>,

@@ -1,10 +1,11 @@
-//! Figure 3.4: the entrance pupil of a double Gauss, field by field: what ends it where.
+//! Figure 3.4: the entrance pupil of a double Gauss lens at several fields, and the surfaces that
+//! limit it.
 //!
-//! The edge of every pupil is followed and split at its corners, each side with the limit that makes
-//! it; that is what the boundary integral of (3.16) runs along. Two checks know nothing of edges: a
-//! bitmap of rays started at the points of a grid in the first vertex plane, whose lit cells must
-//! add up to the same area, and rays started close to the edge on both sides, which must arrive or
-//! end at the surface that is named.
+//! The edge of every pupil is tracked and split at its corners into arcs, each with the limit that
+//! causes it; the boundary integral of (3.16) runs along them. Two checks do not use the edges: a
+//! bitmap of rays launched from a grid in the first vertex plane, whose transmitted cells must add
+//! up to the same area, and rays launched close to the edge on both sides, which must reach the
+//! image or end at the surface of the arc.
 
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
@@ -26,20 +27,20 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 };
 
 const LENS: &str = "double_gauss_nikkor_s_50";
-/// The last field, in degrees.
+/// The largest field angle, in degrees.
 const EDGE: f64 = 24.0;
-/// Points of an outline.
+/// The number of points of an outline.
 const POINTS: usize = 256;
-/// How exact its area is, relatively.
+/// The relative accuracy of its area.
 const ACCURACY: Accuracy = Accuracy { tolerance: 1e-7, max_rays: 100_000 };
-/// How far from the edge, relatively, rays are started to see what ends them there.
+/// The relative distance from the edge at which rays are launched to check their fates.
 const BESIDE: f64 = 1e-6;
-/// The bitmap is this much larger than the pupil.
+/// The size of the bitmap relative to the pupil.
 const MARGIN: f64 = 1.08;
-/// How far its cells stand askew of the pupil's axes of symmetry, in cells: the errors of mirrored
-/// cells would be the same.
+/// The offset of its cells from the axes of symmetry of the pupil, in cells: without it the errors
+/// of mirrored cells would be equal.
 const ASKEW: [f64; 2] = [0.31, 0.17];
-/// Standard errors by which the area of a bitmap may be off.
+/// The largest deviation of the area of a bitmap, in standard errors.
 const SIGMAS: f64 = 4.0;
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -65,12 +66,12 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
 
 /// The pupil of a field.
 struct MappedPupil {
-    /// In degrees.
+    /// The field angle in degrees.
     angle: f64,
     outline: PupilOutline,
     area: ConvergedValues<3>,
     bitmap: Bitmap,
-    /// Rays beside the edge that do not end as the outline says.
+    /// The number of rays beside the edge whose fate contradicts the outline.
     wrong: usize,
     rays: usize,
 }
@@ -106,15 +107,15 @@ impl MappedPupil {
         4.0 * PI * self.area() / self.perimeter().powi(2)
     }
 
-    /// The standard error of the area of the bitmap: the part of a cell on the edge that is lit is
-    /// anything between 0 and 1, and the edge crosses `4/π` cells on each of its cells' lengths.
+    /// The standard error of the area of the bitmap: the transmitted fraction of a cell on the edge
+    /// is uniform between 0 and 1, and the edge crosses `4/π` cells per cell length.
     fn grid_error(&self) -> f64 {
         let cell = self.bitmap.cell;
         let crossed = 4.0 / PI * self.perimeter() / cell;
         cell * cell * (crossed / 12.0).sqrt()
     }
 
-    /// By how many standard errors the bitmap is off.
+    /// The deviation of the area of the bitmap, in standard errors.
     fn deviation(&self) -> f64 {
         (self.bitmap.area() - self.area()).abs() / self.grid_error()
     }
@@ -126,7 +127,7 @@ fn ray(angle: f64, [x, y]: [f64; 2]) -> Ray<f64> {
     Ray { point: Vec3::new(x, y, 0.0), direction: Vec3::new(0.0, sin, cos) }
 }
 
-/// How the rays through some points end.
+/// The fates of the rays through some points.
 fn fates(bench: &RayModel, angle: f64, points: impl Iterator<Item = [f64; 2]>) -> Vec<Fate> {
     let rays: Rays<f64> = points.map(|p| ray(angle, p)).collect();
     let mut landed = ImagePoints::default();
@@ -134,9 +135,9 @@ fn fates(bench: &RayModel, angle: f64, points: impl Iterator<Item = [f64; 2]>) -
     (0..rays.len()).map(|i| landed.fate(i)).collect()
 }
 
-/// How the rays at the points of a square grid end.
+/// The fates of the rays at the points of a square grid.
 struct Bitmap {
-    /// The side of a cell in mm, cells along a side, the middle of the first cell.
+    /// The side of a cell in mm.
     cell: f64,
     cells: usize,
     corner: [f64; 2],
@@ -167,8 +168,8 @@ impl Bitmap {
     }
 }
 
-/// Rays just inside the edge that do not arrive and rays just outside that do not end at the surface
-/// of its side, away from corners; and how many rays there are.
+/// The number of rays just inside the edge that do not reach the image and of rays just outside
+/// that do not end at the surface of its arc, away from corners; and the number of all rays.
 fn wrong_fates(bench: &RayModel, angle: f64, outline: &PupilOutline) -> (usize, usize) {
     let [x, y] = outline.center;
     let mut wrong = 0;
@@ -272,7 +273,7 @@ fn edges(bench: &RayModel, pupils: &[MappedPupil]) -> DataTable {
     table
 }
 
-/// Every limit in the order in which the fields meet it, with its colour.
+/// All limits in the order in which they appear with growing field, with their colours.
 fn colors(pupils: &[MappedPupil]) -> Vec<(PupilLimit, Color)> {
     let mut found: Vec<PupilLimit> = Vec::new();
     for (limit, _) in pupils.iter().flat_map(|pupil| pupil.outline.limits_by_share()) {
@@ -296,7 +297,7 @@ fn fate_color(colors: &[(PupilLimit, Color)], fate: Fate) -> Color {
     }
 }
 
-/// How many fields are drawn, and how large.
+/// The number of fields drawn, and the side of a map in pixels.
 const DRAWN: usize = 5;
 const PANEL: f64 = 400.0;
 
@@ -333,7 +334,7 @@ fn maps(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     canvas
 }
 
-/// Area and shares of the edge against the field.
+/// Area and fractions of the edge against the field.
 fn curves(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     let mut canvas = Canvas::new([1500, 800]);
     let colors = colors(pupils);

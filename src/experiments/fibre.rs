@@ -1,6 +1,6 @@
-//! Figure 5.9: a fibre that focuses parallel light again and again, beside the parabolic one.
+//! Figure 5.9: a fibre that refocuses parallel light periodically, compared with the parabolic one.
 //!
-//! The field is sought by its first focus alone. For meridional rays the exact answer is the
+//! The field is optimised for its first focus alone. For meridional rays the exact answer is the
 //! hyperbolic secant, which refocuses at one, three and five times that distance; the parabolic
 //! profile has no focus, so it is compared at those planes where its own blur is smallest.
 
@@ -25,14 +25,14 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// By how much the foci must be better.
+/// The minimum improvement factor of the foci.
 const BETTER: f64 = 1000.0;
-/// The index must be so near to the secant.
+/// The largest deviation of the index from the secant.
 const NEAR: f64 = 1e-4;
-/// Planes that are tried for the focus of the parabolic fibre, and how often that is refined.
+/// The number of planes tried for the focus of the parabolic fibre, and the number of refinements.
 const PLANES: usize = 40;
 const REFINED: usize = 4;
-/// Steps of a ray from focus to focus.
+/// The number of steps of a ray from focus to focus.
 const STEPS: f64 = 40.0;
 
 fn run(_: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -78,7 +78,7 @@ fn parabolic() -> ProfileField<Parabolic<f64>> {
     ProfileField::cylinder(Parabolic::new(SQRT_2, FRAC_1_SQRT_2))
 }
 
-/// How far each ray is from the axis of the parabolic fibre at a plane.
+/// The distance of each ray from the axis of the parabolic fibre at a plane.
 fn heights(rays: &[GrinRay<f64>], plane: f64) -> Result<Vec<f64>, ExperimentError> {
     let region = GrinRegion::rod(1.5, -1.0, plane);
     let setup = GrinSetup {
@@ -113,7 +113,7 @@ fn parabola(rays: &[GrinRay<f64>], order: f64) -> Result<(f64, f64), ExperimentE
     Ok(best)
 }
 
-/// How far the rays of each height are from the axis at the foci.
+/// Draws the distance of the rays from the axis at the foci against their height.
 fn draw_focus_errors(
     task: &GrinTask,
     best: &GrinField,

@@ -1,12 +1,12 @@
 //! Figure 3.5: the image of a glyph through a lens, differentiated by the stop and by a curvature.
 //!
-//! Light is followed backwards: from a pixel of the sensor through the rear of the lens to a chart
-//! in front of it. A pixel is `∫ c(p) dw` over the rays that get through, `c` the brightness of the
-//! chart where a ray lands. Its derivatives by the boundary integral and by the warp field
-//! stand beside central differences of the image and beside the biased derivative, which cannot see
-//! the stop: no ray that passes it lands elsewhere when it opens.
+//! Light is traced backwards, from a pixel of the sensor through the rear of the lens to a chart in
+//! front of it. A pixel is `∫ c(p) dw` over the transmitted rays, `c` the brightness of the chart
+//! at the end of a ray. Its derivatives by the boundary integral and by the warp field are compared
+//! with central differences of the image and with the biased derivative, which is zero for the
+//! stop: no transmitted ray ends elsewhere when the stop opens.
 //!
-//! The chart is a smooth function, so that pixels are integrals without noise and the three can be
+//! The chart is a smooth function, so that pixels are integrals without noise, which can be
 //! compared to many digits. Figure 3.5 of the thesis shows a trademark in its place.
 
 use super::{
@@ -35,24 +35,26 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 
 const LENS: &str = "double_gauss_rudolph_50";
 const UM: f64 = 0.5875618;
-/// From the middle of the sensor to its sides, in mm.
+/// Half the side of the sensor, in mm.
 const HALF: f64 = 6.0;
-/// How far in front of the lens the chart stands, in mm.
+/// The distance of the chart in front of the lens, in mm.
 const DISTANCE: f64 = 10_000.0;
-/// Order of quadrature.
+/// The order of quadrature.
 const ORDER: usize = 4;
-/// Rays of the crude image beside it.
+/// The rays per pixel of the noisy image for comparison.
 const SCATTERED: usize = 4096;
-/// Samples of the warp field in a pixel.
+/// The samples of the warp field per pixel.
 const SAMPLES: usize = 4096;
 const FEW_SAMPLES: usize = 2048;
-/// How far the warp field may be off, by the stop and by the curvature: it has a standard error.
+/// The largest relative error of the warp field, by the stop and by the curvature: it is a random
+/// estimate.
 const NOISE: [f64; 2] = [0.05, 0.1];
 /// Steps of the differences: the radius of the stop in mm, the curvature in 1/mm.
 const STEPS: [f64; 2] = [1e-5, 1e-6];
-/// What the integrals and their differences leave.
+/// The largest relative difference between the boundary integrals and central differences.
 const AGREEMENT: f64 = 1e-4;
-/// The front of the lens hardly limits these pixels, so that the biased derivative is nearly right.
+/// The largest relative error of the biased derivative by the curvature: the front of the lens
+/// hardly limits these pixels.
 const NEARLY: f64 = 0.05;
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -77,7 +79,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     })
 }
 
-/// The middle of a pixel, in mm, the first row at the top. The image stands upside down.
+/// The centre of a pixel in mm, the first row at the top. The image is upside down.
 fn place(row: usize, column: usize, side: usize) -> [f64; 2] {
     let at = |i: usize| HALF * ((2.0 * i as f64 + 1.0) / side as f64 - 1.0);
     [-at(column), at(row)]
@@ -86,14 +88,14 @@ fn place(row: usize, column: usize, side: usize) -> [f64; 2] {
 /// A capital A in soft strokes, bright on a darker ground.
 #[derive(Debug, Clone, Copy)]
 struct TestChart {
-    /// How many mm on the chart belong to the side of the sensor.
+    /// The length on the chart that corresponds to half the side of the sensor, in mm.
     unit: f64,
 }
 
 /// The strokes from end to end, in units of half the side of the image.
 const STROKES: [[[f64; 2]; 2]; 3] =
     [[[-0.55, -0.7], [0.0, 0.7]], [[0.55, -0.7], [0.0, 0.7]], [[-0.31, -0.1], [0.31, -0.1]]];
-/// Half the width of a stroke, and how soft its rim is.
+/// Half the width of a stroke, and the softness of its edge.
 const WIDTH: f64 = 0.13;
 const SOFT: f64 = 0.03;
 /// Brightness of the ground and of a stroke.
@@ -101,8 +103,8 @@ const GROUND: f64 = 0.15;
 const BRIGHT: f64 = 0.9;
 
 impl TestChart {
-    /// How much of a stroke is at a point, 0 to 1, and its slope: a logistic function of the square
-    /// of the distance, which has no kink anywhere.
+    /// The coverage of a point by a stroke, 0 to 1, and its slope: a logistic function of the
+    /// squared distance, smooth everywhere.
     fn stroke([from, to]: [[f64; 2]; 2], t: [f64; 2]) -> (f64, [f64; 2]) {
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
         let along = (t[0] - from[0]) * dx + (t[1] - from[1]) * dy;
@@ -114,7 +116,7 @@ impl TestChart {
         (ink, away.map(|v| -ink * (1.0 - ink) * v / (WIDTH * SOFT)))
     }
 
-    /// What no stroke covers, and its slope.
+    /// The fraction of a point that no stroke covers, and its slope.
     fn uncovered(t: [f64; 2]) -> (f64, [f64; 2]) {
         STROKES.into_iter().fold((1.0, [0.0; 2]), |(bare, slope), ends| {
             let (ink, by) = Self::stroke(ends, t);
@@ -135,16 +137,16 @@ impl Integrand for TestChart {
     }
 }
 
-/// The lens as seen from the sensor, and the same with a number changed a little.
+/// The lens as seen from the sensor, and with slightly perturbed parameters.
 struct SensorView {
     chart: TestChart,
     bench: RayModel,
-    /// By the stop and by the curvature, each a step down and a step up.
+    /// Perturbed in the stop and in the curvature, each a step down and a step up.
     perturbed: [[RayModel; 2]; 2],
-    /// How the warp field is sampled.
+    /// The sampling of the warp field.
     warp: WarpSampling,
     stop: usize,
-    /// The first surface of the lens, which backwards is the last one.
+    /// The first surface of the lens, the last one of the reversed system.
     front: usize,
 }
 
@@ -174,7 +176,7 @@ impl SensorView {
         let radius = system.surfaces[stop].semi_diameter;
         let bench = |radius: f64, bend: f64| {
             let mut system = system.clone();
-            // The curvature counts from the other side.
+            // The reversed curvature has the other sign.
             *SurfaceParameter::Curvature.value_mut(&mut system, rear) -= bend;
             reversed_model(system, object, radius)
         };
@@ -224,13 +226,13 @@ impl SensorView {
         })
     }
 
-    /// By the semi-diameter of the stop and by the curvature of the first surface.
+    /// The derivatives by the semi-diameter of the stop and by the curvature of the first surface.
     fn numbers(&self, by: &SystemGradient<f64>) -> [f64; 2] {
         [by.surfaces[self.stop].semi_diameter, -by.surfaces[self.front].curvature]
     }
 }
 
-/// A lens met from the sensor.
+/// The ray model of a reversed lens.
 fn reversed_model(
     system: System<f64>,
     object: Object,
@@ -243,7 +245,7 @@ fn reversed_model(
         .map_err(ExperimentError::from_error)
 }
 
-/// The light of the same pixel through a lens that was changed a little.
+/// The pupil of the same pixel tracked to a perturbed lens.
 fn follow_pupil<'a>(
     before: &RegionKind,
     anchor: FixedLaunch,
@@ -252,7 +254,7 @@ fn follow_pupil<'a>(
     Region::track(before, anchor.launch(bench)).trace_pupil(ORDER)
 }
 
-/// Two numbers of a pixel.
+/// Selects the two derivatives of a pixel by one method.
 type PixelPair = fn(&Pixel) -> [f64; 2];
 
 /// All pixels, row by row.
@@ -261,7 +263,7 @@ struct GradientImages {
     pixels: Vec<Pixel>,
 }
 
-/// The length of an image of differences over that of an image.
+/// The norm of the difference of two images relative to the norm of the second.
 fn relative(pixels: &[Pixel], of: impl Fn(&Pixel) -> f64, against: impl Fn(&Pixel) -> f64) -> f64 {
     let length = |number: &dyn Fn(&Pixel) -> f64| -> f64 {
         pixels.iter().map(|pixel| number(pixel).powi(2)).sum::<f64>().sqrt()
@@ -269,7 +271,7 @@ fn relative(pixels: &[Pixel], of: impl Fn(&Pixel) -> f64, against: impl Fn(&Pixe
     length(&|pixel| of(pixel) - against(pixel)) / length(&against)
 }
 
-/// By what the image is differentiated.
+/// The names of the two parameters.
 const NAMES: [&str; 2] = ["semi-diameter of the stop", "curvature of the first surface"];
 
 impl GradientImages {
@@ -348,7 +350,7 @@ impl GradientImages {
         table
     }
 
-    /// The image, and in a row for each number its derivatives on one scale.
+    /// Draws the image, and for each parameter a row of its derivatives on a common scale.
     fn draw(&self) -> Canvas {
         let cell = (320 / self.side).max(1);
         let width = cell * self.side;

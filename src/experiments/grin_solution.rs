@@ -1,5 +1,5 @@
-//! What experiments on gradient-index fields share: a search with its progress, and pictures of a
-//! field with light in it.
+//! Shared parts of the experiments on GRIN fields: solving a task with progress, and plots of a
+//! field with rays.
 
 use super::{ExperimentError, NamedPlot, ProgressFn, report_progress};
 use crate::grin::{GrinRay, GrinTracer, IndexField, plan_tracing};
@@ -7,14 +7,14 @@ use crate::grin_task::{GrinField, GrinOptimizer, GrinTask, LightSource};
 use crate::math::Vec3;
 use crate::plot::{Axis, BLACK, Canvas, Chart, GREY, PALETTE, Stroke, TextAlign, gray_level};
 
-/// Cells along a side of the picture of a section.
+/// The number of cells along a side of the plot of a section.
 const CELLS: usize = 200;
-/// Points of a profile.
+/// The number of points of a profile.
 const POINTS: usize = 300;
-/// Rays in a picture.
+/// The number of rays in a plot.
 const RAYS: usize = 13;
 
-/// Works on a task to its end; it is `from` to `to` of the whole work.
+/// Solves a task; it is the part `from` to `to` of the whole work.
 pub(super) fn solve(
     task: &GrinTask,
     [from, to]: [f64; 2],
@@ -25,7 +25,7 @@ pub(super) fn solve(
     solve_from(runner, [from, to], watch)
 }
 
-/// The same for a search that was begun.
+/// Continues a runner to its end; it is the part `from` to `to` of the whole work.
 pub(super) fn solve_from(
     mut runner: GrinOptimizer,
     [from, to]: [f64; 2],
@@ -44,8 +44,8 @@ pub(super) fn solve_from(
     }
 }
 
-/// A field that was found: its index along the x axis beside the exact one, and a section through
-/// the z axis with light in it.
+/// Plots a field: its index along the x axis with the exact one, and a section through the z axis
+/// with rays.
 pub fn plot_medium(task: &GrinTask, medium: &GrinField) -> Vec<NamedPlot> {
     let profile = NamedPlot { name: "profile", canvas: plot_profile(task, medium) };
     vec![profile, NamedPlot { name: "section", canvas: plot_section(task, medium) }]
@@ -77,7 +77,7 @@ fn plot_section(task: &GrinTask, medium: &GrinField) -> Canvas {
     let region = task.space.region();
     let extremes = task.extremes(medium);
     let range = (extremes.high - extremes.low).max(f64::MIN_POSITIVE);
-    // Light goes to the right.
+    // Light travels to the right.
     let part = |low: f64, high: f64, i: usize| low + (high - low) * (i as f64 + 0.5) / CELLS as f64;
     let shade = |n: usize| {
         let p = Vec3::new(part(high.x, low.x, n / CELLS), 0.0, part(low.z, high.z, n % CELLS));
@@ -104,7 +104,7 @@ fn plot_section(task: &GrinTask, medium: &GrinField) -> Canvas {
     canvas
 }
 
-/// Rays of the first view's kind in the plane of z and x, as points.
+/// The paths of rays of the first view's kind in the plane of z and x.
 fn paths(task: &GrinTask, field: &dyn IndexField<f64>) -> Vec<Vec<Vec3<f64>>> {
     let rays = in_plane(&task.views[0].source, task.space.diameter());
     let region = task.space.region();

@@ -1,37 +1,37 @@
-//! Whether samples have a density: histograms of independent chains against the shares that the
-//! density gives the bins.
+//! A test of samples against a density: histograms of independent chains against the probabilities
+//! of the bins.
 //!
-//! For each chain and bin, `r = W_bin − p_bin W` is what the bin got less its share of what the
-//! chain gave. Under the density its mean is zero, whatever the samples of one chain have to do
-//! with each other, and whatever weights they have; only chains must be independent. So Hotelling's
-//! test of a mean vector applies, `T² = n r̄ᵀ S⁻¹ r̄` with the covariance `S` of the chains, and
-//! `T² (n − k) / (k (n − 1))` is `F` distributed. It is told as a normal number of standard
-//! deviations (Paulson, "An Approximate Normalization of the Analysis of Variance Distribution",
-//! Annals of Mathematical Statistics 1942): 3.1 has a chance of one in a thousand.
+//! For each chain and bin, `r = W_bin − p_bin W` is the weight in the bin minus its expected part
+//! of the weight of the chain. Under the density its mean is zero, whatever the correlations within
+//! a chain and the weights of its samples; only chains have to be independent. So Hotelling's test
+//! of a mean vector applies, `T² = n r̄ᵀ S⁻¹ r̄` with the covariance `S` of the chains, and `T² (n
+//! − k) / (k (n − 1))` is `F` distributed. It is converted to standard deviations of a normal
+//! distribution (Paulson, "An Approximate Normalization of the Analysis of Variance Distribution",
+//! Annals of Mathematical Statistics 1942): 3.1 has a probability of one in a thousand.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Bins with a smaller share are taken together: a mean over chains is normal only if chains come
-/// there.
+/// Bins with a smaller probability are merged: a mean over chains is normal only if chains visit
+/// the bin.
 const SMALL: f64 = 2e-3;
-/// How many places in a bin and direction its share is computed from.
+/// The number of points per bin and direction from which its probability is computed.
 const PLACES: usize = 24;
 
 /// Bins of equal size in one or two directions.
 #[derive(Debug, Clone)]
 pub(super) struct HistogramGrid {
     pub(super) ranges: Vec<[f64; 2]>,
-    /// Bins in each direction.
+    /// The number of bins in each direction.
     pub(super) bins: usize,
 }
 
 impl HistogramGrid {
-    /// How many bins there are.
+    /// The number of bins.
     pub(super) fn bin_count(&self) -> usize {
         self.bins.pow(self.ranges.len() as u32)
     }
 
-    /// The bin of a point, the first direction running fastest.
+    /// The index of the bin of a point, the first direction running fastest.
     pub(super) fn bin(&self, point: &[f64]) -> usize {
         let place = |(value, range): (&f64, &[f64; 2])| {
             let share = (value - range[0]) / (range[1] - range[0]);
@@ -41,7 +41,7 @@ impl HistogramGrid {
         places.rev().fold(0, |bin, place| bin * self.bins + place)
     }
 
-    /// A place in a bin, from 0 to 1 in every direction.
+    /// A point in a bin, from fractions 0 to 1 in every direction.
     fn point_in_bin(&self, bin: usize, share: impl Fn(usize) -> f64) -> Vec<f64> {
         let each = |(i, range): (usize, &[f64; 2])| {
             let index = (bin / self.bins.pow(i as u32)) % self.bins;
@@ -50,12 +50,12 @@ impl HistogramGrid {
         self.ranges.iter().enumerate().map(each).collect()
     }
 
-    /// The middle of a bin.
+    /// The centre of a bin.
     pub(super) fn bin_center(&self, bin: usize) -> Vec<f64> {
         self.point_in_bin(bin, |_| 0.5)
     }
 
-    /// The share of every bin of a density, by the midpoint rule.
+    /// The probability of every bin under a density, by the midpoint rule.
     pub(super) fn bin_shares(&self, density: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
         let places = PLACES.pow(self.ranges.len() as u32);
         let share = |index: usize, i: usize| {
@@ -68,28 +68,28 @@ impl HistogramGrid {
     }
 }
 
-/// The same with the sum 1.
+/// Scales the values to the sum 1.
 fn normalized(mut values: Vec<f64>) -> Vec<f64> {
     let sum: f64 = values.iter().sum();
     values.iter_mut().for_each(|value| *value /= sum);
     values
 }
 
-/// What all chains together gave the bins, with the sum 1.
+/// The histogram of all chains together, normalized to 1.
 pub(super) fn pool(chains: &[Vec<f64>]) -> Vec<f64> {
     let bins = chains.first().map_or(0, Vec::len);
     normalized((0..bins).map(|bin| chains.iter().map(|chain| chain[bin]).sum()).collect())
 }
 
-/// How much of one distribution would have to go elsewhere to be the other: total variation.
+/// The total variation distance of two distributions.
 pub(super) fn total_variation(a: &[f64], b: &[f64]) -> f64 {
     0.5 * a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>()
 }
 
-/// How surprising the chains are if these are the shares, in standard deviations. It cannot come
-/// above about twice the root of the number of chains.
+/// The deviation of the chains from these probabilities, in standard deviations. It is bounded by
+/// about twice the root of the number of chains.
 pub(super) fn deviation_in_sigmas(chains: &[Vec<f64>], shares: &[f64]) -> f64 {
-    // All but one bin, and those with a small share as one: the rest follows from their sum.
+    // All bins except one, which follows from the sum, with those of small probability merged.
     let large: Vec<usize> = (0..shares.len()).filter(|bin| shares[*bin] >= SMALL).collect();
     let kept = if large.len() == shares.len() { &large[1..] } else { &large };
     let excess = |chain: &Vec<f64>| {
@@ -102,7 +102,7 @@ pub(super) fn deviation_in_sigmas(chains: &[Vec<f64>], shares: &[f64]) -> f64 {
     let mean = excesses.iter().sum::<DVector<f64>>() / n;
     let spread = excesses.iter().map(|r| (r - &mean) * (r - &mean).transpose());
     let mut covariance = spread.sum::<DMatrix<f64>>() / (n - 1.0);
-    // Bins that no chain came to have no spread; so little changes nothing else.
+    // Bins that no chain visited have no variance; the ridge is too small to affect the others.
     let ridge = 1e-9 * covariance.trace() / k as f64;
     (0..k).for_each(|i| covariance[(i, i)] += ridge);
     let solved = covariance.cholesky().map(|cholesky| cholesky.solve(&mean));
@@ -111,7 +111,7 @@ pub(super) fn deviation_in_sigmas(chains: &[Vec<f64>], shares: &[f64]) -> f64 {
     f_to_normal(square * (n - k) / (k * (n - 1.0)), k, n - k)
 }
 
-/// An `F` distributed number as a normal one.
+/// Converts an `F` distributed number to a standard normal one.
 fn f_to_normal(f: f64, above: f64, below: f64) -> f64 {
     let [a, b] = [above, below].map(|freedom| 2.0 / (9.0 * freedom));
     let root = f.cbrt();
@@ -124,7 +124,7 @@ mod tests {
     use crate::search::Random;
     use rand::{RngExt as _, SeedableRng as _};
 
-    /// Independent chains of correlated samples: each number is used several times.
+    /// Independent chains of correlated samples: each number is repeated.
     fn chains(power: f64, seed: u64) -> Vec<Vec<f64>> {
         let mut random = Random::seed_from_u64(seed);
         let grid = HistogramGrid { ranges: vec![[0.0, 1.0]], bins: 10 };

@@ -1,9 +1,10 @@
-//! Figure 5.8: two lenses found again from nothing but where their light goes, Luneburg's and
-//! Maxwell's, as functions of the radius and on grids.
+//! Figure 5.8: the Luneburg lens and the Maxwell fisheye reconstructed from their ray paths alone,
+//! as functions of the radius and on grids.
 //!
-//! Rays depend on the gradient of `η²` alone, so that a grid whose surface is held at 1 may hide a
-//! jump in its outermost voxels: the shape is found ten times better than the level, and both errors
-//! are told. The figure's own remark, that the difference is largest at the boundary, is this.
+//! Rays depend on the gradient of `η²` alone, so that a grid whose surface is fixed at 1 may hide a
+//! jump in its outermost voxels: the shape is found ten times more accurately than the level, and
+//! both errors are reported. This explains the remark of the figure that the difference is largest
+//! at the boundary.
 
 use super::grin_solution::{plot_medium, solve};
 use super::{Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
@@ -17,12 +18,12 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// A lens and how well it must be found: as a whole, and without the offset of its square.
+/// A lens and the largest errors of its reconstruction: in all, and without the offset of `η²`.
 struct KnownLensCase {
     name: &'static str,
-    /// At full effort, and as a test with a coarser grid.
+    /// The limits at full effort, and for a test with a coarser grid.
     limits: [[f64; 2]; 2],
-    /// Levels at small effort; those of the task where there are none.
+    /// The refinement levels at small effort; if empty, those of the task.
     small: &'static [RefinementLevel],
 }
 

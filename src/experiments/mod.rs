@@ -1,10 +1,10 @@
-//! The figures and tables of the thesis as studies that anyone can run: data, pictures, and what
-//! the figure claims, checked.
+//! The figures and tables of the thesis as reproducible studies: data, plots, and checked claims.
 //!
 //! An [`Experiment`] is a file of this folder and a line in [`ALL`]; it reads no clock, draws its
-//! own pictures and can be stopped between two steps. What it claims are numbers against limits: an
-//! [`ExperimentOutcome`] in which one of them fails is a failed experiment. After Teh, *Computational Lens
-//! Design* (thesis, Carnegie Mellon University), whose figure numbers name the experiments.
+//! own plots and can be stopped between two steps. Its claims are numbers with limits: an
+//! [`ExperimentOutcome`] with a claim that does not hold is a failed experiment. After Teh,
+//! *Computational Lens Design* (thesis, Carnegie Mellon University), whose figure numbers name the
+//! experiments.
 
 mod adjoint_memory;
 mod aperture_stop;
@@ -67,48 +67,48 @@ pub const ALL: &[Experiment] = &[
 pub struct Experiment {
     /// The number of the figure or table.
     pub id: &'static str,
-    /// What it is about.
+    /// The title.
     pub title: &'static str,
-    /// What it shows, in one sentence.
+    /// The claim, in one sentence.
     pub claim: &'static str,
-    /// About how long it takes at full effort on two cores.
+    /// The approximate time at full effort on two cores, in seconds.
     pub seconds: f64,
-    /// Does the work.
+    /// Runs the experiment.
     ///
     /// # Errors
-    /// The callback asked it to stop, or there was nothing to work with.
+    /// The progress callback asked it to stop, or its lens or task cannot be evaluated.
     pub run: fn(Effort, &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError>,
 }
 
-/// The experiment of a figure.
+/// Returns the experiment of a figure or table.
 pub fn find(id: &str) -> Option<&'static Experiment> {
     ALL.iter().find(|experiment| experiment.id == id)
 }
 
-/// Gets to know how far an experiment is, and says whether it shall go on.
+/// A callback that receives the progress of an experiment and returns `Break` to stop it.
 pub type ProgressFn<'a> = dyn FnMut(ExperimentProgress<'_>) -> ControlFlow<()> + 'a;
 
-/// How far an experiment is.
+/// The progress of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExperimentProgress<'a> {
-    /// The part that is done, 0 to 1.
+    /// The completed fraction, 0 to 1.
     pub done: f64,
-    /// What it is doing.
+    /// The current phase.
     pub doing: &'a str,
 }
 
-/// How much an experiment works for its claims.
+/// The effort of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Effort {
-    /// As the figure deserves.
+    /// The full sizes of the figure.
     Full,
-    /// As little as its claims need: a test.
+    /// The smallest sizes for which the claims hold, for a test.
     Small,
 }
 
 impl Effort {
-    /// One of two numbers: for the figure, or for a test.
+    /// Returns the value for full or for small effort.
     fn select<T>(self, full: T, small: T) -> T {
         match self {
             Self::Full => full,
@@ -117,25 +117,25 @@ impl Effort {
     }
 }
 
-/// Why an experiment has no outcome.
+/// The error of an experiment without an outcome.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ExperimentError {
-    /// It was asked to stop.
+    /// The caller stopped it.
     #[error("stopped")]
     Stopped,
-    /// Its lens could not be worked with.
+    /// Its lens or task cannot be evaluated.
     #[error("{0}")]
     Failed(String),
 }
 
 impl ExperimentError {
-    /// An error of a lower floor.
+    /// Wraps an error of another module.
     fn from_error(error: impl std::fmt::Display) -> Self {
         Self::Failed(error.to_string())
     }
 }
 
-/// Tells how far the work is, and ends it where that is wanted.
+/// Reports the progress; an error if the caller stops the experiment.
 fn report_progress(
     watch: &mut ProgressFn<'_>,
     done: f64,
@@ -147,7 +147,7 @@ fn report_progress(
     }
 }
 
-/// A lens of the library.
+/// Loads a lens of the bundled library.
 fn lens(name: &str) -> Result<Lens, ExperimentError> {
     let bundled = files::bundled_lenses().iter().find(|bundled| bundled.name == name);
     let bundled =

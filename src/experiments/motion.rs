@@ -1,10 +1,10 @@
-//! Figure 3.8: a moving target, through the darkest and through the brightest lens of a front, each
-//! exposed until the image is as bright as with the other. The bright lens is less sharp, but needs
-//! so much less time that what moves is sharper.
+//! Figure 3.8: a moving target, through the darkest and through the brightest lens of a front,
+//! exposed to equal brightness of the image. The bright lens is less sharp, but its shorter
+//! exposure makes the moving target sharper.
 //!
-//! The brightness of an extended scene grows with the area of the pupil over the square of the focal
-//! length. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that of
-//! the way `s` that the image of the target goes meanwhile, `|sin(π ν s) / (π ν s)|`.
+//! The brightness of an extended scene grows with the area of the pupil over the square of the
+//! focal length. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that
+//! of the motion `s` of the image during the exposure, `|sin(π ν s) / (π ν s)|`.
 
 use super::pareto_front::{ANGLES, plan};
 use super::sharpness_vs_light::{ProgressSpan, focal_length, run_sweep, with_field_angles};
@@ -28,16 +28,16 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 };
 
 const LENS: &str = "double_gauss_rudolph_50";
-/// Order of quadrature.
+/// The order of quadrature.
 const ORDER: usize = 6;
-/// Line pairs per mm up to which contrast is shown.
+/// The range of frequencies plotted, in line pairs per mm.
 const FREQUENCIES: [f64; 2] = [0.5, 40.0];
 const STEPS: usize = 80;
-/// How far the image moves during the exposure of the dark lens, in mm.
+/// The motion of the image during the exposure of the dark lens, in mm.
 const WAY: f64 = 0.2;
-/// The line pairs per mm at which both are compared.
+/// The frequency at which both are compared, in line pairs per mm.
 const COMPARED: f64 = 4.0;
-/// How many times as long the dark lens must be exposed.
+/// The minimum ratio of the exposure times.
 const TIMES: f64 = 2.0;
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -63,13 +63,13 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     })
 }
 
-/// A lens that takes a picture.
+/// A lens with its brightness and its spot on the axis.
 struct Exposure {
     design: ParetoPoint,
-    /// Light per area of the image, in arbitrary units, and its relative error.
+    /// The light per image area, in arbitrary units, and its relative error.
     brightness: f64,
     error: f64,
-    /// Where the rays of the field on the axis land across, in mm, and the weight of each.
+    /// The x coordinates in mm and the weights of the rays of the field on the axis.
     spot: Vec<[f64; 2]>,
 }
 
@@ -86,11 +86,12 @@ impl Exposure {
         })
     }
 
-    /// Contrast at some line pairs per mm of a target whose image moves a way in mm.
+    /// The contrast at a frequency in line pairs per mm of a target whose image moves by `way` in
+    /// mm.
     fn contrast(&self, frequency: f64, way: f64) -> f64 {
         let (mut sum, mut light) = (0.0, 0.0);
         for [x, weight] in &self.spot {
-            // The spot is its own mirror image.
+            // The spot is symmetric.
             sum += weight * (2.0 * PI * frequency * x).cos();
             light += weight;
         }
@@ -105,8 +106,7 @@ fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, ExperimentError>
     let launch =
         bench.launch(bench.fields[0], bench.primary).map_err(ExperimentError::from_error)?;
     let region = Region::new(launch);
-    // All azimuths are alike on the axis, and the nodes of one may stand for them: each is turned
-    // through half a turn.
+    // On the axis all azimuths are equivalent: the nodes of one are rotated through half a turn.
     let lit = region.trace_pupil(ORDER);
     *rays += region.rays + lit.rays_traced;
     let turn = |i: usize| {
@@ -117,19 +117,20 @@ fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, ExperimentError>
     Ok(places.collect())
 }
 
-/// Azimuths that a radius of the spot on the axis stands for.
+/// The number of azimuths to which a radius of the spot on the axis is rotated.
 const AZIMUTHS: usize = 32;
 
 /// Both lenses at equal brightness.
 struct ExposurePair {
     dark: Exposure,
     bright: Exposure,
-    /// How many times as long the dark one is exposed.
+    /// The exposure time of the dark lens relative to that of the bright one.
     exposure_ratio: f64,
 }
 
 impl ExposurePair {
-    /// Contrast of the dark and of the bright lens, standing still and moving.
+    /// The contrast of the dark and of the bright lens, for a target at rest and then for a moving
+    /// one.
     fn contrasts(&self, frequency: f64) -> [f64; 4] {
         [
             self.dark.contrast(frequency, 0.0),

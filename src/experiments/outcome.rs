@@ -1,24 +1,24 @@
-//! What an experiment found: numbers against limits, tables, pictures.
+//! The outcome of an experiment: claims with limits, tables, plots.
 
 use crate::lens::Lens;
 use crate::plot::Canvas;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// What an experiment found.
+/// The outcome of an experiment.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct ExperimentOutcome {
-    /// What the figure claims, each with its number.
+    /// The claims of the figure with their numbers.
     pub claims: Vec<Claim>,
-    /// The data behind them.
+    /// The data of the figure.
     pub tables: Vec<DataTable>,
-    /// What they look like; not a part of the JSON.
+    /// The plots; not a part of the JSON.
     #[serde(skip)]
     pub pictures: Vec<NamedPlot>,
-    /// The lenses that were found, under names; not a part of the JSON.
+    /// The resulting lenses with their names; not a part of the JSON.
     #[serde(skip)]
     pub lenses: Vec<(String, Lens)>,
-    /// Rays traced.
+    /// The number of rays traced.
     pub rays: usize,
 }
 
@@ -29,34 +29,34 @@ impl ExperimentOutcome {
     }
 }
 
-/// A number that must keep a limit.
+/// A number that has to satisfy a limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Claim {
-    /// What the number is.
+    /// The description of the number.
     pub says: String,
     /// The number.
     pub value: f64,
-    /// How far it may be wrong; 0 for one that is exact.
+    /// Its estimated error; 0 for an exact number.
     pub error: f64,
     /// The unit of all three numbers; empty for a ratio or a count.
     pub unit: &'static str,
-    /// How the number must stand to the limit.
+    /// The required relation of the number to the limit.
     pub rule: ClaimRelation,
     /// The limit.
     pub limit: f64,
-    /// Whether it does, its error counted against it.
+    /// True if the relation holds even if the number is wrong by its error.
     pub holds: bool,
 }
 
-/// How a number must stand to its limit.
+/// The required relation of a number to its limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClaimRelation {
-    /// Not above it.
+    /// Not above the limit.
     AtMost,
-    /// Not below it.
+    /// Not below the limit.
     AtLeast,
-    /// The very same number.
+    /// Equal to the limit.
     Exactly,
 }
 
@@ -71,17 +71,17 @@ impl Display for ClaimRelation {
 }
 
 impl Claim {
-    /// A number that may not be above a limit.
+    /// A claim that a number is not above a limit.
     pub fn at_most(says: impl Into<String>, value: f64, limit: f64) -> Self {
         Self::new(says, value, ClaimRelation::AtMost, limit)
     }
 
-    /// A number that may not be below a limit.
+    /// A claim that a number is not below a limit.
     pub fn at_least(says: impl Into<String>, value: f64, limit: f64) -> Self {
         Self::new(says, value, ClaimRelation::AtLeast, limit)
     }
 
-    /// A number that must be exactly another one.
+    /// A claim that two numbers are equal.
     pub fn exactly(says: impl Into<String>, value: f64, limit: f64) -> Self {
         Self::new(says, value, ClaimRelation::Exactly, limit)
     }
@@ -91,14 +91,14 @@ impl Claim {
         Self { says, value, error: 0.0, unit: "", rule, limit, holds: false }.check()
     }
 
-    /// The same in a unit.
+    /// The claim with a unit.
     #[must_use]
     pub fn in_unit(mut self, unit: &'static str) -> Self {
         self.unit = unit;
         self
     }
 
-    /// The same with an error, which counts against it.
+    /// The claim with the error of its number.
     #[must_use]
     pub fn with_error(mut self, error: f64) -> Self {
         self.error = error;
@@ -116,14 +116,14 @@ impl Claim {
     }
 }
 
-/// Rows of numbers and words under names.
+/// A table with named columns of numbers and words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DataTable {
-    /// What it is called, as a part of a file name.
+    /// The name, as a part of a file name.
     pub name: &'static str,
-    /// What stands in each column, with its unit: `radius_mm`.
+    /// The names of the columns with their units: `radius_mm`.
     pub columns: Vec<&'static str>,
-    /// The rows, each as long as there are columns.
+    /// The rows, each with as many cells as there are columns.
     pub rows: Vec<Vec<TableCell>>,
 }
 
@@ -162,7 +162,7 @@ fn quoted(text: &str) -> String {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum TableCell {
-    /// A number; written as nothing where it is none.
+    /// A number; NaN is written as an empty cell.
     Number(f64),
     /// A word.
     Word(String),
@@ -202,12 +202,12 @@ impl Display for TableCell {
     }
 }
 
-/// A picture with its name.
+/// A plot with its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedPlot {
-    /// What it is called, as a part of a file name.
+    /// The name, as a part of a file name.
     pub name: &'static str,
-    /// What it looks like.
+    /// The image.
     pub canvas: Canvas,
 }
 

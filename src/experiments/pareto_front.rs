@@ -1,13 +1,14 @@
-//! Figure 3.6: sharpness against light. The same lens is optimised with ever more weight on its
-//! light by derivatives that follow the pupils; beside it by the biased ones, which cannot see
-//! light: for them every weight is the same, and an aperture must be chosen beforehand.
+//! Figure 3.6: sharpness against light. A lens is optimised with increasing weight on its light by
+//! unbiased derivatives, which include the motion of the pupils, and by biased ones. For the latter
+//! the light has no derivative: all weights are equivalent, and an aperture has to be chosen
+//! beforehand.
 //!
-//! Both are compared by the area that they dominate in the plane of blur and light, and by who
-//! dominates whom among designs with at least half of the light of the start. Below that sharpness
-//! is cheap: with the smallest aperture the biased search leaves the last field of the second lens
-//! nearly dark and gets a lens that is sharper than any of the front. On the double Gauss of the thesis stand also three designs that its authors'
-//! program reaches from the same start in 1,000 steps, measured here by the areas and spots of
-//! two-dimensional pupils.
+//! Both are compared by their hypervolume in the plane of blur and light, and by dominance among
+//! designs with at least half of the light of the starting lens. With less light sharpness is
+//! cheap: with the smallest aperture the biased search leaves the last field of the second lens
+//! nearly dark and finds a lens that is sharper than any of the front. For the double Gauss of the
+//! thesis, three designs are added that its authors' program reaches from the same start in 1,000
+//! steps, evaluated here by the areas and spots of two-dimensional pupils.
 
 use super::section::SectionPlot;
 use super::sharpness_vs_light::{
@@ -30,25 +31,25 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// The fields, in degrees.
+/// The field angles, in degrees.
 pub(super) const ANGLES: [f64; 3] = [0.0, 10.0, 20.0];
 /// The apertures chosen for the biased searches, relative to the start.
 const OPENINGS: [f64; 5] = [0.6, 0.8, 1.0, 1.2, 1.3];
 const ONE_OPENING: [f64; 1] = [1.0];
-/// The share of the light at the start that a design needs to be compared.
+/// The minimum light of a design that is compared, relative to the starting lens.
 const MIN_LIGHT: f64 = 0.5;
 
-/// RMS radius in um and area of the pupil in mm² at the three fields.
+/// Name, RMS spot radii in um and pupil areas in mm² at the three fields.
 type PublishedValues = (&'static str, [f64; 3], [f64; 3]);
 
-/// What the authors' program makes of `double_gauss_rudolph_50` at three β in mm².
+/// The results of the authors' program for `double_gauss_rudolph_50` at three β in mm².
 const PUBLISHED: [PublishedValues; 3] = [
     ("authors, beta 0", [14.0, 18.0, 41.0], [90.9, 87.9, 64.3]),
     ("authors, beta 2e-4", [17.0, 19.0, 41.0], [92.0, 90.3, 66.3]),
     ("authors, beta 5e-4", [23.0, 19.0, 43.0], [93.9, 93.1, 70.3]),
 ];
 
-/// How the designs of a front are searched for.
+/// The sweep that finds the designs of a front.
 pub(super) fn plan(effort: Effort) -> WeightSweep {
     WeightSweep::new(4.0, effort.select(14, 8), 1200)
 }
@@ -112,7 +113,7 @@ impl FrontStudy {
         std::iter::once(("start", &self.start)).chain(unbiased).chain(biased).collect()
     }
 
-    /// Every design of the unbiased front, under its weight.
+    /// The designs of the unbiased front, named by their weights.
     fn lenses(&self, name: &str) -> impl Iterator<Item = (String, Lens)> {
         let weighted = self.unbiased.points().iter();
         weighted
@@ -159,7 +160,7 @@ impl FrontStudy {
         Ok(claims)
     }
 
-    /// The plane of blur and light, and the lenses at its ends with their spots.
+    /// Draws the plane of blur and light, and the lenses at the ends of the front with their spots.
     fn draw(&self, name: &str, authors: &[PublishedValues]) -> Result<Canvas, ExperimentError> {
         let mut canvas = Canvas::new([1900, 1000]);
         let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
@@ -205,7 +206,7 @@ fn front(designs: Vec<ParetoPoint>) -> Front {
     front
 }
 
-/// Whether every field is no less sharp and no less bright.
+/// True if every field is at least as sharp and as bright as that published.
 fn dominates_published(views: &[FieldView], (_, rms, area): &PublishedValues) -> bool {
     let fields = views.iter().zip(rms).zip(area);
     views.len() == rms.len()
@@ -214,7 +215,7 @@ fn dominates_published(views: &[FieldView], (_, rms, area): &PublishedValues) ->
         })
 }
 
-/// Blur in um and light in mm², as those of a design.
+/// Blur in um and light in mm² of a published design, computed as for a [`ParetoPoint`].
 fn published_means((_, rms, area): &PublishedValues) -> [f64; 2] {
     let mean = |values: &[f64; 3]| values.iter().sum::<f64>() / 3.0;
     [mean(&rms.map(|um| um * um)).sqrt(), mean(area)]
@@ -223,7 +224,7 @@ fn published_means((_, rms, area): &PublishedValues) -> [f64; 2] {
 /// Half the side of a spot diagram, in mm.
 const SPOT: f64 = 0.1;
 
-/// A lens with its rays, and the spots of its fields beside it.
+/// Draws a lens with its rays, and the spots of its fields beside it.
 pub(super) fn draw_lens_and_spots(
     canvas: &mut Canvas,
     name: &str,

@@ -1,19 +1,19 @@
-//! Figure 5.10 and table 5.2: a plume of gas found again from where light leaves it and how, by the
-//! exact adjoint of curved rays and by straight lines, as the plume becomes a thousand times as
-//! strong.
+//! Figure 5.10 and table 5.2: a plume of gas reconstructed from the positions and directions of
+//! rays that leave it, by the exact adjoint of curved rays and by straight rays, for plumes of up
+//! to a thousand times the strength.
 //!
-//! The plume is synthetic. The light in it is traced through its formula, by another integrator and
-//! in far finer steps than the reconstruction takes, so that no method finds its own errors again.
-//! Straight lines solve the same measurements by linear least squares, on the same grid, within the
-//! same limits, and the best of their iterates counts: a choice that no one could make who does not
-//! know the answer. Beside them stands the way of Atcheson et al. (2008), three volumes for the
-//! gradient that are integrated in the end. Where the plume is weak the better of the two ties with the
-//! adjoint; what either misses there is its own discretisation and its slow convergence, not the
-//! curvature of light.
+//! The plume is synthetic. Its measurements are traced through its formula, by another integrator
+//! and with far finer steps than in the reconstruction, so that no method profits from its own
+//! errors. The straight-ray method solves the same measurements by linear least squares, on the
+//! same grid and within the same bounds, and its best iterate counts, a choice that requires
+//! knowledge of the answer. The method of Atcheson et al. (2008) is added: three volumes for the
+//! gradient, integrated at the end. For weak plumes the better of the two is as good as the
+//! adjoint; their errors there are due to discretisation and slow convergence, not to the curvature
+//! of the rays.
 //!
-//! Table 5.2 prints `‖(η̂ - η)/η‖` over 64³ voxels, not divided by their number. It is given too, but it
-//! says more about the contrast than about the method: a constant index has 0.0088 of it on the
-//! data of the table at their own scale. Errors in parts of the contrast say what was found.
+//! Table 5.2 prints `‖(η̂ - η)/η‖` over 64³ voxels, not divided by their number. It is reported
+//! too, but it depends more on the contrast than on the method: a constant index reaches 0.0088 on
+//! the data of the table. The error relative to the contrast measures the reconstruction.
 
 use super::grin_solution::{plot_medium, solve};
 use super::{
@@ -40,7 +40,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// A task, how many times as strong its plume is, and what table 5.2 prints for other data.
+/// A task, the strength of its plume, and the values that table 5.2 prints for other data.
 struct PlumeCase {
     task: &'static str,
     times: f64,
@@ -54,18 +54,19 @@ const CASES: [PlumeCase; 4] = [
     PlumeCase { task: "plume-1000x", times: 1000.0, printed: [3.8, 19.3] },
 ];
 
-/// What the error may be where the plume is weakest and strongest, in parts of the contrast.
+/// The largest errors for the weakest and the strongest plume, relative to the contrast.
 const WEAK: f64 = 0.02;
 const STRONG: f64 = 0.05;
-/// The same as a test, with fewer rays and a coarser grid.
+/// The largest error of a test, with fewer rays and a coarser grid.
 const COARSE: f64 = 0.10;
-/// By how much the errors of two methods differ that are as good.
+/// The largest ratio of the errors of two methods that count as equally good.
 const TIE: f64 = 2.0;
-/// By how much curved rays must be better where the plume is strongest, and that as a test.
+/// The minimum ratio of the errors of straight and curved rays for the strongest plume, in full and
+/// as a test.
 const BETTER: [f64; 2] = [5.0, 2.0];
-/// Voxels along a side by which table 5.2 judges.
+/// The number of voxels along a side in the norm of table 5.2.
 const VOXELS: usize = 64;
-/// Cells along a side of the picture of a section.
+/// The number of cells along a side of the plot of a section.
 const CELLS: usize = 100;
 
 const FEW: &[RefinementLevel] = &[
@@ -81,18 +82,18 @@ struct ReconstructedPlume {
     frobenius: f64,
 }
 
-/// What was found at one strength.
+/// The results for one strength.
 struct PlumeRow {
     case: &'static PlumeCase,
     task: GrinTask,
     measured: ViewMeasurement,
     adjoint: ReconstructedPlume,
     chords: ReconstructedPlume,
-    /// The error of straight lines after their last step, and the step of the best.
+    /// The error of the straight-ray method after its last step.
     last: f64,
     step: usize,
     gradients: ReconstructedPlume,
-    /// What a constant index has.
+    /// The error of a constant index.
     constant: f64,
     left_out: usize,
 }
@@ -124,7 +125,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     Ok(outcome)
 }
 
-/// The weakest and the strongest plume.
+/// True for the weakest and the strongest plume.
 fn is_extreme(case: &PlumeCase) -> bool {
     case.times == 1.0 || case.times == 1000.0
 }
@@ -145,7 +146,7 @@ fn task(case: &PlumeCase, effort: Effort) -> Result<GrinTask, ExperimentError> {
     Ok(task)
 }
 
-/// What straight lines find, beside what the adjoint found.
+/// Adds the results of the straight-ray methods to that of the adjoint.
 fn row(
     case: &'static PlumeCase,
     task: GrinTask,
@@ -193,7 +194,7 @@ fn row(
     })
 }
 
-/// The error in parts of the contrast.
+/// The error relative to the contrast.
 fn error(task: &GrinTask, medium: &GrinField) -> f64 {
     let difference = task.difference(medium).ok().flatten();
     difference.map_or(f64::NAN, |difference| difference.relative_to_contrast)
@@ -282,7 +283,7 @@ fn table(rows: &[PlumeRow]) -> DataTable {
     table
 }
 
-/// Which rays are left out, and why.
+/// The numbers of excluded rays with the reasons.
 fn reasons(row: &PlumeRow) -> String {
     let measured = row.measured.counts.excluded();
     let mut reasons: Vec<String> =
@@ -293,7 +294,7 @@ fn reasons(row: &PlumeRow) -> String {
     if reasons.is_empty() { "none".to_owned() } else { reasons.join("; ") }
 }
 
-/// Each method: its name, and its field of a row.
+/// A method: its name, and its result in a row.
 type PlumeMethod = (&'static str, fn(&PlumeRow) -> &ReconstructedPlume);
 
 const METHODS: [PlumeMethod; 3] = [
@@ -322,7 +323,7 @@ fn chart(rows: &[PlumeRow]) -> Canvas {
     canvas
 }
 
-/// The plume and what each method makes of it, in the plane of x and z.
+/// Draws the plume and its reconstruction by each method, in the plane of x and z.
 fn sections(rows: &[PlumeRow]) -> Canvas {
     let (side, top) = (2.0 * CELLS as f64, 70.0);
     let (across, down) = (side + 30.0, side + 50.0);
@@ -349,7 +350,7 @@ fn sections(rows: &[PlumeRow]) -> Canvas {
     canvas
 }
 
-/// A section, darker where the index is lower: the range of the index allowed is that of the grey.
+/// The grey levels of a section, from the lowest to the highest index allowed.
 fn section_levels(row: &PlumeRow, field: &dyn IndexField<f64>) -> Vec<Color> {
     let [low, high] = row.task.space.corners();
     let limits = row.task.limits;

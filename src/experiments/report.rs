@@ -1,4 +1,5 @@
-//! An outcome with the experiment that it belongs to: what is printed, shown and written to files.
+//! The report of an experiment: its outcome with its title and times, to be printed, shown and
+//! written to files.
 
 use super::{Experiment, ExperimentOutcome};
 use crate::files::{self, FileError, json};
@@ -6,48 +7,48 @@ use serde::Serialize;
 use std::io;
 use std::path::Path;
 
-/// What a run of an experiment has found.
+/// The report of a run of an experiment.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExperimentReport {
     /// The number of the figure or table.
     pub id: &'static str,
-    /// What it is about.
+    /// The title.
     pub title: &'static str,
-    /// What it shows, in one sentence.
+    /// The claim, in one sentence.
     pub claim: &'static str,
-    /// How long it took, in milliseconds.
+    /// The time of the run, in milliseconds.
     pub ms: f64,
-    /// How long its parts took, where that was measured.
+    /// The times of its phases, if they were measured.
     pub parts: Vec<PhaseTiming>,
-    /// Whether all claims hold.
+    /// True if all claims hold.
     pub holds: bool,
-    /// What it found.
+    /// The outcome.
     #[serde(flatten)]
     pub outcome: ExperimentOutcome,
-    /// The files that it was written to.
+    /// The files written.
     pub files: Vec<String>,
 }
 
-/// A part of an experiment and how long it took.
+/// The time of a phase of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhaseTiming {
-    /// What it did.
+    /// The name of the phase.
     pub doing: String,
-    /// How long, in milliseconds.
+    /// The elapsed time, in milliseconds.
     pub ms: f64,
-    /// The time of all threads together, where the system tells it.
+    /// The processor time of all threads together in milliseconds, if the system reports it.
     pub processor_ms: Option<f64>,
 }
 
 impl ExperimentReport {
-    /// The report of an experiment that took so long.
+    /// The report of an experiment that took `ms` milliseconds.
     pub fn new(study: &Experiment, outcome: ExperimentOutcome, ms: f64) -> Self {
         let Experiment { id, title, claim, .. } = *study;
         let holds = outcome.failed().next().is_none();
         Self { id, title, claim, ms, parts: Vec::new(), holds, outcome, files: Vec::new() }
     }
 
-    /// Writes everything into a folder: tables as CSV, pictures as PNG, lenses in our own form, all
+    /// Writes the report into a folder: tables as CSV, plots as PNG, lenses as lens files, all
     /// numbers as JSON.
     ///
     /// # Errors

@@ -1,12 +1,13 @@
-//! Figure 4.1: whether gradient descents that end by a clock sample the density they descend on.
+//! Figure 4.1: a test whether gradient descents that a random clock terminates sample the target
+//! density.
 //!
 //! One thin singlet with its distance from the sensor, and two with both distances. Independent
-//! chains of whole descents are held against the target, by the time spent and by the count of
-//! places, with the exact rate of regenerations (4.11) and with the approximate ones. The exact
-//! rate samples the target if its samples are weighted by time. The approximate rate (4.16), of
-//! which the figure says the same, does not: neither with regenerations from anywhere nor with
-//! those from a reservoir of the best, for which it was made. It comes close, within a few
-//! hundredths of the time, only with `C` about 1 and regenerations drawn from the target itself.
+//! chains of complete descents are compared with the target, weighted by time and by count, with
+//! the exact rate of regenerations (4.11) and with approximate ones. The exact rate samples the
+//! target if its samples are weighted by time. The approximate rate (4.16), for which the figure
+//! claims the same, does not: neither with uniform regenerations nor with those from a reservoir of
+//! the best, for which it was designed. It comes close, to a few hundredths in total variation,
+//! only with `C` about 1 and regenerations drawn from the target itself.
 
 use super::histogram::{HistogramGrid, deviation_in_sigmas, pool, total_variation};
 use super::{
@@ -30,24 +31,24 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 
 /// The temperature, in mm².
 const TEMPERATURE: f64 = 4.0;
-/// Bins in each direction, for one singlet and for two.
+/// The number of bins in each direction, for one singlet and for two.
 const BINS: [usize; 2] = [20, 8];
-/// Independent chains, and descents of each.
+/// The number of independent chains, and of descents in each.
 const CHAINS: usize = 1500;
 const FEW_CHAINS: usize = 400;
 const DESCENTS: usize = 200;
 const FEW_DESCENTS: usize = 100;
-/// No chain is longer: a rate of 0 would never end one.
+/// The maximum length of a chain: with a rate of 0 a descent would never end.
 const LONGEST: usize = 100_000;
 /// `C` of (4.11), so large that the rate is positive everywhere, for one singlet and for two.
 const EXACT: [f64; 2] = [6.0, 3000.0];
 /// `C` of (4.16); the thesis gives none.
 const PRINTED: [f64; 2] = [0.1, 1.0];
-/// (4.14) as the searches have it.
+/// The regeneration (4.14) with the parameters of the searches.
 const RESERVOIR: Regeneration = Regeneration::Reservoir { gamma: 0.02, size: 5 };
-/// The surprise that one in a thousand tests of the truth has, in standard deviations.
+/// The deviation that one in a thousand tests of correct samples exceeds, in standard deviations.
 const LIKELY: f64 = 3.1;
-/// One that no test of the truth has: one in three millions.
+/// A deviation that tests of correct samples never reach: one in three million.
 const UNLIKELY: f64 = 5.0;
 
 /// A process under test.
@@ -58,7 +59,7 @@ struct SamplingProcess {
 }
 
 impl SamplingProcess {
-    /// All of them for so many singlets, the exact one first and the printed one last.
+    /// All processes for a number of singlets, the exact one first and that of the thesis last.
     fn all(singlets: usize) -> Vec<Self> {
         let exact = EXACT[singlets - 1];
         let [low, high] = PRINTED.map(RegenerationRate::AsPrinted);
@@ -81,7 +82,7 @@ impl SamplingProcess {
         matches!(self.rate, RegenerationRate::AsPrinted(_) | RegenerationRate::PreviousStep(_))
     }
 
-    /// The rate in words, and `C`.
+    /// The name of the rate, and `C`.
     fn rate(self) -> (&'static str, f64) {
         match self.rate {
             RegenerationRate::Exact(c) => ("exact (4.11)", c),
@@ -100,7 +101,7 @@ impl SamplingProcess {
     }
 }
 
-/// A toy, its bins, and their shares under the target.
+/// A toy problem, its bins, and their probabilities under the target.
 #[derive(Debug)]
 struct ToyStudy {
     singlets: usize,
@@ -121,7 +122,7 @@ impl ToyStudy {
         Ok(Self { singlets, toy, temperature, grid, target })
     }
 
-    /// So many independent chains of so many descents.
+    /// Samples independent chains of several descents each.
     fn sample(
         &self,
         process: SamplingProcess,
@@ -171,7 +172,7 @@ impl ToyStudy {
     }
 }
 
-/// What a chain gave the bins: time and counts.
+/// The time and the counts of a chain in each bin.
 #[derive(Debug)]
 struct ChainHistogram {
     times: Vec<f64>,
@@ -180,24 +181,24 @@ struct ChainHistogram {
     clamped: u64,
 }
 
-/// What all chains of a process gave the bins.
+/// The samples of all chains of a process.
 #[derive(Debug)]
 struct ProcessSamples {
     process: SamplingProcess,
     steps: usize,
-    /// How often the rate would have been negative.
+    /// The number of clipped negative rates.
     clamped: u64,
     by_time: TargetComparison,
     by_count: TargetComparison,
 }
 
-/// Samples against the target.
+/// The comparison of samples with the target.
 #[derive(Debug)]
 struct TargetComparison {
     shares: Vec<f64>,
-    /// How unlikely they are, in standard deviations.
+    /// The deviation from the target, in standard deviations.
     sigmas: f64,
-    /// Total variation.
+    /// The total variation distance from the target.
     distance: f64,
 }
 
@@ -222,7 +223,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
             report_progress(watch, done, process.rate().0)?;
             let sampled = study.sample(*process, work)?;
             table.push_row(row(singlets, &sampled));
-            // A paraxial ray for every place.
+            // One paraxial ray per step.
             outcome.rays += sampled.steps;
             found.push(sampled);
         }
@@ -296,7 +297,7 @@ fn claims(study: &ToyStudy, found: &[ProcessSamples]) -> Vec<Claim> {
     ]
 }
 
-/// The histograms that the pictures show: the target, and three samplings of it.
+/// The histograms in the plots: the target, and three samplings of it.
 fn plotted_histograms<'a>(
     study: &'a ToyStudy,
     found: &'a [ProcessSamples],

@@ -1,5 +1,5 @@
-//! What figures 3.6 to 3.10 share: lenses optimised for sharpness and light at once (3.26), and how
-//! sharp and how bright each of their fields is.
+//! Shared parts of figures 3.6 to 3.10: lenses optimised for sharpness and light together (3.26),
+//! and the sharpness and light of their fields.
 
 use super::{DataTable, ExperimentError, ProgressFn, TableCell, report_progress};
 use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens};
@@ -8,10 +8,10 @@ use crate::optimize::pareto::{ParetoPoint, ParetoSettings, ParetoSweep, weighted
 use crate::optimize::start_annealed;
 use crate::pupil::{RayModel, Region};
 
-/// Orders of quadrature of the numbers that are shown: the difference is the error.
+/// The two orders of quadrature of reported numbers: their difference is the error.
 const ORDERS: [usize; 2] = [6, 8];
 
-/// The lens in one colour at some angles of field, in degrees.
+/// The monochromatic lens at some field angles, in degrees.
 pub(super) fn with_field_angles(mut lens: Lens, angles: &[f64]) -> Lens {
     lens = monochromatic(lens);
     let values = angles.iter().map(|y| FieldPoint { x: 0.0, y: *y, weight: 1.0 }).collect();
@@ -19,14 +19,14 @@ pub(super) fn with_field_angles(mut lens: Lens, angles: &[f64]) -> Lens {
     lens
 }
 
-/// The lens at its primary wavelength alone, as the figures have it.
+/// The lens at its primary wavelength alone, as in the figures.
 pub(super) fn monochromatic(mut lens: Lens) -> Lens {
     lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
     lens
 }
 
-/// The same lens with its stop and its rims scaled: how an aperture is chosen for a search that
-/// cannot ask for light.
+/// The lens with its stop and its semi-diameters scaled: the choice of an aperture for a search
+/// that cannot ask for light.
 pub(super) fn with_scaled_aperture(lens: &Lens, factor: f64) -> Lens {
     let mut lens = lens.clone();
     for row in &mut lens.surfaces {
@@ -38,26 +38,26 @@ pub(super) fn with_scaled_aperture(lens: &Lens, factor: f64) -> Lens {
     lens
 }
 
-/// A search for lenses of ever less weight on their light.
+/// A sweep over decreasing weights of the light.
 #[derive(Debug, Clone)]
 pub(super) struct WeightSweep {
     /// The weights β in mm², the largest first.
     pub(super) betas: Vec<f64>,
-    /// Steps of Adam for each.
+    /// The steps of Adam for each weight.
     pub(super) steps: usize,
-    /// How the edges of the pupils are treated.
+    /// The treatment of the pupil edge in derivatives.
     pub(super) pupil: PupilEdge,
-    /// How much smaller and larger a semi-diameter may become.
+    /// The factors by which a semi-diameter may shrink and grow.
     pub(super) rims: [f64; 2],
 }
 
-/// The largest weight: so large that the rim ray of a lens that is not sharp yet is kept. What is
-/// clipped early does not come back.
+/// The largest weight in mm²: large enough to retain the marginal rays of a lens that is not sharp
+/// yet. Light that is clipped early is not regained.
 const LARGEST: f64 = 3e-2;
 
 impl WeightSweep {
-    /// So many weights over some powers of ten, evenly on a logarithmic scale, by derivatives that
-    /// follow the pupils.
+    /// A sweep over `weights` weights in some decades, evenly spaced on a logarithmic scale, with
+    /// unbiased derivatives.
     pub(super) fn new(decades: f64, weights: usize, steps: usize) -> Self {
         let last = (weights - 1).max(1) as f64;
         let beta = |i: usize| LARGEST * 10f64.powf(-decades * i as f64 / last);
@@ -65,14 +65,15 @@ impl WeightSweep {
         Self { betas, steps, pupil: PupilEdge::Moving, rims: [0.25, 1.3] }
     }
 
-    /// The usual search, which cannot see light: one weight is as good as another.
+    /// The usual optimization with biased derivatives: all weights are equivalent, so there is only
+    /// one.
     pub(super) fn biased(&self) -> Self {
         let steps = 2 * self.steps;
         Self { betas: vec![0.0], steps, pupil: PupilEdge::Frozen, ..self.clone() }
     }
 }
 
-/// The part of an experiment that a search is, from one share to another.
+/// A named part of the progress of an experiment, from one completed fraction to another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ProgressSpan<'a> {
     pub(super) from: f64,
@@ -80,12 +81,12 @@ pub(super) struct ProgressSpan<'a> {
     pub(super) name: &'a str,
 }
 
-/// How exact the spots of a search are, and those of its designs, relatively.
+/// The relative accuracy of the spot radii of a search, and of its designs.
 const SEARCH_TOLERANCE: f64 = 1e-3;
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-/// The lens at the start, limited by its stop and with everything free, and a design for each
-/// weight, the search for each beginning where the one before has led.
+/// Runs the sweep: the starting lens, limited by its stop and with all variables, and a design for
+/// each weight, each search starting from the result of the one before.
 pub(super) fn run_sweep(
     lens: &Lens,
     plan: &WeightSweep,
@@ -119,18 +120,17 @@ pub(super) fn run_sweep(
     Ok(designs)
 }
 
-/// A field of a lens.
+/// The sharpness and light of a field of a lens.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FieldView {
-    /// In degrees.
+    /// The field angle in degrees.
     pub(super) angle: f64,
-    /// The area of the pupil in mm², and the root mean square radius of the spot in mm, each with
-    /// its error.
+    /// The area of the pupil in mm² with its error.
     pub(super) area: [f64; 2],
     pub(super) rms: [f64; 2],
 }
 
-/// Every field of a lens; the rays traced are counted.
+/// The sharpness and light of every field of a lens; adds the rays traced to `rays`.
 pub(super) fn field_views(
     lens: &Lens,
     rays: &mut usize,
@@ -139,7 +139,7 @@ pub(super) fn field_views(
     bench.fields.iter().map(|field| field_view(&bench, *field, rays)).collect()
 }
 
-/// The spot and the pupil of a field.
+/// The sharpness and light of a field; adds the rays traced to `rays`.
 pub(super) fn field_view(
     bench: &RayModel,
     field: FieldPoint,
@@ -159,8 +159,7 @@ pub(super) fn field_view(
     Ok(FieldView { angle: field.y, area: number(0), rms: number(1) })
 }
 
-/// The root of the mean square radius of some spots, in mm, and the mean area of their pupils in
-/// mm².
+/// The RMS spot radius over some fields in mm, and the mean area of their pupils in mm².
 pub(super) fn mean_blur_and_light(views: &[FieldView]) -> [f64; 2] {
     let count = views.len() as f64;
     let square: f64 = views.iter().map(|view| view.rms[0].powi(2)).sum();
@@ -174,7 +173,7 @@ pub(super) fn focal_length(lens: &Lens) -> Result<f64, ExperimentError> {
     bench.first_order.efl.ok_or_else(|| ExperimentError::Failed(format!("{} is afocal", lens.name)))
 }
 
-/// A row for each field of each design.
+/// A table with a row for each field of each design.
 pub(super) fn table(
     name: &'static str,
     designs: &[(&str, &ParetoPoint)],

@@ -1,9 +1,9 @@
-//! Figure 3.9: how bright the corner of a white target is, with a lens optimised by gradients that
-//! know of light off the axis, and with one by the biased gradients, which do not.
+//! Figure 3.9: the brightness of the corner of a white target, with a lens optimised by unbiased
+//! gradients, which include the light off the axis, and with one by biased gradients, which do not.
 //!
-//! Both searches begin with the same lens and keep its stop, so that the difference is not just a
-//! larger aperture. Of the unbiased front that lens is shown which is brightest at the corner among
-//! those that are no less sharp than the biased one.
+//! Both searches begin with the same lens and a fixed stop, so that the difference is not just a
+//! larger aperture. From the unbiased front the lens with the brightest corner is chosen among
+//! those that are at least as sharp as the biased one.
 
 use super::pareto_front::ANGLES;
 use super::sharpness_vs_light::{
@@ -30,7 +30,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 };
 
 const LENS: &str = "double_gauss_rudolph_50";
-/// Fields of the curves, from the axis to the corner.
+/// The number of fields of the curves, from the axis to the corner.
 const FIELDS: usize = 21;
 const ACCURACY: Accuracy = Accuracy { tolerance: 1e-5, max_rays: 100_000 };
 
@@ -66,7 +66,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     })
 }
 
-/// The lens with a stop that cannot be opened or closed.
+/// The lens with a fixed semi-diameter of its stop.
 fn with_fixed_stop(mut lens: Lens) -> Lens {
     let stop = lens.stop().and_then(|stop| Some((stop, lens.surfaces[stop].semi_diameter?)));
     if let Some((surface, radius)) = stop {
@@ -96,12 +96,13 @@ impl IlluminatedLens {
         Ok(Self { lens: design.lens.clone(), views, light })
     }
 
-    /// The root of the mean square radius of its spots, in mm.
+    /// Its RMS spot radius over all fields, in mm.
     fn blur(&self) -> f64 {
         mean_blur_and_light(&self.views)[0]
     }
 
-    /// The cone of light at a field, in direction cosines, and its error.
+    /// The solid angle of the light at a field, projected, in squared direction cosines, and its
+    /// error.
     fn cone(&self, field: usize) -> [f64; 2] {
         [self.light[field].cone.value, self.light[field].cone.error]
     }
@@ -110,7 +111,7 @@ impl IlluminatedLens {
         self.cone(FIELDS - 1)
     }
 
-    /// The illumination of the corner over that of the axis, and its error.
+    /// The relative illumination of the corner, and its error.
     fn relative(&self) -> [f64; 2] {
         ratio(self.corner(), self.cone(0))
     }
@@ -165,7 +166,8 @@ fn table(pair: &[IlluminatedLens; 2]) -> DataTable {
 const KINDS: [(&str, Color); 2] =
     [("biased gradient", PALETTE[1]), ("unbiased gradient", PALETTE[0])];
 
-/// Curves over the field, and a white target as both show it from the axis to the corner.
+/// Draws the curves over the field, and a white target from the axis to the corner through both
+/// lenses.
 fn draw(pair: &[IlluminatedLens; 2]) -> Canvas {
     let mut canvas = Canvas::new([1200, 1000]);
     let brightest = pair.iter().map(|lit| lit.cone(0)[0]).fold(0.0, f64::max);

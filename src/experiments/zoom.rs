@@ -1,9 +1,9 @@
-//! Figure 3.10: two zoom lenses made sharper and brighter over their whole range at once.
+//! Figure 3.10: two zoom lenses made sharper and brighter over their whole range.
 //!
-//! The composite objective is summed over three positions of each; curvatures and distances are
-//! free, rims and stop stay as they are. What is claimed is checked between the positions as well:
-//! there the groups stand on parabolas through their three places, and the image plane in focus, for
-//! the lens at the start and for the better one alike.
+//! The objective is summed over three positions of each; curvatures and distances are variables,
+//! semi-diameters and stop are fixed. The claims are checked between the positions as well: there
+//! the groups follow parabolas through their three positions, with the image plane in focus, for
+//! the starting lens and for the result alike.
 
 use super::sharpness_vs_light::{
     ProgressSpan, WeightSweep, field_view, mean_blur_and_light, monochromatic, run_sweep,
@@ -27,7 +27,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// The positions that are compared: those of the search, and one in the middle between two.
+/// The positions compared: those of the search, and one midway between each two.
 const POSITIONS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -54,9 +54,9 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     Ok(outcome)
 }
 
-/// A zoom lens at all places.
+/// A zoom lens at all positions compared.
 struct ZoomRange {
-    /// Blur in mm and light in mm² at every place.
+    /// The blur in mm and the light in mm² at every position.
     points: Vec<[f64; 2]>,
     focal_lengths: Vec<f64>,
 }
@@ -76,13 +76,12 @@ impl ZoomRange {
         Ok(range)
     }
 
-    /// Blur and light over those of another one, at a place.
+    /// Blur and light relative to another one, at a position.
     fn ratios(&self, other: &Self, i: usize) -> [f64; 2] {
         [0, 1].map(|k| self.points[i][k] / other.points[i][k])
     }
 
-    /// How much better it is than another one where it is so least: above 1 where it is better
-    /// everywhere.
+    /// The smallest improvement over another one: above 1 if it is better everywhere.
     fn gain(&self, other: &Self) -> f64 {
         let least = (0..POSITIONS.len()).map(|i| {
             let [blur, light] = self.ratios(other, i);
@@ -92,10 +91,10 @@ impl ZoomRange {
     }
 }
 
-/// How much more a gain in light counts than one in sharpness, when one design is chosen.
+/// The factor by which a gain in light counts less than one in sharpness in the choice of a design.
 const LIGHT_DAMPING: f64 = 20.0;
 
-/// The design that is better at every place, by the largest margin.
+/// The design with the largest smallest improvement over all positions.
 fn best_design(
     designs: &[ParetoPoint],
     before: &ZoomRange,
@@ -117,7 +116,8 @@ fn parabola([a, b, c]: [f64; 3], t: f64) -> f64 {
     a + t * (first + 0.5 * (t - 1.0) * (c - b - first))
 }
 
-/// The lens at a place of its range, whole numbers for its own positions, as a lens of one position.
+/// The lens at a position of its range, whole numbers for its own positions, as a lens without
+/// zoom.
 fn lens_between(lens: &Lens, place: f64) -> Result<Lens, ExperimentError> {
     let positions = [0, 1, 2].map(|zoom| at_zoom(lens, zoom));
     let benches = [0, 1, 2].map(|zoom| RayModel::from_lens(&positions[zoom], 0));
@@ -194,7 +194,7 @@ fn table(name: &'static str, before: &ZoomRange, after: &ZoomRange) -> DataTable
     table
 }
 
-/// Blur and light over the focal length, before and after.
+/// Draws blur and light over the focal length, before and after.
 fn draw(name: &str, before: &ZoomRange, after: &ZoomRange) -> Canvas {
     let mut canvas = Canvas::new([1500, 760]);
     let ranges: [(&str, &ZoomRange, Color); 2] =
@@ -230,7 +230,7 @@ fn draw(name: &str, before: &ZoomRange, after: &ZoomRange) -> Canvas {
     canvas
 }
 
-/// From mm to um, and mm² as it is.
+/// The factors of the plotted quantities: mm to um, and mm² unchanged.
 const SCALES: [f64; 2] = [1e3, 1.0];
 
 #[cfg(test)]

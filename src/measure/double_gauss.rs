@@ -1,4 +1,4 @@
-//! The lens on which speed is measured.
+//! The lens on which speed is measured: a double Gauss.
 
 use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength, glass::line,
@@ -6,7 +6,7 @@ use crate::lens::{
 use crate::math::Vec3;
 use crate::trace::{Ray, Rays};
 
-/// Radius, thickness and index behind, semi-diameter of each surface.
+/// Radius in mm, thickness behind in mm, index behind and semi-diameter in mm of each surface.
 const SURFACES: [(f64, f64, f64, f64); 11] = [
     (56.20238, 8.750, 1.62041, 30.0),
     (152.28580, 0.500, 1.0, 30.0),
@@ -25,7 +25,7 @@ const ENTRANCE_PUPIL_DIAMETER: f64 = 33.33; // mm
 const ENTRANCE_PUPIL: f64 = 58.34775410472952; // mm behind the first vertex
 const FIELD: f64 = 7.0; // degrees, of the bundle on which speed is measured
 
-/// A double Gauss of 100 mm, f/3: eleven surfaces and the image plane, at one wavelength.
+/// A double Gauss lens of 100 mm, f/3: eleven surfaces and the image plane, at one wavelength.
 pub fn double_gauss() -> Lens {
     let row =
         |(i, &(radius, thickness, index, semi_diameter)): (usize, &(f64, f64, f64, f64))| Row {

@@ -1,13 +1,14 @@
-//! Error of aperture-aware derivatives against the time that they take, for every estimator.
+//! Error against time of derivatives of pupil integrals, for every estimator.
 //!
-//! The stop limits the light, with the radius that the aperture gives it, and the semi-diameters
-//! clip. Each derivative starts from nothing: the edge is looked for, rays are started, traced and
-//! traced back, on one thread. The reference is the integral along the edge at its highest order,
-//! and how far central differences are from it is told; a pupil without such an edge is measured
-//! against the warp field with very many samples.
+//! The stop, with the semi-diameter that the aperture defines, and the semi-diameters of the
+//! surfaces limit the light. Each derivative includes all its work on one thread: the edge of the
+//! pupil is found, rays are launched, traced and traced back. The reference is the boundary
+//! integral at its highest order, reported with its deviation from central differences; for a pupil
+//! without such a boundary it is the warp field with very many samples.
 //!
-//! Single precision is measured where it exists. An edge is found to the rounding of `f64`, since
-//! what ends a pupil is decided there; a difference of two integrals has no digit left in `f32`.
+//! Single precision is measured where it exists. The edge is always found in `f64`, since it
+//! decides which rays belong to the pupil; a difference of two integrals has no significant digit
+//! in `f32`.
 
 use super::clock::time_ms;
 use super::rates::{TimedCase, time_interleaved};
@@ -26,7 +27,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
 
-/// The numbers of a lens of one kind.
+/// A class of parameters of a lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParameterClass {
@@ -34,7 +35,7 @@ pub enum ParameterClass {
     Curvature,
     /// Conic constants.
     Conic,
-    /// Asphere coefficients; the worst of the powers.
+    /// Asphere coefficients; the worst of all powers.
     Asphere,
     /// Thicknesses.
     Thickness,
@@ -45,7 +46,7 @@ pub enum ParameterClass {
 }
 
 impl ParameterClass {
-    /// All kinds.
+    /// All classes, in the order of [`GradientRow::errors`].
     pub const ALL: [Self; 6] = [
         Self::Curvature,
         Self::Conic,
@@ -66,12 +67,12 @@ impl ParameterClass {
         }
     }
 
-    /// The relative error of the numbers of this kind, in the root mean square; `None` where the
+    /// The relative RMS error of the derivatives by the parameters of this class; `None` if the
     /// integral depends on none of them.
     fn error(self, found: &SystemGradient<f64>, exact: &SystemGradient<f64>) -> Option<f64> {
         let slots = SurfaceParameter::all().filter(|slot| self.contains(*slot));
         let error = |slot| {
-            // Against the largest, so that no square leaves the numbers.
+            // Scaled by the largest, so that no square overflows.
             let largest = exact.largest(slot);
             let sum = |numbers: &mut dyn Iterator<Item = f64>| -> f64 {
                 numbers.map(|v| (v / largest).powi(2)).sum()
@@ -84,36 +85,36 @@ impl ParameterClass {
     }
 }
 
-/// What is differentiated.
+/// The integral that is differentiated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Integral {
-    /// The square of the distance from the centroid, over the light.
+    /// The squared distance from the centroid, integrated over the pupil.
     Spot,
-    /// The light.
+    /// The area of the pupil.
     Throughput,
 }
 
-/// One point of the curves.
+/// A point of a curve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GradientRow {
-    /// What is differentiated.
+    /// The integral that is differentiated.
     pub integral: Integral,
-    /// How.
+    /// The estimator of the derivative.
     pub estimator: DerivativeEstimator,
     /// The number type of the rays.
     pub precision: Precision,
-    /// Rays traced, those included that only looked for the edge.
+    /// The number of rays traced, including those that find the edge.
     pub rays: usize,
-    /// What it took, on one thread.
+    /// The time on one thread, in milliseconds.
     pub ms: f64,
-    /// The relative error of each kind of numbers, in the order of [`ParameterClass::ALL`]; `None` where
-    /// the integral depends on none of them.
+    /// The relative error for each class of parameters, in the order of [`ParameterClass::ALL`];
+    /// `None` if the integral depends on none of them.
     pub errors: [Option<f64>; 6],
 }
 
 impl GradientRow {
-    /// The largest error of all kinds.
+    /// The largest error of all classes.
     pub fn worst(&self) -> f64 {
         self.errors.iter().flatten().copied().fold(0.0, f64::max)
     }
@@ -124,93 +125,94 @@ impl GradientRow {
 pub struct GradientCurves {
     /// The field, in the unit of the lens's fields.
     pub y: f64,
-    /// Its light against that of the axis, in area of the first vertex plane.
+    /// The area of its pupil in the first vertex plane, relative to that on the axis.
     pub light: f64,
-    /// The estimator that the plan chooses, and why.
+    /// The estimator that the effects plan selects.
     pub planned: DerivativeEstimator,
-    /// Why.
+    /// The reason for that estimator.
     pub reason: String,
-    /// By what the reference was made: `Boundary`, or `WarpSampling` where the pupil has no edge to follow.
+    /// The estimator of the reference: `Boundary`, or `Warp` if the pupil has no boundary to
+    /// track.
     pub reference: DerivativeEstimator,
-    /// How far the reference may be wrong, for the two integrals: its difference from central
-    /// differences, the worst of all kinds of numbers, or its standard error.
+    /// The relative uncertainty of the reference for the two integrals: its deviation from central
+    /// differences, the worst of all classes, or its standard error.
     pub checked: [f64; 2],
-    /// The curves.
+    /// The points of the curves.
     pub rows: Vec<GradientRow>,
 }
 
-/// The price of one derivative against that of the integral.
+/// The cost of all derivatives relative to that of the integral.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GradientCost {
-    /// Surfaces, the image plane included: planes without an effect were put into the gaps.
+    /// The number of surfaces, including the image plane and the inert planes added to the gaps.
     pub surfaces: usize,
-    /// Numbers by which is differentiated.
+    /// The number of parameters of the derivative.
     pub numbers: usize,
-    /// The integral, ms.
+    /// The time of the integral, in milliseconds.
     pub integral_ms: f64,
-    /// The derivative along the edge at the same order, in times of the integral; `None` where the
-    /// pupil has no edge to follow.
+    /// The time of the boundary integral at the same order, relative to the integral; `None` if the
+    /// pupil has no boundary to track.
     pub boundary: Option<f64>,
-    /// Central differences, likewise.
+    /// The time of central differences, relative to the integral.
     pub difference: f64,
-    /// The warp field, in times of the forward trace of the same number of rays.
+    /// The time of the warp field, relative to the forward trace of the same number of rays.
     pub warp: f64,
     /// The same in `f32`.
     pub warp_single: f64,
 }
 
-/// What is measured of a lens.
+/// The benchmark of the gradients of a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GradientBenchmark {
     /// The curves of the axis and of another field.
     pub fields: Vec<GradientCurves>,
-    /// What derivatives cost at the last of those fields, for more and more numbers.
+    /// The cost of derivatives at the last of those fields, for an increasing number of parameters.
     pub costs: Vec<GradientCost>,
 }
 
-/// Why nothing could be measured.
+/// The error of a gradient benchmark.
 #[derive(Debug, thiserror::Error)]
 pub enum GradientBenchmarkError {
-    /// The lens.
+    /// The ray model of the lens cannot be set up.
     #[error(transparent)]
     RayModel(#[from] RayModelError),
-    /// The field.
+    /// No rays can be launched from the field.
     #[error(transparent)]
     Launch(#[from] LaunchError),
-    /// The pupil.
+    /// The estimator has no derivative for this pupil.
     #[error(transparent)]
     Pupil(#[from] DerivativeError),
-    /// The numbers of the lens.
+    /// The system is invalid.
     #[error(transparent)]
     Invalid(#[from] SystemError),
-    /// No thread.
+    /// The thread pool cannot be created.
     #[error("no thread to measure with: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
 /// The order of the differences that check the reference.
 const CHECKED: usize = 8;
-/// Rays of the reference.
+/// The number of rays of a reference by the warp field.
 const REFERENCE_RAYS: usize = 1 << 21;
-/// Orders of the curves.
+/// The orders of quadrature of the curves.
 const ORDERS: usize = 10;
 const DIFFERENCE_ORDERS: usize = 6;
-/// Samples of the warp field along its curves, and how often each is tried.
+/// The numbers of samples of the warp field along its curve, and the number of tries of each.
 const SAMPLES: [usize; 5] = [256, 1024, 4096, 16_384, 65_536];
 const TRIES: u32 = 4;
-/// A result is timed until it has taken so long, in ms, or so often.
+/// A result is timed repeatedly up to this total time in ms, or this many times.
 const LONG_ENOUGH: f64 = 5.0;
 const OFTEN_ENOUGH: usize = 15;
-/// Planes that are put into the gaps to see what more numbers cost.
+/// The numbers of inert planes added to the gaps, to measure the cost of more parameters.
 const PLANES: [usize; 4] = [0, 6, 12, 24];
-/// Order and samples of the costs.
+/// The order of quadrature and the number of samples of the cost measurement.
 const COST_ORDER: usize = 3;
 const COST_SAMPLES: usize = 8192;
 const TURNS: usize = 9;
 const TURN: f64 = 2e-3; // seconds
 
-/// Measures a lens at a zoom position, on the axis and at a field, or at the most vignetted one of
-/// its fields where none is given; `report` is told how many of how many curves are done.
+/// Measures a lens at a zoom position, on the axis and at a field, by default the most vignetted
+/// one of the lens. `report` receives the numbers of finished and of all curves.
 ///
 /// # Errors
 /// A lens, field or pupil without light.
@@ -253,7 +255,7 @@ pub fn measure_gradients(
     Ok(GradientBenchmark { costs: costs.collect::<Result<_, GradientBenchmarkError>>()?, fields })
 }
 
-/// Every estimator in every precision that it has.
+/// Every estimator in every precision that it supports.
 const METHODS: [(DerivativeEstimator, Precision); 6] = [
     (DerivativeEstimator::Biased, Precision::F64),
     (DerivativeEstimator::Biased, Precision::F32),
@@ -278,7 +280,7 @@ fn with_primary_system(
     RayModel::from_systems(systems, 0, model.beam, model.aiming)
 }
 
-/// The field of the lens with the least light that has some.
+/// The field of the lens with the least light above zero.
 fn most_vignetted(bench: &RayModel, lens: &Lens, zoom: usize) -> f64 {
     let heights = lens.fields_at(zoom).values.iter().map(|field| field.y);
     let lit = heights.filter_map(|y| Some((y, area(bench, y)?)));
@@ -291,11 +293,11 @@ fn area(bench: &RayModel, y: f64) -> Option<f64> {
     light.has_light().then_some(light.moments.area)
 }
 
-/// The same lens with planes that change nothing in its gaps, one gap after the other.
+/// The lens with inert planes inserted into its gaps, one gap after the other.
 fn with_planes(mut system: System<f64>, planes: usize) -> System<f64> {
     let mut at = 0;
     for _ in 0..planes {
-        // Behind a mirror light runs the other way: those gaps stay.
+        // Light is reversed behind a mirror: those gaps stay as they are.
         let open = |i: &usize| {
             let row = &system.surfaces[*i];
             row.thickness > 0.0 && !row.mirror
@@ -312,7 +314,7 @@ fn with_planes(mut system: System<f64>, planes: usize) -> System<f64> {
     system
 }
 
-/// The numbers by which is differentiated.
+/// The number of parameters of the derivative.
 fn numbers(system: &System<f64>) -> usize {
     let of = |surface: &Surface<f64>| {
         let has = |slot: &SurfaceParameter| {
@@ -324,10 +326,10 @@ fn numbers(system: &System<f64>) -> usize {
     1 + system.surfaces.iter().map(of).sum::<usize>()
 }
 
-/// A derivative and the rays that it took.
+/// A derivative and the number of rays traced for it.
 type DerivativeWithRays = (SystemGradient<f64>, usize);
 
-/// The derivatives of both integrals, as well as they can be known.
+/// Reference derivatives of both integrals.
 struct ReferenceGradients {
     spot: SystemGradient<f64>,
     throughput: SystemGradient<f64>,
@@ -344,13 +346,13 @@ impl ReferenceGradients {
     }
 }
 
-/// A field of a lens.
+/// A field of a lens with its ray model.
 struct GradientScene<'a> {
     bench: &'a RayModel,
     pool: &'a ThreadPool,
     single: Tracer<f32>,
     y: f64,
-    /// The spot about its centroid.
+    /// The integrand of the spot about its centroid.
     spot: QuadraticIntegrand,
 }
 
@@ -443,7 +445,7 @@ impl<'a> GradientScene<'a> {
         (0..steps).filter_map(row).collect()
     }
 
-    /// One result, and the median of the times that it took on one thread.
+    /// The result of `work` and the median of its times on one thread, in milliseconds.
     fn time(
         &self,
         work: impl Fn() -> Option<DerivativeWithRays> + Sync,
@@ -459,7 +461,7 @@ impl<'a> GradientScene<'a> {
         })
     }
 
-    /// A derivative from nothing.
+    /// Computes a derivative, including the search for the edge of the pupil.
     fn derivative(
         &self,
         cost: &QuadraticIntegrand,
@@ -527,7 +529,7 @@ impl<'a> GradientScene<'a> {
         Some((by, region.rays + nodes.rays + rays.len()))
     }
 
-    /// What derivatives cost against integrals, each at its fastest.
+    /// The cost of derivatives relative to integrals, each by its fastest repetition.
     fn cost(&self) -> Result<GradientCost, GradientBenchmarkError> {
         let region = Region::new(self.bench.launch(at(self.y), 0)?);
         let spot = self.spot;
@@ -563,7 +565,7 @@ impl<'a> GradientScene<'a> {
         let rates = time_interleaved(&mut contestants, TURNS, TURN);
         drop(contestants);
         drop(turns);
-        // The fastest turns: slower ones had company.
+        // The fastest repetitions: slower ones were disturbed by other processes.
         let seconds: Vec<f64> = rates.iter().map(|rate| 1.0 / rate.max).collect();
         let has_edge = region.trace_pupil(0).boundary_derivative(&spot).is_some();
         let system = &self.bench.channels[0].system;
@@ -579,7 +581,7 @@ impl<'a> GradientScene<'a> {
     }
 }
 
-/// The worst error of all kinds of numbers.
+/// The worst error of all classes of parameters.
 fn worst_error(found: &SystemGradient<f64>, exact: &SystemGradient<f64>) -> f64 {
     let errors = ParameterClass::ALL.into_iter().filter_map(|numbers| numbers.error(found, exact));
     errors.fold(0.0, f64::max)

@@ -1,8 +1,8 @@
-//! Light in gradient-index fields: error against time for every integrator, what the way back
-//! costs, and the memory of the adjoint against that of a stored path.
+//! Rays in gradient-index fields: error against time for every integrator, the cost of the adjoint,
+//! and its memory compared with that of a stored path.
 //!
-//! All on one thread. The reference is the same field traced with very fine steps: a grid has an
-//! error of its own, which no step takes away and which is told beside its curves.
+//! All on one thread. The reference is the same field traced with very fine steps. A grid has an
+//! interpolation error that smaller steps do not reduce; it is reported with the curves.
 
 use super::clock::time_ms;
 use super::grin_starts::GrinStarts;
@@ -19,144 +19,145 @@ use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use std::hint::black_box;
 
-/// One point of the curves.
+/// A point of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GrinRow {
-    /// The kind of step.
+    /// The integrator.
     pub integrator: Integrator,
     /// The number type of the rays.
     pub precision: Precision,
-    /// How often a ray asks the field, on average.
+    /// The mean number of field evaluations (kicks) per ray.
     pub kicks: f64,
-    /// All rays forwards, in milliseconds.
+    /// The time of the forward trace of all rays, in milliseconds.
     pub ms: f64,
-    /// All rays forwards and back, with the gradient.
+    /// The time of the forward and adjoint trace of all rays, in milliseconds.
     pub gradient_ms: f64,
-    /// The root of the mean square error of the exits, in mm.
+    /// The RMS error of the exit points, in mm.
     pub exit_error: f64,
-    /// The relative error of the gradient by the numbers of the field.
+    /// The relative error of the gradient by the parameters of the field.
     pub gradient_error: f64,
-    /// The largest distance between a start and the end of its way back, in steps.
+    /// The largest distance between a start point and its reconstruction by the adjoint trace, in
+    /// steps.
     pub retrace_error: f64,
-    /// Rays that do not arrive, or whose way back goes astray.
+    /// The number of rays that do not exit, or that the adjoint trace cannot retrace.
     pub lost: usize,
 }
 
 /// The curves of one field.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GrinCurves {
-    /// How the field is made up.
+    /// The name of the representation of the field.
     pub field: &'static str,
-    /// How many numbers it has.
+    /// The number of its parameters.
     pub parameters: usize,
-    /// How far its exits are from those of the exact field, root mean square, in mm.
+    /// The RMS distance of its exit points from those of the exact field, in mm.
     pub floor: f64,
-    /// The curves.
+    /// The points of the curves.
     pub rows: Vec<GrinRow>,
 }
 
-/// What a ray costs for each time that it asks a field, in batches.
+/// The cost of a ray per field evaluation, traced in batches.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GrinCost {
-    /// How the field is made up.
+    /// The name of the representation of the field.
     pub field: &'static str,
     /// The number type of the rays.
     pub precision: Precision,
-    /// Nanoseconds forwards.
+    /// The time of the forward trace per evaluation, in nanoseconds.
     pub forward_ns: f64,
-    /// Nanoseconds on the way back, with the gradient.
+    /// The time of the adjoint trace per evaluation, in nanoseconds.
     pub back_ns: f64,
-    /// Both in times of the way forwards.
+    /// The time of both relative to the forward trace.
     pub ratio: f64,
 }
 
-/// The adjoint against a stored path, on a trilinear grid.
+/// The memory of the adjoint compared with that of a stored path, on a trilinear grid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GrinMemory {
-    /// Nodes along a side.
+    /// The number of nodes along a side of the grid.
     pub nodes: usize,
-    /// Rays.
+    /// The number of rays.
     pub rays: usize,
-    /// Steps of a ray, on average.
+    /// The mean number of steps of a ray.
     pub steps: f64,
-    /// Bytes that the adjoint keeps of the rays.
+    /// The memory that the adjoint keeps for the rays, in bytes.
     pub adjoint_bytes: usize,
-    /// Bytes of its private gradients.
+    /// The memory of its per-thread gradients, in bytes.
     pub volume_bytes: usize,
-    /// Bytes of the stored path, the least that reverse mode can do with.
+    /// The memory of the stored paths, the minimum for reverse mode, in bytes.
     pub tape_bytes: usize,
-    /// The peak of the process, and what it had before; where the system tells.
+    /// The memory of the process with the adjoint, if the system reports it.
     pub adjoint_memory: Option<MemoryUse>,
-    /// The same with the stored path.
+    /// The memory of the process with the stored paths, if the system reports it.
     pub tape_memory: Option<MemoryUse>,
-    /// Milliseconds of the adjoint: rays forwards and back, in batches.
+    /// The time of the forward and adjoint trace in batches, in milliseconds.
     pub adjoint_ms: f64,
-    /// The same with the stored path, one ray after the other.
+    /// The time with the stored path, one ray after the other, in milliseconds.
     pub tape_ms: f64,
     /// The relative difference between the two gradients.
     pub difference: f64,
 }
 
-/// What is measured of a task.
+/// The benchmark of a GRIN task.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GrinBenchmark {
-    /// Rays of every measurement.
+    /// The number of rays of every measurement.
     pub rays: usize,
-    /// A chart for each field.
+    /// The curves of each field.
     pub fields: Vec<GrinCurves>,
-    /// The derivative by the start of a ray.
+    /// The accuracy of the derivative by the start point of a ray.
     pub starts: Vec<GrinStarts>,
-    /// What a ray costs.
+    /// The cost of a ray.
     pub costs: Vec<GrinCost>,
-    /// What a gradient keeps.
+    /// The memory of a gradient.
     pub memory: Vec<GrinMemory>,
 }
 
-/// Why nothing could be measured.
+/// The error of a GRIN benchmark.
 #[derive(Debug, thiserror::Error)]
 pub enum GrinBenchmarkError {
-    /// There is nothing to compare with.
+    /// The task has no exact field to compare with.
     #[error("exact: found none; expected a task whose exact field is known")]
     NoExact,
-    /// The exact field.
+    /// The exact field is invalid.
     #[error(transparent)]
     Field(#[from] ReferenceFieldError),
-    /// A grid.
+    /// A grid is invalid.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// The space.
+    /// The tracing setup is invalid.
     #[error(transparent)]
     Setup(#[from] GrinSetupError),
-    /// No ray arrives.
+    /// No ray exits.
     #[error("views: found no ray that leaves the space; expected light that goes through")]
     NoLight,
-    /// No thread.
+    /// The thread pool cannot be created.
     #[error("no thread to measure with: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
 /// Rays of every measurement.
 const RAYS: usize = 512;
-/// How often a ray asks the field in the curves, and for the reference.
+/// The numbers of field evaluations per ray of the curves, and that of the reference.
 const KICKS: [f64; 6] = [14.0, 28.0, 56.0, 112.0, 224.0, 448.0];
 const REFERENCE_KICKS: f64 = 16_384.0;
-/// The coarse trace by which the length of the rays is learnt.
+/// The steps across the field of the coarse trace that finds the path lengths.
 const COARSE_STEPS: f64 = 300.0;
-/// Nodes along a side of the grids of the curves, and of the costs.
+/// The nodes along a side of the grids of the curves, and of the cost measurement.
 const NODES: usize = 33;
 const COST_NODES: usize = 65;
-/// Grids and steps a voxel of the measurement of memory.
+/// Nodes along a side and steps per voxel of the memory measurements.
 const MEMORY: [(usize, f64); 5] = [(17, 2.0), (33, 2.0), (65, 1.0), (65, 2.0), (65, 4.0)];
-/// A cube reaches so much beyond the space.
+/// The side of the cube of a grid, relative to that of the field.
 const MARGIN: f64 = 1.1;
-/// Something is timed until it has taken so long, in ms, or so often.
+/// A measurement is repeated up to this total time in ms, or this many times.
 const LONG_ENOUGH: f64 = 10.0;
 const OFTEN_ENOUGH: usize = 7;
-/// After so many times the steps of the longest ray one counts as trapped.
+/// A ray counts as trapped after this many times the steps of the longest ray.
 const TRAPPED: f64 = 8.0;
 
-/// Measures a task whose exact field is known, by the light of its first view; `report` is told how
-/// many of how many parts are done.
+/// Measures a task with a known exact field, with the light of its first view. `report` receives
+/// the numbers of finished and of all parts.
 ///
 /// # Errors
 /// A task without an exact field, or without light.
@@ -197,12 +198,12 @@ pub fn measure_grin(
     Ok(measured)
 }
 
-/// How a field is made up.
+/// The representation of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum BenchmarkField {
     Exact,
     Tricubic(usize),
-    /// With the smoothed diagonal.
+    /// Trilinear with the smoothed Hessian.
     Trilinear(usize),
 }
 
@@ -227,23 +228,23 @@ impl BenchmarkField {
     }
 }
 
-/// Light and a field to send it through.
+/// The field of a task and the rays to trace through it.
 pub(super) struct GrinBenchmarkScene<'a> {
     task: &'a GrinTask,
     pub(super) exact: &'a ReferenceField,
     region: GrinRegion<f64>,
-    /// Half the side of the cube of a grid.
+    /// Half the side of the cube of a grid, in mm.
     pub(super) half: f64,
     pub(super) rays: Vec<GrinRay<f64>>,
-    /// The way of the longest ray in σ.
+    /// The length of the longest ray in σ.
     longest_path: f64,
-    /// Where the loss of the gradient has its bottom.
+    /// The minimum of the loss that is differentiated.
     loss_minimum: Vec3<f64>,
-    /// The exits of the exact field.
+    /// The exit states in the exact field.
     exits: Vec<RayExit<f64>>,
 }
 
-/// Exits and a gradient.
+/// The exits and the gradient of a trace.
 struct GrinTraceResult {
     exits: Vec<Option<Vec3<f64>>>,
     gradient: Vec<f64>,
@@ -271,7 +272,7 @@ impl<'a> GrinBenchmarkScene<'a> {
             loss_minimum: Vec3::new(0.3, -0.2, 0.5) * size,
             exits: Vec::new(),
         };
-        // First roughly, then as finely as the way of the longest ray asks.
+        // First coarsely, then as finely as the length of the longest ray requires.
         let field = exact.field::<f64>()?;
         for kicks in [COARSE_STEPS, REFERENCE_KICKS] {
             let setup = stand.setup(Integrator::BlanesMoan, kicks);
@@ -284,7 +285,7 @@ impl<'a> GrinBenchmarkScene<'a> {
         Ok(stand)
     }
 
-    /// How rays are traced with so many kicks on the longest way.
+    /// The tracing setup with this many kicks along the longest ray.
     pub(super) fn setup<R: Real>(&self, integrator: Integrator, kicks: f64) -> GrinSetup<R> {
         let steps = kicks / integrator.kicks_per_step() as f64;
         let limit = (TRAPPED * steps).max(64.0) as u32;
@@ -301,8 +302,8 @@ impl<'a> GrinBenchmarkScene<'a> {
         }
     }
 
-    /// Half a voxel of the finest grid a step, and no simple fraction of it; a last step that costs
-    /// nothing.
+    /// The coarse setup: about half a voxel of the finest grid per step, but no simple fraction of
+    /// it.
     fn coarse_setup<R: Real>(&self) -> GrinSetup<R> {
         let step = 0.487 * 2.0 * self.half / (COST_NODES - 1) as f64;
         let setup = self.setup(Integrator::LeapfrogDkd, self.longest_path / step);
@@ -330,7 +331,7 @@ impl<'a> GrinBenchmarkScene<'a> {
         self.rays.iter().map(GrinRay::cast).collect()
     }
 
-    /// The derivative of the loss by each exit.
+    /// The derivatives of the loss by each exit.
     fn seeds<R: Real>(&self, exits: &[RayExit<R>]) -> Vec<RayAdjoint<R>> {
         let share = 2.0 / exits.len() as f64;
         let seed = |exit: &RayExit<R>| {
@@ -340,7 +341,7 @@ impl<'a> GrinBenchmarkScene<'a> {
         exits.iter().map(seed).collect()
     }
 
-    /// Traces all rays forwards and back; `often` for its time.
+    /// Traces all rays forwards and back; repeated `often` times for its time.
     fn trace<R: Real>(
         &self,
         field: &dyn IndexField<R>,
@@ -416,7 +417,7 @@ impl<'a> GrinBenchmarkScene<'a> {
         let rays = &self.rays;
         let mut exits = tracer.trace_batch(rays);
         let seeds = self.seeds(&exits);
-        // Rays without a gradient first, so that both work on the same ones.
+        // The adjoint runs first, so that both gradients use the same rays.
         let adjoint = tracer.gradient(rays, &mut exits, &seeds);
         let tape = tracer.tape_gradient(rays, &exits, &seeds);
         let difference = relative(&tape.parameters, &adjoint.parameters);
@@ -467,7 +468,7 @@ fn row(
     }
 }
 
-/// The root of the mean square distance, of the rays that arrive in both.
+/// The RMS distance of the exits, over the rays that exit in both.
 fn distance(found: &[Option<Vec3<f64>>], exact: &[Option<Vec3<f64>>]) -> f64 {
     let pairs = found.iter().zip(exact).filter_map(|(a, b)| Some((*a)? - (*b)?));
     let squares: Vec<f64> = pairs.map(|d| d.dot(d)).collect();
@@ -480,7 +481,7 @@ fn relative(found: &[f64], exact: &[f64]) -> f64 {
     (off / square(&mut exact.iter().copied())).sqrt()
 }
 
-/// What comes out, and the least time of several, in milliseconds.
+/// The result of `work` and the shortest of several times, in milliseconds.
 fn fastest<T>(often: usize, mut work: impl FnMut() -> T) -> (T, f64) {
     let (mut result, mut best) = time_ms(&mut work);
     let mut spent = best;

@@ -1,8 +1,8 @@
-//! How well a field knows by how much its light moves with the start of a ray.
+//! Accuracy of the derivative of the exit point by the start point of a ray.
 //!
-//! The gradient of a trilinear field jumps between voxels, and its exact transpose does not see the
-//! jumps: its derivative by the start stays wrong on any grid. Luneburg's lens shows it best, where
-//! parallel rays end in one point and the derivative is zero.
+//! The gradient of a trilinear field jumps between voxels, and its exact transpose does not contain
+//! the jumps: the derivative by the start is wrong on any grid. The Luneburg lens shows it best:
+//! parallel rays end in one point, and the derivative is zero.
 
 use super::grin::{BenchmarkField, GrinBenchmarkError, GrinBenchmarkScene};
 use crate::grin::field::{HessianDiagonal, RegularGrid, Trilinear};
@@ -10,28 +10,28 @@ use crate::grin::{GrinTracer, IndexField, Integrator, RayAdjoint};
 use crate::math::Vec3;
 use serde::Serialize;
 
-/// The derivative by the start of where rays leave one field.
+/// The derivative of the exit point by the start point, for one field.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GrinStarts {
-    /// How the field is made up.
+    /// The name of the representation of the field.
     pub field: &'static str,
-    /// How large the derivative of `w · x` by the start is, root mean square, with `|w| = 1`.
+    /// The RMS derivative of `w · x` by the start point, with `|w| = 1`.
     pub size: f64,
-    /// How far it is from that of the exact field, root mean square.
+    /// Its RMS deviation from that of the exact field.
     pub error: f64,
-    /// The same for the worst ray.
+    /// Its deviation for the worst ray.
     pub worst: f64,
-    /// Rays that arrive in both.
+    /// The number of rays that exit in both fields.
     pub rays: usize,
 }
 
-/// How often a ray asks the field.
+/// The number of field evaluations per ray.
 const KICKS: f64 = 448.0;
-/// The direction in which the end of a ray is looked at.
+/// The direction `w` along which the exit point is differentiated.
 const END_DIRECTION: Vec3<f64> = Vec3 { x: 0.48, y: 0.64, z: -0.6 };
 
 impl GrinBenchmarkScene<'_> {
-    /// The derivatives of the exact field, of smooth grids and of trilinear ones.
+    /// Measures the derivatives of the exact field, of tricubic grids and of trilinear ones.
     pub(super) fn starts(&self) -> Result<Vec<GrinStarts>, GrinBenchmarkError> {
         let fine = 16.0 * KICKS;
         let smooth = Integrator::BlanesMoan;
@@ -61,7 +61,7 @@ impl GrinBenchmarkScene<'_> {
         Ok(Trilinear::from_function(grid, |p| exact.sample(p).index)?)
     }
 
-    /// The derivative of each ray that arrives.
+    /// The derivative of each ray that exits.
     fn by_start(
         &self,
         field: &dyn IndexField<f64>,

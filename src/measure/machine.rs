@@ -1,24 +1,24 @@
-//! What a measurement was made on.
+//! The machine of a measurement.
 
 use crate::trace::SimdWidth;
 use serde::Serialize;
 use std::fmt;
 
-/// A machine, as far as numbers depend on it.
+/// The properties of a machine that measurements depend on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Machine {
-    /// The processor, as the system calls it.
+    /// The name of the processor, as the system reports it.
     pub processor: String,
-    /// How many cores this process may use.
+    /// The number of cores available to this process.
     pub cores: usize,
-    /// Bits of the vector instructions that batches are traced with.
+    /// The width of the SIMD registers used by batches, in bits.
     pub lane_bits: usize,
-    /// Whether the program was compiled with optimisation.
+    /// True if the program was compiled with optimisation.
     pub optimised: bool,
 }
 
 impl Machine {
-    /// The one that the program runs on.
+    /// The machine that the program runs on.
     pub fn detect() -> Self {
         Self {
             processor: processor().unwrap_or_else(|| std::env::consts::ARCH.to_owned()),

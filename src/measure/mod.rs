@@ -1,8 +1,8 @@
-//! Accuracy against time, throughput, memory.
+//! Benchmarks: accuracy against time, throughput, memory.
 //!
-//! A method, a reference and budgets give a curve; several methods are timed turn by turn in one
-//! run, so that a busy machine slows all of them alike and ratios keep their meaning. A rate is
-//! the median of many short turns, with the slowest and the fastest beside it.
+//! A method, a reference and budgets give a curve. Several methods are timed in turn in one run, so
+//! that a busy machine slows all of them alike and ratios remain meaningful. A rate is the median
+//! of many short repetitions, reported with the slowest and the fastest.
 
 mod clock;
 mod double_gauss;

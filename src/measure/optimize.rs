@@ -1,4 +1,4 @@
-//! What a step of a search costs.
+//! The cost of a step of the local optimizers.
 
 use super::clock::time_ms;
 use super::double_gauss::double_gauss;
@@ -10,46 +10,46 @@ use crate::optimize::{DescentMethod, start};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
-/// Spots are good to this share of their radius.
+/// The relative accuracy of the spot radii.
 const TOLERANCE: f64 = 1e-6;
 
-/// What steps of searches cost on one core.
+/// The cost of the steps of local optimizers on one core.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepCosts {
-    /// How many numbers are free: all curvatures and thicknesses.
+    /// The number of variables: all curvatures and thicknesses.
     pub variables: usize,
-    /// How many fields there are.
+    /// The number of fields.
     pub fields: usize,
-    /// How good the spots are, relative.
+    /// The relative accuracy of the spot radii.
     pub tolerance: f64,
-    /// A search each.
+    /// One row per optimizer.
     pub rows: Vec<StepRow>,
 }
 
-/// One search.
+/// The cost of one optimizer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepRow {
-    /// What it is called.
+    /// The name of the optimizer.
     pub name: &'static str,
-    /// Milliseconds a step: the median of all, those included that find the rays anew.
+    /// The median time of a step in milliseconds, steps that find the rays anew included.
     pub ms_per_iteration: f64,
-    /// The mean, in which finding the rays anew has its share.
+    /// The mean time of a step in milliseconds.
     pub mean: f64,
-    /// The fastest step.
+    /// The fastest step, in milliseconds.
     pub min: f64,
-    /// The slowest step.
+    /// The slowest step, in milliseconds.
     pub max: f64,
-    /// Rays of one evaluation.
+    /// The number of rays of one evaluation.
     pub rays: usize,
-    /// The estimated error of the spots' mean square, relative.
+    /// The estimated relative error of the mean square spot radius.
     pub error: f64,
-    /// The mean square radius of the spots before and after, in mm².
+    /// The mean square spot radius before all steps, in mm².
     pub spot_before: f64,
-    /// The same after all steps.
+    /// The mean square spot radius after all steps, in mm².
     pub spot_after: f64,
 }
 
-/// Times `steps` steps of every search on one core.
+/// Times `steps` steps of every local optimizer on one core.
 pub fn measure_step_costs(steps: usize) -> Result<StepCosts, BenchmarkError> {
     let clipped = with_all_variables(double_gauss());
     let mut clear = clipped.clone();
@@ -70,7 +70,7 @@ pub fn measure_step_costs(steps: usize) -> Result<StepCosts, BenchmarkError> {
     })
 }
 
-/// All curvatures of surfaces that bend light, and all thicknesses.
+/// The lens with all curvatures of refracting surfaces and all thicknesses as variables.
 fn with_all_variables(mut lens: Lens) -> Lens {
     let bent = |i: usize| (!lens.surfaces[i].stop).then_some((i, Quantity::Curvature));
     let curvatures = (0..lens.surfaces.len()).filter_map(bent);

@@ -1,13 +1,13 @@
-//! What this process has used up so far: its age and its processor time, all threads together.
+//! The age and the processor time of this process, all threads together.
 //!
-//! Linux counts both in `/proc`; elsewhere they are unknown.
+//! Linux reports both in `/proc`; elsewhere they are unknown.
 
 use std::fs;
 
-/// Ticks in a second, as Linux counts for programs on every processor.
+/// Clock ticks per second in `/proc`, the same for all Linux processors.
 const TICKS: f64 = 100.0;
 
-/// Milliseconds since the process began, to a hundredth of a second.
+/// The milliseconds since the process started, to a hundredth of a second; `None` if unknown.
 pub fn age_ms() -> Option<f64> {
     let stat = fs::read_to_string("/proc/self/stat").ok()?;
     // The name in brackets may contain blanks; the start is the 20th number behind it.
@@ -18,7 +18,7 @@ pub fn age_ms() -> Option<f64> {
     Some(1e3 * (now - begun / TICKS))
 }
 
-/// Milliseconds that processors have worked for the threads that there are now.
+/// The processor time of all threads that exist now, in milliseconds; `None` if unknown.
 pub fn processor_ms() -> Option<f64> {
     let mut sum = 0.0;
     for thread in fs::read_dir("/proc/self/task").ok()? {

@@ -1,16 +1,16 @@
-//! Timing several methods turn by turn.
+//! Timing of several methods in turn.
 
 use super::clock::Stopwatch;
 use serde::Serialize;
 
-/// How fast something is done: the median of many turns, the slowest and the fastest.
+/// The rate of a piece of work over many repetitions: the median, the slowest and the fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RateStatistics {
-    /// Half of the turns were faster.
+    /// The median rate.
     pub median: f64,
-    /// The slowest turn.
+    /// The rate of the slowest repetition.
     pub min: f64,
-    /// The fastest turn.
+    /// The rate of the fastest repetition.
     pub max: f64,
 }
 
@@ -21,21 +21,21 @@ impl RateStatistics {
         Self { median: at(turns.len() / 2), min: at(0), max: at(turns.len().saturating_sub(1)) }
     }
 
-    /// The same in another unit.
+    /// The rates times a factor, in another unit.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self { median: self.median * factor, min: self.min * factor, max: self.max * factor }
     }
 }
 
-/// One thing that is timed: a turn of it, and how many units of work that is.
+/// A piece of work to be timed, with the number of its units.
 pub(super) struct TimedCase<'a> {
     pub(super) work: f64,
     pub(super) repetition: Box<dyn FnMut() + 'a>,
 }
 
-/// Lets every contestant have `turns` turns of at least `seconds`, one after the other; how many
-/// units of work a second each did.
+/// Times all cases in turn, `turns` times each for at least `seconds`; returns their rates in units
+/// of work per second.
 pub(super) fn time_interleaved(
     contestants: &mut [TimedCase<'_>],
     turns: usize,
@@ -54,7 +54,7 @@ pub(super) fn time_interleaved(
     rates.into_iter().map(RateStatistics::of).collect()
 }
 
-/// How often something has to be done to take `seconds`; the first time warms it up.
+/// The number of repetitions that take `seconds`; the first one warms up.
 fn repetition_count(turn: &mut dyn FnMut(), seconds: f64) -> u32 {
     turn();
     let watch = Stopwatch::start();

@@ -1,4 +1,4 @@
-//! What rounding costs: the same rays in another number type and in twice the precision.
+//! Rounding errors: the same rays in a number type and in twice the precision.
 
 use super::double_gauss::bundle;
 use crate::lens::{System, SystemError};
@@ -6,22 +6,22 @@ use crate::math::{DoubleDouble, Real, Vec3};
 use crate::trace::{Ray, Tracer};
 use serde::Serialize;
 
-/// How far off rounding puts the rays that reach the image, against twice the precision.
+/// The rounding errors of the rays that reach the image, against twice the precision.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Rounding {
-    /// Root of the mean square distance of the image points, in mm.
+    /// The RMS error of the image points, in mm.
     pub point_rms_mm: f64,
-    /// The largest distance, in mm.
+    /// The largest error of an image point, in mm.
     pub point_max_mm: f64,
-    /// Root of the mean square difference of the optical paths, in mm.
+    /// The RMS error of the optical path lengths, in mm.
     pub path_rms_mm: f64,
-    /// Rays that end otherwise; a rim may cut a ray on one side of rounding and not on the other.
+    /// The number of rays with a different fate; rounding may put a ray on the other side of a rim.
     pub other_fates: usize,
-    /// How many rays were compared.
+    /// The number of rays compared.
     pub rays: usize,
 }
 
-/// The rounding error of the number type `R` over a bundle through the measured lens.
+/// Measures the rounding error of the number type `R` for a bundle through the benchmark lens.
 pub fn measure_rounding<R: Real>(
     system: &System<f64>,
     rays: usize,
@@ -34,7 +34,7 @@ pub fn measure_rounding<R: Real>(
     for i in 0..rays {
         let ray = bundle.get(i);
         let got = fast.trace(cast_ray(ray));
-        // Starting where the fast ray starts leaves the error of the tracing alone.
+        // Both start from the same rounded ray, which leaves the error of the tracing alone.
         let want = exact.trace(cast_ray(Ray::<f64> {
             point: cast_ray::<R>(ray).point.value(),
             direction: cast_ray::<R>(ray).direction.value(),
@@ -58,7 +58,7 @@ fn cast_ray<R: Real>(ray: Ray<f64>) -> Ray<R> {
     Ray { point: Vec3::from_f64(ray.point), direction: Vec3::from_f64(ray.direction) }
 }
 
-/// The difference of two numbers, without rounding the exact one first.
+/// The difference of two numbers, without first rounding the exact one.
 fn rounding_error<R: Real>(got: R, exact: DoubleDouble) -> f64 {
     (DoubleDouble::from_f64(got.value()) - exact).value()
 }

@@ -1,8 +1,8 @@
-//! What a search has come to after how many seconds: its samplers, and the tolerance of the spots
-//! that it rests on.
+//! The merit reached by a structure search over time, for all samplers and several tolerances of
+//! the spots.
 //!
-//! Every lens that is compared is judged anew by the same fine sampling, so that a search that sees
-//! less does not look better for it.
+//! Every lens compared is evaluated anew with the same fine sampling, so that a search with a
+//! coarse one does not look better than it is.
 
 use super::clock::Stopwatch;
 use crate::lens::Lens;
@@ -11,39 +11,39 @@ use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError}
 use crate::search::{SearchError, SearchMethod, SearchRun, SearchSettings};
 use serde::Serialize;
 
-/// The parts of the time after which a search is looked at.
+/// The fractions of the time after which the merit is recorded.
 const MARKS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
-/// Tolerances that are compared.
+/// The tolerances compared.
 const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
-/// The tolerance by which lenses are compared.
+/// The tolerance with which lenses are compared.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-/// What is measured.
+/// The duration and the number of runs of a benchmark.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SearchBudget {
-    /// Seconds of each search.
+    /// The duration of each search, in seconds.
     pub seconds: f64,
-    /// How many seeds, from 1 on.
+    /// The number of seeds, from 1 on.
     pub seeds: u64,
 }
 
-/// A way to search.
+/// The results of a sampler at a tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchRow {
     /// The sampler.
     pub method: SearchMethod,
-    /// The tolerance of the spots that it rests on.
+    /// The relative tolerance of the spot radii.
     pub tolerance: f64,
-    /// Gradients of all seeds.
+    /// The number of gradients, all seeds together.
     pub gradients: u64,
-    /// The merit after parts of the time.
+    /// The merit after fractions of the time.
     pub marks: Vec<MeritQuantiles>,
 }
 
-/// The merit of the best lens after some time, over the seeds.
+/// The merit of the best lens after some time: best, median and worst of all seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MeritQuantiles {
-    /// Seconds since the start.
+    /// The time since the start, in seconds.
     pub seconds: f64,
     /// The best of all seeds.
     pub best: f64,
@@ -53,23 +53,23 @@ pub struct MeritQuantiles {
     pub worst: f64,
 }
 
-/// The race of the samplers, and of the tolerances.
+/// The benchmark of the samplers and of the tolerances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchBenchmark {
-    /// How long and how often.
+    /// The duration and the number of seeds.
     pub race: SearchBudget,
-    /// The merit of the start.
+    /// The merit of the starting lens.
     pub start: f64,
-    /// The samplers at the tolerance that was asked for.
+    /// The samplers at the tolerance asked for.
     pub methods: Vec<SearchRow>,
     /// RESTORE at other tolerances.
     pub tolerances: Vec<SearchRow>,
 }
 
-/// Searches from a lens by every sampler and at every tolerance, for as many seconds each.
+/// Runs a search from a lens with every sampler and at every tolerance, all for the same time.
 ///
 /// # Errors
-/// A lens that cannot be searched from.
+/// A lens that a search cannot start from.
 pub fn compare_searches(
     lens: &Lens,
     plan: &SearchPlan,
@@ -84,7 +84,7 @@ pub fn compare_searches(
     };
     let usual = plan.local.tolerance;
     let restore = row(SearchMethod::Restore, usual, None)?;
-    // Brute force divides what another method has needed for as long.
+    // Brute force divides the number of gradients that another sampler computed in the same time.
     let share = restore.gradients / race.seeds.max(1);
     let methods = vec![
         restore,
@@ -129,7 +129,8 @@ fn run_seeds(
     Ok(SearchRow { method, tolerance, gradients, marks })
 }
 
-/// One run; adds the merit of its best lens at every mark, and returns its gradients.
+/// Runs one search; adds the merit of its best lens at every mark, and returns the number of its
+/// gradients.
 fn run_seed(
     lens: &Lens,
     plan: &SearchPlan,

@@ -1,8 +1,8 @@
-//! Error of a spot's RMS radius against the time that it takes, for every way to sample a pupil.
+//! Error against time of the RMS spot radius, for every sampling of the pupil.
 //!
-//! Every way starts from nothing: it finds its points, starts the rays, traces them and sums up. A
-//! way that depends on chance, or on where a grid happens to lie, is represented by the root mean
-//! square of several tries. The reference is the split boundary at its highest order.
+//! Each result includes all its work: finding the points, launching and tracing the rays, and
+//! summation. A random sampling, or one that depends on the position of a grid, is represented by
+//! the RMS error of several tries. The reference is the split boundary at its highest order.
 
 use super::clock::time_ms;
 use crate::lens::{Aperture, FieldPoint, Lens, Surface};
@@ -14,15 +14,15 @@ use crate::pupil::{
 use crate::trace::{ImagePoints, Ray, Rays, TraceSink, Tracer};
 use serde::Serialize;
 
-/// How a pupil is sampled.
+/// The sampling of a pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PupilSampling {
-    /// The middles of the cells of a square grid.
+    /// The centres of the cells of a square grid.
     SquareGrid,
-    /// Rings with the last one on the rim, the usual pattern.
+    /// A hexapolar pattern with its last ring on the rim, the usual one.
     Hexapolar,
-    /// Independent points.
+    /// Independent uniform points.
     Random,
     /// Owen-scrambled Sobol points.
     LowDiscrepancy,
@@ -33,7 +33,7 @@ pub enum PupilSampling {
 }
 
 impl PupilSampling {
-    /// All of them.
+    /// All samplings.
     pub const ALL: [Self; 6] = [
         Self::SquareGrid,
         Self::Hexapolar,
@@ -43,7 +43,7 @@ impl PupilSampling {
         Self::SplitBoundary,
     ];
 
-    /// What a legend calls it.
+    /// The name of the sampling in legends.
     pub fn name(self) -> &'static str {
         match self {
             Self::SquareGrid => "square grid",
@@ -56,13 +56,13 @@ impl PupilSampling {
     }
 }
 
-/// What clips the beam.
+/// The apertures that clip the beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PupilClipping {
-    /// Nothing but the disc of the entrance pupil.
+    /// The disc of the entrance pupil alone.
     Clear,
-    /// The semi-diameters of the lens as well.
+    /// The disc of the entrance pupil and the semi-diameters of the lens.
     Clipped,
 }
 
@@ -70,71 +70,72 @@ pub enum PupilClipping {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
-    /// Single.
+    /// Single precision.
     F32,
-    /// Double.
+    /// Double precision.
     F64,
 }
 
-/// One point of the curves.
+/// A point of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpotRow {
-    /// What clips.
+    /// The apertures that clip the beam.
     pub pupil: PupilClipping,
-    /// How the pupil is sampled.
+    /// The sampling of the pupil.
     pub method: PupilSampling,
-    /// The number type.
+    /// The number type of the rays.
     pub precision: Precision,
-    /// Rays traced, those included that only looked for the edge.
+    /// The number of rays traced, including those that find the edge.
     pub rays: usize,
-    /// The error of the RMS radius, relative.
+    /// The relative error of the RMS radius.
     pub error: f64,
-    /// What it took.
+    /// The time, in milliseconds.
     pub ms: f64,
 }
 
 /// The curves of a field of a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpotCurves {
-    /// The reference of the clear pupil: the RMS radius in mm.
+    /// The reference RMS radius of the clear pupil, in mm.
     pub rms_clear: f64,
-    /// The same of the clipped pupil; `None` where no light gets through.
+    /// The reference RMS radius of the clipped pupil, in mm; `None` if no light gets through.
     pub rms_clipped: Option<f64>,
-    /// The share of the disc that is lit.
+    /// The fraction of the disc that transmits light.
     pub lit: f64,
-    /// The curves.
+    /// The points of the curves.
     pub rows: Vec<SpotRow>,
 }
 
-/// Why there are no curves.
+/// The error of a spot benchmark.
 #[derive(Debug, thiserror::Error)]
 pub enum SpotCurvesError {
-    /// The lens.
+    /// The ray model of the lens cannot be set up.
     #[error(transparent)]
     RayModel(#[from] RayModelError),
-    /// The field.
+    /// No rays can be launched from the field.
     #[error(transparent)]
     Launch(#[from] LaunchError),
-    /// The lens has no entrance pupil with a size.
+    /// The lens has no entrance pupil of finite size.
     #[error("the entrance pupil is at infinity; expected one with a size")]
     NoPupil,
-    /// Not even the clear pupil lets light through.
+    /// No light gets through even the clear pupil.
     #[error("no light gets through at this field")]
     Dark,
 }
 
-/// Rays of the patterns, about.
+/// The approximate numbers of rays of the patterns.
 const BUDGETS: [usize; 8] = [16, 64, 256, 1024, 4096, 16_384, 65_536, 262_144];
-/// How often a pattern with chance in it is tried.
+/// The number of tries of a random pattern.
 const TRIES: u32 = 8;
-/// Wider than the beam, so that the stop and not the disc limits it.
+/// The radius of the disc relative to that of the beam, so that the stop and not the disc limits
+/// it.
 const MARGIN: f64 = 1.3;
-/// A result is timed until it has taken so long, in ms, or so often.
+/// A result is timed repeatedly up to this total time in ms, or this many times.
 const LONG_ENOUGH: f64 = 5.0;
 const OFTEN_ENOUGH: usize = 25;
 
-/// Measures all curves of a field at the primary wavelength, at a zoom position; `report` is told
-/// how many of how many curves are done.
+/// Measures all curves of a field at the primary wavelength, at a zoom position. `report` receives
+/// the numbers of finished and of all curves.
 ///
 /// # Errors
 /// A lens or field without rays.
@@ -173,7 +174,8 @@ pub fn measure_spot_curves(
     Ok(curves)
 }
 
-/// The lens with the disc of its entrance pupil around the beam, and with or without its rims.
+/// The ray model of the lens with the disc of its entrance pupil, and with or without its
+/// semi-diameters.
 fn ray_model(lens: &Lens, zoom: usize, pupil: PupilClipping) -> Result<RayModel, SpotCurvesError> {
     let given = RayModel::from_lens(lens, zoom)?;
     let diameter = given.first_order.entrance_pupil.diameter.ok_or(SpotCurvesError::NoPupil)?;
@@ -197,7 +199,7 @@ struct SpotScene<'a> {
     single: Tracer<f32>,
 }
 
-/// What a way of sampling gave.
+/// The result of a sampling.
 struct SampledRms {
     rms: f64,
     rays: usize,
@@ -214,7 +216,7 @@ impl<'a> SpotScene<'a> {
         self.bench.launch(self.field, 0).ok()
     }
 
-    /// The RMS radius as well as it can be known, and the lit area.
+    /// The reference RMS radius in mm and the fraction of the disc that transmits light.
     fn reference(&self) -> Option<(f64, f64)> {
         let region = Region::new(self.launch()?);
         let accuracy = Accuracy { tolerance: 1e-14, max_rays: 4_000_000 };
@@ -252,7 +254,7 @@ impl<'a> SpotScene<'a> {
         rows
     }
 
-    /// One result, and the median of the times that it took.
+    /// A result and the median of its times, in milliseconds.
     fn time(
         &self,
         method: PupilSampling,
@@ -273,7 +275,7 @@ impl<'a> SpotScene<'a> {
         Some((result?, times[times.len() / 2]))
     }
 
-    /// A way of sampling, from nothing to the RMS radius.
+    /// Computes the RMS radius by a sampling, including the search for its points.
     fn sample(
         &self,
         method: PupilSampling,
@@ -310,7 +312,7 @@ impl<'a> SpotScene<'a> {
         Some(SampledRms { rms: rms?, rays })
     }
 
-    /// The same in single precision; only the tracing is in it.
+    /// Computes the RMS radius with rays traced in single precision.
     fn trace_single(&self, region: &Region<'_>, nodes: &Nodes) -> Option<f64> {
         let mut weights = Vec::with_capacity(nodes.weights.len());
         let mut rays = Rays::with_capacity(nodes.points.len());
@@ -335,7 +337,7 @@ fn round_ray<R: Real>(ray: Ray<f64>) -> Ray<R> {
     }
 }
 
-/// The RMS distance from the centroid; `None` where no ray arrives.
+/// The RMS distance from the centroid; `None` if no ray reaches the image.
 fn rms<R: Real>(
     arrived: impl Iterator<Item = (usize, f64)>,
     points: &ImagePoints<R>,
@@ -358,7 +360,7 @@ fn rms<R: Real>(
     (sum > 0.0).then(|| (arrived.iter().copied().map(square).sum::<f64>() / sum).sqrt())
 }
 
-/// How many points a curve has.
+/// The number of points of a curve.
 fn steps(method: PupilSampling) -> usize {
     match method {
         PupilSampling::SquareGrid | PupilSampling::Hexapolar | PupilSampling::Random => {
@@ -379,7 +381,8 @@ fn tries(method: PupilSampling) -> u32 {
     }
 }
 
-/// The points of a fixed pattern with about the rays of a budget.
+/// The points of a pattern with about as many rays as a budget; `None` for samplings that depend on
+/// the pupil.
 fn fixed_pattern(method: PupilSampling, step: usize, attempt: u32) -> Option<PupilPattern> {
     let count = *BUDGETS.get(step)?;
     let root = (count as f64).sqrt();

@@ -1,4 +1,4 @@
-//! How many ray-surfaces a second, and what rounding costs at that speed.
+//! Throughput of the tracer in ray-surfaces per second, with the rounding error of each precision.
 
 use super::double_gauss::{bundle, double_gauss};
 use super::memory::{MemoryUse, peak_megabytes};
@@ -12,11 +12,11 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
 
-/// Rays of a turn on one thread.
+/// Rays of a repetition on one thread.
 const RAYS: usize = 2 * 4096;
-/// Rays of a turn on two threads: 24 tasks.
+/// Rays of a repetition on two threads: 24 tasks.
 const SHARED_RAYS: usize = 24 * 4096;
-/// Rays that are traced one at a time in a turn.
+/// Rays traced one at a time in a repetition.
 const SINGLE_RAYS: usize = 512;
 /// Rays on which rounding is measured.
 const ROUNDED_RAYS: usize = 4096;
@@ -27,36 +27,36 @@ const TURN: f64 = 5e-4; // seconds: much shorter than what a busy system grants 
 const FORWARD: &str = "f64_batch_1_thread";
 const GRADIENT: &str = "gradient";
 
-/// What tracing costs.
+/// The throughput of the tracer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Throughput {
-    /// Surfaces of the lens, the image plane included.
+    /// The number of surfaces of the lens, including the image plane.
     pub surfaces: usize,
-    /// A way of tracing each.
+    /// One row per way of tracing.
     pub rows: Vec<TraceRow>,
     /// Rounding in `f64` against twice the precision.
     pub rounding_f64: Rounding,
     /// Rounding in `f32` against twice the precision.
     pub rounding_f32: Rounding,
-    /// How many times longer the derivatives by all numbers take than the trace of the same rays,
-    /// tracing them included.
+    /// The time of the derivatives by all parameters, including the forward trace, relative to the
+    /// forward trace of the same rays.
     pub gradient_over_forward: f64,
-    /// Tracing a million rays, the rays themselves included.
+    /// The memory of tracing a million rays, including the rays.
     pub memory_trace: Option<MemoryUse>,
-    /// The derivatives of a million rays by all numbers, the rays themselves included.
+    /// The memory of the derivatives of a million rays by all parameters, including the rays.
     pub memory_gradient: Option<MemoryUse>,
 }
 
-/// One way of tracing.
+/// The throughput of one way of tracing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TraceRow {
-    /// What it is called.
+    /// The name of the way of tracing.
     pub name: &'static str,
-    /// The median of all turns.
+    /// The median, in millions of ray-surfaces per second.
     pub million_ray_surfaces_per_s: f64,
-    /// The slowest turn.
+    /// The slowest repetition, likewise.
     pub min: f64,
-    /// The fastest turn.
+    /// The fastest repetition, likewise.
     pub max: f64,
 }
 
@@ -67,24 +67,24 @@ impl TraceRow {
     }
 }
 
-/// Why nothing could be measured.
+/// The error of a benchmark of the tracer or of the optimizers.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchmarkError {
-    /// The lens of the measurement.
+    /// The prescription is invalid.
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// The numbers of the lens.
+    /// The system is invalid.
     #[error(transparent)]
     Invalid(#[from] SystemError),
-    /// The merit of the lens.
+    /// The lens has no merit.
     #[error(transparent)]
     Merit(#[from] MeritError),
-    /// No threads.
+    /// The thread pool cannot be created.
     #[error("no threads to measure with: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
-/// The forms of the lens that are raced.
+/// The variants of the lens that are timed.
 struct TracerVariants {
     plain: Tracer<f64>,
     single_precision: Tracer<f32>,
@@ -112,7 +112,7 @@ impl TracerVariants {
     }
 }
 
-/// The first and the last glass surface as aspheres, the rest as it is.
+/// The shape of a surface, with the first and the last glass surface as aspheres.
 fn with_asphere(i: usize, shape: Shape<f64>) -> Shape<f64> {
     if i != 0 && i != 10 {
         return shape;
@@ -122,7 +122,7 @@ fn with_asphere(i: usize, shape: Shape<f64>) -> Shape<f64> {
     Shape::Asphere { curvature: shape.curvature(), conic: 0.0, terms }
 }
 
-/// Races every way of tracing, `turns` turns each.
+/// Times every way of tracing in turn, `turns` repetitions each.
 pub fn measure_throughput(turns: usize) -> Result<Throughput, BenchmarkError> {
     let system = double_gauss().resolve(0, line::D)?;
     let tracers = TracerVariants::new(&system)?;
@@ -205,7 +205,7 @@ fn single_rays(tracer: &Tracer<f64>) -> TimedCase<'_> {
     TimedCase { work: ray_surfaces(tracer, SINGLE_RAYS), repetition: turn }
 }
 
-/// The derivative of a sum of squares over the image, by where each ray lands.
+/// The derivative of a sum of squares over the image by the image point of a ray.
 fn seed(ray: usize) -> AdjointSeed<f64> {
     let (x, y) = ((ray % 7) as f64 * 1e-3, (ray % 5) as f64 * 1e-3);
     AdjointSeed { point: Vec3::new(x, y, 0.0), ..AdjointSeed::default() }
@@ -227,7 +227,7 @@ fn gradient_on_two_threads<'a>(tracer: &'a Tracer<f64>, pool: &'a ThreadPool) ->
     TimedCase { work: ray_surfaces(tracer, SHARED_RAYS), repetition: turn }
 }
 
-/// The same rays as another number type.
+/// The rays converted to another number type.
 fn cast_rays<R: Real>(rays: &Rays<f64>) -> Rays<R> {
     let column = |from: &[f64]| from.iter().map(|v| R::from_f64(*v)).collect();
     Rays {

@@ -1,7 +1,8 @@
-//! From variables to the numbers of resolved systems, without looking anything up again.
+//! Binds the variables to the numbers of resolved systems, so that no prescription has to be
+//! resolved again while they change.
 //!
-//! Every number that moves is a straight line in one variable: a curvature is the variable, a
-//! pickup a multiple of it, the index of a model glass grows in proportion with nd.
+//! Every number that changes is an affine function of one variable: a curvature is the variable
+//! itself, a pickup a multiple of it, and the index of a model glass is proportional to nd.
 
 use super::{Dual1, MeritError};
 use crate::lens::glass::model_index;
@@ -31,14 +32,15 @@ pub(super) struct Configuration {
     pub(super) primary: usize,
     pub(super) object: Object,
     pub(super) field_kind: FieldKind,
-    /// Which gaps are glass.
+    /// True for each gap that is glass.
     pub(super) is_glass: Vec<bool>,
-    /// One for each wavelength.
+    /// The systems, one per wavelength.
     systems: Vec<System<f64>>,
-    /// How the beam is limited.
+    /// The aperture that limits the beam.
     aperture: Aperture,
     bindings: Vec<Vec<ParameterBinding>>,
-    /// The distance of the image plane from the paraxial focus, where the last gap is solved.
+    /// The distance of the image plane from the paraxial focus in mm, if the last gap is solved
+    /// for.
     focus_offset: Option<f64>,
     variables: usize,
 }
@@ -46,11 +48,11 @@ pub(super) struct Configuration {
 /// The systems of a zoom position at some values of the variables.
 #[derive(Debug, Clone)]
 pub(super) struct ResolvedSystems {
-    /// One for each wavelength, opened so that rims do not clip.
+    /// The systems, one per wavelength, without the semi-diameters, so that no rim clips.
     pub(super) unclipped: Vec<System<f64>>,
-    /// The same with their rims.
+    /// The systems, one per wavelength, with their semi-diameters.
     pub(super) clipped: Vec<System<f64>>,
-    /// The derivative of the last gap by the variables where it is solved.
+    /// The derivatives of the last gap by the variables, if it is solved for.
     focus_slopes: Option<DVector<f64>>,
 }
 
@@ -112,7 +114,8 @@ impl Configuration {
         found
     }
 
-    /// The lens with its rims, ready for rays; a stop whose semi-diameter is the aperture has it.
+    /// The ray model of the lens with its semi-diameters; a stop that defines the aperture has that
+    /// semi-diameter.
     pub(super) fn ray_model(
         &self,
         found: &ResolvedSystems,
@@ -236,8 +239,9 @@ impl Configuration {
     }
 }
 
-/// Rays may pass a rim or an obstruction by any amount while the lens moves, but an asphere ends not far behind its
-/// own: outside, its polynomial means nothing, and rays may cross it several times.
+/// Removes the limits of a surface: while the lens changes, rays may pass a rim or an obstruction
+/// by any amount. An asphere still ends not far beyond its semi-diameter, because there its
+/// polynomial is meaningless and rays may cross it several times.
 fn unclip(surface: &mut Surface<f64>) {
     surface.obstruction = 0.0;
     surface.semi_diameter = match surface.shape {
@@ -246,11 +250,11 @@ fn unclip(surface: &mut Surface<f64>) {
     };
 }
 
-/// How far an asphere goes on behind its rim.
+/// The radius up to which an asphere is extended, in semi-diameters.
 const ASPHERE_MARGIN: f64 = 1.2;
 
-/// What follows the variables at a wavelength; the system is written in forms that have all these
-/// numbers.
+/// The bindings of the variables at a wavelength; surfaces of `system` are promoted to shapes that
+/// have the numbers bound.
 fn bind_parameters(
     lens: &Lens,
     zoom: usize,
@@ -301,12 +305,13 @@ fn has_own_gap(lens: &Lens, zoom: usize, surface: usize) -> bool {
     position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == surface))
 }
 
-/// Whether the surface is the stop of a zoom position whose own aperture says how large it is.
+/// True if the surface is the stop and the zoom position defines its size by an aperture of its
+/// own.
 fn has_own_aperture(lens: &Lens, zoom: usize, surface: usize) -> bool {
     lens.surfaces[surface].stop && lens.zoom.get(zoom).is_some_and(|z| z.aperture.is_some())
 }
 
-/// How fast the index of a gap grows with its nd.
+/// The derivative of the index of a gap by its nd.
 fn index_slope(lens: &Lens, surface: usize, um: f64) -> f64 {
     let medium = match &lens.surfaces[surface].medium {
         Medium::Grin(gradient) => &gradient.base,
@@ -318,7 +323,8 @@ fn index_slope(lens: &Lens, surface: usize, um: f64) -> f64 {
     }
 }
 
-/// The surface itself, and for an index the mirrors behind it, and the image plane, which keep it.
+/// The surfaces behind which the number applies: the surface itself and, for an index, the mirrors
+/// that follow it and the image plane.
 fn followers_of_index(lens: &Lens, surface: usize, slot: SurfaceParameter) -> Vec<usize> {
     let mut all = vec![surface];
     if slot == SurfaceParameter::Index {

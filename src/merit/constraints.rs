@@ -1,6 +1,6 @@
-//! Terms that keep a lens makeable: thicknesses of glass and air on the axis and at the rim, the
-//! length of the lens, room behind it. Each is the square of what is missing, zero where nothing
-//! is.
+//! Constraints that keep a lens manufacturable: centre and edge thicknesses of glass and air, total
+//! track, back focus, steepness, semi-diameters. Each contributes the square of its violation, zero
+//! where it is satisfied.
 
 use super::binding::{Configuration, ResolvedSystems};
 use super::first_order::slopes;
@@ -10,7 +10,7 @@ use crate::lens::{Lens, System};
 use crate::math::Real;
 use serde::Serialize;
 
-/// Adds one of the terms about gaps.
+/// Adds the squared violations of one of the constraints.
 pub(super) fn add_constraints(scene: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
     for Constraint { quantity: of, min, max } in smooth_constraints(scene.zoom, scene.systems, term)
     {
@@ -20,15 +20,16 @@ pub(super) fn add_constraints(scene: &EvaluationContext<'_>, term: Term, sum: &m
     }
 }
 
-/// A number of a lens and what it may be.
+/// A quantity of a lens with its bounds.
 struct Constraint {
     quantity: ConstrainedQuantity,
     min: Option<f64>,
     max: Option<f64>,
 }
 
-/// What a term limits, with glass limited at each of its two rims in place of the larger one: which
-/// of them is larger may change, and no search would find its way along that edge.
+/// The constraints of a term, with glass limited at both of its rims instead of at the larger one:
+/// the larger one may change from one rim to the other, and the maximum has a kink there that
+/// misleads a search.
 fn smooth_constraints(
     zoom: &Configuration,
     systems: &ResolvedSystems,
@@ -44,7 +45,7 @@ fn smooth_constraints(
     zoom.inner_gaps(true).flat_map(both).collect()
 }
 
-/// Everything that a term limits.
+/// The constraints of a term.
 fn constraints(zoom: &Configuration, systems: &ResolvedSystems, term: Term) -> Vec<Constraint> {
     let last = zoom.is_glass.len() - 1;
     let both = |of, min, max| Constraint { quantity: of, min: Some(min), max: Some(max) };
@@ -78,33 +79,33 @@ fn constraints(zoom: &Configuration, systems: &ResolvedSystems, term: Term) -> V
     }
 }
 
-/// A number of a lens that a term limits.
+/// A constrained quantity of a lens with its value and its bounds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConstraintMargin {
-    /// Which term.
+    /// The name of the term.
     pub term: &'static str,
-    /// The surface, or the one in front of the gap; the field where it is light that is limited; none
-    /// for the whole lens.
+    /// The surface, or the one in front of the gap, counted from 0; the field if light is limited;
+    /// `None` for the whole lens.
     pub surface: Option<usize>,
-    /// The zoom position.
+    /// The zoom position, counted from 0.
     pub zoom: usize,
-    /// What it is: mm, or a ratio for a steepness.
+    /// Its value: in mm, or a ratio for a steepness or for light.
     pub value: f64,
-    /// Not less than this.
+    /// The lower bound.
     pub min: Option<f64>,
-    /// Not more than this.
+    /// The upper bound.
     pub max: Option<f64>,
 }
 
 impl ConstraintMargin {
-    /// By how much it is inside of what it may be, less than 0 outside.
+    /// The distance to the nearest bound, negative if the constraint is violated.
     pub fn slack(&self) -> f64 {
         let below = self.min.map_or(f64::INFINITY, |min| self.value - min);
         below.min(self.max.map_or(f64::INFINITY, |max| max - self.value))
     }
 }
 
-/// Every number of a lens that one of these terms limits, with what it may be.
+/// The constrained quantities of a lens for some terms, with their bounds.
 ///
 /// # Errors
 /// A lens that cannot be resolved.
@@ -128,7 +129,7 @@ pub fn constraint_margins(
                 min,
                 max,
             };
-            // What nothing limits, like the edge of a gap without rims, has no number.
+            // An unlimited quantity, such as the edge of a gap without rims, is infinite.
             let all = constraints(&zoom, &systems, *term).into_iter().map(margin);
             found.extend(all.filter(|margin| margin.value.is_finite()));
         }
@@ -137,20 +138,20 @@ pub fn constraint_margins(
 }
 
 impl Configuration {
-    /// The gaps of a kind, without the last one, which leads to the image.
+    /// The gaps of glass, or of air, without the last one, which leads to the image.
     fn inner_gaps(&self, glass: bool) -> impl Iterator<Item = usize> + '_ {
         (0..self.is_glass.len() - 1).filter(move |gap| self.is_glass[*gap] == glass)
     }
 
-    /// The surfaces that have a rim.
+    /// The surfaces with a finite semi-diameter.
     fn clipping_surfaces(&self, found: &ResolvedSystems) -> Vec<usize> {
         let surfaces = &found.clipped[self.primary].surfaces;
         (0..self.is_glass.len()).filter(|i| surfaces[*i].semi_diameter.is_finite()).collect()
     }
 }
 
-/// The smallest thicknesses that a lens has at any zoom position, in mm; infinite where it has no
-/// such gap.
+/// The smallest thicknesses of a lens over all zoom positions, in mm; infinite if it has no such
+/// gap.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MinimumThickness {
     pub(super) glass_center: f64,
@@ -186,36 +187,36 @@ impl MinimumThickness {
     }
 }
 
-/// A number that a term is about.
+/// A quantity that a constraint limits.
 #[derive(Clone, Copy)]
 enum ConstrainedQuantity {
     Center(usize),
-    /// The thickness at a rim; infinite where that is not limited.
+    /// The thickness at a rim; infinite if the surfaces have none.
     Edge {
         gap: usize,
         rim: EdgeRadius,
     },
     Track,
-    /// `|curvature| × semi-diameter`: 1 for a hemisphere; 0 where nothing limits the surface.
+    /// `|curvature| × semi-diameter`: 1 for a hemisphere; 0 if the surface has no rim.
     Steepness(usize),
     Rim(usize),
 }
 
-/// Where a gap has its edge.
+/// The radius at which the edge thickness of a gap is measured.
 #[derive(Clone, Copy)]
 enum EdgeRadius {
     /// Glass reaches to the larger semi-diameter of its two surfaces.
     Larger,
     /// Elements can touch only within the smaller one.
     Smaller,
-    /// That of the surface in front.
+    /// The semi-diameter of the surface in front.
     Front,
-    /// That of the one behind.
+    /// The semi-diameter of the surface behind.
     Rear,
 }
 
 impl EdgeRadius {
-    /// Its semi-diameter; none where nothing limits it.
+    /// The radius; `None` if the surfaces have no rim.
     fn height<R: Real>(self, front: R, rear: R) -> Option<R> {
         let limited = |rim: &R| rim.value() < f64::INFINITY;
         let both = [front, rear].into_iter().filter(limited);
@@ -238,7 +239,7 @@ impl ConstrainedQuantity {
         }
     }
 
-    /// In mm, lengths counted along the light.
+    /// Its value, lengths in mm along the direction of light.
     fn length<R: Real>(self, system: &System<R>) -> R {
         match self {
             Self::Center(gap) => along_light(system, gap),
@@ -269,7 +270,7 @@ impl ConstrainedQuantity {
     }
 }
 
-/// The sag at a distance from the axis, or near the edge of the surface where it ends before.
+/// The sag at a distance from the axis, or close to the edge of the surface if it ends before.
 fn sag_at<R: Real>(surface: &crate::lens::Surface<R>, height: R) -> R {
     // The slope of the sag is infinite at the edge itself.
     let edge = 0.999 * surface.shape.edge();
@@ -281,7 +282,7 @@ fn along_light<R: Real>(system: &System<R>, gap: usize) -> R {
     system.light_direction(gap) * system.surfaces[gap].thickness
 }
 
-/// A length of a lens, to be kept on one side of a bound.
+/// A length of a lens with the derivatives needed for its bounds.
 struct BoundedLength<'a> {
     quantity: ConstrainedQuantity,
     scene: &'a EvaluationContext<'a>,

@@ -7,13 +7,13 @@ use crate::math::Real;
 use crate::paraxial::{paraxial_ray, signed_indices};
 use nalgebra::DVector;
 
-/// The square of the deviation of the focal length from a target.
+/// Adds the squared deviation of the focal length from a target, in mm².
 pub(super) fn focal_length(scene: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) {
     let focal = focal_length_of(&scene.systems.clipped[scene.zoom.primary]);
     sum.add_residual(1.0, focal - target, &slopes(scene, sum.level, focal_length_of));
 }
 
-/// The derivatives of a first-order number by the variables; zeros where none are asked for.
+/// The derivatives of a first-order number by the variables; zeros if only the value is asked for.
 pub(super) fn slopes(
     scene: &EvaluationContext<'_>,
     detail: DerivativeLevel,

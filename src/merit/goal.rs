@@ -1,4 +1,4 @@
-//! What a lens is asked for.
+//! The goal of an optimization: weighted terms with their targets.
 
 use super::MeritError;
 use super::constraints::MinimumThickness;
@@ -6,30 +6,32 @@ use crate::lens::{Lens, Object};
 use crate::paraxial::{Beam, first_order};
 use serde::{Deserialize, Serialize};
 
-/// What an optimization aims at.
+/// The goal of an optimization: the terms of its merit function.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Goal {
     /// The terms that are summed.
     pub terms: Vec<WeightedTerm>,
-    /// Whether derivatives know that the pupil moves with the lens.
+    /// Tells whether derivatives include the motion of the pupil edge.
     #[serde(default)]
     pub pupil: PupilEdge,
-    /// The focal length at each zoom position relative to the first; a single lens needs none.
+    /// The focal length at each zoom position relative to the first; empty for a lens without zoom
+    /// positions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zoom_ratios: Vec<f64>,
 }
 
-/// How the edge of the pupil is treated.
+/// Treatment of the edge of the pupil in derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PupilEdge {
-    /// It is followed wherever the lens moves it: values are those of the light that gets through,
-    /// and their derivatives are unbiased.
+    /// The edge is tracked as the lens changes: values are those of the transmitted rays, and their
+    /// derivatives are unbiased.
     #[default]
     Moving,
-    /// The rays that got through when it was last looked for are kept: what most programs do.
-    /// Faster, blind to light, biased wherever something clips.
+    /// The set of transmitted rays is frozen between searches for the pupil, as in most programs.
+    /// Faster, but it ignores changes of the transmitted light and is biased wherever something
+    /// clips.
     #[serde(rename = "kept")]
     Frozen,
 }
@@ -44,8 +46,8 @@ pub struct WeightedTerm {
     pub weight: f64,
 }
 
-/// One thing that a lens is asked for. Every term is the mean over the zoom positions; all but
-/// those about light are sums of squares.
+/// A term (operand) of the merit function. Every term is the mean over the zoom positions; all
+/// except those of light are sums of squares.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Term {
@@ -55,65 +57,67 @@ pub enum Term {
     /// The integral of the square distance from the centroid over the pupil, in mm⁴: (3.24), the
     /// mean over fields and wavelengths by weight.
     SpotIntegral,
-    /// Minus the area of the pupil in mm² of the first vertex plane: (3.25), the mean over fields
-    /// and wavelengths by weight.
+    /// The negative area of the pupil in the first vertex plane, in mm²: (3.25), the weighted mean
+    /// over fields and wavelengths.
     Throughput,
-    /// One minus that area over this one in mm²: (4.3).
+    /// One minus the ratio of the mean pupil area to this area in mm²: (4.3).
     ThroughputLoss(f64),
-    /// The mean square of what each pupil's area lacks of this share of the area that it has in the
-    /// lens with which a search begins.
+    /// The mean squared shortfall of the area of each pupil from this fraction of its area in the
+    /// starting lens.
     Light(f64),
-    /// The square of what a field's illumination lacks of this share of that on the axis: the
-    /// ratio of the pupils' areas times cos⁴ of the field angle, as for a lens without distortion.
+    /// The squared shortfall of a field's relative illumination from a minimum: the ratio of its
+    /// pupil area to that on the axis, times cos⁴ of the field angle, as for a lens without
+    /// distortion.
     RelativeIllumination {
         /// The field, counted from 0.
         field: usize,
-        /// Not less than this.
+        /// The minimum relative illumination.
         min: f64,
     },
-    /// The square of the deviation from this of the f-number that the light on the axis has: the
-    /// focal length over the diameter of a disc as large as the pupil.
+    /// The squared deviation of the f-number on the axis from this: the focal length over the
+    /// diameter of a disc with the area of the pupil.
     FNumber(f64),
-    /// The square of the deviation of the focal length from this, in mm².
+    /// The squared deviation of the focal length from this length in mm, in mm².
     FocalLength(f64),
     /// The mean square of the distance of the chief rays' image points from the paraxial image
     /// (`f tan θ` for an object at infinity), in mm².
     Distortion,
-    /// Glass thinner or thicker than this on the axis, in mm².
+    /// Squared violations of limits to the centre thickness of glass, in mm².
     GlassCenter {
-        /// Not thinner than this.
+        /// The minimum thickness, in mm.
         min: f64,
-        /// Not thicker than this.
+        /// The maximum thickness, in mm.
         max: f64,
     },
-    /// Glass thinner than this at the rim, in mm².
+    /// Squared shortfall of the edge thickness of glass from this minimum in mm, in mm².
     GlassEdge(f64),
-    /// Air thinner or thicker than this on the axis, in mm².
+    /// Squared violations of limits to the centre thickness of air gaps, in mm².
     AirCenter {
         /// Not thinner than this.
         min: f64,
         /// Not thicker than this.
         max: f64,
     },
-    /// Air thinner than this at the rim, in mm².
+    /// Squared shortfall of the edge thickness of air gaps from this minimum in mm, in mm².
     AirEdge(f64),
-    /// From the first vertex to the image longer than this, in mm².
+    /// Squared excess of the total track, first vertex to image, over this maximum in mm, in mm².
     TotalTrack(f64),
-    /// From the last vertex to the image shorter than this, in mm².
+    /// Squared shortfall of the back focus, last vertex to image, from this minimum in mm, in mm².
     BackFocus(f64),
-    /// `|curvature| × semi-diameter` larger than this at some surface; 1 is a hemisphere.
+    /// Squared excess of `|curvature| × semi-diameter` of each surface over this maximum; 1 is a
+    /// hemisphere.
     Steepness(f64),
-    /// Semi-diameters smaller or larger than this, in mm².
+    /// Squared violations of limits to the semi-diameters, in mm².
     SemiDiameter {
-        /// Not smaller than this.
+        /// The minimum semi-diameter, in mm.
         min: f64,
-        /// Not larger than this.
+        /// The maximum semi-diameter, in mm.
         max: f64,
     },
 }
 
 impl Term {
-    /// What it is called in files and reports.
+    /// The name of the term in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spot => "spot",
@@ -136,7 +140,7 @@ impl Term {
         }
     }
 
-    /// Whether it asks how much light gets through.
+    /// True if the term depends on the areas of the pupils.
     pub fn concerns_light(self) -> bool {
         matches!(
             self,
@@ -148,7 +152,7 @@ impl Term {
         )
     }
 
-    /// Refuses what a lens cannot be asked for about its light.
+    /// Returns an error if the term asks for light that is undefined for the lens.
     fn check_light(self, lens: &Lens) -> Result<(), MeritError> {
         let refuse = |why| Err(MeritError::DoesNotApply { term: self.name(), why });
         if let Self::ThroughputLoss(v) | Self::Light(v) | Self::FNumber(v) | Self::Steepness(v) =
@@ -197,9 +201,9 @@ impl Term {
 const LIGHT_IN_SPOT: f64 = 0.02;
 
 impl Goal {
-    /// What a designer would ask of a lens first: sharp spots at the focal length it has and with
-    /// the light it has, glass and air that can be made or are no thinner than they are, nothing
-    /// longer than it is by more than a fifth.
+    /// The default goal for a lens: sharp spots at its focal length and with its light, thicknesses
+    /// of glass and air that can be manufactured or are no smaller than they are, and a track at
+    /// most a fifth longer than it is.
     pub fn default_for(lens: &Lens) -> Result<Self, MeritError> {
         let focal_lengths = focal_lengths(lens)?;
         let first = focal_lengths[0];
@@ -229,7 +233,7 @@ impl Goal {
         Ok(Self { terms, pupil: PupilEdge::default(), zoom_ratios })
     }
 
-    /// Refuses what a lens cannot be asked for.
+    /// Returns an error if a term or target does not apply to the lens.
     pub fn check(&self, lens: &Lens) -> Result<(), MeritError> {
         let refuse = |why| Err(MeritError::DoesNotApply { term: "goal", why });
         if self.terms.is_empty() {
@@ -260,7 +264,7 @@ impl Goal {
         Ok(())
     }
 
-    /// The focal length wanted at a zoom position.
+    /// The target focal length at a zoom position in mm, from that of the first one.
     pub(super) fn target(&self, zoom: usize, first: f64) -> f64 {
         first * self.zoom_ratios.get(zoom).copied().unwrap_or(1.0)
     }

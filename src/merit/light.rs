@@ -1,6 +1,7 @@
-//! Terms of light: how much of it gets through, on the axis and off it.
+//! Terms of light: throughput, relative illumination and f-number.
 //!
-//! All of them are functions of the areas of the pupils; their derivatives are those of the edges.
+//! All of them are functions of the areas of the pupils; their derivatives come from the motion of
+//! the edges alone.
 
 use super::first_order::{focal_length_of, slopes};
 use super::sampling::SampledPupil;
@@ -16,7 +17,7 @@ struct WithGradient {
     slope: DVector<f64>,
 }
 
-/// Adds one of the terms about light.
+/// Adds one of the terms of light.
 pub(super) fn add_light_term(scene: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
     match term {
         Term::Throughput => light_loss(&mean_area(scene, sum.level), 1.0, 0.0, sum),
@@ -30,7 +31,7 @@ pub(super) fn add_light_term(scene: &EvaluationContext<'_>, term: Term, sum: &mu
     }
 }
 
-/// Adds the squares of what the pupils lack of a share of the areas that they began with.
+/// Adds the squared shortfalls of the pupil areas from a fraction of their initial areas.
 fn light_shortfall(scene: &EvaluationContext<'_>, share: f64, sum: &mut SumOfSquares) {
     for (i, (pupil, before)) in scene.sampling.pupils.iter().zip(scene.initial_areas).enumerate() {
         let least = share * before;
@@ -42,8 +43,9 @@ fn light_shortfall(scene: &EvaluationContext<'_>, share: f64, sum: &mut SumOfSqu
     }
 }
 
-/// Adds `initial_areas − factor × weighted_area`. Being no square, it is given to least squares as one: of the root
-/// of what the area lacks of twice itself, which has the same derivative.
+/// Adds `initial_areas − factor × weighted_area`. It is no square. For least squares it is replaced
+/// by the square of a residual with the same derivative: the root of twice the current area minus
+/// the area.
 fn light_loss(area: &WithGradient, factor: f64, start: f64, sum: &mut SumOfSquares) {
     sum.value += start - factor * area.value;
     sum.gradient.axpy(-factor, &area.slope, 1.0);
@@ -75,12 +77,12 @@ fn f_number(scene: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) 
     sum.add_residual(1.0, number - target, &slope);
 }
 
-/// The mean area of the pupils by weight, in mm².
+/// The weighted mean area of the pupils, in mm².
 fn mean_area(scene: &EvaluationContext<'_>, detail: DerivativeLevel) -> WithGradient {
     weighted_area(scene, detail, |_| true, 1.0)
 }
 
-/// The area of the pupil of a field, the mean over wavelengths by weight.
+/// The area of the pupil of a field in mm², the weighted mean over wavelengths.
 fn field_area(
     scene: &EvaluationContext<'_>,
     field: usize,
@@ -91,7 +93,7 @@ fn field_area(
     weighted_area(scene, detail, |i| pupils[i].field == field, 1.0 / share)
 }
 
-/// The areas of the pupils of some fields, each by its share and a factor.
+/// The sum of the areas of the chosen pupils in mm², each times its weight and a factor.
 fn weighted_area(
     scene: &EvaluationContext<'_>,
     detail: DerivativeLevel,

@@ -1,15 +1,16 @@
-//! What "better" means: a sum of weighted terms, each with its derivative for every variable.
+//! The merit function: a sum of weighted terms, each with its derivatives by the variables.
 //!
-//! Every term is a sum of squares of residuals, so that the same text serves first-order search
+//! Every term is a sum of squares of residuals, so that the same code serves gradient descent
 //! (value and gradient) and least squares (the normal equations). Spots are integrals over the
-//! pupil: their nodes are found once to a tolerance and then kept while the lens moves, so that a
-//! search sees a smooth function; [`Merit::resample`] finds them anew. Derivatives of the rays come
-//! from the backward pass, those of first-order data from dual numbers.
+//! pupil: their quadrature nodes are found once to a tolerance and then stay fixed in the pupil
+//! while the lens changes, so that an optimizer sees a smooth function; [`Merit::resample`] finds
+//! them anew. Derivatives of the rays come from the adjoint trace, those of first-order data from
+//! dual numbers.
 //!
-//! The set of rays that get through moves with the lens. Unless the goal says otherwise its edge is
-//! followed at every evaluation, and derivatives count its motion (Teh, *Computational Lens
-//! Design*, chapter 3): so a search can be asked for light, and does not mistake clipping for
-//! sharpness. A goal that keeps its pupils has the usual, biased derivatives.
+//! The set of transmitted rays changes with the lens. Unless the goal freezes it, its edge is
+//! tracked at every evaluation, and derivatives include its motion (Teh, *Computational Lens
+//! Design*, chapter 3): an optimizer can then be asked for light, and does not mistake clipping for
+//! sharpness. A goal with frozen pupils has the usual, biased derivatives.
 
 mod binding;
 mod constraints;
@@ -37,36 +38,36 @@ pub use sum::{DerivativeLevel, SumOfSquares};
 /// A number with its derivative along one variable.
 type Dual1 = Dual<f64, 1>;
 
-/// Why a lens has no merit.
+/// The error of a merit function that cannot be set up or evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeritError {
-    /// The prescription.
+    /// The prescription is invalid.
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// The beam.
+    /// The beam cannot be set up.
     #[error(transparent)]
     RayModel(#[from] RayModelError),
-    /// A field without rays.
+    /// No rays can be launched from a field.
     #[error("field {field} at zoom position {zoom}: {cause}")]
     Launch {
         /// The field, counted from 0.
         field: usize,
-        /// The zoom position.
+        /// The zoom position, counted from 0.
         zoom: usize,
-        /// Why.
+        /// The cause.
         cause: LaunchError,
     },
-    /// Nothing gets through.
+    /// No light gets through.
     #[error("no light gets through at field {field}, zoom position {zoom}, {um} um")]
     NoLight {
         /// The field, counted from 0.
         field: usize,
         /// The zoom position.
         zoom: usize,
-        /// The wavelength.
+        /// The wavelength in micrometres.
         um: f64,
     },
-    /// A ray that belongs to the spot does not arrive any more.
+    /// A ray of a spot no longer reaches the image.
     #[error(
         "ray {ray} of field {field} at zoom position {zoom}, {um} um, is lost: {} at surface {}",
         .fate.name(), .fate.surface().unwrap_or(0)
@@ -80,24 +81,24 @@ pub enum MeritError {
         zoom: usize,
         /// The wavelength.
         um: f64,
-        /// How it ended.
+        /// The fate of the ray.
         fate: Fate,
     },
-    /// A value or derivative that is not a number.
+    /// A value or derivative is not finite.
     #[error("the term `{term}` is not finite")]
     NotFinite {
         /// The term.
         term: &'static str,
     },
-    /// A term that the lens cannot have.
+    /// A term does not apply to the lens.
     #[error("the term `{term}` does not apply: {why}")]
     DoesNotApply {
         /// The term.
         term: &'static str,
-        /// Why not.
+        /// The reason.
         why: &'static str,
     },
-    /// Nothing to change.
+    /// The lens has no variables.
     #[error(
         "the lens has no variables that change it; flag some in the file (`\"variables\"`), or name \
          kinds of numbers to vary"
@@ -105,10 +106,10 @@ pub enum MeritError {
     NoVariables,
 }
 
-/// A term of a lens.
+/// The value of a term of the merit function.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TermValue {
-    /// What it is called.
+    /// The name of the term.
     pub term: &'static str,
     /// Its weight.
     pub weight: f64,
@@ -116,11 +117,11 @@ pub struct TermValue {
     pub value: f64,
     /// The estimated error of the value.
     pub error: f64,
-    /// Rays that it rests on.
+    /// The number of rays that it is computed from.
     pub rays: usize,
 }
 
-/// The merit function of a lens: its goal, its variables, and the rays that it is computed from.
+/// The merit function of a lens: its goal, its variables, and the rays that sample it.
 #[derive(Debug, Clone)]
 pub struct Merit {
     goal: Goal,
@@ -128,7 +129,7 @@ pub struct Merit {
     variables: Vec<Variable>,
     zooms: Vec<Configuration>,
     samplings: Vec<RaySampling>,
-    /// The areas of the pupils with which it began, by zoom position.
+    /// The initial areas of the pupils in mm², by zoom position.
     initial_areas: Vec<Vec<f64>>,
     tolerance: f64,
 }
@@ -183,7 +184,7 @@ impl Merit {
         self
     }
 
-    /// What it aims at.
+    /// The goal.
     pub fn goal(&self) -> &Goal {
         &self.goal
     }
@@ -198,7 +199,7 @@ impl Merit {
         self.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect()
     }
 
-    /// The lens with these values of the variables, and pickups that follow them.
+    /// The lens with these values of the variables and with its pickups resolved.
     pub fn lens(&self, values: &[f64]) -> Lens {
         let mut lens = self.lens.clone();
         for (variable, value) in self.variables.iter().zip(values) {
@@ -208,19 +209,20 @@ impl Merit {
         lens.with_pickups().unwrap_or(lens)
     }
 
-    /// Whether light gets through at every field, zoom position and wavelength.
+    /// True if light gets through at every field, zoom position and wavelength.
     pub fn has_light(&self) -> bool {
         self.samplings.iter().flat_map(|sampling| &sampling.pupils).all(|pupil| pupil.area > 0.0)
     }
 
-    /// How the spots are sampled, by zoom position, field and wavelength; a spot without rays has no
-    /// light and counts nothing.
+    /// The sampling of each spot, by zoom position, field and wavelength; a spot without rays has
+    /// no light and no weight.
     pub fn spot_samplings(&self) -> Vec<SpotSampling> {
         self.samplings.iter().flat_map(RaySampling::spot_samplings).collect()
     }
 
     /// The mean area of the pupils over all spots, in mm² of the first vertex plane. A goal without
-    /// a term for light may buy sharpness by clipping it, so it is worth a look.
+    /// a term for light may gain sharpness by clipping, so compare it with that of the starting
+    /// lens.
     pub fn light(&self) -> f64 {
         let sampled = self.spot_samplings();
         sampled.iter().map(|spot| spot.area).sum::<f64>() / sampled.len().max(1) as f64
@@ -231,7 +233,7 @@ impl Merit {
         self.evaluate(values, DerivativeLevel::Value).map(|sum| sum.value)
     }
 
-    /// The merit, its derivatives, and, where asked for, the normal equations of its residuals.
+    /// The merit, with its derivatives and the normal matrix of its residuals as `level` asks.
     pub fn evaluate(
         &self,
         values: &[f64],
@@ -244,7 +246,7 @@ impl Merit {
         Ok(total)
     }
 
-    /// Every term by itself.
+    /// The value of each term, without its weight.
     pub fn terms(&self, values: &[f64]) -> Result<Vec<TermValue>, MeritError> {
         let report = |(sum, weighted): (SumOfSquares, &WeightedTerm)| {
             let (error, rays) = self.error_and_rays(weighted.term, sum.value);
@@ -255,7 +257,7 @@ impl Merit {
         Ok(sums.into_iter().zip(&self.goal.terms).map(report).collect())
     }
 
-    /// Estimated error and rays of a term.
+    /// The estimated error of a term and the number of its rays.
     fn error_and_rays(&self, term: Term, value: f64) -> (f64, usize) {
         let sampled = self.spot_samplings();
         let worst = sampled.iter().fold(0.0, |e: f64, s| e.max(s.error));
@@ -268,7 +270,7 @@ impl Merit {
         }
     }
 
-    /// The sum of every term, the mean over the zoom positions.
+    /// The sum of squares of each term, averaged over the zoom positions.
     fn evaluate_terms(
         &self,
         values: &[f64],
@@ -284,7 +286,7 @@ impl Merit {
                 sampling.check_light(&light)?;
                 if bench.has_grin() && light.iter().any(TracedPupil::is_irregular) {
                     let why = "the pupil is in pieces or not star-shaped, and nothing tells how \
-                               its edge moves with a gradient; expected a goal that keeps its pupils";
+                               its edge moves with a gradient; expected a goal with frozen pupils";
                     return Err(MeritError::DoesNotApply { term: "pupil", why });
                 }
                 let sampling = &sampling.with_pupils(&bench, &light);
@@ -320,7 +322,7 @@ impl Merit {
         Ok(sums)
     }
 
-    /// Whether some term needs to know where the edges of the pupils are.
+    /// True if some term depends on the edges of the pupils.
     fn needs_pupil_edges(&self) -> bool {
         let needs =
             |term: Term| matches!(term, Term::Spot | Term::SpotIntegral) || term.concerns_light();
@@ -357,15 +359,15 @@ struct EvaluationContext<'a> {
     sampling: &'a RaySampling,
     systems: &'a binding::ResolvedSystems,
     values: &'a [f64],
-    /// The areas of the pupils with which the search began.
+    /// The initial areas of the pupils, in mm².
     initial_areas: &'a [f64],
-    /// The light of every pupil of the sampling; none where pupils are kept.
+    /// The traced pupils of the sampling; empty if pupils are frozen.
     traced_pupils: &'a [TracedPupil<'a>],
 }
 
 impl EvaluationContext<'_> {
     /// The derivatives by the variables that the motion of the pupils' edges contributes to
-    /// integrals of these costs, one for each pupil; zeros where pupils are kept.
+    /// integrals with these integrands, one for each pupil; zeros if pupils are frozen.
     fn edge_motion(&self, costs: impl Iterator<Item = QuadraticIntegrand>) -> DVector<f64> {
         let mut total = DVector::zeros(self.values.len());
         for ((lit, pupil), cost) in self.traced_pupils.iter().zip(&self.sampling.pupils).zip(costs)

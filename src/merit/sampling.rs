@@ -1,4 +1,4 @@
-//! The rays that spots are computed from, found once to a tolerance.
+//! The rays that spots are computed from: the pupils, sampled once to a tolerance.
 
 use super::MeritError;
 use crate::lens::{FieldPoint, Lens};
@@ -10,40 +10,40 @@ use crate::trace::{Ray, Rays};
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// How one spot is sampled.
+/// The sampling of one spot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpotSampling {
-    /// The zoom position.
+    /// The zoom position, counted from 0.
     pub zoom: usize,
     /// The field, counted from 0.
     pub field: usize,
     /// The wavelength in micrometres.
     pub um: f64,
-    /// Rays traced for each value of the merit function; none where no light gets through, and the
-    /// spot then counts nothing.
+    /// Rays traced per evaluation of the merit function; 0 if no light gets through, and the spot
+    /// then has no weight.
     pub rays: usize,
     /// The estimated relative error of the spot's radius.
     pub error: f64,
-    /// The share of the paraxial entrance pupil that gets through.
+    /// The fraction of the paraxial entrance pupil that is transmitted.
     pub light: f64,
     /// The area of the pupil in mm² of the first vertex plane.
     pub area: f64,
 }
 
-/// The pupil of one field and wavelength, as it was when it was looked for.
+/// The pupil of one field and wavelength, as last found.
 #[derive(Debug, Clone)]
 pub(super) struct SampledPupil {
     pub(super) field: usize,
     pub(super) wavelength: usize,
-    /// Its part of the whole: fields and wavelengths weighted, one in all.
+    /// Its normalized weight by field and wavelength, without dark pupils: all add up to 1.
     pub(super) share: f64,
-    /// Its share in means of light, to which dark pupils count as well.
+    /// Its weight in means of light, which include dark pupils.
     pub(super) weight: f64,
     /// The cosine of the angle with the axis at which a collimated beam arrives.
     cosine: Option<f64>,
     anchor: FixedLaunch,
     kind: RegionKind,
-    /// The order of quadrature that was good enough.
+    /// The order of quadrature that reaches the tolerance.
     order: usize,
     pub(super) moments: PupilMoments,
     /// [`TracedPupil::signed_area`], in mm².
@@ -55,7 +55,7 @@ pub(super) struct SampledPupil {
 /// The rays of one zoom position.
 #[derive(Debug, Clone)]
 pub(super) struct RaySampling {
-    /// One for each wavelength, all fields one after the other.
+    /// The rays of each wavelength, all fields one after the other.
     pub(super) channels: Vec<ChannelRays>,
     /// The chief ray of each field at the primary wavelength.
     pub(super) chief_rays: Rays<f64>,
@@ -70,11 +70,12 @@ pub(super) struct RaySampling {
 pub(super) struct ChannelRays {
     pub(super) um: f64,
     pub(super) rays: Rays<f64>,
-    /// The share of each ray in the spot of its field, fields and wavelengths weighted.
+    /// The weight of each ray in the spot of its field, including the weights of fields and
+    /// wavelengths.
     pub(super) weights: Vec<f64>,
-    /// Where the rays of each field end.
+    /// The index behind the last ray of each field.
     pub(super) ends: Vec<usize>,
-    /// Whether the rays of each field stand for their mirror images as well.
+    /// True for each field whose rays also represent their mirror images.
     pub(super) mirrored: Vec<bool>,
 }
 
@@ -84,7 +85,7 @@ impl ChannelRays {
         Self { um, rays: Rays::default(), weights, ends, mirrored }
     }
 
-    /// Adds the rays of a pupil with their share of the whole.
+    /// Adds the rays of a pupil, which together have the weight `share`.
     fn add_pupil(&mut self, lit: &TracedPupil<'_>, share: f64) {
         let weight: f64 = lit.landed.arrivals().map(|(_, w)| w).sum();
         for (i, w) in lit.landed.arrivals() {
@@ -101,8 +102,8 @@ impl ChannelRays {
 }
 
 impl RaySampling {
-    /// Finds the pupils of a lens, each sampled so that the radius of its spot is good to a
-    /// tolerance. A lens without any light is refused unless `dark_too`.
+    /// Finds the pupils of a lens, each sampled so that the radius of its spot is accurate to a
+    /// relative tolerance. A lens without any light is an error unless `dark_too`.
     pub(super) fn new(
         lens: &Lens,
         zoom: usize,
@@ -155,7 +156,7 @@ impl RaySampling {
         }
     }
 
-    /// Looks for the pupil of a field and how finely it has to be sampled.
+    /// Finds the pupil of a field and the order of quadrature that it needs.
     fn find_pupil(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: SpotSampling) {
         let (field, wavelength) = (place.field, launch.wavelength);
         let (anchor, cosine) = (launch.to_fixed(), launch.axis_cosine());
@@ -188,7 +189,7 @@ impl RaySampling {
         self.spot_samplings.push(SpotSampling { error, ..place });
     }
 
-    /// Spots without light leave their share to the others.
+    /// Distributes the weight of dark pupils among the others.
     fn redistribute_dark_shares(&mut self) {
         let is_lit = |pupil: &&mut SampledPupil| {
             !matches!(pupil.kind, RegionKind::Dark | RegionKind::Unbounded)
@@ -199,7 +200,8 @@ impl RaySampling {
         }
     }
 
-    /// The light of every pupil through a lens: where it was found, or followed to where it is now.
+    /// Traces every pupil through a lens: as last found, or with its edge tracked to the present
+    /// lens.
     pub(super) fn trace_pupils<'a>(
         &self,
         bench: &'a RayModel,
@@ -217,8 +219,8 @@ impl RaySampling {
         self.pupils.iter().map(lit).collect()
     }
 
-    /// Refuses light that has gone out since the pupils were looked for: a spot without light is
-    /// none, and would be the sharpest of all.
+    /// Returns an error if a pupil has gone dark since it was found: its spot would be empty, and
+    /// so the sharpest of all.
     pub(super) fn check_light(&self, lit: &[TracedPupil<'_>]) -> Result<(), MeritError> {
         let was_lit = |pupil: &SampledPupil| pupil.moments.area > 0.0;
         let mut all = self.pupils.iter().zip(lit).zip(&self.spot_samplings);
@@ -228,7 +230,7 @@ impl RaySampling {
         }
     }
 
-    /// The same sampling with the rays of other light.
+    /// The same sampling with the rays of traced pupils.
     pub(super) fn with_pupils(&self, bench: &RayModel, lit: &[TracedPupil<'_>]) -> Self {
         let mut pupils = self.pupils.clone();
         for (pupil, lit) in pupils.iter_mut().zip(lit) {
@@ -255,13 +257,13 @@ impl RaySampling {
         colors
     }
 
-    /// The areas of the pupils; of dark ones those that they would ideally have.
+    /// The areas of the pupils in mm²; for dark ones those of the ideal entrance pupil.
     pub(super) fn areas(&self) -> Vec<f64> {
         let area = |pupil: &SampledPupil| if pupil.area > 0.0 { pupil.area } else { pupil.ideal };
         self.pupils.iter().map(area).collect()
     }
 
-    /// The field on the axis, if there is one.
+    /// The index of the field on the axis, if there is one.
     pub(super) fn axis(&self) -> Option<usize> {
         self.fields.iter().position(|field| field.x == 0.0 && field.y == 0.0)
     }
@@ -275,7 +277,7 @@ impl RaySampling {
         self.spot_samplings.clone()
     }
 
-    /// Whether no light of a field gets through at any wavelength.
+    /// True if no light of a field gets through at any wavelength.
     pub(super) fn is_dark(&self, field: usize) -> bool {
         self.channels.iter().all(|color| color.range(field).is_empty())
     }

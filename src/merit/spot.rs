@@ -9,31 +9,31 @@ use crate::pupil::{PupilMoments, QuadraticIntegrand};
 use crate::trace::{AdjointSeed, Fate, ImagePoints, TraceSink, Tracer};
 use nalgebra::{DMatrix, DVector};
 
-/// Where the rays of one wavelength land.
+/// The traced rays of one wavelength.
 struct SpotRays {
     tracer: Tracer<f64>,
     points: ImagePoints<f64>,
-    /// The weight of each in the sum.
+    /// The weight of each ray in the sum.
     weights: Vec<f64>,
 }
 
-/// The centroid of each field over all wavelengths, and the share of the field in the whole.
+/// The polychromatic centroid of a field in mm, and the weight of the field.
 struct Centroid {
     x: f64,
     y: f64,
     share: f64,
 }
 
-/// What a spot is divided by.
+/// The normalization of a spot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Normalization {
-    /// The area of its pupil: a mean square radius.
+    /// By the area of its pupil: a mean square radius.
     PupilArea,
-    /// Nothing: the integral over the pupil (3.24).
+    /// None: the integral over the pupil (3.24).
     Unnormalized,
 }
 
-/// The spots about their polychromatic centroids.
+/// Adds the spots about their polychromatic centroids.
 pub(super) fn add_spot(
     scene: &EvaluationContext<'_>,
     per: Normalization,
@@ -62,7 +62,7 @@ pub(super) fn add_spot(
     Ok(())
 }
 
-/// What the motion of the pupils' edges adds to the derivative.
+/// Adds the contribution of the moving pupil edges to the derivatives.
 fn add_edge_motion(
     scene: &EvaluationContext<'_>,
     per: Normalization,
@@ -141,7 +141,7 @@ fn centroid(scene: &EvaluationContext<'_>, landed: &[SpotRays], field: usize) ->
     Centroid { x: x * inverse, y: y * inverse, share }
 }
 
-/// The centroid needs no derivative: moving it changes the sum by nothing in first order.
+/// Adds the derivatives. The centroid needs none: the sum is stationary with respect to it.
 fn add_gradient(
     scene: &EvaluationContext<'_>,
     landed: &[SpotRays],
@@ -164,7 +164,8 @@ fn add_gradient(
     }
 }
 
-/// Gauss-Newton: `Σ w (∂x − ∂x̄)(∂x − ∂x̄)ᵀ = Σ w ∂x ∂xᵀ − W ∂x̄ ∂x̄ᵀ` for each field.
+/// Adds the gradient and the Gauss-Newton matrix: `Σ w (∂x − ∂x̄)(∂x − ∂x̄)ᵀ = Σ w ∂x ∂xᵀ − W ∂x̄
+/// ∂x̄ᵀ` for each field.
 fn add_normal_matrix(
     scene: &EvaluationContext<'_>,
     landed: &[SpotRays],
@@ -205,7 +206,7 @@ fn add_normal_matrix(
     }
 }
 
-/// The mean square distance of the chief rays' image points from the paraxial image.
+/// Adds the mean square distance of the chief rays' image points from the paraxial image, in mm².
 pub(super) fn add_distortion(
     scene: &EvaluationContext<'_>,
     sum: &mut SumOfSquares,
@@ -245,7 +246,8 @@ fn lost_chief_error(scene: &EvaluationContext<'_>, field: usize, fate: Fate) -> 
     MeritError::RayLost { ray: 0, field, zoom: scene.zoom.zoom, um, fate }
 }
 
-/// `tan θ` of each field, or its object height: what the paraxial image is proportional to.
+/// The quantity proportional to the paraxial image height, per field: `tan θ`, or the object height
+/// in mm.
 fn paraxial_heights(scene: &EvaluationContext<'_>) -> Result<Vec<[f64; 2]>, MeritError> {
     let refuse = |why| Err(MeritError::DoesNotApply { term: "distortion", why });
     let convert = |v: f64| match (scene.zoom.field_kind, scene.zoom.object) {

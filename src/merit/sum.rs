@@ -2,32 +2,32 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// How much of a sum is computed.
+/// The derivatives that are computed with a sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DerivativeLevel {
     /// The value alone.
     Value,
     /// The value and its derivatives.
     Gradient,
-    /// Those and the Gauss-Newton matrix.
+    /// The value, its derivatives and the Gauss-Newton matrix.
     Normal,
 }
 
 /// `Σ w r²` with its derivatives by the variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SumOfSquares {
-    /// How much of it is computed.
+    /// The derivatives that are computed.
     pub level: DerivativeLevel,
     /// The sum.
     pub value: f64,
     /// `2 Σ w r ∂r`.
     pub gradient: DVector<f64>,
-    /// `Σ w ∂r ∂rᵀ`; empty where it was not asked for.
+    /// `Σ w ∂r ∂rᵀ`; empty unless asked for.
     pub normal: DMatrix<f64>,
 }
 
 impl SumOfSquares {
-    /// Zero for this many variables.
+    /// A sum of zero for this many variables.
     pub fn zero(variables: usize, detail: DerivativeLevel) -> Self {
         let rows = if detail == DerivativeLevel::Normal { variables } else { 0 };
         let gradient = DVector::zeros(variables);
@@ -43,7 +43,7 @@ impl SumOfSquares {
         }
     }
 
-    /// Multiplies everything.
+    /// Multiplies the value and its derivatives by a factor.
     pub fn scale(&mut self, factor: f64) {
         self.value *= factor;
         self.gradient *= factor;
@@ -61,7 +61,7 @@ impl SumOfSquares {
         }
     }
 
-    /// Whether every number in it is finite.
+    /// True if every number in it is finite.
     pub fn is_finite(&self) -> bool {
         self.value.is_finite()
             && self.gradient.iter().all(|v| v.is_finite())

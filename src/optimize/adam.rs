@@ -1,10 +1,10 @@
 //! Adam: first-order descent with running means of the gradient and of its square (Kingma and Ba,
 //! "Adam: A Method for Stochastic Optimization", ICLR 2015, algorithm 1).
 //!
-//! The merit may rise for a while; the best lens is kept. A patient search halves its rate when the
-//! merit has not improved for long, and goes back to the best lens; an annealed one takes a given
-//! number of steps, while its rate falls to zero as a cosine (Loshchilov and Hutter, "SGDR", ICLR
-//! 2017), so that a run costs what it was meant to cost.
+//! The merit may rise for a while; the best lens is retained. With "reduce on plateau" the rate is
+//! halved when the merit has not improved for long, and the descent restarts from the best lens.
+//! With cosine annealing the descent takes a given number of steps, while its rate falls to zero as
+//! a cosine (Loshchilov and Hutter, "SGDR", ICLR 2017), so that its cost is known in advance.
 
 use super::state::OptimizerState;
 use super::{OptimizationProgress, Optimizer};
@@ -13,23 +13,23 @@ use crate::merit::{DerivativeLevel, Merit, MeritError, TermValue};
 use crate::solve::AdamMoments;
 use std::f64::consts::PI;
 
-/// The first rate, in scaled variables.
+/// The initial rate with reduction on a plateau, in scaled variables.
 const RATE: f64 = 0.1;
-/// Below this the search has ended.
+/// The rate below which the descent has ended.
 const SMALLEST_RATE: f64 = 1e-7;
 /// Steps without improvement before the rate is halved.
 const PATIENCE: usize = 40;
-/// A step may not add more than this part of the merit to it.
+/// The largest relative increase of the merit in a step.
 const WORSE: f64 = 1.0;
-/// The first rate of an annealed search, in scaled variables.
+/// The initial rate with cosine annealing, in scaled variables.
 const ANNEALED_RATE: f64 = 0.01;
 
-/// How the rate falls.
+/// The schedule of the learning rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LearningRate {
-    /// By half, whenever patience ends.
+    /// Halved when the merit has not improved for [`PATIENCE`] steps.
     ReduceOnPlateau,
-    /// As a cosine, to zero after so many steps.
+    /// A cosine that falls to zero after this many steps.
     CosineAnnealing(usize),
 }
 
@@ -65,7 +65,7 @@ impl AdamOptimizer {
         self.state.adam_step(&mut self.moments, &self.gradient, self.rate)
     }
 
-    /// Back to the best lens with half of the rate and fresh moments.
+    /// Restarts from the best lens with half the rate and new moments.
     fn reduce_rate(&mut self) {
         self.rate *= 0.5;
         self.since_better = 0;
@@ -100,7 +100,7 @@ impl AdamOptimizer {
         accepted
     }
 
-    /// The rate falls with the steps, whatever they do to the merit.
+    /// Takes a step of the cosine schedule, accepted whatever its merit.
     fn annealed_step(&mut self, steps: usize) -> f64 {
         let done = self.state.steps as f64 / steps as f64;
         self.rate = 0.5 * ANNEALED_RATE * (1.0 + (PI * done).cos());

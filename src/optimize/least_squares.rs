@@ -1,8 +1,8 @@
 //! Damped least squares: the normal equations of the residuals with Marquardt's damping.
 //!
-//! `(JᵀJ + λ diag JᵀJ) δ = −Jᵀ r` in scaled variables, variables at a bound held there. A step that
-//! does not reduce the merit, or makes the lens invalid, raises the damping; a good one lowers it
-//! (Marquardt 1963; Nielsen 1999 for the update).
+//! `(JᵀJ + λ diag JᵀJ) δ = −Jᵀ r` in scaled variables, with variables at a bound fixed. A step that
+//! does not reduce the merit, or makes the lens invalid, raises the damping; a successful one
+//! lowers it (Marquardt 1963; Nielsen 1999 for the update).
 
 use super::state::OptimizerState;
 use super::{OptimizationProgress, Optimizer};
@@ -11,11 +11,11 @@ use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
 use crate::solve::{Damping, NielsenDamping, damped_step, predicted_decrease};
 use nalgebra::DVector;
 
-/// Relative improvement below which a step counts as none.
+/// The relative improvement below which a step counts as no improvement.
 const SMALLEST_GAIN: f64 = 1e-10;
-/// Relative improvement below which a step hardly gains anything.
+/// The relative improvement below which a segment counts a step as idle.
 const SMALL_GAIN: f64 = 1e-4;
-/// As many steps without a gain end the search.
+/// The number of consecutive idle steps that end the descent.
 const PATIENCE: usize = 3;
 
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub(super) struct LeastSquaresOptimizer {
     sum: SumOfSquares,
     damping: NielsenDamping,
     idle: usize,
-    /// When this often the merit was taken, no other damping is tried.
+    /// The number of evaluations after which no further damping is tried.
     max_evaluations: usize,
 }
 
@@ -49,13 +49,12 @@ impl LeastSquaresOptimizer {
         self.damping
     }
 
-    /// Where it stands.
+    /// The state of the descent.
     pub(super) fn into_state(self) -> OptimizerState {
         self.state
     }
 
-    /// So many steps, those that are tried and not taken included, or fewer where hardly anything is
-    /// left to gain.
+    /// Takes up to this many steps, rejected ones included; fewer when the merit hardly improves.
     pub(super) fn take_steps(&mut self, steps: usize) {
         self.max_evaluations = self.state.evaluations + steps;
         let mut idle = 0;
@@ -93,7 +92,8 @@ impl LeastSquaresOptimizer {
         }
     }
 
-    /// Tries dampings until a step reduces the merit; returns how much of the first one was taken.
+    /// Raises the damping until a step reduces the merit; returns the length of that step relative
+    /// to the first one tried, 0 if none does.
     pub(super) fn descend(&mut self) -> f64 {
         let before = self.state.value;
         let mut first = None;

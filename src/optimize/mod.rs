@@ -1,7 +1,7 @@
-//! Local search, one step at a time: the caller owns the loop.
+//! Local optimization of a lens, one step at a time: the caller owns the loop.
 //!
-//! An [`Optimizer`] knows nothing of threads, clocks or files. It keeps its own copy of the lens,
-//! never lets it become invalid, and always has a best one to give.
+//! An [`Optimizer`] uses no threads, clocks or files. It works on its own copy of the lens, never
+//! lets it become invalid, and always has a best lens.
 
 mod adam;
 mod least_squares;
@@ -16,12 +16,12 @@ use crate::merit::{Goal, Merit, MeritError, TermValue};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// A search that can be stepped, watched and stopped by its caller.
+/// A local optimizer that its caller steps, observes and stops.
 pub trait Optimizer: Send + Debug {
-    /// Takes one step; a step that would make the lens invalid is refused and shortened.
+    /// Takes one step; a step that would make the lens invalid is shortened.
     fn step(&mut self) -> OptimizationProgress;
-    /// Judges the best lens by its own rays, as the search itself does from time to time; to be
-    /// called when it is stopped, so that the best lens is one that is known to be better.
+    /// Evaluates the best lens with newly found rays, as the optimizer itself does from time to
+    /// time. Call it when the optimizer is stopped, so that the best lens is verified.
     fn verify_best(&mut self);
     /// The best lens so far.
     fn best(&self) -> &Lens;
@@ -31,24 +31,24 @@ pub trait Optimizer: Send + Debug {
     fn terms(&self) -> Result<Vec<TermValue>, MeritError>;
 }
 
-/// What a step did.
+/// The progress of an optimizer after a step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptimizationProgress {
-    /// Steps so far.
+    /// The number of steps so far.
     pub step: usize,
-    /// Merit of the current lens.
+    /// The merit of the current lens.
     pub merit: f64,
-    /// Merit of the best lens so far.
+    /// The merit of the best lens so far.
     pub best: f64,
-    /// The size of the step relative to what was proposed: 1 for a full step, 0 for none.
+    /// The fraction of the proposed step that was taken: 1 for a full step, 0 for none.
     pub accepted: f64,
-    /// Why steps were refused or shortened, naming the parameter and the ray.
+    /// The reason for which steps were rejected or shortened, with the parameter and the ray.
     pub refused: Option<String>,
-    /// Whether further steps would change nothing.
+    /// True if further steps would change nothing.
     pub finished: bool,
 }
 
-/// Which method searches.
+/// The method of a local optimizer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DescentMethod {
@@ -60,7 +60,7 @@ pub enum DescentMethod {
 }
 
 impl DescentMethod {
-    /// What it is called in menus.
+    /// The name of the method in menus.
     pub fn name(self) -> &'static str {
         match self {
             Self::Adam => "Adam",
@@ -69,10 +69,10 @@ impl DescentMethod {
     }
 }
 
-/// Begins a search of a lens; spots are good to `tolerance` of their radius.
+/// Creates an optimizer for a lens; spot radii are accurate to the relative `tolerance`.
 ///
 /// # Errors
-/// A lens without variables, or one without merit: see [`MeritError`].
+/// A lens without variables, or without a merit: see [`MeritError`].
 pub fn start(
     method: DescentMethod,
     lens: &Lens,
@@ -90,8 +90,8 @@ pub fn start(
     })
 }
 
-/// Begins a search by Adam that takes this many steps while its rate falls to zero; spots are good
-/// to `tolerance` of their radius.
+/// Creates an Adam optimizer with cosine annealing over this many steps; spot radii are accurate to
+/// the relative `tolerance`.
 ///
 /// # Errors
 /// As [`start`].

@@ -1,16 +1,16 @@
-//! The front of sharpness against light: what a lens can have of one for how much of the other.
+//! The Pareto front of sharpness against light: the lenses that cannot gain one without losing the
+//! other.
 //!
-//! For every weight β the composite objective `L_spot + β L_throughput` (Teh, *Computational Lens
-//! Design*, eq. 3.26) is descended, each time from the lens that the weight before has led to. At
-//! the optimum the ray at the rim is off by √β: that is how weights are named here. Every lens on
-//! the way may join the front; those that another one beats in both are dropped.
+//! For each weight β the objective `L_spot + β L_throughput` (Teh, *Computational Lens Design*, eq.
+//! 3.26) is minimized, starting from the result of the weight before. At the optimum the marginal
+//! ray misses the centroid by √β, so weights are given as this blur. Every lens evaluated on the
+//! way may join the front; dominated lenses are removed.
 //!
-//! Light is given away faster than aberrations are corrected, and what is given away at first is not
-//! found again. So a chain of weights begins with a lens that has been corrected: once with all of
-//! its light, at the largest weight, and once with its pupils kept, as a designer would have it
-//! without the derivative of light. From both the weights fall in one chain and rise in another;
-//! the four run side by side, so that the result does not depend on how many cores there are. The
-//! caller owns the loop.
+//! A descent gives up light faster than it corrects aberrations, and does not regain light lost at
+//! the start. So a chain of weights begins with a corrected lens: once corrected at the largest
+//! weight, and once with frozen pupils, as without the derivative of light. From either, the
+//! weights fall in one chain and rise in another. The four chains run in parallel, so that the
+//! result does not depend on the number of cores. The caller owns the loop.
 
 use super::{DescentMethod, Optimizer, start, start_annealed};
 use crate::lens::{Lens, LensError, ParameterKind, Quantity, add_variables};
@@ -19,24 +19,24 @@ use crate::pupil::{RayModelError, limited_by_stop};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// How a front is swept.
+/// The settings of a Pareto sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ParetoSettings {
-    /// How many weights.
+    /// The number of weights.
     pub points: usize,
-    /// What descends.
+    /// The local optimizer.
     pub method: DescentMethod,
-    /// No more steps than this for each weight.
+    /// The maximum number of steps for each weight.
     pub steps: usize,
-    /// The blur of the rim ray √β that the smallest and the largest weight stand for, relative to
-    /// the focal length.
+    /// The blur of the marginal ray √β that defines the smallest and the largest weight, relative
+    /// to the focal length.
     pub blur: [f64; 2],
-    /// How the motion of the pupil enters the derivatives.
+    /// The treatment of the pupil edge in derivatives.
     pub pupil: PupilEdge,
-    /// The error allowed of the radius of each spot while searching, relatively.
+    /// The relative error allowed for the radius of each spot during the sweep.
     pub tolerance: f64,
-    /// How much smaller and larger a semi-diameter may become.
+    /// The factors by which a semi-diameter may shrink and grow.
     pub rims: [f64; 2],
 }
 
@@ -54,32 +54,32 @@ impl Default for ParetoSettings {
     }
 }
 
-/// A lens with what it is worth.
+/// A lens with its sharpness and light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParetoPoint {
-    /// The lens.
+    /// The ray model of the lens cannot be set up.
     pub lens: Lens,
-    /// The weight β that it was found with, in mm²; none for the lens at the start.
+    /// The weight β that it was found with, in mm²; `None` for the starting lens.
     pub weight: Option<f64>,
-    /// The root of the mean square radius of its spots, in mm.
+    /// The RMS spot radius over fields and wavelengths, in mm.
     pub spot: f64,
     /// Its estimated error, in mm.
     pub spot_error: f64,
-    /// The mean area of its pupils, in mm² of the first vertex plane.
+    /// The mean area of its pupils in the first vertex plane, in mm².
     pub light: f64,
     /// Its estimated error, in mm².
     pub light_error: f64,
-    /// Whether light gets through at every field; a spot without light is none.
+    /// True if light gets through at every field; without light there is no spot.
     pub has_light: bool,
-    /// Rays that these numbers rest on.
+    /// The number of rays that these numbers are computed from.
     pub rays: usize,
 }
 
 impl ParetoPoint {
-    /// Judges a lens by its own rays, good to a tolerance.
+    /// Evaluates a lens with its own rays; spot radii are accurate to the relative tolerance.
     ///
     /// # Errors
-    /// A lens without merit.
+    /// A lens without a merit.
     pub fn evaluate(lens: &Lens, weight: Option<f64>, tolerance: f64) -> Result<Self, MeritError> {
         let terms = [Term::Spot, Term::Throughput].map(|term| WeightedTerm { term, weight: 1.0 });
         let goal =
@@ -100,27 +100,27 @@ impl ParetoPoint {
         })
     }
 
-    /// Whether it is at least as sharp and as bright as another one, and better in one of them.
+    /// True if it is at least as sharp and as bright as another one, and better in one of the two.
     pub fn dominates(&self, other: &Self) -> bool {
         let no_worse = self.spot <= other.spot && self.light >= other.light;
         no_worse && (self.spot < other.spot || self.light > other.light)
     }
 }
 
-/// Lenses of which none is beaten by another one in both sharpness and light, by growing light.
+/// Lenses of which none dominates another in sharpness and light, in the order of increasing light.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Front {
     points: Vec<ParetoPoint>,
 }
 
 impl Front {
-    /// The lenses.
+    /// The lenses of the front.
     pub fn points(&self) -> &[ParetoPoint] {
         &self.points
     }
 
-    /// Takes a lens in unless one that is there is no worse; those that it beats go. Returns
-    /// whether it was taken.
+    /// Inserts a lens unless one of the front is at least as good, and removes those that it
+    /// dominates. Returns true if it was inserted.
     pub fn insert(&mut self, design: ParetoPoint) -> bool {
         let no_worse = |d: &ParetoPoint| d.spot <= design.spot && d.light >= design.light;
         let sound = design.spot.is_finite() && design.light.is_finite() && design.has_light;
@@ -133,9 +133,9 @@ impl Front {
         true
     }
 
-    /// The area that the front covers in the plane of spot and light, relative to a reference: of
-    /// all pairs that some lens of it beats, with spots no larger than that of the reference, as a
-    /// multiple of the reference's spot times its light (Zitzler and Thiele, PPSN V, 1998).
+    /// The hypervolume of the front: the area that it dominates in the plane of spot and light, up
+    /// to a reference spot in mm, in multiples of that spot times a reference light in mm² (Zitzler
+    /// and Thiele, PPSN V, 1998).
     pub fn hypervolume(&self, spot: f64, light: f64) -> f64 {
         let (mut covered, mut below) = (0.0, 0.0);
         for design in self.points.iter().filter(|design| design.spot < spot) {
@@ -152,47 +152,47 @@ impl Front {
     }
 }
 
-/// Why there is no front.
+/// The error of a Pareto sweep that cannot start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParetoError {
     /// The lens.
     #[error(transparent)]
     RayModel(#[from] RayModelError),
-    /// Its prescription.
+    /// The prescription is invalid.
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// Its merit.
+    /// The lens has no merit.
     #[error(transparent)]
     Merit(#[from] MeritError),
-    /// Settings without meaning.
+    /// A setting is out of its range.
     #[error("{what} is {found}; expected {expected}")]
     Settings {
-        /// Which setting.
+        /// The setting.
         what: &'static str,
         /// Its value.
         found: String,
-        /// What it should be.
+        /// The values allowed.
         expected: &'static str,
     },
 }
 
 /// The largest spot that counts for the hypervolume, relative to that of the starting lens.
 const REFERENCE_SPOT: f64 = 2.0;
-/// How many times the steps of a weight correct the lens at the beginning of a chain.
+/// The steps of the initial correction of a chain, in multiples of the steps per weight.
 const FIRST: usize = 3;
-/// Steps between two looks at the lenses.
+/// The number of steps of a chain between two reports.
 const STEPS_PER_SLICE: usize = 25;
-/// Relative error of the numbers that lenses are compared by.
+/// The relative accuracy of the numbers that lenses are compared by.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
-/// The share of its light that every field keeps.
+/// The fraction of its light that every field has to retain.
 const MIN_LIGHT: f64 = 0.1;
 /// No surface may be steeper than this: curvature times semi-diameter.
 const MAX_STEEPNESS: f64 = 0.9;
 
-/// A front on its way.
+/// A Pareto sweep in progress.
 #[derive(Debug)]
 pub struct ParetoSweep {
-    /// The lens at the start, limited by its stop.
+    /// The starting lens, limited by its stop.
     pub start: ParetoPoint,
     settings: ParetoSettings,
     chains: Vec<SweepChain>,
@@ -201,14 +201,14 @@ pub struct ParetoSweep {
     done: usize,
 }
 
-/// Some weights, one after the other.
+/// A sequence of weights, each starting from the result of the one before.
 #[derive(Debug)]
 struct SweepChain {
     lens: Lens,
     goal: Goal,
-    /// Weight and treatment of the pupil with which the lens is corrected first.
+    /// The weight and the treatment of the pupil of the initial correction, until it has begun.
     first_correction: Option<(f64, PupilEdge)>,
-    /// The weights to come, the next one last.
+    /// The remaining weights, the next one last.
     weights: Vec<f64>,
     method: DescentMethod,
     steps: usize,
@@ -222,31 +222,32 @@ struct SweepChain {
 struct ActiveDescent {
     weight: f64,
     search: Box<dyn Optimizer>,
-    /// Steps that it may still take.
+    /// The number of steps that it may still take.
     remaining_steps: usize,
 }
 
-/// What a slice of a sweep has brought.
+/// The progress of a sweep after one call of [`ParetoSweep::step`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepProgress {
-    /// Steps so far, over all chains; those that a descent did not need count as taken.
+    /// The number of steps so far over all chains; steps that a descent did not need count as
+    /// taken.
     pub done: usize,
-    /// Steps in all.
+    /// The total number of steps.
     pub total: usize,
-    /// Lenses that have joined the front.
+    /// The number of lenses that joined the front.
     pub joined: usize,
-    /// What was given up and why, the last one.
+    /// The reason for which the latest descent could not start, if any.
     pub refused: Option<String>,
-    /// Whether all weights are done.
+    /// True if all weights are done.
     pub finished: bool,
 }
 
 impl ParetoSweep {
-    /// Prepares a sweep. A lens without variables has all its curvatures, gaps and semi-diameters
-    /// free; one with variables only those and its semi-diameters.
+    /// Prepares a sweep. In a lens without variables all curvatures, thicknesses and semi-diameters
+    /// become variables; in one with variables the semi-diameters are added to them.
     ///
     /// # Errors
-    /// A lens without merit, settings without meaning.
+    /// A lens without a merit, or a setting out of its range.
     pub fn new(lens: &Lens, settings: &ParetoSettings) -> Result<Self, ParetoError> {
         settings.check()?;
         let lens = with_sweep_variables(&limited_by_stop(lens)?, settings.rims);
@@ -274,7 +275,7 @@ impl ParetoSweep {
             refused: None,
         };
         let chains: Vec<SweepChain> = both.map(chain).collect();
-        // A weight that cannot even begin is an error of the lens, not of the search.
+        // A lens without a merit is an error of the sweep, not of a single weight.
         Merit::new(&lens, &goal, settings.tolerance)?;
         let mut front = Front::default();
         front.insert(start.clone());
@@ -282,7 +283,7 @@ impl ParetoSweep {
         Ok(Self { start, settings, chains, front, evaluated: Vec::new(), done: 0 })
     }
 
-    /// Goes on for a slice of steps in every chain, on all cores.
+    /// Advances every chain by up to 25 steps, on all cores.
     pub fn step(&mut self) -> SweepProgress {
         let found: Vec<Vec<ParetoPoint>> =
             self.chains.par_iter_mut().map(SweepChain::run_slice).collect();
@@ -303,7 +304,7 @@ impl ParetoSweep {
         &self.front
     }
 
-    /// Spot in mm and light in mm² of every lens that was looked at.
+    /// The spot in mm and the light in mm² of every lens evaluated.
     pub fn evaluated(&self) -> &[[f64; 2]] {
         &self.evaluated
     }
@@ -352,7 +353,7 @@ impl ParetoSettings {
 }
 
 impl SweepChain {
-    /// The next steps; the lenses that they have led to.
+    /// Takes the next steps and evaluates the resulting lens.
     fn run_slice(&mut self) -> Vec<ParetoPoint> {
         if self.active.is_none() {
             self.start_next();
@@ -402,39 +403,40 @@ impl SweepChain {
         }
     }
 
-    /// Steps to come, at most.
+    /// The maximum number of remaining steps.
     fn remaining_steps(&self) -> usize {
         let coming = self.weights.len() + if self.first_correction.is_some() { FIRST } else { 0 };
         coming * self.steps + self.active.as_ref().map_or(0, |running| running.remaining_steps)
     }
 }
 
-/// What (3.26) asks for besides light, of a lens with this mean area of its pupils in mm²: the
-/// integrals of the spots, and that the lens stays one: its focal length, glass and air that can be
-/// made, no hemispheres, no field without light.
+/// The objective (3.26) without its term for light, for a lens with this mean area of its pupils in
+/// mm²: the integrals of the spots, and the constraints of the default goal: focal length,
+/// thicknesses that can be manufactured, limited steepness, and a minimum of light at every field.
 ///
 /// # Errors
 /// A lens without first-order data.
 pub fn weighted_sum_goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
     let sensible = Goal::default_for(lens)?;
     let mut terms = vec![WeightedTerm { term: Term::SpotIntegral, weight: 1.0 }];
-    // The integral of a spot is its mean square times the light, and so must the others count.
+    // The integral of a spot is its mean square radius times the light, so the other terms are
+    // scaled by the light too.
     let others =
         sensible.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
     terms.extend(others.map(|w| WeightedTerm { weight: light * w.weight, ..w }));
     terms.push(WeightedTerm { term: Term::Steepness(MAX_STEEPNESS), weight: light });
-    // No field may go dark: a spot without light would be the sharpest of all.
+    // No field may go dark: an empty spot would be the sharpest of all.
     let worth = terms[0].weight * light * goal_size(lens).powi(2);
     terms.push(WeightedTerm { term: Term::Light(MIN_LIGHT), weight: worth });
     Ok(Goal { terms, pupil, zoom_ratios: sensible.zoom_ratios })
 }
 
-/// A spot as large as this is not worth the light that a field must keep, in mm.
+/// The spot radius in mm at which a violated minimum of light outweighs sharpness.
 fn goal_size(lens: &Lens) -> f64 {
     1e-3 * lens.total_track()
 }
 
-/// The focal length that the goal asks for, or the length of an afocal lens.
+/// The target focal length of the goal in mm, or the total track of an afocal lens.
 fn goal_focal_length(goal: &Goal, lens: &Lens) -> f64 {
     let asked = goal.terms.iter().find_map(|w| match w.term {
         Term::FocalLength(focal) => Some(focal.abs()),
@@ -443,7 +445,7 @@ fn goal_focal_length(goal: &Goal, lens: &Lens) -> f64 {
     asked.unwrap_or_else(|| lens.total_track())
 }
 
-/// The lens with everything free that a sweep may change.
+/// The lens with the variables of a sweep and the bounds of its semi-diameters.
 fn with_sweep_variables(lens: &Lens, [narrow, wide]: [f64; 2]) -> Lens {
     let mut lens = lens.clone();
     let own: Vec<_> = lens.variables.clone();

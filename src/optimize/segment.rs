@@ -1,6 +1,6 @@
-//! A stretch of a descent: steps that depend on nothing but the lens where they begin and what is
-//! remembered of the stretches before, so that a search can be written down between two of them
-//! and taken up again without a trace.
+//! A segment of a descent: steps that depend only on the lens at its start and on the serializable
+//! [`DescentState`], so that a search can be saved between two segments and resumed with identical
+//! results.
 
 use super::DescentMethod;
 use super::least_squares::LeastSquaresOptimizer;
@@ -10,74 +10,74 @@ use crate::merit::{DerivativeLevel, Merit, MeritError};
 use crate::solve::{AdamMoments, NielsenDamping};
 use serde::{Deserialize, Serialize};
 
-/// How a stretch goes.
+/// The settings of a segment of a descent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SegmentSettings {
-    /// What descends.
+    /// The local optimizer.
     pub method: DescentMethod,
-    /// How many steps it tries.
+    /// The number of steps to try.
     pub steps: usize,
-    /// The rate of Adam at the beginning of a descent, in scaled variables: a step of one alters
-    /// the residuals by as much as they are.
+    /// The rate of Adam at the start of a descent, in scaled variables: a step of 1 changes the
+    /// residuals by their own size.
     pub rate: f64,
 }
 
-/// What a descent remembers from one stretch to the next; the default begins a new one.
+/// The state of a descent between two segments; the default starts a new descent.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DescentState {
     moments: AdamMoments,
-    /// The part of its first rate that Adam has.
+    /// The rate of Adam relative to the initial one.
     pace: Option<f64>,
-    /// The damping of least squares, and how fast it grows.
+    /// The damping of least squares and its growth factor.
     damping: Option<NielsenDamping>,
-    /// Steps so far.
+    /// The number of steps so far.
     pub steps: usize,
 }
 
-/// Where a stretch has led.
+/// The result of a segment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SegmentResult {
-    /// The lens where it ends.
+    /// The lens at its end.
     pub lens: Lens,
-    /// The merit where it began.
+    /// The merit at its start.
     pub initial_merit: f64,
-    /// Steps, those that were tried and not taken included: each takes the merit and its derivatives.
-    /// At least the one with which it began.
+    /// The number of evaluations of the merit with derivatives, those of rejected steps included;
+    /// at least 1 for the start.
     pub gradients: usize,
 }
 
-/// The pace may not fall below this part of the first one.
+/// The minimum rate, relative to the initial one.
 const MIN_RATE: f64 = 0.02;
-/// A stretch that went well is followed by a faster one, up to this part of the first pace.
+/// The maximum rate, relative to the initial one, and its growth after a successful segment.
 const MAX_RATE: f64 = 2.0;
 const RATE_GROWTH: f64 = 1.2;
-/// One that led to nothing better, by a slower one.
+/// The factor of the rate after a segment without improvement.
 const RATE_DECAY: f64 = 0.8;
 
 impl DescentState {
-    /// The stretch has led to something better: the next one may be bolder.
+    /// Raises the rate after a segment that improved the merit.
     pub fn grow_step(&mut self) {
         self.pace = Some((RATE_GROWTH * self.pace.unwrap_or(1.0)).min(MAX_RATE));
     }
 
-    /// The stretch has led to nothing better: the next one is more cautious.
+    /// Lowers the rate after a segment that did not improve the merit.
     pub fn shrink_step(&mut self) {
         self.pace = Some((RATE_DECAY * self.pace.unwrap_or(1.0)).max(MIN_RATE));
     }
 
-    /// The stretch has led to something worse: the next one is more cautious and begins afresh.
+    /// Halves the rate and resets the moments after a segment that worsened the merit.
     pub fn restart_slower(&mut self) {
         self.pace = Some((0.5 * self.pace.unwrap_or(1.0)).max(MIN_RATE));
         self.moments = AdamMoments::default();
     }
 }
 
-/// Takes steps from a lens, whose merit has its own rays. A step that
-/// would make the lens invalid is shortened; where none is left, the stretch ends early.
+/// Takes the steps of a segment from a lens, whose rays `merit` holds. A step that would make the
+/// lens invalid is shortened; if none remains, the segment ends early.
 ///
 /// # Errors
-/// A lens without variables, or one without merit.
+/// A lens without variables or without a merit.
 pub fn run_segment(
     merit: Merit,
     lens: &Lens,

@@ -1,41 +1,41 @@
-//! What every local search shares: scaled variables with bounds, the best lens, and the rule that
-//! no step may make the lens invalid.
+//! The state shared by all local optimizers: scaled variables with bounds, the best lens, and steps
+//! that never make the lens invalid.
 
 use super::OptimizationProgress;
 use crate::lens::{ASPHERE_TERMS, Lens, Medium, Quantity, RADIAL_TERMS, Variable};
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
 use crate::solve::AdamMoments;
 
-/// How often a step is halved before it is given up.
+/// The number of times a step is halved before it is rejected.
 const MAX_HALVINGS: usize = 12;
-/// Steps between two searches for the rays of the spots.
+/// The number of steps after which the rays of the spots are found anew.
 const RESAMPLE: usize = 25;
-/// As many of these without a better lens end the search.
+/// The number of consecutive verifications without a better lens that end the search.
 const PATIENCE: usize = 4;
-/// Relative improvement below which a lens counts as no better.
+/// The relative improvement below which a lens counts as no better.
 const SMALLEST_GAIN: f64 = 1e-4;
 
-/// A lens on its way.
+/// A lens under optimization, with its merit function and the best lens so far.
 #[derive(Debug, Clone)]
 pub(super) struct OptimizerState {
     pub(super) merit: Merit,
     /// The variables at the current step.
     pub(super) values: Vec<f64>,
-    /// What a change of one means for each variable.
+    /// The change of each variable that corresponds to a scaled step of 1.
     pub(super) scales: Vec<f64>,
-    /// The most that it may mean.
+    /// The upper bound of each scale.
     max_scales: Vec<f64>,
     pub(super) current: Lens,
     pub(super) best: Lens,
     pub(super) value: f64,
     pub(super) best_value: f64,
-    /// The best lens by its own rays, and what it is worth.
+    /// The best lens with newly found rays, and its merit.
     verified: Lens,
     verified_value: f64,
-    /// How often since then none better was found.
+    /// The number of verifications since then that found no better lens.
     failed_verifications: usize,
     pub(super) steps: usize,
-    /// How often a lens had a merit, in whatever detail: one that has none costs little.
+    /// The number of successful evaluations of the merit; failed ones cost little.
     pub(super) evaluations: usize,
     pub(super) refused: Option<String>,
 }
@@ -45,7 +45,7 @@ impl OptimizerState {
         Self::with_evaluation(merit, lens, DerivativeLevel::Value).map(|(state, _)| state)
     }
 
-    /// A lens at the beginning of a search, with its merit in some detail.
+    /// Starts from a lens; returns its merit with the derivatives asked for.
     pub(super) fn with_evaluation(
         merit: Merit,
         lens: &Lens,
@@ -77,8 +77,8 @@ impl OptimizerState {
         Ok((state, sum))
     }
 
-    /// Moves by a step in scaled variables, halved until the lens is valid; returns how much of the
-    /// step was taken, nothing where `accept` does not like the merit.
+    /// Takes a step in scaled variables, halved until the lens is valid. Returns the fraction of
+    /// the step that was taken, 0 if `accept` rejects the merit, and the new sum.
     pub(super) fn advance(
         &mut self,
         step: &[f64],
@@ -103,8 +103,8 @@ impl OptimizerState {
         (0.0, None)
     }
 
-    /// Measures every variable by what it does: a change of one alters the residuals by as much as
-    /// they are.
+    /// Rescales every variable by its effect: a scaled step of 1 changes the residuals by their own
+    /// size.
     pub(super) fn rescale(&mut self, sum: &SumOfSquares) {
         for (i, scale) in self.scales.iter_mut().enumerate() {
             let measured = (sum.value / sum.normal[(i, i)]).sqrt();
@@ -114,7 +114,7 @@ impl OptimizerState {
         }
     }
 
-    /// The variables after a fraction of a step, inside their bounds.
+    /// The variables after a fraction of a step, clamped to their bounds.
     fn proposal(&self, step: &[f64], fraction: f64) -> Vec<f64> {
         let moved = |i: usize| {
             let value = self.values[i] + fraction * step[i] * self.scales[i];
@@ -123,7 +123,7 @@ impl OptimizerState {
         (0..self.values.len()).map(moved).collect()
     }
 
-    /// The merit at some values, which must be those of a lens that passes its own check.
+    /// The merit at some values; an error if the lens that they define is invalid.
     fn evaluate(
         &self,
         values: &[f64],
@@ -149,7 +149,7 @@ impl OptimizerState {
         }
     }
 
-    /// Notes why a step was refused and which variable it moved most.
+    /// Records the reason for which a step was rejected and the variable that it moved most.
     fn record_refusal(&mut self, step: &[f64], cause: &MeritError) {
         let most = (0..step.len()).max_by(|a, b| step[*a].abs().total_cmp(&step[*b].abs()));
         let parameter = most.map(|i| self.merit.variables()[i].parameter.to_string());
@@ -157,11 +157,11 @@ impl OptimizerState {
         self.refused = Some(format!("{cause}; the step moved the {parameter} most"));
     }
 
-    /// Every so often the rays of the spots are found anew, because the pupil has moved.
+    /// Finds the rays of the spots anew every [`RESAMPLE`] steps, because the pupil has moved.
     ///
-    /// Between, the merit is that of the rays of some lens before. Only here the best lens shows
-    /// what it is worth by its own rays; a search that finds none better for long has ended. A lens
-    /// that has lost its light goes back to the best one. Returns whether the merit function has
+    /// In between, the merit is that of the rays of an earlier lens. Here the best lens is verified
+    /// with its own rays; a search that finds none better several times in a row has ended. A lens
+    /// that has lost its light is replaced by the best one. Returns true if the merit function has
     /// changed.
     pub(super) fn resample_if_due(&mut self) -> bool {
         if self.steps == 0 || !self.steps.is_multiple_of(RESAMPLE) {
@@ -180,7 +180,7 @@ impl OptimizerState {
         true
     }
 
-    /// Judges the best lens by its own rays, and takes the last one that was so judged instead if
+    /// Evaluates the best lens with its own rays, and returns to the best lens verified before if
     /// that is better.
     pub(super) fn verify_best(&mut self) {
         let mut merit = self.merit.clone();
@@ -199,12 +199,12 @@ impl OptimizerState {
         self.best_value = self.verified_value;
     }
 
-    /// Whether the last looks at the best lens have found none better.
+    /// True if the latest verifications have found no better lens.
     pub(super) fn has_ended(&self) -> bool {
         self.failed_verifications >= PATIENCE
     }
 
-    /// Goes on from the best lens.
+    /// Makes the best lens the current one.
     pub(super) fn return_to_best(&mut self) {
         self.current.clone_from(&self.best);
         self.values = self.merit.values(&self.best);
@@ -223,7 +223,7 @@ impl OptimizerState {
         }
     }
 
-    /// Which variables stand at a bound that a descent would push them through.
+    /// True for each variable at a bound that a descent would cross.
     pub(super) fn at_bounds(&self, gradient: &[f64]) -> Vec<bool> {
         let held = |i: usize| {
             let variable = &self.merit.variables()[i];
@@ -250,7 +250,7 @@ impl OptimizerState {
         step
     }
 
-    /// The terms of the best lens, by its own rays.
+    /// The terms of the best lens, with its own rays.
     pub(super) fn terms(&self) -> Result<Vec<TermValue>, MeritError> {
         let mut merit = self.merit.clone();
         // The rays of the current lens were found a few steps ago.
@@ -266,25 +266,25 @@ fn clamp(variable: &Variable, value: f64) -> f64 {
     variable.max.map_or(low, |max| low.min(max))
 }
 
-/// A change of a variable that bends rays about as much as that of any other: what one step of a
-/// first-order method should be measured in.
+/// The scale of a variable: a change that deflects rays about as much as the scale of any other
+/// variable does.
 fn scale(lens: &Lens, variable: &Variable) -> f64 {
     let size = lens.total_track().max(1e-6);
     let rim = lens.surfaces[variable.parameter.surface].semi_diameter.unwrap_or(0.1 * size);
-    // A rim that is closed is one to be opened, by steps of the size of the others.
+    // A closed rim has to be able to open, by steps of the size of the others.
     let widest = lens.surfaces.iter().filter_map(|row| row.semi_diameter).fold(0.0, f64::max);
     let rim = rim.max(0.5 * widest).clamp(1e-3 * size, size);
     match variable.parameter.quantity {
         Quantity::Curvature => 0.1 / rim.max(0.05 * size),
         Quantity::Conic => 1.0,
-        // As much sag at the rim as a change of the curvature has.
+        // The same sag at the rim as for the scale of the curvature.
         Quantity::Asphere(term) => {
             let power = 2 * term.min(ASPHERE_TERMS) as i32 + 4;
             0.05 / rim.powi(power - 1)
         }
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.1 * rim,
         Quantity::Index => 0.1,
-        // As much index at the rim, or at the other face.
+        // The same index change at the rim, or at the other face, for all coefficients.
         Quantity::Grin(k) => match &lens.surfaces[variable.parameter.surface].medium {
             Medium::Grin(gradient) => {
                 let length = if k < RADIAL_TERMS { rim } else { size };

@@ -1,54 +1,54 @@
-//! Lines, markers, letters and rasters on a white picture.
+//! Lines, markers, letters and rasters on a white image.
 
 use super::color::Color;
 use super::font::glyph;
 use image::{ImageError, ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
 
-/// How large a dot of a letter is, in pixels.
+/// The size of a dot of a letter, in pixels.
 const DOT: i32 = 2;
-/// From one letter to the next, in dots.
+/// The advance from one letter to the next, in dots.
 const ADVANCE: i32 = 6;
-/// How long a dash is and how far it is to the next one, in pixels.
+/// The length of a dash, and the period of dashes, in pixels.
 const DASH: f64 = 8.0;
 const DASH_PERIOD: f64 = 14.0;
 
-/// Where a text stands from its place.
+/// The horizontal alignment of a text to its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TextAlign {
-    /// It begins there.
+    /// The text starts there.
     Left,
-    /// Its middle is there.
+    /// The text is centred there.
     Middle,
-    /// It ends there.
+    /// The text ends there.
     Right,
 }
 
-/// How a curve is drawn.
+/// The stroke of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stroke {
-    /// Without gaps.
+    /// A continuous line.
     Solid,
-    /// With gaps.
+    /// A dashed line.
     Dashed,
 }
 
-/// A picture; places are in pixels from its upper left corner.
+/// An RGB image; positions are in pixels from its upper left corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canvas(RgbImage);
 
 impl Canvas {
-    /// A white picture of this width and height.
+    /// A white image of this width and height.
     pub fn new([width, height]: [u32; 2]) -> Self {
         Self(RgbImage::from_pixel(width, height, Rgb([0xff; 3])))
     }
 
-    /// Width and height.
+    /// Width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.0.width(), self.0.height()]
     }
 
-    /// Its pixels row by row from the upper left corner: red, green, blue.
+    /// The pixels row by row from the upper left corner, three bytes each: red, green, blue.
     pub fn pixels(&self) -> &[u8] {
         self.0.as_raw()
     }
@@ -61,7 +61,7 @@ impl Canvas {
         }
     }
 
-    /// A filled square around a place, `half` pixels to each side.
+    /// Draws a filled square around a position, `half` pixels to each side.
     pub fn square(&mut self, [x, y]: [f64; 2], half: i32, color: Color) {
         let (x, y) = (x.round() as i32, y.round() as i32);
         for dy in -half..=half {
@@ -69,14 +69,14 @@ impl Canvas {
         }
     }
 
-    /// A line one pixel wide.
+    /// Draws a line one pixel wide.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], color: Color) {
         let place = |t: f64| [0, 1].map(|i| from[i] + t * (to[i] - from[i]));
         let steps = length(from, to).ceil().max(1.0);
         (0..=steps as i32).for_each(|i| self.square(place(f64::from(i) / steps), 0, color));
     }
 
-    /// A broken line three pixels wide.
+    /// Draws a polyline three pixels wide.
     pub fn curve(&mut self, points: &[[f64; 2]], color: Color, stroke: Stroke) {
         let mut way = 0.0;
         for pair in points.windows(2) {
@@ -94,12 +94,13 @@ impl Canvas {
         }
     }
 
-    /// A marker at every point.
+    /// Draws a marker at every point.
     pub fn markers(&mut self, points: &[[f64; 2]], color: Color) {
         points.iter().for_each(|point| self.square(*point, 3, color));
     }
 
-    /// A raster from its upper left corner, row by row, `cell` pixels to a side of each value.
+    /// Draws a raster of square cells, `cell` pixels to a side, row by row from its upper left
+    /// corner.
     pub fn raster(&mut self, [x, y]: [f64; 2], columns: usize, cell: usize, colors: &[Color]) {
         let (x, y) = (x.round() as i32, y.round() as i32);
         for (i, color) in colors.iter().enumerate() {
@@ -111,7 +112,7 @@ impl Canvas {
         }
     }
 
-    /// A line of text; the place is at its top.
+    /// Draws a line of text; the position is at its top.
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, color: Color, align: TextAlign) {
         let width = DOT * ADVANCE * text.chars().count() as i32;
         let start = x.round() as i32
@@ -136,7 +137,7 @@ impl Canvas {
         }
     }
 
-    /// The picture as a file.
+    /// The image as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>, ImageError> {
         let mut bytes = Cursor::new(Vec::new());
         self.0.write_to(&mut bytes, ImageFormat::Png)?;

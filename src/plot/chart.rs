@@ -1,21 +1,21 @@
-//! A chart: two axes, and the way from two quantities to a place on the canvas.
+//! A chart: two axes, and the mapping from two quantities to pixels.
 
 use super::canvas::{Canvas, TextAlign};
 use super::color::{BLACK, GRID};
 
-/// About how many lines a linear axis has.
+/// The approximate number of ticks of a linear axis.
 const TICKS: f64 = 5.0;
-/// A line this close to the end of an axis, in steps, still belongs to it.
+/// A tick this close beyond the end of an axis, in tick intervals, still belongs to it.
 const END_TOLERANCE: f64 = 1e-6;
-/// Room for the letters of an axis, in pixels.
+/// The distance of tick labels from an axis, in pixels.
 const PADDING: f64 = 10.0;
 const HALF_LETTER: f64 = 7.0;
 
-/// An axis from one whole step to another.
+/// An axis that ends at ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     name: String,
-    /// The ends; for a logarithmic axis those of the decimal logarithm.
+    /// The ends; for a logarithmic axis their decimal logarithms.
     low: f64,
     high: f64,
     step: f64,
@@ -23,7 +23,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis around all values.
+    /// A linear axis that contains all values.
     pub fn linear(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = range(values).unwrap_or((0.0, 1.0));
         let width = if high > low { high - low } else { low.abs().max(1.0) };
@@ -33,8 +33,8 @@ impl Axis {
         Self { name: name.to_owned(), low, high, step, logarithmic: false }
     }
 
-    /// A logarithmic axis from one power of ten to another, around all values; what is smaller than
-    /// `smallest` is drawn at its foot.
+    /// A logarithmic axis between two powers of ten that contains all values; values below
+    /// `smallest` are drawn at its lower end.
     pub fn logarithmic(name: &str, values: impl IntoIterator<Item = f64>, smallest: f64) -> Self {
         let logs = values.into_iter().map(|value| value.max(smallest).log10());
         let (low, high) = range(logs).unwrap_or((-1.0, 1.0));
@@ -42,13 +42,13 @@ impl Axis {
         Self { name: name.to_owned(), low, high, step: 1.0, logarithmic: true }
     }
 
-    /// Where a value stands, 0 at the beginning of the axis and 1 at its end.
+    /// The position of a value along the axis, 0 at its start and 1 at its end.
     fn fraction(&self, value: f64) -> f64 {
         let place = if self.logarithmic { value.log10().max(self.low) } else { value };
         (place - self.low) / (self.high - self.low)
     }
 
-    /// The lines of the grid with their labels.
+    /// The positions of the ticks along the axis, with their labels.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> + '_ {
         let [first, last] = [
             (self.low / self.step - END_TOLERANCE).ceil(),
@@ -63,7 +63,7 @@ impl Axis {
         })
     }
 
-    /// The same axis with more room on both sides until it has this length.
+    /// The axis widened on both sides to this length.
     fn widened(mut self, length: f64) -> Self {
         let more = 0.5 * (length - (self.high - self.low)).max(0.0);
         self.low -= more;
@@ -80,14 +80,14 @@ fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// The nearest of 1, 2 and 5 times a power of ten that is not less.
+/// The smallest of 1, 2 and 5 times a power of ten that is not less.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.log10().floor());
     let digits = [1.0, 2.0, 5.0, 10.0];
     power * digits.into_iter().find(|digit| digit * power >= 0.999 * step).unwrap_or(10.0)
 }
 
-/// A place on an axis with as many digits as its steps need.
+/// The label of a tick, with the digits that the tick interval needs.
 fn label(place: f64, step: f64) -> String {
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     if decimals > 4 || step >= 1e6 {
@@ -97,7 +97,7 @@ fn label(place: f64, step: f64) -> String {
     if text.trim_start_matches(['-', '0', '.']).is_empty() { "0".to_owned() } else { text }
 }
 
-/// A rectangle of the canvas with two axes.
+/// A rectangle of a canvas with two axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     left: f64,
@@ -109,12 +109,12 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// A chart between two corners of the canvas, the upper left one first.
+    /// A chart between two corners of the canvas, the upper left one first, in pixels.
     pub fn new([left, top]: [f64; 2], [right, bottom]: [f64; 2], x: Axis, y: Axis) -> Self {
         Self { left, right, top, bottom, x, y }
     }
 
-    /// The same with as many pixels a unit on one axis as on the other: a map.
+    /// The chart with the same scale, in pixels per unit, on both axes, as for a map.
     #[must_use]
     pub fn with_equal_scales(mut self) -> Self {
         let (width, height) = (self.right - self.left, self.bottom - self.top);
@@ -125,7 +125,7 @@ impl Chart {
         self
     }
 
-    /// Where two quantities stand on the canvas.
+    /// The position of two quantities on the canvas, in pixels.
     pub fn to_pixel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [
             self.left + (self.right - self.left) * self.x.fraction(x),
@@ -133,18 +133,18 @@ impl Chart {
         ]
     }
 
-    /// Whether two quantities are within the axes.
+    /// True if two quantities are within the axes.
     pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
         let within = |share: f64| (0.0..=1.0).contains(&share);
         within(self.x.fraction(x)) && within(self.y.fraction(y))
     }
 
-    /// Where several pairs of quantities stand.
+    /// The positions of several pairs of quantities on the canvas, in pixels.
     pub fn to_pixels(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
         points.iter().map(|point| self.to_pixel(*point)).collect()
     }
 
-    /// Draws the grid, the numbers and the names of the axes, and a title above.
+    /// Draws the grid, the tick labels, the names of the axes, and a title above.
     pub fn draw(&self, canvas: &mut Canvas, title: &str) {
         self.draw_grid(canvas);
         self.draw_frame(canvas);

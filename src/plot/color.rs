@@ -1,16 +1,16 @@
-//! Colours: a few to tell curves apart, and scales for rasters.
+//! Colours: a palette for curves, and colour maps for rasters.
 
 /// Red, green, blue.
 pub type Color = [u8; 3];
 
 /// Text and axes.
 pub const BLACK: Color = [0; 3];
-/// What stands in the background.
+/// Elements in the background.
 pub const GREY: Color = [0x7f; 3];
-/// The lines of a grid.
+/// Grid lines.
 pub const GRID: Color = [0xdd; 3];
 
-/// Colours that are told apart easily, the most telling ones first.
+/// Colours that are easy to distinguish, the most distinct ones first.
 pub const PALETTE: [Color; 8] = [
     [0xd6, 0x27, 0x28],
     [0x1f, 0x77, 0xb4],
@@ -22,12 +22,12 @@ pub const PALETTE: [Color; 8] = [
     [0x17, 0xbe, 0xcf],
 ];
 
-/// From black at 0 to white at 1.
+/// A grey from black at 0 to white at 1.
 pub fn gray_level(value: f64) -> Color {
     [byte(value); 3]
 }
 
-/// From blue at −1 over white at 0 to red at 1.
+/// A diverging colour map: blue at −1, white at 0, red at 1.
 pub fn diverging(value: f64) -> Color {
     let faded = byte(1.0 - value.abs());
     if value < 0.0 { [faded, faded, 0xff] } else { [0xff, faded, faded] }

@@ -3,7 +3,8 @@
 /// The first letter of the table.
 const FIRST: u32 = 0x20;
 
-/// The five columns of a letter, the top dot in the lowest bit; a hollow box for what has none.
+/// The five columns of a letter, the top dot in the lowest bit; a hollow box for a character
+/// without a glyph.
 pub(super) fn glyph(letter: char) -> [u8; 5] {
     let place = u32::from(letter).checked_sub(FIRST).and_then(|i| usize::try_from(i).ok());
     place.and_then(|i| GLYPHS.get(i)).copied().unwrap_or([0x7f, 0x41, 0x41, 0x41, 0x7f])

@@ -1,7 +1,6 @@
-//! Plots and images as PNG: lines, markers, letters, charts with axes, rasters in false colours.
+//! Plots and images as PNG: lines, markers, text, charts with axes, rasters in false colours.
 //!
-//! A [`Canvas`] knows pixels, a [`Chart`] leads from two quantities to them. Neither knows what is
-//! drawn.
+//! A [`Canvas`] knows pixels, a [`Chart`] maps two quantities to them. Neither knows what is drawn.
 
 mod canvas;
 mod chart;

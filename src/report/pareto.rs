@@ -10,27 +10,27 @@ use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, PALETTE, Stroke
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A front with what it is compared to.
+/// A Pareto front with its starting lens and a front to compare with.
 #[derive(Debug, Clone, Copy)]
 pub struct ParetoReport<'a> {
-    /// What the lens is called.
+    /// The name of the lens.
     pub name: &'a str,
-    /// The lens that the search has started from.
+    /// The starting lens.
     pub start: &'a ParetoPoint,
-    /// What was found.
+    /// The front.
     pub front: &'a Front,
-    /// Spot in mm and light in mm² of the lenses that were looked at; may be empty.
+    /// The spot in mm and the light in mm² of all lenses evaluated; may be empty.
     pub tried: &'a [[f64; 2]],
-    /// What the same search finds when the derivatives keep the pupils as they are.
+    /// The front found with frozen pupils, that is with biased derivatives.
     pub biased: Option<&'a Front>,
 }
 
 /// The head of the table.
 const HEAD: &str = "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,rays,file\n";
-/// Width and height of the picture, in pixels, and its margins: left, top, right, bottom.
+/// The width and height of the plot in pixels, and its margins: left, top, right, bottom.
 const SIZE: [u32; 2] = [1000, 720];
 const MARGINS: [f64; 4] = [110.0, 110.0, 40.0, 90.0];
-/// From one line of the legend to the next, in pixels.
+/// The distance between two lines of the legend, in pixels.
 const LINE: f64 = 22.0;
 
 impl ParetoReport<'_> {
@@ -69,7 +69,7 @@ impl ParetoReport<'_> {
         text
     }
 
-    /// Every lens with the name of its file.
+    /// All lenses with the names of their files.
     fn lenses(&self) -> Vec<(String, &ParetoPoint)> {
         let biased = self.biased.map_or(&[][..], Front::points);
         let mut all = vec![("start.json".to_owned(), self.start)];
@@ -80,7 +80,7 @@ impl ParetoReport<'_> {
         all
     }
 
-    /// Spot against light: the front over all that was tried, and the biased front in grey.
+    /// Spot against light: the front over all lenses evaluated, and the biased front in grey.
     pub fn plot(&self) -> Canvas {
         let mut canvas = Canvas::new(SIZE);
         let (front, start) = (places(self.front.points()), place(self.start));
@@ -119,7 +119,7 @@ impl ParetoReport<'_> {
     }
 }
 
-/// The axes: around the fronts and the start, not around all that was tried on the way.
+/// The chart, with axes that contain the fronts and the start but not all lenses evaluated.
 fn chart(shown: &[&[[f64; 2]]]) -> Chart {
     let all = || shown.iter().flat_map(|points| points.iter());
     let x = Axis::linear("light, mm^2", all().map(|point| point[0]));

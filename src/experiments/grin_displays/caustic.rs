@@ -1,8 +1,9 @@
 //! Figure 5.7: light gathered into a ring near the field, far behind it, and in both places at once.
 //!
-//! Near or far alone the ring is a picture, which says how bright every place shall be. Both at once
-//! are the rings of the thesis: a ray shall be somewhere on the one and go on somewhere to the other
-//! (5.36 and 5.37). That loss does not ask for even light, so some parts are brighter than others.
+//! Near or far alone the ring is a target image, which defines the brightness everywhere. Both at
+//! once are the rings of the thesis: a ray has to pass anywhere through the one and then anywhere
+//! through the other (5.36 and 5.37). That loss does not ask for even brightness, so some parts are
+//! brighter than others.
 
 use super::image_plots::{draw_row, gray_levels};
 use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
@@ -24,17 +25,17 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// The least quality in dB and the least correlation of a ring as a picture.
+/// The minimum quality in dB and the minimum correlation of a ring as an image.
 const LEAST: [[f64; 2]; 2] = [[24.0, 0.97], [6.0, 0.4]];
-/// By how much rays may miss their rings, in the root mean square: in mm, and in degrees.
+/// The largest RMS distances of rays from their rings: in mm, and in degrees.
 const MISSED: [[f64; 2]; 2] = [[0.06, 1.5], [0.2, 5.0]];
-/// How wide the ring may be on any screen behind the near one, as a share of its radius.
+/// The largest width of the ring on any screen behind the near one, relative to its radius.
 const WIDTH: [f64; 2] = [0.15, 0.4];
-/// Screens, in mm behind the field; that of the near ring is one of them.
+/// The distances of the screens behind the field in mm; that of the near ring is one of them.
 const PLANES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
-/// How well rays are traced here, in mm.
+/// The tolerance of the rays, in mm.
 const TOLERANCE: f64 = 1e-3;
-/// Cells along a side of an image, and its side in times of the ring's diameter.
+/// The number of cells along a side of an image, and its side relative to the diameter of the ring.
 const CELLS: usize = 96;
 const ROOM: f64 = 1.6;
 
@@ -70,7 +71,7 @@ fn pictures_of(shown: &EvaluatedField, [image, section]: [&'static str; 2]) -> V
     pictures
 }
 
-/// The rings near and far at once.
+/// Adds the experiment with both rings at once.
 fn rings(
     outcome: &mut ExperimentOutcome,
     effort: Effort,
@@ -111,15 +112,15 @@ fn rings(
     Ok(())
 }
 
-/// Light behind a field, by its rays across the axis of the beam: where they leave, and how fast they
-/// move away.
+/// The light behind a field, as rays in the coordinates across the axis of the beam: exit position
+/// and slope.
 struct ExitBeam {
     rays: Vec<([f64; 2], [f64; 2])>,
     all: usize,
 }
 
 impl ExitBeam {
-    /// The light of the first view, which goes along z.
+    /// The light of the first view, which travels along z.
     fn behind(task: &GrinTask, medium: &GrinField) -> Result<Self, ExperimentError> {
         let task = independent_task(task);
         let (space, rays) = task.scoring_rays(&task.views[0]);
@@ -137,7 +138,7 @@ impl ExitBeam {
         Ok(Self { rays: arrived.map(ray).collect(), all: rays.len() })
     }
 
-    /// Where the rays are at a distance behind the field.
+    /// The positions of the rays at a distance behind the field.
     fn positions(&self, distance: f64) -> Vec<[f64; 2]> {
         let place = |(x, v): &([f64; 2], [f64; 2])| [0, 1].map(|i| x[i] + distance * v[i]);
         self.rays.iter().map(place).collect()
@@ -152,12 +153,12 @@ impl ExitBeam {
         self.rays.iter().map(|(_, [u, v])| u.hypot(*v).atan().to_degrees()).collect()
     }
 
-    /// The light on every screen, each drawn as large as its ring, and at infinity.
+    /// Draws the light on every screen, scaled to the ring, and at infinity.
     fn draw(&self) -> Canvas {
         let panel = |title: String, places: &[[f64; 2]]| {
             let radii: Vec<f64> = places.iter().map(|[x, y]| x.hypot(*y)).collect();
             let light = count_in_cells(places, ROOM * mean_and_deviation(&radii).0);
-            // A caustic has peaks that would leave the rest black.
+            // A caustic has peaks that would make the rest black.
             let shown: Vec<f64> = light.iter().map(|light| light.sqrt()).collect();
             let peak = shown.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
             (title, gray_levels(&shown, CELLS, peak))
@@ -170,7 +171,7 @@ impl ExitBeam {
     }
 }
 
-/// How many places fall into each cell of a square, rows from the bottom.
+/// The number of points in each cell of a square, rows from the bottom.
 fn count_in_cells(places: &[[f64; 2]], half: f64) -> Vec<f64> {
     let mut light = vec![0.0; CELLS * CELLS];
     let cell = |x: f64| (x / half + 1.0) * 0.5 * CELLS as f64;

@@ -1,8 +1,8 @@
-//! Figure 5.4: a display that shows two pictures, one to each of two beams at a right angle.
+//! Figure 5.4: a display of two images, one for each of two beams at a right angle.
 //!
-//! The portraits of the thesis are replaced by a face and a letter. Finer levels descend by smaller
-//! steps: with the steps of a coarse level the noise of fresh rays would move every one of their many
-//! coefficients, most of which few rays meet, and undo what the coarse level has found.
+//! The portraits of the thesis are replaced by a face and a letter. Finer levels use smaller steps:
+//! with the steps of a coarse level, the noise of new rays would disturb all of their many
+//! coefficients, most of which few rays cross, and destroy the result of the coarse level.
 
 use super::{outcome_of, solve_and_evaluate, task};
 use crate::experiments::{
@@ -17,9 +17,9 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Nodes along a side, in full and as a test.
+/// The nodes along a side, in full and as a test.
 const NODES: [usize; 2] = [33, 9];
-/// The least quality in dB and the least correlation.
+/// The minimum quality in dB and the minimum correlation.
 const LEAST: [[f64; 2]; 2] = [[24.0, 0.97], [14.0, 0.75]];
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {

@@ -1,15 +1,15 @@
-//! Images that light makes, beside the pictures that are wanted.
+//! Plots of images beside their targets.
 
 use crate::grin_task::ViewImage;
 use crate::plot::{BLACK, Canvas, Color, GREY, TextAlign, gray_level};
 
-/// About the side of an image, in pixels of the canvas.
+/// The approximate side of an image on the canvas, in pixels.
 const SIDE: usize = 384;
 const MARGIN: f64 = 40.0;
 const TOP: f64 = 110.0;
 
-/// The picture that is wanted at the left, what light makes of it at the right, both with white for
-/// the brightest place of the former.
+/// Plots the target image at the left and the image by traced rays at the right, both with white
+/// for the brightest pixel of the target.
 pub fn plot_view(name: &str, image: &ViewImage, quality: f64) -> Canvas {
     let correlation = image.correlation();
     let subtitle = format!("{quality:.1} dB, correlation {correlation:.3}");
@@ -20,13 +20,13 @@ pub fn plot_view(name: &str, image: &ViewImage, quality: f64) -> Canvas {
     draw_row(&format!("{name}: {subtitle}"), image.pixels, &panels)
 }
 
-/// Light as shades of grey, rows from the top.
+/// Light as grey levels, rows from the top.
 pub(super) fn gray_levels(light: &[f64], pixels: usize, peak: f64) -> Vec<Color> {
     let rows = light.chunks(pixels.max(1)).rev();
     rows.flatten().map(|value| gray_level(value / peak)).collect()
 }
 
-/// Square images side by side, each under its title.
+/// Draws square images side by side, each under its title.
 pub(super) fn draw_row(title: &str, pixels: usize, panels: &[(String, Vec<Color>)]) -> Canvas {
     let cell = (SIDE / pixels.max(1)).max(1);
     let side = (cell * pixels) as f64;

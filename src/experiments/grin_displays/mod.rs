@@ -1,7 +1,7 @@
-//! Figures 5.4 to 5.7: what a field of refractive index can show, to one beam or to two.
+//! Figures 5.4 to 5.7: GRIN fields as displays, for one beam or for two.
 //!
-//! A search sees other rays in every step and has never seen those by which it is judged here: more
-//! of them, traced with half of its step.
+//! The optimization uses different rays in every step and none of those by which its result is
+//! evaluated here: more rays, traced with half of its step.
 
 pub(super) mod caustic;
 pub(super) mod display;
@@ -20,21 +20,21 @@ use crate::grin_task::{
     self, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport,
 };
 
-/// Rays along a side of a beam that judges, for each of one that is searched with.
+/// The rays along a side of a beam in the evaluation, relative to the optimization.
 const FINER: f64 = 1.57;
-/// Rays that may be left out, as a share.
+/// The largest fraction of excluded rays.
 const LEFT_OUT: f64 = 1e-3;
-/// What rounding may take of the lowest index.
+/// The tolerance of the lowest index for rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// A task that comes with the program.
+/// A built-in task.
 fn builtin(name: &str) -> Result<GrinTask, ExperimentError> {
     let builtin = grin_task::find_builtin(name)
         .ok_or_else(|| ExperimentError::Failed(format!("no task `{name}`")))?;
     builtin.task().map_err(ExperimentError::from_error)
 }
 
-/// The same task for a test: only its first levels, fewer rays, coarser pictures.
+/// The task reduced for a test: its first levels only, fewer rays, coarser images.
 fn reduced(mut task: GrinTask, levels: usize) -> GrinTask {
     task.levels.truncate(levels);
     for view in &mut task.views {
@@ -48,7 +48,7 @@ fn reduced(mut task: GrinTask, levels: usize) -> GrinTask {
     task
 }
 
-/// The same task with rays that no step of its search has, and half of its step.
+/// The task with rays that its optimization does not use, and half of its step.
 fn independent_task(task: &GrinTask) -> GrinTask {
     let mut other = task.clone();
     for view in &mut other.views {
@@ -62,13 +62,13 @@ fn independent_task(task: &GrinTask) -> GrinTask {
     other
 }
 
-/// A field that was found, and what other rays make of it.
+/// A solved task with the images of its field by independent rays.
 struct EvaluatedField {
     runner: GrinOptimizer,
     seen: Vec<ViewReport>,
 }
 
-/// Works on a task; it is a part of the whole work.
+/// Solves a task, which is a part of the whole work, and evaluates it.
 fn solve_and_evaluate(
     task: &GrinTask,
     part: [f64; 2],
@@ -79,12 +79,12 @@ fn solve_and_evaluate(
     Ok(EvaluatedField { runner, seen })
 }
 
-/// What rays that no search has seen make of a field.
+/// Evaluates a field with rays that its optimization has not used.
 fn evaluate(task: &GrinTask, medium: &GrinField) -> Result<Vec<ViewReport>, ExperimentError> {
     independent_task(task).report_views(medium).map_err(ExperimentError::from_error)
 }
 
-/// Columns of the table of views.
+/// The columns of the table of views.
 const COLUMNS: [&str; 10] = [
     "view",
     "nodes",
@@ -121,7 +121,7 @@ impl EvaluatedField {
         }
     }
 
-    /// What every image must be: so good, and of nearly all rays.
+    /// The claims about every image: its quality, its correlation, and few excluded rays.
     fn claims(&self, quality: f64, correlation: f64) -> Vec<Claim> {
         let mut claims = Vec::new();
         for (view, seen) in self.runner.task().views.iter().zip(&self.seen) {
@@ -140,7 +140,7 @@ impl EvaluatedField {
         claims
     }
 
-    /// What a maker can make holds for the field.
+    /// The claims that the field can be manufactured.
     fn manufacturability(&self) -> [Claim; 2] {
         let task = self.runner.task();
         let extremes = task.extremes(self.runner.best());
@@ -151,7 +151,7 @@ impl EvaluatedField {
         ]
     }
 
-    /// Its images beside the pictures that are wanted.
+    /// The plots of its images beside the target images.
     fn pictures(&self, names: &[&'static str]) -> Vec<NamedPlot> {
         let images = self.seen.iter().filter_map(|seen| Some((seen, seen.image.as_ref()?)));
         let picture = |((seen, image), name): ((&ViewReport, _), &&'static str)| {
@@ -162,7 +162,7 @@ impl EvaluatedField {
         images.zip(names).map(picture).collect()
     }
 
-    /// Rays that were traced, forwards.
+    /// The number of rays traced forwards.
     fn rays(&self) -> usize {
         let judging: usize = self.seen.iter().map(|seen| seen.result.counts.fates.total()).sum();
         usize::try_from(self.runner.rays_traced()).unwrap_or(usize::MAX).saturating_add(judging)

@@ -1,10 +1,10 @@
-//! Figure 5.6: a display whose picture depends on where the screen stands, as a scene depends on
-//! where a camera is focused.
+//! Figure 5.6: a display whose image depends on the distance of the screen, as that of a scene
+//! depends on the focus of a camera.
 //!
 //! The scene has a ring in front, a cross in the middle and a square behind, evenly spaced in
-//! dioptres; the light field of the thesis is replaced by it. Three planes ask more than a beam can
-//! give, since a ray that is in its place on two of them is where it must be on the third: the
-//! images are less exact than those of one plane.
+//! dioptres; it replaces the light field of the thesis. Three planes are more than a beam can
+//! satisfy, since the position of a ray on two of them determines that on the third: the images are
+//! less exact than those of one plane.
 
 use super::{EvaluatedField, outcome_of, solve_and_evaluate, task};
 use crate::experiments::{
@@ -19,10 +19,10 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// The least quality in dB and the least correlation, in full and as a test.
+/// The minimum quality in dB and the minimum correlation, in full and as a test.
 const LEAST: [[f64; 2]; 2] = [[23.0, 0.9], [16.0, 0.6]];
 
-/// A coarse field is too smooth for what is in focus.
+/// The tolerance of the claim in a test: a coarse field is too smooth for a sharp image.
 const BLURRED: f64 = 0.5;
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -35,7 +35,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     Ok(outcome)
 }
 
-/// Every image is more like the picture of its own plane than like that of any other.
+/// The claims that every image resembles the target of its own plane more than that of any other.
 fn own_plane_claims(shown: &EvaluatedField, least: f64) -> Vec<Claim> {
     let images: Vec<_> = shown.seen.iter().filter_map(|seen| seen.image.as_ref()).collect();
     let views = &shown.runner.task().views;

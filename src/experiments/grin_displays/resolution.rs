@@ -1,8 +1,10 @@
-//! Figure 5.5: what the resolution of a field brings, on trilinear grids and with tricubic splines.
+//! Figure 5.5: the effect of the resolution of a field, on trilinear grids and with tricubic
+//! splines.
 //!
-//! The gradient of a trilinear field jumps at the faces of its voxels. A Hessian without these jumps
-//! is the exact derivative of what is computed and not of what light does: where the field is fine
-//! and rough it leads the search astray, and the smoothed one is better. A spline has no jumps.
+//! The gradient of a trilinear field jumps at the faces of its voxels. A Hessian without these
+//! jumps is the exact derivative of the computation but not of the physical rays: for fine and
+//! rough fields it misleads the optimization, and the smoothed one is better. A spline has no
+//! jumps.
 
 use super::image_plots::{draw_row, gray_levels};
 use super::{builtin, evaluate, reduced, solve_from};
@@ -21,12 +23,12 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// How a field is made up.
+/// The interpolation of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum InterpolationKind {
-    /// With the Hessian between the nodes alone.
+    /// Trilinear with the Hessian between the nodes alone.
     Exact,
-    /// With its jumps, smoothed.
+    /// Trilinear with the smoothed Hessian, which includes the jumps.
     Smoothed,
     Tricubic,
 }
@@ -34,12 +36,12 @@ enum InterpolationKind {
 const KINDS: [InterpolationKind; 3] =
     [InterpolationKind::Exact, InterpolationKind::Smoothed, InterpolationKind::Tricubic];
 
-/// By how much the next resolution is better at least, in dB.
+/// The minimum gain of the next resolution, in dB.
 const GAIN: f64 = 0.5;
-/// By how much the tricubic field is better at the finest one, in dB, in full and as a test.
+/// The minimum gain of the tricubic field at the finest resolution in dB, in full and as a test.
 const SMOOTHER: [f64; 2] = [5.0, 2.0];
 
-/// By how much the smoothed Hessian is better at the finest resolution, in dB; on a coarse grid both
+/// The minimum gain of the smoothed Hessian at the finest resolution, in dB; on a coarse grid both
 /// differ by less.
 const SMOOTHED: f64 = 0.1;
 
@@ -101,7 +103,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     Ok(outcome)
 }
 
-/// The field of the first levels of a task, with one of its views.
+/// Solves the first levels of a task, with one of its views.
 fn find(
     task: &GrinTask,
     kind: InterpolationKind,
@@ -190,7 +192,7 @@ fn chart(rows: &[ResolutionRow]) -> Canvas {
     canvas
 }
 
-/// The images of the tricubic fields, and the picture that is wanted.
+/// Draws the images of the tricubic fields and the target image.
 fn images(rows: &[ResolutionRow]) -> Canvas {
     let rows = rows_of(rows, InterpolationKind::Tricubic);
     let all: Vec<(&ResolutionRow, &ViewImage)> =

@@ -1,10 +1,10 @@
 //! Figure 4.5: RESTORE against brute force, which adds a singlet behind every element, removes each
-//! one, and descends from every such lens for its part of the gradients.
+//! one, and descends from every such lens with an equal part of the gradients.
 //!
-//! Metropolis and Hastings stand beside them, and a descent from the start that never mutates: what
-//! lies below it is what mutations are worth. No claim is made about that one, and none would hold:
-//! from a published lens in a long valley (135 mm) it comes as low as the search, which spends its
-//! gradients on many structures.
+//! Metropolis-Hastings and a descent without mutations are plotted for comparison; the gap to the
+//! latter is the gain by mutations. No claim is made about it, and none would hold: from a
+//! published lens in a long valley (135 mm) it reaches the same merit as the search, which spends
+//! its gradients on many structures.
 
 use super::sampler_comparison::{SamplerComparison, SamplerKind};
 use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};

@@ -1,8 +1,8 @@
 //! Figure 4.7: the front of sharpness against light, with mutations and without.
 //!
 //! A sweep over weights gives the front that the structure of the lens can reach. From designs of
-//! it, each with the weight and the objective that it was found with, two searches go on for as many
-//! gradients: one mutates, one descends only. The best lens of each joins the front of its side.
+//! it, each with its weight and objective, two searches continue for the same number of gradients:
+//! one with mutations, one by descent alone. The best lens of each joins the front of its side.
 
 use super::recorded_search::{RecordedSearch, run_to_end};
 use super::sampler_comparison::SamplerKind;
@@ -28,11 +28,11 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// The lens of the front.
+/// The starting lens of the front.
 const FILE: &str = "double_gauss_nikkor_s_50";
-/// The part of the work that is the sweep.
+/// The part of the sweep in the whole work.
 const SWEEP_SHARE: f64 = 0.4;
-/// How exact the numbers of a design are, relatively.
+/// The relative accuracy of the numbers of a design.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -59,7 +59,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     Ok(outcome)
 }
 
-/// The front that the lens can reach as it is.
+/// The front that the structure of the lens can reach.
 fn run_sweep(
     start: &Lens,
     settings: &ParetoSettings,
@@ -77,7 +77,7 @@ fn run_sweep(
     }
 }
 
-/// Designs of a front with their weights, evenly among all.
+/// Designs of a front with their weights, evenly distributed along it.
 fn select_designs(front: &Front, count: usize) -> Vec<(ParetoPoint, f64)> {
     let weighted = front.points().iter().filter_map(|d| Some((d.clone(), d.weight?)));
     let all: Vec<(ParetoPoint, f64)> = weighted.filter(|(_, weight)| *weight > 0.0).collect();
@@ -87,11 +87,11 @@ fn select_designs(front: &Front, count: usize) -> Vec<(ParetoPoint, f64)> {
     (0..count).map(|i| all[place(i)].clone()).collect()
 }
 
-/// What mutations have found, and what a longer descent has.
+/// The fronts found with mutations, and by a longer descent.
 struct MutationGain {
     mutated: Front,
     descended: Front,
-    /// Those that mutations have found.
+    /// The designs found with mutations.
     found: Vec<ParetoPoint>,
     rays: usize,
 }
@@ -151,7 +151,7 @@ impl MutationGain {
                 longer,
             ),
         ];
-        // A test has no room for more.
+        // A test is too short for more.
         if effort == Effort::Full {
             let says = "designs beyond the front of descents as long";
             claims.push(Claim::at_least(says, new as f64, 1.0));
@@ -176,7 +176,7 @@ impl MutationGain {
         })
     }
 
-    /// The plane of blur and light, and the lenses at the ends of the front with their spots.
+    /// Draws the plane of blur and light, and the lenses at the ends of the front with their spots.
     fn draw(&self, sweep: &ParetoSweep) -> Result<Canvas, ExperimentError> {
         let mut canvas = Canvas::new([2020, 1000]);
         let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
@@ -213,7 +213,7 @@ impl MutationGain {
     }
 }
 
-/// A front that more designs have been offered to.
+/// The front of a front and more designs.
 fn extend_front(front: &Front, found: &[ParetoPoint]) -> Front {
     let mut front = front.clone();
     found.iter().for_each(|design| {
@@ -222,7 +222,8 @@ fn extend_front(front: &Front, found: &[ParetoPoint]) -> Front {
     front
 }
 
-/// The search that goes on where the sweep was with this weight: the same objective, no wider rims.
+/// The search that continues the sweep at a weight: the same objective and the same bounds of
+/// semi-diameters.
 fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> Result<SearchPlan, ExperimentError> {
     let goal = weighted_sum_goal(&start.lens, start.light, PupilEdge::Moving);
     let mut goal = goal.map_err(ExperimentError::from_error)?;

@@ -1,9 +1,9 @@
-//! Figure 4.4: RESTORE against Metropolis and Hastings.
+//! Figure 4.4: RESTORE against Metropolis-Hastings.
 //!
 //! Noise makes Langevin steps small, and nearly every mutation is much worse than the lens that it
-//! comes from, so that it is rejected; RESTORE descends from it first. Both spend as many gradients.
-//! A Langevin step looks for the pupils of the lens anew, a step of a descent only every twentieth
-//! time: by the clock Metropolis and Hastings are farther behind than here.
+//! comes from and is rejected; RESTORE descends from it first. Both use the same number of
+//! gradients. A Langevin step finds the pupils of the lens anew, a descent only at every twentieth
+//! step: in time Metropolis-Hastings is farther behind than here.
 
 use super::sampler_comparison::{SamplerComparison, SamplerKind};
 use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};

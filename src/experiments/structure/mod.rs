@@ -1,11 +1,11 @@
-//! Figures 4.4 to 4.7: what a search over structure brings, and which of its parts bring it.
+//! Figures 4.4 to 4.7: the gain by structure search, and the contributions of its parts.
 //!
-//! All of them start from lenses of the library in one colour, with fields at four heights of a full
-//! frame. What a published lens does not keep of the usual limits, like the edge of an element, is
-//! limited to what it has: so a search begins with aberrations to correct, and not with limits to
-//! mend. Since nothing here reads a clock, methods are compared after as many gradients, each of
-//! which costs all of them the same: one merit with all its derivatives at one lens. A step of damped
-//! least squares costs as many as it tries.
+//! All of them start from lenses of the library in one colour, with fields at four heights of a
+//! full frame. A usual limit that a published lens violates, such as the edge thickness of an
+//! element, is relaxed to its value there: so a search starts with aberrations to correct, not with
+//! violated limits. Experiments read no clock; methods are compared after the same number of
+//! gradients. A gradient costs the same for all of them: one merit with all its derivatives at one
+//! lens. A step of damped least squares counts as many as it tries.
 
 pub(super) mod brute_force;
 pub(super) mod front_with_mutations;
@@ -23,10 +23,10 @@ use crate::pupil::limited_by_stop;
 use crate::search::lens_landscape::{SearchPlan, goal};
 use crate::search::{SearchRules, SearchSettings};
 
-/// Image heights in mm: from the middle of a full frame nearly to its corner.
+/// The image heights in mm: from the centre of a full frame nearly to its corner.
 const HEIGHTS: [f64; 4] = [0.0, 7.0, 14.0, 21.0];
 
-/// A lens of the thesis's figures, and its file.
+/// A lens of the figures of the thesis, and its file.
 #[derive(Debug, Clone, Copy)]
 struct StudyLens {
     name: &'static str,
@@ -50,13 +50,13 @@ fn at_heights(file: &str) -> Result<Lens, ExperimentError> {
     limited_by_stop(&with_field_angles(single, &angles)).map_err(ExperimentError::from_error)
 }
 
-/// What may be done to the four lenses: the largest of them has ten elements.
+/// The search rules for the four lenses: the largest of them has ten elements.
 fn rules() -> SearchRules {
     SearchRules { elements: [2, 12], ..SearchRules::default() }
 }
 
-/// A search of a lens with one chain, as the thesis has it, over so many gradients: sharp spots, all
-/// of the light, the limits that the lens keeps.
+/// A search from a lens with one chain, as in the thesis, over a number of gradients: sharp spots,
+/// all of the light, the relaxed limits.
 fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> Result<SearchPlan, ExperimentError> {
     let usual = goal(start, &rules, None, 1.0).map_err(ExperimentError::from_error)?;
     let kept = relaxed_limits::relax_limits(start, &usual).map_err(ExperimentError::from_error)?;

@@ -1,10 +1,11 @@
-//! From a lens of 1962 towards one of 1980: what two decades of designing brought, searched for.
+//! From a lens of 1962 towards one of 1980: a search for the progress of two decades of lens
+//! design.
 //!
 //! The start is the 50 mm double Gauss by Nippon Kogaku (US 3,560,079) with its rims opened as far
-//! as its surfaces leave room; the mark is the 50 mm f/1.2 by Canon (US 4,364,644), which has an
-//! element more and an asphere. All are measured alike: one colour, four image heights, the RMS
-//! radius of each spot about its centroid, the clear area of each pupil. The search asks for sharp
-//! spots with at every field as much light as the mark has there.
+//! as its surfaces allow; the reference is the 50 mm f/1.2 by Canon (US 4,364,644), with one more
+//! element and an asphere. All are evaluated alike: one colour, four image heights, the RMS radius
+//! of each spot about its centroid, the clear area of each pupil. The search asks for sharp spots
+//! with as much light at every field as the reference has.
 
 use super::recorded_search::{RecordedSearch, run_to_end};
 use super::{at_heights, rules};
@@ -28,13 +29,13 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// How far rims are opened at the start, in mm.
+/// The semi-diameter up to which rims are opened at the start, in mm.
 const OPENED: f64 = 20.0;
-/// No rim becomes wider than that of the mark, in mm.
+/// The maximum semi-diameter, that of the reference, in mm.
 const WIDEST: f64 = 26.0;
-/// The light asked for beyond that of the mark: penalties stop short of what they ask for.
+/// The light asked for, relative to the reference: a penalty does not reach its target exactly.
 const MORE: f64 = 1.02;
-/// How exact the numbers are, relatively.
+/// The relative accuracy of the numbers.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
@@ -61,7 +62,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     Ok(outcome)
 }
 
-/// A search with as many chains as is usual.
+/// The search, with the default number of chains.
 fn plan(shares: Vec<f64>, gradients: u64) -> SearchPlan {
     let rules = SearchRules { semi_diameter: Some(WIDEST), ..rules() };
     let default = SearchPlan::default();
@@ -88,12 +89,12 @@ impl OverviewLens {
         self.figures.fields.iter().map(|field| field.light.value)
     }
 
-    /// The mean of them.
+    /// The mean area of the pupils, in mm².
     fn light(&self) -> f64 {
         self.lights().sum::<f64>() / self.figures.fields.len() as f64
     }
 
-    /// The root of the mean square radius of the spots, in mm; infinite where a field has no light.
+    /// The RMS spot radius over all fields in mm; infinite if a field has no light.
     fn spot(&self) -> f64 {
         let fields = &self.figures.fields;
         let square = |spot: Option<crate::analysis::Estimate>| {
@@ -112,7 +113,7 @@ fn claims(
     let merits = [course.run.best().loss, course.start()];
     let says = "merit of the lens found, against half of that of the start";
     let mut claims = vec![Claim::at_most(says, merits[0], 0.5 * merits[1]).in_unit("mm^2")];
-    // A test has no room for more.
+    // A test is too short for more.
     if effort == Effort::Full {
         let sharper = format!("blur of the lens found, against that of `{}`", before.name);
         claims.push(Claim::at_most(sharper, um(found), um(before)).in_unit("um"));
@@ -150,7 +151,7 @@ fn table(designs: &[OverviewLens]) -> DataTable {
     table
 }
 
-/// The best merit as the search went on.
+/// The best merit during the search.
 fn course(course: &RecordedSearch) -> DataTable {
     let mut table = DataTable::new("course", &["gradients", "best"]);
     let mut last = f64::INFINITY;
@@ -163,7 +164,7 @@ fn course(course: &RecordedSearch) -> DataTable {
     table
 }
 
-/// Every lens with its rays, and its numbers beside it.
+/// Draws every lens with its rays and its numbers.
 fn draw(designs: &[OverviewLens]) -> Result<Canvas, ExperimentError> {
     let mut canvas = Canvas::new([1340, 60 + 330 * designs.len() as u32]);
     for (i, design) in designs.iter().enumerate() {
@@ -183,7 +184,7 @@ fn draw_design(
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
     let chart = Chart::new([60.0, top], [760.0, top + 260.0], x, y).with_equal_scales();
     let (name, figures) = (design.name, &design.figures);
-    // The letters of a picture have no bar.
+    // The font of plots has no bar.
     let topology = figures.topology.replace('|', "-");
     let title = format!("{name}: {} elements, {topology}", figures.elements);
     canvas.text([60.0, top - 30.0], &title, BLACK, TextAlign::Left);

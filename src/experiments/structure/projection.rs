@@ -1,14 +1,14 @@
-//! Figure 4.6 and table 4.1: what paraxial projection is worth.
+//! Figure 4.6 and table 4.1: the effect of paraxial projection.
 //!
-//! The share of iterations at which a search is at something better than its start, with mutations
-//! that are projected and with such that are not. Local steps are those of the thesis, by Adam: the
-//! least squares of our own searches lead nearly any mutant back, projected or not. The share of
-//! mutants counts what follows a mutation only, and not the descent from the start with which every
-//! search begins. The thesis's shares stand beside ours; its steps are others, so that only the order
-//! of the two is compared.
+//! The fraction of iterations at which a search is at a lens better than its start, with projected
+//! mutations and without projection. Local steps are those of the thesis, by Adam: the damped least
+//! squares of the default search recovers nearly any mutant, projected or not. The fraction of
+//! mutants counts only iterations after a mutation, not the descent from the start with which every
+//! search begins. The fractions of the thesis are listed as well; its steps differ, so that only
+//! the order of the two is compared.
 //!
-//! Shares of single searches lie anywhere between .02 and .9, so that the means of 24 seeds are
-//! compared: those of 8 have the order wrong in one or two of eight places.
+//! Fractions of single searches vary between .02 and .9, so that means of 24 seeds are compared:
+//! with 8 seeds the order is wrong in one or two of eight cases.
 
 use super::recorded_search::{RecordedSearch, RoundRecord, run_to_end};
 use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
@@ -29,14 +29,15 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// After how many gradients the shares are read.
+/// The numbers of gradients after which the fractions are read.
 const READ: [u64; 2] = [1000, 5000];
 
-/// `C` of (4.17): a descent that stands still at half of the density lasts four moves on average, so
-/// that a thousand gradients see mutations.
+/// `C` of (4.17): a descent at rest at half of the density lasts four moves on average, so that a
+/// thousand gradients include mutations.
 const C: f64 = 0.15;
 
-/// Table 4.1 of the thesis: for every lens with projection at both places, then without.
+/// Table 4.1 of the thesis: for every lens with projection at both numbers of gradients, then
+/// without.
 const THESIS: [[[f64; 2]; 2]; 4] = [
     [[0.356, 0.358], [0.225, 0.241]],
     [[0.964, 0.972], [0.554, 0.828]],
@@ -48,7 +49,7 @@ const THESIS: [[[f64; 2]; 2]; 4] = [
 const SIDES: [(bool, &str); 2] = [(true, "projection"), (false, "no projection")];
 
 fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
-    // A test has room for the lens of the picture alone, and for one place.
+    // A test covers only the lens of the plot, and one number of gradients.
     let lenses = effort.select(0..STUDY_LENSES.len(), 3..STUDY_LENSES.len());
     let (seeds, read) = (effort.select(24, 1), effort.select(&READ[..], &[200]));
     let mut outcome = ExperimentOutcome::default();
@@ -89,7 +90,7 @@ fn shares_table() -> DataTable {
     DataTable::new("shares", &columns)
 }
 
-/// A lens with searches on both sides, one for each seed.
+/// A lens with searches with and without projection, one for each seed.
 struct ProjectionComparison {
     subject: StudyLens,
     sides: [Vec<RecordedSearch>; 2],
@@ -118,7 +119,7 @@ impl ProjectionComparison {
         Ok(Self { subject, sides: [all, without] })
     }
 
-    /// The mean share of a side, and the least and the most of all seeds.
+    /// The mean fraction of a side, and the minimum and maximum of all seeds.
     fn share(&self, side: usize, gradients: u64) -> [f64; 3] {
         let shares: Vec<f64> =
             self.sides[side].iter().map(|course| course.share_after(gradients)).collect();
@@ -127,21 +128,21 @@ impl ProjectionComparison {
         [mean, least, shares.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// The share of the moves behind a mutation that led to something better than the start, over
-    /// all seeds; not a number where there are none.
+    /// The fraction of the moves after a mutation to a lens better than the start, over all seeds;
+    /// NaN without such moves.
     fn share_of_mutants(&self, side: usize, gradients: u64) -> f64 {
         let counts = self.sides[side].iter().map(|course| course.mutation_moves_after(gradients));
         let [better, moves] = counts.fold([0, 0], |sum, n| [0, 1].map(|i| sum[i] + n[i]));
         better as f64 / moves as f64
     }
 
-    /// The best loss on a side, the mean over all seeds.
+    /// The mean of the best losses of a side over all seeds.
     fn best(&self, side: usize, gradients: u64) -> f64 {
         let best = self.sides[side].iter().map(|course| course.best_after(gradients));
         best.sum::<f64>() / self.sides[side].len() as f64
     }
 
-    /// What a test has room for.
+    /// The claim of a test, which is too short for the others.
     fn gains(&self, gradients: u64) -> Claim {
         let says = format!("{}: best merit with projection, against the start", self.subject.name);
         Claim::at_most(says, self.best(0, gradients), self.sides[0][0].start())
@@ -190,8 +191,8 @@ impl ProjectionComparison {
         table
     }
 
-    /// The merit of every move of the first seed, on both sides, coloured by the mutation with which
-    /// its descent began.
+    /// Draws the merit of every move of the first seed, on both sides, coloured by the mutation
+    /// that started its descent.
     fn draw(&self) -> Canvas {
         let mut canvas = Canvas::new([1700, 1240]);
         let all = || self.sides.iter().flat_map(|side| &side[0].marks);
@@ -214,10 +215,10 @@ impl ProjectionComparison {
     }
 }
 
-/// What is worse than the start by this factor is not drawn.
+/// Losses above this multiple of the start are not drawn.
 const WORST: f64 = 1e4;
 
-/// What a move is drawn in.
+/// The colour of a move.
 fn color(kind: Option<MutationKind>) -> Color {
     let place =
         kind.and_then(|kind| MutationKind::MUTATIONS.iter().position(|other| *other == kind));
@@ -239,7 +240,7 @@ fn draw_moves(canvas: &mut Canvas, chart: &Chart, marks: &[RoundRecord]) {
     }
 }
 
-/// Which mutation has which colour.
+/// Draws the legend of the mutations.
 fn key(canvas: &mut Canvas) {
     let kinds = std::iter::once(None)
         .chain(MutationKind::MUTATIONS.map(Some))

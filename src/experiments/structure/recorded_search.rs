@@ -1,4 +1,4 @@
-//! Searches that are watched: after every round it is written down how far they are.
+//! Searches with a record of their progress after every round.
 
 use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{ExperimentError, ProgressFn, report_progress};
@@ -7,10 +7,10 @@ use crate::search::lens_landscape::{LensLandscape, SearchPlan};
 use crate::search::{MutationKind, SearchRun, SearchRunOn};
 use rayon::prelude::*;
 
-/// Gradients between two looks at whether a search shall go on.
+/// The number of gradients between two reports of progress.
 const SLICE: u64 = 100;
 
-/// A search, and what became of it so far.
+/// A search with the record of its rounds.
 #[derive(Debug)]
 pub(super) struct RecordedSearch {
     pub(super) landscape: LensLandscape,
@@ -18,17 +18,17 @@ pub(super) struct RecordedSearch {
     pub(super) marks: Vec<RoundRecord>,
 }
 
-/// How far a search was after a round.
+/// The progress of a search after a round.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RoundRecord {
     pub(super) gradients: u64,
     pub(super) moves: u64,
-    /// Moves that led to something better than the start.
+    /// The number of moves to a lens better than the start.
     pub(super) better: u64,
     pub(super) best: f64,
-    /// Where its first chain is; none where its descent has just ended.
+    /// The loss of its first chain; `None` if its descent has just ended.
     pub(super) loss: Option<f64>,
-    /// The generation of that chain, and the mutation with which it began.
+    /// The generation of that chain.
     pub(super) generation: u64,
     pub(super) kind: Option<MutationKind>,
 }
@@ -41,25 +41,26 @@ impl RecordedSearch {
         Ok(Self { run: run.map_err(ExperimentError::from_error)?, landscape, marks: Vec::new() })
     }
 
-    /// The loss of the lens at the start.
+    /// The loss of the starting lens.
     pub(super) fn start(&self) -> f64 {
         self.run.start().loss
     }
 
-    /// The loss of the best lens after so many gradients.
+    /// The loss of the best lens after a number of gradients.
     pub(super) fn best_after(&self, gradients: u64) -> f64 {
         let seen = self.marks.partition_point(|mark| mark.gradients <= gradients);
         self.marks[..seen].last().map_or(self.start(), |mark| mark.best)
     }
 
-    /// The share of the moves that led to something better than the start, up to so many
-    /// gradients; not a number before the first move.
+    /// The fraction of the moves to a lens better than the start, up to a number of gradients; NaN
+    /// before the first move.
     pub(super) fn share_after(&self, gradients: u64) -> f64 {
         let seen = self.marks.iter().take_while(|mark| mark.gradients <= gradients);
         seen.last().map_or(f64::NAN, |mark| mark.better as f64 / mark.moves as f64)
     }
 
-    /// Of the moves behind a mutation: those that led to something better than the start, and all.
+    /// The number of moves after a mutation to a lens better than the start, and the number of all
+    /// moves after one.
     pub(super) fn mutation_moves_after(&self, gradients: u64) -> [u64; 2] {
         let (mut counts, mut last) = ([0, 0], [0, 0]);
         for mark in self.marks.iter().take_while(|mark| mark.gradients <= gradients) {
@@ -72,13 +73,13 @@ impl RecordedSearch {
         counts
     }
 
-    /// About how many rays it traced for its gradients.
+    /// The approximate number of rays traced for its gradients.
     pub(super) fn rays(&self) -> usize {
         self.landscape.rays_per_gradient(self.landscape.start())
             * self.run.statistics().gradients as usize
     }
 
-    /// The part that is done.
+    /// The completed fraction.
     fn done(&self) -> f64 {
         let limit = self.run.settings().gradients.unwrap_or(0).max(1) as f64;
         let share = self.run.statistics().gradients as f64 / limit;
@@ -109,7 +110,7 @@ impl RecordedSearch {
     }
 }
 
-/// Lets some searches go on side by side until all of them are over.
+/// Runs searches in parallel until all of them have ended.
 pub(super) fn run_to_end(
     courses: &mut [RecordedSearch],
     part: ProgressSpan<'_>,

@@ -1,9 +1,10 @@
-//! The limits of a factory, as far as a published lens keeps them.
+//! Manufacturing limits, relaxed to those that a published lens satisfies.
 
 use crate::lens::Lens;
 use crate::merit::{ConstraintMargin, Goal, MeritError, Term, WeightedTerm, constraint_margins};
 
-/// The same goal, each limit of a gap, an edge or a steepness no tighter than what the lens has.
+/// The goal with each limit of a thickness, an edge or a steepness relaxed to the value of the lens
+/// if that violates it.
 pub(super) fn relax_limits(lens: &Lens, goal: &Goal) -> Result<Goal, MeritError> {
     let found = constraint_margins(lens, goal.terms.iter().map(|w| w.term))?;
     let loosened = |w: &WeightedTerm| WeightedTerm { term: relax_term(w.term, &found), ..*w };

@@ -1,4 +1,4 @@
-//! Samplers side by side: the same lenses, the same objective, as many gradients, several seeds.
+//! Comparison of samplers: the same lenses, objective and number of gradients, several seeds.
 
 use super::recorded_search::{RecordedSearch, run_to_end};
 use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
@@ -10,13 +10,13 @@ use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 use crate::search::lens_landscape::SearchPlan;
 use crate::search::{SearchMethod, SearchSettings, Temperature, Termination};
 
-/// A sampler in a race.
+/// A sampler of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SamplerKind {
     Restore,
     Metropolis,
     Brute,
-    /// Steps downhill from the start alone: what mutations are worth.
+    /// Descent from the start without mutations.
     Descent,
 }
 
@@ -45,7 +45,7 @@ impl SamplerKind {
     }
 }
 
-/// A descent that no clock ends.
+/// The settings of a descent that never terminates.
 fn without_termination(settings: &SearchSettings) -> SearchSettings {
     SearchSettings {
         temperature: Temperature::new(f64::INFINITY),
@@ -56,28 +56,28 @@ fn without_termination(settings: &SearchSettings) -> SearchSettings {
     }
 }
 
-/// The first of some samplers against the others.
+/// A comparison of the first of some samplers with the others.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SamplerComparison {
     pub(super) samplers: &'static [SamplerKind],
-    /// Those that the first one must beat.
+    /// The samplers that the first one has to beat.
     pub(super) rivals: &'static [SamplerKind],
     pub(super) lenses: usize,
     pub(super) seeds: u64,
     pub(super) gradients: u64,
 }
 
-/// What became of a lens.
+/// The results for a lens.
 struct LensComparison {
     subject: StudyLens,
-    /// The loss at the start.
+    /// The loss of the starting lens.
     start: f64,
-    /// For every sampler a search of each seed.
+    /// The searches of each sampler, one for each seed.
     courses: Vec<(SamplerKind, Vec<RecordedSearch>)>,
 }
 
 impl SamplerComparison {
-    /// The parts that a claim about most seeds needs: four of five.
+    /// The number of seeds that a claim about most seeds needs: four of five.
     fn required_seeds(&self) -> f64 {
         (0.8 * self.seeds as f64).floor()
     }
@@ -108,7 +108,7 @@ impl SamplerComparison {
         Ok(outcome)
     }
 
-    /// The normal lens where only one is asked for.
+    /// The lenses compared; the normal lens if there is only one.
     fn subjects(&self) -> &'static [StudyLens] {
         if self.lenses == 1 { &STUDY_LENSES[1..2] } else { &STUDY_LENSES[..self.lenses] }
     }
@@ -151,7 +151,7 @@ impl SamplerComparison {
         self.rivals.iter().map(claim).collect()
     }
 
-    /// Where curves are read.
+    /// The numbers of gradients at which curves are evaluated.
     fn gradient_counts(&self) -> impl Iterator<Item = u64> {
         let limit = self.gradients;
         (0..=POINTS).map(move |i| limit * i / POINTS)
@@ -173,7 +173,7 @@ impl SamplerComparison {
         table
     }
 
-    /// The best merit over that of the start for every lens: the middle seed, the best and the worst.
+    /// Draws the best merit relative to the start for every lens: median, best and worst seed.
     fn draw(&self, heats: &[LensComparison]) -> Canvas {
         let rows = heats.len().div_ceil(2) as u32;
         let mut canvas = Canvas::new([1500, 140 + 620 * rows]);
@@ -215,11 +215,11 @@ impl SamplerComparison {
     }
 }
 
-/// Places of a curve.
+/// The number of intervals of a curve.
 const POINTS: u64 = 100;
 
 impl LensComparison {
-    /// The best losses of a sampler, by seed.
+    /// The final best losses of a sampler, by seed.
     fn final_losses(&self, runner: SamplerKind) -> Vec<f64> {
         let own = self.courses.iter().find(|(other, _)| *other == runner);
         own.map_or(Vec::new(), |(_, courses)| courses.iter().map(|c| c.run.best().loss).collect())
@@ -233,14 +233,14 @@ impl LensComparison {
     }
 }
 
-/// The best losses after so many gradients: least, middle and most of all seeds.
+/// The minimum, median and maximum of the best losses of all seeds after a number of gradients.
 fn spread(courses: &[RecordedSearch], gradients: u64) -> [f64; 3] {
     let mut all: Vec<f64> = courses.iter().map(|course| course.best_after(gradients)).collect();
     all.sort_by(f64::total_cmp);
     [0, all.len() / 2, all.len() - 1].map(|place| all[place])
 }
 
-/// Where every search has ended.
+/// The table of the final losses of all searches.
 fn final_table(heats: &[LensComparison]) -> DataTable {
     let columns =
         ["lens", "sampler", "seed", "gradients", "generations", "start", "best", "elements"];
@@ -266,7 +266,7 @@ fn final_table(heats: &[LensComparison]) -> DataTable {
 }
 
 impl Effort {
-    /// How much a race is worth: lenses, seeds, gradients.
+    /// The size of a comparison: lenses, seeds, gradients.
     pub(super) fn comparison_size(self) -> (usize, u64, u64) {
         self.select((STUDY_LENSES.len(), 5, 12_000), (1, 2, 200))
     }
