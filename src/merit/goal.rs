@@ -1,7 +1,6 @@
 //! The goal of an optimization: weighted terms with their targets.
 
 use super::MeritError;
-use super::constraints::MinimumThickness;
 use crate::lens::{Lens, Object};
 use crate::paraxial::{Beam, first_order};
 use serde::{Deserialize, Serialize};
@@ -197,42 +196,7 @@ impl Term {
     }
 }
 
-/// The radius of a spot, relative to the focal length, that is given away for all of the light.
-const LIGHT_IN_SPOT: f64 = 0.02;
-
 impl Goal {
-    /// The default goal for a lens: sharp spots at its focal length and with its light, thicknesses
-    /// of glass and air that can be manufactured or are no smaller than they are, and a track at
-    /// most a fifth longer than it is.
-    pub fn default_for(lens: &Lens) -> Result<Self, MeritError> {
-        let focal_lengths = focal_lengths(lens)?;
-        let first = focal_lengths[0];
-        let size = first.map_or_else(|| lens.total_track(), f64::abs);
-        let mut terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
-        if let Some(first) = first {
-            terms.push(WeightedTerm { term: Term::FocalLength(first), weight: 1e-2 });
-        }
-        let now = MinimumThickness::measure(lens)?;
-        let (glass, air) = (0.012 * size, 0.002 * size);
-        for term in [
-            Term::GlassCenter { min: now.glass_center.clamp(0.0, glass), max: 0.5 * size },
-            Term::GlassEdge(now.glass_edge.clamp(0.0, 0.8 * glass)),
-            Term::AirCenter { min: now.air_center.clamp(0.0, air), max: 3.0 * lens.total_track() },
-            Term::AirEdge(now.air_edge.clamp(0.0, 0.5 * air)),
-            Term::TotalTrack(1.2 * lens.total_track()),
-        ] {
-            terms.push(WeightedTerm { term, weight: 1.0 });
-        }
-        terms.push(WeightedTerm { term: Term::Light(1.0), weight: (LIGHT_IN_SPOT * size).powi(2) });
-        let zoom_ratios = match first {
-            Some(first) if lens.zoom.len() > 1 => {
-                focal_lengths.iter().map(|f| f.unwrap_or(first) / first).collect()
-            }
-            _ => Vec::new(),
-        };
-        Ok(Self { terms, pupil: PupilEdge::default(), zoom_ratios })
-    }
-
     /// Returns an error if a term or target does not apply to the lens.
     pub fn check(&self, lens: &Lens) -> Result<(), MeritError> {
         let refuse = |why| Err(MeritError::DoesNotApply { term: "goal", why });
@@ -271,7 +235,7 @@ impl Goal {
 }
 
 /// The focal length at every zoom position; `None` for an afocal lens.
-fn focal_lengths(lens: &Lens) -> Result<Vec<Option<f64>>, MeritError> {
+pub(super) fn focal_lengths(lens: &Lens) -> Result<Vec<Option<f64>>, MeritError> {
     let um = lens.wavelengths[lens.primary()].um;
     let focal_length = |zoom| {
         let system = lens.resolve(zoom, um)?;

@@ -14,6 +14,7 @@
 
 mod binding;
 mod constraints;
+mod defaults;
 mod first_order;
 mod goal;
 mod light;
@@ -22,6 +23,7 @@ mod spot;
 mod sum;
 
 pub use constraints::{ConstraintMargin, constraint_margins};
+pub use defaults::{GoalLimits, LensFigures, MAX_STEEPNESS, default_terms};
 pub use goal::{Goal, PupilEdge, Term, WeightedTerm};
 pub use sampling::SpotSampling;
 

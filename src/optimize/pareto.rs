@@ -14,7 +14,7 @@
 
 use super::{DescentMethod, Optimizer, start, start_annealed};
 use crate::lens::{Lens, LensError, ParameterKind, Quantity, add_variables};
-use crate::merit::{Goal, Merit, MeritError, PupilEdge, Term, WeightedTerm};
+use crate::merit::{Goal, MAX_STEEPNESS, Merit, MeritError, PupilEdge, Term, WeightedTerm};
 use crate::pupil::{RayModelError, limited_by_stop};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -186,8 +186,6 @@ const STEPS_PER_SLICE: usize = 25;
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 /// The fraction of its light that every field has to retain.
 const MIN_LIGHT: f64 = 0.1;
-/// No surface may be steeper than this: curvature times semi-diameter.
-const MAX_STEEPNESS: f64 = 0.9;
 
 /// A Pareto sweep in progress.
 #[derive(Debug)]

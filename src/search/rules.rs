@@ -3,6 +3,7 @@
 use super::MutationKind;
 use crate::lens::glass;
 use crate::math::format_short;
+use crate::merit::{GoalLimits, MAX_STEEPNESS};
 use serde::{Deserialize, Serialize};
 
 /// Permitted changes of a lens and the limits of manufacturing.
@@ -55,7 +56,7 @@ impl Default for SearchRules {
             glass_edge: 0.8,
             air_center: [0.1, 100.0],
             air_edge: 0.05,
-            steepness: 0.9,
+            steepness: MAX_STEEPNESS,
             semi_diameter: None,
             track: None,
             back_focus: None,
@@ -64,6 +65,20 @@ impl Default for SearchRules {
 }
 
 impl SearchRules {
+    /// The limits of the default goal.
+    pub fn goal_limits(&self) -> GoalLimits {
+        GoalLimits {
+            glass_center: self.glass_center,
+            glass_edge: self.glass_edge,
+            air_center: self.air_center,
+            air_edge: self.air_edge,
+            steepness: self.steepness,
+            semi_diameter: self.semi_diameter,
+            track: self.track,
+            back_focus: self.back_focus,
+        }
+    }
+
     /// The relative frequency of a kind of mutation.
     pub fn weight(&self, kind: MutationKind) -> f64 {
         let listed = self.weights.iter().find(|(listed, _)| *listed == kind);

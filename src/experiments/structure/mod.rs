@@ -19,8 +19,9 @@ mod sampler_comparison;
 use super::sharpness_vs_light::{focal_length, with_field_angles};
 use super::{ExperimentError, lens};
 use crate::lens::{Lens, at_zoom};
+use crate::merit::Goal;
 use crate::pupil::limited_by_stop;
-use crate::search::lens_landscape::{SearchPlan, goal};
+use crate::search::lens_landscape::SearchPlan;
 use crate::search::{SearchRules, SearchSettings};
 
 /// The image heights in mm: from the centre of a full frame nearly to its corner.
@@ -58,7 +59,8 @@ fn rules() -> SearchRules {
 /// A search from a lens with one chain, as in the thesis, over a number of gradients: sharp spots,
 /// all of the light, the relaxed limits.
 fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> Result<SearchPlan, ExperimentError> {
-    let usual = goal(start, &rules, None, 1.0).map_err(ExperimentError::from_error)?;
+    let usual = Goal::with_limits(start, &rules.goal_limits(), None, 1.0)
+        .map_err(ExperimentError::from_error)?;
     let kept = relaxed_limits::relax_limits(start, &usual).map_err(ExperimentError::from_error)?;
     let default = SearchPlan::default();
     let settings = SearchSettings { chains: 1, gradients: Some(gradients), ..default.settings };

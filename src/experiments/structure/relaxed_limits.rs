@@ -29,13 +29,12 @@ fn relax_term(term: Term, found: &[ConstraintMargin]) -> Term {
 mod tests {
     use super::*;
     use crate::experiments::structure::{STUDY_LENSES, at_heights, rules};
-    use crate::search::lens_landscape::goal;
 
     #[test]
     fn a_lens_keeps_its_own_limits_and_no_others_are_loosened() {
         for subject in STUDY_LENSES {
             let lens = at_heights(subject.file).unwrap();
-            let usual = goal(&lens, &rules(), None, 1.0).unwrap();
+            let usual = Goal::with_limits(&lens, &rules().goal_limits(), None, 1.0).unwrap();
             let kept = relax_limits(&lens, &usual).unwrap();
             let terms = |goal: &Goal| goal.terms.iter().map(|w| w.term).collect::<Vec<_>>();
             let room = |goal: &Goal| {

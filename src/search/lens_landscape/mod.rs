@@ -8,7 +8,7 @@
 
 mod descent_settings;
 mod finalize;
-mod goal;
+mod focal_length;
 mod langevin_units;
 mod open_apertures;
 mod plan;
@@ -19,7 +19,6 @@ mod violations;
 
 pub use descent_settings::DescentSettings;
 pub use finalize::{CrossCheck, FinalizedLens, GlassSubstitution, UnlistedGlass, finalize};
-pub use goal::goal;
 pub use open_apertures::with_open_apertures;
 pub use plan::{SearchPlan, SearchSetupError, run};
 pub use summary::{FieldSummary, LensSummary};
@@ -100,7 +99,7 @@ impl LensLandscape {
         let mut start = limited_by_stop(lens)?;
         variables::freeze_others(&mut start);
         start.check()?;
-        let size = goal::reference_length(&start);
+        let size = focal_length::reference_length(&start);
         let asked = goal.terms.iter().find_map(|w| match w.term {
             crate::merit::Term::FocalLength(focal) => Some(focal),
             _ => None,

@@ -1,6 +1,6 @@
 //! A search of a lens, described by one value and run by one call.
 
-use super::{DescentSettings, LandscapeError, LensLandscape, goal};
+use super::{DescentSettings, LandscapeError, LensLandscape};
 use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::search::{
@@ -14,7 +14,7 @@ use std::ops::ControlFlow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SearchPlan {
-    /// The goal; `None` for the default one, [`goal()`].
+    /// The goal; `None` for the default one, [`Goal::with_limits`].
     pub goal: Option<Goal>,
     /// The target focal length of the default goal, in mm; `None` for that of the lens.
     pub focal_length: Option<f64>,
@@ -65,7 +65,8 @@ impl SearchPlan {
             _ => (1.0, &self.light[..]),
         };
         let rules = self.rules.normalize()?;
-        let usual = || goal(lens, &rules, self.focal_length, common);
+        let limits = rules.goal_limits();
+        let usual = || Goal::with_limits(lens, &limits, self.focal_length, common);
         let goal = self.goal.clone().map_or_else(usual, Ok)?;
         let landscape =
             LensLandscape::new(lens, &goal, &rules, &self.local)?.with_field_light(each)?;

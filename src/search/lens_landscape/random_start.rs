@@ -1,6 +1,6 @@
 //! Random lenses: `p_global` of (4.14).
 
-use super::goal::focal_length_of;
+use super::focal_length::focal_length_of;
 use super::open_apertures::with_open_rims;
 use crate::lens::{Lens, Medium, Parameter, Quantity, paraxial_image_distance};
 use crate::search::{Random, SearchRules};

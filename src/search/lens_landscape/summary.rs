@@ -1,6 +1,6 @@
 //! The summary of a lens: sharpness and light of every field, and its size.
 
-use super::goal::focal_length_of;
+use super::focal_length::focal_length_of;
 use crate::analysis::{Estimate, Spot, spots};
 use crate::lens::{Lens, at_zoom};
 use crate::pupil::{Accuracy, RayModel, RayModelError};

@@ -1,20 +1,9 @@
 //! What each term of a goal is called, measured in and explained by, and what it begins with.
 
-use std::f64::consts::PI;
-
-use crate::lens::Lens;
-use crate::merit::{Term, WeightedTerm};
+use crate::merit::{self, LensFigures, Term, WeightedTerm};
 use crate::session::{Analyses, SessionView};
 use crate::studio::number;
 use crate::studio::panels::{design_results, mean_pupil_area};
-
-/// The radius of a spot, relative to the focal length, that is given away for all of the light: the
-/// same exchange as in [`Goal::sensible`](crate::merit::Goal::sensible).
-const LIGHT_IN_SPOT: f64 = 0.02;
-/// A surface this steep is hard to make: 1 is a hemisphere.
-const STEEP: f64 = 0.9;
-/// The share of the light on the axis that the last field shall have, until somebody says better.
-const CORNER: f64 = 0.5;
 
 /// What a term is called.
 pub(super) const fn title(term: Term) -> &'static str {
@@ -151,82 +140,17 @@ pub(super) fn can_ask_for_more_light(term: Term) -> bool {
     }
 }
 
-/// Every term, with targets that the lens meets now or nearly so, and weights that stand in
-/// proportion to its spots.
+/// Every term with its default targets and weights for the current lens, rounded.
 pub(super) fn default_terms(view: &SessionView) -> Vec<WeightedTerm> {
-    let now = CurrentValues::of(view);
-    let plain = |term| WeightedTerm { term, weight: 1.0 };
-    let in_spots = |term, weight| WeightedTerm { term, weight };
-    let CurrentValues { size, track, .. } = now;
-    let given_away = (LIGHT_IN_SPOT * size).powi(2);
-    let field = view.lens.fields_at(view.settings.zoom).values.len().saturating_sub(1);
-    vec![
-        plain(Term::Spot),
-        in_spots(Term::SpotIntegral, 1.0 / now.light),
-        in_spots(Term::Light(1.0), given_away),
-        in_spots(Term::FNumber(now.f_number), given_away / now.f_number.powi(2)),
-        in_spots(Term::RelativeIllumination { field, min: CORNER }, given_away),
-        in_spots(Term::ThroughputLoss(now.light), now.spot),
-        in_spots(Term::Throughput, now.spot / now.light),
-        plain(Term::FocalLength(now.efl)),
-        plain(Term::Distortion),
-        plain(Term::GlassCenter { min: 0.01 * size, max: 0.5 * size }),
-        plain(Term::GlassEdge(0.01 * size)),
-        plain(Term::AirCenter { min: 0.002 * size, max: 3.0 * track }),
-        plain(Term::AirEdge(0.001 * size)),
-        plain(Term::TotalTrack(1.2 * track)),
-        plain(Term::BackFocus(view.lens.surfaces.last().map_or(0.0, |row| row.thickness))),
-        in_spots(Term::Steepness(now.steepest.max(STEEP)), given_away),
-        plain(Term::SemiDiameter { min: 0.5 * now.rims[0], max: 1.5 * now.rims[1] }),
-    ]
-    .into_iter()
-    .map(rounded)
-    .collect()
-}
-
-/// What the lens is like now; plain guesses where it has no numbers.
-struct CurrentValues {
-    efl: f64,
-    /// The focal length without its sign.
-    size: f64,
-    track: f64,
-    /// The mean area of the pupils, in mm².
-    light: f64,
-    f_number: f64,
-    /// The mean square radius of the spots, in mm².
-    spot: f64,
-    /// The largest curvature times semi-diameter.
-    steepest: f64,
-    /// The smallest and the largest semi-diameter.
-    rims: [f64; 2],
-}
-
-impl CurrentValues {
-    fn of(view: &SessionView) -> Self {
-        let numbers = design_results(view);
-        let positive = |value: Option<f64>, otherwise: f64| {
-            value.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(otherwise)
-        };
-        let efl = numbers.and_then(|numbers| numbers.first_order().efl).unwrap_or(100.0);
-        let size = positive(Some(efl.abs()), 100.0);
-        let axis = positive(numbers.and_then(on_axis), 0.01 * size * size);
-        let rims = || view.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
-        let steep = |lens: &Lens| {
-            let rows = lens.surfaces.iter();
-            rows.map(|row| (row.curvature * row.semi_diameter.unwrap_or(0.0)).abs())
-                .fold(0.0, f64::max)
-        };
-        Self {
-            efl,
-            size,
-            track: view.lens.total_track(),
-            light: positive(numbers.map(mean_pupil_area), axis),
-            f_number: size / (2.0 * (axis / PI).sqrt()),
-            spot: positive(numbers.and_then(mean_square), 1e-6 * size * size),
-            steepest: steep(&view.lens),
-            rims: [rims().fold(size, f64::min), rims().fold(0.0, f64::max).max(0.1 * size)],
-        }
-    }
+    let results = design_results(view);
+    let figures = LensFigures {
+        focal_length: results.and_then(|results| results.first_order().efl),
+        light: results.map(mean_pupil_area),
+        axial_light: results.and_then(on_axis),
+        mean_square_spot: results.and_then(mean_square),
+    };
+    let terms = merit::default_terms(&view.lens, view.settings.zoom, &figures);
+    terms.into_iter().map(rounded).collect()
 }
 
 /// The area of the pupil on the axis in mm², the mean over wavelengths.

@@ -1,0 +1,209 @@
+//! Default goals: what a designer asks of a lens unless he says otherwise. The numbers of this
+//! policy are defined here, once.
+
+use super::constraints::MinimumThickness;
+use super::goal::focal_lengths;
+use super::{Goal, MeritError, PupilEdge, Term, WeightedTerm};
+use crate::lens::Lens;
+use std::f64::consts::PI;
+
+/// The steepness of a surface, `|curvature| × semi-diameter`, up to which it counts as easy to
+/// manufacture; 1 is a hemisphere.
+pub const MAX_STEEPNESS: f64 = 0.9;
+/// The spot radius that outweighs all of the light, relative to the focal length.
+const LIGHT_IN_SPOT: f64 = 0.02;
+/// The weight of the squared deviation of the focal length, relative to that of the spots.
+const FOCAL_LENGTH_WEIGHT: f64 = 1e-2;
+/// The factor by which a lens may become longer.
+const TRACK_GROWTH: f64 = 1.2;
+/// The part of the back focus that has to remain.
+const BACK_FOCUS_RETAINED: f64 = 0.8;
+/// The violation of a steepness that counts as much as a spot of this radius, relative to the focal
+/// length.
+const STEEPNESS_IN_SPOT: f64 = 0.1;
+/// The relative illumination asked of the last field.
+const CORNER_ILLUMINATION: f64 = 0.5;
+
+/// The limits that a lens has to satisfy, with the weight 1 for squared violations in mm².
+#[derive(Debug, Clone, PartialEq)]
+pub struct GoalLimits {
+    /// The minimum and maximum centre thickness of glass, in mm.
+    pub glass_center: [f64; 2],
+    /// The minimum edge thickness of glass, in mm.
+    pub glass_edge: f64,
+    /// The minimum and maximum centre thickness of air gaps, in mm.
+    pub air_center: [f64; 2],
+    /// The minimum edge thickness of air gaps, in mm.
+    pub air_edge: f64,
+    /// The maximum of `|curvature| × semi-diameter`.
+    pub steepness: f64,
+    /// The maximum semi-diameter in mm, if there is one.
+    pub semi_diameter: Option<f64>,
+    /// The maximum total track in mm; by default a fifth more than that of the lens.
+    pub track: Option<f64>,
+    /// The minimum back focus in mm; by default four fifths of that of the lens.
+    pub back_focus: Option<f64>,
+}
+
+/// The measured figures of a lens from which [`default_terms`] takes its targets; `None` for those
+/// that are unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LensFigures {
+    /// The focal length, in mm.
+    pub focal_length: Option<f64>,
+    /// The mean area of the pupils in the first vertex plane, in mm².
+    pub light: Option<f64>,
+    /// The area of the pupil on the axis, in mm².
+    pub axial_light: Option<f64>,
+    /// The mean square radius of the spots, in mm².
+    pub mean_square_spot: Option<f64>,
+}
+
+impl Goal {
+    /// The default goal for a lens: sharp spots at its focal length and with its light, thicknesses
+    /// of glass and air that can be manufactured or are no smaller than they are, and a track at
+    /// most a fifth longer than it is.
+    ///
+    /// # Errors
+    /// A lens without first-order data.
+    pub fn default_for(lens: &Lens) -> Result<Self, MeritError> {
+        let focal_lengths = focal_lengths(lens)?;
+        let first = focal_lengths[0];
+        let track = lens.total_track();
+        let size = first.map_or(track, f64::abs);
+        let now = MinimumThickness::measure(lens)?;
+        let (glass, air) = (0.012 * size, 0.002 * size);
+        let mut terms = vec![unit(Term::Spot)];
+        terms.extend(first.map(focal_length));
+        terms.extend(
+            [
+                Term::GlassCenter { min: now.glass_center.clamp(0.0, glass), max: 0.5 * size },
+                Term::GlassEdge(now.glass_edge.clamp(0.0, 0.8 * glass)),
+                Term::AirCenter { min: now.air_center.clamp(0.0, air), max: 3.0 * track },
+                Term::AirEdge(now.air_edge.clamp(0.0, 0.5 * air)),
+                Term::TotalTrack(TRACK_GROWTH * track),
+            ]
+            .map(unit),
+        );
+        terms.push(in_spots(Term::Light(1.0), size));
+        let zoom_ratios = zoom_ratios(lens, &focal_lengths);
+        Ok(Self { terms, pupil: PupilEdge::default(), zoom_ratios })
+    }
+
+    /// Sharp spots at a focal length in mm, by default that of the lens, at every field at least
+    /// the fraction `light` of its light, and limits as penalties (4.6). The focal length applies to
+    /// the first zoom position; the others keep their ratios to it.
+    ///
+    /// # Errors
+    /// A lens without first-order data.
+    pub fn with_limits(
+        lens: &Lens,
+        limits: &GoalLimits,
+        target: Option<f64>,
+        light: f64,
+    ) -> Result<Self, MeritError> {
+        let focal_lengths = focal_lengths(lens)?;
+        let target = target.or(focal_lengths[0]);
+        let track = lens.total_track();
+        let size = target.map_or(track, f64::abs);
+        let rear = lens.surfaces.last().map_or(0.0, |row| row.thickness);
+        let mut terms = vec![unit(Term::Spot)];
+        terms.extend(target.map(focal_length));
+        terms.push(in_spots(Term::Light(light), size));
+        let [[glass_min, glass_max], [air_min, air_max]] = [limits.glass_center, limits.air_center];
+        terms.extend(
+            [
+                Term::GlassCenter { min: glass_min, max: glass_max },
+                Term::GlassEdge(limits.glass_edge),
+                Term::AirCenter { min: air_min, max: air_max },
+                Term::AirEdge(limits.air_edge),
+                Term::TotalTrack(limits.track.unwrap_or(TRACK_GROWTH * track)),
+                Term::BackFocus(limits.back_focus.unwrap_or(BACK_FOCUS_RETAINED * rear)),
+            ]
+            .map(unit),
+        );
+        let weight = (STEEPNESS_IN_SPOT * size).powi(2);
+        terms.push(WeightedTerm { term: Term::Steepness(limits.steepness), weight });
+        terms.extend(limits.semi_diameter.map(|max| unit(Term::SemiDiameter { min: 0.0, max })));
+        let zoom_ratios = zoom_ratios(lens, &focal_lengths);
+        Ok(Self { terms, pupil: PupilEdge::Moving, zoom_ratios })
+    }
+}
+
+/// Every kind of term once, with targets that the lens satisfies or nearly satisfies at a zoom
+/// position, and with weights in proportion to its spots: what an editor of goals offers.
+pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<WeightedTerm> {
+    let positive = |value: Option<f64>, otherwise: f64| {
+        value.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(otherwise)
+    };
+    let efl = figures.focal_length.unwrap_or(100.0);
+    let size = positive(Some(efl.abs()), 100.0);
+    let axial_light = positive(figures.axial_light, 0.01 * size * size);
+    let light = positive(figures.light, axial_light);
+    let spot = positive(figures.mean_square_spot, 1e-6 * size * size);
+    let f_number = size / (2.0 * (axial_light / PI).sqrt());
+    let track = lens.total_track();
+    let field = lens.fields_at(zoom).values.len().saturating_sub(1);
+    let [narrowest, widest] = semi_diameter_range(lens, size);
+    let given_away = light_weight(size);
+    let weighted = |term, weight| WeightedTerm { term, weight };
+    vec![
+        unit(Term::Spot),
+        weighted(Term::SpotIntegral, 1.0 / light),
+        weighted(Term::Light(1.0), given_away),
+        weighted(Term::FNumber(f_number), given_away / f_number.powi(2)),
+        weighted(Term::RelativeIllumination { field, min: CORNER_ILLUMINATION }, given_away),
+        weighted(Term::ThroughputLoss(light), spot),
+        weighted(Term::Throughput, spot / light),
+        unit(Term::FocalLength(efl)),
+        unit(Term::Distortion),
+        unit(Term::GlassCenter { min: 0.01 * size, max: 0.5 * size }),
+        unit(Term::GlassEdge(0.01 * size)),
+        unit(Term::AirCenter { min: 0.002 * size, max: 3.0 * track }),
+        unit(Term::AirEdge(0.001 * size)),
+        unit(Term::TotalTrack(TRACK_GROWTH * track)),
+        unit(Term::BackFocus(lens.surfaces.last().map_or(0.0, |row| row.thickness))),
+        weighted(Term::Steepness(largest_steepness(lens).max(MAX_STEEPNESS)), given_away),
+        unit(Term::SemiDiameter { min: 0.5 * narrowest, max: 1.5 * widest }),
+    ]
+}
+
+fn unit(term: Term) -> WeightedTerm {
+    WeightedTerm { term, weight: 1.0 }
+}
+
+fn focal_length(target: f64) -> WeightedTerm {
+    WeightedTerm { term: Term::FocalLength(target), weight: FOCAL_LENGTH_WEIGHT }
+}
+
+/// A term of light for a lens of this focal length.
+fn in_spots(term: Term, size: f64) -> WeightedTerm {
+    WeightedTerm { term, weight: light_weight(size) }
+}
+
+/// The weight of a loss of all light, in mm², for a lens of this focal length.
+fn light_weight(size: f64) -> f64 {
+    (LIGHT_IN_SPOT * size).powi(2)
+}
+
+/// The focal lengths of the zoom positions relative to the first; empty without zoom.
+fn zoom_ratios(lens: &Lens, focal_lengths: &[Option<f64>]) -> Vec<f64> {
+    match focal_lengths[0] {
+        Some(first) if lens.zoom.len() > 1 => {
+            focal_lengths.iter().map(|f| f.unwrap_or(first) / first).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The largest `|curvature| × semi-diameter` of the surfaces; 0 for those without semi-diameter.
+fn largest_steepness(lens: &Lens) -> f64 {
+    let rows = lens.surfaces.iter();
+    rows.map(|row| (row.curvature * row.semi_diameter.unwrap_or(0.0)).abs()).fold(0.0, f64::max)
+}
+
+/// The smallest semi-diameter, at most `size`, and the largest one, at least a tenth of it.
+fn semi_diameter_range(lens: &Lens, size: f64) -> [f64; 2] {
+    let rims = || lens.surfaces.iter().filter_map(|row| row.semi_diameter);
+    [rims().fold(size, f64::min), rims().fold(0.0, f64::max).max(0.1 * size)]
+}
