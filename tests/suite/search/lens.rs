@@ -10,8 +10,7 @@ use aplanat::math::quadrature::gauss_legendre;
 use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, DescentState};
 use aplanat::search::lens_landscape::{
-    DescentSettings, LensLandscape, LensSummary, SearchPlan, finalize, goal, run,
-    with_open_apertures,
+    DescentSettings, LensLandscape, LensSummary, SearchPlan, finalize, run, with_open_apertures,
 };
 use aplanat::search::{
     Landscape, MutationKind, SearchRules, SearchRunOn, SearchSettings, Temperature,
@@ -263,7 +262,7 @@ fn a_finished_lens_can_be_made() {
     lens.variables.clear();
     lens.surfaces[0].medium = Medium::Model { nd: 1.6204, vd: 60.3 };
     let rules = SearchRules { glass_edge: 1.2, air_edge: 0.2, ..SearchRules::default() };
-    let wanted = goal(&lens, &rules, None, 0.98).unwrap();
+    let wanted = Goal::with_limits(&lens, &rules.goal_limits(), None, 0.98).unwrap();
     let landscape =
         LensLandscape::new(&lens, &wanted, &rules, &DescentSettings::default()).unwrap();
     let finished = finalize(&landscape, landscape.start()).unwrap();
@@ -275,7 +274,7 @@ fn a_finished_lens_can_be_made() {
     assert!(finished.limits.iter().all(|limit| limit.slack() >= 0.0));
     finished.lens.check().unwrap();
     let impossible = SearchRules { track: Some(20.0), ..rules };
-    let wanted = goal(&lens, &impossible, None, 0.98).unwrap();
+    let wanted = Goal::with_limits(&lens, &impossible.goal_limits(), None, 0.98).unwrap();
     let landscape =
         LensLandscape::new(&lens, &wanted, &impossible, &DescentSettings::default()).unwrap();
     let failures = finalize(&landscape, landscape.start()).unwrap().failures();
