@@ -23,14 +23,15 @@ use crate::math::SimdWidth;
 use crate::math::Vec3;
 use crate::math::run_vectorized;
 
-/// The derivative of a loss by a ray's position, velocity and optical path.
+/// The adjoint of a ray: the derivatives of a loss with respect to its position, velocity and
+/// optical path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RayAdjoint<R> {
-    /// By the position.
+    /// With respect to the position.
     pub x: Vec3<R>,
-    /// By the velocity.
+    /// With respect to the velocity.
     pub v: Vec3<R>,
-    /// By the optical path.
+    /// With respect to the optical path.
     pub path: R,
 }
 
@@ -40,7 +41,7 @@ impl<R: Real> RayAdjoint<R> {
     }
 }
 
-/// Rays side by side on their way back; a column begins where a line of the cache does.
+/// Rays side by side, traced backwards; each column is aligned with a cache line.
 #[derive(Clone, Default)]
 #[repr(C, align(64))]
 struct BackwardBlock<R> {
@@ -51,21 +52,21 @@ struct BackwardBlock<R> {
     /// `μ`.
     by_v: LaneVectors<R>,
     by_path: LaneScalars<R>,
-    /// The length of the step to be undone: 0 for an empty seat.
+    /// The length of the step to be undone; 0 for an empty lane.
     h: LaneScalars<R>,
-    /// At which step of the block the ray is back.
+    /// The step of the block at which the ray is back at its start.
     due_step: [u64; LANES],
-    /// Which ray sits here.
+    /// The number of the ray in each lane.
     ray: [Option<usize>; LANES],
 }
 
-/// Room for what a kick needs.
+/// Work space for one kick.
 #[repr(C, align(64))]
 struct KickScratch<R> {
     samples: IndexSamples<R>,
     /// `Hess(η) μ`.
     hessian_product: LaneVectors<R>,
-    /// What goes to the parameters with `∂η/∂θ`, and with `∂∇η/∂θ`.
+    /// The weights of `∂η/∂θ` and of `∂∇η/∂θ` in the gradient by the parameters.
     weight: LaneScalars<R>,
     pull: LaneVectors<R>,
 }
@@ -89,7 +90,8 @@ impl<R: Real> BackwardBlock<R> {
         self.ray[lane] = Some(ray);
     }
 
-    /// Empties a seat; what was not finite must not stay, since it would survive a step of 0.
+    /// Empties a lane. Values that are not finite must not remain, since they would survive a step
+    /// of 0.
     fn clear_lane(&mut self, lane: usize) {
         for columns in [&mut self.x, &mut self.v, &mut self.by_x, &mut self.by_v] {
             put(columns, lane, Vec3::default());
@@ -100,7 +102,7 @@ impl<R: Real> BackwardBlock<R> {
         self.ray[lane] = None;
     }
 
-    /// Gives every ray on its way a whole step.
+    /// Gives every ray in flight a whole step.
     fn set_full_step(&mut self, step: R) {
         for (h, due) in self.h.iter_mut().zip(&self.due_step) {
             *h = R::select(*due == u64::MAX, R::ZERO, step);
@@ -116,21 +118,22 @@ impl<R: Real> BackwardBlock<R> {
     }
 }
 
-/// One chunk of rays with what is known of them.
+/// One chunk of rays with their exits and adjoints.
 pub(super) struct Chunk<'a, R> {
     pub(super) rays: &'a [GrinRay<R>],
     pub(super) exits: &'a mut [RayExit<R>],
     pub(super) seeds: &'a [RayAdjoint<R>],
-    /// The gradient by the start of each ray.
+    /// The gradient with respect to the start of each ray.
     pub(super) starts: &'a mut [RayAdjoint<R>],
 }
 
-/// What retracing a chunk showed.
+/// The result of retracing a chunk.
 #[derive(Default)]
 pub(super) struct RetraceResult {
-    /// The largest distance between a start and where the way back ended, in steps.
+    /// The largest distance between a start and the end of the retraced ray, in steps.
     pub(super) largest_error: f64,
-    /// How many rays turned out to have no gradient; what they deposited must be thrown away.
+    /// The number of rays that turned out to have no gradient; their contributions must be
+    /// discarded.
     pub(super) lost_rays: usize,
 }
 
@@ -154,7 +157,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
             );
             clock += 1;
             if boarded {
-                // Only the first step on the way back may be a cut one.
+                // Only the first step backwards may be a shortened one.
                 block.set_full_step(self.setup.step);
             }
             boarded = clock >= soonest;
@@ -173,7 +176,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         retraced
     }
 
-    /// Ends the way back of one ray: checks that it is where it started, and finishes its gradient.
+    /// Finishes one retraced ray: checks that it is back at its start, and completes its gradient.
     fn finish_lane(
         &self,
         block: &BackwardBlock<R>,
@@ -197,7 +200,8 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         chunk.starts[ray] = RayAdjoint::default();
     }
 
-    /// How far the way back ended from the start, in steps; infinite for what is no number.
+    /// The distance between the start and the end of the retraced ray, in steps; infinite for
+    /// values that are not numbers.
     fn retrace_error(&self, entry: &RegionEntry<R>, back: Vec3<R>) -> f64 {
         let miss = (back - entry.state.x).value();
         let v = entry.state.v.value();
@@ -206,7 +210,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         if error.is_nan() { f64::INFINITY } else { error }
     }
 
-    /// Gives an empty seat to the next ray that has anything to differentiate.
+    /// Loads the next ray that has a nonzero adjoint into a lane.
     fn refill_backward(
         &self,
         block: &mut BackwardBlock<R>,
@@ -263,12 +267,14 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     }
 }
 
-/// How far a way back may end from its start, in steps, before its gradient counts as lost.
+/// The largest distance between a start and the end of its retraced ray, in steps, at which the
+/// gradient is still trusted.
 fn retrace_tolerance<R: Real>() -> f64 {
     if R::EPSILON > 1e-10 { 1e-2 } else { 1e-6 }
 }
 
-/// Undoes a kick of weight `c` for every lane, and works out what the parameters get.
+/// Undoes a kick of weight `c` in every lane, and computes the contributions to the gradient by the
+/// parameters.
 #[inline(always)]
 fn undo_kick<R: Real>(block: &mut BackwardBlock<R>, scratch: &mut KickScratch<R>, c: R) {
     let KickScratch { samples, hessian_product: bent, weight, pull } = scratch;

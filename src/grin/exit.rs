@@ -1,5 +1,5 @@
-//! Both ends of a ray: how it enters the region, and how it leaves it and reaches the screen; each
-//! with its transpose.
+//! Both ends of a ray: its entry into the region, its exit, and the way to the screen; each with
+//! its adjoint.
 
 use super::adjoint::RayAdjoint;
 use super::fate::GrinFate;
@@ -10,42 +10,45 @@ use super::tracer::{GrinRay, GrinTracer, RayState};
 use crate::math::Real;
 use crate::math::Vec3;
 
-/// Where a ray ended, and how.
+/// The end of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RayExit<R> {
-    /// How it ended.
+    /// The fate of the ray.
     pub fate: GrinFate,
-    /// Where: on the screen, else on the boundary, else where it stood after its last step.
+    /// The position in mm: on the screen, else on the boundary, else after the last step.
     pub x: Vec3<R>,
-    /// Its velocity there: in air the direction.
+    /// The velocity there; in air it is the unit direction.
     pub v: Vec3<R>,
-    /// The optical path from its start.
+    /// The optical path from the start.
     pub path: R,
-    /// How many steps it took.
+    /// The number of steps.
     pub steps: u32,
     /// The cosine between the ray and the outward normal of the boundary; 1 where there is none.
-    /// The derivative of the exit grows as its inverse: a loss should give a flat exit less weight.
+    /// The derivative of the exit grows as its inverse: a loss should give a grazing exit less
+    /// weight.
     pub cosine: R,
-    /// `|v|² - η²` before it leaves. Zero for light, up to the error of the integrator; a start with
-    /// the wrong speed, or a jump of the index at the boundary that nothing refracts, stays in it.
+    /// `|v|² - η²` before the ray leaves. Zero for light, up to the error of the integrator; a
+    /// start with the wrong speed, or a jump of the index at the boundary without refraction,
+    /// remains in it.
     pub excess: R,
     pub(super) record: ExitRecord<R>,
 }
 
-/// What the way back needs to know.
+/// The intermediate results of an exit that its adjoint needs.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct ExitRecord<R> {
-    /// Where the way back begins.
+    /// The state from which the ray is retraced.
     pub(super) state: RayState<R>,
     /// The length of the last step.
     pub(super) last: R,
-    /// The derivative of the state by the length of the last step, if that was cut to length.
+    /// The derivative of the state with respect to the length of the last step, if that step was
+    /// shortened.
     rate: Option<RayState<R>>,
-    /// The way along `v` from the state to the boundary: not positive.
+    /// The distance along `v` from the state to the boundary, not positive.
     slide: R,
-    /// The face by which it left.
+    /// The face through which the ray left.
     face: Option<usize>,
-    /// The way along `v` from the boundary to the screen.
+    /// The distance along `v` from the boundary to the screen.
     flight: R,
 }
 
@@ -57,12 +60,12 @@ impl<R: Real> RayExit<R> {
     }
 }
 
-/// How a ray came in.
+/// The entry of a ray into the region.
 pub(super) struct RegionEntry<R> {
     pub(super) state: RayState<R>,
-    /// The way along `v` in air.
+    /// The distance along `v` in air.
     slide: R,
-    /// The face it came through; none for a start inside.
+    /// The face through which the ray entered; none for a start inside.
     face: Option<Face<R>>,
 }
 
@@ -89,7 +92,8 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         Ok(RegionEntry { state: RayState { x, v, path }, slide, face })
     }
 
-    /// The transpose of [`Self::enter`]: takes the gradient from the state inside to the ray.
+    /// The adjoint of [`Self::enter`]: carries the adjoint from the state inside to the start of
+    /// the ray.
     pub(super) fn enter_adjoint(
         &self,
         ray: &GrinRay<R>,
@@ -99,7 +103,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     ) -> RayAdjoint<R> {
         let x = entry.state.x;
         let mut seed = inside;
-        // What the speed takes from the index at the start.
+        // The derivative of the speed with respect to the index at the start.
         let by_index = match (self.setup.launch, entry.face) {
             (LaunchMode::Scaled, _) => {
                 let by_index = seed.v.dot(ray.v);
@@ -127,7 +131,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         }
     }
 
-    /// Ends a ray whose last step led from `before` to `after`.
+    /// Ends a ray whose last step went from `before` to `after`.
     pub(super) fn end_ray(
         &self,
         ray: &GrinRay<R>,
@@ -158,13 +162,13 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         if fate.has_arrived() { self.propagate_to_screen(exit) } else { exit }
     }
 
-    /// The outward normal where a ray leaves.
+    /// The outward normal at the exit.
     fn normal(&self, landing: &ExitRecord<R>, x: Vec3<R>) -> Option<Vec3<R>> {
         let region = self.setup.region()?;
         Some(region.face(landing.face?).normal(x))
     }
 
-    /// Finds where the last step met the boundary; none if that cannot be told.
+    /// Finds the point where the last step met the boundary; none if it cannot be determined.
     fn find_boundary(&self, before: &RayState<R>, after: &RayState<R>) -> Option<ExitRecord<R>> {
         let whole = ExitRecord { state: *after, last: self.setup.step, ..ExitRecord::default() };
         let EndCondition::Boundary { region, last, .. } = &self.setup.end else {
@@ -182,8 +186,8 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         }
     }
 
-    /// The length of the last step that ends on the boundary, by Newton's iteration between two
-    /// lengths that lie inside and outside.
+    /// Shortens the last step so that it ends on the boundary, by Newton's iteration bracketed
+    /// between a length that ends inside and one that ends outside.
     fn cut_last_step(
         &self,
         region: &GrinRegion<R>,
@@ -213,7 +217,8 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
                 break;
             }
         }
-        // With the exact derivative; those that a number carries settle one step after its value.
+        // Corrects with the exact derivative; derivatives carried by the number type converge one
+        // step after its value.
         for _ in 0..=R::ORDER {
             let (end, rate) = self.advance_with_rate(*before, length);
             let (face, _) = region.outermost(end.x);
@@ -226,7 +231,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         (near && length.is_finite()).then_some(ExitRecord { face: Some(face), ..cut })
     }
 
-    /// From the boundary into air and on to the screen.
+    /// Continues from the boundary through air to the screen.
     fn propagate_to_screen(&self, mut exit: RayExit<R>) -> RayExit<R> {
         if let (LaunchMode::Refracted, Some(normal)) =
             (self.setup.launch, self.normal(&exit.record, exit.x))
@@ -251,8 +256,8 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         exit
     }
 
-    /// The transpose of everything behind the last step: from the gradient by the exit to the one
-    /// by the state where the way back begins.
+    /// The adjoint of everything after the last step: from the adjoint of the exit to that of the
+    /// state from which the ray is retraced.
     pub(super) fn exit_adjoint(&self, exit: &RayExit<R>, seed: RayAdjoint<R>) -> RayAdjoint<R> {
         let landing = &exit.record;
         let mut seed = seed;
@@ -270,7 +275,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         }
         match landing.rate {
             None => slide_adjoint(landing.slide, inside.v, normal, seed),
-            // The length of the last step gives way so that the end stays on the boundary.
+            // The length of the last step changes so that the end stays on the boundary.
             Some(rate) => {
                 let gain = seed.x.dot(rate.x) + seed.v.dot(rate.v) + seed.path * rate.path;
                 RayAdjoint { x: seed.x - normal * (gain / normal.dot(rate.x)), ..seed }
@@ -279,7 +284,8 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     }
 }
 
-/// How a ray comes to the region: the face and the way along `v`; no face for a start inside.
+/// Finds the entry into the region: the face and the distance along `v`; no face for a start
+/// inside.
 fn find_entry<R: Real>(region: &GrinRegion<R>, ray: &GrinRay<R>) -> Option<(Option<Face<R>>, R)> {
     let (face, distance) = region.outermost(ray.x);
     let tolerance = rounding_error(ray.x, Vec3::default());
@@ -298,27 +304,27 @@ fn newton_correction<R: Real>(face: &Face<R>, x: Vec3<R>, rate: Vec3<R>) -> R {
     face.level(x) / face.normal(x).dot(rate)
 }
 
-/// The state after a straight way `t v`, whose optical path is `t |v|²`.
+/// The state after a straight segment `t v`, whose optical path is `t |v|²`.
 fn move_straight<R: Real>(state: &RayState<R>, t: R) -> RayState<R> {
     let v = state.v;
     RayState { x: state.x + v * t, v, path: state.path + t * v.dot(v) }
 }
 
-/// The transpose of a straight way `t v` that ends on a face with this normal: `t` gives way so that
-/// the end stays on the face.
+/// The adjoint of a straight segment `t v` that ends on a face with this normal: `t` changes so
+/// that the end stays on the face.
 fn slide_adjoint<R: Real>(t: R, v: Vec3<R>, normal: Vec3<R>, seed: RayAdjoint<R>) -> RayAdjoint<R> {
     let gain = seed.x.dot(v) + seed.path * v.dot(v);
     let x = seed.x - normal * (gain / normal.dot(v));
     RayAdjoint { x, v: seed.v + x * t + v * (R::TWO * t * seed.path), path: seed.path }
 }
 
-/// A diagonal Hessian, twice these squares, times a vector.
+/// The Hessian of a face, twice the diagonal matrix of `square`, times a vector.
 fn diagonal_hessian_times<R: Real>(square: Vec3<R>, v: Vec3<R>) -> Vec3<R> {
     Vec3::new(square.x * v.x, square.y * v.y, square.z * v.z) * R::TWO
 }
 
-/// Snell's law: the part of `v` along the surface stays, its length becomes the root of `square`;
-/// none where that is impossible.
+/// Snell's law: the tangential part of `v` is kept, its length becomes the square root of `square`;
+/// `None` for total reflection.
 fn refract<R: Real>(v: Vec3<R>, normal: Vec3<R>, square: R) -> Option<Vec3<R>> {
     let unit = normal * (R::ONE / normal.dot(normal).sqrt());
     let along = v.dot(unit);
@@ -330,14 +336,14 @@ fn refract<R: Real>(v: Vec3<R>, normal: Vec3<R>, square: R) -> Option<Vec3<R>> {
     Some(v + unit * (R::select(along < R::ZERO, -root, root) - along))
 }
 
-/// What the transpose of [`refract`] gives.
+/// The adjoint of [`refract`] with respect to its arguments.
 struct RefractAdjoint<R> {
     v: Vec3<R>,
     normal: Vec3<R>,
     square: R,
 }
 
-/// The transpose of [`refract`], where it is possible.
+/// The adjoint of [`refract`], where refraction is possible.
 fn refract_adjoint<R: Real>(
     v: Vec3<R>,
     normal: Vec3<R>,

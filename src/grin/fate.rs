@@ -1,30 +1,32 @@
-//! How a ray in a gradient-index field ends.
+//! The fate of a ray in a gradient-index field.
 
 use serde::Serialize;
 
-/// How a ray ends. No ray is dropped silently: each has one.
+/// The fate of a ray in a gradient-index field. No ray is dropped silently: each has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GrinFate {
-    /// It left the region.
+    /// The ray left the region.
     Left,
-    /// It took the number of steps that was asked for.
+    /// The ray took the requested number of steps.
     Stopped,
-    /// It left the region against the direction in which it started.
+    /// The ray left the region against the direction in which it started.
     Turned,
-    /// It was still inside after the largest number of steps: a closed orbit, or too small a limit.
+    /// The ray was still inside after the largest number of steps: a closed orbit, or a limit that
+    /// is too small.
     Trapped,
-    /// It started outside the region, or on its boundary, and did not go in.
+    /// The ray started outside the region, or on its boundary, and did not enter it.
     NeverEntered,
-    /// It left so flat that the straight line back from its last point misses the region.
+    /// The ray left at such grazing incidence that the straight line back from its last point
+    /// misses the region.
     Grazing,
-    /// It was totally reflected at the boundary.
+    /// The ray was totally reflected at the boundary.
     TotalReflection,
-    /// It left, but not towards the screen.
+    /// The ray left the region, but not towards the screen.
     MissedScreen,
-    /// Its retrace did not come back to its start: no digit of its gradient would be right.
+    /// The retraced ray did not return to its start: no digit of its gradient would be correct.
     Chaotic,
-    /// Its numbers overflowed.
+    /// The state of the ray overflowed.
     Diverged,
 }
 
@@ -43,7 +45,7 @@ impl GrinFate {
         Self::Diverged,
     ];
 
-    /// What it is called in files and reports.
+    /// The name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Left => "left",
@@ -59,28 +61,28 @@ impl GrinFate {
         }
     }
 
-    /// Whether the ray reached the end that was asked for, so that its exit can be differentiated.
+    /// True if the ray reached the requested end, so that its exit can be differentiated.
     pub fn has_arrived(self) -> bool {
         matches!(self, Self::Left | Self::Stopped | Self::Turned)
     }
 }
 
-/// How many rays ended how.
+/// The number of rays with each fate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GrinFateCounts([usize; GrinFate::ALL.len()]);
 
 impl GrinFateCounts {
-    /// Counts one more.
+    /// Counts one more ray with this fate.
     pub fn add(&mut self, fate: GrinFate) {
         self.0[fate as usize] += 1;
     }
 
-    /// How many ended this way.
+    /// The number of rays with this fate.
     pub fn count_of(self, fate: GrinFate) -> usize {
         self.0[fate as usize]
     }
 
-    /// How many reached the end that was asked for.
+    /// The number of rays that reached the requested end.
     pub fn arrived_count(self) -> usize {
         GrinFate::ALL
             .into_iter()
@@ -89,7 +91,7 @@ impl GrinFateCounts {
             .sum()
     }
 
-    /// How many ended how, of the ways that occurred.
+    /// The fates that occurred, with the number of rays of each.
     pub fn iter(self) -> impl Iterator<Item = (GrinFate, usize)> {
         GrinFate::ALL
             .into_iter()
@@ -97,7 +99,7 @@ impl GrinFateCounts {
             .filter(|(_, count)| *count > 0)
     }
 
-    /// How many rays there are.
+    /// The total number of rays.
     pub fn total(self) -> usize {
         self.0.iter().sum()
     }

@@ -1,4 +1,5 @@
-//! Gradients of a loss on the exits of many rays, by the parameters of the field and by the starts.
+//! Gradients of a loss on the exits of many rays, with respect to the parameters of the field and
+//! to the starts.
 //!
 //! Rays are split into a number of parts that depends on the problem alone, never on the threads.
 //! Each part has its own gradient, and they are added in order: the same bits on any number of
@@ -13,25 +14,24 @@ use super::tracer::{GrinRay, GrinTracer};
 use crate::math::Real;
 use rayon::prelude::*;
 
-/// Most private gradients at a time: their memory is this many times the parameters.
+/// The largest number of private gradients in memory at a time.
 const PARTS: usize = 16;
-/// Ray against parameter: a private gradient is worth clearing and adding from this many parameters
-/// a ray on.
+/// A private gradient is worth clearing and adding from this many parameters per ray on.
 const PARAMETERS_PER_RAY: usize = 64;
-/// The same for the second one, which halves the time of two threads at once.
+/// The same for the second private gradient, which halves the time on two threads.
 const PARAMETERS_PER_RAY_OF_TWO: usize = 512;
 /// Parameters that one task adds.
 const STRIP: usize = 4096;
 
-/// The gradient of a loss.
+/// The gradient of a loss, by the adjoint method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjointGradient<R> {
-    /// By the parameters of the field.
+    /// With respect to the parameters of the field.
     pub parameters: Vec<R>,
-    /// By the start of each ray; zero for a ray that has no gradient.
+    /// With respect to the start of each ray; zero for a ray that has no gradient.
     pub starts: Vec<RayAdjoint<R>>,
-    /// The largest distance between a start and the end of its way back, in steps, of the rays
-    /// that count: rounding, unless the light is chaotic.
+    /// The largest distance between a start and the end of its retraced ray, in steps, of the rays
+    /// with a gradient: rounding, unless the light is chaotic.
     pub retrace_error: f64,
 }
 
@@ -40,21 +40,22 @@ pub struct AdjointGradient<R> {
 pub struct LossAndGradient<R> {
     /// The sum over all rays.
     pub loss: R,
-    /// Its gradient.
+    /// The gradient of the sum.
     pub gradient: AdjointGradient<R>,
-    /// How each ray ended.
+    /// The exit of each ray.
     pub exits: Vec<RayExit<R>>,
-    /// How many rays ended how.
+    /// The number of rays with each fate.
     pub fates: GrinFateCounts,
 }
 
 impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
-    /// The sum of `loss` over rays.
+    /// The sum of `loss` over rays, with its gradient.
     ///
-    /// `loss` gets the number of the ray and its exit, and gives the loss and its derivative by the
-    /// exit. It is asked about every ray, also one that did not arrive, whose derivative is not
-    /// used: a constant for those keeps an optimiser from driving rays away. Where the way back
-    /// shows that a ray is chaotic it is asked again, with [`GrinFate::Chaotic`].
+    /// `loss` receives the number of the ray and its exit, and returns the loss and its derivative
+    /// with respect to the exit. It is called for every ray, also for one that did not arrive,
+    /// whose derivative is ignored: a constant loss for those keeps an optimiser from driving rays
+    /// away. If retracing shows that a ray is chaotic, `loss` is called again with
+    /// [`GrinFate::Chaotic`].
     pub fn loss_and_gradient(
         &self,
         rays: &[GrinRay<R>],
@@ -77,9 +78,9 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         LossAndGradient { loss: sum, gradient, exits, fates }
     }
 
-    /// The gradient of a loss whose derivatives by the exits are known: the second pass, where the
-    /// first was [`Self::trace_batch`] with the same rays. A ray whose way back shows that it has no
-    /// gradient gets its new fate, and adds nothing.
+    /// The gradient of a loss whose derivatives with respect to the exits are known: the second
+    /// pass after [`Self::trace_batch`] with the same rays. A ray that turns out to have no
+    /// gradient when it is retraced gets its new fate and contributes nothing.
     ///
     /// # Panics
     /// If there is not one exit and one seed for each ray.
@@ -108,8 +109,8 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         AdjointGradient { parameters, starts, retrace_error }
     }
 
-    /// The gradient of one part of the rays. A chaotic ray is known by its way back, when it has
-    /// already deposited what is worth nothing: then the part begins again without it.
+    /// The gradient of one part of the rays. A chaotic ray is detected when it is retraced, after
+    /// it has already contributed invalid terms: the part is then repeated without it.
     fn gradient_of_part(&self, chunk: &mut Chunk<'_, R>) -> (Vec<R>, f64) {
         loop {
             let mut parameters = vec![R::ZERO; self.field.parameters().len()];
@@ -121,7 +122,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         }
     }
 
-    /// The bytes that [`Self::gradient`] works with: what it keeps of the rays, and the private
+    /// The memory in bytes that [`Self::gradient`] needs: for the rays, and for the private
     /// gradients. Neither depends on the number of steps.
     pub fn gradient_bytes(&self, rays: usize) -> [usize; 2] {
         let each =
@@ -130,7 +131,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         [rays * each, parts * self.field.parameters().len() * size_of::<R>()]
     }
 
-    /// How many rays share a private gradient.
+    /// The number of rays that share a private gradient.
     fn rays_per_part(&self, rays: usize) -> usize {
         let parameters = self.field.parameters().len().max(1);
         let two = 1 + usize::from(rays * PARAMETERS_PER_RAY_OF_TWO >= parameters);

@@ -6,7 +6,7 @@
 use crate::math::Real;
 use serde::{Deserialize, Serialize};
 
-/// One piece of a step: its weight is a fraction of the step.
+/// One part of a step; its weight is a fraction of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IntegratorOp<R> {
     /// `x += c h v`.
@@ -15,14 +15,15 @@ pub enum IntegratorOp<R> {
     Kick(R),
 }
 
-/// A way to advance a ray by one step.
+/// A splitting method that advances a ray by one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
-    /// Velocity first, then position; order 1. For comparison with the literature: [`Self::LeapfrogDkd`]
-    /// costs the same.
+    /// Velocity first, then position; order 1. For comparison with the literature:
+    /// [`Self::LeapfrogDkd`] costs the same.
     SymplecticEuler,
-    /// Drift, kick, drift; order 2. Turns only between straight pieces: right for grids.
+    /// Drift, kick, drift; order 2. The ray changes direction only between straight segments, which
+    /// suits grids.
     LeapfrogDkd,
     /// Kick, drift, kick; order 2.
     LeapfrogKdk,
@@ -46,7 +47,7 @@ impl Integrator {
         Self::BlanesMoan,
     ];
 
-    /// What it is called in files and reports.
+    /// The name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::SymplecticEuler => "symplectic_euler",
@@ -58,7 +59,7 @@ impl Integrator {
         }
     }
 
-    /// The error in a smooth field falls as the step to this power.
+    /// The order of convergence in a smooth field.
     pub fn order(self) -> u32 {
         match self {
             Self::SymplecticEuler => 1,
@@ -67,12 +68,12 @@ impl Integrator {
         }
     }
 
-    /// How often a step asks the field.
+    /// The number of field evaluations per step.
     pub fn kicks_per_step(self) -> usize {
         self.ops::<f64>().iter().filter(|op| matches!(op, IntegratorOp::Kick(_))).count()
     }
 
-    /// The pieces of a step, in order.
+    /// The parts of a step, in order.
     pub fn ops<R: Real>(self) -> Vec<IntegratorOp<R>> {
         let drift = |c: f64| IntegratorOp::Drift(R::from_f64(c));
         let kick = |c: f64| IntegratorOp::Kick(R::from_f64(c));
@@ -104,7 +105,7 @@ impl Integrator {
     }
 }
 
-/// A palindrome: `half`, the middle, `half` backwards.
+/// The palindrome of `half`, `middle` and the reversed `half`.
 fn palindrome<R: Real>(half: &[IntegratorOp<R>], middle: IntegratorOp<R>) -> Vec<IntegratorOp<R>> {
     half.iter().copied().chain([middle]).chain(half.iter().rev().copied()).collect()
 }

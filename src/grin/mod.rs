@@ -1,4 +1,5 @@
-//! Light in one gradient-index field: fields, ray integrators, their discrete adjoint. Knows no lens.
+//! Light in one gradient-index field: fields, ray integrators and their discrete adjoint. Knows no
+//! lens.
 //!
 //! In the canonical parameter σ, with `dσ = ds/η`, a ray obeys `x' = v`, `v' = η ∇η` (Sharma et al.,
 //! Appl. Opt. 21, 1982; equations 5.5 and 5.6 of Pediredla et al., "Adjoint nonlinear ray tracing",

@@ -1,4 +1,4 @@
-//! Which integrator and which step a field calls for, and why.
+//! The choice of integrator and step size for a field, with its reasons.
 //!
 //! On a trilinear grid the force jumps between voxels, which holds every integrator to the first
 //! order: the cheapest one with about two steps a voxel is right. A smooth field rewards order 4.
@@ -14,42 +14,42 @@ use super::setup::{EndCondition, GrinSetup, GrinSetupError, LastStep, LaunchMode
 use super::tracer::{GrinRay, GrinTracer};
 use crate::math::Vec3;
 
-/// Rays that the step is tried on.
+/// Rays used to test a step.
 const SAMPLE: usize = 64;
-/// Largest number of tries.
+/// Largest number of tried step sizes.
 const TRIES: usize = 24;
-/// After so many tries that do not halve an error of this part of the way, light counts as chaotic:
-/// finer steps tell no more about it, and become very many.
+/// After this many step sizes in a row that do not halve an error of this fraction of the path,
+/// light counts as chaotic: smaller steps do not reduce the error, and their number explodes.
 const MAX_STALLED: usize = 3;
 const CHAOTIC_ERROR: f64 = 0.1;
-/// A ray may be this many times longer than the longest straight way through the region.
+/// A ray may be this many times longer than the longest straight path through the region.
 const MAX_RELATIVE_LENGTH: f64 = 32.0;
-/// Most steps a straight way may take before the plan gives up on a tolerance.
+/// Most steps along a straight path before the plan gives up on a tolerance.
 const MAX_STEPS: f64 = 1e6;
-/// Most steps a voxel where the force jumps.
+/// Most steps per voxel where the force jumps.
 const MAX_STEPS_PER_VOXEL: f64 = 16.0;
-/// Steps that are a simple fraction of a voxel would meet the same place of every voxel, and on a
-/// ray along the grid its faces, where rounding decides which voxel counts.
+/// Steps that are a simple fraction of a voxel would sample the same place of every voxel, and on a
+/// ray along the grid its faces, where rounding decides to which voxel a point belongs.
 const INCOMMENSURATE: f64 = 0.974;
 
-/// A setup and the reasons for it.
+/// A tracing setup and the reasons for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TracingPlan {
-    /// How to trace.
+    /// The setup to trace with.
     pub setup: GrinSetup<f64>,
-    /// The largest change of an exit position in the sample when the step is halved.
+    /// The largest change of an exit position in the sample when the step is halved, a length.
     pub error: f64,
-    /// Whether that is within the tolerance.
+    /// True if that change is within the tolerance.
     pub is_within_tolerance: bool,
-    /// Why: a sentence for each decision, with the number it rests on.
+    /// A sentence for each decision, with the number it rests on.
     pub reasons: Vec<String>,
 }
 
-/// Chooses integrator, step and last step for light in a region, so that exit positions are good to
-/// `tolerance`, judged by some of the rays.
+/// Chooses integrator, step and last step for light in a region, so that exit positions are
+/// accurate to `tolerance`, judged by a sample of the rays.
 ///
 /// # Errors
-/// A region that is empty.
+/// An empty region.
 pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
     field: &F,
     region: &GrinRegion<f64>,
@@ -75,7 +75,7 @@ pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
         },
         screen: None,
     };
-    // Where the force jumps, the error falls no further once a voxel has some steps.
+    // Where the force jumps, the error does not decrease further once a voxel has several steps.
     let finest = if field.resolution().continuous_force {
         way / MAX_STEPS
     } else {
@@ -103,7 +103,7 @@ pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
     Ok(TracingPlan { setup: setup(step), error, is_within_tolerance: reached, reasons })
 }
 
-/// What the force of the field allows.
+/// The integrator and the last step that suit the continuity of the force.
 fn choose_integrator<F: IndexField<f64> + ?Sized>(
     field: &F,
     reasons: &mut Vec<String>,
@@ -124,7 +124,7 @@ fn choose_integrator<F: IndexField<f64> + ?Sized>(
     (Integrator::LeapfrogDkd, LastStep::BrokenLine)
 }
 
-/// The longest step to begin with.
+/// The longest step to try first.
 fn longest_step<F: IndexField<f64> + ?Sized>(
     field: &F,
     integrator: Integrator,
@@ -147,7 +147,7 @@ fn longest_step<F: IndexField<f64> + ?Sized>(
     limit
 }
 
-/// The straight way of a ray through the region, in σ.
+/// The length of the straight path of a ray through the region, in σ.
 fn straight_path(region: &GrinRegion<f64>, ray: &GrinRay<f64>) -> f64 {
     let start = match region.entry(ray.x, ray.v) {
         Some((_, t)) if region.level(ray.x) > 0.0 => ray.x + ray.v * t,
@@ -162,7 +162,7 @@ fn straight_path(region: &GrinRegion<f64>, ray: &GrinRay<f64>) -> f64 {
     if far.is_finite() { far } else { 0.0 }
 }
 
-/// The largest change of an exit position between two setups, of the rays that arrive with both.
+/// The largest change of an exit position between two setups, over the rays that arrive with both.
 fn exit_change<F: IndexField<f64> + ?Sized>(
     field: &F,
     coarse: &GrinSetup<f64>,

@@ -1,12 +1,12 @@
-//! Where light is traced: a region bounded by planes and quadrics, and where a straight line
-//! crosses its boundary.
+//! Convex regions bounded by planes and quadrics, and the intersections of straight lines with
+//! their boundary.
 
 use super::lanes::{LANES, LaneScalars, LaneVectors, get};
 use crate::math::Real;
 use crate::math::Vec3;
 
 /// A plane or quadric `φ(x) = Σ aᵢ xᵢ² + b·x + c`, negative inside: planes, spheres, cylinders and
-/// conics of revolution along an axis are all of this form.
+/// conics of revolution about an axis are all of this form.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Face<R> {
     /// `a`.
@@ -18,39 +18,39 @@ pub struct Face<R> {
 }
 
 impl<R: Real> Face<R> {
-    /// The plane `normal · x = offset`; inside is where the normal points away from.
+    /// The plane `normal · x = offset`; the normal points outwards.
     pub fn plane(normal: Vec3<R>, offset: R) -> Self {
         Self { square: Vec3::default(), linear: normal, constant: -offset }
     }
 
-    /// The sphere about the origin, seen from inside.
+    /// The sphere about the origin; its interior is inside.
     pub fn sphere(radius: R) -> Self {
         let square = Vec3::new(R::ONE, R::ONE, R::ONE);
         Self { square, linear: Vec3::default(), constant: -(radius * radius) }
     }
 
-    /// The cylinder about the z axis, seen from inside.
+    /// The cylinder about the z axis; its interior is inside.
     pub fn cylinder(radius: R) -> Self {
         let square = Vec3::new(R::ONE, R::ONE, R::ZERO);
         Self { square, linear: Vec3::default(), constant: -(radius * radius) }
     }
 
-    /// `φ` at a point.
+    /// `φ` at a point, negative inside.
     #[inline(always)]
     pub fn level(&self, p: Vec3<R>) -> R {
         let (a, b) = (self.square, self.linear);
         p.x * (a.x * p.x + b.x) + p.y * (a.y * p.y + b.y) + p.z * (a.z * p.z + b.z) + self.constant
     }
 
-    /// `∇φ`: outwards, not normalised.
+    /// `∇φ`, outwards, not normalised.
     #[inline(always)]
     pub fn normal(&self, p: Vec3<R>) -> Vec3<R> {
         let (a, b, two) = (self.square, self.linear, R::TWO);
         Vec3::new(two * a.x * p.x + b.x, two * a.y * p.y + b.y, two * a.z * p.z + b.z)
     }
 
-    /// The two `t` at which `x + t v` meets the face, in ascending order; for a plane the other one
-    /// is infinite.
+    /// The two `t` at which `x + t v` intersects the face, in ascending order; for a plane the
+    /// second one is infinite.
     pub fn crossings(&self, x: Vec3<R>, v: Vec3<R>) -> Option<[R; 2]> {
         let squares = self.square;
         let a = squares.x * v.x * v.x + squares.y * v.y * v.y + squares.z * v.z * v.z;
@@ -65,7 +65,7 @@ impl<R: Real> Face<R> {
         if !(radicand >= R::ZERO) {
             return None;
         }
-        // The sum that does not cancel, and the other root from the product of both.
+        // The sum without cancellation, and the other root from the product of both.
         let root = radicand.sqrt();
         let q = -(half_b + R::select(half_b < R::ZERO, -root, root));
         if q == R::ZERO {
@@ -76,18 +76,18 @@ impl<R: Real> Face<R> {
     }
 }
 
-/// A convex region: everything between two corners that is also inside every face.
+/// A convex region: the box between two corners, cut by further faces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GrinRegion<R> {
-    /// Lower corner; minus infinity where there is none.
+    /// The lower corner; minus infinity where there is none.
     pub low: Vec3<R>,
-    /// Upper corner; infinity where there is none.
+    /// The upper corner; infinity where there is none.
     pub high: Vec3<R>,
     /// Further faces.
     pub faces: Vec<Face<R>>,
 }
 
-/// Faces of the box: they have the numbers 0 to 5, the further ones those behind.
+/// Faces of the box: they have the numbers 0 to 5, the further ones follow.
 const SIDES: usize = 6;
 
 impl<R: Real> GrinRegion<R> {
@@ -101,7 +101,7 @@ impl<R: Real> GrinRegion<R> {
         Self::block(Vec3::new(-half, -half, -half), Vec3::new(half, half, half))
     }
 
-    /// Everything inside these faces.
+    /// The intersection of the insides of these faces.
     pub fn within_faces(faces: Vec<Face<R>>) -> Self {
         let infinite = R::from_f64(f64::INFINITY);
         let high = Vec3::new(infinite, infinite, infinite);
@@ -113,7 +113,7 @@ impl<R: Real> GrinRegion<R> {
         Self::within_faces(vec![Face::sphere(radius)])
     }
 
-    /// A piece of fibre along z.
+    /// A finite cylinder about the z axis, from one z to another.
     pub fn rod(radius: R, from: R, to: R) -> Self {
         let mut rod = Self::within_faces(vec![Face::cylinder(radius)]);
         (rod.low.z, rod.high.z) = (from, to);
@@ -143,8 +143,8 @@ impl<R: Real> GrinRegion<R> {
         self.faces.iter().fold(sides, |height, face| larger(height, face.level(p)))
     }
 
-    /// How many sides each ray of a block is not inside of; more than none for what is nowhere. Numbers
-    /// as wide as the places themselves, which lanes need not convert.
+    /// The number of faces that each ray of a block is not inside of; positive for coordinates that
+    /// are not numbers. As floating-point numbers, which lanes need not convert.
     #[inline(always)]
     pub(super) fn count_outside(&self, at: &LaneVectors<R>) -> LaneScalars<R> {
         let mut out = [R::ZERO; LANES];
@@ -166,15 +166,16 @@ impl<R: Real> GrinRegion<R> {
         out
     }
 
-    /// How many faces there are, those of the box included.
+    /// The number of faces, those of the box included.
     pub fn face_count(&self) -> usize {
         SIDES + self.faces.len()
     }
 
-    /// Face number `n`: those of the box in the order low x, high x, low y, …, then the further ones.
+    /// Face number `n`: those of the box in the order low x, high x, low y, …, then the further
+    /// ones.
     ///
     /// # Panics
-    /// If there are not that many.
+    /// If `n` is not less than [`Self::face_count`].
     pub fn face(&self, n: usize) -> Face<R> {
         let (zero, one) = (R::ZERO, R::ONE);
         let axis =
@@ -190,7 +191,7 @@ impl<R: Real> GrinRegion<R> {
         }
     }
 
-    /// The face that a point is farthest outside of, in units of length, and how far.
+    /// The face that a point is farthest outside of, and its distance from that face.
     pub fn outermost(&self, p: Vec3<R>) -> (usize, R) {
         let mut found = (0, R::from_f64(f64::NEG_INFINITY));
         let faces = self.faces.iter().map(|face| distance(face, p));
@@ -202,7 +203,7 @@ impl<R: Real> GrinRegion<R> {
         found
     }
 
-    /// How far a point is outside each side of the box, in the order of [`Self::face`]: minus
+    /// The distance of a point outside each side of the box, in the order of [`Self::face`]: minus
     /// infinity where there is none.
     #[inline(always)]
     fn box_distances(&self, p: Vec3<R>) -> [R; SIDES] {
@@ -210,8 +211,8 @@ impl<R: Real> GrinRegion<R> {
         [low.x, high.x, low.y, high.y, low.z, high.z]
     }
 
-    /// Where the line `x + t v` from a point outside first is inside every face: the `t ≥ 0`, and the
-    /// face by which it goes in; none if it misses. With `-v` it is where a ray that has just left
+    /// The point where the line `x + t v` from a point outside enters the region: the face and `t ≥
+    /// 0`; `None` if the line misses. With `-v` it is the point where a ray that has just left
     /// crossed the boundary.
     pub fn entry(&self, x: Vec3<R>, v: Vec3<R>) -> Option<(usize, R)> {
         let mut found: Option<(usize, R)> = None;
@@ -243,7 +244,7 @@ fn distance<R: Real>(face: &Face<R>, p: Vec3<R>) -> R {
     if length > R::ZERO { face.level(p) / length } else { face.level(p) }
 }
 
-/// A distance that rounding may explain at a point that was reached over this way.
+/// The distance that rounding may cause at a point reached along `way`.
 pub(super) fn rounding_error<R: Real>(at: Vec3<R>, way: Vec3<R>) -> R {
     let size = at.dot(at).sqrt() + way.dot(way).sqrt();
     R::from_f64(1e3 * R::EPSILON) * size

@@ -1,76 +1,77 @@
-//! What a tracer needs to know besides the field: integrator, step, start and end.
+//! The settings of a tracer besides the field: integrator, step, start and end.
 
 use super::integrator::Integrator;
 use super::region::{Face, GrinRegion};
 use crate::math::Real;
 use serde::{Deserialize, Serialize};
 
-/// How a ray's speed is made to fit the index where it starts.
+/// The relation of a ray's initial speed to the index at its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LaunchMode {
-    /// `v` is used as it is: right where the index at the start is `|v|`.
+    /// `v` is used unchanged: correct where the index at the start is `|v|`.
     #[default]
     AsGiven,
     /// `v₀ = η(x₀) d`: light that starts inside the medium in the direction `d`.
     Scaled,
-    /// Light comes from air and goes back into air: it is refracted by Snell's law where it enters
-    /// and where it leaves. A ray that starts inside is used as it is.
+    /// Light comes from air and returns to air: it is refracted by Snell's law at its entry and
+    /// exit. A ray that starts inside is used unchanged.
     Refracted,
 }
 
-/// How the last step meets the boundary.
+/// The treatment of the last step at the boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LastStep {
-    /// Back along the straight line from the first point outside. Of first order, which on a
-    /// trilinear grid loses nothing.
+    /// Back along the straight line from the first point outside. Of first order, which loses
+    /// nothing on a trilinear grid.
     BrokenLine,
-    /// A last step of just the right length: keeps the order of the integrator.
+    /// The last step is shortened to end on the boundary, which preserves the order of the
+    /// integrator.
     Fractional,
 }
 
-/// Where a ray ends.
+/// The condition that ends a ray.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EndCondition<R> {
-    /// After so many steps.
+    /// After this number of steps.
     Steps(u32),
-    /// Where it leaves a region.
+    /// At the boundary of a region.
     Boundary {
-        /// The region in which it is traced.
+        /// The region in which the ray is traced.
         region: GrinRegion<R>,
-        /// How the last step meets the boundary.
+        /// The treatment of the last step.
         last: LastStep,
-        /// After so many steps it counts as trapped.
+        /// The number of steps after which the ray counts as trapped.
         limit: u32,
     },
 }
 
-/// How rays are traced.
+/// The settings of a tracer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GrinSetup<R> {
-    /// The kind of step.
+    /// The splitting method.
     pub integrator: Integrator,
-    /// The length of a step in σ, a length; the ray moves by `η` times that.
+    /// The length of a step in σ; the ray moves by `η` times that.
     pub step: R,
-    /// How the speed is made to fit the index at the start.
+    /// The relation of the initial speed to the index.
     pub launch: LaunchMode,
-    /// Where rays end.
+    /// The condition that ends a ray.
     pub end: EndCondition<R>,
     /// A screen in air behind the end, reached by a straight line.
     pub screen: Option<Face<R>>,
 }
 
-/// Why nothing can be traced with a setup.
+/// A setup that no ray can be traced with.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GrinSetupError {
     /// The step is not a positive number.
     #[error("a step of {0}, expected a positive number")]
     Step(f64),
-    /// No steps are allowed.
+    /// The largest number of steps is zero.
     #[error("rays of no steps")]
     NoSteps,
-    /// The region contains nothing.
+    /// The region is empty.
     #[error("the region is empty along {axis}")]
     EmptyRegion {
         /// `x`, `y` or `z`.
@@ -79,7 +80,7 @@ pub enum GrinSetupError {
 }
 
 impl<R: Real> GrinSetup<R> {
-    /// Refuses numbers that no ray can be traced with.
+    /// Checks that rays can be traced with these settings.
     pub(super) fn check(&self) -> Result<(), GrinSetupError> {
         if !(self.step > R::ZERO && self.step.is_finite()) {
             return Err(GrinSetupError::Step(self.step.value()));
@@ -109,7 +110,7 @@ impl<R: Real> GrinSetup<R> {
         }
     }
 
-    /// Whether the last step is cut to length.
+    /// True if the last step is shortened to end on the boundary.
     pub(super) fn is_fractional(&self) -> bool {
         matches!(self.end, EndCondition::Boundary { last: LastStep::Fractional, .. })
     }

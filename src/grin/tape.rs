@@ -1,7 +1,7 @@
-//! Reverse mode with a stored path, for comparison with the retraced one.
+//! Reverse-mode differentiation with a stored path, for comparison with the retraced one.
 //!
-//! It keeps the position of every kick, the least that reverse-mode differentiation of this tracer
-//! can do with, and walks them backwards. Its memory grows with the number of steps.
+//! It stores the position of every kick, the minimum for reverse-mode differentiation of this
+//! tracer, and processes them backwards. Its memory grows with the number of steps.
 
 use super::adjoint::RayAdjoint;
 use super::exit::RayExit;
@@ -11,22 +11,22 @@ use super::tracer::{GrinRay, GrinTracer};
 use crate::math::Real;
 use crate::math::Vec3;
 
-/// A gradient by a stored path, and what that took.
+/// A gradient by a stored path, and its memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TapeGradient<R> {
-    /// By the parameters of the field.
+    /// With respect to the parameters of the field.
     pub parameters: Vec<R>,
-    /// By the start of each ray.
+    /// With respect to the start of each ray.
     pub starts: Vec<RayAdjoint<R>>,
-    /// The largest number of bytes on the tape at a time, all rays being on their way at once.
+    /// The largest size of the tape in bytes, with all rays in flight at once.
     pub bytes: usize,
 }
 
 impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
-    /// What [`Self::gradient`] gives, with every ray's path stored first, on one thread.
+    /// The same as [`Self::gradient`], but with every ray's path stored first, on one thread.
     ///
     /// # Panics
-    /// If there is not one exit and one seed for each ray.
+    /// If there is not one exit and one adjoint for each ray.
     pub fn tape_gradient(
         &self,
         rays: &[GrinRay<R>],
@@ -77,7 +77,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         tape
     }
 
-    /// The transpose of all steps.
+    /// The adjoint of all steps.
     fn backpropagate(
         &self,
         mut tape: Vec<Vec3<R>>,
@@ -99,7 +99,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         seed
     }
 
-    /// The transpose of one kick over `step`.
+    /// The adjoint of one kick over `step`.
     fn kick_adjoint(&self, x: Vec3<R>, step: R, seed: &mut RayAdjoint<R>, gradient: &mut [R]) {
         let (sample, hessian) = self.field.sample_and_hessian(x);
         let (index, g) = (sample.index, sample.gradient);

@@ -1,8 +1,8 @@
-//! Rays forwards: single ones and blocks of them.
+//! Forward tracing: single rays and blocks of them.
 //!
-//! A block has a seat for each lane. A ray that ends leaves its seat to the next one, so the lanes
-//! stay full however different the rays are. An empty seat has a step of length 0: drifts and kicks
-//! leave it alone, and the loops need no branch on a ray.
+//! A block has one lane per ray. A ray that ends leaves its lane to the next one, so the lanes stay
+//! full however different the rays are. An empty lane has a step of length 0: drifts and kicks
+//! leave it unchanged, and the loops need no branch on a ray.
 
 use super::exit::RayExit;
 use super::fate::GrinFate;
@@ -19,13 +19,13 @@ use rayon::prelude::*;
 /// Rays that one task traces when all cores work.
 const CHUNK: usize = 16 * LANES;
 
-/// Where a ray starts.
+/// The start of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GrinRay<R> {
     /// Position.
     pub x: Vec3<R>,
-    /// Velocity `dx/dσ`: the direction times the index, unless [`Launch`](super::Launch) says
-    /// otherwise.
+    /// Velocity `dx/dσ`: the direction times the index, unless [`LaunchMode`](super::LaunchMode)
+    /// says otherwise.
     pub v: Vec3<R>,
 }
 
@@ -36,7 +36,7 @@ impl<R: Real> GrinRay<R> {
     }
 }
 
-/// A ray on its way.
+/// The state of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RayState<R> {
     /// Position.
@@ -61,20 +61,20 @@ pub struct GrinTracer<'a, R, F: ?Sized> {
     pub(super) ops: Vec<IntegratorOp<R>>,
 }
 
-/// Rays side by side; a column begins where a line of the cache does.
+/// Rays side by side; each column is aligned with a cache line.
 #[derive(Clone, Default)]
 #[repr(C, align(64))]
 struct ForwardBlock<R> {
     x: LaneVectors<R>,
     v: LaneVectors<R>,
     path: LaneScalars<R>,
-    /// The length of the step: 0 for an empty seat.
+    /// The length of the step; 0 for an empty lane.
     h: LaneScalars<R>,
-    /// After how many steps of the block the ray has used up its own.
+    /// The step of the block at which each ray has taken its largest number of steps.
     step_limit: [u64; LANES],
     /// The earliest of these.
     next_limit: u64,
-    /// Which ray sits here.
+    /// The number of the ray in each lane.
     ray: [Option<usize>; LANES],
 }
 
@@ -94,7 +94,8 @@ impl<R: Real> ForwardBlock<R> {
         self.step_limit.into_iter().min().unwrap_or(u64::MAX)
     }
 
-    /// Empties a seat; what was not finite must not stay, since it would survive a step of 0.
+    /// Empties a lane. Values that are not finite must not remain, since they would survive a step
+    /// of 0.
     fn clear_lane(&mut self, lane: usize) {
         self.load_lane(lane, 0, &RayState::default());
         self.ray[lane] = None;
@@ -104,7 +105,7 @@ impl<R: Real> ForwardBlock<R> {
 }
 
 impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
-    /// Makes a field ready for rays.
+    /// Prepares a field for tracing.
     ///
     /// # Errors
     /// A step that is not positive, no steps, or an empty region.
@@ -114,24 +115,24 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         Ok(Self { field, setup, ops })
     }
 
-    /// How rays are traced.
+    /// The settings.
     pub fn setup(&self) -> &GrinSetup<R> {
         &self.setup
     }
 
-    /// Traces one ray; the same bits as in a batch.
+    /// Traces one ray; bit-identical to its trace in a batch.
     pub fn trace(&self, ray: &GrinRay<R>) -> RayExit<R> {
         self.trace_with(ray, |_| {})
     }
 
-    /// Traces one ray and keeps every point between steps, for a drawing.
+    /// Traces one ray and returns every state between steps, for drawing.
     pub fn trace_path(&self, ray: &GrinRay<R>) -> (Vec<RayState<R>>, RayExit<R>) {
         let mut points = Vec::new();
         let exit = self.trace_with(ray, |state| points.push(*state));
         (points, exit)
     }
 
-    /// Traces one ray and shows every state inside.
+    /// Traces one ray and passes every state inside to `visit`.
     fn trace_with(&self, ray: &GrinRay<R>, mut visit: impl FnMut(&RayState<R>)) -> RayExit<R> {
         let mut state = match self.enter(ray) {
             Ok(entry) => entry.state,
@@ -155,7 +156,7 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         }
     }
 
-    /// Traces rays, in the order given, on all cores.
+    /// Traces rays on all cores; the exits are in the order of the rays.
     pub fn trace_batch(&self, rays: &[GrinRay<R>]) -> Vec<RayExit<R>> {
         let mut exits =
             vec![RayExit::from_state(GrinFate::Diverged, &RayState::default(), 0); rays.len()];
@@ -165,7 +166,7 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         exits
     }
 
-    /// Whether a point is not inside the region, or no point at all.
+    /// True if a point is not inside the region or is not a number.
     fn is_outside(&self, x: Vec3<R>) -> bool {
         self.setup.region().is_some_and(|region| !(region.level(x) < R::ZERO))
     }
@@ -187,7 +188,7 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         RayState { x, v, path }
     }
 
-    /// One step of length `h`, and the derivative of its end by `h`.
+    /// One step of length `h`, and the derivative of its end with respect to `h`.
     pub(super) fn advance_with_rate(&self, state: RayState<R>, h: R) -> (RayState<R>, RayState<R>) {
         let mut rate = RayState::default();
         let RayState { mut x, mut v, mut path } = state;
@@ -221,7 +222,7 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         (0..LANES).for_each(|lane| self.refill(&mut block, lane, (&mut queue, 0), rays, exits));
         block.next_limit = block.earliest_limit();
         let (mut clock, mut before) = (0, block.clone());
-        // An empty seat is never due.
+        // The step limit of an empty lane is never reached.
         while block.next_limit != u64::MAX {
             if self.setup.is_fractional() {
                 (before.x, before.v, before.path) = (block.x, block.v, block.path);
@@ -252,12 +253,13 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         }
     }
 
-    /// How many steps a ray has taken.
+    /// The number of steps that a ray has taken.
     fn steps_taken(&self, clock: u64, deadline: u64) -> u32 {
         self.setup.max_steps() - (deadline - clock) as u32
     }
 
-    /// Gives an empty seat to the next ray that enters; those that do not, end.
+    /// Loads the next ray that enters the region into a lane; rays that do not enter get their
+    /// exits.
     fn refill(
         &self,
         block: &mut ForwardBlock<R>,
@@ -284,13 +286,13 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         }
     }
 
-    /// Whether any ray has to be looked at.
+    /// True if any ray of the block has left the region or reached its step limit.
     #[inline(always)]
     fn any_due(&self, block: &ForwardBlock<R>, clock: u64) -> bool {
         let Some(region) = self.setup.region() else { return clock >= block.next_limit };
         let mut due = false;
         for (out, h) in region.count_outside(&block.x).into_iter().zip(block.h) {
-            // The step of an empty seat has no length.
+            // The step of an empty lane has no length.
             due |= out * h > R::ZERO;
         }
         due | (clock >= block.next_limit)
@@ -312,7 +314,7 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
     }
 }
 
-/// `x += c h v` for every lane.
+/// `x += c h v` in every lane.
 #[inline(always)]
 pub(super) fn drift<R: Real>(x: &mut LaneVectors<R>, v: &LaneVectors<R>, h: &LaneScalars<R>, c: R) {
     for (lane, h) in h.iter().enumerate() {
@@ -323,7 +325,7 @@ pub(super) fn drift<R: Real>(x: &mut LaneVectors<R>, v: &LaneVectors<R>, h: &Lan
     }
 }
 
-/// `v += c h η ∇η` for every lane, and the optical path grows.
+/// `v += c h η ∇η` in every lane, and the optical path grows.
 #[inline(always)]
 fn kick<R: Real>(block: &mut ForwardBlock<R>, samples: &IndexSamples<R>, c: R) {
     let (v, g) = (&mut block.v, &samples.gradient);

@@ -1,14 +1,14 @@
-//! The tasks that come with the program: the lenses and the plume of the thesis.
+//! The tasks that come with the program: the gradient-index lenses and the plume of the thesis.
 
 use super::task::GrinTask;
 use crate::files::{FileError, json};
 
-/// A task under a name.
+/// A task that comes with the program, under its name.
 #[derive(Debug, Clone, Copy)]
 pub struct BuiltinTask {
-    /// What a person types.
+    /// The name by which it is selected.
     pub name: &'static str,
-    /// The text of its file.
+    /// The text of its task file.
     pub text: &'static str,
 }
 
@@ -37,24 +37,25 @@ pub const BUILTIN_TASKS: &[BuiltinTask] = &[
 ];
 
 impl BuiltinTask {
-    /// The task.
+    /// Parses the task.
     ///
     /// # Errors
-    /// A text that is no task, which none of ours is.
+    /// A text that is not a task, which none of the built-in texts is.
     pub fn task(&self) -> Result<GrinTask, FileError> {
         read_task(self.text, self.name)
     }
 }
 
-/// The task of a name that comes with the program.
+/// The built-in task of this name.
 pub fn find_builtin(name: &str) -> Option<&'static BuiltinTask> {
     BUILTIN_TASKS.iter().find(|builtin| builtin.name == name)
 }
 
-/// Reads a task; `file` is only for the message. What it says is not checked: see [`GrinTask::check`].
+/// Parses a task; `file` is used for the error message only. The values are not checked: see
+/// [`GrinTask::check`].
 ///
 /// # Errors
-/// A text that is no task, with its place.
+/// A text that is not a task, with the position of the error.
 pub fn read_task(text: &str, file: &str) -> Result<GrinTask, FileError> {
     json::read_json(text, file)
 }

@@ -1,4 +1,4 @@
-//! What is wrong with a task, told before any ray is traced.
+//! Validation of a task before any ray is traced.
 
 use super::drawing::TargetImage;
 use super::given::ReferenceFieldError;
@@ -14,65 +14,65 @@ use crate::files::FileError;
 use crate::grin::GrinSetupError;
 use crate::grin::field::GridError;
 
-/// Most numbers that least squares are worth while for.
+/// The largest number of parameters for which least squares are allowed.
 const MAX_LEAST_SQUARES_PARAMETERS: usize = 400;
-/// By how much an index may be below 1 that is the difference of two numbers.
+/// The difference of two numbers may be below an index of 1 by this much.
 pub(super) const INDEX_ROUNDING: f64 = 1e-9;
-/// Most rays in a step, and most nodes along a side.
+/// The largest numbers of rays in a step, and of nodes along a side.
 const MAX_RAYS: usize = 10_000_000;
 const MAX_NODES: usize = 513;
 
-/// Why a task cannot be worked on.
+/// A task that cannot be evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum GrinTaskError {
-    /// A number that makes no sense.
+    /// An invalid value.
     #[error("{place}: found {found}; expected {expected}")]
     Value {
-        /// Where it stands in the task.
+        /// The position in the task.
         place: String,
-        /// What stands there.
+        /// The value that was found.
         found: String,
-        /// What should.
+        /// The values that are valid.
         expected: String,
     },
-    /// The field to begin with, or one that is given, cannot be had.
+    /// The initial field, or a reference field, is not available.
     #[error("{place}: {source}")]
     Field {
-        /// Where it stands in the task.
+        /// The position in the task.
         place: String,
-        /// Why not.
+        /// The cause.
         source: ReferenceFieldError,
     },
-    /// A picture cannot be had.
+    /// A target image is not available.
     #[error("{place}: {source}")]
     Picture {
-        /// Where it stands in the task.
+        /// The position in the task.
         place: String,
-        /// Why not.
+        /// The cause.
         source: FileError,
     },
-    /// A field cannot be made of so many numbers.
+    /// A resolution of which no field can be made.
     #[error("levels: {0}")]
     Level(#[from] GridError),
-    /// Nothing can be traced.
+    /// The tracing setup is invalid.
     #[error("space: {0}")]
     Setup(#[from] GrinSetupError),
-    /// Every number of the field is fixed.
+    /// Every parameter of the field is fixed.
     #[error(
         "levels: a field of {nodes} nodes has none that may change; expected more nodes, or an edge \
          that is not fixed"
     )]
     NoFreeParameters {
-        /// Nodes along a side.
+        /// The number of nodes along a side.
         nodes: usize,
     },
 }
 
 impl GrinTask {
-    /// Refuses what cannot be worked on.
+    /// Checks every value of the task.
     ///
     /// # Errors
-    /// The first thing that is wrong, with its place.
+    /// The first invalid value, with its position.
     pub fn check(&self) -> Result<(), GrinTaskError> {
         if self.aplanat_grin != TASK_VERSION {
             return Err(invalid("aplanat_grin", self.aplanat_grin, TASK_VERSION.to_string()));
@@ -100,7 +100,7 @@ impl GrinTask {
         self.exact.iter().try_for_each(|exact| exact.check("exact"))
     }
 
-    /// Refuses a space in which the field has no nodes.
+    /// Refuses a domain that reaches beyond the nodes of the field.
     fn check_extent(&self) -> Result<(), GrinTaskError> {
         let ends =
             self.space.corners().into_iter().flat_map(|corner| [corner.x, corner.y, corner.z]);
@@ -239,12 +239,12 @@ impl LightView {
 }
 
 impl LightGoal {
-    /// Whether it is a picture, on a screen or at infinity: its loss has no unit.
+    /// True if the goal is an image, on a screen or at infinity: its loss has no unit.
     pub fn is_image(&self) -> bool {
         matches!(self, Self::Image { .. } | Self::Far { .. })
     }
 
-    /// What it is called in a task.
+    /// The name in a task file.
     fn name(&self) -> &'static str {
         match self {
             Self::Point(_) => "point",
@@ -256,7 +256,7 @@ impl LightGoal {
         }
     }
 
-    /// Whether it stands across the direction of a beam.
+    /// True if the goal is defined with respect to the direction of a beam.
     fn is_across_a_beam(&self) -> bool {
         self.is_image() || matches!(self, Self::Ring { .. })
     }

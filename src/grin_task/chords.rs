@@ -1,12 +1,12 @@
-//! What straight lines make of a measurement of light: the method that does without curved rays,
-//! for comparison.
+//! Reconstruction of a field from measured rays by straight-ray tomography, for comparison with
+//! curved rays.
 //!
-//! To the first order in the contrast of the index a ray is turned by `∫ ∇η ds` along the straight
-//! chord from where it comes in, and shifted by the same with the way that is left as a weight. Both
-//! are linear in the field, so its numbers follow from linear least squares. The chord takes as many
-//! steps as the ray tracer would, so that at weak contrast both see the same integrals. After the
-//! idea of Atcheson et al. (ACM TOG 27, 2008), who solve for the three parts of `∇η` one by one and
-//! integrate them: [`StraightRays::reconstruct_by_gradients`].
+//! To first order in the contrast of the index a ray is deflected by `∫ ∇η ds` along the straight
+//! chord from its entry, and displaced by the same integral weighted with the remaining distance.
+//! Both are linear in the field, so its parameters follow from linear least squares. The chord has
+//! as many steps as the ray tracer would take, so that at weak contrast both evaluate the same
+//! integrals. After the idea of Atcheson et al. (ACM TOG 27, 2008), who solve for the three
+//! components of `∇η` one by one and integrate them: [`StraightRays::reconstruct_by_gradients`].
 
 use super::check::GrinTaskError;
 use super::measured::measure_targets;
@@ -23,39 +23,41 @@ use crate::solve::{ParameterBounds, cgls};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Chords are worked off in so many parts, which are added in order.
+/// The number of parts into which the rays are split; their sums are added in order.
 const PARTS: usize = 16;
-/// Places of the surface at which the index is held.
+/// Points of the surface at which the index is prescribed.
 const SURFACE: usize = 2000;
-/// Steps that integrate a gradient, in times of the nodes along a side.
+/// Steps that integrate a gradient, as a multiple of the nodes along a side.
 const INTEGRATION: usize = 4;
 
-/// Traces through a field without contrast.
+/// A tracer through a field without contrast.
 type StraightTracer<'a> = GrinTracer<'a, f64, dyn IndexField<f64> + 'a>;
 
-/// The straight way of a ray, and by how much the true one differs.
+/// The straight path of a ray, and the measured difference of the real one.
 #[derive(Debug, Clone, Copy)]
 struct StraightRay {
     from: Vec3<f64>,
-    /// Of length 1.
+    /// A unit vector.
     direction: Vec3<f64>,
     length: f64,
-    /// Places along it at which the field is looked at.
+    /// The number of sample points along the path.
     steps: usize,
-    /// What an integral of the gradient turns `v` by, and what its moment shifts `x` by.
+    /// Factors from the integral of the gradient to the change of `v`, and from its moment to the
+    /// change of `x`.
     gains: [f64; 2],
-    /// By how much the ray is turned and shifted.
+    /// The measured deflection and displacement of the ray.
     measured: [Vec3<f64>; 2],
 }
 
-/// The measurements of a task with the straight chords of their rays.
+/// The measurements of a task with the straight paths of their rays.
 #[derive(Debug, Clone)]
 pub struct StraightRays {
     rays: Vec<StraightRay>,
     task: GrinTask,
-    /// The index around.
+    /// The index outside.
     ambient: f64,
-    /// Where the task holds the index, and the root of the weight of each of these places.
+    /// The points at which the task prescribes the index, and the square root of the weight of
+    /// each.
     edge: (Vec<Vec3<f64>>, f64),
 }
 
@@ -86,7 +88,7 @@ impl StraightRay {
         })
     }
 
-    /// Each place with the way that is left behind it and its share of the length.
+    /// Each sample point with the remaining distance behind it and its share of the length.
     fn sample_points(&self) -> impl Iterator<Item = (Vec3<f64>, f64, f64)> {
         let share = self.length / self.steps as f64;
         let at = move |i: usize| share * (i as f64 + 0.5);
@@ -94,12 +96,13 @@ impl StraightRay {
         (0..steps).map(move |i| (from + direction * at(i), length - at(i), share))
     }
 
-    /// The part across the chord: along it light does not turn, and slides on the boundary.
+    /// The component transverse to the path: along it light is not deflected, and a displacement
+    /// slides on the boundary.
     fn transverse(&self, v: Vec3<f64>) -> Vec3<f64> {
         v - self.direction * self.direction.dot(v)
     }
 
-    /// How a field of weak contrast turns and shifts the ray.
+    /// The deflection and displacement of the ray by a field of weak contrast.
     fn deflection(&self, field: &dyn IndexField<f64>) -> [Vec3<f64>; 2] {
         let mut sums = [Vec3::default(); 2];
         for (p, left, share) in self.sample_points() {
@@ -124,7 +127,7 @@ impl StraightRay {
         }
     }
 
-    /// How a volume of one part of the gradient turns the ray.
+    /// The deflection of the ray by a volume of one component of the gradient.
     fn turning(&self, part: &Trilinear<f64>) -> f64 {
         let turns = self.sample_points().map(|(p, _, share)| share * part.sample(p).index);
         self.gains[0] * turns.sum::<f64>()
@@ -139,10 +142,10 @@ impl StraightRay {
 }
 
 impl StraightRays {
-    /// The chords of a task, all of whose views ask for light as it leaves another field.
+    /// The straight rays of a task whose views all have the goal `like`.
     ///
     /// # Errors
-    /// A task that cannot be worked on.
+    /// A task that is invalid.
     pub fn new(task: &GrinTask) -> Result<Self, GrinTaskError> {
         task.check()?;
         let ambient = match (task.edge, &task.start) {
@@ -167,19 +170,19 @@ impl StraightRays {
         }
         let weight = task.edge.map_or(0.0, |edge| edge.weight);
         let places = if weight > 0.0 { task.space.surface_points(SURFACE) } else { Vec::new() };
-        // The weight stands against the mean over the rays, here against their sum.
+        // The weight is relative to the mean over the rays, here to their sum.
         let firm = (weight * chords.len() as f64 / SURFACE as f64).sqrt();
         Ok(Self { rays: chords, task: task.clone(), ambient, edge: (places, firm) })
     }
 
-    /// How many there are.
+    /// The number of rays.
     pub fn count(&self) -> usize {
         self.rays.len()
     }
 
-    /// The field of so many nodes that explains the measurement best by straight lines, within the
-    /// limits of the task, after so many steps of conjugate gradients; `visit` sees the field after
-    /// each of them.
+    /// The field with this many nodes that explains the measurement best by straight rays, within
+    /// the limits of the task, after `steps` steps of conjugate gradients; `visit` receives the
+    /// field after each of them and may stop.
     ///
     /// # Errors
     /// Too few nodes.
@@ -224,8 +227,9 @@ impl StraightRays {
         Ok(field(&found))
     }
 
-    /// The same by way of three volumes for the parts of `∇η`, each found from the turns of the rays
-    /// alone, which are then integrated with the index around at the boundary; on a trilinear grid.
+    /// The same by way of three volumes for the components of `∇η`, each found from the deflections
+    /// alone, which are then integrated with the index outside as the boundary value; on a
+    /// trilinear grid.
     ///
     /// # Errors
     /// Too few nodes.
@@ -259,7 +263,7 @@ impl StraightRays {
         Ok(GrinField::Trilinear(Trilinear::new(grid, values)?))
     }
 
-    /// Six numbers a chord.
+    /// Six numbers per ray.
     fn rows(&self, of: impl Fn(&StraightRay) -> [Vec3<f64>; 2] + Sync) -> Vec<f64> {
         let rows = |chord: &StraightRay| {
             let [a, b] = of(chord);
@@ -281,7 +285,7 @@ impl StraightRays {
         })
     }
 
-    /// Sums over all chords, the same on any number of threads.
+    /// Sums over all rays; the result does not depend on the number of threads.
     fn accumulate(
         &self,
         unknowns: usize,
@@ -318,8 +322,8 @@ fn component(v: Vec3<f64>, axis: usize) -> f64 {
     [v.x, v.y, v.z][axis]
 }
 
-/// The values that vanish at the boundary and whose gradient is nearest to these volumes, in the
-/// middles of the voxels: Poisson's equation.
+/// The values that vanish at the boundary and whose gradient is nearest to these volumes at the
+/// centres of the voxels: Poisson's equation.
 fn integrate_gradient(
     shape: &Trilinear<f64>,
     parts: &[Trilinear<f64>; 3],

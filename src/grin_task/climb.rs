@@ -1,5 +1,5 @@
-//! The highest value of a smooth field in a space: many places are looked at, and the best of them
-//! are climbed from.
+//! The maximum of a smooth field in a domain: the field is sampled, and the best samples are
+//! improved by a pattern search.
 
 use super::medium::GrinField;
 use super::task::Domain;
@@ -7,15 +7,15 @@ use crate::grin::field::ProfileCoordinate;
 use crate::math::Vec3;
 use rayon::prelude::*;
 
-/// Points in a cell along each axis, and along a radius, at which a smooth field is looked at.
+/// Sample points per cell along each axis, and along a radius.
 pub(super) const POINTS_PER_CELL: usize = 2;
 pub(super) const RADIAL_POINTS: usize = 1000;
-/// How many of the highest places are climbed from, how often the step is halved there, and how
-/// often one is taken before that.
+/// The largest number of starting points, the number of halvings of the step, and the number of
+/// moves between them.
 const MAX_STARTS: usize = 64;
 const HALVINGS: i32 = 8;
 const MOVES_PER_HALVING: i32 = 4;
-/// Where a climb may lead.
+/// The directions of the pattern search.
 const AXES: [Vec3<f64>; 6] = [
     Vec3 { x: 1.0, y: 0.0, z: 0.0 },
     Vec3 { x: -1.0, y: 0.0, z: 0.0 },
@@ -25,22 +25,22 @@ const AXES: [Vec3<f64>; 6] = [
     Vec3 { x: 0.0, y: 0.0, z: -1.0 },
 ];
 
-/// A value and where it stands.
+/// A value and its position.
 pub(super) type LocatedValue = (f64, Vec3<f64>);
 
-/// The higher of two; the first of equals, so that the order alone decides.
+/// The higher of two; the first of two equal ones, so that the result depends on the order alone.
 pub(super) fn higher(a: LocatedValue, b: LocatedValue) -> LocatedValue {
     if b.0 > a.0 { b } else { a }
 }
 
-/// Whether a place counts, and the value of a field there.
+/// A function to be maximised, and the points at which it is defined.
 pub(super) struct FieldObjective<'a> {
     pub(super) inside: &'a (dyn Fn(Vec3<f64>) -> bool + Sync),
     pub(super) value: &'a (dyn Fn(Vec3<f64>) -> f64 + Sync),
 }
 
-/// The highest value near the highest of some places, which stand `sample_spacing` apart; below all numbers
-/// where none of them is inside.
+/// The highest value near the highest of these points, which are `gap` apart; minus infinity if
+/// none of them is inside.
 pub(super) fn find_maximum(
     places: &[Vec3<f64>],
     gap: f64,
@@ -50,7 +50,7 @@ pub(super) fn find_maximum(
     local_maxima(places, gap, hill).into_iter().fold(none, higher)
 }
 
-/// Where climbs from the highest of some places lead.
+/// The local maxima that are reached from the highest of these points.
 fn local_maxima(places: &[Vec3<f64>], gap: f64, hill: &FieldObjective<'_>) -> Vec<LocatedValue> {
     let FieldObjective { inside, value } = hill;
     let looked = places.par_iter().filter(|p| inside(**p));
@@ -74,12 +74,12 @@ fn local_maxima(places: &[Vec3<f64>], gap: f64, hill: &FieldObjective<'_>) -> Ve
 }
 
 impl GrinField {
-    /// Where it is looked at in a space: all over it, or along a radius.
+    /// The sample points in a domain: a lattice, or points along a radius.
     pub(super) fn sample_points(&self, space: Domain) -> Vec<Vec3<f64>> {
         let [low, high] = space.corners();
         match self {
             Self::Radial(field, _) => {
-                // Towards a corner of the box around the space: the farthest place.
+                // Towards a corner of the bounding box: the farthest point.
                 let z = (low.z + high.z) * 0.5;
                 let (to, z) = match field.coordinate {
                     ProfileCoordinate::Sphere => (high, 0.0),
@@ -92,7 +92,7 @@ impl GrinField {
         }
     }
 
-    /// The distance between such places.
+    /// The distance between sample points.
     pub(super) fn sample_spacing(&self, space: Domain) -> f64 {
         let [low, high] = space.corners();
         match self {
@@ -101,13 +101,13 @@ impl GrinField {
         }
     }
 
-    /// Cells along a side of its cube.
+    /// The number of cells along a side of its cube.
     fn cells(&self) -> usize {
         self.nodes().saturating_sub(1).max(1)
     }
 }
 
-/// Points of the box around a space, its faces included.
+/// The lattice points of the bounding box of a domain, its faces included.
 fn lattice(space: Domain, parts: usize) -> Vec<Vec3<f64>> {
     let [low, high] = space.corners();
     let side = parts.max(1) + 1;

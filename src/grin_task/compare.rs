@@ -1,5 +1,4 @@
-//! How a field that was found differs from the one that is known to be the answer, and whether a
-//! maker can make it.
+//! The difference between a field and its reference, and the range of its index and gradient.
 
 use super::given::ReferenceFieldError;
 use super::medium::GrinField;
@@ -8,44 +7,44 @@ use super::task::{FieldRepresentation, GrinTask};
 use crate::grin::IndexField;
 use crate::math::Vec3;
 
-/// Points along a side of the box around the space.
+/// Points along a side of the bounding box of the domain.
 const LATTICE: usize = 40;
 /// Points along a radius.
 const RADIAL: usize = 400;
 
-/// Two fields are the same whose mean square difference is below this part of their square.
+/// Fields count as equal if their mean square difference is below this fraction of their mean
+/// square.
 const ROUNDING_DIFFERENCE: f64 = 1e-26;
 
-/// The difference between two fields over the space.
+/// The difference between two fields over the domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldDifference {
     /// `‖η - η*‖ / ‖η*‖`.
     pub relative: f64,
-    /// The same after the mean of `η² - η*²` is taken off: rays do not see that offset.
+    /// The same after subtraction of the mean of `η² - η*²`: rays do not depend on that offset.
     pub without_offset: f64,
     /// That mean.
     pub offset: f64,
-    /// `‖η - η*‖ / ‖η* - η₀‖` with `η₀` the field to begin with: 1 for a search that found nothing,
-    /// infinite where the answer is the field to begin with, but for rounding: there is nothing to
-    /// find.
+    /// `‖η - η*‖ / ‖η* - η₀‖` with the initial field `η₀`: 1 for an optimisation that found
+    /// nothing, infinite where the reference is the initial field up to rounding.
     pub relative_to_contrast: f64,
 }
 
-/// What a field is like, over the space.
+/// The range of the index and the largest gradient over the domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldExtremes {
-    /// Smallest index.
+    /// The smallest index.
     pub low: f64,
-    /// Largest index.
+    /// The largest index.
     pub high: f64,
-    /// Steepest index, in 1/mm.
+    /// The largest gradient of the index, in 1/mm.
     pub slope: f64,
-    /// Where these three are, in mm.
+    /// The positions of these three, in mm.
     pub at: [Vec3<f64>; 3],
 }
 
 impl GrinTask {
-    /// How a field differs from the exact one; `None` where none is known.
+    /// The difference from the reference field; `None` without a reference.
     ///
     /// # Errors
     /// A volume that cannot be read.
@@ -57,10 +56,10 @@ impl GrinTask {
         self.difference_from(medium, &*exact.field::<f64>()?).map(Some)
     }
 
-    /// How a field differs from another one.
+    /// The difference from another field.
     ///
     /// # Errors
-    /// A field to begin with that cannot be read.
+    /// An initial field that cannot be read.
     pub fn difference_from(
         &self,
         medium: &GrinField,
@@ -70,7 +69,7 @@ impl GrinTask {
         Ok(difference(medium.field(), exact, &*start, &self.comparison_points()))
     }
 
-    /// The range of the index over the space, and how steep it is.
+    /// The range of the index over the domain, and its largest gradient.
     pub fn extremes(&self, medium: &GrinField) -> FieldExtremes {
         let spaces = self.spaces();
         let [low, high] =
@@ -79,7 +78,7 @@ impl GrinTask {
         FieldExtremes { low: low.0, high: high.0, slope: slope.0, at: [low.1, high.1, slope.1] }
     }
 
-    /// Points all over the space, or along the radius that a spline depends on, each with its share.
+    /// Points over the domain, or along the radius of a spline, each with its weight.
     fn comparison_points(&self) -> Vec<(Vec3<f64>, f64)> {
         let along = |radius: f64, power: i32| {
             let at = |i: usize| radius * (i as f64 + 0.5) / RADIAL as f64;

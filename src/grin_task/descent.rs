@@ -1,4 +1,4 @@
-//! The methods that a task may ask for, behind one step.
+//! The optimisation methods of a task behind one interface.
 
 use super::check::GrinTaskError;
 use super::hold::FieldPenalties;
@@ -7,19 +7,19 @@ use super::scene::{LossEvaluation, RayCounts, ViewRays, evaluate, evaluate_rows}
 use super::task::GrinMethod;
 use crate::solve::{Adam, Lbfgs, LevenbergMarquardt, ParameterBounds, ResidualRows};
 
-/// Adam's rate falls to this part over the second half of a level.
+/// Adam's rate falls to this fraction over the second half of a level.
 const ANNEALED: f64 = 0.1;
 
-/// What descends.
+/// An optimisation method with its state.
 #[derive(Debug, Clone)]
 pub(super) enum FieldSolver {
-    /// With the rate at the beginning of the level.
+    /// Adam, with its rate at the beginning of the level.
     Adam(Adam, f64),
     Lbfgs(Lbfgs),
     LeastSquares(LevenbergMarquardt),
 }
 
-/// The loss as a function of the numbers of a field.
+/// The loss as a function of the parameters of a field.
 pub(super) struct LossFunction<'a> {
     pub(super) shape: &'a GrinField,
     pub(super) shots: &'a [ViewRays],
@@ -27,13 +27,13 @@ pub(super) struct LossFunction<'a> {
     pub(super) limits: &'a ParameterBounds,
 }
 
-/// What a step did.
+/// The result of one step.
 pub(super) struct SolverStep {
     pub(super) loss: f64,
     pub(super) counts: RayCounts,
-    /// How often the loss was asked for.
+    /// The number of evaluations of the loss.
     pub(super) evaluations: usize,
-    /// Whether further steps would change nothing.
+    /// True if further steps would change nothing.
     pub(super) converged: bool,
 }
 
@@ -65,7 +65,7 @@ impl FieldSolver {
         }
     }
 
-    /// Forgets what it knows of the loss, which has become another one.
+    /// Discards the state that belongs to a previous loss function.
     pub(super) fn restart(&mut self) {
         match self {
             Self::Adam(..) => {}
@@ -74,7 +74,7 @@ impl FieldSolver {
         }
     }
 
-    /// Takes one step; `share` of the level is done.
+    /// Takes one step; `share` is the completed fraction of the level.
     pub(super) fn step(
         &mut self,
         parameters: &mut [f64],

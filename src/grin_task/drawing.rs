@@ -1,4 +1,4 @@
-//! Pictures that light shall make: drawn by formula, or a person's own from a file.
+//! Target images: drawn by formula, or read from a file.
 
 use super::space::GOLDEN_ANGLE;
 use crate::files::{FileError, GrayscaleImage, read_grayscale};
@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// Points along a side of a pixel of a drawing.
+/// Sample points along a side of a pixel.
 const SUBPIXELS: usize = 4;
-/// Light where nothing is drawn: all of it cannot be taken away from any place.
+/// The background: light cannot be removed completely from any place.
 const BACKGROUND: f64 = 0.25;
-/// How soft edges are, in halves of the side.
+/// The width of a soft edge, in units of half the side.
 const EDGE_SOFTNESS: f64 = 0.03;
-/// Points of a circle of confusion, and its radius, in halves of the side, one scene deep out of
-/// focus.
+/// Sample points of the circle of confusion, and its radius in units of half the side per unit of
+/// defocus.
 const CONFUSION_POINTS: usize = 12;
 const CONFUSION_RADIUS: f64 = 0.4;
 
-/// A picture that light shall make.
+/// A target image, which the light of a view should form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TargetImage {
@@ -30,12 +30,12 @@ pub enum TargetImage {
     /// A scene as a camera sees it that is focused at this depth, evenly spaced in dioptres: a ring
     /// at depth 0, a cross at 0.5, a square at 1.
     Scene(f64),
-    /// A person's own: grey, cut to the largest square in its middle. Its numbers are taken as
-    /// light as they are.
+    /// An image file: converted to grey and cropped to the largest central square. Its pixel values
+    /// are taken as linear light.
     File(ImageFile),
 }
 
-/// A picture in a file, which is read once, when it is needed first.
+/// An image file, which is read once, at its first use.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(from = "PathBuf", into = "PathBuf")]
 pub struct ImageFile {
@@ -44,12 +44,12 @@ pub struct ImageFile {
 }
 
 impl ImageFile {
-    /// The file.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Its picture.
+    /// The image of the file.
     fn photo(&self) -> Result<&GrayscaleImage, FileError> {
         if let Some(photo) = self.photo.get() {
             return Ok(photo);
@@ -78,10 +78,10 @@ impl PartialEq for ImageFile {
 }
 
 impl TargetImage {
-    /// Its pixels in rows from the bottom, as many as columns, of mean 1.
+    /// The pixels in rows from the bottom, as many as columns, of mean 1.
     ///
     /// # Errors
-    /// A file that holds no picture, or one without light in its middle square.
+    /// A file that is not an image, or one without light in its central square.
     pub fn render(&self, pixels: usize) -> Result<Vec<f64>, FileError> {
         let mut all = match self {
             Self::File(file) => resample(file.photo()?, pixels),
@@ -100,7 +100,7 @@ impl TargetImage {
         Ok(all)
     }
 
-    /// A pixel of a drawing by formula, averaged over its area.
+    /// A pixel of an image by formula, averaged over its area.
     fn pixel(&self, n: usize, pixels: usize) -> f64 {
         let fine = (pixels * SUBPIXELS) as f64;
         let at = |pixel: usize, k: usize| 2.0 * ((pixel * SUBPIXELS + k) as f64 + 0.5) / fine - 1.0;
@@ -110,8 +110,8 @@ impl TargetImage {
         (0..SUBPIXELS * SUBPIXELS).map(lit).sum::<f64>() / (SUBPIXELS * SUBPIXELS) as f64
     }
 
-    /// The light at a point of the square from -1 to 1: soft edges on a dim ground. Points of a pixel
-    /// have circles of confusion that are turned against each other.
+    /// The light at a point of the square from -1 to 1: soft edges on a background. The circles of
+    /// confusion of the points of a pixel are rotated against each other.
     fn light(&self, x: f64, y: f64, turn: f64) -> f64 {
         let drawn = match self {
             Self::Face => face(x, y),
@@ -144,7 +144,7 @@ fn letter(x: f64, y: f64) -> f64 {
     frame.max(legs).max(bar)
 }
 
-/// Three things at three depths, each as blurred as its depth is off the focus.
+/// Three objects at three depths, each blurred in proportion to its defocus.
 fn scene(place: [f64; 2], focus: f64, turn: f64) -> f64 {
     let ring = |x: f64, y: f64| soft_edge(((x + 0.36).hypot(y - 0.3) - 0.22).abs() - 0.06);
     let cross = |x: f64, y: f64| {
@@ -171,8 +171,8 @@ fn blur([x, y]: [f64; 2], off: f64, turn: f64, light: impl Fn(f64, f64) -> f64) 
     (0..CONFUSION_POINTS).map(lit).sum::<f64>() / CONFUSION_POINTS as f64
 }
 
-/// The middle square of a photo on so many pixels a side, each the mean over its area, rows from the
-/// bottom.
+/// The central square of an image resampled to `pixels` a side, each the mean over its area, rows
+/// from the bottom.
 fn resample(photo: &GrayscaleImage, pixels: usize) -> Vec<f64> {
     let side = photo.width.min(photo.height);
     let (left, top) = ((photo.width - side) / 2, (photo.height - side) / 2);
@@ -187,8 +187,8 @@ fn resample(photo: &GrayscaleImage, pixels: usize) -> Vec<f64> {
     (0..pixels * pixels).map(mean).collect()
 }
 
-/// What a pixel covers of `side` others along an axis: which, and the share of each; the shares make
-/// 1.
+/// The pixels of `side` that a target pixel covers along an axis, with the share of each; the
+/// shares sum to 1.
 fn pixel_overlap(pixel: usize, pixels: usize, side: usize) -> Vec<(usize, f64)> {
     let scale = side as f64 / pixels as f64;
     let (from, to) = (pixel as f64 * scale, (pixel + 1) as f64 * scale);

@@ -1,5 +1,4 @@
-//! Fields that are given: by a formula, or by a volume in a file, which is refused where it cannot be
-//! what the task needs.
+//! Reference and initial fields: given by a formula, or by a volume file.
 
 use super::check::INDEX_ROUNDING;
 use super::medium::GrinField;
@@ -14,24 +13,24 @@ use crate::grin::field::{
 use crate::math::{Real, Vec3};
 use std::path::Path;
 
-/// By how much an index may be off that was written with four bytes.
+/// The relative rounding error of an index stored with four bytes.
 const SINGLE_PRECISION: f64 = 5e-7;
 
-/// Why a given field cannot be had.
+/// A reference or initial field that is not available.
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceFieldError {
-    /// Its file.
+    /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Its values.
+    /// The values do not make a field.
     #[error("{file}: {source}")]
     Values {
         /// The file.
         file: String,
-        /// What is wrong with it.
+        /// The cause.
         source: GridError,
     },
-    /// An index in it.
+    /// An index below 1.
     #[error(
         "{file}: node {node:?} has the index {found}; expected 1 or more; the index of a raw volume \
          is offset + scale * number, and a number has its lowest byte first"
@@ -41,10 +40,10 @@ pub enum ReferenceFieldError {
         file: String,
         /// The node, counted from 0 along x, y and z.
         node: [usize; 3],
-        /// What stands there.
+        /// The index there.
         found: f64,
     },
-    /// An index that the task does not allow.
+    /// An index beyond the limits of the task.
     #[error(
         "{file}: the index is {found} at {at:?} mm; expected {} to {}, the limits of the task",
         expected[0], expected[1]
@@ -52,25 +51,25 @@ pub enum ReferenceFieldError {
     BeyondLimits {
         /// The file.
         file: String,
-        /// The index that is farthest off.
+        /// The index farthest beyond the limits.
         found: f64,
-        /// Where, in mm.
+        /// Its position, in mm.
         at: [f64; 3],
         /// The smallest and the largest index.
         expected: [f64; 2],
     },
-    /// It ends before the space does.
+    /// The volume does not cover the domain.
     #[error("{file}: reaches from {low} to {high} mm along {axis}; expected all of {expected:?}")]
     TooSmall {
         /// The file.
         file: String,
         /// `x`, `y` or `z`.
         axis: char,
-        /// Where it begins.
+        /// The lower end of the volume, in mm.
         low: f64,
-        /// Where it ends.
+        /// The upper end of the volume, in mm.
         high: f64,
-        /// From where to where the space reaches.
+        /// The extent of the domain, in mm.
         expected: [f64; 2],
     },
 }
@@ -88,7 +87,7 @@ pub(super) fn read_field<R: Real>(path: &Path) -> Result<Trilinear<R>, Reference
     Trilinear::new(grid, values.into_iter().map(R::from_f64).collect()).map_err(wrong)
 }
 
-/// The place of a node in a grid.
+/// The position of a node in a grid.
 fn node_place([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
     [n % nx, n / nx % ny, n / nx / ny]
 }
@@ -97,7 +96,7 @@ fn node_place([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
 type IndexFunction = Box<dyn Fn(Vec3<f64>) -> f64>;
 
 impl InitialField {
-    /// The index of the field to begin with.
+    /// The index of the initial field.
     pub(super) fn index(&self) -> Result<IndexFunction, ReferenceFieldError> {
         Ok(match self {
             Self::Uniform(index) => {
@@ -112,8 +111,8 @@ impl InitialField {
     }
 }
 
-/// Refuses a volume that ends before a space does, by more than half a voxel: beyond its last nodes
-/// a field only continues.
+/// Refuses a volume that ends before a domain does by more than half a voxel: beyond its last nodes
+/// a field is only extrapolated.
 pub(super) fn check_extent(path: &Path, space: Domain) -> Result<(), ReferenceFieldError> {
     let grid = *read_field::<f64>(path)?.grid();
     let (low, spacing, counts) = (grid.low(), grid.spacing(), grid.counts());
@@ -133,8 +132,8 @@ pub(super) fn check_extent(path: &Path, space: Domain) -> Result<(), ReferenceFi
     Ok(())
 }
 
-/// Refuses a volume with an index beyond limits within some spaces; what rounding to four
-/// bytes takes is nothing.
+/// Refuses a volume with an index beyond limits within some domains, up to the rounding of four
+/// bytes.
 pub(super) fn check_index_range(
     path: &Path,
     spaces: &[Domain],
@@ -154,10 +153,10 @@ pub(super) fn check_index_range(
 }
 
 impl ReferenceField {
-    /// The same sampled on a grid.
+    /// The field sampled on a grid.
     ///
     /// # Errors
-    /// A volume that cannot be read, or a grid that cannot be made.
+    /// A volume that cannot be read, or an invalid grid.
     pub fn sample_on_grid<R: Real>(
         &self,
         cubic: bool,

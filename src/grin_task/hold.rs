@@ -1,25 +1,28 @@
-//! What is asked of a field itself: its index at the edge, a limit of its slope, and for splines the
-//! range of the index; each a penalty that vanishes where it is kept.
+//! Penalty terms on the field itself: its index at the boundary, a limit of its gradient, and for
+//! splines the range of the index; each vanishes where the limit is satisfied.
 
 use super::space::length;
 use super::task::{BoundaryCondition, FieldRepresentation, GrinTask, ManufacturingLimits};
 use crate::grin::IndexField;
 use crate::math::Vec3;
 
-/// Fewest and most points along a side of the box at which a slope is held; else one a voxel.
+/// Fewest and most points along a side of the bounding box at which the gradient is penalised;
+/// otherwise one per voxel.
 const LATTICE: [usize; 2] = [24, 64];
-/// Points of a radius at which an index is held, and how firmly.
+/// Points of a radius at which an index is penalised, and the weight of the penalty.
 const RADIAL_POINTS: usize = 100;
 const STIFFNESS: f64 = 10.0;
-/// Points of the surface at which the index is held.
+/// Points of the surface at which the index is prescribed.
 const SURFACE: usize = 2000;
 
-/// What is asked of the field itself: its index at the edge, and a limit of its slope.
+/// Penalty terms on the field itself: its index at the boundary, and limits of its gradient and
+/// index.
 #[derive(Debug, Clone)]
 pub(super) struct FieldPenalties {
     edge: Option<(BoundaryCondition, Vec<Vec3<f64>>)>,
     slope: Option<(f64, f64, Vec<Vec3<f64>>)>,
-    /// The smallest and the largest index, of a spline: its coefficients alone do not keep them.
+    /// The smallest and the largest index of a spline, which its coefficients alone do not
+    /// guarantee.
     range: Option<([f64; 2], f64, Vec<Vec3<f64>>)>,
 }
 
@@ -52,7 +55,8 @@ impl FieldPenalties {
         }
     }
 
-    /// What each place counts: the residual, and its derivative by the index and its gradient.
+    /// Visits every nonzero residual: its position, its value, and its derivatives with respect to
+    /// the index and to its gradient.
     fn visit_residuals(
         &self,
         field: &dyn IndexField<f64>,
@@ -88,7 +92,7 @@ impl FieldPenalties {
         }
     }
 
-    /// The sum of squares, and its gradient added.
+    /// The sum of squares; its gradient is added.
     pub(super) fn add_gradient(&self, field: &dyn IndexField<f64>, gradient: &mut [f64]) -> f64 {
         let mut sum = 0.0;
         self.visit_residuals(field, |p, residual, by_index, by_slope| {
@@ -108,7 +112,7 @@ impl FieldPenalties {
         rows
     }
 
-    /// The sum of squares alone.
+    /// The sum of squares.
     pub(super) fn value(&self, field: &dyn IndexField<f64>) -> f64 {
         let mut sum = 0.0;
         self.visit_residuals(field, |_, residual, _, _| sum += residual * residual);

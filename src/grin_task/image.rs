@@ -1,8 +1,8 @@
-//! Images that light makes on a screen: the loss of a display, and its derivative by every ray.
+//! Images formed on a screen: their loss, and its derivative with respect to every ray.
 //!
-//! Each ray deposits a quadratic B-spline footprint of three by three pixels (5.32 and 5.33), so that
-//! the image changes smoothly as rays move. It takes two passes: all rays make the image, then the
-//! difference from the picture that is wanted tells each ray where it should go.
+//! Each ray contributes a quadratic B-spline footprint of three by three pixels (5.32 and 5.33), so
+//! that the image changes smoothly as rays move. The evaluation takes two passes: all rays form the
+//! image, then the difference from the target image gives the adjoint of each ray.
 
 use super::drawing::TargetImage;
 use super::space::orthogonal_axes;
@@ -10,14 +10,13 @@ use crate::files::FileError;
 use crate::grin::{Face, RayAdjoint, RayExit};
 use crate::math::Vec3;
 
-/// A ray this many pixels off the screen has no place on it.
+/// A ray this many pixels off the screen has no position on it.
 const MAX_PIXELS_OFF: f64 = 1e6;
 
-/// A square screen across the direction of a beam, or the same at infinity, and the picture that is
-/// wanted on it.
+/// A square screen perpendicular to a beam, or at infinity, with its target image.
 #[derive(Debug, Clone)]
 pub(super) struct Screen {
-    /// Where it stands; nowhere at infinity.
+    /// The plane of the screen; `None` at infinity.
     pub(super) face: Option<Face<f64>>,
     direction: Vec3<f64>,
     axes: [Vec3<f64>; 2],
@@ -26,11 +25,12 @@ pub(super) struct Screen {
     pub(super) wanted: Vec<f64>,
 }
 
-/// The pixels that a ray touches along one axis: the first, three weights and their slopes.
+/// The pixels that a ray contributes to along one axis: the first, three weights and their
+/// derivatives.
 type AxisFootprint = (isize, [f64; 3], [f64; 3]);
 
 impl Screen {
-    /// A screen that stands on a face.
+    /// A screen in the plane `face`.
     pub(super) fn new(
         face: Option<Face<f64>>,
         direction: Vec3<f64>,
@@ -45,7 +45,7 @@ impl Screen {
         2.0 * self.half / self.pixels as f64
     }
 
-    /// Where a ray arrives along both axes of the screen, in pixels from the middle of the first;
+    /// The position of a ray on the screen along both axes, in pixels from the centre of the first;
     /// at infinity by the tangents of its direction.
     fn arrival(&self, exit: &RayExit<f64>) -> Option<[f64; 2]> {
         let along = exit.v.dot(self.direction);
@@ -58,7 +58,7 @@ impl Screen {
         seen.then_some(place)
     }
 
-    /// The pixels that a place along one axis touches.
+    /// The pixels that a position along one axis contributes to.
     fn axis_footprint(u: f64) -> AxisFootprint {
         let nearest = u.round();
         let t = u - nearest;
@@ -66,7 +66,8 @@ impl Screen {
         (nearest as isize - 1, weights, [t - 0.5, -2.0 * t, t + 0.5])
     }
 
-    /// What each touched pixel gets: its number, and the weight with its slopes along both axes.
+    /// The number of each pixel that a ray contributes to, and the weight with its derivatives
+    /// along both axes.
     fn footprint(&self, exit: &RayExit<f64>) -> impl Iterator<Item = (usize, f64, [f64; 2])> {
         let pixels = self.pixels as isize;
         self.arrival(exit).into_iter().flat_map(move |place| {
@@ -81,12 +82,12 @@ impl Screen {
         })
     }
 
-    /// The light of a ray: as many pixels as rays give an image of mean 1.
+    /// The light of a ray, such that the image has mean 1.
     fn share(&self, rays: usize) -> f64 {
         (self.pixels * self.pixels) as f64 / rays as f64
     }
 
-    /// The image that rays make.
+    /// The image formed by rays.
     pub(super) fn image<'a>(
         &self,
         exits: impl Iterator<Item = &'a RayExit<f64>>,
@@ -99,19 +100,19 @@ impl Screen {
         image
     }
 
-    /// The mean square difference between an image and the picture.
+    /// The mean square difference between an image and the target.
     pub(super) fn difference(&self, image: &[f64]) -> f64 {
         let squares = image.iter().zip(&self.wanted).map(|(a, b)| (a - b) * (a - b));
         squares.sum::<f64>() / image.len() as f64
     }
 
-    /// The peak signal against that difference, in dB.
+    /// The peak signal-to-noise ratio of that difference, in dB.
     pub(super) fn psnr(&self, difference: f64) -> f64 {
         let peak = self.wanted.iter().copied().fold(0.0, f64::max);
         10.0 * (peak * peak / difference).log10()
     }
 
-    /// The derivative of that difference by the end of a ray.
+    /// The derivative of that difference with respect to the exit of a ray.
     pub(super) fn adjoint(
         &self,
         image: &[f64],
@@ -130,7 +131,7 @@ impl Screen {
         if self.face.is_some() {
             return RayAdjoint { x: by_place, ..RayAdjoint::default() };
         }
-        // The tangents are v/(v·d), whose derivative is 1/(v·d) less v d/(v·d)².
+        // The tangents are v/(v·d), whose derivative is 1/(v·d) minus v d/(v·d)².
         let forward = exit.v.dot(self.direction);
         let turned = by_place - self.direction * (by_place.dot(exit.v) / forward);
         let v = if forward > 0.0 { turned * (1.0 / forward) } else { Vec3::default() };

@@ -1,4 +1,4 @@
-//! Whether a field keeps what a maker can make: every limit with the value that stands against it.
+//! The manufacturing limits of a task, compared with a field.
 
 use super::check::INDEX_ROUNDING;
 use super::compare::FieldExtremes;
@@ -8,30 +8,30 @@ use crate::files::Volume;
 use crate::grin::field::GridError;
 use crate::math::Vec3;
 
-/// A limit of a maker, and what the field makes of it.
+/// A manufacturing limit, compared with a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitCheck {
-    /// What is limited: `lowest index`, `highest index` or `slope`, the last in 1/mm.
+    /// The limited quantity: `lowest index`, `highest index` or `slope`, the last in 1/mm.
     pub name: &'static str,
-    /// The worst that the field has.
+    /// The extreme value of the field.
     pub value: f64,
-    /// What it may be.
+    /// The limit.
     pub limit: f64,
-    /// What is left; below 0 where the limit is broken.
+    /// The distance from the limit; negative where the limit is violated.
     pub margin: f64,
-    /// Where that is, in mm.
+    /// The position of the extreme value, in mm.
     pub at: Vec3<f64>,
 }
 
 impl LimitCheck {
-    /// Whether the limit is kept, but for rounding.
+    /// True if the limit is satisfied, up to rounding.
     pub fn is_satisfied(&self) -> bool {
         self.margin >= -INDEX_ROUNDING
     }
 }
 
 impl GrinTask {
-    /// Every place where light bends: the space of the task and those of its views.
+    /// Every domain in which light is refracted: that of the task and those of its views.
     pub(super) fn spaces(&self) -> Vec<Domain> {
         let mut spaces = vec![self.space];
         for space in self.views.iter().filter_map(|view| view.space) {
@@ -42,7 +42,7 @@ impl GrinTask {
         spaces
     }
 
-    /// Every limit of a maker that the task sets, and how a field with these extremes keeps it.
+    /// Every manufacturing limit of the task, compared with a field of these extremes.
     pub fn limit_checks(&self, found: &FieldExtremes) -> Vec<LimitCheck> {
         let limits = self.limits;
         let [low, high, steepest] = found.at;
@@ -58,11 +58,11 @@ impl GrinTask {
         index.into_iter().chain(slope).collect()
     }
 
-    /// The values of a field on a grid, as [`GrinField::volume`] has them, put within the limits
-    /// of the index: outside the space a spline may be anything.
+    /// The values of a field on a grid, as in [`GrinField::volume`], clamped to the limits of the
+    /// index: outside the domain a spline is not limited.
     ///
     /// # Errors
-    /// A space without extent.
+    /// A domain without extent.
     pub fn volume(&self, medium: &GrinField, nodes: usize) -> Result<Volume, GridError> {
         let mut volume = medium.volume(self.space, nodes)?;
         let clamp = |value: &mut f64| *value = value.clamp(self.limits.low, self.limits.high);

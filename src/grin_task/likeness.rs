@@ -1,15 +1,15 @@
-//! How like an image is to the picture that is wanted.
+//! Measures of the similarity between the image of a view and its target.
 
 use super::seen::ViewImage;
 
 impl ViewImage {
-    /// The share of the light that falls on the screen.
+    /// The fraction of the light that falls on the screen.
     pub fn light_share(&self) -> f64 {
         mean(&self.formed)
     }
 
-    /// The correlation of both, pixel by pixel: 1 for what differs by contrast alone, 0 for an even
-    /// image.
+    /// The correlation coefficient of image and target, pixel by pixel: 1 for images that differ by
+    /// contrast alone, 0 for a uniform image.
     pub fn correlation(&self) -> f64 {
         let (a, b) = (mean(&self.formed), mean(&self.target));
         let product = |v: &[f64], v0: f64, w: &[f64], w0: f64| {

@@ -1,8 +1,9 @@
-//! What a measurement of light would give: where rays leave another field, and how.
+//! Simulated measurements: the exits of the rays of a view from a reference field.
 //!
-//! The field is traced as its own kind wants it, and finer than the one that is sought, so that the
-//! search does not find its own errors again. A ray that tells nothing, because it is trapped,
-//! chaotic or too flat there, is told by its reason and left out.
+//! The reference field is traced with the settings for its own kind, and to a tighter tolerance
+//! than the field under optimisation, so that the optimisation does not reproduce its own tracing
+//! errors. A ray without information, because it is trapped, chaotic or grazing there, is excluded
+//! and counted with its reason.
 
 use super::check::GrinTaskError;
 use super::given::{check_extent, check_index_range};
@@ -13,25 +14,25 @@ use super::space::{length, unit};
 use super::task::{Domain, GrinTask, InitialField, LightGoal, LightView, ReferenceField};
 use crate::grin::{GrinRay, GrinTracer, RayAdjoint, RayExit, plan_tracing};
 
-/// The field from which a measurement comes is traced so much better than the one that is sought.
+/// The tolerance for the reference field relative to that of the task.
 const FINER: f64 = 0.1;
 
-/// The measured aims of the views whose rays are the same in every step; nothing for other views.
+/// The measured targets of the views whose rays are the same in every step; `None` for other views.
 pub(super) type MeasuredTargets = Vec<Option<Vec<RayTarget>>>;
 
-/// What the light of a view does in the field that it is measured in.
+/// The simulated measurement of a view in its reference field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewMeasurement {
     /// The name of the view.
     pub view: String,
-    /// The largest angle between a ray and its exit, in radians, of the rays that tell something.
+    /// The largest angle between a ray and its exit, in radians, over the valid rays.
     pub deflection: f64,
-    /// What became of the rays.
+    /// The number of rays with each outcome.
     pub counts: RayCounts,
 }
 
 impl GrinTask {
-    /// The measurements that its views are compared with, by the rays that all fields are judged by.
+    /// The simulated measurements of the views with the goal `like`, for the scoring rays.
     ///
     /// # Errors
     /// A volume that cannot be read.
@@ -57,8 +58,8 @@ impl GrinTask {
         self.views.iter().filter_map(|view| measured(view).transpose()).collect()
     }
 
-    /// Refuses volumes that cannot be read or end before the space does, and one to begin with that
-    /// is beyond the limits.
+    /// Refuses volumes that cannot be read or do not cover their domain, and an initial volume that
+    /// violates the limits.
     pub(super) fn check_volumes(&self) -> Result<(), GrinTaskError> {
         let check = |place: String, path: &std::path::Path, space: Domain| {
             check_extent(path, space).map_err(|source| GrinTaskError::Field { place, source })
@@ -80,7 +81,7 @@ impl GrinTask {
     }
 }
 
-/// Traces the rays of a view through the field that it is measured in, and back.
+/// Traces the rays of a view through its reference field, and back.
 fn trace_reference(
     task: &GrinTask,
     view: &LightView,
@@ -95,12 +96,12 @@ fn trace_reference(
     let setup = plan_tracing(&*field, &space.region(), task.launch, &rays, finer)?.setup;
     let tracer = GrinTracer::new(&*field, setup)?;
     let mut exits = tracer.trace_batch(&rays);
-    // The way back finds the chaotic ones.
+    // Retracing finds the chaotic rays.
     tracer.gradient(&rays, &mut exits, &vec![RayAdjoint::default(); rays.len()]);
     Ok(exits)
 }
 
-/// Where the rays of a view shall go that are measured in a field.
+/// The targets of the rays of a view, measured in its reference field.
 pub(super) fn trace_targets(
     task: &GrinTask,
     view: &LightView,
@@ -120,7 +121,7 @@ pub(super) fn trace_targets(
     Ok(exits.iter().map(aim).collect())
 }
 
-/// Traces what is measured once and for all.
+/// Measures the targets of all views whose rays are the same in every step.
 pub(super) fn measure_targets(task: &GrinTask) -> Result<MeasuredTargets, GrinTaskError> {
     let aims = |view: &LightView| match &view.goal {
         LightGoal::Like { field, direction } if !view.source.is_resampled() => {

@@ -1,5 +1,5 @@
-//! A field on its way: how it begins, what its numbers may do, how it becomes finer, and how it is
-//! written as a volume.
+//! The field under optimisation: its initial values, the ranges of its parameters, its refinement,
+//! and its values on a grid.
 
 use super::check::GrinTaskError;
 use super::task::{BoundaryCondition, Domain, FieldRepresentation, GrinTask, ManufacturingLimits};
@@ -11,13 +11,13 @@ use crate::grin::field::{
 };
 use crate::math::Vec3;
 
-/// Fewest coefficients of a spline.
+/// The smallest number of coefficients of a spline.
 const MIN_COEFFICIENTS: usize = 4;
 
-/// A field that a search works on.
+/// A field under optimisation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GrinField {
-    /// Nodes on a cube.
+    /// Node values on a cube.
     Trilinear(Trilinear<f64>),
     /// Tricubic B-splines on a cube.
     Tricubic(Tricubic<f64>),
@@ -26,7 +26,7 @@ pub enum GrinField {
 }
 
 impl FieldRepresentation {
-    /// The fewest nodes or coefficients that make a field.
+    /// The smallest number of nodes or coefficients of a field.
     pub(super) fn min_nodes(self) -> usize {
         match self {
             Self::Trilinear { .. } | Self::Tricubic { .. } => 2,
@@ -34,7 +34,7 @@ impl FieldRepresentation {
         }
     }
 
-    /// How many numbers make a field with so many nodes along a side.
+    /// The number of parameters of a field with this many nodes along a side.
     pub(super) fn parameter_count(self, nodes: usize) -> usize {
         match self {
             Self::Trilinear { .. } => nodes.saturating_pow(3),
@@ -43,7 +43,7 @@ impl FieldRepresentation {
         }
     }
 
-    /// Its size: half a side, or a radius.
+    /// Its size in mm: half a side, or a radius.
     pub(super) fn size(self) -> f64 {
         let (Self::Trilinear { half: size }
         | Self::Tricubic { half: size }
@@ -52,17 +52,17 @@ impl FieldRepresentation {
         size
     }
 
-    /// Whether it is a spline in one coordinate.
+    /// True if the field is a spline in one coordinate.
     pub(super) fn is_radial(self) -> bool {
         matches!(self, Self::Sphere { .. } | Self::Cylinder { .. })
     }
 }
 
 impl GrinField {
-    /// The field of a kind that takes given values.
+    /// The field of a given representation and number of nodes that approximates a function.
     ///
     /// # Errors
-    /// Too few nodes, no extent, or values that are no numbers.
+    /// Too few nodes, no extent, or values that are not finite.
     pub(super) fn from_function(
         kind: FieldRepresentation,
         nodes: usize,
@@ -89,7 +89,7 @@ impl GrinField {
         })
     }
 
-    /// The field that a task begins with, with so many nodes.
+    /// The initial field of a task, with this many nodes.
     ///
     /// # Errors
     /// Too few nodes, or a volume that cannot be read.
@@ -99,7 +99,7 @@ impl GrinField {
         Ok(Self::from_function(task.field, nodes, index)?)
     }
 
-    /// The same field with other numbers of nodes or coefficients.
+    /// The same field with another number of nodes or coefficients.
     ///
     /// # Errors
     /// As [`Self::from_function`].
@@ -122,14 +122,14 @@ impl GrinField {
         Ok(finer)
     }
 
-    /// Chooses the Hessian of a trilinear field.
+    /// Selects the Hessian of a trilinear field.
     pub(super) fn set_diagonal(&mut self, diagonal: HessianDiagonal) {
         if let Self::Trilinear(field) = self {
             field.diagonal = diagonal;
         }
     }
 
-    /// What rays are traced through.
+    /// The field for tracing.
     pub fn field(&self) -> &dyn IndexField<f64> {
         match self {
             Self::Trilinear(field) => field,
@@ -138,7 +138,7 @@ impl GrinField {
         }
     }
 
-    /// Its numbers, to be changed.
+    /// Mutable access to its parameters.
     pub(super) fn parameters_mut(&mut self) -> &mut [f64] {
         match self {
             Self::Trilinear(field) => field.parameters_mut(),
@@ -147,8 +147,8 @@ impl GrinField {
         }
     }
 
-    /// The range of each of its numbers. A coefficient of a spline that stands outside the space is
-    /// no index of it and has more room; a penalty holds the index itself.
+    /// The range of each parameter. A coefficient of a spline that lies outside the domain is not
+    /// an index in it and has a wider range; a penalty limits the index itself.
     pub(super) fn parameter_ranges(
         &self,
         space: Domain,
@@ -169,7 +169,7 @@ impl GrinField {
             }
             Self::Tricubic(field) => {
                 let grid = field.grid();
-                // The first coefficient stands one spacing before the domain.
+                // The first coefficient lies one spacing before the domain.
                 let place = |n: usize| grid.node(n) - grid.spacing();
                 (0..grid.node_count()).map(|n| range(is_inside(place(n)), wide)).collect()
             }
@@ -191,11 +191,12 @@ impl GrinField {
         }
     }
 
-    /// Its values on a grid: those of its own nodes, or of a spline in one coordinate on so many
-    /// nodes along each side of the box around the space, constant from where the spline ends.
+    /// Its values on a grid: those of its own nodes, or of a spline in one coordinate on this many
+    /// nodes along each side of the bounding box of the domain, constant beyond the end of the
+    /// spline.
     ///
     /// # Errors
-    /// A space without extent.
+    /// A domain without extent.
     pub fn volume(&self, space: Domain, nodes: usize) -> Result<Volume, GridError> {
         let grid = match self {
             Self::Trilinear(field) => *field.grid(),
@@ -213,8 +214,8 @@ impl GrinField {
         Ok(Volume { grid, values: (0..grid.node_count()).map(index).collect() })
     }
 
-    /// The nearest point at which the field is given: where a spline ends, a maker needs material of
-    /// the index at its end, and not what the spline would go on to.
+    /// The nearest point covered by the field: beyond the end of a spline the index is constant,
+    /// not the extrapolated polynomial.
     fn nearest_covered(&self, point: Vec3<f64>) -> Vec3<f64> {
         let Self::Radial(ProfileField { coordinate, .. }, radius) = self else { return point };
         let across = match coordinate {

@@ -1,13 +1,13 @@
-//! Design tasks in one gradient-index field: which light shall go where, what a maker can make, and
-//! the search for the field.
+//! Design tasks in one gradient-index field: the task file, the loss, the optimisation of the
+//! field, and reports on a field.
 //!
-//! A [`GrinTask`] is what a person writes, as JSON: the kind of field and its resolutions, the
-//! sources, the goals, the limits. A [`GrinOptimizer`] works on it one step at a time, by the exact adjoint
-//! of [`grin`](crate::grin): it knows no clock, no file and no window, draws nothing by chance and
-//! comes to the same field on any number of threads. Rays are traced as well as the tolerance of
-//! the task asks, chosen anew as the field takes shape; a ray that cannot count is left out, at a
-//! constant price, and told with its reason. After chapter 5 of Teh, *Computational Lens Design*,
-//! whose equation numbers are given.
+//! A [`GrinTask`] is the content of a JSON file: the representation of the field and its
+//! resolutions, the sources, the goals, the limits. A [`GrinOptimizer`] works on it one step at a
+//! time, by the exact adjoint of [`grin`](crate::grin): it knows no clock, no file and no window,
+//! uses no random numbers and comes to the same field on any number of threads. Rays are traced to
+//! the tolerance of the task, with a step chosen anew as the field changes; rays that cannot be
+//! evaluated are excluded with a fixed penalty and reported with the reason. After chapter 5 of
+//! Teh, *Computational Lens Design*, whose equation numbers are given.
 
 mod builtin;
 mod check;

@@ -1,4 +1,4 @@
-//! Planes across an axis of space, as a person looks at them.
+//! Planes perpendicular to an axis, in which a field is displayed.
 
 use crate::math::Vec3;
 use serde::{Deserialize, Serialize};
@@ -7,19 +7,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SpatialAxis {
-    /// To the side.
+    /// The horizontal axis.
     X,
-    /// Upwards.
+    /// The vertical axis, upwards.
     Y,
-    /// The way of light, in most tasks.
+    /// The axis along which light travels in most tasks.
     Z,
 }
 
 impl SpatialAxis {
-    /// All three.
+    /// All three axes.
     pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
 
-    /// What it is called.
+    /// The name of the axis.
     pub const fn name(self) -> &'static str {
         match self {
             Self::X => "x",
@@ -28,7 +28,7 @@ impl SpatialAxis {
         }
     }
 
-    /// The part of a vector along it.
+    /// The component of a vector along the axis.
     pub const fn component(self, v: Vec3<f64>) -> f64 {
         match self {
             Self::X => v.x,
@@ -37,7 +37,7 @@ impl SpatialAxis {
         }
     }
 
-    /// A vector of this length along it.
+    /// A vector of this length along the axis.
     const fn vector(self, length: f64) -> Vec3<f64> {
         match self {
             Self::X => Vec3::new(length, 0.0, 0.0),
@@ -46,8 +46,8 @@ impl SpatialAxis {
         }
     }
 
-    /// The axes that point right and up in a picture of a plane across this one: z points right
-    /// where it can, as light goes in a drawing of a lens.
+    /// The axes that point right and up in a picture of a plane perpendicular to this one: z points
+    /// right where possible, the direction of light in lens drawings.
     pub const fn across(self) -> [Self; 2] {
         match self {
             Self::X => [Self::Z, Self::Y],
@@ -57,23 +57,23 @@ impl SpatialAxis {
     }
 }
 
-/// A plane across an axis.
+/// A plane perpendicular to an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlicePlane {
     /// The axis.
     pub axis: SpatialAxis,
-    /// Where it crosses the axis, in mm.
+    /// The coordinate of the plane along the axis, in mm.
     pub depth: f64,
 }
 
 impl SlicePlane {
-    /// The point of the plane at a place of its picture: right and up, in mm.
+    /// The point of the plane at a position of its picture: right and up, in mm.
     pub fn point(self, [right, up]: [f64; 2]) -> Vec3<f64> {
         let [across, above] = self.axis.across();
         self.axis.vector(self.depth) + across.vector(right) + above.vector(up)
     }
 
-    /// Where a point is seen in the picture of the plane: it is projected along the axis.
+    /// The position in the picture of a point projected along the axis onto the plane.
     pub fn project(self, point: Vec3<f64>) -> [f64; 2] {
         self.axis.across().map(|axis| axis.component(point))
     }

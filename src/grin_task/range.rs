@@ -1,11 +1,12 @@
-//! The range of the index, and a spline put where it keeps one.
+//! The range of the index, and the projection of a spline onto it.
 //!
-//! The value of a spline is a mean of its coefficients, weighted by numbers that are not below zero
-//! (de Boor, *A Practical Guide to Splines*, chapter IX): coefficients within a range keep the value
-//! there. Those that stand outside the space need more room, for a field that is steep at its edge.
-//! Where that breaks the range within a cell that the space touches, what they have beyond the range
-//! is taken back: as much as the control points of the cell need, and of the coefficients that count
-//! there, no others. The values in a cell are means of its control points, so that nothing is missed.
+//! The value of a spline is a weighted mean of its coefficients with nonnegative weights (de Boor,
+//! *A Practical Guide to Splines*, chapter IX): coefficients within a range keep the value in it.
+//! Those outside the domain need a wider range, for a field with a large gradient at its boundary.
+//! Where that violates the range within a cell that intersects the domain, the excess of the
+//! coefficients of that cell beyond the range is reduced: by as much as the control points of the
+//! cell require. The values in a cell are means of its control points, so that no violation is
+//! missed.
 
 use super::climb::{FieldObjective, LocatedValue, RADIAL_POINTS, find_maximum, higher};
 use super::medium::GrinField;
@@ -15,15 +16,14 @@ use crate::grin::field::RegularGrid;
 use crate::math::Vec3;
 use rayon::prelude::*;
 
-/// Points along a side of the box around the space at which a trilinear field is looked at between
-/// its nodes.
+/// Points along a side of the bounding box at which a trilinear field is sampled between its nodes.
 const LATTICE: usize = 40;
-/// Rounds of taking back, before all of it is taken back.
+/// Rounds of reducing the excess, before all of it is removed.
 const MAX_ROUNDS: usize = 40;
-/// What is beyond the range by less is rounding.
+/// A smaller excess is rounding.
 const TOLERANCE: f64 = 1e-12;
 
-/// One of the two ends of the index.
+/// One of the two limits of the index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum IndexBound {
     Low,
@@ -31,7 +31,7 @@ pub(super) enum IndexBound {
 }
 
 impl IndexBound {
-    /// A value that grows towards this end.
+    /// The value with the sign for which this limit is a maximum.
     fn signed(self, value: f64) -> f64 {
         match self {
             Self::Low => -value,
@@ -41,9 +41,9 @@ impl IndexBound {
 }
 
 impl GrinField {
-    /// Its lowest or highest index in some spaces, and where that is: of a trilinear field at its
-    /// nodes and many places between them, of a smooth one by a climb. A spline in one coordinate is
-    /// looked at up to its end.
+    /// The lowest or highest index in some domains, and its position: for a trilinear field at its
+    /// nodes and at many points between them, for a smooth one by a maximum search. A spline in one
+    /// coordinate is searched up to its end.
     pub(super) fn extreme_index(&self, spaces: &[Domain], bound: IndexBound) -> LocatedValue {
         let value = |p: Vec3<f64>| bound.signed(self.field().sample(p).index);
         let of_space = |space: &Domain| {
@@ -62,8 +62,8 @@ impl GrinField {
         (bound.signed(most), at)
     }
 
-    /// The same field with the index within a range everywhere in some spaces; one that keeps it is
-    /// not changed.
+    /// The same field with the index limited to a range everywhere in some domains; unchanged if it
+    /// is already within the range.
     #[must_use]
     pub(super) fn limit_index(&self, spaces: &[Domain], range: [f64; 2]) -> Self {
         let mut kept = self.clone();
@@ -85,14 +85,15 @@ impl GrinField {
         kept
     }
 
-    /// Whether its index is within a range wherever it is looked at. Control points alone do not tell:
-    /// those of a cell at the surface lie outside, where a steep field may well be beyond the range.
+    /// True if the index is within a range at every sample point. Control points alone are too
+    /// strict: those of a cell at the surface lie outside, where a field with a large gradient may
+    /// exceed the range.
     fn is_within(&self, spaces: &[Domain], [low, high]: [f64; 2]) -> bool {
         self.extreme_index(spaces, IndexBound::Low).0 >= low - TOLERANCE
             && self.extreme_index(spaces, IndexBound::High).0 <= high + TOLERANCE
     }
 
-    /// Whether it is a spline with a coefficient beyond a range.
+    /// True if the field is a spline with a coefficient beyond a range.
     fn has_loose_coefficients(&self, [low, high]: [f64; 2]) -> bool {
         let within = |value: &f64| (low..=high).contains(value);
         !matches!(self, Self::Trilinear(_)) && !self.field().parameters().iter().all(within)
@@ -102,21 +103,21 @@ impl GrinField {
         matches!(self, Self::Radial(..))
     }
 
-    /// Whether a place along x is one of a spline in one coordinate, which ends.
+    /// True if a point along x is covered by a spline in one coordinate, which ends.
     fn covers(&self, p: Vec3<f64>) -> bool {
         let Self::Radial(_, radius) = self else { return true };
         (0.0..=*radius).contains(&p.x) && p.y == 0.0 && p.z == 0.0
     }
 
-    /// Where the index is looked at: all over the space, or along x up to where a spline ends.
+    /// The sample points for the index: over the domain, or along x up to the end of a spline.
     fn index_points(&self, space: Domain) -> Vec<Vec3<f64>> {
         let Self::Radial(_, radius) = self else { return self.sample_points(space) };
         let at = |i: usize| Vec3::new(radius * i as f64 / RADIAL_POINTS as f64, 0.0, 0.0);
         (0..=RADIAL_POINTS).map(at).collect()
     }
 
-    /// Means of coefficients that are beyond a range, and at which end: among them are the values of
-    /// the spline wherever it counts.
+    /// The control points beyond a range, and the limit that each violates: the values of the
+    /// spline in the domain are means of control points.
     fn violations(
         &self,
         spaces: &[Domain],
@@ -155,7 +156,8 @@ impl GrinField {
         }
     }
 
-    /// Takes back what the coefficients of some means have beyond a range, until these are within it.
+    /// Reduces the excess of the coefficients of some control points until these are within the
+    /// range.
     fn project_coefficients(
         &mut self,
         broken: &[(WeightedMean, IndexBound)],
@@ -184,7 +186,8 @@ impl GrinField {
 /// Coefficients with their weights, whose sum is 1.
 type WeightedMean = Vec<(usize, f64)>;
 
-/// The control points of a cubic B-spline in a cell: the values there are means of them.
+/// The weights of the control points of a cubic B-spline in a cell: the values there are means of
+/// them.
 const CONTROL_POINTS: [[f64; 4]; 4] = [
     [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 0.0],
     [0.0, 2.0 / 3.0, 1.0 / 3.0, 0.0],
@@ -200,7 +203,7 @@ struct SplineCell<'a> {
 }
 
 impl SplineCell<'_> {
-    /// The number of coefficient `n` of the 64 that count in it.
+    /// The number of coefficient `n` of the 64 of the cell.
     fn coefficient(&self, n: usize) -> usize {
         let ([i, j, k], [nx, ny, _]) = (self.at, self.grid.counts());
         i + n % 4 + nx * (j + n / 4 % 4 + ny * (k + n / 16))
@@ -217,8 +220,8 @@ impl SplineCell<'_> {
         (0..64).map(|n| (self.coefficient(n), weight(n))).collect()
     }
 
-    /// Whether a space comes into it, or within half of it: its corners and the middles between them
-    /// tell.
+    /// True if a domain intersects the cell or its surrounding of half a cell, judged by a lattice
+    /// of points.
     fn touches(&self, space: Domain) -> bool {
         let (low, h) = (self.grid.low(), self.grid.spacing());
         let region = space.region();
@@ -231,7 +234,7 @@ impl SplineCell<'_> {
     }
 }
 
-/// The highest value at the nodes of a grid in a space, and between them.
+/// The highest value at the nodes of a grid in a domain, and between them.
 fn highest_value(
     grid: &RegularGrid<f64>,
     space: Domain,
@@ -248,7 +251,7 @@ mod tests {
     use super::*;
     use crate::grin_task::task::FieldRepresentation;
 
-    /// A field that waves so strongly that it is beyond its range inside and outside the space.
+    /// A field with variations so strong that it exceeds its range inside and outside the domain.
     fn wild(kind: FieldRepresentation) -> GrinField {
         let mut medium = GrinField::from_function(kind, 9, |_| 1.3).unwrap();
         let wave = |i: usize| 1.3 + 3.0 * (0.7 * i as f64).sin();

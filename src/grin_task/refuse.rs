@@ -1,13 +1,13 @@
-//! Refusals of numbers that make no sense, in the words of what the number is.
+//! Checks of the numbers in a task, with error messages that name the quantity.
 
 use super::check::GrinTaskError;
 pub(super) use crate::math::format_short as number;
 use std::fmt::Display;
 
-/// No length is longer, in mm.
+/// The largest length, in mm.
 pub(super) const MAX_LENGTH: f64 = 1e6;
 
-/// An error at a place.
+/// The error for an invalid value.
 pub(super) fn invalid<T: Display>(
     place: impl Into<String>,
     found: T,
@@ -17,7 +17,7 @@ pub(super) fn invalid<T: Display>(
     GrinTaskError::Value { place: place.into(), found, expected: expected.into() }
 }
 
-/// Refuses a number that is not above zero.
+/// Checks that a number is positive.
 pub(super) fn check_positive(
     place: impl Into<String>,
     value: f64,
@@ -29,7 +29,7 @@ pub(super) fn check_positive(
     Err(invalid(place, number(value), format!("{what} above 0")))
 }
 
-/// Refuses what is no length.
+/// Checks that a number is a length.
 pub(super) fn check_length(place: impl Into<String>, value: f64) -> Result<(), GrinTaskError> {
     if value > 0.0 && value <= MAX_LENGTH {
         return Ok(());
@@ -38,7 +38,7 @@ pub(super) fn check_length(place: impl Into<String>, value: f64) -> Result<(), G
     Err(invalid(place, number(value), expected))
 }
 
-/// Refuses a place or a distance that no space of ours reaches.
+/// Checks that a coordinate or distance is finite and not below `low`.
 pub(super) fn check_position(
     place: impl Into<String>,
     value: f64,
@@ -51,7 +51,7 @@ pub(super) fn check_position(
     Err(invalid(place, number(value), expected))
 }
 
-/// Refuses what is no weight.
+/// Checks that a number is a weight.
 pub(super) fn check_weight(place: impl Into<String>, value: f64) -> Result<(), GrinTaskError> {
     if value >= 0.0 && value.is_finite() {
         return Ok(());
@@ -59,7 +59,7 @@ pub(super) fn check_weight(place: impl Into<String>, value: f64) -> Result<(), G
     Err(invalid(place, number(value), "a weight, 0 or more"))
 }
 
-/// Refuses what is not between two numbers.
+/// Checks that a number is within a range.
 pub(super) fn check_range(
     place: impl Into<String>,
     value: f64,
@@ -73,7 +73,7 @@ pub(super) fn check_range(
     Err(invalid(place, number(value), expected))
 }
 
-/// Refuses what is no direction.
+/// Checks that a vector has a direction.
 pub(super) fn check_direction(place: &str, [x, y, z]: [f64; 3]) -> Result<(), GrinTaskError> {
     let square = x * x + y * y + z * z;
     if square > 0.0 && square.is_finite() {

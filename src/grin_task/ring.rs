@@ -1,11 +1,11 @@
-//! A ring of light near a field and one far behind it: how far a ray is from both, without asking
-//! where on them it should be (5.36 and 5.37).
+//! The distance of a ray from a ring behind the field and from a ring at infinity, wherever on them
+//! it arrives (5.36 and 5.37).
 
 use super::space::{length, radians, unit};
 use crate::grin::RayExit;
 use crate::math::Vec3;
 
-/// What is shorter than this has no direction.
+/// A shorter vector has no direction.
 const MIN_LENGTH: f64 = 1e-9;
 
 /// Two rings about the direction of a beam.
@@ -13,20 +13,21 @@ const MIN_LENGTH: f64 = 1e-9;
 pub(super) struct RingTarget {
     direction: Vec3<f64>,
     radius: f64,
-    /// The sine of the angle of the far one.
+    /// The sine of the angular radius of the far ring.
     sine: f64,
-    /// What the square of a difference in direction counts.
+    /// The weight of a squared difference in direction.
     pub(super) direction_weight: f64,
 }
 
 impl RingTarget {
-    /// `angle` in degrees.
+    /// `angle` is the angular radius of the far ring in degrees.
     pub(super) fn new(direction: Vec3<f64>, radius: f64, angle: f64, far: f64) -> Self {
         Self { direction, radius, sine: radians(angle).sin(), direction_weight: far }
     }
 
-    /// By how much a ray misses the nearest point of the near ring, and its direction, of length 1,
-    /// that of the far one. A ray on the axis has no nearest point: it goes on outwards.
+    /// The distance vector of a ray from the nearest point of the near ring, and of its unit
+    /// direction from that of the far ring. A ray on the axis has no nearest point: the centre
+    /// counts instead.
     pub(super) fn residuals(&self, exit: &RayExit<f64>) -> (Vec3<f64>, Vec3<f64>) {
         let across = |v: Vec3<f64>| v - self.direction * v.dot(self.direction);
         let (x, v) = (across(exit.x), across(unit(exit.v)));
@@ -35,7 +36,7 @@ impl RingTarget {
         (x - outwards * self.radius, v - onwards * self.sine)
     }
 
-    /// The derivative by a velocity of what depends on its direction.
+    /// The derivative with respect to a velocity of a quantity that depends on its direction.
     pub(super) fn by_velocity(v: Vec3<f64>, by_direction: Vec3<f64>) -> Vec3<f64> {
         let d = unit(v);
         (by_direction - d * d.dot(by_direction)) * (1.0 / length(v))

@@ -1,4 +1,4 @@
-//! A search for a field, one step at a time: the caller owns the loop.
+//! The optimisation of a field, one step at a time: the caller owns the loop.
 
 use super::check::GrinTaskError;
 use super::descent::{FieldSolver, LossFunction, SolverStep};
@@ -12,43 +12,43 @@ use crate::grin::field::HessianDiagonal;
 use crate::grin::{GrinSetup, Integrator};
 use crate::solve::ParameterBounds;
 
-/// Steps between two looks at how rays are traced, once the field has taken shape.
+/// Steps between two choices of the tracing setup, once the field has taken shape.
 const REPLAN_INTERVAL: usize = 16;
-/// Steps between two judgements of the field by the same rays.
+/// Steps between two evaluations of the field with the scoring rays.
 const SCORE_INTERVAL: usize = 20;
 
-/// What a step did.
+/// The progress of an optimisation after a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GrinProgress {
     /// Steps so far.
     pub step: usize,
-    /// Steps that the task allows.
+    /// The largest number of steps of the task.
     pub max_steps: usize,
-    /// The level that is worked at, counted from 0.
+    /// The current level, counted from 0.
     pub level: usize,
     /// Nodes along a side, or coefficients.
     pub nodes: usize,
-    /// The loss of the current field by the rays of this step, in mm².
+    /// The loss of the current field for the rays of this step, in mm².
     pub loss: f64,
-    /// The loss of the best field by the rays that all fields are judged by.
+    /// The loss of the best field for the scoring rays.
     pub best: f64,
-    /// What became of the rays of this step that count for the loss; nothing for least squares,
-    /// which look at them when the field is judged.
+    /// The outcomes of the rays of this step that contribute to the loss; empty for least squares,
+    /// which count rays only when the field is scored.
     pub counts: RayCounts,
-    /// Whether the search is at its end.
+    /// True if the optimisation has finished.
     pub finished: bool,
 }
 
-/// How a field does by the rays that all fields are judged by.
+/// The loss of a field for the scoring rays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldScore {
     /// The loss, in mm².
     pub loss: f64,
-    /// The views, those of weight 0 included.
+    /// The results of the views, those of weight 0 included.
     pub views: Vec<ViewResult>,
 }
 
-/// A search for the field of a task. It is the same on any number of threads.
+/// The optimisation of the field of a task. Its result does not depend on the number of threads.
 #[derive(Debug)]
 pub struct GrinOptimizer {
     task: GrinTask,
@@ -62,7 +62,7 @@ pub struct GrinOptimizer {
     limits: ParameterBounds,
     solver: FieldSolver,
     setups: Vec<GrinSetup<f64>>,
-    /// Where rays shall go that are measured.
+    /// The measured targets of the views.
     measured: MeasuredTargets,
     /// The rays of the steps, where they are always the same.
     views: Vec<ViewRays>,
@@ -72,10 +72,10 @@ pub struct GrinOptimizer {
 }
 
 impl GrinOptimizer {
-    /// Begins a search.
+    /// Starts an optimisation.
     ///
     /// # Errors
-    /// A task that cannot be worked on.
+    /// A task that is invalid.
     pub fn new(task: &GrinTask) -> Result<Self, GrinTaskError> {
         task.check()?;
         task.check_volumes()?;
@@ -105,8 +105,8 @@ impl GrinOptimizer {
         Ok(runner)
     }
 
-    /// The same search by the Hessian that a trilinear field has between its nodes, which leaves out
-    /// what the jumps of its slope bring: for comparison. See [`HessianDiagonal`].
+    /// The same optimisation with the Hessian of a trilinear field inside its voxels, which ignores
+    /// the jumps of its gradient: for comparison. See [`HessianDiagonal`].
     #[must_use]
     pub fn with_exact_hessian(mut self) -> Self {
         self.current.set_diagonal(HessianDiagonal::Exact);
@@ -123,13 +123,13 @@ impl GrinOptimizer {
         &self.current
     }
 
-    /// The best field so far, of those that a maker can make: it keeps the limits of the index and
-    /// of the slope.
+    /// The best manufacturable field so far: it satisfies the limits of the index and of its
+    /// gradient.
     pub fn best(&self) -> &GrinField {
         &self.best
     }
 
-    /// Rays traced for the loss so far, each with its way back.
+    /// The number of rays traced for the loss so far, each forwards and backwards.
     pub fn rays_traced(&self) -> u64 {
         self.rays
     }
@@ -139,7 +139,7 @@ impl GrinOptimizer {
         self.steps
     }
 
-    /// How rays of the first view are traced now: integrator and step.
+    /// The current integrator and step of the first view.
     pub fn tracing(&self) -> (Integrator, f64) {
         let setup = &self.setups[0];
         (setup.integrator, setup.step)
@@ -148,7 +148,7 @@ impl GrinOptimizer {
     /// Takes one step.
     ///
     /// # Errors
-    /// A field that cannot be made, which a checked task does not have.
+    /// An invalid field, which a checked task does not have.
     pub fn step(&mut self) -> Result<GrinProgress, GrinTaskError> {
         if self.finished {
             return Ok(self.progress(f64::NAN, RayCounts::default()));
@@ -159,7 +159,7 @@ impl GrinOptimizer {
         let SolverStep { loss, counts, converged: settled, .. } = self.take_step()?;
         self.steps += 1;
         self.level_steps += 1;
-        // What seems settled may be so only for rays that are traced too coarsely.
+        // Convergence may be an artefact of rays that are traced too coarsely.
         let settled = settled && !self.replan()?;
         if settled || self.level_steps >= self.task.levels[self.level].steps {
             self.update_best()?;
@@ -170,8 +170,8 @@ impl GrinOptimizer {
         Ok(self.progress(loss, counts))
     }
 
-    /// Judges the current field, so that the best one is known; to be called when a search is
-    /// stopped before its end.
+    /// Scores the current field, so that the best one is known; to be called when an optimisation
+    /// is stopped before its end.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -179,8 +179,8 @@ impl GrinOptimizer {
         self.update_best()
     }
 
-    /// How a field does by the rays that all fields are judged by, traced as well as it needs; and
-    /// back, so that chaotic ones are found.
+    /// Scores a field with the scoring rays, traced to the tolerance of the task, and retraced so
+    /// that chaotic rays are found.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -215,7 +215,7 @@ impl GrinOptimizer {
         }
     }
 
-    /// Chooses anew how rays are traced; whether that has changed.
+    /// Chooses the tracing setups again; true if they have changed.
     fn replan(&mut self) -> Result<bool, GrinTaskError> {
         let draw = RaySet::Step(self.steps);
         let new = plan_views(&self.task, self.current.field(), draw)?;
@@ -250,7 +250,7 @@ impl GrinOptimizer {
         Ok(step)
     }
 
-    /// Keeps the current field if it is better than the best one.
+    /// Replaces the best field by the current one if that is better.
     fn update_best(&mut self) -> Result<(), GrinTaskError> {
         let medium = self.manufacturable();
         let field = medium.field();
@@ -262,7 +262,7 @@ impl GrinOptimizer {
         Ok(())
     }
 
-    /// The current field as a maker can make it.
+    /// The current field, projected onto the manufacturing limits.
     fn manufacturable(&self) -> GrinField {
         let GrinTask { space, limits, edge, .. } = self.task;
         let bounded = self.current.limit_index(&self.task.spaces(), [limits.low, limits.high]);
@@ -293,7 +293,7 @@ impl GrinOptimizer {
         self.update_best()
     }
 
-    /// Limits and method of a level.
+    /// Sets the bounds and the method of a level.
     fn begin_level(&mut self) -> Result<(), GrinTaskError> {
         let GrinTask { space, limits, edge, method, .. } = self.task;
         let ranges = self.current.parameter_ranges(space, limits, edge);

@@ -1,4 +1,4 @@
-//! What a field does to the light of a task: loss, gradient, misses, and what became of every ray.
+//! The evaluation of a field for a task: loss, gradient, residuals, and the outcome of every ray.
 
 use super::check::GrinTaskError;
 use super::hold::FieldPenalties;
@@ -15,23 +15,24 @@ use crate::grin::{
 use crate::math::Vec3;
 use rayon::prelude::*;
 
-/// A ray that leaves flatter than this, as a cosine, is left out: the derivative of its exit grows
-/// as the inverse.
+/// A ray with a smaller cosine at its exit is excluded: the derivative of its exit grows as the
+/// inverse.
 pub(super) const MIN_COSINE: f64 = 0.05;
-/// Steps that are tied to voxels are no simple fraction of one; without voxels they are tied to this
-/// part of the space; and a ray counts as trapped when it is so many times longer than the space.
+/// Steps tied to voxels are not a simple fraction of one; without voxels they are tied to this
+/// fraction of the domain; and a ray counts as trapped when it is this many times longer than the
+/// domain.
 const INCOMMENSURATE: f64 = 0.974;
 const RELATIVE_STEP: f64 = 0.02;
 const MAX_RELATIVE_LENGTH: f64 = 32.0;
 
-/// Where a ray shall go.
+/// The target of a ray.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RayTarget {
     pub(super) x: Vec3<f64>,
     pub(super) v: Vec3<f64>,
-    /// What the square of a difference in `v` counts.
+    /// The weight of a squared difference in `v`.
     pub(super) direction: f64,
-    /// Whether it is known at all.
+    /// True if the target is known.
     pub(super) measured: bool,
 }
 
@@ -42,28 +43,28 @@ pub(super) struct ViewRays {
     pub(super) targets: Vec<RayTarget>,
     pub(super) setup: GrinSetup<f64>,
     pub(super) weight: f64,
-    /// What a ray that is left out counts, in mm²: more than any that is not.
+    /// The penalty of an excluded ray, in mm²: more than that of any valid one.
     lost_penalty: f64,
-    /// What an image is made on.
+    /// The screen of an image.
     pub(super) screen: Option<Screen>,
-    /// What rays shall go through, wherever they like.
+    /// The rings that rays should pass through, anywhere on them.
     ring: Option<RingTarget>,
-    /// Rays that no aim is known for; they are not among the others.
+    /// The number of rays without a known target; they are not among the others.
     pub(super) unmeasured: usize,
 }
 
-/// Rays that are left out, by reason, and those that count.
+/// The outcomes of rays: the excluded ones by reason, and the valid ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RayCounts {
-    /// How all rays ended.
+    /// The number of rays with each fate.
     pub fates: GrinFateCounts,
-    /// Rays that arrived, but so flat to the boundary that their derivative is worth nothing.
+    /// Rays that arrived at such grazing incidence that their derivative is worthless.
     pub flat: usize,
-    /// Rays that are not traced: what they should do could not be measured.
+    /// Rays that are not traced: their target could not be measured.
     pub unmeasured: usize,
 }
 
-/// How rays ended, and how many of them left too flat.
+/// The fates of rays, and the number of those that left at grazing incidence.
 pub(super) fn count_rays(exits: &[RayExit<f64>]) -> RayCounts {
     let fates = exits.iter().map(|exit| exit.fate).collect();
     let is_flat = |exit: &&RayExit<f64>| exit.fate.has_arrived() && !ViewRays::is_valid(exit);
@@ -71,17 +72,17 @@ pub(super) fn count_rays(exits: &[RayExit<f64>]) -> RayCounts {
 }
 
 impl RayCounts {
-    /// All rays.
+    /// The number of all rays.
     pub fn total(self) -> usize {
         self.fates.total() + self.unmeasured
     }
 
-    /// Rays that count.
+    /// The number of valid rays.
     pub fn valid(self) -> usize {
         self.fates.arrived_count() - self.flat
     }
 
-    /// Rays that are left out, by reason.
+    /// The excluded rays, by reason.
     pub fn excluded(self) -> impl Iterator<Item = (&'static str, usize)> {
         let more = [("flat", self.flat), ("unmeasured", self.unmeasured)];
         let lost = self.fates.iter().filter(|(fate, _)| !fate.has_arrived());
@@ -89,7 +90,7 @@ impl RayCounts {
         lost.chain(more.into_iter().filter(|(_, count)| *count > 0))
     }
 
-    /// Those of two sets of rays.
+    /// The sum of two counts.
     #[must_use]
     pub fn merge(self, other: Self) -> Self {
         let mut both = self;
@@ -102,19 +103,18 @@ impl RayCounts {
     }
 }
 
-/// What became of the light of a view.
+/// The result of a view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewResult {
     /// The loss of this view without its weight, in mm².
     pub loss: f64,
-    /// The root of the mean square distance from the aim, in mm, of the rays that count; not a
-    /// number for an image.
+    /// The root mean square distance from the target, in mm, over the valid rays; NaN for an image.
     pub spot: f64,
-    /// Of an image: the square of the picture's peak over the mean square difference, in dB.
+    /// The peak signal-to-noise ratio of an image, in dB.
     pub psnr: Option<f64>,
-    /// What became of the rays.
+    /// The outcomes of the rays.
     pub counts: RayCounts,
-    /// The largest distance between a start and the end of its way back, in steps.
+    /// The largest distance between a start and the end of its retraced ray, in steps.
     pub retrace_error: f64,
 }
 
@@ -127,7 +127,7 @@ pub(super) struct LossEvaluation {
 }
 
 impl GrinTask {
-    /// The space of a view, and the rays by which fields are judged in it.
+    /// The domain of a view, and its scoring rays.
     pub fn scoring_rays(&self, view: &LightView) -> (Domain, Vec<GrinRay<f64>>) {
         let space = view.space.unwrap_or(self.space);
         let rays = view.source.rays(space, RaySet::Scoring);
@@ -135,7 +135,7 @@ impl GrinTask {
     }
 }
 
-/// How rays are traced, for each view: chosen anew as the field takes shape.
+/// The tracing setup of each view, chosen for the current field.
 pub(super) fn plan_views(
     task: &GrinTask,
     field: &dyn IndexField<f64>,
@@ -154,7 +154,7 @@ pub(super) fn plan_views(
     task.views.iter().map(setup).collect()
 }
 
-/// Steps that are tied to the voxels; to the space where the field has none.
+/// A setup with steps tied to the voxels, or to the domain where the field has none.
 fn tie_to_voxels(
     task: &GrinTask,
     field: &dyn IndexField<f64>,
@@ -169,7 +169,7 @@ fn tie_to_voxels(
     GrinSetup { integrator, step, launch: task.launch, end, screen: None }
 }
 
-/// The rays of every view with their aims.
+/// The rays of every view with their targets.
 pub(super) fn view_rays(
     task: &GrinTask,
     known: &MeasuredTargets,
@@ -183,7 +183,7 @@ pub(super) fn view_rays(
                 ray_bundle(task, view, known.as_deref(), draw)?;
             let lost = space.diameter() * space.diameter();
             let (setup, weight, screen) = (setup.clone(), view.weight, image_screen(view, space)?);
-            // The difference of an image has no unit.
+            // The difference of images has no unit.
             let lost = if screen.is_some() { 1.0 } else { lost };
             Ok(ViewRays {
                 rays,
@@ -199,7 +199,7 @@ pub(super) fn view_rays(
     task.views.iter().zip(setups).zip(known).map(shot).collect()
 }
 
-/// The same views with the rays of another step.
+/// Replaces the rays of the views by those of another step.
 pub(super) fn resample_views(
     task: &GrinTask,
     known: &MeasuredTargets,
@@ -213,7 +213,7 @@ pub(super) fn resample_views(
     Ok(())
 }
 
-/// The rays of a view that count, with their aims, and how many others there are.
+/// The rays of a view with a known target, and the number of others.
 struct RayBundle {
     rays: Vec<GrinRay<f64>>,
     aims: Vec<RayTarget>,
@@ -261,29 +261,29 @@ fn ray_targets(
 }
 
 impl LossEvaluation {
-    /// What became of the rays of all views.
+    /// The outcomes of the rays of all views.
     pub(super) fn counts(&self) -> RayCounts {
         self.views.iter().fold(RayCounts::default(), |sum, view| sum.merge(view.counts))
     }
 }
 
 impl ViewRays {
-    /// Whether it is more than looked at.
+    /// True if the view contributes to the loss.
     pub(super) fn has_weight(&self) -> bool {
         self.weight > 0.0
     }
 
-    /// How many rays there are.
+    /// The number of rays.
     pub(super) fn ray_count(&self) -> usize {
         self.rays.len()
     }
 
-    /// What a loss of this view adds to that of the task.
+    /// The contribution of a loss of this view to that of the task.
     pub(super) fn weighted(&self, loss: f64) -> f64 {
         self.weight * loss
     }
 
-    /// Whether a ray counts.
+    /// True if a ray contributes to the loss.
     pub(super) fn is_valid(exit: &RayExit<f64>) -> bool {
         exit.fate.has_arrived() && exit.cosine.abs() >= MIN_COSINE
     }
@@ -299,7 +299,7 @@ impl ViewRays {
         (dx.dot(dx) + direction * dv.dot(dv), seed)
     }
 
-    /// By how much a ray misses its aim.
+    /// The residuals of a ray in position and direction.
     fn residuals(&self, ray: usize, exit: &RayExit<f64>) -> (Vec3<f64>, Vec3<f64>) {
         if let Some(ring) = &self.ring {
             return ring.residuals(exit);
@@ -308,12 +308,12 @@ impl ViewRays {
         (exit.x - aim.x, exit.v - aim.v)
     }
 
-    /// What the square of a miss in direction counts.
+    /// The weight of a squared residual in direction.
     fn direction_weight(&self, ray: usize) -> f64 {
         self.ring.as_ref().map_or_else(|| self.targets[ray].direction, |ring| ring.direction_weight)
     }
 
-    /// The derivative by the end of a ray of what has these by its misses.
+    /// The derivative with respect to the exit of a ray, from those with respect to its residuals.
     fn adjoint(
         &self,
         exit: &RayExit<f64>,
@@ -327,7 +327,7 @@ impl ViewRays {
         RayAdjoint { x, v, path: 0.0 }
     }
 
-    /// What becomes of the light, without a gradient.
+    /// Traces the rays without a gradient.
     pub(super) fn trace_result(
         &self,
         field: &dyn IndexField<f64>,
@@ -336,12 +336,12 @@ impl ViewRays {
         Ok(self.result(&exits, 0.0))
     }
 
-    /// The image of the rays that count.
+    /// The image formed by the valid rays.
     pub(super) fn image(screen: &Screen, exits: &[RayExit<f64>]) -> Vec<f64> {
         screen.image(exits.iter().filter(|exit| Self::is_valid(exit)), exits.len())
     }
 
-    /// The derivative of the loss by every exit, times the number of rays.
+    /// The derivative of the loss with respect to every exit, times the number of rays.
     fn adjoints(&self, exits: &[RayExit<f64>]) -> Vec<RayAdjoint<f64>> {
         let rays = exits.len();
         let Some(screen) = &self.screen else {
@@ -365,7 +365,7 @@ impl ViewRays {
         }
     }
 
-    /// How its rays ended.
+    /// The outcomes of its rays.
     fn ray_counts(&self, exits: &[RayExit<f64>]) -> RayCounts {
         RayCounts { unmeasured: self.unmeasured, ..count_rays(exits) }
     }
@@ -399,7 +399,7 @@ impl ViewRays {
         ViewResult { loss, spot, psnr: None, counts, retrace_error }
     }
 
-    /// The loss with its gradient, added with the weight of the view.
+    /// The loss; its gradient is added with the weight of the view.
     pub(super) fn add_gradient(
         &self,
         field: &dyn IndexField<f64>,
@@ -414,7 +414,7 @@ impl ViewRays {
         Ok(self.result(&exits, found.retrace_error))
     }
 
-    /// What each ray misses its aim by, as rows of a least-squares problem with their derivatives.
+    /// The residuals of each ray with their derivatives, as rows of a least-squares problem.
     fn residual_rows(
         &self,
         field: &dyn IndexField<f64>,
@@ -448,7 +448,7 @@ impl ViewRays {
     }
 }
 
-/// The loss of a field by some rays, with its gradient; views of weight 0 are not looked at.
+/// The loss of a field with its gradient; views of weight 0 are skipped.
 pub(super) fn evaluate(
     field: &dyn IndexField<f64>,
     shots: &[ViewRays],

@@ -1,5 +1,5 @@
-//! What is seen of a field at work: the light of every view, by the rays that all fields are judged
-//! by, and its image beside the picture that is wanted. No gradient, and nothing of a search.
+//! The image of every view, traced with the scoring rays, beside its target. Needs no gradient and
+//! no optimisation.
 
 use super::check::GrinTaskError;
 use super::measured::measure_targets;
@@ -10,47 +10,47 @@ use super::space::length;
 use super::task::GrinTask;
 use crate::grin::{GrinRay, GrinSetup, GrinTracer, IndexField, Integrator, RayExit};
 
-/// Rays by which the error of the tracing is known.
+/// Rays used to estimate the tracing error.
 const SAMPLE: usize = 64;
 
-/// An image of a view on its screen beside the picture that is wanted: rows from the bottom, as many
-/// as columns, both of mean 1 where all light arrives.
+/// The image of a view on its screen beside its target: rows from the bottom, as many as columns,
+/// both of mean 1 where all light arrives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewImage {
     /// Pixels along a side.
     pub pixels: usize,
-    /// Half of the side of the screen, in mm.
+    /// Half the side of the screen, in mm.
     pub half: f64,
-    /// The picture.
+    /// The target image.
     pub target: Vec<f64>,
-    /// What the light makes.
+    /// The image formed by the light.
     pub formed: Vec<f64>,
 }
 
-/// What became of the light of a view.
+/// The result of a view with its image and tracing error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewReport {
-    /// Loss, spot, quality, and what became of the rays; without a way back, so that no ray is
-    /// known to be chaotic.
+    /// Loss, spot, quality and outcomes of the rays; without retracing, so that no ray is known to
+    /// be chaotic.
     pub result: ViewResult,
-    /// Its image, where it makes one.
+    /// Its image, if its goal is one.
     pub image: Option<ViewImage>,
-    /// The kind of step.
+    /// The integrator.
     pub integrator: Integrator,
     /// The length of a step, in mm.
     pub step: f64,
-    /// By how much an exit moves at most, in mm, where the step is halved; `None` where no ray of
-    /// the sample arrives with both.
+    /// The largest change of an exit when the step is halved, in mm; `None` where no ray of the
+    /// sample arrives with both.
     pub error: Option<f64>,
-    /// Rays that this was tried on.
+    /// The number of rays in that sample.
     pub sample: usize,
 }
 
 impl GrinTask {
-    /// What becomes of the light of every view in a field, those of weight 0 included.
+    /// The results of all views in a field, those of weight 0 included.
     ///
     /// # Errors
-    /// A field that is given in a file and cannot be read, or a space of no extent.
+    /// A reference field that cannot be read, or a domain without extent.
     pub fn report_views(&self, medium: &GrinField) -> Result<Vec<ViewReport>, GrinTaskError> {
         let field = medium.field();
         let setups = plan_views(self, field, RaySet::Scoring)?;
@@ -74,7 +74,8 @@ fn report_view(shot: &ViewRays, field: &dyn IndexField<f64>) -> Result<ViewRepor
     Ok(ViewReport { result: shot.result(&exits, 0.0), image, integrator, step, error, sample })
 }
 
-/// By how much exits move where the step is halved, by a sample of the rays; and its size.
+/// The largest change of exits when the step is halved, over a sample of the rays, and the size of
+/// the sample.
 fn step_error(
     shot: &ViewRays,
     field: &dyn IndexField<f64>,

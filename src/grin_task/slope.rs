@@ -1,8 +1,9 @@
-//! How steep a field is at its steepest place, and a field made flatter so that a maker can make it.
+//! The largest gradient of a field, and its limitation.
 //!
-//! A field is linear in its numbers and a constant one has all numbers alike. Drawing all of them
-//! towards one index by the same factor therefore draws the gradient everywhere by that factor: the
-//! limit holds exactly, and a field within the range of the index stays there.
+//! A field is linear in its parameters, and a constant one has all parameters equal. Scaling the
+//! difference of all parameters from one index by a factor therefore scales the gradient everywhere
+//! by that factor: the limit holds exactly, and a field within the range of the index remains
+//! there.
 
 use super::climb::{FieldObjective, LocatedValue, find_maximum, higher};
 use super::medium::GrinField;
@@ -13,18 +14,18 @@ use crate::grin::field::Trilinear;
 use crate::math::Vec3;
 use rayon::prelude::*;
 
-/// How far below its limit a field is put: a trilinear one for rounding, a smooth one for what a climb
-/// may miss.
+/// The relative margin below the limit: of a trilinear field for rounding, of a smooth one for the
+/// error of the maximum search.
 const MARGINS: [f64; 2] = [1e-9, 1e-3];
 
 impl GrinField {
-    /// Its steepest slope in the space, in 1/mm: of a trilinear field exactly, over all voxels that
-    /// the space touches; of a smooth one to about a thousandth.
+    /// The largest gradient in the domain, in 1/mm: of a trilinear field exactly, over all voxels
+    /// that intersect the domain; of a smooth one to about a thousandth.
     pub fn max_slope(&self, space: Domain) -> f64 {
         self.locate_max_slope(space).0
     }
 
-    /// The same, and where that is.
+    /// The same, with its position.
     pub(super) fn locate_max_slope(&self, space: Domain) -> LocatedValue {
         if let Self::Trilinear(field) = self {
             return max_voxel_slope(field, space);
@@ -38,7 +39,7 @@ impl GrinField {
         (steepest.max(0.0), at)
     }
 
-    /// The same field, drawn towards an index until it is nowhere steeper than the limit.
+    /// The same field, scaled towards an index until its gradient is nowhere above the limit.
     #[must_use]
     pub(super) fn limit_slope(&self, space: Domain, limit: f64, towards: f64) -> Self {
         let steepest = self.max_slope(space);
@@ -53,7 +54,7 @@ impl GrinField {
     }
 }
 
-/// The square of the slope within a voxel is convex along each axis: it is largest in a corner,
+/// The square of the gradient within a voxel is convex along each axis: it is largest in a corner,
 /// where it is made of the three edges that meet there.
 fn max_voxel_slope(field: &Trilinear<f64>, space: Domain) -> LocatedValue {
     let grid = field.grid();

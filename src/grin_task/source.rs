@@ -1,4 +1,5 @@
-//! The rays of a source. No chance is involved: the same step has the same rays everywhere.
+//! The rays of a source. No random numbers are involved: the same step has the same rays on every
+//! run.
 
 use super::space::{
     GOLDEN_ANGLE, half_circle, orthogonal_axes, radians, sphere_points, sphere_sequence,
@@ -8,19 +9,19 @@ use super::task::{Domain, LightSource, SourceDirections};
 use crate::grin::GrinRay;
 use crate::math::Vec3;
 
-/// Directions in which a source with new ones in every step is judged.
+/// Scoring directions of a source with new directions in every step.
 const SCORING_DIRECTIONS: usize = 24;
 
-/// Which rays are asked for.
+/// The set of rays that is requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RaySet {
-    /// Those of a step.
+    /// The rays of a step.
     Step(usize),
-    /// Those by which fields are compared: always the same.
+    /// The rays by which fields are compared: always the same.
     Scoring,
 }
 
-/// A ray and the point of the sphere opposite to where it comes from.
+/// A ray and the point of the unit sphere opposite to its source.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SourceRay {
     pub(super) ray: GrinRay<f64>,
@@ -43,7 +44,7 @@ impl SourceDirections {
         }
     }
 
-    /// How many there are in a step.
+    /// The number of directions in a step.
     pub(super) fn count(&self) -> usize {
         match self {
             Self::Given(list) => list.len(),
@@ -53,7 +54,7 @@ impl SourceDirections {
 }
 
 impl LightSource {
-    /// Its directions, where it has several.
+    /// Its directions, if it has several.
     pub(super) fn directions(&self) -> Option<&SourceDirections> {
         match self {
             Self::Parallel { directions, .. } | Self::Points { directions, .. } => Some(directions),
@@ -61,19 +62,19 @@ impl LightSource {
         }
     }
 
-    /// The direction of a beam, of length 1.
+    /// The unit direction of a beam.
     pub(super) fn axis(&self) -> Option<Vec3<f64>> {
         let Self::Beam { direction: [x, y, z], .. } = self else { return None };
         Some(unit(Vec3::new(*x, *y, *z)))
     }
 
-    /// Whether it has other rays in every step.
+    /// True if its rays differ from step to step.
     pub(super) fn is_resampled(&self) -> bool {
         matches!(self.directions(), Some(SourceDirections::Fresh(_)))
             || matches!(self, Self::Beam { fresh: true, .. })
     }
 
-    /// Rays in a step.
+    /// The number of rays in a step.
     pub fn count(&self) -> usize {
         let directions = self.directions().map_or(1, SourceDirections::count);
         match self {
@@ -114,7 +115,8 @@ impl LightSource {
     }
 }
 
-/// Even parallel rays that begin `back` before the origin: a sunflower, turned with its number.
+/// Uniform parallel rays that begin `back` before the origin: a sunflower pattern, rotated with the
+/// number of the direction.
 fn disc(
     number: usize,
     d: Vec3<f64>,
@@ -131,7 +133,7 @@ fn disc(
     })
 }
 
-/// An even cone of rays from a point of a sphere towards its centre.
+/// A uniform cone of rays from a point of a sphere towards its centre.
 fn ray_cone(
     number: usize,
     d: Vec3<f64>,
@@ -149,7 +151,8 @@ fn ray_cone(
     })
 }
 
-/// A square beam, one ray in each of its squares: where, tells a sequence from its member `first` on.
+/// A square beam, one ray in each cell of a grid; the positions in the cells follow a sequence from
+/// its member `first` on.
 fn square(d: Vec3<f64>, half: f64, side: usize, (back, first): (f64, usize)) -> Vec<SourceRay> {
     let [u, v] = orthogonal_axes(d);
     let ray = |n: usize| {

@@ -1,15 +1,15 @@
-//! Where light bends, as the tracer wants it, and points spread over it.
+//! The geometry of a domain: its region for the tracer, and point sets in it and on its surface.
 
 use super::task::Domain;
 use crate::grin::{Face, GrinRegion};
 use crate::math::Vec3;
 use std::f64::consts::{PI, TAU};
 
-/// The angle by which the points of a sunflower follow one another.
+/// The golden angle, between successive points of a sunflower pattern.
 pub(super) const GOLDEN_ANGLE: f64 = 2.399963229728653;
 
 impl Domain {
-    /// The region of the tracer.
+    /// The region for the tracer.
     pub fn region(self) -> GrinRegion<f64> {
         match self {
             Self::Ball { radius } => GrinRegion::ball(radius),
@@ -18,7 +18,7 @@ impl Domain {
         }
     }
 
-    /// The corners of the smallest box around it.
+    /// The corners of the bounding box.
     pub fn corners(self) -> [Vec3<f64>; 2] {
         let cube = |half: f64| [Vec3::new(-half, -half, -half), Vec3::new(half, half, half)];
         match self {
@@ -30,7 +30,7 @@ impl Domain {
         }
     }
 
-    /// No two points of it are farther apart.
+    /// The diameter: the largest distance between two of its points.
     pub fn diameter(self) -> f64 {
         match self {
             Self::Ball { radius } => 2.0 * radius,
@@ -39,7 +39,7 @@ impl Domain {
         }
     }
 
-    /// Points inside on a lattice with so many points along each side of the box around it.
+    /// The points inside of a lattice with `count` points along each side of the bounding box.
     pub(super) fn lattice(self, count: usize) -> Vec<Vec3<f64>> {
         let region = self.region();
         let [low, high] = self.corners();
@@ -55,7 +55,7 @@ impl Domain {
         (0..count.pow(3)).map(at).filter(|p| region.level(*p) < 0.0).collect()
     }
 
-    /// The plane across a direction that stands so far behind the space.
+    /// The plane perpendicular to a direction, `distance` behind the domain.
     pub(super) fn plane_behind(self, direction: Vec3<f64>, distance: f64) -> Face<f64> {
         let [low, high] = self.corners();
         let far = |d: f64, low: f64, high: f64| if d < 0.0 { d * low } else { d * high };
@@ -65,7 +65,7 @@ impl Domain {
         Face::plane(direction, reach + distance)
     }
 
-    /// About so many points spread over its surface; of a rod, over its wall.
+    /// About `count` points spread over its surface; of a rod, over its lateral surface.
     pub(super) fn surface_points(self, count: usize) -> Vec<Vec3<f64>> {
         let share = |i: usize| (i as f64 + 0.5) / count as f64;
         match self {
@@ -94,14 +94,14 @@ impl Domain {
     }
 }
 
-/// So many points spread evenly over the unit sphere: a sunflower wrapped around it.
+/// `count` points spread uniformly over the unit sphere: a sunflower pattern.
 pub(super) fn sphere_points(count: usize) -> Vec<Vec3<f64>> {
     let at = |i: usize| on_sphere((i as f64 + 0.5) / count as f64, GOLDEN_ANGLE * i as f64);
     (0..count).map(at).collect()
 }
 
-/// So many directions across the z axis, evenly over half a turn; light that goes the other way would
-/// tell the same.
+/// `count` directions perpendicular to the z axis, uniform over half a turn; the opposite
+/// directions are equivalent.
 pub(super) fn half_circle(count: usize) -> Vec<Vec3<f64>> {
     let at = |i: usize| {
         let (sin, cos) = (PI * (i as f64 + 0.5) / count as f64).sin_cos();
@@ -110,26 +110,26 @@ pub(super) fn half_circle(count: usize) -> Vec<Vec3<f64>> {
     (0..count).map(at).collect()
 }
 
-/// A point of the unit sphere from an even share of its area and an angle about z.
+/// A point of the unit sphere from its share of the area and an angle about z.
 fn on_sphere(share: f64, angle: f64) -> Vec3<f64> {
     let z = 1.0 - 2.0 * share;
     let r = (1.0 - z * z).max(0.0).sqrt();
     Vec3::new(r * angle.cos(), r * angle.sin(), z)
 }
 
-/// Member `i` of a sequence of directions that fills the sphere ever more evenly.
+/// Member `i` of a low-discrepancy sequence of directions on the sphere.
 pub(super) fn sphere_sequence(i: usize) -> Vec3<f64> {
     let (u, v) = square_sequence(i);
     on_sphere(u, TAU * v)
 }
 
-/// Member `i` of the additive sequence that fills the unit square most evenly (Roberts 2018).
+/// Member `i` of the additive low-discrepancy sequence in the unit square (Roberts 2018).
 pub(super) fn square_sequence(i: usize) -> (f64, f64) {
     let at = |step: f64| (0.5 + step * i as f64).fract();
     (at(0.7548776662466927), at(0.5698402909980532))
 }
 
-/// Two unit vectors across a unit vector and across each other.
+/// Two unit vectors perpendicular to a unit vector and to each other.
 pub(super) fn orthogonal_axes(d: Vec3<f64>) -> [Vec3<f64>; 2] {
     let (x, y, z) = (d.x.abs(), d.y.abs(), d.z.abs());
     let axis = if x <= y && x <= z {
@@ -147,7 +147,7 @@ fn cross(a: Vec3<f64>, b: Vec3<f64>) -> Vec3<f64> {
     Vec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
 
-/// The vector of length 1 in this direction.
+/// The unit vector in this direction.
 pub(super) fn unit(v: Vec3<f64>) -> Vec3<f64> {
     v * (1.0 / length(v))
 }

@@ -1,4 +1,4 @@
-//! Where the light of a beam is looked at: on a screen, at infinity, at rings.
+//! The screens and rings of a view.
 
 use super::check::GrinTaskError;
 use super::image::Screen;
@@ -7,7 +7,8 @@ use super::space::radians;
 use super::task::{Domain, LightGoal, LightView};
 use crate::grin::Face;
 
-/// Where the light of a view is looked at behind its space, unless at its boundary or at infinity.
+/// The plane behind the domain in which the light of a view is evaluated; `None` for its boundary
+/// or infinity.
 pub(super) fn screen_face(view: &LightView, space: Domain) -> Option<Face<f64>> {
     match (&view.goal, &view.source) {
         (LightGoal::Image { distance, .. } | LightGoal::Ring { distance, .. }, source) => {
@@ -17,7 +18,7 @@ pub(super) fn screen_face(view: &LightView, space: Domain) -> Option<Face<f64>> 
     }
 }
 
-/// What a view makes its image on.
+/// The image screen of a view.
 pub(super) fn image_screen(
     view: &LightView,
     space: Domain,
@@ -49,7 +50,7 @@ mod tests {
     use crate::grin_task::{GrinTask, LightGoal, LightSource, find_builtin};
     use crate::math::Vec3;
 
-    /// A task with few rays, traced so well that its loss is smooth.
+    /// A task with few rays, traced so accurately that its loss is smooth.
     fn smooth(name: &str) -> Option<GrinTask> {
         let mut task = find_builtin(name)?.task().ok()?;
         (task.tracing, task.tolerance) = (None, 1e-6);
@@ -65,7 +66,8 @@ mod tests {
         Some(task)
     }
 
-    /// The slope of the loss along a change of the field, by the adjoint and by differences.
+    /// The directional derivative of the loss along a change of the field, by the adjoint and by
+    /// differences.
     fn slopes(task: &GrinTask) -> Option<[f64; 2]> {
         let wave = |p: Vec3<f64>| 1.1 + 0.02 * (2.0 * p.x + p.y).sin() * (p.z - 0.4 * p.x).cos();
         let medium = GrinField::from_function(task.field, 6, wave).ok()?;

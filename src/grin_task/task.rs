@@ -1,4 +1,4 @@
-//! What a person asks of a field of refractive index: the task as it is written in a file.
+//! The task file: the sources and goals of light, the field and its limits, and the method.
 
 use super::drawing::TargetImage;
 use crate::grin::{Integrator, LaunchMode};
@@ -8,7 +8,8 @@ use std::path::PathBuf;
 /// The version of the format.
 pub const TASK_VERSION: u32 = 1;
 
-/// A task: which field is to be found, what it shall do to light, and what a maker can make.
+/// A design task: the representation of the field, the light and its goals, and the manufacturing
+/// limits.
 ///
 /// Lengths are in mm and angles in degrees, as in every file. `η` is the refractive index.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -16,48 +17,48 @@ pub const TASK_VERSION: u32 = 1;
 pub struct GrinTask {
     /// The version of this format: 1.
     pub aplanat_grin: u32,
-    /// What it is called.
+    /// The name of the task.
     pub name: String,
-    /// What a reader should know.
+    /// Notes for the reader.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub notes: String,
-    /// How the field is made up.
+    /// The representation of the field.
     pub field: FieldRepresentation,
-    /// Where light bends.
+    /// The domain in which light is refracted.
     pub space: Domain,
-    /// How the speed of a ray is made to fit the index where it starts.
+    /// The relation of a ray's initial speed to the index at its start.
     #[serde(default)]
     pub launch: LaunchMode,
-    /// Light and where it shall go.
+    /// Sources of light and their goals.
     pub views: Vec<LightView>,
-    /// The field to begin with.
+    /// The initial field.
     #[serde(default)]
     pub start: InitialField,
-    /// Exit positions are good to this length, where the field allows it.
+    /// The accuracy of exit positions in mm, where the field allows it.
     pub tolerance: f64,
-    /// The step of rays in a grid, where it is not to be chosen by the tolerance.
+    /// The step of rays in a grid, unless it is chosen by the tolerance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tracing: Option<TracingSettings>,
-    /// What a maker can make.
+    /// The manufacturing limits.
     #[serde(default)]
     pub limits: ManufacturingLimits,
-    /// What holds at the boundary of the space; nothing where it is absent.
+    /// The condition at the boundary of the domain; none if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge: Option<BoundaryCondition>,
-    /// How the field is found.
+    /// The optimisation method.
     pub method: GrinMethod,
     /// Resolutions from coarse to fine.
     pub levels: Vec<RefinementLevel>,
-    /// The field that is known to be the answer, for comparison; the search does not see it.
+    /// The known solution, for comparison; the optimisation does not use it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<ReferenceField>,
 }
 
-/// How a field is made up of numbers.
+/// The representation of a field by parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum FieldRepresentation {
-    /// Nodes on a cube, trilinear between them.
+    /// Nodes on a cube with trilinear interpolation.
     Trilinear {
         /// Half the side of the cube.
         half: f64,
@@ -69,17 +70,17 @@ pub enum FieldRepresentation {
     },
     /// A cubic B-spline in the square of the distance from the centre.
     Sphere {
-        /// Where the spline ends.
+        /// The radius at which the spline ends.
         radius: f64,
     },
     /// A cubic B-spline in the square of the distance from the z axis.
     Cylinder {
-        /// Where the spline ends.
+        /// The radius at which the spline ends.
         radius: f64,
     },
 }
 
-/// Where light bends; outside there is air.
+/// The domain in which light is refracted; outside there is air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Domain {
@@ -88,13 +89,13 @@ pub enum Domain {
         /// Its radius.
         radius: f64,
     },
-    /// A rod about the z axis.
+    /// A cylindrical rod about the z axis.
     Rod {
         /// Its radius.
         radius: f64,
-        /// The z at which it begins.
+        /// The z of its front face.
         from: f64,
-        /// The z at which it ends.
+        /// The z of its rear face.
         to: f64,
     },
     /// A cube about the origin.
@@ -104,20 +105,20 @@ pub enum Domain {
     },
 }
 
-/// Light from one source and what shall become of it.
+/// A light source and the goal for its rays.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightView {
-    /// What it is called.
+    /// The name of the view.
     pub name: String,
-    /// Where the rays come from.
+    /// The source of the rays.
     pub source: LightSource,
-    /// Where they shall go.
+    /// The goal for the rays.
     pub goal: LightGoal,
-    /// How much it counts; a view of weight 0 is only looked at.
+    /// The weight in the loss; a view of weight 0 is only evaluated.
     #[serde(default = "one")]
     pub weight: f64,
-    /// The space of this view, where it is another one: a rod cut elsewhere.
+    /// The domain of this view, if it differs from that of the task: a rod of another length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub space: Option<Domain>,
 }
@@ -126,48 +127,48 @@ fn one() -> f64 {
     1.0
 }
 
-/// Where rays come from.
+/// A source of rays.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightSource {
-    /// Parallel light: even discs of rays about the lines through the origin.
+    /// Parallel light: uniform discs of rays about the lines through the origin.
     Parallel {
-        /// The directions in which light goes.
+        /// The directions of the light.
         directions: SourceDirections,
         /// The radius of each disc.
         radius: f64,
-        /// Rays a direction.
+        /// Rays per direction.
         rays: usize,
     },
-    /// Points on a sphere about the origin that send even cones of rays towards it.
+    /// Points on a sphere about the origin that emit uniform cones of rays towards it.
     Points {
-        /// From the points to the centre.
+        /// The directions from the points to the centre.
         directions: SourceDirections,
         /// The radius of the sphere.
         radius: f64,
         /// The angle between the outermost rays and the axis of the cone.
         cone: f64,
-        /// Rays a point.
+        /// Rays per point.
         rays: usize,
     },
-    /// Parallel rays along +z in the plane of z and x, at even heights on one side of the axis.
+    /// Parallel rays along +z in the z-x plane, at uniform heights on one side of the axis.
     Fan {
         /// The height of the outermost ray.
         height: f64,
-        /// The z at which they start.
+        /// The z at which the rays start.
         z: f64,
-        /// How many.
+        /// The number of rays.
         rays: usize,
     },
-    /// A square beam from outside the space: a ray somewhere in each square of a grid.
+    /// A square beam from outside the domain: one ray in each cell of a square grid.
     Beam {
-        /// The direction in which light goes.
+        /// The direction of the light.
         direction: [f64; 3],
         /// Half the side of the square.
         half: f64,
         /// Rays along a side.
         rays: usize,
-        /// Whether they stand elsewhere in their squares in every step; for Adam.
+        /// True if the positions of the rays in their cells change with every step; for Adam.
         #[serde(default)]
         fresh: bool,
     },
@@ -177,77 +178,78 @@ pub enum LightSource {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SourceDirections {
-    /// These, of any length.
+    /// These directions, of any length.
     Given(Vec<[f64; 3]>),
-    /// So many, evenly all around, the same in every step.
+    /// This many directions, uniform over the sphere, the same in every step.
     Even(usize),
-    /// So many across the z axis, evenly over half a turn.
+    /// This many directions perpendicular to the z axis, uniform over half a turn.
     Around(usize),
-    /// So many new ones in every step; for Adam.
+    /// This many new directions in every step; for Adam.
     Fresh(usize),
 }
 
-/// What shall become of light.
+/// The goal for the rays of a view.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightGoal {
-    /// It leaves through this point. The loss is the mean square distance, in mm².
+    /// The rays leave through this point. The loss is the mean square distance, in mm².
     Point([f64; 3]),
-    /// It leaves through the point of the space's surface opposite to its source. Likewise.
+    /// The rays leave through the point of the domain's surface opposite to their source. The loss
+    /// is the mean square distance, in mm².
     Antipode,
-    /// It makes a picture on a square screen across a beam. The loss is the mean square difference
-    /// from the picture of mean 1, without a unit.
+    /// The rays form an image on a square screen perpendicular to a beam. The loss is the mean
+    /// square difference from the target image of mean 1, without unit.
     Image {
-        /// The picture.
+        /// The target image.
         drawing: TargetImage,
         /// Half the side of the screen.
         half: f64,
-        /// How far it stands behind the space.
+        /// The distance of the screen behind the domain.
         distance: f64,
-        /// Pixels along its side.
+        /// Pixels along a side.
         pixels: usize,
     },
-    /// It makes a picture at infinity: where a ray shows is told by its direction alone, as in the
-    /// focal plane of a lens. Likewise.
+    /// The rays form an image at infinity: the position in the image depends on the direction of a
+    /// ray alone, as in the focal plane of a lens. The loss is that of [`Self::Image`].
     Far {
-        /// The picture.
+        /// The target image.
         drawing: TargetImage,
-        /// The angle between the middle of the picture, in the direction of the beam, and the
-        /// middle of a side.
+        /// The angle between the centre of the image, in the direction of the beam, and the middle
+        /// of a side.
         angle: f64,
-        /// Pixels along its side.
+        /// Pixels along a side.
         pixels: usize,
     },
-    /// It goes through a ring about the axis of a beam, and towards a ring at infinity (5.36 and
-    /// 5.37). The loss is the mean square distance from the former, in mm², and that of the
+    /// The rays pass through a ring about the axis of a beam, and towards a ring at infinity (5.36
+    /// and 5.37). The loss is the mean square distance from the former, in mm², and that of the
     /// direction from the latter.
     Ring {
         /// The radius of the near ring.
         radius: f64,
-        /// How far it stands behind the space.
+        /// The distance of the near ring behind the domain.
         distance: f64,
         /// The angle between the axis and the far ring.
         angle: f64,
-        /// What the square of a difference in direction counts against that of one in mm.
+        /// The weight of a squared difference in direction relative to one in mm.
         far: f64,
     },
-    /// It leaves as it does from another field, which a measurement of rays would give.
+    /// The rays leave as from another field, whose exits would be known from a measurement.
     Like {
         /// That field.
         field: ReferenceField,
-        /// What the square of a difference in direction counts against that of one in mm.
+        /// The weight of a squared difference in direction relative to one in mm.
         #[serde(default)]
         direction: f64,
     },
 }
 
-/// The field to begin with.
+/// The initial field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum InitialField {
     /// The same index everywhere.
     Uniform(f64),
-    /// A volume from a file, `NumPy`'s .npz or raw numbers with a header.
+    /// A volume file, `NumPy`'s .npz or raw numbers with a header.
     Volume(PathBuf),
 }
 
@@ -257,33 +259,34 @@ impl Default for InitialField {
     }
 }
 
-/// Steps that are tied to the voxels of a grid.
+/// A tracing step tied to the voxels of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TracingSettings {
-    /// The kind of step.
+    /// The integrator.
     pub integrator: Integrator,
-    /// About how many steps a voxel has.
+    /// The approximate number of steps per voxel.
     pub per_voxel: f64,
 }
 
-/// What a maker can make.
+/// The manufacturing limits of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ManufacturingLimits {
-    /// Smallest index: 1 or more.
+    /// The smallest index: 1 or more.
     #[serde(default = "one")]
     pub low: f64,
-    /// Largest index.
+    /// The largest index.
     #[serde(default = "two")]
     pub high: f64,
-    /// Steepest index, in 1/mm; any where it is absent. A penalty leads the search, and what is
-    /// found keeps it everywhere: a field that is too steep is drawn towards the index of the edge.
-    /// The range of the index is likewise held by a penalty where coefficients alone do not hold it,
-    /// and kept by what is found.
+    /// The largest gradient of the index, in 1/mm; unlimited if absent. A penalty guides the
+    /// optimisation, and the resulting field satisfies the limit everywhere: a field whose gradient
+    /// is too large is scaled towards the index of the boundary. The range of the index is likewise
+    /// enforced by a penalty where coefficients alone do not guarantee it, and satisfied by the
+    /// resulting field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
-    /// Largest change of the index in one step of the search.
+    /// The largest change of the index in one step of the optimisation.
     #[serde(default = "small")]
     pub change: f64,
 }
@@ -302,53 +305,53 @@ fn small() -> f64 {
     0.05
 }
 
-/// What holds at the boundary of the space.
+/// The condition at the boundary of the domain.
 ///
-/// Rays depend on the gradient of `η²` alone: what they leave open, the level of the index, must be
-/// fixed here, or by refraction (`"launch": "refracted"`).
+/// Rays depend on the gradient of `η²` alone: the additive constant of the index that they do not
+/// determine must be fixed here, or by refraction (`"launch": "refracted"`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryCondition {
     /// The index there.
     pub index: f64,
-    /// Whether all nodes of a trilinear grid outside the space have it.
+    /// True if all nodes of a trilinear grid outside the domain have this index.
     #[serde(default)]
     pub fixed: bool,
-    /// The weight, in mm², of its mean square deviation on the surface of the space; for a spline,
+    /// The weight, in mm², of the mean square deviation on the surface of the domain; for a spline,
     /// at its end.
     #[serde(default)]
     pub weight: f64,
 }
 
-/// How a field is found.
+/// The optimisation method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum GrinMethod {
-    /// First order, with moments: for rays that are new in every step.
+    /// Adam, a first-order method with moments: for rays that differ in every step.
     Adam {
         /// The size of a step of the index at the first level.
         rate: f64,
-        /// What it is multiplied by at each further level.
+        /// The factor applied to the rate at each further level.
         #[serde(default = "one")]
         fall: f64,
     },
-    /// Limited-memory BFGS: for many numbers and the same rays in every step.
+    /// Limited-memory BFGS: for many parameters and the same rays in every step.
     Lbfgs,
-    /// Levenberg and Marquardt: for few numbers and the same rays in every step.
+    /// Levenberg-Marquardt: for few parameters and the same rays in every step.
     LeastSquares,
 }
 
-/// A resolution and how long it is worked at.
+/// A resolution and its largest number of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RefinementLevel {
     /// Nodes along a side of the cube, or coefficients of the spline.
     pub nodes: usize,
-    /// No more steps than this.
+    /// The largest number of steps.
     pub steps: usize,
 }
 
-/// A field that is given.
+/// A reference field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ReferenceField {
@@ -381,13 +384,13 @@ pub enum ReferenceField {
     /// A synthetic plume of gas: `η = ambient + contrast q`, `q` from 0 to nearly 1, after
     /// [`Plume`](crate::grin::field::Plume).
     Plume {
-        /// The index around it.
+        /// The index outside.
         ambient: f64,
-        /// What the index changes by where the plume is densest; below 0 for a thin one.
+        /// The change of the index where the plume is densest; negative for a plume of lower index.
         contrast: f64,
-        /// Half the side of the cube that it stands in.
+        /// Half the side of the cube that contains it.
         half: f64,
     },
-    /// A volume from a file, trilinear between its nodes.
+    /// A volume file with trilinear interpolation between its nodes.
     Volume(PathBuf),
 }

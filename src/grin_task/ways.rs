@@ -1,4 +1,4 @@
-//! The ways of a few rays through a field, for a drawing in a plane.
+//! The paths of a few rays through a field, for drawing them in a plane.
 
 use super::check::GrinTaskError;
 use super::medium::GrinField;
@@ -10,52 +10,52 @@ use super::task::{Domain, GrinTask};
 use crate::grin::{GrinFate, GrinRay, GrinSetup, GrinTracer, RayExit, RayState};
 use crate::math::Vec3;
 
-/// A ray is drawn from so far before it enters on, as a part of the size of the space.
+/// A path begins this far before the entry, as a fraction of the diameter of the domain.
 const LEAD_IN: f64 = 0.12;
-/// A way of fewer steps is drawn with so many points between two of them, one of more steps than
-/// the second number without some of them.
+/// The number of points drawn between two steps of a path with few steps; the number of points
+/// above which some steps are skipped.
 const POINTS_BETWEEN: usize = 6;
 const MAX_POINTS: usize = 300;
-/// Rays to choose from: so many for two that are drawn, and all that are hardly farther off the
-/// plane than the best, as a part of the size of the space.
+/// The number of candidates is this many for two drawn rays, and includes all rays that are this
+/// much farther from the plane than the best, as a fraction of the domain.
 const CANDIDATES: usize = 3;
 const NEARLY: f64 = 0.02;
 
-/// The way of a ray.
+/// The path of a ray.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPath {
-    /// From before it enters to where it ends: on the screen, else on the boundary.
+    /// The points from before the entry to the end: on the screen, else on the boundary.
     pub points: Vec<Vec3<f64>>,
-    /// How it ends.
+    /// The fate of the ray.
     pub fate: GrinFate,
-    /// Whether it arrives so flat to the boundary that it does not count.
+    /// True if the ray left at such grazing incidence that it is excluded.
     pub flat: bool,
 }
 
 impl RayPath {
-    /// Why it does not count; `None` for a ray that does.
+    /// The reason for which the ray is excluded; `None` for a valid ray.
     pub fn excluded(&self) -> Option<&'static str> {
         if self.flat { Some("flat") } else { (!self.fate.has_arrived()).then(|| self.fate.name()) }
     }
 }
 
-/// The rays of a view that are drawn.
+/// The paths of the rays of a view that are drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPaths {
-    /// The place of the view in the task.
+    /// The index of the view in the task.
     pub view: usize,
-    /// The rays.
+    /// The paths.
     pub paths: Vec<RayPath>,
-    /// How far the farthest of them is off the plane, in mm, were it straight.
+    /// The largest distance of the straight continuation of these rays from the plane, in mm.
     pub distance: f64,
 }
 
 impl GrinTask {
-    /// For each view the ways of at most `count` of the rays that all fields are judged by: of one
-    /// beam or point those that run nearest to a plane, well apart from each other.
+    /// The paths of at most `count` scoring rays of each view: those of one beam or point that run
+    /// nearest to a plane, well separated from each other.
     ///
     /// # Errors
-    /// A space of no extent.
+    /// A domain without extent.
     pub fn ray_paths(
         &self,
         medium: &GrinField,
@@ -78,7 +78,8 @@ impl GrinTask {
     }
 }
 
-/// Some rays of one beam or point nearest to a plane, well apart; and how far off it they are.
+/// The rays of one beam or point nearest to a plane, well separated, and their largest distance
+/// from it.
 fn choose_rays(
     rays: &[GrinRay<f64>],
     plane: SlicePlane,
@@ -119,8 +120,8 @@ fn choose_rays(
     (chosen.into_iter().map(|n| best[n].1).collect(), farthest)
 }
 
-/// The numbers of rays that go together: those of one direction, else those from one point, else
-/// all.
+/// The numbers of rays that belong together: those of one direction, else those from one point,
+/// else all.
 fn group_rays(rays: &[GrinRay<f64>]) -> Vec<Vec<usize>> {
     let bits = |v: Vec3<f64>| [v.x, v.y, v.z].map(f64::to_bits);
     let by = |key: &dyn Fn(&GrinRay<f64>) -> [u64; 3]| -> Vec<Vec<usize>> {
@@ -137,8 +138,8 @@ fn group_rays(rays: &[GrinRay<f64>]) -> Vec<Vec<usize>> {
     if points.len() < rays.len() { points } else { vec![(0..rays.len()).collect()] }
 }
 
-/// The numbers of at most so many places, spread evenly along the coordinate in which they differ
-/// most.
+/// The numbers of at most `count` points, spread uniformly along the coordinate with the largest
+/// range.
 fn choose_spread(places: &[[f64; 4]], count: usize) -> Vec<usize> {
     let range = |axis: usize| {
         let values = places.iter().map(|place| place[axis]);
@@ -159,7 +160,7 @@ fn choose_spread(places: &[[f64; 4]], count: usize) -> Vec<usize> {
     chosen
 }
 
-/// The points of a way, from shortly before the space on.
+/// The points of a path, from shortly before the domain on.
 fn path_points(
     ray: &GrinRay<f64>,
     states: &[RayState<f64>],
@@ -188,7 +189,7 @@ fn path_points(
     points
 }
 
-/// Where a ray that ends on a screen has left the space.
+/// The point where a ray that ends on a screen has left the domain.
 fn exit_point(exit: &RayExit<f64>, space: Domain) -> Option<Vec3<f64>> {
     let region = space.region();
     if !exit.fate.has_arrived() || region.level(exit.x) <= 1e-6 * space.diameter() {
@@ -197,7 +198,7 @@ fn exit_point(exit: &RayExit<f64>, space: Domain) -> Option<Vec3<f64>> {
     region.entry(exit.x, -exit.v).map(|(_, t)| exit.x - exit.v * t)
 }
 
-/// A point between two states, by the cubic that has their places and velocities.
+/// A point between two states, on the cubic with their positions and velocities.
 fn hermite(pair: &[RayState<f64>], t: f64) -> Vec3<f64> {
     let [a, b] = [&pair[0], &pair[1]];
     // The ray moves by |v| times the step.

@@ -5,8 +5,8 @@ use super::{ProfileFunction, ProfileSample, ProfileSamples};
 use crate::grin::lanes::{LANES, LaneScalars};
 use crate::math::Real;
 
-/// The four cubic B-splines that are not zero in a cell, at `0 ≤ t < 1`; outside that range the
-/// same polynomials.
+/// The four cubic B-splines that are nonzero in a cell, at `0 ≤ t < 1`; the same polynomials
+/// outside that range.
 #[inline(always)]
 pub(super) fn basis<R: Real>(t: R) -> [R; 4] {
     let c = R::from_f64;
@@ -41,7 +41,7 @@ pub(super) fn basis_curvatures<R: Real>(t: R) -> [R; 4] {
     [u, c(3.0) * t - R::TWO, c(3.0) * u - R::TWO, t]
 }
 
-/// A cubic B-spline in `s` with even knots; the parameters are its coefficients. Beyond its ends
+/// A cubic B-spline in `s` with uniform knots; the parameters are its coefficients. Beyond its ends
 /// the polynomials of the outer cells continue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BSpline<R> {
@@ -51,7 +51,7 @@ pub struct BSpline<R> {
 }
 
 impl<R: Real> BSpline<R> {
-    /// The spline over `start ≤ s ≤ end`; `None` with fewer than four coefficients or without a
+    /// The spline over `start ≤ s ≤ end`; `None` with fewer than four coefficients or an empty
     /// range.
     pub fn new(start: R, end: R, coefficients: Vec<R>) -> Option<Self> {
         let cells = coefficients.len().checked_sub(3).filter(|cells| *cells > 0)?;
@@ -63,7 +63,7 @@ impl<R: Real> BSpline<R> {
         })
     }
 
-    /// The first coefficient that counts at `s`, and the place within its cell.
+    /// The first coefficient of the support at `s`, and the position within its cell.
     #[inline(always)]
     fn locate(&self, s: R) -> (usize, R) {
         let u = (s - self.start) / self.spacing;
@@ -101,7 +101,7 @@ impl<R: Real> ProfileFunction<R> for BSpline<R> {
         }
     }
 
-    /// Finds the cells, collects the coefficients, sums: lanes do all but the second.
+    /// Locates the cells, gathers the coefficients, sums: SIMD lanes do all but the gathering.
     #[inline(always)]
     fn evaluate_block(&self, s: &LaneScalars<R>, out: &mut ProfileSamples<R>) {
         let (mut first, mut t) = ([0; LANES], [R::ZERO; LANES]);

@@ -1,10 +1,10 @@
-//! Rounding down to a cell, without branches and casts that lanes do not have.
+//! Rounding down to the index of a cell, without branches or casts that SIMD lanes lack.
 
 /// The first number whose neighbours are 1 apart.
 const INTEGER_SPACING: f64 = 4503599627370496.0; // 2⁵²
 
-/// The cell of a coordinate counted in cells from the first, kept within `0..=last`; what is not a
-/// number falls into the first.
+/// The cell of a coordinate counted in cells from the first, clamped to `0..=last`; a value that is
+/// not a number falls into the first.
 #[inline(always)]
 pub(super) fn floor_cell(u: f64, last: f64) -> f64 {
     let inside = u.max(0.0).min(last);
@@ -12,7 +12,7 @@ pub(super) fn floor_cell(u: f64, last: f64) -> f64 {
     if rounded > inside { rounded - 1.0 } else { rounded }
 }
 
-/// A whole number below 2⁵² that is not negative, as an integer: its bits behind the point.
+/// A whole number from 0 to below 2⁵² as an integer: the low bits of its mantissa.
 #[inline(always)]
 pub(super) fn to_index(whole: f64) -> usize {
     ((whole + INTEGER_SPACING).to_bits() - INTEGER_SPACING.to_bits()) as usize

@@ -1,22 +1,22 @@
-//! The profile of a gradient-index lens: a polynomial in r², a polynomial in z, added.
+//! The profile of a gradient-index lens: the sum of a polynomial in r² and a polynomial in z.
 //!
-//! What the standard profiles of lens design have in common (Marchand, *Gradient Index Optics*,
+//! The common form of the standard profiles of lens design (Marchand, *Gradient Index Optics*,
 //! 1978, chapter 4): `u(r, z) = B + Σ aᵢ r²ⁱ + Σ bⱼ zʲ`, where `u` is the index or its square, or
-//! the hyperbolic secant in place of the radial polynomial. A ray needs `η²` and the force
-//! `η ∇η = ∇(η²)/2` only, so that the square costs no root.
+//! the hyperbolic secant in place of the radial polynomial. A ray needs `η²` and the force `η ∇η =
+//! ∇(η²)/2` only, so that the square costs no root.
 
 use super::{ProfileFunction, Sech};
 use crate::math::{Real, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// How many coefficients of even powers of r there may be: r² to r¹².
+/// The largest number of radial coefficients, of r² to r¹².
 pub const RADIAL_TERMS: usize = 6;
-/// How many coefficients of powers of z there may be: z to z⁴.
+/// The largest number of axial coefficients, of z to z⁴.
 pub const AXIAL_TERMS: usize = 4;
-/// All of them, the radial ones first.
+/// The number of all coefficients; the radial ones come first.
 pub const PROFILE_TERMS: usize = RADIAL_TERMS + AXIAL_TERMS;
 
-/// What the coefficients build.
+/// The quantity that the coefficients define.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProfileLaw {
@@ -25,31 +25,31 @@ pub enum ProfileLaw {
     Index,
     /// Its square: `n² = n₀² + Σ aᵢ r²ⁱ + Σ bⱼ zʲ`.
     Square,
-    /// `n = n₀ / cosh(a₁ r) + Σ bⱼ zʲ`; the other radial coefficients mean nothing.
+    /// `n = n₀ / cosh(a₁ r) + Σ bⱼ zʲ`; the other radial coefficients are ignored.
     Sech,
 }
 
-/// Coefficients of a gradient, without the index to which they are added.
+/// Coefficients of an index profile, without the base index to which they are added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProfileCoefficients<R> {
-    /// What they build.
+    /// The quantity that they define.
     pub law: ProfileLaw,
-    /// The radial ones, r² to r¹², then the axial ones, z to z⁴.
+    /// The radial coefficients, of r² to r¹², then the axial ones, of z to z⁴.
     pub terms: [R; PROFILE_TERMS],
-    /// Where z = 0 of the polynomial lies, and whether it counts towards +z or −z (±1): the
-    /// polynomial is one in `origin + sense z`.
+    /// The origin of the axial polynomial, whose variable is `origin + sense z`.
     pub origin: R,
-    /// See there.
+    /// The direction of its variable, +1 towards +z or -1 towards -z.
     pub sense: R,
-    /// How many radial and how many axial coefficients count; those behind are zero and cost
+    /// The numbers of radial and of axial coefficients in use; those behind are zero and cost
     /// nothing.
     pub used: [usize; 2],
-    /// How far from the axis it is used, for the plan of the step; infinite where nobody says.
+    /// The largest distance from the axis at which the profile is used, for the choice of the step;
+    /// infinite if unknown.
     pub reach: f64,
 }
 
 impl<R: Real> ProfileCoefficients<R> {
-    /// Coefficients that count from the vertex in front.
+    /// Coefficients of a profile whose axial polynomial begins at the front vertex.
     pub fn new(law: ProfileLaw, terms: [R; PROFILE_TERMS]) -> Self {
         let count = |part: &[R]| part.iter().rposition(|a| a.value() != 0.0).map_or(0, |i| i + 1);
         let (radial, axial) = terms.split_at(RADIAL_TERMS);
@@ -57,7 +57,7 @@ impl<R: Real> ProfileCoefficients<R> {
         Self { law, terms, origin: R::ZERO, sense: R::ONE, used, reach: f64::INFINITY }
     }
 
-    /// The same with a coefficient that counts even where it is zero.
+    /// Marks coefficient `k` as used even if it is zero.
     #[must_use]
     pub fn with_term(mut self, k: usize) -> Self {
         let (part, count) = if k < RADIAL_TERMS { (0, k + 1) } else { (1, k + 1 - RADIAL_TERMS) };
@@ -65,7 +65,7 @@ impl<R: Real> ProfileCoefficients<R> {
         self
     }
 
-    /// Whether the index is the same everywhere.
+    /// True if the index is constant.
     pub fn is_constant(&self) -> bool {
         self.terms.iter().all(|term| term.value() == 0.0)
     }
@@ -83,14 +83,14 @@ impl<R: Real> ProfileCoefficients<R> {
         }
     }
 
-    /// The same gradient met from the other end of a gap of this thickness.
+    /// The same profile seen from the other end of a gap of this thickness.
     #[must_use]
     pub fn reversed(self, thickness: R) -> Self {
         Self { origin: self.origin + self.sense * thickness, sense: -self.sense, ..self }
     }
 }
 
-/// `η²` at a point and the force `η ∇η`.
+/// `η²` and the force `η ∇η` at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Force<R> {
     /// `η²`.
@@ -99,12 +99,12 @@ pub struct Force<R> {
     pub force: Vec3<R>,
 }
 
-/// A gradient with the index to which it is added.
+/// An index profile with rotational symmetry about z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationalProfile<R> {
     /// The index on the axis at z = 0.
     pub base: R,
-    /// Everything else.
+    /// The coefficients added to it.
     pub coefficients: ProfileCoefficients<R>,
 }
 
@@ -120,7 +120,7 @@ fn polynomial<R: Real>(terms: &[R], s: R) -> [R; 3] {
     [value, slope, half_bend + half_bend]
 }
 
-/// `u`, its derivatives by r² and by z, and the second ones.
+/// `u` and its first and second derivatives with respect to r² and z.
 struct ProfileDerivatives<R> {
     value: R,
     by_s: R,
@@ -181,13 +181,14 @@ impl<R: Real> RotationalProfile<R> {
         }
     }
 
-    /// The index at a point; not a number where its square is negative.
+    /// The index at a point; NaN where its square is negative.
     pub fn index(&self, at: Vec3<R>) -> R {
         let value = self.evaluate(at).value;
         if self.coefficients.law == ProfileLaw::Square { value.sqrt() } else { value }
     }
 
-    /// The derivative of the force along a direction, which is also its transpose.
+    /// The derivative of the force along a direction; the Jacobian is symmetric, so this is also
+    /// the product with its transpose.
     #[inline(always)]
     pub fn force_derivative(&self, at: Vec3<R>, along: Vec3<R>) -> Vec3<R> {
         let built = self.evaluate(at);
@@ -208,13 +209,13 @@ impl<R: Real> RotationalProfile<R> {
         }
     }
 
-    /// Adds the derivatives of `weight η² + pull · η ∇η` by the index on the axis and by every
-    /// coefficient.
+    /// Adds the derivatives of `weight η² + pull · η ∇η` with respect to the base index and to
+    /// every coefficient.
     #[inline(always)]
     pub fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, by: &mut ProfileGradient<R>) {
         let (s, z) = self.coordinates(at);
         let built = self.evaluate(at);
-        // By the value and by the gradient of u.
+        // With respect to the value and to the gradient of u.
         let (by_value, by_climb) = match self.coefficients.law {
             ProfileLaw::Square => (weight, pull * R::from_f64(0.5)),
             ProfileLaw::Index | ProfileLaw::Sech => {
@@ -241,12 +242,12 @@ impl<R: Real> RotationalProfile<R> {
     }
 }
 
-/// Derivatives by the numbers of a gradient.
+/// Derivatives with respect to the base index and the coefficients of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ProfileGradient<R> {
-    /// By the index on the axis at z = 0.
+    /// With respect to the index on the axis at z = 0.
     pub base: R,
-    /// By the coefficients.
+    /// With respect to the coefficients.
     pub terms: [R; PROFILE_TERMS],
 }
 
@@ -254,7 +255,7 @@ fn add<R: Real>(base: R, [value, slope, bend]: [R; 3]) -> [R; 3] {
     [base + value, slope, bend]
 }
 
-/// Adds `value sᵏ + slope k sᵏ⁻¹` for the powers from the first on.
+/// Adds `value sᵏ + slope k sᵏ⁻¹` for each power k from 1 on.
 #[inline(always)]
 fn accumulate_powers<R: Real>(s: R, value: R, slope: R, by: &mut [R]) {
     let (mut power, mut derived) = (s, R::ONE);

@@ -1,10 +1,10 @@
-//! Where the values of a sampled field stand: a block of nodes with even spacing on each axis.
+//! Regular grids: nodes with constant spacing along each axis.
 
 use super::cell::{floor_cell, to_index};
 use crate::math::Real;
 use crate::math::Vec3;
 
-/// Nodes on a regular grid. Node `(i, j, k)` stands at `low + (i hx, j hy, k hz)` and has the number
+/// Nodes on a regular grid. Node `(i, j, k)` is at `low + (i hx, j hy, k hz)` and has the number
 /// `(k ny + j) nx + i`: x runs fastest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegularGrid<R> {
@@ -15,43 +15,43 @@ pub struct RegularGrid<R> {
     pub(super) inverse_spacing: Vec3<R>,
 }
 
-/// Why values do not make a sampled field.
+/// Values or a grid that do not make a sampled field.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GridError {
-    /// Too few nodes on an axis.
+    /// Too few nodes along an axis.
     #[error("{found} nodes along {axis}, expected at least {least}")]
     TooFew {
         /// `x`, `y` or `z`.
         axis: char,
-        /// How many there are.
+        /// The number of nodes.
         found: usize,
-        /// How many there must be.
+        /// The smallest valid number of nodes.
         least: usize,
     },
-    /// Not one value for each node.
+    /// The number of values differs from the number of nodes.
     #[error("{found} values for {expected} nodes")]
     Values {
-        /// How many values there are.
+        /// The number of values.
         found: usize,
-        /// How many nodes there are.
+        /// The number of nodes.
         expected: usize,
     },
-    /// A spacing that is not positive, or a corner that is no number.
+    /// A spacing that is not positive, or a corner that is not a number.
     #[error("the grid has no extent along {axis}")]
     Extent {
         /// `x`, `y` or `z`.
         axis: char,
     },
-    /// A value that is no number.
+    /// A value that is not a finite number.
     #[error("value {node} is not a finite number")]
     NotANumber {
-        /// Which value, counted from 0.
+        /// The number of the value, counted from 0.
         node: usize,
     },
 }
 
 impl<R: Real> RegularGrid<R> {
-    /// Nodes from the corner `low` on, `spacing` apart.
+    /// Nodes that begin at the corner `low`, `spacing` apart.
     ///
     /// # Errors
     /// [`GridError::Extent`] for a spacing that is not positive.
@@ -80,12 +80,12 @@ impl<R: Real> RegularGrid<R> {
         Self::new([count; 3], Vec3::new(-half, -half, -half), Vec3::new(h, h, h))
     }
 
-    /// Nodes along x, y and z.
+    /// The numbers of nodes along x, y and z.
     pub fn counts(&self) -> [usize; 3] {
         self.counts
     }
 
-    /// The first node.
+    /// The position of the first node.
     pub fn low(&self) -> Vec3<R> {
         self.low
     }
@@ -95,13 +95,13 @@ impl<R: Real> RegularGrid<R> {
         self.spacing
     }
 
-    /// How many nodes there are; the largest number where there are more than that.
+    /// The total number of nodes; saturates at the largest integer.
     pub fn node_count(&self) -> usize {
         let [x, y, z] = self.counts;
         x.saturating_mul(y).saturating_mul(z)
     }
 
-    /// Where node number `n` stands.
+    /// The position of node number `n`.
     pub fn node(&self, n: usize) -> Vec3<R> {
         let [nx, ny, _] = self.counts;
         let at = |i: usize| R::from_f64(i as f64);
@@ -117,7 +117,7 @@ impl<R: Real> RegularGrid<R> {
         self.spacing.x.value().min(self.spacing.y.value()).min(self.spacing.z.value())
     }
 
-    /// Refuses values that do not fit.
+    /// Checks that values fit the grid.
     pub(super) fn check(&self, values: &[R], least: usize) -> Result<(), GridError> {
         for (axis, found) in ['x', 'y', 'z'].into_iter().zip(self.counts) {
             if found < least {
@@ -133,7 +133,8 @@ impl<R: Real> RegularGrid<R> {
         }
     }
 
-    /// The cell of a point, whose support is `width` nodes wide; outside the grid the outermost cell.
+    /// The cell of a point, whose support is `width` nodes wide; outside the grid the outermost
+    /// cell.
     #[inline(always)]
     pub(super) fn locate(&self, at: Vec3<R>, width: usize) -> GridCell<R> {
         let [nx, ny, nz] = self.counts;
@@ -145,18 +146,18 @@ impl<R: Real> RegularGrid<R> {
     }
 }
 
-/// Where a point lies in a grid.
+/// The cell of a grid that contains a point, and the position in it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GridCell<R> {
-    /// The cell along each axis, a whole number.
+    /// The number of the cell along each axis, a whole number.
     pub(super) cell: [f64; 3],
-    /// The number of the first node that counts.
+    /// The number of the first node of the support.
     pub(super) first: usize,
-    /// Where the point lies within the cell: from 0 to 1 unless it is outside the grid.
+    /// The position within the cell: from 0 to 1 unless it is outside the grid.
     pub(super) t: Vec3<R>,
 }
 
-/// The cell along one axis and the place within it.
+/// The cell along one axis and the position within it.
 #[inline(always)]
 fn locate_along<R: Real>(x: R, low: R, density: R, last: usize) -> (f64, R) {
     let u = (x - low) * density;

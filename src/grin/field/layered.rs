@@ -57,7 +57,7 @@ pub struct ProfileSample<R> {
     pub curvature: R,
 }
 
-/// The same for a block of rays.
+/// A profile for a block of rays.
 #[derive(Debug, Clone, Copy)]
 pub struct ProfileSamples<R> {
     /// `f`.
@@ -70,15 +70,15 @@ pub struct ProfileSamples<R> {
 
 /// The index as a function of one coordinate.
 pub trait ProfileFunction<R: Real>: Debug + Send + Sync {
-    /// What an optimiser may change.
+    /// The parameters that an optimiser may change.
     fn parameters(&self) -> &[R];
-    /// The same, to be changed.
+    /// Mutable access to the parameters.
     fn parameters_mut(&mut self) -> &mut [R];
-    /// The profile and its derivatives.
+    /// The profile and its derivatives at one value of the coordinate.
     fn evaluate(&self, s: R) -> ProfileSample<R>;
-    /// Adds `weight ∂f/∂θ + pull ∂f'/∂θ` to the gradient by the parameters.
+    /// Adds `weight ∂f/∂θ + pull ∂f'/∂θ` to the gradient by the parameters θ.
     fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]);
-    /// [`Self::at`] for a block of rays: the same bits.
+    /// [`Self::evaluate`] for a block of rays: the same bits.
     #[inline(always)]
     fn evaluate_block(&self, s: &LaneScalars<R>, out: &mut ProfileSamples<R>) {
         for (lane, s) in s.iter().enumerate() {
@@ -87,7 +87,7 @@ pub trait ProfileFunction<R: Real>: Debug + Send + Sync {
                 (f.value, f.slope, f.curvature);
         }
     }
-    /// Whether one formula holds everywhere; else the distance in `s` between the changes.
+    /// The distance in `s` between changes of the formula; `None` if one formula holds everywhere.
     fn knot_spacing(&self) -> Option<R> {
         None
     }
@@ -96,31 +96,31 @@ pub trait ProfileFunction<R: Real>: Debug + Send + Sync {
 /// A field `η = f(s)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileField<P> {
-    /// What `s` is.
+    /// The coordinate `s`.
     pub coordinate: ProfileCoordinate,
     /// `f`.
     pub profile: P,
 }
 
 impl<P> ProfileField<P> {
-    /// A ball about the origin.
+    /// A spherical field about the origin.
     pub fn sphere(profile: P) -> Self {
         Self { coordinate: ProfileCoordinate::Sphere, profile }
     }
 
-    /// A fibre along z.
+    /// A cylindrical field about the z axis, as in a fibre.
     pub fn cylinder(profile: P) -> Self {
         Self { coordinate: ProfileCoordinate::Cylinder, profile }
     }
 
-    /// Layers across z.
+    /// A field that depends on z alone.
     pub fn axial(profile: P) -> Self {
         Self { coordinate: ProfileCoordinate::Axial, profile }
     }
 }
 
 impl<P> ProfileField<P> {
-    /// The Hessian where the coordinate has this gradient.
+    /// The Hessian where the coordinate has the gradient `ds`.
     #[inline(always)]
     fn hessian_from<R: Real>(&self, ds: Vec3<R>, slope: R, bend: R) -> Hessian<R> {
         let squares = Vec3::new(ds.x * ds.x, ds.y * ds.y, ds.z * ds.z);
@@ -217,7 +217,7 @@ impl<R: Real, P: ProfileFunction<R>> IndexField<R> for ProfileField<P> {
     }
 
     fn resolution(&self) -> FieldResolution {
-        // At the far end of a radial profile, where its knots lie closest.
+        // The knots of a radial profile lie closest at its far end.
         let voxel = self.profile.knot_spacing().map(|knot| {
             if self.coordinate == ProfileCoordinate::Axial {
                 return knot.value();

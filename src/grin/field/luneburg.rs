@@ -1,7 +1,7 @@
 //! The Luneburg lens: `η = √(2 - r²/R²)` images infinity onto its rear surface.
 //!
-//! Luneburg, *Mathematical Theory of Optics* (1944). In units of its radius every ray is
-//! `x(σ) = x₀ cos σ + v₀ sin σ`, so at `σ = π/2` it stands at `v₀`: an exact test.
+//! Luneburg, *Mathematical Theory of Optics* (1944). In units of its radius every ray is `x(σ) = x₀
+//! cos σ + v₀ sin σ`, so at `σ = π/2` it is at `v₀`: an exact test.
 
 use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
@@ -10,8 +10,8 @@ use crate::math::Real;
 /// stay real.
 const CUT: f64 = 1.5;
 
-/// `f = √(2 - s/R²)`; its parameter is the radius `R`. To be cut by a boundary at `R`: it goes on
-/// by the same formula to `1.22 R` and is constant from there.
+/// `f = √(2 - s/R²)`; its parameter is the radius `R`. To be cut by a boundary at `R`: the same
+/// formula continues to `1.22 R`, and the profile is constant from there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Luneburg<R> {
     radius: [R; 1],
@@ -23,7 +23,7 @@ impl<R: Real> Luneburg<R> {
         Self { radius: [radius] }
     }
 
-    /// `s/R²`, not beyond the cut, and one before it, zero behind.
+    /// `s/R²` clamped to the cut, and the factor 1 before the cut, 0 beyond it.
     #[inline(always)]
     fn clamped_square(&self, s: R) -> (R, R) {
         let [radius] = self.radius;

@@ -13,7 +13,7 @@ pub struct Maxwell<R> {
 }
 
 impl<R: Real> Maxwell<R> {
-    /// The fish-eye of this index at its centre, half of it at `radius`.
+    /// The fish-eye of index `centre` at its centre and half of that at `radius`.
     pub fn new(centre: R, radius: R) -> Self {
         Self { parameters: [centre, radius] }
     }

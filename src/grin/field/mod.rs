@@ -73,25 +73,26 @@ impl<R: Real> Hessian<R> {
     }
 }
 
-/// How a field is built, for the choice of integrator and step.
+/// The resolution and continuity of a field, for the choice of integrator and step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldResolution {
-    /// Smallest distance over which it may change its formula; none for a field of one formula.
+    /// The smallest distance over which the field changes its formula, a length; `None` for a field
+    /// of one formula.
     pub voxel: Option<f64>,
-    /// Whether the force `η ∇η` has no jumps.
+    /// True if the force `η ∇η` is continuous.
     pub continuous_force: bool,
 }
 
 /// A field of refractive index with parameters.
 ///
-/// It has a value everywhere, also outside the region in which light is traced: a step may end
-/// outside. A block of rays is asked at once; the block forms must give the same bits as the
-/// single ones, and do unless they are overridden.
+/// It is defined everywhere, also outside the region in which light is traced: a step may end
+/// outside. Blocks of rays are evaluated at once; the block methods must return the same bits as
+/// the single ones, and do unless they are overridden.
 pub trait IndexField<R: Real>: Debug + Send + Sync {
-    /// What an optimiser may change, in the order of the gradient.
+    /// The parameters that an optimiser may change, in the order of the gradient.
     fn parameters(&self) -> &[R];
 
-    /// The same, to be changed.
+    /// Mutable access to the parameters.
     fn parameters_mut(&mut self) -> &mut [R];
 
     /// Index and gradient at a point.
@@ -100,16 +101,16 @@ pub trait IndexField<R: Real>: Debug + Send + Sync {
     /// The second derivatives at a point.
     fn hessian(&self, at: Vec3<R>) -> Hessian<R>;
 
-    /// Both at once.
+    /// Index, gradient and second derivatives at a point.
     #[inline(always)]
     fn sample_and_hessian(&self, at: Vec3<R>) -> (IndexSample<R>, Hessian<R>) {
         (self.sample(at), self.hessian(at))
     }
 
-    /// Adds `weight ∂η/∂θ + pull · ∂∇η/∂θ` to the gradient by the parameters.
+    /// Adds `weight ∂η/∂θ + pull · ∂∇η/∂θ` to the gradient by the parameters θ.
     fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]);
 
-    /// How it is built.
+    /// The resolution and continuity of the field.
     fn resolution(&self) -> FieldResolution;
 
     /// Index and gradient for a block of rays.
@@ -125,7 +126,7 @@ pub trait IndexField<R: Real>: Debug + Send + Sync {
         );
     }
 
-    /// The same, and the Hessian times a vector for each ray.
+    /// Index, gradient, and the Hessian times a vector for each ray of a block.
     fn sample_block_with_hessians(
         &self,
         at: &LaneVectors<R>,
@@ -167,7 +168,7 @@ pub trait IndexField<R: Real>: Debug + Send + Sync {
     }
 }
 
-/// Indices and gradients for a block of rays; a column begins where a line of the cache does.
+/// Indices and gradients for a block of rays; each column is aligned with a cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub struct IndexSamples<R> {

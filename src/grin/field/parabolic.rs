@@ -6,7 +6,7 @@
 use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
-/// Where `g² s` exceeds this the profile is constant: the root must stay real.
+/// Beyond this `g² s` the profile is constant: the root must stay real.
 const CUT: f64 = 0.9;
 
 /// `f = n₀ √(1 - g² s)`; its parameters are `n₀` and `g`, per length where `s` is a squared radius.
@@ -16,12 +16,12 @@ pub struct Parabolic<R> {
 }
 
 impl<R: Real> Parabolic<R> {
-    /// The fibre of this index on its axis and this constant `g`.
+    /// The fibre of index `axis` on its axis and constant `g`.
     pub fn new(axis: R, g: R) -> Self {
         Self { parameters: [axis, g] }
     }
 
-    /// `g² s`, not beyond the cut, and one before it, zero behind.
+    /// `g² s` clamped to the cut, and the factor 1 before the cut, 0 beyond it.
     #[inline(always)]
     fn clamped_square(&self, s: R) -> (R, R) {
         let [_, g] = self.parameters;

@@ -1,17 +1,18 @@
-//! A synthetic plume of gas: a few Gaussians one above the other, made up for reconstructions and
-//! measured nowhere.
+//! A synthetic plume of gas: a few Gaussians stacked along z, invented for reconstruction tests and
+//! not measured.
 //!
-//! `η = n₀ + s q(p)` with `q = Σ wᵢ exp(-|p - cᵢ|²/2σᵢ²)`: `q` is about 1 where the plume is densest
-//! and below 10⁻⁴ on the surface of its cube. A thin plume, as of hot gas, has `s < 0`.
+//! `η = n₀ + s q(p)` with `q = Σ wᵢ exp(-|p - cᵢ|²/2σᵢ²)`: `q` is about 1 where the plume is
+//! densest and below 10⁻⁴ on the surface of its cube. A plume of lower index, as of hot gas, has `s
+//! < 0`.
 
 use super::{FieldResolution, Hessian, IndexField, IndexSample};
 use crate::math::Real;
 use crate::math::Vec3;
 
-/// A part of the plume, in units of half the side of its cube.
+/// A Gaussian of the plume, in units of half the side of its cube.
 struct GaussianBlob {
     centre: [f64; 3],
-    /// Its standard deviation.
+    /// The standard deviation.
     width: f64,
     weight: f64,
 }
@@ -65,8 +66,8 @@ fn exp_negative<R: Real>(exponent: R) -> R {
 }
 
 impl<R: Real> Plume<R> {
-    /// A plume that changes the index `ambient` by at most about `contrast`, in a cube of so much to
-    /// each side of the origin.
+    /// A plume that changes the index `ambient` by at most about `contrast`, in a cube from `-half`
+    /// to `half` on each axis.
     pub fn new(ambient: R, contrast: R, half: R) -> Self {
         Self { parameters: [ambient, contrast], half }
     }

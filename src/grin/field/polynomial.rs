@@ -32,7 +32,7 @@ impl<R: Real> ProfileFunction<R> for Polynomial<R> {
         ProfileSample { value, slope, curvature: half_bend + half_bend }
     }
 
-    /// One coefficient for all rays, then the next.
+    /// Applies each coefficient to all rays before the next.
     #[inline(always)]
     fn evaluate_block(&self, s: &LaneScalars<R>, out: &mut ProfileSamples<R>) {
         let ProfileSamples { value, slope, curvature: bend } = out;

@@ -16,16 +16,16 @@ pub struct Sech<R> {
 }
 
 impl<R: Real> Sech<R> {
-    /// The fibre of this index on its axis and this constant `a`.
+    /// The fibre of index `axis` on its axis and constant `a`.
     pub fn new(axis: R, a: R) -> Self {
         Self { parameters: [axis, a] }
     }
 }
 
-/// `cosh √q = Σ qᵏ/(2k)!` and its first three derivatives by `q`. All terms are positive, so nothing
-/// cancels, and the axis needs no special case.
+/// `cosh √q = Σ qᵏ/(2k)!` and its first two derivatives with respect to `q`. All terms are
+/// positive, so nothing cancels, and the axis needs no special case.
 fn cosh_root<R: Real>(q: R) -> [R; 3] {
-    // Of each derivative: the sum so far. Terms of the m-th: qᵏ (k+m)!/(k! (2k+2m)!).
+    // The sum so far of each derivative. Terms of the m-th: qᵏ (k+m)!/(k! (2k+2m)!).
     let (half, twelfth) = (R::from_f64(0.5), R::from_f64(1.0 / 12.0));
     let mut terms = [R::ONE, half, twelfth];
     let mut sums = terms;
@@ -44,7 +44,8 @@ fn cosh_root<R: Real>(q: R) -> [R; 3] {
 }
 
 impl<R: Real> Sech<R> {
-    /// `a² s` not beyond the cut, one before it and zero behind, and `cosh √q` with derivatives.
+    /// `a² s` clamped to the cut, the factor 1 before the cut and 0 beyond it, and `cosh √q` with
+    /// its derivatives.
     fn cosh_parts(&self, s: R) -> (R, R, [R; 3]) {
         let [_, a] = self.parameters;
         let (q, cut) = (a * a * s, R::from_f64(CUT));
@@ -72,7 +73,7 @@ impl<R: Real> ProfileFunction<R> for Sech<R> {
         ProfileSample { value, slope, curvature: bend }
     }
 
-    /// By `q = a² s`: `df/dq = -n₀ c'/c²`, and `f' = a² df/dq`.
+    /// With respect to `q = a² s`: `df/dq = -n₀ c'/c²`, and `f' = a² df/dq`.
     fn accumulate(&self, s: R, weight: R, pull: R, gradient: &mut [R]) {
         let [axis, a] = self.parameters;
         let (_, on, [c, c1, c2]) = self.cosh_parts(s);

@@ -1,7 +1,8 @@
-//! A field of tricubic B-splines on a grid: its force and the slope of its force are continuous.
+//! A field of tricubic B-splines on a grid: its force and the derivative of its force are
+//! continuous.
 //!
 //! The coefficients are not values at the nodes. A field with `n` cells on an axis has `n + 3`
-//! coefficients there; the first stands one spacing before the domain.
+//! coefficients there; the first lies one spacing before the domain.
 
 use super::bspline::{basis, basis_curvatures, basis_slopes};
 use super::{FieldResolution, GridError, Hessian, IndexField, IndexSample, RegularGrid};
@@ -12,7 +13,7 @@ use crate::math::Vec3;
 /// continue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tricubic<R> {
-    /// Counts of coefficients, spacing, and the lower corner of the domain.
+    /// The numbers of coefficients, the spacing, and the lower corner of the domain.
     grid: RegularGrid<R>,
     coefficients: Vec<R>,
 }
@@ -21,23 +22,24 @@ pub struct Tricubic<R> {
 type AxisWeights<R> = Vec3<[R; 4]>;
 
 impl<R: Real> Tricubic<R> {
-    /// The field of these coefficients, in the order of [`RegularGrid`]. `grid.low()` is the lower corner
-    /// of the *domain*, which has three cells less than there are coefficients on each axis.
+    /// The field of these coefficients, in the order of [`RegularGrid`]. `grid.low()` is the lower
+    /// corner of the *domain*, which has three cells less than there are coefficients on each axis.
     ///
     /// # Errors
-    /// Fewer than four coefficients on an axis, or values that do not fit or are no numbers.
+    /// Fewer than four coefficients on an axis, or values that do not fit or are not finite.
     pub fn new(grid: RegularGrid<R>, coefficients: Vec<R>) -> Result<Self, GridError> {
         grid.check(&coefficients, 4)?;
         Ok(Self { grid, coefficients })
     }
 
-    /// A field near a smooth function, over a cube from `-half` to `half` with `cells³` cells.
+    /// An approximation of a smooth function over a cube from `-half` to `half` with `cells³`
+    /// cells.
     ///
-    /// The coefficients are `f - h²/6 ∇²f` at their places, by differences: good to the fourth
+    /// The coefficients are `f - h²/6 ∇²f` at their positions, by differences: accurate to fourth
     /// order in the spacing.
     ///
     /// # Errors
-    /// No cells, or values that are no numbers.
+    /// No cells, or values that are not finite.
     pub fn approximate(cells: usize, half: R, f: impl Fn(Vec3<R>) -> R) -> Result<Self, GridError> {
         let domain = RegularGrid::cube(cells + 1, half)?;
         let h = domain.spacing().x;
@@ -58,12 +60,12 @@ impl<R: Real> Tricubic<R> {
         Self::new(grid, (0..grid.node_count()).map(|n| coefficient(place(n))).collect())
     }
 
-    /// Counts of coefficients, spacing, and the lower corner of the domain.
+    /// The numbers of coefficients, the spacing, and the lower corner of the domain.
     pub fn grid(&self) -> &RegularGrid<R> {
         &self.grid
     }
 
-    /// The first coefficient that counts at a point, and the place within its cell.
+    /// The first coefficient of the support at a point, and the position within its cell.
     #[inline(always)]
     fn locate(&self, at: Vec3<R>) -> (usize, Vec3<R>) {
         let place = self.grid.locate(at, 4);

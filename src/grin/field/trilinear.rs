@@ -1,4 +1,4 @@
-//! A field between grid nodes by trilinear interpolation.
+//! A field with trilinear interpolation between the nodes of a grid.
 //!
 //! Its gradient jumps from voxel to voxel. Inside a voxel the second derivatives along the axes are
 //! zero, and delta functions on the faces carry all of them. The discrete ray map does not see the
@@ -6,8 +6,8 @@
 //! any resolution: `d(loss)/dx₀` of the sampled Luneburg lens is 1.2 where it should be 0. The
 //! smoothed diagonal fills the gap with the second differences of the nodes and brings it to 4e-4.
 //!
-//! A block of rays is worked off in three passes, so that lanes do all but the second: find the
-//! voxels, collect the nodes, interpolate.
+//! A block of rays is evaluated in three passes, so that SIMD lanes do all but the second: locate
+//! the voxels, gather the nodes, interpolate.
 
 use super::grid::GridCell;
 use super::{
@@ -19,13 +19,14 @@ use crate::math::SimdWidth;
 use crate::math::Vec3;
 use crate::math::run_vectorized;
 
-/// What stands on the diagonal of the Hessian.
+/// The diagonal of the Hessian of a trilinear field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum HessianDiagonal {
     /// Zero, as differentiation inside a voxel gives: the exact transpose of the discrete map, for
     /// comparison.
     Exact,
-    /// Second differences of the nodes, interpolated: what the field means. For optimisation.
+    /// Second differences of the nodes, interpolated: the second derivatives of the sampled
+    /// function. For optimisation.
     #[default]
     Smoothed,
 }
@@ -36,18 +37,18 @@ pub enum HessianDiagonal {
 pub struct Trilinear<R> {
     grid: RegularGrid<R>,
     values: Vec<R>,
-    /// What stands on the diagonal of the Hessian.
+    /// The diagonal of the Hessian.
     pub diagonal: HessianDiagonal,
 }
 
 /// The eight corners of a voxel: x runs fastest.
 type Corners<R> = [R; 8];
 
-/// The nodes before and behind a voxel on the four lines through its corners along each axis, in the
-/// order x, y, z, the lines in the order of the corners they go through.
+/// The nodes before and behind a voxel on the four lines through its corners along each axis, in
+/// the order x, y, z, the lines in the order of their corners.
 type OuterNodes<R> = [[R; 2]; 12];
 
-/// What the corners of a voxel say at a point, in units of voxels.
+/// The interpolated value, gradient and mixed derivatives at a point, in units of voxels.
 struct VoxelSample<R> {
     value: R,
     slope: Vec3<R>,
@@ -109,13 +110,13 @@ impl<R: Real> Trilinear<R> {
     /// The field of these values, in the order of [`RegularGrid`], with the smoothed diagonal.
     ///
     /// # Errors
-    /// Fewer than two nodes on an axis, or values that do not fit or are no numbers.
+    /// Fewer than two nodes on an axis, or values that do not fit or are not finite.
     pub fn new(grid: RegularGrid<R>, values: Vec<R>) -> Result<Self, GridError> {
         grid.check(&values, 2)?;
         Ok(Self { grid, values, diagonal: HessianDiagonal::default() })
     }
 
-    /// The field that takes these values at the nodes.
+    /// The field with the values of a function at the nodes.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -127,12 +128,12 @@ impl<R: Real> Trilinear<R> {
         Self::new(grid, values)
     }
 
-    /// Where the nodes stand.
+    /// The grid of its nodes.
     pub fn grid(&self) -> &RegularGrid<R> {
         &self.grid
     }
 
-    /// How far the four pairs of corners along x lie behind the first.
+    /// The offsets of the four pairs of corners along x from the first corner.
     #[inline(always)]
     fn strides(&self) -> [usize; 4] {
         let [nx, ny, _] = self.grid.counts();
@@ -141,7 +142,8 @@ impl<R: Real> Trilinear<R> {
 
     #[inline(always)]
     fn corners(&self, first: usize) -> Corners<R> {
-        // One check that they are there; what remains to be checked is the same for every voxel.
+        // One bounds check for all corners; the offsets that remain to be checked are the same for
+        // every voxel.
         let [_, row, layer, both] = self.strides();
         let near = &self.values[first..][..both + 2];
         let (a, b) = (pair(near, 0), pair(near, row));
@@ -159,7 +161,7 @@ impl<R: Real> Trilinear<R> {
         self.outer_inside(place.first, place.t)
     }
 
-    /// Whether a voxel lacks a neighbour.
+    /// True if a voxel has no neighbour on some side.
     #[inline(always)]
     fn is_at_rim(&self, place: &GridCell<R>) -> bool {
         let [nx, ny, nz] = self.grid.counts();
@@ -170,7 +172,7 @@ impl<R: Real> Trilinear<R> {
 
     #[inline(always)]
     fn outer_inside(&self, first: usize, t: Vec3<R>) -> Vec3<R> {
-        // One check, as for the corners: the first node is one layer before them.
+        // One bounds check, as for the corners: the first node is one layer before them.
         let [_, row, layer, both] = self.strides();
         let near = &self.values[first - layer..][..2 * layer + both + 2];
         let across = |stride: usize, step: usize| {
@@ -241,7 +243,7 @@ impl<R: Real> Trilinear<R> {
         }
     }
 
-    /// What the corners of a voxel get of a deposit.
+    /// The contribution of each corner of a voxel to the gradient by the parameters.
     #[inline(always)]
     fn corner_shares(&self, t: Vec3<R>, weight: R, pull: Vec3<R>) -> Corners<R> {
         let d = self.grid.inverse_spacing;
@@ -269,7 +271,7 @@ impl<R: Real> Trilinear<R> {
     }
 }
 
-/// Puts the corners of one ray into columns.
+/// Writes the corners of one ray into columns.
 #[inline(always)]
 fn scatter<R: Real>(columns: &mut [LaneScalars<R>; 8], lane: usize, corners: &Corners<R>) {
     for (column, corner) in columns.iter_mut().zip(corners) {
@@ -277,7 +279,7 @@ fn scatter<R: Real>(columns: &mut [LaneScalars<R>; 8], lane: usize, corners: &Co
     }
 }
 
-/// Takes the corners of one ray out of columns.
+/// Reads the corners of one ray from columns.
 #[inline(always)]
 fn gather<R: Real>(columns: &[LaneScalars<R>; 8], lane: usize) -> Corners<R> {
     std::array::from_fn(|n| columns[n][lane])
