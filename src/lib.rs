@@ -36,8 +36,8 @@ pub mod trace;
 // Reading and writing lenses: the native JSON, Zemax; an export proves itself.
 pub mod files;
 
-// Design tasks in one gradient-index field: what light shall do, and the search for the field.
-pub mod grin_task;
+// Design tasks in one gradient-index field: the light and its goals, and the optimisation of the field.
+pub mod grin_design;
 
 // The set of rays that get through: where they start, their boundary, quadrature over them, and
 // derivatives of integrals over it that know that it moves.

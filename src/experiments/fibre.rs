@@ -12,7 +12,7 @@ use crate::grin::field::{Parabolic, ProfileField};
 use crate::grin::{
     EndCondition, GrinRay, GrinRegion, GrinSetup, GrinTracer, Integrator, LastStep, LaunchMode,
 };
-use crate::grin_task::{self, GrinField, GrinTask};
+use crate::grin_design::{self, GrinField, GrinTask};
 use crate::math::Vec3;
 use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
@@ -36,7 +36,7 @@ const REFINED: usize = 4;
 const STEPS: f64 = 40.0;
 
 fn run(_: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
-    let builtin = grin_task::find_builtin("fibre");
+    let builtin = grin_design::find_builtin("fibre");
     let task = builtin.ok_or_else(|| ExperimentError::Failed("no task `fibre`".to_owned()))?.task();
     let task = task.map_err(ExperimentError::from_error)?;
     let runner = solve(&task, [0.0, 1.0], watch)?;

@@ -3,7 +3,7 @@
 
 use super::{ExperimentError, NamedPlot, ProgressFn, report_progress};
 use crate::grin::{GrinRay, GrinTracer, IndexField, plan_tracing};
-use crate::grin_task::{GrinField, GrinOptimizer, GrinTask, LightSource};
+use crate::grin_design::{GrinField, GrinOptimizer, GrinTask, LightSource};
 use crate::math::Vec3;
 use crate::plot::{Axis, BLACK, Canvas, Chart, GREY, PALETTE, Stroke, TextAlign, gray_level};
 

@@ -8,7 +8,7 @@
 
 use super::grin_solution::{plot_medium, solve};
 use super::{Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
-use crate::grin_task::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
+use crate::grin_design::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.8",
@@ -80,7 +80,7 @@ const PICTURES: [[&str; 2]; 4] = [
 ];
 
 fn task(case: &KnownLensCase, effort: Effort) -> Result<GrinTask, ExperimentError> {
-    let builtin = grin_task::find_builtin(case.name);
+    let builtin = grin_design::find_builtin(case.name);
     let builtin =
         builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.name)))?;
     let mut task = builtin.task().map_err(ExperimentError::from_error)?;

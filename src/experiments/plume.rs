@@ -21,7 +21,7 @@ use super::{
     ProgressFn, TableCell, report_progress,
 };
 use crate::grin::IndexField;
-use crate::grin_task::{
+use crate::grin_design::{
     self, GrinField, GrinTask, LightSource, RefinementLevel, SourceDirections, StraightRays,
     ViewMeasurement,
 };
@@ -131,7 +131,7 @@ fn is_extreme(case: &PlumeCase) -> bool {
 }
 
 fn task(case: &PlumeCase, effort: Effort) -> Result<GrinTask, ExperimentError> {
-    let builtin = grin_task::find_builtin(case.task);
+    let builtin = grin_design::find_builtin(case.task);
     let builtin =
         builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.task)))?;
     let mut task = builtin.task().map_err(ExperimentError::from_error)?;

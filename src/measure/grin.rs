@@ -13,7 +13,7 @@ use crate::grin::{
     EndCondition, GrinRay, GrinRegion, GrinSetup, GrinSetupError, GrinTracer, IndexField,
     Integrator, LastStep, RayAdjoint, RayExit,
 };
-use crate::grin_task::{GrinTask, ReferenceField, ReferenceFieldError};
+use crate::grin_design::{GrinTask, ReferenceField, ReferenceFieldError};
 use crate::math::{Real, Vec3};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use aplanat::grin_task::{SlicePlane, SpatialAxis};
+use aplanat::grin_design::{SlicePlane, SpatialAxis};
 use aplanat::lens::blank;
 use aplanat::session::{
     Command, GrinCommand, GrinView, RunStatus, Session, SessionView, SliceQuantity, SliceSettings,

@@ -4,7 +4,7 @@
 use aplanat::files::{Volume, write_volume};
 use aplanat::grin::field::RegularGrid;
 use aplanat::grin::{Integrator, LaunchMode};
-use aplanat::grin_task::{
+use aplanat::grin_design::{
     Domain, FieldRepresentation, GrinMethod, GrinOptimizer, GrinTask, InitialField, LightGoal,
     LightSource, LightView, LimitCheck, ManufacturingLimits, RefinementLevel, SourceDirections,
     TracingSettings,

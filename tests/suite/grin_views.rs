@@ -2,7 +2,7 @@
 //! beams that miss, and the same on any number of threads.
 
 use aplanat::grin::GrinFate;
-use aplanat::grin_task::{
+use aplanat::grin_design::{
     self, Domain, GrinField, GrinOptimizer, GrinTask, ImageFile, LightGoal, LightSource,
     RefinementLevel, TargetImage, ViewImage,
 };
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// A task that comes with the program, with so many steps of its first level, quick to work on.
 fn quick(name: &str, steps: usize) -> GrinTask {
-    let mut task = grin_task::find_builtin(name).unwrap().task().unwrap();
+    let mut task = grin_design::find_builtin(name).unwrap().task().unwrap();
     task.levels = vec![RefinementLevel { nodes: 5, steps }];
     for view in &mut task.views {
         if let LightSource::Beam { rays, .. } = &mut view.source {
@@ -145,7 +145,7 @@ fn a_persons_own_picture_is_made_whatever_its_size() {
     let task = of_picture(scrap.drawing());
     let text = serde_json::to_string(&task).unwrap();
     assert!(text.contains("{\"file\":\""), "{text}");
-    assert_eq!(grin_task::read_task(&text, "a file").unwrap(), task);
+    assert_eq!(grin_design::read_task(&text, "a file").unwrap(), task);
     let [even, found] = [GrinOptimizer::new(&task).unwrap().best().clone(), solved(&task)]
         .map(|m| images(&task, &m).remove(0));
     let rows = |image: &ViewImage, from: usize| {

@@ -2,13 +2,13 @@
 //! what is expected there.
 
 use super::cli::{Scratch, done, done_json, refused};
-use aplanat::grin_task::{self, GrinOptimizer};
+use aplanat::grin_design::{self, GrinOptimizer};
 use serde_json::{Value, json};
 
 /// What a task that comes with the program is refused for once a value in it is another one, or is
 /// taken out.
 fn refusal(name: &str, place: &str, value: Option<Value>) -> Option<String> {
-    let task = grin_task::find_builtin(name).unwrap().task().unwrap();
+    let task = grin_design::find_builtin(name).unwrap().task().unwrap();
     let mut task = serde_json::to_value(&task).unwrap();
     if let Some(value) = value {
         *task.pointer_mut(place).unwrap() = value;
@@ -16,7 +16,7 @@ fn refusal(name: &str, place: &str, value: Option<Value>) -> Option<String> {
         let (parent, key) = place.rsplit_once('/').unwrap();
         task.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(key).unwrap();
     }
-    match grin_task::read_task(&task.to_string(), "task.json") {
+    match grin_design::read_task(&task.to_string(), "task.json") {
         Err(error) => Some(error.to_string()),
         Ok(task) => GrinOptimizer::new(&task).err().map(|error| error.to_string()),
     }

@@ -8,7 +8,7 @@ use aplanat::grin::{
     EndCondition, GrinFate, GrinRay, GrinRegion, GrinSetup, GrinTracer, IndexField as _,
     Integrator, LastStep, LaunchMode,
 };
-use aplanat::grin_task::{
+use aplanat::grin_design::{
     self, BoundaryCondition, Domain, FieldRepresentation, GrinField, GrinMethod, GrinOptimizer,
     GrinTask, InitialField, LightGoal, LightSource, ManufacturingLimits, ReferenceField,
     RefinementLevel, SourceDirections, StraightRays, TracingSettings,
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 /// The task of the weakest plume with few rays and a coarse grid.
 fn small() -> GrinTask {
-    let mut task = grin_task::find_builtin("plume").unwrap().task().unwrap();
+    let mut task = grin_design::find_builtin("plume").unwrap().task().unwrap();
     task.levels =
         vec![RefinementLevel { nodes: 5, steps: 8 }, RefinementLevel { nodes: 9, steps: 15 }];
     task.views[0].source =
@@ -92,7 +92,7 @@ fn grin_a_volume_of_ones_own_is_found_in_any_precision() {
         task.field = FieldRepresentation::Trilinear { half: 1.0 };
         task.edge = Some(BoundaryCondition { index: 1.0003, fixed: true, weight: 0.0 });
         let text = serde_json::to_string(&task).unwrap();
-        let task = grin_task::read_task(&text, "a task").unwrap();
+        let task = grin_design::read_task(&text, "a task").unwrap();
         let runner = solved(&task);
         let found = task.difference(runner.best()).unwrap().unwrap();
         println!("own volume, {numbers}: {found:?}");

@@ -4,7 +4,7 @@
 use super::session_front::wait;
 use aplanat::files::{Volume, read_volume, write_volume};
 use aplanat::grin::field::RegularGrid;
-use aplanat::grin_task::{
+use aplanat::grin_design::{
     self, GrinField, GrinOptimizer, GrinTask, RefinementLevel, SlicePlane, SpatialAxis,
 };
 use aplanat::lens::blank;
@@ -30,7 +30,7 @@ fn folder(name: &str) -> PathBuf {
 
 /// A built-in task with few steps at a coarse resolution.
 fn coarse(name: &str, levels: &[RefinementLevel]) -> GrinTask {
-    let task = grin_task::find_builtin(name).unwrap().task().unwrap();
+    let task = grin_design::find_builtin(name).unwrap().task().unwrap();
     GrinTask { levels: levels.to_vec(), ..task }
 }
 
@@ -228,7 +228,7 @@ fn images_of_a_display_stand_beside_their_pictures() {
     let path = folder.join("task.json");
     let mut task = coarse("display", &[RefinementLevel { nodes: 4, steps: 2 }]);
     for view in &mut task.views {
-        if let grin_task::LightSource::Beam { rays, .. } = &mut view.source {
+        if let grin_design::LightSource::Beam { rays, .. } = &mut view.source {
             *rays = 32;
         }
     }
@@ -260,7 +260,7 @@ fn rays_that_do_not_count_are_drawn_and_counted_with_their_reason() {
     let path = folder.join("task.json");
     let mut task = coarse("display", &[RefinementLevel { nodes: 4, steps: 2 }]);
     for view in &mut task.views {
-        if let grin_task::LightSource::Beam { rays, half, .. } = &mut view.source {
+        if let grin_design::LightSource::Beam { rays, half, .. } = &mut view.source {
             (*rays, *half) = (32, 1.5);
         }
     }
@@ -327,7 +327,7 @@ fn what_is_no_task_and_no_volume_is_refused_by_name_and_what_is_open_stays() {
         std::fs::write(&path, text).unwrap();
         path
     };
-    let task = grin_task::find_builtin("fibre").unwrap().text;
+    let task = grin_design::find_builtin("fibre").unwrap().text;
     let cases = [
         (file("lens.json", r#"{"aplanat": 1}"#), "found a lens; expected a task"),
         (file("text.txt", "no field"), "found neither; expected a task"),
@@ -353,7 +353,7 @@ fn what_is_no_task_and_no_volume_is_refused_by_name_and_what_is_open_stays() {
     assert!(refused(&mut session, &path).contains("one finite value for each node"));
     assert_eq!(
         run(&session).document.name,
-        grin_task::find_builtin("fibre").unwrap().task().unwrap().name
+        grin_design::find_builtin("fibre").unwrap().task().unwrap().name
     );
     std::fs::remove_dir_all(folder).unwrap();
 }

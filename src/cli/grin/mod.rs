@@ -11,7 +11,7 @@ use super::output_paths::check_distinct;
 use super::progress::{progress_bar, stop_flag};
 use crate::experiments::{plot_medium, plot_view};
 use crate::files;
-use crate::grin_task::{self, GrinField, GrinOptimizer, GrinTask};
+use crate::grin_design::{self, GrinField, GrinOptimizer, GrinTask};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
 use report::{GrinCostSummary, GrinReport};
 use serde::Serialize;
@@ -135,7 +135,7 @@ impl GrinArgs {
         &self,
         runner: &mut GrinOptimizer,
         clock: Stopwatch,
-    ) -> Result<bool, grin_task::GrinTaskError> {
+    ) -> Result<bool, grin_design::GrinTaskError> {
         let stop = stop_flag();
         let bar = progress_bar(0);
         let most = self.iterations.unwrap_or(usize::MAX);
@@ -161,13 +161,14 @@ impl GrinArgs {
 
 /// A task by its name or from a file.
 pub(super) fn load_task(name: &str) -> Result<GrinTask, CliError> {
-    let task = match grin_task::find_builtin(name) {
+    let task = match grin_design::find_builtin(name) {
         Some(builtin) => builtin.task()?,
         None if Path::new(name).extension().is_some_and(|e| e == "json") || name == "-" => {
             read_json(Path::new(name))?
         }
         None => {
-            let names: Vec<&str> = grin_task::BUILTIN_TASKS.iter().map(|task| task.name).collect();
+            let names: Vec<&str> =
+                grin_design::BUILTIN_TASKS.iter().map(|task| task.name).collect();
             let names = names.join(", ");
             return Err(CliError::Input(format!(
                 "no task `{name}`; expected a file .json, or one of {names}"
@@ -194,7 +195,7 @@ struct TaskEntry {
 }
 
 fn task_entries() -> impl Iterator<Item = TaskEntry> {
-    grin_task::BUILTIN_TASKS.iter().filter_map(|builtin| {
+    grin_design::BUILTIN_TASKS.iter().filter_map(|builtin| {
         let GrinTask { name: title, notes, .. } = builtin.task().ok()?;
         Some(TaskEntry { name: builtin.name, title, notes })
     })

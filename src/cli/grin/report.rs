@@ -2,7 +2,7 @@
 
 use super::straight_rays::StraightRayResult;
 use crate::cli::output::{ShortNumber, TextTable};
-use crate::grin_task::{self, FieldScore, GrinOptimizer, LimitCheck, ViewResult};
+use crate::grin_design::{self, FieldScore, GrinOptimizer, LimitCheck, ViewResult};
 use crate::measure::MemoryUse;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -97,7 +97,7 @@ impl GrinReport {
     ) -> Result<Self, Box<dyn std::error::Error>> {
         let (task, best) = (runner.task(), runner.best());
         let FieldScore { loss, views } = runner.score(best)?;
-        let view = |(view, result): (&grin_task::LightView, &ViewResult)| ViewSummary {
+        let view = |(view, result): (&grin_design::LightView, &ViewResult)| ViewSummary {
             name: view.name.clone(),
             weight: view.weight,
             spot: result.spot,

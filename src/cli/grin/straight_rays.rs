@@ -1,7 +1,7 @@
 //! What straight lines make of the measurement of a task, beside what its search found.
 
 use crate::cli::error::CliError;
-use crate::grin_task::{GrinField, GrinTask, GrinTaskError, StraightRays};
+use crate::grin_design::{GrinField, GrinTask, GrinTaskError, StraightRays};
 use crate::measure::Stopwatch;
 use serde::Serialize;
 use std::fmt::{self, Display};

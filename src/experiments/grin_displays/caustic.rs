@@ -13,7 +13,7 @@ use crate::experiments::{
     ProgressFn, plot_medium,
 };
 use crate::grin::{GrinTracer, RayExit, plan_tracing};
-use crate::grin_task::{GrinField, GrinTask, LightGoal};
+use crate::grin_design::{GrinField, GrinTask, LightGoal};
 use crate::plot::Canvas;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {

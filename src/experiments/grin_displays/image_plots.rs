@@ -1,6 +1,6 @@
 //! Plots of images beside their targets.
 
-use crate::grin_task::ViewImage;
+use crate::grin_design::ViewImage;
 use crate::plot::{BLACK, Canvas, Color, GREY, TextAlign, gray_level};
 
 /// The approximate side of an image on the canvas, in pixels.

@@ -16,7 +16,7 @@ use super::{
     Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
     plot_medium,
 };
-use crate::grin_task::{
+use crate::grin_design::{
     self, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport,
 };
 
@@ -29,7 +29,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// A built-in task.
 fn builtin(name: &str) -> Result<GrinTask, ExperimentError> {
-    let builtin = grin_task::find_builtin(name)
+    let builtin = grin_design::find_builtin(name)
         .ok_or_else(|| ExperimentError::Failed(format!("no task `{name}`")))?;
     builtin.task().map_err(ExperimentError::from_error)
 }

@@ -12,7 +12,7 @@ use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, report_progress,
 };
-use crate::grin_task::{FieldRepresentation, GrinOptimizer, GrinTask, ViewImage, ViewReport};
+use crate::grin_design::{FieldRepresentation, GrinOptimizer, GrinTask, ViewImage, ViewReport};
 use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {

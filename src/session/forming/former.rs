@@ -6,7 +6,7 @@
 use super::subject::{DocumentSource, GrinDocument};
 use crate::files;
 use crate::grin::Integrator;
-use crate::grin_task::{Domain, GrinField, GrinOptimizer, GrinProgress};
+use crate::grin_design::{Domain, GrinField, GrinOptimizer, GrinProgress};
 use crate::session::background::{Background, Outbox, Work, guarded, pool};
 use crate::session::clock::{Throttle, Timed, time};
 use crate::session::slot::Slot;

@@ -22,7 +22,7 @@ pub use wish::GrinCommand;
 
 use super::clock::{Throttle, Timed, time};
 use super::worker::RunStatus;
-use crate::grin_task::{GrinField, ViewReport};
+use crate::grin_design::{GrinField, ViewReport};
 use former::Former;
 use observer::LatestRequestWorker;
 use slice::{SliceRequest, compute_slice};

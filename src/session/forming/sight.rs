@@ -1,6 +1,6 @@
 //! How a person looks at a field: which slice, which quantity, how many rays.
 
-use crate::grin_task::{SlicePlane, SpatialAxis};
+use crate::grin_design::{SlicePlane, SpatialAxis};
 use serde::{Deserialize, Serialize};
 
 /// Most rays of each view in a slice.

@@ -4,7 +4,7 @@ use super::contour::{Contour, contours, level_set};
 use super::sight::{SliceQuantity, SliceSettings};
 use super::subject::GrinDocument;
 use crate::grin::IndexField;
-use crate::grin_task::{
+use crate::grin_design::{
     FieldDifference, FieldRepresentation, GrinField, RayPaths, SlicePlane, SpatialAxis,
 };
 use crate::math::Vec3;

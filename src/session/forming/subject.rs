@@ -4,7 +4,7 @@ use super::sight::{MAX_RAYS, SliceQuantity, SliceSettings};
 use crate::files;
 use crate::grin::field::Trilinear;
 use crate::grin::{GrinRegion, IndexField};
-use crate::grin_task::{
+use crate::grin_design::{
     self, Domain, FieldRepresentation, GrinField, GrinOptimizer, GrinTask, ReferenceField,
     SlicePlane, SpatialAxis,
 };
@@ -48,7 +48,7 @@ impl GrinDocument {
     pub(super) fn open(origin: &DocumentSource) -> Result<(Self, Option<GrinOptimizer>), String> {
         match origin {
             DocumentSource::Builtin(name) => {
-                let builtin = grin_task::find_builtin(name);
+                let builtin = grin_design::find_builtin(name);
                 let builtin = builtin.ok_or_else(|| format!("there is no task `{name}`"))?;
                 let task = builtin.task().map_err(|why| why.to_string())?;
                 Self::of_task(task, origin, name)
@@ -68,7 +68,7 @@ impl GrinDocument {
         let json: Option<Value> = text.and_then(|text| serde_json::from_str(text).ok());
         let has = |key: &str| json.as_ref().is_some_and(|json| json.get(key).is_some());
         if let Some(text) = text.filter(|_| has("aplanat_grin")) {
-            let task = grin_task::read_task(text, &file).map_err(|why| why.to_string())?;
+            let task = grin_design::read_task(text, &file).map_err(|why| why.to_string())?;
             return Self::of_task(task, origin, &file);
         }
         if bytes.starts_with(b"PK") || has("aplanat_volume") {

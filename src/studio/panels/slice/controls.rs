@@ -7,7 +7,7 @@ use eframe::egui::{
 
 use super::picture::SlicePicture;
 use super::{grin_command, words};
-use crate::grin_task::{BUILTIN_TASKS, FieldRepresentation, SlicePlane, SpatialAxis};
+use crate::grin_design::{BUILTIN_TASKS, FieldRepresentation, SlicePlane, SpatialAxis};
 use crate::session::{
     Command, GrinCommand, GrinRun, MAX_NODES, RunStatus, SessionView, SliceQuantity, SliceSettings,
 };

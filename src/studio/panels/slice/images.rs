@@ -7,7 +7,7 @@ use eframe::egui::{
 };
 
 use super::words;
-use crate::grin_task::ViewImage;
+use crate::grin_design::ViewImage;
 use crate::session::{GrinAnalysis, GrinRun, SessionView};
 
 /// The images as the graphics card has them.

@@ -16,7 +16,7 @@ pub(in crate::studio) use controls::DEFAULT_NODES;
 use eframe::egui::{Button, Frame, Margin, Panel as Side, ScrollArea, Ui};
 
 use super::Panel;
-use crate::grin_task::LightView as TaskView;
+use crate::grin_design::LightView as TaskView;
 use crate::math::Vec3;
 use crate::session::{Command, GrinCommand, GrinRun, SessionView};
 use crate::studio::draw::RenderBackend;

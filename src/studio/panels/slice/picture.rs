@@ -9,7 +9,7 @@ use eframe::egui::{
 use glam::DVec2;
 
 use super::{legend, words};
-use crate::grin_task::RayPath;
+use crate::grin_design::RayPath;
 use crate::math::Vec3;
 use crate::session::{SessionView, Slice};
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};

@@ -2,7 +2,7 @@
 
 use eframe::egui::{Label, RichText, Ui};
 
-use crate::grin_task::{
+use crate::grin_design::{
     GrinField, LightGoal, RayCounts, RayPath, RayPaths, SpatialAxis, ViewReport,
 };
 use crate::math::Vec3;

@@ -1,0 +1,10 @@
+//! Fields of a task: the one under optimisation, with its limits, and the reference fields.
+
+mod grin_field;
+pub(super) mod index_bounds;
+mod max_slope;
+mod maximum;
+mod reference;
+mod volume_checks;
+
+pub use grin_field::GrinField;

@@ -1,0 +1,125 @@
+//! The difference between a field and its reference, and the range of its index and gradient.
+
+use crate::grin::IndexField;
+use crate::grin_design::ReferenceFieldError;
+use crate::grin_design::field::GrinField;
+use crate::grin_design::field::index_bounds::IndexBound;
+use crate::grin_design::task::{FieldRepresentation, GrinTask};
+use crate::math::Vec3;
+
+/// Points along a side of the bounding box of the domain.
+const LATTICE: usize = 40;
+/// Points along a radius.
+const RADIAL: usize = 400;
+
+/// Fields count as equal if their mean square difference is below this fraction of their mean
+/// square.
+const ROUNDING_DIFFERENCE: f64 = 1e-26;
+
+/// The difference between two fields over the domain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldDifference {
+    /// `‖η - η*‖ / ‖η*‖`.
+    pub relative: f64,
+    /// The same after subtraction of the mean of `η² - η*²`: rays do not depend on that offset.
+    pub without_offset: f64,
+    /// That mean.
+    pub offset: f64,
+    /// `‖η - η*‖ / ‖η* - η₀‖` with the initial field `η₀`: 1 for an optimisation that found
+    /// nothing, infinite where the reference is the initial field up to rounding.
+    pub relative_to_contrast: f64,
+}
+
+/// The range of the index and the largest gradient over the domain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldExtremes {
+    /// The smallest index.
+    pub low: f64,
+    /// The largest index.
+    pub high: f64,
+    /// The largest gradient of the index, in 1/mm.
+    pub slope: f64,
+    /// The positions of these three, in mm.
+    pub at: [Vec3<f64>; 3],
+}
+
+impl GrinTask {
+    /// The difference from the reference field; `None` without a reference.
+    ///
+    /// # Errors
+    /// A volume that cannot be read.
+    pub fn difference(
+        &self,
+        medium: &GrinField,
+    ) -> Result<Option<FieldDifference>, ReferenceFieldError> {
+        let Some(exact) = &self.exact else { return Ok(None) };
+        self.difference_from(medium, &*exact.field::<f64>()?).map(Some)
+    }
+
+    /// The difference from another field.
+    ///
+    /// # Errors
+    /// An initial field that cannot be read.
+    pub fn difference_from(
+        &self,
+        medium: &GrinField,
+        exact: &dyn IndexField<f64>,
+    ) -> Result<FieldDifference, ReferenceFieldError> {
+        let start = self.start.index()?;
+        Ok(difference(medium.field(), exact, &*start, &self.comparison_points()))
+    }
+
+    /// The range of the index over the domain, and its largest gradient.
+    pub fn extremes(&self, medium: &GrinField) -> FieldExtremes {
+        let spaces = self.spaces();
+        let [low, high] =
+            [IndexBound::Low, IndexBound::High].map(|bound| medium.extreme_index(&spaces, bound));
+        let slope = medium.locate_max_slope(self.space);
+        FieldExtremes { low: low.0, high: high.0, slope: slope.0, at: [low.1, high.1, slope.1] }
+    }
+
+    /// Points over the domain, or along the radius of a spline, each with its weight.
+    fn comparison_points(&self) -> Vec<(Vec3<f64>, f64)> {
+        let along = |radius: f64, power: i32| {
+            let at = |i: usize| radius * (i as f64 + 0.5) / RADIAL as f64;
+            (0..RADIAL).map(|i| (Vec3::new(at(i), 0.0, 0.0), at(i).powi(power))).collect()
+        };
+        match self.field {
+            FieldRepresentation::Sphere { radius } => along(radius, 2),
+            FieldRepresentation::Cylinder { radius } => along(radius, 1),
+            FieldRepresentation::Trilinear { .. } | FieldRepresentation::Tricubic { .. } => {
+                self.space.lattice(LATTICE).into_iter().map(|p| (p, 1.0)).collect()
+            }
+        }
+    }
+}
+
+fn difference(
+    found: &dyn IndexField<f64>,
+    exact: &dyn IndexField<f64>,
+    start: &dyn Fn(Vec3<f64>) -> f64,
+    places: &[(Vec3<f64>, f64)],
+) -> FieldDifference {
+    let three = |p: Vec3<f64>| [found.sample(p).index, exact.sample(p).index, start(p)];
+    let all: Vec<([f64; 3], f64)> = places.iter().map(|(p, share)| (three(*p), *share)).collect();
+    let mean = |of: &dyn Fn(&[f64; 3]) -> f64| {
+        let shares: f64 = all.iter().map(|(_, share)| share).sum();
+        all.iter().map(|(three, share)| share * of(three)).sum::<f64>() / shares
+    };
+    let offset = mean(&|[found, exact, _]| found * found - exact * exact);
+    let norm = mean(&|[_, exact, _]| exact * exact);
+    let plain = mean(&|[found, exact, _]| (found - exact).powi(2));
+    let contrast = mean(&|[_, exact, start]| (exact - start).powi(2));
+    let level = |found: f64| (found * found - offset).max(0.0).sqrt();
+    let shape = mean(&|[found, exact, _]| (level(*found) - exact).powi(2));
+    FieldDifference {
+        relative: (plain / norm).sqrt(),
+        without_offset: (shape / norm).sqrt(),
+        offset,
+        relative_to_contrast: if contrast > ROUNDING_DIFFERENCE * norm {
+            (plain / contrast).sqrt()
+        } else {
+            f64::INFINITY
+        },
+    }
+}
