@@ -9,6 +9,7 @@
 mod distortion;
 mod fan;
 mod illumination;
+mod image_quality;
 mod mtf;
 mod pupil;
 mod ray_layout;
@@ -20,6 +21,7 @@ mod wavefront;
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, illumination};
+pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{MtfPoint, mtf};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};

@@ -1,54 +1,59 @@
-//! The spot: where the rays of a field land.
+//! The spot: the image points of the rays of a field.
 
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
-use crate::pupil::{Accuracy, Nodes, RayModel, Region, RegionKind, converge};
+use crate::pupil::{Accuracy, Nodes, PupilMoments, RayModel, Region, RegionKind, converge};
 use crate::trace::{ImagePoints, Landings, Rays, TraceSink};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// The spot of a field in one colour.
+/// The spot of a field at one wavelength.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MonochromaticSpot {
-    /// RMS distance from its own centroid, in mm.
+    /// The RMS distance of the rays from their centroid, in mm.
     pub rms: Estimate,
     /// The centroid, in mm.
     pub centroid: [Estimate; 2],
-    /// The area of the pupil that is lit, in pupil coordinates: π where nothing is clipped.
+    /// The area of the pupil that is lit, in pupil coordinates: π if nothing is clipped.
     pub area: Estimate,
-    /// The same in mm² of the plane through the first vertex: how much light the spot has.
+    /// The same area in mm² of the plane through the first vertex: the light of the spot.
     pub light: Estimate,
-    /// What the spot does out of focus.
+    /// The ray slopes, which give the spot out of focus.
     slopes: ArrivalSlopes,
-    /// Whether the tolerance was met.
+    /// True if the tolerance was reached.
     pub converged: bool,
 }
 
-/// The slopes with which the rays of a spot arrive.
+/// Moments of the slopes `L/N`, `M/N` with which the rays of a spot arrive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ArrivalSlopes {
     /// The mean slope.
     mean: [f64; 2],
     /// The mean square of the slope about its mean.
     variance: f64,
-    /// Its covariance with the place, in mm.
+    /// The covariance of slope and image point, in mm.
     covariance: f64,
 }
 
-/// The spot of a field.
+/// The spot of a field over all wavelengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spot {
     /// The field.
     pub field: FieldPoint,
-    /// One entry a wavelength; a colour may be dark by itself.
+    /// The spot at each wavelength; one may be dark by itself.
     pub channels: Vec<Result<MonochromaticSpot, AnalysisError>>,
-    /// RMS distance from the common centroid of all colours, in mm.
+    /// The RMS distance of the rays from the common centroid of all wavelengths, in mm.
     pub rms: Estimate,
     /// The common centroid, in mm.
     pub centroid: [Estimate; 2],
     /// The largest distance of any ray from the common centroid, in mm.
     pub radius: Estimate,
-    /// The lit colours with their shares in the light.
+    /// The area of the pupil in mm² of the plane through the first vertex, the mean over the
+    /// wavelengths by weight; a dark one counts as 0.
+    pub light: Estimate,
+    /// True if light gets through at every wavelength that has a weight.
+    pub is_fully_lit: bool,
+    /// The lit wavelengths, each with its share in the light.
     shares: Vec<(MonochromaticSpot, f64)>,
 }
 
@@ -67,8 +72,8 @@ impl Spot {
         colors().map(|(color, share)| share * square(color)).sum::<f64>().sqrt()
     }
 
-    /// By how much to move the image plane for the smallest RMS radius, in mm; `None` where all
-    /// rays are parallel.
+    /// The shift of the image plane that gives the smallest RMS radius, in mm along the light; `None`
+    /// if all rays are parallel.
     pub fn best_focus(&self) -> Option<f64> {
         // The mean square is a parabola: three of its points tell where its bottom is.
         let at = |defocus: f64| self.rms_at(defocus).powi(2);
@@ -89,58 +94,75 @@ pub fn spots(model: &RayModel, accuracy: Accuracy) -> Vec<Result<Spot, AnalysisE
     model.fields.par_iter().map(|field| spot(model, *field, accuracy)).collect()
 }
 
-/// The spot of a field in all colours; errors are relative to the RMS radius.
+/// The spot of a field over all wavelengths; errors are relative to the RMS radius.
 ///
 /// # Errors
-/// Where no colour of the field gets through: see [`AnalysisError`].
+/// No wavelength of the field gets through: see [`AnalysisError`].
 pub fn spot(
     model: &RayModel,
     field: FieldPoint,
     accuracy: Accuracy,
 ) -> Result<Spot, AnalysisError> {
-    let pairs: Vec<_> = (0..model.channels.len())
-        .into_par_iter()
-        .map(|w| {
-            let region = lit_region(model, field, w)?;
-            let spot = monochromatic_spot(&region, accuracy).ok_or(AnalysisError::NoLight)?;
-            Ok((region, spot))
-        })
-        .collect();
-    let lit: Vec<_> = pairs.iter().filter_map(|pair| pair.as_ref().ok()).collect();
-    let Some(shares) = shares(model, &lit) else {
-        let reason = pairs.iter().find_map(|pair| pair.as_ref().err().copied());
-        return Err(reason.unwrap_or(AnalysisError::NoLight));
-    };
-    let pooled = combine_channels(&lit, &shares);
+    let channels = trace_channels(model, field, accuracy);
+    let pooled = combine_channels(model, &channels)?;
+    let lit = || channels.iter().filter_map(|channel| channel.as_ref().ok());
     let center = pooled.centroid.map(|e| e.value);
     Ok(Spot {
         field,
         rms: pooled.rms,
         centroid: pooled.centroid,
-        radius: geometric_radius(&lit, center, pooled.rms.error),
-        shares: lit.iter().map(|pair| pair.1).zip(shares).collect(),
-        channels: pairs.iter().map(|pair| pair.as_ref().map(|p| p.1).map_err(|e| *e)).collect(),
+        radius: geometric_radius(lit(), center, pooled.rms.error),
+        light: pooled.light,
+        is_fully_lit: pooled.is_fully_lit,
+        shares: lit().map(|(_, spot)| *spot).zip(pooled.shares).collect(),
+        channels: channels.iter().map(|c| c.as_ref().map(|c| c.1).map_err(|e| *e)).collect(),
     })
 }
 
-/// The share of each lit colour in the light: its weight times the area of its pupil.
-fn shares(model: &RayModel, lit: &[&(Region<'_>, MonochromaticSpot)]) -> Option<Vec<f64>> {
-    let light = |(region, spot): &(Region<'_>, MonochromaticSpot)| {
-        model.channels[region.launch.wavelength].weight * spot.area.value
+/// The pupil and the spot at one wavelength.
+pub(super) type LitChannel<'a> = (Region<'a>, MonochromaticSpot);
+
+/// The pupil and the spot of a field at every wavelength, or why there is none.
+pub(super) fn trace_channels(
+    model: &RayModel,
+    field: FieldPoint,
+    accuracy: Accuracy,
+) -> Vec<Result<LitChannel<'_>, AnalysisError>> {
+    let trace = |wavelength| {
+        let region = lit_region(model, field, wavelength)?;
+        let spot = monochromatic_spot(&region, accuracy).ok_or(AnalysisError::NoLight)?;
+        Ok((region, spot))
     };
-    let sum: f64 = lit.iter().map(|pair| light(pair)).sum();
-    (sum > 0.0).then(|| lit.iter().map(|pair| light(pair) / sum).collect())
+    (0..model.channels.len()).into_par_iter().map(trace).collect()
 }
 
-struct PolychromaticSpot {
-    rms: Estimate,
+/// The spot over all wavelengths.
+pub(super) struct PolychromaticSpot {
+    pub(super) rms: Estimate,
     centroid: [Estimate; 2],
+    pub(super) light: Estimate,
+    pub(super) is_fully_lit: bool,
+    /// The share of each lit wavelength in the light.
+    shares: Vec<f64>,
 }
 
-/// All colours together: `rms² = Σ share (rms_λ² + |c_λ − c|²)`.
-fn combine_channels(lit: &[&(Region<'_>, MonochromaticSpot)], shares: &[f64]) -> PolychromaticSpot {
+/// All wavelengths together: `rms² = Σ share (rms_λ² + |c_λ − c|²)`, with shares in the light that
+/// are proportional to the weight of the wavelength times the area of its pupil.
+pub(super) fn combine_channels(
+    model: &RayModel,
+    channels: &[Result<LitChannel<'_>, AnalysisError>],
+) -> Result<PolychromaticSpot, AnalysisError> {
+    let weighted = || model.channels.iter().map(|channel| channel.weight).zip(channels);
+    let lit: Vec<(f64, &MonochromaticSpot)> =
+        weighted().filter_map(|(w, channel)| Some((w, &channel.as_ref().ok()?.1))).collect();
+    let sum: f64 = lit.iter().map(|(weight, spot)| weight * spot.area.value).sum();
+    if !(sum > 0.0) {
+        let reason = channels.iter().find_map(|channel| channel.as_ref().err().copied());
+        return Err(reason.unwrap_or(AnalysisError::NoLight));
+    }
+    let shares: Vec<f64> = lit.iter().map(|(w, spot)| w * spot.area.value / sum).collect();
     let rays = lit.iter().map(|(_, spot)| spot.rms.rays).sum();
-    let colors = || lit.iter().map(|pair| &pair.1).zip(shares);
+    let colors = || lit.iter().map(|(_, spot)| spot).zip(&shares);
     let center = [0, 1].map(|i| colors().map(|(c, share)| share * c.centroid[i].value).sum());
     let center_error = [0, 1].map(|i| colors().map(|(c, share)| share * c.centroid[i].error).sum());
     let (mut square, mut error) = (0.0, 0.0);
@@ -152,14 +174,29 @@ fn combine_channels(lit: &[&(Region<'_>, MonochromaticSpot)], shares: &[f64]) ->
     }
     let rms = square.sqrt();
     let error = if rms > 0.0 { error / rms } else { 0.0 };
-    PolychromaticSpot {
+    Ok(PolychromaticSpot {
         rms: Estimate::new(rms, error, rays),
         centroid: [0, 1].map(|i| Estimate::new(center[i], center_error[i], rays)),
-    }
+        light: mean_light(model, &lit),
+        is_fully_lit: weighted().all(|(weight, channel)| weight == 0.0 || channel.is_ok()),
+        shares,
+    })
 }
 
-/// What rounding may do to the place of a ray, in mm: a few units of the last digit of the largest
-/// coordinate on its way. It is the error of whatever a single ray says.
+/// The mean area of the pupils over the wavelengths by weight; a dark one counts as 0.
+fn mean_light(model: &RayModel, lit: &[(f64, &MonochromaticSpot)]) -> Estimate {
+    let total: f64 = model.channels.iter().map(|channel| channel.weight).sum();
+    let mut light = Estimate::new(0.0, 0.0, 0);
+    for (weight, spot) in lit {
+        light.value += weight / total * spot.light.value;
+        light.error += weight / total * spot.light.error;
+        light.rays += spot.light.rays;
+    }
+    light
+}
+
+/// The rounding error of the image point of a ray, in mm: a few units of the last digit of the largest
+/// coordinate on its path. It bounds the accuracy of any result from a single ray.
 pub fn rounding_error(model: &RayModel) -> f64 {
     let gaps =
         model.channels[model.primary].system.surfaces.iter().map(|surface| surface.thickness);
@@ -172,9 +209,9 @@ fn monochromatic_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<Monochr
     let found = converge(
         region,
         accuracy,
-        |nodes| SpotMoments::of(region, nodes).map(|m| m.numbers()),
+        |nodes| spot_moments(region, nodes),
         |[rms, _, _, area, ..]| {
-            // What rounding leaves of a perfect spot has no digits to ask for.
+            // The RMS radius of a perfect spot is rounding: no digit of it can converge.
             let rms = rms.max(rounding / accuracy.tolerance);
             let any = f64::INFINITY;
             [rms, rms, rms, *area, any, any, any, any]
@@ -207,69 +244,39 @@ impl MonochromaticSpot {
         mean.max(0.0).sqrt()
     }
 
-    /// By how much to move the image plane for the smallest RMS radius, in mm; `None` where all
-    /// rays are parallel.
+    /// The shift of the image plane that gives the smallest RMS radius, in mm along the light; `None`
+    /// if all rays are parallel.
     pub fn best_focus(&self) -> Option<f64> {
         let ArrivalSlopes { variance: square, covariance, .. } = self.slopes;
         (square > 0.0).then(|| -covariance / square)
     }
 }
 
-/// Weighted sums over the rays that arrive.
-#[derive(Debug, Clone, Copy, Default)]
-struct SpotMoments {
-    area: f64,
-    x: f64,
-    y: f64,
-    square: f64,
-    slope_square: f64,
-    covariance: f64,
-    drift: [f64; 2],
+/// RMS radius, centroid, area, variance of the slopes, covariance of slopes and image points, and
+/// mean slope over some nodes; `None` if no ray arrives.
+fn spot_moments(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 8]> {
+    let traced = region.trace::<Landings<f64>>(nodes);
+    let hits = &traced.sink;
+    let point = |i: usize| [hits.x[i], hits.y[i]];
+    let slope = |i: usize| [hits.l[i] / hits.n[i], hits.m[i] / hits.n[i]];
+    let points = PupilMoments::new(&traced, 1.0, point);
+    let slopes = PupilMoments::new(&traced, 1.0, slope);
+    let ([x, y], [u, v], area) = (points.centroid, slopes.centroid, points.area);
+    let product = |i: usize| {
+        let ([px, py], [su, sv]) = (point(i), slope(i));
+        (px - x) * (su - u) + (py - y) * (sv - v)
+    };
+    let covariance = traced.arrivals().map(|(i, w)| w * product(i)).sum::<f64>() / area;
+    (area > 0.0).then(|| [points.rms_radius(), x, y, area, slopes.spread / area, covariance, u, v])
 }
 
-impl SpotMoments {
-    /// The means and central second moments over some nodes; `None` where no ray arrives.
-    fn of(region: &Region<'_>, nodes: &Nodes) -> Option<Self> {
-        let landed = region.trace::<Landings<f64>>(nodes);
-        let hits = &landed.sink;
-        let area: f64 = landed.arrivals().map(|(_, w)| w).sum();
-        if !(area > 0.0) {
-            return None;
-        }
-        let mean = |of: &dyn Fn(usize) -> f64| {
-            // About the first ray, so that a small spot far from the axis keeps its digits.
-            let first = landed.arrivals().next().map_or(0.0, |(i, _)| of(i));
-            first + landed.arrivals().map(|(i, w)| w * (of(i) - first)).sum::<f64>() / area
-        };
-        let slope_x = |i: usize| hits.l[i] / hits.n[i];
-        let slope_y = |i: usize| hits.m[i] / hits.n[i];
-        let across = |of: &dyn Fn(usize) -> f64| if nodes.mirrored { 0.0 } else { mean(of) };
-        let (x, y) = (across(&|i| hits.x[i]), mean(&|i| hits.y[i]));
-        let (u, v) = (across(&slope_x), mean(&slope_y));
-        let mut moments = Self { area, x, y, drift: [u, v], ..Self::default() };
-        for (i, w) in landed.arrivals() {
-            let (dx, dy) = (hits.x[i] - x, hits.y[i] - y);
-            let (du, dv) = (slope_x(i) - u, slope_y(i) - v);
-            moments.square += w * (dx * dx + dy * dy) / area;
-            moments.slope_square += w * (du * du + dv * dv) / area;
-            moments.covariance += w * (dx * du + dy * dv) / area;
-        }
-        Some(moments)
-    }
-
-    fn numbers(&self) -> [f64; 8] {
-        let Self { area, x, y, square, slope_square, covariance, drift: [u, v] } = *self;
-        [square.sqrt(), x, y, area, slope_square, covariance, u, v]
-    }
-}
-
-/// Rays around the edge at which the largest distance is looked for.
+/// The rays around the edge from which the largest distance is found.
 const EDGE_RAYS: usize = 128;
 
-/// The largest distance of a ray from a point: the rays at the edge, and those of a quadrature
-/// inside it. The error is what half of the edge rays would have missed.
-fn geometric_radius(
-    lit: &[&(Region<'_>, MonochromaticSpot)],
+/// The largest distance of a ray from a point, over rays at the edge and those of a quadrature
+/// inside it. The error is the change if only every other edge ray is used.
+fn geometric_radius<'a>(
+    lit: impl Iterator<Item = &'a LitChannel<'a>>,
     center: [f64; 2],
     rms_error: f64,
 ) -> Estimate {

@@ -2,14 +2,15 @@
 //! and the sharpness and light of their fields.
 
 use super::{DataTable, ExperimentError, ProgressFn, TableCell, report_progress};
+use crate::analysis::{AnalysisError, Estimate, field_quality};
 use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens};
 use crate::merit::{PupilEdge, Term, WeightedTerm};
 use crate::optimize::pareto::{ParetoPoint, ParetoSettings, ParetoSweep, weighted_sum_goal};
 use crate::optimize::start_annealed;
-use crate::pupil::{RayModel, Region};
+use crate::pupil::{Accuracy, RayModel};
 
-/// The two orders of quadrature of reported numbers: their difference is the error.
-const ORDERS: [usize; 2] = [6, 8];
+/// The accuracy of reported numbers.
+const REPORTED: Accuracy = Accuracy { tolerance: 1e-6, max_rays: 100_000 };
 
 /// The monochromatic lens at some field angles, in degrees.
 pub(super) fn with_field_angles(mut lens: Lens, angles: &[f64]) -> Lens {
@@ -145,18 +146,15 @@ pub(super) fn field_view(
     field: FieldPoint,
     rays: &mut usize,
 ) -> Result<FieldView, ExperimentError> {
-    let launch = bench.launch(field, bench.primary).map_err(ExperimentError::from_error)?;
-    let region = Region::new(launch);
-    *rays += region.rays;
-    let [low, high] = ORDERS.map(|order| {
-        let lit = region.trace_pupil(order);
-        *rays += lit.rays_traced;
-        let moments = lit.moments;
-        let rms = if moments.area > 0.0 { (moments.spread / moments.area).sqrt() } else { 0.0 };
-        [moments.area, rms]
-    });
-    let number = |i: usize| [high[i], (high[i] - low[i]).abs()];
-    Ok(FieldView { angle: field.y, area: number(0), rms: number(1) })
+    let quality = field_quality(bench, field, REPORTED);
+    let rms = match quality.spot {
+        Err(AnalysisError::NoRays(why)) => return Err(ExperimentError::from_error(why)),
+        Err(_) => Estimate::new(0.0, 0.0, 0),
+        Ok(rms) => rms,
+    };
+    *rays += rms.rays;
+    let number = |estimate: Estimate| [estimate.value, estimate.error];
+    Ok(FieldView { angle: field.y, area: number(quality.light), rms: number(rms) })
 }
 
 /// The RMS spot radius over some fields in mm, and the mean area of their pupils in mm².

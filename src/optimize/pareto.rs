@@ -13,6 +13,7 @@
 //! result does not depend on the number of cores. The caller owns the loop.
 
 use super::{DescentMethod, Optimizer, start, start_annealed};
+use crate::analysis::{AnalysisError, image_quality};
 use crate::lens::{Lens, LensError, ParameterKind, Quantity, add_variables};
 use crate::merit::{Goal, MAX_STEEPNESS, Merit, MeritError, PupilEdge, Term, WeightedTerm};
 use crate::pupil::{RayModelError, limited_by_stop};
@@ -76,27 +77,22 @@ pub struct ParetoPoint {
 }
 
 impl ParetoPoint {
-    /// Evaluates a lens with its own rays; spot radii are accurate to the relative tolerance.
+    /// Evaluates the sharpness and light of a lens; spot radii are accurate to a relative tolerance.
     ///
     /// # Errors
-    /// A lens without a merit.
-    pub fn evaluate(lens: &Lens, weight: Option<f64>, tolerance: f64) -> Result<Self, MeritError> {
-        let terms = [Term::Spot, Term::Throughput].map(|term| WeightedTerm { term, weight: 1.0 });
-        let goal =
-            Goal { terms: terms.to_vec(), pupil: PupilEdge::Frozen, zoom_ratios: Vec::new() };
-        let merit = Merit::new(lens, &goal, tolerance)?;
-        let values = merit.terms(&merit.values(lens))?;
-        let (square, area) = (&values[0], &values[1]);
-        let spot = square.value.sqrt();
+    /// A lens that cannot be set up, or through which no light gets.
+    pub fn evaluate(lens: &Lens, weight: Option<f64>, tolerance: f64) -> Result<Self, ParetoError> {
+        let quality = image_quality(lens, tolerance)?;
+        let spot = quality.spot?;
         Ok(Self {
             lens: lens.clone(),
             weight,
-            spot,
-            spot_error: if spot > 0.0 { 0.5 * square.error / spot } else { 0.0 },
-            light: -area.value,
-            light_error: area.error,
-            has_light: merit.has_light(),
-            rays: square.rays,
+            spot: spot.value,
+            spot_error: spot.error,
+            light: quality.light.value,
+            light_error: quality.light.error,
+            has_light: quality.is_fully_lit,
+            rays: spot.rays,
         })
     }
 
@@ -161,6 +157,9 @@ pub enum ParetoError {
     /// The prescription is invalid.
     #[error(transparent)]
     Lens(#[from] LensError),
+    /// No light gets through it.
+    #[error(transparent)]
+    NoLight(#[from] AnalysisError),
     /// The lens has no merit.
     #[error(transparent)]
     Merit(#[from] MeritError),

@@ -1,7 +1,7 @@
 //! The summary of a lens: sharpness and light of every field, and its size.
 
 use super::focal_length::focal_length_of;
-use crate::analysis::{Estimate, Spot, spots};
+use crate::analysis::{Estimate, field_qualities};
 use crate::lens::{Lens, at_zoom};
 use crate::pupil::{Accuracy, RayModel, RayModelError};
 use crate::search::element;
@@ -54,12 +54,9 @@ impl LensSummary {
         for zoom in 0..lens.zoom_positions() {
             let bench = RayModel::from_lens(lens, zoom)?;
             focal_lengths.push(focal_length_of(&at_zoom(lens, zoom)));
-            for (i, spot) in spots(&bench, accuracy).into_iter().enumerate() {
-                let spot = spot.ok();
-                let light =
-                    spot.as_ref().map_or(Estimate::new(0.0, 0.0, 0), |s| mean_light(s, &bench));
+            for (i, quality) in field_qualities(&bench, accuracy).into_iter().enumerate() {
                 let (x, y) = (bench.fields[i].x, bench.fields[i].y);
-                let spot = spot.map(|spot| spot.rms);
+                let (spot, light) = (quality.spot.ok(), quality.light);
                 fields.push(FieldSummary { zoom, field: i, x, y, spot, light });
             }
         }
@@ -76,19 +73,4 @@ impl LensSummary {
     pub fn rays(&self) -> usize {
         self.fields.iter().map(|f| f.spot.map_or(0, |spot| spot.rays)).sum()
     }
-}
-
-/// The mean pupil area over the wavelengths by weight; a wavelength without light counts as 0.
-fn mean_light(spot: &Spot, bench: &RayModel) -> Estimate {
-    let total: f64 = bench.channels.iter().map(|color| color.weight).sum();
-    let mut light = Estimate::new(0.0, 0.0, 0);
-    for (color, found) in bench.channels.iter().zip(&spot.channels) {
-        if let Ok(found) = found {
-            let share = color.weight / total;
-            light.value += share * found.light.value;
-            light.error += share * found.light.error;
-            light.rays += found.light.rays;
-        }
-    }
-    light
 }

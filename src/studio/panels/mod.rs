@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 use super::draw::RenderBackend;
 use super::number;
 use super::wording::{capitalize, counted_from_one};
-use crate::analysis::{Estimate, Spot};
+use crate::analysis::{Estimate, ImageQuality, Spot};
 use crate::lens::{Edit, FieldKind, FieldPoint, Lens, ParameterKind, add_variables};
 use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 
@@ -127,17 +127,9 @@ fn pupil_share(spot: Option<&Spot>) -> f64 {
 
 /// The light of a lens: the mean area of its pupils in mm², over fields and wavelengths by weight.
 fn mean_pupil_area(numbers: &Analyses) -> f64 {
-    let bench = &numbers.bench.value;
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for (spot, field) in numbers.spots.value.iter().zip(&bench.fields) {
-        for (i, color) in bench.channels.iter().enumerate() {
-            let lit = spot.as_ref().ok().and_then(|spot| spot.channels[i].as_ref().ok());
-            let weight = field.weight * color.weight;
-            sum += weight * lit.map_or(0.0, |color| color.light.value);
-            weights += weight;
-        }
-    }
-    if weights > 0.0 { sum / weights } else { 0.0 }
+    let fields = numbers.spots.value.iter().zip(&numbers.bench.value.fields);
+    let parts = fields.map(|(spot, field)| (field.weight, ImageQuality::of_spot(spot)));
+    ImageQuality::mean(&parts.collect::<Vec<_>>()).light.value
 }
 
 /// The edit that lets the optimizer change some kinds of numbers too.
