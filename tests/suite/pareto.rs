@@ -93,6 +93,6 @@ fn settings_without_meaning_and_lenses_without_light_are_refused() {
     dark.surfaces[0].semi_diameter = Some(0.0);
     assert!(matches!(
         ParetoSweep::new(&dark, &ParetoSettings::default()),
-        Err(ParetoError::Merit(_))
+        Err(ParetoError::NoLight(_))
     ));
 }
