@@ -1,4 +1,5 @@
-//! Writing a file so that nothing is lost: beside the target, to the disk, then renamed over it.
+//! Atomic writing: the bytes go to a temporary file beside the target, which is synchronized and
+//! then renamed over it.
 
 use super::FileError;
 use std::fs::{self, File, OpenOptions};
@@ -6,25 +7,28 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Writes `bytes` to `path`; where that fails, what was there before is untouched.
+/// Replaces the content of `path` by `bytes`; on failure the target is unchanged.
+///
+/// # Errors
+/// [`FileError::Unwritable`]: the target is a folder or read-only, or the system refuses a step.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let unwritable = |source| FileError::Unwritable { file: path.display().to_string(), source };
-    // A link keeps pointing where it did: the file behind it is replaced.
+    // A link is kept: the file behind it is replaced.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     check_replaceable(&target).map_err(unwritable)?;
     let beside = temporary_path(&target).map_err(unwritable)?;
     let written = write_and_rename(&beside, &target, bytes);
     if written.is_err() {
-        // The first error is the one that counts.
+        // The error of the write is reported, not that of the clean-up.
         drop(fs::remove_file(&beside));
     }
     written.map_err(unwritable)
 }
 
-/// Refuses a file that could not be written, or replaced, before there is anything to write.
+/// Checks that a file can be written or replaced, before there is anything to write.
 ///
 /// # Errors
-/// The system's.
+/// [`FileError::Unwritable`], as from [`write_atomic`].
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     let unwritable = |source| FileError::Unwritable { file: path.display().to_string(), source };
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -34,7 +38,7 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
     made.and_then(|_| fs::remove_file(&beside)).map_err(unwritable)
 }
 
-/// Refuses what a rename would replace although it must not be written.
+/// Refuses targets that a rename would replace although they must not be written.
 fn check_replaceable(target: &Path) -> io::Result<()> {
     match fs::metadata(target) {
         Ok(data) if data.is_dir() => Err(io::Error::other("it is a folder")),
@@ -45,7 +49,7 @@ fn check_replaceable(target: &Path) -> io::Result<()> {
     }
 }
 
-/// A name in the same folder that nothing has.
+/// An unused name in the folder of the target.
 fn temporary_path(target: &Path) -> io::Result<PathBuf> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = target.file_name().ok_or_else(|| io::Error::other("it has no file name"))?;
@@ -67,7 +71,7 @@ fn write_and_rename(beside: &Path, target: &Path, bytes: &[u8]) -> io::Result<()
     Ok(())
 }
 
-/// Lets the rename reach the disk too; not every system can.
+/// Synchronizes the rename to the disk, where the system can.
 fn sync_folder(target: &Path) {
     let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if let Ok(folder) = File::open(folder) {

@@ -1,17 +1,17 @@
-//! The lenses that come with the program, inside it.
+//! Bundled lenses: the folder `lenses/`, embedded in the program.
 
-/// A lens that comes with the program.
+/// A bundled lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BundledLens {
     /// The name of its file in `lenses/`, without `.json`.
     pub name: &'static str,
-    /// What a menu shows.
+    /// The title in menus.
     pub title: &'static str,
     /// The text of the file.
     pub text: &'static str,
 }
 
-/// Every lens of the folder `lenses/`, the one that opens first in front.
+/// All lenses of the folder `lenses/`; the first is the one that the studio opens.
 pub fn bundled_lenses() -> &'static [BundledLens] {
     LENSES
 }

@@ -1,24 +1,27 @@
-//! From one file to another.
+//! Conversion of a lens file into another format.
 
 use super::{ConversionReport, FileError, SaveReport, SelfCheck};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// What became of a lens on its way from one file to another.
+/// The report of a conversion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Conversion {
-    /// What became of the lines of a foreign file that was read.
+    /// The report on the lines of a foreign file that was read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub import: Option<ConversionReport>,
-    /// The numbers to compare with the program from which it comes.
+    /// Numbers to compare with the program that wrote the file.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub checks: Vec<SelfCheck>,
-    /// What became of the numbers of the lens on writing.
+    /// The report on the written file.
     pub export: SaveReport,
 }
 
 /// Reads a lens from one file and writes it to another, each in any known format.
+///
+/// # Errors
+/// Those of [`open`](super::open) and [`save`](super::save).
 pub fn convert(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Conversion, FileError> {
     let opened = super::open(from)?;
     let export = super::save(&opened.lens, to)?;

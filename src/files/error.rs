@@ -1,62 +1,60 @@
-//! Why a file could not be read or written: the file, the place in it, what was found there and
-//! what was expected.
+//! Errors of reading and writing files: the file, the place in it, what was found there and what was
+//! expected.
 
 use crate::lens::LensError;
 use std::io;
 
-/// Why a file could not be read or written.
+/// An error of reading or writing a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The system refuses to read it.
+    /// The system cannot read the file.
     #[error("{file}: cannot be read: {source}")]
     Unreadable {
         /// The file.
         file: String,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The system refuses to write it; what was there before is untouched.
-    #[error("{file}: cannot be written: {source}; what was there before is untouched")]
+    /// The system cannot write the file; the previous content is unchanged.
+    #[error("{file}: cannot be written: {source}; the file is unchanged")]
     Unwritable {
         /// The file.
         file: String,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// It is something else than a lens.
+    /// The content is not a lens.
     #[error("{file}: found {found}; expected {expected}")]
     NotALens {
         /// The file.
         file: String,
-        /// What it seems to be.
+        /// The kind of content that was recognized.
         found: String,
-        /// What can be read.
+        /// The contents that are accepted.
         expected: &'static str,
     },
-    /// The text does not say what it should.
+    /// The content does not follow the format.
     #[error("{file}, {place}: found {found}; expected {expected}")]
     Malformed {
         /// The file.
         file: String,
-        /// Line and column, or line and surface.
+        /// The place: line, column and keys, or line and surface.
         place: String,
-        /// What stands there.
+        /// The content of that place.
         found: String,
-        /// What should.
+        /// The accepted content.
         expected: String,
     },
-    /// The text is sound, the lens is not.
+    /// The format is right, but the lens is invalid.
     #[error("{file}: {source}")]
     Lens {
         /// The file.
         file: String,
-        /// What is wrong with the lens.
+        /// The error of the lens.
         source: LensError,
     },
-    /// The written file does not trace like the lens; nothing was saved.
-    #[error(
-        "{file}: not saved, since it does not trace like the lens when it is read back: {what}"
-    )]
+    /// Read back, the file does not trace like the lens; nothing was saved.
+    #[error("{file}: not saved: read back, it does not trace like the lens: {what}")]
     RoundTripFailed {
         /// The file.
         file: String,
@@ -65,14 +63,14 @@ pub enum FileError {
     },
 }
 
-/// The parts of [`FileError::ParseError`] that a reader of text knows; the file is added outside.
+/// [`FileError::Malformed`] without the file, which the caller adds.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct ParseError {
-    /// Line and column, or line and surface.
+    /// The place: line, column and keys, or line and surface.
     pub(super) place: String,
-    /// What stands there.
+    /// The content of that place.
     pub(super) found: String,
-    /// What should.
+    /// The accepted content.
     pub(super) expected: String,
 }
 

@@ -1,8 +1,8 @@
-//! Reading and writing lenses and volumes; reading pictures.
+//! Reading and writing of lenses and volumes; reading of images.
 //!
-//! A file is known by its content first and its extension second. An import reports what it used,
-//! approximated, preserved and dropped; an export is read back and traced before it counts as
-//! written; a file is written beside its target and renamed, so that nothing is lost on the way.
+//! The format of a file is recognized by its content, then by its extension. An import reports what it
+//! used, approximated, preserved and dropped. An export is read back and traced before it is saved, and
+//! every file is written beside its target and renamed, so that a failure leaves the target unchanged.
 
 mod atomic;
 mod bundled;
@@ -10,8 +10,10 @@ mod convert;
 mod error;
 mod grayscale;
 pub mod json;
+mod probe_rays;
 mod report;
 mod round_trip;
+mod self_check;
 mod text;
 mod volume;
 pub mod zemax;
@@ -22,53 +24,57 @@ pub use convert::{Conversion, convert};
 pub use error::FileError;
 pub use grayscale::{GrayscaleImage, read_grayscale};
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
-pub use round_trip::{RoundTripCheck, SelfCheck};
+pub use round_trip::RoundTripCheck;
+pub use self_check::SelfCheck;
 pub use volume::{Volume, read_volume, write_volume};
 
 use crate::lens::Lens;
 use serde::Serialize;
 use std::path::Path;
 
-/// The formats that are read and written.
+/// A file format of lenses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LensFormat {
-    /// Our own JSON, `.json`.
+    /// The JSON of this program, `.json`.
     Native,
     /// Zemax, `.zmx`.
     Zemax,
 }
 
-/// A lens from a file.
+/// A lens read from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenedLens {
     /// The lens.
     pub lens: Lens,
-    /// What it was read from.
+    /// The format of the file.
     pub format: LensFormat,
-    /// What became of the lines of a foreign file.
+    /// The report on the lines of a foreign file.
     pub report: Option<ConversionReport>,
-    /// The numbers to compare with the program from which a foreign file comes; empty for our own
-    /// files, and for a lens whose glasses have no index at its wavelengths.
+    /// Numbers to compare with the program that wrote a foreign file; empty for JSON, and for a lens
+    /// whose glasses have no index at its wavelengths.
     pub checks: Vec<SelfCheck>,
 }
 
-/// What became of a saved lens.
+/// The report on a saved lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SaveReport {
-    /// What was written.
+    /// The format of the file.
     pub format: LensFormat,
-    /// What a foreign file could not hold exactly.
+    /// Everything that a foreign file cannot hold exactly.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<ConversionReport>,
-    /// That a foreign file traces like the lens.
+    /// The comparison of a foreign file with the lens by rays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<RoundTripCheck>,
 }
 
-const READABLE: &str = "a lens: our JSON (with the key `aplanat`) or Zemax .zmx";
+const READABLE: &str = "a lens: JSON with the key `aplanat`, or Zemax .zmx";
 
 /// Reads a lens from a file of any known format.
+///
+/// # Errors
+/// A file that cannot be read, and those of [`parse`].
 pub fn open(path: impl AsRef<Path>) -> Result<OpenedLens, FileError> {
     let path = path.as_ref();
     let file = path.display().to_string();
@@ -77,7 +83,11 @@ pub fn open(path: impl AsRef<Path>) -> Result<OpenedLens, FileError> {
     parse(&bytes, &file)
 }
 
-/// Reads a lens from the bytes of a file; `name` is for messages and, by its extension, a hint.
+/// Reads a lens from the bytes of a file. `name` is its name in messages, and its extension decides
+/// where the content does not.
+///
+/// # Errors
+/// Bytes that are not a lens, malformed text, or an invalid lens.
 pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
     let nothing = |found| FileError::NotALens { file: name.to_owned(), found, expected: READABLE };
     if let Some(found) = text::binary_kind(bytes) {
@@ -85,7 +95,7 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
     }
     let text = text::decode(bytes);
     let format = format_by_content(&text).or_else(|| format_by_extension(Path::new(name)));
-    match format.ok_or_else(|| nothing("text that is no lens".to_owned()))? {
+    match format.ok_or_else(|| nothing("text that is not a lens".to_owned()))? {
         LensFormat::Native => {
             text::require_unicode(bytes).map_err(|wrong| wrong.in_file(name))?;
             let lens = json::read(&text, name)?;
@@ -93,7 +103,7 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
         }
         LensFormat::Zemax => {
             let (lens, report) = zemax::read(&text, name)?;
-            let checks = round_trip::self_checks(&lens).unwrap_or_default();
+            let checks = self_check::self_checks(&lens).unwrap_or_default();
             Ok(OpenedLens { lens, format: LensFormat::Zemax, report: Some(report), checks })
         }
     }
@@ -115,8 +125,12 @@ fn format_by_extension(path: &Path) -> Option<LensFormat> {
     }
 }
 
-/// Writes a lens to a file, in the format of its extension: `.json` or `.zmx`. A foreign file is
-/// read back and traced first. Where anything fails, what was there before is untouched.
+/// Writes a lens to a file, in the format of its extension: `.json` or `.zmx`. A foreign file is read
+/// back and traced first. On failure the target is unchanged.
+///
+/// # Errors
+/// An invalid lens, another extension, a foreign file that does not trace like the lens, or a target
+/// that cannot be written.
 pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError> {
     let path = path.as_ref();
     let file = path.display().to_string();
@@ -137,7 +151,7 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     Ok(SaveReport { format, report, proof })
 }
 
-/// The bytes of a Zemax file that traces like the lens.
+/// The bytes of a Zemax file, checked by reading it back and tracing it.
 fn checked_zemax(
     lens: &Lens,
     file: &str,

@@ -1,27 +1,27 @@
-//! What became of each part of a lens on its way between two formats.
+//! The report of a conversion between two formats: the outcome of each part of the lens.
 
 use serde::Serialize;
 use std::fmt;
 
-/// What became of one line or one number.
+/// The outcome for one line or one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ConversionOutcome {
-    /// It means something that the other side cannot say; it is lost.
+    /// The other format cannot represent it; it is lost.
     Dropped,
-    /// It is there, but not quite as it was; the note says with what.
+    /// It is represented approximately, as described by the note.
     Approximated,
-    /// It changes no ray; it is kept in this report.
+    /// It affects no ray; it is kept in this report only.
     Preserved,
-    /// It is there exactly.
+    /// It is represented exactly.
     Used,
 }
 
 impl ConversionOutcome {
-    /// All of them, the one that matters most first.
+    /// All outcomes, the most important one first.
     pub const ALL: [Self; 4] = [Self::Dropped, Self::Approximated, Self::Preserved, Self::Used];
 
-    /// How reports call it.
+    /// The word in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Dropped => "dropped",
@@ -32,42 +32,42 @@ impl ConversionOutcome {
     }
 }
 
-/// One line of the source, or one number of the lens, and what became of it.
+/// One line of the source, or one number of the lens, with its outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ConversionRow {
-    /// What became of it.
+    /// The outcome.
     pub outcome: ConversionOutcome,
-    /// Its line in the foreign file, counted from 1; `None` for what has none there.
+    /// The line in the foreign file, counted from 1; `None` for a number that has no line there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<usize>,
-    /// Its first word.
+    /// The first word of the text.
     pub keyword: String,
-    /// All of it.
+    /// The whole text.
     pub text: String,
-    /// With what it was approximated, or why it was dropped.
+    /// The approximation, or the reason of the loss; empty for none.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
 
-/// What an import or export used, approximated, preserved and dropped.
+/// The report of an import or export: used, approximated, preserved and dropped parts.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct ConversionReport {
-    /// A row for each line of an import; on export one for whatever is not exact.
+    /// On import a row for each line; on export a row for each number that is not exact.
     pub rows: Vec<ConversionRow>,
 }
 
 impl ConversionReport {
-    /// How many rows ended so.
+    /// The number of rows with this outcome.
     pub fn count(&self, outcome: ConversionOutcome) -> usize {
         self.rows_with(outcome).count()
     }
 
-    /// The rows that ended so.
+    /// The rows with this outcome.
     pub fn rows_with(&self, outcome: ConversionOutcome) -> impl Iterator<Item = &ConversionRow> {
         self.rows.iter().filter(move |row| row.outcome == outcome)
     }
 
-    /// Adds a row that has no line in a file.
+    /// Adds a row without a line number.
     pub(super) fn add(&mut self, outcome: ConversionOutcome, what: &str, note: impl Into<String>) {
         self.rows.push(ConversionRow {
             outcome,
@@ -78,14 +78,14 @@ impl ConversionReport {
         });
     }
 
-    /// Changes what became of a line that was read before.
+    /// Changes the outcome of a line that was read before.
     pub(super) fn amend(
         &mut self,
         line: usize,
         outcome: ConversionOutcome,
         note: impl Into<String>,
     ) {
-        // An import adds its lines in order, and nothing else.
+        // An import adds one row for each line, in order.
         if let Ok(found) = self.rows.binary_search_by_key(&Some(line), |row| row.line) {
             self.rows[found].outcome = outcome;
             self.rows[found].note = note.into();

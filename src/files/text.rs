@@ -1,9 +1,9 @@
-//! From bytes to text: what encoding it is, and whether it is text at all.
+//! Decoding of text files: the encoding is guessed from the bytes, and binary files are recognized.
 
 use super::error::ParseError;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-/// What a file is that starts with these bytes, if it is surely no text.
+/// The first bytes of common binary files, and their kinds.
 const SIGNATURES: &[(&[u8], &str)] = &[
     (b"\x89PNG", "a PNG picture"),
     (b"\xFF\xD8\xFF", "a JPEG picture"),
@@ -19,10 +19,10 @@ const SIGNATURES: &[(&[u8], &str)] = &[
     (b"MZ", "a program"),
 ];
 
-/// Why bytes are no text.
+/// The kind of a file that is not text; `None` for text.
 pub(super) fn binary_kind(bytes: &[u8]) -> Option<String> {
     let known = SIGNATURES.iter().find(|(signature, _)| bytes.starts_with(signature));
-    // Some signatures are letters: only a file with control characters is what they say.
+    // Some signatures are letters, so they count only in a file with control characters.
     let binary = control_share(bytes) > 0.02;
     match known {
         Some((_, what)) if binary => Some((*what).to_owned()),
@@ -38,14 +38,14 @@ fn control_share(bytes: &[u8]) -> f64 {
     start.iter().filter(control).count() as f64 / start.len().max(1) as f64
 }
 
-/// The text of a file in UTF-16 or UTF-8, with or without byte order mark, or in an 8-bit code.
+/// Decodes UTF-16 or UTF-8, with or without a byte order mark, or Windows-1252.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let (mark, encoding) = encoding(bytes);
     let (text, _) = encoding.decode_without_bom_handling(&bytes[mark..]);
     text.into_owned()
 }
 
-/// Refuses bytes of an 8-bit code, in which letters mean what each country makes of them.
+/// Refuses 8-bit encodings, whose letters depend on the country.
 pub(super) fn require_unicode(bytes: &[u8]) -> Result<(), ParseError> {
     if encoding(bytes).1 != WINDOWS_1252 {
         return Ok(());
@@ -56,12 +56,12 @@ pub(super) fn require_unicode(bytes: &[u8]) -> Result<(), ParseError> {
     Err(ParseError { place: format!("line {line}"), found, expected: "UTF-8 text".to_owned() })
 }
 
-/// UTF-16 in the order of small machines, with its byte order mark.
+/// Encodes little-endian UTF-16 with a byte order mark.
 pub(super) fn encode_utf16(text: &str) -> Vec<u8> {
     std::iter::once(0xFEFF).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect()
 }
 
-/// How long the byte order mark is, and the encoding.
+/// The length of the byte order mark, in bytes, and the encoding.
 fn encoding(bytes: &[u8]) -> (usize, &'static Encoding) {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         return (mark, encoding);
@@ -77,7 +77,7 @@ fn encoding(bytes: &[u8]) -> (usize, &'static Encoding) {
     }
 }
 
-/// The share of zeros among every other byte at the start; Latin letters in UTF-16 have them.
+/// The share of zeros among every other byte at the start, which is high for Latin text in UTF-16.
 fn zero_share(bytes: &[u8], first: usize) -> f64 {
     let start = &bytes[..bytes.len().min(400)];
     let half = || start.iter().skip(first).step_by(2);

@@ -1,15 +1,15 @@
-//! JSON for people: a key of the lens a line, a surface a line, blanks after `:` and `,`.
+//! Layout of JSON for readers: a line for each key of the lens and each surface.
 
 use serde::Serialize;
 use serde_json::ser::Formatter;
 use std::io::{Result, Write};
 
-/// The text of a value; what is two levels down starts a line, what is deeper shares it.
+/// Writes a value as JSON text; the two outer levels have a line for each entry, deeper ones share it.
 pub fn pretty(value: &impl Serialize) -> String {
     let mut bytes = Vec::new();
     let mut serializer =
         serde_json::Serializer::with_formatter(&mut bytes, JsonLayout { depth: 0 });
-    // Writing to memory fails for no lens; an empty text would be refused on reading.
+    // Writing to memory does not fail; an empty text would be refused on reading.
     if value.serialize(&mut serializer).is_err() {
         return String::new();
     }

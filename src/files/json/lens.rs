@@ -10,7 +10,7 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
-/// The keys of a lens.
+/// The keys of a lens file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LensJson {
@@ -90,7 +90,7 @@ impl<'de> Deserialize<'de> for Lens {
     }
 }
 
-/// The keys of an object that is not at infinity.
+/// The keys of an object at a finite distance.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ObjectJson {

@@ -8,12 +8,12 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
-/// True for air, which is not written.
+/// True for air, the default, which is not written.
 pub(super) fn is_air(medium: &Medium) -> bool {
     *medium == Medium::Air
 }
 
-/// The keys of a medium that is not a name.
+/// The keys of a medium that is given by numbers.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MediumJson {
@@ -23,7 +23,7 @@ struct MediumJson {
     gradient: Option<GradientIndexJson>,
 }
 
-/// The keys of a gradient.
+/// The keys of a gradient-index medium.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GradientIndexJson {

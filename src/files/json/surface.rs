@@ -8,7 +8,7 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
-/// The keys of a surface. A `radius` is read but never written.
+/// The keys of a surface. `radius` is read in place of `curvature` and never written.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RowJson {
@@ -47,7 +47,7 @@ struct RowJson {
     comment: String,
 }
 
-/// A zero without sign, so that −0 is written and comes back with its sign.
+/// True for +0, the default. −0 is written, so that its sign is read back.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
 fn is_plain_zero(value: &f64) -> bool {
     value.to_bits() == 0
@@ -59,7 +59,7 @@ fn is_false(value: &bool) -> bool {
 }
 
 impl RowJson {
-    /// One over the radius, whichever of the two is given.
+    /// The curvature, from either of the two keys.
     fn curvature(&self) -> Result<f64, &'static str> {
         match (self.curvature, self.radius) {
             (Some(_), Some(_)) => Err("both `curvature` and `radius`, expected one of them"),

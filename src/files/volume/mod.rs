@@ -1,7 +1,7 @@
-//! Volumes: values on a grid, for fields of refractive index.
+//! Volumes: samples of a refractive index on a regular grid.
 //!
-//! Two formats, told apart by their content: `NumPy`'s `.npz`, and raw numbers with a JSON header. In
-//! both x runs fastest. A file for the first is written in Python by
+//! Two formats, recognized by their content: `NumPy`'s `.npz`, and raw numbers with a JSON header. In
+//! both x runs fastest. Python writes the first with
 //! `np.savez("lens.npz", index=a, low=[-1, -1, -1], spacing=[0.1, 0.1, 0.1])` with `a.shape == (nz,
 //! ny, nx)`, lengths in mm.
 
@@ -15,19 +15,19 @@ use crate::grin::field::RegularGrid;
 use crate::math::Vec3;
 use std::path::{Path, PathBuf};
 
-/// Values on a grid.
+/// Samples on a regular grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Volume {
-    /// Where the nodes stand, in mm.
+    /// The grid, in mm.
     pub grid: RegularGrid<f64>,
-    /// A value for each node, in the order of the grid.
+    /// One value for each node, in the order of the grid.
     pub values: Vec<f64>,
 }
 
 /// Reads a volume.
 ///
 /// # Errors
-/// A file that cannot be read or does not say what it should; see [`FileError`].
+/// A file that cannot be read or is malformed; see [`FileError`].
 pub fn read_volume(path: &Path) -> Result<Volume, FileError> {
     let file = path.display().to_string();
     let bytes = std::fs::read(path)
@@ -38,14 +38,14 @@ pub fn read_volume(path: &Path) -> Result<Volume, FileError> {
     let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
     if first != Some(&b'{') {
         let (place, found) = ("its beginning".to_owned(), describe_start(&bytes));
-        let expected = "NumPy's .npz, an archive that begins with `PK`, or a header of a volume, \
+        let expected = "NumPy's .npz, an archive that begins with `PK`, or the header of a volume, \
             JSON that begins with `{`";
         return Err(ParseError { place, found, expected: expected.to_owned() }.in_file(&file));
     }
     raw::read(path, &bytes)
 }
 
-/// What a file seems to be that is no volume.
+/// The beginning of a file that is not a volume, for a message.
 fn describe_start(bytes: &[u8]) -> String {
     let start = &bytes[..bytes.len().min(16)];
     match std::str::from_utf8(start) {
@@ -58,12 +58,12 @@ fn describe_start(bytes: &[u8]) -> String {
     }
 }
 
-/// Writes a volume: `NumPy`'s format to a file that ends in `.npz`, else a JSON header and the numbers
-/// beside it in a file that ends in `.raw`. Every file that was written.
+/// Writes a volume and returns the paths of the written files: `NumPy`'s format for the extension
+/// `.npz`, else a JSON header with the numbers in a `.raw` file beside it.
 ///
 /// # Errors
-/// A file that cannot be written; what was there before is untouched, except that the numbers of a
-/// `.raw` file are replaced before its header.
+/// A file that cannot be written; the targets are unchanged, except that the numbers of a `.raw` file
+/// are replaced before its header.
 pub fn write_volume(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
     let is_npz = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz"));
     if !is_npz {
@@ -73,7 +73,7 @@ pub fn write_volume(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileEr
     Ok(vec![path.to_owned()])
 }
 
-/// The volume of these numbers; `place` is where they stand.
+/// Checks that there is one finite value for each node; `place` is their place in a message.
 fn checked_volume(
     counts: [usize; 3],
     low: [f64; 3],
@@ -104,4 +104,9 @@ fn checked_volume(
             expected: "a positive spacing".to_owned(),
         }),
     }
+}
+
+/// Decodes numbers of `N` bytes each; an incomplete one at the end is ignored.
+fn decode<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+    bytes.as_chunks::<N>().0.iter().map(|bytes| number(*bytes)).collect()
 }

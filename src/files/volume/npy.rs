@@ -1,9 +1,9 @@
-//! One array in `NumPy`'s format (NEP 1): a magic string, a header that is a Python dictionary, and the
-//! numbers.
+//! One array in `NumPy`'s format (NEP 1): a magic string, a Python dictionary as header, and the numbers.
 
+use super::decode;
 use crate::files::error::ParseError;
 
-/// An array of numbers, the last index running fastest.
+/// An array of numbers in row-major order: the last index runs fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct NpyArray {
     pub(super) shape: Vec<usize>,
@@ -12,7 +12,7 @@ pub(super) struct NpyArray {
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Reads an array; `name` is what it is called in its file.
+/// Reads an array; `name` is its name in messages.
 pub(super) fn read(name: &str, bytes: &[u8]) -> Result<NpyArray, ParseError> {
     let wrong = |found: String, expected: &str| ParseError {
         place: format!("array {name}"),
@@ -20,7 +20,7 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<NpyArray, ParseError> {
         expected: expected.to_owned(),
     };
     let (header, data) = split_header(bytes)
-        .ok_or_else(|| wrong("no header of an array".into(), "NumPy's .npy format"))?;
+        .ok_or_else(|| wrong("no array header".into(), "NumPy's .npy format"))?;
     let entry = |key| header_entry(header, key).unwrap_or_default();
     let kind = entry("descr").trim_matches(['\'', '"']);
     let numbers: Vec<f64> = match kind {
@@ -36,7 +36,7 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<NpyArray, ParseError> {
     if count != Some(numbers.len()) {
         return Err(wrong(
             format!("{} numbers for {shape:?}", numbers.len()),
-            "one for each place",
+            "one for each element",
         ));
     }
     let values =
@@ -44,11 +44,11 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<NpyArray, ParseError> {
     Ok(NpyArray { shape, values })
 }
 
-/// The header and the numbers.
+/// The header and the bytes of the numbers.
 fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (version, rest) = rest.split_at_checked(2)?;
-    // Version 1 counts the bytes of its header with 2 bytes, later ones with 4.
+    // The length of the header has 2 bytes in version 1 and 4 in later versions.
     let (length, rest) = if version[0] == 1 {
         let (length, rest) = rest.split_first_chunk()?;
         (u32::from(u16::from_le_bytes(*length)), rest)
@@ -60,7 +60,7 @@ fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     Some((std::str::from_utf8(header).ok()?, data))
 }
 
-/// The text of an entry of a dictionary of strings, words and tuples.
+/// The text of an entry of the header, a dictionary of strings, words and tuples.
 fn header_entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, rest) = header.split_once(&format!("'{key}'"))?;
     let rest = rest.trim_start().strip_prefix(':')?.trim_start();
@@ -74,12 +74,7 @@ fn parse_shape(tuple: &str) -> Option<Vec<usize>> {
     counts.map(|count| count.parse().ok()).collect()
 }
 
-fn decode<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-    let (whole, _) = data.as_chunks::<N>();
-    whole.iter().map(|bytes| number(*bytes)).collect()
-}
-
-/// Numbers whose first index runs fastest, with the last running fastest.
+/// Reorders numbers from column-major to row-major order.
 fn to_row_major(shape: &[usize], numbers: &[f64]) -> Vec<f64> {
     let place = |mut n: usize| {
         let (mut at, mut stride) = (0, numbers.len());
@@ -98,7 +93,7 @@ pub(super) fn write(shape: &[usize], values: &[f64]) -> Vec<u8> {
     let counts: Vec<String> = shape.iter().map(|count| format!("{count},")).collect();
     let shape = counts.join(" ");
     let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({shape}), }}");
-    // The numbers begin at a multiple of 64 bytes, and a line end closes the header.
+    // The numbers begin at a multiple of 64 bytes, and the header ends with a line feed.
     let before = MAGIC.len() + 4;
     let padding = (before + header.len() + 1).next_multiple_of(64) - before - header.len() - 1;
     header.push_str(&" ".repeat(padding));

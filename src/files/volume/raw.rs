@@ -1,37 +1,37 @@
 //! A volume as raw little-endian numbers with a JSON header beside them.
 //!
-//! The value at a node is `offset + scale * number`: a volume of densities in bytes, as many are
-//! kept, becomes one of the index by `"scale": -1.176e-6, "offset": 1.0003`. Left out, they are 1 and
-//! 0, and the numbers are the values themselves.
+//! The value at a node is `offset + scale * number`, with the defaults 0 and 1. For example, densities
+//! stored as bytes become an index by `"scale": -1.176e-6, "offset": 1.0003`.
 
-use super::{Volume, checked_volume};
+use super::{Volume, checked_volume, decode};
 use crate::files::FileError;
 use crate::files::error::ParseError;
+use crate::files::json;
 use crate::files::write_atomic;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What the numbers mean.
+/// The header: grid, number format and scale.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawHeader {
-    /// The version of this format: 1.
+    /// The version of the format: 1.
     aplanat_volume: u32,
-    /// Nodes along x, y and z.
+    /// The number of nodes along x, y and z.
     counts: [usize; 3],
-    /// The first node, in mm.
+    /// The position of the first node, in mm.
     low: [f64; 3],
-    /// Between neighbours along x, y and z, in mm.
+    /// The distance of neighbours along x, y and z, in mm.
     spacing: [f64; 3],
-    /// How a number is written.
+    /// The format of a number.
     numbers: SampleFormat,
-    /// The value where the number is 0.
+    /// The value for the number 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     offset: f64,
-    /// What the value grows by from a number to the next whole one.
+    /// The difference of the values for the numbers 1 and 0.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     scale: f64,
-    /// The file of the numbers, beside this one.
+    /// The file of the numbers, relative to the header.
     data: PathBuf,
 }
 
@@ -49,7 +49,7 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// How a number is written, with its lowest byte first.
+/// The format of a number, little-endian.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum SampleFormat {
@@ -76,25 +76,16 @@ impl SampleFormat {
     fn read(self, bytes: &[u8]) -> Vec<f64> {
         match self {
             Self::U8 => bytes.iter().map(|b| f64::from(*b)).collect(),
-            Self::U16 => each(bytes, |b| f64::from(u16::from_le_bytes(b))),
-            Self::F32 => each(bytes, |b| f64::from(f32::from_le_bytes(b))),
-            Self::F64 => each(bytes, f64::from_le_bytes),
+            Self::U16 => decode(bytes, |b| f64::from(u16::from_le_bytes(b))),
+            Self::F32 => decode(bytes, |b| f64::from(f32::from_le_bytes(b))),
+            Self::F64 => decode(bytes, f64::from_le_bytes),
         }
     }
 }
 
-/// Numbers of so many bytes each.
-fn each<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-    bytes.as_chunks::<N>().0.iter().map(|bytes| number(*bytes)).collect()
-}
-
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Volume, FileError> {
     let file = path.display().to_string();
-    let header: RawHeader = serde_json::from_slice(bytes).map_err(|error| {
-        let place = format!("line {}, column {}", error.line(), error.column());
-        let expected = "a header of a volume, or NumPy's .npz".to_owned();
-        ParseError { place, found: error.to_string(), expected }.in_file(&file)
-    })?;
+    let header: RawHeader = json::read_json(&String::from_utf8_lossy(bytes), &file)?;
     if header.aplanat_volume != 1 {
         let found = format!("version {}", header.aplanat_volume);
         let place = "aplanat_volume".to_owned();
@@ -115,7 +106,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Volume, FileError> {
         .map_err(|malformed| malformed.in_file(&file))
 }
 
-/// Writes a header and the numbers beside it: both files.
+/// Writes a header and the numbers beside it; returns both paths.
 pub(super) fn write(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
     let data = path.with_extension("raw");
     let (low, spacing) = (volume.grid.low(), volume.grid.spacing());

@@ -1,16 +1,16 @@
-//! Coordinate breaks: a run of them that puts the axis back where it was changes no ray and is
-//! read as planes; any other is refused.
+//! Coordinate breaks: a run of them that restores the axis affects no ray and is read as planes; any
+//! other is refused.
 
 use super::file::ZemaxSurface;
 use crate::files::error::ParseError;
 use nalgebra::{Rotation3, Vector3};
 
-/// Whether this is a coordinate break.
+/// True for a coordinate break.
 pub(super) fn is_break(surface: &ZemaxSurface) -> bool {
     surface.kind.0 == "COORDBRK"
 }
 
-/// Refuses the breaks that move or tilt the axis.
+/// Refuses runs of coordinate breaks that decentre or tilt the axis.
 pub(super) fn check_breaks(surfaces: &[ZemaxSurface]) -> Result<(), ParseError> {
     let mut frame = AxisFrame::default();
     let mut first = None;
@@ -23,7 +23,7 @@ pub(super) fn check_breaks(surfaces: &[ZemaxSurface]) -> Result<(), ParseError> 
         let run_ends = !is_break(surface) || gap != 0.0 || number + 1 == surfaces.len();
         let Some((start, at)) = first.filter(|_| run_ends) else { continue };
         if !frame.is_identity() {
-            let found = format!("surface {start}, a coordinate break that the next does not undo");
+            let found = format!("surface {start}, a coordinate break that is not undone");
             let expected = "surfaces that are centred on the axis".to_owned();
             return Err(ParseError { place: format!("line {}", at.kind.1), found, expected });
         }
@@ -32,7 +32,7 @@ pub(super) fn check_breaks(surfaces: &[ZemaxSurface]) -> Result<(), ParseError> 
     Ok(())
 }
 
-/// Where the axes of the present frame are in the frame before the run: `p = R q + d`.
+/// The current frame relative to the frame before the run: a point `q` becomes `p = R q + d`.
 struct AxisFrame {
     rotation: Rotation3<f64>,
     shift: Vector3<f64>,
@@ -45,8 +45,8 @@ impl Default for AxisFrame {
 }
 
 impl AxisFrame {
-    /// Parameters: 1, 2 decentre; 3, 4, 5 tilts about x, y, z in degrees; 6 zero where the
-    /// decentre comes first and the tilts in this order, else the reverse.
+    /// Applies a break. Parameters: 1, 2 decentre; 3, 4, 5 tilts about x, y, z in degrees; 6: zero for
+    /// decentre first and tilts in this order, else the reverse.
     fn apply(&mut self, surface: &ZemaxSurface) {
         let value = |index| {
             let found = surface.parameters.iter().rfind(|(i, ..)| *i == index);
@@ -67,7 +67,7 @@ impl AxisFrame {
 
     fn is_identity(&self) -> bool {
         let tilt = (self.rotation.matrix() - nalgebra::Matrix3::identity()).amax();
-        // Written not as `>` so that a frame that is not a number is none either.
+        // Not written with `>`, so that NaN is not the identity.
         tilt < 1e-12 && self.shift.amax() < 1e-9
     }
 }
@@ -101,7 +101,7 @@ mod tests {
             check_breaks(&[ZemaxSurface::default(), there(), ZemaxSurface::default()]).unwrap_err();
         assert_eq!(error.place, "line 7");
         assert!(error.found.contains("surface 1"));
-        // With a surface between them the two tilt that surface.
+        // With a surface between them the two breaks tilt that surface.
         let back = || coordinate_break([0.0, 0.0, -45.0, 0.0, 0.0, 1.0]);
         assert!(check_breaks(&[there(), ZemaxSurface::default(), back()]).is_err());
         let same_order = coordinate_break([1.0, 0.0, -45.0, 0.0, 0.0, 0.0]);

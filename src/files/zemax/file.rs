@@ -1,6 +1,6 @@
-//! What a `.zmx` file says, before anything is made of it. Lengths are in its own unit.
+//! The content of a `.zmx` file before it is interpreted. Lengths are in the unit of the file.
 
-/// Everything in a file that a lens can be made of.
+/// The content of a file.
 #[derive(Debug)]
 pub(super) struct ZemaxFile {
     /// Millimetres per unit.
@@ -13,7 +13,7 @@ pub(super) struct ZemaxFile {
     /// Names of glass catalogues, in the order in which they are searched.
     pub(super) catalogues: Vec<String>,
     pub(super) surfaces: Vec<ZemaxSurface>,
-    /// How many configurations there are.
+    /// The number of configurations.
     pub(super) configurations: usize,
     pub(super) operands: Vec<ConfigurationOperand>,
 }
@@ -35,7 +35,7 @@ impl Default for ZemaxFile {
     }
 }
 
-/// How the width of the beam is given.
+/// The definition of the beam width.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum ApertureLine {
     Diameter(f64),
@@ -45,7 +45,7 @@ pub(super) enum ApertureLine {
     FloatByStop,
 }
 
-/// The lines that give the field points.
+/// The lines of the field points.
 #[derive(Debug, Default)]
 pub(super) struct FieldLines {
     /// 0 angle, 1 object height, 2 paraxial image height, 3 real image height, 4 theodolite; with
@@ -57,7 +57,7 @@ pub(super) struct FieldLines {
     pub(super) weights: Vec<f64>,
 }
 
-/// The lines that give the wavelengths.
+/// The lines of the wavelengths.
 #[derive(Debug, Default)]
 pub(super) struct WaveLines {
     pub(super) count: Option<usize>,
@@ -76,7 +76,7 @@ pub(super) struct ZemaxSurface {
     /// The line of its `SURF`.
     pub(super) line: usize,
     pub(super) stop: Option<usize>,
-    /// Its type, empty for none, and the line.
+    /// The surface type, empty for none, and its line.
     pub(super) kind: (String, usize),
     pub(super) comment: String,
     pub(super) curvature: Option<(f64, usize)>,
@@ -85,13 +85,13 @@ pub(super) struct ZemaxSurface {
     /// Parameter and extra-data numbers with their index and line.
     pub(super) parameters: Vec<(usize, f64, usize)>,
     pub(super) extra: Vec<(usize, f64, usize)>,
-    /// Infinite for the word, and the line.
+    /// Infinite for the word `INFINITY`, and the line.
     pub(super) thickness: Option<(f64, usize)>,
     pub(super) glass: Option<GlassLine>,
     pub(super) semi_diameter: Option<SemiDiameterLine>,
-    /// The radius outside which a circular aperture cuts, and its line.
+    /// The outer radius of a circular aperture, and its line.
     pub(super) clip: Option<(f64, usize)>,
-    /// The radius inside which an aperture or an obscuration cuts, and its line.
+    /// The inner radius of an aperture or the outer one of an obscuration, and its line.
     pub(super) obstruction: Option<(f64, usize)>,
     pub(super) variable_thickness: Option<(f64, f64, usize)>,
     pub(super) thickness_pickup: Option<PickupLine>,
@@ -102,7 +102,7 @@ pub(super) struct ZemaxSurface {
     pub(super) variable_parameters: Vec<(usize, usize)>,
 }
 
-/// What the curvature follows.
+/// The solve of a curvature.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) enum CurvatureSolve {
     #[default]
@@ -111,7 +111,7 @@ pub(super) enum CurvatureSolve {
     Pickup(PickupLine),
 }
 
-/// A number that follows that of another surface.
+/// A pickup of the same number of another surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PickupLine {
     pub(super) surface: usize,
@@ -120,11 +120,11 @@ pub(super) struct PickupLine {
     pub(super) line: usize,
 }
 
-/// A semi-diameter and how it came about.
+/// A semi-diameter and its origin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SemiDiameterLine {
     pub(super) value: f64,
-    /// Whether a person fixed it; else the program computed it.
+    /// True if it was typed; else the program computed it.
     pub(super) fixed: bool,
     pub(super) line: usize,
 }
@@ -141,7 +141,7 @@ pub(super) struct GlassLine {
     pub(super) vd: f64,
     pub(super) partial: f64,
     pub(super) variable_index: bool,
-    /// What is added to nd and vd for code 4.
+    /// The offsets of nd and vd for code 4.
     pub(super) offsets: (f64, f64),
     pub(super) line: usize,
 }

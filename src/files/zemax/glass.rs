@@ -1,8 +1,8 @@
-//! From a `GLAS` line to a medium.
+//! The medium of a `GLAS` line.
 //!
 //! The line names a glass but not its maker: the catalogues of `GCAT` are searched in their order.
-//! Index and Abbe number on the line may be placeholders and count only where no catalogue has
-//! the name.
+//! Index and Abbe number on the line may be placeholders; they are used only where no catalogue has the
+//! name.
 
 use super::file::{GlassLine, ZemaxSurface};
 use crate::files::error::ParseError;
@@ -10,7 +10,7 @@ use crate::files::report::ConversionOutcome;
 use crate::lens::Medium;
 use crate::lens::glass::{self, Glass};
 
-/// A medium, how faithful it is, and why.
+/// A medium, the outcome of its import, and the note on it.
 pub(super) type ImportedMedium = (Medium, ConversionOutcome, String);
 
 /// The medium behind surface `number`.
@@ -20,7 +20,7 @@ pub(super) fn medium(
     catalogues: &[String],
 ) -> Result<ImportedMedium, ParseError> {
     let mut at = number;
-    // A glass may be picked up from a surface that picks it up itself.
+    // A glass may be picked up from a surface that has a pickup itself.
     for _ in 0..=surfaces.len() {
         let line = surfaces.get(at).and_then(|surface| surface.glass.as_ref());
         match line {
@@ -30,7 +30,7 @@ pub(super) fn medium(
         }
     }
     let line = surfaces[number].glass.as_ref().map_or(0, |glass| glass.line);
-    let found = format!("surface {number}, whose glass is picked up in a circle");
+    let found = format!("surface {number}, whose glass pickups form a circle");
     Err(malformed_glass(line, found, "a pickup that ends at a glass"))
 }
 
@@ -55,20 +55,20 @@ fn resolve_glass(line: &GlassLine, catalogues: &[String]) -> Result<ImportedMedi
     }
 }
 
-/// The glass of that name, in the first of the catalogues that has it, or in the only one.
+/// The glass of this name, in the first of the catalogues that has it, or else in any.
 fn find_in_catalogues(name: &str, catalogues: &[String]) -> Option<&'static Glass> {
     let listed = catalogues.iter().find_map(|catalogue| {
-        // `OHARA_2021-04` is a state of the catalogue `OHARA`.
+        // `OHARA_2021-04` is a version of the catalogue `OHARA`.
         let maker = catalogue.split(['_', '-']).next().unwrap_or_default();
         glass::find(&format!("{maker} {name}"))
     });
     listed.or_else(|| glass::find(name))
 }
 
-/// What makers put in front of the names of glasses that replaced older ones.
+/// Prefixes of glasses that replaced older ones.
 const PREFIXES: [&str; 5] = ["N-", "S-", "H-", "E-", "J-"];
 
-/// A glass of nearly that name, if the line's own index, where it has one, agrees.
+/// A glass of a similar name, provided that the index on the line, if any, agrees.
 fn find_similar(line: &GlassLine, catalogues: &[String]) -> Option<(&'static Glass, bool)> {
     let name = line.name.to_ascii_uppercase();
     let with = |prefix: &&str| find_in_catalogues(&format!("{prefix}{name}"), catalogues);
@@ -81,7 +81,7 @@ fn find_similar(line: &GlassLine, catalogues: &[String]) -> Option<(&'static Gla
     agrees.then_some((found, false))
 }
 
-/// Whether index and Abbe number on the line say nothing.
+/// True if index and Abbe number on the line are placeholders.
 fn is_placeholder(line: &GlassLine) -> bool {
     line.nd <= 1.0 || (line.nd, line.vd) == (1.5, 40.0)
 }
@@ -100,7 +100,7 @@ fn model_medium(line: &GlassLine) -> ImportedMedium {
     }
 }
 
-/// The catalogue glass; for code 4 a model glass with what is added to its nd and vd.
+/// The catalogue glass; for code 4 a model glass with its offsets of nd and vd.
 fn catalogue_medium(line: &GlassLine, glass: &Glass, exact: bool) -> ImportedMedium {
     let full = glass.full_name();
     if line.code == 4 && line.offsets != (0.0, 0.0) {
@@ -121,7 +121,7 @@ fn catalogue_medium(line: &GlassLine, glass: &Glass, exact: bool) -> ImportedMed
     (medium, ConversionOutcome::Used, full)
 }
 
-/// A glass that no catalogue has: its index on the line, or the one in its name.
+/// A glass that no catalogue has, by the index on its line or by the six-digit code of its name.
 fn unlisted_medium(line: &GlassLine) -> Result<ImportedMedium, ParseError> {
     let numbers =
         if is_placeholder(line) { six_digit_code(&line.name) } else { Some((line.nd, line.vd)) };
@@ -141,19 +141,19 @@ fn unlisted_medium(line: &GlassLine) -> Result<ImportedMedium, ParseError> {
     Ok((medium, ConversionOutcome::Approximated, note))
 }
 
-/// Whether the glass is no maker's own: crystals, fused silica, plastics.
+/// True for materials without a maker: crystals, fused silica, plastics.
 pub(super) fn is_general(glass: &Glass) -> bool {
     matches!(glass.maker.as_str(), "CRYSTAL" | "PLASTIC" | "FUSED_SILICA")
 }
 
-/// `517642` and `517.642`: nd 1.517, vd 64.2.
+/// nd and vd of a six-digit code: 1.517 and 64.2 for `517642` and `517.642`.
 fn six_digit_code(name: &str) -> Option<(f64, f64)> {
     let digits: String = name.chars().filter(|c| *c != '.').collect();
     if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
     let (nd, vd) = digits.split_at(3);
-    // From its decimal text, so that it is the f64 next to 1.517.
+    // Parsed from decimal text, so that it is the f64 nearest to 1.517.
     let (nd, vd): (f64, f64) = (format!("1.{nd}").parse().ok()?, vd.parse().ok()?);
     Some((nd, vd / 10.0))
 }
@@ -194,7 +194,7 @@ mod tests {
         assert_eq!(note, "SCHOTT N-BK7 in place of BK7");
         let (medium, ..) = found(line("n-bk7", 3, 0.0, 0.0)).unwrap();
         assert_eq!(medium, glass("SCHOTT N-BK7"));
-        // An old name whose index is not that of the new glass is a glass of its own.
+        // An old name whose index differs from that of the new glass is a model glass.
         let (medium, ..) = found(line("BK7", 0, 1.6, 60.0)).unwrap();
         assert_eq!(medium, Medium::Model { nd: 1.6, vd: 60.0 });
     }

@@ -1,21 +1,21 @@
-//! The surface type whose gap is a gradient: `GRINSUR3`, "Gradient 3".
+//! The surface type with a gradient-index gap: `GRINSUR3`, "Gradient 3".
 //!
 //! `n = n₀ + nr₂ r² + nr₄ r⁴ + nr₆ r⁶ + nz₁ z + nz₂ z² + nz₃ z³`, with z from the vertex and the
-//! same at every wavelength. Parameter 1 is the largest step there, which says nothing here, 2 is n₀,
-//! 3 to 5 are radial, 6 to 8 axial (the user guide of `OpticStudio`, "Gradient 3"). Other types are refused
+//! same at every wavelength. Parameter 1 is the largest integration step, which is not used here, 2 is
+//! n₀, 3 to 5 are radial, 6 to 8 axial (the user guide of `OpticStudio`, "Gradient 3"). Other types are refused
 //! by name, on reading and on writing.
 
 use super::file::ZemaxSurface;
 use crate::lens::{GradientIndex, Medium, ProfileLaw, Quantity, RADIAL_TERMS};
 
-/// What such a surface is called.
+/// The name of the surface type.
 pub(super) const KIND: &str = "GRINSUR3";
-/// The step that is written: the other program bounds it itself.
+/// The integration step that is written; the other program bounds it itself.
 const STEP: f64 = 0.1;
-/// Coefficients of either kind.
+/// The number of radial and of axial coefficients.
 const TERMS: usize = 3;
 
-/// The gradient behind a surface of that type; lengths are in units of so many mm.
+/// The medium behind a surface of this type, for lengths in units of `unit` mm; `None` for other types.
 pub(super) fn medium(surface: &ZemaxSurface, unit: f64) -> Option<Medium> {
     if surface.kind.0 != KIND {
         return None;
@@ -34,7 +34,7 @@ pub(super) fn medium(surface: &ZemaxSurface, unit: f64) -> Option<Medium> {
     Some(Medium::Grin(Box::new(GradientIndex { base, law: ProfileLaw::Index, radial, axial })))
 }
 
-/// What parameter number `index` of a surface of a type is, if it is one of a gradient.
+/// The quantity of parameter number `index` of a surface of type `kind`; `None` if it has none.
 pub(super) fn variable_quantity(kind: &str, index: usize) -> Option<Quantity> {
     match index {
         _ if kind != KIND => None,
@@ -45,8 +45,8 @@ pub(super) fn variable_quantity(kind: &str, index: usize) -> Option<Quantity> {
     }
 }
 
-/// The parameters of a surface with this gradient behind it, by number; `None` for one that the type
-/// cannot say.
+/// The parameters of a surface with this medium behind it, by number; `None` for a medium that the
+/// type cannot represent.
 pub(super) fn parameters(gradient: &GradientIndex) -> Option<Vec<(usize, f64)>> {
     let Medium::Index(base) = gradient.base else { return None };
     let fits = |terms: &[f64]| terms.iter().skip(TERMS).all(|term| *term == 0.0);

@@ -2,21 +2,21 @@
 
 use crate::files::error::ParseError;
 
-/// Beyond this no ray can be traced.
+/// The largest accepted number.
 const MAX_NUMBER: f64 = 1e100;
 
 /// One line that is not blank.
 #[derive(Debug, Clone)]
 pub(super) struct ZemaxLine<'a> {
-    /// Its number, counted from 1.
+    /// The line number, from 1.
     pub(super) number: usize,
-    /// Its first word.
+    /// The first word.
     pub(super) keyword: &'a str,
-    /// Everything behind the keyword.
+    /// The text behind the keyword.
     pub(super) rest: &'a str,
-    /// What stands behind the keyword, word by word; a quoted text is one word.
+    /// The words behind the keyword; a quoted text is one word.
     pub(super) fields: Vec<&'a str>,
-    /// Whether numbers are written with a comma in place of the point.
+    /// True if numbers have a decimal comma.
     pub(super) comma: bool,
 }
 
@@ -36,7 +36,7 @@ fn parse_line((text, number): (&str, usize)) -> Option<ZemaxLine<'_>> {
     Some(ZemaxLine { number, keyword, rest, fields: split_fields(rest), comma: false })
 }
 
-/// Commas are decimal where curvatures or thicknesses have commas and no points.
+/// True if curvatures or thicknesses have commas and no points.
 fn has_decimal_commas(lines: &[ZemaxLine<'_>]) -> bool {
     let lengths = || {
         let geometry = lines.iter().filter(|line| matches!(line.keyword, "CURV" | "DISZ"));
@@ -60,17 +60,17 @@ fn split_fields(rest: &str) -> Vec<&str> {
 }
 
 impl ZemaxLine<'_> {
-    /// All of it.
+    /// The whole line, without surrounding blanks.
     pub(super) fn source_text(&self) -> String {
         format!("{} {}", self.keyword, self.rest).trim_end().to_owned()
     }
 
-    /// Its place, for a message.
+    /// The place of the line in a message.
     pub(super) fn place(&self) -> String {
         format!("line {}", self.number)
     }
 
-    /// What is wrong with it.
+    /// The error that the line is malformed.
     pub(super) fn malformed(&self, found: impl Into<String>, expected: &str) -> ParseError {
         ParseError { place: self.place(), found: found.into(), expected: expected.to_owned() }
     }
@@ -87,7 +87,7 @@ impl ZemaxLine<'_> {
         })
     }
 
-    /// The number in a field, or `default` where the line is shorter.
+    /// The number in a field, or `default` if the line is shorter.
     pub(super) fn number_or(&self, field: usize, default: f64) -> Result<f64, ParseError> {
         if field < self.fields.len() { self.number(field) } else { Ok(default) }
     }
@@ -97,7 +97,7 @@ impl ZemaxLine<'_> {
         (0..self.fields.len()).map(|field| self.number(field)).collect()
     }
 
-    /// The number in a field that counts something; some writers append `.0`.
+    /// The whole number in a field; some writers append `.0`.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -114,7 +114,7 @@ impl ZemaxLine<'_> {
         ))
     }
 
-    /// The number that counts something, if the field is there and holds one.
+    /// The whole number in a field, if there is one.
     pub(super) fn count_if_any(&self, field: usize) -> Option<usize> {
         self.count(field).ok()
     }
@@ -130,7 +130,7 @@ impl ZemaxLine<'_> {
     fn parse(&self, text: &str) -> Option<f64> {
         let number: f64 =
             if self.comma { text.replace(',', ".").parse() } else { text.parse() }.ok()?;
-        // The words `inf` and `nan` parse as numbers too.
+        // `inf` and `nan` parse as numbers too.
         (number.abs() <= MAX_NUMBER).then_some(number)
     }
 }

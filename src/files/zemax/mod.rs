@@ -1,7 +1,7 @@
 //! Zemax `.zmx`: reading and writing.
 //!
-//! There is no public specification; what is known comes from files and from programs that read
-//! them. Every line of a file ends up in the report as used, approximated, preserved or dropped.
+//! There is no public specification: the format is known from files and from programs that read them.
+//! The report lists every line of a file as used, approximated, preserved or dropped.
 
 mod build;
 mod coordinate_breaks;
@@ -20,14 +20,17 @@ use super::report::ConversionReport;
 use crate::lens::Lens;
 use std::path::Path;
 
-/// How a note begins that holds the source of a lens.
+/// The beginning of the note with the source of the lens.
 const SOURCE: &str = "Source: ";
 
-/// How a note begins that holds the name of a zoom position.
+/// The beginning of a note with the name of a zoom position.
 const ZOOM_NAME: &str = "Zoom position: ";
 
-/// Reads a lens from the text of a file; `file` is for messages, and for the name of a lens that
-/// has none.
+/// Reads a lens from the text of a file. `file` is its name in messages, and the name of a lens that has
+/// none.
+///
+/// # Errors
+/// A malformed line, a surface that cannot be traced, or an invalid lens.
 pub fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), FileError> {
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let (mut lens, report) = parse_lens(&text).map_err(|wrong| wrong.in_file(file))?;
@@ -55,7 +58,7 @@ fn parse_lens(text: &str) -> Result<(Lens, ConversionReport), ParseError> {
     Ok((lens, report))
 }
 
-/// Writes the solved gap into the lens, so that its prescription shows where the focus is.
+/// Writes the solved gap into the lens, so that its prescription shows the position of the focus.
 fn apply_focus_solve(lens: &mut Lens) {
     if lens.image_solve.is_none() {
         return;
@@ -64,7 +67,7 @@ fn apply_focus_solve(lens: &mut Lens) {
     let Some(last) = lens.surfaces.last_mut() else { return };
     match system {
         Ok(system) => last.thickness = system.surfaces[system.surfaces.len() - 2].thickness,
-        // No focus can be found, so none is solved for.
+        // Without a paraxial focus the solve is dropped.
         Err(_) => lens.image_solve = None,
     }
 }

@@ -1,24 +1,24 @@
-//! Which of the surface types reduce to a conic with a polynomial in r², and to which.
+//! Reduction of the surface types to a conic with a polynomial in r².
 
 use super::file::ZemaxSurface;
 use crate::files::error::ParseError;
 use crate::lens::ASPHERE_TERMS;
 
-/// The numbers of a surface, in the unit of the file.
+/// The shape of a surface, in the unit of the file.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct ZemaxShape {
     pub(super) curvature: f64,
     pub(super) conic: f64,
     /// Coefficients of r⁴, r⁶, ...
     pub(super) asphere: Vec<f64>,
-    /// How it was reduced, with the line that made it necessary.
+    /// The note on a reduction, with the line that made it necessary.
     pub(super) note: Option<(usize, String)>,
 }
 
 const EXPECTED: &str = "STANDARD, EVENASPH, or an asphere without odd terms; other types cannot be \
                         traced here";
 
-/// The form of surface `number`.
+/// The shape of surface `number`.
 pub(super) fn surface_shape(
     surface: &ZemaxSurface,
     number: usize,
@@ -51,7 +51,7 @@ fn parameter_terms(parameters: &[PowerTerm], power: fn(usize) -> usize) -> Vec<P
     terms.map(|(i, value, line)| (power(*i), *value, *line)).collect()
 }
 
-/// Extra data: 1 how many terms, 2 the radius that normalises r, then the coefficients.
+/// Extra data: 1 number of terms, 2 normalization radius, then the coefficients.
 fn extended_terms(extra: &[PowerTerm], power: fn(usize) -> usize) -> Vec<PowerTerm> {
     let value = |index| extra.iter().rfind(|(i, ..)| *i == index).map(|(_, value, _)| *value);
     let count = value(1).unwrap_or(0.0);
@@ -66,7 +66,7 @@ fn extended_terms(extra: &[PowerTerm], power: fn(usize) -> usize) -> Vec<PowerTe
         .collect()
 }
 
-/// The conic with these terms, as far as they are even and the term in r² folds into the conic.
+/// Adds even terms to a conic; a term in r² is folded into the conic where this is exact.
 fn add_terms(mut form: ZemaxShape, terms: &[PowerTerm]) -> Result<ZemaxShape, String> {
     let mut asphere = [0.0; ASPHERE_TERMS];
     let mut parabola = (0.0, 0);
@@ -87,7 +87,7 @@ fn add_terms(mut form: ZemaxShape, terms: &[PowerTerm]) -> Result<ZemaxShape, St
     Ok(form)
 }
 
-/// `α r²` is itself a paraboloid: it adds to a plane or to another paraboloid and to nothing else.
+/// Folds `α r²`, a paraboloid, into a plane or another paraboloid; other conics cannot take it exactly.
 fn fold_parabola(form: &mut ZemaxShape, (alpha, line): (f64, usize)) -> Result<(), String> {
     if form.curvature != 0.0 && form.conic != -1.0 {
         return Err(format!(
@@ -103,7 +103,8 @@ fn fold_parabola(form: &mut ZemaxShape, (alpha, line): (f64, usize)) -> Result<(
     Ok(())
 }
 
-/// Parameters: 1 the radius in x, 0 for flat; 2 the conic constant in x.
+/// A biconic surface that is rotationally symmetric. Parameters: 1 radius in x, 0 for flat; 2 conic
+/// constant in x.
 fn biconic(form: ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
     let value = |index| {
         let found = surface.parameters.iter().rfind(|(i, ..)| *i == index);
@@ -158,7 +159,7 @@ mod tests {
         let mut s = surface("XASPHERE", 0.02, 0.0);
         s.extra = vec![(1, 8.0, 7), (2, 2.0, 8), (3, 0.0, 9), (4, 0.16, 10), (5, -0.64, 11)];
         assert_eq!(surface_shape(&s, 1).unwrap().asphere, [0.01, -0.01]);
-        s.extra.push((12, 1.0, 12)); // r^20, beyond the eight terms that count
+        s.extra.push((12, 1.0, 12)); // r^20, beyond the eight terms in use
         assert_eq!(surface_shape(&s, 1).unwrap().asphere, [0.01, -0.01]);
         s.extra[0].1 = 10.0;
         assert!(surface_shape(&s, 1).unwrap_err().found.contains("a term in r^20 (line 12)"));

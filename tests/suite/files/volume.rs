@@ -53,8 +53,8 @@ fn grin_volumes_that_are_wrong_say_where() {
     let text = refusal("empty.npz", b"PK\x05\x06");
     assert!(text.contains("array index") && text.contains("low and spacing"), "{text}");
     let text = refusal("lens.json", br#"{"aplanat_volume": 1, "size": 3}"#);
-    assert!(text.contains("line 1") && text.contains("unknown field `size`"), "{text}");
-    assert!(refusal("lens.zmx", b"VERS 1").contains("a header of a volume"));
+    assert!(text.contains("line 1") && text.contains("the unknown key `size`"), "{text}");
+    assert!(refusal("lens.zmx", b"VERS 1").contains("the header of a volume"));
     let header = |counts: &str, spacing: &str| {
         format!(
             r#"{{"aplanat_volume": 1, "counts": {counts}, "low": [0, 0, 0], "spacing": {spacing},

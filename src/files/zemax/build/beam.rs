@@ -35,8 +35,8 @@ pub(super) fn aperture(
     }
 }
 
-/// The f-number of a finite object may be that of the lens for an object at infinity; here it is
-/// the working one, so the pupil's diameter says the same.
+/// Replaces an f-number for an object at infinity by the entrance pupil diameter if the object is at a
+/// finite distance, where an f-number here means the working one.
 pub(super) fn infinite_f_number(draft: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
     let Some((ApertureLine::FNumber { value, working: false }, line)) = draft.aperture else {
         return;
@@ -62,7 +62,7 @@ fn index(medium: &Medium) -> f64 {
     }
 }
 
-/// The field points: as many as the file counts, or in older files up to the last that is not 0.
+/// The field points: the number that the file states, or in older files up to the last that is not 0.
 pub(super) fn fields(draft: &ZemaxFile) -> Result<Fields, ParseError> {
     let lines = &draft.fields;
     let (kind, line) = lines.kind.unwrap_or((0, 0));
@@ -91,10 +91,10 @@ pub(super) fn fields(draft: &ZemaxFile) -> Result<Fields, ParseError> {
     Ok(Fields { kind, values })
 }
 
-/// What fills the lines of wavelengths that are not used.
+/// Wavelength and weight of unused wavelength lines.
 const PADDING: (f64, f64) = (0.55, 1.0);
 
-/// The wavelengths: as many as the file counts, or all in front of the padding.
+/// The wavelengths: the number that the file states, or all before the unused ones.
 pub(super) fn wavelengths(
     draft: &ZemaxFile,
     report: &mut ConversionReport,
@@ -112,7 +112,7 @@ pub(super) fn wavelengths(
     let unpadded = (all.len() - padding).max(1);
     all.truncate(lines.count.unwrap_or(unpadded));
     for (.., line) in numbered.iter().skip(all.len()) {
-        report.amend(*line, ConversionOutcome::Preserved, "beyond the wavelengths that count");
+        report.amend(*line, ConversionOutcome::Preserved, "beyond the number of wavelengths");
     }
     if all.is_empty() {
         let place = format!("line {}", draft.surfaces[0].line);

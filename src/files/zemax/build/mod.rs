@@ -1,4 +1,4 @@
-//! From a draft to a lens.
+//! Interpretation of the content of a file as a lens.
 //!
 //! Surface 0 of the file is the object and the last one the image; surface k between them is row
 //! k − 1 here. Lengths become millimetres.
@@ -14,7 +14,7 @@ use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, Medium, Object, Row};
 
-/// Makes a lens of the draft and says in the report what could not be kept.
+/// Builds the lens; the report receives everything that cannot be represented.
 pub(super) fn build(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Lens, ParseError> {
     check_complete(draft)?;
     coordinate_breaks::check_breaks(&draft.surfaces)?;
@@ -46,7 +46,7 @@ pub(super) fn build(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<
     Ok(lens)
 }
 
-/// Refuses a file that ends too early.
+/// Refuses a truncated file.
 fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
     let surfaces = &draft.surfaces;
     let wrong = |line, found: String, expected: &str| {
@@ -99,7 +99,7 @@ fn stop(draft: &ZemaxFile) -> Result<usize, ParseError> {
     Ok(stop)
 }
 
-/// A thickness on the object from which on it counts as infinite.
+/// Object distances from this on are infinite.
 const INFINITE_DISTANCE: f64 = 1e10;
 
 fn object(draft: &ZemaxFile) -> Result<Object, ParseError> {
@@ -119,7 +119,7 @@ fn object_medium(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Med
     let (medium, outcome, note) = glass::medium(&draft.surfaces, 0, &draft.catalogues)?;
     if let Some(glass) = &draft.surfaces[0].glass {
         if medium == Medium::Mirror {
-            report.amend(glass.line, ConversionOutcome::Dropped, "the object is no mirror here");
+            report.amend(glass.line, ConversionOutcome::Dropped, "the object cannot be a mirror");
             return Ok(Medium::Air);
         }
         report.amend(glass.line, outcome, note);
@@ -132,7 +132,7 @@ fn rows(
     stop: usize,
     report: &mut ConversionReport,
 ) -> Result<Vec<Row>, ParseError> {
-    // What fills the present gap; a coordinate break has the same on both sides.
+    // The medium of the current gap; a coordinate break has the same on both sides.
     let mut gap = Medium::Air;
     let mut rows = Vec::with_capacity(draft.surfaces.len() - 2);
     for number in 1..draft.surfaces.len() - 1 {
@@ -151,35 +151,51 @@ fn rows(
     Ok(rows)
 }
 
-/// The image is a plane without a row: says what else the file makes of it.
+/// Reports the properties of object and image that are lost, since both are planes here.
 fn report_image(draft: &ZemaxFile, report: &mut ConversionReport) {
     for surface in [draft.surfaces.first(), draft.surfaces.last()].into_iter().flatten() {
         if let Some((curvature, line)) = surface.curvature
             && curvature != 0.0
         {
-            report.amend(line, ConversionOutcome::Dropped, "object and image are planes here");
+            report.amend(
+                line,
+                ConversionOutcome::Dropped,
+                "object and image are planes in this program",
+            );
         }
         if let Some(given) = surface.semi_diameter {
             report.amend(
                 given.line,
                 ConversionOutcome::Preserved,
-                "object and image clip nothing here",
+                "object and image do not clip in this program",
             );
         }
         for (_, line) in surface.clip.into_iter().chain(surface.obstruction) {
-            report.amend(line, ConversionOutcome::Dropped, "object and image clip nothing here");
+            report.amend(
+                line,
+                ConversionOutcome::Dropped,
+                "object and image do not clip in this program",
+            );
         }
         let terms = surface.parameters.iter().chain(&surface.extra);
         for (_, _, line) in terms.filter(|(_, value, _)| *value != 0.0) {
-            report.amend(*line, ConversionOutcome::Dropped, "object and image are planes here");
+            report.amend(
+                *line,
+                ConversionOutcome::Dropped,
+                "object and image are planes in this program",
+            );
         }
     }
     if let Some(glass) = draft.surfaces.last().and_then(|surface| surface.glass.as_ref()) {
-        report.amend(glass.line, ConversionOutcome::Dropped, "nothing lies behind the image here");
+        report.amend(
+            glass.line,
+            ConversionOutcome::Dropped,
+            "a medium behind the image is not supported",
+        );
     }
 }
 
-/// Name, source, notes, and the names of the zoom positions, as our own exports write them.
+/// Name, source, notes and names of the zoom positions, as this program exports them.
 fn split_notes(draft: &ZemaxFile) -> (String, String, String, Vec<String>) {
     let mut source = String::new();
     let mut zoom = Vec::new();

@@ -7,7 +7,7 @@ use crate::files::zemax::file::{ApertureLine, ZemaxFile, ZemaxSurface};
 use crate::files::zemax::shape::{self, ZemaxShape};
 use crate::lens::{Medium, Row};
 
-/// A gap from which on it counts as infinite, which only that behind the object may be.
+/// Thicknesses from this on are infinite, which is accepted for the object only.
 const INFINITE: f64 = 1e18;
 
 /// The row of surface `number`.
@@ -20,7 +20,7 @@ pub(super) fn row(
 ) -> Result<Row, ParseError> {
     let surface = &draft.surfaces[number];
     let form = if coordinate_breaks::is_break(surface) {
-        let note = "this run of coordinate breaks changes nothing; read as planes";
+        let note = "this run of coordinate breaks has no effect; read as planes";
         report.amend(surface.kind.1, ConversionOutcome::Approximated, note);
         ZemaxShape::default()
     } else {
@@ -56,8 +56,8 @@ fn thickness(surface: &ZemaxSurface, number: usize) -> Result<f64, ParseError> {
     Err(ParseError { place: format!("line {line}"), found, expected })
 }
 
-/// What clips there: a circular aperture. A fixed semi-diameter is only drawn there and clips here,
-/// an automatic one is wide enough for every ray.
+/// The clipping radius. In the file only circular apertures clip: a fixed semi-diameter is drawn there
+/// and clips here, an automatic one is wide enough for every ray and is not read.
 fn semi_diameter(
     draft: &ZemaxFile,
     number: usize,
@@ -71,19 +71,19 @@ fn semi_diameter(
     let given = surface.semi_diameter?;
     let floating = matches!(draft.aperture, Some((ApertureLine::FloatByStop, _)));
     if floating && number == stop {
-        return None; // it is the aperture of the whole lens
+        return None; // it is the aperture of the lens
     }
     if given.fixed && surface.obstruction.is_some_and(|(inner, _)| inner >= given.value) {
-        let note = "the size of the obscuration, which is drawn; nothing is clipped outside it";
+        let note = "the drawn size of the obscuration; nothing is clipped outside it";
         report.amend(given.line, ConversionOutcome::Preserved, note);
         return None;
     }
     if given.fixed && given.value > 0.0 {
-        let note = "clips here; in the file it is only drawn";
+        let note = "clips in this program; in the file it is only drawn";
         report.amend(given.line, ConversionOutcome::Approximated, note);
         return Some(given.value);
     }
-    let note = "found automatically there; nothing is clipped here";
+    let note = "automatic in the file; nothing is clipped";
     report.amend(given.line, ConversionOutcome::Preserved, note);
     None
 }

@@ -5,7 +5,7 @@ use crate::files::zemax::file::{CurvatureSolve, PickupLine, ZemaxFile, ZemaxSurf
 use crate::files::zemax::gradient;
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 
-/// Gives the lens what its numbers follow.
+/// Adds variables, pickups and the focus solve to the lens.
 pub(super) fn add_solves(draft: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
     for row in 0..lens.surfaces.len() {
         let surface = &draft.surfaces[row + 1];
@@ -29,8 +29,8 @@ pub(super) fn add_solves(draft: &ZemaxFile, lens: &mut Lens, report: &mut Conver
     }
 }
 
-/// The paraxial marginal ray at height 0 in the image is the focus solve; others are kept at their
-/// present value.
+/// A marginal ray height of 0 at the image is the focus solve; other height solves keep their present
+/// value.
 fn add_focus_solve(
     surface: &ZemaxSurface,
     row: usize,
@@ -46,12 +46,13 @@ fn add_focus_solve(
             "the last gap is solved for the paraxial focus",
         );
     } else {
-        let note = "only the paraxial focus of the last gap is solved here; kept as it is";
+        let note =
+            "only the paraxial focus of the last gap can be solved; the present value is used";
         report.amend(line, ConversionOutcome::Approximated, note);
     }
 }
 
-/// Makes a number variable, if the lens has it and nothing else sets it.
+/// Adds a variable, if the lens has the number and it is not a variable already.
 fn add_variable(lens: &mut Lens, surface: usize, quantity: Quantity) {
     let parameter = Parameter::new(surface, quantity);
     if lens.get(parameter).is_some() && lens.variable(parameter).is_none() {
@@ -88,8 +89,7 @@ fn thickness(draft: &ZemaxFile, row: usize, lens: &mut Lens, report: &mut Conver
     }
 }
 
-/// Parameter i of an even asphere is the coefficient of r^(2i); those of a gradient have places of
-/// their own.
+/// Adds the variable parameters: parameter i of an even asphere is the coefficient of r^(2i).
 fn terms(surface: &ZemaxSurface, row: usize, lens: &mut Lens, report: &mut ConversionReport) {
     for &(index, line) in &surface.variable_parameters {
         if surface.kind.0 == "EVENASPH" && (2..=8).contains(&index) {
@@ -97,12 +97,12 @@ fn terms(surface: &ZemaxSurface, row: usize, lens: &mut Lens, report: &mut Conve
         } else if let Some(quantity) = gradient::variable_quantity(&surface.kind.0, index) {
             add_variable(lens, row, quantity);
         } else {
-            report.amend(line, ConversionOutcome::Dropped, "this parameter cannot vary here");
+            report.amend(line, ConversionOutcome::Dropped, "this parameter cannot be a variable");
         }
     }
 }
 
-/// A pickup counts where it gives the value that is there; else the value counts.
+/// Adds a pickup if it yields the present value; else the present value is used.
 fn add_pickup(
     lens: &mut Lens,
     row: usize,
@@ -122,12 +122,12 @@ fn add_pickup(
                 lens.pickups.push(Pickup { parameter, source, scale, offset });
             } else {
                 let note =
-                    format!("the pickup gives {given}, the file has {present}, which is kept");
+                    format!("the pickup yields {given}, the file has {present}, which is used");
                 report.amend(line.line, ConversionOutcome::Approximated, note);
             }
         }
         _ => {
-            let note = "a pickup from a surface that is not there; the present value is kept";
+            let note = "a pickup from a surface that does not exist; the present value is used";
             report.amend(line.line, ConversionOutcome::Approximated, note);
         }
     }

@@ -1,4 +1,4 @@
-//! The multi-configuration table: one zoom position a configuration.
+//! The multi-configuration table: each configuration is a zoom position.
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
@@ -8,7 +8,7 @@ use crate::lens::{
 };
 use std::collections::BTreeMap;
 
-/// Gives the lens its zoom positions, if the file has more than one configuration.
+/// Adds zoom positions to the lens, if the file has more than one configuration.
 pub(super) fn add_positions(
     draft: &ZemaxFile,
     lens: &mut Lens,
@@ -31,7 +31,7 @@ pub(super) fn add_positions(
     Ok(())
 }
 
-/// Refuses an operand that has no value at some configuration.
+/// Refuses an operand without a value for each configuration.
 fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
     let mut values: BTreeMap<(&str, usize), (usize, usize)> = BTreeMap::new();
     for operand in &draft.operands {
@@ -50,7 +50,7 @@ fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
     Ok(())
 }
 
-/// Writes one value into its position, or says why it cannot.
+/// Writes one value into its zoom position; the error is the note of the report.
 fn apply(unit: f64, lens: &mut Lens, operand: &ConfigurationOperand) -> Result<(), &'static str> {
     let zoom = operand.configuration - 1;
     match operand.name.as_str() {
@@ -59,7 +59,7 @@ fn apply(unit: f64, lens: &mut Lens, operand: &ConfigurationOperand) -> Result<(
         "SDIA" => {
             let stop = lens.stop().map(|stop| stop + 1) == Some(operand.target);
             if !(stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_))) {
-                return Err("only the stop's size changes with the zoom position here");
+                return Err("only the size of the stop can change with the zoom position");
             }
             lens.zoom[zoom].aperture = Some(Aperture::StopSemiDiameter(operand.value * unit));
             Ok(())
@@ -74,7 +74,7 @@ fn thickness(
     operand: &ConfigurationOperand,
 ) -> Result<(), &'static str> {
     let surface = match operand.target.checked_sub(1) {
-        None => return Err("the object does not move with the zoom position here"),
+        None => return Err("the object distance cannot change with the zoom position"),
         Some(surface) if surface < lens.surfaces.len() => surface,
         Some(_) => return Err("there is no such gap"),
     };
@@ -85,7 +85,7 @@ fn thickness(
     let parameter = Parameter::new(surface, Quantity::ZoomThickness(zoom));
     let gaps = &mut lens.zoom[zoom].thicknesses;
     if gaps.iter().any(|gap| gap.surface == surface) {
-        return Err("a second value for this gap; the first one counts");
+        return Err("a second value for this gap; the first one is used");
     }
     gaps.push(ZoomThickness { surface, thickness: operand.value * unit });
     if operand.variable {
@@ -94,7 +94,7 @@ fn thickness(
     Ok(())
 }
 
-/// The value means whatever the aperture of the lens is given by.
+/// The aperture at a zoom position, defined as that of the lens.
 fn aperture(
     unit: f64,
     lens: &mut Lens,
@@ -102,7 +102,7 @@ fn aperture(
 ) -> Result<(), &'static str> {
     let value = operand.value;
     if lens.object != Object::Infinity && matches!(lens.aperture, Aperture::FNumber(_)) {
-        return Err("the f-number of a finite object does not change with the zoom position here");
+        return Err("the f-number of a finite object cannot change with the zoom position");
     }
     if value <= 0.0 {
         return Err("an aperture of 0");
@@ -111,7 +111,7 @@ fn aperture(
         Aperture::EntrancePupilDiameter(_) => Aperture::EntrancePupilDiameter(value * unit),
         Aperture::FNumber(_) => Aperture::FNumber(value),
         Aperture::ObjectNa(_) => Aperture::ObjectNa(value),
-        Aperture::StopSemiDiameter(_) => return Err("the stop's size is the aperture"),
+        Aperture::StopSemiDiameter(_) => return Err("the size of the stop is the aperture"),
     };
     lens.zoom[operand.configuration - 1].aperture = Some(aperture);
     Ok(())

@@ -5,7 +5,7 @@ use crate::files::error::ParseError;
 use crate::files::zemax::file::{ApertureLine, ZemaxFile};
 use crate::files::zemax::line::ZemaxLine;
 
-/// Reads a line of the header; `None` where it is none.
+/// Reads a line of the header; `None` for other lines.
 pub(super) fn read(
     draft: &mut ZemaxFile,
     line: &ZemaxLine<'_>,
@@ -43,7 +43,7 @@ fn text(to: &mut String, rest: &str) -> LineOutcome {
     used()
 }
 
-/// `NOTE 0 source_text`; the number is the kind of note.
+/// `NOTE 0 text`; the number is the kind of note.
 fn note(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> LineOutcome {
     let (kind, text) = line.rest.split_once(char::is_whitespace).unwrap_or((line.rest, ""));
     let numbered = kind.parse::<u32>().is_ok();
@@ -74,7 +74,7 @@ fn unit(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, Pars
 
 fn aperture(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     if draft.aperture.is_some() {
-        return Ok(dropped("a second aperture; the first one counts"));
+        return Ok(dropped("a second aperture; the first one is used"));
     }
     let kind = line.number_or(1, 0.0)?;
     let aperture = match line.keyword {
@@ -88,7 +88,7 @@ fn aperture(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, 
     Ok(used())
 }
 
-/// Temperature in °C, pressure in atmospheres, and whether indices are adjusted to them.
+/// Temperature in °C, pressure in atmospheres, and a flag for indices that are adjusted to them.
 fn environment(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let standard = line.number_or(0, 20.0)? == 20.0 && line.number_or(1, 1.0)? == 1.0;
     let adjusted = line.number_or(2, 0.0)? != 0.0;
@@ -105,12 +105,14 @@ fn field_type(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome
         return Err(line.malformed(format!("field type {kind}"), "0 to 4"));
     }
     draft.fields.kind = Some((kind, line.number));
-    // Older files have one or two fields; a count of 0 says nothing.
+    // Older files have one or two words; a count of 0 means that it is not stated.
     draft.fields.count = line.count_if_any(2).filter(|count| *count > 0);
     draft.waves.count = line.count_if_any(3).filter(|count| *count > 0);
     Ok(match (kind, line.number_or(1, 0.0)? != 0.0) {
-        (_, true) => dropped("telecentric object space: chief rays go through the stop here"),
-        (3, _) => super::approximated("real image heights are taken as paraxial ones"),
+        (_, true) => dropped(
+            "telecentric object space: chief rays pass through the centre of the stop in this program",
+        ),
+        (3, _) => super::approximated("real image heights are read as paraxial ones"),
         _ => used(),
     })
 }
@@ -146,6 +148,6 @@ fn vignetting(line: &ZemaxLine<'_>) -> LineOutcome {
     if (0..line.fields.len()).all(|field| line.number(field).is_ok_and(|value| value == 0.0)) {
         preserved()
     } else {
-        dropped("vignetting factors: rays are clipped by the semi-diameters here")
+        dropped("vignetting factors: rays are clipped by semi-diameters in this program")
     }
 }

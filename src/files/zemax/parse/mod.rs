@@ -1,7 +1,7 @@
-//! From lines to a draft: what each keyword means.
+//! Reading of the lines: the meaning of each keyword.
 //!
 //! The order of lines is free: `SURF` begins a surface, the next header keyword ends it. A keyword
-//! that is not known is no error; its line is preserved in the report.
+//! that is not known is not an error; its line is preserved in the report.
 
 mod header;
 mod surface;
@@ -11,7 +11,7 @@ use super::line::{self, ZemaxLine};
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport, ConversionRow};
 
-/// What became of a line.
+/// The outcome of a line, with a note.
 pub(super) struct LineOutcome {
     outcome: ConversionOutcome,
     note: String,
@@ -53,9 +53,9 @@ pub(super) fn parse(text: &str) -> Result<(ZemaxFile, ConversionReport), ParseEr
 struct ZemaxReader {
     draft: ZemaxFile,
     report: ConversionReport,
-    /// Whether the lines belong to the last surface.
+    /// True while lines belong to the last surface.
     in_surface: bool,
-    /// Whether the multi-configuration table has begun.
+    /// True from the beginning of the multi-configuration table.
     in_table: bool,
 }
 
@@ -118,17 +118,17 @@ impl ZemaxReader {
         if self.draft.configurations == 1 {
             return preserved();
         }
-        dropped("only thicknesses, aperture and fields differ between zoom positions here")
+        dropped("only thicknesses, aperture and fields can differ between zoom positions")
     }
 }
 
-/// More than any zoom lens has, few enough to list.
+/// The largest accepted number of configurations.
 const MAX_CONFIGURATIONS: usize = 1000;
 
 /// The operands of the multi-configuration table that are read.
 const TABLE: &[&str] = &["THIC", "APER", "XFIE", "YFIE", "SDIA"];
 
-/// Those that change the lens and are not read.
+/// Operands that change the lens and are not read.
 const OTHER_OPERANDS: &[&str] = &[
     "CRVT", "CONN", "GLSS", "PRAM", "PAR1", "PAR2", "PAR3", "PAR4", "PAR5", "PAR6", "PAR7", "PAR8",
     "WAVE", "WLWT", "PRWV", "FLTP", "FLWT", "FVDX", "FVDY", "FVCX", "FVCY", "FVAN", "IGNR", "APMX",

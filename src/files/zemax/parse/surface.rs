@@ -7,7 +7,7 @@ use crate::files::zemax::file::{
 };
 use crate::files::zemax::line::ZemaxLine;
 
-/// The keywords that make no sense outside a surface.
+/// The keywords that are valid only in a surface.
 pub(super) const KEYWORDS: &[&str] = &[
     "STOP", "TYPE", "CURV", "DISZ", "CONI", "PARM", "XDAT", "GLAS", "DIAM", "CLAP", "FLAP", "OBSC",
 ];
@@ -61,15 +61,15 @@ pub(super) fn read(
     Ok(used())
 }
 
-/// What changes rays and has no place in a lens here, and whatever else there is.
+/// Reads the other lines of a surface: those that affect rays are dropped, approximated or refused.
 fn read_other(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let zeros = |from| (from..line.fields.len()).all(|field| line.number(field) == Ok(0.0));
     Ok(match line.keyword {
         "SQAP" | "ELAP" | "OBDC" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
-            dropped("only round, centred apertures and obstructions clip here")
+            dropped("only circular, centred apertures and obstructions are supported")
         }
         "PPAR" | "CHZH" | "TOLE" | "TCOM" | "EDGE" | "PMVA" | "PUPZ" | "CENT" => {
-            approximated("the value that is solved for is kept as it is")
+            approximated("the present value of the solve is used")
         }
         "SCBD" if !zeros(1) => {
             let found = format!("a tilted or decentred surface (`{}`)", line.source_text());
@@ -79,7 +79,7 @@ fn read_other(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     })
 }
 
-/// The words of the solve codes, from 2 on.
+/// The names of the solve codes, from 2 on.
 const SOLVES: [&str; 11] = [
     "marginal ray angle",
     "chief ray angle",
@@ -110,7 +110,7 @@ fn curvature(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> Result<LineOut
         }
         code => {
             let solve = SOLVES.get(code - 2).copied().unwrap_or("unknown");
-            return Ok(approximated(format!("the {solve} solve is kept at its present value")));
+            return Ok(approximated(format!("the {solve} solve is replaced by its present value")));
         }
     }
     Ok(used())
@@ -146,7 +146,7 @@ fn semi_diameter(line: &ZemaxLine<'_>) -> Result<SemiDiameterLine, ParseError> {
     Ok(SemiDiameterLine { value, fixed: line.number_or(1, 0.0)? == 1.0, line: line.number })
 }
 
-/// `CLAP rmin rmax`, `FLAP rmin rmax`: what lies inside the one and outside the other is cut.
+/// `CLAP rmin rmax`, `FLAP rmin rmax`: clips inside the first and outside the second radius.
 fn clip(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> Result<(), ParseError> {
     let (inner, outer) = radii(line)?;
     if surface.clip.is_none_or(|(other, _)| outer < other) {
@@ -156,7 +156,7 @@ fn clip(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> Result<(), ParseErr
     Ok(())
 }
 
-/// `OBSC rmin rmax`: what lies between is cut.
+/// `OBSC rmin rmax`: clips between the radii.
 fn obscuration(
     surface: &mut ZemaxSurface,
     line: &ZemaxLine<'_>,
@@ -179,7 +179,7 @@ fn radii(line: &ZemaxLine<'_>) -> Result<(f64, f64), ParseError> {
     Err(line.malformed(found, "radii of zero or more, the inner one smaller"))
 }
 
-/// Darkens the middle as far as the widest of its obstructions.
+/// Widens the central obstruction to this radius.
 fn obstruct(surface: &mut ZemaxSurface, radius: f64, line: &ZemaxLine<'_>) {
     if radius > surface.obstruction.map_or(0.0, |(other, _)| other) {
         surface.obstruction = Some((radius, line.number));

@@ -7,7 +7,7 @@ use crate::files::zemax::{SOURCE, ZOOM_NAME};
 use crate::lens::glass;
 use crate::lens::{Aperture, FieldKind, Medium, Object};
 
-/// How many field points a file has room for at least.
+/// The number of field points that every version of the program reads.
 const FIELD_SLOTS: usize = 12;
 
 impl ZemaxWriter {
@@ -20,7 +20,7 @@ impl ZemaxWriter {
         self.line("ENVD 20.0 1.0 0");
         self.catalogues();
         let real = matches!(self.lens.aperture, Aperture::StopSemiDiameter(_));
-        // Rays fill the real stop where its size is given, and the paraxial pupil else.
+        // Rays fill the real stop if its size is given, else the paraxial pupil.
         self.line(if real { "RAIM 0 2 1 1 0 0 0 0 0 1" } else { "RAIM 0 0 1 1 0 0 0 0 0 1" });
         self.fields();
         self.wavelengths();
@@ -54,13 +54,13 @@ impl ZemaxWriter {
         self.line(text);
     }
 
-    /// The makers of the glasses, in the order in which they are met.
+    /// The makers of the glasses, in order of appearance.
     fn catalogues(&mut self) {
         let mut makers: Vec<&str> = Vec::new();
         let rows = self.lens.surfaces.iter().map(|row| &row.medium);
         for medium in std::iter::once(&self.lens.object_medium).chain(rows) {
             let Medium::Glass(name) = medium else { continue };
-            // What is no maker's own stands in the general catalogue there.
+            // Materials without a maker are in the general catalogue of the other program.
             let own = glass::find(name).filter(|glass| !there::is_general(glass));
             let maker = own.map_or("MISC", |glass| glass.maker.as_str());
             if !makers.contains(&maker) {

@@ -1,7 +1,7 @@
-//! From a lens to the text of a `.zmx` file.
+//! Writing of a lens as the text of a `.zmx` file.
 //!
-//! Curvatures, not radii; the fewest digits that read back to the same bits; a semi-diameter that
-//! clips is a fixed one with a circular aperture, since a semi-diameter alone cuts no ray there.
+//! Curvatures, not radii, with the fewest digits that read back to the same bits. A semi-diameter is
+//! written as a fixed one with a circular aperture, since a semi-diameter alone does not clip there.
 
 mod header;
 mod surface;
@@ -10,7 +10,10 @@ mod table;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, LensError, Quantity, ZoomThickness};
 
-/// The text of the file and what could not be said in it.
+/// The text of the file, and the report of everything that is not exact.
+///
+/// # Errors
+/// An invalid lens.
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
     let mut export = ZemaxWriter {
@@ -27,9 +30,9 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     Ok((export.text, export.report))
 }
 
-/// A file on its way.
+/// A file that is being written.
 struct ZemaxWriter {
-    /// The lens, with every pickup and the focus worked out.
+    /// The lens, with pickups and focus resolved.
     lens: Lens,
     text: String,
     report: ConversionReport,
@@ -75,12 +78,12 @@ impl ZemaxWriter {
         self.report.add(outcome, what.as_ref(), note);
     }
 
-    /// Whether the last gap is solved for the focus there too.
+    /// True if the focus solve can be written as a solve of the other program.
     fn has_focus_solve(&self) -> bool {
         self.lens.image_solve == Some(0.0)
     }
 
-    /// Makes one zoom position the lens itself: a single configuration is no zoom lens there.
+    /// Turns a single zoom position into the lens itself: one configuration is not a zoom lens there.
     fn flatten_single_position(&mut self) {
         if self.lens.zoom.len() != 1 {
             return;
@@ -100,8 +103,8 @@ impl ZemaxWriter {
         self.record(ConversionOutcome::Approximated, "zoom positions: 1", note);
     }
 
-    /// Writes the solved last gap into the lens, at every zoom position where it is not solved
-    /// there too.
+    /// Writes the solved last gap into the lens, at every zoom position if the solve itself cannot be
+    /// written.
     fn apply_focus_solve(&mut self) {
         let Some(offset) = self.lens.image_solve else { return };
         let primary = self.lens.wavelengths[self.lens.primary()].um;
@@ -122,7 +125,7 @@ impl ZemaxWriter {
             }
         }
         if offset != 0.0 {
-            let note = "no solve there displaces the focus: the last gap is what it is now";
+            let note = "a displaced focus cannot be solved there: the present thickness is written";
             self.record(
                 ConversionOutcome::Approximated,
                 format!("focus solve displaced by {offset} mm"),
@@ -131,12 +134,13 @@ impl ZemaxWriter {
         }
     }
 
-    /// What has no place in the file, or another one.
+    /// Reports everything that the file cannot represent, or represents differently.
     fn report_losses(&mut self) {
         let lens = self.lens.clone();
         let clipping = lens.surfaces.iter().filter(|row| row.semi_diameter.is_some()).count();
         if clipping > 0 {
-            let note = "semi-diameters alone clip nothing there: written with circular apertures";
+            let note =
+                "written with circular apertures, since semi-diameters alone do not clip there";
             self.record(
                 ConversionOutcome::Used,
                 format!("{clipping} semi-diameters that clip"),
@@ -157,13 +161,15 @@ impl ZemaxWriter {
                     self.record(
                         ConversionOutcome::Dropped,
                         what,
-                        "semi-diameters do not vary there",
+                        "semi-diameters cannot be variables there",
                     );
                 }
                 Quantity::Thickness if both => {}
-                _ if bounded => {
-                    self.record(ConversionOutcome::Dropped, what, "its bounds; it stays variable")
-                }
+                _ if bounded => self.record(
+                    ConversionOutcome::Dropped,
+                    what,
+                    "its bounds; it remains a variable",
+                ),
                 _ => {}
             }
         }
@@ -176,7 +182,7 @@ impl ZemaxWriter {
                 self.record(
                     ConversionOutcome::Approximated,
                     what,
-                    "its present value, without the pickup",
+                    "the present value, without the pickup",
                 );
             }
         }

@@ -1,4 +1,4 @@
-//! The surfaces, with the object in front and the image behind.
+//! The surfaces, with the object plane in front and the image plane behind.
 
 use super::{ZemaxWriter, number, numbers, one_line};
 use crate::files::report::ConversionOutcome;
@@ -28,7 +28,7 @@ impl ZemaxWriter {
         self.glass(&medium, "before surface 0", false);
     }
 
-    /// Object or image.
+    /// The object or the image plane.
     fn plane(&mut self, thickness: &str) {
         self.surface_line("TYPE STANDARD");
         self.surface_line("CURV 0.0 0 0 0 0 \"\"");
@@ -85,7 +85,7 @@ impl ZemaxWriter {
         }
     }
 
-    /// The parameters of a surface whose gap is a gradient that the format can say.
+    /// The parameters of a surface whose gap is a gradient-index medium that the format has.
     fn gradient(&self, i: usize, aspheric: bool) -> Option<Vec<(usize, f64)>> {
         match &self.lens.surfaces[i].medium {
             Medium::Grin(gradient) if !aspheric => gradient::parameters(gradient),
@@ -97,7 +97,7 @@ impl ZemaxWriter {
         self.lens.variable(Parameter::new(surface, quantity)).is_some()
     }
 
-    /// The pickup of a number from the same number of another surface.
+    /// The pickup of a number from the same number of another surface, if there is one.
     fn pickup(&self, surface: usize, quantity: Quantity) -> Option<Pickup> {
         let parameter = Parameter::new(surface, quantity);
         let mut pickups = self.lens.pickups.iter();
@@ -116,7 +116,7 @@ impl ZemaxWriter {
         self.surface_line(format!("CURV {} {solve} \"\"", number(curvature)));
     }
 
-    /// Parameter 1 belongs to r², which a conic has already.
+    /// The asphere coefficients, from parameter 2 on; parameter 1 belongs to r², which the conic contains.
     fn terms(&mut self, i: usize, asphere: &[f64]) {
         self.surface_line("PARM 1 0.0");
         for (term, a) in asphere.iter().enumerate() {
@@ -183,8 +183,8 @@ impl ZemaxWriter {
         }
     }
 
-    /// The semi-diameter, and the aperture that makes it and the obstruction clip: a surface has one
-    /// aperture there, with an inner radius too.
+    /// The semi-diameter, and the aperture by which it and the obstruction clip: a surface has one
+    /// aperture there, with an outer and an inner radius.
     fn semi_diameter(&mut self, row: &Row) {
         let aperture = match self.lens.aperture {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),

@@ -17,7 +17,7 @@ impl ZemaxWriter {
         self.zoom_fields();
     }
 
-    /// One operand over all positions.
+    /// One operand at all positions.
     fn operand(&mut self, name: &str, target: usize, values: &[(f64, bool)]) {
         for (i, (value, variable)) in values.iter().enumerate() {
             let (configuration, status) = (i + 1, i32::from(*variable));
@@ -101,7 +101,7 @@ fn size(aperture: Aperture) -> f64 {
     }
 }
 
-/// Whether only the coordinates differ.
+/// True if only the coordinates of the fields differ.
 fn alike(fields: &Fields, base: &Fields) -> bool {
     let weights = |fields: &Fields| fields.values.iter().map(|f| f.weight).collect::<Vec<_>>();
     fields.kind == base.kind && weights(fields) == weights(base)
