@@ -1,4 +1,4 @@
-//! From one file format to another, with all that was lost on the way.
+//! `convert`: conversion between file formats, with a report of every loss.
 
 use super::error::CliError;
 use super::input::check_output_file;
@@ -6,15 +6,15 @@ use super::output::Output;
 use crate::files;
 use std::path::PathBuf;
 
-/// Converts a lens between formats; reports what was used, approximated, preserved and dropped
+/// Converts a lens between formats; reports used, approximated, preserved and dropped parts
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/convert.txt"))]
 pub(super) struct ConvertArgs {
-    /// The lens that is read: .json or .zmx
+    /// The lens to read: .json or .zmx
     #[arg(value_name = "IN")]
     from: PathBuf,
 
-    /// The file that is written, in the format of its extension: .json or .zmx
+    /// The file to write, in the format of its extension: .json or .zmx
     #[arg(value_name = "OUT")]
     to: PathBuf,
 }

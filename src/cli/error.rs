@@ -1,4 +1,4 @@
-//! Why a subcommand did not do its work, and the exit status that says so.
+//! The errors of subcommands, and their exit status.
 
 use crate::files::FileError;
 use crate::lens::{LensError, SystemError};
@@ -7,42 +7,42 @@ use crate::paraxial::ParaxialError;
 use crate::pupil::RayModelError;
 use std::io;
 
-/// Why a subcommand did not do its work.
+/// An error of a subcommand.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CliError {
-    /// A file that cannot be read, is not what it should be, or cannot be written.
+    /// A file that cannot be read or written, or is malformed.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A lens that cannot be used as asked.
+    /// A lens that cannot be resolved.
     #[error("{file}: {source}")]
     Lens {
-        /// The lens.
+        /// The file of the lens.
         file: String,
-        /// What is wrong.
+        /// The cause.
         source: LensError,
     },
-    /// A lens without the first-order data that are asked for.
+    /// A lens without first-order data.
     #[error("{file}: {source}")]
     Paraxial {
-        /// The lens.
+        /// The file of the lens.
         file: String,
-        /// What is wrong.
+        /// The cause.
         source: ParaxialError,
     },
-    /// A lens that cannot be set up for rays.
+    /// A lens for which no rays can be launched.
     #[error("{file}: {source}")]
     RayModel {
-        /// The lens.
+        /// The file of the lens.
         file: String,
-        /// What is wrong.
+        /// The cause.
         source: RayModelError,
     },
-    /// A lens without the merit that is asked for.
+    /// A lens for which the merit function is not defined.
     #[error("{file}: {source}")]
     Merit {
-        /// The lens.
+        /// The file of the lens.
         file: String,
-        /// What is wrong.
+        /// The cause.
         source: MeritError,
     },
     /// Rays that cannot be traced.
@@ -50,13 +50,13 @@ pub(super) enum CliError {
     Rays {
         /// The file of the rays.
         file: String,
-        /// The ray and what is wrong with it.
+        /// The ray and its error.
         source: SystemError,
     },
-    /// Anything else that was asked for wrongly.
+    /// Any other wrong input.
     #[error("{0}")]
     Input(String),
-    /// The work was begun and could not be finished.
+    /// The work began and failed.
     #[error("{0}")]
     Failed(String),
     /// The result could not be printed.
@@ -81,7 +81,7 @@ impl CliError {
         }
     }
 
-    /// Whether the reader of the result has seen enough of it.
+    /// True if the reader of standard output has closed it.
     pub(super) fn is_closed_pipe(&self) -> bool {
         matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
     }

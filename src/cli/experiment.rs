@@ -1,4 +1,4 @@
-//! The figures and tables of the thesis.
+//! `experiment`: the figures and tables of the thesis.
 
 use super::error::CliError;
 use super::output::{Output, ShortNumber, TextTable};
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/experiment.txt"))]
 pub(super) struct ExperimentArgs {
-    /// The number of the figure or table; a list of all where it is absent
+    /// The number of the figure or table; absent: lists all of them
     #[arg(value_name = "FIGURE")]
     id: Option<String>,
 
@@ -61,14 +61,14 @@ fn failure(study: &Study, ended: &ExperimentError) -> CliError {
     CliError::Failed(format!("experiment {}: {ended}", study.id))
 }
 
-/// Refuses a folder that cannot be made, before the work and not after it.
+/// Creates a folder, before the work begins.
 pub(super) fn create_folder(folder: &Path) -> Result<(), CliError> {
     std::fs::create_dir_all(folder).map_err(|error| {
         CliError::Input(format!("{}: {error}; expected a folder", folder.display()))
     })
 }
 
-/// Shows how far the work is.
+/// A bar with the progress of an experiment and the name of its phase.
 fn progress_display() -> impl FnMut(ExperimentProgress<'_>) -> ControlFlow<()> {
     let bar = ProgressBar::new(STEPS as u64);
     let style = ProgressStyle::with_template("{wide_bar} {percent} %  {msg}");
@@ -84,10 +84,10 @@ fn progress_display() -> impl FnMut(ExperimentProgress<'_>) -> ControlFlow<()> {
     }
 }
 
-/// How long each part of an experiment takes: from when it is named to when another one is.
+/// Times each phase of an experiment, from one progress message to the next.
 struct PhaseTimer {
     clock: Stopwatch,
-    /// When the current part began, in seconds and in milliseconds of all threads.
+    /// The start of the current phase, in seconds and in milliseconds of all threads.
     since: (f64, Option<f64>),
     current: Option<String>,
     list: Vec<PhaseTiming>,
@@ -99,7 +99,7 @@ impl PhaseTimer {
         Self { clock, since: (0.0, processor_ms()), current: None, list: Vec::new() }
     }
 
-    /// From now on it does this.
+    /// Ends the current phase and begins another one, unless it is the same.
     fn enter(&mut self, doing: &str) {
         if self.current.as_deref() != Some(doing) {
             self.close();
@@ -127,7 +127,7 @@ impl PhaseTimer {
     }
 }
 
-/// Every experiment.
+/// The list of all experiments.
 struct ExperimentList(&'static [Study]);
 
 #[derive(Serialize)]
@@ -158,7 +158,7 @@ impl Display for ExperimentList {
     }
 }
 
-/// A claim that does not hold is a failure.
+/// Fails if a claim does not hold.
 fn check_claims(report: &ExperimentReport) -> Result<(), CliError> {
     let failed: Vec<&str> = report.outcome.failed().map(|claim| claim.says.as_str()).collect();
     if failed.is_empty() {

@@ -1,9 +1,12 @@
-//! The derivative of an integral over the pupil by every number of a lens.
+//! `gradient`: an integral over the pupil and its derivatives with respect to all numbers of a lens.
 
 use super::error::CliError;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, TextTable};
-use crate::lens::{Fields, Lens, Medium, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, at_zoom};
+use crate::lens::{
+    Fields, Lens, Medium, MediumPlace, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, SurfaceNumber,
+    at_zoom,
+};
 use crate::measure::{Integral, time_ms};
 use crate::pupil::{
     Accuracy, DerivativeError, DerivativeEstimator, PupilDerivative, QuadraticIntegrand, RayModel,
@@ -14,22 +17,22 @@ use clap::ValueEnum;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// An integral over the pupil and its derivative by every number of the lens
+/// An integral over the pupil and its derivatives with respect to all numbers of the lens
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/gradient.txt"))]
 pub(super) struct GradientArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// What is integrated
+    /// The integrand
     #[arg(long, value_enum, default_value_t = Integral::Spot)]
     term: Integral,
 
-    /// How the motion of the pupil's edge is counted
+    /// The treatment of the motion of the pupil's edge
     #[arg(long, value_enum, default_value_t = Method::Auto)]
     method: Method,
 
-    /// Only this field, in the unit of the lens's fields; the sum over all of them where it is absent
+    /// Only this field, in the unit of the lens's fields; absent: the sum over all fields
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     field: Option<f64>,
 
@@ -37,27 +40,27 @@ pub(super) struct GradientArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// The error allowed of the derivatives, relative to the largest of their kind: `0.1%` or `1e-3`
+    /// Tolerance of the derivatives, relative to the largest of their kind: `0.1%` or `1e-3`
     #[arg(long, default_value = "1e-6", value_name = "TOLERANCE")]
     error: Tolerance,
 
-    /// No more rays than this for one field and wavelength
+    /// Maximum number of rays for one field and wavelength
     #[arg(long, default_value_t = 2_000_000, value_name = "N")]
     rays: usize,
 }
 
-/// The ways to differentiate an integral whose region moves with the lens.
+/// The estimators of derivatives of an integral whose region moves with the lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Method {
-    /// What the form of the pupil and the tolerance call for
+    /// Chosen for the shape of the pupil and the tolerance
     Auto,
-    /// The rays that get through are kept: exact while nothing is clipped, biased elsewhere
+    /// The transmitted rays are held fixed: exact while nothing is clipped, else biased
     Biased,
     /// The motion of the edge is integrated along it
     Boundary,
     /// The motion of the edge is spread over the pupil
     Warp,
-    /// Central differences with the edge found anew
+    /// Central differences with the edge located anew
     Difference,
 }
 
@@ -85,7 +88,7 @@ impl GradientArgs {
         output.print(&GradientReport::new(self, &lens, &found, ms))
     }
 
-    /// The lens at the zoom position and field that are asked for.
+    /// The lens at the selected zoom position and field.
     fn selected_lens(&self, opened: &LoadedLens) -> Result<Lens, CliError> {
         let mut lens = at_zoom(&opened.lens, self.zoom);
         if let Some(y) = self.field {
@@ -107,7 +110,7 @@ impl GradientArgs {
             let cost = self.cost(bench, &regions);
             for (region, color) in regions.iter().zip(&bench.channels) {
                 let (estimator, reason) = match self.method.estimator() {
-                    Some(asked) => (asked, "asked for".to_owned()),
+                    Some(asked) => (asked, "chosen by --method".to_owned()),
                     None => choose_estimator(region, accuracy)?,
                 };
                 let derivative = differentiate(region, &cost, estimator, accuracy)?;
@@ -122,7 +125,7 @@ impl GradientArgs {
         Ok(found)
     }
 
-    /// The cost about the centroid of all wavelengths.
+    /// The integrand about the centroid of all wavelengths.
     fn cost(&self, bench: &RayModel, regions: &[Region<'_>]) -> QuadraticIntegrand {
         if self.term == Integral::Throughput {
             return QuadraticIntegrand::throughput();
@@ -137,10 +140,10 @@ impl GradientArgs {
     }
 }
 
-/// The order of quadrature of the value.
+/// The quadrature order of the value.
 const VALUE_ORDER: usize = 6;
 
-/// What was found.
+/// An integral with its derivatives.
 struct IntegralDerivative {
     value: f64,
     value_error: f64,
@@ -168,7 +171,7 @@ impl IntegralDerivative {
     }
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct GradientReport {
     term: Integral,
@@ -182,15 +185,15 @@ struct GradientReport {
     d_error: DerivativeColumns,
     #[serde(skip)]
     unit: &'static str,
-    /// What the coefficients of the gradient behind each surface belong to.
+    /// The labels of the gradient-index coefficients behind each surface.
     #[serde(skip)]
     coefficients: Vec<CoefficientLabels>,
 }
 
-/// What each coefficient of a gradient belongs to; nothing where its law has none.
+/// The label of each coefficient of a gradient-index medium; `None` if its law does not have it.
 type CoefficientLabels = [Option<String>; PROFILE_TERMS];
 
-/// One entry a surface; nothing where the surface has no such number.
+/// Derivatives, one entry a surface; `None` if the surface has no such number.
 #[derive(Serialize)]
 struct DerivativeColumns {
     curvature: Vec<f64>,
@@ -199,7 +202,7 @@ struct DerivativeColumns {
     conic: Vec<Option<f64>>,
     index: Vec<f64>,
     asphere: Vec<Option<Vec<f64>>>,
-    /// The ten coefficients of a gradient; only where the lens has one.
+    /// The ten coefficients of a gradient-index medium; only if the lens has one.
     #[serde(skip_serializing_if = "are_none")]
     gradient: Vec<Option<Vec<f64>>>,
 }
@@ -263,7 +266,7 @@ impl Display for GradientReport {
                 rim.map_or("-".to_owned(), |(value, error)| cell(value, error)),
                 cell(d.index[i], d_error.index[i]),
             ];
-            table.row(std::iter::once(i.to_string()).chain(cells));
+            table.row(std::iter::once(SurfaceNumber::new(i).to_string()).chain(cells));
         }
         write!(f, "{table}")?;
         self.write_gradients(f)
@@ -283,11 +286,11 @@ fn coefficient_labels(medium: &Medium) -> CoefficientLabels {
 }
 
 impl GradientReport {
-    /// The coefficients of every gradient-index medium.
+    /// Writes a table of the coefficients of each gradient-index medium.
     fn write_gradients(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, (by, error)) in self.d.gradient.iter().zip(&self.d_error.gradient).enumerate() {
             let (Some(by), Some(error)) = (by, error) else { continue };
-            let title = format!("gradient after surface {i}, coefficient of");
+            let title = format!("gradient index {}, coefficient of", MediumPlace::behind(i));
             let mut table = TextTable::new(&[&title, "derivative"]);
             for ((by, error), power) in by.iter().zip(error).zip(&self.coefficients[i]) {
                 if let Some(power) = power {

@@ -1,4 +1,4 @@
-//! Reading what a subcommand works on.
+//! The input of subcommands: lenses, fields, tolerances, JSON, and the files that will be written.
 
 use super::error::CliError;
 use super::output::print_note;
@@ -10,7 +10,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// The lens that a subcommand works on.
+/// The lens argument of a subcommand.
 #[derive(Debug, clap::Args)]
 pub(super) struct LensFile {
     /// The lens: .json or .zmx
@@ -18,7 +18,7 @@ pub(super) struct LensFile {
     path: PathBuf,
 }
 
-/// A lens that was read, and where from.
+/// A lens with the name of its file.
 #[derive(Debug, Clone)]
 pub(super) struct LoadedLens {
     pub(super) lens: Lens,
@@ -30,7 +30,7 @@ impl LensFile {
         &self.path
     }
 
-    /// Reads the lens; what a foreign file says that we cannot is remarked on.
+    /// Reads the lens; a note counts the lines of a foreign file that are not represented exactly.
     pub(super) fn open(&self) -> Result<LoadedLens, CliError> {
         let file = self.path.display().to_string();
         let opened = files::open(&self.path)?;
@@ -46,26 +46,26 @@ impl LensFile {
 }
 
 impl LoadedLens {
-    /// The lens in plain numbers, at its primary wavelength where no other is asked for.
+    /// The resolved lens, at the primary wavelength if `um` is `None`.
     pub(super) fn system(&self, zoom: usize, um: Option<f64>) -> Result<System<f64>, CliError> {
         let um = um.unwrap_or_else(|| self.primary_um());
         let system = self.lens.resolve(zoom, um);
         system.map_err(|source| CliError::Lens { file: self.file.clone(), source })
     }
 
-    /// The primary wavelength.
+    /// The primary wavelength, in µm.
     pub(super) fn primary_um(&self) -> f64 {
         self.lens.wavelengths[self.lens.primary()].um
     }
 
-    /// The lens with its beam at a zoom position.
+    /// The lens with its beam and aiming at a zoom position.
     pub(super) fn bench(&self, zoom: usize) -> Result<RayModel, CliError> {
         self.check_zoom(zoom)?;
         let bench = RayModel::from_lens(&self.lens, zoom);
         bench.map_err(|source| CliError::RayModel { file: self.file.clone(), source })
     }
 
-    /// A field at this height or angle, in the unit of the lens's fields.
+    /// The field point at this height (mm) or angle (degrees), as the lens defines its fields.
     pub(super) fn field_at(&self, y: f64, zoom: usize) -> Result<FieldPoint, CliError> {
         let angle = self.lens.fields_at(zoom).kind == FieldKind::Angle;
         if y.is_finite() && !(angle && y.abs() >= 180.0) {
@@ -75,7 +75,7 @@ impl LoadedLens {
         Err(CliError::Input(format!("--field: found {y}; expected {unit}")))
     }
 
-    /// Refuses a zoom position that the lens does not have.
+    /// Refuses a zoom position that does not exist.
     pub(super) fn check_zoom(&self, zoom: usize) -> Result<(), CliError> {
         let count = self.lens.zoom_positions();
         if zoom < count {
@@ -89,7 +89,7 @@ impl LoadedLens {
     }
 }
 
-/// A relative error that is allowed, `0.1%` or `1e-3`.
+/// A relative tolerance: `0.1%` or `1e-3`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tolerance(pub(super) f64);
 
@@ -108,7 +108,7 @@ impl FromStr for Tolerance {
     }
 }
 
-/// Reads JSON from a file, or from standard input for `-`.
+/// Reads JSON from a file, or from standard input if the path is `-`.
 pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CliError> {
     let file = display_name(path);
     let unreadable = |source| FileError::Unreadable { file: file.clone(), source };
@@ -122,7 +122,7 @@ pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CliError>
     Ok(json::read_json(&text, &file)?)
 }
 
-/// Refuses a target that surely cannot be written, before the work and not after it.
+/// Refuses a target that cannot be written, before the work begins.
 pub(super) fn check_output_file(path: &Path, extensions: &[&str]) -> Result<(), CliError> {
     let file = path.display();
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
@@ -141,7 +141,7 @@ pub(super) fn check_output_file(path: &Path, extensions: &[&str]) -> Result<(), 
     files::check_writable(path).map_err(|error| CliError::Input(error.to_string()))
 }
 
-/// What a message calls a file.
+/// The name of a file in messages.
 pub(super) fn display_name(path: &Path) -> String {
     if path == Path::new("-") { "standard input".to_owned() } else { path.display().to_string() }
 }

@@ -1,4 +1,4 @@
-//! Local optimization: the loop, its progress bar, and saving the best lens whatever ends it.
+//! `optimize`: local optimization, which saves the best lens however it ends.
 
 use super::error::CliError;
 use super::input::{self, LensFile, LoadedLens, Tolerance};
@@ -23,31 +23,31 @@ pub(super) struct OptimizeArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// Where the best lens is saved: .json or .zmx
+    /// The file for the best lens: .json or .zmx
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// How to search
+    /// The optimization method
     #[arg(long, value_enum, default_value_t = DescentMethod::DampedLeastSquares)]
     method: DescentMethod,
 
-    /// No more steps than this; 100 for dls and 2000 for adam where it is absent
+    /// Maximum number of steps; absent: 100 for dls, 2000 for adam
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
 
-    /// The error allowed of the radius of each spot: `0.1%` or `1e-3`
+    /// Tolerance of the radius of each spot: `0.1%` or `1e-3`
     #[arg(long, default_value = "1e-6", value_name = "TOLERANCE")]
     error: Tolerance,
 
-    /// Kinds of numbers to vary besides the variables of the lens
+    /// Kinds of parameters to vary in addition to the variables of the lens
     #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]
     vary: Vec<ParameterKind>,
 
-    /// What to aim at, as JSON; sharp spots at the focal length it has where it is absent
+    /// The merit function, as JSON; absent: sharp spots at the present focal length
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
 
-    /// Where every step is written down, as JSON
+    /// A file for the history of all steps, as JSON
     #[arg(long, value_name = "FILE")]
     history: Option<PathBuf>,
 }
@@ -75,7 +75,7 @@ impl OptimizeArgs {
         let light = |lens: &Lens| Merit::new(lens, &goal, self.error.0).map(|m| m.light());
         let light_before = light(&lens).map_err(refuse)?;
         let (search, ms) = time_ms(|| self.search(optimizer.as_mut()));
-        // The lens is safe before anything else is worked out about it.
+        // The lens is saved before anything else is computed from it.
         let best = Lens { variables: opened.lens.variables.clone(), ..optimizer.best().clone() };
         files::save(&best, &self.out)?;
         let after = optimizer.terms().map_err(refuse)?;
@@ -97,7 +97,7 @@ impl OptimizeArgs {
         }
     }
 
-    /// Steps until nothing gets better, the steps are used up, or the person has had enough.
+    /// Steps until convergence, the maximum number of steps or Ctrl-C.
     fn search(&self, optimizer: &mut dyn Optimizer) -> OptimizeRun {
         let most = self.steps.unwrap_or(default_steps(self.method));
         let stop = stop_flag();
@@ -124,7 +124,7 @@ impl OptimizeArgs {
     }
 }
 
-/// What can go wrong while the goal is made.
+/// An error of the merit function.
 enum GoalError {
     Failure(CliError),
     Merit(MeritError),
@@ -144,27 +144,27 @@ fn merit_error(opened: &LoadedLens, source: MeritError) -> CliError {
     match source {
         MeritError::NoVariables => CliError::Input(format!(
             "{file}: found no variables; expected some in the file (`\"variables\"`), or kinds of \
-             numbers to vary: `--vary curvatures,thicknesses`"
+             parameters to vary: `--vary curvatures,thicknesses`"
         )),
         source => CliError::Merit { file, source },
     }
 }
 
-/// How a search went.
+/// The steps of a run and the reason of its end.
 struct OptimizeRun {
     steps: Vec<OptimizationProgress>,
     ended: OptimizeEnd,
 }
 
-/// What ended a search.
+/// The reason why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum OptimizeEnd {
-    /// Nothing gets better.
+    /// It converged.
     Finished,
-    /// The steps are used up.
+    /// The maximum number of steps was reached.
     Steps,
-    /// The person stopped it.
+    /// It was stopped by Ctrl-C.
     Stopped,
 }
 
@@ -173,17 +173,17 @@ struct StepHistory<'a> {
     steps: &'a [OptimizationProgress],
 }
 
-/// A search with the terms around it.
+/// A run with the terms before and after it.
 struct OptimizeOutcome<'a> {
     search: &'a OptimizeRun,
     ms: f64,
-    /// Before and after.
+    /// The mean pupil area before and after, in mm².
     light: [f64; 2],
     before: Vec<TermValue>,
     after: Vec<TermValue>,
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct OptimizeReport {
     method: String,
@@ -236,7 +236,7 @@ impl OptimizeReport {
     }
 }
 
-/// The terms that ask for light.
+/// The terms that depend on the transmitted light.
 const LIGHT_TERMS: [&str; 5] =
     ["throughput", "throughput_loss", "light", "relative_illumination", "f_number"];
 
@@ -244,13 +244,13 @@ impl Display for OptimizeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { steps, ms, merit_before, merit_after, out, .. } = self;
         let ended = match self.ended {
-            OptimizeEnd::Finished => "nothing gets better any more",
-            OptimizeEnd::Steps => "the steps are used up",
+            OptimizeEnd::Finished => "converged",
+            OptimizeEnd::Steps => "the maximum number of steps was reached",
             OptimizeEnd::Stopped => "stopped",
         };
         writeln!(f, "{steps} steps in {:.3} s: {ended}", 1e-3 * ms)?;
         if let Some(refusal) = &self.last_refusal {
-            writeln!(f, "{} steps refused or shortened, the last: {refusal}", self.refused_steps)?;
+            writeln!(f, "{} steps rejected or shortened, the last: {refusal}", self.refused_steps)?;
         }
         writeln!(f, "merit {} -> {}", ShortNumber(*merit_before), ShortNumber(*merit_after))?;
         let [before, after] = [self.light_before, self.light_after];
@@ -263,7 +263,10 @@ impl Display for OptimizeReport {
         )?;
         let asks = self.terms.iter().any(|term| LIGHT_TERMS.contains(&term.term));
         if change < -1.0 && !asks {
-            writeln!(f, "  no term asks for light: some of the sharpness was bought by clipping")?;
+            writeln!(
+                f,
+                "  no term depends on the light: part of the sharpness was gained by clipping"
+            )?;
         }
         writeln!(f)?;
         let table = TermComparison::table(&self.terms);

@@ -1,4 +1,4 @@
-//! Printing a result: text for people, JSON for programs.
+//! Printing of results: text for readers, JSON for programs.
 
 use super::error::CliError;
 use crate::files::json;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::io::{Write as _, stderr, stdout};
 
-/// Where results go, and in which form.
+/// The printer of results, as text or as JSON.
 #[derive(Debug)]
 pub(super) struct Output {
     json: bool,
@@ -26,13 +26,13 @@ impl Output {
     }
 }
 
-/// Tells the person something that is not the result.
+/// Prints a note on standard error.
 pub(super) fn print_note(text: impl Display) {
-    // A remark that nobody can read is not worth failing for.
+    // A note that cannot be printed is not a failure.
     drop(writeln!(stderr(), "{text}"));
 }
 
-/// A number with seven significant digits, and no more zeros than it needs.
+/// A number with seven significant digits and without trailing zeros.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShortNumber(pub(super) f64);
 
@@ -57,12 +57,12 @@ impl Display for ShortNumber {
     }
 }
 
-/// A number that may not exist.
+/// A number, or a dash if it does not exist.
 pub(super) fn or_dash(value: Option<f64>) -> String {
     value.map_or("-".to_owned(), |value| ShortNumber(value).to_string())
 }
 
-/// Rows of text in columns that line up: the first to the left, the others to the right.
+/// A table of text: the first column is aligned to the left, the others to the right.
 #[derive(Debug, Default)]
 pub(super) struct TextTable {
     rows: Vec<Vec<String>>,

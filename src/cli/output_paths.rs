@@ -1,10 +1,10 @@
-//! The files that a command writes: none of them is one that it reads, or another one that it writes.
+//! Checks that the files that a command writes differ from those that it reads, and from each other.
 
 use super::error::CliError;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Refuses what is no folder, or cannot become one.
+/// Refuses a path that is not a folder and cannot become one.
 pub(super) fn check_folder(folder: &Path) -> Result<(), CliError> {
     let there = folder.ancestors().find(|part| part.exists());
     match there {
@@ -16,7 +16,7 @@ pub(super) fn check_folder(folder: &Path) -> Result<(), CliError> {
     }
 }
 
-/// Refuses files that would be written over one that is read, or over each other.
+/// Refuses files that would overwrite one that is read, or each other.
 pub(super) fn check_distinct<'a>(
     targets: &[Option<(&'static str, &'a Path)>],
     read: impl Iterator<Item = (&'static str, &'a Path)>,
@@ -34,7 +34,7 @@ pub(super) fn check_distinct<'a>(
     Ok(())
 }
 
-/// Where a file lies, whatever it is called on the way there.
+/// The canonical path of a file, which need not exist.
 fn canonical_path(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = fs::canonicalize(folder.unwrap_or(Path::new(".")));

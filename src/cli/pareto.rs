@@ -1,4 +1,4 @@
-//! The front of sharpness against light.
+//! `pareto`: the front of sharpness against light.
 
 use super::error::CliError;
 use super::input::{LensFile, Tolerance};
@@ -22,27 +22,27 @@ pub(super) struct ParetoArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// The folder into which table, picture and lenses are written
+    /// The folder for table, picture and lenses
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// How many weights
+    /// The number of weights of light
     #[arg(long, default_value_t = ParetoSettings::default().points, value_name = "N")]
     points: usize,
 
-    /// What descends
+    /// The optimization method
     #[arg(long, value_enum, default_value_t = DescentMethod::Adam)]
     method: DescentMethod,
 
-    /// No more steps than this for each weight; 100 for dls and 500 for adam where it is absent
+    /// Maximum number of steps for each weight; absent: 100 for dls, 500 for adam
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
 
-    /// The error allowed of the radius of each spot while searching: `0.1%` or `1e-3`
+    /// Tolerance of the radius of each spot: `0.1%` or `1e-3`
     #[arg(long, default_value = "1e-3", value_name = "TOLERANCE")]
     error: Tolerance,
 
-    /// Without the same search by biased derivatives, which is made for comparison
+    /// Omits the comparison with biased derivatives, which hold the transmitted rays fixed
     #[arg(long)]
     no_biased: bool,
 }
@@ -113,7 +113,7 @@ impl ParetoArgs {
     }
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct ParetoSweepReport {
     ms: f64,
@@ -183,7 +183,7 @@ impl ParetoSweepReport {
     }
 }
 
-/// No more lenses than this are listed; the files have all.
+/// The number of lenses in the printed table; the files have all of them.
 const MAX_LISTED: usize = 20;
 
 impl Display for ParetoSweepReport {
@@ -195,7 +195,7 @@ impl Display for ParetoSweepReport {
         writeln!(f, "hypervolume {hypervolume:.4} of twice the spot and the light at the start")?;
         if let Some(BiasedSweep { ms, hypervolume, dominated, front }) = &self.biased {
             write!(f, "biased: {} lenses in {:.2} s, hypervolume ", front.len(), 1e-3 * ms)?;
-            writeln!(f, "{hypervolume:.4}; {dominated} of them are beaten in both")?;
+            writeln!(f, "{hypervolume:.4}; {dominated} of them are dominated")?;
         }
         writeln!(f)?;
         let mut table = TextTable::new(&[

@@ -4,7 +4,7 @@ use super::output::{ShortNumber, TextTable};
 use crate::merit::TermValue;
 use serde::Serialize;
 
-/// A term before and after.
+/// A term before and after a run.
 #[derive(Serialize)]
 pub(super) struct TermComparison {
     pub(super) term: &'static str,
@@ -27,7 +27,7 @@ impl TermEstimate {
 }
 
 impl TermComparison {
-    /// The terms of a goal at two lenses.
+    /// The terms of a merit function at two lenses.
     pub(super) fn compare(before: &[TermValue], after: &[TermValue]) -> Vec<Self> {
         let term = |(before, after): (&TermValue, &TermValue)| Self {
             term: before.term,
@@ -38,7 +38,7 @@ impl TermComparison {
         before.iter().zip(after).map(term).collect()
     }
 
-    /// A row for each term.
+    /// A table with a row for each term.
     pub(super) fn table(terms: &[Self]) -> TextTable {
         let mut table =
             TextTable::new(&["term", "weight", "before", "error", "after", "error", "rays"]);

@@ -1,15 +1,16 @@
-//! Tracing rays that are given as JSON.
+//! `trace`: rays given as JSON.
 
 use super::error::CliError;
 use super::input::{self, LensFile};
 use super::output::{Output, ShortNumber, TextTable};
+use crate::lens::SurfaceNumber;
 use crate::math::Vec3;
 use crate::trace::{Fates, Ray, TracedRay, Tracer};
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
-/// Traces rays given as JSON: how each one ends, where, and its optical path
+/// Traces rays given as JSON: fate, end point and optical path of each
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/trace.txt"))]
 pub(super) struct TraceArgs {
@@ -41,7 +42,7 @@ impl TraceArgs {
     }
 }
 
-/// What is read.
+/// The rays of the input, with their conditions.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RayRequest {
@@ -121,8 +122,10 @@ impl Display for TraceReport {
         let mut table = TextTable::new(&head);
         for (i, ray) in self.rays.iter().enumerate() {
             let numbers = [ray.x, ray.y, ray.z, ray.l, ray.m, ray.n, ray.opl];
-            let remark = ray.backwards.map(|i| format!("backwards to surface {i}"));
-            let start = [i.to_string(), ray.fate.to_owned(), ray.surface.to_string()];
+            let remark =
+                ray.backwards.map(|i| format!("backwards to surface {}", SurfaceNumber::new(i)));
+            let start =
+                [i.to_string(), ray.fate.to_owned(), SurfaceNumber::new(ray.surface).to_string()];
             let numbers = numbers.iter().map(|value| ShortNumber(*value).to_string());
             table.row(start.into_iter().chain(numbers).chain([remark.unwrap_or_default()]));
         }

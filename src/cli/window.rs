@@ -1,11 +1,11 @@
-//! Opening the studio, or saying what works without it.
+//! Opening the studio, or the alternatives if the program was built without it.
 
 use super::error::CliError;
 use crate::files;
 use serde_json::Value;
 use std::path::Path;
 
-/// Opens the studio on a lens, or on the one that comes first in the library.
+/// Opens the studio on a lens, or on the first bundled one.
 pub(super) fn open(lens: Option<&Path>) -> Result<(), CliError> {
     if let Some(path) = lens {
         reject_mistyped_command(path)?;
@@ -14,7 +14,7 @@ pub(super) fn open(lens: Option<&Path>) -> Result<(), CliError> {
     show(lens)
 }
 
-/// What the window costs, measured in a real one.
+/// Times of the studio, measured in a real window.
 pub(super) fn benchmark() -> Result<Value, CliError> {
     measured()
 }
@@ -46,7 +46,7 @@ fn measured() -> Result<Value, CliError> {
     Err(CliError::Failed(without.to_owned()))
 }
 
-/// A word that is neither a file nor looks like one was meant as a subcommand.
+/// Refuses a word that is neither a file nor looks like one: a mistyped subcommand.
 fn reject_mistyped_command(path: &Path) -> Result<(), CliError> {
     if path.exists() || path.extension().is_some() || path.components().count() > 1 {
         return Ok(());

@@ -6,7 +6,7 @@ use super::binding::{Configuration, ResolvedSystems};
 use super::first_order::slopes;
 use super::sum::SumOfSquares;
 use super::{Dual1, EvaluationContext, MeritError, Term};
-use crate::lens::{Lens, System};
+use crate::lens::{Lens, SurfaceNumber, System};
 use crate::math::Real;
 use serde::Serialize;
 
@@ -98,6 +98,14 @@ pub struct ConstraintMargin {
 }
 
 impl ConstraintMargin {
+    /// The constrained surface or field, as it is displayed; `None` for the whole lens.
+    pub fn place(&self) -> Option<String> {
+        let index = self.surface?;
+        let is_field = self.term == "light";
+        let surface = || format!("surface {}", SurfaceNumber::new(index));
+        Some(if is_field { format!("field {index}") } else { surface() })
+    }
+
     /// The distance to the nearest bound, negative if the constraint is violated.
     pub fn slack(&self) -> f64 {
         let below = self.min.map_or(f64::INFINITY, |min| self.value - min);

@@ -188,9 +188,9 @@ fn wrong_pictures_are_refused_with_their_file() {
     let empty = Scrap::new("empty.png", &[]);
     says(refused(empty.drawing()), &["empty.png", "an empty file", "PNG"]);
     let text = Scrap::new("text.png", b"this is no picture");
-    says(refused(text.drawing()), &["text.png", "expected a picture"]);
+    says(refused(text.drawing()), &["text.png", "expected an image"]);
     let black = Scrap::picture("black.png", [5, 5], |_, _| 0);
-    says(refused(black.drawing()), &["black.png", "a black picture", "some light"]);
+    says(refused(black.drawing()), &["black.png", "a black image", "not black"]);
     let rim = Scrap::picture("rim.png", [30, 10], |x, _| if x < 5 { 255 } else { 0 });
     says(refused(rim.drawing()), &["rim.png", "middle", "no light"]);
     let huge = Scrap::picture("huge.png", [20_000, 1], |_, _| 255);

@@ -325,7 +325,7 @@ fn grin_a_report_has_every_limit_and_every_file_and_no_infinite_number() {
     assert!(limits.len() == 2 && limits.iter().all(|limit| limit["kept"] == true), "{limits:?}");
     assert_eq!(limits[1]["limit"], 2.0);
     let text = done(&arguments, &task.to_string());
-    let words = ["lowest index", "limit 2: kept, margin", "nothing to find", ".raw", ".json"];
+    let words = ["lowest index", "limit 2: satisfied, margin", "nothing to find", ".raw", ".json"];
     assert!(words.iter().all(|word| text.contains(word)) && !text.contains("inf"), "{text}");
     std::fs::remove_file(raw).unwrap();
 }

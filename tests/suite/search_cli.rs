@@ -211,7 +211,7 @@ fn a_search_says_what_is_not_kept() {
     assert_eq!(report["reservoir"][0]["merit"], report["merit_best"]);
     let said = Command::new(env!("CARGO_BIN_EXE_aplanat")).args(base).output().unwrap();
     let said = String::from_utf8(said.stderr).unwrap();
-    assert!(said.contains("note: the start breaks a limit: total track"), "{said}");
+    assert!(said.contains("note: the start violates a constraint: total track"), "{said}");
 }
 
 /// A negative number is a number.

@@ -1,4 +1,4 @@
-//! What chief rays show: distortion and field curvature.
+//! Results from chief rays: distortion and field curvature.
 
 use super::{AnalysisRun, AtField, TextLines, estimate_text};
 use crate::analysis::{Estimate, distortion, field_curvature};
@@ -53,7 +53,7 @@ pub(super) struct FieldCurvatureJson {
 }
 
 pub(super) fn curvatures(task: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> {
-    // A focus is where rays cross at a small angle: rounding across the axis counts more along it.
+    // Rays cross at the focus at a small angle, so rounding across the axis is enlarged along it.
     let cone = task.bench.first_order.working_f_number.unwrap_or(1.0).abs().max(1.0);
     let at = |field: &crate::lens::FieldPoint| {
         let (result, ms) = time_ms(|| field_curvature(&task.bench, *field, task.bench.primary));

@@ -6,7 +6,7 @@ use crate::cli::output::{ShortNumber, or_dash};
 use crate::measure::time_ms;
 use serde::Serialize;
 
-/// Rays of a fan: a curve that people look at, not a sum.
+/// Rays of a fan, which is a curve to look at and not an integral.
 const POINTS: usize = 21;
 
 /// The fans of a field.

@@ -1,4 +1,4 @@
-//! The spot at image planes around the one of the lens.
+//! Through focus: the spot at displaced image planes.
 
 use super::{AnalysisRun, AtField, FieldOutcome, TextLines, estimate_text, spot};
 use crate::analysis::{AnalysisError, Estimate};
@@ -8,7 +8,7 @@ use crate::lens::{Lens, Parameter, Quantity};
 use crate::measure::time_ms;
 use serde::Serialize;
 
-/// Image planes on each side of the one of the lens.
+/// The number of image planes on each side of that of the lens.
 const STEPS: i32 = 5;
 
 /// The spots of a field through focus.
@@ -19,7 +19,7 @@ pub(super) struct ThroughFocusJson {
 
 #[derive(Serialize)]
 struct FocusPosition {
-    /// How far the image plane is moved along z, in mm.
+    /// The displacement of the image plane along z, in mm.
     defocus: f64,
     rms: Option<Estimate>,
 }
@@ -48,7 +48,7 @@ pub(super) fn through_focus(
     Ok(task.fields.iter().enumerate().map(at).collect())
 }
 
-/// The RMS radii of all fields with the image plane moved.
+/// The RMS radii of all fields at a displaced image plane.
 fn spots(
     task: &AnalysisRun,
     defocus: f64,
@@ -64,7 +64,7 @@ fn spots(
     Ok(task.fields.iter().map(spot).collect())
 }
 
-/// Moves the image plane along z, whichever number it hangs on.
+/// Displaces the image plane along z by the number that determines its position.
 fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
     if let Some(offset) = &mut lens.image_solve {
         *offset += defocus;
@@ -82,8 +82,8 @@ fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
     lens.set(parameter, gap + defocus);
 }
 
-/// A step over which the spot of the sharpest field changes by about its own size, as a round
-/// number.
+/// The step of the displacement, a round number over which the spot of the sharpest field changes by
+/// about its own size.
 fn focus_step(task: &AnalysisRun) -> f64 {
     let rms = |field: &AtField<spot::SpotJson>| match &field.outcome {
         FieldOutcome::Lit(lit) => Some(lit.rms()),

@@ -1,4 +1,4 @@
-//! How much light a field gets.
+//! The illumination of the fields.
 
 use super::{AnalysisRun, AtField, TextLines, estimate_text};
 use crate::analysis::{Estimate, Illumination, illumination};
@@ -6,7 +6,7 @@ use crate::measure::time_ms;
 use crate::pupil::RayModel;
 use serde::Serialize;
 
-/// The light at a field; a field without any has 0 and says why.
+/// The light at a field; a field without light has 0 and the reason.
 #[derive(Serialize)]
 pub(super) struct IlluminationJson {
     cone: Estimate,
@@ -16,7 +16,7 @@ pub(super) struct IlluminationJson {
 }
 
 pub(super) fn illuminations(task: &AnalysisRun) -> Vec<AtField<IlluminationJson>> {
-    // Light is compared with that of the first field of the lens, asked for or not.
+    // The reference is the first field of the lens, even if it is not selected.
     let first = task.bench.fields.first().copied();
     let alone = first.is_some_and(|first| task.fields == [first]);
     let asked = if alone { Vec::new() } else { task.fields.clone() };

@@ -1,4 +1,4 @@
-//! What a designer reads, each number with its error, rays and milliseconds.
+//! `analyze`: the results that a designer reads, each number with its error, rays and milliseconds.
 
 mod chief;
 mod fan;
@@ -10,7 +10,7 @@ use super::error::CliError;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber};
 use crate::analysis::{AnalysisError, Estimate};
-use crate::lens::{FieldKind, FieldPoint};
+use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
 use crate::measure::time_ms;
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fate, Fates};
@@ -26,14 +26,14 @@ pub(super) struct AnalyzeArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// What to analyze
+    /// The analysis
     what: AnalysisKind,
 
-    /// The error allowed, relative to the number: `0.1%` or `1e-3`
+    /// Relative tolerance: `0.1%` or `1e-3`
     #[arg(long, default_value = "0.1%", value_name = "TOLERANCE")]
     error: Tolerance,
 
-    /// Only this field, in the unit of the lens's fields; all fields of the lens where it is absent
+    /// Only this field, in the unit of the lens's fields; absent: all fields
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     field: Option<f64>,
 
@@ -50,13 +50,13 @@ enum AnalysisKind {
     Spot,
     /// Transverse ray errors along both sections of the pupil
     Fan,
-    /// Chief rays against `f tan(theta)` and `f theta`
+    /// Chief rays compared with `f tan(theta)` and `f theta`
     Distortion,
     /// Tangential and sagittal focus along chief rays
     FieldCurvature,
-    /// Light against that of the first field, with the really clipped pupil
+    /// Light relative to the first field, with the vignetted pupil
     Illumination,
-    /// RMS radius at image planes around the one of the lens
+    /// RMS radius at displaced image planes
     ThroughFocus,
 }
 
@@ -76,12 +76,12 @@ impl AnalyzeArgs {
     }
 }
 
-/// A lens that is to be analyzed.
+/// A lens and the options of its analysis.
 struct AnalysisRun {
     what: AnalysisKind,
     opened: LoadedLens,
     bench: RayModel,
-    /// The fields that are asked for.
+    /// The selected fields.
     fields: Vec<FieldPoint>,
     zoom: usize,
     accuracy: Accuracy,
@@ -103,19 +103,19 @@ impl AnalysisRun {
         self.bench.channels[self.bench.primary].um
     }
 
-    /// What rounding in `f64` may do to a length that one ray gives.
+    /// The rounding error in `f64` of a length from one ray, in mm.
     fn rounding(&self) -> f64 {
         let system = &self.bench.channels[self.bench.primary].system;
         16.0 * f64::EPSILON * system.total_track()
     }
 
-    /// A length from one ray.
+    /// The estimate of a length from one ray.
     fn single_ray_estimate(&self, value: f64, milliseconds: f64) -> Estimate {
         let milliseconds = Some(milliseconds);
         Estimate { milliseconds, ..Estimate::new(value, self.rounding(), 1) }
     }
 
-    /// The results at every field, unless no field has any light.
+    /// The report of all fields; an error if no field has light.
     fn report<T: TextLines + Serialize>(
         &self,
         fields: Vec<AtField<T>>,
@@ -136,7 +136,7 @@ impl AnalysisRun {
         })
     }
 
-    /// Says where the light is lost of which nothing arrives.
+    /// The error that there is no light, with the surface where most of it is lost.
     fn no_light(&self, reason: &str) -> CliError {
         let mut ends: BTreeMap<Fate, usize> = BTreeMap::new();
         let mut fates = Fates::default();
@@ -151,13 +151,13 @@ impl AnalysisRun {
             }
         }
         let most = ends.into_iter().max_by_key(|(_, count)| *count);
-        let place = most.map_or("no ray could be started".to_owned(), |(fate, count)| {
-            let surface = fate.surface().unwrap_or(0);
+        let place = most.map_or("no ray can be launched".to_owned(), |(fate, count)| {
+            let surface = SurfaceNumber::new(fate.surface().unwrap_or(0));
             let (name, total) = (fate.name(), fates.total());
             format!("{count} of {total} rays end {name} at surface {surface}")
         });
         let file = &self.opened.file;
-        CliError::Input(format!("{file}: {reason}: {place}; expected a lens that images"))
+        CliError::Input(format!("{file}: {reason}: {place}; expected a lens that forms an image"))
     }
 }
 
@@ -169,7 +169,7 @@ fn common_reason<T>(fields: &[AtField<T>]) -> Option<&str> {
     }
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct AnalysisReport<T> {
     analysis: AnalysisKind,
@@ -181,7 +181,7 @@ struct AnalysisReport<T> {
     fields: Vec<AtField<T>>,
 }
 
-/// A result at a field.
+/// The result at a field.
 #[derive(Serialize)]
 struct AtField<T> {
     x: f64,
@@ -190,7 +190,7 @@ struct AtField<T> {
     outcome: FieldOutcome<T>,
 }
 
-/// A result, or why there is none.
+/// A result, or the reason why there is none.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum FieldOutcome<T> {
@@ -208,11 +208,11 @@ impl<T> AtField<T> {
     }
 }
 
-/// How a result is shown to people.
+/// A result as lines of text.
 trait TextLines {
-    /// What the numbers are, for the first line.
+    /// The heading.
     const TITLE: &'static str;
-    /// Lines about a field.
+    /// The lines of a field.
     fn lines(&self) -> Vec<String>;
 }
 
@@ -239,14 +239,14 @@ impl<T: TextLines> Display for AnalysisReport<T> {
     }
 }
 
-/// A number with its error, rays and milliseconds.
+/// A line with a number, its error, rays and milliseconds.
 fn estimate_text(name: &str, estimate: &Estimate) -> String {
     let Estimate { value, error, rays, milliseconds } = *estimate;
     let ms = milliseconds.map(|ms| format!(", {ms:.3} ms")).unwrap_or_default();
     format!("{name:<22} {:>13} ± {error:.1e}   {rays} rays{ms}", ShortNumber(value))
 }
 
-/// Does some work and notes the milliseconds in its results.
+/// Computes a result and passes it with its milliseconds to `note`.
 fn with_time<T>(work: impl FnOnce() -> T, note: impl FnOnce(&mut T, f64)) -> T {
     let (mut result, milliseconds) = time_ms(work);
     note(&mut result, milliseconds);

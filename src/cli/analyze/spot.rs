@@ -1,4 +1,4 @@
-//! Where the rays of a field land.
+//! The spot of a field.
 
 use super::{AnalysisRun, AtField, TextLines, estimate_text, with_time};
 use crate::analysis::{AnalysisError, Estimate, MonochromaticSpot, Spot, spot};
@@ -15,7 +15,7 @@ pub(super) struct SpotJson {
     colors: Vec<ColorSpotJson>,
 }
 
-/// The spot in one colour.
+/// The spot at one wavelength.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum ColorSpotJson {
@@ -41,7 +41,7 @@ pub(super) fn spots(task: &AnalysisRun) -> Vec<AtField<SpotJson>> {
     task.fields.iter().map(at).collect()
 }
 
-/// All numbers of a spot come from the same rays at the same time.
+/// Enters the milliseconds into all numbers of a spot, which come from the same rays.
 fn note_time(result: &mut Result<Spot, AnalysisError>, milliseconds: f64) {
     let Ok(Spot { rms, centroid: [x, y], radius, channels: colors, .. }) = result else { return };
     let note = |estimate: &mut Estimate| estimate.milliseconds = Some(milliseconds);

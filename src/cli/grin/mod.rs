@@ -1,4 +1,4 @@
-//! A design task in a gradient-index field.
+//! `grin`: design of a gradient-index field for a task.
 
 mod report;
 mod straight_rays;
@@ -20,13 +20,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use straight_rays::StraightRaySolver;
 
-/// Finds the field of refractive index that sends light where a task wants it; Ctrl-C ends the
-/// search and writes the best field
+/// Designs a field of refractive index for the light of a task; Ctrl-C ends the search and writes the
+/// best field
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/grin.txt"))]
 pub(super) struct GrinArgs {
-    /// The task: a name that comes with the program, or a file .json; a list of names where it is
-    /// absent
+    /// The task: the name of a built-in one, or a file .json; absent: lists the names
     #[arg(value_name = "TASK")]
     task: Option<String>,
 
@@ -34,27 +33,27 @@ pub(super) struct GrinArgs {
     #[arg(long, value_name = "FILE", requires = "task")]
     out: Option<PathBuf>,
 
-    /// Draws the best field into this folder
+    /// Writes images of the best field into this folder
     #[arg(long, value_name = "FOLDER", requires = "task")]
     png: Option<PathBuf>,
 
-    /// Nodes along a side of the written volume, where the field is a spline in one coordinate
+    /// Nodes along a side of the written volume, if the field is a spline in one coordinate
     #[arg(long, value_name = "N", default_value_t = 65)]
     nodes: usize,
 
-    /// No more steps than this, all levels together
+    /// Maximum number of steps over all levels
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
 
-    /// No longer than this
+    /// Maximum duration in minutes
     #[arg(long, value_name = "M")]
     minutes: Option<f64>,
 
-    /// Also solves for the field by straight lines, for comparison, where the light was measured
+    /// Also reconstructs the field with straight rays, for tasks with measured light
     #[arg(long, requires = "task")]
     lines: bool,
 
-    /// Prints the task itself, as a file to begin with, and does nothing
+    /// Prints the task as a file to begin with, and does nothing else
     #[arg(long, requires = "task")]
     show: bool,
 }
@@ -92,7 +91,7 @@ impl GrinArgs {
         output.print(&report)
     }
 
-    /// Writes what is asked for.
+    /// Writes volume and images; returns the paths.
     fn write(&self, task: &GrinTask, best: &GrinField) -> Result<Vec<String>, CliError> {
         let failed = |error: &dyn std::error::Error| CliError::Failed(error.to_string());
         let mut written = Vec::new();
@@ -130,7 +129,7 @@ impl GrinArgs {
         Ok(())
     }
 
-    /// Steps until the end, or until it is stopped; whether it came to its end.
+    /// Steps until convergence, Ctrl-C or a maximum; true for convergence.
     fn search(
         &self,
         runner: &mut GrinOptimizer,
@@ -159,7 +158,7 @@ impl GrinArgs {
     }
 }
 
-/// A task by its name or from a file.
+/// Loads a task by its name or from a file.
 pub(super) fn load_task(name: &str) -> Result<GrinTask, CliError> {
     let task = match grin_design::find_builtin(name) {
         Some(builtin) => builtin.task()?,
@@ -179,12 +178,12 @@ pub(super) fn load_task(name: &str) -> Result<GrinTask, CliError> {
     Ok(task)
 }
 
-/// Where a task comes from, for a message.
+/// The name of the source of a task in messages.
 fn source_name(name: &str) -> &str {
     if name == "-" { "standard input" } else { name }
 }
 
-/// The tasks that come with the program.
+/// The list of built-in tasks.
 struct TaskList;
 
 #[derive(Serialize)]
@@ -216,7 +215,7 @@ impl Display for TaskList {
     }
 }
 
-/// A task as its file.
+/// A task, printed as its file.
 #[derive(Serialize)]
 #[serde(transparent)]
 struct TaskFile(GrinTask);

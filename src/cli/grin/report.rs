@@ -1,4 +1,4 @@
-//! What a search for a gradient-index field prints: what it found, what it keeps, what it took.
+//! The report of a gradient-index design: result, limits, time and memory.
 
 use super::straight_rays::StraightRayResult;
 use crate::cli::output::{ShortNumber, TextTable};
@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
 
-/// What a search took.
+/// The cost of a search.
 pub(super) struct GrinCostSummary {
     pub(super) ms: f64,
     pub(super) processor_ms: Option<f64>,
@@ -16,7 +16,7 @@ pub(super) struct GrinCostSummary {
     pub(super) stopped: bool,
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 pub(super) struct GrinReport {
     name: String,
@@ -40,7 +40,7 @@ pub(super) struct GrinReport {
     pub(super) files: Vec<String>,
 }
 
-/// What became of the light of a view.
+/// The result of a view.
 #[derive(Serialize)]
 struct ViewSummary {
     name: String,
@@ -60,7 +60,7 @@ struct FieldErrorReport {
     of_contrast: Option<f64>,
 }
 
-/// A limit of a maker and what the field makes of it.
+/// A manufacturing limit and the extreme of the field.
 #[derive(Serialize)]
 struct LimitReport {
     name: &'static str,
@@ -83,8 +83,8 @@ impl Display for LimitReport {
         let Self { name, value, limit, margin, at: [x, y, z], .. } = self;
         let unit = if *name == "slope" { " / mm" } else { "" };
         write!(f, "{name} {value:.6}{unit}, limit {limit}: ")?;
-        let what = if self.kept { "kept, margin" } else { "broken by" };
-        // What rounding takes is nothing.
+        let what = if self.kept { "satisfied, margin" } else { "violated by" };
+        // A negative margin within rounding is printed as 0.
         let margin = if self.kept { margin.max(0.0) } else { -margin };
         write!(f, "{what} {margin:.2e} at ({x:.3}, {y:.3}, {z:.3}) mm")
     }
@@ -142,22 +142,26 @@ impl Display for GrinReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, steps, rays, ms, .. } = self;
         let stopped = if self.stopped { ", stopped" } else { "" };
-        writeln!(f, "{name}: {steps} steps, {rays} rays and back, {:.2} s{stopped}", 1e-3 * ms)?;
+        writeln!(
+            f,
+            "{name}: {steps} steps, {rays} rays forward and back, {:.2} s{stopped}",
+            1e-3 * ms
+        )?;
         let Self { nodes, parameters, integrator, step, .. } = self;
         writeln!(f, "{nodes} nodes, {parameters} numbers; {integrator}, step {step:.4} mm")?;
         let [low, high] = self.index.map(|index| format!("{index:.6}"));
-        writeln!(f, "index {low} to {high}, at most {:.4} / mm steep", self.slope)?;
+        writeln!(f, "index {low} to {high}, slope at most {:.4} / mm", self.slope)?;
         self.limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
         if let Some(FieldErrorReport { relative, without_offset, offset, of_contrast }) =
             &self.error
         {
-            write!(f, "off the exact field by {relative:.2e}, relative; by {without_offset:.2e} ")?;
+            write!(f, "relative error from the exact field {relative:.2e}; {without_offset:.2e} ")?;
             writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
             match of_contrast {
                 Some(part) => {
                     writeln!(
                         f,
-                        "which is {part:.4} of what the exact field differs from the start"
+                        "which is {part:.4} of the difference between the exact field and the start"
                     )?;
                 }
                 None => writeln!(f, "the exact field is the one at the start: nothing to find")?,
@@ -172,7 +176,7 @@ impl Display for GrinReport {
             None => writeln!(f)?,
         }
         writeln!(f, "loss {:.4e} mm^2\n", self.loss)?;
-        let mut table = TextTable::new(&["view", "weight", "rms spot, mm", "rays", "left out"]);
+        let mut table = TextTable::new(&["view", "weight", "rms spot, mm", "rays", "excluded"]);
         for view in &self.views {
             let lost = view.excluded.iter().map(|(reason, count)| format!("{count} {reason}"));
             let lost: Vec<String> = lost.collect();

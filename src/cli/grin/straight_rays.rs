@@ -1,4 +1,4 @@
-//! What straight lines make of the measurement of a task, beside what its search found.
+//! Reconstruction of a measured field with straight rays, for comparison with the design.
 
 use crate::cli::error::CliError;
 use crate::grin_design::{GrinField, GrinTask, GrinTaskError, StraightRays};
@@ -7,21 +7,21 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
 
-/// Steps of conjugate gradients.
+/// Steps of the conjugate gradient method.
 const CGLS_STEPS: usize = 60;
 
-/// The best field that straight lines found; their last one where the answer is not known.
+/// The best field of straight rays; the last one if the exact field is not known.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct StraightRayResult {
-    /// Its error, as that of the search.
+    /// The error, relative to the contrast of the exact field.
     of_contrast: Option<f64>,
-    /// Which of the steps it is.
+    /// The step of the best field, from 1.
     step: usize,
     steps: usize,
     ms: f64,
 }
 
-/// Straight lines, ready to be solved for; what that took, in milliseconds.
+/// Straight rays that are ready for the solver, and the milliseconds of the preparation.
 #[derive(Debug)]
 pub(super) struct StraightRaySolver {
     chords: StraightRays,
@@ -29,7 +29,7 @@ pub(super) struct StraightRaySolver {
 }
 
 impl StraightRaySolver {
-    /// Refuses a task whose light was not measured.
+    /// Prepares the rays; refuses a task without measured light.
     pub(super) fn new(name: &str, task: &GrinTask) -> Result<Self, CliError> {
         let clock = Stopwatch::start();
         let chords = StraightRays::new(task).map_err(|error| straight_ray_error(name, &error))?;
@@ -73,9 +73,11 @@ fn straight_ray_error(name: &str, error: &GrinTaskError) -> CliError {
 impl Display for StraightRayResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { of_contrast, step, steps, ms } = self;
-        write!(f, "straight lines: {steps} steps of least squares, {:.2} s", 1e-3 * ms)?;
+        write!(f, "straight rays: {steps} least-squares steps, {:.2} s", 1e-3 * ms)?;
         match of_contrast {
-            Some(error) => writeln!(f, "; the best, step {step}, is off by {error:.4} of the same"),
+            Some(error) => {
+                writeln!(f, "; the best, step {step}, has an error of {error:.4} of the contrast")
+            }
             None => writeln!(f),
         }
     }

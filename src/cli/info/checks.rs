@@ -1,42 +1,45 @@
-//! What a maker would ask about a lens: gaps that are not there, rims that cannot be.
+//! Warnings about a lens that cannot be manufactured: negative gaps, semi-diameters beyond the surface.
 
-use crate::lens::{Medium, System};
+use crate::lens::{Medium, SurfaceNumber, System};
 use crate::trace::Fates;
 use serde::Serialize;
 
-/// Something about a lens that is worth a second look.
+/// A warning about a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct LensCheck {
-    /// The surface that it is about, or the one in front of the gap.
+    /// The surface, or the one in front of the gap; `None` for the whole lens.
     #[serde(skip_serializing_if = "Option::is_none")]
     surface: Option<usize>,
-    /// What was found.
+    /// The text of the warning.
     found: String,
 }
 
 impl LensCheck {
     pub(super) fn line(&self) -> String {
-        let place = self.surface.map(|i| format!("surface {i}: ")).unwrap_or_default();
+        let place = self
+            .surface
+            .map(|i| format!("surface {}: ", SurfaceNumber::new(i)))
+            .unwrap_or_default();
         format!("  {place}{}", self.found)
     }
 }
 
-/// Looks at the gaps and rims of a lens, and at the rays that were tried.
+/// Checks the gaps and semi-diameters of a lens, and the fates of its rays.
 pub(super) fn checks(system: &System<f64>, media: &[Medium], fates: Fates) -> Vec<LensCheck> {
     let rows = media.len();
     let mut checks: Vec<LensCheck> = (0..rows).filter_map(|i| rim(system, i)).collect();
-    // Behind a mirror gaps are negative, and an edge means something else.
+    // Behind a mirror gaps are negative, and the edge thickness has another meaning.
     let straight = media.iter().position(|m| *m == Medium::Mirror).unwrap_or(rows);
     checks.extend((0..straight.min(rows - 1)).filter_map(|i| gap(system, i)));
     let lost = fates.total() - fates.imaged;
     if fates.imaged == 0 && lost > 0 {
-        let found = format!("no light: none of {lost} rays gets through");
+        let found = format!("no light: none of {lost} rays reaches the image");
         checks.push(LensCheck { surface: None, found });
     }
     checks
 }
 
-/// A rim where the surface has ended already.
+/// Checks that the surface extends to its semi-diameter.
 fn rim(system: &System<f64>, i: usize) -> Option<LensCheck> {
     let surface = &system.surfaces[i];
     let sd = surface.semi_diameter;
@@ -47,7 +50,7 @@ fn rim(system: &System<f64>, i: usize) -> Option<LensCheck> {
     Some(LensCheck { surface: Some(i), found })
 }
 
-/// A gap without thickness on the axis or at the rims of its surfaces.
+/// Checks the thickness of a gap on the axis and at the edge.
 fn gap(system: &System<f64>, i: usize) -> Option<LensCheck> {
     let [before, behind] = [&system.surfaces[i], &system.surfaces[i + 1]];
     let check = |found| Some(LensCheck { surface: Some(i), found });

@@ -1,4 +1,4 @@
-//! Which effects a lens calls for, with the time that each decision saves.
+//! The effects that are computed for a lens, with the time that each decision saves.
 
 use crate::analysis::spots;
 use crate::cli::error::CliError;
@@ -11,12 +11,12 @@ use crate::effects::{
 use crate::measure::time_ms;
 use crate::pupil::Accuracy;
 
-/// How good spots shall be, against the smallest one.
+/// The tolerance of spots, relative to the smallest one.
 pub(super) const SPOT_TOLERANCE: f64 = 1e-3;
-/// The fastest of so many turns counts: what else the machine does only makes it slower.
+/// Repetitions, of which the fastest counts, since other load only slows them.
 const REPETITIONS: usize = 3;
 
-/// The plan for spots at a zoom position, and what it rests on.
+/// The decisions for spots at a zoom position, and the measurements behind them.
 pub(super) fn decisions(
     opened: &LoadedLens,
     zoom: usize,
@@ -35,8 +35,8 @@ pub(super) fn decisions(
     Ok((facts, decisions))
 }
 
-/// The milliseconds that leaving an effect out saves or would save, where the spots take so many
-/// with what the plan computes.
+/// The milliseconds that leaving an effect out saves or would save, if the spots take `spots_ms` with
+/// the present plan.
 fn saved_ms(decision: &EffectDecision, spots_ms: f64) -> f64 {
     let share = decision.saved_share.clamp(0.0, 0.99);
     let whole = if decision.computed { spots_ms } else { spots_ms / (1.0 - share) };
@@ -45,7 +45,7 @@ fn saved_ms(decision: &EffectDecision, spots_ms: f64) -> f64 {
 
 pub(super) fn decision_text(decision: &EffectDecision) -> String {
     let EffectDecision { effect, computed, reason, error, limit, unit, .. } = decision;
-    let verdict = if *computed { "computed" } else { "left out" };
+    let verdict = if *computed { "computed" } else { "omitted" };
     let saving = if *computed { "without it" } else { "saves" };
     let ms = decision.saved_ms.unwrap_or(0.0);
     let numbers = format!("{} of {} {unit}", ShortNumber(*error), ShortNumber(*limit));

@@ -1,4 +1,4 @@
-//! What a lens is: first-order data, third-order sums, sizes.
+//! `info`: first-order data, Seidel sums, sizes, checks and effects of a lens.
 
 mod checks;
 mod effects;
@@ -7,20 +7,20 @@ use super::error::CliError;
 use super::input::{LensFile, LoadedLens};
 use super::output::{Output, ShortNumber, TextTable, or_dash};
 use crate::effects::EffectDecision;
-use crate::lens::Lens;
+use crate::lens::{Lens, SurfaceNumber};
 use crate::paraxial::{Beam, FirstOrder, ParaxialPupil, SeidelSums, first_order, seidel};
 use checks::{LensCheck, checks};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// First-order data, Seidel sums, semi-diameters, checks, and the effects chosen and why
+/// First-order data, Seidel sums, semi-diameters, checks, and the computed effects with reasons
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/info.txt"))]
 pub(super) struct InfoArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// Only this zoom position, counted from 0; all of them where it is absent
+    /// Only this zoom position, counted from 0; absent: all of them
     #[arg(long, value_name = "N")]
     zoom: Option<usize>,
 }
@@ -41,12 +41,12 @@ impl InfoArgs {
     }
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct InfoReport {
     name: String,
     wavelength_um: f64,
-    /// The first of the positions again, so that a lens that does not zoom has its data at hand.
+    /// The data of the first position, so that those of a lens without zoom are at the top.
     #[serde(flatten)]
     first: Option<ZoomReport>,
     semi_diameters: Vec<Option<f64>>,
@@ -188,7 +188,7 @@ impl ZoomReport {
     }
 }
 
-/// The third-order sums, with colour between the two outer wavelengths.
+/// The Seidel sums, with colour between the two outer wavelengths.
 fn seidel_keys(
     opened: &LoadedLens,
     zoom: usize,
@@ -223,7 +223,7 @@ impl Display for InfoReport {
     }
 }
 
-/// Radii in a row, with a word for those that are not there.
+/// Radii in a line, with a word for those that are not set.
 fn radii_text(radii: &[Option<f64>], none: &str) -> String {
     let shown = |r: &Option<f64>| r.map_or(none.to_owned(), |r| ShortNumber(r).to_string());
     radii.iter().map(shown).collect::<Vec<_>>().join("  ")
@@ -276,7 +276,7 @@ impl ZoomReport {
         lines.push(format!("\nchecks, zoom {zoom}"));
         lines.extend(self.checks.iter().map(LensCheck::line));
         if self.checks.is_empty() {
-            lines.push("  nothing to remark".to_owned());
+            lines.push("  no warnings".to_owned());
         }
         lines.join("\n") + "\n"
     }
@@ -286,11 +286,11 @@ impl ZoomReport {
         let columns =
             ["spherical", "coma", "astigm.", "Petzval", "distort.", "axial c.", "lateral c."];
         let Some(seidel) = &self.seidel else {
-            return TextTable::new(&[&format!("{title}: none, since {}", self.no_seidel)]);
+            return TextTable::new(&[&format!("{title}: none: {}", self.no_seidel)]);
         };
         let mut table = TextTable::new(&[[title.as_str()].as_slice(), &columns].concat());
         for (i, sums) in seidel.surfaces.iter().enumerate() {
-            table.row(sums.row(format!("surface {i}")));
+            table.row(sums.row(format!("surface {}", SurfaceNumber::new(i))));
         }
         table.row(seidel.total.row("sum".to_owned()));
         table

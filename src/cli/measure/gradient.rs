@@ -1,4 +1,4 @@
-//! Accuracy of aperture-aware derivatives against time.
+//! `measure gradient`: accuracy of aperture-aware derivatives against time.
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
 use crate::cli::error::CliError;
@@ -16,15 +16,14 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
-/// Error against milliseconds of every estimator of derivatives over a pupil that moves
+/// Error against milliseconds of every estimator of derivatives over a moving pupil
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_gradient.txt"))]
 pub(super) struct MeasureGradientArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// The field beside the axis, in the unit of the lens's fields; the most vignetted field of
-    /// the lens where it is absent
+    /// The field beside the axis, in the unit of the lens's fields; absent: the most vignetted one
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     field: Option<f64>,
 
@@ -32,7 +31,7 @@ pub(super) struct MeasureGradientArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// Draws the curves, each the worst of all kinds of numbers
+    /// Draws the curves, each the largest error of all kinds of numbers
     #[arg(long, value_name = "FILE.png")]
     plot: Option<PathBuf>,
 }
@@ -68,7 +67,7 @@ const COLORS: [(DerivativeEstimator, Color); 4] = [
 const STROKES: [(Integral, Stroke); 2] =
     [(Integral::Spot, Stroke::Solid), (Integral::Throughput, Stroke::Dashed)];
 
-/// A chart for each field, in `f64`.
+/// Draws a chart for each field, in `f64`.
 fn draw_curves(measured: &GradientBenchmark, title: &str) -> Result<Vec<u8>, ImageError> {
     let chart = |curves: &GradientCurves| {
         let curve = |(estimator, color), (integral, stroke)| {
@@ -92,7 +91,7 @@ fn draw_curves(measured: &GradientBenchmark, title: &str) -> Result<Vec<u8>, Ima
     plot::draw(&charts, &labels, title)
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct MeasureGradientReport {
     machine: Machine,
@@ -108,7 +107,7 @@ impl Display for MeasureGradientReport {
         for curves in &measured.fields {
             write_curves(f, curves)?;
         }
-        writeln!(f, "\nwhat derivatives cost, in times of what they are derivatives of:\n")?;
+        writeln!(f, "\ncost of derivatives, relative to the integral or trace itself:\n")?;
         write!(f, "{}", costs(&measured.costs))
     }
 }
@@ -120,7 +119,7 @@ fn write_curves(f: &mut fmt::Formatter<'_>, curves: &GradientCurves) -> fmt::Res
     writeln!(f, "planned: {planned}, because {reason}")?;
     let check = match reference {
         DerivativeEstimator::Warp => "its standard error",
-        _ => "central differences are off by",
+        _ => "central differences differ by",
     };
     let [spot, throughput] = checked;
     writeln!(

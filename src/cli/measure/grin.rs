@@ -1,4 +1,4 @@
-//! Light in gradient-index fields: accuracy against time, cost, memory.
+//! `measure grin`: ray tracing in gradient-index fields: accuracy against time, cost, memory.
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
 use crate::cli::error::CliError;
@@ -18,12 +18,12 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
-/// Error of exits and gradients against milliseconds for every integrator, and what a gradient
-/// costs in time and memory
+/// Error of exits and gradients against milliseconds for every integrator, and the cost of a gradient
+/// in time and memory
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_grin.txt"))]
 pub(super) struct MeasureGrinArgs {
-    /// A task whose exact field is known: a name that comes with the program, or a file .json
+    /// A task whose exact field is known: the name of a built-in one, or a file .json
     #[arg(value_name = "TASK", default_value = "luneburg")]
     task: String,
 
@@ -54,7 +54,7 @@ fn color(integrator: Integrator) -> Color {
     PALETTE[place % PALETTE.len()]
 }
 
-/// A chart for each of the first two fields.
+/// Draws a chart for each of the first two fields.
 fn draw_curves(measured: &GrinBenchmark, title: &str) -> Result<Vec<u8>, ImageError> {
     let chart = |curves: &GrinCurves| {
         let curve = |integrator: Integrator, (precision, stroke)| {
@@ -73,7 +73,7 @@ fn draw_curves(measured: &GrinBenchmark, title: &str) -> Result<Vec<u8>, ImageEr
     plot::draw(&charts, &labels, title)
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct MeasureGrinReport {
     machine: Machine,
@@ -88,15 +88,12 @@ impl Display for MeasureGrinReport {
         writeln!(f, "{machine}\n{task}: {} rays, one thread", measured.rays)?;
         for curves in &measured.fields {
             let GrinCurves { field, parameters, floor, .. } = curves;
-            writeln!(
-                f,
-                "\n{field}, {parameters} numbers; off the exact field by {floor:.1e} mm\n"
-            )?;
+            writeln!(f, "\n{field}, {parameters} numbers; {floor:.1e} mm from the exact field\n")?;
             write!(f, "{}", table(curves))?;
         }
-        writeln!(f, "\nthe derivative of an exit by the start of its ray:\n")?;
+        writeln!(f, "\nthe derivative of an exit with respect to the start of its ray:\n")?;
         write!(f, "{}", starts(&measured.starts))?;
-        writeln!(f, "\nfor each time that a ray asks the field, in batches:\n")?;
+        writeln!(f, "\nper evaluation of the field, in batches:\n")?;
         write!(f, "{}", costs(&measured.costs))?;
         writeln!(f, "\nthe adjoint against a stored path:\n")?;
         write!(f, "{}", memory(&measured.memory))
@@ -131,7 +128,7 @@ fn table(curves: &GrinCurves) -> TextTable {
 }
 
 fn starts(rows: &[GrinStarts]) -> TextTable {
-    let mut table = TextTable::new(&["field", "size", "off the exact field", "worst ray", "rays"]);
+    let mut table = TextTable::new(&["field", "size", "error", "worst ray", "rays"]);
     for row in rows {
         table.row([
             row.field.to_owned(),

@@ -1,4 +1,4 @@
-//! Accuracy against time, throughput, memory.
+//! `measure`: benchmarks of accuracy against time, throughput and memory.
 
 mod gradient;
 mod grin;
@@ -20,7 +20,7 @@ pub(super) struct MeasureArgs {
     what: BenchmarkCommand,
 }
 
-/// Everything that is measured.
+/// The benchmarks.
 #[derive(Debug, Subcommand)]
 enum BenchmarkCommand {
     Trace(trace::MeasureTraceArgs),

@@ -1,4 +1,4 @@
-//! The cost of a step of a search.
+//! `measure optimize`: the time of a step of local optimization.
 
 use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
@@ -6,11 +6,11 @@ use crate::measure::{Machine, StepCosts, measure_step_costs};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// Milliseconds an iteration on one core: double Gauss, 4 fields, all curvatures and thicknesses
+/// Milliseconds per iteration on one core: double Gauss, 4 fields, all curvatures and thicknesses
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_optimize.txt"))]
 pub(super) struct MeasureOptimizeArgs {
-    /// How many steps each search takes
+    /// The number of steps of each run
     #[arg(long, value_name = "N", default_value_t = 200)]
     steps: usize,
 }

@@ -1,4 +1,4 @@
-//! Curves of error against time as a picture: one log-log chart or two side by side.
+//! Curves of error against time: one log-log chart, or two side by side.
 
 use crate::plot::{Axis, BLACK, Canvas, Chart as Axes, TextAlign};
 use image::ImageError;
@@ -8,13 +8,13 @@ pub(super) use crate::plot::{Color, Stroke};
 const SIZE: [u32; 2] = [1800, 900];
 const TOP: f64 = 120.0;
 const BOTTOM: f64 = 800.0;
-/// Left and right of each chart.
+/// The left and right side of each chart, in pixels.
 const CHART_SPANS: [(f64, f64); 2] = [(120.0, 740.0), (860.0, 1480.0)];
 const LEGEND: f64 = 1510.0;
-/// Below this an error is drawn at the foot of the chart.
+/// The smallest error of the axis; smaller ones are drawn at its foot.
 const SMALLEST: f64 = 1e-16;
 
-/// Milliseconds and relative errors.
+/// A curve of relative errors against milliseconds.
 pub(super) struct ErrorCurve {
     pub(super) color: Color,
     pub(super) stroke: Stroke,
@@ -27,7 +27,7 @@ pub(super) struct ErrorChart {
     pub(super) curves: Vec<ErrorCurve>,
 }
 
-/// What a kind of curve is called.
+/// An entry of the legend.
 pub(super) struct LegendEntry {
     pub(super) name: &'static str,
     pub(super) color: Color,
@@ -35,18 +35,18 @@ pub(super) struct LegendEntry {
 }
 
 impl LegendEntry {
-    /// The name of a color.
+    /// The entry of a colour.
     pub(super) fn colored(name: &'static str, color: Color) -> Self {
         Self { name, color, stroke: Stroke::Solid }
     }
 
-    /// The name of a stroke.
+    /// The entry of a stroke.
     pub(super) fn stroked(name: &'static str, stroke: Stroke) -> Self {
         Self { name, color: BLACK, stroke }
     }
 }
 
-/// One chart or two as a PNG.
+/// Draws one or two charts as a PNG.
 pub(super) fn draw(
     charts: &[ErrorChart],
     labels: &[LegendEntry],

@@ -1,4 +1,4 @@
-//! What searches come to in the same time.
+//! `measure search`: the samplers compared at the same time.
 
 use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
@@ -9,19 +9,19 @@ use crate::search::SearchMethod;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// Best merit against seconds: RESTORE, Metropolis and Hastings, brute force, several seeds; and what
-/// the tolerance of the spots does to it
+/// Best merit against seconds: RESTORE, Metropolis-Hastings and brute force with several seeds; and the
+/// effect of the tolerance of the spots
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_search.txt"))]
 pub(super) struct MeasureSearchArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// Seconds of each search
+    /// The seconds of each search
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     seconds: f64,
 
-    /// How many seeds
+    /// The number of seeds
     #[arg(long, value_name = "N", default_value_t = 3)]
     seeds: u64,
 

@@ -1,4 +1,4 @@
-//! Accuracy of a spot against time.
+//! `measure spot`: accuracy of a spot against time.
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
 use crate::cli::error::CliError;
@@ -14,14 +14,14 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
-/// Error against milliseconds of every way to sample a pupil, clear and clipped, f32 and f64
+/// Error against milliseconds of every sampling of a pupil, clear and clipped, in f32 and f64
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_spot.txt"))]
 pub(super) struct MeasureSpotArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// The field, in the unit of the lens's fields; 0.7 of the farthest one where it is absent
+    /// The field, in the unit of the lens's fields; absent: 0.7 of the farthest one
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     field: Option<f64>,
 
@@ -34,7 +34,7 @@ pub(super) struct MeasureSpotArgs {
     plot: Option<PathBuf>,
 }
 
-/// A usual place to look: neither the axis nor the corner.
+/// The default field relative to the farthest one: neither the axis nor the corner.
 const DEFAULT_ZONE: f64 = 0.7;
 
 impl MeasureSpotArgs {
@@ -74,7 +74,7 @@ const COLORS: [(PupilSampling, Color); 6] = [
 const STROKES: [(Precision, Stroke); 2] =
     [(Precision::F64, Stroke::Solid), (Precision::F32, Stroke::Dashed)];
 
-/// The clear pupil beside the clipped one.
+/// Draws the clear pupil beside the clipped one.
 fn draw_curves(curves: &SpotCurves, title: &str) -> Result<Vec<u8>, ImageError> {
     let chart = |pupil| {
         let name = match pupil {
@@ -98,7 +98,7 @@ fn draw_curves(curves: &SpotCurves, title: &str) -> Result<Vec<u8>, ImageError> 
     plot::draw(&[chart(PupilClipping::Clear), chart(PupilClipping::Clipped)], &labels, title)
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 struct MeasureSpotReport {
     machine: Machine,
@@ -126,7 +126,7 @@ impl Display for MeasureSpotReport {
             };
             match rms {
                 Some(rms) => writeln!(f, "\n{title}; RMS radius {} mm", ShortNumber(rms))?,
-                None => writeln!(f, "\n{title}: no light gets through")?,
+                None => writeln!(f, "\n{title}: no light is transmitted")?,
             }
             write!(f, "{}", table(curves, pupil))?;
         }

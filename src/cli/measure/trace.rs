@@ -1,4 +1,4 @@
-//! The speed of tracing.
+//! `measure trace`: the speed of ray tracing.
 
 use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
@@ -10,7 +10,7 @@ use std::fmt::{self, Display};
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_trace.txt"))]
 pub(super) struct MeasureTraceArgs {
-    /// How many times each way of tracing is timed
+    /// The number of repetitions of each case
     #[arg(long, value_name = "N", default_value_t = 201)]
     turns: usize,
 }
@@ -39,7 +39,7 @@ impl Display for MeasureTraceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { machine, turns, measured } = self;
         writeln!(f, "{machine}")?;
-        writeln!(f, "million ray-surfaces a second, fates included, over {turns} turns:\n")?;
+        writeln!(f, "million ray-surfaces a second, fates included, over {turns} repetitions:\n")?;
         let mut table = TextTable::new(&["", "median", "slowest", "fastest"]);
         for row in &measured.rows {
             let rates = [row.million_ray_surfaces_per_s, row.min, row.max];
@@ -50,7 +50,10 @@ impl Display for MeasureTraceReport {
         write_rounding(f, "f64", &measured.rounding_f64)?;
         write_rounding(f, "f32", &measured.rounding_f32)?;
         let ratio = measured.gradient_over_forward;
-        writeln!(f, "derivatives by all numbers: {ratio:.2} times the trace of the same rays")?;
+        writeln!(
+            f,
+            "derivatives with respect to all numbers: {ratio:.2} times the trace of the same rays"
+        )?;
         write_memory(f, "tracing a million rays", measured.memory_trace)?;
         write_memory(f, "differentiating a million rays", measured.memory_gradient)
     }
@@ -72,6 +75,6 @@ fn write_memory(f: &mut fmt::Formatter<'_>, what: &str, memory: Option<MemoryUse
         Some(MemoryUse { before_mb, peak_mb }) => {
             writeln!(f, "{what}: {peak_mb:.0} MB at the peak, {before_mb:.0} MB before")
         }
-        None => writeln!(f, "{what}: this system does not tell its memory"),
+        None => writeln!(f, "{what}: this system does not report its memory"),
     }
 }

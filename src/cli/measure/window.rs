@@ -1,4 +1,4 @@
-//! What the window costs.
+//! `measure window`: the times of the studio.
 
 use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 use std::fmt::{self, Display};
 
-/// First frame, edits and frames of the studio, measured in a real window that needs a display
+/// First frame, edits and frames of the studio, measured in a real window, which needs a display
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_window.txt"))]
 pub(super) struct MeasureWindowArgs {}
@@ -30,13 +30,13 @@ struct MeasureWindowReport {
     figures: Value,
 }
 
-/// The keys of the figures, and what they are.
+/// The keys of the results, and their descriptions.
 const NAMES: [(&str, &str); 7] = [
     ("first_frame_ms", "process start to first frame, ms"),
-    ("edit_ms", "an edit to the numbers of all panels, ms"),
+    ("edit_ms", "an edit to the results of all panels, ms"),
     ("slowest_edit_ms", "the slowest edit, ms"),
     ("frame_processor_ms", "processor time of a frame without changes, ms"),
-    ("idle_seconds", "left alone for, s"),
+    ("idle_seconds", "time without input, s"),
     ("idle_processor_ms", "processor time in that time, ms"),
     ("renderer", "drawn by"),
 ];

@@ -1,5 +1,4 @@
-//! Limits that a lens does not keep: said before a search for its start, and behind it for the best
-//! lens.
+//! Violated constraints: noted for the start before a search, and reported for the best lens after it.
 
 use crate::cli::output::{ShortNumber, TextTable, or_dash, print_note};
 use crate::merit::ConstraintMargin;
@@ -7,10 +6,10 @@ use crate::search::lens_landscape::describe_violation;
 use serde::Serialize;
 use std::fmt;
 
-/// No more of them are said one by one before a search.
+/// The number of violations that are noted one by one before a search.
 const MAX_NOTES: usize = 6;
 
-/// A limit that is not kept.
+/// A violated constraint.
 #[derive(Serialize)]
 pub(super) struct ViolatedLimit {
     #[serde(flatten)]
@@ -24,34 +23,34 @@ impl ViolatedLimit {
     }
 }
 
-/// Says what the start does not keep.
+/// Notes the constraints that the start violates.
 pub(super) fn warn(broken: &[ConstraintMargin]) {
     for limit in broken.iter().take(MAX_NOTES) {
-        print_note(format!("note: the start breaks a limit: {}", describe_violation(limit)));
+        print_note(format!("note: the start violates a constraint: {}", describe_violation(limit)));
     }
     if broken.len() > MAX_NOTES {
         print_note(format!("note: and {} more", broken.len() - MAX_NOTES));
     }
 }
 
-/// Says what the best lens does not keep.
+/// Writes the constraints that the best lens violates.
 pub(super) fn write(broken: &[ViolatedLimit], f: &mut fmt::Formatter<'_>) -> fmt::Result {
     if broken.is_empty() {
-        return writeln!(f, "the best lens keeps all limits\n");
+        return writeln!(f, "the best lens satisfies all constraints\n");
     }
-    writeln!(f, "the best lens breaks limits, which only --finish enforces:")?;
+    writeln!(f, "the best lens violates constraints, which only --finish enforces:")?;
     let mut table =
-        TextTable::new(&["limit", "surface or field", "zoom", "value", "min", "max", "off by"]);
+        TextTable::new(&["constraint", "place", "zoom", "value", "min", "max", "off by"]);
     for ViolatedLimit { limit, off_by } in broken {
         table.row(cells(limit).into_iter().chain([format!("{off_by:.1e}")]));
     }
     writeln!(f, "{table}")
 }
 
-/// A limit up to what it may be.
+/// The cells of a constraint, up to its bounds.
 pub(super) fn cells(limit: &ConstraintMargin) -> [String; 6] {
-    let surface = limit.surface.map_or("-".to_owned(), |i| i.to_string());
+    let place = limit.place().unwrap_or_else(|| "-".to_owned());
     let [min, max] = [limit.min, limit.max].map(or_dash);
     let value = ShortNumber(limit.value).to_string();
-    [limit.term.to_owned(), surface, limit.zoom.to_string(), value, min, max]
+    [limit.term.to_owned(), place, limit.zoom.to_string(), value, min, max]
 }

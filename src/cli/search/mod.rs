@@ -1,4 +1,4 @@
-//! The search over structure: a run that can be stopped, killed and taken up again.
+//! `search`: optimization of the structure, in a run that can be stopped, killed and resumed.
 
 mod limits;
 mod plan_args;
@@ -24,15 +24,15 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Searches over structure: adds, removes, glues and splits elements while it descends; Ctrl-C ends
-/// it and saves what was found
+/// Optimizes the structure of a lens: adds, removes, cements and splits elements; Ctrl-C ends the
+/// search and saves its results
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/search.txt"))]
 pub(super) struct SearchArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// Where the best lens is saved: .json or .zmx
+    /// The file for the best lens: .json or .zmx
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
@@ -40,24 +40,23 @@ pub(super) struct SearchArgs {
     #[arg(long, value_enum, default_value_t = SearchMethod::Restore)]
     method: SearchMethod,
 
-    /// All chance follows from it
+    /// The seed of all random numbers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
 
-    /// Ends after so many minutes
+    /// Maximum duration in minutes
     #[arg(long, value_name = "MINUTES", allow_negative_numbers = true)]
     minutes: Option<f64>,
 
-    /// Ends after so many gradients of all chains, and takes no more; 12000 where --minutes is absent
-    /// too
+    /// Maximum number of gradients of all chains, never exceeded; 12000 if --minutes is absent too
     #[arg(long, value_name = "N")]
     iterations: Option<u64>,
 
-    /// Where the run is saved every few seconds; goes on where it was, if the file exists
+    /// A file in which the run is saved every few seconds; resumes the run if it exists
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
 
-    /// Seconds between two savings
+    /// Seconds between two checkpoints
     #[arg(
         long,
         value_name = "SECONDS",
@@ -67,12 +66,11 @@ pub(super) struct SearchArgs {
     )]
     checkpoint_every: f64,
 
-    /// The folder into which every lens of the reservoir is written, and the best one where its
-    /// descent still goes on
+    /// The folder for all lenses of the reservoir, and for the best one if its descent has not ended
     #[arg(long, value_name = "FOLDER")]
     reservoir_dir: Option<PathBuf>,
 
-    /// Makes the best lens one that can be made: glasses of the catalogue, every limit kept
+    /// Finalizes the best lens: catalogue glasses, every constraint satisfied
     #[arg(long)]
     finish: bool,
 
@@ -80,20 +78,20 @@ pub(super) struct SearchArgs {
     asked: SearchPlanArgs,
 }
 
-/// Gradients of a search that nothing else ends.
+/// Maximum number of gradients if neither it nor a duration is given.
 const DEFAULT_ITERATIONS: u64 = 12_000;
 /// Seconds between two checkpoints.
 const SAVED: f64 = 3.0;
 
-/// What ended a search.
+/// The reason why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum SearchEnd {
-    /// The run says so.
+    /// The run itself ended.
     Run(RunEnd),
-    /// The minutes are used up.
+    /// The time limit was reached.
     Time,
-    /// The person stopped it.
+    /// It was stopped by Ctrl-C.
     Interrupted,
 }
 
@@ -194,7 +192,7 @@ impl SearchArgs {
             let run: SearchRunOn<LensLandscape> =
                 SearchRun::load(landscape, &settings, path).map_err(search_error)?;
             let done = run.statistics().gradients;
-            print_note(format!("{}: goes on after {done} gradients", path.display()));
+            print_note(format!("{}: resumes after {done} gradients", path.display()));
             return Ok((run, true));
         }
         let start = landscape.start().clone();
@@ -205,7 +203,7 @@ impl SearchArgs {
         Ok((run, false))
     }
 
-    /// Rounds until the run is over, the time is used up, or the person has had enough.
+    /// Runs rounds until the run ends, the time limit or Ctrl-C.
     fn run_rounds(
         &self,
         landscape: &LensLandscape,
@@ -247,7 +245,7 @@ impl SearchArgs {
         run.save(landscape, path).map_err(search_error)
     }
 
-    /// Writes what was found, best lens first; the files.
+    /// Writes the lenses of the reservoir, best first; returns the paths.
     fn write_reservoir(
         &self,
         run: &SearchRunOn<LensLandscape>,
@@ -266,7 +264,7 @@ impl SearchArgs {
     }
 }
 
-/// A lens as a file has it: what was held or free only for the search is not written.
+/// A lens with the variables of the file that was read, not those of the search.
 fn lens_to_write(lens: &Lens, opened: &Lens) -> Lens {
     let same = lens.surfaces.len() == opened.surfaces.len();
     let variables = if same { opened.variables.clone() } else { Vec::new() };
@@ -278,7 +276,7 @@ fn is_raised(flag: &AtomicBool) -> bool {
     flag.load(Ordering::Relaxed)
 }
 
-/// What a run that was taken up again has no more to do; none where it goes on.
+/// The reason why a resumed run has nothing to do; `None` if it continues.
 fn nothing_to_do(run: &SearchRunOn<LensLandscape>) -> Option<String> {
     let (done, limit) = (run.statistics().gradients, run.settings().gradients);
     Some(match (run.end_reason()?, limit) {
@@ -290,7 +288,7 @@ fn nothing_to_do(run: &SearchRunOn<LensLandscape>) -> Option<String> {
     })
 }
 
-/// What a lens, or what is asked of it, makes impossible.
+/// The error of a lens for which the search is not possible.
 fn landscape_error(file: &str, cause: LandscapeError) -> CliError {
     match cause {
         LandscapeError::Setting { .. } | LandscapeError::Rule(_) => {
@@ -300,7 +298,7 @@ fn landscape_error(file: &str, cause: LandscapeError) -> CliError {
     }
 }
 
-/// What the search itself refuses: its settings, or a checkpoint.
+/// The error of settings or of a checkpoint.
 fn search_error(cause: SearchError) -> CliError {
     match cause {
         SearchError::File(error) => CliError::File(error),

@@ -1,4 +1,4 @@
-//! What a search may do and aims at, as arguments.
+//! The options of a structure search: merit function, constraints and settings.
 
 use crate::cli::error::CliError;
 use crate::cli::input::{self, Tolerance};
@@ -10,18 +10,18 @@ use crate::search::{MutationKind, SearchRules, Temperature, element};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// What a search may do and aims at.
+/// The options of a structure search.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct SearchPlanArgs {
-    /// What to aim at, as JSON; sharp spots with the light it has, at its focal length, where absent
+    /// The merit function, as JSON; absent: sharp spots with the present light and focal length
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
 
-    /// The focal length to aim at, in mm; the one it has where it is absent
+    /// The target focal length in mm; absent: the present one
     #[arg(long, value_name = "MM", conflicts_with = "goal", allow_negative_numbers = true)]
     focal_length: Option<f64>,
 
-    /// How much of its light every field keeps: one share, or one for each field
+    /// Minimum light of every field relative to the start: one number, or one for each field
     #[arg(
         long,
         value_name = "SHARES",
@@ -32,7 +32,7 @@ pub(in crate::cli) struct SearchPlanArgs {
     )]
     light: Vec<f64>,
 
-    /// What the search may do and a factory can make, as JSON
+    /// The constraints and permitted mutations, as JSON
     #[arg(long, value_name = "FILE")]
     rules: Option<PathBuf>,
 
@@ -40,15 +40,15 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long, value_name = "RANGE")]
     elements: Option<ElementRange>,
 
-    /// No surface is larger than this, in mm
+    /// The largest diameter of a surface in mm
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     max_diameter: Option<f64>,
 
-    /// The longest track in mm; a fifth longer than it is where it is absent
+    /// The longest track in mm; absent: 1.2 times the present one
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     max_track: Option<f64>,
 
-    /// The shortest back focus in mm; four fifths of what it is where it is absent
+    /// The shortest back focus in mm; absent: 0.8 times the present one
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     min_back_focus: Option<f64>,
 
@@ -56,61 +56,61 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long)]
     no_projection: bool,
 
-    /// Kinds of mutations that are not tried
+    /// Kinds of mutations to exclude
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     forbid: Vec<MutationArg>,
 
-    /// Opens every rim as far as its neighbours allow, at most to this semi-diameter in mm; the
-    /// diaphragm goes
+    /// Opens every semi-diameter as far as the neighbours allow, at most to this one in mm; removes the
+    /// diaphragm
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     open: Option<f64>,
 
-    /// Frees every curvature and gap, whatever the file says
+    /// Varies every curvature and gap, whatever the variables of the file
     #[arg(long)]
     free: bool,
 
-    /// Image heights in mm in place of the fields: angles `atan(h / focal length)`
+    /// Image heights in mm that replace the fields, as angles `atan(h / focal length)`
     #[arg(long, value_name = "HEIGHTS", value_delimiter = ',', allow_hyphen_values = true)]
     heights: Vec<f64>,
 
-    /// One wavelength in um in place of those of the lens
+    /// One wavelength in um that replaces those of the lens
     #[arg(long, value_name = "UM", allow_negative_numbers = true)]
     wavelength: Option<f64>,
 
-    /// How many chains share the reservoir
+    /// The number of chains that share the reservoir
     #[arg(long, value_name = "N")]
     chains: Option<usize>,
 
-    /// How many lenses the reservoir holds
+    /// The number of lenses in the reservoir
     #[arg(long, value_name = "N")]
     reservoir: Option<usize>,
 
-    /// 0 or more, or `infinite`; the start has a density of one half where it is absent
+    /// Temperature, 0 or more, or `infinite`; absent: the density of the start is one half
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature: Option<TemperatureArg>,
 
-    /// The larger, the shorter descents are
+    /// The rate at which descents end at random; the larger, the shorter they are
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     c: Option<f64>,
 
-    /// How often a regeneration draws a lens from anywhere
+    /// The share of regenerations that draw a lens globally
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     gamma: Option<f64>,
 
-    /// What takes the local steps
+    /// The method of the local steps
     #[arg(long, value_enum, default_value_t = DescentSettings::default().method)]
     descent: DescentMethod,
 
-    /// Steps that a local move tries
+    /// The number of steps of a local move
     #[arg(long, value_name = "N", default_value_t = DescentSettings::default().steps)]
     steps: usize,
 
-    /// The error allowed of the radius of each spot while searching: `1%` or `1e-2`
+    /// Tolerance of the radius of each spot: `1%` or `1e-2`
     #[arg(long, default_value = "1e-2", value_name = "TOLERANCE")]
     error: Tolerance,
 }
 
-/// Two numbers, `4..8`.
+/// A range of numbers of elements: `4..8`.
 #[derive(Debug, Clone, Copy)]
 struct ElementRange([usize; 2]);
 
@@ -126,7 +126,7 @@ impl FromStr for ElementRange {
     }
 }
 
-/// A temperature.
+/// A temperature: a number, or `infinite`.
 #[derive(Debug, Clone, Copy)]
 struct TemperatureArg(Temperature);
 
@@ -140,7 +140,7 @@ impl FromStr for TemperatureArg {
     }
 }
 
-/// A kind of mutation by its name.
+/// A kind of mutation, by name.
 #[derive(Debug, Clone, Copy)]
 struct MutationArg(MutationKind);
 
@@ -165,17 +165,17 @@ fn positive(name: &str, value: Option<f64>) -> Result<Option<f64>, CliError> {
     }
 }
 
-/// Focal lengths that can be asked for, in mm, whatever their sign.
+/// The accepted range of focal lengths of either sign, in mm.
 const FOCAL_LENGTHS: [f64; 2] = [1e-9, 1e9];
 
 impl SearchPlanArgs {
-    /// The files that are read, each with its argument.
+    /// The files that are read, each with its option.
     pub(in crate::cli) fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
         let goal = self.goal.as_deref().map(|path| ("--goal", path));
         goal.into_iter().chain(self.rules.as_deref().map(|path| ("--rules", path)))
     }
 
-    /// The search of a lens that is asked for.
+    /// The plan of a search of this lens.
     pub(in crate::cli) fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
         let rules = self.rules(lens)?;
         let mut plan = SearchPlan { rules, light: self.light.clone(), ..SearchPlan::default() };
@@ -224,7 +224,7 @@ impl SearchPlanArgs {
         Ok(rules)
     }
 
-    /// The lens that the search starts from.
+    /// The start of the search.
     pub(in crate::cli) fn start_lens(&self, lens: &Lens) -> Result<Lens, CliError> {
         let mut start = lens.clone();
         if self.free {

@@ -1,4 +1,4 @@
-//! What a search prints: the start against the best lens, what there is besides, and what it took.
+//! The report of a search: results, reservoir, statistics and cost.
 
 use super::SearchEnd;
 use super::limits::ViolatedLimit;
@@ -12,18 +12,18 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::Path;
 
-/// All that is known after a search.
+/// Everything that the report is made from.
 pub(super) struct SearchResults<'a> {
     pub(super) landscape: &'a LensLandscape,
     pub(super) run: &'a SearchRunOn<LensLandscape>,
     pub(super) ended: SearchEnd,
     pub(super) resumed: bool,
-    /// Why it had nothing to do, if that is so.
+    /// The reason why a resumed run had nothing to do.
     pub(super) idle: Option<String>,
     pub(super) ms: f64,
-    /// Gradients since it began or was taken up again.
+    /// The gradients since it began or was resumed.
     pub(super) gradients: u64,
-    /// What the start does not keep.
+    /// The constraints that the start violates.
     pub(super) start_breaks: Vec<ConstraintMargin>,
     pub(super) compared: StartAgainstBest,
     pub(super) compared_ms: f64,
@@ -32,7 +32,7 @@ pub(super) struct SearchResults<'a> {
     pub(super) finished: Option<FinalizedLens>,
 }
 
-/// What is printed.
+/// The printed result.
 #[derive(Serialize)]
 pub(super) struct SearchReport {
     ended: SearchEnd,
@@ -119,7 +119,7 @@ impl SearchReport {
         }
     }
 
-    /// A lens that was to be finished and could not be is a failure.
+    /// Fails if the finalized lens violates a constraint.
     pub(super) fn check_finished(&self) -> Result<(), CliError> {
         match &self.finished {
             Some(FinishedReport { failures, .. }) if !failures.is_empty() => {
@@ -130,14 +130,16 @@ impl SearchReport {
     }
 }
 
-/// What ended a search, in words.
+/// The reason of an end, as text.
 pub(super) fn stop_reason_text(ended: SearchEnd) -> &'static str {
     match ended {
         SearchEnd::Run(RunEnd::Stopped) | SearchEnd::Interrupted => "stopped",
-        SearchEnd::Run(RunEnd::Moves | RunEnd::Gradients) => "the iterations are used up",
+        SearchEnd::Run(RunEnd::Moves | RunEnd::Gradients) => {
+            "the maximum number of iterations was reached"
+        }
         SearchEnd::Run(RunEnd::Done) => "everything was tried",
-        SearchEnd::Run(RunEnd::Stuck) => "nothing was found to go on from",
-        SearchEnd::Time => "the time is used up",
+        SearchEnd::Run(RunEnd::Stuck) => "no lens was found to continue from",
+        SearchEnd::Time => "the time limit was reached",
     }
 }
 
@@ -170,7 +172,7 @@ impl Display for SearchReport {
             finished.write(f)?;
         }
         if let Some(first) = self.files.first() {
-            writeln!(f, "\n{} lenses that were found, the best is {first}", self.files.len())?;
+            writeln!(f, "\n{} retained lenses, the best is {first}", self.files.len())?;
         }
         match &self.out {
             Some(out) => writeln!(f, "\nsaved as {out}"),
@@ -191,7 +193,7 @@ impl SearchReport {
     }
 
     fn write_mutations(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let head = ["mutation", "tried", "refused", "ended", "better", "kept", "moves each"];
+        let head = ["mutation", "tried", "refused", "ended", "better", "retained", "moves each"];
         let mut table = TextTable::new(&head);
         for MutationRow { kind, tally } in &self.mutations {
             let refused: u64 = tally.refused.values().sum();

@@ -1,16 +1,16 @@
-//! What a search has found: the start against the best lens, and the lens that was finished.
+//! The result of a search: the start against the best lens, and the finalized lens.
 
 use super::limits::{self, ViolatedLimit};
 use crate::cli::output::{ShortNumber, TextTable, or_dash};
 use crate::cli::terms::TermComparison;
-use crate::lens::Lens;
+use crate::lens::{Lens, MediumPlace};
 use crate::search::lens_landscape::{
     FieldSummary, FinalizedLens, LandscapeError, LensLandscape, LensSummary, UnlistedGlass,
 };
 use serde::Serialize;
 use std::fmt;
 
-/// The tolerance of the numbers that are printed.
+/// The tolerance of the printed numbers.
 const FIGURES_TOLERANCE: f64 = 1e-4;
 
 /// The start against the best lens.
@@ -22,7 +22,7 @@ pub(super) struct StartAgainstBest {
     best_breaks: Vec<ViolatedLimit>,
 }
 
-/// A lens that was finished, and what is not kept.
+/// A finalized lens and the constraints that it violates.
 #[derive(Serialize)]
 pub(super) struct FinishedReport {
     pub(super) failures: Vec<String>,
@@ -42,12 +42,12 @@ impl StartAgainstBest {
         })
     }
 
-    /// Rays of the figures.
+    /// The number of rays of the figures.
     pub(super) fn rays(&self) -> usize {
         self.start.rays() + self.best.rays()
     }
 
-    /// The start against the best lens.
+    /// Writes the figures of both lenses.
     pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (start, best) = (&self.start, &self.best);
         let mut table = TextTable::new(&[
@@ -88,7 +88,7 @@ impl StartAgainstBest {
         Ok(())
     }
 
-    /// What each term is worth, and the limits that are not kept.
+    /// Writes the terms of the merit function and the violated constraints.
     pub(super) fn write_terms(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", TermComparison::table(&self.terms))?;
         limits::write(&self.best_breaks, f)
@@ -99,24 +99,26 @@ impl FinishedReport {
     pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let FinalizedLens { glasses, unlisted, gradients, figures, confirmed, .. } = &self.finished;
         let (kept, light) = (&self.finished.limits, &self.finished.light);
-        let verdict = if self.failures.is_empty() { "every limit is kept" } else { "NOT finished" };
+        let verdict =
+            if self.failures.is_empty() { "satisfies every constraint" } else { "NOT finished" };
         writeln!(f, "\nfinished: {verdict}")?;
         for change in glasses {
             let (nd, vd) = change.was;
             let was = format!("{} {}", ShortNumber(nd), or_dash(vd));
             let (nd, vd) = change.is;
             let is = format!("{} ({} {})", change.glass, ShortNumber(nd), ShortNumber(vd));
-            writeln!(f, "  glass behind surface {}: {was} -> {is}", change.surface)?;
+            writeln!(f, "  glass {}: {was} -> {is}", MediumPlace::behind(change.surface))?;
         }
         for UnlistedGlass { surface, glass } in unlisted {
             writeln!(
                 f,
-                "  glass behind surface {surface}: {glass} stays: the rules do not list it, \
-                and keep the surface"
+                "  glass {}: {glass} is retained: the rules do not list it, but fix the surface",
+                MediumPlace::behind(*surface)
             )?;
         }
         for surface in gradients {
-            writeln!(f, "  medium behind surface {surface}: a gradient, kept as it is")?;
+            let place = MediumPlace::behind(*surface);
+            writeln!(f, "  medium {place}: a gradient index, retained as it is")?;
         }
         let head =
             ["field", "spot, um", "error", "other rays", "light, mm^2", "error", "other rays"];
@@ -131,7 +133,7 @@ impl FinishedReport {
         }
         writeln!(f, "{table}")?;
         let mut table =
-            TextTable::new(&["limit", "surface or field", "zoom", "value", "min", "max", "margin"]);
+            TextTable::new(&["constraint", "place", "zoom", "value", "min", "max", "margin"]);
         for limit in kept.iter().chain(light) {
             table.row(limits::cells(limit).into_iter().chain([format!("{:.4}", limit.slack())]));
         }
@@ -139,7 +141,7 @@ impl FinishedReport {
     }
 }
 
-/// µm.
+/// The RMS radius of a spot and its error, in µm.
 fn spot(field: &FieldSummary) -> [String; 2] {
     let both = |spot: crate::analysis::Estimate| {
         [format!("{:.3}", 1e3 * spot.value), format!("{:.0e}", 1e3 * spot.error)]

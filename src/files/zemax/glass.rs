@@ -247,6 +247,6 @@ mod tests {
         let surfaces = [pickup(1), pickup(2), end];
         assert_eq!(medium(&surfaces, 0, &[]).unwrap().0, glass("SCHOTT N-BK7"));
         let circle = [pickup(1), pickup(0)];
-        assert!(medium(&circle, 0, &[]).unwrap_err().found.contains("in a circle"));
+        assert!(medium(&circle, 0, &[]).unwrap_err().found.contains("form a circle"));
     }
 }

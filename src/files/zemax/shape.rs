@@ -16,7 +16,7 @@ pub(super) struct ZemaxShape {
 }
 
 const EXPECTED: &str = "STANDARD, EVENASPH, or an asphere without odd terms; other types cannot be \
-                        traced here";
+                        traced";
 
 /// The shape of surface `number`.
 pub(super) fn surface_shape(

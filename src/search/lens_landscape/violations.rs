@@ -109,8 +109,7 @@ impl LensLandscape {
 
 /// The message for a violated constraint.
 pub fn describe_violation(limit: &ConstraintMargin) -> String {
-    let of = if limit.term == "light" { "field" } else { "surface" };
-    let place = limit.surface.map_or(String::new(), |i| format!(", {of} {i}"));
+    let place = limit.place().map_or(String::new(), |place| format!(", {place}"));
     let zoom = if limit.zoom == 0 { String::new() } else { format!(", zoom {}", limit.zoom) };
     let (name, value) = (limit.term.replace('_', " "), format_limit(limit.value));
     let bound = match (limit.min, limit.max) {

@@ -32,7 +32,8 @@ fn what_is_no_lens_is_called_what_it_is() {
     assert!(refusal(b"", "a.json").contains("an empty file"));
     assert!(refusal(b"", "a.zmx").contains("an empty file"));
     assert!(
-        refusal(b"Dear Ernst, the lens is ready.", "letter.txt").contains("text that is no lens")
+        refusal(b"Dear Ernst, the lens is ready.", "letter.txt")
+            .contains("text that is not a lens")
     );
     assert!(refusal(b"Dear Ernst, the lens is ready.", "letter.zmx").contains("no SURF line"));
     assert!(
@@ -105,7 +106,7 @@ fn a_target_that_cannot_be_written_keeps_what_it_was() {
     permissions.set_readonly(true);
     fs::set_permissions(&old, permissions).unwrap();
     let error = files::save(&lens, &old).unwrap_err().to_string();
-    assert!(error.contains("it is read-only") && error.contains("untouched"), "{error}");
+    assert!(error.contains("it is read-only") && error.contains("unchanged"), "{error}");
     assert_eq!(fs::read_to_string(&old).unwrap(), "old");
 
     let names: Vec<_> = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name()).collect();

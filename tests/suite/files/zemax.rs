@@ -268,11 +268,15 @@ fn solves_that_cannot_be_kept_are_frozen_and_said_so() {
         (
             "CURV -2.4330900243309004E-2 1 0 0",
             "CURV -2.4330900243309004E-2 4 1 -1",
-            "which is kept",
+            "which is used",
         ),
-        ("CURV -2.4330900243309004E-2 1 0 0", "CURV -2.4330900243309004E-2 4 9 1", "not there"),
-        ("MAZH 0 0", "MAZH 0 0.7", "kept as it is"),
-        ("VDSZ 2 9", "TOLE 1 5", "kept as it is"),
+        (
+            "CURV -2.4330900243309004E-2 1 0 0",
+            "CURV -2.4330900243309004E-2 4 9 1",
+            "does not exist",
+        ),
+        ("MAZH 0 0", "MAZH 0 0.7", "the present value is used"),
+        ("VDSZ 2 9", "TOLE 1 5", "the present value of the solve"),
         ("VDSZ 2 9", "VDSZ 6 9", "without its bounds"),
     ];
     for (from, to, note) in cases {

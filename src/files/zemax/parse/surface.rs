@@ -163,7 +163,9 @@ fn obscuration(
 ) -> Result<LineOutcome, ParseError> {
     let (inner, outer) = radii(line)?;
     if inner > 0.0 {
-        return Ok(dropped("a ring that is dark with light inside cannot be had here"));
+        return Ok(dropped(
+            "a ring-shaped obstruction that transmits light inside is not supported",
+        ));
     }
     obstruct(surface, outer, line);
     Ok(used())

@@ -5,7 +5,9 @@ use crate::files::report::ConversionOutcome;
 use crate::files::zemax::glass as there;
 use crate::files::zemax::gradient;
 use crate::lens::glass;
-use crate::lens::{Aperture, Medium, Object, Parameter, Pickup, Quantity, Row};
+use crate::lens::{
+    Aperture, Medium, MediumPlace, Object, Parameter, Pickup, Quantity, Row, SurfaceNumber,
+};
 
 impl ZemaxWriter {
     pub(super) fn surfaces(&mut self) {
@@ -25,7 +27,7 @@ impl ZemaxWriter {
         };
         self.plane(&distance);
         let medium = self.lens.object_medium.clone();
-        self.glass(&medium, "before surface 0", false);
+        self.glass(&medium, MediumPlace::Object, false);
     }
 
     /// The object or the image plane.
@@ -76,12 +78,16 @@ impl ZemaxWriter {
         self.thickness(i, row.thickness);
         let variable = self.is_variable(i, Quantity::Index);
         if graded.is_none() {
-            self.glass(&row.medium, &format!("after surface {i}"), variable);
+            self.glass(&row.medium, MediumPlace::behind(i), variable);
         }
         self.semi_diameter(&row);
         if row.hyperhemisphere {
-            let note = "the far half of the surface counts there or not, as the program decides";
-            self.record(ConversionOutcome::Dropped, format!("hyper of surface {i}"), note);
+            let note = "the other program decides by itself if the far half of the surface counts";
+            self.record(
+                ConversionOutcome::Dropped,
+                format!("hyperhemisphere of surface {}", SurfaceNumber::new(i)),
+                note,
+            );
         }
     }
 
@@ -145,7 +151,7 @@ impl ZemaxWriter {
         }
     }
 
-    fn glass(&mut self, medium: &Medium, place: &str, variable: bool) {
+    fn glass(&mut self, medium: &Medium, place: MediumPlace, variable: bool) {
         let vary = i32::from(variable);
         match medium {
             Medium::Air => {}
@@ -166,19 +172,23 @@ impl ZemaxWriter {
             Medium::Grin(gradient) => {
                 self.glass(&gradient.base, place, variable);
                 let note = "only r^2 to r^6 and z to z^3 of an index without dispersion behind a conic \
-                            can be written: its coefficients are left out";
-                self.record(ConversionOutcome::Dropped, format!("gradient {place}"), note);
+                            can be written: its coefficients are dropped";
+                self.record(
+                    ConversionOutcome::Dropped,
+                    format!("gradient-index medium {place}"),
+                    note,
+                );
             }
         }
     }
 
-    fn catalogue_glass(&mut self, name: &str, place: &str) {
+    fn catalogue_glass(&mut self, name: &str, place: MediumPlace) {
         let Some(glass) = glass::find(name) else { return };
         let bare: String = glass.name.split_whitespace().collect();
         let values = numbers([glass.nd, glass.vd]);
         self.surface_line(format!("GLAS {bare} 0 0 {values} 0 0 0 0 0 0"));
         if there::is_general(glass) {
-            let note = "not a maker's own: its data in the other program may differ";
+            let note = "a material without a maker: its data in the other program may differ";
             self.record(ConversionOutcome::Approximated, format!("glass {place}: {name}"), note);
         }
     }

@@ -55,7 +55,7 @@ impl ZemaxWriter {
             return;
         }
         if all.iter().any(|aperture| discriminant(aperture) != discriminant(&base)) {
-            let note = "apertures of different kinds: that of the lens holds at every position";
+            let note = "apertures of different kinds: that of the lens is used at every position";
             self.record(ConversionOutcome::Dropped, "apertures of the zoom positions", note);
             return;
         }
@@ -74,8 +74,7 @@ impl ZemaxWriter {
         let all: Vec<Fields> =
             (0..self.lens.zoom.len()).map(|zoom| self.lens.fields_at(zoom).clone()).collect();
         if !all.iter().all(|fields| alike(fields, &base)) {
-            let note =
-                "fields of another kind, number or weight: those of the lens hold everywhere";
+            let note = "fields of another kind, number or weight: those of the lens are used at every position";
             self.record(ConversionOutcome::Dropped, "fields of the zoom positions", note);
             return;
         }
