@@ -40,7 +40,10 @@ struct AdjointMemoryRow {
     difference: f64,
 }
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let nodes = effort.select([17, 33, 65, 129].as_slice(), &[17, 33]);
     let side = effort.select(64, 16);
     let (mut outcome, mut rows) = (ExperimentOutcome::default(), Vec::new());
@@ -49,7 +52,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
         for fineness in FINENESS {
             let done = rows.len() as f64 / all as f64;
             report_progress(
-                watch,
+                progress,
                 done,
                 &format!("{nodes} nodes a side, {fineness} steps a voxel"),
             )?;

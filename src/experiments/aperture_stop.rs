@@ -57,16 +57,19 @@ const HIGH_ORDER: usize = 8;
 /// The stop counts as a pinhole below this fraction of its initial semi-diameter.
 const PINHOLE: f64 = 0.1;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let steps = effort.select(STEPS, FEW_STEPS);
     let mut outcome = ExperimentOutcome::default();
     let start = StopObjective::at(START, HIGH_ORDER)?;
-    let mut ways = Vec::new();
+    let mut descents = Vec::new();
     for gradient in [GradientKind::Unbiased, GradientKind::Biased] {
-        ways.push(StopDescent::run(gradient, steps, watch)?);
+        descents.push(StopDescent::run(gradient, steps, progress)?);
     }
-    outcome.rays = start.rays + ways.iter().map(|way| way.rays).sum::<usize>();
-    let [unbiased, biased] = [&ways[0], &ways[1]];
+    outcome.rays = start.rays + descents.iter().map(|descent| descent.rays).sum::<usize>();
+    let [unbiased, biased] = [&descents[0], &descents[1]];
     outcome.claims = claims(&start, unbiased, biased, &mut outcome.rays)?;
     outcome.tables.push(table(unbiased, biased));
     outcome.pictures.push(NamedPlot { name: "radius", canvas: radii(unbiased, biased) });
@@ -112,7 +115,7 @@ fn lens(radius: f64) -> Result<Lens, ExperimentError> {
     Ok(lens)
 }
 
-fn bench(radius: f64) -> Result<RayModel, ExperimentError> {
+fn model(radius: f64) -> Result<RayModel, ExperimentError> {
     RayModel::from_lens(&lens(radius)?, 0).map_err(ExperimentError::from_error)
 }
 
@@ -130,8 +133,8 @@ struct StopObjective {
 
 impl StopObjective {
     fn at(radius: f64, order: usize) -> Result<Self, ExperimentError> {
-        let bench = bench(radius)?;
-        let region = Region::new(bench.launch(AXIS, 0).map_err(ExperimentError::from_error)?);
+        let model = model(radius)?;
+        let region = Region::new(model.launch(AXIS, 0).map_err(ExperimentError::from_error)?);
         let lit = region.trace_pupil(order);
         let cost = QuadraticIntegrand::spread([0.0; 2]);
         let failed =
@@ -167,19 +170,19 @@ impl StopDescent {
     fn run(
         gradient: GradientKind,
         steps: usize,
-        watch: &mut ProgressFn<'_>,
+        progress: &mut ProgressFn<'_>,
     ) -> Result<Self, ExperimentError> {
         let (name, done) = match gradient {
             GradientKind::Unbiased => ("descent by the unbiased gradient", 0.0),
             GradientKind::Biased => ("descent by the biased gradient", 0.5),
         };
-        let mut way = Self { radii: Vec::new(), blurs: Vec::new(), rms: Vec::new(), rays: 0 };
+        let mut descent = Self { radii: Vec::new(), blurs: Vec::new(), rms: Vec::new(), rays: 0 };
         let (mut radius, mut mean, mut square) = (START, 0.0, 0.0);
         let [b1, b2]: [f64; 2] = [0.9, 0.999];
         for step in 0..=steps {
-            report_progress(watch, done + 0.5 * step as f64 / steps as f64, name)?;
+            report_progress(progress, done + 0.5 * step as f64 / steps as f64, name)?;
             let point = StopObjective::at(radius, ORDER)?;
-            way.record(radius, &point);
+            descent.record(radius, &point);
             let slope = match gradient {
                 GradientKind::Unbiased => point.unbiased,
                 GradientKind::Biased => point.biased,
@@ -191,7 +194,7 @@ impl StopDescent {
             let along = if size > 0.0 { mean / (1.0 - b1.powi(age)) / size } else { 0.0 };
             radius = (radius - RATE * along).max(CLOSED);
         }
-        Ok(way)
+        Ok(descent)
     }
 
     fn record(&mut self, radius: f64, point: &StopObjective) {
@@ -259,7 +262,8 @@ fn table(unbiased: &StopDescent, biased: &StopDescent) -> DataTable {
     ];
     let mut table = DataTable::new("radius", &columns);
     for step in 0..unbiased.radii.len() {
-        let of = |way: &StopDescent| [way.radii[step], way.blurs[step], way.rms[step]];
+        let of =
+            |descent: &StopDescent| [descent.radii[step], descent.blurs[step], descent.rms[step]];
         let numbers = of(unbiased).into_iter().chain(of(biased));
         table.push_row(std::iter::once(step.into()).chain(numbers.map(Into::into)));
     }
@@ -272,18 +276,23 @@ const BIASED: Color = PALETTE[1];
 /// Radius and blur over the steps.
 fn radii(unbiased: &StopDescent, biased: &StopDescent) -> Canvas {
     let mut canvas = Canvas::new([1500, 700]);
-    let ways = [("unbiased", unbiased, UNBIASED), ("biased", biased, BIASED)];
+    let descents = [("unbiased", unbiased, UNBIASED), ("biased", biased, BIASED)];
     let x = Axis::linear("step", [0.0, unbiased.radii.len() as f64 - 1.0]);
-    let radius = Axis::linear("mm", ways.iter().flat_map(|way| way.1.radii.iter().copied()));
-    let rms = Axis::logarithmic("mm", ways.iter().flat_map(|way| way.1.rms.iter().copied()), 1e-9);
+    let radius =
+        Axis::linear("mm", descents.iter().flat_map(|descent| descent.1.radii.iter().copied()));
+    let rms = Axis::logarithmic(
+        "mm",
+        descents.iter().flat_map(|descent| descent.1.rms.iter().copied()),
+        1e-9,
+    );
     let charts = [
         Chart::new([120.0, 110.0], [700.0, 580.0], x.clone(), radius),
         Chart::new([860.0, 110.0], [1440.0, 580.0], x, rms),
     ];
     charts[0].draw(&mut canvas, "radius of the stop");
     charts[1].draw(&mut canvas, "blur, root mean square");
-    for (i, (name, way, color)) in ways.into_iter().enumerate() {
-        for (chart, values) in charts.iter().zip([&way.radii, &way.rms]) {
+    for (i, (name, descent, color)) in descents.into_iter().enumerate() {
+        for (chart, values) in charts.iter().zip([&descent.radii, &descent.rms]) {
             let points =
                 values.iter().enumerate().map(|(step, v)| chart.to_pixel([step as f64, *v]));
             canvas.curve(&points.collect::<Vec<_>>(), color, Stroke::Solid);
@@ -304,14 +313,14 @@ fn lenses(unbiased: &StopDescent, biased: &StopDescent) -> Result<Canvas, Experi
         ("unbiased gradient", unbiased.final_radius(), UNBIASED),
     ];
     for (i, (name, radius, color)) in panels.into_iter().enumerate() {
-        let bench = bench(radius)?;
-        let section = SectionPlot::new(&bench.channels[0].system);
+        let model = model(radius)?;
+        let section = SectionPlot::new(&model.channels[0].system);
         let [z, y] = section.extent();
         let left = 90.0 + 600.0 * i as f64;
         let (x, y) = (Axis::linear("z, mm", z), Axis::linear("y, mm", y));
         let chart = Chart::new([left, 110.0], [left + 480.0, 600.0], x, y).with_equal_scales();
         chart.draw(&mut canvas, &format!("{name}: stop {radius:.3} mm"));
-        let launch = bench.launch(AXIS, 0).map_err(ExperimentError::from_error)?;
+        let launch = model.launch(AXIS, 0).map_err(ExperimentError::from_error)?;
         for ray in -4..=4 {
             section.draw_ray(&mut canvas, &chart, &launch, [0.0, 0.24 * f64::from(ray)], color);
         }

@@ -43,22 +43,25 @@ const ASKEW: [f64; 2] = [0.31, 0.17];
 /// The largest deviation of the area of a bitmap, in standard errors.
 const SIGMAS: f64 = 4.0;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let (fields, cells): (usize, usize) = effort.select((13, 400), (5, 150));
-    let bench = RayModel::from_lens(&lens(LENS)?, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(&lens(LENS)?, 0).map_err(ExperimentError::from_error)?;
     let mut pupils = Vec::new();
     for i in 0..fields {
         let angle = EDGE * i as f64 / (fields - 1) as f64;
-        report_progress(watch, i as f64 / fields as f64, &format!("pupil at {angle} degrees"))?;
-        pupils.push(MappedPupil::at(&bench, angle, cells)?);
+        report_progress(progress, i as f64 / fields as f64, &format!("pupil at {angle} degrees"))?;
+        pupils.push(MappedPupil::at(&model, angle, cells)?);
     }
     Ok(ExperimentOutcome {
         claims: claims(&pupils),
-        tables: vec![areas(&pupils), shares(&bench, &pupils), edges(&bench, &pupils)],
+        tables: vec![areas(&pupils), shares(&model, &pupils), edges(&model, &pupils)],
         lenses: Vec::new(),
         pictures: vec![
-            NamedPlot { name: "pupils", canvas: maps(&bench, &pupils) },
-            NamedPlot { name: "shares", canvas: curves(&bench, &pupils) },
+            NamedPlot { name: "pupils", canvas: maps(&model, &pupils) },
+            NamedPlot { name: "shares", canvas: curves(&model, &pupils) },
         ],
         rays: pupils.iter().map(|pupil| pupil.rays).sum(),
     })
@@ -77,15 +80,15 @@ struct MappedPupil {
 }
 
 impl MappedPupil {
-    fn at(bench: &RayModel, angle: f64, cells: usize) -> Result<Self, ExperimentError> {
+    fn at(model: &RayModel, angle: f64, cells: usize) -> Result<Self, ExperimentError> {
         let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
-        let launch = bench.launch(field, bench.primary).map_err(ExperimentError::from_error)?;
+        let launch = model.launch(field, model.primary).map_err(ExperimentError::from_error)?;
         let region = Region::new(launch);
         let dark = || ExperimentError::Failed(format!("the pupil at {angle} degrees has no edge"));
         let outline = region.outline(POINTS).ok_or_else(dark)?;
         let area = region.extent(ACCURACY).ok_or_else(dark)?;
-        let bitmap = Bitmap::of(bench, angle, &outline, cells);
-        let (wrong, beside) = wrong_fates(bench, angle, &outline);
+        let bitmap = Bitmap::of(model, angle, &outline, cells);
+        let (wrong, beside) = wrong_fates(model, angle, &outline);
         let rays = area.rays + outline.rays + beside + cells * cells;
         Ok(Self { angle, outline, area, bitmap, wrong, rays })
     }
@@ -128,10 +131,10 @@ fn ray(angle: f64, [x, y]: [f64; 2]) -> Ray<f64> {
 }
 
 /// The fates of the rays through some points.
-fn fates(bench: &RayModel, angle: f64, points: impl Iterator<Item = [f64; 2]>) -> Vec<Fate> {
+fn fates(model: &RayModel, angle: f64, points: impl Iterator<Item = [f64; 2]>) -> Vec<Fate> {
     let rays: Rays<f64> = points.map(|p| ray(angle, p)).collect();
     let mut landed = ImagePoints::default();
-    bench.channels[bench.primary].tracer.trace_batch(&rays, &mut landed);
+    model.channels[model.primary].tracer.trace_batch(&rays, &mut landed);
     (0..rays.len()).map(|i| landed.fate(i)).collect()
 }
 
@@ -145,7 +148,7 @@ struct Bitmap {
 }
 
 impl Bitmap {
-    fn of(bench: &RayModel, angle: f64, outline: &PupilOutline, cells: usize) -> Self {
+    fn of(model: &RayModel, angle: f64, outline: &PupilOutline, cells: usize) -> Self {
         let points = || outline.sides.iter().flat_map(|side| &side.points);
         let ends = [0, 1].map(|k| {
             let values = || points().map(|p| p[k]);
@@ -158,7 +161,7 @@ impl Bitmap {
         let at = |i: usize| {
             [corner[0] + (i % cells) as f64 * cell, corner[1] + (i / cells) as f64 * cell]
         };
-        let fates = fates(bench, angle, (0..cells * cells).map(at));
+        let fates = fates(model, angle, (0..cells * cells).map(at));
         Self { cell, cells, corner, fates }
     }
 
@@ -170,7 +173,7 @@ impl Bitmap {
 
 /// The number of rays just inside the edge that do not reach the image and of rays just outside
 /// that do not end at the surface of its arc, away from corners; and the number of all rays.
-fn wrong_fates(bench: &RayModel, angle: f64, outline: &PupilOutline) -> (usize, usize) {
+fn wrong_fates(model: &RayModel, angle: f64, outline: &PupilOutline) -> (usize, usize) {
     let [x, y] = outline.center;
     let mut wrong = 0;
     let mut rays = 0;
@@ -181,7 +184,7 @@ fn wrong_fates(bench: &RayModel, angle: f64, outline: &PupilOutline) -> (usize, 
             let moved = points
                 .iter()
                 .map(move |p| [x + (1.0 + factor) * (p[0] - x), y + (1.0 + factor) * (p[1] - y)]);
-            fates(bench, angle, moved)
+            fates(model, angle, moved)
         };
         let lost = beside(-BESIDE).iter().filter(|fate| !fate.is_imaged()).count();
         let surface = side.limit.surface();
@@ -247,24 +250,24 @@ fn areas(pupils: &[MappedPupil]) -> DataTable {
     table
 }
 
-fn shares(bench: &RayModel, pupils: &[MappedPupil]) -> DataTable {
+fn shares(model: &RayModel, pupils: &[MappedPupil]) -> DataTable {
     let mut table = DataTable::new("shares", &["field_deg", "limit", "surface", "share_of_edge"]);
     for pupil in pupils {
         for (limit, share) in pupil.outline.limits_by_share() {
             let surface = limit.surface().map_or(TableCell::Number(f64::NAN), TableCell::from);
-            let name = bench.limit_name(limit);
+            let name = model.limit_name(limit);
             table.push_row([pupil.angle.into(), name.into(), surface, share.into()]);
         }
     }
     table
 }
 
-fn edges(bench: &RayModel, pupils: &[MappedPupil]) -> DataTable {
+fn edges(model: &RayModel, pupils: &[MappedPupil]) -> DataTable {
     let mut table = DataTable::new("edges", &["field_deg", "side", "limit", "x_mm", "y_mm"]);
     for pupil in pupils {
         for (i, side) in pupil.outline.sides.iter().enumerate() {
             for [x, y] in &side.points {
-                let name = bench.limit_name(side.limit);
+                let name = model.limit_name(side.limit);
                 let angle = pupil.angle.into();
                 table.push_row([angle, i.into(), name.into(), (*x).into(), (*y).into()]);
             }
@@ -302,10 +305,10 @@ const DRAWN: usize = 5;
 const PANEL: f64 = 400.0;
 
 /// Outlines above, bitmaps below.
-fn maps(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
+fn maps(model: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     let mut canvas = Canvas::new([120 + DRAWN as u32 * 500, 1240]);
     let colors = colors(pupils);
-    legend(&mut canvas, bench, &colors, [90.0, 20.0]);
+    legend(&mut canvas, model, &colors, [90.0, 20.0]);
     let step = (pupils.len() - 1) as f64 / (DRAWN - 1) as f64;
     for i in 0..DRAWN {
         let pupil = &pupils[(step * i as f64).round() as usize];
@@ -335,10 +338,10 @@ fn maps(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
 }
 
 /// Area and fractions of the edge against the field.
-fn curves(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
+fn curves(model: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     let mut canvas = Canvas::new([1500, 800]);
     let colors = colors(pupils);
-    legend(&mut canvas, bench, &colors, [120.0, 20.0]);
+    legend(&mut canvas, model, &colors, [120.0, 20.0]);
     let x = || Axis::linear("field, deg", pupils.iter().map(|pupil| pupil.angle));
     let area = Axis::linear("mm^2", pupils.iter().map(MappedPupil::area).chain([0.0]));
     let share = Axis::linear("share", [0.0, 1.0]);
@@ -360,7 +363,7 @@ fn curves(bench: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     canvas
 }
 
-fn legend(canvas: &mut Canvas, bench: &RayModel, colors: &[(PupilLimit, Color)], [x, y]: [f64; 2]) {
+fn legend(canvas: &mut Canvas, model: &RayModel, colors: &[(PupilLimit, Color)], [x, y]: [f64; 2]) {
     for (i, (limit, color)) in colors.iter().enumerate() {
         let place = [x + 340.0 * (i % 4) as f64, y + 30.0 * (i / 4) as f64];
         canvas.curve(
@@ -368,6 +371,6 @@ fn legend(canvas: &mut Canvas, bench: &RayModel, colors: &[(PupilLimit, Color)],
             *color,
             Stroke::Solid,
         );
-        canvas.text([place[0] + 52.0, place[1]], &bench.limit_name(*limit), BLACK, TextAlign::Left);
+        canvas.text([place[0] + 52.0, place[1]], &model.limit_name(*limit), BLACK, TextAlign::Left);
     }
 }

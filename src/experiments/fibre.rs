@@ -35,16 +35,18 @@ const REFINED: usize = 4;
 /// The number of steps of a ray from focus to focus.
 const STEPS: f64 = 40.0;
 
-fn run(_: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(_: Effort, progress: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
     let builtin = grin_design::find_builtin("fibre");
     let task = builtin.ok_or_else(|| ExperimentError::Failed("no task `fibre`".to_owned()))?.task();
     let task = task.map_err(ExperimentError::from_error)?;
-    let runner = solve(&task, [0.0, 1.0], watch)?;
-    let best = runner.best();
-    let spots = runner.score(best).map_err(ExperimentError::from_error)?.views;
+    let optimizer = solve(&task, [0.0, 1.0], progress)?;
+    let best = optimizer.best();
+    let spots = optimizer.score(best).map_err(ExperimentError::from_error)?.views;
     let (_, rays) = task.scoring_rays(&task.views[0]);
-    let mut outcome =
-        ExperimentOutcome { rays: runner.rays_traced() as usize, ..ExperimentOutcome::default() };
+    let mut outcome = ExperimentOutcome {
+        rays: optimizer.rays_traced() as usize,
+        ..ExperimentOutcome::default()
+    };
     let columns = ["focus", "plane_mm", "spot_mm", "parabola_plane_mm", "parabola_spot_mm"];
     let mut table = DataTable::new("foci", &columns);
     for (i, view) in spots.iter().enumerate() {

@@ -57,12 +57,15 @@ const AGREEMENT: f64 = 1e-4;
 /// hardly limits these pixels.
 const NEARLY: f64 = 0.05;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let side = effort.select(40, 10);
     let camera = SensorView::new(effort.select(SAMPLES, FEW_SAMPLES))?;
     let mut pixels = Vec::with_capacity(side * side);
     for row in 0..side {
-        report_progress(watch, row as f64 / side as f64, "pixels")?;
+        report_progress(progress, row as f64 / side as f64, "pixels")?;
         let line: Result<Vec<Pixel>, ExperimentError> = (0..side)
             .into_par_iter()
             .map(|column| camera.pixel(place(row, column, side)))
@@ -140,7 +143,7 @@ impl Integrand for TestChart {
 /// The lens as seen from the sensor, and with slightly perturbed parameters.
 struct SensorView {
     chart: TestChart,
-    bench: RayModel,
+    model: RayModel,
     /// Perturbed in the stop and in the curvature, each a step down and a step up.
     perturbed: [[RayModel; 2]; 2],
     /// The sampling of the warp field.
@@ -174,7 +177,7 @@ impl SensorView {
         let system = forwards.reversed(DISTANCE);
         let stop = system.stop.unwrap_or(0);
         let radius = system.surfaces[stop].semi_diameter;
-        let bench = |radius: f64, bend: f64| {
+        let model = |radius: f64, bend: f64| {
             let mut system = system.clone();
             // The reversed curvature has the other sign.
             *SurfaceParameter::Curvature.value_mut(&mut system, rear) -= bend;
@@ -183,10 +186,10 @@ impl SensorView {
         let [wider, bent] = STEPS;
         Ok(Self {
             chart: TestChart { unit: DISTANCE * HALF / focal },
-            bench: bench(radius, 0.0)?,
+            model: model(radius, 0.0)?,
             perturbed: [
-                [bench(radius - wider, 0.0)?, bench(radius + wider, 0.0)?],
-                [bench(radius, -bent)?, bench(radius, bent)?],
+                [model(radius - wider, 0.0)?, model(radius + wider, 0.0)?],
+                [model(radius, -bent)?, model(radius, bent)?],
             ],
             warp: WarpSampling { count: samples, seed: 1 },
             stop,
@@ -196,7 +199,7 @@ impl SensorView {
 
     fn pixel(&self, [x, y]: [f64; 2]) -> Result<Pixel, ExperimentError> {
         let field = FieldPoint { x, y, weight: 1.0 };
-        let launch = self.bench.launch(field, 0).map_err(ExperimentError::from_error)?;
+        let launch = self.model.launch(field, 0).map_err(ExperimentError::from_error)?;
         let anchor = launch.to_fixed();
         let region = Region::new(launch);
         let lit = region.trace_pupil(ORDER);
@@ -209,7 +212,7 @@ impl SensorView {
         let mut rays = region.rays + lit.rays_traced + warp.rays + nodes.points.len();
         let mut difference = [0.0; 2];
         for (i, benches) in self.perturbed.iter().enumerate() {
-            let ends = benches.each_ref().map(|bench| follow_pupil(&region.kind, anchor, bench));
+            let ends = benches.each_ref().map(|model| follow_pupil(&region.kind, anchor, model));
             rays += ends[0].rays_traced + ends[1].rays_traced;
             let [low, high] = ends.map(|lit| lit.integral(&self.chart));
             difference[i] = (high - low) / (2.0 * STEPS[i]);
@@ -249,9 +252,9 @@ fn reversed_model(
 fn follow_pupil<'a>(
     before: &RegionKind,
     anchor: FixedLaunch,
-    bench: &'a RayModel,
+    model: &'a RayModel,
 ) -> TracedPupil<'a> {
-    Region::track(before, anchor.launch(bench)).trace_pupil(ORDER)
+    Region::track(before, anchor.launch(model)).trace_pupil(ORDER)
 }
 
 /// Selects the two derivatives of a pixel by one method.

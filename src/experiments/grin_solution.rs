@@ -18,28 +18,28 @@ const RAYS: usize = 13;
 pub(super) fn solve(
     task: &GrinTask,
     [from, to]: [f64; 2],
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<GrinOptimizer, ExperimentError> {
-    report_progress(watch, from, &task.name)?;
-    let runner = GrinOptimizer::new(task).map_err(ExperimentError::from_error)?;
-    solve_from(runner, [from, to], watch)
+    report_progress(progress, from, &task.name)?;
+    let optimizer = GrinOptimizer::new(task).map_err(ExperimentError::from_error)?;
+    solve_from(optimizer, [from, to], progress)
 }
 
 /// Continues a runner to its end; it is the part `from` to `to` of the whole work.
 pub(super) fn solve_from(
-    mut runner: GrinOptimizer,
+    mut optimizer: GrinOptimizer,
     [from, to]: [f64; 2],
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<GrinOptimizer, ExperimentError> {
-    let name = runner.task().name.clone();
+    let name = optimizer.task().name.clone();
     let mut done = from;
     loop {
-        let progress = runner.step().map_err(ExperimentError::from_error)?;
-        let share = progress.step as f64 / progress.max_steps.max(1) as f64;
-        done = if progress.finished { to } else { done.max(from + share.min(1.0) * (to - from)) };
-        report_progress(watch, done, &name)?;
-        if progress.finished {
-            return Ok(runner);
+        let step = optimizer.step().map_err(ExperimentError::from_error)?;
+        let share = step.step as f64 / step.max_steps.max(1) as f64;
+        done = if step.finished { to } else { done.max(from + share.min(1.0) * (to - from)) };
+        report_progress(progress, done, &name)?;
+        if step.finished {
+            return Ok(optimizer);
         }
     }
 }

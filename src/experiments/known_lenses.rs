@@ -37,7 +37,10 @@ const CASES: [KnownLensCase; 4] = [
     KnownLensCase { name: "maxwell", limits: [[1.5e-2, 5e-3]; 2], small: &[] },
 ];
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let mut outcome = ExperimentOutcome::default();
     let mut table = DataTable::new(
         "lenses",
@@ -47,11 +50,11 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     for (i, case) in cases.iter().enumerate() {
         let span = [i, i + 1].map(|part| part as f64 / cases.len() as f64);
         let task = task(case, effort)?;
-        let runner = solve(&task, span, watch)?;
-        let found = task.difference(runner.best()).map_err(ExperimentError::from_error)?;
+        let optimizer = solve(&task, span, progress)?;
+        let found = task.difference(optimizer.best()).map_err(ExperimentError::from_error)?;
         let found = found
             .ok_or_else(|| ExperimentError::Failed(format!("{}: no exact field", case.name)))?;
-        let judged = runner.score(runner.best()).map_err(ExperimentError::from_error)?;
+        let judged = optimizer.score(optimizer.best()).map_err(ExperimentError::from_error)?;
         outcome.claims.extend(claims(case, effort, found));
         let left_out = judged.views.iter().map(|v| v.counts.fates.total() - v.counts.valid());
         outcome.claims.push(Claim::at_most(
@@ -59,9 +62,9 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
             left_out.sum::<usize>() as f64,
             0.0,
         ));
-        outcome.rays += usize::try_from(runner.rays_traced()).unwrap_or(usize::MAX);
-        table.push_row(row(case, &runner, found, judged.views[0].spot));
-        let pictures = plot_medium(&task, runner.best());
+        outcome.rays += usize::try_from(optimizer.rays_traced()).unwrap_or(usize::MAX);
+        table.push_row(row(case, &optimizer, found, judged.views[0].spot));
+        let pictures = plot_medium(&task, optimizer.best());
         let names = PICTURES[i];
         outcome.pictures.extend(pictures.into_iter().zip(names).map(|(mut picture, name)| {
             picture.name = name;
@@ -105,18 +108,18 @@ fn claims(case: &KnownLensCase, effort: Effort, found: FieldDifference) -> [Clai
 
 fn row(
     case: &KnownLensCase,
-    runner: &GrinOptimizer,
+    optimizer: &GrinOptimizer,
     found: FieldDifference,
     spot: f64,
 ) -> [super::TableCell; 8] {
     [
         case.name.into(),
-        runner.best().nodes().into(),
+        optimizer.best().nodes().into(),
         found.relative.into(),
         found.without_offset.into(),
         found.offset.into(),
         spot.into(),
-        runner.steps().into(),
-        (runner.rays_traced() as f64).into(),
+        optimizer.steps().into(),
+        (optimizer.rays_traced() as f64).into(),
     ]
 }

@@ -137,11 +137,11 @@ impl ExperimentError {
 
 /// Reports the progress; an error if the caller stops the experiment.
 fn report_progress(
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
     done: f64,
     doing: &str,
 ) -> Result<(), ExperimentError> {
-    match watch(ExperimentProgress { done, doing }) {
+    match progress(ExperimentProgress { done, doing }) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(ExperimentError::Stopped),
     }

@@ -40,10 +40,13 @@ const COMPARED: f64 = 4.0;
 /// The minimum ratio of the exposure times.
 const TIMES: f64 = 2.0;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let start = with_field_angles(lens(LENS)?, &ANGLES);
     let part = ProgressSpan { from: 0.0, to: 1.0, name: "front of sharpness and light" };
-    let designs = run_sweep(&start, &plan(effort), part, watch)?;
+    let designs = run_sweep(&start, &plan(effort), part, progress)?;
     let [Some(bright), Some(dark)] = [designs.get(1), designs.last()] else {
         return Err(ExperimentError::Failed("no design was found".to_owned()));
     };
@@ -102,9 +105,9 @@ impl Exposure {
 }
 
 fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, ExperimentError> {
-    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
     let launch =
-        bench.launch(bench.fields[0], bench.primary).map_err(ExperimentError::from_error)?;
+        model.launch(model.fields[0], model.primary).map_err(ExperimentError::from_error)?;
     let region = Region::new(launch);
     // On the axis all azimuths are equivalent: the nodes of one are rotated through half a turn.
     let lit = region.trace_pupil(ORDER);

@@ -54,7 +54,10 @@ pub(super) fn plan(effort: Effort) -> WeightSweep {
     WeightSweep::new(4.0, effort.select(14, 8), 1200)
 }
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let mut outcome = ExperimentOutcome::default();
     let lenses = [
         ("rudolph", "double_gauss_rudolph_50", PUBLISHED.as_slice()),
@@ -64,7 +67,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     for (i, (name, file, authors)) in lenses.into_iter().take(count).enumerate() {
         let start = with_field_angles(lens(file)?, &ANGLES);
         let span = [i, i + 1].map(|part| part as f64 / count as f64);
-        let study = FrontStudy::of(&start, effort, span, watch)?;
+        let study = FrontStudy::of(&start, effort, span, progress)?;
         outcome.claims.extend(study.claims(name, authors, &mut outcome.rays)?);
         outcome.tables.push(sharpness_vs_light::table(name, &study.designs(), &mut outcome.rays)?);
         outcome.lenses.extend(study.lenses(name));
@@ -85,13 +88,13 @@ impl FrontStudy {
         start: &Lens,
         effort: Effort,
         [from, to]: [f64; 2],
-        watch: &mut ProgressFn<'_>,
+        progress: &mut ProgressFn<'_>,
     ) -> Result<Self, ExperimentError> {
         let openings = effort.select(OPENINGS.as_slice(), &ONE_OPENING);
         let plan = plan(effort);
         let middle = from + 0.6 * (to - from);
         let part = ProgressSpan { from, to: middle, name: "unbiased gradient" };
-        let found = run_sweep(start, &plan, part, watch)?;
+        let found = run_sweep(start, &plan, part, progress)?;
         let start_design = found[0].clone();
         let unbiased = front(found);
         let mut biased = Vec::new();
@@ -101,7 +104,7 @@ impl FrontStudy {
             let name = format!("biased gradient, opened {opening}");
             let part = ProgressSpan { from, to: from + share, name: &name };
             let found =
-                run_sweep(&with_scaled_aperture(start, *opening), &plan.biased(), part, watch)?;
+                run_sweep(&with_scaled_aperture(start, *opening), &plan.biased(), part, progress)?;
             biased.extend(found.into_iter().next_back());
         }
         Ok(Self { start: start_design, unbiased, biased: front(biased) })
@@ -231,14 +234,14 @@ pub(super) fn draw_lens_and_spots(
     lens: &Lens,
     top: f64,
 ) -> Result<(), ExperimentError> {
-    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
-    let section = SectionPlot::new(&bench.channels[0].system);
+    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    let section = SectionPlot::new(&model.channels[0].system);
     let [z, y] = section.extent();
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
     let chart = Chart::new([960.0, top], [1460.0, top + 220.0], x, y).with_equal_scales();
     canvas.text([960.0, top - 40.0], name, BLACK, TextAlign::Left);
-    for (i, field) in bench.fields.iter().enumerate() {
-        let launch = bench.launch(*field, bench.primary).map_err(ExperimentError::from_error)?;
+    for (i, field) in model.fields.iter().enumerate() {
+        let launch = model.launch(*field, model.primary).map_err(ExperimentError::from_error)?;
         let color = PALETTE[i % PALETTE.len()];
         for ray in -2..=2 {
             section.draw_ray(canvas, &chart, &launch, [0.0, 0.45 * f64::from(ray)], color);

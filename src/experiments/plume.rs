@@ -98,19 +98,22 @@ struct PlumeRow {
     left_out: usize,
 }
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let cases: Vec<&'static PlumeCase> =
         CASES.iter().filter(|case| effort == Effort::Full || is_extreme(case)).collect();
     let (mut outcome, mut rows) = (ExperimentOutcome::default(), Vec::new());
     for (i, case) in cases.iter().enumerate() {
         let at = |part: f64| (i as f64 + part) / cases.len() as f64;
         let task = task(case, effort)?;
-        let runner = solve(&task, [at(0.0), at(0.7)], watch)?;
-        outcome.rays += usize::try_from(runner.rays_traced()).unwrap_or(usize::MAX);
-        let judged = runner.score(runner.best()).map_err(ExperimentError::from_error)?;
+        let optimizer = solve(&task, [at(0.0), at(0.7)], progress)?;
+        outcome.rays += usize::try_from(optimizer.rays_traced()).unwrap_or(usize::MAX);
+        let judged = optimizer.score(optimizer.best()).map_err(ExperimentError::from_error)?;
         let left_out = judged.views.iter().map(|v| v.counts.total() - v.counts.valid()).sum();
-        let adjoint = found(&task, runner.best().clone())?;
-        rows.push(row(case, task, (adjoint, left_out), effort, at, watch)?);
+        let adjoint = found(&task, optimizer.best().clone())?;
+        rows.push(row(case, task, (adjoint, left_out), effort, at, progress)?);
     }
     outcome.claims = claims(&rows, effort);
     outcome.tables.push(table(&rows));
@@ -153,11 +156,11 @@ fn row(
     (adjoint, left_out): (ReconstructedPlume, usize),
     effort: Effort,
     at: impl Fn(f64) -> f64,
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<PlumeRow, ExperimentError> {
     let (nodes, steps) = (adjoint.medium.nodes(), effort.select(60, 25));
     let doing = format!("{}, by straight lines", task.name);
-    report_progress(watch, at(0.7), &doing)?;
+    report_progress(progress, at(0.7), &doing)?;
     let chords = StraightRays::new(&task).map_err(ExperimentError::from_error)?;
     let (mut best, mut last, mut step): (Option<(f64, GrinField)>, _, _) = (None, f64::NAN, 0);
     let (mut count, mut ended) = (0, Ok(()));
@@ -167,14 +170,14 @@ fn row(
         if best.as_ref().is_none_or(|(least, _)| last < *least) {
             (best, step) = (Some((last, medium.clone())), count);
         }
-        ended = report_progress(watch, at(0.7 + 0.2 * count as f64 / steps as f64), &doing);
+        ended = report_progress(progress, at(0.7 + 0.2 * count as f64 / steps as f64), &doing);
         if ended.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     };
     let end = chords.reconstruct(nodes, steps, visit).map_err(ExperimentError::from_error)?;
     ended?;
     let best = best.map_or(end, |(_, medium)| medium);
     let doing = format!("{}, by gradients of straight lines", task.name);
-    report_progress(watch, at(0.9), &doing)?;
+    report_progress(progress, at(0.9), &doing)?;
     let gradients =
         chords.reconstruct_by_gradients(nodes, steps).map_err(ExperimentError::from_error)?;
     let measured = task.measurements().map_err(ExperimentError::from_error)?.into_iter().next();

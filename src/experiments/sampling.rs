@@ -210,7 +210,10 @@ impl TargetComparison {
     }
 }
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let work = effort.select([CHAINS, DESCENTS], [FEW_CHAINS, FEW_DESCENTS]);
     let mut outcome = ExperimentOutcome::default();
     let mut table = DataTable::new("processes", &COLUMNS);
@@ -220,7 +223,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
         let mut found = Vec::new();
         for (i, process) in processes.iter().enumerate() {
             let done = 0.5 * (singlets as f64 - 1.0 + i as f64 / processes.len() as f64);
-            report_progress(watch, done, process.rate().0)?;
+            report_progress(progress, done, process.rate().0)?;
             let sampled = study.sample(*process, work)?;
             table.push_row(row(singlets, &sampled));
             // One paraxial ray per step.

@@ -92,7 +92,7 @@ pub(super) fn run_sweep(
     lens: &Lens,
     plan: &WeightSweep,
     part: ProgressSpan<'_>,
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<Vec<ParetoPoint>, ExperimentError> {
     let settings =
         ParetoSettings { rims: plan.rims, pupil: plan.pupil, ..ParetoSettings::default() };
@@ -109,7 +109,7 @@ pub(super) fn run_sweep(
         let mut search = search.map_err(ExperimentError::from_error)?;
         for step in 0..plan.steps {
             let done = (i * plan.steps + step) as f64 / total;
-            report_progress(watch, part.from + (part.to - part.from) * done, part.name)?;
+            report_progress(progress, part.from + (part.to - part.from) * done, part.name)?;
             if search.step().finished {
                 break;
             }
@@ -136,17 +136,17 @@ pub(super) fn field_views(
     lens: &Lens,
     rays: &mut usize,
 ) -> Result<Vec<FieldView>, ExperimentError> {
-    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
-    bench.fields.iter().map(|field| field_view(&bench, *field, rays)).collect()
+    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    model.fields.iter().map(|field| field_view(&model, *field, rays)).collect()
 }
 
 /// The sharpness and light of a field; adds the rays traced to `rays`.
 pub(super) fn field_view(
-    bench: &RayModel,
+    model: &RayModel,
     field: FieldPoint,
     rays: &mut usize,
 ) -> Result<FieldView, ExperimentError> {
-    let quality = field_quality(bench, field, REPORTED);
+    let quality = field_quality(model, field, REPORTED);
     let rms = match quality.spot {
         Err(AnalysisError::NoRays(why)) => return Err(ExperimentError::from_error(why)),
         Err(_) => Estimate::new(0.0, 0.0, 0),
@@ -167,8 +167,8 @@ pub(super) fn mean_blur_and_light(views: &[FieldView]) -> [f64; 2] {
 
 /// The focal length of a lens, in mm.
 pub(super) fn focal_length(lens: &Lens) -> Result<f64, ExperimentError> {
-    let bench = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
-    bench.first_order.efl.ok_or_else(|| ExperimentError::Failed(format!("{} is afocal", lens.name)))
+    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    model.first_order.efl.ok_or_else(|| ExperimentError::Failed(format!("{} is afocal", lens.name)))
 }
 
 /// A table with a row for each field of each design.

@@ -34,14 +34,17 @@ const LENS: &str = "double_gauss_rudolph_50";
 const FIELDS: usize = 21;
 const ACCURACY: Accuracy = Accuracy { tolerance: 1e-5, max_rays: 100_000 };
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let start = with_fixed_stop(with_field_angles(lens(LENS)?, &ANGLES));
     // Weights near the sharpness of the biased design are enough.
     let plan = WeightSweep::new(2.0, effort.select(14, 8), 1200);
     let part = ProgressSpan { from: 0.0, to: 0.2, name: "biased gradient" };
-    let without = run_sweep(&start, &plan.biased(), part, watch)?;
+    let without = run_sweep(&start, &plan.biased(), part, progress)?;
     let part = ProgressSpan { from: 0.2, to: 1.0, name: "unbiased gradient" };
-    let with = run_sweep(&start, &plan, part, watch)?;
+    let with = run_sweep(&start, &plan, part, progress)?;
     let mut rays = 0;
     let biased = IlluminatedLens::of(&without[without.len() - 1], &mut rays)?;
     let mut unbiased: Option<IlluminatedLens> = None;
@@ -89,9 +92,9 @@ impl IlluminatedLens {
         let views = field_views(&design.lens, rays)?;
         let last = ANGLES[ANGLES.len() - 1];
         let angles: Vec<f64> = (0..FIELDS).map(|i| last * i as f64 / (FIELDS - 1) as f64).collect();
-        let bench = RayModel::from_lens(&with_field_angles(design.lens.clone(), &angles), 0);
-        let bench = bench.map_err(ExperimentError::from_error)?;
-        let light = illumination(&bench, bench.primary, ACCURACY);
+        let model = RayModel::from_lens(&with_field_angles(design.lens.clone(), &angles), 0);
+        let model = model.map_err(ExperimentError::from_error)?;
+        let light = illumination(&model, model.primary, ACCURACY);
         *rays += light.iter().map(|field| field.cone.rays).sum::<usize>();
         Ok(Self { lens: design.lens.clone(), views, light })
     }

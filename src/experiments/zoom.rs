@@ -30,7 +30,10 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 /// The positions compared: those of the search, and one midway between each two.
 const POSITIONS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let mut outcome = ExperimentOutcome::default();
     let lenses = [("nikkor", "zoom_nikkor_28_80"), ("tamron", "zoom_tamron_28_75_f28")];
     let count = effort.select(lenses.len(), 1);
@@ -43,7 +46,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
         };
         let [from, to] = [i, i + 1].map(|part| part as f64 / count as f64);
         let part = ProgressSpan { from, to, name };
-        let designs = run_sweep(&zoom, &plan, part, watch)?;
+        let designs = run_sweep(&zoom, &plan, part, progress)?;
         let before = ZoomRange::of(&designs[0].lens, &mut outcome.rays)?;
         let (lens, after) = best_design(&designs[1..], &before, &mut outcome.rays)?;
         outcome.lenses.push((format!("{name}-optimised"), lens));
@@ -65,13 +68,13 @@ impl ZoomRange {
     fn of(lens: &Lens, rays: &mut usize) -> Result<Self, ExperimentError> {
         let mut range = Self { points: Vec::new(), focal_lengths: Vec::new() };
         for place in POSITIONS {
-            let bench = RayModel::from_lens(&lens_between(lens, place)?, 0)
+            let model = RayModel::from_lens(&lens_between(lens, place)?, 0)
                 .map_err(ExperimentError::from_error)?;
-            let views = bench.fields.iter().map(|field| field_view(&bench, *field, rays));
+            let views = model.fields.iter().map(|field| field_view(&model, *field, rays));
             range
                 .points
                 .push(mean_blur_and_light(&views.collect::<Result<Vec<_>, ExperimentError>>()?));
-            range.focal_lengths.push(bench.first_order.efl.unwrap_or(f64::NAN));
+            range.focal_lengths.push(model.first_order.efl.unwrap_or(f64::NAN));
         }
         Ok(range)
     }
@@ -127,22 +130,22 @@ fn lens_between(lens: &Lens, place: f64) -> Result<Lens, ExperimentError> {
         single.surfaces[i].thickness = parabola(gaps, place);
     }
     let (mut behind, mut radii, mut focal) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-    for (zoom, bench) in benches.into_iter().enumerate() {
-        let bench = bench.map_err(ExperimentError::from_error)?;
-        let system = &bench.channels[bench.primary].system;
+    for (zoom, model) in benches.into_iter().enumerate() {
+        let model = model.map_err(ExperimentError::from_error)?;
+        let system = &model.channels[model.primary].system;
         let last = system.surfaces.len() - 2;
         behind[zoom] =
             system.surfaces[last].thickness - paraxial_image_distance(system, lens.object);
-        radii[zoom] = bench.stop_radius();
-        focal[zoom] = bench.first_order.efl.unwrap_or(f64::NAN);
+        radii[zoom] = model.stop_radius();
+        focal[zoom] = model.first_order.efl.unwrap_or(f64::NAN);
     }
     single.aperture = Aperture::StopSemiDiameter(parabola(radii, place));
     single.image_solve = Some(parabola(behind, place));
     // The same corner of the image at every focal length.
     let height = |field: &FieldPoint| focal[0] * field.y.to_radians().tan();
     let heights: Vec<f64> = positions[0].fields.values.iter().map(height).collect();
-    let bench = RayModel::from_lens(&single, 0).map_err(ExperimentError::from_error)?;
-    let now = bench.first_order.efl.unwrap_or(f64::NAN);
+    let model = RayModel::from_lens(&single, 0).map_err(ExperimentError::from_error)?;
+    let now = model.first_order.efl.unwrap_or(f64::NAN);
     let field =
         |height: f64| FieldPoint { x: 0.0, y: (height / now).atan().to_degrees(), weight: 1.0 };
     let values = heights.into_iter().map(field).collect();

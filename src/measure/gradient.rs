@@ -224,15 +224,15 @@ pub fn measure_gradients(
 ) -> Result<GradientBenchmark, GradientBenchmarkError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     let limited = RayModel::from_lens(lens, zoom)?.limited_by_stop()?;
-    let bench = with_primary_system(&limited, |system| system)?;
-    let field = field.unwrap_or_else(|| most_vignetted(&bench, lens, zoom));
-    let axis = area(&bench, 0.0).unwrap_or(f64::NAN);
+    let model = with_primary_system(&limited, |system| system)?;
+    let field = field.unwrap_or_else(|| most_vignetted(&model, lens, zoom));
+    let axis = area(&model, 0.0).unwrap_or(f64::NAN);
     let heights = if field == 0.0 { vec![0.0] } else { vec![0.0, field] };
     let all = heights.len() * (2 * METHODS.len() + 1);
     let mut done = 0;
     let mut fields = Vec::new();
     for y in heights {
-        let scene = GradientScene::new(&bench, &pool, y)?;
+        let scene = GradientScene::new(&model, &pool, y)?;
         let exact = scene.reference()?;
         let mut rows = Vec::new();
         for integral in [Integral::Spot, Integral::Throughput] {
@@ -245,8 +245,8 @@ pub fn measure_gradients(
         fields.push(scene.curves(&exact, axis, rows)?);
     }
     let costs = PLANES.into_iter().map(|planes| {
-        let bench = with_primary_system(&bench, |system| with_planes(system, planes))?;
-        let scene = GradientScene::new(&bench, &pool, field)?;
+        let model = with_primary_system(&model, |system| with_planes(system, planes))?;
+        let scene = GradientScene::new(&model, &pool, field)?;
         let cost = pool.install(|| scene.cost());
         done += 1;
         report(done.min(all), all);
@@ -281,14 +281,14 @@ fn with_primary_system(
 }
 
 /// The field of the lens with the least light above zero.
-fn most_vignetted(bench: &RayModel, lens: &Lens, zoom: usize) -> f64 {
+fn most_vignetted(model: &RayModel, lens: &Lens, zoom: usize) -> f64 {
     let heights = lens.fields_at(zoom).values.iter().map(|field| field.y);
-    let lit = heights.filter_map(|y| Some((y, area(bench, y)?)));
+    let lit = heights.filter_map(|y| Some((y, area(model, y)?)));
     lit.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(y, _)| y)
 }
 
-fn area(bench: &RayModel, y: f64) -> Option<f64> {
-    let region = Region::new(bench.launch(at(y), 0).ok()?);
+fn area(model: &RayModel, y: f64) -> Option<f64> {
+    let region = Region::new(model.launch(at(y), 0).ok()?);
     let light = region.trace_pupil(2);
     light.has_light().then_some(light.moments.area)
 }
@@ -348,7 +348,7 @@ impl ReferenceGradients {
 
 /// A field of a lens with its ray model.
 struct GradientScene<'a> {
-    bench: &'a RayModel,
+    model: &'a RayModel,
     pool: &'a ThreadPool,
     single: Tracer<f32>,
     y: f64,
@@ -358,17 +358,17 @@ struct GradientScene<'a> {
 
 impl<'a> GradientScene<'a> {
     fn new(
-        bench: &'a RayModel,
+        model: &'a RayModel,
         pool: &'a ThreadPool,
         y: f64,
     ) -> Result<Self, GradientBenchmarkError> {
-        let region = Region::new(bench.launch(at(y), 0)?);
+        let region = Region::new(model.launch(at(y), 0)?);
         choose_estimator(&region, Accuracy::default())?;
         let spot = QuadraticIntegrand::spread(
             region.trace_pupil(CHECKED.min(region.orders() - 1)).moments.centroid,
         );
-        let single = Tracer::new(&bench.channels[0].system.cast())?;
-        Ok(Self { bench, pool, single, y, spot })
+        let single = Tracer::new(&model.channels[0].system.cast())?;
+        Ok(Self { model, pool, single, y, spot })
     }
 
     fn integrand(&self, integral: Integral) -> QuadraticIntegrand {
@@ -379,7 +379,7 @@ impl<'a> GradientScene<'a> {
     }
 
     fn reference(&self) -> Result<ReferenceGradients, GradientBenchmarkError> {
-        let region = Region::new(self.bench.launch(at(self.y), 0)?);
+        let region = Region::new(self.model.launch(at(self.y), 0)?);
         let (by, _) = choose_estimator(&region, Accuracy::default())?;
         let asked = Accuracy { tolerance: f64::EPSILON, max_rays: REFERENCE_RAYS };
         let found = |cost| differentiate(&region, &cost, by, asked);
@@ -404,7 +404,7 @@ impl<'a> GradientScene<'a> {
         axis: f64,
         rows: Vec<GradientRow>,
     ) -> Result<GradientCurves, GradientBenchmarkError> {
-        let region = Region::new(self.bench.launch(at(self.y), 0)?);
+        let region = Region::new(self.model.launch(at(self.y), 0)?);
         let (planned, reason) = choose_estimator(&region, Accuracy::default())?;
         let light = region.trace_pupil(4).moments.area / axis;
         let ReferenceGradients { by: reference, checked, .. } = *exact;
@@ -412,7 +412,7 @@ impl<'a> GradientScene<'a> {
     }
 
     fn launch(&self) -> Option<Launch<'a>> {
-        self.bench.launch(at(self.y), 0).ok()
+        self.model.launch(at(self.y), 0).ok()
     }
 
     fn curve(
@@ -531,11 +531,11 @@ impl<'a> GradientScene<'a> {
 
     /// The cost of derivatives relative to integrals, each by its fastest repetition.
     fn cost(&self) -> Result<GradientCost, GradientBenchmarkError> {
-        let region = Region::new(self.bench.launch(at(self.y), 0)?);
+        let region = Region::new(self.model.launch(at(self.y), 0)?);
         let spot = self.spot;
         let nodes = region.pattern_nodes(PupilPattern::Random { count: COST_SAMPLES, seed: 1 });
         let rays: Rays<f64> = nodes.points.iter().filter_map(|p| region.launch.ray(*p)).collect();
-        let tracer = &self.bench.channels[0].tracer;
+        let tracer = &self.model.channels[0].tracer;
         let sampling = WarpSampling { count: COST_SAMPLES, seed: 1 };
         let fresh = || self.launch().map(Region::new);
         let along = |differentiated: bool| {
@@ -568,7 +568,7 @@ impl<'a> GradientScene<'a> {
         // The fastest repetitions: slower ones were disturbed by other processes.
         let seconds: Vec<f64> = rates.iter().map(|rate| 1.0 / rate.max).collect();
         let has_edge = region.trace_pupil(0).boundary_derivative(&spot).is_some();
-        let system = &self.bench.channels[0].system;
+        let system = &self.model.channels[0].system;
         Ok(GradientCost {
             surfaces: system.surfaces.len(),
             numbers: numbers(system),

@@ -166,7 +166,7 @@ pub fn measure_grin(
     mut report: impl FnMut(usize, usize),
 ) -> Result<GrinBenchmark, GrinBenchmarkError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
-    let stand = pool.install(|| GrinBenchmarkScene::new(task))?;
+    let scene = pool.install(|| GrinBenchmarkScene::new(task))?;
     let all = 4 + COSTS.len() + MEMORY.len();
     let mut done = 0;
     let mut tell = || {
@@ -174,9 +174,9 @@ pub fn measure_grin(
         report(done, all);
     };
     let mut measured = GrinBenchmark {
-        rays: stand.rays.len(),
+        rays: scene.rays.len(),
         fields: vec![],
-        starts: pool.install(|| stand.starts())?,
+        starts: pool.install(|| scene.starts())?,
         costs: vec![],
         memory: vec![],
     };
@@ -184,15 +184,15 @@ pub fn measure_grin(
     for made in
         [BenchmarkField::Exact, BenchmarkField::Tricubic(NODES), BenchmarkField::Trilinear(NODES)]
     {
-        measured.fields.push(pool.install(|| stand.curves(made))?);
+        measured.fields.push(pool.install(|| scene.curves(made))?);
         tell();
     }
     for (made, precision) in COSTS {
-        measured.costs.push(pool.install(|| stand.cost(made, precision))?);
+        measured.costs.push(pool.install(|| scene.cost(made, precision))?);
         tell();
     }
     for (nodes, per_voxel) in MEMORY {
-        measured.memory.push(pool.install(|| stand.memory(nodes, per_voxel))?);
+        measured.memory.push(pool.install(|| scene.memory(nodes, per_voxel))?);
         tell();
     }
     Ok(measured)
@@ -262,7 +262,7 @@ impl<'a> GrinBenchmarkScene<'a> {
         let [low, high] = space.corners();
         let size = [low.x, low.y, low.z, high.x, high.y, high.z].into_iter().map(f64::abs);
         let size = size.fold(0.0, f64::max);
-        let mut stand = Self {
+        let mut scene = Self {
             task,
             exact,
             region: space.region(),
@@ -275,14 +275,14 @@ impl<'a> GrinBenchmarkScene<'a> {
         // First coarsely, then as finely as the length of the longest ray requires.
         let field = exact.field::<f64>()?;
         for kicks in [COARSE_STEPS, REFERENCE_KICKS] {
-            let setup = stand.setup(Integrator::BlanesMoan, kicks);
+            let setup = scene.setup(Integrator::BlanesMoan, kicks);
             let step = setup.step;
-            stand.exits = GrinTracer::new(&*field, setup)?.trace_batch(&stand.rays);
-            let arrived = stand.exits.iter().filter(|exit| exit.fate.has_arrived());
+            scene.exits = GrinTracer::new(&*field, setup)?.trace_batch(&scene.rays);
+            let arrived = scene.exits.iter().filter(|exit| exit.fate.has_arrived());
             let most = arrived.map(|exit| exit.steps).max().ok_or(GrinBenchmarkError::NoLight)?;
-            stand.longest_path = f64::from(most) * step;
+            scene.longest_path = f64::from(most) * step;
         }
-        Ok(stand)
+        Ok(scene)
     }
 
     /// The tracing setup with this many kicks along the longest ray.

@@ -148,8 +148,8 @@ pub fn measure_spot_curves(
     let mut curves = SpotCurves { rms_clear: 0.0, rms_clipped: None, lit: 1.0, rows: Vec::new() };
     let (mut done, all) = (0, 4 * PupilSampling::ALL.len());
     for pupil in [PupilClipping::Clear, PupilClipping::Clipped] {
-        let bench = ray_model(lens, zoom, pupil)?;
-        let scene = SpotScene::new(&bench, field)?;
+        let model = ray_model(lens, zoom, pupil)?;
+        let scene = SpotScene::new(&model, field)?;
         let Some((rms, area)) = scene.reference() else {
             if pupil == PupilClipping::Clear {
                 return Err(SpotCurvesError::Dark);
@@ -194,7 +194,7 @@ fn ray_model(lens: &Lens, zoom: usize, pupil: PupilClipping) -> Result<RayModel,
 
 /// A field of a lens, in both precisions.
 struct SpotScene<'a> {
-    bench: &'a RayModel,
+    model: &'a RayModel,
     field: FieldPoint,
     single: Tracer<f32>,
 }
@@ -206,14 +206,14 @@ struct SampledRms {
 }
 
 impl<'a> SpotScene<'a> {
-    fn new(bench: &'a RayModel, field: FieldPoint) -> Result<Self, SpotCurvesError> {
-        bench.launch(field, 0)?;
-        let single = Tracer::new(&bench.channels[0].system.cast());
-        Ok(Self { bench, field, single: single.map_err(RayModelError::from)? })
+    fn new(model: &'a RayModel, field: FieldPoint) -> Result<Self, SpotCurvesError> {
+        model.launch(field, 0)?;
+        let single = Tracer::new(&model.channels[0].system.cast());
+        Ok(Self { model, field, single: single.map_err(RayModelError::from)? })
     }
 
     fn launch(&self) -> Option<Launch<'a>> {
-        self.bench.launch(self.field, 0).ok()
+        self.model.launch(self.field, 0).ok()
     }
 
     /// The reference RMS radius in mm and the fraction of the disc that transmits light.
@@ -408,8 +408,8 @@ mod tests {
     #[test]
     fn gauss_beats_every_fixed_pattern_on_a_clear_pupil() {
         let lens = double_gauss();
-        let bench = ray_model(&lens, 0, PupilClipping::Clear).unwrap();
-        let scene = SpotScene::new(&bench, FieldPoint { x: 0.0, y: 10.0, weight: 1.0 }).unwrap();
+        let model = ray_model(&lens, 0, PupilClipping::Clear).unwrap();
+        let scene = SpotScene::new(&model, FieldPoint { x: 0.0, y: 10.0, weight: 1.0 }).unwrap();
         let (exact, _) = scene.reference().unwrap();
         let error = |method, step| {
             let sampled = scene.sample(method, Precision::F64, step, 0).unwrap();

@@ -20,7 +20,7 @@ use nalgebra::DVector;
 struct ParameterBinding {
     variable: usize,
     surface: usize,
-    slot: SurfaceParameter,
+    target: SurfaceParameter,
     factor: f64,
     offset: f64,
 }
@@ -57,17 +57,17 @@ pub(super) struct ResolvedSystems {
 }
 
 impl Configuration {
-    pub(super) fn new(lens: &Lens, number: usize) -> Result<Self, MeritError> {
-        let aperture = lens.aperture_at(number);
+    pub(super) fn new(lens: &Lens, zoom: usize) -> Result<Self, MeritError> {
+        let aperture = lens.aperture_at(zoom);
         let mut systems = Vec::new();
-        let mut lines = Vec::new();
+        let mut bindings = Vec::new();
         for wavelength in &lens.wavelengths {
-            let mut system = lens.resolve(number, wavelength.um)?;
+            let mut system = lens.resolve(zoom, wavelength.um)?;
             if let (Some(stop), Aperture::StopSemiDiameter(radius)) = (system.stop, aperture) {
                 system.surfaces[stop].semi_diameter = radius;
             }
-            let found = bind_parameters(lens, number, wavelength.um, &mut system);
-            lines.push(found);
+            let bound = bind_parameters(lens, zoom, wavelength.um, &mut system);
+            bindings.push(bound);
             systems.push(system);
         }
         let glass = |i: usize| {
@@ -81,59 +81,58 @@ impl Configuration {
             }
         };
         Ok(Self {
-            zoom: number,
+            zoom,
             primary: lens.primary(),
             object: lens.object,
-            field_kind: lens.fields_at(number).kind,
+            field_kind: lens.fields_at(zoom).kind,
             is_glass: (0..lens.surfaces.len()).map(glass).collect(),
             aperture,
             focus_offset: lens.image_solve,
             variables: lens.variables.len(),
-            bindings: lines,
+            bindings,
             systems,
         })
     }
 
     /// The systems at some values of the variables.
     pub(super) fn at(&self, values: &[f64]) -> ResolvedSystems {
-        let mut rimmed = self.systems.clone();
-        for (system, lines) in rimmed.iter_mut().zip(&self.bindings) {
-            for line in lines {
-                let number = line.offset + line.factor * values[line.variable];
-                *line.slot.value_mut(system, line.surface) = number;
+        let mut clipped = self.systems.clone();
+        for (system, bindings) in clipped.iter_mut().zip(&self.bindings) {
+            for binding in bindings {
+                let value = binding.offset + binding.factor * values[binding.variable];
+                *binding.target.value_mut(system, binding.surface) = value;
             }
         }
-        let mut found =
-            ResolvedSystems { unclipped: Vec::new(), clipped: rimmed, focus_slopes: None };
+        let mut systems = ResolvedSystems { unclipped: Vec::new(), clipped, focus_slopes: None };
         if let Some(offset) = self.focus_offset {
-            self.solve_focus(&mut found, offset);
+            self.solve_focus(&mut systems, offset);
         }
-        found.unclipped.clone_from(&found.clipped);
-        let surfaces = found.unclipped.iter_mut().flat_map(|system| &mut system.surfaces);
+        systems.unclipped.clone_from(&systems.clipped);
+        let surfaces = systems.unclipped.iter_mut().flat_map(|system| &mut system.surfaces);
         surfaces.for_each(unclip);
-        found
+        systems
     }
 
     /// The ray model of the lens with its semi-diameters; a stop that defines the aperture has that
     /// semi-diameter.
     pub(super) fn ray_model(
         &self,
-        found: &ResolvedSystems,
+        systems: &ResolvedSystems,
         lens: &Lens,
         aiming: Aiming,
     ) -> Result<RayModel, MeritError> {
-        let weighted = lens.wavelengths.iter().zip(&found.clipped);
-        let systems = weighted.map(|(w, system)| (w.um, w.weight, system.clone())).collect();
+        let weighted = lens.wavelengths.iter().zip(&systems.clipped);
+        let channels = weighted.map(|(w, system)| (w.um, w.weight, system.clone())).collect();
         let mut beam = Beam::for_lens(lens, self.zoom);
-        let primary = &found.clipped[self.primary];
+        let primary = &systems.clipped[self.primary];
         if let (Some(stop), Aperture::StopSemiDiameter(_)) = (primary.stop, self.aperture) {
             beam.aperture = Aperture::StopSemiDiameter(primary.surfaces[stop].semi_diameter);
         }
-        Ok(RayModel::from_systems(systems, self.primary, beam, aiming)?)
+        Ok(RayModel::from_systems(channels, self.primary, beam, aiming)?)
     }
 
-    fn solve_focus(&self, found: &mut ResolvedSystems, offset: f64) {
-        let primary = &found.clipped[self.primary];
+    fn solve_focus(&self, systems: &mut ResolvedSystems, offset: f64) {
+        let primary = &systems.clipped[self.primary];
         let gap = paraxial_image_distance(primary, self.object) + offset;
         let slope = |variable| {
             paraxial_image_distance(
@@ -142,9 +141,9 @@ impl Configuration {
             )
             .slope[0]
         };
-        found.focus_slopes =
+        systems.focus_slopes =
             Some(DVector::from_iterator(self.variables, (0..self.variables).map(slope)));
-        for system in &mut found.clipped {
+        for system in &mut systems.clipped {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness = gap;
         }
@@ -152,16 +151,18 @@ impl Configuration {
 
     fn system_along_without_focus(&self, primary: &System<f64>, variable: usize) -> System<Dual1> {
         let mut system: System<Dual1> = primary.cast();
-        for line in self.bindings[self.primary].iter().filter(|line| line.variable == variable) {
-            line.slot.value_mut(&mut system, line.surface).slope[0] = line.factor;
+        for binding in
+            self.bindings[self.primary].iter().filter(|binding| binding.variable == variable)
+        {
+            binding.target.value_mut(&mut system, binding.surface).slope[0] = binding.factor;
         }
         system
     }
 
     /// The system at the primary wavelength with its derivative along one variable.
-    pub(super) fn system_along(&self, found: &ResolvedSystems, variable: usize) -> System<Dual1> {
-        let mut system = self.system_along_without_focus(&found.clipped[self.primary], variable);
-        if let Some(focus) = &found.focus_slopes {
+    pub(super) fn system_along(&self, systems: &ResolvedSystems, variable: usize) -> System<Dual1> {
+        let mut system = self.system_along_without_focus(&systems.clipped[self.primary], variable);
+        if let Some(focus) = &systems.focus_slopes {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness.slope[0] = focus[variable];
         }
@@ -171,14 +172,14 @@ impl Configuration {
     /// The derivatives by the variables from those by the numbers of a system.
     pub(super) fn by_variables(
         &self,
-        found: &ResolvedSystems,
+        systems: &ResolvedSystems,
         wavelength: usize,
         gradient: &SystemGradient<f64>,
     ) -> DVector<f64> {
         let mut by_variable = DVector::zeros(self.variables);
-        for line in &self.bindings[wavelength] {
-            let surface = &gradient.surfaces[line.surface];
-            let by_number = match line.slot {
+        for binding in &self.bindings[wavelength] {
+            let surface = &gradient.surfaces[binding.surface];
+            let by_number = match binding.target {
                 SurfaceParameter::Curvature => surface.curvature,
                 SurfaceParameter::Conic => surface.conic,
                 SurfaceParameter::AsphereTerm(term) => surface.terms[term],
@@ -187,51 +188,51 @@ impl Configuration {
                 SurfaceParameter::SemiDiameter => surface.semi_diameter,
                 SurfaceParameter::GrinTerm(k) => surface.grin_terms[k],
             };
-            by_variable[line.variable] += line.factor * by_number;
+            by_variable[binding.variable] += binding.factor * by_number;
         }
-        if let Some(focus) = &found.focus_slopes {
+        if let Some(focus) = &systems.focus_slopes {
             let last = gradient.surfaces.len() - 2;
             by_variable.axpy(gradient.surfaces[last].thickness, focus, 1.0);
         }
         by_variable
     }
 
-    /// The numbers of a system that some variable moves.
+    /// The parameters of a system that vary with some variable.
     pub(super) fn moving_parameters(
         &self,
         wavelength: usize,
     ) -> Vec<(Option<usize>, SurfaceParameter)> {
-        let mut moving = Vec::new();
-        for line in &self.bindings[wavelength] {
-            let number = (Some(line.surface), line.slot);
-            if !moving.contains(&number) {
-                moving.push(number);
+        let mut varying = Vec::new();
+        for binding in &self.bindings[wavelength] {
+            let parameter = (Some(binding.surface), binding.target);
+            if !varying.contains(&parameter) {
+                varying.push(parameter);
             }
         }
         let last = (Some(self.systems[wavelength].surfaces.len() - 2), SurfaceParameter::Thickness);
-        if self.focus_offset.is_some() && !moving.contains(&last) {
-            moving.push(last);
+        if self.focus_offset.is_some() && !varying.contains(&last) {
+            varying.push(last);
         }
-        moving
+        varying
     }
 
-    /// The derivatives by the variables from those by the moving numbers.
+    /// The derivatives by the variables from those by the varying parameters.
     pub(super) fn row_by_variables(
         &self,
-        found: &ResolvedSystems,
+        systems: &ResolvedSystems,
         wavelength: usize,
-        moving: &[(Option<usize>, SurfaceParameter)],
+        varying: &[(Option<usize>, SurfaceParameter)],
         row: &[f64],
         by_variable: &mut [f64],
     ) {
         by_variable.fill(0.0);
-        let by = |surface: usize, slot: SurfaceParameter| {
-            moving.iter().position(|m| *m == (Some(surface), slot)).map_or(0.0, |i| row[i])
+        let by = |surface: usize, parameter: SurfaceParameter| {
+            varying.iter().position(|m| *m == (Some(surface), parameter)).map_or(0.0, |i| row[i])
         };
-        for line in &self.bindings[wavelength] {
-            by_variable[line.variable] += line.factor * by(line.surface, line.slot);
+        for binding in &self.bindings[wavelength] {
+            by_variable[binding.variable] += binding.factor * by(binding.surface, binding.target);
         }
-        if let Some(focus) = &found.focus_slopes {
+        if let Some(focus) = &systems.focus_slopes {
             let last = self.systems[wavelength].surfaces.len() - 2;
             let by_gap = by(last, SurfaceParameter::Thickness);
             by_variable.iter_mut().zip(focus.iter()).for_each(|(to, f)| *to += by_gap * f);
@@ -261,13 +262,13 @@ fn bind_parameters(
     um: f64,
     system: &mut System<f64>,
 ) -> Vec<ParameterBinding> {
-    let mut lines = Vec::new();
+    let mut bindings = Vec::new();
     for (variable, free) in lens.variables.iter().enumerate() {
         let start = lens.get(free.parameter).unwrap_or(0.0);
         for (parameter, factor) in lens.dependents(free.parameter) {
             let surface = parameter.surface;
             let own_gap = has_own_gap(lens, zoom, surface);
-            let slot = match parameter.quantity {
+            let target = match parameter.quantity {
                 Quantity::Curvature => SurfaceParameter::Curvature,
                 Quantity::Conic => SurfaceParameter::Conic,
                 Quantity::Asphere(term) => SurfaceParameter::AsphereTerm(term),
@@ -282,22 +283,25 @@ fn bind_parameters(
                     continue;
                 }
             };
-            let growth =
-                if slot == SurfaceParameter::Index { index_slope(lens, surface, um) } else { 1.0 };
+            let growth = if target == SurfaceParameter::Index {
+                index_slope(lens, surface, um)
+            } else {
+                1.0
+            };
             let factor = factor * growth;
-            for surface in followers_of_index(lens, surface, slot) {
-                if let SurfaceParameter::GrinTerm(_) = slot {
+            for surface in followers_of_index(lens, surface, target) {
+                if let SurfaceParameter::GrinTerm(_) = target {
                     let graded = &mut system.surfaces[surface].grin;
                     *graded = graded.or_else(|| lens.grin_coefficients(surface));
                 }
-                slot.promote_shape(system, surface);
-                let now = *slot.value_mut(system, surface);
+                target.promote_shape(system, surface);
+                let now = *target.value_mut(system, surface);
                 let offset = if factor == 1.0 && now == start { 0.0 } else { now - factor * start };
-                lines.push(ParameterBinding { variable, surface, slot, factor, offset });
+                bindings.push(ParameterBinding { variable, surface, target, factor, offset });
             }
         }
     }
-    lines
+    bindings
 }
 
 fn has_own_gap(lens: &Lens, zoom: usize, surface: usize) -> bool {
@@ -325,9 +329,9 @@ fn index_slope(lens: &Lens, surface: usize, um: f64) -> f64 {
 
 /// The surfaces behind which the number applies: the surface itself and, for an index, the mirrors
 /// that follow it and the image plane.
-fn followers_of_index(lens: &Lens, surface: usize, slot: SurfaceParameter) -> Vec<usize> {
+fn followers_of_index(lens: &Lens, surface: usize, parameter: SurfaceParameter) -> Vec<usize> {
     let mut all = vec![surface];
-    if slot == SurfaceParameter::Index {
+    if target == SurfaceParameter::Index {
         let mirrors =
             lens.surfaces[surface + 1..].iter().take_while(|r| r.medium == Medium::Mirror);
         all.extend((1..=mirrors.count()).map(|i| surface + i));

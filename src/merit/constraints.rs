@@ -11,10 +11,10 @@ use crate::math::Real;
 use serde::Serialize;
 
 /// Adds the squared violations of one of the constraints.
-pub(super) fn add_constraints(scene: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
-    for Constraint { quantity: of, min, max } in smooth_constraints(scene.zoom, scene.systems, term)
+pub(super) fn add_constraints(context: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
+    for Constraint { quantity, min, max } in smooth_constraints(context.zoom, context.systems, term)
     {
-        let number = BoundedLength { quantity: of, scene };
+        let number = BoundedLength { quantity, context };
         min.into_iter().for_each(|min| number.at_least(min, sum));
         max.into_iter().for_each(|max| number.at_most(max, sum));
     }
@@ -48,9 +48,9 @@ fn smooth_constraints(
 /// The constraints of a term.
 fn constraints(zoom: &Configuration, systems: &ResolvedSystems, term: Term) -> Vec<Constraint> {
     let last = zoom.is_glass.len() - 1;
-    let both = |of, min, max| Constraint { quantity: of, min: Some(min), max: Some(max) };
-    let least = |of, min| Constraint { quantity: of, min: Some(min), max: None };
-    let most = |of, max| Constraint { quantity: of, min: None, max: Some(max) };
+    let both = |quantity, min, max| Constraint { quantity, min: Some(min), max: Some(max) };
+    let least = |quantity, min| Constraint { quantity, min: Some(min), max: None };
+    let most = |quantity, max| Constraint { quantity, min: None, max: Some(max) };
     let gaps = |glass| zoom.inner_gaps(glass);
     match term {
         Term::GlassCenter { min, max } => {
@@ -129,11 +129,11 @@ pub fn constraint_margins(
             lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
         let systems = zoom.at(&values);
         for term in &terms {
-            let margin = |Constraint { quantity: of, min, max }: Constraint| ConstraintMargin {
+            let margin = |Constraint { quantity, min, max }: Constraint| ConstraintMargin {
                 term: term.name(),
-                surface: of.surface(),
+                surface: quantity.surface(),
                 zoom: number,
-                value: of.length(&systems.clipped[zoom.primary]),
+                value: quantity.length(&systems.clipped[zoom.primary]),
                 min,
                 max,
             };
@@ -293,7 +293,7 @@ fn along_light<R: Real>(system: &System<R>, gap: usize) -> R {
 /// A length of a lens with the derivatives needed for its bounds.
 struct BoundedLength<'a> {
     quantity: ConstrainedQuantity,
-    scene: &'a EvaluationContext<'a>,
+    context: &'a EvaluationContext<'a>,
 }
 
 impl BoundedLength<'_> {
@@ -312,12 +312,12 @@ impl BoundedLength<'_> {
     }
 
     fn value(&self) -> f64 {
-        self.quantity.length(&self.scene.systems.clipped[self.scene.zoom.primary])
+        self.quantity.length(&self.context.systems.clipped[self.context.zoom.primary])
     }
 
     fn residual(&self, r: f64, sum: &mut SumOfSquares) {
         let slope =
-            slopes(self.scene, sum.level, |system: &System<Dual1>| self.quantity.length(system));
+            slopes(self.context, sum.level, |system: &System<Dual1>| self.quantity.length(system));
         sum.add_residual(1.0, r, &slope);
     }
 }

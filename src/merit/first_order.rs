@@ -8,22 +8,22 @@ use crate::paraxial::{paraxial_ray, signed_indices};
 use nalgebra::DVector;
 
 /// Adds the squared deviation of the focal length from a target, in mm².
-pub(super) fn focal_length(scene: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) {
-    let focal = focal_length_of(&scene.systems.clipped[scene.zoom.primary]);
-    sum.add_residual(1.0, focal - target, &slopes(scene, sum.level, focal_length_of));
+pub(super) fn focal_length(context: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) {
+    let focal = focal_length_of(&context.systems.clipped[context.zoom.primary]);
+    sum.add_residual(1.0, focal - target, &slopes(context, sum.level, focal_length_of));
 }
 
 /// The derivatives of a first-order number by the variables; zeros if only the value is asked for.
 pub(super) fn slopes(
-    scene: &EvaluationContext<'_>,
-    detail: DerivativeLevel,
+    context: &EvaluationContext<'_>,
+    level: DerivativeLevel,
     number: impl Fn(&System<super::Dual1>) -> super::Dual1,
 ) -> DVector<f64> {
-    let count = scene.values.len();
-    if detail == DerivativeLevel::Value {
+    let count = context.values.len();
+    if level == DerivativeLevel::Value {
         return DVector::zeros(count);
     }
-    let slope = |variable| number(&scene.zoom.system_along(scene.systems, variable)).slope[0];
+    let slope = |variable| number(&context.zoom.system_along(context.systems, variable)).slope[0];
     DVector::from_iterator(count, (0..count).map(slope))
 }
 

@@ -18,26 +18,32 @@ struct WithGradient {
 }
 
 /// Adds one of the terms of light.
-pub(super) fn add_light_term(scene: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
+pub(super) fn add_light_term(context: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
     match term {
-        Term::Throughput => light_loss(&mean_area(scene, sum.level), 1.0, 0.0, sum),
+        Term::Throughput => light_loss(&mean_area(context, sum.level), 1.0, 0.0, sum),
         Term::ThroughputLoss(full) => {
-            light_loss(&mean_area(scene, sum.level), 1.0 / full, 1.0, sum)
+            light_loss(&mean_area(context, sum.level), 1.0 / full, 1.0, sum)
         }
-        Term::Light(share) => light_shortfall(scene, share, sum),
-        Term::RelativeIllumination { field, min } => illumination(scene, field, min, sum),
-        Term::FNumber(target) => f_number(scene, target, sum),
+        Term::Light(share) => light_shortfall(context, share, sum),
+        Term::RelativeIllumination { field, min } => illumination(context, field, min, sum),
+        Term::FNumber(target) => f_number(context, target, sum),
         _ => {}
     }
 }
 
 /// Adds the squared shortfalls of the pupil areas from a fraction of their initial areas.
-fn light_shortfall(scene: &EvaluationContext<'_>, share: f64, sum: &mut SumOfSquares) {
-    for (i, (pupil, before)) in scene.sampling.pupils.iter().zip(scene.initial_areas).enumerate() {
+fn light_shortfall(context: &EvaluationContext<'_>, share: f64, sum: &mut SumOfSquares) {
+    for (i, (pupil, before)) in
+        context.sampling.pupils.iter().zip(context.initial_areas).enumerate()
+    {
         let least = share * before;
         if pupil.area < least {
-            let slope =
-                weighted_area(scene, sum.level, |other| other == i, -1.0 / (least * pupil.weight));
+            let slope = weighted_area(
+                context,
+                sum.level,
+                |other| other == i,
+                -1.0 / (least * pupil.weight),
+            );
             sum.add_residual(pupil.weight, 1.0 - pupil.area / least, &slope.slope);
         }
     }
@@ -54,10 +60,11 @@ fn light_loss(area: &WithGradient, factor: f64, start: f64, sum: &mut SumOfSquar
     }
 }
 
-fn illumination(scene: &EvaluationContext<'_>, field: usize, min: f64, sum: &mut SumOfSquares) {
-    let Some(axis) = scene.sampling.axis() else { return };
-    let (here, center) = (field_area(scene, field, sum.level), field_area(scene, axis, sum.level));
-    let cosine = scene.sampling.cosine(field).unwrap_or(1.0);
+fn illumination(context: &EvaluationContext<'_>, field: usize, min: f64, sum: &mut SumOfSquares) {
+    let Some(axis) = context.sampling.axis() else { return };
+    let (here, center) =
+        (field_area(context, field, sum.level), field_area(context, axis, sum.level));
+    let cosine = context.sampling.cosine(field).unwrap_or(1.0);
     let factor = cosine.powi(4) / center.value;
     let share = factor * here.value;
     if share < min {
@@ -66,49 +73,49 @@ fn illumination(scene: &EvaluationContext<'_>, field: usize, min: f64, sum: &mut
     }
 }
 
-fn f_number(scene: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) {
-    let Some(axis) = scene.sampling.axis() else { return };
-    let area = field_area(scene, axis, sum.level);
-    let focal = focal_length_of(&scene.systems.clipped[scene.zoom.primary]);
+fn f_number(context: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) {
+    let Some(axis) = context.sampling.axis() else { return };
+    let area = field_area(context, axis, sum.level);
+    let focal = focal_length_of(&context.systems.clipped[context.zoom.primary]);
     let diameter = 2.0 * (area.value / PI).sqrt();
     let number = focal.abs() / diameter;
-    let by_focal = slopes(scene, sum.level, focal_length_of) * (focal.signum() / diameter);
+    let by_focal = slopes(context, sum.level, focal_length_of) * (focal.signum() / diameter);
     let slope = by_focal - area.slope * (0.5 * number / area.value);
     sum.add_residual(1.0, number - target, &slope);
 }
 
 /// The weighted mean area of the pupils, in mm².
-fn mean_area(scene: &EvaluationContext<'_>, detail: DerivativeLevel) -> WithGradient {
-    weighted_area(scene, detail, |_| true, 1.0)
+fn mean_area(context: &EvaluationContext<'_>, level: DerivativeLevel) -> WithGradient {
+    weighted_area(context, level, |_| true, 1.0)
 }
 
 /// The area of the pupil of a field in mm², the weighted mean over wavelengths.
 fn field_area(
-    scene: &EvaluationContext<'_>,
+    context: &EvaluationContext<'_>,
     field: usize,
-    detail: DerivativeLevel,
+    level: DerivativeLevel,
 ) -> WithGradient {
-    let pupils = &scene.sampling.pupils;
+    let pupils = &context.sampling.pupils;
     let share: f64 = pupils.iter().filter(|p| p.field == field).map(|p| p.weight).sum();
-    weighted_area(scene, detail, |i| pupils[i].field == field, 1.0 / share)
+    weighted_area(context, level, |i| pupils[i].field == field, 1.0 / share)
 }
 
 /// The sum of the areas of the chosen pupils in mm², each times its weight and a factor.
 fn weighted_area(
-    scene: &EvaluationContext<'_>,
-    detail: DerivativeLevel,
+    context: &EvaluationContext<'_>,
+    level: DerivativeLevel,
     chosen: impl Fn(usize) -> bool,
     factor: f64,
 ) -> WithGradient {
-    let pupils = &scene.sampling.pupils;
+    let pupils = &context.sampling.pupils;
     let share = |(i, p): (usize, &SampledPupil)| if chosen(i) { factor * p.weight } else { 0.0 };
     let shares = pupils.iter().enumerate().map(share);
     let value = shares.clone().zip(pupils).map(|(share, pupil)| share * pupil.area).sum();
-    let slope = if detail == DerivativeLevel::Value {
-        DVector::zeros(scene.values.len())
+    let slope = if level == DerivativeLevel::Value {
+        DVector::zeros(context.values.len())
     } else {
         let cost = |share| QuadraticIntegrand { center: [0.0; 2], square: 0.0, constant: share };
-        scene.edge_motion(shares.map(cost))
+        context.edge_motion(shares.map(cost))
     };
     WithGradient { value, slope }
 }

@@ -239,10 +239,10 @@ impl Merit {
     pub fn evaluate(
         &self,
         values: &[f64],
-        detail: DerivativeLevel,
+        level: DerivativeLevel,
     ) -> Result<SumOfSquares, MeritError> {
-        let mut total = SumOfSquares::zero(values.len(), detail);
-        for (sum, weighted) in self.evaluate_terms(values, detail)?.iter().zip(&self.goal.terms) {
+        let mut total = SumOfSquares::zero(values.len(), level);
+        for (sum, weighted) in self.evaluate_terms(values, level)?.iter().zip(&self.goal.terms) {
             total.add(sum, weighted.weight);
         }
         Ok(total)
@@ -276,24 +276,24 @@ impl Merit {
     fn evaluate_terms(
         &self,
         values: &[f64],
-        detail: DerivativeLevel,
+        level: DerivativeLevel,
     ) -> Result<Vec<SumOfSquares>, MeritError> {
-        let mut sums = vec![SumOfSquares::zero(values.len(), detail); self.goal.terms.len()];
+        let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
         let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
         for ((zoom, sampling), start) in positions {
             let systems = zoom.at(values);
             if self.needs_pupil_edges() {
-                let bench = zoom.ray_model(&systems, &self.lens, sampling.aiming)?;
-                let light = sampling.trace_pupils(&bench, true);
+                let model = zoom.ray_model(&systems, &self.lens, sampling.aiming)?;
+                let light = sampling.trace_pupils(&model, true);
                 sampling.check_light(&light)?;
-                if bench.has_grin() && light.iter().any(TracedPupil::is_irregular) {
+                if model.has_grin() && light.iter().any(TracedPupil::is_irregular) {
                     let why = "the pupil is in pieces or not star-shaped, and nothing tells how \
                                its edge moves with a gradient; expected a goal with frozen pupils";
                     return Err(MeritError::DoesNotApply { term: "pupil", why });
                 }
-                let sampling = &sampling.with_pupils(&bench, &light);
+                let sampling = &sampling.with_pupils(&model, &light);
                 let light = &light[..];
-                let scene = EvaluationContext {
+                let context = EvaluationContext {
                     zoom,
                     sampling,
                     systems: &systems,
@@ -301,10 +301,10 @@ impl Merit {
                     initial_areas: start,
                     traced_pupils: light,
                 };
-                self.add_terms(&scene, &mut sums)?;
+                self.add_terms(&context, &mut sums)?;
             } else {
                 let light = &[];
-                let scene = EvaluationContext {
+                let context = EvaluationContext {
                     zoom,
                     sampling,
                     systems: &systems,
@@ -312,7 +312,7 @@ impl Merit {
                     initial_areas: start,
                     traced_pupils: light,
                 };
-                self.add_terms(&scene, &mut sums)?;
+                self.add_terms(&context, &mut sums)?;
             }
         }
         for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
@@ -333,22 +333,22 @@ impl Merit {
 
     fn add_terms(
         &self,
-        scene: &EvaluationContext<'_>,
+        context: &EvaluationContext<'_>,
         sums: &mut [SumOfSquares],
     ) -> Result<(), MeritError> {
         for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
             match weighted.term {
-                Term::Spot => spot::add_spot(scene, spot::Normalization::PupilArea, sum)?,
+                Term::Spot => spot::add_spot(context, spot::Normalization::PupilArea, sum)?,
                 Term::SpotIntegral => {
-                    spot::add_spot(scene, spot::Normalization::Unnormalized, sum)?
+                    spot::add_spot(context, spot::Normalization::Unnormalized, sum)?
                 }
-                Term::Distortion => spot::add_distortion(scene, sum)?,
+                Term::Distortion => spot::add_distortion(context, sum)?,
                 Term::FocalLength(target) => {
-                    let target = self.goal.target(scene.zoom.zoom, target);
-                    first_order::focal_length(scene, target, sum);
+                    let target = self.goal.target(context.zoom.zoom, target);
+                    first_order::focal_length(context, target, sum);
                 }
-                term if term.concerns_light() => light::add_light_term(scene, term, sum),
-                term => constraints::add_constraints(scene, term, sum),
+                term if term.concerns_light() => light::add_light_term(context, term, sum),
+                term => constraints::add_constraints(context, term, sum),
             }
         }
         Ok(())
@@ -372,14 +372,15 @@ impl EvaluationContext<'_> {
     /// integrals with these integrands, one for each pupil; zeros if pupils are frozen.
     fn edge_motion(&self, costs: impl Iterator<Item = QuadraticIntegrand>) -> DVector<f64> {
         let mut total = DVector::zeros(self.values.len());
-        for ((lit, pupil), cost) in self.traced_pupils.iter().zip(&self.sampling.pupils).zip(costs)
+        for ((traced, pupil), cost) in
+            self.traced_pupils.iter().zip(&self.sampling.pupils).zip(costs)
         {
             let asked = cost.square != 0.0 || cost.constant != 0.0;
             if asked {
                 total += self.zoom.by_variables(
                     self.systems,
                     pupil.wavelength,
-                    &lit.robust_edge_motion(&cost),
+                    &traced.robust_edge_motion(&cost),
                 );
             }
         }

@@ -41,7 +41,7 @@ pub(super) struct SampledPupil {
     pub(super) weight: f64,
     /// The cosine of the angle with the axis at which a collimated beam arrives.
     cosine: Option<f64>,
-    anchor: FixedLaunch,
+    fixed_launch: FixedLaunch,
     kind: RegionKind,
     /// The order of quadrature that reaches the tolerance.
     order: usize,
@@ -49,7 +49,7 @@ pub(super) struct SampledPupil {
     /// [`TracedPupil::signed_area`], in mm².
     pub(super) area: f64,
     /// The area of the ideal entrance pupil, in mm².
-    ideal: f64,
+    ideal_area: f64,
 }
 
 /// The rays of one zoom position.
@@ -86,10 +86,10 @@ impl ChannelRays {
     }
 
     /// Adds the rays of a pupil, which together have the weight `share`.
-    fn add_pupil(&mut self, lit: &TracedPupil<'_>, share: f64) {
-        let weight: f64 = lit.landed.arrivals().map(|(_, w)| w).sum();
-        for (i, w) in lit.landed.arrivals() {
-            self.rays.push(lit.rays.get(i));
+    fn add_pupil(&mut self, traced: &TracedPupil<'_>, share: f64) {
+        let weight: f64 = traced.landed.arrivals().map(|(_, w)| w).sum();
+        for (i, w) in traced.landed.arrivals() {
+            self.rays.push(traced.rays.get(i));
             self.weights.push(share * w / weight);
         }
     }
@@ -110,43 +110,43 @@ impl RaySampling {
         tolerance: f64,
         dark_too: bool,
     ) -> Result<Self, MeritError> {
-        let bench = RayModel::from_lens(lens, zoom)?;
+        let model = RayModel::from_lens(lens, zoom)?;
         let mut sampling = Self {
             channels: Vec::new(),
             chief_rays: Rays::default(),
-            fields: bench.fields.clone(),
+            fields: model.fields.clone(),
             pupils: Vec::new(),
-            aiming: bench.aiming,
+            aiming: model.aiming,
             spot_samplings: Vec::new(),
         };
         let total: f64 = sampling.fields.iter().map(|f| f.weight).sum();
-        let colors: f64 = bench.channels.iter().map(|c| c.weight).sum();
-        for (wavelength, color) in bench.channels.iter().enumerate() {
+        let channels: f64 = model.channels.iter().map(|c| c.weight).sum();
+        for (wavelength, channel) in model.channels.iter().enumerate() {
             for number in 0..sampling.fields.len() {
                 let field = sampling.fields[number];
-                let place = SpotSampling::unlit(zoom, number, color.um);
-                let launch = bench.launch(field, wavelength);
+                let spot = SpotSampling::unlit(zoom, number, channel.um);
+                let launch = model.launch(field, wavelength);
                 let launch =
                     launch.map_err(|cause| MeritError::Launch { field: number, zoom, cause })?;
-                if wavelength == bench.primary {
-                    sampling.chief_rays.push(chief_ray(&launch).ok_or_else(|| no_light(&place))?);
+                if wavelength == model.primary {
+                    sampling.chief_rays.push(chief_ray(&launch).ok_or_else(|| no_light(&spot))?);
                 }
-                let share = field.weight / total * color.weight / colors;
+                let share = field.weight / total * channel.weight / channels;
                 if share > 0.0 {
-                    sampling.find_pupil(launch, share, tolerance, place);
+                    sampling.find_pupil(launch, share, tolerance, spot);
                 }
             }
         }
         sampling.redistribute_dark_shares();
-        let lit = sampling.trace_pupils(&bench, false);
-        sampling.channels = sampling.channel_rays(&bench, &lit);
-        for (sampled, (pupil, lit)) in
-            sampling.spot_samplings.iter_mut().zip(sampling.pupils.iter_mut().zip(&lit))
+        let traced = sampling.trace_pupils(&model, false);
+        sampling.channels = sampling.channel_rays(&model, &traced);
+        for (sampled, (pupil, traced)) in
+            sampling.spot_samplings.iter_mut().zip(sampling.pupils.iter_mut().zip(&traced))
         {
-            (pupil.moments, pupil.area) = (lit.moments, lit.signed_area());
-            sampled.area = lit.moments.area;
-            sampled.light = lit.landed.arrivals().map(|(_, w)| w).sum::<f64>() / PI;
-            sampled.rays = if sampled.light > 0.0 { lit.rays.len() } else { 0 };
+            (pupil.moments, pupil.area) = (traced.moments, traced.signed_area());
+            sampled.area = traced.moments.area;
+            sampled.light = traced.landed.arrivals().map(|(_, w)| w).sum::<f64>() / PI;
+            sampled.rays = if sampled.light > 0.0 { traced.rays.len() } else { 0 };
         }
         match sampling.spot_samplings.first() {
             Some(first) if !dark_too && sampling.spot_samplings.iter().all(|s| s.rays == 0) => {
@@ -157,10 +157,10 @@ impl RaySampling {
     }
 
     /// Finds the pupil of a field and the order of quadrature that it needs.
-    fn find_pupil(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, place: SpotSampling) {
-        let (field, wavelength) = (place.field, launch.wavelength);
-        let (anchor, cosine) = (launch.to_fixed(), launch.axis_cosine());
-        let ideal = PI * launch.area();
+    fn find_pupil(&mut self, launch: Launch<'_>, share: f64, tolerance: f64, spot: SpotSampling) {
+        let (field, wavelength) = (spot.field, launch.wavelength);
+        let (fixed_launch, cosine) = (launch.to_fixed(), launch.axis_cosine());
+        let ideal_area = PI * launch.area();
         let region = Region::new(launch);
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let mut orders = 0_usize;
@@ -179,24 +179,24 @@ impl RaySampling {
             share,
             weight: share,
             cosine,
-            anchor,
+            fixed_launch,
             kind,
             order,
             moments,
             area: 0.0,
-            ideal,
+            ideal_area,
         });
-        self.spot_samplings.push(SpotSampling { error, ..place });
+        self.spot_samplings.push(SpotSampling { error, ..spot });
     }
 
     /// Distributes the weight of dark pupils among the others.
     fn redistribute_dark_shares(&mut self) {
-        let is_lit = |pupil: &&mut SampledPupil| {
+        let has_light = |pupil: &&mut SampledPupil| {
             !matches!(pupil.kind, RegionKind::Dark | RegionKind::Unbounded)
         };
-        let lit: f64 = self.pupils.iter_mut().filter(is_lit).map(|pupil| pupil.share).sum();
-        if lit > 0.0 {
-            self.pupils.iter_mut().filter(is_lit).for_each(|pupil| pupil.share /= lit);
+        let traced: f64 = self.pupils.iter_mut().filter(has_light).map(|pupil| pupil.share).sum();
+        if traced > 0.0 {
+            self.pupils.iter_mut().filter(has_light).for_each(|pupil| pupil.share /= traced);
         }
     }
 
@@ -204,62 +204,63 @@ impl RaySampling {
     /// lens.
     pub(super) fn trace_pupils<'a>(
         &self,
-        bench: &'a RayModel,
-        follow: bool,
+        model: &'a RayModel,
+        track: bool,
     ) -> Vec<TracedPupil<'a>> {
-        let lit = |pupil: &SampledPupil| {
-            let launch = pupil.anchor.launch(bench);
-            let region = if follow {
+        let traced = |pupil: &SampledPupil| {
+            let launch = pupil.fixed_launch.launch(model);
+            let region = if track {
                 Region::track(&pupil.kind, launch)
             } else {
                 Region { launch, kind: pupil.kind.clone(), rays: 0 }
             };
             region.trace_pupil(pupil.order)
         };
-        self.pupils.iter().map(lit).collect()
+        self.pupils.iter().map(traced).collect()
     }
 
     /// Returns an error if a pupil has gone dark since it was found: its spot would be empty, and
     /// so the sharpest of all.
-    pub(super) fn check_light(&self, lit: &[TracedPupil<'_>]) -> Result<(), MeritError> {
+    pub(super) fn check_light(&self, traced: &[TracedPupil<'_>]) -> Result<(), MeritError> {
         let was_lit = |pupil: &SampledPupil| pupil.moments.area > 0.0;
-        let mut all = self.pupils.iter().zip(lit).zip(&self.spot_samplings);
-        match all.find(|((pupil, lit), _)| was_lit(pupil) && !(lit.moments.area > 0.0)) {
-            Some((_, place)) => Err(no_light(place)),
+        let mut all = self.pupils.iter().zip(traced).zip(&self.spot_samplings);
+        match all.find(|((pupil, traced), _)| was_lit(pupil) && !(traced.moments.area > 0.0)) {
+            Some((_, spot)) => Err(no_light(spot)),
             None => Ok(()),
         }
     }
 
     /// The same sampling with the rays of traced pupils.
-    pub(super) fn with_pupils(&self, bench: &RayModel, lit: &[TracedPupil<'_>]) -> Self {
+    pub(super) fn with_pupils(&self, model: &RayModel, traced: &[TracedPupil<'_>]) -> Self {
         let mut pupils = self.pupils.clone();
-        for (pupil, lit) in pupils.iter_mut().zip(lit) {
-            (pupil.moments, pupil.area) = (lit.moments, lit.signed_area());
+        for (pupil, traced) in pupils.iter_mut().zip(traced) {
+            (pupil.moments, pupil.area) = (traced.moments, traced.signed_area());
         }
-        Self { channels: self.channel_rays(bench, lit), pupils, ..self.clone() }
+        Self { channels: self.channel_rays(model, traced), pupils, ..self.clone() }
     }
 
     /// The rays of all pupils, sorted by wavelength and field.
-    fn channel_rays(&self, bench: &RayModel, lit: &[TracedPupil<'_>]) -> Vec<ChannelRays> {
-        let mut colors: Vec<ChannelRays> =
-            bench.channels.iter().map(|c| ChannelRays::new(c.um)).collect();
-        for (wavelength, color) in colors.iter_mut().enumerate() {
+    fn channel_rays(&self, model: &RayModel, traced: &[TracedPupil<'_>]) -> Vec<ChannelRays> {
+        let mut channels: Vec<ChannelRays> =
+            model.channels.iter().map(|c| ChannelRays::new(c.um)).collect();
+        for (wavelength, channel) in channels.iter_mut().enumerate() {
             for field in 0..self.fields.len() {
-                color.mirrored.push(self.fields[field].x == 0.0);
-                let here = |(pupil, _): &(&SampledPupil, &TracedPupil<'_>)| {
+                channel.mirrored.push(self.fields[field].x == 0.0);
+                let is_same = |(pupil, _): &(&SampledPupil, &TracedPupil<'_>)| {
                     (pupil.wavelength, pupil.field) == (wavelength, field)
                 };
-                let mine = self.pupils.iter().zip(lit).filter(here);
-                mine.for_each(|(pupil, lit)| color.add_pupil(lit, pupil.share));
-                color.ends.push(color.weights.len());
+                let mine = self.pupils.iter().zip(traced).filter(is_same);
+                mine.for_each(|(pupil, traced)| channel.add_pupil(traced, pupil.share));
+                channel.ends.push(channel.weights.len());
             }
         }
-        colors
+        channels
     }
 
     /// The areas of the pupils in mm²; for dark ones those of the ideal entrance pupil.
     pub(super) fn areas(&self) -> Vec<f64> {
-        let area = |pupil: &SampledPupil| if pupil.area > 0.0 { pupil.area } else { pupil.ideal };
+        let area =
+            |pupil: &SampledPupil| if pupil.area > 0.0 { pupil.area } else { pupil.ideal_area };
         self.pupils.iter().map(area).collect()
     }
 
@@ -279,7 +280,7 @@ impl RaySampling {
 
     /// True if no light of a field gets through at any wavelength.
     pub(super) fn is_dark(&self, field: usize) -> bool {
-        self.channels.iter().all(|color| color.range(field).is_empty())
+        self.channels.iter().all(|channel| channel.range(field).is_empty())
     }
 
     pub(super) fn chief_count(&self) -> usize {
@@ -293,8 +294,8 @@ impl SpotSampling {
     }
 }
 
-fn no_light(place: &SpotSampling) -> MeritError {
-    MeritError::NoLight { field: place.field, zoom: place.zoom, um: place.um }
+fn no_light(spot: &SpotSampling) -> MeritError {
+    MeritError::NoLight { field: spot.field, zoom: spot.zoom, um: spot.um }
 }
 
 /// The ray through the centre of the pupil.

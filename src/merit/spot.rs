@@ -35,47 +35,47 @@ pub(super) enum Normalization {
 
 /// Adds the spots about their polychromatic centroids.
 pub(super) fn add_spot(
-    scene: &EvaluationContext<'_>,
-    per: Normalization,
+    context: &EvaluationContext<'_>,
+    normalization: Normalization,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
-    let wavelengths = 0..scene.sampling.channels.len();
-    let landed: Result<Vec<_>, _> =
-        wavelengths.map(|wavelength| trace(scene, wavelength, per)).collect();
-    let landed = landed?;
+    let wavelengths = 0..context.sampling.channels.len();
+    let traced: Result<Vec<_>, _> =
+        wavelengths.map(|wavelength| trace(context, wavelength, normalization)).collect();
+    let traced = traced?;
     let centroids: Vec<_> =
-        (0..scene.sampling.fields.len()).map(|field| centroid(scene, &landed, field)).collect();
-    for (color, landed) in scene.sampling.channels.iter().zip(&landed) {
+        (0..context.sampling.fields.len()).map(|field| centroid(context, &traced, field)).collect();
+    for (channel, traced) in context.sampling.channels.iter().zip(&traced) {
         for (field, centroid) in centroids.iter().enumerate() {
-            for i in color.range(field) {
-                let (x, y) = (landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y);
-                sum.value += landed.weights[i] * (x * x + y * y);
+            for i in channel.range(field) {
+                let (x, y) = (traced.points.x[i] - centroid.x, traced.points.y[i] - centroid.y);
+                sum.value += traced.weights[i] * (x * x + y * y);
             }
         }
     }
     match sum.level {
         DerivativeLevel::Value => return Ok(()),
-        DerivativeLevel::Gradient => add_gradient(scene, &landed, &centroids, sum),
-        DerivativeLevel::Normal => add_normal_matrix(scene, &landed, &centroids, sum),
+        DerivativeLevel::Gradient => add_gradient(context, &traced, &centroids, sum),
+        DerivativeLevel::Normal => add_normal_matrix(context, &traced, &centroids, sum),
     }
-    add_edge_motion(scene, per, &centroids, sum);
+    add_edge_motion(context, normalization, &centroids, sum);
     Ok(())
 }
 
 /// Adds the contribution of the moving pupil edges to the derivatives.
 fn add_edge_motion(
-    scene: &EvaluationContext<'_>,
-    per: Normalization,
+    context: &EvaluationContext<'_>,
+    normalization: Normalization,
     centroids: &[Centroid],
     sum: &mut SumOfSquares,
 ) {
-    let costs = scene.sampling.pupils.iter().map(|pupil| {
+    let costs = context.sampling.pupils.iter().map(|pupil| {
         let Centroid { x, y, .. } = centroids[pupil.field];
         let PupilMoments { area, centroid, spread } = pupil.moments;
         let [dx, dy] = [centroid[0] - x, centroid[1] - y];
         let spread = spread + area * (dx * dx + dy * dy);
         let share = pupil.share;
-        let (square, constant) = match per {
+        let (square, constant) = match normalization {
             Normalization::PupilArea if area > 0.0 => {
                 (share / area, -share * spread / (area * area))
             }
@@ -84,57 +84,63 @@ fn add_edge_motion(
         };
         QuadraticIntegrand { center: [x, y], square, constant }
     });
-    sum.gradient += scene.edge_motion(costs);
+    sum.gradient += context.edge_motion(costs);
 }
 
 fn trace(
-    scene: &EvaluationContext<'_>,
+    context: &EvaluationContext<'_>,
     wavelength: usize,
-    per: Normalization,
+    normalization: Normalization,
 ) -> Result<SpotRays, MeritError> {
-    let color = &scene.sampling.channels[wavelength];
-    let system = &scene.systems.unclipped[wavelength];
+    let channel = &context.sampling.channels[wavelength];
+    let system = &context.systems.unclipped[wavelength];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
     let mut points = ImagePoints::default();
-    tracer.trace_batch(&color.rays, &mut points);
-    let lost = (0..color.rays.len()).find(|i| !points.fate(*i).is_imaged());
+    tracer.trace_batch(&channel.rays, &mut points);
+    let lost = (0..channel.rays.len()).find(|i| !points.fate(*i).is_imaged());
     match lost {
-        None => Ok(SpotRays { tracer, points, weights: weights(scene, wavelength, per) }),
-        Some(i) => Err(lost_ray_error(scene, wavelength, i, points.fate(i))),
+        None => {
+            Ok(SpotRays { tracer, points, weights: weights(context, wavelength, normalization) })
+        }
+        Some(i) => Err(lost_ray_error(context, wavelength, i, points.fate(i))),
     }
 }
 
-fn weights(scene: &EvaluationContext<'_>, wavelength: usize, per: Normalization) -> Vec<f64> {
-    let color = &scene.sampling.channels[wavelength];
-    let mut weights = color.weights.clone();
-    if per == Normalization::Unnormalized {
-        for pupil in scene.sampling.pupils.iter().filter(|p| p.wavelength == wavelength) {
-            weights[color.range(pupil.field)].iter_mut().for_each(|w| *w *= pupil.moments.area);
+fn weights(
+    context: &EvaluationContext<'_>,
+    wavelength: usize,
+    normalization: Normalization,
+) -> Vec<f64> {
+    let channel = &context.sampling.channels[wavelength];
+    let mut weights = channel.weights.clone();
+    if normalization == Normalization::Unnormalized {
+        for pupil in context.sampling.pupils.iter().filter(|p| p.wavelength == wavelength) {
+            weights[channel.range(pupil.field)].iter_mut().for_each(|w| *w *= pupil.moments.area);
         }
     }
     weights
 }
 
 fn lost_ray_error(
-    scene: &EvaluationContext<'_>,
+    context: &EvaluationContext<'_>,
     wavelength: usize,
     i: usize,
     fate: Fate,
 ) -> MeritError {
-    let color = &scene.sampling.channels[wavelength];
-    let field = color.ends.iter().position(|end| i < *end).unwrap_or(0);
-    let ray = i - color.range(field).start;
-    MeritError::RayLost { ray, field, zoom: scene.zoom.zoom, um: color.um, fate }
+    let channel = &context.sampling.channels[wavelength];
+    let field = channel.ends.iter().position(|end| i < *end).unwrap_or(0);
+    let ray = i - channel.range(field).start;
+    MeritError::RayLost { ray, field, zoom: context.zoom.zoom, um: channel.um, fate }
 }
 
-fn centroid(scene: &EvaluationContext<'_>, landed: &[SpotRays], field: usize) -> Centroid {
+fn centroid(context: &EvaluationContext<'_>, traced: &[SpotRays], field: usize) -> Centroid {
     let (mut x, mut y, mut share) = (0.0, 0.0, 0.0);
-    for (color, landed) in scene.sampling.channels.iter().zip(landed) {
-        for i in color.range(field) {
-            let w = landed.weights[i];
+    for (channel, traced) in context.sampling.channels.iter().zip(traced) {
+        for i in channel.range(field) {
+            let w = traced.weights[i];
             share += w;
-            x += if color.mirrored[field] { 0.0 } else { w * landed.points.x[i] };
-            y += w * landed.points.y[i];
+            x += if channel.mirrored[field] { 0.0 } else { w * traced.points.x[i] };
+            y += w * traced.points.y[i];
         }
     }
     let inverse = if share > 0.0 { 1.0 / share } else { 0.0 };
@@ -143,55 +149,62 @@ fn centroid(scene: &EvaluationContext<'_>, landed: &[SpotRays], field: usize) ->
 
 /// Adds the derivatives. The centroid needs none: the sum is stationary with respect to it.
 fn add_gradient(
-    scene: &EvaluationContext<'_>,
-    landed: &[SpotRays],
+    context: &EvaluationContext<'_>,
+    traced: &[SpotRays],
     centroids: &[Centroid],
     sum: &mut SumOfSquares,
 ) {
-    for (wavelength, landed) in landed.iter().enumerate() {
-        let color = &scene.sampling.channels[wavelength];
-        let mut seeds = vec![Vec3::default(); color.rays.len()];
+    for (wavelength, traced) in traced.iter().enumerate() {
+        let channel = &context.sampling.channels[wavelength];
+        let mut seeds = vec![Vec3::default(); channel.rays.len()];
         for (field, centroid) in centroids.iter().enumerate() {
-            for i in color.range(field) {
-                let w = 2.0 * landed.weights[i];
-                let (x, y) = (landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y);
+            for i in channel.range(field) {
+                let w = 2.0 * traced.weights[i];
+                let (x, y) = (traced.points.x[i] - centroid.x, traced.points.y[i] - centroid.y);
                 seeds[i] = Vec3::new(w * x, w * y, 0.0);
             }
         }
         let seed = |i: usize| AdjointSeed { point: seeds[i], ..AdjointSeed::default() };
-        let by_number = landed.tracer.gradient(&color.rays, seed);
-        sum.gradient += scene.zoom.by_variables(scene.systems, wavelength, &by_number);
+        let by_number = traced.tracer.gradient(&channel.rays, seed);
+        sum.gradient += context.zoom.by_variables(context.systems, wavelength, &by_number);
     }
 }
 
 /// Adds the gradient and the Gauss-Newton matrix: `Σ w (∂x − ∂x̄)(∂x − ∂x̄)ᵀ = Σ w ∂x ∂xᵀ − W ∂x̄
 /// ∂x̄ᵀ` for each field.
 fn add_normal_matrix(
-    scene: &EvaluationContext<'_>,
-    landed: &[SpotRays],
+    context: &EvaluationContext<'_>,
+    traced: &[SpotRays],
     centroids: &[Centroid],
     sum: &mut SumOfSquares,
 ) {
     let count = sum.gradient.len();
     // The mean slopes of x and y of every field.
     let mut means = vec![[DVector::zeros(count), DVector::zeros(count)]; centroids.len()];
-    for (wavelength, landed) in landed.iter().enumerate() {
-        let color = &scene.sampling.channels[wavelength];
-        let moving = scene.zoom.moving_parameters(wavelength);
-        let (_, rows) = landed.tracer.jacobian(&color.rays, &moving);
-        let mut weighted = DMatrix::zeros(count, 2 * color.rays.len());
+    for (wavelength, traced) in traced.iter().enumerate() {
+        let channel = &context.sampling.channels[wavelength];
+        let moving = context.zoom.moving_parameters(wavelength);
+        let (_, rows) = traced.tracer.jacobian(&channel.rays, &moving);
+        let mut weighted = DMatrix::zeros(count, 2 * channel.rays.len());
         let mut slope = vec![0.0; count];
         for (field, centroid) in centroids.iter().enumerate() {
-            let axes = color.range(field).flat_map(|i| [(i, 0), (i, 1)]);
+            let axes = channel.range(field).flat_map(|i| [(i, 0), (i, 1)]);
             for (i, axis) in axes {
-                let w = landed.weights[i];
-                let at = [landed.points.x[i] - centroid.x, landed.points.y[i] - centroid.y][axis];
+                let w = traced.weights[i];
+                let position =
+                    [traced.points.x[i] - centroid.x, traced.points.y[i] - centroid.y][axis];
                 let from = (2 * i + axis) * moving.len();
                 let row = &rows[from..from + moving.len()];
-                scene.zoom.row_by_variables(scene.systems, wavelength, &moving, row, &mut slope);
+                context.zoom.row_by_variables(
+                    context.systems,
+                    wavelength,
+                    &moving,
+                    row,
+                    &mut slope,
+                );
                 let column = DVector::from_column_slice(&slope);
-                sum.gradient.axpy(2.0 * w * at, &column, 1.0);
-                if axis == 1 || !color.mirrored[field] {
+                sum.gradient.axpy(2.0 * w * position, &column, 1.0);
+                if axis == 1 || !channel.mirrored[field] {
                     means[field][axis].axpy(w, &column, 1.0);
                 }
                 weighted.set_column(2 * i + axis, &(column * w.sqrt()));
@@ -208,56 +221,56 @@ fn add_normal_matrix(
 
 /// Adds the mean square distance of the chief rays' image points from the paraxial image, in mm².
 pub(super) fn add_distortion(
-    scene: &EvaluationContext<'_>,
+    context: &EvaluationContext<'_>,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
-    let primary = scene.zoom.primary;
-    let heights = paraxial_heights(scene)?;
-    let system = &scene.systems.unclipped[primary];
+    let primary = context.zoom.primary;
+    let heights = paraxial_heights(context)?;
+    let system = &context.systems.unclipped[primary];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
-    let scale = image_scale(system, scene.zoom.object);
-    let scale_slope = slopes(scene, sum.level, |system| image_scale(system, scene.zoom.object));
-    let moving = scene.zoom.moving_parameters(primary);
-    let chief = &scene.sampling.chief_rays;
+    let scale = image_scale(system, context.zoom.object);
+    let scale_slope = slopes(context, sum.level, |system| image_scale(system, context.zoom.object));
+    let moving = context.zoom.moving_parameters(primary);
+    let chief = &context.sampling.chief_rays;
     let (hits, rows) = tracer.jacobian(chief, &moving);
-    let total: f64 = scene.sampling.fields.iter().map(|f| f.weight).sum();
+    let total: f64 = context.sampling.fields.iter().map(|f| f.weight).sum();
     let mut slope = vec![0.0; sum.gradient.len()];
     for (field, height) in heights.iter().enumerate() {
-        if scene.sampling.is_dark(field) {
+        if context.sampling.is_dark(field) {
             continue;
         }
         if !hits.fate(field).is_imaged() {
-            return Err(lost_chief_error(scene, field, hits.fate(field)));
+            return Err(lost_chief_error(context, field, hits.fate(field)));
         }
-        let weight = scene.sampling.fields[field].weight / total;
-        for (axis, at) in [hits.x[field], hits.y[field]].into_iter().enumerate() {
+        let weight = context.sampling.fields[field].weight / total;
+        for (axis, position) in [hits.x[field], hits.y[field]].into_iter().enumerate() {
             let from = (2 * field + axis) * moving.len();
             let row = &rows[from..from + moving.len()];
-            scene.zoom.row_by_variables(scene.systems, primary, &moving, row, &mut slope);
+            context.zoom.row_by_variables(context.systems, primary, &moving, row, &mut slope);
             let column = DVector::from_column_slice(&slope) - &scale_slope * height[axis];
-            sum.add_residual(weight, at - scale * height[axis], &column);
+            sum.add_residual(weight, position - scale * height[axis], &column);
         }
     }
     Ok(())
 }
 
-fn lost_chief_error(scene: &EvaluationContext<'_>, field: usize, fate: Fate) -> MeritError {
-    let um = scene.sampling.channels[scene.zoom.primary].um;
-    MeritError::RayLost { ray: 0, field, zoom: scene.zoom.zoom, um, fate }
+fn lost_chief_error(context: &EvaluationContext<'_>, field: usize, fate: Fate) -> MeritError {
+    let um = context.sampling.channels[context.zoom.primary].um;
+    MeritError::RayLost { ray: 0, field, zoom: context.zoom.zoom, um, fate }
 }
 
 /// The quantity proportional to the paraxial image height, per field: `tan θ`, or the object height
 /// in mm.
-fn paraxial_heights(scene: &EvaluationContext<'_>) -> Result<Vec<[f64; 2]>, MeritError> {
+fn paraxial_heights(context: &EvaluationContext<'_>) -> Result<Vec<[f64; 2]>, MeritError> {
     let refuse = |why| Err(MeritError::DoesNotApply { term: "distortion", why });
-    let convert = |v: f64| match (scene.zoom.field_kind, scene.zoom.object) {
+    let convert = |v: f64| match (context.zoom.field_kind, context.zoom.object) {
         (FieldKind::Angle, Object::Infinity) => Some(v.to_radians().tan()),
         (FieldKind::ObjectHeight, _) => Some(v),
         (FieldKind::ImageHeight, _) | (FieldKind::Angle, Object::Finite(_)) => None,
     };
     let mut heights = Vec::new();
-    for field in &scene.sampling.fields {
-        if scene.zoom.field_kind == FieldKind::Angle && field.x.hypot(field.y) >= 89.0 {
+    for field in &context.sampling.fields {
+        if context.zoom.field_kind == FieldKind::Angle && field.x.hypot(field.y) >= 89.0 {
             return refuse("a field of 90 degrees or more has no image at f tan(theta)");
         }
         let (Some(x), Some(y)) = (convert(field.x), convert(field.y)) else {

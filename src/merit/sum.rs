@@ -28,10 +28,10 @@ pub struct SumOfSquares {
 
 impl SumOfSquares {
     /// A sum of zero for this many variables.
-    pub fn zero(variables: usize, detail: DerivativeLevel) -> Self {
-        let rows = if detail == DerivativeLevel::Normal { variables } else { 0 };
+    pub fn zero(variables: usize, level: DerivativeLevel) -> Self {
+        let rows = if level == DerivativeLevel::Normal { variables } else { 0 };
         let gradient = DVector::zeros(variables);
-        Self { level: detail, value: 0.0, gradient, normal: DMatrix::zeros(rows, rows) }
+        Self { level, value: 0.0, gradient, normal: DMatrix::zeros(rows, rows) }
     }
 
     /// Adds `weight` times another one.

@@ -39,7 +39,10 @@ const TOLERANCE: f64 = 1e-3;
 const CELLS: usize = 96;
 const ROOM: f64 = 1.6;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let mut outcome = ExperimentOutcome::default();
     let mut table = DataTable::new("views", &COLUMNS);
     let [least, less] = LEAST;
@@ -48,24 +51,24 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
         [("caustic-near", NEAR), ("caustic-far", FAR)].into_iter().enumerate()
     {
         let part = [0, 1].map(|k| (i + k) as f64 / 3.0);
-        let shown = solve_and_evaluate(&task(name, effort, 2)?, part, watch)?;
-        shown.rows(&mut table);
-        outcome.claims.extend(shown.claims(quality, correlation));
-        outcome.claims.extend(shown.manufacturability());
-        outcome.pictures.extend(pictures_of(&shown, pictures));
-        outcome.rays = outcome.rays.saturating_add(shown.rays());
+        let evaluated = solve_and_evaluate(&task(name, effort, 2)?, part, progress)?;
+        evaluated.rows(&mut table);
+        outcome.claims.extend(evaluated.claims(quality, correlation));
+        outcome.claims.extend(evaluated.manufacturability());
+        outcome.pictures.extend(pictures_of(&evaluated, pictures));
+        outcome.rays = outcome.rays.saturating_add(evaluated.rays());
     }
     outcome.tables.push(table);
-    rings(&mut outcome, effort, watch)?;
+    rings(&mut outcome, effort, progress)?;
     Ok(outcome)
 }
 
 const NEAR: [&str; 2] = ["near", "near-section"];
 const FAR: [&str; 2] = ["far", "far-section"];
 
-fn pictures_of(shown: &EvaluatedField, [image, section]: [&'static str; 2]) -> Vec<NamedPlot> {
-    let mut pictures = shown.pictures(&[image]);
-    let of_medium = plot_medium(shown.runner.task(), shown.runner.best());
+fn pictures_of(evaluated: &EvaluatedField, [image, section]: [&'static str; 2]) -> Vec<NamedPlot> {
+    let mut pictures = evaluated.pictures(&[image]);
+    let of_medium = plot_medium(evaluated.optimizer.task(), evaluated.optimizer.best());
     pictures
         .extend(of_medium.into_iter().last().map(|picture| NamedPlot { name: section, ..picture }));
     pictures
@@ -75,11 +78,11 @@ fn pictures_of(shown: &EvaluatedField, [image, section]: [&'static str; 2]) -> V
 fn rings(
     outcome: &mut ExperimentOutcome,
     effort: Effort,
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<(), ExperimentError> {
     let task = task("caustic", effort, 2)?;
-    let runner = solve(&task, [2.0 / 3.0, 1.0], watch)?;
-    let beam = ExitBeam::behind(&task, runner.best())?;
+    let optimizer = solve(&task, [2.0 / 3.0, 1.0], progress)?;
+    let beam = ExitBeam::behind(&task, optimizer.best())?;
     let [full, test] = MISSED;
     let [near, far] = effort.select(full, test);
     let LightGoal::Ring { radius, distance, angle, .. } = task.views[0].goal else {
@@ -107,7 +110,7 @@ fn rings(
     }
     outcome.tables.push(table);
     outcome.pictures.push(NamedPlot { name: "planes", canvas: beam.draw() });
-    let rays = usize::try_from(runner.rays_traced()).unwrap_or(usize::MAX);
+    let rays = usize::try_from(optimizer.rays_traced()).unwrap_or(usize::MAX);
     outcome.rays = outcome.rays.saturating_add(rays).saturating_add(beam.all);
     Ok(())
 }
@@ -159,9 +162,9 @@ impl ExitBeam {
             let radii: Vec<f64> = places.iter().map(|[x, y]| x.hypot(*y)).collect();
             let light = count_in_cells(places, ROOM * mean_and_deviation(&radii).0);
             // A caustic has peaks that would make the rest black.
-            let shown: Vec<f64> = light.iter().map(|light| light.sqrt()).collect();
-            let peak = shown.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-            (title, gray_levels(&shown, CELLS, peak))
+            let evaluated: Vec<f64> = light.iter().map(|light| light.sqrt()).collect();
+            let peak = evaluated.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+            (title, gray_levels(&evaluated, CELLS, peak))
         };
         let screens =
             PLANES.iter().map(|plane| panel(format!("{plane} mm behind"), &self.positions(*plane)));

@@ -22,13 +22,16 @@ const NODES: [usize; 2] = [33, 9];
 /// The minimum quality in dB and the minimum correlation.
 const LEAST: [[f64; 2]; 2] = [[24.0, 0.97], [14.0, 0.75]];
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let task = task("display", effort, 2)?;
-    let shown = solve_and_evaluate(&task, [0.0, 1.0], watch)?;
+    let evaluated = solve_and_evaluate(&task, [0.0, 1.0], progress)?;
     let [nodes, few] = NODES;
     let [least, less] = LEAST;
-    let mut outcome = outcome_of(&shown, &["face", "letter"], effort.select(least, less));
-    let found = shown.runner.best().nodes();
+    let mut outcome = outcome_of(&evaluated, &["face", "letter"], effort.select(least, less));
+    let found = evaluated.optimizer.best().nodes();
     let says = "nodes along a side of the best field";
     outcome.claims.push(Claim::exactly(says, found as f64, effort.select(nodes, few) as f64));
     Ok(outcome)

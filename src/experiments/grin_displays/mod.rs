@@ -64,19 +64,19 @@ fn independent_task(task: &GrinTask) -> GrinTask {
 
 /// A solved task with the images of its field by independent rays.
 struct EvaluatedField {
-    runner: GrinOptimizer,
-    seen: Vec<ViewReport>,
+    optimizer: GrinOptimizer,
+    views: Vec<ViewReport>,
 }
 
 /// Solves a task, which is a part of the whole work, and evaluates it.
 fn solve_and_evaluate(
     task: &GrinTask,
     part: [f64; 2],
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<EvaluatedField, ExperimentError> {
-    let runner = solve(task, part, watch)?;
-    let seen = evaluate(task, runner.best())?;
-    Ok(EvaluatedField { runner, seen })
+    let optimizer = solve(task, part, progress)?;
+    let views = evaluate(task, optimizer.best())?;
+    Ok(EvaluatedField { optimizer, views })
 }
 
 /// Evaluates a field with rays that its optimization has not used.
@@ -101,20 +101,20 @@ const COLUMNS: [&str; 10] = [
 impl EvaluatedField {
     /// Adds a row for every image.
     fn rows(&self, table: &mut DataTable) {
-        let task = self.runner.task();
-        let extremes = task.extremes(self.runner.best());
-        for (view, seen) in task.views.iter().zip(&self.seen) {
-            let Some(image) = &seen.image else { continue };
-            let counts = seen.result.counts;
+        let task = self.optimizer.task();
+        let extremes = task.extremes(self.optimizer.best());
+        for (view, views) in task.views.iter().zip(&self.views) {
+            let Some(image) = &views.image else { continue };
+            let counts = views.result.counts;
             table.push_row([
                 view.name.clone().into(),
-                self.runner.best().nodes().into(),
-                seen.result.psnr.unwrap_or(f64::NAN).into(),
+                self.optimizer.best().nodes().into(),
+                views.result.psnr.unwrap_or(f64::NAN).into(),
                 image.correlation().into(),
                 image.light_share().into(),
                 counts.fates.total().into(),
                 (counts.fates.total() - counts.valid()).into(),
-                seen.error.unwrap_or(f64::NAN).into(),
+                views.error.unwrap_or(f64::NAN).into(),
                 extremes.low.into(),
                 extremes.high.into(),
             ]);
@@ -124,15 +124,15 @@ impl EvaluatedField {
     /// The claims about every image: its quality, its correlation, and few excluded rays.
     fn claims(&self, quality: f64, correlation: f64) -> Vec<Claim> {
         let mut claims = Vec::new();
-        for (view, seen) in self.runner.task().views.iter().zip(&self.seen) {
-            let Some(image) = &seen.image else { continue };
+        for (view, views) in self.optimizer.task().views.iter().zip(&self.views) {
+            let Some(image) = &views.image else { continue };
             let name = &view.name;
-            let found = seen.result.psnr.unwrap_or(f64::NAN);
+            let found = views.result.psnr.unwrap_or(f64::NAN);
             let says = format!("{name}: peak signal to noise, by rays of no step");
             claims.push(Claim::at_least(says, found, quality).in_unit("dB"));
             let says = format!("{name}: correlation with the picture");
             claims.push(Claim::at_least(says, image.correlation(), correlation));
-            let counts = seen.result.counts;
+            let counts = views.result.counts;
             let left_out = 1.0 - counts.valid() as f64 / counts.fates.total() as f64;
             let says = format!("{name}: share of the rays that are left out");
             claims.push(Claim::at_most(says, left_out, LEFT_OUT));
@@ -142,8 +142,8 @@ impl EvaluatedField {
 
     /// The claims that the field can be manufactured.
     fn manufacturability(&self) -> [Claim; 2] {
-        let task = self.runner.task();
-        let extremes = task.extremes(self.runner.best());
+        let task = self.optimizer.task();
+        let extremes = task.extremes(self.optimizer.best());
         let [low, high] = [task.limits.low, task.limits.high];
         [
             Claim::at_least("smallest index", extremes.low, low - ROUNDING),
@@ -153,9 +153,9 @@ impl EvaluatedField {
 
     /// The plots of its images beside the target images.
     fn pictures(&self, names: &[&'static str]) -> Vec<NamedPlot> {
-        let images = self.seen.iter().filter_map(|seen| Some((seen, seen.image.as_ref()?)));
-        let picture = |((seen, image), name): ((&ViewReport, _), &&'static str)| {
-            let quality = seen.result.psnr.unwrap_or(f64::NAN);
+        let images = self.views.iter().filter_map(|views| Some((views, views.image.as_ref()?)));
+        let picture = |((views, image), name): ((&ViewReport, _), &&'static str)| {
+            let quality = views.result.psnr.unwrap_or(f64::NAN);
             let canvas = plot_view(name, image, quality);
             NamedPlot { name, canvas }
         };
@@ -164,28 +164,28 @@ impl EvaluatedField {
 
     /// The number of rays traced forwards.
     fn rays(&self) -> usize {
-        let judging: usize = self.seen.iter().map(|seen| seen.result.counts.fates.total()).sum();
-        usize::try_from(self.runner.rays_traced()).unwrap_or(usize::MAX).saturating_add(judging)
+        let judging: usize = self.views.iter().map(|views| views.result.counts.fates.total()).sum();
+        usize::try_from(self.optimizer.rays_traced()).unwrap_or(usize::MAX).saturating_add(judging)
     }
 }
 
 /// The outcome of one field that shows images.
 fn outcome_of(
-    shown: &EvaluatedField,
+    evaluated: &EvaluatedField,
     names: &[&'static str],
     [quality, correlation]: [f64; 2],
 ) -> ExperimentOutcome {
     let mut table = DataTable::new("views", &COLUMNS);
-    shown.rows(&mut table);
-    let mut claims = shown.claims(quality, correlation);
-    claims.extend(shown.manufacturability());
-    let mut pictures = shown.pictures(names);
-    pictures.extend(plot_medium(shown.runner.task(), shown.runner.best()));
+    evaluated.rows(&mut table);
+    let mut claims = evaluated.claims(quality, correlation);
+    claims.extend(evaluated.manufacturability());
+    let mut pictures = evaluated.pictures(names);
+    pictures.extend(plot_medium(evaluated.optimizer.task(), evaluated.optimizer.best()));
     ExperimentOutcome {
         claims,
         tables: vec![table],
         pictures,
-        rays: shown.rays(),
+        rays: evaluated.rays(),
         ..ExperimentOutcome::default()
     }
 }

@@ -25,20 +25,23 @@ const LEAST: [[f64; 2]; 2] = [[23.0, 0.9], [16.0, 0.6]];
 /// The tolerance of the claim in a test: a coarse field is too smooth for a sharp image.
 const BLURRED: f64 = 0.5;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let task = task("multifocal", effort, 2)?;
-    let shown = solve_and_evaluate(&task, [0.0, 1.0], watch)?;
+    let evaluated = solve_and_evaluate(&task, [0.0, 1.0], progress)?;
     let [least, less] = LEAST;
     let names = ["front", "middle", "back"];
-    let mut outcome = outcome_of(&shown, &names, effort.select(least, less));
-    outcome.claims.extend(own_plane_claims(&shown, effort.select(1.0, BLURRED)));
+    let mut outcome = outcome_of(&evaluated, &names, effort.select(least, less));
+    outcome.claims.extend(own_plane_claims(&evaluated, effort.select(1.0, BLURRED)));
     Ok(outcome)
 }
 
 /// The claims that every image resembles the target of its own plane more than that of any other.
-fn own_plane_claims(shown: &EvaluatedField, least: f64) -> Vec<Claim> {
-    let images: Vec<_> = shown.seen.iter().filter_map(|seen| seen.image.as_ref()).collect();
-    let views = &shown.runner.task().views;
+fn own_plane_claims(evaluated: &EvaluatedField, least: f64) -> Vec<Claim> {
+    let images: Vec<_> = evaluated.views.iter().filter_map(|views| views.image.as_ref()).collect();
+    let views = &evaluated.optimizer.task().views;
     let off = |a: usize, b: usize| {
         let pairs = images[a].formed.iter().zip(&images[b].target);
         pairs.map(|(made, wanted)| (made - wanted) * (made - wanted)).sum::<f64>()

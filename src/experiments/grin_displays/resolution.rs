@@ -65,25 +65,28 @@ impl InterpolationKind {
 /// A field of one kind and resolution.
 struct ResolutionRow {
     kind: InterpolationKind,
-    runner: GrinOptimizer,
-    seen: ViewReport,
+    optimizer: GrinOptimizer,
+    views: ViewReport,
 }
 
 impl ResolutionRow {
     fn nodes(&self) -> usize {
-        self.runner.current().nodes()
+        self.optimizer.current().nodes()
     }
 
     fn quality(&self) -> f64 {
-        self.seen.result.psnr.unwrap_or(f64::NAN)
+        self.views.result.psnr.unwrap_or(f64::NAN)
     }
 
     fn image(&self) -> Option<&ViewImage> {
-        self.seen.image.as_ref()
+        self.views.image.as_ref()
     }
 }
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let full = builtin("display")?;
     let task = if effort == Effort::Full { full } else { reduced(full, 2) };
     let count = KINDS.len() * task.levels.len();
@@ -91,12 +94,12 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     for kind in KINDS {
         for levels in 1..=task.levels.len() {
             let part = [0, 1].map(|i| (rows.len() + i) as f64 / count as f64);
-            rows.push(find(&task, kind, levels, part, watch)?);
+            rows.push(find(&task, kind, levels, part, progress)?);
         }
     }
     let mut outcome =
         ExperimentOutcome { claims: claims(&rows, effort), ..ExperimentOutcome::default() };
-    outcome.rays = rows.iter().map(|row| row.runner.rays_traced() as usize).sum();
+    outcome.rays = rows.iter().map(|row| row.optimizer.rays_traced() as usize).sum();
     outcome.tables.push(table(&rows));
     outcome.pictures.push(NamedPlot { name: "quality", canvas: chart(&rows) });
     outcome.pictures.push(NamedPlot { name: "images", canvas: images(&rows) });
@@ -109,7 +112,7 @@ fn find(
     kind: InterpolationKind,
     levels: usize,
     part: [f64; 2],
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<ResolutionRow, ExperimentError> {
     let mut task = task.clone();
     task.views.truncate(1);
@@ -117,15 +120,15 @@ fn find(
     task.field = kind.field(task.space.corners()[1].x);
     let nodes = task.levels[levels - 1].nodes;
     task.name = format!("{}, {nodes} nodes", kind.name());
-    report_progress(watch, part[0], &task.name)?;
-    let runner = GrinOptimizer::new(&task).map_err(ExperimentError::from_error)?;
-    let runner =
-        if kind == InterpolationKind::Exact { runner.with_exact_hessian() } else { runner };
-    let runner = solve_from(runner, part, watch)?;
-    let seen = evaluate(&task, runner.current())?;
-    let first = seen.into_iter().next();
-    let seen = first.ok_or_else(|| ExperimentError::Failed("a task without views".to_owned()))?;
-    Ok(ResolutionRow { kind, runner, seen })
+    report_progress(progress, part[0], &task.name)?;
+    let optimizer = GrinOptimizer::new(&task).map_err(ExperimentError::from_error)?;
+    let optimizer =
+        if kind == InterpolationKind::Exact { optimizer.with_exact_hessian() } else { optimizer };
+    let optimizer = solve_from(optimizer, part, progress)?;
+    let views = evaluate(&task, optimizer.current())?;
+    let first = views.into_iter().next();
+    let views = first.ok_or_else(|| ExperimentError::Failed("a task without views".to_owned()))?;
+    Ok(ResolutionRow { kind, optimizer, views })
 }
 
 fn rows_of(rows: &[ResolutionRow], kind: InterpolationKind) -> Vec<&ResolutionRow> {
@@ -164,11 +167,11 @@ fn table(rows: &[ResolutionRow]) -> DataTable {
         table.push_row([
             row.kind.name().into(),
             row.nodes().into(),
-            row.runner.current().field().parameters().len().into(),
+            row.optimizer.current().field().parameters().len().into(),
             row.quality().into(),
             row.image().map_or(f64::NAN, ViewImage::correlation).into(),
-            row.runner.steps().into(),
-            (row.runner.rays_traced() as usize).into(),
+            row.optimizer.steps().into(),
+            (row.optimizer.rays_traced() as usize).into(),
         ]);
     }
     table

@@ -17,10 +17,13 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let (lenses, seeds, gradients) = effort.comparison_size();
-    let runners =
+    let samplers =
         &[SamplerKind::Restore, SamplerKind::Brute, SamplerKind::Metropolis, SamplerKind::Descent];
-    let rivals = &runners[1..3];
-    SamplerComparison { samplers: runners, rivals, lenses, seeds, gradients }.run(watch)
+    let rivals = &samplers[1..3];
+    SamplerComparison { samplers, rivals, lenses, seeds, gradients }.run(progress)
 }

@@ -35,17 +35,20 @@ const SWEEP_SHARE: f64 = 0.4;
 /// The relative accuracy of the numbers of a design.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let start = at_heights(FILE)?;
     let settings = ParetoSettings {
         points: effort.select(8, 2),
         steps: effort.select(400, 25),
         ..ParetoSettings::default()
     };
-    let sweep = run_sweep(&start, &settings, watch)?;
+    let sweep = run_sweep(&start, &settings, progress)?;
     let chosen = select_designs(sweep.front(), effort.select(8, 2));
     let gradients = effort.select(4000, 60);
-    let sides = MutationGain::of(&sweep, &chosen, gradients, watch)?;
+    let sides = MutationGain::of(&sweep, &chosen, gradients, progress)?;
     let mut outcome =
         ExperimentOutcome { claims: sides.claims(&sweep, effort), ..ExperimentOutcome::default() };
     outcome.rays = sides.rays;
@@ -63,12 +66,12 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
 fn run_sweep(
     start: &Lens,
     settings: &ParetoSettings,
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<ParetoSweep, ExperimentError> {
     let mut sweep = ParetoSweep::new(start, settings).map_err(ExperimentError::from_error)?;
     let mut done = 0.0;
     loop {
-        report_progress(watch, SWEEP_SHARE * done, "the front without mutations")?;
+        report_progress(progress, SWEEP_SHARE * done, "the front without mutations")?;
         let slice = sweep.step();
         done = slice.done as f64 / slice.total as f64;
         if slice.finished {
@@ -101,24 +104,25 @@ impl MutationGain {
         sweep: &ParetoSweep,
         chosen: &[(ParetoPoint, f64)],
         gradients: u64,
-        watch: &mut ProgressFn<'_>,
+        progress: &mut ProgressFn<'_>,
     ) -> Result<Self, ExperimentError> {
-        let mut courses = Vec::new();
-        for runner in [SamplerKind::Restore, SamplerKind::Descent] {
+        let mut searches = Vec::new();
+        for sampler in [SamplerKind::Restore, SamplerKind::Descent] {
             for (i, (design, weight)) in chosen.iter().enumerate() {
                 let plan = plan(&sweep.start, *weight, gradients)?;
-                courses.push(RecordedSearch::new(&design.lens, &runner.plan(&plan, 1 + i as u64))?);
+                searches
+                    .push(RecordedSearch::new(&design.lens, &sampler.plan(&plan, 1 + i as u64))?);
             }
         }
         let part =
             ProgressSpan { from: SWEEP_SHARE, to: 1.0, name: "from the front, with mutations" };
-        run_to_end(&mut courses, part, watch)?;
-        let rays = courses.iter().map(RecordedSearch::rays).sum();
-        let judged = |(course, (_, weight)): (&RecordedSearch, &(ParetoPoint, f64))| {
-            ParetoPoint::evaluate(&course.run.best().point, Some(*weight), EVALUATION_TOLERANCE)
+        run_to_end(&mut searches, part, progress)?;
+        let rays = searches.iter().map(RecordedSearch::rays).sum();
+        let judged = |(search, (_, weight)): (&RecordedSearch, &(ParetoPoint, f64))| {
+            ParetoPoint::evaluate(&search.run.best().point, Some(*weight), EVALUATION_TOLERANCE)
                 .map_err(ExperimentError::from_error)
         };
-        let (mutated, descended) = courses.split_at(chosen.len());
+        let (mutated, descended) = searches.split_at(chosen.len());
         let [found, longer] = [mutated, descended].map(|side| {
             side.iter().zip(chosen).map(judged).collect::<Result<Vec<_>, ExperimentError>>()
         });

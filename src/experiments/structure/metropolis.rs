@@ -16,15 +16,12 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let (lenses, seeds, gradients) = effort.comparison_size();
-    let runners = &[SamplerKind::Restore, SamplerKind::Metropolis];
-    SamplerComparison {
-        samplers: runners,
-        rivals: &[SamplerKind::Metropolis],
-        lenses,
-        seeds,
-        gradients,
-    }
-    .run(watch)
+    let samplers = &[SamplerKind::Restore, SamplerKind::Metropolis];
+    SamplerComparison { samplers, rivals: &[SamplerKind::Metropolis], lenses, seeds, gradients }
+        .run(progress)
 }

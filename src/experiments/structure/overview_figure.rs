@@ -38,7 +38,10 @@ const MORE: f64 = 1.02;
 /// The relative accuracy of the numbers.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     let own = at_heights("double_gauss_nikkor_s_50")?;
     let start = with_open_apertures(&own, OPENED);
     let mark = OverviewLens::of("mark, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
@@ -47,7 +50,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     let plan = plan(shares.collect(), effort.select(560_000, 400));
     let mut found = vec![RecordedSearch::new(&start, &plan)?];
     let part = ProgressSpan { from: 0.0, to: 1.0, name: "search" };
-    run_to_end(&mut found, part, watch)?;
+    run_to_end(&mut found, part, progress)?;
     let best = OverviewLens::of("found", found[0].run.best().point.clone())?;
     let designs = [OverviewLens::of("start, 1962", own)?, before, best, mark];
     let mut outcome = ExperimentOutcome {
@@ -56,7 +59,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
     };
     outcome.rays = found[0].rays() + designs.iter().map(|d| d.figures.rays()).sum::<usize>();
     outcome.tables.push(table(&designs));
-    outcome.tables.push(course(&found[0]));
+    outcome.tables.push(search(&found[0]));
     outcome.pictures.push(NamedPlot { name: "lenses", canvas: draw(&designs)? });
     outcome.lenses.push(("found".to_owned(), designs[2].lens.clone()));
     Ok(outcome)
@@ -106,11 +109,11 @@ impl OverviewLens {
 
 fn claims(
     [_, before, found, mark]: &[OverviewLens; 4],
-    course: &RecordedSearch,
+    search: &RecordedSearch,
     effort: Effort,
 ) -> Vec<Claim> {
     let um = |design: &OverviewLens| 1e3 * design.spot();
-    let merits = [course.run.best().loss, course.start()];
+    let merits = [search.run.best().loss, search.start()];
     let says = "merit of the lens found, against half of that of the start";
     let mut claims = vec![Claim::at_most(says, merits[0], 0.5 * merits[1]).in_unit("mm^2")];
     // A test is too short for more.
@@ -152,10 +155,10 @@ fn table(designs: &[OverviewLens]) -> DataTable {
 }
 
 /// The best merit during the search.
-fn course(course: &RecordedSearch) -> DataTable {
+fn search(search: &RecordedSearch) -> DataTable {
     let mut table = DataTable::new("course", &["gradients", "best"]);
     let mut last = f64::INFINITY;
-    for mark in &course.marks {
+    for mark in &search.marks {
         if mark.best < last {
             last = mark.best;
             table.push_row([mark.gradients as f64, mark.best].map(TableCell::from));
@@ -178,8 +181,8 @@ fn draw_design(
     design: &OverviewLens,
     top: f64,
 ) -> Result<(), ExperimentError> {
-    let bench = RayModel::from_lens(&design.lens, 0).map_err(ExperimentError::from_error)?;
-    let section = SectionPlot::new(&bench.channels[0].system);
+    let model = RayModel::from_lens(&design.lens, 0).map_err(ExperimentError::from_error)?;
+    let section = SectionPlot::new(&model.channels[0].system);
     let [z, y] = section.extent();
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
     let chart = Chart::new([60.0, top], [760.0, top + 260.0], x, y).with_equal_scales();
@@ -188,8 +191,8 @@ fn draw_design(
     let topology = figures.topology.replace('|', "-");
     let title = format!("{name}: {} elements, {topology}", figures.elements);
     canvas.text([60.0, top - 30.0], &title, BLACK, TextAlign::Left);
-    for (i, field) in bench.fields.iter().enumerate() {
-        let launch = bench.launch(*field, bench.primary).map_err(ExperimentError::from_error)?;
+    for (i, field) in model.fields.iter().enumerate() {
+        let launch = model.launch(*field, model.primary).map_err(ExperimentError::from_error)?;
         let color = PALETTE[i % PALETTE.len()];
         for ray in -2..=2 {
             section.draw_ray(canvas, &chart, &launch, [0.0, 0.45 * f64::from(ray)], color);

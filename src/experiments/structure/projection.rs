@@ -48,7 +48,10 @@ const THESIS: [[[f64; 2]; 2]; 4] = [
 /// With and without.
 const SIDES: [(bool, &str); 2] = [(true, "projection"), (false, "no projection")];
 
-fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(
+    effort: Effort,
+    progress: &mut ProgressFn<'_>,
+) -> Result<ExperimentOutcome, ExperimentError> {
     // A test covers only the lens of the plot, and one number of gradients.
     let lenses = effort.select(0..STUDY_LENSES.len(), 3..STUDY_LENSES.len());
     let (seeds, read) = (effort.select(24, 1), effort.select(&READ[..], &[200]));
@@ -59,7 +62,7 @@ fn run(effort: Effort, watch: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, 
         let [from, to] = [done, done + 1].map(|part| part as f64 / count);
         let part = ProgressSpan { from, to, name: STUDY_LENSES[i].name };
         let pair =
-            ProjectionComparison::of(STUDY_LENSES[i], seeds, read[read.len() - 1], part, watch)?;
+            ProjectionComparison::of(STUDY_LENSES[i], seeds, read[read.len() - 1], part, progress)?;
         for (k, gradients) in read.iter().enumerate() {
             outcome.claims.push(effort.select(pair.claim(*gradients), pair.gains(*gradients)));
             pair.rows(&mut table, *gradients, THESIS[i].map(|side| side[k]));
@@ -102,7 +105,7 @@ impl ProjectionComparison {
         seeds: u64,
         gradients: u64,
         part: ProgressSpan<'_>,
-        watch: &mut ProgressFn<'_>,
+        progress: &mut ProgressFn<'_>,
     ) -> Result<Self, ExperimentError> {
         let start = at_heights(subject.file)?;
         let mut all = Vec::new();
@@ -114,7 +117,7 @@ impl ProjectionComparison {
                 all.push(RecordedSearch::new(&start, &plan)?);
             }
         }
-        run_to_end(&mut all, part, watch)?;
+        run_to_end(&mut all, part, progress)?;
         let without = all.split_off(seeds as usize);
         Ok(Self { subject, sides: [all, without] })
     }
@@ -122,7 +125,7 @@ impl ProjectionComparison {
     /// The mean fraction of a side, and the minimum and maximum of all seeds.
     fn share(&self, side: usize, gradients: u64) -> [f64; 3] {
         let shares: Vec<f64> =
-            self.sides[side].iter().map(|course| course.share_after(gradients)).collect();
+            self.sides[side].iter().map(|search| search.share_after(gradients)).collect();
         let mean = shares.iter().sum::<f64>() / shares.len() as f64;
         let least = shares.iter().copied().fold(f64::INFINITY, f64::min);
         [mean, least, shares.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
@@ -131,14 +134,14 @@ impl ProjectionComparison {
     /// The fraction of the moves after a mutation to a lens better than the start, over all seeds;
     /// NaN without such moves.
     fn share_of_mutants(&self, side: usize, gradients: u64) -> f64 {
-        let counts = self.sides[side].iter().map(|course| course.mutation_moves_after(gradients));
+        let counts = self.sides[side].iter().map(|search| search.mutation_moves_after(gradients));
         let [better, moves] = counts.fold([0, 0], |sum, n| [0, 1].map(|i| sum[i] + n[i]));
         better as f64 / moves as f64
     }
 
     /// The mean of the best losses of a side over all seeds.
     fn best(&self, side: usize, gradients: u64) -> f64 {
-        let best = self.sides[side].iter().map(|course| course.best_after(gradients));
+        let best = self.sides[side].iter().map(|search| search.best_after(gradients));
         best.sum::<f64>() / self.sides[side].len() as f64
     }
 
@@ -160,8 +163,8 @@ impl ProjectionComparison {
     fn rows(&self, table: &mut DataTable, gradients: u64, thesis: [f64; 2]) {
         for (side, (_, name)) in SIDES.iter().enumerate() {
             let [mean, least, most] = self.share(side, gradients);
-            let born = |course: &RecordedSearch| {
-                let seen = course.marks.iter().take_while(|mark| mark.gradients <= gradients);
+            let born = |search: &RecordedSearch| {
+                let seen = search.marks.iter().take_while(|mark| mark.gradients <= gradients);
                 seen.map(|mark| mark.generation + 1).max().unwrap_or(1) as f64
             };
             let generations = self.sides[side].iter().map(born).sum::<f64>();
@@ -179,8 +182,8 @@ impl ProjectionComparison {
     fn moves(&self) -> DataTable {
         let columns = ["mutations", "gradients", "generation", "began_with", "merit", "best"];
         let mut table = DataTable::new("moves", &columns);
-        for (courses, (_, name)) in self.sides.iter().zip(SIDES) {
-            for mark in &courses[0].marks {
+        for (searches, (_, name)) in self.sides.iter().zip(SIDES) {
+            for mark in &searches[0].marks {
                 let kind = mark.kind.map_or("start", MutationKind::name);
                 let numbers = [mark.gradients as f64, mark.generation as f64].map(TableCell::from);
                 let merits = [mark.loss.unwrap_or(f64::NAN), mark.best].map(TableCell::from);

@@ -112,17 +112,17 @@ impl RecordedSearch {
 
 /// Runs searches in parallel until all of them have ended.
 pub(super) fn run_to_end(
-    courses: &mut [RecordedSearch],
+    searches: &mut [RecordedSearch],
     part: ProgressSpan<'_>,
-    watch: &mut ProgressFn<'_>,
+    progress: &mut ProgressFn<'_>,
 ) -> Result<(), ExperimentError> {
     loop {
         let done: f64 =
-            courses.iter().map(RecordedSearch::done).sum::<f64>() / courses.len() as f64;
-        report_progress(watch, part.from + (part.to - part.from) * done, part.name)?;
-        if courses.iter().all(|course| course.run.end_reason().is_some()) {
+            searches.iter().map(RecordedSearch::done).sum::<f64>() / searches.len() as f64;
+        report_progress(progress, part.from + (part.to - part.from) * done, part.name)?;
+        if searches.iter().all(|search| search.run.end_reason().is_some()) {
             return Ok(());
         }
-        courses.par_iter_mut().for_each(RecordedSearch::advance);
+        searches.par_iter_mut().for_each(RecordedSearch::advance);
     }
 }

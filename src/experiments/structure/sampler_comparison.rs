@@ -73,7 +73,7 @@ struct LensComparison {
     /// The loss of the starting lens.
     start: f64,
     /// The searches of each sampler, one for each seed.
-    courses: Vec<(SamplerKind, Vec<RecordedSearch>)>,
+    searches: Vec<(SamplerKind, Vec<RecordedSearch>)>,
 }
 
 impl SamplerComparison {
@@ -84,27 +84,27 @@ impl SamplerComparison {
 
     pub(super) fn run(
         &self,
-        watch: &mut ProgressFn<'_>,
+        progress: &mut ProgressFn<'_>,
     ) -> Result<ExperimentOutcome, ExperimentError> {
         let mut outcome = ExperimentOutcome::default();
-        let mut heats = Vec::new();
+        let mut comparisons = Vec::new();
         for (i, subject) in self.subjects().iter().enumerate() {
             let [from, to] = [i, i + 1].map(|part| part as f64 / self.lenses as f64);
-            heats.push(self.compare_lens(
+            comparisons.push(self.compare_lens(
                 *subject,
                 ProgressSpan { from, to, name: subject.name },
-                watch,
+                progress,
             )?);
         }
-        for heat in &heats {
-            outcome.claims.extend(self.claims(heat));
-            let all = heat.courses.iter().flat_map(|(_, courses)| courses);
+        for comparison in &comparisons {
+            outcome.claims.extend(self.claims(comparison));
+            let all = comparison.searches.iter().flat_map(|(_, searches)| searches);
             outcome.rays += all.map(RecordedSearch::rays).sum::<usize>();
         }
-        outcome.tables.push(final_table(&heats));
-        outcome.tables.push(self.curves(&heats));
-        outcome.pictures.push(NamedPlot { name: "merit", canvas: self.draw(&heats) });
-        outcome.lenses.extend(heats.iter().filter_map(LensComparison::best));
+        outcome.tables.push(final_table(&comparisons));
+        outcome.tables.push(self.curves(&comparisons));
+        outcome.pictures.push(NamedPlot { name: "merit", canvas: self.draw(&comparisons) });
+        outcome.lenses.extend(comparisons.iter().filter_map(LensComparison::best));
         Ok(outcome)
     }
 
@@ -117,34 +117,34 @@ impl SamplerComparison {
         &self,
         subject: StudyLens,
         part: ProgressSpan<'_>,
-        watch: &mut ProgressFn<'_>,
+        progress: &mut ProgressFn<'_>,
     ) -> Result<LensComparison, ExperimentError> {
         let start = at_heights(subject.file)?;
         let plan = plan(&start, rules(), self.gradients)?;
         let mut all = Vec::new();
-        for runner in self.samplers {
+        for sampler in self.samplers {
             for seed in 1..=self.seeds {
-                all.push(RecordedSearch::new(&start, &runner.plan(&plan, seed))?);
+                all.push(RecordedSearch::new(&start, &sampler.plan(&plan, seed))?);
             }
         }
-        run_to_end(&mut all, part, watch)?;
+        run_to_end(&mut all, part, progress)?;
         let loss = all[0].start();
         let mut rest = all.into_iter();
         let of_each =
-            |runner: &SamplerKind| (*runner, rest.by_ref().take(self.seeds as usize).collect());
-        let courses = self.samplers.iter().map(of_each).collect();
-        Ok(LensComparison { subject, start: loss, courses })
+            |sampler: &SamplerKind| (*sampler, rest.by_ref().take(self.seeds as usize).collect());
+        let searches = self.samplers.iter().map(of_each).collect();
+        Ok(LensComparison { subject, start: loss, searches })
     }
 
-    fn claims(&self, heat: &LensComparison) -> Vec<Claim> {
-        let first = heat.final_losses(self.samplers[0]);
+    fn claims(&self, comparison: &LensComparison) -> Vec<Claim> {
+        let first = comparison.final_losses(self.samplers[0]);
         let claim = |rival: &SamplerKind| {
-            let other = heat.final_losses(*rival);
+            let other = comparison.final_losses(*rival);
             let below = first.iter().zip(&other).filter(|(own, other)| own < other).count();
             let names = [self.samplers[0], *rival].map(SamplerKind::name);
             let says = format!(
                 "{}: seeds of {} with which {} ends below {}",
-                heat.subject.name, self.seeds, names[0], names[1]
+                comparison.subject.name, self.seeds, names[0], names[1]
             );
             Claim::at_least(says, below as f64, self.required_seeds())
         };
@@ -157,14 +157,14 @@ impl SamplerComparison {
         (0..=POINTS).map(move |i| limit * i / POINTS)
     }
 
-    fn curves(&self, heats: &[LensComparison]) -> DataTable {
+    fn curves(&self, comparisons: &[LensComparison]) -> DataTable {
         let columns = ["lens", "sampler", "gradients", "median", "least", "most"];
         let mut table = DataTable::new("curves", &columns);
-        for heat in heats {
-            for (runner, courses) in &heat.courses {
+        for comparison in comparisons {
+            for (sampler, searches) in &comparison.searches {
                 for gradients in self.gradient_counts() {
-                    let [least, median, most] = spread(courses, gradients);
-                    let words = [heat.subject.name, runner.name()].map(TableCell::from);
+                    let [least, median, most] = spread(searches, gradients);
+                    let words = [comparison.subject.name, sampler.name()].map(TableCell::from);
                     let numbers = [gradients as f64, median, least, most].map(TableCell::from);
                     table.push_row(words.into_iter().chain(numbers));
                 }
@@ -174,40 +174,41 @@ impl SamplerComparison {
     }
 
     /// Draws the best merit relative to the start for every lens: median, best and worst seed.
-    fn draw(&self, heats: &[LensComparison]) -> Canvas {
-        let rows = heats.len().div_ceil(2) as u32;
+    fn draw(&self, comparisons: &[LensComparison]) -> Canvas {
+        let rows = comparisons.len().div_ceil(2) as u32;
         let mut canvas = Canvas::new([1500, 140 + 620 * rows]);
-        for (i, runner) in self.samplers.iter().enumerate() {
+        for (i, sampler) in self.samplers.iter().enumerate() {
             let x = 120.0 + 340.0 * i as f64;
             let color = PALETTE[i % PALETTE.len()];
             canvas.curve(&[[x, 27.0], [x + 40.0, 27.0]], color, Stroke::Solid);
-            canvas.text([x + 52.0, 20.0], runner.name(), BLACK, TextAlign::Left);
+            canvas.text([x + 52.0, 20.0], sampler.name(), BLACK, TextAlign::Left);
         }
         let note = "solid: middle seed; dashed: best and worst";
         canvas.text([120.0, 52.0], note, BLACK, TextAlign::Left);
-        for (i, heat) in heats.iter().enumerate() {
+        for (i, comparison) in comparisons.iter().enumerate() {
             let left = 120.0 + 740.0 * (i % 2) as f64;
             let top = 160.0 + 620.0 * (i / 2) as f64;
-            self.draw_lens(&mut canvas, heat, [left, top]);
+            self.draw_lens(&mut canvas, comparison, [left, top]);
         }
         canvas
     }
 
-    fn draw_lens(&self, canvas: &mut Canvas, heat: &LensComparison, [left, top]: [f64; 2]) {
-        let all = heat.courses.iter().flat_map(|(_, courses)| courses);
-        let lowest = all.map(|course| course.run.best().loss / heat.start);
+    fn draw_lens(&self, canvas: &mut Canvas, comparison: &LensComparison, [left, top]: [f64; 2]) {
+        let all = comparison.searches.iter().flat_map(|(_, searches)| searches);
+        let lowest = all.map(|search| search.run.best().loss / comparison.start);
         let chart = Chart::new(
             [left, top],
             [left + 580.0, top + 440.0],
             Axis::linear("gradients", [0.0, self.gradients as f64]),
             Axis::logarithmic("best merit / start", lowest.chain([1.0]), 1e-9),
         );
-        chart.draw(canvas, heat.subject.name);
-        for (i, (_, courses)) in heat.courses.iter().enumerate() {
+        chart.draw(canvas, comparison.subject.name);
+        for (i, (_, searches)) in comparison.searches.iter().enumerate() {
             let color = PALETTE[i % PALETTE.len()];
             let strokes = [Stroke::Dashed, Stroke::Solid, Stroke::Dashed];
             for (k, stroke) in strokes.into_iter().enumerate() {
-                let at = |g: u64| chart.to_pixel([g as f64, spread(courses, g)[k] / heat.start]);
+                let at =
+                    |g: u64| chart.to_pixel([g as f64, spread(searches, g)[k] / comparison.start]);
                 let points: Vec<[f64; 2]> = self.gradient_counts().map(at).collect();
                 canvas.curve(&points, color, stroke);
             }
@@ -220,41 +221,41 @@ const POINTS: u64 = 100;
 
 impl LensComparison {
     /// The final best losses of a sampler, by seed.
-    fn final_losses(&self, runner: SamplerKind) -> Vec<f64> {
-        let own = self.courses.iter().find(|(other, _)| *other == runner);
-        own.map_or(Vec::new(), |(_, courses)| courses.iter().map(|c| c.run.best().loss).collect())
+    fn final_losses(&self, sampler: SamplerKind) -> Vec<f64> {
+        let own = self.searches.iter().find(|(other, _)| *other == sampler);
+        own.map_or(Vec::new(), |(_, searches)| searches.iter().map(|c| c.run.best().loss).collect())
     }
 
     /// The best lens of all, with its name.
     fn best(&self) -> Option<(String, crate::lens::Lens)> {
-        let all = self.courses.iter().flat_map(|(_, courses)| courses);
+        let all = self.searches.iter().flat_map(|(_, searches)| searches);
         let best = all.min_by(|a, b| a.run.best().loss.total_cmp(&b.run.best().loss))?;
         Some((self.subject.file.to_owned(), best.run.best().point.clone()))
     }
 }
 
 /// The minimum, median and maximum of the best losses of all seeds after a number of gradients.
-fn spread(courses: &[RecordedSearch], gradients: u64) -> [f64; 3] {
-    let mut all: Vec<f64> = courses.iter().map(|course| course.best_after(gradients)).collect();
+fn spread(searches: &[RecordedSearch], gradients: u64) -> [f64; 3] {
+    let mut all: Vec<f64> = searches.iter().map(|search| search.best_after(gradients)).collect();
     all.sort_by(f64::total_cmp);
     [0, all.len() / 2, all.len() - 1].map(|place| all[place])
 }
 
 /// The table of the final losses of all searches.
-fn final_table(heats: &[LensComparison]) -> DataTable {
+fn final_table(comparisons: &[LensComparison]) -> DataTable {
     let columns =
         ["lens", "sampler", "seed", "gradients", "generations", "start", "best", "elements"];
     let mut table = DataTable::new("ends", &columns);
-    for heat in heats {
-        for (runner, courses) in &heat.courses {
-            for course in courses {
-                let run = &course.run;
-                let words = [heat.subject.name, runner.name()].map(TableCell::from);
+    for comparison in comparisons {
+        for (sampler, searches) in &comparison.searches {
+            for search in searches {
+                let run = &search.run;
+                let words = [comparison.subject.name, sampler.name()].map(TableCell::from);
                 let numbers = [
                     run.settings().seed as f64,
                     run.statistics().gradients as f64,
                     run.lineage().total() as f64,
-                    heat.start,
+                    comparison.start,
                     run.best().loss,
                 ];
                 let row = words.into_iter().chain(numbers.map(TableCell::from));
