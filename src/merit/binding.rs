@@ -331,7 +331,7 @@ fn index_slope(lens: &Lens, surface: usize, um: f64) -> f64 {
 /// that follow it and the image plane.
 fn followers_of_index(lens: &Lens, surface: usize, parameter: SurfaceParameter) -> Vec<usize> {
     let mut all = vec![surface];
-    if target == SurfaceParameter::Index {
+    if parameter == SurfaceParameter::Index {
         let mirrors =
             lens.surfaces[surface + 1..].iter().take_while(|r| r.medium == Medium::Mirror);
         all.extend((1..=mirrors.count()).map(|i| surface + i));
