@@ -1,32 +1,33 @@
-//! The studio: one session, the panels that show it, the menu, and the questions before something
-//! would be lost.
+//! The studio: one session, the panels that show it, the menu, and the dialogs.
 
 use std::path::{Path, PathBuf};
 
-use eframe::egui::{
+use eframe::{App, Storage};
+use egui::{
     Align, CentralPanel, Context, Frame, Id, Label, Layout, Margin, Modal, Panel as Side, Response,
     RichText, ScrollArea, Ui, ViewportCommand,
 };
-use eframe::{App, Storage};
 
-use super::chooser::{FileDialog, FileRequest};
+use super::actions::{Actions, UiAction};
 use super::dock::Dock;
 use super::draw::RenderBackend;
-use super::experiment::ExperimentWindow;
-use super::menu::{self, UiAction};
-use super::shell::Persistence;
+use super::experiment_window::ExperimentWindow;
+use super::file_dialog::{FileDialog, FileRequest};
+use super::menu;
+use super::text::{capitalize, counted_from_one};
 use super::unsaved::{PendingAction, PendingState};
-use super::wording::{capitalize, counted_from_one};
+use super::window::Persistence;
 use crate::files;
+use crate::files::BundledLens;
 use crate::session::{
     Command, DocumentSource, GrinCommand, Message, Session, SessionEvent, SessionView, Severity,
     StructureSearchCommand,
 };
 
-/// Under which name the arrangement of the panels is remembered.
+/// The key under which the arrangement of the panels is stored.
 const DOCK: &str = "dock";
 
-/// All of the window.
+/// The content of the window.
 #[derive(Debug)]
 pub struct Studio {
     pub(super) session: Session,
@@ -34,30 +35,30 @@ pub struct Studio {
     pub(super) file_dialog: FileDialog,
     experiment_window: ExperimentWindow,
     persistence: Persistence,
-    /// What waits for the answer to whether changes may be lost.
+    /// The action that waits until the user has decided about unsaved changes.
     pub(super) pending: Option<PendingState>,
-    /// A message too long for the line at the bottom.
+    /// A message that does not fit into the status bar.
     message: Option<String>,
     title: String,
-    /// The window closes although changes are lost.
+    /// True if the window closes without asking about unsaved changes.
     pub(super) closing: bool,
 }
 
 impl Studio {
-    /// A studio on a session. `unfinished` is where the last window has left the panels.
+    /// A studio on a session. `storage` holds the arrangement of the panels of an earlier window.
     pub fn new(
         session: Session,
-        backing: RenderBackend,
-        memory: Persistence,
-        left: Option<&dyn Storage>,
+        backend: RenderBackend,
+        persistence: Persistence,
+        storage: Option<&dyn Storage>,
     ) -> Self {
-        let tree = left.and_then(|storage| eframe::get_value(storage, DOCK));
+        let tree = storage.and_then(|storage| eframe::get_value(storage, DOCK));
         Self {
             session,
-            dock: Dock::new(backing, tree),
+            dock: Dock::new(backend, tree),
             file_dialog: FileDialog::default(),
             experiment_window: ExperimentWindow::default(),
-            persistence: memory,
+            persistence,
             pending: None,
             message: None,
             title: String::new(),
@@ -65,115 +66,73 @@ impl Studio {
         }
     }
 
-    /// What the studio works on.
+    /// The session.
     pub const fn session(&self) -> &Session {
         &self.session
     }
 
-    /// Lets the window close although changes are lost.
+    /// Lets the window close without asking about unsaved changes.
     pub const fn close_without_asking(&mut self) {
         self.closing = true;
     }
 
-    /// The same, to be told commands directly.
+    /// The session, to run commands directly.
     pub const fn session_mut(&mut self) -> &mut Session {
         &mut self.session
     }
 
-    /// Does what a command says, as a panel would ask for it.
+    /// Runs a command as if a panel had asked for it.
     pub fn apply(&mut self, context: &Context, command: Command) {
         let events = self.session.apply(command);
         self.on_events(events);
         context.request_repaint();
     }
 
-    /// Shows the whole window and does what is wished in it.
+    /// Shows the whole window and carries out the requests made in it.
     pub fn ui(&mut self, ui: &mut Ui) {
         let events = self.session.poll();
         self.on_events(events);
         let view = self.session.view();
         self.update_title(ui.ctx(), &view);
-        let mut wishes = menu::shortcut_actions(ui, &view, self.dock.is_typing(ui.ctx()));
-        bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut wishes));
-        bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut wishes));
-        let mut commands = Vec::new();
-        CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut commands));
-        wishes.extend(commands.into_iter().map(UiAction::Run));
+        let mut actions = Actions::default();
+        menu::shortcuts(ui, &view, self.dock.is_typing(ui.ctx()), &mut actions);
+        bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut actions));
+        bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut actions));
+        CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut actions));
         let context = ui.ctx().clone();
-        self.experiment_window.ui(&context, view.experiment.as_deref(), &mut wishes);
+        self.experiment_window.ui(&context, view.experiment.as_deref(), &mut actions);
         self.dialogs(&context, &view);
-        for wish in wishes {
-            self.dispatch(&context, &view, wish);
+        for action in actions {
+            self.dispatch(&context, &view, action);
         }
     }
 
-    fn dispatch(&mut self, context: &Context, view: &SessionView, wish: UiAction) {
-        match wish {
-            UiAction::Run(Command::ExportPareto(None)) => {
-                let folder = view.path.as_deref().map(|path| path.with_file_name("front"));
-                let folder = folder.unwrap_or_else(|| PathBuf::from("front"));
-                self.file_dialog.ask(context, FileRequest::ExportFront, Some(&folder));
-            }
-            UiAction::Run(Command::StructureSearch(wish)) => {
-                self.dispatch_search(context, view, wish)
-            }
-            UiAction::Run(Command::Grin(GrinCommand::OpenFile(None))) => {
-                self.file_dialog.ask(context, FileRequest::OpenField, open_field_path(view));
-            }
-            UiAction::Run(Command::Grin(GrinCommand::Save { path: None, nodes })) => {
-                self.ask_field_path(context, view, nodes);
-            }
-            UiAction::AskPath(purpose) => {
-                self.file_dialog.ask(context, purpose, view.path.as_deref())
-            }
-            UiAction::Bundled(bundled) => match files::parse(bundled.text.as_bytes(), bundled.name)
-            {
-                Ok(opened) => {
-                    let command = Command::New(Box::new(opened.lens));
-                    self.run_or_ask(context, PendingAction::Run(command), None);
-                }
-                Err(why) => self.message = Some(why.to_string()),
-            },
+    fn dispatch(&mut self, context: &Context, view: &SessionView, action: UiAction) {
+        match action {
             UiAction::Run(command) => self.run_or_ask(context, PendingAction::Run(command), None),
+            UiAction::AskPath(request) => self.ask_path(context, view, request),
+            UiAction::OpenBundled(bundled) => self.open_bundled(context, bundled),
         }
     }
 
-    /// Asks for the file of the field.
-    pub(super) fn ask_field_path(&mut self, context: &Context, view: &SessionView, nodes: usize) {
-        let field = open_field_path(view).map(|path| path.with_extension("npz"));
-        let field = field.unwrap_or_else(|| PathBuf::from("field.npz"));
-        self.file_dialog.ask(context, FileRequest::SaveField(nodes), Some(&field));
+    fn open_bundled(&mut self, context: &Context, bundled: &BundledLens) {
+        match files::parse(bundled.text.as_bytes(), bundled.name) {
+            Ok(opened) => {
+                let command = Command::New(Box::new(opened.lens));
+                self.run_or_ask(context, PendingAction::Run(command), None);
+            }
+            Err(why) => self.message = Some(why.to_string()),
+        }
     }
 
-    /// Does what is asked of a search, a file being chosen first where one is needed.
-    fn dispatch_search(
-        &mut self,
-        context: &Context,
-        view: &SessionView,
-        wish: StructureSearchCommand,
-    ) {
-        let known = &view.structure_search;
-        let saved = known.run.as_ref().and_then(|run| run.checkpoint.path.as_deref());
-        match wish {
-            StructureSearchCommand::ResumeFrom(None) => {
-                let near = saved.or(known.unfinished.as_deref());
-                self.file_dialog.ask(context, FileRequest::OpenSearch, near);
-            }
-            StructureSearchCommand::SaveTo(None) => {
-                let near = saved.or(known.save_path.as_deref());
-                self.file_dialog.ask(context, FileRequest::SaveSearch, near);
-            }
-            StructureSearchCommand::Export { number, path: None } => {
-                let near = view.path.as_deref();
-                self.file_dialog.ask(context, FileRequest::ExportSearchLens(number), near);
-            }
-            wish => self.apply(context, Command::StructureSearch(wish)),
-        }
+    /// Asks for a path, starting from the one that is most likely meant.
+    pub(super) fn ask_path(&mut self, context: &Context, view: &SessionView, request: FileRequest) {
+        self.file_dialog.ask(context, request, likely_path(view, request).as_deref());
     }
 
     fn dialogs(&mut self, context: &Context, view: &SessionView) {
-        if let Some((purpose, path)) = self.file_dialog.ui(context) {
-            self.on_path_chosen(context, purpose, path);
+        if let Some((request, path)) = self.file_dialog.ui(context) {
+            self.on_path_chosen(context, request, path);
         }
         let closing = context.input(|input| input.viewport().close_requested());
         if closing && !self.closing && self.would_discard(&PendingAction::Quit) {
@@ -184,48 +143,28 @@ impl Studio {
         self.show_message(context);
     }
 
-    fn on_path_chosen(&mut self, context: &Context, purpose: FileRequest, path: PathBuf) {
-        match purpose {
-            FileRequest::Open => {
-                self.run_or_ask(context, PendingAction::Run(Command::Open(path)), None)
-            }
-            FileRequest::ExperimentFolder => self.apply(context, Command::SaveExperiment(path)),
-            FileRequest::Save => self.apply(context, Command::Save(Some(path))),
-            FileRequest::ExportFront => self.apply(context, Command::ExportPareto(Some(path))),
-            FileRequest::OpenSearch => {
-                self.apply(
-                    context,
-                    Command::StructureSearch(StructureSearchCommand::ResumeFrom(Some(path))),
-                );
-            }
-            FileRequest::SaveSearch => {
-                self.apply(
-                    context,
-                    Command::StructureSearch(StructureSearchCommand::SaveTo(Some(path))),
-                );
-            }
+    fn on_path_chosen(&mut self, context: &Context, request: FileRequest, path: PathBuf) {
+        let search = Command::StructureSearch;
+        let command = match request {
+            FileRequest::Open => Command::Open(path),
+            FileRequest::ExperimentFolder => Command::SaveExperiment(path),
+            FileRequest::Save => Command::Save(Some(path)),
+            FileRequest::ExportFront => Command::ExportPareto(Some(path)),
+            FileRequest::OpenSearch => search(StructureSearchCommand::ResumeFrom(Some(path))),
+            FileRequest::SaveSearch => search(StructureSearchCommand::SaveTo(Some(path))),
             FileRequest::ExportSearchLens(number) => {
-                let path = Some(path);
-                self.apply(
-                    context,
-                    Command::StructureSearch(StructureSearchCommand::Export { number, path }),
-                );
+                search(StructureSearchCommand::Export { number, path: Some(path) })
             }
-            FileRequest::OpenField => {
-                let command = Command::Grin(GrinCommand::OpenFile(Some(path)));
-                self.run_or_ask(context, PendingAction::Run(command), None);
-            }
+            FileRequest::OpenField => Command::Grin(GrinCommand::OpenFile(Some(path))),
             FileRequest::SaveField(nodes) => {
-                let path = Some(path);
-                self.apply(context, Command::Grin(GrinCommand::Save { path, nodes }));
+                Command::Grin(GrinCommand::Save { path: Some(path), nodes })
             }
-            FileRequest::ExportZemax | FileRequest::ExportJson => {
-                self.apply(context, Command::Export(path));
-            }
-        }
+            FileRequest::ExportZemax | FileRequest::ExportJson => Command::Export(path),
+        };
+        self.run_or_ask(context, PendingAction::Run(command), None);
     }
 
-    /// Notes what is too much for the line at the bottom.
+    /// Keeps a message that does not fit into the status bar for the dialog.
     fn on_events(&mut self, events: Vec<SessionEvent>) {
         for event in events {
             if let SessionEvent::Said(message) = event
@@ -236,7 +175,7 @@ impl Studio {
         }
     }
 
-    /// Shows a report or an error until it is closed.
+    /// Shows a long message or an error until it is closed.
     fn show_message(&mut self, context: &Context) {
         let Some(text) = &self.message else { return };
         let mut read = false;
@@ -269,13 +208,13 @@ impl Studio {
         }
     }
 
-    /// The line at the bottom: the last message, and how old the numbers are.
-    fn status_bar(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
+    /// The line at the bottom: the last message, and the time of the analysis.
+    fn status_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         ui.horizontal(|ui| {
-            messages(ui, &view.messages, wishes);
+            messages(ui, &view.messages, actions);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 ui.weak(timing_text(view))
-                    .on_hover_text("How long all numbers of all panels took after the last change");
+                    .on_hover_text("Time to compute all numbers of all panels after the last edit");
                 if view.dirty {
                     ui.separator();
                     ui.weak("unsaved changes");
@@ -301,6 +240,26 @@ impl App for Studio {
     }
 }
 
+/// The path with which a file dialog starts.
+fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
+    let search = &view.structure_search;
+    let checkpoint = || search.run.as_ref().and_then(|run| run.checkpoint.path.clone());
+    match request {
+        FileRequest::ExportFront => {
+            let beside = view.path.as_ref().map(|path| path.with_file_name("front"));
+            Some(beside.unwrap_or_else(|| PathBuf::from("front")))
+        }
+        FileRequest::OpenSearch => checkpoint().or_else(|| search.unfinished.clone()),
+        FileRequest::SaveSearch => checkpoint().or_else(|| search.save_path.clone()),
+        FileRequest::OpenField => open_field_path(view).map(Path::to_owned),
+        FileRequest::SaveField(_) => {
+            let beside = open_field_path(view).map(|path| path.with_extension("npz"));
+            Some(beside.unwrap_or_else(|| PathBuf::from("field.npz")))
+        }
+        _ => view.path.clone(),
+    }
+}
+
 /// The file of the gradient-index field that is open.
 fn open_field_path(view: &SessionView) -> Option<&Path> {
     match &view.grin.run.as_ref()?.document.source {
@@ -314,8 +273,8 @@ fn bar_frame(ui: &mut Ui, side: Side, show: impl FnOnce(&mut Ui)) {
     side.frame(frame).show_separator_line(false).show(ui, show);
 }
 
-/// The last message, and a button for those before it.
-fn messages(ui: &mut Ui, messages: &[Message], wishes: &mut Vec<UiAction>) {
+/// The last message, and a menu of all messages.
+fn messages(ui: &mut Ui, messages: &[Message], actions: &mut Actions) {
     let Some(last) = messages.last() else {
         ui.weak("Ready");
         return;
@@ -325,8 +284,8 @@ fn messages(ui: &mut Ui, messages: &[Message], wishes: &mut Vec<UiAction>) {
         ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
             messages.iter().rev().for_each(|message| drop(message_label(ui, message)));
         });
-        if ui.button("Forget all").clicked() {
-            wishes.push(UiAction::Run(Command::ClearMessages));
+        if ui.button("Clear").clicked() {
+            actions.push(Command::ClearMessages);
             ui.close();
         }
     });

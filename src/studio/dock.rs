@@ -1,12 +1,13 @@
 //! The arrangement of the panels: tabs that can be dragged side by side, on top of each other, or
 //! closed and opened again from the menu.
 
-use eframe::egui::{Color32, Context, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText};
+use egui::{Color32, Context, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles,
     Tree, UiResponse,
 };
 
+use super::actions::Actions;
 use super::draw::RenderBackend;
 use super::panels::{Panel, PanelKind};
 use crate::session::{Command, GrinCommand, SessionView};
@@ -75,16 +76,16 @@ impl Dock {
     }
 
     /// Shows all panels.
-    pub fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    pub fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Self { tree, panels } = self;
-        tree.ui(&mut DockFrame { panels, view, commands: wishes }, ui);
+        tree.ui(&mut DockFrame { panels, view, actions }, ui);
         let pupils = self.is_visible(PanelKind::Pupil);
         if pupils != view.settings.pupils {
-            wishes.push(Command::ShowPupils(pupils));
+            actions.push(Command::ShowPupils(pupils));
         }
         let watched = self.is_visible(PanelKind::Slice);
         if watched != view.grin.is_active {
-            wishes.push(Command::Grin(GrinCommand::SetActive(watched)));
+            actions.push(Command::Grin(GrinCommand::SetActive(watched)));
         }
     }
 }
@@ -141,7 +142,7 @@ fn linear_tile(
 struct DockFrame<'a> {
     panels: &'a mut Vec<(PanelKind, Box<dyn Panel>)>,
     view: &'a SessionView,
-    commands: &'a mut Vec<Command>,
+    actions: &'a mut Actions,
 }
 
 impl Behavior<PanelKind> for DockFrame<'_> {
@@ -151,7 +152,7 @@ impl Behavior<PanelKind> for DockFrame<'_> {
             let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::same(5));
             frame.show(ui, |ui| {
                 ui.set_min_size(ui.available_size());
-                panel.ui(ui, self.view, self.commands);
+                panel.ui(ui, self.view, self.actions);
             });
         }
         UiResponse::None

@@ -1,28 +1,18 @@
 //! The menu bar and its keys.
 
-use eframe::egui::{
+use egui::{
     Align, Button, Key, KeyboardShortcut, Layout, MenuBar, Modifiers, Theme, Ui, ViewportCommand,
 };
 
-use super::chooser::FileRequest;
+use super::actions::{Actions, UiAction};
 use super::dock::Dock;
-use super::experiment;
+use super::experiment_window;
+use super::file_dialog::FileRequest;
 use super::panels::PanelKind;
-use super::wording::counted_from_one;
-use crate::files::{self, BundledLens};
+use super::text::counted_from_one;
+use crate::files::{self};
 use crate::lens::blank;
 use crate::session::{Command, SessionView};
-
-/// What the menu asks for.
-#[derive(Debug)]
-pub(super) enum UiAction {
-    /// A change of the design.
-    Run(Command),
-    /// A lens that comes with the program.
-    Bundled(&'static BundledLens),
-    /// A file has to be chosen first.
-    AskPath(FileRequest),
-}
 
 const fn control(key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND, key)
@@ -41,56 +31,50 @@ const UNDO: KeyboardShortcut = control(Key::Z);
 const REDO: KeyboardShortcut = control_shift(Key::Z);
 const REDO_TOO: KeyboardShortcut = control(Key::Y);
 
-/// What the keys ask for. Undo and redo are left to a field while something is typed into it.
-pub(super) fn shortcut_actions(ui: &Ui, view: &SessionView, typing: bool) -> Vec<UiAction> {
+/// Collects what shortcuts ask for. Undo and redo are left to a text field that is being edited.
+pub(super) fn shortcuts(ui: &Ui, view: &SessionView, typing: bool, actions: &mut Actions) {
     let pressed = |key: &KeyboardShortcut| ui.input_mut(|input| input.consume_shortcut(key));
-    let mut wishes = Vec::new();
     // A shortcut with Shift also contains the one without: the longer ones are asked first.
     if pressed(&SAVE_AS) {
-        wishes.push(UiAction::AskPath(FileRequest::Save));
+        actions.push(FileRequest::Save);
     }
     if pressed(&SAVE) {
-        wishes.push(save_action(view));
+        actions.push(save_action(view));
     }
     if pressed(&OPEN) {
-        wishes.push(UiAction::AskPath(FileRequest::Open));
+        actions.push(FileRequest::Open);
     }
     if pressed(&EXPORT) {
-        wishes.push(UiAction::AskPath(FileRequest::ExportZemax));
+        actions.push(FileRequest::ExportZemax);
     }
     if pressed(&NEW) {
-        wishes.push(new_lens_action());
+        actions.push(new_lens());
     }
     if !typing && (pressed(&REDO) || pressed(&REDO_TOO)) {
-        wishes.push(UiAction::Run(Command::Redo));
+        actions.push(Command::Redo);
     }
     if !typing && pressed(&UNDO) {
-        wishes.push(UiAction::Run(Command::Undo));
+        actions.push(Command::Undo);
     }
-    wishes
 }
 
-fn new_lens_action() -> UiAction {
-    UiAction::Run(Command::New(Box::new(blank())))
+fn new_lens() -> Command {
+    Command::New(Box::new(blank()))
 }
 
 fn save_action(view: &SessionView) -> UiAction {
-    if view.path.is_some() {
-        UiAction::Run(Command::Save(None))
-    } else {
-        UiAction::AskPath(FileRequest::Save)
-    }
+    if view.path.is_some() { Command::Save(None).into() } else { FileRequest::Save.into() }
 }
 
 /// Shows the menu bar.
-pub(super) fn bar(ui: &mut Ui, view: &SessionView, dock: &mut Dock, wishes: &mut Vec<UiAction>) {
+pub(super) fn bar(ui: &mut Ui, view: &SessionView, dock: &mut Dock, actions: &mut Actions) {
     MenuBar::new().ui(ui, |ui| {
-        ui.menu_button("File", |ui| file_menu(ui, view, wishes));
-        ui.menu_button("Edit", |ui| edit_menu(ui, view, wishes));
+        ui.menu_button("File", |ui| file_menu(ui, view, actions));
+        ui.menu_button("Edit", |ui| edit_menu(ui, view, actions));
         ui.menu_button("View", |ui| view_menu(ui, dock));
-        ui.menu_button("Experiments", |ui| experiment::menu(ui, wishes));
+        ui.menu_button("Experiments", |ui| experiment_window::menu(ui, actions));
         ui.separator();
-        undo_buttons(ui, view, wishes);
+        undo_buttons(ui, view, actions);
         ui.with_layout(Layout::right_to_left(Align::Center), theme_button);
     });
 }
@@ -107,37 +91,37 @@ fn item(ui: &mut Ui, text: &str, key: Option<&KeyboardShortcut>) -> bool {
     clicked
 }
 
-fn file_menu(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
+fn file_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     ui.set_min_width(210.0);
     if item(ui, "New", Some(&NEW)) {
-        wishes.push(new_lens_action());
+        actions.push(new_lens());
     }
     if item(ui, "Open or import…", Some(&OPEN)) {
-        wishes.push(UiAction::AskPath(FileRequest::Open));
+        actions.push(FileRequest::Open);
     }
     ui.menu_button("Bundled lenses", |ui| {
         for bundled in files::bundled_lenses() {
             if item(ui, bundled.title, None) {
-                wishes.push(UiAction::Bundled(bundled));
+                actions.push(UiAction::OpenBundled(bundled));
             }
         }
     });
     ui.separator();
     if item(ui, "Save", Some(&SAVE)) {
-        wishes.push(save_action(view));
+        actions.push(save_action(view));
     }
     if item(ui, "Save as…", Some(&SAVE_AS)) {
-        wishes.push(UiAction::AskPath(FileRequest::Save));
+        actions.push(FileRequest::Save);
     }
     if item(ui, "Export for Zemax…", Some(&EXPORT)) {
-        wishes.push(UiAction::AskPath(FileRequest::ExportZemax));
+        actions.push(FileRequest::ExportZemax);
     }
     if item(ui, "Export a copy as JSON…", None) {
-        wishes.push(UiAction::AskPath(FileRequest::ExportJson));
+        actions.push(FileRequest::ExportJson);
     }
     ui.add_enabled_ui(view.pareto.run.is_some(), |ui| {
         if item(ui, "Export the front…", None) {
-            wishes.push(UiAction::Run(Command::ExportPareto(None)));
+            actions.push(FileRequest::ExportFront);
         }
     });
     ui.separator();
@@ -146,7 +130,7 @@ fn file_menu(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
     }
 }
 
-fn edit_menu(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
+fn edit_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     ui.set_min_width(260.0);
     let steps =
         [("Undo", &view.undo, UNDO, Command::Undo), ("Redo", &view.redo, REDO, Command::Redo)];
@@ -157,7 +141,7 @@ fn edit_menu(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
         );
         ui.add_enabled_ui(title.is_some(), |ui| {
             if item(ui, &text, Some(&key)) {
-                wishes.push(UiAction::Run(command));
+                actions.push(command);
             }
         });
     }
@@ -184,7 +168,7 @@ fn view_menu(ui: &mut Ui, dock: &mut Dock) {
     }
 }
 
-fn undo_buttons(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
+fn undo_buttons(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let steps = [("Undo", &view.undo, Command::Undo), ("Redo", &view.redo, Command::Redo)];
     for (name, title, command) in steps {
         let button = ui.add_enabled(title.is_some(), Button::new(name));
@@ -193,7 +177,7 @@ fn undo_buttons(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<UiAction>) {
             |title| format!("{name}: {}", counted_from_one(title)),
         );
         if button.on_hover_text(hint).clicked() {
-            wishes.push(UiAction::Run(command));
+            actions.push(command);
         }
     }
 }

@@ -1,31 +1,33 @@
 //! The window: panels read a view and push commands.
 //!
-//! **A panel changes nothing**: it gets a view of the design and writes down wishes.
+//! **A panel changes nothing**: it gets a view of the design and writes down actions.
 
+mod actions;
 mod app;
-pub mod chooser;
+pub mod colormap;
 pub mod dock;
 pub mod draw;
-mod experiment;
-pub mod field;
-mod gauge;
+mod experiment_window;
+pub mod file_dialog;
 mod menu;
 pub mod number;
 pub mod palette;
 pub mod panels;
-pub mod ramp;
 pub mod section;
-pub mod shell;
+pub mod text;
+pub mod text_input;
 pub mod theme;
 mod unsaved;
-pub mod wording;
+pub mod window;
+mod window_benchmark;
 
+pub use actions::{Actions, UiAction};
 pub use app::Studio;
-pub use gauge::{WindowMetrics, measure_window};
+pub use window_benchmark::{WindowMetrics, measure_window};
 
 use std::path::Path;
 
-use shell::{Persistence, StudioError};
+use window::{Persistence, StudioError};
 
 use crate::files;
 use crate::lens::{Lens, blank};
@@ -37,7 +39,7 @@ use crate::session::{Command, Session};
 /// # Errors
 /// Where no window can open: see [`StudioError`]. A file that cannot be read is said in the window.
 pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
-    shell::open_window(Persistence::Enabled, |context, backing| {
+    window::open_window(Persistence::Enabled, |context, backing| {
         let wake = context.egui_ctx.clone();
         let mut session = Session::new(first_lens(), move || wake.request_repaint())?;
         if let Some(folder) = eframe::storage_dir("aplanat") {

@@ -1,6 +1,6 @@
 //! The colours of drawings: legible on dark and on light, and told apart by colour-blind eyes.
 
-use eframe::egui::{self, Color32};
+use egui::Color32;
 
 use super::draw::Rgba;
 

@@ -1,7 +1,7 @@
 //! How the window looks: calm greys around the drawings, one blue accent, compact rows, the same
 //! in dark and in light.
 
-use eframe::egui::{
+use egui::{
     Color32, Context, CornerRadius, FontId, Margin, Stroke, Style, TextStyle, Theme, Visuals, vec2,
 };
 
@@ -12,7 +12,7 @@ use eframe::egui::{
 pub fn apply(context: &Context) {
     context.all_styles_mut(|style| {
         style.animation_time = 0.0;
-        style.scroll_animation = eframe::egui::style::ScrollAnimation::none();
+        style.scroll_animation = egui::style::ScrollAnimation::none();
         set_spacing(style);
     });
     context.style_mut_of(Theme::Dark, |style| set_colors(&mut style.visuals, &ThemeColors::DARK));

@@ -1,10 +1,10 @@
 //! The question before something is lost that is in no file: the lens, or the field that was formed.
 
 use super::app::Studio;
-use super::chooser::FileRequest;
-use super::panels::slice::DEFAULT_NODES;
+use super::file_dialog::FileRequest;
+use super::panels::grin::DEFAULT_NODES;
 use crate::session::{Command, GrinCommand, RunStatus, SessionView};
-use eframe::egui::{Context, Id, Modal, ViewportCommand};
+use egui::{Context, Id, Modal, ViewportCommand};
 
 /// What may be lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,7 +134,7 @@ impl Studio {
                 if run.is_some_and(|run| run.status == RunStatus::Running) {
                     self.apply(context, Command::Grin(GrinCommand::Pause));
                 }
-                self.ask_field_path(context, view, DEFAULT_NODES);
+                self.ask_path(context, view, FileRequest::SaveField(DEFAULT_NODES));
             }
         }
     }

@@ -3,12 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot prepare its case should fail")]
 #![expect(clippy::print_stdout, reason = "`--nocapture` shows how near the two drawings are")]
 
-mod bench;
-mod chooser;
 mod drawing;
+mod file_dialog;
+mod grin;
+mod harness;
 mod panels;
 mod search;
 mod shaders;
-mod slice;
 mod unsaved;
 mod window;

@@ -1,4 +1,4 @@
-//! Panels by what a screen reader calls their parts: they show a view and write down wishes.
+//! Panels by what a screen reader calls their parts: they show a view and write down commands.
 
 use std::sync::Arc;
 
@@ -11,24 +11,30 @@ use aplanat::session::{
     RunStatus, SessionView,
 };
 use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::{
     EffectsPanel, FirstOrderPanel, LayoutPanel, OptimizerPanel, Panel, ParetoPanel,
     PrescriptionPanel, PupilPanel, SpotPanel,
 };
-use eframe::egui::{Key, Modifiers};
+use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::bench::{Stand, double_gauss, stand, view};
+use crate::harness::{PanelState, double_gauss, panel_harness, view};
 
-fn prescription() -> Harness<'static, Stand<PrescriptionPanel>> {
-    let mut harness = stand(PrescriptionPanel::default(), view());
+fn prescription() -> Harness<'static, PanelState<PrescriptionPanel>> {
+    let mut harness = panel_harness(PrescriptionPanel::default(), view());
     harness.run();
     harness
 }
 
 /// Types into a field as a person does: enter it, type over what is there, end with a key.
-fn type_into<P: Panel>(harness: &mut Harness<'_, Stand<P>>, field: &str, text: &str, end: Key) {
+fn type_into<P: Panel>(
+    harness: &mut Harness<'_, PanelState<P>>,
+    field: &str,
+    text: &str,
+    end: Key,
+) {
     harness.get_by_label(field).focus();
     harness.run();
     harness.get_by_label(field).type_text(text);
@@ -37,10 +43,10 @@ fn type_into<P: Panel>(harness: &mut Harness<'_, Stand<P>>, field: &str, text: &
     harness.run();
 }
 
-fn edits(wishes: &[Command]) -> Vec<&Edit> {
-    wishes
+fn edits(commands: &[Command]) -> Vec<&Edit> {
+    commands
         .iter()
-        .filter_map(|wish| if let Command::Edit(edit) = wish { Some(edit) } else { None })
+        .filter_map(|command| if let Command::Edit(edit) = command { Some(edit) } else { None })
         .collect()
 }
 
@@ -49,7 +55,7 @@ fn a_typed_radius_is_wished_for_at_enter() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 1", "15*1.1", Key::Enter);
     let wanted = Edit::set_radius(0, 15.0 * 1.1);
-    assert_eq!(harness.state().wishes, [Command::Edit(wanted), Command::CommitEdit]);
+    assert_eq!(harness.state().commands, [Command::Edit(wanted), Command::CommitEdit]);
     assert!(harness.get_by_label("Radius of surface 2").is_focused(), "Enter goes down");
 }
 
@@ -60,7 +66,7 @@ fn a_typed_thickness_is_wished_for_at_tab() {
     let parameter = Parameter::new(1, Quantity::Thickness);
     let gap = harness.state().view.lens.surfaces[1].thickness;
     let wanted = Edit::Set { parameter, value: 2.0 * gap };
-    assert_eq!(edits(&harness.state().wishes), [&wanted]);
+    assert_eq!(edits(&harness.state().commands), [&wanted]);
     assert!(harness.get_by_label("Glass of surface 2").is_focused(), "Tab goes to the right");
 }
 
@@ -68,7 +74,7 @@ fn a_typed_thickness_is_wished_for_at_tab() {
 fn what_is_no_number_stays_in_its_cell_with_the_reason() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 3", "abc", Key::Enter);
-    assert_eq!(harness.state().wishes, []);
+    assert_eq!(harness.state().commands, []);
     let cell = harness.get_by_label("Radius of surface 3");
     assert_eq!(cell.value().as_deref(), Some("abc"), "nothing is lost");
     assert!(harness.query_by_label_contains("is no number; expected").is_some());
@@ -78,7 +84,7 @@ fn what_is_no_number_stays_in_its_cell_with_the_reason() {
 fn a_glass_that_nobody_makes_is_refused_with_its_surface() {
     let mut harness = prescription();
     type_into(&mut harness, "Glass of surface 3", "SCHOTT BK7", Key::Enter);
-    assert_eq!(harness.state().wishes, []);
+    assert_eq!(harness.state().commands, []);
     harness.get_by_label_contains("Unknown glass `SCHOTT BK7` after surface 3; similar names");
 }
 
@@ -86,7 +92,7 @@ fn a_glass_that_nobody_makes_is_refused_with_its_surface() {
 fn escape_gives_up_what_was_typed() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 1", "99", Key::Escape);
-    assert_eq!(harness.state().wishes, []);
+    assert_eq!(harness.state().commands, []);
     let value = harness.get_by_label("Radius of surface 1").value();
     assert_eq!(value.as_deref(), Some("14.1615"));
 }
@@ -101,7 +107,7 @@ fn a_glass_may_be_a_name_a_model_or_nothing() {
     for (text, medium) in media {
         let mut harness = prescription();
         type_into(&mut harness, "Glass of surface 1", text, Key::Enter);
-        assert_eq!(edits(&harness.state().wishes), [&Edit::SetMedium { surface: 0, medium }]);
+        assert_eq!(edits(&harness.state().commands), [&Edit::SetMedium { surface: 0, medium }]);
     }
 }
 
@@ -110,7 +116,7 @@ fn the_object_can_come_near() {
     let mut harness = prescription();
     type_into(&mut harness, "Object distance", "1000", Key::Enter);
     let wanted = Edit::SetObject(Object::Finite(1000.0));
-    assert_eq!(edits(&harness.state().wishes), [&wanted]);
+    assert_eq!(edits(&harness.state().commands), [&wanted]);
 }
 
 #[test]
@@ -126,7 +132,7 @@ fn a_badge_frees_and_fixes() {
         Edit::RemoveVariable(free),
         Edit::AddVariable(Variable { parameter, min: None, max: None }),
     ];
-    assert_eq!(edits(&harness.state().wishes), wanted.iter().collect::<Vec<_>>());
+    assert_eq!(edits(&harness.state().commands), wanted.iter().collect::<Vec<_>>());
 }
 
 #[test]
@@ -138,7 +144,7 @@ fn a_key_frees_the_number_under_the_cursor() {
     harness.run();
     let parameter = Parameter::new(0, Quantity::Conic);
     let wanted = Edit::AddVariable(Variable { parameter, min: None, max: None });
-    assert_eq!(edits(&harness.state().wishes), [&wanted]);
+    assert_eq!(edits(&harness.state().commands), [&wanted]);
 }
 
 #[test]
@@ -151,7 +157,7 @@ fn a_selected_row_can_be_deleted_and_flipped() {
     harness.get_by_label("Flip element").click();
     harness.run();
     let wanted = [Edit::RemoveRow(2), Edit::ReverseRows { first: 2, last: 4 }];
-    assert_eq!(edits(&harness.state().wishes), wanted.iter().collect::<Vec<_>>());
+    assert_eq!(edits(&harness.state().commands), wanted.iter().collect::<Vec<_>>());
 }
 
 #[test]
@@ -161,7 +167,7 @@ fn a_row_has_a_menu_of_its_own() {
     harness.run();
     harness.get_all_by_label("Make stop").last().unwrap().click();
     harness.run();
-    assert_eq!(edits(&harness.state().wishes), [&Edit::SetStop(1)]);
+    assert_eq!(edits(&harness.state().commands), [&Edit::SetStop(1)]);
 }
 
 /// A search that stands somehow.
@@ -193,8 +199,8 @@ fn searching(standing: RunStatus) -> SessionView {
     SessionView { optimization: Some(Arc::new(search)), ..view }
 }
 
-fn optimizer(view: SessionView) -> Harness<'static, Stand<OptimizerPanel>> {
-    let mut harness = stand(OptimizerPanel::default(), view);
+fn optimizer(view: SessionView) -> Harness<'static, PanelState<OptimizerPanel>> {
+    let mut harness = panel_harness(OptimizerPanel::default(), view);
     harness.run();
     harness
 }
@@ -207,8 +213,8 @@ fn optimize_wishes_for_a_search_with_the_terms_of_the_panel() {
     harness.run();
     harness.get_by_label("Optimize").click();
     harness.run();
-    let [Command::Optimize { method, goal }] = harness.state().wishes.as_slice() else {
-        panic!("{:?}", harness.state().wishes);
+    let [Command::Optimize { method, goal }] = harness.state().commands.as_slice() else {
+        panic!("{:?}", harness.state().commands);
     };
     assert_eq!(*method, DescentMethod::DampedLeastSquares);
     assert_eq!(goal.terms[0].weight, 3.0);
@@ -216,13 +222,13 @@ fn optimize_wishes_for_a_search_with_the_terms_of_the_panel() {
 }
 
 /// Presses something by its name.
-fn press<P: Panel>(harness: &mut Harness<'_, Stand<P>>, name: &str) {
+fn press<P: Panel>(harness: &mut Harness<'_, PanelState<P>>, name: &str) {
     harness.get_by_label(name).click();
     harness.run();
 }
 
-fn goal_of(wishes: &[Command]) -> &Goal {
-    let mut goals = wishes.iter().filter_map(|wish| match wish {
+fn goal_of(commands: &[Command]) -> &Goal {
+    let mut goals = commands.iter().filter_map(|command| match command {
         Command::Optimize { goal, .. } => Some(goal),
         _ => None,
     });
@@ -233,24 +239,24 @@ fn goal_of(wishes: &[Command]) -> &Goal {
 fn more_light_is_asked_for_in_a_few_clicks() {
     let mut lens = double_gauss();
     lens.aperture = Aperture::EntrancePupilDiameter(10.9);
-    let mut harness = optimizer(crate::bench::view_of(lens.clone()));
+    let mut harness = optimizer(crate::harness::view_of(lens.clone()));
     assert!(harness.query_by_label("Limit the beam by the stop").is_none(), "nobody asks for more");
     type_into(&mut harness, "Minimum of Light", "1.2", Key::Enter);
     press(&mut harness, "Limit the beam by the stop");
     press(&mut harness, "Free the semi-diameters");
     press(&mut harness, "Optimize");
-    let wishes = &harness.state().wishes;
-    assert!(wishes.contains(&Command::LimitByStop));
-    let [Edit::SetVariables(freed)] = edits(wishes)[..] else { panic!("{wishes:?}") };
+    let commands = &harness.state().commands;
+    assert!(commands.contains(&Command::LimitByStop));
+    let [Edit::SetVariables(freed)] = edits(commands)[..] else { panic!("{commands:?}") };
     let rims = freed.iter().filter(|v| v.parameter.quantity == Quantity::SemiDiameter).count();
     assert_eq!(rims, double_gauss().surfaces.len());
-    let goal = goal_of(wishes);
+    let goal = goal_of(commands);
     assert_eq!(goal.pupil, PupilEdge::Moving);
     assert!(goal.terms.iter().any(|weighted| weighted.term == Term::Light(1.2)));
 
     let mut lens = aplanat::pupil::limited_by_stop(&lens).unwrap();
     lens.variables.clone_from(freed);
-    let mut ready = optimizer(crate::bench::view_of(lens));
+    let mut ready = optimizer(crate::harness::view_of(lens));
     type_into(&mut ready, "Minimum of Light", "1.2", Key::Enter);
     assert!(ready.query_by_label_contains("Limit the beam").is_none());
     assert!(ready.query_by_label_contains("Free the semi").is_none());
@@ -264,7 +270,7 @@ fn a_new_term_begins_with_what_the_lens_has() {
         press(&mut harness, term);
     }
     press(&mut harness, "Optimize");
-    let goal = goal_of(&harness.state().wishes);
+    let goal = goal_of(&harness.state().commands);
     let lens = &harness.state().view.lens;
     goal.check(lens).unwrap();
     let terms: Vec<Term> = goal.terms.iter().map(|weighted| weighted.term).collect();
@@ -282,7 +288,7 @@ fn kept_rays_are_said_to_be_blind_to_light() {
     press(&mut harness, "Keep the rays");
     harness.get_by_label_contains("Kept rays tell nothing about light");
     press(&mut harness, "Optimize");
-    assert_eq!(goal_of(&harness.state().wishes).pupil, PupilEdge::Frozen);
+    assert_eq!(goal_of(&harness.state().commands).pupil, PupilEdge::Frozen);
 }
 
 #[test]
@@ -291,7 +297,7 @@ fn a_semi_diameter_is_freed_by_its_badge() {
     press(&mut harness, "Semi-diameter of surface 1 variable");
     let parameter = Parameter::new(0, Quantity::SemiDiameter);
     let wanted = Edit::AddVariable(Variable { parameter, min: None, max: None });
-    assert_eq!(edits(&harness.state().wishes), [&wanted]);
+    assert_eq!(edits(&harness.state().commands), [&wanted]);
 }
 
 #[test]
@@ -308,7 +314,7 @@ fn a_search_can_be_held_stepped_ended_and_taken() {
         let mut harness = optimizer(searching(standing));
         harness.get_by_label(button).click();
         harness.run();
-        assert_eq!(harness.state().wishes, [command], "{button}");
+        assert_eq!(harness.state().commands, [command], "{button}");
     }
 }
 
@@ -323,15 +329,15 @@ fn a_refused_step_names_parameter_and_ray_counted_as_in_the_table() {
 fn a_lens_without_variables_cannot_be_optimized() {
     let mut lens = double_gauss();
     lens.variables.clear();
-    let mut harness = optimizer(crate::bench::view_of(lens));
+    let mut harness = optimizer(crate::harness::view_of(lens));
     harness.get_by_label("Optimize").click();
     harness.run();
-    assert_eq!(harness.state().wishes, []);
+    assert_eq!(harness.state().commands, []);
 }
 
 #[test]
 fn spots_show_radii_with_errors_and_rays() {
-    let mut harness = stand(SpotPanel::new(RenderBackend::Software), view());
+    let mut harness = panel_harness(SpotPanel::new(RenderBackend::Software), view());
     harness.run();
     for text in ["RMS 50.59 µm ±", "RMS 93.31 µm ±", "RMS 101.3 µm ±", "GEO 152.1 µm ±"] {
         harness.get_by_label_contains(text);
@@ -341,17 +347,17 @@ fn spots_show_radii_with_errors_and_rays() {
 
 #[test]
 fn the_error_of_spots_can_be_chosen() {
-    let mut harness = stand(SpotPanel::new(RenderBackend::Software), view());
+    let mut harness = panel_harness(SpotPanel::new(RenderBackend::Software), view());
     harness.run();
     harness.get_by_label("Allowed error").click();
     harness.run();
     harness.get_by_label("1e-6").click();
     harness.run();
-    assert_eq!(harness.state().wishes, [Command::SetTolerance(1e-6)]);
+    assert_eq!(harness.state().commands, [Command::SetTolerance(1e-6)]);
 }
 
-fn pupils(lens: Lens) -> Harness<'static, Stand<PupilPanel>> {
-    let mut harness = stand(PupilPanel::default(), crate::bench::view_of(lens));
+fn pupils(lens: Lens) -> Harness<'static, PanelState<PupilPanel>> {
+    let mut harness = panel_harness(PupilPanel::default(), crate::harness::view_of(lens));
     harness.run();
     harness
 }
@@ -376,7 +382,7 @@ fn a_limit_of_the_pupil_points_its_surface_out_and_no_longer() {
     for wanted in [Some(10), None] {
         harness.get_by_label("Rim of surface 11").click();
         harness.run();
-        assert_eq!(harness.state().wishes.last(), Some(&Command::Select(wanted)));
+        assert_eq!(harness.state().commands.last(), Some(&Command::Select(wanted)));
     }
 }
 
@@ -390,7 +396,7 @@ fn rims_tell_what_a_tenth_of_a_millimetre_would_do() {
     assert!(harness.query_by_label_contains("Rim of surface 2 by").is_none());
     harness.get_by_label_contains("Rim of surface 11 by 0.1 mm").click();
     harness.run();
-    assert_eq!(harness.state().wishes.last(), Some(&Command::Select(Some(10))));
+    assert_eq!(harness.state().commands.last(), Some(&Command::Select(Some(10))));
 }
 
 #[test]
@@ -399,17 +405,17 @@ fn a_click_on_the_edge_of_a_pupil_points_its_surface_out() {
     // The rim of surface 1 is the lower edge of the third pupil: the first thing above its bottom.
     let picture = harness.get_by_label_contains("Pupil of field 3").rect();
     for i in 0..60 {
-        let at = picture.center_bottom() - eframe::egui::vec2(0.0, 4.0 * i as f32);
+        let at = picture.center_bottom() - egui::vec2(0.0, 4.0 * i as f32);
         harness.hover_at(at);
         harness.run();
         harness.drag_at(at);
         harness.drop_at(at);
         harness.run();
-        if !harness.state().wishes.is_empty() {
+        if !harness.state().commands.is_empty() {
             break;
         }
     }
-    assert_eq!(harness.state().wishes, [Command::Select(Some(0))]);
+    assert_eq!(harness.state().commands, [Command::Select(Some(0))]);
 }
 
 #[test]
@@ -419,7 +425,7 @@ fn the_wavelength_of_pupils_can_be_chosen() {
     harness.run();
     harness.get_by_label("486.1 nm").click();
     harness.run();
-    assert_eq!(harness.state().wishes, [Command::ShowPupilWavelength(Some(0))]);
+    assert_eq!(harness.state().commands, [Command::ShowPupilWavelength(Some(0))]);
 }
 
 #[test]
@@ -457,7 +463,7 @@ fn a_ragged_pupil_is_told_in_pieces() {
 
 #[test]
 fn the_layout_tells_how_many_rays_are_lost_and_how() {
-    let mut harness = stand(LayoutPanel::new(RenderBackend::Software), view());
+    let mut harness = panel_harness(LayoutPanel::new(RenderBackend::Software), view());
     harness.run();
     harness.get_by_label_contains("clipped of 45 rays");
     harness.get_by_label_contains("Section of");
@@ -465,7 +471,7 @@ fn the_layout_tells_how_many_rays_are_lost_and_how() {
 
 #[test]
 fn first_order_data_are_there_by_name() {
-    let mut harness = stand(FirstOrderPanel, view());
+    let mut harness = panel_harness(FirstOrderPanel, view());
     harness.run();
     for text in ["Focal length", "49.389 mm", "Petzval radius", "Seidel sums, µm"] {
         harness.get_by_label(text);
@@ -474,13 +480,13 @@ fn first_order_data_are_there_by_name() {
 
 #[test]
 fn an_effect_can_be_forced() {
-    let mut harness = stand(EffectsPanel, view());
+    let mut harness = panel_harness(EffectsPanel, view());
     harness.run();
     harness.get_by_label("Choice of ray aiming").click();
     harness.run();
     harness.get_by_label("On").click();
     harness.run();
-    assert_eq!(harness.state().wishes, [Command::SetEffect(Effect::Aiming, EffectOverride::On)]);
+    assert_eq!(harness.state().commands, [Command::SetEffect(Effect::Aiming, EffectOverride::On)]);
 }
 
 #[test]
@@ -490,7 +496,7 @@ fn a_lens_that_cannot_be_traced_says_why_in_every_panel() {
     let mut results = Arc::unwrap_or_clone(results);
     results.analyses = Err("no beam at surface 2".to_owned());
     broken.results = Some(Arc::new(results));
-    let mut harness = stand(SpotPanel::new(RenderBackend::Software), broken);
+    let mut harness = panel_harness(SpotPanel::new(RenderBackend::Software), broken);
     harness.run();
     harness.get_by_label("No beam at surface 3");
 }
@@ -534,8 +540,8 @@ fn fronts(standing: RunStatus) -> SessionView {
     SessionView { pareto: fronts, ..view }
 }
 
-fn pareto_front(view: SessionView) -> Harness<'static, Stand<ParetoPanel>> {
-    let mut harness = stand(ParetoPanel::default(), view);
+fn pareto_front(view: SessionView) -> Harness<'static, PanelState<ParetoPanel>> {
+    let mut harness = panel_harness(ParetoPanel::default(), view);
     harness.run();
     harness
 }
@@ -549,7 +555,7 @@ fn a_front_is_wished_for_with_the_settings_of_the_panel() {
     harness.get_by_label("Start").click();
     harness.run();
     let settings = pareto::ParetoSettings::default();
-    assert_eq!(harness.state().wishes, [Command::StartPareto { settings, compare: true }]);
+    assert_eq!(harness.state().commands, [Command::StartPareto { settings, compare: true }]);
 }
 
 #[test]
@@ -558,15 +564,17 @@ fn a_sweep_can_be_held_ended_exported_and_forgotten() {
         (RunStatus::Running, "Pause", Command::PausePareto),
         (RunStatus::Paused, "Resume", Command::ResumePareto),
         (RunStatus::Running, "Stop", Command::StopPareto),
-        (RunStatus::Finished, "Export…", Command::ExportPareto(None)),
         (RunStatus::Stopped, "Clear", Command::ClearPareto),
     ];
     for (standing, button, command) in cases {
         let mut harness = pareto_front(fronts(standing));
         harness.get_by_label(button).click();
         harness.run();
-        assert_eq!(harness.state().wishes, [command], "{button}");
+        assert_eq!(harness.state().commands, [command], "{button}");
     }
+    let mut harness = pareto_front(fronts(RunStatus::Finished));
+    press(&mut harness, "Export…");
+    assert_eq!(harness.state().requests, [FileRequest::ExportFront]);
 }
 
 #[test]
@@ -579,13 +587,13 @@ fn lenses_of_the_front_are_stepped_through_and_taken() {
     harness.get_by_label("Sharper").click();
     harness.run();
     let preview = |i: usize| Command::Preview(Some(Box::new(designs[i].lens.clone())));
-    assert_eq!(harness.state().wishes, [preview(0)]);
+    assert_eq!(harness.state().commands, [preview(0)]);
     harness.get_by_label("Brighter").click();
     harness.run();
     harness.get_by_label_contains("% of the start");
     harness.get_by_label("Take this lens").click();
     harness.run();
-    assert_eq!(harness.state().wishes[1..], [preview(1), Command::AcceptPreview]);
+    assert_eq!(harness.state().commands[1..], [preview(1), Command::AcceptPreview]);
 }
 
 #[test]
@@ -595,7 +603,7 @@ fn a_click_on_a_point_shows_its_lens() {
     // Somewhere on the way across the plot lies a point.
     'search: for i in 0..40 {
         for j in 0..25 {
-            let share = eframe::egui::vec2(i as f32 / 40.0, j as f32 / 25.0);
+            let share = egui::vec2(i as f32 / 40.0, j as f32 / 25.0);
             let at = plot.min + share * plot.size();
             harness.hover_at(at);
             harness.run();
@@ -607,8 +615,8 @@ fn a_click_on_a_point_shows_its_lens() {
             }
         }
     }
-    let [Command::Preview(Some(_))] = harness.state().wishes.as_slice() else {
-        panic!("{:?}", harness.state().wishes.len());
+    let [Command::Preview(Some(_))] = harness.state().commands.as_slice() else {
+        panic!("{:?}", harness.state().commands.len());
     };
 }
 
@@ -625,6 +633,6 @@ fn a_front_that_failed_says_why_and_a_dark_lens_cannot_begin_one() {
     let mut harness = pareto_front(dark);
     harness.get_by_label("Start").click();
     harness.run();
-    assert_eq!(harness.state().wishes, []);
+    assert_eq!(harness.state().commands, []);
     harness.get_by_label("No light gets through this lens");
 }

@@ -16,34 +16,35 @@ use aplanat::session::{
     ScoredLens, SearchHistory, SessionView, StructureSearchCommand, StructureSearchRequest,
     StructureSearchSnapshot,
 };
+use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::SearchPanel;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::bench::{Stand, double_gauss, stand, view, view_of};
+use crate::harness::{PanelState, double_gauss, panel_harness, view, view_of};
 
-fn panel(view: SessionView) -> Harness<'static, Stand<SearchPanel>> {
-    let mut harness = stand(SearchPanel::default(), view);
+fn panel(view: SessionView) -> Harness<'static, PanelState<SearchPanel>> {
+    let mut harness = panel_harness(SearchPanel::default(), view);
     harness.run();
     harness
 }
 
-fn press(harness: &mut Harness<'_, Stand<SearchPanel>>, name: &str) {
+fn press(harness: &mut Harness<'_, PanelState<SearchPanel>>, name: &str) {
     harness.get_by_label(name).click();
     harness.run();
 }
 
 /// What was asked of the search.
-fn asked(harness: &Harness<'_, Stand<SearchPanel>>) -> Vec<StructureSearchCommand> {
-    let wishes = harness.state().wishes.iter();
-    let asked = wishes.filter_map(|wish| match wish {
+fn asked(harness: &Harness<'_, PanelState<SearchPanel>>) -> Vec<StructureSearchCommand> {
+    let commands = harness.state().commands.iter();
+    let asked = commands.filter_map(|command| match command {
         Command::StructureSearch(explore) => Some(explore.clone()),
         _ => None,
     });
     asked.collect()
 }
 
-fn started(harness: &Harness<'_, Stand<SearchPanel>>) -> StructureSearchRequest {
+fn started(harness: &Harness<'_, PanelState<SearchPanel>>) -> StructureSearchRequest {
     match asked(harness).as_slice() {
         [StructureSearchCommand::Start(quest)] => StructureSearchRequest::clone(quest),
         other => panic!("{other:?}"),
@@ -232,8 +233,6 @@ fn a_search_can_be_held_ended_saved_and_forgotten() {
         (RunStatus::Running, "Pause", StructureSearchCommand::Pause),
         (RunStatus::Paused, "Resume", StructureSearchCommand::Resume),
         (RunStatus::Running, "Stop", StructureSearchCommand::Stop),
-        (RunStatus::Running, "Save to…", StructureSearchCommand::SaveTo(None)),
-        (RunStatus::Stopped, "Open…", StructureSearchCommand::ResumeFrom(None)),
         (RunStatus::Finished, "Clear", StructureSearchCommand::Clear),
         (RunStatus::Running, "Reheat", StructureSearchCommand::Control(SteerCommand::Reheat)),
         (RunStatus::Running, "Follow the search", StructureSearchCommand::Preview(Some(0))),
@@ -242,6 +241,14 @@ fn a_search_can_be_held_ended_saved_and_forgotten() {
         let mut harness = panel(searching(standing));
         press(&mut harness, button);
         assert_eq!(asked(&harness), [explore], "{button}");
+    }
+    for (status, button, request) in [
+        (RunStatus::Running, "Save to…", FileRequest::SaveSearch),
+        (RunStatus::Stopped, "Open…", FileRequest::OpenSearch),
+    ] {
+        let mut harness = panel(searching(status));
+        press(&mut harness, button);
+        assert_eq!(harness.state().requests, [request], "{button}");
     }
     let mut harness = panel(searching(RunStatus::Running));
     press(&mut harness, "Search");
@@ -262,22 +269,16 @@ fn a_lens_that_is_kept_is_compared_pinned_taken_and_exported() {
     harness.get_by_label_contains("Lens 1: 10 µm, 90 mm², 6 elements").click();
     harness.run();
     let preview = Command::Preview(Some(Box::new(Lens::clone(&other(1)))));
-    assert_eq!(harness.state().wishes, [preview]);
+    assert_eq!(harness.state().commands, [preview]);
     harness.get_by_label_contains("Lens 1: RMS 50 to 10 µm (-80 %), light 90 to 90 mm² (0 %)");
     for button in ["Pin", "Take", "Export…"] {
         press(&mut harness, button);
     }
-    let export = StructureSearchCommand::Export { number: 1, path: None };
-    assert_eq!(
-        asked(&harness),
-        [
-            StructureSearchCommand::Control(SteerCommand::Pin(1)),
-            StructureSearchCommand::Accept(1),
-            export
-        ]
-    );
+    let pin = StructureSearchCommand::Control(SteerCommand::Pin(1));
+    assert_eq!(asked(&harness), [pin, StructureSearchCommand::Accept(1)]);
+    assert_eq!(harness.state().requests, [FileRequest::ExportSearchLens(1)]);
     press(&mut harness, "Back to the design");
-    assert_eq!(harness.state().wishes.last(), Some(&Command::Preview(None)));
+    assert_eq!(harness.state().commands.last(), Some(&Command::Preview(None)));
 
     let mut pinned = searching(RunStatus::Running);
     let mut run = StructureSearchSnapshot::clone(pinned.structure_search.run.as_ref().unwrap());
@@ -315,7 +316,7 @@ fn every_lens_tells_where_it_came_from() {
     assert_eq!(fates.count(), 2);
     press(&mut harness, "Show lens 0");
     let preview = Command::Preview(Some(Box::new(Lens::clone(&other(0)))));
-    assert_eq!(harness.state().wishes, [preview]);
+    assert_eq!(harness.state().commands, [preview]);
 }
 
 #[test]

@@ -6,8 +6,8 @@ use aplanat::lens::blank;
 use aplanat::session::{Command, GrinCommand, GrinRun, RunStatus, Session};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
-use aplanat::studio::shell::Persistence;
-use eframe::egui::accesskit::Role;
+use aplanat::studio::window::Persistence;
+use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 

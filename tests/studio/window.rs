@@ -6,13 +6,13 @@ use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::session::{Command, ExperimentStatus, Session};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
-use aplanat::studio::shell::Persistence;
 use aplanat::studio::theme;
-use eframe::egui::{Key, Modifiers};
+use aplanat::studio::window::Persistence;
+use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::bench::double_gauss;
+use crate::harness::double_gauss;
 
 /// How long numbers may take on a slow and busy machine.
 const DEADLINE: Duration = Duration::from_mins(1);

@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use eframe::egui::{
-    self, ColorImage, PaintCallbackInfo, Pos2, Rect, TextureHandle, TextureOptions, Ui,
-    emath::GuiRounding,
-};
 use eframe::egui_wgpu::{
     Callback, CallbackResources, CallbackTrait, RenderState, ScreenDescriptor,
+};
+use egui::{
+    ColorImage, PaintCallbackInfo, Pos2, Rect, TextureHandle, TextureOptions, Ui,
+    emath::GuiRounding,
 };
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BlendState, ColorTargetState,

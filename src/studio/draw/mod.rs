@@ -12,13 +12,13 @@ mod camera;
 mod canvas;
 pub mod gpu;
 mod scene;
+mod scene_view;
 pub mod software;
-mod stage;
 
 pub use camera::{BoundingBox, Camera, round_length_below};
 pub use canvas::{RenderBackend, SceneCanvas, install_gpu_cache};
 pub use scene::{Rgba, Scene, Segment, TriangleVertex};
-pub use stage::{SceneResponse, SceneView, length_text};
+pub use scene_view::{SceneResponse, SceneView, length_text};
 
 /// A drawn scene: rows from the top, four bytes a pixel, colour multiplied by alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]

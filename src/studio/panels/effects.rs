@@ -1,12 +1,13 @@
 //! Which physics is computed for this lens, on which number that rests, and what it saves.
 
-use eframe::egui::{Align, Color32, ComboBox, Frame, Layout, Margin, RichText, ScrollArea, Ui};
+use egui::{Align, Color32, ComboBox, Frame, Layout, Margin, RichText, ScrollArea, Ui};
 
 use super::{Panel, displayed_results, show_missing_results};
 use crate::effects::{EffectDecision, EffectOverride, EffectPlan};
 use crate::session::{Command, SessionView};
+use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::wording::{capitalize, counted_from_one};
+use crate::studio::text::{capitalize, counted_from_one};
 
 /// The panel.
 #[derive(Debug)]
@@ -17,17 +18,17 @@ impl Panel for EffectsPanel {
         "Effects"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((_, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            table(ui, &numbers.plan.value, view, wishes);
+            table(ui, &numbers.plan.value, view, actions);
         });
     }
 }
 
-fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, wishes: &mut Vec<Command>) {
+fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, actions: &mut Actions) {
     ui.spacing_mut().item_spacing.y = 1.0;
     for (i, decision) in plan.decisions.iter().enumerate() {
         let striped = if i % 2 == 0 { ui.visuals().faint_bg_color } else { Color32::TRANSPARENT };
@@ -38,7 +39,7 @@ fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, wishes: &mut Vec<Co
                 state_label(ui, decision);
                 ui.strong(capitalize(decision.effect.name()));
                 let chosen = view.settings.overrides.get(decision.effect);
-                override_menu(ui, decision, chosen, wishes);
+                override_menu(ui, decision, chosen, actions);
             });
             let reason = capitalize(&counted_from_one(&decision.reason));
             ui.label(RichText::new(reason).small());
@@ -65,7 +66,7 @@ fn override_menu(
     ui: &mut Ui,
     decision: &EffectDecision,
     old: EffectOverride,
-    wishes: &mut Vec<Command>,
+    actions: &mut Actions,
 ) {
     let mut chosen = old;
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -79,7 +80,7 @@ fn override_menu(
         combo.response.accessible_name(label).on_hover_text("Auto follows the plan for this lens");
     });
     if chosen != old {
-        wishes.push(Command::SetEffect(decision.effect, chosen));
+        actions.push(Command::SetEffect(decision.effect, chosen));
     }
 }
 

@@ -1,13 +1,14 @@
 //! What a lens does to rays near its axis: lengths, pupils, and the third-order sums.
 
-use eframe::egui::{
+use egui::{
     Align, Color32, Frame, Grid, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui,
 };
 
 use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::Lens;
 use crate::paraxial::{FirstOrder, ParaxialPupil, Seidel, SeidelSums};
-use crate::session::{Command, SessionView};
+use crate::session::SessionView;
+use crate::studio::actions::Actions;
 use crate::studio::number;
 
 /// The panel.
@@ -19,7 +20,7 @@ impl Panel for FirstOrderPanel {
         "First order"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };

@@ -5,14 +5,16 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{Align, ComboBox, DragValue, Layout as Arrange, RichText, Stroke, Ui};
+use egui::{Align, ComboBox, DragValue, Layout as Arrange, RichText, Stroke, Ui};
 use glam::DVec2;
 
-use super::{Panel, displayed_results, field_name, show_missing_results, swatch, zoom_name};
+use super::widgets::swatch;
+use super::{Panel, displayed_results, field_name, show_missing_results, zoom_name};
 use crate::analysis::{LayoutRay, RayLayout};
 use crate::lens::{System, added_glass};
 use crate::math::Vec3;
 use crate::session::{Analyses, AnalysisResults, Command, SessionView};
+use crate::studio::actions::Actions;
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -79,16 +81,16 @@ impl Panel for LayoutPanel {
         "Layout"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.refresh(ui, view);
-        self.header(ui, view, wishes);
+        self.header(ui, view, actions);
         let Some(drawing) = &self.drawing else { return show_missing_results(ui, view) };
         let label = format!("Section of {}", view.lens.name);
         let shown =
             self.scene_view.show(ui, self.backing, &drawing.scene, drawing.full_view, &label);
         let near = drawing.highlight_surface(ui, view, &shown);
         if shown.response.clicked() && near != view.selected {
-            wishes.push(Command::Select(near));
+            actions.push(Command::Select(near));
         }
     }
 }
@@ -104,15 +106,15 @@ impl LayoutPanel {
         }
     }
 
-    fn header(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn header(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         ui.horizontal(|ui| {
             self.legend(ui, view);
             ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
                 if ui.button("Fit").on_hover_text("Show the whole lens (double click)").clicked() {
                     self.scene_view.fit();
                 }
-                rays(ui, view, wishes);
-                zoom_position(ui, view, wishes);
+                rays(ui, view, actions);
+                zoom_position(ui, view, actions);
             });
         });
     }
@@ -157,16 +159,16 @@ fn losses_text(fates: Fates) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{} of {} rays", parts.join(", "), fates.total()))
 }
 
-fn rays(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+fn rays(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let mut count = view.settings.rays;
     let drag = DragValue::new(&mut count).range(1..=501).speed(0.2).suffix(" rays");
     let drag = ui.add(drag).accessible_name("Rays of each field");
     if drag.on_hover_text("Rays of each field in the drawing").changed() {
-        wishes.push(Command::ShowRays(count));
+        actions.push(Command::ShowRays(count));
     }
 }
 
-fn zoom_position(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+fn zoom_position(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let lens = &view.lens;
     if lens.zoom_positions() < 2 {
         return;
@@ -181,7 +183,7 @@ fn zoom_position(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     });
     shown.response.accessible_name("Zoom position");
     if chosen != view.settings.zoom {
-        wishes.push(Command::ShowZoom(chosen));
+        actions.push(Command::ShowZoom(chosen));
     }
 }
 

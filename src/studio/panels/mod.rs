@@ -1,19 +1,21 @@
 //! What the window is made of: one panel a question that a designer asks.
 
-mod cells;
+mod cell_layout;
 mod effects;
 mod first_order;
+pub(super) mod grin;
 mod layout;
 mod optimizer;
 mod pareto;
 mod prescription;
 mod pupil;
 mod search;
-pub(super) mod slice;
 mod spot;
+mod widgets;
 
 pub use effects::EffectsPanel;
 pub use first_order::FirstOrderPanel;
+pub use grin::GrinPanel;
 pub use layout::LayoutPanel;
 pub use optimizer::OptimizerPanel;
 pub use pareto::ParetoPanel;
@@ -21,28 +23,28 @@ pub use prescription::PrescriptionPanel;
 pub(super) use prescription::first_radius_field;
 pub use pupil::PupilPanel;
 pub use search::SearchPanel;
-pub use slice::GrinPanel;
 pub use spot::SpotPanel;
 
 use std::sync::Arc;
 
-use eframe::egui::{Color32, Context, Sense, Ui, vec2};
+use egui::{Context, Ui};
 use serde::{Deserialize, Serialize};
 
 use super::draw::RenderBackend;
 use super::number;
-use super::wording::{capitalize, counted_from_one};
+use super::text::{capitalize, counted_from_one};
 use crate::analysis::{Estimate, ImageQuality, Spot};
 use crate::lens::{Edit, FieldKind, FieldPoint, Lens, ParameterKind, add_variables};
-use crate::session::{Analyses, AnalysisResults, Command, SessionView};
+use crate::session::{Analyses, AnalysisResults, SessionView};
+use crate::studio::actions::Actions;
 
-/// A part of the window. It shows a view and writes down wishes; it changes nothing.
+/// A part of the window. It shows a view and writes down actions; it changes nothing.
 pub trait Panel {
     /// What its tab says.
     fn title(&self) -> &'static str;
 
     /// Shows it.
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>);
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions);
 
     /// Whether something is being typed into it.
     fn is_typing(&self, _context: &Context) -> bool {
@@ -113,6 +115,14 @@ fn design_results(view: &SessionView) -> Option<&Analyses> {
     view.results.as_ref()?.analyses.as_ref().ok()
 }
 
+/// The reason why a search cannot start from a lens without light.
+const NO_LIGHT: &str = "No light gets through this lens";
+
+/// True if the analysis of the design has failed.
+fn is_dark(view: &SessionView) -> bool {
+    view.results.is_some() && design_results(view).is_none()
+}
+
 /// The results that drawings show: those of the search where there are any, else the design's.
 fn displayed_results(view: &SessionView) -> Option<(&Arc<AnalysisResults>, &Analyses)> {
     let results = view.preview_results.as_ref().or(view.results.as_ref())?;
@@ -149,12 +159,6 @@ fn relative_error(estimate: Estimate) -> String {
     } else {
         format!(" ± {share:.0e}")
     }
-}
-
-/// A small square in the colour of what stands behind it.
-fn swatch(ui: &mut Ui, color: Color32) {
-    let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
-    ui.painter().rect_filled(rect, 1.0, color);
 }
 
 /// Says why there are no numbers, where there are none.

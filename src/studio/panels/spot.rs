@@ -6,18 +6,18 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use eframe::egui::{
-    Align, ComboBox, Layout as Arrange, Rect, Response, RichText, Sense, Ui, WidgetInfo,
-};
+use egui::{Align, ComboBox, Layout as Arrange, Rect, Response, RichText, Sense, Ui, WidgetInfo};
 use glam::DVec2;
 
-use super::cells::{CellLayout, scale_bar, show_within};
+use super::cell_layout::{CellLayout, scale_bar, show_within};
+use super::widgets::swatch;
 use super::{
-    Panel, displayed_results, field_name, pupil_share, relative_error, show_missing_results, swatch,
+    Panel, displayed_results, field_name, pupil_share, relative_error, show_missing_results,
 };
 use crate::analysis::{Estimate, Spot};
 use crate::lens::Fields;
 use crate::session::{Analyses, AnalysisResults, Command, SessionView};
+use crate::studio::actions::Actions;
 use crate::studio::draw::{Camera, RenderBackend, Scene, SceneCanvas};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -67,13 +67,13 @@ impl Panel for SpotPanel {
         "Spot diagram"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
-        header(ui, view, wishes);
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+        header(ui, view, actions);
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, "Spots"));
+        response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, "Spots"));
         let cells = WORDS.cells(rect, numbers.spots.value.len());
         self.draw(ui, rect, results, numbers, &cells);
         for (i, cell) in cells.iter().enumerate() {
@@ -110,7 +110,7 @@ impl SpotPanel {
     }
 }
 
-fn header(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+fn header(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     ui.horizontal(|ui| {
         let palette = Palette::for_visuals(ui.visuals());
         for wavelength in &view.lens.wavelengths {
@@ -118,12 +118,12 @@ fn header(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
             ui.label(format!("{:.0} nm", 1e3 * wavelength.um));
         }
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
-            tolerance(ui, view, wishes);
+            tolerance(ui, view, actions);
         });
     });
 }
 
-fn tolerance(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+fn tolerance(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let mut chosen = view.settings.tolerance;
     let known = TOLERANCES.iter().find(|(error, _)| *error == chosen);
     let text = known.map_or_else(|| format!("{chosen:e}"), |(_, name)| (*name).to_owned());
@@ -138,7 +138,7 @@ fn tolerance(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
     );
     ui.weak("error below");
     if chosen != view.settings.tolerance {
-        wishes.push(Command::SetTolerance(chosen));
+        actions.push(Command::SetTolerance(chosen));
     }
 }
 

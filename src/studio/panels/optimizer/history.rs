@@ -1,6 +1,6 @@
 //! The merit against the steps.
 
-use eframe::egui::{Role, Ui, WidgetInfo, vec2};
+use egui::{Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, Plot, PlotPoints};
 
 use crate::session::{MeritSample, OptimizationSnapshot};

@@ -2,21 +2,21 @@
 //!
 //! The search works on its own copy. The design changes only when its result is taken.
 
-mod goal;
 mod history;
+mod merit_editor;
 mod terms;
 
-use eframe::egui::{
-    Button, ComboBox, Context, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui,
-};
+use egui::{ComboBox, Context, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::{Panel, mean_pupil_area};
 use crate::optimize::DescentMethod;
 use crate::session::{Analyses, Command, OptimizationSnapshot, RunStatus, SessionView};
-use crate::studio::field::EditBuffers;
+use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::wording::{capitalize, counted_from_one};
-use goal::MeritEditor;
+use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
+use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text_input::EditBuffers;
+use merit_editor::MeritEditor;
 
 /// How high the merit history is, in points; less where there is little room.
 const HISTORY: f32 = 130.0;
@@ -36,9 +36,9 @@ impl Panel for OptimizerPanel {
         "Optimizer"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.merit.sync(view);
-        self.controls(ui, view, wishes);
+        self.controls(ui, view, actions);
         if let Some(search) = view.optimization.as_deref() {
             progress(ui, view, search);
             let frame = Frame::new().inner_margin(Margin { right: 10, ..Margin::ZERO });
@@ -50,7 +50,7 @@ impl Panel for OptimizerPanel {
             ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            self.merit.ui(ui, view, &mut self.drafts, wishes);
+            self.merit.ui(ui, view, &mut self.drafts, actions);
         });
     }
 
@@ -60,61 +60,58 @@ impl Panel for OptimizerPanel {
 }
 
 impl OptimizerPanel {
-    fn controls(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
-        let standing = view.optimization.as_ref().map(|search| search.status);
-        let paused = standing == Some(RunStatus::Paused);
-        let under_way = paused || standing == Some(RunStatus::Running);
+    fn controls(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+        let status = view.optimization.as_ref().map(|run| run.status);
+        let paused = status == Some(RunStatus::Paused);
+        let active = paused || status == Some(RunStatus::Running);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            self.start_button(ui, view, under_way, wishes);
-            let hold = if paused {
-                ("Resume", Command::Resume, "Let the search go on")
-            } else {
-                ("Pause", Command::Pause, "Hold the search after its current step")
-            };
+            self.start_button(ui, view, active, actions);
             let buttons = [
-                (hold.0, under_way, hold.1, hold.2),
-                ("Step", paused, Command::Step, "Take one step of the search that is held"),
-                ("Stop", under_way, Command::Stop, "End the search and keep its result to look at"),
-                (
-                    "Take",
-                    standing.is_some(),
-                    Command::AcceptResult,
-                    "Make the best lens of the search the design, as one undo step",
+                if paused {
+                    ActionButton::new("Resume", active, Command::Resume, "Resume the optimization")
+                } else {
+                    let hint = "Pause the optimization after its current step";
+                    ActionButton::new("Pause", active, Command::Pause, hint)
+                },
+                ActionButton::new(
+                    "Step",
+                    paused,
+                    Command::Step,
+                    "Take one step of the paused optimization",
                 ),
-                (
+                ActionButton::new(
+                    "Stop",
+                    active,
+                    Command::Stop,
+                    "Stop the optimization and retain its result for inspection",
+                ),
+                ActionButton::new(
+                    "Take",
+                    status.is_some(),
+                    Command::AcceptResult,
+                    "Make the best lens the design, as one undo step",
+                ),
+                ActionButton::new(
                     "Discard",
-                    standing.is_some(),
+                    status.is_some(),
                     Command::DiscardResult,
-                    "End the search and throw its result away",
+                    "Stop the optimization and discard its result",
                 ),
             ];
-            for (text, enabled, command, hint) in buttons {
-                if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
-                    wishes.push(command);
-                }
-            }
+            action_buttons(ui, buttons, actions);
         });
-        self.method(ui, under_way);
-        ui.add_enabled_ui(!under_way, |ui| self.merit.edge_choice(ui));
+        self.method(ui, active);
+        ui.add_enabled_ui(!active, |ui| self.merit.edge_choice(ui));
     }
 
-    fn start_button(
-        &self,
-        ui: &mut Ui,
-        view: &SessionView,
-        under_way: bool,
-        wishes: &mut Vec<Command>,
-    ) {
-        let ready = !under_way && !view.lens.variables.is_empty();
-        let fill = ui.visuals().selection.bg_fill;
-        let text = RichText::new("Optimize").strong();
-        let button = ui.add_enabled(ready, Button::new(text).fill(fill));
-        let button = button.on_hover_text("Search for a better lens in the background, on a copy");
-        let why = if under_way { "A search is under way" } else { NO_VARIABLES };
-        if button.on_disabled_hover_text(why).clicked() {
+    fn start_button(&self, ui: &mut Ui, view: &SessionView, active: bool, actions: &mut Actions) {
+        let ready = !active && !view.lens.variables.is_empty();
+        let hint = "Optimize in the background, on a copy of the design";
+        let reason = if active { "An optimization is already running" } else { NO_VARIABLES };
+        if main_button(ui, "Optimize", ready, hint, reason) {
             let goal = self.merit.goal();
-            wishes.push(Command::Optimize { method: self.method, goal });
+            actions.push(Command::Optimize { method: self.method, goal });
         }
     }
 

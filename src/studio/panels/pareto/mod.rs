@@ -5,14 +5,18 @@
 
 mod plot;
 mod setup;
-mod words;
+mod text;
 
-use eframe::egui::{Button, Frame, Margin, Panel as Side, ProgressBar, RichText, Ui};
+use egui::{Button, Frame, Margin, Panel as Side, ProgressBar, Ui};
 
-use super::{Panel, design_results};
+use super::Panel;
 use crate::optimize::pareto::ParetoPoint;
 use crate::session::{Command, ParetoRun, RunStatus, SessionView};
-use crate::studio::wording::{capitalize, counted_from_one};
+use crate::studio::actions::Actions;
+use crate::studio::file_dialog::FileRequest;
+use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
+use crate::studio::panels::{NO_LIGHT, is_dark};
+use crate::studio::text::{capitalize, counted_from_one};
 use setup::ParetoSetup;
 
 /// What the panel is about, before anything is swept.
@@ -45,20 +49,20 @@ impl Panel for ParetoPanel {
         "Pareto front"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         if view.preview_lens.is_none() {
             self.selected = None;
         }
-        self.buttons(ui, view, wishes);
+        self.buttons(ui, view, actions);
         let under_way = view.pareto.run.as_ref().is_some_and(|run| run.is_active());
         ui.add_enabled_ui(!under_way, |ui| self.setup.ui(ui, view));
-        words::variables_label(ui, view);
+        text::variables_label(ui, view);
         if let Some(why) = &view.pareto.error {
             let why = capitalize(&counted_from_one(why));
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
         match view.pareto.run.as_deref() {
-            Some(run) => self.show(ui, view, run, wishes),
+            Some(run) => self.show(ui, view, run, actions),
             None if view.pareto.starting => {
                 ui.weak("Looking at the lens…");
             }
@@ -71,99 +75,78 @@ impl Panel for ParetoPanel {
 }
 
 impl ParetoPanel {
-    fn buttons(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn buttons(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let run = view.pareto.run.as_deref();
-        let standing = run.map(|run| run.status);
-        let paused = standing == Some(RunStatus::Paused);
-        let under_way = run.is_some_and(ParetoRun::is_active);
+        let active = run.is_some_and(ParetoRun::is_active);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            self.start_button(ui, view, under_way, wishes);
-            let hold = if paused {
-                ("Resume", Command::ResumePareto, "Let the sweep go on")
-            } else {
-                ("Pause", Command::PausePareto, "Hold the sweep after its current slice")
-            };
+            self.start_button(ui, view, active, actions);
+            let hint = "Write the front into a folder: a table (CSV), a plot (PNG) and every lens \
+                        (JSON)";
             let buttons = [
-                (hold.0, under_way, hold.1, hold.2),
-                ("Stop", under_way, Command::StopPareto, "End the sweep; its front stays"),
-                (
-                    "Export…",
-                    run.is_some(),
-                    Command::ExportPareto(None),
-                    "Write the front into a folder: a table (CSV), a picture (PNG) and every lens \
-                     (JSON)",
+                if run.is_some_and(|run| run.status == RunStatus::Paused) {
+                    ActionButton::new("Resume", active, Command::ResumePareto, "Resume the sweep")
+                } else {
+                    let hint = "Pause the sweep after its current slice";
+                    ActionButton::new("Pause", active, Command::PausePareto, hint)
+                },
+                ActionButton::new(
+                    "Stop",
+                    active,
+                    Command::StopPareto,
+                    "Stop the sweep and retain its front",
                 ),
-                (
+                ActionButton::new("Export…", run.is_some(), FileRequest::ExportFront, hint),
+                ActionButton::new(
                     "Clear",
                     run.is_some() || view.pareto.error.is_some(),
                     Command::ClearPareto,
-                    "Forget this front and all earlier ones",
+                    "Dismiss this front and all earlier ones",
                 ),
             ];
-            for (text, enabled, command, hint) in buttons {
-                if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
-                    wishes.push(command);
-                }
-            }
+            action_buttons(ui, buttons, actions);
             if run.is_some() && ui.button("Fit").on_hover_text("Show the whole front").clicked() {
                 self.fit = true;
             }
         });
     }
 
-    fn start_button(
-        &self,
-        ui: &mut Ui,
-        view: &SessionView,
-        under_way: bool,
-        wishes: &mut Vec<Command>,
-    ) {
-        let broken = view.results.is_some() && design_results(view).is_none();
-        let ready = !under_way && !view.pareto.starting && !broken;
-        let fill = ui.visuals().selection.bg_fill;
-        let button = Button::new(RichText::new("Start").strong()).fill(fill);
-        let button = ui
-            .add_enabled(ready, button)
-            .on_hover_text("Sweep the front in the background, on a copy of the design");
-        let why = if broken { "No light gets through this lens" } else { "A sweep is under way" };
-        if button.on_disabled_hover_text(why).clicked() {
-            wishes.push(self.setup.command());
+    fn start_button(&self, ui: &mut Ui, view: &SessionView, active: bool, actions: &mut Actions) {
+        let dark = is_dark(view);
+        let ready = !active && !view.pareto.starting && !dark;
+        let hint = "Sweep the front in the background, on a copy of the design";
+        let reason = if dark { NO_LIGHT } else { "A sweep is already running" };
+        if main_button(ui, "Start", ready, hint, reason) {
+            actions.push(self.setup.command());
         }
-        if broken {
-            ui.colored_label(ui.visuals().warn_fg_color, why);
+        if dark {
+            ui.colored_label(ui.visuals().warn_fg_color, NO_LIGHT);
         }
     }
 
-    fn show(
-        &mut self,
-        ui: &mut Ui,
-        view: &SessionView,
-        run: &ParetoRun,
-        wishes: &mut Vec<Command>,
-    ) {
+    fn show(&mut self, ui: &mut Ui, view: &SessionView, run: &ParetoRun, actions: &mut Actions) {
         let share = run.fraction_done() as f32;
         let bar = ProgressBar::new(share)
             .desired_height(16.0)
-            .text(words::progress_text(run, view.pareto.pending));
+            .text(text::progress_text(run, view.pareto.pending));
         ui.add(bar.corner_radius(2));
-        words::hypervolume_label(ui, run);
+        text::hypervolume_label(ui, run);
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
         let side = Side::bottom("chosen lens").frame(frame).show_separator_line(false);
         side.exact_size(SELECTION_HEIGHT).show(ui, |ui| {
-            self.selection_bar(ui, view, run, wishes);
+            self.selection_bar(ui, view, run, actions);
         });
         let clicked = plot::plot(ui, view, run, self.selected.as_ref(), &mut self.fit);
         if let Some(clicked) = clicked {
-            self.select(clicked.design, wishes);
+            self.select(clicked.design, actions);
             if clicked.double {
-                wishes.push(Command::AcceptPreview);
+                actions.push(Command::AcceptPreview);
             }
         }
     }
 
-    fn select(&mut self, design: ParetoPoint, wishes: &mut Vec<Command>) {
-        wishes.push(Command::Preview(Some(Box::new(design.lens.clone()))));
+    fn select(&mut self, design: ParetoPoint, actions: &mut Actions) {
+        actions.push(Command::Preview(Some(Box::new(design.lens.clone()))));
         self.selected = Some(design);
     }
 
@@ -173,7 +156,7 @@ impl ParetoPanel {
         ui: &mut Ui,
         view: &SessionView,
         run: &ParetoRun,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
@@ -185,13 +168,13 @@ impl ParetoPanel {
             for (text, next, hint) in steps {
                 let button = ui.add_enabled(next.is_some(), Button::new(text)).on_hover_text(hint);
                 if let (true, Some(next)) = (button.clicked(), next) {
-                    self.select(next, wishes);
+                    self.select(next, actions);
                 }
             }
             let shown = view.preview_lens.is_some() && self.selected.is_some();
             let take = ui.add_enabled(shown, Button::new("Take this lens"));
             if take.on_hover_text("Make it the design, as one undo step").clicked() {
-                wishes.push(Command::AcceptPreview);
+                actions.push(Command::AcceptPreview);
             }
             let back = ui.add_enabled(shown, Button::new("Back to the design"));
             if back
@@ -200,10 +183,10 @@ impl ParetoPanel {
                 )
                 .clicked()
             {
-                wishes.push(Command::Preview(None));
+                actions.push(Command::Preview(None));
             }
         });
-        words::selection_label(ui, run, self.selected.as_ref());
+        text::selection_label(ui, run, self.selected.as_ref());
     }
 
     /// The lenses of the front on both sides of the one that was clicked, or the ends of the front.

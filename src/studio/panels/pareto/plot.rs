@@ -3,13 +3,13 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{Color32, CursorIcon, PointerButton, Pos2, Role, Ui, WidgetInfo};
+use egui::{Color32, CursorIcon, PointerButton, Pos2, Role, Ui, WidgetInfo};
 use egui_plot::{
     AxisHints, Corner, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints,
     PlotTransform, PlotUi, Points,
 };
 
-use super::words;
+use super::text;
 use crate::optimize::pareto::{Front, ParetoPoint};
 use crate::session::{ParetoRun, SessionView};
 
@@ -77,7 +77,7 @@ pub(super) fn plot(
     let twice = response.double_clicked_by(PointerButton::Primary);
     response
         .on_hover_cursor(CursorIcon::PointingHand)
-        .on_hover_text_at_pointer(words::design_text(design, &run.start));
+        .on_hover_text_at_pointer(text::design_text(design, &run.start));
     (clicked || twice).then(|| ClickedDesign { design: design.clone(), double: twice })
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{DragValue, Ui};
+use egui::{DragValue, Ui};
 
 use crate::optimize::pareto::ParetoSettings;
 use crate::session::{Command, SessionView};

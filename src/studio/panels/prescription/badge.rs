@@ -1,16 +1,16 @@
 //! What decides a number: nothing (it is fixed), the optimizer, another number, or a solve.
 
-use eframe::egui::{
+use egui::{
     Align, Button, Color32, CornerRadius, Id, Popup, PopupCloseBehavior, Response, RichText, Sense,
     Ui, Visuals, vec2,
 };
 
 use crate::lens::{Edit, Lens, Parameter, Pickup, Quantity, Variable};
 use crate::math::expression::evaluate;
-use crate::session::Command;
-use crate::studio::field::{EditBuffers, InputPlacement, TextInput};
+use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::wording::counted_from_one;
+use crate::studio::text::counted_from_one;
+use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 
 /// How wide a badge is, in points.
 pub(super) const WIDTH: f32 = 18.0;
@@ -66,20 +66,20 @@ pub(super) fn show(
     lens: &Lens,
     parameter: Parameter,
     drafts: &mut EditBuffers,
-    wishes: &mut Vec<Command>,
+    actions: &mut Actions,
 ) {
     let decides = ParameterStatus::of(lens, parameter);
     let name = format!("{} variable", super::table::parameter_name(parameter));
     let button = badge(ui, decides).accessible_name(name);
     let simple = matches!(decides, ParameterStatus::Fixed | ParameterStatus::Variable(_));
     if simple && button.clicked() {
-        wishes.push(toggle_edit(decides, parameter).into());
+        actions.push(toggle_edit(decides, parameter));
     }
     let menu = StatusMenu { lens, parameter, status: decides };
     let popup = if simple { Popup::context_menu(&button) } else { Popup::menu(&button) };
     popup
         .close_behavior(PopupCloseBehavior::CloseOnClickOutside)
-        .show(|ui| menu.ui(ui, drafts, wishes));
+        .show(|ui| menu.ui(ui, drafts, actions));
     button.on_hover_text(decides.hint());
 }
 
@@ -124,23 +124,23 @@ struct StatusMenu<'a> {
 }
 
 impl StatusMenu<'_> {
-    fn ui(&self, ui: &mut Ui, drafts: &mut EditBuffers, wishes: &mut Vec<Command>) {
+    fn ui(&self, ui: &mut Ui, drafts: &mut EditBuffers, actions: &mut Actions) {
         ui.set_width(210.0);
         ui.strong(super::table::parameter_name(self.parameter));
-        self.choices(ui, wishes);
+        self.choices(ui, actions);
         match self.status {
-            ParameterStatus::Variable(variable) => self.bounds_lines(ui, variable, drafts, wishes),
-            ParameterStatus::Pickup(pickup) => self.pickup_lines(ui, pickup, drafts, wishes),
-            ParameterStatus::ImageSolve(offset) => self.offset_line(ui, offset, drafts, wishes),
+            ParameterStatus::Variable(variable) => self.bounds_lines(ui, variable, drafts, actions),
+            ParameterStatus::Pickup(pickup) => self.pickup_lines(ui, pickup, drafts, actions),
+            ParameterStatus::ImageSolve(offset) => self.offset_line(ui, offset, drafts, actions),
             ParameterStatus::Fixed => {}
         }
     }
 
-    fn choices(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
+    fn choices(&self, ui: &mut Ui, actions: &mut Actions) {
         let decides = self.status;
         let mut choice = |ui: &mut Ui, on: bool, text: &str, edits: Vec<Edit>| {
             if ui.selectable_label(on, text).clicked() && !on {
-                wishes.extend(edits.into_iter().map(Command::Edit));
+                actions.extend(edits);
                 ui.close();
             }
         };
@@ -194,7 +194,7 @@ impl StatusMenu<'_> {
         ui: &mut Ui,
         variable: Variable,
         drafts: &mut EditBuffers,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         ui.separator();
         let unit = match self.parameter.quantity {
@@ -209,10 +209,10 @@ impl StatusMenu<'_> {
             if text.trim().is_empty() { Some(None) } else { parse_value(text).map(Some) }
         };
         if let Some(min) = self.number_line(ui, "Minimum", variable.min, drafts, limit) {
-            wishes.push(Edit::AddVariable(Variable { min, ..variable }).into());
+            actions.push(Edit::AddVariable(Variable { min, ..variable }));
         }
         if let Some(max) = self.number_line(ui, "Maximum", variable.max, drafts, limit) {
-            wishes.push(Edit::AddVariable(Variable { max, ..variable }).into());
+            actions.push(Edit::AddVariable(Variable { max, ..variable }));
         }
     }
 
@@ -221,12 +221,12 @@ impl StatusMenu<'_> {
         ui: &mut Ui,
         pickup: Pickup,
         drafts: &mut EditBuffers,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         ui.separator();
         let row = |text: &str| text.trim().parse().ok().filter(|n| (1..=1000).contains(n));
         let surface = Some((pickup.source.surface + 1) as f64);
-        let mut set = |pickup: Pickup| wishes.push(Edit::SetPickup(pickup).into());
+        let mut set = |pickup: Pickup| actions.push(Edit::SetPickup(pickup));
         if let Some(number) = self.number_line(ui, "From surface", surface, drafts, row) {
             let number: usize = number;
             set(Pickup { source: Parameter { surface: number - 1, ..pickup.source }, ..pickup });
@@ -247,13 +247,13 @@ impl StatusMenu<'_> {
         ui: &mut Ui,
         offset: f64,
         drafts: &mut EditBuffers,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         ui.separator();
         if let Some(offset) =
             self.number_line(ui, "Displaced by, mm", Some(offset), drafts, parse_value)
         {
-            wishes.push(Edit::SetImageSolve(Some(offset)).into());
+            actions.push(Edit::SetImageSolve(Some(offset)));
         }
     }
 

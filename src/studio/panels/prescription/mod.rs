@@ -10,11 +10,12 @@ mod glass;
 mod table;
 mod variables;
 
-use eframe::egui::{Button, Context, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
+use egui::{Button, Context, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
 use super::Panel;
-use crate::session::{Command, SessionView};
-use crate::studio::field::{EditBuffers, error_color};
+use crate::session::SessionView;
+use crate::studio::actions::Actions;
+use crate::studio::text_input::{EditBuffers, error_color};
 use actions::RowAction;
 use table::PrescriptionTable;
 
@@ -29,11 +30,11 @@ impl Panel for PrescriptionPanel {
         "Prescription"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
-        keys(ui, view, wishes);
-        toolbar(ui, view, wishes);
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+        keys(ui, view, actions);
+        toolbar(ui, view, actions);
         self.error_line(ui);
-        PrescriptionTable { view, buffers: &mut self.buffers, commands: wishes }.show(ui);
+        PrescriptionTable { view, buffers: &mut self.buffers, actions }.show(ui);
     }
 
     fn is_typing(&self, context: &Context) -> bool {
@@ -58,19 +59,19 @@ impl PrescriptionPanel {
 }
 
 /// Insert and Delete work on the selected row while no text is being edited.
-fn keys(ui: &Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+fn keys(ui: &Ui, view: &SessionView, actions: &mut Actions) {
     let Some(row) = view.selected.filter(|_| !ui.ctx().egui_wants_keyboard_input()) else {
         return;
     };
     for (key, action) in [(Key::Delete, RowAction::Remove), (Key::Insert, RowAction::InsertBefore)]
     {
         if ui.input(|input| input.key_pressed(key)) {
-            wishes.extend(action.edit(&view.lens, row).map(Command::Edit));
+            actions.extend(action.edit(&view.lens, row));
         }
     }
 }
 
-fn toolbar(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+fn toolbar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let lens = &view.lens;
     ui.horizontal(|ui| {
         for action in actions::ALL {
@@ -79,9 +80,9 @@ fn toolbar(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
             let button = button.on_hover_text(action.hint());
             let button = button.on_disabled_hover_text("Select a row by its number first.");
             if let Some(edit) = edit.filter(|_| button.clicked()) {
-                wishes.push(edit.into());
+                actions.push(edit);
             }
         }
-        variables::menu(ui, lens, wishes);
+        variables::menu(ui, lens, actions);
     });
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{
+use egui::{
     Align, Button, Color32, Id, Key, Layout, Modifiers, Popup, PopupCloseBehavior, Response,
     RichText, ScrollArea, Ui, vec2,
 };
@@ -13,11 +13,12 @@ use super::{actions, glass};
 use crate::lens::{Edit, Lens, Medium, Object, Parameter, Quantity, apply_edit};
 use crate::math::expression::evaluate;
 use crate::session::{Command, SessionView};
-use crate::studio::field::{EditBuffers, InputPlacement, TextInput as Cell};
+use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::design_results;
-use crate::studio::wording::{capitalize, counted_from_one};
+use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput as Cell};
 
 /// How high a row is, in points.
 const ROW: f32 = 21.0;
@@ -129,7 +130,7 @@ pub(super) fn parameter_name(parameter: Parameter) -> String {
 pub(super) struct PrescriptionTable<'a> {
     pub(super) view: &'a SessionView,
     pub(super) buffers: &'a mut EditBuffers,
-    pub(super) commands: &'a mut Vec<Command>,
+    pub(super) actions: &'a mut Actions,
 }
 
 impl PrescriptionTable<'_> {
@@ -221,7 +222,7 @@ impl PrescriptionTable<'_> {
         let chosen = self.view.selected == Some(surface);
         let label = ui.selectable_label(chosen, text).accessible_name(row_label(surface));
         if label.clicked() || label.secondary_clicked() {
-            self.commands.push(Command::Select(Some(surface)));
+            self.actions.push(Command::Select(Some(surface)));
         }
         label.context_menu(|ui| self.row_menu(ui, surface));
         label.on_hover_text(format!(
@@ -236,14 +237,14 @@ impl PrescriptionTable<'_> {
             let edit = action.edit(&self.view.lens, surface);
             let button = Button::new(action.title());
             if ui.add_enabled(edit.is_some(), button).on_hover_text(action.hint()).clicked() {
-                self.commands.extend(edit.map(Command::Edit));
+                self.actions.extend(edit);
                 ui.close();
             }
         }
         ui.separator();
         let hyper = self.view.lens.surfaces[surface].hyperhemisphere;
         if ui.selectable_label(hyper, "Hyper-hemisphere").clicked() {
-            self.commands.push(Edit::SetHyperhemisphere { surface, hyper: !hyper }.into());
+            self.actions.push(Edit::SetHyperhemisphere { surface, hyper: !hyper });
             ui.close();
         }
     }
@@ -265,7 +266,7 @@ impl PrescriptionTable<'_> {
         let response = self.text_cell(ui, place, cell, |text| typed_edit(&lens, parameter, text));
         // A rim that is not written has nothing to vary.
         if self.view.lens.get(parameter).is_some() || !limit {
-            badge::show(ui, &self.view.lens, parameter, self.buffers, self.commands);
+            badge::show(ui, &self.view.lens, parameter, self.buffers, self.actions);
             self.toggle_by_key(ui, &response, parameter);
         }
         if limit {
@@ -307,7 +308,7 @@ impl PrescriptionTable<'_> {
         let keys = Modifiers::COMMAND | Modifiers::SHIFT;
         if field.has_focus() && ui.input_mut(|input| input.consume_key(keys, Key::V)) {
             let decides = ParameterStatus::of(&self.view.lens, parameter);
-            self.commands.push(badge::toggle_edit(decides, parameter).into());
+            self.actions.push(badge::toggle_edit(decides, parameter));
         }
     }
 
@@ -341,7 +342,7 @@ impl PrescriptionTable<'_> {
                 // Taken as the button goes down: its release comes after the typing has ended.
                 if ui.selectable_label(false, &name).is_pointer_button_down_on() {
                     self.buffers.accept(field.id);
-                    self.commands.push(edit(&name).into());
+                    self.actions.push(edit(&name));
                 }
             }
         });
@@ -435,7 +436,7 @@ impl PrescriptionTable<'_> {
         match tried {
             Ok(edit) => {
                 self.buffers.accept(id);
-                self.commands.extend([Command::Edit(edit), Command::CommitEdit]);
+                self.actions.extend([Command::Edit(edit), Command::CommitEdit]);
                 true
             }
             Err(why) => {

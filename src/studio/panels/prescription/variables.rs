@@ -1,9 +1,9 @@
 //! Freeing and fixing many numbers at once.
 
-use eframe::egui::{Button, Ui};
+use egui::{Button, Ui};
 
 use crate::lens::{Edit, Lens, Medium, Parameter, ParameterKind, Quantity, Variable};
-use crate::session::Command;
+use crate::studio::actions::Actions;
 use crate::studio::panels::add_variables_edit;
 
 /// What can be freed at once.
@@ -18,7 +18,7 @@ const KINDS: [(&str, ParameterKind); 7] = [
 ];
 
 /// How many numbers are variable, with a menu to free or fix many at once, as one undo step.
-pub(super) fn menu(ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
+pub(super) fn menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
     let count = lens.variables.len();
     let text = if count == 1 { "1 variable".to_owned() } else { format!("{count} variables") };
     let button = ui.menu_button(text, |ui| {
@@ -32,7 +32,7 @@ pub(super) fn menu(ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
         let now = Edit::SetVariables(lens.variables.clone());
         for (title, edit) in choices {
             if ui.add_enabled(edit != now, Button::new(title)).clicked() {
-                wishes.push(edit.into());
+                actions.push(edit);
                 ui.close();
             }
         }

@@ -6,19 +6,21 @@
 
 mod picture;
 mod rims;
-mod words;
+mod text;
 
-use eframe::egui::{
+use egui::{
     Align, ComboBox, Id, Layout as Arrange, Rect, Response, Sense, Ui, UiBuilder, WidgetInfo, vec2,
 };
 
-use super::cells::{CellLayout, scale_bar, show_within};
-use super::{Panel, displayed_results, show_missing_results, swatch, zoom_name};
+use super::cell_layout::{CellLayout, scale_bar, show_within};
+use super::widgets::swatch;
+use super::{Panel, displayed_results, show_missing_results, zoom_name};
 use crate::analysis::{FieldPupil, PupilShape};
 use crate::pupil::{PupilLimit, RayModel};
 use crate::session::{self, Analyses, AnalysisResults, Command, SessionView, Timed};
+use crate::studio::actions::Actions;
 use crate::studio::palette::{Palette, color32};
-use crate::studio::wording::{capitalize, counted_from_one};
+use crate::studio::text::{capitalize, counted_from_one};
 use picture::{PupilPicture, PupilWindow};
 
 /// The field of a cell above, four lines of numbers below; more where a pupil has more limits than
@@ -43,7 +45,7 @@ impl Panel for PupilPanel {
         "Pupil"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
@@ -53,15 +55,15 @@ impl Panel for PupilPanel {
         };
         let pupils = &pupils.value;
         self.remember_limits(pupils, results.lens.surfaces.len());
-        header(ui, view, pupils, wishes);
+        header(ui, view, pupils, actions);
         let shown = PupilView { known_limits: &self.known_limits, view, results, numbers, pupils };
         let all = ui.available_rect_before_wrap();
         let (above, below) = all.split_top_bottom_at_y(all.bottom() - rims::height(ui, &shown));
         ui.scope_builder(UiBuilder::new().max_rect(above), |ui| {
-            shown.legend(ui, wishes);
-            shown.pictures(ui, wishes);
+            shown.legend(ui, actions);
+            shown.pictures(ui, actions);
         });
-        show_within(ui, below, |ui| rims::show_table(ui, &shown, wishes));
+        show_within(ui, below, |ui| rims::show_table(ui, &shown, actions));
     }
 }
 
@@ -100,14 +102,9 @@ const HINT: &str = "Shaded: rays that get through. Coloured: what ends them. Das
      over from another. Cross: the centroid. In the plane through the first vertex, seen along the \
      axis; where the field reaches beyond 45°, seen along the beam of each field instead.";
 
-fn header(
-    ui: &mut Ui,
-    view: &SessionView,
-    pupils: &session::FieldPupils,
-    wishes: &mut Vec<Command>,
-) {
+fn header(ui: &mut Ui, view: &SessionView, pupils: &session::FieldPupils, actions: &mut Actions) {
     ui.horizontal(|ui| {
-        wavelength(ui, view, pupils.wavelength, wishes);
+        wavelength(ui, view, pupils.wavelength, actions);
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
             let across = pupils.fields.iter().any(|pupil| pupil.value.across_beam);
             let plane = if across { "across the beam" } else { "in the plane of the first vertex" };
@@ -120,7 +117,7 @@ fn header(
 }
 
 /// The choice of the wavelength; its name where there is no choice.
-fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, wishes: &mut Vec<Command>) {
+fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, actions: &mut Actions) {
     let palette = Palette::for_visuals(ui.visuals());
     let waves = &view.lens.wavelengths;
     let name =
@@ -142,7 +139,7 @@ fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, wishes: &mut Vec<Co
     });
     combo.response.accessible_name("Wavelength of the pupils");
     if chosen != shown {
-        wishes.push(Command::ShowPupilWavelength(Some(chosen)));
+        actions.push(Command::ShowPupilWavelength(Some(chosen)));
     }
 }
 
@@ -165,7 +162,7 @@ impl PupilView<'_> {
         counted_from_one(&self.bench().limit_name(limit))
     }
 
-    fn limit_color(&self, palette: &Palette, limit: PupilLimit) -> eframe::egui::Color32 {
+    fn limit_color(&self, palette: &Palette, limit: PupilLimit) -> egui::Color32 {
         if limit == PupilLimit::Disc {
             return color32(palette.strong);
         }
@@ -179,25 +176,25 @@ impl PupilView<'_> {
     }
 
     /// Points a limit's surface out, or no longer.
-    fn select(&self, limit: PupilLimit, wishes: &mut Vec<Command>) {
+    fn select(&self, limit: PupilLimit, actions: &mut Actions) {
         let surface = limit.surface();
         let wanted = surface.filter(|surface| self.view.selected != Some(*surface));
         if surface.is_some() {
-            wishes.push(Command::Select(wanted));
+            actions.push(Command::Select(wanted));
         }
     }
 
     /// The colours of the limits; a click points out the surface.
-    fn legend(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
+    fn legend(&self, ui: &mut Ui, actions: &mut Actions) {
         let palette = Palette::for_visuals(ui.visuals());
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
             for limit in limits(self.pupils) {
                 let (color, name) =
                     (self.limit_color(&palette, limit), capitalize(&self.limit_name(limit)));
-                let label = words::limit_button(ui, color, name, self.is_selected(limit));
-                if label.on_hover_text(words::hint(limit)).clicked() {
-                    self.select(limit, wishes);
+                let label = text::limit_button(ui, color, name, self.is_selected(limit));
+                if label.on_hover_text(text::hint(limit)).clicked() {
+                    self.select(limit, actions);
                 }
             }
         });
@@ -216,7 +213,7 @@ impl PupilView<'_> {
         (words, words.cells(rect, fields.len()))
     }
 
-    fn pictures(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
+    fn pictures(&self, ui: &mut Ui, actions: &mut Actions) {
         let (rect, _) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
         let (words, cells) = self.layout_cells(ui, rect);
         let Some(first) = cells.first() else { return };
@@ -236,7 +233,7 @@ impl PupilView<'_> {
         if let Some((picture, response, limit)) = pointed {
             response.clone().on_hover_text_at_pointer(self.describe(picture.pupil, limit));
             if response.clicked() {
-                self.select(limit, wishes);
+                self.select(limit, actions);
             }
         }
         let bold = |limit| self.is_selected(limit) || pointed.is_some_and(|p| p.2 == limit);
@@ -255,7 +252,7 @@ impl PupilView<'_> {
         let id = Id::unique("pupil").with(field);
         let response = ui.interact(rect, id, Sense::click());
         let name = format!("Pupil of field {}: {}", field + 1, self.summary(pupil));
-        response.widget_info(|| WidgetInfo::labeled(eframe::egui::Role::Image, true, &name));
+        response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &name));
         response
     }
 }

@@ -1,6 +1,6 @@
 //! One pupil in its square: what gets through, by what it ends, and the ideal pupil around it.
 
-use eframe::egui::{Align2, Color32, Mesh, Pos2, Rect, Shape, Stroke, TextStyle, Ui};
+use egui::{Align2, Color32, Mesh, Pos2, Rect, Shape, Stroke, TextStyle, Ui};
 use glam::DVec2;
 
 use crate::analysis::{FieldPupil, PupilShape};
@@ -102,7 +102,7 @@ impl<'a> PupilPicture<'a> {
         let from = self.scale * (DVec2::from(mm) - self.center);
         #[expect(clippy::cast_possible_truncation, reason = "a place on the screen")]
         let (x, y) = (from.x as f32, from.y as f32);
-        self.rect.center() + eframe::egui::vec2(x, -y)
+        self.rect.center() + egui::vec2(x, -y)
     }
 
     fn to_screen_all(&self, points: &[[f64; 2]]) -> Vec<Pos2> {
@@ -171,7 +171,7 @@ impl<'a> PupilPicture<'a> {
     }
 
     /// The two lines through the axis of the lens.
-    fn paint_axes(&self, painter: &eframe::egui::Painter, palette: &Palette) {
+    fn paint_axes(&self, painter: &egui::Painter, palette: &Palette) {
         let axis = self.to_screen([0.0; 2]);
         let stroke = Stroke::new(1.0, color32(palette.faint).gamma_multiply(0.6));
         painter.hline(self.rect.x_range(), axis.y, stroke);
@@ -179,7 +179,7 @@ impl<'a> PupilPicture<'a> {
     }
 
     /// The ideal pupil, dashed.
-    fn paint_disc(&self, painter: &eframe::egui::Painter, palette: &Palette) {
+    fn paint_disc(&self, painter: &egui::Painter, palette: &Palette) {
         let stroke = Stroke::new(1.0, color32(palette.faint));
         painter.extend(Shape::dashed_line(&self.to_screen_all(&self.pupil.disc), stroke, 4.0, 3.0));
     }

@@ -3,7 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{
+use egui::{
     Align, Align2, Color32, Layout as Arrange, Pos2, Rect, RichText, Role, ScrollArea, Sense,
     Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
 };
@@ -12,6 +12,7 @@ use egui_extras::{Column as Width, TableBuilder, TableRow};
 use super::PupilView;
 use crate::analysis::{Estimate, RimSensitivities, RimSensitivity};
 use crate::session::Command;
+use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::field_name;
@@ -73,7 +74,7 @@ pub(super) fn height(ui: &Ui, shown: &PupilView<'_>) -> f32 {
 }
 
 /// The table below the pictures, as high as there is room.
-pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, wishes: &mut Vec<Command>) {
+pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, actions: &mut Actions) {
     let Some(all) = &shown.pupils.all_rims else { return };
     let room = ui.available_height();
     let table = SensitivityTable::new(shown, all);
@@ -88,7 +89,7 @@ pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, wishes: &mut Vec<Co
         ui.weak("No rim ends a ray: the beam ends at the ideal entrance pupil.");
         return;
     }
-    table.show(ui, &felt, wishes);
+    table.show(ui, &felt, actions);
 }
 
 /// The surfaces at whose rim some ray ends.
@@ -147,7 +148,7 @@ impl<'a> SensitivityTable<'a> {
         Estimate::new(scale * number.value, scale * number.error, number.rays)
     }
 
-    fn show(&self, ui: &mut Ui, felt: &[usize], wishes: &mut Vec<Command>) {
+    fn show(&self, ui: &mut Ui, felt: &[usize], actions: &mut Actions) {
         ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
             ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
             let mut table = TableBuilder::new(ui)
@@ -162,7 +163,7 @@ impl<'a> SensitivityTable<'a> {
             }
             table.header(HEAD, |row| self.head(row)).body(|mut body| {
                 for surface in felt {
-                    body.row(ROW, |row| self.row(row, *surface, wishes));
+                    body.row(ROW, |row| self.row(row, *surface, actions));
                 }
             });
         });
@@ -179,7 +180,7 @@ impl<'a> SensitivityTable<'a> {
         }
     }
 
-    fn row(&self, mut row: TableRow<'_, '_>, surface: usize, wishes: &mut Vec<Command>) {
+    fn row(&self, mut row: TableRow<'_, '_>, surface: usize, actions: &mut Actions) {
         let chosen = self.selected == Some(surface);
         row.set_selected(chosen);
         row.col(|ui| {
@@ -198,7 +199,7 @@ impl<'a> SensitivityTable<'a> {
         }
         let response = row.response().on_hover_text(self.details(surface));
         if response.clicked() {
-            wishes.push(Command::Select((!chosen).then_some(surface)));
+            actions.push(Command::Select((!chosen).then_some(surface)));
         }
     }
 

@@ -1,90 +1,87 @@
 //! What begins, holds and ends a search, how far it is, and the hand on it while it goes on.
 
-use eframe::egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui};
+use egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui};
 
 use super::setup::SearchSetup;
-use super::{search_command, words};
+use super::text;
 use crate::search::lens_landscape::describe_violation;
 use crate::search::{SteerCommand, Temperature};
 use crate::session::{
     Command, RunStatus, SessionView, StructureSearchCommand, StructureSearchSnapshot,
 };
+use crate::studio::actions::Actions;
+use crate::studio::file_dialog::FileRequest;
 use crate::studio::number;
-use crate::studio::panels::design_results;
+use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
+use crate::studio::panels::{NO_LIGHT, is_dark};
 
-/// Start, pause, stop, open, forget.
-pub(super) fn buttons(
-    ui: &mut Ui,
-    view: &SessionView,
-    setup: &SearchSetup,
-    wishes: &mut Vec<Command>,
-) {
-    let run = view.structure_search.run.as_deref();
-    let under_way = run.is_some_and(StructureSearchSnapshot::is_active);
-    let paused = run.is_some_and(|run| run.status == RunStatus::Paused);
+/// Start, pause, stop, open, save and clear.
+pub(super) fn buttons(ui: &mut Ui, view: &SessionView, setup: &SearchSetup, actions: &mut Actions) {
+    let search = &view.structure_search;
+    let run = search.run.as_deref();
+    let active = run.is_some_and(StructureSearchSnapshot::is_active);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        start_button(ui, view, under_way, setup, wishes);
-        let hold = if paused {
-            ("Resume", StructureSearchCommand::Resume, "Let the search go on")
-        } else {
-            ("Pause", StructureSearchCommand::Pause, "Hold the search after its present round")
-        };
+        start_button(ui, view, active, setup, actions);
         let buttons = [
-            (hold.0, under_way, hold.1, hold.2),
-            ("Stop", under_way, StructureSearchCommand::Stop, "End the search; its lenses stay"),
-            (
-                "Open…",
-                !under_way && !view.structure_search.starting,
-                StructureSearchCommand::ResumeFrom(None),
-                "Go on with a search that was saved",
+            if run.is_some_and(|run| run.status == RunStatus::Paused) {
+                let command = StructureSearchCommand::Resume;
+                ActionButton::new("Resume", active, command, "Resume the search")
+            } else {
+                let command = StructureSearchCommand::Pause;
+                let hint = "Pause the search after its current round";
+                ActionButton::new("Pause", active, command, hint)
+            },
+            ActionButton::new(
+                "Stop",
+                active,
+                StructureSearchCommand::Stop,
+                "Stop the search and retain its lenses",
             ),
-            (
+            ActionButton::new(
+                "Open…",
+                !active && !search.starting,
+                FileRequest::OpenSearch,
+                "Resume a search from its file",
+            ),
+            ActionButton::new(
                 "Save to…",
                 true,
-                StructureSearchCommand::SaveTo(None),
-                "Where the search is saved every few seconds",
+                FileRequest::SaveSearch,
+                "Choose the file in which the search is saved every few seconds",
             ),
-            (
+            ActionButton::new(
                 "Clear",
-                run.is_some() || view.structure_search.error.is_some(),
+                run.is_some() || search.error.is_some(),
                 StructureSearchCommand::Clear,
-                "Forget this search; its file stays",
+                "Dismiss this search; its file is retained",
             ),
         ];
-        for (text, enabled, explore, hint) in buttons {
-            if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
-                wishes.push(search_command(explore));
-            }
-        }
+        action_buttons(ui, buttons, actions);
     });
 }
 
 fn start_button(
     ui: &mut Ui,
     view: &SessionView,
-    under_way: bool,
+    active: bool,
     setup: &SearchSetup,
-    wishes: &mut Vec<Command>,
+    actions: &mut Actions,
 ) {
-    let broken = view.results.is_some() && design_results(view).is_none();
-    let ready = !under_way && !view.structure_search.starting && !broken;
-    let fill = ui.visuals().selection.bg_fill;
-    let button = Button::new(RichText::new("Search").strong()).fill(fill);
-    let button = ui
-        .add_enabled(ready, button)
-        .on_hover_text("Search over structure in the background, on a copy of the design");
-    let why = if broken { "No light gets through this lens" } else { "A search is under way" };
-    if button.on_disabled_hover_text(why).clicked() {
-        wishes.push(search_command(StructureSearchCommand::Start(Box::new(setup.request(view)))));
+    let dark = is_dark(view);
+    let ready = !active && !view.structure_search.starting && !dark;
+    let hint = "Search over structure in the background, on a copy of the design";
+    let reason = if dark { NO_LIGHT } else { "A search is already running" };
+    if main_button(ui, "Search", ready, hint, reason) {
+        actions.push(StructureSearchCommand::Start(Box::new(setup.request(view))));
     }
-    if broken {
-        ui.colored_label(ui.visuals().warn_fg_color, why);
+    if dark {
+        ui.colored_label(ui.visuals().warn_fg_color, NO_LIGHT);
     }
 }
 
 /// The offer to go on with the search that was left when the program was closed.
-pub(super) fn unfinished_search(ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+pub(super) fn unfinished_search(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let known = &view.structure_search;
     let Some(left) = known.unfinished.as_ref().filter(|_| known.run.is_none() && !known.starting)
     else {
@@ -95,13 +92,13 @@ pub(super) fn unfinished_search(ui: &mut Ui, view: &SessionView, wishes: &mut Ve
         ui.label("A search was left:").on_hover_text(left.display().to_string());
         ui.strong(name.unwrap_or_default().trim_end_matches(".search.json"));
         if ui.button("Go on").on_hover_text("Go on where it was saved").clicked() {
-            wishes.push(search_command(StructureSearchCommand::ResumeFrom(Some(left.clone()))));
+            actions.push(StructureSearchCommand::ResumeFrom(Some(left.clone())));
         }
         ui.add_space(12.0);
         let hint =
             "Put its file aside; Open… finds it as forgotten.json until another is forgotten";
         if ui.button("Forget it").on_hover_text(hint).clicked() {
-            wishes.push(search_command(StructureSearchCommand::DismissUnfinished));
+            actions.push(StructureSearchCommand::DismissUnfinished);
         }
     });
 }
@@ -113,7 +110,7 @@ const GRADIENT: &str = "A move of a chain is some gradient steps; a gradient is 
 fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
     for (lens, limits) in [("start", &run.start_violations), ("best lens", &run.best_violations)] {
         if !limits.is_empty() {
-            let text = words::violations_text(lens, limits.len());
+            let text = text::violations_text(lens, limits.len());
             let all: Vec<String> = limits.iter().map(describe_violation).collect();
             let label = Label::new(RichText::new(text).small().color(ui.visuals().warn_fg_color));
             ui.add(label).on_hover_text(all.join("\n"));
@@ -123,7 +120,7 @@ fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
 
 /// How far the search is, in numbers.
 pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &StructureSearchSnapshot) {
-    let text = words::status_text(run, view.structure_search.pending);
+    let text = text::status_text(run, view.structure_search.pending);
     match run.fraction_done() {
         Some(done) => {
             let bar = ProgressBar::new(done as f32).desired_height(16.0).text(text);
@@ -133,10 +130,10 @@ pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &StructureSearchSna
             ui.label(text);
         }
     }
-    let speed = words::speed_text(run);
+    let speed = text::speed_text(run);
     let label = Label::new(RichText::new(&speed).small().weak()).truncate();
     ui.add(label).on_hover_text(format!("{speed}\n{GRADIENT}"));
-    let (text, failed) = words::checkpoint_text(&run.checkpoint);
+    let (text, failed) = text::checkpoint_text(&run.checkpoint);
     let visuals = ui.visuals();
     let color = if failed { visuals.error_fg_color } else { visuals.weak_text_color() };
     let path = run.checkpoint.path.as_ref().map(|path| path.display().to_string());
@@ -150,15 +147,15 @@ pub(super) fn live_controls(
     ui: &mut Ui,
     view: &SessionView,
     run: &StructureSearchSnapshot,
-    wishes: &mut Vec<Command>,
+    actions: &mut Actions,
 ) {
     ui.horizontal_wrapped(|ui| {
-        temperature(ui, run, wishes);
-        preview_choice(ui, view, run, wishes);
+        temperature(ui, run, actions);
+        preview_choice(ui, view, run, actions);
     });
 }
 
-fn temperature(ui: &mut Ui, run: &StructureSearchSnapshot, wishes: &mut Vec<Command>) {
+fn temperature(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Actions) {
     ui.weak("Temperature").on_hover_text(
         "How much worse a lens may become before a descent is given up for a new mutation: at this \
          merit its density is 1/e. Hotter is more patient with bad lenses",
@@ -171,15 +168,13 @@ fn temperature(ui: &mut Ui, run: &StructureSearchSnapshot, wishes: &mut Vec<Comm
         .custom_formatter(|value, _| number::format_digits(value, 3));
     let drag = ui.add_enabled(run.is_active(), drag).accessible_name("Temperature");
     if let Some(temperature) = Temperature::new(value).filter(|_| drag.changed()) {
-        wishes.push(search_command(StructureSearchCommand::Control(SteerCommand::Temperature(
-            temperature,
-        ))));
+        actions.push(StructureSearchCommand::Control(SteerCommand::Temperature(temperature)));
     }
     let factor = run.request.plan.settings.reheat;
     let hint = format!("Multiply the temperature by {factor}");
     let reheat = ui.add_enabled(run.is_active(), Button::new("Reheat")).on_hover_text(hint);
     if reheat.clicked() {
-        wishes.push(search_command(StructureSearchCommand::Control(SteerCommand::Reheat)));
+        actions.push(StructureSearchCommand::Control(SteerCommand::Reheat));
     }
 }
 
@@ -187,21 +182,21 @@ fn preview_choice(
     ui: &mut Ui,
     view: &SessionView,
     run: &StructureSearchSnapshot,
-    wishes: &mut Vec<Command>,
+    actions: &mut Actions,
 ) {
     let mut follows = view.structure_search.previewed_chain.is_some();
     let chain = view.structure_search.previewed_chain.unwrap_or(0);
     let hint = "Show the lens of a chain in place of the design as it changes, in all panels";
     let check = Checkbox::new(&mut follows, "Follow the search");
     if ui.add(check).on_hover_text(hint).changed() {
-        wishes.push(Command::Preview(None));
-        wishes.push(search_command(StructureSearchCommand::Preview(follows.then_some(chain))));
+        actions.push(Command::Preview(None));
+        actions.push(StructureSearchCommand::Preview(follows.then_some(chain)));
     }
     if follows && run.chains.len() > 1 {
         let mut number = chain + 1;
         let drag = DragValue::new(&mut number).range(1..=run.chains.len()).prefix("chain ");
         if ui.add(drag).accessible_name("Chain that is followed").changed() {
-            wishes.push(search_command(StructureSearchCommand::Preview(Some(number - 1))));
+            actions.push(StructureSearchCommand::Preview(Some(number - 1)));
         }
     }
 }

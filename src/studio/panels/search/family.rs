@@ -3,13 +3,13 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{
+use egui::{
     Color32, CursorIcon, Label, Pos2, Rect, RichText, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
     vec2,
 };
 
 use super::thumbnail::Thumbnails;
-use super::{lenses, marks, words};
+use super::{lenses, mutation_style, text};
 use crate::lens::Lens;
 use crate::search::{LineageNode, OfferOutcome};
 use crate::session::{SessionView, StructureSearchSnapshot};
@@ -56,7 +56,7 @@ pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> O
     for (node, at) in shown.iter().zip(&places) {
         let kept = node.offer.is_some_and(OfferOutcome::is_accepted);
         let radius = if kept { 4.2 } else { 2.4 };
-        painter.circle_filled(*at, radius, marks::color(ui.visuals(), node.kind));
+        painter.circle_filled(*at, radius, mutation_style::color(ui.visuals(), node.kind));
     }
     if let Some(at) = place_of(number) {
         painter.circle_stroke(at, 6.5, Stroke::new(1.5, ui.visuals().strong_text_color()));
@@ -71,8 +71,8 @@ pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> O
     let text = format!(
         "Lens {}\n{}\n{}",
         node.number,
-        words::mutation_text(node),
-        words::outcome_text(node)
+        text::mutation_text(node),
+        text::outcome_text(node)
     );
     let response =
         response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text_at_pointer(text);
@@ -139,12 +139,12 @@ fn generation_text(ui: &mut Ui, node: &Generation) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         if let Some(kind) = node.kind {
-            marks::symbol(ui, kind);
+            mutation_style::symbol(ui, kind);
         }
         ui.add(Label::new(RichText::new(format!("Lens {}", node.number)).strong()));
-        ui.add(Label::new(words::mutation_text(node)).wrap());
+        ui.add(Label::new(text::mutation_text(node)).wrap());
     });
-    for text in words::outcome_text(node).lines() {
+    for text in text::outcome_text(node).lines() {
         ui.add(Label::new(RichText::new(text).small().weak()).wrap());
     }
 }

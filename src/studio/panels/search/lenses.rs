@@ -2,18 +2,21 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{
+use egui::{
     Align2, Button, Color32, CursorIcon, FontId, Pos2, Rect, Response, Role, Sense, Stroke,
     StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
+use super::text;
 use super::thumbnail::Thumbnails;
-use super::{search_command, words};
 use crate::lens::Lens;
 use crate::search::SteerCommand;
 use crate::session::{
     Command, FoundLens, SessionView, StructureSearchCommand, StructureSearchSnapshot,
 };
+use crate::studio::actions::Actions;
+use crate::studio::file_dialog::FileRequest;
+use crate::studio::panels::widgets::{ActionButton, action_buttons};
 
 /// The smallest card.
 const CARD: Vec2 = vec2(148.0, 112.0);
@@ -73,7 +76,7 @@ fn card(
     thumbnails: &mut Thumbnails,
 ) -> Response {
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
-    let text = words::lens_text(found);
+    let text = text::lens_text(found);
     let pinned = if look.pinned { ", pinned" } else { "" };
     let label = format!("Lens {}{pinned}: {}", found.number, text.replace('\n', ", "));
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
@@ -120,56 +123,46 @@ pub(super) fn paint(
     }
 }
 
-/// Take, pin, export; whether the design is shown again.
-pub(super) fn actions(
+/// Buttons to accept, pin or export a lens; true if the design is to be shown again.
+pub(super) fn lens_buttons(
     ui: &mut Ui,
     view: &SessionView,
     run: &StructureSearchSnapshot,
     number: u64,
-    wishes: &mut Vec<Command>,
+    actions: &mut Actions,
 ) -> bool {
-    let pinned = run.pinned == Some(number);
-    let pin = if pinned {
-        (
-            "Unpin",
-            StructureSearchCommand::Control(SteerCommand::Unpin),
-            "Mutate any of the lenses that are kept again",
-        )
-    } else {
-        (
-            "Pin",
-            StructureSearchCommand::Control(SteerCommand::Pin(number)),
-            "Let every new descent begin from this lens from now on",
-        )
-    };
     let exporting = view.structure_search.exporting.contains(&number);
-    let take =
-        format!("Make lens {number} the design in place of {}, one undo step", view.lens.name);
+    let take = format!("Make lens {number} the design, as one undo step");
+    let pin = if run.pinned == Some(number) {
+        let command = StructureSearchCommand::Control(SteerCommand::Unpin);
+        let hint = "Start new descents from any retained lens again";
+        ActionButton::new("Unpin", run.is_active(), command, hint)
+    } else {
+        let command = StructureSearchCommand::Control(SteerCommand::Pin(number));
+        let hint = "Start every new descent from this lens";
+        ActionButton::new("Pin", run.is_active(), command, hint)
+    };
     let buttons = [
-        ("Take", true, StructureSearchCommand::Accept(number), take.as_str()),
-        (pin.0, run.is_active(), pin.1, pin.2),
-        (
-            if exporting { "Finishing…" } else { "Export…" },
+        ActionButton::new("Take", true, StructureSearchCommand::Accept(number), &take),
+        pin,
+        ActionButton::new(
+            if exporting { "Finalizing…" } else { "Export…" },
             !exporting,
-            StructureSearchCommand::Export { number, path: None },
-            "Write this lens with glasses of the catalogue, every limit of the factory kept; one \
-             that does not get there is refused with the limit that fails",
+            FileRequest::ExportSearchLens(number),
+            "Replace model glasses by catalogue glasses, satisfy all manufacturing limits, and \
+             write the lens; if a limit cannot be satisfied, it is named and nothing is written",
         ),
     ];
     let mut back = false;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for (text, enabled, explore, hint) in buttons {
-            if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
-                wishes.push(search_command(explore));
-            }
-        }
+        action_buttons(ui, buttons, actions);
         let shown = view.preview_lens.is_some();
         let button = ui.add_enabled(shown, Button::new("Back to the design"));
         back = button.on_hover_text("Show the design again in all panels").clicked();
     });
     if back {
-        wishes.push(Command::Preview(None));
+        actions.push(Command::Preview(None));
     }
     back
 }

@@ -1,6 +1,6 @@
 //! How much of its light each field keeps: one share for all, or one for each.
 
-use eframe::egui::{DragValue, Ui};
+use egui::{DragValue, Ui};
 
 use crate::lens::{FieldPoint, Lens};
 use crate::studio::panels::field_name;

@@ -1,6 +1,6 @@
 //! What a factory can make, and how the sampler goes: what is seldom changed.
 
-use eframe::egui::{ComboBox, Grid, Ui};
+use egui::{ComboBox, Grid, Ui};
 
 use super::setup::{drag, length, optional};
 use crate::search::lens_landscape::SearchPlan;

@@ -8,18 +8,19 @@ mod family;
 mod lenses;
 mod light;
 mod limits;
-mod marks;
 mod moves;
+mod mutation_style;
 mod plot;
 mod setup;
+mod text;
 mod thumbnail;
-mod words;
 
-use eframe::egui::{Button, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
+use egui::{Button, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::Panel;
-use crate::session::{Command, SessionView, StructureSearchCommand, StructureSearchSnapshot};
-use crate::studio::wording::{capitalize, counted_from_one};
+use crate::session::{Command, SessionView, StructureSearchSnapshot};
+use crate::studio::actions::Actions;
+use crate::studio::text::{capitalize, counted_from_one};
 use setup::SearchSetup;
 use thumbnail::Thumbnails;
 
@@ -72,10 +73,10 @@ impl Panel for SearchPanel {
         "Search"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.sync_page(view);
-        controls::buttons(ui, view, &self.setup, wishes);
-        controls::unfinished_search(ui, view, wishes);
+        controls::buttons(ui, view, &self.setup, actions);
+        controls::unfinished_search(ui, view, actions);
         if let Some(why) = &view.structure_search.error {
             let why = capitalize(&counted_from_one(why));
             ui.colored_label(ui.visuals().error_fg_color, why);
@@ -88,14 +89,14 @@ impl Panel for SearchPanel {
         }
         self.pages(ui, run.is_some());
         if let (SearchPage::Lenses | SearchPage::Family, Some(run)) = (self.page, run.as_deref()) {
-            self.selection_bar(ui, view, run, wishes);
+            self.selection_bar(ui, view, run, actions);
         }
         let scroll = ScrollArea::vertical().id_salt(self.page as u8).auto_shrink([false, false]);
         scroll.show(ui, |ui| match (self.page, run.as_deref()) {
             (SearchPage::Setup, _) | (_, None) => self.setup_page(ui, view),
-            (SearchPage::Lenses, Some(run)) => self.lenses_page(ui, view, run, wishes),
-            (SearchPage::Moves, Some(run)) => moves::table(ui, run, wishes),
-            (SearchPage::Family, Some(run)) => self.family_page(ui, view, run, wishes),
+            (SearchPage::Lenses, Some(run)) => self.lenses_page(ui, view, run, actions),
+            (SearchPage::Moves, Some(run)) => moves::table(ui, run, actions),
+            (SearchPage::Family, Some(run)) => self.family_page(ui, view, run, actions),
         });
     }
 }
@@ -143,14 +144,14 @@ impl SearchPanel {
         ui: &mut Ui,
         view: &SessionView,
         run: &StructureSearchSnapshot,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
-        controls::live_controls(ui, view, run, wishes);
+        controls::live_controls(ui, view, run, actions);
         let clicked = plot::plots(ui, view, run, self.selected_number());
         let chosen = self.selected_number();
         let clicked =
             clicked.or_else(|| lenses::cards(ui, view, run, chosen, &mut self.thumbnails));
-        self.select(run, clicked, wishes);
+        self.select(run, clicked, actions);
     }
 
     /// The line of the lens that was clicked, or of the best one.
@@ -159,13 +160,13 @@ impl SearchPanel {
         ui: &mut Ui,
         view: &SessionView,
         run: &StructureSearchSnapshot,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         let number = self.selected_number().unwrap_or(run.best.number);
         let clicked = family::tree(ui, run, number);
         let clicked =
             clicked.or_else(|| family::ancestors(ui, view, run, number, &mut self.thumbnails));
-        self.select(run, clicked, wishes);
+        self.select(run, clicked, actions);
     }
 
     /// The generation that was clicked.
@@ -178,12 +179,12 @@ impl SearchPanel {
         &mut self,
         run: &StructureSearchSnapshot,
         number: Option<u64>,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         let Some(number) = number else { return };
         self.selected = Some((run.number, number));
         if let Some(lens) = run.lens_by_number(number) {
-            wishes.push(Command::Preview(Some(Box::new((**lens).clone()))));
+            actions.push(Command::Preview(Some(Box::new((**lens).clone()))));
         }
     }
 
@@ -194,15 +195,15 @@ impl SearchPanel {
         ui: &mut Ui,
         view: &SessionView,
         run: &StructureSearchSnapshot,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         if ui.available_height() < MIN_HEIGHT {
-            return self.selection(ui, view, run, wishes);
+            return self.selection(ui, view, run, actions);
         }
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
         let side = Side::bottom("chosen lens of the search").frame(frame);
         let side = side.show_separator_line(false).exact_size(SELECTION_HEIGHT);
-        side.show(ui, |ui| self.selection(ui, view, run, wishes));
+        side.show(ui, |ui| self.selection(ui, view, run, actions));
     }
 
     fn selection(
@@ -210,7 +211,7 @@ impl SearchPanel {
         ui: &mut Ui,
         view: &SessionView,
         run: &StructureSearchSnapshot,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
         let number = self.selected_number();
         let lens = number.and_then(|number| run.lens_by_number(number));
@@ -218,14 +219,9 @@ impl SearchPanel {
             ui.weak("Click a lens or a mark to see it beside the design.");
             return;
         };
-        if lenses::actions(ui, view, run, number, wishes) {
+        if lenses::lens_buttons(ui, view, run, number, actions) {
             self.selected = None;
         }
-        words::comparison(ui, view, run, number);
+        text::comparison(ui, view, run, number);
     }
-}
-
-/// The wish for something of the search.
-fn search_command(explore: StructureSearchCommand) -> Command {
-    Command::StructureSearch(explore)
 }

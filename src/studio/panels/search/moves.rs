@@ -1,12 +1,13 @@
 //! What became of each kind of mutation, and how often it is tried from now on.
 
-use eframe::egui::{DragValue, Grid, RichText, Ui};
+use egui::{DragValue, Grid, RichText, Ui};
 
-use super::{marks, search_command};
+use super::mutation_style;
 use crate::search::{MutationKind, MutationStatistics, SteerCommand};
-use crate::session::{Command, StructureSearchCommand, StructureSearchSnapshot};
+use crate::session::{StructureSearchCommand, StructureSearchSnapshot};
+use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::wording::{capitalize, counted_from_one};
+use crate::studio::text::{capitalize, counted_from_one};
 
 const HEADINGS: [(&str, &str); 7] = [
     ("Mutation", ""),
@@ -19,7 +20,7 @@ const HEADINGS: [(&str, &str); 7] = [
 ];
 
 /// The table of all kinds.
-pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, wishes: &mut Vec<Command>) {
+pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Actions) {
     Grid::new("moves").num_columns(HEADINGS.len()).spacing([9.0, 3.0]).striped(true).show(
         ui,
         |ui| {
@@ -30,8 +31,8 @@ pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, wishes: &mut Vec
                 }
             }
             ui.end_row();
-            for kind in marks::kinds() {
-                row(ui, run, kind, wishes);
+            for kind in mutation_style::kinds() {
+                row(ui, run, kind, actions);
                 ui.end_row();
             }
         },
@@ -39,10 +40,10 @@ pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, wishes: &mut Vec
     refusal_summary(ui, run);
 }
 
-fn row(ui: &mut Ui, run: &StructureSearchSnapshot, kind: MutationKind, wishes: &mut Vec<Command>) {
+fn row(ui: &mut Ui, run: &StructureSearchSnapshot, kind: MutationKind, actions: &mut Actions) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        marks::symbol(ui, kind);
+        mutation_style::symbol(ui, kind);
         ui.label(kind.name());
     });
     let mut weight = run.weights.of(kind);
@@ -50,9 +51,7 @@ fn row(ui: &mut Ui, run: &StructureSearchSnapshot, kind: MutationKind, wishes: &
     let name = format!("Weight of {}", kind.name());
     let drag = ui.add_enabled(run.is_active(), drag).accessible_name(&name);
     if drag.changed() {
-        wishes.push(search_command(StructureSearchCommand::Control(SteerCommand::Weight(
-            kind, weight,
-        ))));
+        actions.push(StructureSearchCommand::Control(SteerCommand::Weight(kind, weight)));
     }
     let tally = run.statistics.kinds.get(&kind).cloned().unwrap_or_default();
     ui.label(tally.tried.to_string());
@@ -81,7 +80,7 @@ fn most_common_refusal(tally: &MutationStatistics) -> Option<(&str, u64)> {
 /// The commonest reason of each kind, in words.
 fn refusal_summary(ui: &mut Ui, run: &StructureSearchSnapshot) {
     ui.add_space(6.0);
-    for kind in marks::kinds() {
+    for kind in mutation_style::kinds() {
         let tally = run.statistics.kinds.get(&kind);
         if let Some((why, count)) = tally.and_then(most_common_refusal) {
             let text = format!("{}, {count} × refused: {}", kind.name(), counted_from_one(why));

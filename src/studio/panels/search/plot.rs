@@ -1,10 +1,10 @@
 //! The merit against iterations with a mark for every mutation (figure 4.6 of Teh, *Computational
 //! Lens Design*), and below it how many elements the lens of the chain has.
 
-use eframe::egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
+use egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points};
 
-use super::{marks, words};
+use super::{mutation_style, text};
 use crate::session::{DescentMark, HistorySample, SessionView, StructureSearchSnapshot};
 use crate::studio::panels::decade_name;
 
@@ -88,7 +88,7 @@ fn merit_plot(
 }
 
 /// The merit of the start across all iterations.
-fn start_line(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, color: eframe::egui::Color32) {
+fn start_line(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, color: egui::Color32) {
     let (first, last) = (run.history.moments.first(), run.history.moments.last());
     if let (Some(first), Some(last), Some(y)) = (first, last, decade(run.start.merit)) {
         let ends = vec![[first.round as f64, y], [last.round as f64, y]];
@@ -110,19 +110,15 @@ fn mark_point(mark: &DescentMark) -> Option<[f64; 2]> {
 }
 
 /// Every mutation where it led; what was kept in the end is larger.
-fn mutation_marks(
-    plot: &mut PlotUi<'_>,
-    run: &StructureSearchSnapshot,
-    visuals: &eframe::egui::Visuals,
-) {
-    for kind in marks::kinds() {
+fn mutation_marks(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, visuals: &egui::Visuals) {
+    for kind in mutation_style::kinds() {
         for (entered, radius) in [(false, 2.6), (true, 4.8)] {
             let of_kind = run.history.marks.iter();
             let of_kind = of_kind.filter(|m| m.kind == Some(kind) && m.entered == entered);
             let places: Vec<[f64; 2]> = of_kind.filter_map(mark_point).collect();
             if !places.is_empty() {
-                let color = marks::color(visuals, Some(kind));
-                let points = Points::new(kind.name(), places).shape(marks::shape(kind));
+                let color = mutation_style::color(visuals, Some(kind));
+                let points = Points::new(kind.name(), places).shape(mutation_style::shape(kind));
                 plot.points(points.radius(radius).color(color));
             }
         }
@@ -151,15 +147,11 @@ fn hovered_mark(ui: &Ui, run: &StructureSearchSnapshot, shown: &PlotResponse<()>
         Some(node) => format!(
             "Lens {}\n{}\n{}",
             node.number,
-            words::mutation_text(node),
-            words::outcome_text(node)
+            text::mutation_text(node),
+            text::outcome_text(node)
         ),
         None => {
-            format!(
-                "Lens {}, forgotten since; merit {}",
-                mark.number,
-                words::merit_text(mark.merit)
-            )
+            format!("Lens {}, forgotten since; merit {}", mark.number, text::merit_text(mark.merit))
         }
     };
     let response = shown.response.clone().on_hover_text_at_pointer(text);
@@ -217,9 +209,9 @@ fn step_curve(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
 fn legend(ui: &mut Ui, run: &StructureSearchSnapshot) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for kind in marks::kinds() {
+        for kind in mutation_style::kinds() {
             if run.history.marks.iter().any(|mark| mark.kind == Some(kind)) {
-                marks::symbol(ui, kind);
+                mutation_style::symbol(ui, kind);
                 ui.label(RichText::new(kind.name()).small());
                 ui.add_space(4.0);
             }

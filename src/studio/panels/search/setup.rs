@@ -2,10 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::emath::Numeric;
-use eframe::egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
+use egui::emath::Numeric;
+use egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
 
-use super::{light, limits, marks};
+use super::{light, limits, mutation_style};
 use crate::lens::{Lens, Medium};
 use crate::search::element::piece_count;
 use crate::search::{MutationKind, SearchMethod, SearchRules, SearchSettings};
@@ -227,7 +227,7 @@ impl SearchSetup {
 /// How often a kind is tried.
 fn weight_field(ui: &mut Ui, weights: &mut Vec<(MutationKind, f64)>, kind: MutationKind) {
     ui.horizontal(|ui| {
-        marks::symbol(ui, kind);
+        mutation_style::symbol(ui, kind);
         ui.label(kind.name());
     });
     let listed = weights.iter().find(|(other, _)| *other == kind);

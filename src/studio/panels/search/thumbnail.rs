@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{ColorImage, TextureHandle, TextureOptions, Ui, Vec2};
+use egui::{ColorImage, TextureHandle, TextureOptions, Ui, Vec2};
 
 use crate::lens::{Lens, added_glass};
 use crate::studio::draw::{BoundingBox, Camera, Scene, software};

@@ -1,12 +1,12 @@
 //! The numbers of a front in words: how far it is, how much it covers, what a lens on it is worth.
 
-use eframe::egui::{Label, RichText, Ui};
+use egui::{Label, RichText, Ui};
 
 use crate::lens::{Lens, Quantity};
 use crate::optimize::pareto::ParetoPoint;
 use crate::session::{ParetoRun, RunStatus, SessionView};
 use crate::studio::number;
-use crate::studio::wording::{capitalize, counted_from_one, status_text};
+use crate::studio::text::{capitalize, counted_from_one, status_text};
 
 /// What a sweep may change, and what it takes as it is.
 pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {

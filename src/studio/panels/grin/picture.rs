@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{
-    self, Align2, Color32, ColorImage, CursorIcon, Rect, Stroke, TextStyle, TextureHandle,
+use egui::{
+    Align2, Color32, ColorImage, CursorIcon, Rect, Stroke, TextStyle, TextureHandle,
     TextureOptions, Ui, UiBuilder, pos2,
 };
 use glam::DVec2;
 
-use super::{legend, words};
+use super::{legend, text};
 use crate::grin_design::RayPath;
 use crate::math::Vec3;
 use crate::session::{SessionView, Slice};
@@ -74,7 +74,7 @@ impl SlicePicture {
         let split = (all.right() - legend::WIDTH).max(all.left() + 1.0);
         let room = Rect::from_min_max(all.min, pos2(split, all.bottom()));
         ui.scope_builder(UiBuilder::new().max_rect(room), |ui| {
-            let label = words::slice_name(slice);
+            let label = text::slice_name(slice);
             let drawn = (&drawing.scene, drawing.full_view);
             let below = |ui: &Ui, shown: &SceneResponse| drawing.paint_colors(ui, shown, slice);
             let shown = self.scene_view.show_over(ui, self.backing, drawn, &label, below);
@@ -216,7 +216,7 @@ fn probe(ui: &Ui, shown: &SceneResponse, slice: &Slice, pinned: &mut Option<Vec3
     if shown.response.clone().on_hover_cursor(CursorIcon::Crosshair).clicked() {
         *pinned = Some(point);
     }
-    let text = words::probe_text(&slice.document, &slice.field, point);
+    let text = text::probe_text(&slice.document, &slice.field, point);
     let font = TextStyle::Small.resolve(ui.style());
     let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
     let corner = shown.response.rect.right_bottom() - egui::vec2(8.0, 8.0);

@@ -4,13 +4,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use eframe::egui::{Context, Ui, ViewportCommand};
 use eframe::{App, CreationContext};
+use egui::{Context, Ui, ViewportCommand};
 use serde::Serialize;
 
 use super::app::Studio;
 use super::draw::RenderBackend;
-use super::shell::{self, AppResult, Persistence, StudioError};
+use super::window::{self, AppResult, Persistence, StudioError};
 use super::{first_lens, panels};
 use crate::lens::{Edit, Parameter, Quantity};
 use crate::measure::{age_ms, processor_ms, time_ms};
@@ -56,7 +56,7 @@ pub struct WindowMetrics {
 pub fn measure_window() -> Result<WindowMetrics, StudioError> {
     let figures = Arc::new(Mutex::new(WindowMetrics::default()));
     let shared = Arc::clone(&figures);
-    shell::open_window(Persistence::Disabled, move |context, backing| {
+    window::open_window(Persistence::Disabled, move |context, backing| {
         start_benchmark(context, backing, &shared)
     })?;
     let found = figures.lock().unwrap_or_else(PoisonError::into_inner).clone();

@@ -1,6 +1,6 @@
 //! What a search aims at: terms with weights and targets, and how it treats the edge of the pupil.
 
-use eframe::egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
+use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::path::PathBuf;
 
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
@@ -8,9 +8,10 @@ use crate::lens::{Aperture, Lens, ParameterKind, Quantity};
 use crate::math::expression::evaluate;
 use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
-use crate::studio::field::{EditBuffers, InputPlacement, TextInput};
+use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::{add_variables_edit, field_name};
+use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 
 /// The terms of the panel.
 #[derive(Debug, Default)]
@@ -96,9 +97,9 @@ impl MeritEditor {
         ui: &mut Ui,
         view: &SessionView,
         drafts: &mut EditBuffers,
-        wishes: &mut Vec<Command>,
+        actions: &mut Actions,
     ) {
-        self.warnings(ui, &view.lens, wishes);
+        self.warnings(ui, &view.lens, actions);
         let search = view.optimization.as_deref();
         let mut unwanted = None;
         Grid::new("terms").num_columns(6).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
@@ -124,7 +125,7 @@ impl MeritEditor {
     }
 
     /// What stands in the way of the light that is asked for, each with the remedy.
-    fn warnings(&mut self, ui: &mut Ui, lens: &Lens, wishes: &mut Vec<Command>) {
+    fn warnings(&mut self, ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
         let more: Vec<&str> = self
             .active_terms()
             .filter(|weighted| can_ask_for_more_light(weighted.term))
@@ -150,7 +151,7 @@ impl MeritEditor {
             let hint = "Makes the rim of the stop, as large as the beam is there now, the aperture \
                         of the lens: one undo step";
             if warning_with_fix(ui, &what, "Limit the beam by the stop", hint) {
-                wishes.push(Command::LimitByStop);
+                actions.push(Command::LimitByStop);
             }
         }
         let rim = |v: &crate::lens::Variable| v.parameter.quantity == Quantity::SemiDiameter;
@@ -159,7 +160,7 @@ impl MeritEditor {
             let hint = "Lets the optimizer change every semi-diameter that is written: one undo \
                         step";
             if warning_with_fix(ui, &what, "Free the semi-diameters", hint) {
-                wishes.push(add_variables_edit(lens, &[ParameterKind::SemiDiameters]).into());
+                actions.push(add_variables_edit(lens, &[ParameterKind::SemiDiameters]));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! A search in words: how it stands, how fast it is, what a lens is worth beside the design.
 
-use eframe::egui::{Label, Ui};
+use egui::{Label, Ui};
 
 use crate::optimize::pareto::ParetoPoint;
 use crate::search::element::piece_count;
@@ -11,7 +11,7 @@ use crate::session::{
 };
 use crate::studio::number;
 use crate::studio::panels::optimizer::changes_text;
-use crate::studio::wording::{self, counted_from_one};
+use crate::studio::text::{self, counted_from_one};
 
 fn short(value: f64) -> String {
     number::format_digits(value, 4)
@@ -36,7 +36,7 @@ pub(super) fn status_text(run: &StructureSearchSnapshot, pending: Option<RunStat
         Some(EndReason::Sampler(RunEnd::Stuck)) => ": no mutation applies any more",
         Some(EndReason::Sampler(RunEnd::Stopped)) | None => "",
     };
-    let standing = wording::status_text(run.status, pending);
+    let standing = text::status_text(run.status, pending);
     let (from, to) = (merit_text(run.start.merit), merit_text(run.best.merit));
     format!("{standing}{why}, merit {from} to {to}")
 }

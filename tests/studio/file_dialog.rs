@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use aplanat::studio::chooser::{FileDialog, FileRequest};
+use aplanat::studio::file_dialog::{FileDialog, FileRequest};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 

@@ -1,6 +1,6 @@
 //! Everything about a field in words and numbers, each with its rays, its error and its time.
 
-use eframe::egui::{Label, RichText, Ui};
+use egui::{Label, RichText, Ui};
 
 use crate::grin_design::{
     GrinField, LightGoal, RayCounts, RayPath, RayPaths, SpatialAxis, ViewReport,
@@ -8,7 +8,7 @@ use crate::grin_design::{
 use crate::math::Vec3;
 use crate::session::{GrinAnalysis, GrinDocument, GrinRun, RunStatus, SessionView, Slice};
 use crate::studio::number::format_digits;
-use crate::studio::wording;
+use crate::studio::text;
 
 /// How the search stands, in one line.
 pub(super) fn status_text(run: &GrinRun, pending: Option<RunStatus>) -> String {
@@ -20,7 +20,7 @@ pub(super) fn status_text(run: &GrinRun, pending: Option<RunStatus>) -> String {
     };
     format!(
         "{}: step {} of {}, level {} of {} ({} nodes), loss {}{}",
-        wording::status_text(run.status, pending),
+        text::status_text(run.status, pending),
         progress.step,
         progress.max_steps,
         progress.level + 1,

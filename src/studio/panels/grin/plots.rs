@@ -1,9 +1,9 @@
 //! Two curves: the loss against the steps, and the index along a line beside the exact one.
 
-use eframe::egui::{Role, Ui, WidgetInfo, vec2};
+use egui::{Role, Ui, WidgetInfo, vec2};
 use egui_plot::{AxisHints, Corner, Legend, Line, LineStyle, Plot, VLine};
 
-use super::words;
+use super::text;
 use crate::session::{GrinRun, LossSample, SessionView};
 use crate::studio::panels::decade_name;
 
@@ -59,7 +59,7 @@ pub(super) fn loss_plot(ui: &mut Ui, run: &GrinRun) {
         ui.weak("No step has been taken yet: press Optimize.");
         return;
     }
-    ui.label(words::losses_text(run));
+    ui.label(text::losses_text(run));
     let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
     let curve = |loss: fn(&LossSample) -> f64| -> Vec<[f64; 2]> {
         let points = run.history.iter().map(|point| [point.step as f64, decade(loss(point))]);
@@ -93,7 +93,7 @@ pub(super) fn profile_plot(ui: &mut Ui, view: &SessionView) {
         return;
     };
     let profile = &slice.profile;
-    ui.label(words::profile_text(slice));
+    ui.label(text::profile_text(slice));
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.strong_text_color());
     let now = visuals.hyperlink_color;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{
+use egui::{
     Align, Color32, Galley, Layout as Arrange, Rect, Response, RichText, Role, Sense, TextStyle,
     Ui, Vec2, WidgetInfo, vec2,
 };
@@ -13,7 +13,7 @@ use crate::pupil::{PupilLimit, PupilOutline};
 use crate::studio::number;
 use crate::studio::palette::Palette;
 use crate::studio::panels::{field_name, relative_error};
-use crate::studio::wording::capitalize;
+use crate::studio::text::capitalize;
 use crate::trace::{Fate, RayLimit};
 
 /// The gap between two limits in a line, in points.

@@ -3,9 +3,8 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{
-    self, Align2, CornerRadius, Event, MouseWheelUnit, Rect, Response, Sense, Stroke, Ui,
-    WidgetInfo,
+use egui::{
+    Align2, CornerRadius, Event, MouseWheelUnit, Rect, Response, Sense, Stroke, Ui, WidgetInfo,
 };
 use glam::DVec2;
 

@@ -1,8 +1,6 @@
 //! Square pictures of one size and scale side by side, each with words above and below.
 
-use eframe::egui::{
-    Align, Align2, Layout as Arrange, Rect, TextStyle, Ui, UiBuilder, Vec2, pos2, vec2,
-};
+use egui::{Align, Align2, Layout as Arrange, Rect, TextStyle, Ui, UiBuilder, Vec2, pos2, vec2};
 
 use crate::studio::draw::{length_text, round_length_below};
 

@@ -3,9 +3,9 @@
 //! Enter, Tab and a click elsewhere end the typing, Escape gives it up. A text that was refused
 //! stays where it was typed, marked, with the reason beside it.
 
-use eframe::egui::text::{CCursor, CCursorRange};
-use eframe::egui::text_edit::TextEditState;
-use eframe::egui::{
+use egui::text::{CCursor, CCursorRange};
+use egui::text_edit::TextEditState;
+use egui::{
     Align, Align2, Color32, Context, Frame, Id, Key, Margin, Memory, Response, Stroke, TextEdit,
     Ui, WidgetText,
 };

@@ -1,16 +1,16 @@
 //! The window of an experiment: how far it is, then what the figure claims with its numbers, its
 //! pictures, and a button to keep them.
 
-use eframe::egui::{
+use egui::{
     Align, Button, ColorImage, Context, Grid, Id, Image, Layout, ProgressBar, RichText, ScrollArea,
     TextureHandle, TextureOptions, Ui, Window, vec2,
 };
 
-use super::chooser::FileRequest;
-use super::menu::UiAction;
+use super::actions::Actions;
+use super::file_dialog::FileRequest;
 use super::number;
 use super::palette::{Palette, color32};
-use super::wording::capitalize;
+use super::text::capitalize;
 use crate::experiments::{ALL, Claim, Effort, Experiment, ExperimentReport, NamedPlot};
 use crate::session::{Command, ExperimentRun, ExperimentStatus};
 
@@ -29,13 +29,13 @@ impl std::fmt::Debug for ExperimentWindow {
 }
 
 /// The menu of all experiments.
-pub(super) fn menu(ui: &mut Ui, wishes: &mut Vec<UiAction>) {
+pub(super) fn menu(ui: &mut Ui, actions: &mut Actions) {
     ui.set_min_width(380.0);
     for study in ALL {
         let button = Button::new(format!("{}  {}", study.id, study.title));
         let button = ui.add(button.shortcut_text(duration_text(study)));
         if button.on_hover_text(format!("{}.", study.claim)).clicked() {
-            wishes.push(UiAction::Run(run_command(study)));
+            actions.push(run_command(study));
             ui.close();
         }
     }
@@ -56,7 +56,7 @@ impl ExperimentWindow {
         &mut self,
         context: &Context,
         trial: Option<&ExperimentRun>,
-        wishes: &mut Vec<UiAction>,
+        actions: &mut Actions,
     ) {
         let Some(trial) = trial else {
             *self = Self::default();
@@ -76,21 +76,21 @@ impl ExperimentWindow {
             ui.separator();
             match &trial.status {
                 ExperimentStatus::Running { done, doing } => {
-                    running(ui, study, *done, doing, wishes)
+                    running(ui, study, *done, doing, actions)
                 }
-                ExperimentStatus::Done(report) => self.report(ui, trial.number, report, wishes),
+                ExperimentStatus::Done(report) => self.report(ui, trial.number, report, actions),
                 ExperimentStatus::Stopped => {
                     ui.label("Stopped before it had found anything.");
-                    run_again_button(ui, study, wishes);
+                    run_again_button(ui, study, actions);
                 }
                 ExperimentStatus::Failed(why) => {
                     ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
-                    run_again_button(ui, study, wishes);
+                    run_again_button(ui, study, actions);
                 }
             }
         });
         if !open {
-            wishes.push(UiAction::Run(Command::DismissExperiment));
+            actions.push(Command::DismissExperiment);
         }
     }
 
@@ -99,13 +99,13 @@ impl ExperimentWindow {
         ui: &mut Ui,
         number: u64,
         report: &ExperimentReport,
-        wishes: &mut Vec<UiAction>,
+        actions: &mut Actions,
     ) {
         if self.number != number {
             let load = |picture: &NamedPlot| (picture.name, texture(ui.ctx(), picture));
             *self = Self { number, pictures: report.outcome.pictures.iter().map(load).collect() };
         }
-        verdict(ui, report, wishes);
+        verdict(ui, report, actions);
         ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
             claims(ui, &report.outcome.claims);
             for (name, texture) in &self.pictures {
@@ -118,26 +118,26 @@ impl ExperimentWindow {
     }
 }
 
-fn running(ui: &mut Ui, study: &Experiment, done: f64, doing: &str, wishes: &mut Vec<UiAction>) {
+fn running(ui: &mut Ui, study: &Experiment, done: f64, doing: &str, actions: &mut Actions) {
     ui.horizontal(|ui| {
         #[expect(clippy::cast_possible_truncation, reason = "a part of a bar")]
         let bar = ProgressBar::new(done as f32).desired_width(0.6 * ui.available_width());
         ui.add(bar.text(format!("{:.0} %  {doing}", 100.0 * done)));
         if ui.button("Cancel").on_hover_text("Stop at the next step").clicked() {
-            wishes.push(UiAction::Run(Command::CancelExperiment));
+            actions.push(Command::CancelExperiment);
         }
         ui.weak(duration_text(study)).on_hover_text("On two cores without other work");
     });
 }
 
-fn run_again_button(ui: &mut Ui, study: &Experiment, wishes: &mut Vec<UiAction>) {
+fn run_again_button(ui: &mut Ui, study: &Experiment, actions: &mut Actions) {
     if ui.button("Run again").clicked() {
-        wishes.push(UiAction::Run(run_command(study)));
+        actions.push(run_command(study));
     }
 }
 
 /// Whether all claims hold, what it cost, and what can be done with it.
-fn verdict(ui: &mut Ui, report: &ExperimentReport, wishes: &mut Vec<UiAction>) {
+fn verdict(ui: &mut Ui, report: &ExperimentReport, actions: &mut Actions) {
     let (failed, all) = (report.outcome.failed().count(), report.outcome.claims.len());
     ui.horizontal(|ui| {
         if failed == 0 {
@@ -150,11 +150,11 @@ fn verdict(ui: &mut Ui, report: &ExperimentReport, wishes: &mut Vec<UiAction>) {
         ui.weak(format!("{} rays, {:.1} s", report.outcome.rays, 1e-3 * report.ms));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if let Some(study) = ALL.iter().find(|study| study.id == report.id) {
-                run_again_button(ui, study, wishes);
+                run_again_button(ui, study, actions);
             }
             let hint = "Writes data (CSV, JSON) and pictures (PNG) into a folder";
             if ui.button("Save…").on_hover_text(hint).clicked() {
-                wishes.push(UiAction::AskPath(FileRequest::ExperimentFolder));
+                actions.push(FileRequest::ExperimentFolder);
             }
         });
     });

@@ -1,6 +1,6 @@
 //! How kinds of mutations look: each has a colour and a shape of its own.
 
-use eframe::egui::{Color32, Sense, Shape, Stroke, Ui, Visuals, pos2, vec2};
+use egui::{Color32, Sense, Shape, Stroke, Ui, Visuals, pos2, vec2};
 use egui_plot::MarkerShape;
 
 use crate::search::MutationKind;
@@ -48,8 +48,7 @@ pub(super) fn symbol(ui: &mut Ui, kind: MutationKind) {
     let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), Sense::hover());
     let (center, color) = (rect.center(), color(ui.visuals(), Some(kind)));
     let corner = |x: f32, y: f32| pos2(center.x + 4.5 * x, center.y + 4.5 * y);
-    let filled =
-        |corners: Vec<eframe::egui::Pos2>| Shape::convex_polygon(corners, color, Stroke::NONE);
+    let filled = |corners: Vec<egui::Pos2>| Shape::convex_polygon(corners, color, Stroke::NONE);
     let strokes = |lines: &[[f32; 4]]| {
         let line = |[a, b, c, d]: &[f32; 4]| {
             Shape::line_segment([corner(*a, *b), corner(*c, *d)], Stroke::new(1.5, color))

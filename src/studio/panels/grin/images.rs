@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{
+use egui::{
     Color32, ColorImage, Image as Shown, RichText, TextureHandle, TextureOptions, Ui, vec2,
 };
 
-use super::words;
+use super::text;
 use crate::grin_design::ViewImage;
 use crate::session::{GrinAnalysis, GrinRun, SessionView};
 
@@ -54,7 +54,7 @@ impl ViewImages {
         for pair in pairs {
             let name = run.document.task.as_ref().and_then(|task| task.views.get(pair.view));
             let name = name.map_or("", |view| view.name.as_str());
-            ui.label(words::image_text(name, &sighting.views.value[pair.view]));
+            ui.label(text::image_text(name, &sighting.views.value[pair.view]));
             pair.ui(ui, name);
         }
     }

@@ -8,18 +8,19 @@ use aplanat::session::{
     Command, GrinCommand, GrinView, RunStatus, Session, SessionView, SliceQuantity, SliceSettings,
 };
 use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::GrinPanel;
-use eframe::egui::accesskit::Role;
+use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::bench::{Stand, stand};
+use crate::harness::{PanelState, panel_harness};
 
-type Bench = Harness<'static, Stand<GrinPanel>>;
+type Bench = Harness<'static, PanelState<GrinPanel>>;
 
 fn panel(forming: GrinView) -> Bench {
     let view = SessionView { grin: forming, ..SessionView::default() };
-    let mut harness = stand(GrinPanel::new(RenderBackend::Software), view);
+    let mut harness = panel_harness(GrinPanel::new(RenderBackend::Software), view);
     harness.run();
     harness
 }
@@ -31,8 +32,8 @@ fn press(harness: &mut Bench, name: &str) {
 
 /// What was asked of the field.
 fn asked(harness: &Bench) -> Vec<GrinCommand> {
-    let wishes = harness.state().wishes.iter();
-    let asked = wishes.filter_map(|wish| match wish {
+    let commands = harness.state().commands.iter();
+    let asked = commands.filter_map(|command| match command {
         Command::Grin(form) => Some(form.clone()),
         _ => None,
     });
@@ -82,14 +83,12 @@ fn opened(name: &str, to_its_end: bool) -> GrinView {
 fn without_a_task_the_panel_says_what_to_do_and_asks_for_nothing() {
     let mut harness = panel(GrinView::default());
     harness.get_by_label_contains("Open a task and press Optimize");
-    assert_eq!(harness.state().wishes, []);
+    assert_eq!(harness.state().commands, []);
     assert!(harness.query_by_label("Optimize").is_none());
     press(&mut harness, "Luneburg lens as a function of the radius");
     press(&mut harness, "Open file…");
-    assert_eq!(
-        asked(&harness),
-        [GrinCommand::OpenBuiltin("luneburg-radial".into()), GrinCommand::OpenFile(None)]
-    );
+    assert_eq!(asked(&harness), [GrinCommand::OpenBuiltin("luneburg-radial".into())]);
+    assert_eq!(harness.state().requests, [FileRequest::OpenField]);
 
     let failed = GrinView { error: Some("a.json: found a lens".into()), ..GrinView::default() };
     panel(failed).get_by_label("A.json: found a lens");
@@ -111,11 +110,11 @@ fn a_task_is_worked_on_turned_and_saved_by_buttons() {
         press(&mut harness, button);
     }
     let turned = SliceSettings { plane: SlicePlane { axis: SpatialAxis::X, depth: 0.0 }, ..sight };
-    let save = GrinCommand::Save { path: None, nodes: 65 };
     assert_eq!(
         asked(&harness),
-        [GrinCommand::Start, save, GrinCommand::SetSlice(turned), GrinCommand::Close]
+        [GrinCommand::Start, GrinCommand::SetSlice(turned), GrinCommand::Close]
     );
+    assert_eq!(harness.state().requests, [FileRequest::SaveField(65)]);
 
     let mut harness = panel(ready.clone());
     harness.get_by_role_and_label(Role::Slider, "Depth of the slice").set_value_accesskit(0.25);
@@ -134,7 +133,7 @@ fn a_task_is_worked_on_turned_and_saved_by_buttons() {
 
     for (standing, buttons) in [
         (RunStatus::Running, [("Pause", GrinCommand::Pause), ("Stop", GrinCommand::Stop)]),
-        (RunStatus::Paused, [("Go on", GrinCommand::Resume), ("Stop", GrinCommand::Stop)]),
+        (RunStatus::Paused, [("Resume", GrinCommand::Resume), ("Stop", GrinCommand::Stop)]),
     ] {
         let mut held = opened("luneburg-radial", true);
         let mut run = held.run.as_deref().unwrap().clone();

@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use eframe::egui;
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use eframe::{App, CreationContext, NativeOptions, Renderer};
 

@@ -1,16 +1,19 @@
 //! What is open, the hand on its search, and how it is looked at.
 
-use eframe::egui::{
+use egui::{
     Align, Button, ComboBox, DragValue, Label, Layout as Arrange, ProgressBar, RichText,
     ScrollArea, Slider, Ui,
 };
 
 use super::picture::SlicePicture;
-use super::{grin_command, words};
+use super::text;
 use crate::grin_design::{BUILTIN_TASKS, FieldRepresentation, SlicePlane, SpatialAxis};
 use crate::session::{
-    Command, GrinCommand, GrinRun, MAX_NODES, RunStatus, SessionView, SliceQuantity, SliceSettings,
+    GrinCommand, GrinRun, MAX_NODES, RunStatus, SessionView, SliceQuantity, SliceSettings,
 };
+use crate::studio::actions::Actions;
+use crate::studio::file_dialog::FileRequest;
+use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
 
 /// Nodes along a side of a written volume, where the field is a spline, unless it is changed.
 pub(in crate::studio) const DEFAULT_NODES: usize = 65;
@@ -40,13 +43,13 @@ impl TaskMenu {
     }
 
     /// The list of all tasks, where nothing is open.
-    pub(super) fn list(&self, ui: &mut Ui, what: &str, wishes: &mut Vec<Command>) {
+    pub(super) fn list(&self, ui: &mut Ui, what: &str, actions: &mut Actions) {
         ui.label(what);
         ui.add_space(6.0);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             for BuiltinEntry { key, title, notes } in &self.builtin {
                 if ui.add(Button::new(title).min_size([280.0, 0.0].into())).clicked() {
-                    wishes.push(grin_command(GrinCommand::OpenBuiltin((*key).to_owned())));
+                    actions.push(GrinCommand::OpenBuiltin((*key).to_owned()));
                 }
                 ui.add(Label::new(RichText::new(notes).small().weak()).wrap());
                 ui.add_space(3.0);
@@ -55,48 +58,48 @@ impl TaskMenu {
     }
 
     /// The buttons.
-    pub(super) fn bar(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    pub(super) fn bar(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            self.open(ui, view, wishes);
+            self.open(ui, view, actions);
             let Some(run) = view.grin.run.as_deref() else { return };
             if run.document.task.is_some() {
-                run_controls(ui, view, run, wishes);
+                run_controls(ui, view, run, actions);
             }
-            self.save(ui, run, wishes);
+            self.save(ui, run, actions);
             if ui.button("Close").on_hover_text("Close it; what is not saved is lost").clicked() {
-                wishes.push(grin_command(GrinCommand::Close));
+                actions.push(GrinCommand::Close);
             }
             document_name(ui, run);
         });
     }
 
-    fn open(&self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn open(&self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         ui.add_enabled_ui(!view.grin.opening, |ui| {
-            ui.menu_button("Open task", |ui| self.menu(ui, wishes));
+            ui.menu_button("Open task", |ui| self.menu(ui, actions));
             let hint = "Open a task (.json), a volume of NumPy (.npz), or one of raw numbers with \
                 a header (.json)";
             if ui.button("Open file…").on_hover_text(hint).clicked() {
-                wishes.push(grin_command(GrinCommand::OpenFile(None)));
+                actions.push(FileRequest::OpenField);
             }
         });
     }
 
-    fn menu(&self, ui: &mut Ui, wishes: &mut Vec<Command>) {
+    fn menu(&self, ui: &mut Ui, actions: &mut Actions) {
         ui.set_min_width(250.0);
         for BuiltinEntry { key, title, notes } in &self.builtin {
             if ui.button(title).on_hover_text(notes).clicked() {
-                wishes.push(grin_command(GrinCommand::OpenBuiltin((*key).to_owned())));
+                actions.push(GrinCommand::OpenBuiltin((*key).to_owned()));
                 ui.close();
             }
         }
     }
 
-    fn save(&mut self, ui: &mut Ui, run: &GrinRun, wishes: &mut Vec<Command>) {
+    fn save(&mut self, ui: &mut Ui, run: &GrinRun, actions: &mut Actions) {
         let hint = "Write the best field as a volume for a printer: .npz for Python, or .json with \
             the numbers beside it in .raw";
         if ui.button("Save volume…").on_hover_text(hint).clicked() {
-            wishes.push(grin_command(GrinCommand::Save { path: None, nodes: self.nodes }));
+            actions.push(FileRequest::SaveField(self.nodes));
         }
         let kind = run.document.task.as_ref().map(|task| task.field);
         if matches!(
@@ -119,37 +122,39 @@ fn document_name(ui: &mut Ui, run: &GrinRun) {
     label.on_hover_text(if notes.is_empty() { name } else { notes });
 }
 
-/// Begins, holds and ends the search.
-fn run_controls(ui: &mut Ui, view: &SessionView, run: &GrinRun, wishes: &mut Vec<Command>) {
-    let fill = ui.visuals().selection.bg_fill;
+/// Starts, pauses and stops the optimization.
+fn run_controls(ui: &mut Ui, view: &SessionView, run: &GrinRun, actions: &mut Actions) {
     let (text, hint) = if run.is_active() {
-        ("Optimize", "Form the field in the background; watch it in the slice")
+        ("Optimize", "Optimize the field in the background; the slice shows its progress")
     } else {
-        ("Start over", "Form the field again from the beginning; this one is lost unless saved")
+        ("Start over", "Optimize again from the start; unsaved changes of this field are lost")
     };
-    let begins = run.is_ready() || !run.is_active();
-    let begins = begins && view.grin.pending.is_none() && !view.grin.opening;
-    let start = Button::new(RichText::new(text).strong()).fill(fill);
-    if ui.add_enabled(begins, start).on_hover_text(hint).clicked() {
-        wishes.push(grin_command(GrinCommand::Start));
+    let ready = run.is_ready() || !run.is_active();
+    let ready = ready && view.grin.pending.is_none() && !view.grin.opening;
+    if main_button(ui, text, ready, hint, "The optimization is already running") {
+        actions.push(GrinCommand::Start);
     }
-    let hold = if run.status == RunStatus::Paused && !run.is_ready() {
-        ("Go on", GrinCommand::Resume, "Let the search go on")
-    } else {
-        ("Pause", GrinCommand::Pause, "Hold the search after its present step")
-    };
-    let under_way = run.is_active() && !run.is_ready();
-    let buttons = [hold, ("Stop", GrinCommand::Stop, "End the search and show its best field")];
-    for (text, form, hint) in buttons {
-        if ui.add_enabled(under_way, Button::new(text)).on_hover_text(hint).clicked() {
-            wishes.push(grin_command(form));
-        }
-    }
+    let active = run.is_active() && !run.is_ready();
+    let buttons = [
+        if run.status == RunStatus::Paused && !run.is_ready() {
+            ActionButton::new("Resume", active, GrinCommand::Resume, "Resume the optimization")
+        } else {
+            let hint = "Pause the optimization after its current step";
+            ActionButton::new("Pause", active, GrinCommand::Pause, hint)
+        },
+        ActionButton::new(
+            "Stop",
+            active,
+            GrinCommand::Stop,
+            "Stop the optimization and show its best field",
+        ),
+    ];
+    action_buttons(ui, buttons, actions);
 }
 
 /// How far the search is.
 pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
-    let text = words::status_text(run, view.grin.pending);
+    let text = text::status_text(run, view.grin.pending);
     match &run.progress {
         Some(progress) => {
             let share = if progress.finished {
@@ -171,7 +176,7 @@ pub(super) fn slice_controls(
     view: &SessionView,
     run: &GrinRun,
     picture: &mut SlicePicture,
-    wishes: &mut Vec<Command>,
+    actions: &mut Actions,
 ) {
     let old = view.grin.slice_settings;
     let mut sight = old;
@@ -195,7 +200,7 @@ pub(super) fn slice_controls(
         });
     });
     if sight != old {
-        wishes.push(grin_command(GrinCommand::SetSlice(sight)));
+        actions.push(GrinCommand::SetSlice(sight));
     }
 }
 

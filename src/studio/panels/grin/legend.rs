@@ -1,15 +1,15 @@
 //! What the colours of a slice mean: numbers beside a strip, and the rays of each view.
 
-use eframe::egui::{Align2, Color32, Mesh, Rect, RichText, Role, Sense, Shape, TextStyle, Ui};
-use eframe::egui::{WidgetInfo, pos2};
+use egui::{Align2, Color32, Mesh, Rect, RichText, Role, Sense, Shape, TextStyle, Ui};
+use egui::{WidgetInfo, pos2};
 
-use super::words;
+use super::text;
 use crate::session::Slice;
+use crate::studio::colormap;
 use crate::studio::draw::Rgba;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
-use crate::studio::panels::swatch;
-use crate::studio::ramp;
+use crate::studio::panels::widgets::swatch;
 
 /// The room for the legend of the colours, and the width of its strip.
 pub(super) const WIDTH: f32 = 76.0;
@@ -54,15 +54,15 @@ pub(super) const fn ray_outline(dark: bool) -> Rgba {
 pub(super) fn value_color(slice: &Slice, value: f64, dark: bool) -> [u8; 3] {
     let [low, high] = slice.range;
     if slice.settings.quantity.is_difference() {
-        return ramp::diverging(if high > 0.0 { value / high } else { 0.0 }, dark);
+        return colormap::diverging(if high > 0.0 { value / high } else { 0.0 }, dark);
     }
-    ramp::sequential(if high > low { (value - low) / (high - low) } else { 0.5 })
+    colormap::sequential(if high > low { (value - low) / (high - low) } else { 0.5 })
 }
 
 /// The strip of colours with its numbers.
 pub(super) fn color_bar(ui: &mut Ui, rect: Rect, slice: &Slice) {
     let response = ui.allocate_rect(rect, Sense::hover());
-    let text = words::color_scale_text(slice);
+    let text = text::color_scale_text(slice);
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &text));
     response.on_hover_text(&text);
     let [low, high] = slice.range;
@@ -103,15 +103,15 @@ pub(super) fn ray_legend(ui: &mut Ui, slice: &Slice) {
     let (dark, lost) = (visuals.dark_mode, color32(Palette::for_visuals(visuals).lost_ray));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(RichText::new(words::slice_text(slice)).small().color(weak));
+        ui.label(RichText::new(text::slice_text(slice)).small().color(weak));
         let task = slice.document.task.as_ref();
         for ways in slice.paths.iter().filter(|ways| !ways.paths.is_empty()) {
             let name = task.and_then(|task| task.views.get(ways.view)).map(|view| &view.name);
             ui.add_space(4.0);
             swatch(ui, color32(ray_color(ways.view, dark)));
-            let text = words::rays_text(name.map_or("", String::as_str), ways);
-            ui.label(RichText::new(text).small()).on_hover_text(words::distance_text(ways));
-            if let Some(text) = words::excluded_text(ways) {
+            let text = text::rays_text(name.map_or("", String::as_str), ways);
+            ui.label(RichText::new(text).small()).on_hover_text(text::distance_text(ways));
+            if let Some(text) = text::excluded_text(ways) {
                 swatch(ui, lost);
                 ui.label(RichText::new(text).small().color(lost)).on_hover_text(
                     "Rays that do not count are drawn to where they end, with a dot there",

@@ -9,18 +9,19 @@ mod images;
 mod legend;
 mod picture;
 mod plots;
-mod words;
+mod text;
 
 pub(in crate::studio) use controls::DEFAULT_NODES;
 
-use eframe::egui::{Button, Frame, Margin, Panel as Side, ScrollArea, Ui};
+use egui::{Button, Frame, Margin, Panel as Side, ScrollArea, Ui};
 
 use super::Panel;
 use crate::grin_design::LightView as TaskView;
 use crate::math::Vec3;
-use crate::session::{Command, GrinCommand, GrinRun, SessionView};
+use crate::session::{GrinRun, SessionView};
+use crate::studio::actions::Actions;
 use crate::studio::draw::RenderBackend;
-use crate::studio::wording::capitalize;
+use crate::studio::text::capitalize;
 use controls::TaskMenu;
 use images::ViewImages;
 use picture::SlicePicture;
@@ -93,9 +94,9 @@ impl Panel for GrinPanel {
         "GRIN slice"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, wishes: &mut Vec<Command>) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.sync_page(view);
-        self.tasks.bar(ui, view, wishes);
+        self.tasks.bar(ui, view, actions);
         if let Some(why) = &view.grin.error {
             ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
         }
@@ -103,12 +104,12 @@ impl Panel for GrinPanel {
             if view.grin.opening {
                 ui.weak("Opening…");
             } else {
-                self.tasks.list(ui, INTRODUCTION, wishes);
+                self.tasks.list(ui, INTRODUCTION, actions);
             }
             return;
         };
         controls::progress(ui, view, &run);
-        controls::slice_controls(ui, view, &run, &mut self.picture, wishes);
+        controls::slice_controls(ui, view, &run, &mut self.picture, actions);
         self.side_panel(ui, view, &run);
         self.picture(ui, view, &run);
     }
@@ -146,7 +147,7 @@ impl GrinPanel {
             let scroll =
                 ScrollArea::vertical().id_salt(self.page as u8).auto_shrink([false, false]);
             scroll.show(ui, |ui| match self.page {
-                GrinPage::Light => words::light_page(ui, view, run),
+                GrinPage::Light => text::light_page(ui, view, run),
                 GrinPage::Loss => plots::loss_plot(ui, run),
                 GrinPage::Profile => plots::profile_plot(ui, view),
                 GrinPage::Images => self.images.ui(ui, view, run),
@@ -181,7 +182,7 @@ impl GrinPanel {
     fn picture(&mut self, ui: &mut Ui, view: &SessionView, run: &GrinRun) {
         match view.grin.slice.as_deref() {
             Some(Ok(slice)) => {
-                words::pinned_line(ui, run, &mut self.pinned);
+                text::pinned_line(ui, run, &mut self.pinned);
                 self.picture.ui(ui, view, slice, &mut self.pinned);
             }
             Some(Err(why)) => {
@@ -192,9 +193,4 @@ impl GrinPanel {
             }
         }
     }
-}
-
-/// The wish for something of the field.
-fn grin_command(form: GrinCommand) -> Command {
-    Command::Grin(form)
 }

@@ -1,0 +1,77 @@
+//! The user's requests in one frame, as panels and menus collect them.
+
+use super::file_dialog::FileRequest;
+use crate::files::BundledLens;
+use crate::lens::Edit;
+use crate::session::{Command, GrinCommand, StructureSearchCommand};
+
+/// A request of the user to the window.
+#[derive(Debug, Clone, PartialEq)]
+pub enum UiAction {
+    /// Runs a command of the session.
+    Run(Command),
+    /// Opens a lens that comes with the program.
+    OpenBundled(&'static BundledLens),
+    /// Asks for a path, and runs the command that needs it.
+    AskPath(FileRequest),
+}
+
+impl From<Command> for UiAction {
+    fn from(command: Command) -> Self {
+        Self::Run(command)
+    }
+}
+
+impl From<Edit> for UiAction {
+    fn from(edit: Edit) -> Self {
+        Self::Run(edit.into())
+    }
+}
+
+impl From<StructureSearchCommand> for UiAction {
+    fn from(command: StructureSearchCommand) -> Self {
+        Self::Run(Command::StructureSearch(command))
+    }
+}
+
+impl From<GrinCommand> for UiAction {
+    fn from(command: GrinCommand) -> Self {
+        Self::Run(Command::Grin(command))
+    }
+}
+
+impl From<FileRequest> for UiAction {
+    fn from(request: FileRequest) -> Self {
+        Self::AskPath(request)
+    }
+}
+
+/// The requests of one frame, in the order in which they were made.
+#[derive(Debug, Default)]
+pub struct Actions(Vec<UiAction>);
+
+impl Actions {
+    /// Adds a request.
+    pub fn push(&mut self, action: impl Into<UiAction>) {
+        self.0.push(action.into());
+    }
+
+    /// Adds several requests.
+    pub fn extend<A: Into<UiAction>>(&mut self, actions: impl IntoIterator<Item = A>) {
+        self.0.extend(actions.into_iter().map(Into::into));
+    }
+
+    /// All requests so far.
+    pub fn as_slice(&self) -> &[UiAction] {
+        &self.0
+    }
+}
+
+impl IntoIterator for Actions {
+    type Item = UiAction;
+    type IntoIter = std::vec::IntoIter<UiAction>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
+    }
+}

@@ -1,0 +1,58 @@
+//! Widgets that several panels share.
+
+use egui::{Button, Color32, RichText, Sense, Ui, vec2};
+
+use crate::studio::actions::{Actions, UiAction};
+
+/// A button that asks for one action.
+#[derive(Debug)]
+pub(super) struct ActionButton<'a> {
+    text: &'a str,
+    enabled: bool,
+    action: UiAction,
+    hint: &'a str,
+}
+
+impl<'a> ActionButton<'a> {
+    pub(super) fn new(
+        text: &'a str,
+        enabled: bool,
+        action: impl Into<UiAction>,
+        hint: &'a str,
+    ) -> Self {
+        Self { text, enabled, action: action.into(), hint }
+    }
+}
+
+/// Shows buttons in a row.
+pub(super) fn action_buttons<'a>(
+    ui: &mut Ui,
+    buttons: impl IntoIterator<Item = ActionButton<'a>>,
+    actions: &mut Actions,
+) {
+    for ActionButton { text, enabled, action, hint } in buttons {
+        if ui.add_enabled(enabled, Button::new(text)).on_hover_text(hint).clicked() {
+            actions.push(action);
+        }
+    }
+}
+
+/// Shows the main button of a panel; true if it was pressed. `reason` says why it is disabled.
+pub(super) fn main_button(
+    ui: &mut Ui,
+    text: &str,
+    enabled: bool,
+    hint: &str,
+    reason: &str,
+) -> bool {
+    let fill = ui.visuals().selection.bg_fill;
+    let button = Button::new(RichText::new(text).strong()).fill(fill);
+    let button = ui.add_enabled(enabled, button).on_hover_text(hint);
+    button.on_disabled_hover_text(reason).clicked()
+}
+
+/// A small square of a colour, as in a legend.
+pub(super) fn swatch(ui: &mut Ui, color: Color32) {
+    let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
+    ui.painter().rect_filled(rect, 1.0, color);
+}

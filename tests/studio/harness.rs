@@ -1,0 +1,76 @@
+//! What the tests of panels share: a lens, a view of it with its numbers, a panel in a harness.
+
+use std::sync::Arc;
+
+use aplanat::files;
+use aplanat::lens::Lens;
+use aplanat::session::{AnalysisResults, AnalysisSettings, Command, SessionView, analyze};
+use aplanat::studio::file_dialog::FileRequest;
+use aplanat::studio::panels::Panel;
+use aplanat::studio::theme;
+use aplanat::studio::{Actions, UiAction};
+use egui_kittest::Harness;
+
+/// The lens that the studio opens with.
+pub(super) fn double_gauss() -> Lens {
+    let bundled = &files::bundled_lenses()[0];
+    files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens
+}
+
+/// A view of a lens with all its numbers, those of its pupils too.
+pub(super) fn view_of(lens: Lens) -> SessionView {
+    let lens = Arc::new(lens);
+    let settings = AnalysisSettings { pupils: true, ..AnalysisSettings::default() };
+    let view =
+        SessionView { lens: Arc::clone(&lens), version: 1, settings, ..SessionView::default() };
+    let (version, settings) = (view.version, view.settings.clone());
+    let numbers = analyze(&lens, &settings);
+    let results = AnalysisResults { version, lens, settings, analyses: numbers, ms: 1.0 };
+    SessionView { results: Some(Arc::new(results)), ..view }
+}
+
+/// A view of the double Gauss.
+pub(super) fn view() -> SessionView {
+    view_of(double_gauss())
+}
+
+/// A panel alone, with what it shows and what was asked for in it.
+pub(super) struct PanelState<P> {
+    pub(super) panel: P,
+    pub(super) view: SessionView,
+    pub(super) commands: Vec<Command>,
+    pub(super) requests: Vec<FileRequest>,
+}
+
+impl<P: Panel> PanelState<P> {
+    fn show(&mut self, ui: &mut egui::Ui) {
+        let mut actions = Actions::default();
+        self.panel.ui(ui, &self.view, &mut actions);
+        for action in actions {
+            match action {
+                UiAction::Run(command) => self.run(command),
+                UiAction::AskPath(request) => self.requests.push(request),
+                UiAction::OpenBundled(bundled) => panic!("no panel opens {bundled:?}"),
+            }
+        }
+    }
+
+    fn run(&mut self, command: Command) {
+        match &command {
+            Command::Select(surface) => self.view.selected = *surface,
+            Command::Preview(lens) => self.view.preview_lens = lens.clone().map(Arc::from),
+            _ => {}
+        }
+        self.commands.push(command);
+    }
+}
+
+/// A harness around a panel, large enough for all of it.
+pub(super) fn panel_harness<P: Panel + 'static>(
+    panel: P,
+    view: SessionView,
+) -> Harness<'static, PanelState<P>> {
+    let state = PanelState { panel, view, commands: Vec::new(), requests: Vec::new() };
+    let builder = Harness::builder().with_size([900.0, 620.0]).with_context_setup(theme::apply);
+    builder.build_ui_state(|ui, state: &mut PanelState<P>| state.show(ui), state)
+}
