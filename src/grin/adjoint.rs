@@ -16,30 +16,10 @@ use super::exit::{RayExit, RegionEntry};
 use super::fate::GrinFate;
 use super::field::{IndexField, IndexSamples};
 use super::integrator::IntegratorOp;
-use super::lanes::{LANES, LaneScalars, LaneVectors, get, put};
-use super::tracer::{GrinRay, GrinTracer, drift};
-use crate::math::Real;
-use crate::math::SimdWidth;
-use crate::math::Vec3;
-use crate::math::run_vectorized;
-
-/// The adjoint of a ray: the derivatives of a loss with respect to its position, velocity and
-/// optical path.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct RayAdjoint<R> {
-    /// With respect to the position.
-    pub x: Vec3<R>,
-    /// With respect to the velocity.
-    pub v: Vec3<R>,
-    /// With respect to the optical path.
-    pub path: R,
-}
-
-impl<R: Real> RayAdjoint<R> {
-    pub(super) fn is_finite(&self) -> bool {
-        self.x.is_finite() && self.v.is_finite() && self.path.is_finite()
-    }
-}
+use super::lanes::{LANES, LaneScalars, LaneVectors, drift, get, put};
+use super::state::{GrinRay, RayAdjoint};
+use super::step::GrinTracer;
+use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
 
 /// Rays side by side, traced backwards; each column is aligned with a cache line.
 #[derive(Clone, Default)]

@@ -1,14 +1,13 @@
 //! Both ends of a ray: its entry into the region, its exit, and the way to the screen; each with
 //! its adjoint.
 
-use super::adjoint::RayAdjoint;
 use super::fate::GrinFate;
 use super::field::IndexField;
 use super::region::{Face, GrinRegion, rounding_error};
 use super::setup::{EndCondition, LastStep, LaunchMode};
-use super::tracer::{GrinRay, GrinTracer, RayState};
-use crate::math::Real;
-use crate::math::Vec3;
+use super::state::{GrinRay, RayAdjoint, RayState};
+use super::step::GrinTracer;
+use crate::math::{Real, Vec3};
 
 /// The end of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]

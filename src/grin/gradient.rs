@@ -5,12 +5,13 @@
 //! Each part has its own gradient, and they are added in order: the same bits on any number of
 //! threads.
 
-use super::adjoint::{Chunk, RayAdjoint, RetraceResult};
+use super::adjoint::{Chunk, RetraceResult};
 use super::exit::RayExit;
 use super::fate::{GrinFate, GrinFateCounts};
 use super::field::IndexField;
 use super::lanes::LANES;
-use super::tracer::{GrinRay, GrinTracer};
+use super::state::{GrinRay, RayAdjoint};
+use super::step::GrinTracer;
 use crate::math::Real;
 use rayon::prelude::*;
 

@@ -1,7 +1,6 @@
 //! Blocks of rays side by side: the loops over them have no branch on a ray.
 
-use crate::math::Real;
-use crate::math::Vec3;
+use crate::math::{Real, Vec3};
 
 /// Rays in a block. A single ray is one chain of dependent operations; this many hide its latency.
 pub const LANES: usize = 16;
@@ -24,4 +23,15 @@ pub(super) fn put<R: Real>(columns: &mut LaneVectors<R>, lane: usize, v: Vec3<R>
     columns.x[lane] = v.x;
     columns.y[lane] = v.y;
     columns.z[lane] = v.z;
+}
+
+/// `x += c h v` in every lane.
+#[inline(always)]
+pub(super) fn drift<R: Real>(x: &mut LaneVectors<R>, v: &LaneVectors<R>, h: &LaneScalars<R>, c: R) {
+    for (lane, h) in h.iter().enumerate() {
+        let step = c * *h;
+        x.x[lane] += v.x[lane] * step;
+        x.y[lane] += v.y[lane] * step;
+        x.z[lane] += v.z[lane] * step;
+    }
 }

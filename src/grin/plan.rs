@@ -11,7 +11,8 @@ use super::field::IndexField;
 use super::integrator::Integrator;
 use super::region::GrinRegion;
 use super::setup::{EndCondition, GrinSetup, GrinSetupError, LastStep, LaunchMode};
-use super::tracer::{GrinRay, GrinTracer};
+use super::state::GrinRay;
+use super::step::GrinTracer;
 use crate::math::Vec3;
 
 /// Rays used to test a step.

@@ -2,8 +2,7 @@
 //! their boundary.
 
 use super::lanes::{LANES, LaneScalars, LaneVectors, get};
-use crate::math::Real;
-use crate::math::Vec3;
+use crate::math::{Real, Vec3};
 
 /// A plane or quadric `φ(x) = Σ aᵢ xᵢ² + b·x + c`, negative inside: planes, spheres, cylinders and
 /// conics of revolution about an axis are all of this form.

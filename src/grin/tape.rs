@@ -3,13 +3,12 @@
 //! It stores the position of every kick, the minimum for reverse-mode differentiation of this
 //! tracer, and processes them backwards. Its memory grows with the number of steps.
 
-use super::adjoint::RayAdjoint;
 use super::exit::RayExit;
 use super::field::IndexField;
 use super::integrator::IntegratorOp;
-use super::tracer::{GrinRay, GrinTracer};
-use crate::math::Real;
-use crate::math::Vec3;
+use super::state::{GrinRay, RayAdjoint};
+use super::step::GrinTracer;
+use crate::math::{Real, Vec3};
 
 /// A gradient by a stored path, and its memory.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,58 +8,14 @@ use super::exit::RayExit;
 use super::fate::GrinFate;
 use super::field::{IndexField, IndexSamples};
 use super::integrator::IntegratorOp;
-use super::lanes::{LANES, LaneScalars, LaneVectors, get, put};
-use super::setup::{GrinSetup, GrinSetupError};
-use crate::math::Real;
-use crate::math::SimdWidth;
-use crate::math::Vec3;
-use crate::math::run_vectorized;
+use super::lanes::{LANES, LaneScalars, LaneVectors, drift, get, put};
+use super::state::{GrinRay, RayState};
+use super::step::GrinTracer;
+use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
 use rayon::prelude::*;
 
 /// Rays that one task traces when all cores work.
 const CHUNK: usize = 16 * LANES;
-
-/// The start of a ray.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GrinRay<R> {
-    /// Position.
-    pub x: Vec3<R>,
-    /// Velocity `dx/dσ`: the direction times the index, unless [`LaunchMode`](super::LaunchMode)
-    /// says otherwise.
-    pub v: Vec3<R>,
-}
-
-impl<R: Real> GrinRay<R> {
-    /// The same ray in another number type.
-    pub fn cast<S: Real>(&self) -> GrinRay<S> {
-        GrinRay { x: Vec3::from_f64(self.x.value()), v: Vec3::from_f64(self.v.value()) }
-    }
-}
-
-/// The state of a ray.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct RayState<R> {
-    /// Position.
-    pub x: Vec3<R>,
-    /// Velocity `dx/dσ`.
-    pub v: Vec3<R>,
-    /// Optical path since the start.
-    pub path: R,
-}
-
-impl<R: Real> RayState<R> {
-    pub(super) fn is_finite(&self) -> bool {
-        self.x.is_finite() && self.v.is_finite() && self.path.is_finite()
-    }
-}
-
-/// Traces rays through one field, forwards and backwards.
-#[derive(Debug)]
-pub struct GrinTracer<'a, R, F: ?Sized> {
-    pub(super) field: &'a F,
-    pub(super) setup: GrinSetup<R>,
-    pub(super) ops: Vec<IntegratorOp<R>>,
-}
 
 /// Rays side by side; each column is aligned with a cache line.
 #[derive(Clone, Default)]
@@ -104,22 +60,7 @@ impl<R: Real> ForwardBlock<R> {
     }
 }
 
-impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
-    /// Prepares a field for tracing.
-    ///
-    /// # Errors
-    /// A step that is not positive, no steps, or an empty region.
-    pub fn new(field: &'a F, setup: GrinSetup<R>) -> Result<Self, GrinSetupError> {
-        setup.check()?;
-        let ops = setup.integrator.ops();
-        Ok(Self { field, setup, ops })
-    }
-
-    /// The settings.
-    pub fn setup(&self) -> &GrinSetup<R> {
-        &self.setup
-    }
-
+impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     /// Traces one ray; bit-identical to its trace in a batch.
     pub fn trace(&self, ray: &GrinRay<R>) -> RayExit<R> {
         self.trace_with(ray, |_| {})
@@ -169,49 +110,6 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
     /// True if a point is not inside the region or is not a number.
     fn is_outside(&self, x: Vec3<R>) -> bool {
         self.setup.region().is_some_and(|region| !(region.level(x) < R::ZERO))
-    }
-
-    /// One step of length `h`.
-    pub(super) fn advance(&self, state: RayState<R>, h: R) -> RayState<R> {
-        let RayState { mut x, mut v, mut path } = state;
-        for op in &self.ops {
-            match *op {
-                IntegratorOp::Drift(c) => x = x + v * (c * h),
-                IntegratorOp::Kick(c) => {
-                    let sample = self.field.sample(x);
-                    let weight = c * h * sample.index;
-                    v = v + sample.gradient * weight;
-                    path += weight * sample.index;
-                }
-            }
-        }
-        RayState { x, v, path }
-    }
-
-    /// One step of length `h`, and the derivative of its end with respect to `h`.
-    pub(super) fn advance_with_rate(&self, state: RayState<R>, h: R) -> (RayState<R>, RayState<R>) {
-        let mut rate = RayState::default();
-        let RayState { mut x, mut v, mut path } = state;
-        for op in &self.ops {
-            match *op {
-                IntegratorOp::Drift(c) => {
-                    x = x + v * (c * h);
-                    rate.x = rate.x + (v + rate.v * h) * c;
-                }
-                IntegratorOp::Kick(c) => {
-                    let (sample, hessian) = self.field.sample_and_hessian(x);
-                    let (index, gradient) = (sample.index, sample.gradient);
-                    let weight = c * h * index;
-                    v = v + gradient * weight;
-                    path += weight * index;
-                    let climb = gradient.dot(rate.x);
-                    let turn = gradient * climb + hessian.times(rate.x) * index;
-                    rate.v = rate.v + (gradient * index + turn * h) * c;
-                    rate.path += c * index * (index + R::TWO * h * climb);
-                }
-            }
-        }
-        (RayState { x, v, path }, rate)
     }
 
     /// Traces the rays of one chunk.
@@ -311,17 +209,6 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
                 }
             }
         }
-    }
-}
-
-/// `x += c h v` in every lane.
-#[inline(always)]
-pub(super) fn drift<R: Real>(x: &mut LaneVectors<R>, v: &LaneVectors<R>, h: &LaneScalars<R>, c: R) {
-    for (lane, h) in h.iter().enumerate() {
-        let step = c * *h;
-        x.x[lane] += v.x[lane] * step;
-        x.y[lane] += v.y[lane] * step;
-        x.z[lane] += v.z[lane] * step;
     }
 }
 

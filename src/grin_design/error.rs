@@ -56,6 +56,12 @@ pub enum ReferenceFieldError {
     /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The file has not been read.
+    #[error("{file}: the volume has not been read")]
+    NotRead {
+        /// The file.
+        file: String,
+    },
     /// The values do not make a field.
     #[error("{file}: {source}")]
     Values {

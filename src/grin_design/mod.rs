@@ -26,7 +26,7 @@ pub use report::{
 pub use solver::{FieldScore, GrinOptimizer, GrinProgress};
 pub use task::{
     BUILTIN_TASKS, BoundaryCondition, BuiltinTask, Domain, FieldRepresentation, GrinMethod,
-    GrinTask, ImageFile, InitialField, LightGoal, LightSource, LightView, ManufacturingLimits,
-    ReferenceField, RefinementLevel, SourceDirections, TASK_VERSION, TargetImage, TracingSettings,
-    find_builtin, read_task,
+    GrinTask, InitialField, LightGoal, LightSource, LightView, ManufacturingLimits, ReferenceField,
+    RefinementLevel, SourceDirections, TASK_VERSION, TargetImage, TaskFile, TracingSettings,
+    VolumeFile, find_builtin, read_task,
 };

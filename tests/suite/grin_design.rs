@@ -205,9 +205,10 @@ fn grin_chaotic_rays_are_found_by_their_way_back_and_counted() {
     let volume = aplanat::files::Volume { grid, values: values.collect() };
     aplanat::files::write_volume(&folder, &volume).unwrap();
     let mut task = small();
-    task.start = InitialField::Volume(folder.clone());
+    task.start = InitialField::Volume(folder.clone().into());
     task.limits.high = 4.0;
     task.levels = vec![RefinementLevel { nodes: 33, steps: 1 }];
+    task.read_files().unwrap();
     let runner = GrinOptimizer::new(&task).unwrap();
     let judged = runner.score(runner.best()).unwrap();
     std::fs::remove_file(folder).unwrap();
@@ -220,7 +221,8 @@ fn grin_chaotic_rays_are_found_by_their_way_back_and_counted() {
 fn refused(change: impl FnOnce(&mut GrinTask)) -> String {
     let mut task = small();
     change(&mut task);
-    GrinOptimizer::new(&task).map(|_| ()).unwrap_err().to_string()
+    let checked = task.check().and_then(|()| task.read_files());
+    checked.and_then(|()| GrinOptimizer::new(&task)).map(|_| ()).unwrap_err().to_string()
 }
 
 #[test]

@@ -123,8 +123,8 @@ fn grin_a_start_beyond_the_limits_is_refused_and_one_within_rounding_is_not() {
         let values = (0..grid.node_count()).map(value).collect();
         write_volume(&path, &Volume { grid, values }).unwrap();
         let mut task = greedy(FieldRepresentation::Trilinear { half: 1.0 }, GrinMethod::Lbfgs, 5);
-        task.start = InitialField::Volume(path.clone());
-        GrinOptimizer::new(&task).map(|_| ()).map_err(|error| error.to_string())
+        task.start = InitialField::Volume(path.clone().into());
+        task.read_files().map_err(|error| error.to_string())
     };
     let error = refused(1.13).unwrap_err();
     let words = ["start", "start.npz", "[0.0, 0.0, 0.0]", "1.13", "1.05 to 1.12", "limits"];

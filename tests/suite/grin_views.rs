@@ -3,8 +3,8 @@
 
 use aplanat::grin::GrinFate;
 use aplanat::grin_design::{
-    self, Domain, GrinField, GrinOptimizer, GrinTask, ImageFile, LightGoal, LightSource,
-    RefinementLevel, TargetImage, ViewImage,
+    self, Domain, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, RefinementLevel,
+    TargetImage, ViewImage,
 };
 use image::{GrayImage, Luma};
 use rayon::ThreadPoolBuilder;
@@ -54,7 +54,7 @@ impl Scrap {
     }
 
     fn drawing(&self) -> TargetImage {
-        TargetImage::File(ImageFile::from(self.0.clone()))
+        TargetImage::File(self.0.clone().into())
     }
 }
 
@@ -72,12 +72,16 @@ fn of_picture(wanted: TargetImage) -> GrinTask {
     task
 }
 
+/// The pixels of an image file.
+fn pixels(image: TargetImage) -> Vec<f64> {
+    of_picture(image.clone()).read_files().unwrap();
+    image.render(8).unwrap()
+}
+
 /// What is wrong with a task of this picture.
 fn refused(drawing: TargetImage) -> String {
     let task = of_picture(drawing);
-    let error = task.check().unwrap_err().to_string();
-    assert_eq!(GrinOptimizer::new(&task).map(|_| ()).unwrap_err().to_string(), error);
-    error
+    task.check().and_then(|()| task.read_files()).unwrap_err().to_string()
 }
 
 #[test]
@@ -146,6 +150,7 @@ fn a_persons_own_picture_is_made_whatever_its_size() {
     let text = serde_json::to_string(&task).unwrap();
     assert!(text.contains("{\"file\":\""), "{text}");
     assert_eq!(grin_design::read_task(&text, "a file").unwrap(), task);
+    task.read_files().unwrap();
     let [even, found] = [GrinOptimizer::new(&task).unwrap().best().clone(), solved(&task)]
         .map(|m| images(&task, &m).remove(0));
     let rows = |image: &ViewImage, from: usize| {
@@ -161,12 +166,12 @@ fn a_persons_own_picture_is_made_whatever_its_size() {
 #[test]
 fn a_small_or_transparent_picture_is_a_picture() {
     let one = Scrap::picture("one.png", [1, 1], |_, _| 7);
-    let wanted = one.drawing().render(8).unwrap();
+    let wanted = pixels(one.drawing());
     assert!(wanted.iter().all(|value| (value - 1.0).abs() < 1e-12));
     let scrap = Scrap::new("half.png", &[]);
     let half = |x: u32, _: u32| image::LumaA([200_u8, if x < 4 { 255 } else { 0 }]);
     image::GrayAlphaImage::from_fn(8, 8, half).save(&scrap.0).unwrap();
-    let wanted = scrap.drawing().render(8).unwrap();
+    let wanted = pixels(scrap.drawing());
     assert!(
         wanted
             .iter()

@@ -18,7 +18,10 @@ fn refusal(name: &str, place: &str, value: Option<Value>) -> Option<String> {
     }
     match grin_design::read_task(&task.to_string(), "task.json") {
         Err(error) => Some(error.to_string()),
-        Ok(task) => GrinOptimizer::new(&task).err().map(|error| error.to_string()),
+        Ok(task) => {
+            let checked = task.check().and_then(|()| task.read_files());
+            checked.and_then(|()| GrinOptimizer::new(&task)).err().map(|error| error.to_string())
+        }
     }
 }
 

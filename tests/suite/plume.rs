@@ -29,6 +29,7 @@ fn small() -> GrinTask {
 }
 
 fn solved(task: &GrinTask) -> GrinOptimizer {
+    task.read_files().unwrap();
     let mut runner = GrinOptimizer::new(task).unwrap();
     while !runner.step().unwrap().finished {}
     runner
@@ -88,7 +89,7 @@ fn grin_a_volume_of_ones_own_is_found_in_any_precision() {
     ];
     for (numbers, map, bytes, limit) in cases {
         let path = raw(&folder, numbers, &map, &bytes);
-        let mut task = with_truth(&small(), ReferenceField::Volume(path.clone()));
+        let mut task = with_truth(&small(), ReferenceField::Volume(path.clone().into()));
         task.field = FieldRepresentation::Trilinear { half: 1.0 };
         task.edge = Some(BoundaryCondition { index: 1.0003, fixed: true, weight: 0.0 });
         let text = serde_json::to_string(&task).unwrap();
@@ -107,8 +108,8 @@ fn grin_a_volume_of_ones_own_is_found_in_any_precision() {
 fn grin_a_volume_that_is_wrong_is_refused_with_its_reason() {
     let folder = folder("wrong-volume");
     let refused = |path: PathBuf| {
-        let task = with_truth(&small(), ReferenceField::Volume(path));
-        GrinOptimizer::new(&task).map(|_| ()).unwrap_err().to_string()
+        let task = with_truth(&small(), ReferenceField::Volume(path.into()));
+        task.read_files().unwrap_err().to_string()
     };
     let says = |found: String, words: &[&str]| {
         words.iter().for_each(|word| assert!(found.contains(word), "`{found}`: no `{word}`"));
@@ -142,7 +143,7 @@ fn grin_a_volume_without_contrast_is_found_at_once() {
     let path = folder.join("air.npz");
     let grid = RegularGrid::cube(2, 1.0).unwrap();
     write_volume(&path, &Volume { grid, values: vec![1.0003; 8] }).unwrap();
-    let task = with_truth(&small(), ReferenceField::Volume(path));
+    let task = with_truth(&small(), ReferenceField::Volume(path.into()));
     let runner = solved(&task);
     let found = task.difference(runner.best()).unwrap().unwrap();
     println!("no contrast: {found:?} after {} steps", runner.steps());
@@ -214,10 +215,11 @@ fn grin_a_plume_that_is_chaotic_is_told_and_nothing_becomes_nan() {
         with_truth(&small(), ReferenceField::Plume { ambient: 1.0, contrast: 0.3, half: 1.0 });
     task.launch = LaunchMode::AsGiven;
     task.field = FieldRepresentation::Trilinear { half: 1.0 };
-    task.start = InitialField::Volume(path);
+    task.start = InitialField::Volume(path.into());
     task.edge = None;
     task.limits = ManufacturingLimits { low: 1.0, high: 301.0, slope: None, change: 1.0 };
     task.levels = vec![RefinementLevel { nodes: 33, steps: 2 }];
+    task.read_files().unwrap();
     let mut runner = GrinOptimizer::new(&task).unwrap();
     let judged = runner.score(runner.best()).unwrap();
     let counts = judged.views[0].counts;
@@ -268,7 +270,7 @@ fn grin_rays_that_a_field_traps_are_told_as_trapped() {
     task.field = FieldRepresentation::Tricubic { half: 4.0 };
     task.space = Domain::Cube { half: 4.0 };
     task.launch = LaunchMode::Scaled;
-    task.start = InitialField::Volume(path);
+    task.start = InitialField::Volume(path.into());
     task.edge = None;
     task.exact = None;
     task.tracing = Some(TracingSettings { integrator: Integrator::LeapfrogDkd, per_voxel: 20.0 });
@@ -278,6 +280,7 @@ fn grin_rays_that_a_field_traps_are_told_as_trapped() {
     // Across the radius at 0.6 and at 1.8 mm: the far ends of their circles are at 1.7 and 0.56 mm.
     task.views[0].source = LightSource::Fan { height: 2.4, z: 0.0, rays: 2 };
     task.views[0].goal = LightGoal::Point([4.0, 0.0, 0.0]);
+    task.read_files().unwrap();
     let runner = GrinOptimizer::new(&task).unwrap();
     std::fs::remove_dir_all(folder).unwrap();
     let judged = runner.score(runner.best()).unwrap();

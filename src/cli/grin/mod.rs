@@ -174,7 +174,8 @@ pub(super) fn load_task(name: &str) -> Result<GrinTask, CliError> {
             )));
         }
     };
-    task.check().map_err(|error| CliError::Input(format!("{}: {error}", source_name(name))))?;
+    let checked = task.check().and_then(|()| task.read_files());
+    checked.map_err(|error| CliError::Input(format!("{}: {error}", source_name(name))))?;
     Ok(task)
 }
 

@@ -1,8 +1,7 @@
 //! Regular grids: nodes with constant spacing along each axis.
 
 use super::cell::{floor_cell, to_index};
-use crate::math::Real;
-use crate::math::Vec3;
+use crate::math::{Real, Vec3};
 
 /// Nodes on a regular grid. Node `(i, j, k)` is at `low + (i hx, j hy, k hz)` and has the number
 /// `(k ny + j) nx + i`: x runs fastest.

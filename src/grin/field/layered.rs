@@ -5,10 +5,7 @@
 
 use super::{FieldResolution, Hessian, IndexField, IndexSample, IndexSamples};
 use crate::grin::lanes::{LANES, LaneScalars, LaneVectors, get, put};
-use crate::math::Real;
-use crate::math::SimdWidth;
-use crate::math::Vec3;
-use crate::math::run_vectorized;
+use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
 use std::fmt::Debug;
 
 /// The coordinate that a profile depends on.

@@ -36,10 +36,7 @@ pub use tricubic::Tricubic;
 pub use trilinear::{HessianDiagonal, Trilinear};
 
 use super::lanes::{LANES, LaneScalars, LaneVectors, get, put};
-use crate::math::Real;
-use crate::math::SimdWidth;
-use crate::math::Vec3;
-use crate::math::run_vectorized;
+use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
 use std::fmt::Debug;
 
 /// The index at a point, and its gradient.

@@ -6,8 +6,7 @@
 //! < 0`.
 
 use super::{FieldResolution, Hessian, IndexField, IndexSample};
-use crate::math::Real;
-use crate::math::Vec3;
+use crate::math::{Real, Vec3};
 
 /// A Gaussian of the plume, in units of half the side of its cube.
 struct GaussianBlob {

@@ -6,8 +6,7 @@
 
 use super::bspline::{basis, basis_curvatures, basis_slopes};
 use super::{FieldResolution, GridError, Hessian, IndexField, IndexSample, RegularGrid};
-use crate::math::Real;
-use crate::math::Vec3;
+use crate::math::{Real, Vec3};
 
 /// Coefficients of tricubic B-splines. Beyond the domain the polynomials of the outermost cells
 /// continue.

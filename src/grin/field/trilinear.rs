@@ -14,10 +14,7 @@ use super::{
     FieldResolution, GridError, Hessian, IndexField, IndexSample, IndexSamples, RegularGrid,
 };
 use crate::grin::lanes::{LANES, LaneScalars, LaneVectors, get, put};
-use crate::math::Real;
-use crate::math::SimdWidth;
-use crate::math::Vec3;
-use crate::math::run_vectorized;
+use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
 
 /// The diagonal of the Hessian of a trilinear field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

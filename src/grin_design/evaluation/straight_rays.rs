@@ -146,7 +146,7 @@ impl StraightRays {
     /// The straight rays of a task whose views all have the goal `like`.
     ///
     /// # Errors
-    /// A task that is invalid.
+    /// A task that is invalid, or a file that has not been read.
     pub fn new(task: &GrinTask) -> Result<Self, GrinTaskError> {
         task.check()?;
         let ambient = match (task.edge, &task.start) {

@@ -46,7 +46,7 @@ impl GrinTask {
     /// The simulated measurements of the views with the goal `like`, for the scoring rays.
     ///
     /// # Errors
-    /// A volume that cannot be read.
+    /// A volume that has not been read.
     pub fn measurements(&self) -> Result<Vec<ViewMeasurement>, GrinTaskError> {
         let measured = |view: &LightView| {
             let LightGoal::Like { field, .. } = &view.goal else { return Ok(None) };

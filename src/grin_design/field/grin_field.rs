@@ -94,7 +94,7 @@ impl GrinField {
     /// The initial field of a task, with this many nodes.
     ///
     /// # Errors
-    /// Too few nodes, or a volume that cannot be read.
+    /// Too few nodes, or a volume that has not been read.
     pub fn initial(task: &GrinTask, nodes: usize) -> Result<Self, GrinTaskError> {
         let place = "start".to_owned();
         let index = task.start.index().map_err(|source| GrinTaskError::Field { place, source })?;

@@ -5,6 +5,6 @@ pub(super) mod index_bounds;
 mod max_slope;
 mod maximum;
 mod reference;
-mod volume_checks;
+mod task_files;
 
 pub use grin_field::GrinField;

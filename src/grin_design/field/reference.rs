@@ -1,47 +1,40 @@
 //! Reference and initial fields: given by a formula, or by a volume file.
 
-use crate::files::{self, Volume};
 use crate::grin::IndexField;
 use crate::grin::field::{
-    Luneburg, Maxwell, Parabolic, Plume, ProfileField, RegularGrid, Sech, Tricubic, Trilinear,
+    GridError, Luneburg, Maxwell, Parabolic, Plume, ProfileField, RegularGrid, Sech, Tricubic,
+    Trilinear,
 };
 use crate::grin_design::ReferenceFieldError;
-use crate::grin_design::task::checks::INDEX_ROUNDING;
-use crate::grin_design::task::{InitialField, ReferenceField};
+use crate::grin_design::task::{InitialField, ReferenceField, VolumeFile};
 use crate::math::{Real, Vec3};
-use std::path::Path;
-
-/// The trilinear field of a volume in a file.
-pub(super) fn read_field<R: Real>(path: &Path) -> Result<Trilinear<R>, ReferenceFieldError> {
-    let Volume { grid, values } = files::read_volume(path)?;
-    let wrong = |source| ReferenceFieldError::Values { file: path.display().to_string(), source };
-    if let Some(n) = values.iter().position(|index| !(*index >= 1.0 - INDEX_ROUNDING)) {
-        let (file, node) = (path.display().to_string(), node_place(grid.counts(), n));
-        return Err(ReferenceFieldError::Index { file, node, found: values[n] });
-    }
-    let (low, spacing) = (Vec3::from_f64(grid.low()), Vec3::from_f64(grid.spacing()));
-    let grid = RegularGrid::new(grid.counts(), low, spacing).map_err(wrong)?;
-    Trilinear::new(grid, values.into_iter().map(R::from_f64).collect()).map_err(wrong)
-}
-
-/// The position of a node in a grid.
-fn node_place([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
-    [n % nx, n / nx % ny, n / nx / ny]
-}
 
 /// The index at every point.
-type IndexFunction = Box<dyn Fn(Vec3<f64>) -> f64>;
+type IndexFunction<'a> = Box<dyn Fn(Vec3<f64>) -> f64 + 'a>;
+
+/// The field of a volume file that has been read.
+fn volume(file: &VolumeFile) -> Result<&Trilinear<f64>, ReferenceFieldError> {
+    file.content().ok_or_else(|| ReferenceFieldError::NotRead { file: file.name() })
+}
+
+/// The same field in another number type.
+fn cast<R: Real>(volume: &Trilinear<f64>) -> Result<Trilinear<R>, GridError> {
+    let grid = volume.grid();
+    let (low, spacing) = (Vec3::from_f64(grid.low()), Vec3::from_f64(grid.spacing()));
+    let values = volume.parameters().iter().copied().map(R::from_f64).collect();
+    Trilinear::new(RegularGrid::new(grid.counts(), low, spacing)?, values)
+}
 
 impl InitialField {
     /// The index of the initial field.
-    pub(in crate::grin_design) fn index(&self) -> Result<IndexFunction, ReferenceFieldError> {
+    pub(in crate::grin_design) fn index(&self) -> Result<IndexFunction<'_>, ReferenceFieldError> {
         Ok(match self {
             Self::Uniform(index) => {
                 let index = *index;
                 Box::new(move |_| index)
             }
-            Self::Volume(path) => {
-                let volume = read_field::<f64>(path)?;
+            Self::Volume(file) => {
+                let volume = volume(file)?;
                 Box::new(move |p| volume.sample(p).index)
             }
         })
@@ -52,7 +45,7 @@ impl ReferenceField {
     /// The field sampled on a grid.
     ///
     /// # Errors
-    /// A volume that cannot be read, or an invalid grid.
+    /// A volume that has not been read, or an invalid grid.
     pub fn sample_on_grid<R: Real>(
         &self,
         cubic: bool,
@@ -74,7 +67,7 @@ impl ReferenceField {
     /// The field.
     ///
     /// # Errors
-    /// A volume that cannot be read.
+    /// A volume that has not been read.
     pub fn field<R: Real>(&self) -> Result<Box<dyn IndexField<R>>, ReferenceFieldError> {
         let c = R::from_f64;
         Ok(match self {
@@ -91,7 +84,10 @@ impl ReferenceField {
             Self::Plume { ambient, contrast, half } => {
                 Box::new(Plume::new(c(*ambient), c(*contrast), c(*half)))
             }
-            Self::Volume(path) => Box::new(read_field(path)?),
+            Self::Volume(file) => {
+                let wrong = |source| ReferenceFieldError::Values { file: file.name(), source };
+                Box::new(cast(volume(file)?).map_err(wrong)?)
+            }
         })
     }
 }

@@ -47,7 +47,7 @@ impl GrinTask {
     /// The difference from the reference field; `None` without a reference.
     ///
     /// # Errors
-    /// A volume that cannot be read.
+    /// A volume that has not been read.
     pub fn difference(
         &self,
         medium: &GrinField,
@@ -59,7 +59,7 @@ impl GrinTask {
     /// The difference from another field.
     ///
     /// # Errors
-    /// An initial field that cannot be read.
+    /// An initial volume that has not been read.
     pub fn difference_from(
         &self,
         medium: &GrinField,

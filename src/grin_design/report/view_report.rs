@@ -52,7 +52,7 @@ impl GrinTask {
     /// The results of all views in a field, those of weight 0 included.
     ///
     /// # Errors
-    /// A reference field that cannot be read, or a domain without extent.
+    /// A reference volume that has not been read, or a domain without extent.
     pub fn report_views(&self, medium: &GrinField) -> Result<Vec<ViewReport>, GrinTaskError> {
         let field = medium.field();
         let setups = plan_views(self, field, RaySet::Scoring)?;

@@ -74,13 +74,13 @@ pub struct GrinOptimizer {
 }
 
 impl GrinOptimizer {
-    /// Starts an optimisation.
+    /// Starts the optimisation of a task whose files have been read: see
+    /// [`GrinTask::read_files`].
     ///
     /// # Errors
-    /// A task that is invalid.
+    /// A task that is invalid, or a file that has not been read.
     pub fn new(task: &GrinTask) -> Result<Self, GrinTaskError> {
         task.check()?;
-        task.check_volumes()?;
         let known = measure_targets(task)?;
         let current = GrinField::initial(task, task.levels[0].nodes)?;
         let setups = plan_views(task, current.field(), RaySet::Step(0))?;

@@ -6,14 +6,16 @@ mod domain;
 pub(super) mod geometry;
 pub(super) mod source;
 pub(super) mod target_image;
+mod task_file;
 mod validate;
 
 pub use builtin::{BUILTIN_TASKS, BuiltinTask, find_builtin, read_task};
-pub use target_image::{ImageFile, TargetImage};
+pub use target_image::TargetImage;
+pub use task_file::TaskFile;
 
+use crate::grin::field::Trilinear;
 use crate::grin::{Integrator, LaunchMode};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 
 /// The version of the format.
 pub const TASK_VERSION: u32 = 1;
@@ -253,6 +255,9 @@ pub enum LightGoal {
     },
 }
 
+/// A volume file with trilinear interpolation between its nodes.
+pub type VolumeFile = TaskFile<Trilinear<f64>>;
+
 /// The initial field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -260,7 +265,7 @@ pub enum InitialField {
     /// The same index everywhere.
     Uniform(f64),
     /// A volume file, `NumPy`'s .npz or raw numbers with a header.
-    Volume(PathBuf),
+    Volume(VolumeFile),
 }
 
 impl Default for InitialField {
@@ -402,5 +407,5 @@ pub enum ReferenceField {
         half: f64,
     },
     /// A volume file with trilinear interpolation between its nodes.
-    Volume(PathBuf),
+    Volume(VolumeFile),
 }

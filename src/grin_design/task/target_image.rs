@@ -1,10 +1,9 @@
 //! Target images: drawn by formula, or read from a file.
 
 use super::geometry::GOLDEN_ANGLE;
-use crate::files::{FileError, GrayscaleImage, read_grayscale};
+use super::task_file::TaskFile;
+use crate::files::{FileError, GrayscaleImage};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
 
 /// Sample points along a side of a pixel.
 const SUBPIXELS: usize = 4;
@@ -32,72 +31,38 @@ pub enum TargetImage {
     Scene(f64),
     /// An image file: converted to grey and cropped to the largest central square. Its pixel values
     /// are taken as linear light.
-    File(ImageFile),
-}
-
-/// An image file, which is read once, at its first use.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-#[serde(from = "PathBuf", into = "PathBuf")]
-pub struct ImageFile {
-    path: PathBuf,
-    photo: Arc<OnceLock<GrayscaleImage>>,
-}
-
-impl ImageFile {
-    /// The path of the file.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The image of the file.
-    fn photo(&self) -> Result<&GrayscaleImage, FileError> {
-        if let Some(photo) = self.photo.get() {
-            return Ok(photo);
-        }
-        let photo = read_grayscale(&self.path)?;
-        Ok(self.photo.get_or_init(|| photo))
-    }
-}
-
-impl From<PathBuf> for ImageFile {
-    fn from(path: PathBuf) -> Self {
-        Self { path, photo: Arc::default() }
-    }
-}
-
-impl From<ImageFile> for PathBuf {
-    fn from(file: ImageFile) -> Self {
-        file.path
-    }
-}
-
-impl PartialEq for ImageFile {
-    fn eq(&self, other: &Self) -> bool {
-        self.path == other.path
-    }
+    File(TaskFile<GrayscaleImage>),
 }
 
 impl TargetImage {
     /// The pixels in rows from the bottom, as many as columns, of mean 1.
     ///
     /// # Errors
-    /// A file that is not an image, or one without light in its central square.
+    /// A file that has not been read, or an image without light in its central square.
     pub fn render(&self, pixels: usize) -> Result<Vec<f64>, FileError> {
         let mut all = match self {
-            Self::File(file) => resample(file.photo()?, pixels),
+            Self::File(file) => match file.content() {
+                Some(image) => resample(image, pixels),
+                None => return Err(self.unusable("its content", "a file that was not read")),
+            },
             drawn => (0..pixels * pixels).map(|n| drawn.pixel(n, pixels)).collect(),
         };
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         if !(mean > 0.0) {
-            let file = match self {
-                Self::File(file) => file.path.display().to_string(),
-                _ => "drawing".to_owned(),
-            };
-            let (found, expected) = ("no light".to_owned(), "some light".to_owned());
-            return Err(FileError::Malformed { file, place: "its middle".into(), found, expected });
+            return Err(self.unusable("its middle", "no light"));
         }
         all.iter_mut().for_each(|value| *value /= mean);
         Ok(all)
+    }
+
+    fn unusable(&self, place: &str, found: &str) -> FileError {
+        let file = match self {
+            Self::File(file) => file.name(),
+            _ => "drawing".to_owned(),
+        };
+        let (place, found, expected) =
+            (place.to_owned(), found.to_owned(), "some light".to_owned());
+        FileError::Malformed { file, place, found, expected }
     }
 
     /// A pixel of an image by formula, averaged over its area.

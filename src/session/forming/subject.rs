@@ -86,7 +86,8 @@ impl GrinDocument {
         origin: &DocumentSource,
         file: &str,
     ) -> Result<(Self, Option<GrinOptimizer>), String> {
-        let runner = GrinOptimizer::new(&task).map_err(|why| format!("{file}: {why}"))?;
+        let runner = task.read_files().and_then(|()| GrinOptimizer::new(&task));
+        let runner = runner.map_err(|why| format!("{file}: {why}"))?;
         let exact = task.exact.as_ref().map(ReferenceField::field::<f64>).transpose();
         let exact = exact.map_err(|why| format!("{file}, exact: {why}"))?;
         let spaces = || task.views.iter().map(|view| view.space.unwrap_or(task.space));
