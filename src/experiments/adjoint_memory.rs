@@ -15,7 +15,7 @@ use crate::grin::{
     LastStep, LaunchMode, RayAdjoint, RayExit,
 };
 use crate::math::Vec3;
-use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.3",
@@ -164,20 +164,17 @@ fn draw(rows: &[AdjointMemoryRow]) -> Canvas {
     let y = Axis::logarithmic("megabytes", all().map(|p| p[1]), 1e-3);
     let chart = Chart::new([140.0, 110.0], [960.0, 760.0], x, y);
     chart.draw(&mut canvas, "memory of a gradient");
+    let mut legend = Legend::new([1000.0, 123.0]);
     for (i, rows) in rows.chunks(FINENESS.len()).enumerate() {
         let color = PALETTE[i % PALETTE.len()];
-        let top = 130.0 + 76.0 * i as f64;
         let curves: [(&str, Vec<[f64; 2]>, Stroke); 2] = [
             ("stored path", rows.iter().map(tape).collect(), Stroke::Dashed),
             ("adjoint", rows.iter().map(adjoint).collect(), Stroke::Solid),
         ];
-        for (k, (name, points, stroke)) in curves.into_iter().enumerate() {
-            canvas.curve(&chart.to_pixels(&points), color, stroke);
-            canvas.markers(&chart.to_pixels(&points), color);
-            let y = top + 32.0 * k as f64;
-            canvas.curve(&[[1000.0, y], [1050.0, y]], color, stroke);
+        for (name, points, stroke) in curves {
+            canvas.marked_curve(&chart.to_pixels(&points), color, stroke);
             let text = format!("{name}, {} nodes", rows[0].nodes);
-            canvas.text([1064.0, y - 7.0], &text, BLACK, TextAlign::Left);
+            legend.curve(&mut canvas, &text, color, stroke);
         }
     }
     canvas

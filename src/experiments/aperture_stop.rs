@@ -18,7 +18,7 @@ use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength,
     paraxial_image_distance,
 };
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, Legend, PALETTE, Stroke};
 use crate::pupil::{QuadraticIntegrand, RayModel, Region};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -291,15 +291,14 @@ fn radii(unbiased: &StopDescent, biased: &StopDescent) -> Canvas {
     ];
     charts[0].draw(&mut canvas, "radius of the stop");
     charts[1].draw(&mut canvas, "blur, root mean square");
-    for (i, (name, descent, color)) in descents.into_iter().enumerate() {
+    let mut legend = Legend::new([120.0, 20.0]);
+    for (name, descent, color) in descents {
         for (chart, values) in charts.iter().zip([&descent.radii, &descent.rms]) {
             let points =
                 values.iter().enumerate().map(|(step, v)| chart.to_pixel([step as f64, *v]));
             canvas.curve(&points.collect::<Vec<_>>(), color, Stroke::Solid);
         }
-        let y = 20.0 + 24.0 * i as f64;
-        canvas.curve(&[[120.0, y + 7.0], [170.0, y + 7.0]], color, Stroke::Solid);
-        canvas.text([180.0, y], name, BLACK, TextAlign::Left);
+        legend.curve(&mut canvas, name, color, Stroke::Solid);
     }
     canvas
 }

@@ -351,14 +351,12 @@ fn curves(model: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     right.draw(&mut canvas, "share of the edge by limit");
     let places = pupils.iter().map(|pupil| left.to_pixel([pupil.angle, pupil.area()]));
     let places: Vec<_> = places.collect();
-    canvas.curve(&places, BLACK, Stroke::Solid);
-    canvas.markers(&places, BLACK);
+    canvas.marked_curve(&places, BLACK, Stroke::Solid);
     for (limit, color) in &colors {
         let share =
             |pupil: &MappedPupil| right.to_pixel([pupil.angle, pupil.outline.share(*limit)]);
         let places: Vec<_> = pupils.iter().map(share).collect();
-        canvas.curve(&places, *color, Stroke::Solid);
-        canvas.markers(&places, *color);
+        canvas.marked_curve(&places, *color, Stroke::Solid);
     }
     canvas
 }

@@ -14,7 +14,7 @@ use crate::grin::{
 };
 use crate::grin_design::{self, GrinField, GrinTask};
 use crate::math::Vec3;
-use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -149,12 +149,11 @@ fn draw_focus_errors(
     let y = Axis::logarithmic("distance from the axis, mm", all().map(|p| p[1]), 1e-8);
     let chart = Chart::new([140.0, 110.0], [960.0, 760.0], x, y);
     chart.draw(&mut canvas, "misses at the foci");
+    let mut legend = Legend::new([1000.0, 123.0]);
     for (i, (name, points, color)) in curves.iter().enumerate() {
         let stroke = if i % 2 == 0 { Stroke::Dashed } else { Stroke::Solid };
         canvas.curve(&chart.to_pixels(points), *color, stroke);
-        let y = 130.0 + 34.0 * i as f64;
-        canvas.curve(&[[1000.0, y], [1050.0, y]], *color, stroke);
-        canvas.text([1064.0, y - 7.0], name, BLACK, TextAlign::Left);
+        legend.curve(&mut canvas, name, *color, stroke);
     }
     Ok(canvas)
 }

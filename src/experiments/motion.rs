@@ -14,7 +14,7 @@ use super::{
 };
 use crate::lens::Lens;
 use crate::optimize::pareto::ParetoPoint;
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, Canvas, Chart, Color, Legend, PALETTE, Stroke};
 use crate::pupil::{RayModel, Region};
 use std::f64::consts::PI;
 
@@ -203,12 +203,11 @@ impl ExposurePair {
             ("darkest, moving", PALETTE[1], Stroke::Solid),
             ("brightest, moving", PALETTE[0], Stroke::Solid),
         ];
+        let mut legend = Legend::new([130.0, 20.0]);
         for (i, (name, color, stroke)) in kinds.into_iter().enumerate() {
             let curve = frequencies().map(|f| chart.to_pixel([f, self.contrasts(f)[i]]));
             canvas.curve(&curve.collect::<Vec<_>>(), color, stroke);
-            let y = 20.0 + 28.0 * i as f64;
-            canvas.curve(&[[130.0, y + 7.0], [180.0, y + 7.0]], color, stroke);
-            canvas.text([195.0, y], name, BLACK, TextAlign::Left);
+            legend.curve(&mut canvas, name, color, stroke);
         }
         canvas
     }

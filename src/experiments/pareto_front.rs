@@ -20,7 +20,7 @@ use super::{
 };
 use crate::lens::Lens;
 use crate::optimize::pareto::{Front, ParetoPoint};
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, Legend, PALETTE, Stroke, TextAlign};
 use crate::pupil::{PupilPattern, RayModel, pattern_points};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -179,10 +179,9 @@ impl FrontStudy {
         let y = Axis::linear("area of the pupil, mm^2", all().map(|p| p[1]).chain([0.0]));
         let chart = Chart::new([120.0, 200.0], [840.0, 880.0], x, y);
         chart.draw(&mut canvas, name);
-        for (i, (label, points, color)) in sets.iter().filter(|s| !s.1.is_empty()).enumerate() {
-            let place = [130.0, 20.0 + 28.0 * i as f64];
-            canvas.markers(&[[place[0], place[1] + 7.0]], *color);
-            canvas.text([place[0] + 20.0, place[1]], label, BLACK, TextAlign::Left);
+        let mut legend = Legend::new([130.0, 20.0]);
+        for (label, points, color) in sets.iter().filter(|s| !s.1.is_empty()) {
+            legend.marker(&mut canvas, label, *color);
             canvas.markers(&chart.to_pixels(points), *color);
         }
         let front = self.unbiased.points();

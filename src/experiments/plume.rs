@@ -27,7 +27,7 @@ use crate::grin_design::{
 };
 use crate::math::Vec3;
 use crate::plot::{
-    Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign, gray_level,
+    Axis, BLACK, Canvas, Chart, Color, GREY, Legend, PALETTE, Stroke, TextAlign, gray_level,
 };
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -313,15 +313,13 @@ fn chart(rows: &[PlumeRow]) -> Canvas {
     let y = Axis::logarithmic("error in parts of the contrast", errors, 1e-4);
     let chart = Chart::new([140.0, 110.0], [960.0, 700.0], x, y);
     chart.draw(&mut canvas, "a synthetic plume, found again");
+    let mut legend = Legend::new([1000.0, 133.0]);
     for (i, (name, of)) in METHODS.iter().enumerate() {
         let points: Vec<[f64; 2]> =
             rows.iter().map(|row| [row.case.times, of(row).error]).collect();
         let places = chart.to_pixels(&points);
-        canvas.curve(&places, PALETTE[i], Stroke::Solid);
-        canvas.markers(&places, PALETTE[i]);
-        let y = 140.0 + 36.0 * i as f64;
-        canvas.curve(&[[1000.0, y], [1050.0, y]], PALETTE[i], Stroke::Solid);
-        canvas.text([1064.0, y - 7.0], name, BLACK, TextAlign::Left);
+        canvas.marked_curve(&places, PALETTE[i], Stroke::Solid);
+        legend.curve(&mut canvas, name, PALETTE[i], Stroke::Solid);
     }
     canvas
 }

@@ -14,7 +14,7 @@ use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, TableCell, report_progress,
 };
-use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign, gray_level};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Legend, PALETTE, Stroke, TextAlign, gray_level};
 use crate::search::competing_clocks::{CompetingClocks, Regeneration, RegenerationRate};
 use crate::search::toy::ToyLandscape;
 use crate::search::{Landscape as _, Random, Temperature};
@@ -335,15 +335,14 @@ fn curves(study: &ToyStudy, found: &[ProcessSamples]) -> Canvas {
     let chart =
         Chart::new([130.0, 170.0], [940.0, 640.0], x, Axis::linear("", shares.chain([0.0])));
     chart.draw(&mut canvas, "share of each bin");
+    let mut legend = Legend::new([130.0, 20.0]);
     for (i, (name, shares)) in shown.into_iter().enumerate() {
         let color = if i == 0 { BLACK } else { PALETTE[i - 1] };
         let stroke = if i == 0 { Stroke::Solid } else { Stroke::Dashed };
         let place = |bin: usize| [study.grid.bin_center(bin)[0], shares[bin]];
         let points: Vec<[f64; 2]> = (0..shares.len()).map(place).collect();
         canvas.curve(&chart.to_pixels(&points), color, stroke);
-        let y = 20.0 + 26.0 * i as f64;
-        canvas.curve(&[[130.0, y + 7.0], [190.0, y + 7.0]], color, stroke);
-        canvas.text([200.0, y], name, BLACK, TextAlign::Left);
+        legend.curve(&mut canvas, name, color, stroke);
     }
     canvas
 }

@@ -17,7 +17,9 @@ use super::{
 use crate::analysis::{Illumination, illumination};
 use crate::lens::{Lens, Parameter, Quantity, Variable};
 use crate::optimize::pareto::ParetoPoint;
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign, gray_level};
+use crate::plot::{
+    Axis, BLACK, Canvas, Chart, Color, Legend, PALETTE, Stroke, TextAlign, gray_level,
+};
 use crate::pupil::{Accuracy, RayModel};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -178,16 +180,14 @@ fn draw(pair: &[IlluminatedLens; 2]) -> Canvas {
     let y = Axis::linear("illumination", [0.0, 1.0]);
     let chart = Chart::new([120.0, 190.0], [1140.0, 690.0], x, y);
     chart.draw(&mut canvas, "illumination, the brighter axis 1");
+    let mut legend = Legend::new([130.0, 20.0]);
     for (i, ((name, color), lit)) in KINDS.into_iter().zip(pair).enumerate() {
         let share = |field: usize| lit.cone(field)[0] / brightest;
         let curve: Vec<[f64; 2]> = (0..FIELDS)
             .map(|field| chart.to_pixel([lit.light[field].field.y, share(field)]))
             .collect();
-        canvas.curve(&curve, color, Stroke::Solid);
-        canvas.markers(&curve, color);
-        let y = 20.0 + 28.0 * i as f64;
-        canvas.curve(&[[130.0, y + 7.0], [180.0, y + 7.0]], color, Stroke::Solid);
-        canvas.text([195.0, y], name, BLACK, TextAlign::Left);
+        canvas.marked_curve(&curve, color, Stroke::Solid);
+        legend.curve(&mut canvas, name, color, Stroke::Solid);
         let strip: Vec<Color> = (0..FIELDS).map(|field| gray_level(share(field))).collect();
         let top = 790.0 + 100.0 * i as f64;
         canvas.raster([120.0, top], FIELDS, 48, &strip);

@@ -16,7 +16,7 @@ use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, at_zoom, paraxial_image_distance,
 };
 use crate::optimize::pareto::ParetoPoint;
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, Canvas, Chart, Color, Legend, PALETTE, Stroke};
 use crate::pupil::RayModel;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -88,14 +88,14 @@ impl ZoomRange {
     fn gain(&self, other: &Self) -> f64 {
         let least = (0..POSITIONS.len()).map(|i| {
             let [blur, light] = self.ratios(other, i);
-            (1.0 / blur).min(1.0 + LIGHT_DAMPING * (light - 1.0))
+            (1.0 / blur).min(1.0 + LIGHT_FACTOR * (light - 1.0))
         });
         least.fold(f64::INFINITY, f64::min)
     }
 }
 
-/// The factor by which a gain in light counts less than one in sharpness in the choice of a design.
-const LIGHT_DAMPING: f64 = 20.0;
+/// The factor by which a gain in light counts more than one in sharpness in the choice of a design.
+const LIGHT_FACTOR: f64 = 20.0;
 
 /// The design with the largest smallest improvement over all positions.
 fn best_design(
@@ -219,16 +219,16 @@ fn draw(name: &str, before: &ZoomRange, after: &ZoomRange) -> Canvas {
     ];
     for (k, chart) in charts.iter().enumerate() {
         chart.draw(&mut canvas, name);
-        for (label, range, color) in ranges {
+        for (_, range, color) in ranges {
             let places = range.focal_lengths.iter().zip(&range.points);
             let places: Vec<[f64; 2]> =
                 places.map(|(f, point)| chart.to_pixel([*f, SCALES[k] * point[k]])).collect();
-            canvas.curve(&places, color, Stroke::Solid);
-            canvas.markers(&places, color);
-            let y = if label == "start" { 20.0 } else { 46.0 };
-            canvas.curve(&[[120.0, y + 7.0], [170.0, y + 7.0]], color, Stroke::Solid);
-            canvas.text([185.0, y], label, BLACK, TextAlign::Left);
+            canvas.marked_curve(&places, color, Stroke::Solid);
         }
+    }
+    let mut legend = Legend::new([120.0, 20.0]);
+    for (label, _, color) in ranges {
+        legend.curve(&mut canvas, label, color, Stroke::Solid);
     }
     canvas
 }

@@ -99,6 +99,12 @@ impl Canvas {
         points.iter().for_each(|point| self.square(*point, 3, color));
     }
 
+    /// Draws a polyline with a marker at every point.
+    pub fn marked_curve(&mut self, points: &[[f64; 2]], color: Color, stroke: Stroke) {
+        self.curve(points, color, stroke);
+        self.markers(points, color);
+    }
+
     /// Draws a raster of square cells, `cell` pixels to a side, row by row from its upper left
     /// corner.
     pub fn raster(&mut self, [x, y]: [f64; 2], columns: usize, cell: usize, colors: &[Color]) {

@@ -6,7 +6,7 @@
 
 use crate::files::{self, FileError};
 use crate::optimize::pareto::{Front, ParetoPoint};
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, Legend, PALETTE, Stroke};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -30,8 +30,6 @@ const HEAD: &str = "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,r
 /// The width and height of the plot in pixels, and its margins: left, top, right, bottom.
 const SIZE: [u32; 2] = [1000, 720];
 const MARGINS: [f64; 4] = [110.0, 110.0, 40.0, 90.0];
-/// The distance between two lines of the legend, in pixels.
-const LINE: f64 = 22.0;
 
 impl ParetoReport<'_> {
     /// Writes the report into a folder, which is created if it does not exist. Returns the files,
@@ -95,8 +93,7 @@ impl ParetoReport<'_> {
         }
         for (points, color) in [(&biased, GREY), (&front, PALETTE[1])] {
             let points = chart.to_pixels(points);
-            canvas.curve(&points, color, Stroke::Solid);
-            canvas.markers(&points, color);
+            canvas.marked_curve(&points, color, Stroke::Solid);
         }
         canvas.markers(&chart.to_pixels(&[start]), BLACK);
         self.legend(&mut canvas);
@@ -111,10 +108,9 @@ impl ParetoReport<'_> {
             (format!("front, {}", volume(self.front)), PALETTE[1]),
         ];
         lines.extend(self.biased.map(|front| (format!("pupils kept, {}", volume(front)), GREY)));
-        for (i, (text, color)) in lines.iter().enumerate() {
-            let y = MARGINS[1] + 12.0 + LINE * i as f64;
-            canvas.square([MARGINS[0] + 18.0, y + 7.0], 4, *color);
-            canvas.text([MARGINS[0] + 32.0, y], text, BLACK, TextAlign::Left);
+        let mut legend = Legend::new([MARGINS[0] + 18.0, MARGINS[1] + 12.0]);
+        for (text, color) in &lines {
+            legend.marker(canvas, text, *color);
         }
     }
 }

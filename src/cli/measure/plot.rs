@@ -1,6 +1,6 @@
 //! Curves of error against time: one log-log chart, or two side by side.
 
-use crate::plot::{Axis, BLACK, Canvas, Chart as Axes, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart as Axes, Legend, TextAlign};
 use image::ImageError;
 
 pub(super) use crate::plot::{Color, Stroke};
@@ -61,20 +61,14 @@ pub(super) fn draw(
         let axes = Axes::new([left, TOP], [right, BOTTOM], x.clone(), y.clone());
         axes.draw(&mut canvas, &chart.name);
         for curve in &chart.curves {
-            draw_curve(&mut canvas, &axes.to_pixels(&curve.points), curve.color, curve.stroke);
+            canvas.marked_curve(&axes.to_pixels(&curve.points), curve.color, curve.stroke);
         }
     }
-    for (i, label) in labels.iter().enumerate() {
-        let y = TOP + 20.0 + 34.0 * i as f64;
-        draw_curve(&mut canvas, &[[LEGEND, y], [LEGEND + 40.0, y]], label.color, label.stroke);
-        canvas.text([LEGEND + 52.0, y - 7.0], label.name, BLACK, TextAlign::Left);
+    let mut legend = Legend::new([LEGEND, TOP + 13.0]);
+    for label in labels {
+        legend.curve(&mut canvas, label.name, label.color, label.stroke);
     }
     canvas.png()
-}
-
-fn draw_curve(canvas: &mut Canvas, points: &[[f64; 2]], color: Color, stroke: Stroke) {
-    canvas.curve(points, color, stroke);
-    canvas.markers(points, color);
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@
 //! through the other (5.36 and 5.37). That loss does not ask for even brightness, so some parts are
 //! brighter than others.
 
-use super::image_plots::{draw_row, gray_levels};
 use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
 use crate::experiments::grin_solution::solve;
 use crate::experiments::{
@@ -14,7 +13,7 @@ use crate::experiments::{
 };
 use crate::grin::{GrinTracer, RayExit, plan_tracing};
 use crate::grin_design::{GrinField, GrinTask, LightGoal};
-use crate::plot::Canvas;
+use crate::plot::{Canvas, draw_image_row, gray_levels};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.7",
@@ -170,7 +169,11 @@ impl ExitBeam {
             PLANES.iter().map(|plane| panel(format!("{plane} mm behind"), &self.positions(*plane)));
         let slopes: Vec<[f64; 2]> = self.rays.iter().map(|(_, v)| *v).collect();
         let panels: Vec<_> = screens.chain([panel("at infinity".to_owned(), &slopes)]).collect();
-        draw_row("the ring on screens behind the field, each as large as its ring", CELLS, &panels)
+        draw_image_row(
+            "the ring on screens behind the field, each as large as its ring",
+            CELLS,
+            &panels,
+        )
     }
 }
 

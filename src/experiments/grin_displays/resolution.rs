@@ -6,14 +6,13 @@
 //! rough fields it misleads the optimization, and the smoothed one is better. A spline has no
 //! jumps.
 
-use super::image_plots::{draw_row, gray_levels};
 use super::{builtin, evaluate, reduced, solve_from};
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, report_progress,
 };
 use crate::grin_design::{FieldRepresentation, GrinOptimizer, GrinTask, ViewImage, ViewReport};
-use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke, draw_image_row, gray_levels};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.5",
@@ -184,13 +183,11 @@ fn chart(rows: &[ResolutionRow]) -> Canvas {
     let y = Axis::linear("peak signal to noise, dB", rows.iter().map(|row| place(row)[1]));
     let chart = Chart::new([120.0, 110.0], [940.0, 660.0], x, y);
     chart.draw(&mut canvas, "quality by resolution");
+    let mut legend = Legend::new([980.0, 133.0]);
     for (i, kind) in KINDS.into_iter().enumerate() {
         let points: Vec<[f64; 2]> = rows_of(rows, kind).into_iter().map(place).collect();
-        canvas.curve(&chart.to_pixels(&points), PALETTE[i], Stroke::Solid);
-        canvas.markers(&chart.to_pixels(&points), PALETTE[i]);
-        let y = 140.0 + 34.0 * i as f64;
-        canvas.curve(&[[980.0, y], [1030.0, y]], PALETTE[i], Stroke::Solid);
-        canvas.text([1044.0, y - 7.0], kind.name(), BLACK, TextAlign::Left);
+        canvas.marked_curve(&chart.to_pixels(&points), PALETTE[i], Stroke::Solid);
+        legend.curve(&mut canvas, kind.name(), PALETTE[i], Stroke::Solid);
     }
     canvas
 }
@@ -208,5 +205,5 @@ fn images(rows: &[ResolutionRow]) -> Canvas {
     };
     let mut panels: Vec<_> = all.iter().map(panel).collect();
     panels.push(("wanted".to_owned(), gray_levels(&first.target, first.pixels, peak)));
-    draw_row("tricubic fields", first.pixels, &panels)
+    draw_image_row("tricubic fields", first.pixels, &panels)
 }

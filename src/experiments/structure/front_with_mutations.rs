@@ -16,7 +16,7 @@ use crate::experiments::{
 use crate::lens::Lens;
 use crate::merit::{PupilEdge, Term, WeightedTerm};
 use crate::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep, weighted_sum_goal};
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, PALETTE, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, Legend, PALETTE};
 use crate::search::SearchRules;
 use crate::search::lens_landscape::SearchPlan;
 
@@ -196,10 +196,9 @@ impl MutationGain {
         let y = Axis::linear("area of the pupil, mm^2", all().map(|p| p[1]).chain([0.0]));
         let chart = Chart::new([120.0, 200.0], [840.0, 880.0], x, y);
         chart.draw(&mut canvas, FILE);
-        for (i, (label, points, color)) in sets.iter().enumerate() {
-            let place = [130.0, 20.0 + 28.0 * i as f64];
-            canvas.markers(&[[place[0], place[1] + 7.0]], *color);
-            canvas.text([place[0] + 20.0, place[1]], label, BLACK, TextAlign::Left);
+        let mut legend = Legend::new([130.0, 20.0]);
+        for (label, points, color) in sets.iter() {
+            legend.marker(&mut canvas, label, *color);
             canvas.markers(&chart.to_pixels(points), *color);
         }
         let found = &self.found;

@@ -18,7 +18,7 @@ use crate::experiments::{
     ProgressFn, TableCell,
 };
 use crate::optimize::DescentMethod;
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, PALETTE, Stroke, TextAlign};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, Legend, PALETTE, Stroke};
 use crate::search::{MutationKind, SearchRules};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
@@ -248,11 +248,9 @@ fn key(canvas: &mut Canvas) {
     let kinds = std::iter::once(None)
         .chain(MutationKind::MUTATIONS.map(Some))
         .chain([Some(MutationKind::Global)]);
-    for (i, kind) in kinds.enumerate() {
-        let y = 140.0 + 30.0 * i as f64;
-        canvas.markers(&[[1420.0, y + 7.0]], color(kind));
-        canvas.text([1436.0, y], kind.map_or("start", MutationKind::name), BLACK, TextAlign::Left);
+    let mut legend = Legend::new([1420.0, 140.0]);
+    for kind in kinds {
+        legend.marker(canvas, kind.map_or("start", MutationKind::name), color(kind));
     }
-    canvas.curve(&[[1410.0, 507.0], [1430.0, 507.0]], GREY, Stroke::Dashed);
-    canvas.text([1436.0, 500.0], "merit of the start", BLACK, TextAlign::Left);
+    legend.curve(canvas, "merit of the start", GREY, Stroke::Dashed);
 }
