@@ -54,7 +54,7 @@ fn run(
             report_progress(
                 progress,
                 done,
-                &format!("{nodes} nodes a side, {fineness} steps a voxel"),
+                &format!("{nodes} nodes per side, {fineness} steps per voxel"),
             )?;
             rows.push(measure(*nodes, fineness, side)?);
             outcome.rays += 2 * side * side;
@@ -115,17 +115,19 @@ fn claims(rows: &[AdjointMemoryRow]) -> Vec<Claim> {
         let nodes = first.nodes;
         let growth = last.steps / first.steps;
         claims.push(Claim::exactly(
-            format!("{nodes} nodes: bytes of the adjoint with {growth:.1} times the steps, more"),
+            format!(
+                "{nodes} nodes: additional bytes of the adjoint with {growth:.1} times the steps"
+            ),
             (last.rays + last.gradients) as f64 - (first.rays + first.gradients) as f64,
             0.0,
         ));
         claims.push(Claim::at_least(
-            format!("{nodes} nodes: bytes of the stored path, in times of those with fewer steps"),
+            format!("{nodes} nodes: bytes of the stored path, relative to those with fewer steps"),
             last.tape as f64 / first.tape as f64,
             0.99 * growth,
         ));
         claims.push(Claim::at_least(
-            format!("{nodes} nodes: bytes of the longest stored path, in times of the adjoint's"),
+            format!("{nodes} nodes: bytes of the longest stored path, relative to the adjoint"),
             last.tape as f64 / last.rays as f64,
             last.steps * 0.03,
         ));

@@ -24,7 +24,7 @@ use crate::pupil::{QuadraticIntegrand, RayModel, Region};
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.3",
     title: "An aperture stop optimised for sharpness alone",
-    claim: "The unbiased gradient closes the stop to a pinhole; the biased one leaves it as it is",
+    claim: "The unbiased gradient closes the stop to a pinhole; the biased one leaves it unchanged",
     seconds: 1.0,
     run,
 };
@@ -227,23 +227,23 @@ fn claims(
     let last = |values: &[f64]| values.last().copied().unwrap_or(f64::NAN);
     Ok(vec![
         Claim::at_most(
-            "unbiased: radius of the stop at the end over that at the start",
+            "unbiased: final radius of the stop over the initial one",
             unbiased.final_radius() / START,
             PINHOLE,
         ),
-        Claim::at_most("unbiased: steps on which the stop opens", grown as f64, 0.0),
+        Claim::at_most("unbiased: steps that open the stop", grown as f64, 0.0),
         Claim::at_most(
-            "unbiased: blur (rms) at the end over that at the start",
+            "unbiased: final blur (rms) over the initial one",
             last(&unbiased.rms) / unbiased.rms[0],
             PINHOLE,
         ),
-        Claim::exactly("biased: derivative by the radius at the start", start.biased, 0.0)
+        Claim::exactly("biased: initial derivative by the radius", start.biased, 0.0)
             .in_unit("mm^3"),
-        Claim::exactly("biased: steps after which the radius is another", moved as f64, 0.0),
-        Claim::exactly("biased: radius of the stop at the end", biased.final_radius(), START)
+        Claim::exactly("biased: steps that change the radius", moved as f64, 0.0),
+        Claim::exactly("biased: final radius of the stop", biased.final_radius(), START)
             .in_unit("mm"),
         Claim::at_most(
-            "unbiased derivative at the start against central differences, relative error",
+            "initial unbiased derivative against central differences, relative error",
             (start.unbiased / difference - 1.0).abs(),
             1e-6,
         ),

@@ -20,8 +20,8 @@ use std::f64::consts::PI;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.4",
-    title: "The entrance pupil of a double Gauss by what ends it",
-    claim: "Off the axis the pupil is no disc: ever more limits make its edge, corners between them",
+    title: "The entrance pupil of a double Gauss lens by its limits",
+    claim: "Off the axis the pupil is no disc: more and more limits form its edge, with corners",
     seconds: 2.0,
     run,
 };
@@ -219,7 +219,7 @@ fn claims(pupils: &[MappedPupil]) -> Vec<Claim> {
         Claim::at_most("area at the last field over that on the axis", share, 0.9)
             .with_error(error),
         Claim::at_most("area against a bitmap of rays: worst, in standard errors", off, SIGMAS),
-        Claim::at_most("rays beside the edge that do not end as its side says", wrong as f64, 0.0),
+        Claim::at_most("rays beside the edge whose fate contradicts its arc", wrong as f64, 0.0),
     ]
 }
 
@@ -348,7 +348,7 @@ fn curves(model: &RayModel, pupils: &[MappedPupil]) -> Canvas {
     let left = Chart::new([120.0, 190.0], [700.0, 690.0], x(), area);
     let right = Chart::new([860.0, 190.0], [1440.0, 690.0], x(), share);
     left.draw(&mut canvas, "area of the pupil");
-    right.draw(&mut canvas, "share of the edge by limit");
+    right.draw(&mut canvas, "fraction of the edge by limit");
     let places = pupils.iter().map(|pupil| left.to_pixel([pupil.angle, pupil.area()]));
     let places: Vec<_> = places.collect();
     canvas.marked_curve(&places, BLACK, Stroke::Solid);

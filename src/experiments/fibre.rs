@@ -19,8 +19,8 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.9",
-    title: "A fibre that focuses, beside the parabolic one",
-    claim: "The optimised profile focuses better than the parabolic one, and keeps its focus farther",
+    title: "A focusing fibre compared with the parabolic one",
+    claim: "The optimised profile focuses better than the parabolic one, over more periods",
     seconds: 1.0,
     run,
 };
@@ -60,7 +60,8 @@ fn run(_: Effort, progress: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, Ex
             plane.into(),
             spot.into(),
         ]);
-        let says = format!("focus {}: blur of the parabolic fibre, in times of ours", i + 1);
+        let says =
+            format!("focus {}: blur of the parabolic fibre, relative to the optimised one", i + 1);
         outcome.claims.push(Claim::at_least(says, spot / view.spot, BETTER));
     }
     let difference = task.difference(best).map_err(ExperimentError::from_error)?;
@@ -141,14 +142,14 @@ fn draw_focus_errors(
         let setup = plan.map_err(ExperimentError::from_error)?.setup;
         let tracer = GrinTracer::new(best.field(), setup).map_err(ExperimentError::from_error)?;
         let found = tracer.trace_batch(rays).iter().map(|exit| radius(exit.x)).collect();
-        curves.push((format!("found, focus {}", i + 1), points(found), color));
+        curves.push((format!("optimised, focus {}", i + 1), points(found), color));
     }
     let mut canvas = Canvas::new([1500, 860]);
     let all = || curves.iter().flat_map(|curve| &curve.1);
     let x = Axis::linear("height of the ray, mm", all().map(|p| p[0]).chain([0.0]));
     let y = Axis::logarithmic("distance from the axis, mm", all().map(|p| p[1]), 1e-8);
     let chart = Chart::new([140.0, 110.0], [960.0, 760.0], x, y);
-    chart.draw(&mut canvas, "misses at the foci");
+    chart.draw(&mut canvas, "ray errors at the foci");
     let mut legend = Legend::new([1000.0, 123.0]);
     for (i, (name, points, color)) in curves.iter().enumerate() {
         let stroke = if i % 2 == 0 { Stroke::Dashed } else { Stroke::Solid };

@@ -384,7 +384,7 @@ impl GradientImages {
             ];
             for (column, (name, of)) in kinds.into_iter().enumerate() {
                 let shown = self.pixels.iter().map(|pixel| diverging(of(pixel)[i] / largest));
-                let title = ["by the stop", "by curvature 0"][i];
+                let title = ["by the stop", "by the first curvature"][i];
                 panel(column + 1, i, &format!("{name}, {title}"), shown.collect());
             }
         }

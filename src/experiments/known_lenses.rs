@@ -12,8 +12,8 @@ use crate::grin_design::{self, FieldDifference, GrinOptimizer, GrinTask, Refinem
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.8",
-    title: "Luneburg's and Maxwell's lenses found again",
-    claim: "The index that was found matches the analytic lenses",
+    title: "The lenses of Luneburg and Maxwell reconstructed",
+    claim: "The reconstructed index matches the analytic lenses",
     seconds: 25.0,
     run,
 };
@@ -58,7 +58,7 @@ fn run(
         outcome.claims.extend(claims(case, effort, found));
         let left_out = judged.views.iter().map(|v| v.counts.fates.total() - v.counts.valid());
         outcome.claims.push(Claim::at_most(
-            format!("{}: rays that are left out", case.name),
+            format!("{}: excluded rays", case.name),
             left_out.sum::<usize>() as f64,
             0.0,
         ));

@@ -149,12 +149,12 @@ impl ExposurePair {
         let sharper = self.dark.design.spot / self.bright.design.spot;
         vec![
             Claim::at_least(
-                "exposure of the darkest lens over that of the brightest at equal brightness",
+                "exposure of the darkest lens relative to the brightest at equal brightness",
                 self.exposure_ratio,
                 TIMES,
             )
             .with_error(error),
-            Claim::at_most("spot of the darkest lens over that of the brightest", sharper, 1.0),
+            Claim::at_most("spot of the darkest lens relative to the brightest", sharper, 1.0),
             Claim::at_most(
                 format!("at rest: contrast bright over dark, {COMPARED} line pairs/mm"),
                 bright / dark,

@@ -34,8 +34,8 @@ use std::ops::ControlFlow;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.10",
-    title: "A plume of gas from how it bends light, by curved rays and by straight lines",
-    claim: "Curved rays find the plume at any strength, straight lines only where it is weak",
+    title: "A plume of gas reconstructed from its deflections, by curved and by straight rays",
+    claim: "Curved rays reconstruct the plume at any strength, straight rays only a weak one",
     seconds: 120.0,
     run,
 };
@@ -159,7 +159,7 @@ fn row(
     progress: &mut ProgressFn<'_>,
 ) -> Result<PlumeRow, ExperimentError> {
     let (nodes, steps) = (adjoint.medium.nodes(), effort.select(60, 25));
-    let doing = format!("{}, by straight lines", task.name);
+    let doing = format!("{}, by straight rays", task.name);
     report_progress(progress, at(0.7), &doing)?;
     let chords = StraightRays::new(&task).map_err(ExperimentError::from_error)?;
     let (mut best, mut last, mut step): (Option<(f64, GrinField)>, _, _) = (None, f64::NAN, 0);
@@ -176,7 +176,7 @@ fn row(
     let end = chords.reconstruct(nodes, steps, visit).map_err(ExperimentError::from_error)?;
     ended?;
     let best = best.map_or(end, |(_, medium)| medium);
-    let doing = format!("{}, by gradients of straight lines", task.name);
+    let doing = format!("{}, by gradients along straight rays", task.name);
     report_progress(progress, at(0.9), &doing)?;
     let gradients =
         chords.reconstruct_by_gradients(nodes, steps).map_err(ExperimentError::from_error)?;
@@ -224,14 +224,14 @@ fn claims(rows: &[PlumeRow], effort: Effort) -> Vec<Claim> {
     let mut claims = Vec::new();
     for row in rows {
         let name = format!("{} times", row.case.times);
-        let says = format!("{name}: rays that are left out");
+        let says = format!("{name}: excluded rays");
         claims.push(Claim::exactly(says, row.left_out as f64, 0.0));
         let limit = if row.case.times < 1000.0 { WEAK } else { STRONG };
-        let says = format!("{name}: error by curved rays, in parts of the contrast");
+        let says = format!("{name}: error by curved rays, relative to the contrast");
         claims.push(Claim::at_most(says, row.adjoint.error, effort.select(limit, COARSE)));
         let worse = row.chords.error.min(row.gradients.error) / row.adjoint.error;
         let says = format!(
-            "{name}: error by straight lines, the better of both ways, in times of that by curved rays"
+            "{name}: error by straight rays, the better method, relative to that by curved rays"
         );
         if row.case.times == 1.0 {
             claims.push(Claim::at_most(says, worse.max(1.0 / worse), TIE));
@@ -292,7 +292,7 @@ fn reasons(row: &PlumeRow) -> String {
     let mut reasons: Vec<String> =
         measured.map(|(reason, count)| format!("{count} {reason} in the measurement")).collect();
     if row.left_out > 0 {
-        reasons.push(format!("{} in the field found", row.left_out));
+        reasons.push(format!("{} in the reconstructed field", row.left_out));
     }
     if reasons.is_empty() { "none".to_owned() } else { reasons.join("; ") }
 }
@@ -302,17 +302,17 @@ type PlumeMethod = (&'static str, fn(&PlumeRow) -> &ReconstructedPlume);
 
 const METHODS: [PlumeMethod; 3] = [
     ("curved rays", |row| &row.adjoint),
-    ("straight lines", |row| &row.chords),
-    ("their gradients", |row| &row.gradients),
+    ("straight rays", |row| &row.chords),
+    ("gradients along them", |row| &row.gradients),
 ];
 
 fn chart(rows: &[PlumeRow]) -> Canvas {
     let mut canvas = Canvas::new([1300, 800]);
-    let x = Axis::logarithmic("strength, in times", rows.iter().map(|row| row.case.times), 0.1);
+    let x = Axis::logarithmic("relative strength", rows.iter().map(|row| row.case.times), 0.1);
     let errors = METHODS.iter().flat_map(|(_, of)| rows.iter().map(|row| of(row).error));
-    let y = Axis::logarithmic("error in parts of the contrast", errors, 1e-4);
+    let y = Axis::logarithmic("error relative to the contrast", errors, 1e-4);
     let chart = Chart::new([140.0, 110.0], [960.0, 700.0], x, y);
-    chart.draw(&mut canvas, "a synthetic plume, found again");
+    chart.draw(&mut canvas, "reconstruction of a synthetic plume");
     let mut legend = Legend::new([1000.0, 133.0]);
     for (i, (name, of)) in METHODS.iter().enumerate() {
         let points: Vec<[f64; 2]> =

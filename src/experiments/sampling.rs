@@ -23,8 +23,8 @@ use rayon::prelude::*;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "4.1",
-    title: "Whether RESTORE samples its target, on a toy of one and of two singlets",
-    claim: "Weighted by time, it does with the exact rate; with the printed one it does not",
+    title: "A test of the sampling by RESTORE, on a toy problem of one and of two singlets",
+    claim: "Weighted by time, it samples its target with the exact rate, not with the printed one",
     seconds: 10.0,
     run,
 };
@@ -88,7 +88,7 @@ impl SamplingProcess {
             RegenerationRate::Exact(c) => ("exact (4.11)", c),
             RegenerationRate::WithoutDeterminant(c) => ("no determinant (4.13)", c),
             RegenerationRate::AsPrinted(c) => ("printed (4.16)", c),
-            RegenerationRate::PreviousStep(c) => ("printed, a step behind", c),
+            RegenerationRate::PreviousStep(c) => ("printed, of the step before", c),
         }
     }
 
@@ -115,7 +115,7 @@ impl ToyStudy {
     fn new(singlets: usize) -> Result<Self, ExperimentError> {
         let toy =
             if singlets == 1 { ToyLandscape::one_singlet() } else { ToyLandscape::two_singlets() };
-        let cold = || ExperimentError::Failed(format!("no temperature is {TEMPERATURE}"));
+        let cold = || ExperimentError::Failed(format!("{TEMPERATURE} is no valid temperature"));
         let temperature = Temperature::new(TEMPERATURE).ok_or_else(cold)?;
         let grid = HistogramGrid { ranges: toy.ranges(singlets), bins: BINS[singlets - 1] };
         let target = grid.bin_shares(|point| temperature.density(toy.loss(point)));
@@ -279,21 +279,17 @@ fn claims(study: &ToyStudy, found: &[ProcessSamples]) -> Vec<Claim> {
     let reservoir = printed.filter(|sampled| sampled.process.regeneration == RESERVOIR);
     let distance = least(&mut reservoir.map(|sampled| sampled.by_time.distance));
     vec![
-        Claim::exactly(
-            says("exact rate, steps on which it is negative"),
-            exact.clamped as f64,
-            0.0,
-        ),
-        Claim::at_most(says("exact rate, surprise by time"), exact.by_time.sigmas, LIKELY),
-        Claim::at_least(says("exact rate, surprise by count"), exact.by_count.sigmas, UNLIKELY),
+        Claim::exactly(says("exact rate, steps with a negative rate"), exact.clamped as f64, 0.0),
+        Claim::at_most(says("exact rate, deviation by time"), exact.by_time.sigmas, LIKELY),
+        Claim::at_least(says("exact rate, deviation by count"), exact.by_count.sigmas, UNLIKELY),
         Claim::at_least(
-            says("without the determinant, surprise by time"),
+            says("without the determinant, deviation by time"),
             found[1].by_time.sigmas,
             UNLIKELY,
         ),
-        Claim::at_least(says("printed rate, least surprise by time"), surprise, UNLIKELY),
+        Claim::at_least(says("printed rate, smallest deviation by time"), surprise, UNLIKELY),
         Claim::at_least(
-            says("printed rate, reservoir: least part of the time in the wrong place"),
+            says("printed rate, reservoir: smallest total variation by time"),
             distance,
             0.2,
         ),
@@ -334,7 +330,7 @@ fn curves(study: &ToyStudy, found: &[ProcessSamples]) -> Canvas {
     let shares = shown.iter().flat_map(|(_, shares)| shares.iter().copied());
     let chart =
         Chart::new([130.0, 170.0], [940.0, 640.0], x, Axis::linear("", shares.chain([0.0])));
-    chart.draw(&mut canvas, "share of each bin");
+    chart.draw(&mut canvas, "probability of each bin");
     let mut legend = Legend::new([130.0, 20.0]);
     for (i, (name, shares)) in shown.into_iter().enumerate() {
         let color = if i == 0 { BLACK } else { PALETTE[i - 1] };

@@ -179,7 +179,7 @@ fn draw(pair: &[IlluminatedLens; 2]) -> Canvas {
     let x = Axis::linear("field, deg", ANGLES);
     let y = Axis::linear("illumination", [0.0, 1.0]);
     let chart = Chart::new([120.0, 190.0], [1140.0, 690.0], x, y);
-    chart.draw(&mut canvas, "illumination, the brighter axis 1");
+    chart.draw(&mut canvas, "illumination relative to the brighter axis");
     let mut legend = Legend::new([130.0, 20.0]);
     for (i, ((name, color), lit)) in KINDS.into_iter().zip(pair).enumerate() {
         let share = |field: usize| lit.cone(field)[0] / brightest;

@@ -22,7 +22,7 @@ use crate::pupil::RayModel;
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.10",
     title: "Two zoom lenses optimised at three positions",
-    claim: "Sharper and brighter over the whole range, between the positions of the search too",
+    claim: "Sharper and brighter over the whole range, also between the optimised positions",
     seconds: 100.0,
     run,
 };
@@ -162,12 +162,12 @@ fn claims(name: &str, before: &ZoomRange, after: &ZoomRange) -> Vec<Claim> {
     let mut claims = Vec::new();
     for (searched, where_) in [(true, "at the positions"), (false, "between them")] {
         claims.push(Claim::at_most(
-            format!("{name}: blur over that at the start, worst {where_}"),
+            format!("{name}: blur relative to the start, worst {where_}"),
             worst(searched, 0),
             1.0,
         ));
         claims.push(Claim::at_least(
-            format!("{name}: light over that at the start, worst {where_}"),
+            format!("{name}: light relative to the start, worst {where_}"),
             worst(searched, 1),
             1.0,
         ));

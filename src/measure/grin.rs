@@ -117,7 +117,7 @@ pub struct GrinBenchmark {
 #[derive(Debug, thiserror::Error)]
 pub enum GrinBenchmarkError {
     /// The task has no exact field to compare with.
-    #[error("exact: found none; expected a task whose exact field is known")]
+    #[error("exact: found none; expected a task with a known exact field")]
     NoExact,
     /// The exact field is invalid.
     #[error(transparent)]
@@ -129,7 +129,7 @@ pub enum GrinBenchmarkError {
     #[error(transparent)]
     Setup(#[from] GrinSetupError),
     /// No ray exits.
-    #[error("views: found no ray that leaves the space; expected light that goes through")]
+    #[error("views: found no ray that leaves the space; expected light that passes through it")]
     NoLight,
     /// The thread pool cannot be created.
     #[error("no thread to measure with: {0}")]

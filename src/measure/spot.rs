@@ -116,7 +116,7 @@ pub enum SpotCurvesError {
     #[error(transparent)]
     Launch(#[from] LaunchError),
     /// The lens has no entrance pupil of finite size.
-    #[error("the entrance pupil is at infinity; expected one with a size")]
+    #[error("the entrance pupil is at infinity; expected one of finite size")]
     NoPupil,
     /// No light gets through even the clear pupil.
     #[error("no light gets through at this field")]

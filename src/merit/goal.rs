@@ -158,12 +158,12 @@ impl Term {
             self
             && !(v > 0.0)
         {
-            return refuse("its number is not positive");
+            return refuse("its target is not positive");
         }
         let axial = |zoom| lens.fields_at(zoom).values.iter().any(|f| f.x == 0.0 && f.y == 0.0);
         let needs_axis = matches!(self, Self::FNumber(_) | Self::RelativeIllumination { .. });
         if needs_axis && !(0..lens.zoom_positions()).all(axial) {
-            return refuse("the lens has no field on the axis to compare with");
+            return refuse("the lens has no field on the axis as a reference");
         }
         if let Self::RelativeIllumination { field, .. } = self {
             if lens.object != Object::Infinity {
@@ -204,12 +204,12 @@ impl Goal {
             return refuse("it has no terms");
         }
         if !self.zoom_ratios.is_empty() && self.zoom_ratios.len() != lens.zoom_positions() {
-            return refuse("it has not one of `zoom_ratios` for each zoom position");
+            return refuse("the number of `zoom_ratios` differs from the number of zoom positions");
         }
         for WeightedTerm { term, weight } in &self.terms {
             let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
             if !(weight.is_finite() && *weight >= 0.0) {
-                return refuse("its weight is not a number of zero or more");
+                return refuse("its weight is negative or not finite");
             }
             if !term.numbers().iter().all(|v| v.is_finite()) {
                 return refuse("its target is not finite");
@@ -217,7 +217,7 @@ impl Goal {
             if let [min, max] = term.numbers()[..]
                 && min > max
             {
-                return refuse("its smallest thickness is larger than its largest");
+                return refuse("its minimum is larger than its maximum");
             }
             let focal = matches!(term, Term::FocalLength(_) | Term::FNumber(_));
             if focal && focal_lengths(lens)?.contains(&None) {

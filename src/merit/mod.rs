@@ -27,7 +27,7 @@ pub use defaults::{GoalLimits, LensFigures, MAX_STEEPNESS, default_terms};
 pub use goal::{Goal, PupilEdge, Term, WeightedTerm};
 pub use sampling::SpotSampling;
 
-use crate::lens::{Lens, LensError, Variable};
+use crate::lens::{Lens, LensError, SurfaceNumber, Variable};
 use crate::math::Dual;
 use crate::pupil::{LaunchError, QuadraticIntegrand, RayModelError, TracedPupil};
 use crate::trace::Fate;
@@ -72,7 +72,7 @@ pub enum MeritError {
     /// A ray of a spot no longer reaches the image.
     #[error(
         "ray {ray} of field {field} at zoom position {zoom}, {um} um, is lost: {} at surface {}",
-        .fate.name(), .fate.surface().unwrap_or(0)
+        .fate.name(), SurfaceNumber::new(.fate.surface().unwrap_or(0))
     )]
     RayLost {
         /// The ray of the field, counted from 0.
@@ -287,8 +287,9 @@ impl Merit {
                 let light = sampling.trace_pupils(&model, true);
                 sampling.check_light(&light)?;
                 if model.has_grin() && light.iter().any(TracedPupil::is_irregular) {
-                    let why = "the pupil is in pieces or not star-shaped, and nothing tells how \
-                               its edge moves with a gradient; expected a goal with frozen pupils";
+                    let why = "the pupil is disconnected or not star-shaped, and in a \
+                               gradient-index lens the motion of its edge is unknown then; \
+                               expected a goal with frozen pupils";
                     return Err(MeritError::DoesNotApply { term: "pupil", why });
                 }
                 let sampling = &sampling.with_pupils(&model, &light);

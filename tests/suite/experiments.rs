@@ -134,7 +134,7 @@ fn rows_with(table: &DataTable, name: &str, word: &str) -> DataTable {
 fn restore_finds_better_lenses_than_metropolis() {
     let outcome = outcome("4.4");
     let curves = &outcome.tables[1];
-    for sampler in ["RESTORE", "Metropolis and Hastings"] {
+    for sampler in ["RESTORE", "Metropolis-Hastings"] {
         let own = rows_with(curves, "sampler", sampler);
         let [least, median, most] = ["least", "median", "most"].map(|name| column(&own, name));
         assert!(median.windows(2).all(|pair| pair[1] <= pair[0]), "{sampler}");

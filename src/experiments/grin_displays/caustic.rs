@@ -94,7 +94,7 @@ fn rings(
     let says = "rings: angle from the far one";
     outcome.claims.push(Claim::at_most(says, missed, far).in_unit("degrees"));
     let lost = beam.all - beam.rays.len();
-    let says = "rings: rays that are left out";
+    let says = "rings: excluded rays";
     outcome.claims.push(Claim::at_most(says, lost as f64, 0.0));
     let mut table = DataTable::new("planes", &["distance_mm", "radius_mm", "width_mm"]);
     for plane in PLANES {
@@ -102,7 +102,7 @@ fn rings(
         table.push_row([plane.into(), mean.into(), width.into()]);
         if plane >= distance {
             let says =
-                format!("rings: width on a screen {plane} mm behind, in times of the radius");
+                format!("rings: width on a screen {plane} mm behind, relative to the radius");
             let [wide, wider] = WIDTH;
             outcome.claims.push(Claim::at_most(says, width / mean, effort.select(wide, wider)));
         }
@@ -170,7 +170,7 @@ impl ExitBeam {
         let slopes: Vec<[f64; 2]> = self.rays.iter().map(|(_, v)| *v).collect();
         let panels: Vec<_> = screens.chain([panel("at infinity".to_owned(), &slopes)]).collect();
         draw_image_row(
-            "the ring on screens behind the field, each as large as its ring",
+            "the ring on screens behind the field, each scaled to its ring",
             CELLS,
             &panels,
         )

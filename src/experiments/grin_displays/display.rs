@@ -11,8 +11,8 @@ use crate::experiments::{
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.4",
-    title: "A display of two pictures",
-    claim: "One field makes two pictures, one for each of two beams at a right angle",
+    title: "A display of two images",
+    claim: "One field forms two images, one for each of two beams at a right angle",
     seconds: 20.0,
     run,
 };

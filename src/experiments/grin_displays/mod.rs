@@ -128,13 +128,13 @@ impl EvaluatedField {
             let Some(image) = &views.image else { continue };
             let name = &view.name;
             let found = views.result.psnr.unwrap_or(f64::NAN);
-            let says = format!("{name}: peak signal to noise, by rays of no step");
+            let says = format!("{name}: peak signal to noise, by independent rays");
             claims.push(Claim::at_least(says, found, quality).in_unit("dB"));
-            let says = format!("{name}: correlation with the picture");
+            let says = format!("{name}: correlation with the target");
             claims.push(Claim::at_least(says, image.correlation(), correlation));
             let counts = views.result.counts;
             let left_out = 1.0 - counts.valid() as f64 / counts.fates.total() as f64;
-            let says = format!("{name}: share of the rays that are left out");
+            let says = format!("{name}: fraction of excluded rays");
             claims.push(Claim::at_most(says, left_out, LEFT_OUT));
         }
         claims

@@ -50,7 +50,7 @@ fn own_plane_claims(evaluated: &EvaluatedField, least: f64) -> Vec<Claim> {
         let others = (0..images.len()).filter(|k| *k != i).map(|k| off(i, k));
         let nearest = others.fold(f64::INFINITY, f64::min);
         let name = &views[i].name;
-        let says = format!("{name}: difference from another plane's picture, in times of its own");
+        let says = format!("{name}: difference from another plane's target, relative to its own");
         Claim::at_least(says, nearest / off(i, i), least)
     };
     (0..images.len()).map(claim).collect()

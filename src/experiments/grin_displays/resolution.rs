@@ -17,7 +17,7 @@ use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke, draw_image_row, 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.5",
     title: "Effect of the resolution of a field",
-    claim: "The finer the field, the nearer its image is to the picture",
+    claim: "The finer the field, the closer its image is to the target",
     seconds: 40.0,
     run,
 };
@@ -204,6 +204,6 @@ fn images(rows: &[ResolutionRow]) -> Canvas {
         (title, gray_levels(&image.formed, image.pixels, peak))
     };
     let mut panels: Vec<_> = all.iter().map(panel).collect();
-    panels.push(("wanted".to_owned(), gray_levels(&first.target, first.pixels, peak)));
+    panels.push(("target".to_owned(), gray_levels(&first.target, first.pixels, peak)));
     draw_image_row("tricubic fields", first.pixels, &panels)
 }

@@ -12,7 +12,7 @@ use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome,
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.5",
     title: "RESTORE against brute force on four lenses",
-    claim: "After as many gradients RESTORE has found a better lens than either baseline",
+    claim: "With the same number of gradients RESTORE finds a better lens than either baseline",
     seconds: 750.0,
     run,
 };

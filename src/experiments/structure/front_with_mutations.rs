@@ -150,14 +150,14 @@ impl MutationGain {
                 without,
             ),
             Claim::at_least(
-                "hypervolume with mutations, against that of descents as long without",
+                "hypervolume with mutations, against that of equally long descents without",
                 with,
                 longer,
             ),
         ];
         // A test is too short for more.
         if effort == Effort::Full {
-            let says = "designs beyond the front of descents as long";
+            let says = "designs beyond the front of equally long descents";
             claims.push(Claim::at_least(says, new as f64, 1.0));
         }
         claims
@@ -168,7 +168,7 @@ impl MutationGain {
         let start = std::iter::once(("start", &sweep.start));
         start
             .chain(named("without mutations", sweep.front()))
-            .chain(named("descended on", &self.descended))
+            .chain(named("descent without mutations", &self.descended))
             .chain(named("with mutations", &self.mutated))
             .collect()
     }
@@ -188,7 +188,7 @@ impl MutationGain {
         let sets: [(&str, Vec<[f64; 2]>, Color); 4] = [
             ("start", vec![um(&sweep.start)], BLACK),
             ("with mutations", points(&self.mutated), PALETTE[0]),
-            ("descended on without", points(&self.descended), PALETTE[2]),
+            ("descent without mutations", points(&self.descended), PALETTE[2]),
             ("without mutations", points(sweep.front()), PALETTE[1]),
         ];
         let all = || sets.iter().flat_map(|set| &set.1);

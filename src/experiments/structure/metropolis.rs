@@ -10,8 +10,8 @@ use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome,
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "4.4",
-    title: "RESTORE against Metropolis and Hastings on four lenses",
-    claim: "After as many gradients RESTORE has found a better lens",
+    title: "RESTORE against Metropolis-Hastings on four lenses",
+    claim: "With the same number of gradients RESTORE finds a better lens",
     seconds: 400.0,
     run,
 };

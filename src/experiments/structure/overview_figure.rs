@@ -44,7 +44,7 @@ fn run(
 ) -> Result<ExperimentOutcome, ExperimentError> {
     let own = at_heights("double_gauss_nikkor_s_50")?;
     let start = with_open_apertures(&own, OPENED);
-    let mark = OverviewLens::of("mark, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
+    let mark = OverviewLens::of("reference, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
     let before = OverviewLens::of("start, opened", start.clone())?;
     let shares = mark.lights().zip(before.lights()).map(|(mark, before)| MORE * mark / before);
     let plan = plan(shares.collect(), effort.select(560_000, 400));
@@ -120,9 +120,9 @@ fn claims(
     if effort == Effort::Full {
         let sharper = format!("blur of the lens found, against that of `{}`", before.name);
         claims.push(Claim::at_most(sharper, um(found), um(before)).in_unit("um"));
-        let brighter = "mean light of the lens found, against that of the mark";
+        let brighter = "mean light of the lens found, against that of the reference";
         claims.push(Claim::at_least(brighter, found.light(), mark.light()).in_unit("mm^2"));
-        let sharper = "blur of the lens found, against that of the mark";
+        let sharper = "blur of the lens found, against that of the reference";
         claims.push(Claim::at_most(sharper, um(found), um(mark)).in_unit("um"));
     }
     claims

@@ -24,7 +24,7 @@ impl SamplerKind {
     fn name(self) -> &'static str {
         match self {
             Self::Restore => "RESTORE",
-            Self::Metropolis => "Metropolis and Hastings",
+            Self::Metropolis => "Metropolis-Hastings",
             Self::Brute => "brute force",
             Self::Descent => "descent alone",
         }
