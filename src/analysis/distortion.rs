@@ -1,22 +1,22 @@
-//! Distortion and field curvature: what the chief ray and its closest neighbours say.
+//! Distortion and field curvature, from the chief ray and its derivatives.
 
 use super::AnalysisError;
 use crate::lens::{FieldKind, FieldPoint, Object};
 use crate::math::Vec3;
 use crate::pupil::RayModel;
 
-/// Where a chief ray lands against where it should.
+/// The image height of a chief ray compared with the ideal one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distortion {
     /// The field.
     pub field: FieldPoint,
-    /// Where the real chief ray lands, along the field's direction, in mm.
+    /// The image height of the real chief ray along the field's direction, in mm.
     pub height: f64,
-    /// Where it should land: `f tan θ`, or the magnified object height, in mm.
+    /// The ideal image height, in mm: `f tan θ`, or the magnified object height.
     pub ideal: f64,
     /// `height / ideal − 1`; `None` on the axis.
     pub distortion: Option<f64>,
-    /// The same against `f θ`; `None` on the axis and for an object at a finite distance.
+    /// The same relative to `f θ`; `None` on the axis and for an object at a finite distance.
     pub f_theta: Option<f64>,
 }
 
@@ -25,15 +25,15 @@ pub struct Distortion {
 pub struct FieldCurvature {
     /// The field.
     pub field: FieldPoint,
-    /// How far behind the image plane rays in the plane of the field meet, in mm; `None` where
-    /// they are parallel.
+    /// The distance from the image plane to the focus of rays in the plane of the field, in mm,
+    /// positive along the light; `None` if they are parallel.
     pub tangential: Option<f64>,
-    /// How far behind the image plane rays perpendicular to it meet, in mm.
+    /// The same for rays perpendicular to the plane of the field.
     pub sagittal: Option<f64>,
 }
 
 impl RayModel {
-    /// Where the chief ray of a field lands, clipped by nothing, in mm.
+    /// The image point of the chief ray of a field, without clipping, in mm.
     pub(super) fn chief_point(
         &self,
         field: FieldPoint,
@@ -44,7 +44,7 @@ impl RayModel {
         Ok([landing.ray.point.x.value, landing.ray.point.y.value])
     }
 
-    /// Where the chief ray of a field should land, along the field's direction, in mm.
+    /// The ideal image height of a field along its direction, in mm.
     fn ideal_height(&self, field: FieldPoint) -> Option<f64> {
         let size = field.x.hypot(field.y);
         match (self.beam.field, self.beam.object) {
@@ -65,7 +65,8 @@ impl RayModel {
 /// The distortion of a field at a wavelength.
 ///
 /// # Errors
-/// Where the chief ray does not reach the image, or the lens has no focal length to compare with.
+///
+/// The chief ray does not reach the image, or the lens has no focal length to compare with.
 pub fn distortion(
     model: &RayModel,
     field: FieldPoint,
@@ -87,7 +88,8 @@ pub fn distortion(
 /// ray: the same numbers as Coddington's equations give.
 ///
 /// # Errors
-/// Where the chief ray does not reach the image.
+///
+/// The chief ray does not reach the image.
 pub fn field_curvature(
     model: &RayModel,
     field: FieldPoint,

@@ -1,4 +1,5 @@
-//! Transverse ray fans: how far from the chief ray's image point the rays of a pupil section land.
+//! Transverse ray fans: the distances of the rays of a pupil section from the image point of the
+//! chief ray.
 
 use super::AnalysisError;
 use crate::lens::FieldPoint;
@@ -10,16 +11,17 @@ use crate::trace::Fate;
 pub struct FanPoint {
     /// Its coordinate along the section, −1 to 1 between the rims of the pupil.
     pub pupil: f64,
-    /// How far from the chief ray it lands, in mm; `None` where it is lost.
+    /// The distance of its image point from that of the chief ray, x and y in mm; `None` if it is
+    /// lost.
     pub error: Option<[f64; 2]>,
-    /// How it ended; `None` where it could not be started.
+    /// Its fate; `None` if it could not be launched.
     pub fate: Option<Fate>,
 }
 
-/// The two fans of a field in one colour.
+/// The two fans of a field at one wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fan {
-    /// Which wavelength.
+    /// The index of the wavelength.
     pub wavelength: usize,
     /// Along y of the pupil.
     pub tangential: Vec<FanPoint>,
@@ -27,8 +29,12 @@ pub struct Fan {
     pub sagittal: Vec<FanPoint>,
 }
 
-/// The fans of a field, one for each wavelength, measured from the chief ray of the primary one;
-/// `count` rays each.
+/// The fans of a field at each wavelength, of `count` rays each, relative to the chief ray of the
+/// primary wavelength.
+///
+/// # Errors
+///
+/// The chief ray does not reach the image, or the field has no rays.
 pub fn fan(model: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>, AnalysisError> {
     let chief = model.chief_point(field, model.primary)?;
     let one = |wavelength: usize| {

@@ -1,8 +1,8 @@
-//! How bright the image is towards the edge of the field.
+//! Relative illumination: the brightness of the image over the field.
 //!
-//! The light that reaches a point of the image is proportional to the area that its cone covers in
-//! direction cosines, `∫ dL' dM'` (Rimmer, "Relative illumination calculations", Proc. SPIE 655,
-//! 1986), taken over the pupil that is really lit: `∫ |∂(L', M')/∂(px, py)| dpx dpy`.
+//! The light that reaches a point of the image is proportional to the area of its cone in direction
+//! cosines, `∫ dL' dM'` (Rimmer, "Relative illumination calculations", Proc. SPIE 655, 1986), over
+//! the lit pupil: `∫ |∂(L', M')/∂(px, py)| dpx dpy`.
 
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
@@ -14,16 +14,16 @@ use rayon::prelude::*;
 pub struct Illumination {
     /// The field.
     pub field: FieldPoint,
-    /// The area of its cone in direction cosines: π sin² of a full cone's half angle; 0 where no
+    /// The area of its cone in direction cosines: π sin² of the half angle for a full cone; 0 if no
     /// light gets through.
     pub cone: Estimate,
-    /// The same over that of the first field; `None` where that one is dark.
+    /// The same relative to the first field; `None` if that one is dark.
     pub relative: Option<Estimate>,
-    /// Why there is no light, where there is none.
+    /// The reason if there is no light.
     pub error: Option<AnalysisError>,
 }
 
-/// The illumination of all fields at a wavelength; a field without light has 0 and says why.
+/// The illumination of all fields at a wavelength; a field without light has 0 and the reason.
 pub fn illumination(model: &RayModel, wavelength: usize, accuracy: Accuracy) -> Vec<Illumination> {
     let cones: Vec<_> =
         model.fields.par_iter().map(|field| cone(model, *field, wavelength, accuracy)).collect();

@@ -1,10 +1,9 @@
-//! What a designer reads, each number with its error estimate and what it cost.
+//! Analyses of a lens: each number with its error estimate and its cost.
 //!
-//! Integrals over the pupil are asked for with a tolerance, never with a number of rays: the order
-//! of the quadrature is raised until two agree (see [`crate::pupil`]). Fields and wavelengths are
-//! worked on in parallel, and their results stand in the order of the lens, whatever the number of
-//! threads. A field without light is a [`AnalysisError`], by name and reason, and never a number that is
-//! none.
+//! Integrals over the pupil are computed to a tolerance, not with a number of rays: the order of
+//! the quadrature is raised until two agree (see [`crate::pupil`]). Fields and wavelengths are
+//! computed in parallel; the results are in the order of the lens, whatever the number of threads.
+//! A field without light gives an [`AnalysisError`] with the reason, never a NaN.
 
 mod distortion;
 mod fan;
@@ -13,7 +12,7 @@ mod image_quality;
 mod mtf;
 mod pupil;
 mod ray_layout;
-mod rims;
+mod semi_diameters;
 mod spot;
 mod spot_points;
 mod wavefront;
@@ -25,7 +24,9 @@ pub use image_quality::{ImageQuality, field_qualities, field_quality, image_qual
 pub use mtf::{MtfPoint, mtf};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
-pub use rims::{RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities};
+pub use semi_diameters::{
+    RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities,
+};
 pub use spot::{MonochromaticSpot, Spot, airy_radius, rounding_error, spot, spots};
 pub use spot_points::{SpotPoints, spot_points};
 pub use wavefront::{Wavefront, path_differences, wavefront};
@@ -34,45 +35,47 @@ use crate::lens::FieldPoint;
 use crate::pupil::{LaunchError, RayModel, Region, RegionKind};
 use serde::Serialize;
 
-/// A number with its error, and what it cost.
+/// A number with its error and its cost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
     /// The number.
     pub value: f64,
     /// An estimate of its error, in the same unit.
     pub error: f64,
-    /// Rays traced for it, those that only looked for the edge of the pupil included.
+    /// The number of rays traced for it, those that only searched for the edge of the pupil
+    /// included.
     pub rays: usize,
-    /// What it took; the engine reads no clock, so whoever does fills this in.
+    /// The time that it took, in milliseconds; the engine reads no clock, so the caller that does
+    /// fills this in.
     pub milliseconds: Option<f64>,
 }
 
 impl Estimate {
-    /// A number whose time nobody took.
+    /// A number without a time.
     pub const fn new(value: f64, error: f64, rays: usize) -> Self {
         Self { value, error, rays, milliseconds: None }
     }
 }
 
-/// Why a field has no result.
+/// The reason why a field has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AnalysisError {
     /// No ray of the field gets through the lens.
     #[error("no light: no ray of this field gets through the lens")]
     NoLight,
-    /// No ray of the field could be started.
+    /// No ray of the field can be launched.
     #[error("no rays: {0}")]
     NoRays(LaunchError),
     /// Nothing limits the beam.
     #[error("no beam: no surface limits it; give the stop a semi-diameter")]
     Endless,
-    /// The chief ray does not reach the image, so that nothing can be measured from it.
+    /// The chief ray does not reach the image.
     #[error("no chief ray: the ray through the middle of the pupil does not reach the image")]
     NoChief,
 }
 
-/// The rays of a field that get through, if any do.
+/// The pupil of a field at a wavelength, if rays get through.
 pub fn lit_region(
     model: &RayModel,
     field: FieldPoint,

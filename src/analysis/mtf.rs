@@ -1,4 +1,4 @@
-//! The geometric modulation transfer: the contrast of a grating imaged by rays alone,
+//! The geometric modulation transfer function: the contrast of a grating imaged by rays alone,
 //! `|mean exp(−2πi ν y)|` (Hopkins and Yzuel, Optica Acta 17, 1970).
 
 use super::{AnalysisError, Estimate, lit_region};
@@ -10,19 +10,20 @@ use std::f64::consts::TAU;
 /// The contrast at one spatial frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MtfPoint {
-    /// Line pairs per mm.
+    /// The spatial frequency, in line pairs per mm.
     pub frequency: f64,
-    /// Of lines perpendicular to y: rays are spread along y.
+    /// The contrast of lines perpendicular to y: from the spread of rays along y.
     pub tangential: Estimate,
-    /// Of lines perpendicular to x.
+    /// The contrast of lines perpendicular to x.
     pub sagittal: Estimate,
 }
 
-/// The contrast of a field in one colour at some frequencies in line pairs per mm; errors are
+/// The contrast of a field at one wavelength and some frequencies in line pairs per mm; errors are
 /// absolute.
 ///
 /// # Errors
-/// Where the field is dark.
+///
+/// The field is dark.
 pub fn mtf(
     model: &RayModel,
     field: FieldPoint,

@@ -1,7 +1,7 @@
-//! The pupil: which rays of a field get through, what ends them, and how much light that is.
+//! The pupil of a field: its outline, the limits that make it, and its area.
 //!
-//! Everything is in mm in the plane through the first vertex, or across the beam where the field is
-//! wide, so that pupils of several fields can be laid over each other.
+//! Lengths are in mm in the plane through the first vertex, or, if the field of view is wide,
+//! perpendicular to the beam, so that pupils of several fields can be compared in one drawing.
 
 use super::Estimate;
 use crate::lens::FieldPoint;
@@ -16,72 +16,72 @@ use crate::trace::{Fate, ImagePoints, Rays, TraceSink};
 pub struct FieldPupil {
     /// The field.
     pub field: FieldPoint,
-    /// What it looks like.
+    /// The shape.
     pub shape: PupilShape,
-    /// How much gets through; `None` where nothing does or no beam is defined.
+    /// The area and centroid; `None` if nothing gets through or no beam is defined.
     pub extent: Option<PupilExtent>,
-    /// The rim of the unit disc of the pupil coordinates: what would get through if the ideal
-    /// entrance pupil alone limited the beam. Closed, in mm; empty where no ray can be started.
+    /// The rim of the unit disc of the pupil coordinates: the pupil if the ideal entrance pupil
+    /// alone limited the beam. A closed curve, in mm; empty if no ray can be launched.
     pub disc: Vec<[f64; 2]>,
-    /// Whether mm are counted across the beam instead of in the plane through the first vertex.
+    /// True if lengths are perpendicular to the beam and not in the plane through the first vertex.
     pub across_beam: bool,
-    /// Rays traced for all of it.
+    /// The number of rays traced for all of it.
     pub rays: usize,
 }
 
-/// The light that gets through.
+/// The area and the centroid of the light that gets through.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PupilExtent {
-    /// The area that it covers, in mm².
+    /// The area, in mm².
     pub area: Estimate,
-    /// The centroid of that area, in mm.
+    /// The x and y of the centroid, in mm.
     pub centroid: [Estimate; 2],
 }
 
-/// What a pupil looks like.
+/// The shape of a pupil.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PupilShape {
-    /// One piece with its edge.
+    /// One piece with its outline.
     Outlined(PupilOutline),
-    /// Several pieces, or one whose edge cannot be followed: a grid of the rays that get through.
+    /// Several pieces, or one without a known outline: a grid of the rays that get through.
     Irregular {
-        /// How many separate pieces were seen.
+        /// The number of separate pieces found.
         pieces: usize,
-        /// Where those rays are, in mm.
+        /// The positions of those rays, in mm.
         dots: Vec<[f64; 2]>,
     },
     /// Nothing gets through.
     Dark(RayLoss),
     /// Nothing limits the beam.
     Unbounded,
-    /// No ray could be started.
+    /// No ray could be launched.
     NoRays(LaunchError),
 }
 
-/// What ends the rays of a dark field.
+/// The loss of the rays of a dark field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RayLoss {
-    /// How most rays of a pattern over the unit disc end; `None` where none could be started.
+    /// The fate of most rays of a pattern over the unit disc; `None` if none could be launched.
     pub main_fate: Option<Fate>,
-    /// How many of them end that way.
+    /// The number of rays with that fate.
     pub count: usize,
-    /// How many there are.
+    /// The number of rays of the pattern.
     pub rays: usize,
-    /// Whether the chief ray is among them.
+    /// True if the chief ray has that fate.
     pub includes_chief: bool,
 }
 
-/// How many points an outline has, about.
+/// The approximate number of points of an outline.
 const POINTS: usize = 128;
-/// Cells along a side of the grid that shows a ragged pupil.
+/// The number of cells along a side of the grid that shows an irregular pupil.
 const CELLS: usize = 45;
-/// Rings of the pattern that tells where the rays of a dark field end.
+/// The rings of the pattern that shows the fates of the rays of a dark field.
 const RINGS: usize = 6;
 
-/// No sum over rays is more exact than this, relatively.
+/// The relative rounding error of a sum over rays.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// The pupil of a field at a wavelength; the area is as exact as asked for.
+/// The pupil of a field at a wavelength, its area to the given accuracy.
 pub fn pupil(
     model: &RayModel,
     field: FieldPoint,
@@ -124,7 +124,7 @@ fn from_region(region: &Region<'_>, accuracy: Accuracy) -> FieldPupil {
     }
 }
 
-/// What a region looks like, and the rays that it took to see it.
+/// The shape of a region, and the number of rays traced to find it.
 fn describe_shape(region: &Region<'_>) -> (PupilShape, usize) {
     match &region.kind {
         RegionKind::Clear | RegionKind::StarShaped(_) => match region.outline(POINTS) {
@@ -132,7 +132,7 @@ fn describe_shape(region: &Region<'_>) -> (PupilShape, usize) {
                 let rays = outline.rays;
                 (PupilShape::Outlined(outline), rays)
             }
-            // The edge is followed ray by ray, and one of them was not found.
+            // The outline is traced ray by ray, and one of them was not found.
             None => irregular_shape(region, 1, ([0.0; 2], 1.0)),
         },
         RegionKind::Irregular { pieces, square, .. } => irregular_shape(region, *pieces, *square),
@@ -175,7 +175,7 @@ fn ray_loss(launch: &Launch<'_>) -> RayLoss {
     }
 }
 
-/// How the rays at some pupil points end; points where none starts are left out.
+/// The fates of the rays at some pupil points, without the points from which none can be launched.
 fn trace_fates(launch: &Launch<'_>, points: &[[f64; 2]]) -> Vec<([f64; 2], Fate)> {
     let started: Vec<_> = points.iter().filter_map(|p| Some((*p, launch.ray(*p)?))).collect();
     let rays: Rays<f64> = started.iter().map(|(_, ray)| *ray).collect();
@@ -185,8 +185,8 @@ fn trace_fates(launch: &Launch<'_>, points: &[[f64; 2]]) -> Vec<([f64; 2], Fate)
 }
 
 impl FieldPupil {
-    /// Its area over that of another, with its error: the share of the light that is left where
-    /// the other is the pupil on the axis. `None` where that one is dark.
+    /// The ratio of its area to that of another pupil, with its error: the vignetting if the other
+    /// is the pupil on the axis. `None` if that one is dark.
     pub fn share_of(&self, whole: Estimate) -> Option<Estimate> {
         let area = self.extent.map_or(Estimate::new(0.0, 0.0, self.rays), |light| light.area);
         let share = area.value / whole.value;

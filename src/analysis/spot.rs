@@ -75,7 +75,7 @@ impl Spot {
     /// The shift of the image plane that gives the smallest RMS radius, in mm along the light; `None`
     /// if all rays are parallel.
     pub fn best_focus(&self) -> Option<f64> {
-        // The mean square is a parabola: three of its points tell where its bottom is.
+        // The mean square is a parabola in the defocus: three points give its minimum.
         let at = |defocus: f64| self.rms_at(defocus).powi(2);
         let (left, middle, right) = (at(-1.0), at(0.0), at(1.0));
         let curvature = left - 2.0 * middle + right;

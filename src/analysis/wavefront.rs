@@ -1,9 +1,9 @@
-//! The wavefront: how far the light of a point is from a perfect sphere about its image.
+//! The wavefront error: the optical path difference from a perfect sphere about the image point.
 //!
-//! The optical path of every ray is counted from the object point, or from a plane wave through
-//! the first vertex, to a sphere about the chief ray's image point that goes through the middle of
-//! the paraxial exit pupil (Welford, *Aberrations of Optical Systems*, 1986, section 7.2). An
-//! undercorrected lens has positive differences.
+//! The optical path of every ray is counted from the object point, or from a plane wave through the
+//! first vertex, to a sphere about the chief ray's image point through the centre of the paraxial
+//! exit pupil (Welford, *Aberrations of Optical Systems*, 1986, section 7.2). An undercorrected
+//! lens has positive differences.
 
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
@@ -11,21 +11,22 @@ use crate::math::Vec3;
 use crate::pupil::{Accuracy, Launch, Nodes, RayModel, Region, converge};
 use crate::trace::{Landings, Ray, Rays};
 
-/// The wavefront of a field in one colour.
+/// The wavefront error of a field at one wavelength.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wavefront {
     /// The standard deviation of the path difference over the lit pupil, in wavelengths.
     pub rms: Estimate,
-    /// The mean path difference against the chief ray, in wavelengths.
+    /// The mean path difference from the chief ray, in wavelengths.
     pub mean: Estimate,
-    /// Whether the tolerance was met.
+    /// True if the tolerance was reached.
     pub converged: bool,
 }
 
 /// The wavefront of a field at a wavelength; errors are relative to its RMS.
 ///
 /// # Errors
-/// Where the field is dark or its chief ray does not reach the image.
+///
+/// The field is dark or its chief ray does not reach the image.
 pub fn wavefront(
     model: &RayModel,
     field: FieldPoint,
@@ -46,7 +47,8 @@ pub fn wavefront(
 /// The path differences at some pupil points in wavelengths; `None` for a ray that is lost.
 ///
 /// # Errors
-/// Where the field has no rays or its chief ray does not reach the image.
+///
+/// The field has no rays or its chief ray does not reach the image.
 pub fn path_differences(
     model: &RayModel,
     field: FieldPoint,
@@ -64,16 +66,16 @@ pub fn path_differences(
     Ok(points.iter().map(at).collect())
 }
 
-/// The reference sphere with the chief ray that ends in its middle.
+/// The reference sphere, with the chief ray that ends at its centre.
 struct ReferenceSphere {
     middle: Vec3<f64>,
     direction: Vec3<f64>,
     path: f64,
-    /// From the middle to the exit pupil, negative where the light has passed that before; `None`
-    /// for a pupil at infinity.
+    /// The signed distance from the centre to the exit pupil, in mm, negative if the light has
+    /// passed the pupil before; `None` for a pupil at infinity.
     radius: Option<f64>,
     index: f64,
-    /// In mm.
+    /// The wavelength, in mm.
     wavelength: f64,
 }
 
@@ -95,13 +97,14 @@ impl ReferenceSphere {
         Some(Self { middle, direction, path, radius, index, wavelength })
     }
 
-    /// The path difference of a ray at the image, in wavelengths, from its path up to there.
+    /// The path difference of a ray at the image, in wavelengths, from its optical path up to
+    /// there.
     fn difference(&self, ray: Ray<f64>, path: f64) -> f64 {
         let off = ray.point - self.middle;
         let along = off.dot(ray.direction);
         let beyond = match self.radius {
-            // How much farther than the chief ray's the way to the sphere is, without a
-            // difference of two radii.
+            // The distance to the sphere beyond that of the chief ray, without a difference of two
+            // radii.
             Some(radius) => {
                 let square = along * along - off.dot(off);
                 let root = (radius * radius + square).max(0.0).sqrt();
@@ -112,13 +115,13 @@ impl ReferenceSphere {
         (self.path - path - self.index * beyond) / self.wavelength
     }
 
-    /// What rounding does to a path, in wavelengths.
+    /// The rounding error of a path, in wavelengths.
     fn rounding(&self) -> f64 {
         let longest = self.path.abs().max(self.radius.unwrap_or(0.0).abs());
         8.0 * f64::EPSILON * longest / self.wavelength
     }
 
-    /// Standard deviation and mean over some nodes; `None` where no ray arrives.
+    /// The standard deviation and the mean over some nodes; `None` if no ray arrives.
     fn moments(&self, region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 2]> {
         let rays: Rays<f64> = nodes.points.iter().filter_map(|p| region.launch.ray(*p)).collect();
         let landed = region.trace::<Landings<f64>>(nodes);

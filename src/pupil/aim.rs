@@ -1,24 +1,24 @@
-//! The ray of a field that crosses the stop, or another surface, at a given point: Newton's iteration on the two
-//! coordinates that name the ray, with the derivative from dual numbers.
+//! Ray aiming: the ray of a field that crosses the stop, or another surface, at a given point, by
+//! Newton's method on the two ray coordinates with derivatives from dual numbers.
 
 use super::launch::{FieldSource, PupilMap};
 use super::ray_model::{Dual2, RayModel};
 use crate::math::Vec3;
 
-/// A ray that crosses a surface where it was asked to.
+/// A ray that crosses a surface at a given point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AimedRay {
-    /// What names it.
+    /// Its ray coordinates.
     pub(super) q: [f64; 2],
-    /// Derivatives of the point at the surface: `slopes[i][j]` is coordinate `i` by `q[j]`.
+    /// The derivatives of the point at the surface: `slopes[i][j]` is coordinate `i` by `q[j]`.
     pub(super) slopes: [[f64; 2]; 2],
-    /// How far `q` lies from the paraxial place.
+    /// The difference between `q` and the paraxial ray coordinates.
     pub(super) shift: [f64; 2],
 }
 
 impl AimedRay {
-    /// The affine map that takes the unit circle to the neighbourhood of this ray which crosses
-    /// the stop within `radius` of it.
+    /// The affine map that takes the unit disc to the ray coordinates near this ray which cross the
+    /// stop within `radius` of it, in mm.
     pub(super) fn pupil_map(&self, radius: f64) -> Option<PupilMap> {
         let column = |x, y| solve_2x2(self.slopes, [x, y]);
         let columns = [column(radius, 0.0)?, column(0.0, radius)?];
@@ -33,13 +33,15 @@ pub(super) fn solve_2x2([[a, b], [c, d]]: [[f64; 2]; 2], [x, y]: [f64; 2]) -> Op
     solution.iter().all(|v| v.is_finite()).then_some(solution)
 }
 
-/// Steps of Newton's iteration, and halvings of a step that went wrong.
+/// The largest number of Newton steps, and of halvings of a step that does not reduce the offset.
 const STEPS: usize = 40;
 const HALVINGS: usize = 12;
-/// A miss that is no longer reduced counts as rounding if it is this small against the stop.
+/// An offset that Newton steps do not reduce counts as rounding if it is below this part of the
+/// stop.
 const ROUNDING: f64 = 1e-10;
 
-/// The ray of a source that crosses `surface` at `target`, searched from the ray named `guess`.
+/// The ray of a source that crosses `surface` at `target`, in mm, searched from the ray coordinates
+/// `guess`.
 pub(super) fn aim_at(
     model: &RayModel,
     wavelength: usize,
@@ -76,7 +78,7 @@ struct AimSolver<'a> {
     target: [f64; 2],
 }
 
-/// How far from the target a ray crosses the surface.
+/// The distance between a ray's intersection with the surface and the target.
 struct AimOffset {
     q: [f64; 2],
     offset: [f64; 2],
@@ -85,7 +87,7 @@ struct AimOffset {
 }
 
 impl AimSolver<'_> {
-    /// The size of the stop, or of the beam where the stop has none.
+    /// The radius of the stop in mm, or of the beam if the stop has none.
     fn scale(&self) -> f64 {
         let stop = self.model.stop_radius();
         let beam =
@@ -103,8 +105,8 @@ impl AimSolver<'_> {
         reached.then_some(AimOffset { q, offset, slopes: [x.slope, y.slope], size })
     }
 
-    /// The first of ever shorter steps that comes nearer, or the last one tried once the miss is
-    /// as small as rounding.
+    /// The result of the first of ever shorter steps that reduces the offset, or of the last one
+    /// tried if the offset is rounding already.
     fn line_search(&self, here: &AimOffset, step: [f64; 2]) -> Option<AimOffset> {
         let mut factor = 1.0;
         for _ in 0..HALVINGS {

@@ -4,7 +4,7 @@ use crate::math::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// The largest rule that is kept.
+/// The largest number of nodes.
 const LARGEST: usize = 96;
 
 /// Nodes and weights on the interval from 0 to 1.

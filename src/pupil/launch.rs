@@ -1,9 +1,9 @@
-//! Where a ray starts.
+//! The rays of a field: from pupil coordinates to a point and a direction.
 //!
-//! Every ray of a field is named by its point `q` in a plane: for a collimated beam the plane
-//! across the beam through the first vertex, so that 90 degrees and more are nothing special; for
-//! an object point the plane of the entrance pupil; in a telecentric beam `q` is the slope. A chart
-//! leads from pupil coordinates to that plane.
+//! Every ray of a field is identified by its coordinates `q` in a plane: for a collimated beam the
+//! plane perpendicular to the beam through the first vertex, so that field angles of 90 degrees and
+//! more need no special case; for an object point the plane of the entrance pupil; for a
+//! telecentric beam `q` is the slope. A [`PupilMap`] leads from pupil coordinates to that plane.
 
 use super::aim::{AimedRay, aim_at, solve_2x2};
 use super::ray_model::{Aiming, Channel, Dual2, RayModel};
@@ -13,11 +13,11 @@ use crate::math::Vec3;
 use crate::trace::{Ray, TracedRay};
 use serde::Serialize;
 
-/// Why a field has no rays.
+/// The reason why a field has no rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LaunchError {
-    /// Nothing defines the field point.
+    /// The field point is undefined.
     #[error("the field has no object point: the lens gives the field's unit no meaning")]
     NoObjectPoint,
     /// No ray of the field through the centre of the stop was found.
@@ -28,23 +28,23 @@ pub enum LaunchError {
     NoWavelength,
 }
 
-/// What all rays of a field have in common.
+/// The origin that all rays of a field share.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum FieldSource {
-    /// A direction; `across` spans the plane perpendicular to it, `ahead` is how far in front of
-    /// that plane a ray starts that does not start at the first vertex plane.
+    /// A direction. `across` spans the plane perpendicular to it; `ahead` is the distance in front
+    /// of that plane at which a ray starts that cannot start at the first vertex plane, in mm.
     Collimated { direction: Vec3<f64>, across: [Vec3<f64>; 2], ahead: f64 },
-    /// A point, and the plane `z = through` in which rays are named.
+    /// A point, and the plane `z = through` of the ray coordinates.
     Point { from: Vec3<f64>, through: f64 },
-    /// A point whose rays are named by their slopes.
+    /// A point whose ray coordinates are slopes.
     Slopes { from: Vec3<f64> },
 }
 
-/// Below this direction cosine a collimated ray starts in front of the lens instead of at the
-/// vertex plane, which it may meet far behind the lens or never.
+/// Below this direction cosine a collimated ray starts in front of the lens, not at the vertex
+/// plane, which it may meet far behind the lens or never.
 const GRAZING: f64 = 0.05;
 
-/// A field beyond this many degrees is a wide one.
+/// A field beyond this angle, in degrees, is wide.
 const WIDE: f64 = 45.0;
 
 impl FieldSource {
@@ -73,7 +73,7 @@ impl FieldSource {
 }
 
 impl FieldSource {
-    /// Where the ray meets the plane through the first vertex, in mm.
+    /// The intersection of the ray with the plane through the first vertex, in mm.
     fn at_vertex<R: Real>(&self, q: [R; 2]) -> [R; 2] {
         let Ray { point, direction } = self.ray(q);
         let met = point - direction * (point.z / direction.z);
@@ -89,7 +89,7 @@ fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
     Ray { point, direction }
 }
 
-/// An affine map from pupil coordinates to the plane in which rays are named.
+/// An affine map from pupil coordinates to ray coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PupilMap {
     pub(super) origin: [f64; 2],
@@ -112,8 +112,8 @@ impl PupilMap {
     }
 }
 
-/// From where the rays of one field and wavelength start, whatever becomes of the lens behind: what
-/// an integral over a moving pupil keeps while the lens moves.
+/// The rays of one field and wavelength, independent of the lens: an integral over a moving pupil
+/// keeps them while the lens changes.
 #[derive(Debug, Clone, Copy)]
 pub struct FixedLaunch {
     field: FieldPoint,
@@ -124,7 +124,7 @@ pub struct FixedLaunch {
 }
 
 impl FixedLaunch {
-    /// The same rays through a lens of the same wavelengths.
+    /// The same rays through a model of the same wavelengths.
     pub fn launch(self, model: &RayModel) -> Launch<'_> {
         let Self { field, wavelength, aiming, source, map: chart } = self;
         Launch { model, field, wavelength, aiming, source, map: chart }
@@ -134,11 +134,11 @@ impl FixedLaunch {
 /// The rays of one field at one wavelength.
 #[derive(Debug, Clone)]
 pub struct Launch<'a> {
-    /// The lens.
+    /// The model of the lens.
     pub model: &'a RayModel,
     /// The field.
     pub field: FieldPoint,
-    /// Which wavelength.
+    /// The index of the wavelength.
     pub wavelength: usize,
     aiming: Aiming,
     source: FieldSource,
@@ -168,14 +168,14 @@ impl<'a> Launch<'a> {
         Ok(launch)
     }
 
-    /// Where its rays start.
+    /// The same rays, independent of the lens.
     pub fn to_fixed(&self) -> FixedLaunch {
         let Self { field, wavelength, aiming, source, map: chart, .. } = *self;
         FixedLaunch { field, wavelength, aiming, source, map: chart }
     }
 
-    /// The cosine of the angle with the axis at which a collimated beam arrives; `None` for the
-    /// rays of an object point.
+    /// The cosine of the angle between a collimated beam and the axis; `None` for the rays of an
+    /// object point.
     pub fn axis_cosine(&self) -> Option<f64> {
         match self.source {
             FieldSource::Collimated { direction, .. } => Some(direction.z),
@@ -183,7 +183,7 @@ impl<'a> Launch<'a> {
         }
     }
 
-    /// Whether the rays are those of a point on the axis, so that all azimuths are alike.
+    /// True for a field on the axis: all azimuths of its pupil are alike.
     pub(super) fn is_axial(&self) -> bool {
         self.field.x == 0.0 && self.field.y == 0.0
     }
@@ -193,14 +193,14 @@ impl<'a> Launch<'a> {
         &self.model.channels[self.wavelength]
     }
 
-    /// Whether the rays at `(−px, py)` mirror those at `(px, py)`.
+    /// True if the rays at `(−px, py)` mirror those at `(px, py)`.
     pub fn is_symmetric(&self) -> bool {
         self.field.x == 0.0
     }
 
-    /// The area in mm² of the first vertex plane that one unit of pupil coordinates stands for: the
-    /// measure of integrals over a pupil. Where a collimated beam grazes that plane (a direction
-    /// cosine below 0.05), across the beam instead.
+    /// The area of one unit of pupil coordinates, in mm² of the first vertex plane: the measure of
+    /// integrals over a pupil. For a collimated beam that grazes that plane (a direction cosine
+    /// below 0.05), the area perpendicular to the beam.
     pub fn area(&self) -> f64 {
         let [[a, b], [c, d]] = self.map.columns;
         let area = (a * d - b * c).abs();
@@ -214,16 +214,15 @@ impl<'a> Launch<'a> {
         }
     }
 
-    /// The ray at these pupil coordinates; `None` where none was found that crosses the stop
-    /// there.
+    /// The ray at these pupil coordinates; `None` if none was found that crosses the stop there.
     pub fn ray(&self, p: [f64; 2]) -> Option<Ray<f64>> {
         Some(self.source.ray(self.ray_coordinates(p)?))
     }
 
-    /// Where the ray at these pupil coordinates crosses the plane in which pupils are compared, in
-    /// mm: the plane through the first vertex, or, where the field of the lens is wide
-    /// ([`Launch::is_across_beam`]), the one across the beam. `None` where no ray was found that crosses
-    /// the stop there.
+    /// The intersection of the ray at these pupil coordinates with the plane in which pupils are
+    /// compared, in mm: the plane through the first vertex, or, if the field of view is wide
+    /// ([`Launch::is_across_beam`]), the one perpendicular to the beam. `None` if no ray was found
+    /// that crosses the stop there.
     pub fn crossing(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         self.ray_coordinates(p).map(|q| self.crossing_at(q))
     }
@@ -232,17 +231,18 @@ impl<'a> Launch<'a> {
         if self.is_across_beam() { q } else { self.source.at_vertex(q) }
     }
 
-    /// The same with the area in mm² that one unit of pupil coordinates stands for there. Where
-    /// every ray is aimed at the stop, that changes over the pupil.
+    /// The same with the area of one unit of pupil coordinates there, in mm². It varies over the
+    /// pupil if every ray is aimed at the stop.
     pub(super) fn crossing_with_area(&self, p: [f64; 2]) -> Option<([f64; 2], f64)> {
         let [x, y] = self.crossing_at(self.dual_ray_coordinates(p)?);
         let area = x.slope[0] * y.slope[1] - x.slope[1] * y.slope[0];
         Some(([x.value, y.value], area.abs()))
     }
 
-    /// Whether [`Launch::crossing`] looks along the beam: a collimated one that grazes the plane
-    /// through the first vertex, and every one of a lens whose field reaches beyond 45 degrees,
-    /// where that plane stretches the pupils at the edge out of all comparison.
+    /// True if [`Launch::crossing`] uses the plane perpendicular to the beam: for a collimated beam
+    /// that grazes the plane through the first vertex, and for every beam of a lens whose field
+    /// reaches beyond 45 degrees, where the vertex plane would stretch the pupils at the edge too
+    /// much to compare them.
     pub fn is_across_beam(&self) -> bool {
         let FieldSource::Collimated { direction, .. } = self.source else { return false };
         let beam = &self.model.beam;
@@ -260,8 +260,8 @@ impl<'a> Launch<'a> {
         index * away.dot(ray.direction)
     }
 
-    /// The ray at these pupil coordinates over any number type, for coordinates that need no search
-    /// for the stop: an affine map to the plane in which rays are named.
+    /// The ray at these pupil coordinates over any number type, for an aiming that needs no search
+    /// for each ray.
     #[inline(always)]
     pub(super) fn mapped_ray<R: Real>(&self, p: [R; 2]) -> Ray<R> {
         self.source.ray(self.map.map(p))
@@ -285,7 +285,8 @@ impl<'a> Launch<'a> {
         }))
     }
 
-    /// Where the ray at these pupil coordinates crosses the stop, clipped by nothing.
+    /// The intersection of the ray at these pupil coordinates with the stop, in mm, without
+    /// clipping.
     pub fn stop_point(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         let ray = self.source.ray(self.ray_coordinates(p)?.map(Dual2::constant));
         let landing = self.channel().unclipped.trace_to(ray, self.model.stop());
@@ -293,15 +294,15 @@ impl<'a> Launch<'a> {
         landing.fate.is_imaged().then_some([point.x, point.y])
     }
 
-    /// The ray at these pupil coordinates at the image, clipped by nothing, with its derivatives;
-    /// `None` where it does not get there.
+    /// The ray at these pupil coordinates at the image, without clipping, with its derivatives;
+    /// `None` if it does not get there.
     pub fn unclipped_landing(&self, p: [f64; 2]) -> Option<TracedRay<Dual2>> {
         let landing = self.channel().unclipped.trace(self.dual_ray(p)?);
         landing.fate.is_imaged().then_some(landing)
     }
 
-    /// The derivatives by the pupil coordinates of the direction cosines `L'` and `M'` with which
-    /// a ray arrives; `None` for a ray that is lost.
+    /// The derivatives of the direction cosines `L'` and `M'` at the image by the pupil
+    /// coordinates; `None` for a ray that is lost.
     pub fn direction_derivatives(&self, p: [f64; 2]) -> Option<[[f64; 2]; 2]> {
         let ray = self.ray(p)?;
         if !self.channel().tracer.trace(ray).fate.is_imaged() {
@@ -324,8 +325,8 @@ impl<'a> Launch<'a> {
         aim_at(self.model, self.wavelength, &self.source, self.model.stop(), guess, target)
     }
 
-    /// The pupil point whose ray, clipped by nothing, goes through the vertex of a surface, inside
-    /// the pupil or not; `None` where none was found.
+    /// The pupil point, inside the pupil or not, whose ray goes through the vertex of a surface
+    /// without clipping; `None` if none was found.
     pub(super) fn through_vertex(&self, surface: usize) -> Option<[f64; 2]> {
         let (model, source) = (self.model, &self.source);
         let search = |start: [f64; 2]| {
@@ -344,7 +345,8 @@ impl<'a> Launch<'a> {
         landing.fate.is_imaged().then_some([point.x / radius, point.y / radius])
     }
 
-    /// The real ray through the centre of the stop, followed from the axis to the field.
+    /// The real ray through the centre of the stop, found by continuation from the axis to the
+    /// field.
     fn chief_ray(&self) -> Option<AimedRay> {
         let mut walk = ChiefRayContinuation { done: 0.0, shift: [0.0; 2], slope: [0.0; 2] };
         let mut step: f64 = if self.is_wide() { 0.125 } else { 1.0 };
@@ -371,7 +373,7 @@ impl<'a> Launch<'a> {
         }
     }
 
-    /// The chief ray at a fraction of the field, from where the walk so far predicts it.
+    /// The chief ray at a fraction of the field, searched from the prediction of the continuation.
     fn chief_ray_at(&self, walk: &ChiefRayContinuation, fraction: f64) -> Option<AimedRay> {
         let field =
             FieldPoint { x: self.field.x * fraction, y: self.field.y * fraction, ..self.field };
@@ -386,10 +388,12 @@ impl<'a> Launch<'a> {
     }
 }
 
-/// A field that cannot be reached in steps this small, as a fraction of it, is not reached.
+/// The smallest step of the continuation, as a fraction of the field; below it the field counts as
+/// unreachable.
 const SMALLEST_STEP: f64 = 1e-3;
 
-/// The way from the axis to a field: how far the chief ray's place is from its paraxial one.
+/// The continuation of the chief ray from the axis to a field: the shift between its coordinates
+/// and the paraxial ones, and the slope of that shift.
 struct ChiefRayContinuation {
     done: f64,
     shift: [f64; 2],
@@ -439,7 +443,7 @@ fn field_source(model: &RayModel, field: FieldPoint) -> Option<FieldSource> {
     }
 }
 
-/// The unit vector in the direction of a field, `length` of it given.
+/// The unit vector in the direction of a field of a given length.
 fn field_direction(field: FieldPoint, length: f64) -> [f64; 2] {
     if length == 0.0 { [0.0, 1.0] } else { [field.x / length, field.y / length] }
 }
@@ -470,7 +474,7 @@ fn point_source(model: &RayModel, x: f64, y: f64, distance: f64) -> FieldSource 
     }
 }
 
-/// The chart of the paraxial entrance pupil.
+/// The map to the paraxial entrance pupil.
 fn paraxial_map(model: &RayModel, source: &FieldSource) -> PupilMap {
     let pupil = model.first_order.entrance_pupil;
     let marginal = &model.first_order.marginal;

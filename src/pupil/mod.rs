@@ -1,16 +1,17 @@
-//! The set of rays that get through: where they start, where the set ends, quadrature over it.
+//! The pupil: the set of rays of a field that get through the lens, its boundary, and quadrature
+//! over it.
 //!
-//! A [`RayModel`] is a lens with its beam, ready for rays. A [`Launch`] turns pupil coordinates of
-//! one field and wavelength into rays. A [`Region`] knows which of them arrive: the whole disc, a
-//! piece of it bounded by the rims that clip, or nothing at all. Its quadrature converges
-//! spectrally in both cases, so the difference of two orders is an honest error estimate.
+//! A [`RayModel`] is a lens with its beam, ready for tracing. A [`Launch`] maps pupil coordinates
+//! of one field and wavelength to rays. A [`Region`] is the set of pupil points whose rays arrive:
+//! the whole disc, a part of it bounded by the rims that clip, or nothing. Its quadrature converges
+//! spectrally in each case, so the difference of two orders is a reliable error estimate.
 //!
-//! After Forbes, "Optical system assessment for design: numerical ray tracing in the Gaussian
-//! pupil", JOSA A 5 (1988), for the clear disc; the clipped pupil is split where one rim takes
-//! over from another, so that every piece is smooth.
+//! The quadrature follows Forbes, "Optical system assessment for design: numerical ray tracing in
+//! the Gaussian pupil", JOSA A 5 (1988), for the clear disc; a clipped pupil is split where one
+//! limit takes over from another, so that the integrand is smooth on every part.
 //!
-//! Pupil coordinates `(px, py)` are 1 at the rim of the paraxial entrance pupil, or of the stop
-//! where rays are aimed at it.
+//! Pupil coordinates `(px, py)` have length 1 at the rim of the paraxial entrance pupil, or of the
+//! stop if every ray is aimed at it.
 
 mod aim;
 mod gauss_rules;

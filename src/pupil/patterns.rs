@@ -1,30 +1,30 @@
-//! Patterns of pupil points with equal weights: what other programs use, for comparison and for
-//! pictures.
+//! Patterns of pupil points with equal weights, as other programs use them: for comparison and for
+//! drawings.
 
 use std::f64::consts::TAU;
 
 /// A pattern of points in the unit disc.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PupilPattern {
-    /// The middles of the cells of a square grid, as many along a side.
+    /// The centres of the cells of a square grid with this many cells on a side.
     Square(usize),
-    /// The centre and rings of 6, 12, 18, ... points, the last one on the rim: the usual pattern.
-    /// Its rim counts fully, so that its sums are biased by a few to twenty percent.
+    /// The centre and rings of 6, 12, 18, … points, the last one on the rim: the usual pattern. The
+    /// rim has full weight, which biases its sums by a few to twenty percent.
     Hexapolar(usize),
-    /// The same rings in the middle of equal widths, the centre left out: not biased.
+    /// The same rings in the middle of bands of equal width, without the centre: unbiased.
     HexapolarInside(usize),
     /// Independent points from a seed.
     Random {
-        /// How many.
+        /// The number of points.
         count: usize,
-        /// From where the generator starts.
+        /// The seed of the generator.
         seed: u32,
     },
     /// Owen-scrambled Sobol points (Burley, JCGT 9, 2020).
     Sobol {
-        /// How many.
+        /// The number of points.
         count: usize,
-        /// Which scrambling.
+        /// The seed of the scrambling.
         seed: u32,
     },
 }
@@ -81,8 +81,8 @@ fn disc_point(u: f64, v: f64) -> [f64; 2] {
     [u.sqrt() * cos, u.sqrt() * sin]
 }
 
-/// Point `i` of Roberts's additive sequence over the unit square, begun at `start`: points that fill
-/// it evenly for any count.
+/// Point `i` of Roberts's additive sequence over the unit square, begun at `start`: any number of
+/// points fills the square evenly.
 pub(super) fn additive_sequence(start: [f64; 2], i: usize) -> [f64; 2] {
     const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
     [0, 1].map(|k| (start[k] + STEP[k] * i as f64).fract())

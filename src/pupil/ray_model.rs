@@ -1,4 +1,4 @@
-//! A lens with its beam, ready for rays.
+//! A lens with its beam, ready for tracing.
 
 use crate::lens::{Aperture, FieldPoint, Lens, LensError, System, SystemError};
 use crate::math::Dual;
@@ -10,33 +10,34 @@ use super::launch::Launch;
 /// A number with its derivatives by the two coordinates of a pupil.
 pub type Dual2 = Dual<f64, 2>;
 
-/// How pupil coordinates become rays.
+/// The map from pupil coordinates to rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Aiming {
-    /// Through that point of the paraxial entrance pupil at the primary wavelength. Exact on the
-    /// axis, right for narrow fields.
+    /// The ray goes through that point of the paraxial entrance pupil at the primary wavelength.
+    /// Exact on the axis, accurate for narrow fields.
     Paraxial,
-    /// As `Paraxial`, but shifted and stretched so that the chief ray and its neighbours cross the
-    /// stop where they should: what wide fields need, at the price of one search per field.
+    /// As `Paraxial`, but shifted and scaled so that the chief ray and its neighbours cross the
+    /// stop at the right points: needed for wide fields, at the cost of one search per field.
     Chief,
-    /// Through that point of the real stop, searched for every ray and wavelength by itself.
+    /// The ray goes through that point of the real stop; each ray and wavelength is searched for by
+    /// itself.
     Stop,
 }
 
-/// Beyond this miss of the stop's centre by the paraxial chief ray, in stop radii, the pupil of a
-/// wide field is looked for where it is: paraxial coordinates would waste half of the beam.
+/// The largest distance of the paraxial chief ray from the centre of the stop, in stop radii, up to
+/// which paraxial aiming is used: beyond it, much of the beam would be missed.
 pub const WIDE_AIMING_THRESHOLD: f64 = 0.25;
 
-/// Why a lens cannot be set up.
+/// The reason why a lens cannot be traced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RayModelError {
-    /// The prescription.
+    /// The prescription is invalid.
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// Its numbers.
+    /// Its numbers cannot be traced.
     #[error(transparent)]
     Invalid(#[from] SystemError),
-    /// Its aperture.
+    /// Its aperture has no meaning for it.
     #[error(transparent)]
     Undefined(#[from] ParaxialError),
 }
@@ -46,30 +47,31 @@ pub enum RayModelError {
 pub struct Channel {
     /// The wavelength in micrometres.
     pub um: f64,
-    /// Its share in polychromatic results.
+    /// The weight in polychromatic results.
     pub weight: f64,
-    /// The lens, with the stop as large as the aperture says.
+    /// The resolved lens; its stop is as large as the aperture defines.
     pub system: System<f64>,
-    /// The same made ready for tracing.
+    /// The tracer of the system.
     pub tracer: Tracer<f64>,
-    /// The same clipped by nothing, with derivatives by two pupil coordinates.
+    /// The same without semi-diameters and obstructions, with derivatives by the two pupil
+    /// coordinates.
     pub(super) unclipped: Tracer<Dual2>,
 }
 
-/// A lens with its beam at one zoom position, ready for rays at every wavelength.
+/// A lens with its beam at one zoom position, ready for tracing at every wavelength.
 #[derive(Debug, Clone)]
 pub struct RayModel {
-    /// How it is used.
+    /// The object, aperture and field of view.
     pub beam: Beam,
     /// The field points, in the unit of the beam's field kind.
     pub fields: Vec<FieldPoint>,
-    /// One entry a wavelength.
+    /// The lens at each wavelength.
     pub channels: Vec<Channel>,
-    /// Which of them is the primary one.
+    /// The index of the primary wavelength.
     pub primary: usize,
     /// First-order data at the primary wavelength.
     pub first_order: FirstOrder<f64>,
-    /// How pupil coordinates become rays.
+    /// The map from pupil coordinates to rays.
     pub aiming: Aiming,
 }
 
@@ -97,7 +99,8 @@ impl RayModel {
         Ok(model)
     }
 
-    /// Systems at several wavelengths in micrometres, each with its weight.
+    /// The model of systems at several wavelengths, each given with its wavelength in micrometres
+    /// and its weight.
     ///
     /// # Errors
     /// Numbers that cannot be traced, or an aperture without meaning for the lens.
@@ -132,6 +135,10 @@ impl RayModel {
     }
 
     /// The rays of a field at a wavelength.
+    ///
+    /// # Errors
+    ///
+    /// A field without rays: see [`LaunchError`](super::LaunchError).
     pub fn launch(
         &self,
         field: FieldPoint,
@@ -140,8 +147,8 @@ impl RayModel {
         Launch::new(self, field, wavelength, self.aiming)
     }
 
-    /// The third-order sums, chromatic ones between the shortest and the longest wavelength where
-    /// there are two; `None` where there is no chief ray or a gradient fills a gap.
+    /// The Seidel sums; the chromatic ones between the shortest and the longest wavelength if there
+    /// are two. `None` if there is no chief ray or a gap is filled with a gradient-index medium.
     pub fn seidel(&self) -> Option<Seidel<f64>> {
         let by_length = |a: &&Channel, b: &&Channel| a.um.total_cmp(&b.um);
         let short = self.channels.iter().min_by(by_length)?;
@@ -150,8 +157,8 @@ impl RayModel {
         seidel(&self.channels[self.primary].system, &self.first_order, outer)
     }
 
-    /// The same beam through a lens that has changed at one wavelength: where its stop limits it,
-    /// the stop is as large as that says.
+    /// The same beam through another system at one wavelength. A stop that limits the beam takes
+    /// its semi-diameter from the system.
     pub(super) fn with_system(
         &self,
         wavelength: usize,
@@ -168,13 +175,13 @@ impl RayModel {
         Ok(model)
     }
 
-    /// Whether the beam ends at the unit disc of the pupil coordinates; else only the surfaces
+    /// True if the beam ends at the unit disc of the pupil coordinates; otherwise only the surfaces
     /// limit it, the stop among them.
     pub fn ends_at_disc(&self) -> bool {
         self.aiming == Aiming::Stop || !matches!(self.beam.aperture, Aperture::StopSemiDiameter(_))
     }
 
-    /// Whether a gradient fills a gap.
+    /// True if a gap is filled with a gradient-index medium.
     pub fn has_grin(&self) -> bool {
         self.channels[self.primary].system.has_grin()
     }
@@ -187,7 +194,7 @@ impl RayModel {
         }
     }
 
-    /// The surface that is the stop.
+    /// The index of the stop surface.
     pub fn stop(&self) -> usize {
         self.channels[self.primary].system.stop.unwrap_or(0)
     }

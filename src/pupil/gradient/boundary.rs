@@ -1,14 +1,15 @@
 //! The derivative as an integral over the pupil and one along its edge.
 //!
 //! In polar coordinates about a point inside, `L = ∫dψ ∫₀^R(ψ) C r dr`, and the edge moves with
-//! `dR/dt = −∂M/∂t / ∂M/∂r` where the margin `M` ends it, so that
+//! `dR/dt = −∂M/∂t / ∂M/∂r` for the margin `M` that ends it, so that
 //!
 //! ```text
 //! dL/dt = ∫ dC/dt dw + ∫ C(R) R dR/dt dψ
 //! ```
 //!
 //! Split at its corners, the edge is smooth along every arc, and Gauss nodes converge spectrally.
-//! Rays are traced backwards, so that the cost does not depend on the number of parameters.
+//! The derivatives come from adjoint rays, so that the cost does not depend on the number of
+//! parameters.
 
 use super::{Integrand, QuadraticIntegrand, WarpSampling};
 use crate::math::Vec3;
@@ -16,15 +17,15 @@ use crate::pupil::region::{PolarFrame, PupilLimit, RadialLine, RegionKind, Trace
 use crate::trace::{AdjointSeed, Ray, RayLimit, Rays, SystemGradient};
 
 impl TracedPupil<'_> {
-    /// The integral itself, in mm² of the first vertex plane times the unit of the integrand.
+    /// The integral, in mm² of the first vertex plane times the unit of the integrand.
     pub fn integral(&self, cost: &impl Integrand) -> f64 {
         let points = &self.landed.sink;
         let of = |(i, weight): (usize, f64)| weight * cost.value([points.x[i], points.y[i]]);
         self.region.launch.area() * self.landed.arrivals().map(of).sum::<f64>()
     }
 
-    /// The derivative with the motion of the edge, by every number of the system; `None` where the
-    /// pupil is not one piece that a point inside sees all of.
+    /// The derivative with the motion of the edge, by every number of the system; `None` if the
+    /// pupil is neither star-shaped nor an annulus.
     pub fn boundary_derivative(&self, cost: &impl Integrand) -> Option<SystemGradient<f64>> {
         let mut total = self.biased_derivative(cost);
         total.add(&self.edge_motion(cost)?, 1.0);
@@ -32,7 +33,7 @@ impl TracedPupil<'_> {
     }
 
     /// The integral of `dC/dt` over fixed rays: the derivative without the motion of the edge,
-    /// biased wherever something clips.
+    /// biased if anything clips.
     pub fn biased_derivative(&self, cost: &impl Integrand) -> SystemGradient<f64> {
         let (scale, points) = (self.region.launch.area(), &self.landed.sink);
         let seed = |i: usize| {
@@ -43,8 +44,8 @@ impl TracedPupil<'_> {
         self.region.launch.channel().tracer.gradient(&self.rays, seed)
     }
 
-    /// What the motion of the edge contributes: nothing where it is the disc of the pupil, which
-    /// does not move; `None` where the edge is not known.
+    /// The contribution of the motion of the edge: zero for the disc of the pupil, which does not
+    /// move; `None` if the edge is unknown.
     pub fn edge_motion(&self, cost: &impl Integrand) -> Option<SystemGradient<f64>> {
         let tracer = &self.region.launch.channel().tracer;
         let mut total = SystemGradient::zero(tracer.surfaces());
@@ -70,9 +71,10 @@ impl TracedPupil<'_> {
         Some(total)
     }
 
-    /// The motion of the edge for a search, whatever the form of the pupil: in several pieces
-    /// estimated by the warp field, always with the same samples; of a dark pupil the motion of
-    /// [`TracedPupil::area`] times the constant of the cost, which leads back to light.
+    /// The contribution of the motion of the edge for any form of the pupil: for an irregular pupil
+    /// estimated by the warp field, always with the same samples; for a dark pupil the derivative
+    /// of [`TracedPupil::signed_area`] times the constant of the integrand, which leads back to
+    /// light.
     pub fn robust_edge_motion(&self, cost: &QuadraticIntegrand) -> SystemGradient<f64> {
         if let Some(shadow) = &self.dark {
             return shadow.derivative(&self.region, cost.constant);
@@ -82,14 +84,14 @@ impl TracedPupil<'_> {
             .unwrap_or_else(|| SystemGradient::zero(self.region.launch.channel().tracer.surfaces()))
     }
 
-    /// What the warp field finds besides the derivative of fixed rays.
+    /// The estimate of the warp field without the derivative of fixed rays.
     fn sampled_edge_motion(&self, cost: &QuadraticIntegrand) -> Option<SystemGradient<f64>> {
         let mut whole = self.region.warp_derivative(cost, WarpSampling::default())?.gradient;
         whole.add(&self.biased_derivative(cost), -1.0);
         Some(whole)
     }
 
-    /// The ray at the end of a spoke, and what a change of its margin adds to the integral.
+    /// The ray at the end of a radial line, and the derivative of the integral by its margin.
     fn edge_ray(
         &self,
         cost: &impl Integrand,

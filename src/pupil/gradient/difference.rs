@@ -1,33 +1,34 @@
-//! Central differences of the integral, the edge of the pupil found anew for every lens.
+//! Central differences of the integral, with the edge of the pupil searched for in every changed
+//! lens.
 //!
-//! Each number is moved up and down by a step and by twice that, while the rays keep their names:
+//! Each number is changed by plus and minus a step and twice that, with the same pupil coordinates:
 //!
 //! ```text
 //! D(h) = (L(t+h) − L(t−h)) / 2h    dL/dt ≈ D(h) + (D(h) − D(2h)) / 3
 //! ```
 //!
-//! (Richardson, Phil. Trans. A 210, 1911). The correction is the estimate of the error: it is far
-//! too large where the integral is smooth, and right where a step reaches a corner of it. Nothing
-//! here knows how a derivative is worked out, which makes it the check of what does, at four edges
-//! and four quadratures a number.
+//! (Richardson, Phil. Trans. A 210, 1911). The correction is the estimate of the error: much too
+//! large if the integral is smooth, and right if a step reaches a corner of it. No derivative is
+//! computed here, which makes this the check of those that are, at the cost of four searches for
+//! the edge and four quadratures a number.
 
 use super::{PupilDerivative, QuadraticIntegrand};
 use crate::lens::{ProfileCoefficients, ProfileLaw, RADIAL_TERMS, System, SystemError};
 use crate::pupil::region::{Region, RegionKind, TracedPupil};
 use crate::trace::{SurfaceParameter, SystemGradient};
 
-/// The shorter step against the scale on which a number acts: long enough that rounding of the
-/// integral leaves ten digits, short enough that the fourth power of it is nothing.
+/// The shorter step, relative to the scale of a number: long enough that rounding of the integral
+/// leaves ten digits, short enough that its fourth power is negligible.
 const STEP: f64 = 3e-4;
-/// A surface that light meets closer to the axis than this part of the widest one is stepped as if
-/// light met it there.
+/// The smallest ray height at a surface, relative to the largest at any, from which its steps are
+/// derived.
 const NARROW: f64 = 1e-3;
-/// A conic constant moves `c² r²` by a step; at flat surfaces, by a step of this.
+/// The smallest `c² r²` from which the step of a conic constant is derived: surfaces may be flat.
 const FLAT: f64 = 1e-2;
 
 impl Region<'_> {
-    /// The derivative of the integral of a cost over this pupil by central differences, at an
-    /// order of quadrature; `None` where nothing gets through or nothing limits it.
+    /// The derivative of an integral over this pupil by central differences, at an order of
+    /// quadrature; `None` if nothing gets through or nothing limits the beam.
     pub fn difference_derivative(
         &self,
         cost: &QuadraticIntegrand,
@@ -62,7 +63,7 @@ impl Region<'_> {
     }
 }
 
-/// How far from the axis light meets each surface, in mm.
+/// The largest ray height at each surface, in mm.
 struct SurfaceScales {
     heights: Vec<f64>,
     widest: f64,
@@ -82,8 +83,8 @@ impl SurfaceScales {
         Self { heights, widest }
     }
 
-    /// The shorter step of a number: it turns rays by about the same small angle, whatever the
-    /// number. `None` for an infinite semi-diameter and where there are no scales.
+    /// The shorter step of a number: each turns rays by about the same small angle. `None` for an
+    /// infinite semi-diameter and if there is no scale.
     fn step(&self, system: &System<f64>, surface: usize, slot: SurfaceParameter) -> Option<f64> {
         let (row, r) = (&system.surfaces[surface], self.heights[surface]);
         let scale = match slot {
@@ -107,8 +108,8 @@ impl SurfaceScales {
     }
 }
 
-/// What a coefficient of a gradient has to change for the index to change by one part in ten at a
-/// distance from the axis, or from the vertex.
+/// The change of a coefficient of an index profile that changes the index by 0.1 at a distance from
+/// the axis, or from the vertex.
 fn grin_scale(grade: &ProfileCoefficients<f64>, k: usize, r: f64, length: f64) -> f64 {
     let power = match k.checked_sub(RADIAL_TERMS) {
         None if grade.law == ProfileLaw::Sech => return 0.1 / r,
@@ -118,7 +119,7 @@ fn grin_scale(grade: &ProfileCoefficients<f64>, k: usize, r: f64, length: f64) -
     0.1 * length.powi(-power)
 }
 
-/// The integral while the lens moves.
+/// The integral as a function of the changed lens.
 struct PerturbedIntegral<'a> {
     region: &'a Region<'a>,
     cost: &'a QuadraticIntegrand,
@@ -127,7 +128,7 @@ struct PerturbedIntegral<'a> {
 }
 
 impl PerturbedIntegral<'_> {
-    /// A derivative and how far it may be wrong: infinitely, where the changed lens has no beam.
+    /// A derivative and its error; the error is infinite if the changed lens has no beam.
     fn derivative(&mut self, step: f64, change: impl Fn(&mut System<f64>, f64)) -> [f64; 2] {
         let mut slope = |h: f64| {
             let [up, down] = [h, -h].map(|h| self.integral(|system| change(system, h)));
@@ -140,7 +141,7 @@ impl PerturbedIntegral<'_> {
         [near + correction, correction.abs()]
     }
 
-    /// The integral over the pupil of a changed lens; `None` where nothing limits its beam.
+    /// The integral over the pupil of a changed lens; `None` if nothing limits its beam.
     fn integral(&mut self, change: impl FnOnce(&mut System<f64>)) -> Option<f64> {
         let launch = &self.region.launch;
         let mut system = launch.channel().system.clone();

@@ -1,5 +1,6 @@
-//! One door to all estimators: the order, or the number of samples, is raised until the estimated
-//! error is what was asked for, and a plan says which estimator a pupil calls for.
+//! The common interface of all estimators: the order of quadrature, or the number of samples, is
+//! raised until the estimated error is within the tolerance; and the choice of an estimator for a
+//! pupil.
 
 use super::{PupilDerivative, QuadraticIntegrand, WarpSampling};
 use crate::lens::{RADIAL_TERMS, SystemError};
@@ -12,27 +13,27 @@ use std::f64::consts::PI;
 use std::fmt::{self, Display};
 use std::str::FromStr;
 
-/// How the motion of the pupil's edge enters a derivative.
+/// The treatment of the motion of the pupil's edge in a derivative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DerivativeEstimator {
-    /// Not at all: the rays that get through are kept. Exact while nothing clips, biased elsewhere.
+    /// Ignored: the same rays get through. Exact if nothing clips, biased otherwise.
     Biased,
-    /// As an integral along the edge: spectral, where the pupil is one piece that a point inside
-    /// sees all of.
+    /// An integral along the edge: converges spectrally; for a pupil that is star-shaped or an
+    /// annulus.
     Boundary,
-    /// Spread over the pupil by a warp field: with a standard error that falls with the root of the
-    /// samples or a little faster, whatever the form of the pupil.
+    /// A warp field spread over the pupil: with a standard error that falls with the square root of
+    /// the number of samples or a little faster, for any form of the pupil.
     Warp,
-    /// By central differences with the edge found anew: no derivative is worked out at all.
+    /// Central differences with the edge searched for again: no derivative is computed.
     Difference,
 }
 
 impl DerivativeEstimator {
-    /// All of them.
+    /// All estimators.
     pub const ALL: [Self; 4] = [Self::Biased, Self::Boundary, Self::Warp, Self::Difference];
 
-    /// What files and command lines call it.
+    /// The name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Biased => "biased",
@@ -58,50 +59,52 @@ impl FromStr for DerivativeEstimator {
     }
 }
 
-/// Why an integral over a pupil has no derivative, or not by the estimator that was asked for.
+/// The reason why an integral over a pupil has no derivative, or not by the chosen estimator.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DerivativeError {
-    /// No light, so that nothing says where it would come back.
+    /// No light: the reason, and a remedy.
     #[error("no light gets through ({0}), and the derivative of nothing is no way back: {1}")]
     Dark(String, &'static str),
-    /// No edge.
+    /// Nothing limits the beam.
     #[error("nothing limits the beam; give the stop or another surface a semi-diameter")]
     Unbounded,
-    /// An edge that no point sees all of.
+    /// A pupil that is neither star-shaped nor an annulus; its form.
     #[error("{0}, and `boundary` needs one that a point inside sees all of; expected `warp`")]
     NotStarShaped(String),
-    /// Samples that are never all inside the square in which they are drawn.
+    /// No square was found that holds all samples of the warp field.
     #[error("the square around the pupil for the warp field was not found")]
     NoSquare,
-    /// A lens whose stop cannot limit the beam.
+    /// The lens cannot be limited by its stop.
     #[error(transparent)]
     Invalid(#[from] SystemError),
-    /// Rays that cannot be started when the stop is to limit the beam.
+    /// No rays can be launched with the stop as limit.
     #[error(transparent)]
     Launch(#[from] LaunchError),
 }
 
-/// What the warp field rounds its number of samples up to, at most.
+/// The number of samples of the warp field is rounded up by at most this.
 const REPLICATES: usize = 8;
-/// Samples of the warp field at first.
+/// The first number of samples of the warp field.
 const FIRST: usize = 1024;
-/// How many times more at the next try, at least.
+/// The smallest factor between numbers of samples.
 const LEAST: f64 = 2.0;
-/// And at most: the first standard errors are rough.
+/// The largest factor between numbers of samples: the first standard errors are rough.
 const MOST: f64 = 16.0;
 
-/// The derivative of the integral of a cost over a pupil by every number of the lens, each with its
-/// estimated error: how much raising the order changed it, the standard error of the warp field, or
-/// what the step of a difference leaves open. The bias of `Biased` is in no error.
+/// The derivative of an integral over a pupil by every number of the lens, each with its estimated
+/// error: its change by the last raising of the order, the standard error of the warp field, or the
+/// correction of a difference. The bias of `Biased` is in no error.
 ///
-/// The order or the number of samples is raised until [`PupilDerivative::reaches`] the tolerance, or
-/// until more rays than allowed would be needed: then the result is what they gave. The noise of the
-/// warp field in a kind of numbers with little or no effect counts against what such numbers can do.
-/// Where rays are aimed at the stop, its rim limits the beam and moves with its semi-diameter.
+/// The order or the number of samples is raised until [`PupilDerivative::reaches`] the tolerance,
+/// or until more rays than allowed would be needed: then the result is the best so far. For the
+/// warp field, the noise of a kind of numbers with little or no effect is compared with the effect
+/// that such numbers can have. If rays are aimed at the stop, its rim limits the beam and moves
+/// with its semi-diameter.
 ///
 /// # Errors
-/// A pupil without light or edge; `Boundary` for a pupil that is neither star-shaped nor a ring,
-/// `WarpSampling` for a lens with an obstruction or a gradient.
+///
+/// A pupil without light or edge; `Boundary` for a pupil that is neither star-shaped nor an
+/// annulus, `Warp` for a lens with an obstruction or a gradient-index gap.
 pub fn differentiate(
     region: &Region<'_>,
     cost: &QuadraticIntegrand,
@@ -132,7 +135,7 @@ pub fn differentiate(
     }
 }
 
-/// Which estimator a pupil calls for, and why.
+/// Chooses the estimator for a pupil, with the reason.
 ///
 /// # Errors
 /// A pupil without light or edge has no derivative.
@@ -176,8 +179,8 @@ pub fn choose_estimator(
     }
 }
 
-/// The standard error of the warp field times the root of the rays, relative to the largest of a
-/// group: about the worst of the groups of a double Gauss at 14 degrees.
+/// The standard error of the warp field times the square root of the number of rays, relative to
+/// the largest number of a kind: about the worst kind of a double Gauss at 14 degrees.
 const WARP_ERROR: f64 = 2.0;
 
 fn describe_pieces(pieces: usize) -> String {
@@ -200,7 +203,7 @@ impl Region<'_> {
         }
     }
 
-    /// What happens to the ray through the centre of a dark pupil, and what would help.
+    /// The fate of the ray through the centre of a dark pupil, and a remedy.
     fn explain_darkness(&self) -> (String, &'static str) {
         const NEARER: &str = "take a field nearer to the axis or a larger semi-diameter";
         let launch = &self.launch;
@@ -293,8 +296,8 @@ impl Region<'_> {
         cost: &QuadraticIntegrand,
         asked: Accuracy,
     ) -> Result<PupilDerivative, DerivativeError> {
-        // Numbers without an effect are never more than noise: it must be small against what
-        // numbers of their kind can do.
+        // Numbers without an effect are only noise: it must be small against the effect that
+        // numbers of their kind can have.
         let natural = natural_size(cost, &self.trace_pupil(0).moments);
         let mut count = FIRST;
         let mut rays = 0;
@@ -316,17 +319,17 @@ impl Region<'_> {
     }
 }
 
-/// Of the natural size: what the noise of numbers without an effect is measured against.
+/// The part of the natural size that the noise of numbers without an effect is compared with.
 const NOTABLE: f64 = 0.1;
 /// A derivative this much smaller than its natural size is rounding.
 const ROUNDING: f64 = 1e-13;
-/// The same where it was divided by a small step.
+/// The same for a derivative that was divided by a small step.
 const DIFFERENCE_ROUNDING: f64 = 1e-9;
 
 impl PupilDerivative {
-    /// Adds what raising the order has changed to the errors; all of it where this is the first
-    /// one. A number cannot be known better, relatively, than the worst of its kind: some of them
-    /// always change little by chance.
+    /// Adds the change by the last raising of the order to the errors; all of the derivative if
+    /// this is the first order. The relative error of a number is at least that of the worst of its
+    /// kind, since some change little by chance.
     fn add_order_error(&mut self, before: Option<&Self>) {
         let Some(before) = before else {
             self.error = self.gradient.zip_with(&self.gradient, |_, _| f64::INFINITY);
@@ -344,7 +347,7 @@ impl PupilDerivative {
         }
     }
 
-    /// Sets to zero the kinds of numbers on which the integral depends by no more than rounding.
+    /// Sets the kinds of numbers to zero on which the integral depends by no more than rounding.
     fn drop_rounding(&mut self, rounding: f64, natural: impl Fn(SurfaceParameter) -> f64) {
         let Self { gradient: by, error, .. } = self;
         for slot in SurfaceParameter::all() {
@@ -361,8 +364,8 @@ impl PupilDerivative {
     }
 }
 
-/// How large the derivative by a number of some kind is that does what it can: the integral over
-/// the pupil's radius in the unit of the number.
+/// The natural size of the derivative by a number of a kind: the integral divided by the pupil's
+/// radius in the unit of the number.
 fn natural_size(
     cost: &QuadraticIntegrand,
     light: &PupilMoments,

@@ -1,9 +1,9 @@
 //! Derivatives of integrals over a pupil whose edge moves with the lens.
 //!
-//! `L = ∫ C(p) dw` over the rays that get through, each named by the point `w` where it crosses
-//! the plane through the first vertex, `p` where it lands. When a number `t` of the lens changes,
-//! the integrand changes and so does the set. With `g` the limit that ends it somewhere, negative
-//! inside, Reynolds' transport theorem gives
+//! `L = ∫ C(p) dw` over the rays that get through, with `w` the point where a ray crosses the plane
+//! through the first vertex, and `p` its image point. When a number `t` of the lens changes, the
+//! integrand changes and so does the set of rays. With `g` the limit at an edge, negative inside,
+//! Reynolds' transport theorem gives
 //!
 //! ```text
 //! dL/dt = ∫ dC/dt dw − ∮ C ∂g/∂t / |∇g| dl
@@ -25,31 +25,31 @@ use crate::math::Real;
 use crate::pupil::region::PupilMoments;
 use crate::trace::{SurfaceParameter, SystemGradient};
 
-/// What each ray of a pupil contributes by where it lands. Where a pupil is its own mirror image, so
-/// must be the contribution.
+/// A contribution of each ray of a pupil that depends on its image point. If a pupil is its own
+/// mirror image, the contribution must be too.
 pub trait Integrand: Sync {
-    /// The contribution of a ray that lands at a point, in mm on the image plane.
+    /// The contribution of a ray with this image point, in mm.
     fn value<R: Real>(&self, p: [R; 2]) -> R;
-    /// Its derivative by the point.
+    /// The derivative of the contribution by the image point.
     fn slope<R: Real>(&self, p: [R; 2]) -> [R; 2];
 }
 
-/// What each ray of a pupil contributes: `square |p − center|² + constant`, `p` its image point.
+/// The integrand `square |p − center|² + constant`, with `p` the image point.
 ///
-/// The spot (3.24) has `square = 1` about the centroid, which may be held fixed: moving it changes
-/// the integral by nothing in first order. The throughput (3.25) has `constant = −1`.
+/// The spot (3.24) has `square = 1` about the centroid, which may be held fixed: moving it does not
+/// change the integral in first order. The throughput (3.25) has `constant = −1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct QuadraticIntegrand {
-    /// From where distances count, in mm on the image plane.
+    /// The origin of distances, in mm in the image plane.
     pub center: [f64; 2],
-    /// The factor of the square of the distance.
+    /// The factor of the squared distance.
     pub square: f64,
-    /// What every ray contributes.
+    /// The constant contribution of every ray.
     pub constant: f64,
 }
 
 impl QuadraticIntegrand {
-    /// The square of the distance from a point: the spot (3.24) where that is the centroid.
+    /// The squared distance from a point: the spot (3.24) if that is the centroid.
     pub fn spread(center: [f64; 2]) -> Self {
         Self { center, square: 1.0, constant: 0.0 }
     }
@@ -75,7 +75,7 @@ impl Integrand for QuadraticIntegrand {
 }
 
 impl QuadraticIntegrand {
-    /// Its integral over the light of a pupil.
+    /// The integral over the light of a pupil.
     pub fn integrate(&self, light: &PupilMoments) -> f64 {
         let [x, y] = [0, 1].map(|i| light.centroid[i] - self.center[i]);
         let about_center = light.spread + light.area * (x * x + y * y);
@@ -86,23 +86,25 @@ impl QuadraticIntegrand {
 /// The derivative of an integral over a pupil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PupilDerivative {
-    /// By every number of the system; the integral is in mm² of the first vertex plane.
+    /// The derivative by every number of the system; the integral is in mm² of the first vertex
+    /// plane.
     pub gradient: SystemGradient<f64>,
-    /// How far each may be wrong: a standard error, or the difference of two orders.
+    /// The error of each: a standard error, or the difference of two orders.
     pub error: SystemGradient<f64>,
-    /// Rays traced.
+    /// The number of rays traced.
     pub rays: usize,
 }
 
 impl PupilDerivative {
-    /// Whether every number is known within a tolerance of the largest of its kind: curvatures,
-    /// conic constants, coefficients of each power, thicknesses, indices, semi-diameters.
+    /// True if the error of every number is within a tolerance of the largest of its kind:
+    /// curvatures, conic constants, coefficients of each power, thicknesses, indices,
+    /// semi-diameters.
     pub fn reaches(&self, tolerance: f64) -> bool {
         self.excess(tolerance, |_| 0.0) <= 1.0
     }
 
-    /// By how much the largest error of a kind exceeds what a tolerance allows there, of the
-    /// largest number of the kind or of a floor.
+    /// The largest ratio, over the kinds of numbers, of the error to what a tolerance allows,
+    /// relative to the largest number of the kind or to a floor.
     fn excess(&self, tolerance: f64, floor: impl Fn(SurfaceParameter) -> f64) -> f64 {
         let excess = |slot| {
             let error = self.error.largest(slot);

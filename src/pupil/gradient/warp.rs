@@ -1,4 +1,4 @@
-//! The derivative of an integral over a pupil from rays inside it: no edge is looked for.
+//! The derivative of an integral over a pupil from rays inside it, without a search for the edge.
 //!
 //! A field V that moves every ray as its nearest edge moves turns the integral along the edge into
 //! one over the pupil (Teh, *Computational Lens Design*, section 3.4; Bangaru, Li and Durand, ACM
@@ -9,21 +9,20 @@
 //! ŵ = w / Σ w   w = |g|^−p
 //! ```
 //!
-//! where ∂/∂t is the whole derivative at a fixed ray. Near an edge its own limit has all of the
-//! weight. V depends on the numbers t of the lens through ∂g/∂t alone, so that with
-//! `A = ∇C·a + C div a` and `B = C a` held fixed the integrand is the derivative of one number a
-//! ray,
+//! where ∂/∂t is the total derivative at a fixed ray. Near an edge its own limit has all of the
+//! weight. V depends on the numbers t of the lens through ∂g/∂t alone, so that with `A = ∇C·a + C
+//! div a` and `B = C a` held fixed the integrand is the derivative of one number for each ray,
 //!
 //! ```text
 //! F = C − Σ (A g + B·∇g)
 //! ```
 //!
-//! by all of them at once: second derivatives along each ray on its way out, one adjoint back, and a
-//! cost that does not depend on how many numbers the lens has.
+//! by all of them at once: second derivatives along each ray forwards, one adjoint backwards, and a
+//! cost that does not depend on the number of numbers of the lens.
 //!
-//! Where the beam ends at the disc of the pupil coordinates, the disc takes its share of the weights
-//! but does not move: rays are held in place, the entrance pupil with them. Rays that are aimed at
-//! the stop end at the rim of the stop instead, which moves.
+//! If the beam ends at the disc of the pupil coordinates, the disc takes its share of the weights
+//! but does not move: the rays are held fixed, and the entrance pupil with them. Rays that are
+//! aimed at the stop end at the rim of the stop instead, which moves.
 
 use super::{Integrand, PupilDerivative};
 use crate::math::{Jet, Real};
@@ -36,13 +35,13 @@ use crate::trace::{
 };
 use rayon::prelude::*;
 
-/// How the warp field samples a pupil.
+/// The sampling of a pupil by the warp field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WarpSampling {
-    /// Points of the square around the pupil in which rays are started; a few more where it does
-    /// not split into equal replicates.
+    /// The number of points of the square around the pupil from which rays start; a few more if it
+    /// does not divide into equal replicates.
     pub count: usize,
-    /// From where the random shifts of the points are drawn.
+    /// The seed of the random shifts of the points.
     pub seed: u32,
 }
 
@@ -52,25 +51,25 @@ impl Default for WarpSampling {
     }
 }
 
-/// Independent random shifts of the same points: the error is told by how they differ.
+/// The number of independent random shifts of the same points: their differences give the error.
 const REPLICATES: usize = 8;
-/// Points of one task.
+/// The number of points of one task.
 const CHUNK: usize = 4096;
-/// λ against half the extent of the pupil: what keeps the field finite where a limit is flat.
+/// λ relative to half the extent of the pupil: it keeps the field finite where a limit is flat.
 const FLATNESS: f64 = 2.0;
-/// No limit counts as closer than this.
+/// The smallest distance of a limit.
 const CLOSEST: f64 = 1e-30;
-/// How much larger than the pupil the square is.
+/// The size of the square relative to the pupil.
 const MARGIN: f64 = 1.04;
-/// Light beyond this part of the square tells that the pupil may not be all inside.
+/// Light beyond this part of the square shows that the pupil may reach outside.
 const OUTERMOST: f64 = 0.98;
-/// How much larger the next square is, and how many are tried.
+/// The factor between the sizes of squares, and the largest number that is tried.
 const GROWTH: f64 = 1.25;
 const SQUARES: usize = 24;
 
 impl Region<'_> {
-    /// The derivative of the integral of a cost over this pupil, estimated by the warp field with
-    /// its standard error; `None` where nothing gets through or nothing limits it.
+    /// The derivative of an integral over this pupil, estimated by the warp field with its standard
+    /// error; `None` if nothing gets through or nothing limits the beam.
     pub fn warp_derivative(
         &self,
         cost: &impl Integrand,
@@ -105,7 +104,7 @@ impl Region<'_> {
         None
     }
 
-    /// A frame whose square from −1 to 1 holds all of the pupil and a little more.
+    /// A frame whose square from −1 to 1 holds all of the pupil with a margin.
     fn enclosing_frame(&self) -> Option<PolarFrame> {
         let frame = match &self.kind {
             RegionKind::Clear => PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
@@ -122,7 +121,7 @@ impl Region<'_> {
 }
 
 impl WarpSampling {
-    /// Points of a replicate.
+    /// The number of points of a replicate.
     fn points_per_replicate(self) -> usize {
         self.count.div_ceil(REPLICATES).max(1)
     }
@@ -137,7 +136,7 @@ fn derivative(replicates: &[SystemGradient<f64>], rays: usize) -> PupilDerivativ
     let mean = |i: usize| column(i).map(|v| v / count).sum::<f64>();
     let error = |i: usize| {
         let mean = mean(i);
-        // Against the largest, so that no square leaves the numbers.
+        // Relative to the largest, so that squares do not overflow.
         let largest = column(i).map(|v| (v - mean).abs()).fold(0.0, f64::max);
         let square = |v: f64| if largest > 0.0 { ((v - mean) / largest).powi(2) } else { 0.0 };
         largest * (column(i).map(square).sum::<f64>() / (count * (count - 1.0))).sqrt()
@@ -150,7 +149,7 @@ fn derivative(replicates: &[SystemGradient<f64>], rays: usize) -> PupilDerivativ
     }
 }
 
-/// A pupil and a cost, ready to be sampled.
+/// A pupil and an integrand, ready for sampling.
 struct WarpEstimator<'a, R, C> {
     launch: &'a Launch<'a>,
     cost: &'a C,
@@ -165,8 +164,8 @@ impl<'a, R: Real, C: Integrand> WarpEstimator<'a, R, C> {
         Some(Self { launch, cost, plain_tracer: scout, tracer: WarpTracer::new(system).ok()? })
     }
 
-    /// The estimates of independent replicates; `None` where light is found so close to the edge
-    /// of the square that there may be more outside.
+    /// The estimates of independent replicates; `None` if light is found so close to the edge of
+    /// the square that there may be more outside.
     fn replicates(
         &self,
         square: PolarFrame,
@@ -217,7 +216,7 @@ impl<'a, R: Real, C: Integrand> WarpEstimator<'a, R, C> {
         Some(SystemGradient::from_numbers(surfaces, sum.numbers().map(Real::value)))
     }
 
-    /// The points whose rays get through, told by tracing them without derivatives.
+    /// The points whose rays get through, found by tracing without derivatives.
     fn lit_points(
         &self,
         square: PolarFrame,
@@ -252,9 +251,9 @@ fn pupil_point<R: Real>(square: PolarFrame, [u, v]: [R; 2]) -> [R; 2] {
     [0, 1].map(|i| R::from_f64(square.center[i]) + R::from_f64(a[i]) * u + R::from_f64(b[i]) * v)
 }
 
-/// The limits of a block of rays against each other, relative to the closest of each.
+/// The weights of the limits of a block of rays, relative to the closest limit of each.
 struct LimitWeights<R> {
-    /// `|g|` of the closest limit and its slopes.
+    /// `|g|` of the closest limit and its derivatives.
     closest: [[R; 3]; LANES],
     /// Σ (closest/|g|)^p.
     total: [R; LANES],
@@ -262,7 +261,7 @@ struct LimitWeights<R> {
     drift: [[R; 2]; LANES],
 }
 
-/// `p` of the weights; the number of factors below.
+/// The exponent `p` of the weights; [`fifth_power`] computes it.
 const EXPONENT: f64 = 5.0;
 
 #[inline(always)]
@@ -271,7 +270,7 @@ fn fifth_power<R: Real>(v: R) -> R {
     square * square * v
 }
 
-/// Fills in A and B of every limit and the derivative of the cost.
+/// Sets A and B of every limit and the derivative of the integrand.
 #[inline(always)]
 fn weigh_limits<R: Real>(
     abreast: &mut JetBlock<R>,
@@ -333,8 +332,8 @@ impl<R: Real> LimitWeights<R> {
         self.closest[j] = [0, 1, 2].map(|i| R::select(closer, limit[i], self.closest[j][i]));
     }
 
-    /// The weight of a limit against the closest one, and by how much the slopes of its logarithm
-    /// differ from those of the closest one: with `w = |g|^−p`, `∇ log w = p ∇g/|g|`.
+    /// The weight of a limit relative to the closest one, and the difference of the gradients of
+    /// their logarithms: with `w = |g|^−p`, `∇ log w = p ∇g/|g|`.
     #[inline(always)]
     fn weight(&self, j: usize, [distance, x, y]: [R; 3]) -> (R, [R; 2]) {
         let [closest, cx, cy] = self.closest[j];
@@ -351,7 +350,7 @@ impl<R: Real> LimitWeights<R> {
         self.drift[j][1] += weight * y;
     }
 
-    /// `A` and the two numbers of `B` of a limit.
+    /// `A` and the two components of `B` of a limit.
     #[inline(always)]
     fn share(&self, j: usize, limit: Jet<R>, cost: R, slope: [R; 2]) -> [R; 3] {
         let Jet { value: g, slope: [x, y], hessian: [xx, xy, yy] } = limit;
@@ -379,7 +378,7 @@ fn distance<R: Real>(g: R) -> R {
     R::select(-g > closest, -g, closest)
 }
 
-/// The unit disc of the pupil as a limit `(|p|² − 1)/2`: its distance and its slopes.
+/// The unit disc of the pupil as a limit `(|p|² − 1)/2`: its distance and its derivatives.
 #[inline(always)]
 fn disc_limit<R: Real>(frame: PolarFrame, point: [R; 2]) -> [R; 3] {
     let p = pupil_point(frame, point);

@@ -1,7 +1,7 @@
-//! A pupil with a shadow in it: the ring between the edge of the shadow and that of the light.
+//! A pupil with a central shadow: the annulus between the edge of the shadow and that of the light.
 //!
-//! No point sees all of a ring, but from the middle of the shadow both of its edges are functions
-//! of azimuth. Gauss nodes between them converge as fast as those of a pupil that one point sees.
+//! An annulus is not star-shaped, but from the centre of the shadow both of its edges are functions
+//! of azimuth. Gauss nodes between them converge as fast as those of a star-shaped pupil.
 
 use super::boundary::{Boundary, PolarFrame, PupilLimit};
 use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
@@ -11,18 +11,18 @@ use crate::pupil::launch::Launch;
 use crate::trace::RayLimit;
 use std::f64::consts::PI;
 
-/// The two edges of a ring, both from the same point inside the shadow.
+/// The two edges of an annulus, both about the same point inside the shadow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Annulus {
-    /// Where the light ends.
+    /// The outer edge, where the light ends.
     pub outer: Boundary,
-    /// Where the shadow of the obstructions ends.
+    /// The inner edge, where the shadow of the obstructions ends.
     pub inner: Boundary,
 }
 
 impl Annulus {
-    /// The ring about the middle of a frame, over azimuths from 0 to `end`; `None` where the light
-    /// does not go all around the shadow.
+    /// The annulus about the centre of a frame, over azimuths from 0 to `end`; `None` if the light
+    /// does not surround the shadow.
     pub(super) fn around(
         launch: &Launch<'_>,
         frame: PolarFrame,
@@ -40,7 +40,7 @@ impl Annulus {
         closed.then_some(ring)
     }
 
-    /// Whether there is light between the edges wherever they were looked at.
+    /// True if the outer edge is outside the inner one at all sampled azimuths.
     fn is_open(&self) -> bool {
         let Self { outer, inner } = self;
         inner.samples.iter().all(|(azimuth, edge)| edge.radius < outer.radius_guess(*azimuth))
@@ -50,14 +50,14 @@ impl Annulus {
                 .all(|(azimuth, edge)| edge.radius > inner.radius_guess(*azimuth))
     }
 
-    /// Rays traced to find both edges.
+    /// The number of rays traced to find both edges.
     pub(super) fn rays(&self) -> usize {
         self.outer.rays + self.inner.rays
     }
 
-    /// The ends of radii at Gauss nodes of azimuth between corners of either edge, the outer one
-    /// first, and the rays traced to find them. The shares of the inner ends are negative: what
-    /// lies within is not lit.
+    /// The outer and inner ends of radii at Gauss nodes in azimuth between the corners of either
+    /// edge, and the number of rays traced to find them. The shares of the inner ends are negative,
+    /// since what lies within is dark.
     pub(super) fn radial_lines(
         &self,
         launch: &Launch<'_>,
@@ -84,7 +84,7 @@ impl Annulus {
         (spokes, outer.rays + inner.rays)
     }
 
-    /// Gauss nodes along radii from one edge to the other.
+    /// The Gauss nodes along radii from one edge to the other.
     pub(super) fn nodes(&self, spokes: &[[RadialLine; 2]], radii: usize) -> Nodes {
         let mut nodes = Nodes::default();
         for [far, near] in spokes {
@@ -99,7 +99,7 @@ impl Annulus {
         nodes
     }
 
-    /// The azimuths between one corner and the next, of whichever edge.
+    /// The intervals of azimuth between consecutive corners of either edge.
     fn azimuth_intervals(&self) -> Vec<(f64, f64)> {
         let arcs = || self.outer.arcs.iter().chain(&self.inner.arcs);
         let first = self.outer.arcs.first().map_or(0.0, |arc| arc.from);

@@ -1,25 +1,26 @@
-//! The boundary of a pupil: what limits it, and the arcs that one limit each makes.
+//! The boundary of a pupil: the arcs of its edge, each made by one limit.
 //!
-//! From a point inside, the edge of the pupil is a function `R(ψ)` of azimuth, both in a frame that
-//! is stretched with the pupil so that a narrow sliver looks round. Where the limit changes, `R` has
-//! a corner, and there the azimuths are split into arcs.
+//! About a point inside, the edge of the pupil is a function `R(ψ)` of azimuth, both in a frame
+//! that is stretched with the pupil so that a narrow sliver looks round. Where the limit changes,
+//! `R` has a corner, and there the azimuths are split into arcs.
 
 use crate::trace::RayLimit;
 use std::f64::consts::PI;
 
-/// What ends the pupil somewhere.
+/// A limit of the pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PupilLimit {
-    /// The disc of the entrance pupil, or of the stop that rays are aimed at.
+    /// The disc of the entrance pupil, or of the stop if every ray is aimed at it.
     Disc,
-    /// A surface that clips, misses or totally reflects.
+    /// A surface, given by its index, that clips, is missed or reflects totally.
     Surface(usize, RayLimit),
-    /// No ray is found that crosses the stop there.
+    /// No ray was found that crosses the stop there.
     Unaimed,
 }
 
 impl PupilLimit {
-    /// Whether a cosine vanishes there, so that rays turn ever faster towards it.
+    /// True if a cosine vanishes at the limit, so that the ray direction varies without bound
+    /// towards it.
     pub fn is_grazing(self) -> bool {
         matches!(self, Self::Surface(_, RayLimit::Miss | RayLimit::TotalReflection))
     }
@@ -28,14 +29,15 @@ impl PupilLimit {
 /// Polar coordinates about a point of the pupil, stretched with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PolarFrame {
-    /// The point, in pupil coordinates.
+    /// The centre, in pupil coordinates.
     pub center: [f64; 2],
-    /// Where the frame's unit vectors along x and y lie.
+    /// The unit vectors of the frame along its x and y, in pupil coordinates.
     pub axes: [[f64; 2]; 2],
 }
 
 impl PolarFrame {
-    /// Along which pupil coordinates change with the radius at an azimuth from +y towards +x.
+    /// The derivative of the pupil coordinates by the radius, at an azimuth measured from +y
+    /// towards +x.
     pub fn direction(&self, azimuth: f64) -> [f64; 2] {
         let (sin, cos) = azimuth.sin_cos();
         [0, 1].map(|i| sin * self.axes[0][i] + cos * self.axes[1][i])
@@ -47,13 +49,13 @@ impl PolarFrame {
         [0, 1].map(|i| self.center[i] + radius * direction[i])
     }
 
-    /// By how much an area is larger in pupil coordinates.
+    /// The area of the frame's unit square, in pupil coordinates.
     pub fn area(&self) -> f64 {
         let [[a, b], [c, d]] = self.axes;
         (a * d - b * c).abs()
     }
 
-    /// Azimuth from 0 to 2π and radius of a pupil point.
+    /// The azimuth from 0 to 2π and the radius of a pupil point.
     pub(super) fn polar(&self, p: [f64; 2]) -> (f64, f64) {
         let [[a, b], [c, d]] = self.axes;
         let (x, y) = (p[0] - self.center[0], p[1] - self.center[1]);
@@ -66,50 +68,50 @@ impl PolarFrame {
 /// The edge of the pupil along one radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgePoint {
-    /// Its distance from the centre, in the frame.
+    /// The distance from the centre, in the frame.
     pub radius: f64,
-    /// What ends the pupil there.
+    /// The limit there.
     pub limit: PupilLimit,
 }
 
-/// A stretch of the edge that one limit makes.
+/// A part of the edge that one limit makes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundaryArc {
-    /// Azimuth where it begins, in radians from the frame's +y towards its +x.
+    /// The azimuth where it begins, in radians from the frame's +y towards its +x.
     pub from: f64,
-    /// Azimuth where it ends.
+    /// The azimuth where it ends.
     pub to: f64,
-    /// What ends the pupil along it.
+    /// The limit along it.
     pub limit: PupilLimit,
 }
 
 /// The edge of a pupil that is star-shaped about a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
-    /// In what it is measured.
+    /// The frame of its azimuths and radii.
     pub frame: PolarFrame,
-    /// The arcs in order of azimuth: over a half turn where the pupil is its own mirror image.
+    /// The arcs in order of azimuth; over a half turn if the pupil is its own mirror image.
     pub arcs: Vec<BoundaryArc>,
-    /// The edge at the azimuths that were looked at.
+    /// The edge at the sampled azimuths.
     pub(super) samples: Vec<(f64, EdgePoint)>,
-    /// Limits at which a cosine vanishes on the edge or not far behind it.
+    /// The limits at which a cosine vanishes, on the edge or not far behind it.
     pub(super) grazing_limits: Vec<PupilLimit>,
-    /// Rays traced to find it.
+    /// The number of rays traced to find it.
     pub rays: usize,
 }
 
-/// What is added to the largest radius seen so that none is larger.
+/// The factor on the largest sampled radius that covers those in between.
 const COVER: f64 = 1.02;
 
 impl Boundary {
-    /// The frame grown until its unit disc holds all of the pupil.
+    /// The frame scaled so that its unit disc holds all of the pupil.
     pub(super) fn enclosing_disc(&self) -> PolarFrame {
         let reach = self.samples.iter().map(|(_, edge)| edge.radius).fold(0.0, f64::max);
         let grown = COVER * reach;
         PolarFrame { axes: self.frame.axes.map(|axis| axis.map(|v| v * grown)), ..self.frame }
     }
 
-    /// A frame whose square from −1 to 1 holds all of the pupil, with the same turn.
+    /// A frame with the same axes whose square from −1 to 1 holds all of the pupil.
     pub(in crate::pupil) fn enclosing_square(&self, mirrored: bool) -> PolarFrame {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for (azimuth, edge) in &self.samples {
@@ -128,7 +130,7 @@ impl Boundary {
         PolarFrame { center, axes: [a.map(|v| half[0] * v), b.map(|v| half[1] * v)] }
     }
 
-    /// A guess of the radius at an azimuth, from the nearest ones known.
+    /// The radius at an azimuth, interpolated between samples.
     pub(super) fn radius_guess(&self, azimuth: f64) -> f64 {
         let end = self.samples.last().map_or(1.0, |s| s.0);
         let azimuth = if azimuth > end { azimuth - end } else { azimuth };

@@ -1,26 +1,28 @@
-//! Following an edge while the lens moves a little: the same arcs between corners found anew.
+//! Tracking of a boundary while the lens changes a little: the same arcs between corners found
+//! anew.
 
 use super::boundary::{Boundary, BoundaryArc, PupilLimit};
 use super::kind::{Region, RegionKind};
 use crate::pupil::launch::Launch;
 use std::f64::consts::PI;
 
-/// A corner is where both margins vanish, to this part of the pupil's size.
+/// The accuracy of a corner, where both margins vanish, relative to the size of the pupil.
 const CORNER_TOLERANCE: f64 = 1e-12;
-/// Steps of Newton's method to a corner.
+/// The largest number of Newton steps to a corner.
 const STEPS: usize = 12;
-/// A step longer than this part of the pupil leaves the neighbourhood.
+/// The longest Newton step, relative to the size of the pupil: a longer one leaves the
+/// neighbourhood.
 const MAX_STEP: f64 = 0.3;
-/// An arc shorter than this, in radians, is about to vanish.
+/// The shortest arc, in radians: a shorter one is about to vanish.
 const SHORTEST_ARC: f64 = 1e-6;
-/// Rays along a side of the grid that looks for lost light, and how far it reaches, in sizes of the
+/// The grid that looks for lost light: rays along a side, and half of its side in sizes of the
 /// pupil.
 const CELLS: usize = 21;
 const GRID_REACH: f64 = 1.5;
 
 impl<'a> Region<'a> {
-    /// The region of a launch whose lens has moved little since it was `before`: its edge is
-    /// followed, or searched anew where its arcs have changed.
+    /// The region of a launch whose lens has changed little since its region was `before`: the
+    /// boundary is tracked, or searched for again if its arcs have changed.
     pub fn track(before: &RegionKind, launch: Launch<'a>) -> Self {
         match before {
             RegionKind::StarShaped(boundary) => match boundary.track(&launch) {
@@ -39,8 +41,8 @@ impl<'a> Region<'a> {
 }
 
 impl<'a> Region<'a> {
-    /// The region of a launch, searched anew unless no ray gets through around where the light was:
-    /// then it is dark, and no larger search is worth its rays.
+    /// The region of a launch, searched for again unless no ray gets through around the former
+    /// light: then it is dark, and a larger search would waste rays.
     fn search_near(before: &Boundary, launch: Launch<'a>) -> Self {
         let cover = before.enclosing_disc();
         let place = |i: usize| {
@@ -57,7 +59,7 @@ impl<'a> Region<'a> {
 }
 
 impl Boundary {
-    /// The same arcs between corners found anew; `None` where an arc has vanished.
+    /// The same arcs between tracked corners; `None` if an arc has vanished.
     fn track(&self, launch: &Launch<'_>) -> Option<Self> {
         let mut found = self.clone();
         found.rays = 0;
@@ -72,12 +74,12 @@ impl Boundary {
             let turn = if next == 0 { 2.0 * PI } else { 0.0 };
             found.arcs[next].from = corner - turn;
         }
-        // A ray at the centre that has lost the light ends all.
+        // Without light at the centre there is no star-shaped pupil.
         let lit = launch.is_lit(self.frame.center);
         (lit && found.arcs.iter().all(|arc| arc.to - arc.from > SHORTEST_ARC)).then_some(found)
     }
 
-    /// The azimuth at which two limits vanish, near where one arc has ended and the next begun:
+    /// The azimuth at which two limits meet, near the end of one arc and the start of the next, by
     /// Newton's method in the plane of the pupil.
     fn track_corner(
         &self,
@@ -102,7 +104,7 @@ impl Boundary {
             p = [p[0] - step[0], p[1] - step[1]];
             if length <= CORNER_TOLERANCE * size {
                 let (azimuth, _) = self.frame.polar(p);
-                // The azimuth nearest to the one before, whatever the number of turns.
+                // The azimuth nearest to the former one, up to full turns.
                 let turns = ((before - azimuth) / (2.0 * PI)).round();
                 return Some(azimuth + 2.0 * PI * turns);
             }

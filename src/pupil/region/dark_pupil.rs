@@ -1,9 +1,9 @@
-//! How dark a pupil is that lets nothing through, and the way back to light.
+//! Dark pupils: a measure of how far a pupil without light is from light.
 //!
-//! Light that is not there has no derivative. But every ray of the ideal pupil is stopped by so
-//! much: by how far it passes outside of a rim, or how far it is from meeting a surface. The mean of
-//! that over a coarse grid, the depth of the shadow, has a derivative, and what reduces it lets
-//! light through.
+//! The area of a dark pupil is zero and has no derivative. But every ray of the ideal pupil is
+//! blocked by some amount: the distance by which it passes outside of a rim, or by which it misses
+//! a surface. The mean of these amounts over a coarse grid, the depth, has a derivative, and
+//! reducing it lets light through.
 
 use super::kind::{Region, RegionKind};
 use crate::lens::System;
@@ -11,10 +11,10 @@ use crate::pupil::launch::Launch;
 use crate::trace::{Ray, RayLimit, Rays, SystemGradient};
 use std::f64::consts::PI;
 
-/// Rays along a side of the grid.
+/// The number of rays along a side of the grid.
 const CELLS: usize = 9;
 
-/// The rays of a dark pupil, and what stops them.
+/// The blocked rays of a dark pupil.
 #[derive(Debug, Clone)]
 pub struct DarkPupil {
     rays: Vec<BlockedRay>,
@@ -22,21 +22,21 @@ pub struct DarkPupil {
     size: f64,
 }
 
-/// A ray and where it is stopped most.
+/// A ray with the limit that blocks it most.
 #[derive(Debug, Clone, Copy)]
 struct BlockedRay {
     ray: Ray<f64>,
     surface: usize,
     constraint: RayLimit,
-    /// By how much: in radii of the ideal pupil at a rim, in squares of a cosine at a surface that is
-    /// missed or reflects.
+    /// The amount: in radii of the ideal pupil at a rim, in squared cosines at a surface that is
+    /// missed or reflects totally.
     depth: f64,
-    /// What its margin adds to the depth for every unit.
+    /// The derivative of the depth by the margin.
     by_margin: f64,
 }
 
 impl Region<'_> {
-    /// How far a dark pupil is from light; `None` for one that is lit.
+    /// The blocked rays of a dark pupil; `None` for one that is lit.
     pub(super) fn dark_pupil(&self) -> Option<DarkPupil> {
         if self.kind != RegionKind::Dark {
             return None;
@@ -50,7 +50,7 @@ impl Region<'_> {
     }
 }
 
-/// Where the ray from a point of the pupil is stopped most.
+/// The limit that blocks the ray from a point of the pupil most; `None` if the ray passes.
 fn blocked_ray(launch: &Launch<'_>, p: [f64; 2], size: f64) -> Option<BlockedRay> {
     let (ray, color) = (launch.ray(p)?, launch.channel());
     let mut worst: Option<BlockedRay> = None;
@@ -63,7 +63,7 @@ fn blocked_ray(launch: &Launch<'_>, p: [f64; 2], size: f64) -> Option<BlockedRay
     worst.filter(|worst| worst.depth > 0.0)
 }
 
-/// By how much a margin is short, and its derivative.
+/// The depth at a limit from the margin there, and its derivative by the margin.
 fn depth(
     system: &System<f64>,
     surface: usize,
@@ -97,13 +97,13 @@ fn depth(
 }
 
 impl DarkPupil {
-    /// The mean by which the rays are stopped: 0 where none is.
+    /// The mean depth of the rays; 0 if none is blocked.
     pub fn depth(&self) -> f64 {
         let sum: f64 = self.rays.iter().map(|stopped| stopped.depth).sum();
         sum / self.rays.len().max(1) as f64
     }
 
-    /// Minus an area in mm² that grows with the depth.
+    /// The negative of an area in mm² that grows with the depth.
     pub(super) fn area(&self) -> f64 {
         -self.depth() * self.ideal_area()
     }
@@ -129,7 +129,7 @@ impl DarkPupil {
             let rays: Rays<f64> = rays.into_iter().collect();
             let mut found = tracer.margin_gradient(surface, hurdle, &rays, &weights);
             if hurdle == RayLimit::Rim {
-                // Not by the square of a rim, which may be 0.
+                // Directly, not by the square of a semi-diameter, which may be 0.
                 found.surfaces[surface].semi_diameter = -by_depth * rays.len() as f64 / self.size;
             }
             total.add(&found, 1.0);
@@ -137,7 +137,7 @@ impl DarkPupil {
         total
     }
 
-    /// What stops the rays, each once.
+    /// The limits that block rays, each once.
     fn constraints(&self) -> Vec<(usize, RayLimit)> {
         let mut found = Vec::new();
         for stopped in &self.rays {

@@ -8,57 +8,58 @@ use crate::pupil::launch::Launch;
 use crate::trace::RayLimit;
 use std::f64::consts::PI;
 
-/// How a ray fares against the limits.
+/// The result of testing a ray against the limits.
 pub(super) struct LimitProbe {
-    /// The first limit that it fails, with the margin.
+    /// The first limit that it violates, with the margin.
     pub(super) failed: Option<(PupilLimit, f64)>,
-    /// Its margin at the limit that was asked for; not a number where it does not get that far.
+    /// Its margin at the limit that was asked for; NaN if it does not get that far.
     margin_at_limit: f64,
 }
 
-/// A ray so close to the rim of the disc, relatively, counts as one at the rim: where the rim of
-/// the stop is the rim of the pupil as well, rounding must not decide ray by ray between them.
+/// A ray this close to the rim of the disc, relatively, counts as one at the rim: if the rim of the
+/// stop is the rim of the pupil as well, rounding must not decide ray by ray between them.
 const AT_DISC: f64 = 1e-10;
-/// A corner is located to this in azimuth and radius; the derivative by a rim is as wrong as this.
+/// The accuracy of a corner in azimuth and relative radius; derivatives by a semi-diameter have the
+/// same error.
 const CORNER: f64 = 1e-11;
-/// A step along the radius that is rounding, relatively.
+/// A step along the radius, relative to it, that is rounding.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// Two edges as close as that differ by less than this, relatively, unless the edge jumps.
+/// Two edges next to a corner differ by less than this, relatively, unless the edge jumps.
 const JUMP: f64 = 1e-5;
-/// How far, relatively, the edge between two known azimuths may be from their interpolation.
+/// The relative error of the radius interpolated between two samples of the edge.
 pub(super) const GUESS_SPREAD: f64 = 0.003;
-/// How far inside the edge, relatively, margins are looked at.
+/// The distance inside the edge, relative to the radius, at which margins are evaluated.
 const INSIDE: f64 = 1e-9;
-/// A margin this small against its neighbours is one that ends the pupil.
+/// A margin this small relative to its neighbours is one that ends the pupil.
 const ENDING: f64 = 1e-6;
-/// A cosine that vanishes this much inside the edge, relatively, vanishes there but for rounding.
+/// A cosine that vanishes at this part of the radius or beyond vanishes at the edge but for
+/// rounding.
 const AT_GRAZING: f64 = 1.0 - 1e-9;
-/// A squared cosine that has fallen to this part of what it is at the centre is one that vanishes
-/// not far away.
+/// A squared cosine that has fallen to this part of its value at the centre vanishes not far away.
 const NEAR_GRAZING: f64 = 0.3;
-/// More arcs than this are no pupil but noise.
+/// The largest number of arcs: more are noise.
 pub(super) const MAX_ARCS: usize = 24;
-/// A pupil that reaches this far, in its frame, is limited by nothing.
+/// A pupil that reaches this far, in its frame, is unbounded.
 const UNBOUNDED: f64 = 1e4;
 
-/// Which limits a search for the edge looks at.
+/// The limits that a search for the edge takes into account.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LimitFilter {
-    /// All.
+    /// All limits.
     All,
-    /// All but the obstructions.
+    /// All limits except obstructions.
     WithoutObstructions,
     /// The obstructions alone, from inside: the edge is where their shadow ends.
     Obstructions,
 }
 
 impl Launch<'_> {
-    /// Whether the ray at `p` gets through, and its margin at one limit.
+    /// Tests the ray at `p` against all limits; `wanted` is the limit whose margin is recorded.
     pub(super) fn probe(&self, p: [f64; 2], wanted: PupilLimit) -> LimitProbe {
         self.probe_filtered(p, wanted, |_| true)
     }
 
-    /// Whether the ray at `p` is in no shadow, with margins that are negative there.
+    /// Tests whether the ray at `p` is outside of all shadows, with the signs of margins reversed.
     fn probe_obstructions(&self, p: [f64; 2], wanted: PupilLimit) -> LimitProbe {
         let mut probe = LimitProbe { failed: None, margin_at_limit: f64::NAN };
         let Some(ray) = self.ray(p) else { return probe };
@@ -104,7 +105,7 @@ impl Launch<'_> {
         probe
     }
 
-    /// The margins of a ray at every hurdle; `None` where it does not get through.
+    /// The margins of a ray at every limit; `None` if it does not get through.
     pub(super) fn margins_if_passing(&self, p: [f64; 2]) -> Option<Vec<f64>> {
         let ray = self.ray(p)?;
         let mut margins = Vec::with_capacity(3 * self.channel().tracer.surfaces());
@@ -112,13 +113,13 @@ impl Launch<'_> {
         margins.iter().all(|margin| *margin >= 0.0).then_some(margins)
     }
 
-    /// Whether the ray at `p` gets through the surfaces.
+    /// True if the ray at `p` gets through the surfaces.
     pub(super) fn is_lit(&self, p: [f64; 2]) -> bool {
         self.probe(p, PupilLimit::Disc).failed.is_none()
     }
 }
 
-/// A search for the edge from one point.
+/// A search for the edge along radii from one point.
 pub(super) struct EdgeSearch<'a> {
     pub(super) launch: &'a Launch<'a>,
     pub(super) frame: PolarFrame,
@@ -131,7 +132,7 @@ impl<'a> EdgeSearch<'a> {
         Self { launch, frame, rays: 0, limits: LimitFilter::All }
     }
 
-    /// The same search for another edge.
+    /// The same search with other limits.
     pub(super) fn with_limits(self, seen: LimitFilter) -> Self {
         Self { limits: seen, ..self }
     }
@@ -148,7 +149,7 @@ impl<'a> EdgeSearch<'a> {
         }
     }
 
-    /// Where the radius leaves the unit disc; infinite where the disc is no limit.
+    /// The radius at which the azimuth leaves the unit disc; infinite if the disc is no limit.
     fn disc(&self, azimuth: f64) -> f64 {
         if !self.launch.model.ends_at_disc() {
             return f64::INFINITY;
@@ -162,7 +163,7 @@ impl<'a> EdgeSearch<'a> {
     }
 
     /// The edge at an azimuth, searched around a guess of its radius that is right within a
-    /// `spread`, relatively; `None` where nothing limits the pupil.
+    /// relative `spread`; `None` if nothing limits the pupil.
     pub(super) fn edge(&mut self, azimuth: f64, guess: f64, spread: f64) -> Option<EdgePoint> {
         let disc = self.disc(azimuth);
         let last = disc * (1.0 - AT_DISC);
@@ -186,7 +187,7 @@ impl<'a> EdgeSearch<'a> {
         }
     }
 
-    /// The edge in front of a ray that fails, looked for behind ever smaller radii.
+    /// The edge inside of a ray that fails, bracketed by ever smaller radii.
     fn search_inward(
         &mut self,
         azimuth: f64,
@@ -215,8 +216,8 @@ impl<'a> EdgeSearch<'a> {
         }
     }
 
-    /// The zero of the margin that ends the pupil between a ray that passes and one that fails:
-    /// the method of Anderson and Björck (BIT 13, 1973), halving where it is slow.
+    /// The zero of the margin that ends the pupil between a ray that passes and one that fails, by
+    /// the method of Anderson and Björck (BIT 13, 1973), with bisection where that is slow.
     fn refine_bracket(
         &mut self,
         azimuth: f64,
@@ -255,8 +256,8 @@ impl<'a> EdgeSearch<'a> {
         EdgePoint { radius: low, limit }
     }
 
-    /// The edge at an azimuth where it is expected of one limit: the zero of its margin alone, if
-    /// a ray just inside of it passes everything.
+    /// The edge at an azimuth if a given limit makes it: the zero of its margin alone, provided
+    /// that a ray just inside passes all limits.
     pub(super) fn edge_at_limit(
         &mut self,
         limit: PupilLimit,
@@ -269,7 +270,7 @@ impl<'a> EdgeSearch<'a> {
         self.launch.is_lit(inside).then_some(EdgePoint { radius, limit })
     }
 
-    /// The margin of a ray at one limit; not a number where it does not get there.
+    /// The margin of a ray at one limit; NaN if it does not get there.
     fn margin(&mut self, azimuth: f64, r: f64, limit: PupilLimit) -> f64 {
         self.rays += 1;
         let PupilLimit::Surface(surface, hurdle) = limit else { return f64::NAN };
@@ -278,7 +279,7 @@ impl<'a> EdgeSearch<'a> {
         ray.and_then(|ray| tracer.margin(ray, surface, hurdle)).unwrap_or(f64::NAN)
     }
 
-    /// Where one limit alone would end the pupil along a radius, by secants from a guess.
+    /// The radius at which one limit alone would end the pupil, by the secant method from a guess.
     fn limit_zero(&mut self, limit: PupilLimit, azimuth: f64, guess: f64) -> Option<f64> {
         if limit == PupilLimit::Disc {
             return Some(self.disc(azimuth));
@@ -299,8 +300,8 @@ impl<'a> EdgeSearch<'a> {
         None
     }
 
-    /// Where along a radius the nearest of some cosines vanishes, in parts of the distance to the
-    /// edge; the one that is the edge does not count.
+    /// The nearest radius at which one of some cosines vanishes, relative to the edge; the limit of
+    /// the edge itself is omitted.
     pub(super) fn grazing_distance(
         &mut self,
         limits: &[PupilLimit],
@@ -313,8 +314,8 @@ impl<'a> EdgeSearch<'a> {
         parts.fold(f64::INFINITY, f64::min).max(1.0)
     }
 
-    /// The corner between two edges where the limit of one takes over from that of the other, by
-    /// a bracketed secant on the distance between the two; `None` where a third one is in the way.
+    /// The corner between two edges where the limit of one takes over from that of the other, by a
+    /// bracketed secant on the distance between the two; `None` if a third one intervenes.
     fn find_corner(&mut self, a: (f64, EdgePoint), b: (f64, EdgePoint)) -> Option<f64> {
         let (mut low, mut high) = (a.0, b.0);
         let gap = |search: &mut Self, azimuth: f64| {
@@ -346,8 +347,8 @@ impl<'a> EdgeSearch<'a> {
         None
     }
 
-    /// The edge all around, from the azimuths 0 to `end`; `None` where nothing limits the pupil
-    /// or where its edge is too ragged to be split.
+    /// The whole edge, over azimuths from 0 to `end`; `None` if nothing limits the pupil or if its
+    /// edge is too irregular to be split into arcs.
     pub(super) fn trace_boundary(mut self, end: f64, azimuths: usize) -> Option<Boundary> {
         let samples = self.sample_edge(end, azimuths)?;
         let mut arcs = vec![BoundaryArc { from: 0.0, to: end, limit: samples[0].1.limit }];
@@ -368,8 +369,8 @@ impl<'a> EdgeSearch<'a> {
         })
     }
 
-    /// The limits whose squared cosine falls from the centre to the edge by so much that it will
-    /// vanish not far behind.
+    /// The limits whose squared cosine falls from the centre to the edge so much that it vanishes
+    /// not far behind.
     fn find_grazing_limits(&mut self, samples: &[(f64, EdgePoint)]) -> Vec<PupilLimit> {
         let inside = 1.0 - INSIDE;
         let mut margins = |p: [f64; 2]| {
@@ -396,7 +397,8 @@ impl<'a> EdgeSearch<'a> {
         grazed
     }
 
-    /// Edges at equal steps of azimuth, and where another limit comes close in between.
+    /// The edge at equal steps of azimuth, and at azimuths in between where another limit comes
+    /// close.
     fn sample_edge(&mut self, end: f64, azimuths: usize) -> Option<Vec<(f64, EdgePoint)>> {
         let step = end / azimuths as f64;
         let mut samples = Vec::with_capacity(azimuths + 1);
@@ -425,8 +427,8 @@ impl<'a> EdgeSearch<'a> {
         Some(samples)
     }
 
-    /// The corners between two edges: one, or what halving the azimuths brings to light where
-    /// another limit makes an arc in between.
+    /// Finds the corners between two edges: one, or, by halving the azimuths, several if another
+    /// limit makes an arc in between.
     fn find_corners(
         &mut self,
         a: (f64, EdgePoint),
@@ -454,8 +456,8 @@ impl<'a> EdgeSearch<'a> {
     }
 }
 
-/// Whether the edge jumps from the near side of a shadow to what ends the pupil behind it: there
-/// is light behind the shadow that the centre does not see. The two edges are next to a corner.
+/// True if the edge jumps from the near side of a shadow to a limit behind it: there is light
+/// behind the shadow that is not visible from the centre. The two edges are next to a corner.
 fn hides_light(a: EdgePoint, b: EdgePoint) -> bool {
     let shadow =
         |edge: EdgePoint| matches!(edge.limit, PupilLimit::Surface(_, RayLimit::Obstruction));
@@ -463,8 +465,8 @@ fn hides_light(a: EdgePoint, b: EdgePoint) -> bool {
     jump && (shadow(a) || shadow(b))
 }
 
-/// Where margins dip between rays at equal steps of azimuth, in steps from the first of them: the
-/// bottoms of the parabolas through a least margin and its neighbours, if they are much lower than
+/// The minima of margins between rays at equal steps of azimuth, in steps from the first: the
+/// vertices of the parabolas through a least margin and its neighbours, if they are much lower than
 /// that. Over half a turn the rays beyond its ends are mirror images.
 pub(super) fn margin_minima(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
     let count = margins.len();
@@ -479,7 +481,7 @@ pub(super) fn margin_minima(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
         for ((left, here), right) in neighbours {
             let (left, here, right) = (*left, *here, *right);
             let bend = left - 2.0 * here + right;
-            // A margin that ends the pupil here is zero but for rounding, and no dip.
+            // A margin that ends the pupil here is zero but for rounding, and not a minimum.
             let open = here > ENDING * left.max(right);
             if open && here <= left && here <= right && bend > 0.0 {
                 let place = 0.5 * (left - right) / bend;
@@ -493,13 +495,13 @@ pub(super) fn margin_minima(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
     dips
 }
 
-/// What the value at the kept end of a bracket is multiplied with.
+/// The factor on the value at the retained end of a bracket (Anderson and Björck).
 fn damping(new: f64, replaced: f64) -> f64 {
     let factor = 1.0 - new / replaced;
     if factor > 0.0 { factor } else { 0.5 }
 }
 
-/// The first and the last arc of a full turn are one where the same limit makes them.
+/// Joins the first and the last arc of a full turn if the same limit makes them.
 fn join_ends(arcs: &mut Vec<BoundaryArc>, turn: f64) {
     if let (Some(first), Some(last)) = (arcs.first().copied(), arcs.last().copied())
         && arcs.len() > 1
@@ -513,7 +515,7 @@ fn join_ends(arcs: &mut Vec<BoundaryArc>, turn: f64) {
 }
 
 impl Boundary {
-    /// Points of the edge, or, for an `inside` below 1, just inside it, at some azimuths.
+    /// The points of the edge at some azimuths, their radii scaled by `inside`.
     pub fn points(&self, launch: &Launch<'_>, count: usize, inside: f64) -> Vec<[f64; 2]> {
         let mut search = EdgeSearch::new(launch, self.frame);
         let mut points = Vec::with_capacity(count + self.arcs.len());

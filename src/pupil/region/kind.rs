@@ -1,38 +1,39 @@
-//! The set of rays that get through, and the forms that it can have.
+//! The region of a pupil and the forms that it can have.
 
 use super::annulus::Annulus;
 use super::boundary::Boundary;
 use crate::pupil::launch::Launch;
 
-/// The form of a pupil.
+/// The form of the region of a pupil.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RegionKind {
-    /// Nothing gets through.
+    /// No ray gets through.
     Dark,
     /// The whole disc gets through.
     Clear,
-    /// One piece, bounded by arcs.
+    /// One piece, star-shaped about a point and bounded by arcs.
     StarShaped(Boundary),
-    /// No single point sees all of it, or its edge is noise: it is sampled and clipped.
+    /// Neither clear nor star-shaped, or with an edge that is noise: it is sampled and clipped.
     Irregular {
-        /// How many separate pieces were seen.
+        /// The number of separate pieces found.
         pieces: usize,
-        /// A square that holds all of it: its centre and half of its side.
+        /// A square around it: its centre and half of its side, in pupil coordinates.
         square: ([f64; 2], f64),
-        /// Its two edges, where it is a ring about a shadow: its quadrature lies between them.
+        /// Its two edges if it is an annulus around an obstruction; its quadrature lies between
+        /// them.
         annulus: Option<Box<Annulus>>,
     },
     /// Nothing limits it, so that no beam is defined.
     Unbounded,
 }
 
-/// The rays of a field at a wavelength that get through.
+/// The pupil points of a field at a wavelength from which rays get through.
 #[derive(Debug, Clone)]
 pub struct Region<'a> {
-    /// Where its rays start.
+    /// The rays of the field.
     pub launch: Launch<'a>,
-    /// Its form.
+    /// The form of the region.
     pub kind: RegionKind,
-    /// Rays traced to find it.
+    /// The number of rays traced to find it.
     pub rays: usize,
 }

@@ -1,8 +1,8 @@
-//! Which rays of a field get through.
+//! The search for the region of a pupil.
 //!
-//! Sixteen rays at the rim tell whether anything clips at all. If so, a coarse grid of rays shows
-//! where light is, in how many pieces, and whether one point sees all of it; then the edge is
-//! followed from there.
+//! Sixteen rays at the rim decide whether anything clips. If so, a coarse grid of rays shows the
+//! position of the light, the number of its pieces, and whether it is star-shaped about a point;
+//! then the edge is searched for from there.
 
 use super::annulus::Annulus;
 use super::boundary::{Boundary, EdgePoint, PolarFrame};
@@ -14,25 +14,25 @@ use crate::pupil::patterns::{PupilPattern, pattern_points};
 use crate::trace::{ImagePoints, Rays, TraceSink};
 use std::f64::consts::{PI, TAU};
 
-/// Rays at the rim that tell whether a pupil is clear.
+/// The number of rays at the rim that decide whether a pupil is clear.
 const RIM_RAYS: usize = 16;
-/// Grids that look for light where no disc limits the pupil: cells along a side, and how far from
-/// the axis that fine a grid is worth its rays.
+/// The grids that search for light if no disc limits the pupil: cells along a side, and the largest
+/// distance from the axis that a grid so fine is used for.
 const SCANS: [(usize, f64); 3] = [(25, 120.0), (101, 13.0), (301, 1.7)];
-/// A grid with fewer rays than this in the light is too coarse for a verdict: another one is laid
-/// around that light, this often at most.
+/// A grid with fewer lit rays than this is too coarse: another one is laid around the light, at
+/// most `MAX_ZOOMS` times.
 const ENOUGH_LIT: usize = 12;
 const MAX_ZOOMS: usize = 14;
-/// Light through a hole narrower than this, in pupil coordinates, is a single ray: a rim of size
-/// zero lets it through on the axis.
+/// Light through a narrower opening, in pupil coordinates, is a single ray: a semi-diameter of zero
+/// lets one through on the axis.
 const NARROWEST_PUPIL: f64 = 1e-9;
-/// Azimuths at which the edge is looked at first, over a half turn.
+/// The number of azimuths at which the edge is sampled first, over a half turn.
 const AZIMUTHS: usize = 24;
-/// How far from the axis light is looked for first where no disc limits the pupil.
+/// The distance from the axis to which light is searched for first if no disc limits the pupil.
 const FIRST_REACH: f64 = 1.6;
 
 impl<'a> Region<'a> {
-    /// The region of a launch.
+    /// Searches for the region of a launch.
     pub fn new(launch: Launch<'a>) -> Self {
         let disc = launch.model.ends_at_disc();
         let shadows = launch.obstruction_centers();
@@ -55,8 +55,8 @@ impl<'a> Region<'a> {
         Self { launch, kind, rays }
     }
 
-    /// The points of a pattern over a disc, or a stretched one, that holds all of the light: a
-    /// sum over those that arrive is what clipped patterns give in other programs.
+    /// The points of a pattern over a disc, or an ellipse, that holds all of the light: a sum over
+    /// those that arrive is what clipped patterns give in other programs.
     pub fn pattern_nodes(&self, chosen: PupilPattern) -> Nodes {
         let frame = match &self.kind {
             RegionKind::Clear => PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
@@ -81,13 +81,13 @@ impl<'a> Region<'a> {
         Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
     }
 
-    /// Whether no light gets through.
+    /// True if no light gets through.
     pub fn is_dark(&self) -> bool {
         self.kind == RegionKind::Dark
     }
 }
 
-/// The ray at an azimuth of the rim.
+/// The pupil point at an azimuth of the rim.
 fn rim_point(azimuth: f64) -> [f64; 2] {
     azimuth.sin_cos().into()
 }
@@ -99,17 +99,17 @@ fn nearest_in_disc([x, y]: [f64; 2]) -> [f64; 2] {
 }
 
 impl Launch<'_> {
-    /// Where in the pupil, inside or not, the shadow of every obstruction has its middle: the ray
-    /// through the vertex of the surface. `None` for one that was not found.
+    /// The centre of the shadow of every obstruction, inside the pupil or not: the pupil point of
+    /// the ray through the vertex of the surface. `None` for one that was not found.
     fn obstruction_centers(&self) -> Vec<Option<[f64; 2]>> {
         let surfaces = self.channel().system.surfaces.iter().enumerate();
         let obstructed = surfaces.filter(|(_, surface)| surface.obstruction > 0.0);
         obstructed.map(|(i, _)| self.through_vertex(i)).collect()
     }
 
-    /// Whether the whole disc gets through, told by the margins of rays at its rim, by where they
-    /// are least in between, and by the ray that comes nearest to the middle of each shadow, which
-    /// may be too small for all of them.
+    /// True if the whole disc gets through, judged by the margins of rays at its rim, at the minima
+    /// of margins in between, and by the ray nearest to the centre of each shadow, which may be too
+    /// small for all of them.
     fn is_clear(&self, shadows: &[Option<[f64; 2]>], rays: &mut usize) -> bool {
         let half = self.is_symmetric();
         let step = if half { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
@@ -131,7 +131,7 @@ impl Launch<'_> {
             && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(nearest_in_disc(p))))
     }
 
-    /// Which of these pupil points get through the surfaces.
+    /// For each pupil point, true if its ray gets through the surfaces.
     pub(super) fn lit_mask(&self, points: &[[f64; 2]]) -> Vec<bool> {
         let mut lit = vec![false; points.len()];
         let launched = points.iter().enumerate().filter_map(|(i, p)| Some((i, self.ray(*p)?)));
@@ -143,7 +143,7 @@ impl Launch<'_> {
     }
 }
 
-/// Splits rays from what belongs to them.
+/// Splits pairs into values and rays.
 trait UnzipRays<T> {
     fn unzip_rays(self) -> (Vec<T>, Rays<f64>);
 }
@@ -159,7 +159,7 @@ impl<T, I: Iterator<Item = (T, crate::trace::Ray<f64>)>> UnzipRays<T> for I {
     }
 }
 
-/// A coarse picture of the light in a square of the pupil plane.
+/// A coarse grid of rays over a square of the pupil plane, each lit or dark.
 struct LightGrid {
     cells: usize,
     center: [f64; 2],
@@ -169,7 +169,7 @@ struct LightGrid {
 }
 
 impl LightGrid {
-    /// A grid that holds all of the light and enough of it; `None` where there is none.
+    /// A grid that holds all of the light with enough lit rays; `None` if there is none.
     fn around_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
         let mut grid =
             SCANS.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays))?;
@@ -188,7 +188,7 @@ impl LightGrid {
         (grid.half > NARROWEST_PUPIL).then_some(grid)
     }
 
-    /// Ever larger grids about the axis until one holds light, and all of it.
+    /// Doubles a grid about the axis until it holds light, and all of it.
     fn scan(launch: &Launch<'_>, cells: usize, widest: f64, rays: &mut usize) -> Option<Self> {
         let disc = launch.model.ends_at_disc();
         let mut half = if disc { 1.0 } else { FIRST_REACH };
@@ -225,7 +225,7 @@ impl LightGrid {
         grid
     }
 
-    /// The middle of a cell.
+    /// The centre of a cell.
     fn point(&self, cell: usize) -> [f64; 2] {
         let step = 2.0 * self.half / self.cells as f64;
         let at = |i: usize| step * (i as f64 - 0.5 * (self.cells - 1) as f64);
@@ -268,7 +268,7 @@ impl LightGrid {
         };
         let rings = shadows.iter().flatten().filter_map(|middle| around(*middle));
         let ring = rings.into_iter().find(|ring| self.agrees_with_annulus(launch, ring, shadows));
-        // A grid may be too coarse to see that a narrow ring hangs together.
+        // A grid may be too coarse to show that a narrow annulus is connected.
         let pieces = if ring.is_some() { 1 } else { pieces };
         RegionKind::Irregular {
             pieces,
@@ -285,7 +285,7 @@ impl LightGrid {
         [sum[0] / count, sum[1] / count]
     }
 
-    /// The frame in which the light looks round about its centroid, or about the lit point nearest
+    /// The frame in which the light looks round, about its centroid, or about the lit point nearest
     /// to that.
     fn frame(&self, launch: &Launch<'_>) -> PolarFrame {
         let points = || self.lit_cells().map(|i| self.point(i));
@@ -299,8 +299,8 @@ impl LightGrid {
         PolarFrame { center, axes: self.axes(middle, launch.is_symmetric()) }
     }
 
-    /// The axes of an ellipse with the second moments of the light: those of a uniform one are a
-    /// quarter of the squares of its semi-axes.
+    /// The axes of an ellipse with the second moments of the light: those of a uniform ellipse are
+    /// a quarter of the squares of its semi-axes.
     fn axes(&self, middle: [f64; 2], symmetric: bool) -> [[f64; 2]; 2] {
         let cell = 2.0 * self.half / self.cells as f64;
         let own = cell * cell / 12.0;
@@ -312,14 +312,14 @@ impl LightGrid {
         let count = self.count() as f64;
         let (xx, yy) = (xx / count + own, yy / count + own);
         let xy = if symmetric { 0.0 } else { xy / count };
-        // Cholesky: the frame's y stays y.
+        // Cholesky factors that keep the y axis along y.
         let y = yy.sqrt();
         let slant = xy / y;
         let x = (xx - slant * slant).max(0.01 * xx).sqrt();
         [[2.0 * x, 0.0], [2.0 * slant, 2.0 * y]]
     }
 
-    /// A square around the light.
+    /// A square around the light: its centre and half of its side.
     fn bounding_square(&self) -> ([f64; 2], f64) {
         let cell = 2.0 * self.half / self.cells as f64;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -331,7 +331,7 @@ impl LightGrid {
         (center, 0.5 * (high[0] - low[0]).max(high[1] - low[1]) + 1.5 * cell)
     }
 
-    /// How many separate pieces the light has.
+    /// The number of separate pieces of the light.
     fn count_pieces(&self) -> usize {
         let mut seen = vec![false; self.lit.len()];
         let mut pieces = 0;
@@ -344,7 +344,7 @@ impl LightGrid {
         pieces
     }
 
-    /// Marks all light that hangs together with a cell, over sides and corners.
+    /// Marks all light connected with a cell, over sides and corners.
     fn flood(&self, start: usize, seen: &mut [bool]) {
         let mut waiting = vec![start];
         seen[start] = true;
@@ -365,7 +365,7 @@ impl LightGrid {
         near(row).flat_map(move |r| near(column).map(move |c| r * cells + c))
     }
 
-    /// Grid points and the middles of shadows, and whether they are lit.
+    /// The grid points and the centres of shadows, each with true if it is lit.
     fn labelled_points<'b>(
         &'b self,
         shadows: &'b [Option<[f64; 2]>],
@@ -374,7 +374,7 @@ impl LightGrid {
         cells.chain(shadows.iter().flatten().map(|p| (*p, false)))
     }
 
-    /// Whether light and dark lie on their sides of the edge.
+    /// True if the lit points lie inside the boundary and the dark ones outside.
     fn agrees(
         &self,
         launch: &Launch<'_>,
@@ -386,7 +386,7 @@ impl LightGrid {
             .all(|(point, lit)| lies_on_side(&mut search, boundary, point, lit))
     }
 
-    /// Whether light lies between the two edges of a ring and dark does not.
+    /// True if the lit points, and only those, lie between the two edges of an annulus.
     fn agrees_with_annulus(
         &self,
         launch: &Launch<'_>,
@@ -408,8 +408,8 @@ impl LightGrid {
     }
 }
 
-/// Whether a point lies inside an edge, or outside, as it should; where it is close to it, the edge
-/// is looked for at its azimuth.
+/// True if a point lies inside a boundary (or outside, if not `inside`); close to it, the edge is
+/// searched for at its azimuth.
 fn lies_on_side(
     search: &mut EdgeSearch<'_>,
     boundary: &Boundary,

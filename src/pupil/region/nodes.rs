@@ -5,37 +5,38 @@ use crate::pupil::gauss_rules::{legendre, radial};
 use crate::pupil::patterns::additive_sequence;
 use std::f64::consts::PI;
 
-/// Points of the pupil with their weights.
+/// Quadrature nodes: points of the pupil with their weights.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nodes {
-    /// Pupil coordinates.
+    /// The points, in pupil coordinates.
     pub points: Vec<[f64; 2]>,
-    /// The share of the pupil that each stands for, in pupil coordinates: π for the whole disc.
+    /// The weight of each, an area in pupil coordinates: π in sum for the whole disc.
     pub weights: Vec<f64>,
-    /// Whether every point stands for its mirror image `(−px, py)` as well; the weights then count
+    /// True if every point stands for its mirror image `(−px, py)` as well; the weights then count
     /// both.
     pub mirrored: bool,
-    /// Rays traced to find them.
+    /// The number of rays traced to find them.
     pub rays: usize,
 }
 
-/// A radius of a split pupil, from the centre of its frame to its edge.
+/// A radius of a pupil with a boundary, from the centre of its frame to its edge.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::pupil) struct RadialLine {
     pub(in crate::pupil) azimuth: f64,
     pub(in crate::pupil) edge: EdgePoint,
-    /// Its share of the turn, in the area of the frame.
+    /// Its share of the full turn, times the area of the frame.
     pub(in crate::pupil) share: f64,
-    /// Where a cosine vanishes behind its end, in parts of its length: infinite where none does
-    /// nearby.
+    /// The distance from the centre at which a cosine vanishes beyond the edge, in lengths of the
+    /// radius; infinite if none does nearby.
     pub(in crate::pupil) grazing_distance: f64,
 }
 
-/// A cosine that vanishes farther out than this, in parts of the radius, is far away.
+/// A cosine that vanishes beyond this, in lengths of the radius, does not matter.
 const FAR: f64 = 1.5;
 
-/// The nodes on some radii. Where a cosine vanishes at the edge or close behind it, the image moves
-/// with the root of the distance from there: Gauss nodes in a variable that makes it smooth.
+/// The nodes on some radii. If a cosine vanishes at the edge or close behind it, the image point
+/// varies with the square root of the distance from there: Gauss nodes are then taken in a variable
+/// that makes it smooth.
 pub(super) fn line_nodes(spokes: &[RadialLine], frame: &PolarFrame, radii: usize) -> Nodes {
     let mut nodes = Nodes::default();
     for spoke in spokes {
@@ -77,8 +78,8 @@ pub(super) fn line_nodes(spokes: &[RadialLine], frame: &PolarFrame, radii: usize
     nodes
 }
 
-/// How nodes are drawn to the ends of an arc: next to one along which a cosine vanishes, integrals
-/// along the radius change with the root of the distance from the corner.
+/// The concentration of nodes at the ends of an arc: next to an arc along which a cosine vanishes,
+/// integrals along the radius vary with the square root of the distance from the corner.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grading {
     from: bool,
@@ -95,7 +96,7 @@ impl Grading {
         Self { from: before.is_some_and(differs), to: after.is_some_and(differs) }
     }
 
-    /// The place between 0 and 1 of a node, and how densely nodes lie there.
+    /// The position of a node between 0 and 1, and the derivative of that map.
     pub(super) fn map(self, t: f64) -> (f64, f64) {
         match (self.from, self.to) {
             (false, false) => (t, 1.0),
@@ -122,7 +123,8 @@ pub(super) fn clear_nodes(order: usize, mirrored: bool) -> Nodes {
     nodes
 }
 
-/// An even sequence over a square. Points farther out than `reach`, where no beam is, are left out.
+/// Evenly distributed points of a square. Points outside the beam, farther out than `reach`, are
+/// omitted.
 pub(super) fn irregular_nodes((center, half): ([f64; 2], f64), count: usize, reach: f64) -> Nodes {
     let point = |i: usize| {
         let u = additive_sequence([0.5; 2], i);

@@ -1,8 +1,8 @@
-//! The edge of a pupil as a designer sees it: in mm, split into sides that one limit each makes.
+//! The outline of a pupil in mm, split into sides that one limit each makes.
 //!
 //! Sides are polylines of equal steps of azimuth, fine enough to draw. Their lengths are those of
-//! the smooth curve: the chords of all points and of every other one, extrapolated (Richardson), so
-//! that 128 points give six digits.
+//! the smooth curve, extrapolated (Richardson) from the chords of all points and of every other
+//! one: 128 points give six digits.
 
 use super::boundary::{Boundary, BoundaryArc, PupilLimit};
 use super::edge_search::{EdgeSearch, GUESS_SPREAD};
@@ -14,37 +14,38 @@ use crate::pupil::ray_model::{Aiming, RayModel};
 use crate::trace::RayLimit;
 use std::f64::consts::{PI, TAU};
 
-/// A side of the edge that one limit makes.
+/// A side of the outline, made by one limit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutlineSide {
-    /// What ends the pupil along it.
+    /// The limit along it.
     pub limit: PupilLimit,
-    /// Its points in mm in the plane of [`Launch::crossing`], its ends included; the first and the
-    /// last are the same where one limit makes the whole edge.
+    /// Its points in mm in the plane of [`Launch::crossing`], ends included; the first and the last
+    /// are the same if one limit makes the whole outline.
     pub points: Vec<[f64; 2]>,
-    /// How long it is, in mm.
+    /// Its length, in mm.
     pub length: f64,
 }
 
-/// The closed edge of a pupil.
+/// The closed outline of a pupil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PupilOutline {
     /// Its sides, each beginning where the one before ends.
     pub sides: Vec<OutlineSide>,
-    /// A point inside that sees all of the edge, in mm.
+    /// A point inside from which all of the outline is visible, in mm.
     pub center: [f64; 2],
-    /// Rays traced to draw it, those that found the pupil not included.
+    /// The number of rays traced to draw it, without those that found the pupil.
     pub rays: usize,
 }
 
 impl PupilOutline {
-    /// The places in mm where one limit takes over from another; none where one makes all.
+    /// The corners in mm, where one limit takes over from another; none if one limit makes the
+    /// whole outline.
     pub fn corners(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let several = self.sides.len() > 1;
         self.sides.iter().filter_map(move |side| side.points.first().copied().filter(|_| several))
     }
 
-    /// The share of the edge that a limit makes, 0 to 1.
+    /// The share of a limit in the length of the outline, 0 to 1.
     pub fn share(&self, limit: PupilLimit) -> f64 {
         let length = |all: bool| -> f64 {
             let sides = self.sides.iter().filter(|side| all || side.limit == limit);
@@ -53,7 +54,7 @@ impl PupilOutline {
         length(false) / length(true)
     }
 
-    /// What makes the edge, the largest share first.
+    /// The limits and their shares, the largest first.
     pub fn limits_by_share(&self) -> Vec<(PupilLimit, f64)> {
         let mut limits: Vec<(PupilLimit, f64)> = Vec::new();
         for side in &self.sides {
@@ -65,14 +66,14 @@ impl PupilOutline {
         limits
     }
 
-    /// Whether the whole disc gets through and no surface clips.
+    /// True if the whole disc gets through: no surface clips.
     pub fn is_clear(&self) -> bool {
         self.sides.iter().all(|side| side.limit == PupilLimit::Disc)
     }
 }
 
 impl PupilLimit {
-    /// The surface that makes it, counted from 0.
+    /// The index of the surface of the limit.
     pub const fn surface(self) -> Option<usize> {
         match self {
             Self::Surface(surface, _) => Some(surface),
@@ -82,7 +83,7 @@ impl PupilLimit {
 }
 
 impl RayModel {
-    /// What a limit is called, with surfaces counted from 0: `rim of surface 3`.
+    /// The name of a limit, such as `rim of surface 4`.
     pub fn limit_name(&self, limit: PupilLimit) -> String {
         match limit {
             PupilLimit::Disc if self.aiming == Aiming::Stop => "rim of the stop".to_owned(),
@@ -106,8 +107,8 @@ impl RayModel {
 }
 
 impl Region<'_> {
-    /// The edge, drawn with about so many points; `None` where there is no light, where nothing
-    /// limits it or where it is ragged.
+    /// The outline, drawn with about `points` points; `None` if there is no light, if nothing
+    /// limits it or if it is irregular.
     pub fn outline(&self, points: usize) -> Option<PupilOutline> {
         let launch = &self.launch;
         match &self.kind {
@@ -123,8 +124,8 @@ impl Region<'_> {
     }
 
     /// The area of the light in mm² and the x and y of its centroid in mm, in the plane of
-    /// [`Launch::crossing`]; the centroid is known to the tolerance times the root of the area.
-    /// `None` where no light gets through.
+    /// [`Launch::crossing`]; the centroid is accurate to the tolerance times the square root of the
+    /// area.
     pub fn extent(&self, accuracy: Accuracy) -> Option<ConvergedValues<3>> {
         let scales = |[area, ..]: &[f64; 3]| [*area, area.sqrt(), area.sqrt()];
         converge(self, accuracy, |nodes| self.area_and_centroid(nodes), scales)
@@ -144,7 +145,7 @@ impl Region<'_> {
 }
 
 impl Launch<'_> {
-    /// The rim of the unit disc in mm: about so many points from +y towards +x, closed.
+    /// The rim of the unit disc in mm: a closed curve of about `points` points from +y towards +x.
     pub fn rim(&self, points: usize) -> Vec<[f64; 2]> {
         let steps = even_steps(points);
         let azimuths = (0..=steps).map(|i| TAU * i as f64 / steps as f64);
@@ -152,7 +153,7 @@ impl Launch<'_> {
     }
 }
 
-/// So many steps, an even number of them and not too few for a length.
+/// The number of steps rounded up to an even one, and to one that gives a length.
 fn even_steps(steps: usize) -> usize {
     2 * steps.div_ceil(2).max(4)
 }
@@ -202,20 +203,20 @@ fn length(points: &[[f64; 2]]) -> f64 {
 }
 
 impl OutlineSide {
-    /// The same on the other side of the y axis, from its end to its beginning.
+    /// The mirror image across the y axis, from its end to its beginning.
     fn mirror_image(&self) -> Self {
         let points = self.points.iter().rev().map(|[x, y]| [-x, *y]).collect();
         Self { points, ..self.clone() }
     }
 
-    /// Goes on along a side of the same limit that begins where this one ends.
+    /// Appends a side of the same limit that begins where this one ends.
     fn append(&mut self, next: Self) {
         self.points.extend(next.points.into_iter().skip(1));
         self.length += next.length;
     }
 }
 
-/// Neighbours that the same limit makes are one side.
+/// Merges neighbours of the same limit.
 fn merge_adjacent(sides: Vec<OutlineSide>) -> Vec<OutlineSide> {
     let mut whole: Vec<OutlineSide> = Vec::with_capacity(sides.len());
     for side in sides {

@@ -1,9 +1,9 @@
-//! Integrals over the rays that get through, by orders that are raised until two agree.
+//! Integrals over the rays that get through, of an order that is raised until two orders agree.
 //!
 //! The clear disc has Gauss nodes in `ρ²` and equal steps of azimuth: odd powers of `ρ` cancel
 //! there, and the rule converges spectrally (Forbes 1988). A clipped pupil has Gauss nodes in
-//! azimuth along every arc, and in the radius with weight `r` up to the edge. What mirrors itself
-//! is integrated over one half.
+//! azimuth along every arc, and in the radius with weight `r` up to the edge. A pupil that is its
+//! own mirror image is integrated over one half.
 
 use super::boundary::Boundary;
 use super::edge_search::{EdgeSearch, GUESS_SPREAD};
@@ -12,12 +12,12 @@ use super::nodes::{Grading, Nodes, RadialLine, clear_nodes, irregular_nodes, lin
 use crate::pupil::gauss_rules::legendre;
 use crate::trace::{Rays, TraceSink};
 
-/// What is asked of a result.
+/// The accuracy that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// The error allowed, relative to what the analysis names as its scale.
+    /// The tolerance: the largest error, relative to a scale that each analysis names.
     pub tolerance: f64,
-    /// No more rays than this for one field and wavelength.
+    /// The largest number of rays for one field and wavelength.
     pub max_rays: usize,
 }
 
@@ -27,22 +27,22 @@ impl Default for Accuracy {
     }
 }
 
-/// Numbers with their errors, and what they cost.
+/// Converged numbers with their errors and their cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConvergedValues<const K: usize> {
-    /// The numbers at the highest order.
+    /// The numbers at the highest order used.
     pub values: [f64; K],
-    /// How much the last raising of the order changed each.
+    /// The change of each by the last raising of the order.
     pub errors: [f64; K],
-    /// Rays traced.
+    /// The number of rays traced.
     pub rays: usize,
-    /// Whether the errors are what was asked for; else the rays ran out.
+    /// True if the errors are within the tolerance; otherwise the orders or the rays ran out.
     pub converged: bool,
 }
 
-/// Nodes along the radius and along half a turn, of the clear disc.
+/// The numbers of nodes along the radius and along half a turn, for the clear disc.
 const CLEAR_ORDERS: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
-/// Nodes along an arc and along the radius, of a piece.
+/// The numbers of nodes along an arc and along the radius, for a pupil with a boundary.
 const STAR_ORDERS: [(usize, usize); 12] = [
     (4, 3),
     (6, 4),
@@ -57,12 +57,13 @@ const STAR_ORDERS: [(usize, usize); 12] = [
     (72, 40),
     (96, 56),
 ];
-/// Points of the lowest order where nothing better is known than a clipped low-discrepancy set.
+/// The number of points of the lowest order for an irregular pupil, sampled by a low-discrepancy
+/// sequence.
 const IRREGULAR_POINTS: usize = 1024;
 const IRREGULAR_ORDERS: usize = 8;
 
 impl Region<'_> {
-    /// How many orders of quadrature there are.
+    /// The number of orders of quadrature.
     pub fn orders(&self) -> usize {
         match self.kind {
             RegionKind::Dark | RegionKind::Unbounded => 0,
@@ -74,13 +75,13 @@ impl Region<'_> {
         }
     }
 
-    /// The nodes of an order, counted from 0; none where there is no light.
+    /// The nodes of an order, counted from 0; none if there is no light.
     pub fn nodes(&self, order: usize) -> Nodes {
         self.nodes_and_lines(order, false).0
     }
 
-    /// The nodes of an order, and the radii that they lie on where the pupil is split; one radius
-    /// where all azimuths are `alike` and that is enough.
+    /// The nodes of an order, and the radii that they lie on if the boundary is known. A single
+    /// radius is used if all azimuths give the same and the caller allows it (`alike`).
     pub(super) fn nodes_and_lines(&self, order: usize, alike: bool) -> (Nodes, Vec<RadialLine>) {
         let mirrored = self.launch.is_symmetric();
         let (azimuths, radii) = STAR_ORDERS[order.min(STAR_ORDERS.len() - 1)];
@@ -107,7 +108,8 @@ impl Region<'_> {
         }
     }
 
-    /// Radii at the Gauss nodes of azimuth of every arc, and the rays traced to find their ends.
+    /// The radii at the Gauss nodes in azimuth of every arc, and the number of rays traced to find
+    /// their ends.
     pub(super) fn radial_lines(
         &self,
         boundary: &Boundary,
@@ -140,7 +142,7 @@ impl Region<'_> {
         self.launch_and_trace(nodes).1
     }
 
-    /// Traces nodes into a sink; returns the rays as they were launched too.
+    /// Traces nodes into a sink; also returns the rays as they were launched.
     pub(super) fn launch_and_trace<S: TraceSink<f64> + Default>(
         &self,
         nodes: &Nodes,
@@ -166,12 +168,12 @@ impl Region<'_> {
     }
 }
 
-/// Rays of a quadrature where they landed.
+/// The traced rays of a quadrature.
 #[derive(Debug, Clone)]
 pub struct TracedNodes<S> {
-    /// Where.
+    /// The recorded ends of the rays.
     pub sink: S,
-    /// The weight of each.
+    /// The weight of each ray.
     pub weights: Vec<f64>,
     /// The number of nodes from which no ray could be launched.
     pub lost: usize,
@@ -180,23 +182,23 @@ pub struct TracedNodes<S> {
 }
 
 impl<S: TraceSink<f64>> TracedNodes<S> {
-    /// The number and weight of every ray that arrived.
+    /// The index and the weight of every ray that arrived.
     pub fn arrivals(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let all = self.weights.iter().copied().enumerate();
         all.filter(|(i, _)| self.sink.fate(*i).is_imaged())
     }
 }
 
-/// The error of clipped points from their last change: four times as many are no more than four
-/// times as good, even where two counts agree by chance.
+/// The error of clipped points from the last change: four times as many points are at most four
+/// times as accurate, even if two results agree by chance.
 fn sampling_error(change: f64, error_before: f64) -> f64 {
     let least = if error_before.is_finite() { 0.25 * error_before } else { 0.0 };
     (2.0 * change).max(least)
 }
 
 /// Raises the order until each of some numbers changes by less than the tolerance times its scale;
-/// `None` where no light gets through. `numbers` computes them from nodes, `scales` says against
-/// what each is measured.
+/// `None` if no light gets through. `numbers` computes them from nodes, `scales` gives the scale of
+/// each.
 pub fn converge<const K: usize>(
     region: &Region<'_>,
     accuracy: Accuracy,

@@ -1,15 +1,14 @@
-//! What the size of every rim does: the derivatives of light and of sharpness by the
-//! semi-diameters.
+//! The sensitivity of light and sharpness to the semi-diameters: the derivatives by each of them.
 //!
-//! With `A` the area of the pupil and `L` the integral of the square distance from the centroid over
-//! it, the RMS radius of the spot is `r = √(L/A)`, so that
+//! With `A` the area of the pupil and `L` the integral of the squared distance from the centroid
+//! over it, the RMS radius of the spot is `r = √(L/A)`, so that
 //!
 //! ```text
 //! dr = (dL − r² dA) / (2 A r)
 //! ```
 //!
-//! Both derivatives are those of an edge that moves (Teh, *Computational Lens Design*, eq. 3.16): a
-//! rim changes no ray, only which rays get through.
+//! Both derivatives are those of a moving edge (Teh, *Computational Lens Design*, eq. 3.16): a
+//! semi-diameter changes no ray, only the set of rays that get through.
 
 use super::Estimate;
 use crate::lens::FieldPoint;
@@ -18,44 +17,45 @@ use crate::pupil::{
     RayModel, Region, choose_estimator, differentiate,
 };
 
-/// What the rims of a lens do to the light and the sharpness of a field, or of all fields.
+/// The sensitivities of the light and sharpness of a field, or of all fields, to the
+/// semi-diameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RimSensitivities {
     /// The area of the pupil, in mm² of the plane through the first vertex.
     pub area: f64,
     /// The RMS radius of the spot about its centroid, in mm.
     pub rms: f64,
-    /// One entry a surface.
+    /// The sensitivity to the semi-diameter of each surface.
     pub surfaces: Vec<RimSensitivity>,
-    /// Rays traced.
+    /// The number of rays traced.
     pub rays: usize,
 }
 
-/// What the semi-diameter of a surface does.
+/// The sensitivity to the semi-diameter of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RimSensitivity {
-    /// The change of the area of the pupil, in mm² for a mm.
+    /// The derivative of the area of the pupil, in mm² per mm.
     pub area: Estimate,
-    /// The change of the RMS radius of the spot, in mm for a mm.
+    /// The derivative of the RMS radius of the spot, in mm per mm.
     pub rms: Estimate,
 }
 
 impl RimSensitivity {
-    /// Whether the rim does anything, as far as is known.
+    /// True if one of the derivatives is larger than its error.
     pub fn is_significant(&self) -> bool {
         [self.area, self.rms].iter().any(|number| number.value.abs() > number.error)
     }
 }
 
-/// An edge that is not followed is sampled by no more rays than this, to this error.
+/// The accuracy if the edge is sampled by a warp field.
 const SAMPLED_ACCURACY: Accuracy = Accuracy { tolerance: 0.05, max_rays: 32_768 };
-/// The order of quadrature of area and spot.
+/// The order of quadrature for area and spot.
 const ORDER: usize = 3;
-/// No sum over rays is more exact than this, relatively.
+/// The relative rounding error of a sum over rays.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// What the rims do to a field at a wavelength. Where the edge of the pupil is sampled instead of
-/// followed, no more than a few per cent of the largest effect are known.
+/// The sensitivities of a field at a wavelength. If the edge of the pupil is sampled by a warp
+/// field, they are known to a few percent of the largest.
 ///
 /// # Errors
 /// A pupil without light or edge.
@@ -100,7 +100,7 @@ fn sensitivity(
     [spread, spread_error]: [f64; 2],
     rays: usize,
 ) -> RimSensitivity {
-    // The throughput is minus the area.
+    // The throughput is the negative of the area.
     let (brightening, square, scale) = (-darkening, rms * rms, 2.0 * area * rms);
     let over = |value: f64| if scale > 0.0 { value / scale } else { 0.0 };
     let blur = over(spread - square * brightening);
@@ -110,8 +110,8 @@ fn sensitivity(
     RimSensitivity { area: number(brightening, dark_error), rms: number(blur, blur_error) }
 }
 
-/// What the rims do to several fields together, each with its weight: to the mean of their areas,
-/// and to the root of the mean of their squared radii. `None` where none has a weight.
+/// The sensitivities of several fields together, each with its weight: of the mean of their areas,
+/// and of the root mean square of their radii. `None` if no field has a weight.
 pub fn mean_rim_sensitivities(fields: &[(f64, &RimSensitivities)]) -> Option<RimSensitivities> {
     let sum: f64 = fields.iter().map(|(weight, _)| weight).sum();
     let first = fields.first().filter(|_| sum > 0.0)?.1;
