@@ -69,7 +69,8 @@ pub enum AnalysisError {
     NoRays(LaunchError),
     /// Nothing limits the beam.
     #[error("no beam: no surface limits it; give the stop a semi-diameter")]
-    Endless,
+    #[serde(rename = "endless")]
+    Unbounded,
     /// The chief ray does not reach the image.
     #[error("no chief ray: the ray through the middle of the pupil does not reach the image")]
     NoChief,
@@ -85,7 +86,7 @@ pub fn lit_region(
     let region = Region::new(launch);
     match region.kind {
         RegionKind::Dark => Err(AnalysisError::NoLight),
-        RegionKind::Unbounded => Err(AnalysisError::Endless),
+        RegionKind::Unbounded => Err(AnalysisError::Unbounded),
         RegionKind::Clear | RegionKind::StarShaped(_) | RegionKind::Irregular { .. } => Ok(region),
     }
 }

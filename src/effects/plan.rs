@@ -2,6 +2,7 @@
 
 use super::effect::{Effect, EffectOverride, EffectOverrides};
 use super::measure::{EffectMeasurements, RimClearance};
+use crate::lens::SurfaceNumber;
 use crate::pupil::WIDE_AIMING_THRESHOLD;
 use crate::trace::GrinStepPlan;
 use serde::{Deserialize, Serialize};
@@ -289,7 +290,10 @@ fn step_text(facts: &EffectMeasurements) -> String {
     let of = |(plan, _): &(GrinStepPlan, f64)| {
         format!(
             "behind surface {} in {} steps ({} evaluations of the index), accurate to {:.0e} mm",
-            plan.surface, plan.steps, plan.kicks, plan.error
+            SurfaceNumber::new(plan.surface),
+            plan.steps,
+            plan.kicks,
+            plan.error
         )
     };
     facts.grin_gaps.iter().map(of).collect::<Vec<_>>().join(", ")

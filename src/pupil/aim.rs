@@ -1,7 +1,7 @@
 //! Ray aiming: the ray of a field that crosses the stop, or another surface, at a given point, by
 //! Newton's method on the two ray coordinates with derivatives from dual numbers.
 
-use super::launch::{FieldSource, PupilMap};
+use super::field_source::{FieldSource, PupilMap, solve_2x2};
 use super::ray_model::{Dual2, RayModel};
 use crate::math::Vec3;
 
@@ -24,13 +24,6 @@ impl AimedRay {
         let columns = [column(radius, 0.0)?, column(0.0, radius)?];
         Some(PupilMap { origin: self.q, columns })
     }
-}
-
-/// The solution of a system of two linear equations.
-pub(super) fn solve_2x2([[a, b], [c, d]]: [[f64; 2]; 2], [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-    let determinant = a * d - b * c;
-    let solution = [(d * x - b * y) / determinant, (a * y - c * x) / determinant];
-    solution.iter().all(|v| v.is_finite()).then_some(solution)
 }
 
 /// The largest number of Newton steps, and of halvings of a step that does not reduce the offset.

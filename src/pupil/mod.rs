@@ -14,6 +14,7 @@
 //! stop if every ray is aimed at it.
 
 mod aim;
+mod field_source;
 mod gauss_rules;
 mod gradient;
 mod launch;

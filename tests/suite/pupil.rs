@@ -292,10 +292,10 @@ fn limits_have_names() {
     let (bench, _) = vignetted(8.0, 0.0);
     let cases = [
         (PupilLimit::Disc, "entrance pupil"),
-        (PupilLimit::Surface(0, RayLimit::Rim), "stop, surface 0"),
-        (PupilLimit::Surface(1, RayLimit::Rim), "rim of surface 1"),
-        (PupilLimit::Surface(1, RayLimit::Miss), "missed surface 1"),
-        (PupilLimit::Surface(1, RayLimit::TotalReflection), "critical angle at surface 1"),
+        (PupilLimit::Surface(0, RayLimit::Rim), "stop, surface 1"),
+        (PupilLimit::Surface(1, RayLimit::Rim), "rim of surface 2"),
+        (PupilLimit::Surface(1, RayLimit::Miss), "missed surface 2"),
+        (PupilLimit::Surface(1, RayLimit::TotalReflection), "critical angle at surface 2"),
         (PupilLimit::Unaimed, "no ray to the stop"),
     ];
     for (limit, name) in cases {

@@ -52,7 +52,7 @@ impl TracedPupil<'_> {
         let frame = match &self.region.kind {
             RegionKind::Clear => return Some(total),
             RegionKind::StarShaped(boundary) => boundary.frame,
-            RegionKind::Irregular { annulus: Some(ring), .. } => ring.outer.frame,
+            RegionKind::Irregular { annulus: Some(annulus), .. } => annulus.outer.frame,
             RegionKind::Irregular { annulus: None, .. }
             | RegionKind::Dark
             | RegionKind::Unbounded => return None,
@@ -62,7 +62,7 @@ impl TracedPupil<'_> {
         }
         for limit in self.limits() {
             let PupilLimit::Surface(surface, hurdle) = limit else { continue };
-            let on_limit = self.radial_lines.iter().filter(|spoke| spoke.edge.limit == limit);
+            let on_limit = self.radial_lines.iter().filter(|line| line.edge.limit == limit);
             let moved = on_limit.filter_map(|s| self.edge_ray(cost, &frame, s, (surface, hurdle)));
             let (rays, weights): (Vec<_>, Vec<f64>) = moved.unzip();
             let rays: Rays<f64> = rays.into_iter().collect();
@@ -96,18 +96,18 @@ impl TracedPupil<'_> {
         &self,
         cost: &impl Integrand,
         frame: &PolarFrame,
-        spoke: &RadialLine,
+        line: &RadialLine,
         (surface, hurdle): (usize, RayLimit),
     ) -> Option<(Ray<f64>, f64)> {
         let launch = &self.region.launch;
-        let p = frame.point(spoke.azimuth, spoke.edge.radius);
+        let p = frame.point(line.azimuth, line.edge.radius);
         let ray = launch.ray(p)?;
         let color = launch.channel();
         let landed = color.tracer.land_at_edge(ray, surface, hurdle)?;
         let slope = color.unclipped.margin(launch.dual_ray(p)?, surface, hurdle)?.slope;
-        let direction = frame.direction(spoke.azimuth);
+        let direction = frame.direction(line.azimuth);
         let outwards = slope[0] * direction[0] + slope[1] * direction[1];
-        let measure = launch.area() * spoke.share * spoke.edge.radius;
+        let measure = launch.area() * line.share * line.edge.radius;
         let weight = -measure * cost.value([landed.x, landed.y]) / outwards;
         weight.is_finite().then_some((ray, weight))
     }

@@ -63,13 +63,13 @@ impl FromStr for DerivativeEstimator {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DerivativeError {
     /// No light: the reason, and a remedy.
-    #[error("no light gets through ({0}), and the derivative of nothing is no way back: {1}")]
+    #[error("no light gets through ({0}), so there is no derivative; {1}")]
     Dark(String, &'static str),
     /// Nothing limits the beam.
     #[error("nothing limits the beam; give the stop or another surface a semi-diameter")]
     Unbounded,
     /// A pupil that is neither star-shaped nor an annulus; its form.
-    #[error("{0}, and `boundary` needs one that a point inside sees all of; expected `warp`")]
+    #[error("{0}, and `boundary` needs a star-shaped pupil or an annulus; expected `warp`")]
     NotStarShaped(String),
     /// No square was found that holds all samples of the warp field.
     #[error("the square around the pupil for the warp field was not found")]
@@ -151,11 +151,13 @@ pub fn choose_estimator(
             let reason = format!("the pupil is one piece with an edge of {edge}");
             Ok((DerivativeEstimator::Boundary, reason))
         }
-        RegionKind::Irregular { annulus: Some(_), .. } => {
-            Ok((DerivativeEstimator::Boundary, "the pupil is a ring around a shadow".to_owned()))
-        }
+        RegionKind::Irregular { annulus: Some(_), .. } => Ok((
+            DerivativeEstimator::Boundary,
+            "the pupil is an annulus around an obstruction".to_owned(),
+        )),
         RegionKind::Irregular { pieces, .. } if region.launch.channel().system.has_grin() => {
-            let reason = format!("{}, and a gradient has no warp field", describe_pieces(*pieces));
+            let reason =
+                format!("{}, and a gradient-index gap has no warp field", describe_pieces(*pieces));
             Ok((DerivativeEstimator::Difference, reason))
         }
         RegionKind::Irregular { pieces, .. } => {
@@ -164,7 +166,7 @@ pub fn choose_estimator(
             let reason = if best > asked.tolerance {
                 format!(
                     "{shape}; the standard error will be about {best:.0e} after {} rays and not \
-                     the {:.0e} that are asked for",
+                     the tolerance of {:.0e}",
                     asked.max_rays, asked.tolerance
                 )
             } else {
@@ -206,6 +208,7 @@ impl Region<'_> {
     /// The fate of the ray through the centre of a dark pupil, and a remedy.
     fn explain_darkness(&self) -> (String, &'static str) {
         const NEARER: &str = "take a field nearer to the axis or a larger semi-diameter";
+        const FLATTEN: &str = "flatten it or take a field nearer to the axis";
         let launch = &self.launch;
         if launch.model.stop_radius() == 0.0 {
             return ("the stop has the radius 0".to_owned(), "open the stop");
@@ -213,28 +216,22 @@ impl Region<'_> {
         let Some(ray) = launch.ray([0.0; 2]) else {
             return ("no ray through the centre of the stop is found".to_owned(), NEARER);
         };
-        match launch.channel().tracer.trace(ray).fate {
-            Fate::Imaged => ("only single rays do".to_owned(), "enlarge the semi-diameters"),
-            Fate::Clipped(i) => {
-                let found = format!("the ray through the centre is clipped by surface {i}");
-                (found, "enlarge its semi-diameter or take a field nearer to the axis")
+        let (found, remedy) = match launch.channel().tracer.trace(ray).fate {
+            Fate::Imaged => {
+                return ("only single rays do".to_owned(), "enlarge the semi-diameters");
             }
-            Fate::Missed(i) => {
-                let found = format!("the ray through the centre misses surface {i}");
-                (found, "flatten it or take a field nearer to the axis")
-            }
-            Fate::TotalReflection(i) => {
-                let found =
-                    format!("the ray through the centre is totally reflected at surface {i}");
-                (found, "flatten it or take a field nearer to the axis")
-            }
-            Fate::Turned(i) | Fate::Trapped(i) => {
-                let found = format!(
-                    "the gradient in front of surface {i} keeps the ray through the centre"
-                );
-                (found, "weaken it or take a field nearer to the axis")
-            }
-        }
+            Fate::Clipped(i) => (
+                format!("is clipped by surface {i}"),
+                "enlarge its semi-diameter or take a field nearer to the axis",
+            ),
+            Fate::Missed(i) => (format!("misses surface {i}"), FLATTEN),
+            Fate::TotalReflection(i) => (format!("is totally reflected at surface {i}"), FLATTEN),
+            Fate::Turned(i) | Fate::Trapped(i) => (
+                format!("does not leave the gradient before surface {i}"),
+                "weaken it or take a field nearer to the axis",
+            ),
+        };
+        (format!("the ray through the centre {found}"), remedy)
     }
 
     /// Raises the order of quadrature.

@@ -29,15 +29,16 @@ impl Annulus {
         end: f64,
         azimuths: usize,
     ) -> Option<Self> {
-        let edge =
-            |seen| EdgeSearch::new(launch, frame).with_limits(seen).trace_boundary(end, azimuths);
-        let ring = Self {
+        let edge = |limits| {
+            EdgeSearch::new(launch, frame).with_limits(limits).trace_boundary(end, azimuths)
+        };
+        let annulus = Self {
             outer: edge(LimitFilter::WithoutObstructions)?,
             inner: edge(LimitFilter::Obstructions)?,
         };
         let shadow = |limit| matches!(limit, PupilLimit::Surface(_, RayLimit::Obstruction));
-        let closed = ring.inner.arcs.iter().all(|arc| shadow(arc.limit)) && ring.is_open();
-        closed.then_some(ring)
+        let closed = annulus.inner.arcs.iter().all(|arc| shadow(arc.limit)) && annulus.is_open();
+        closed.then_some(annulus)
     }
 
     /// True if the outer edge is outside the inner one at all sampled azimuths.
@@ -68,7 +69,7 @@ impl Annulus {
             EdgeSearch::new(launch, frame).with_limits(LimitFilter::WithoutObstructions);
         let mut inner = EdgeSearch::new(launch, frame).with_limits(LimitFilter::Obstructions);
         let factor = frame.area() * if launch.is_symmetric() { 2.0 } else { 1.0 };
-        let mut spokes = Vec::new();
+        let mut lines = Vec::new();
         for (from, to) in self.azimuth_intervals() {
             for (t, share) in legendre(azimuths) {
                 let azimuth = from + t * (to - from);
@@ -78,16 +79,16 @@ impl Annulus {
                     let edge = search.edge(azimuth, side.radius_guess(azimuth), GUESS_SPREAD)?;
                     Some(RadialLine { azimuth, edge, share, grazing_distance: f64::INFINITY })
                 });
-                spokes.extend(far.zip(near).map(|(far, near)| [far, near]));
+                lines.extend(far.zip(near).map(|(far, near)| [far, near]));
             }
         }
-        (spokes, outer.rays + inner.rays)
+        (lines, outer.rays + inner.rays)
     }
 
     /// The Gauss nodes along radii from one edge to the other.
-    pub(super) fn nodes(&self, spokes: &[[RadialLine; 2]], radii: usize) -> Nodes {
+    pub(super) fn nodes(&self, lines: &[[RadialLine; 2]], radii: usize) -> Nodes {
         let mut nodes = Nodes::default();
-        for [far, near] in spokes {
+        for [far, near] in lines {
             let from = near.edge.radius;
             let width = (far.edge.radius - from).max(0.0);
             for (u, weight) in legendre(radii) {

@@ -133,8 +133,8 @@ impl<'a> EdgeSearch<'a> {
     }
 
     /// The same search with other limits.
-    pub(super) fn with_limits(self, seen: LimitFilter) -> Self {
-        Self { limits: seen, ..self }
+    pub(super) fn with_limits(self, limits: LimitFilter) -> Self {
+        Self { limits, ..self }
     }
 
     fn probe(&mut self, azimuth: f64, r: f64, wanted: PupilLimit) -> LimitProbe {

@@ -49,7 +49,7 @@ impl<'a> Region<'a> {
         let kind = grid.classify(&launch, &shadows);
         rays += match &kind {
             RegionKind::StarShaped(boundary) => boundary.rays,
-            RegionKind::Irregular { annulus: Some(ring), .. } => ring.rays(),
+            RegionKind::Irregular { annulus: Some(annulus), .. } => annulus.rays(),
             _ => 0,
         };
         Self { launch, kind, rays }
@@ -266,14 +266,15 @@ impl LightGrid {
             let frame = PolarFrame { center, axes: self.axes(self.centroid(), symmetric) };
             Annulus::around(launch, frame, end, azimuths)
         };
-        let rings = shadows.iter().flatten().filter_map(|middle| around(*middle));
-        let ring = rings.into_iter().find(|ring| self.agrees_with_annulus(launch, ring, shadows));
+        let annuli = shadows.iter().flatten().filter_map(|middle| around(*middle));
+        let annulus =
+            annuli.into_iter().find(|annulus| self.agrees_with_annulus(launch, annulus, shadows));
         // A grid may be too coarse to show that a narrow annulus is connected.
-        let pieces = if ring.is_some() { 1 } else { pieces };
+        let pieces = if annulus.is_some() { 1 } else { pieces };
         RegionKind::Irregular {
             pieces,
             square: self.bounding_square(),
-            annulus: ring.map(Box::new),
+            annulus: annulus.map(Box::new),
         }
     }
 
@@ -390,10 +391,10 @@ impl LightGrid {
     fn agrees_with_annulus(
         &self,
         launch: &Launch<'_>,
-        ring: &Annulus,
+        annulus: &Annulus,
         shadows: &[Option<[f64; 2]>],
     ) -> bool {
-        let Annulus { outer, inner } = ring;
+        let Annulus { outer, inner } = annulus;
         let mut rims =
             EdgeSearch::new(launch, outer.frame).with_limits(LimitFilter::WithoutObstructions);
         let mut shadow =

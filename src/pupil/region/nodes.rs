@@ -37,17 +37,17 @@ const FAR: f64 = 1.5;
 /// The nodes on some radii. If a cosine vanishes at the edge or close behind it, the image point
 /// varies with the square root of the distance from there: Gauss nodes are then taken in a variable
 /// that makes it smooth.
-pub(super) fn line_nodes(spokes: &[RadialLine], frame: &PolarFrame, radii: usize) -> Nodes {
+pub(super) fn line_nodes(lines: &[RadialLine], frame: &PolarFrame, radii: usize) -> Nodes {
     let mut nodes = Nodes::default();
-    for spoke in spokes {
-        let radius = spoke.edge.radius;
-        let sector = spoke.share * radius * radius;
+    for line in lines {
+        let radius = line.edge.radius;
+        let sector = line.share * radius * radius;
         let mut add = |r: f64, weight: f64| {
-            nodes.points.push(frame.point(spoke.azimuth, r * radius));
+            nodes.points.push(frame.point(line.azimuth, r * radius));
             nodes.weights.push(sector * weight);
         };
-        let beyond = spoke.grazing_distance - 1.0;
-        match (spoke.edge.limit.is_grazing(), spoke.grazing_distance < FAR) {
+        let beyond = line.grazing_distance - 1.0;
+        match (line.edge.limit.is_grazing(), line.grazing_distance < FAR) {
             (false, false) => radial(radii).iter().for_each(|(r, weight)| add(*r, *weight)),
             // r = 1 − s²
             (true, false) => legendre(2 * radii).iter().for_each(|(s, w)| {
@@ -56,10 +56,10 @@ pub(super) fn line_nodes(spokes: &[RadialLine], frame: &PolarFrame, radii: usize
             }),
             // r = 1 + beyond − s²
             (false, true) => {
-                let [first, last] = [beyond.sqrt(), spoke.grazing_distance.sqrt()];
+                let [first, last] = [beyond.sqrt(), line.grazing_distance.sqrt()];
                 legendre(2 * radii).iter().for_each(|(t, w)| {
                     let s = first + t * (last - first);
-                    let r = spoke.grazing_distance - s * s;
+                    let r = line.grazing_distance - s * s;
                     add(r, 2.0 * s * (last - first) * r * w);
                 });
             }

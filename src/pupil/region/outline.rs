@@ -9,6 +9,7 @@ use super::edge_search::{EdgeSearch, GUESS_SPREAD};
 use super::kind::{Region, RegionKind};
 use super::nodes::Nodes;
 use super::quadrature::{Accuracy, ConvergedValues, converge};
+use crate::lens::SurfaceNumber;
 use crate::pupil::launch::Launch;
 use crate::pupil::ray_model::{Aiming, RayModel};
 use crate::trace::RayLimit;
@@ -85,24 +86,22 @@ impl PupilLimit {
 impl RayModel {
     /// The name of a limit, such as `rim of surface 4`.
     pub fn limit_name(&self, limit: PupilLimit) -> String {
-        match limit {
-            PupilLimit::Disc if self.aiming == Aiming::Stop => "rim of the stop".to_owned(),
-            PupilLimit::Disc => "entrance pupil".to_owned(),
-            PupilLimit::Surface(i, RayLimit::Rim) if i == self.stop() => {
-                format!("stop, surface {i}")
-            }
-            PupilLimit::Surface(i, RayLimit::Rim) => format!("rim of surface {i}"),
-            PupilLimit::Surface(i, RayLimit::Obstruction) => format!("obstruction of surface {i}"),
-            PupilLimit::Surface(i, RayLimit::Miss) => format!("missed surface {i}"),
-            PupilLimit::Surface(i, RayLimit::Equator) => format!("equator of surface {i}"),
-            PupilLimit::Surface(i, RayLimit::TotalReflection) => {
-                format!("critical angle at surface {i}")
-            }
-            PupilLimit::Surface(i, RayLimit::Side) => {
-                format!("side of the gradient before surface {i}")
-            }
-            PupilLimit::Unaimed => "no ray to the stop".to_owned(),
-        }
+        let (surface, ray_limit) = match limit {
+            PupilLimit::Disc if self.aiming == Aiming::Stop => return "rim of the stop".to_owned(),
+            PupilLimit::Disc => return "entrance pupil".to_owned(),
+            PupilLimit::Unaimed => return "no ray to the stop".to_owned(),
+            PupilLimit::Surface(surface, limit) => (surface, limit),
+        };
+        let name = match ray_limit {
+            RayLimit::Rim if surface == self.stop() => "stop,",
+            RayLimit::Rim => "rim of",
+            RayLimit::Obstruction => "obstruction of",
+            RayLimit::Miss => "missed",
+            RayLimit::Equator => "equator of",
+            RayLimit::TotalReflection => "critical angle at",
+            RayLimit::Side => "side of the gradient before",
+        };
+        format!("{name} surface {}", SurfaceNumber::new(surface))
     }
 }
 

@@ -92,14 +92,14 @@ impl Region<'_> {
             }
             RegionKind::StarShaped(boundary) => {
                 let alike = alike && self.launch.is_axial() && boundary.arcs.len() == 1;
-                let (spokes, rays) = self.radial_lines(boundary, if alike { 1 } else { azimuths });
-                let nodes = line_nodes(&spokes, &boundary.frame, radii);
-                (Nodes { mirrored, rays, ..nodes }, spokes)
+                let (lines, rays) = self.radial_lines(boundary, if alike { 1 } else { azimuths });
+                let nodes = line_nodes(&lines, &boundary.frame, radii);
+                (Nodes { mirrored, rays, ..nodes }, lines)
             }
-            RegionKind::Irregular { annulus: Some(ring), .. } => {
-                let (spokes, rays) = ring.radial_lines(&self.launch, azimuths);
-                let nodes = ring.nodes(&spokes, radii);
-                (Nodes { mirrored, rays, ..nodes }, spokes.into_iter().flatten().collect())
+            RegionKind::Irregular { annulus: Some(annulus), .. } => {
+                let (lines, rays) = annulus.radial_lines(&self.launch, azimuths);
+                let nodes = annulus.nodes(&lines, radii);
+                (Nodes { mirrored, rays, ..nodes }, lines.into_iter().flatten().collect())
             }
             RegionKind::Irregular { square, .. } => {
                 let reach = if self.launch.model.ends_at_disc() { 1.0 } else { f64::INFINITY };
@@ -118,7 +118,7 @@ impl Region<'_> {
         let mut search = EdgeSearch::new(&self.launch, boundary.frame);
         let halves = if self.launch.is_symmetric() { 2.0 } else { 1.0 };
         let factor = halves * boundary.frame.area();
-        let mut spokes = Vec::with_capacity(azimuths * boundary.arcs.len());
+        let mut lines = Vec::with_capacity(azimuths * boundary.arcs.len());
         for (i, arc) in boundary.arcs.iter().enumerate() {
             let length = arc.to - arc.from;
             let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
@@ -128,13 +128,14 @@ impl Region<'_> {
                 let guess = boundary.radius_guess(azimuth);
                 let expected = search.edge_at_limit(arc.limit, azimuth, guess);
                 if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, GUESS_SPREAD)) {
-                    let grazing = search.grazing_distance(&boundary.grazing_limits, azimuth, edge);
+                    let grazing_distance =
+                        search.grazing_distance(&boundary.grazing_limits, azimuth, edge);
                     let share = factor * share * stretch * length;
-                    spokes.push(RadialLine { azimuth, edge, share, grazing_distance: grazing });
+                    lines.push(RadialLine { azimuth, edge, share, grazing_distance });
                 }
             }
         }
-        (spokes, search.rays)
+        (lines, search.rays)
     }
 
     /// Traces nodes into a sink.

@@ -7,7 +7,7 @@ use crate::effects::{EffectDecision, EffectOverride, EffectPlan};
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text::capitalize;
 
 /// The panel.
 #[derive(Debug)]
@@ -41,7 +41,7 @@ fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, actions: &mut Actio
                 let chosen = view.settings.overrides.get(decision.effect);
                 override_menu(ui, decision, chosen, actions);
             });
-            let reason = capitalize(&counted_from_one(&decision.reason));
+            let reason = capitalize(&decision.reason);
             ui.label(RichText::new(reason).small());
             ui.label(RichText::new(reason_text(decision)).small().weak()).on_hover_text(
                 "What changes if the effect is left out, above what that is needed, and the share \

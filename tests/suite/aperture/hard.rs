@@ -232,7 +232,7 @@ fn aperture_gradients_of_no_light_are_an_error_that_says_what_to_do() {
     let clipped = bench(system(&rows, 0));
     let closed = bench(system(&[(0.0, 5.0, 1.0, 0.0)], 0));
     for (bench, degrees, says) in
-        [(&clipped, 30.0, "clipped by surface 1"), (&closed, 0.0, "open the stop")]
+        [(&clipped, 30.0, "clipped by surface 2"), (&closed, 0.0, "open the stop")]
     {
         let region = Region::new(launch(bench, degrees));
         let dark = choose_estimator(&region, ASKED).unwrap_err();

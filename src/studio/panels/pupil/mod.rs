@@ -20,7 +20,7 @@ use crate::pupil::{PupilLimit, RayModel};
 use crate::session::{self, Analyses, AnalysisResults, Command, SessionView, Timed};
 use crate::studio::actions::Actions;
 use crate::studio::palette::{Palette, color32};
-use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text::capitalize;
 use picture::{PupilPicture, PupilWindow};
 
 /// The field of a cell above, four lines of numbers below; more where a pupil has more limits than
@@ -157,9 +157,9 @@ impl PupilView<'_> {
         &self.numbers.bench.value
     }
 
-    /// A limit as the window counts surfaces.
+    /// The name of a limit.
     fn limit_name(&self, limit: PupilLimit) -> String {
-        counted_from_one(&self.bench().limit_name(limit))
+        self.bench().limit_name(limit)
     }
 
     fn limit_color(&self, palette: &Palette, limit: PupilLimit) -> egui::Color32 {
