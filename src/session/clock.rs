@@ -2,29 +2,29 @@
 
 use std::time::{Duration, Instant};
 
-/// The present moment.
+/// The present time.
 #[expect(clippy::disallowed_methods, reason = "a session paces its window and times its numbers")]
 pub(super) fn now() -> Instant {
     Instant::now()
 }
 
-/// A result and how long it took.
+/// A result with its computing time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timed<T> {
     /// The result.
     pub value: T,
-    /// How long it took, in milliseconds.
+    /// The time that it took, in milliseconds.
     pub ms: f64,
 }
 
-/// Computes something and looks at the clock before and after.
+/// Calls a function and measures its time.
 pub(super) fn time<T>(compute: impl FnOnce() -> T) -> Timed<T> {
     let start = now();
     let value = compute();
     Timed { value, ms: start.elapsed().as_secs_f64() * 1e3 }
 }
 
-/// Lets something happen at most so often.
+/// Limits the rate of an action.
 #[derive(Debug)]
 pub(super) struct Throttle {
     interval: Duration,
@@ -36,7 +36,7 @@ impl Throttle {
         Self { interval: every, last: None }
     }
 
-    /// Whether it is time; if so, the next time is that much later.
+    /// Returns true if the interval since the last time that this was true has passed.
     pub(super) fn ready(&mut self) -> bool {
         let now = now();
         let due = self.last.is_none_or(|last| now.duration_since(last) >= self.interval);

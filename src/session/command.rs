@@ -1,11 +1,7 @@
-//! Everything a person can ask for, as one enum.
-//!
-//! The window, the command line and recorded work speak the same language: an [`Edit`] changes
-//! the design and can be undone, every other [`Command`] opens, saves, searches or sets up what is
-//! shown.
+//! The commands of a session.
 
-use super::forming::GrinCommand;
-use super::quest::StructureSearchRequest;
+use super::grin_design::GrinCommand;
+use super::structure_search::StructureSearchRequest;
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
 use crate::lens::{Edit, Lens};
@@ -15,136 +11,137 @@ use crate::search::SteerCommand;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// One wish of a person.
+/// A command of the user. An [`Edit`] changes the design and can be undone; the other commands open
+/// and save, control background runs, or set what is shown.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
-    /// Change the design: one undo step.
+    /// Changes the design, as one undo step.
     Edit(Edit),
-    /// Limits the beam by the rim of the stop as it is now, instead of by an ideal entrance pupil: one
+    /// Limits the beam by the present aperture of the stop instead of an ideal entrance pupil, as one
     /// undo step.
     LimitByStop,
-    /// Typing into a cell has ended: the next edit of the same cell is an undo step of its own.
+    /// Ends an edit of a table cell: the next edit of the same cell is an undo step of its own.
     CommitEdit,
-    /// Take back the last step.
+    /// Reverts the last undo step.
     Undo,
-    /// Do it again.
+    /// Restores the undo step that was reverted last.
     Redo,
-    /// Start with another lens that has no file yet.
+    /// Starts with another lens that has no file yet.
     New(Box<Lens>),
-    /// Read a lens from a file of any known format.
+    /// Reads a lens from a file of any known format.
     Open(PathBuf),
-    /// Write the lens to its own file, or to this one, which becomes its own.
+    /// Writes the lens to its own file, or to this one, which becomes its own.
     Save(Option<PathBuf>),
-    /// Write a copy, in the format of the extension.
+    /// Writes a copy in the format of the extension.
     Export(PathBuf),
-    /// Search for a better lens in the background, on a copy.
+    /// Starts a local optimization of a copy of the design.
     Optimize {
-        /// How.
+        /// The descent method.
         method: DescentMethod,
-        /// What for.
+        /// The merit function.
         goal: Goal,
     },
-    /// Hold the search after its current step.
+    /// Pauses the optimization after its current step.
     Pause,
-    /// Let it go on.
+    /// Resumes the optimization.
     Resume,
-    /// One step of a search that is held.
+    /// Takes one step of the paused optimization.
     Step,
-    /// End the search; its result stays to be taken or thrown away.
+    /// Stops the optimization; its result can be accepted or discarded.
     Stop,
-    /// Make the best lens of the search the design, as one undo step, and end the search.
+    /// Makes the best lens of the optimization the design, as one undo step, and ends the optimization.
     AcceptResult,
-    /// End the search and throw its result away.
+    /// Ends the optimization and discards its result.
     DiscardResult,
-    /// Sweep the front of sharpness against light in the background, from the design.
+    /// Starts a sweep of the Pareto front of sharpness and light from the design.
     StartPareto {
-        /// How.
+        /// The settings of the sweep.
         settings: pareto::ParetoSettings,
-        /// Whether to do the same afterwards with pupils that the derivatives keep as they are.
+        /// True for a second pass whose derivatives keep the pupils frozen.
         compare: bool,
     },
-    /// Hold the sweep after its current slice.
+    /// Pauses the sweep after its current step.
     PausePareto,
-    /// Let it go on.
+    /// Resumes the sweep.
     ResumePareto,
-    /// End the sweep; its front stays.
+    /// Stops the sweep; its front remains.
     StopPareto,
-    /// End the sweep and forget its front and all earlier ones.
+    /// Ends the sweep and dismisses all fronts.
     ClearPareto,
-    /// Write the front into this folder: table, picture and every lens.
+    /// Writes the front into a folder: table, plot and every lens.
     ExportPareto(Option<PathBuf>),
-    /// Search over structure.
+    /// A command for the search over lens structures.
     StructureSearch(StructureSearchCommand),
-    /// Form a gradient-index field, or look at one.
+    /// A command for the gradient-index field.
     Grin(GrinCommand),
-    /// Show another lens in place of the design, which stays what it is; `None` for the design.
+    /// Shows another lens in place of the design, which does not change; `None` shows the design.
     Preview(Option<Box<Lens>>),
-    /// Make the lens that is shown in place of the design the design, as one undo step.
+    /// Makes the lens that is shown in place of the design the design, as one undo step.
     AcceptPreview,
-    /// How exact the shown numbers have to be: a relative error, 0.001 for 0.1 %.
+    /// Sets the relative error allowed of the numbers, 0.001 for 0.1 %.
     SetTolerance(f64),
-    /// Which zoom position is shown.
+    /// Sets the index of the zoom position to show.
     ShowZoom(usize),
-    /// How many rays of each field the layout shows.
+    /// Sets the number of rays of each field in the layout.
     ShowRays(usize),
-    /// Whether a physical effect is computed: as planned, always or never.
+    /// Sets whether a physical effect is computed: as planned, always or never.
     SetEffect(Effect, EffectOverride),
-    /// Whether the pupils of the fields are computed: while a panel shows them.
+    /// Sets whether the pupils of the fields are computed.
     ShowPupils(bool),
-    /// The wavelength of the pupils that are shown; `None` for the primary one.
+    /// Sets the index of the wavelength of the pupils; `None` for the primary one.
     ShowPupilWavelength(Option<usize>),
-    /// Carry out an experiment in the background, in place of the one that runs.
+    /// Starts an experiment in place of the one that runs.
     StartExperiment {
         /// The number of its figure or table.
         id: String,
-        /// How much it works for its claims.
+        /// The computational effort.
         effort: Effort,
     },
-    /// Tell the experiment to stop.
+    /// Stops the experiment.
     CancelExperiment,
-    /// End the experiment and forget what it found.
+    /// Stops the experiment and dismisses its results.
     DismissExperiment,
-    /// Write what the experiment found into this folder.
+    /// Writes the results of the experiment into a folder.
     SaveExperiment(PathBuf),
-    /// Point out a surface in every panel, or none.
+    /// Highlights a surface in every panel, or none.
     Select(Option<usize>),
-    /// Forget the messages so far.
+    /// Removes all messages.
     ClearMessages,
 }
 
-/// What a person asks of a search over structure. It works on its own copy of the design.
+/// A command for the search over lens structures, which works on a copy of the design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StructureSearchCommand {
-    /// Begin one from the design, in place of the one before.
+    /// Starts a search from the design, in place of the one before.
     Start(Box<StructureSearchRequest>),
-    /// Go on with the one that a file holds.
+    /// Resumes the search of a file.
     ResumeFrom(Option<PathBuf>),
-    /// Hold it after its present round.
+    /// Pauses the search after its current round.
     Pause,
-    /// Let it go on.
+    /// Resumes the search.
     Resume,
-    /// End it; what it has found stays.
+    /// Stops the search; its lenses remain.
     Stop,
-    /// Pin a lens, forbid a mutation, change the temperature.
+    /// Changes the search between two rounds: its pinned lens, mutations or temperature.
     Control(SteerCommand),
-    /// Show the lens of a chain, counted from 0, in place of the design as it changes; or no more.
+    /// Shows the lens of the chain with this index in place of the design; `None` shows the design.
     Preview(Option<usize>),
-    /// Save it to this file from now on, or the next one where none goes on.
+    /// Saves the search to this file from now on, or the next search if none is active.
     SaveTo(Option<PathBuf>),
-    /// Make the lens of a generation the design, as one undo step.
+    /// Makes the lens of a generation the design, as one undo step.
     Accept(u64),
-    /// Write the lens of a generation.
+    /// Finalizes and writes the lens of a generation.
     Export {
-        /// Its number.
+        /// The generation.
         number: u64,
         /// The file.
         path: Option<PathBuf>,
     },
-    /// End it and forget it; its file stays.
+    /// Ends the search and dismisses its lenses; its file remains.
     Clear,
-    /// Remove the file of the one that was left when the program was closed.
+    /// Dismisses the search that was unfinished when the program was closed.
     DismissUnfinished,
 }
 

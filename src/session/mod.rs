@@ -1,62 +1,47 @@
-//! One open design: the document, commands and undo, a search and an analyst in the background.
+//! One open design: the document, its undo history, and everything that is computed from it in the
+//! background.
 //!
-//! A [`Session`] is told what a person wants as [`Command`]s and shows what there is as a
-//! [`SessionView`]. It knows no widgets: the window, a test and a script use it alike.
+//! A [`Session`] carries out [`Command`]s and shows its state as a [`SessionView`]. It knows no
+//! widgets: the window, a test and a script use it alike.
 //!
 //! - *The document changes only by a command*, and an edit that would leave a lens that cannot be
-//!   used is refused: the document is then what it was.
-//! - *A search works on its own copy*: its result becomes the document when it is taken, as one
-//!   undo step. So does the sweep of a front, whose lenses can be looked at before.
-//! - *Nothing here waits*: numbers and searches are in newest-value slots, and `wake` is called when
-//!   something new is in one.
+//!   used is refused: the document stays as it was.
+//! - *A run works on its own copy*: an optimization, a sweep of the Pareto front and a structure search
+//!   change the document only when one of their lenses is accepted, as one undo step.
+//! - *Nothing here waits*: analyses and runs have threads of their own, their newest states are in
+//!   slots, and `wake` is called when there is something new in one.
 
-mod analyst;
-mod background;
+mod analysis;
 mod clock;
 mod command;
-mod course;
-mod desk;
-mod diary;
-mod exploration;
-mod explorations;
-mod explorer;
-mod finishing;
-mod forming;
-mod fronts;
-mod history;
-mod judged;
-mod laboratory;
-mod moments;
-mod pupils;
-mod quest;
-mod saving;
+mod experiment;
+mod grin_design;
+mod optimization;
+mod pareto;
+mod run;
+mod score;
 mod slot;
-mod sweeper;
+mod state;
+mod structure_search;
+mod undo;
 mod view;
-mod worker;
 
-pub use analyst::{Analyses, AnalysisResults, analyze};
+pub use analysis::{Analyses, AnalysisResults, FieldPupils, analyze, measure_effect_costs};
 pub use clock::Timed;
 pub use command::{Command, StructureSearchCommand};
-pub use desk::{Session, SessionEvent};
-pub use exploration::{
-    ChainPosition, CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot,
-};
-pub use explorations::StructureSearchView;
-pub use forming::{
+pub use experiment::{ExperimentRun, ExperimentStatus};
+pub use grin_design::{
     Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinRun, GrinView,
     IndexProfile, LossSample, MAX_NODES, Slice, SliceQuantity, SliceSettings,
 };
-pub use fronts::ParetoView;
-pub use judged::ScoredLens;
-pub use laboratory::{ExperimentRun, ExperimentStatus};
-pub use moments::{DescentMark, HistorySample, SearchHistory};
-pub use pupils::FieldPupils;
-pub use quest::StructureSearchRequest;
-pub use saving::measure_effect_costs;
+pub use optimization::{MeritSample, OptimizationRequest, OptimizationSnapshot, OptimizerFactory};
+pub use pareto::{ParetoPass, ParetoRun, ParetoView};
+pub use run::{RunId, RunKind, RunStatus, RunView};
+pub use score::ScoredLens;
 pub use slot::Slot;
-pub use sweeper::{ParetoPass, ParetoRun};
-pub use view::{AnalysisSettings, Message, SessionView, Severity};
-pub use worker::{
-    MeritSample, OptimizationRequest, OptimizationSnapshot, OptimizerFactory, RunStatus,
+pub use state::{Session, SessionEvent};
+pub use structure_search::{
+    ChainPosition, CheckpointStatus, DescentMark, EndReason, FoundLens, HistorySample,
+    SearchHistory, StructureSearchRequest, StructureSearchSnapshot, StructureSearchView,
 };
+pub use view::{AnalysisSettings, Message, SessionView, Severity};

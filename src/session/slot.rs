@@ -1,9 +1,9 @@
-//! Places where threads leave things for each other, so that neither waits for the other.
+//! Shared values between threads of which neither waits for the other.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A place for the newest value; neither side waits for the other to finish anything.
+/// A slot for the newest value of a thread.
 #[derive(Debug)]
 pub struct Slot<T>(Arc<Mutex<Option<Arc<T>>>>);
 
@@ -20,7 +20,7 @@ impl<T> Default for Slot<T> {
 }
 
 impl<T> Slot<T> {
-    /// Puts a value in the place of the one before.
+    /// Replaces the value.
     pub fn set(&self, value: T) {
         *locked(&self.0) = Some(Arc::new(value));
     }
@@ -36,7 +36,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A letter box that holds one letter: a newer one replaces one that was not read yet.
+/// A one-element mailbox: a new request replaces an unread one.
 #[derive(Debug)]
 pub(super) struct LatestRequest<T> {
     state: Mutex<RequestState<T>>,
@@ -55,25 +55,25 @@ impl<T> LatestRequest<T> {
         Self { state: Mutex::new(state), arrived: Condvar::new() }
     }
 
-    /// Leaves a letter.
-    pub(super) fn submit(&self, letter: T) {
-        locked(&self.state).request = Some(letter);
+    /// Submits a request.
+    pub(super) fn submit(&self, request: T) {
+        locked(&self.state).request = Some(request);
         self.arrived.notify_one();
     }
 
-    /// Says that no more letters come.
+    /// Closes the mailbox.
     pub(super) fn close(&self) {
         locked(&self.state).closed = true;
         self.arrived.notify_all();
     }
 
-    /// Whether a reader should leave what it is at.
+    /// True if a request waits or the mailbox is closed.
     pub(super) fn is_interrupted(&self) -> bool {
         let state = locked(&self.state);
         state.closed || state.request.is_some()
     }
 
-    /// Waits for a letter; `None` when the box is closed.
+    /// Waits for a request; `None` if the mailbox is closed.
     pub(super) fn take(&self) -> Option<T> {
         let waiting = |state: &mut RequestState<T>| !state.closed && state.request.is_none();
         let state = self.arrived.wait_while(locked(&self.state), waiting);
@@ -81,14 +81,14 @@ impl<T> LatestRequest<T> {
         if state.closed { None } else { state.request.take() }
     }
 
-    /// Whether nothing arrives for a while.
+    /// Waits for this time. Returns true if nothing has arrived.
     pub(super) fn idle_for(&self, time: Duration) -> bool {
         let waiting = |state: &mut RequestState<T>| !state.closed && state.request.is_none();
         let waited = self.arrived.wait_timeout_while(locked(&self.state), time, waiting);
         waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
     }
 
-    /// Whether no more letters come.
+    /// True if the mailbox is closed.
     pub(super) fn is_closed(&self) -> bool {
         locked(&self.state).closed
     }

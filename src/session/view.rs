@@ -1,54 +1,59 @@
-//! What a panel reads: a snapshot of the session that nothing changes.
+//! The state of a session that panels read.
 
-use super::analyst::AnalysisResults;
-use super::explorations::StructureSearchView;
-use super::forming::GrinView;
-use super::fronts::ParetoView;
-use super::laboratory::ExperimentRun;
-use super::worker::OptimizationSnapshot;
+use super::analysis::AnalysisResults;
+use super::experiment::ExperimentRun;
+use super::grin_design::GrinView;
+use super::optimization::OptimizationSnapshot;
+use super::pareto::ParetoView;
+use super::run::RunView;
+use super::score::ScoredLens;
+use super::structure_search::StructureSearchView;
 use crate::effects::EffectOverrides;
 use crate::lens::{Lens, blank};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A snapshot of one open design and everything that is known about it.
+/// A snapshot of one open design and of everything that is known about it. It shares its large parts
+/// with the session.
 #[derive(Debug, Clone)]
 pub struct SessionView {
     /// The design.
     pub lens: Arc<Lens>,
-    /// Counts every change of the design and of the settings.
+    /// The number of changes of the design and of the settings.
     pub version: u64,
-    /// The newest numbers there are, maybe of an older version.
+    /// The newest analyses, maybe of an earlier version.
     pub results: Option<Arc<AnalysisResults>>,
-    /// The search in the background, or the last one whose result was neither taken nor thrown
-    /// away.
-    pub optimization: Option<Arc<OptimizationSnapshot>>,
-    /// The fronts of sharpness against light.
+    /// The local optimization.
+    pub optimization: RunView<OptimizationSnapshot>,
+    /// The Pareto fronts of sharpness and light.
     pub pareto: ParetoView,
-    /// The search over structure.
+    /// The search over lens structures.
     pub structure_search: StructureSearchView,
     /// The gradient-index field that is open.
     pub grin: GrinView,
-    /// A lens that is shown in place of the design.
+    /// The sharpness and light of the design, maybe of an earlier version; `None` without a run to
+    /// compare with.
+    pub design_score: Option<Arc<ScoredLens>>,
+    /// The lens that a panel shows in place of the design.
     pub preview_lens: Option<Arc<Lens>>,
-    /// The numbers of that lens, or of the one that the search shows, maybe of a step before.
+    /// The analyses of that lens, or of the one that a run shows, maybe of an earlier step.
     pub preview_results: Option<Arc<AnalysisResults>>,
-    /// The experiment in the background, or the last one until it is put away.
+    /// The experiment, until it is dismissed.
     pub experiment: Option<Arc<ExperimentRun>>,
-    /// What was said, newest last.
-    pub messages: Vec<Message>,
-    /// What undo would take back; `None` where there is nothing.
+    /// The messages so far, the newest last.
+    pub messages: Arc<Vec<Message>>,
+    /// The title of the edit that undo reverts; `None` if there is none.
     pub undo: Option<String>,
-    /// What redo would do again; `None` where there is nothing.
+    /// The title of the edit that redo restores; `None` if there is none.
     pub redo: Option<String>,
-    /// The file of the design; `None` where it was never saved.
+    /// The file of the design; `None` if it was never saved.
     pub path: Option<PathBuf>,
-    /// Whether the design differs from its file.
+    /// True if the design differs from its file.
     pub dirty: bool,
-    /// What is shown and how exactly.
+    /// The settings of the analyses.
     pub settings: AnalysisSettings,
-    /// The surface that every panel points out.
+    /// The index of the surface that every panel highlights.
     pub selected: Option<usize>,
 }
 
@@ -58,14 +63,15 @@ impl Default for SessionView {
             lens: Arc::new(blank()),
             version: 0,
             results: None,
-            optimization: None,
+            optimization: RunView::default(),
             pareto: ParetoView::default(),
             structure_search: StructureSearchView::default(),
             grin: GrinView::default(),
+            design_score: None,
             preview_lens: None,
             preview_results: None,
             experiment: None,
-            messages: Vec::new(),
+            messages: Arc::default(),
             undo: None,
             redo: None,
             path: None,
@@ -77,26 +83,26 @@ impl Default for SessionView {
 }
 
 impl SessionView {
-    /// Whether the numbers belong to the design as it is now.
+    /// True if the analyses belong to the present version.
     pub fn is_current(&self) -> bool {
         self.results.as_ref().is_some_and(|results| results.version == self.version)
     }
 }
 
-/// What is shown and how exactly.
+/// The settings of the analyses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AnalysisSettings {
-    /// The relative error that the shown numbers may have.
+    /// The relative error allowed of the numbers.
     pub tolerance: f64,
-    /// The zoom position that is shown.
+    /// The index of the zoom position.
     pub zoom: usize,
-    /// How many rays of each field the layout shows.
+    /// The number of rays of each field in the layout.
     pub rays: usize,
-    /// Effects that are not left to the plan.
+    /// The effects that are not left to the plan.
     pub overrides: EffectOverrides,
-    /// Whether pupils are computed: what is not shown is not.
+    /// True if the pupils are computed, because a panel shows them.
     pub pupils: bool,
-    /// The wavelength of the pupils; `None` for the primary one.
+    /// The index of the wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
 }
 
@@ -113,23 +119,23 @@ impl Default for AnalysisSettings {
     }
 }
 
-/// How much a message matters.
+/// The severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// Something was done.
     Note,
-    /// A wish was not fulfilled, or not wholly.
+    /// A command was not carried out, or not completely.
     Warning,
-    /// Something failed.
+    /// Something has failed.
     Error,
 }
 
-/// Something that was said to the person.
+/// A message to the user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Message {
-    /// How much it matters.
+    /// The severity.
     pub severity: Severity,
-    /// The words.
+    /// The text.
     pub text: String,
 }

@@ -167,7 +167,7 @@ impl Studio {
     /// Keeps a message that does not fit into the status bar for the dialog.
     fn on_events(&mut self, events: Vec<SessionEvent>) {
         for event in events {
-            if let SessionEvent::Said(message) = event
+            if let SessionEvent::Message(message) = event
                 && (message.text.lines().count() > 1 || message.severity == Severity::Error)
             {
                 self.message = Some(message.text);
@@ -243,7 +243,7 @@ impl App for Studio {
 /// The path with which a file dialog starts.
 fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
     let search = &view.structure_search;
-    let checkpoint = || search.run.as_ref().and_then(|run| run.checkpoint.path.clone());
+    let checkpoint = || search.run.snapshot.as_ref().and_then(|run| run.checkpoint.path.clone());
     match request {
         FileRequest::ExportFront => {
             let beside = view.path.as_ref().map(|path| path.with_file_name("front"));
@@ -262,7 +262,7 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
 
 /// The file of the gradient-index field that is open.
 fn open_field_path(view: &SessionView) -> Option<&Path> {
-    match &view.grin.run.as_ref()?.document.source {
+    match &view.grin.run.snapshot.as_ref()?.document.source {
         DocumentSource::File(path) => Some(path),
         DocumentSource::Builtin(_) => None,
     }

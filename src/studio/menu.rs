@@ -119,7 +119,7 @@ fn file_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     if item(ui, "Export a copy as JSON…", None) {
         actions.push(FileRequest::ExportJson);
     }
-    ui.add_enabled_ui(view.pareto.run.is_some(), |ui| {
+    ui.add_enabled_ui(view.pareto.run.snapshot.is_some(), |ui| {
         if item(ui, "Export the front…", None) {
             actions.push(FileRequest::ExportFront);
         }

@@ -30,15 +30,18 @@ pub fn capitalize(text: &str) -> String {
     first + letters.as_str()
 }
 
-/// How a run stands, or will as soon as its present work is done.
-pub fn status_text(now: RunStatus, pending: Option<RunStatus>) -> &'static str {
-    match now {
-        _ if pending == Some(RunStatus::Paused) => "Pausing…",
-        _ if pending == Some(RunStatus::Stopped) => "Stopping…",
+/// The status of a background run, as the window shows it.
+pub fn status_text(status: RunStatus) -> &'static str {
+    match status {
+        RunStatus::Idle => "",
+        RunStatus::Starting => "Starting…",
         RunStatus::Running => "Running",
+        RunStatus::Pausing => "Pausing…",
         RunStatus::Paused => "Paused",
+        RunStatus::Stopping => "Stopping…",
         RunStatus::Stopped => "Stopped",
         RunStatus::Finished => "Finished",
+        RunStatus::Failed => "Failed",
     }
 }
 

@@ -62,7 +62,7 @@ impl Studio {
         match lost {
             UnsavedDocument::Lens => self.session.is_dirty(),
             UnsavedDocument::Field => {
-                self.session.view().grin.run.is_some_and(|run| run.is_unsaved())
+                self.session.view().grin.run.snapshot.is_some_and(|run| run.is_unsaved())
             }
         }
     }
@@ -130,8 +130,7 @@ impl Studio {
             UnsavedDocument::Lens => self.file_dialog.ask(context, FileRequest::Save, None),
             UnsavedDocument::Field => {
                 // What goes on changing is never saved as it is.
-                let run = view.grin.run.as_ref();
-                if run.is_some_and(|run| run.status == RunStatus::Running) {
+                if view.grin.run.status == RunStatus::Running {
                     self.apply(context, Command::Grin(GrinCommand::Pause));
                 }
                 self.ask_path(context, view, FileRequest::SaveField(DEFAULT_NODES));
@@ -166,7 +165,7 @@ fn ask_about_unsaved(
             ("Save the changes first?", format!("{name} has changes that are in no file yet."))
         }
         UnsavedDocument::Field => {
-            let name = view.grin.run.as_ref().map_or("", |run| run.document.name.as_str());
+            let name = view.grin.run.snapshot.as_ref().map_or("", |run| run.document.name.as_str());
             ("Save the field first?", format!("The field of “{name}” is in no file yet."))
         }
     };

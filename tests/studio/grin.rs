@@ -54,10 +54,10 @@ fn wait(session: &mut Session, what: &str, enough: impl Fn(&GrinView) -> bool) {
 
 /// Whether everything that can be seen of the field is there.
 fn is_seen(forming: &GrinView) -> bool {
-    let GrinView { run: Some(run), slice: Some(slice), analysis: Some(sighting), .. } = forming
-    else {
+    let GrinView { run, slice: Some(slice), analysis: Some(sighting), .. } = forming else {
         return false;
     };
+    let Some(run) = &run.snapshot else { return false };
     let (Ok(slice), Ok(sighting)) = (slice.as_ref(), sighting.as_ref()) else { return false };
     let media = [&slice.field, &sighting.field];
     media.into_iter().all(|medium| std::sync::Arc::ptr_eq(medium, &run.field))
@@ -68,12 +68,10 @@ fn opened(name: &str, to_its_end: bool) -> GrinView {
     let mut session = Session::new(blank(), || {}).unwrap();
     session.apply(Command::Grin(GrinCommand::SetActive(true)));
     session.apply(Command::Grin(GrinCommand::OpenBuiltin(name.to_owned())));
-    wait(&mut session, "the opening", |forming| forming.run.is_some());
+    wait(&mut session, "the opening", |forming| forming.run.snapshot.is_some());
     if to_its_end {
         session.apply(Command::Grin(GrinCommand::Start));
-        wait(&mut session, "the end", |forming| {
-            forming.run.as_ref().is_some_and(|run| run.status == RunStatus::Finished)
-        });
+        wait(&mut session, "the end", |forming| forming.run.status == RunStatus::Finished);
     }
     wait(&mut session, "the view", is_seen);
     session.view().grin
@@ -90,7 +88,8 @@ fn without_a_task_the_panel_says_what_to_do_and_asks_for_nothing() {
     assert_eq!(asked(&harness), [GrinCommand::OpenBuiltin("luneburg-radial".into())]);
     assert_eq!(harness.state().requests, [FileRequest::OpenField]);
 
-    let failed = GrinView { error: Some("a.json: found a lens".into()), ..GrinView::default() };
+    let mut failed = GrinView::default();
+    failed.run.error = Some("a.json: found a lens".into());
     panel(failed).get_by_label("A.json: found a lens");
     let opening = GrinView { opening: true, ..GrinView::default() };
     panel(opening).get_by_label("Opening…");
@@ -136,9 +135,7 @@ fn a_task_is_worked_on_turned_and_saved_by_buttons() {
         (RunStatus::Paused, [("Resume", GrinCommand::Resume), ("Stop", GrinCommand::Stop)]),
     ] {
         let mut held = opened("luneburg-radial", true);
-        let mut run = held.run.as_deref().unwrap().clone();
-        run.status = standing;
-        held.run = Some(run.into());
+        held.run.status = standing;
         for (button, form) in buttons {
             let mut harness = panel(held.clone());
             press(&mut harness, "Optimize");

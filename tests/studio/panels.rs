@@ -7,8 +7,8 @@ use aplanat::lens::{Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, R
 use aplanat::merit::{Goal, PupilEdge, Term};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, pareto};
 use aplanat::session::{
-    Command, OptimizationRequest, OptimizationSnapshot, ParetoPass, ParetoRun, ParetoView,
-    RunStatus, SessionView,
+    Command, OptimizationRequest, OptimizationSnapshot, ParetoPass, ParetoRun, ParetoView, RunId,
+    RunKind, RunStatus, RunView, SessionView,
 };
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::file_dialog::FileRequest;
@@ -170,6 +170,12 @@ fn a_row_has_a_menu_of_its_own() {
     assert_eq!(edits(&harness.state().commands), [&Edit::SetStop(1)]);
 }
 
+/// A run with a state.
+fn run_view<S>(kind: RunKind, number: u64, status: RunStatus, state: S) -> RunView<S> {
+    let snapshot = Some(Arc::new(state));
+    RunView { id: Some(RunId { kind, number }), status, error: None, snapshot }
+}
+
 /// A search that stands somehow.
 fn searching(standing: RunStatus) -> SessionView {
     let view = view();
@@ -186,8 +192,6 @@ fn searching(standing: RunStatus) -> SessionView {
         finished: false,
     };
     let search = OptimizationSnapshot {
-        number: 1,
-        status: standing,
         request: Arc::new(task),
         progress: Some(progress),
         best: Arc::clone(&view.lens),
@@ -196,7 +200,8 @@ fn searching(standing: RunStatus) -> SessionView {
         best_terms: Vec::new(),
         history: Vec::new(),
     };
-    SessionView { optimization: Some(Arc::new(search)), ..view }
+    let optimization = run_view(RunKind::Optimization, 1, standing, search);
+    SessionView { optimization, ..view }
 }
 
 fn optimizer(view: SessionView) -> Harness<'static, PanelState<OptimizerPanel>> {
@@ -526,8 +531,6 @@ fn fronts(standing: RunStatus) -> SessionView {
         rejection: None,
     };
     let run = ParetoRun {
-        number: 2,
-        status: standing,
         settings: pareto::ParetoSettings::default(),
         compare: true,
         lens: Arc::clone(&view.lens),
@@ -535,8 +538,8 @@ fn fronts(standing: RunStatus) -> SessionView {
         main: leg.clone(),
         biased: Some(leg),
     };
-    let earlier = vec![Arc::new(ParetoRun { number: 1, ..run.clone() })];
-    let fronts = ParetoView { run: Some(Arc::new(run)), earlier, ..ParetoView::default() };
+    let earlier = vec![run_view(RunKind::Pareto, 1, RunStatus::Finished, run.clone())];
+    let fronts = ParetoView { run: run_view(RunKind::Pareto, 2, standing, run), earlier };
     SessionView { pareto: fronts, ..view }
 }
 
@@ -580,7 +583,7 @@ fn a_sweep_can_be_held_ended_exported_and_forgotten() {
 #[test]
 fn lenses_of_the_front_are_stepped_through_and_taken() {
     let view = fronts(RunStatus::Finished);
-    let run = view.pareto.run.clone().unwrap();
+    let run = view.pareto.run.snapshot.clone().unwrap();
     let designs = run.main.front.points();
     let mut harness = pareto_front(view);
     harness.get_by_label_contains("hypervolume");
@@ -623,7 +626,7 @@ fn a_click_on_a_point_shows_its_lens() {
 #[test]
 fn a_front_that_failed_says_why_and_a_dark_lens_cannot_begin_one() {
     let mut failed = view();
-    failed.pareto.error = Some("surface 2 is steeper than a hemisphere".to_owned());
+    failed.pareto.run.error = Some("surface 2 is steeper than a hemisphere".to_owned());
     pareto_front(failed).get_by_label("Surface 3 is steeper than a hemisphere");
 
     let mut dark = view();

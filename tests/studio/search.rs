@@ -12,9 +12,9 @@ use aplanat::search::{
     SearchMethod, SearchStatistics, SteerCommand, Temperature,
 };
 use aplanat::session::{
-    ChainPosition, CheckpointStatus, Command, DescentMark, FoundLens, HistorySample, RunStatus,
-    ScoredLens, SearchHistory, SessionView, StructureSearchCommand, StructureSearchRequest,
-    StructureSearchSnapshot,
+    ChainPosition, CheckpointStatus, Command, DescentMark, FoundLens, HistorySample, RunId,
+    RunKind, RunStatus, RunView, ScoredLens, SearchHistory, SessionView, StructureSearchCommand,
+    StructureSearchRequest, StructureSearchSnapshot,
 };
 use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::SearchPanel;
@@ -137,8 +137,6 @@ fn searching(standing: RunStatus) -> SessionView {
     statistics.kinds.insert(MutationKind::AddSinglet, tally);
     let place = ChainPosition { number: 1, merit: 0.03, elements: 6, lens: other(1) };
     let run = StructureSearchSnapshot {
-        number: 1,
-        status: standing,
         request: Arc::default(),
         start: found(0, 0.1),
         best: found(1, 0.02),
@@ -162,8 +160,13 @@ fn searching(standing: RunStatus) -> SessionView {
             error: None,
         },
     };
-    view.structure_search.current_design = Some(Arc::new(run.start.score.clone().unwrap()));
-    view.structure_search.run = Some(Arc::new(run));
+    view.design_score = Some(Arc::new(run.start.score.clone().unwrap()));
+    view.structure_search.run = RunView {
+        id: Some(RunId { kind: RunKind::StructureSearch, number: 1 }),
+        status: standing,
+        error: None,
+        snapshot: Some(Arc::new(run)),
+    };
     view
 }
 
@@ -281,9 +284,10 @@ fn a_lens_that_is_kept_is_compared_pinned_taken_and_exported() {
     assert_eq!(harness.state().commands.last(), Some(&Command::Preview(None)));
 
     let mut pinned = searching(RunStatus::Running);
-    let mut run = StructureSearchSnapshot::clone(pinned.structure_search.run.as_ref().unwrap());
+    let mut run =
+        StructureSearchSnapshot::clone(pinned.structure_search.run.snapshot.as_ref().unwrap());
     run.pinned = Some(1);
-    pinned.structure_search.run = Some(Arc::new(run));
+    pinned.structure_search.run.snapshot = Some(Arc::new(run));
     let mut harness = panel(pinned);
     harness.get_by_label_contains("Lens 1, pinned: 10 µm").click();
     harness.run();
@@ -322,7 +326,7 @@ fn every_lens_tells_where_it_came_from() {
 #[test]
 fn without_a_search_the_panel_says_what_is_missing() {
     let mut failed = view();
-    failed.structure_search.error = Some("surface 2 is steeper than a hemisphere".to_owned());
+    failed.structure_search.run.error = Some("surface 2 is steeper than a hemisphere".to_owned());
     panel(failed).get_by_label("Surface 3 is steeper than a hemisphere");
 
     let mut left = view();

@@ -14,7 +14,7 @@ use egui_kittest::kittest::Queryable;
 type Window = Harness<'static, Studio>;
 
 fn run(harness: &Window) -> Option<std::sync::Arc<GrinRun>> {
-    harness.state().session().view().grin.run
+    harness.state().session().view().grin.run.snapshot
 }
 
 fn wait(harness: &mut Window, what: &str, so: impl Fn(&Window) -> bool) {
@@ -43,7 +43,8 @@ fn formed() -> Window {
     wait(&mut harness, "the opening", |harness| run(harness).is_some());
     assert!(!run(&harness).unwrap().is_unsaved(), "nothing has been formed yet");
     tell(&mut harness, GrinCommand::Start);
-    let is_done = |harness: &Window| run(harness).unwrap().status == RunStatus::Finished;
+    let status = |harness: &Window| harness.state().session().view().grin.run.status;
+    let is_done = |harness: &Window| status(harness) == RunStatus::Finished;
     wait(&mut harness, "the end", is_done);
     assert!(run(&harness).unwrap().is_unsaved());
     harness
@@ -66,7 +67,7 @@ fn a_field_is_not_lost_without_a_question() {
     press(&mut harness, "Don't save");
     assert!(harness.query_by_label("Save the field first?").is_none());
     wait(&mut harness, "the beginning", |harness| {
-        harness.state().session().view().grin.pending.is_none()
+        harness.state().session().view().grin.run.status != RunStatus::Starting
     });
 }
 

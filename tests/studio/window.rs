@@ -146,7 +146,8 @@ fn a_search_bends_the_shown_lens_and_its_result_is_one_step() {
     harness.run_steps(3);
     wait(&mut harness, "a better spot", |harness| {
         let view = harness.state().session().view();
-        let steps = view.optimization.and_then(|search| search.progress.as_ref().map(|p| p.step));
+        let steps =
+            view.optimization.snapshot.and_then(|search| search.progress.as_ref().map(|p| p.step));
         view.preview_results.is_some() && steps.unwrap_or(0) > 3
     });
     harness.get_by_label("Stop").click();
@@ -173,7 +174,7 @@ fn a_search_over_structure_shows_its_lenses_and_one_is_taken_as_one_step() {
     button.click();
     wait(&mut harness, "a card", |harness| {
         let cards = harness.query_all_by_label_contains(" elements, ");
-        let moves = harness.state().session().view().structure_search.run;
+        let moves = harness.state().session().view().structure_search.run.snapshot;
         cards.count() > 0 && moves.is_some_and(|run| run.statistics.moves > 8)
     });
     harness.get_by_label("Follow the search").click();
@@ -284,7 +285,7 @@ fn nothing_repaints_while_nothing_changes() {
 fn a_field_is_looked_at_only_while_its_panel_is_shown() {
     let mut harness = window();
     let forming = |harness: &Harness<'_, Studio>| harness.state().session().view().grin;
-    assert!(!forming(&harness).is_active && forming(&harness).run.is_none());
+    assert!(!forming(&harness).is_active && forming(&harness).run.snapshot.is_none());
     harness.get_by_label("GRIN slice").click();
     harness.run_steps(3);
     assert!(forming(&harness).is_active);
@@ -294,5 +295,8 @@ fn a_field_is_looked_at_only_while_its_panel_is_shown() {
     harness.get_by_label_contains("Slice of Luneburg");
     harness.get_by_label("Layout").click();
     harness.run_steps(3);
-    assert!(!forming(&harness).is_active && forming(&harness).run.is_some(), "it stays open");
+    assert!(
+        !forming(&harness).is_active && forming(&harness).run.snapshot.is_some(),
+        "it stays open"
+    );
 }

@@ -112,7 +112,7 @@ fn wait(
 }
 
 fn step_of(view: &SessionView) -> usize {
-    let progress = view.optimization.as_ref().and_then(|search| search.progress.as_ref());
+    let progress = view.optimization.snapshot.as_ref().and_then(|search| search.progress.as_ref());
     progress.map_or(0, |progress| progress.step)
 }
 
@@ -214,7 +214,7 @@ fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());
-        let refused = matches!(events.last(), Some(SessionEvent::Said(_)));
+        let refused = matches!(events.last(), Some(SessionEvent::Message(_)));
         assert!(!refused && session.lens() != lenses.last().unwrap(), "{edit:?}: {events:?}");
         let text = serde_json::to_string(&Command::from(edit.clone())).unwrap();
         assert_eq!(serde_json::from_str::<Command>(&text).unwrap(), Command::Edit(edit), "{text}");
@@ -255,7 +255,10 @@ fn consecutive_edits_of_one_cell_are_one_step() {
 fn refused_edits_leave_the_design_and_say_why() {
     let cases = [
         (Edit::Set { parameter: GAP, value: f64::NAN }, "thickness after surface 2 is NaN"),
-        (Edit::Set { parameter: Parameter::new(99, Quantity::Conic), value: 0.0 }, "no surface 99"),
+        (
+            Edit::Set { parameter: Parameter::new(99, Quantity::Conic), value: 0.0 },
+            "no surface 100",
+        ),
         (Edit::SetSemiDiameter { surface: 0, value: Some(-1.0) }, "expected zero or more"),
         (Edit::SetMedium { surface: 0, medium: Medium::Glass("N-BK77".into()) }, "unknown glass"),
         (Edit::RemoveRow(usize::MAX), "there is no surface"),
@@ -269,7 +272,7 @@ fn refused_edits_leave_the_design_and_say_why() {
     let before = session.view();
     for (edit, words) in cases {
         let events = session.apply(edit.into());
-        let [SessionEvent::Said(message)] = events.as_slice() else { panic!("{events:?}") };
+        let [SessionEvent::Message(message)] = events.as_slice() else { panic!("{events:?}") };
         assert!(message.text.contains(words), "{} has no `{words}`", message.text);
         assert_eq!(message.severity, Severity::Warning);
     }
@@ -400,12 +403,12 @@ fn a_search_runs_beside_the_design_and_its_result_is_one_step() {
     session.apply(OPTIMIZE);
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
     session.apply(Command::Stop);
-    wait(&mut session, "the stop", |view, _| !view.optimization.as_ref().unwrap().is_active());
+    wait(&mut session, "the stop", |view, _| !view.optimization.is_active());
     assert_eq!(*session.lens(), before, "the search has its own copy");
-    let best = Arc::clone(&session.view().optimization.unwrap().best);
+    let best = Arc::clone(&session.view().optimization.snapshot.unwrap().best);
     session.apply(Command::AcceptResult);
     assert_eq!(*session.lens(), best);
-    assert!(session.view().optimization.is_none());
+    assert!(session.view().optimization.snapshot.is_none());
     session.apply(Command::Undo);
     assert_eq!(*session.lens(), before);
     assert!(session.view().undo.is_none());
@@ -418,10 +421,10 @@ fn the_double_gauss_gets_better_in_the_background() {
     let mut session = Session::new(lens, || {}).unwrap();
     session.apply(Command::Optimize { method: DescentMethod::DampedLeastSquares, goal });
     wait(&mut session, "ten steps", |view, _| {
-        let over = view.optimization.as_ref().is_some_and(|search| !search.is_active());
+        let over = !view.optimization.is_active();
         step_of(view) >= 10 || over
     });
-    let search = session.view().optimization.unwrap();
+    let search = session.view().optimization.snapshot.unwrap();
     let (first, last) = (search.history[0], search.history[search.history.len() - 1]);
     assert!(last.best < first.best, "{first:?} {last:?}");
     assert!(!search.best_terms.is_empty());
@@ -438,11 +441,11 @@ fn a_discarded_search_leaves_the_design_alone() {
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
     session.apply(Command::DiscardResult);
     let after = session.view();
-    assert!(after.optimization.is_none());
+    assert!(after.optimization.snapshot.is_none());
     assert_eq!((after.version, &after.lens), (before.version, &before.lens));
     let events = session.apply(Command::AcceptResult);
     assert!(
-        matches!(events.last(), Some(SessionEvent::Said(_))),
+        matches!(events.last(), Some(SessionEvent::Message(_))),
         "there is nothing to take: {events:?}"
     );
 }
@@ -456,10 +459,8 @@ fn a_result_taken_after_an_edit_keeps_the_edit() {
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
     session.apply(Command::Pause);
     session.apply(Edit::Set { parameter: GAP, value: 0.5 }.into());
-    wait(&mut session, "the pause", |view, _| {
-        view.optimization.as_ref().is_some_and(|search| search.status == RunStatus::Paused)
-    });
-    let best = Arc::clone(&session.view().optimization.unwrap().best);
+    wait(&mut session, "the pause", |view, _| view.optimization.status == RunStatus::Paused);
+    let best = Arc::clone(&session.view().optimization.snapshot.unwrap().best);
     session.apply(Command::AcceptResult);
     assert_eq!(session.lens().surfaces[0].curvature, best.surfaces[0].curvature);
     assert_eq!(session.lens().surfaces[1].thickness, 0.5);
@@ -471,9 +472,7 @@ fn pause_holds_and_step_advances_by_one() {
     let mut session = Session::with_optimizer(double_gauss(), toy(600, &steps), || {}).unwrap();
     session.apply(OPTIMIZE);
     session.apply(Command::Pause);
-    wait(&mut session, "the pause", |view, _| {
-        view.optimization.as_ref().is_some_and(|search| search.status == RunStatus::Paused)
-    });
+    wait(&mut session, "the pause", |view, _| view.optimization.status == RunStatus::Paused);
     let held = steps.load(Ordering::SeqCst);
     std::thread::sleep(Duration::from_millis(60));
     assert_eq!(steps.load(Ordering::SeqCst), held, "nothing moves while the search is held");
@@ -483,12 +482,10 @@ fn pause_holds_and_step_advances_by_one() {
         assert_eq!(steps.load(Ordering::SeqCst), held + more);
     }
     session.apply(Command::Resume);
-    wait(&mut session, "the end", |view, _| {
-        view.optimization.as_ref().is_some_and(|search| search.status == RunStatus::Finished)
-    });
-    let search = session.view().optimization.unwrap();
+    wait(&mut session, "the end", |view, _| view.optimization.status == RunStatus::Finished);
+    let search = session.view().optimization.snapshot.unwrap();
     // Every step, and the start before the first one.
-    assert_eq!((search.status, search.history.len()), (RunStatus::Finished, 601));
+    assert_eq!(search.history.len(), 601);
 }
 
 #[test]
@@ -507,7 +504,7 @@ fn a_search_that_breaks_says_so_and_the_next_one_works() {
     wait(&mut session, "the refusal", |view, _| {
         view.messages.iter().any(|m| m.text.contains("needs a curved surface"))
     });
-    assert!(session.view().optimization.is_none());
+    assert!(session.view().optimization.snapshot.is_none());
 }
 
 #[test]
@@ -724,7 +721,7 @@ fn a_design_is_saved_and_opened() {
     let path = folder.join("lens.json");
     let mut session = session(double_gauss());
     let events = session.apply(Command::Save(None));
-    assert!(matches!(events.last(), Some(SessionEvent::Said(_))), "it has no file yet");
+    assert!(matches!(events.last(), Some(SessionEvent::Message(_))), "it has no file yet");
     session.apply(Edit::SetName("Mine".into()).into());
     let events = session.apply(Command::Save(Some(path.clone())));
     assert!(events.contains(&SessionEvent::Saved(path.clone())), "{events:?}");
@@ -737,7 +734,7 @@ fn a_design_is_saved_and_opened() {
     let before = Arc::clone(session.lens());
     let events = session.apply(Command::Open(folder.join("missing.json")));
     assert!(
-        matches!(&events[0], SessionEvent::Said(m) if m.text.contains("missing.json")),
+        matches!(&events[0], SessionEvent::Message(m) if m.text.contains("missing.json")),
         "{events:?}"
     );
     assert_eq!(*session.lens(), before);
@@ -876,8 +873,10 @@ fn a_thousand_random_commands_leave_a_sound_design() {
             session.lens().check().unwrap_or_else(|why| panic!("{command:?}: {why}"));
             let changed = *session.lens() != before;
             accepted += usize::from(changed);
-            if matches!((&command, events.last()), (Command::Edit(_), Some(SessionEvent::Said(_))))
-            {
+            if matches!(
+                (&command, events.last()),
+                (Command::Edit(_), Some(SessionEvent::Message(_)))
+            ) {
                 refused += 1;
                 assert!(!changed, "refused and yet changed: {command:?}");
             }

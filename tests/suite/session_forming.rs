@@ -47,15 +47,14 @@ fn forming(session: &Session) -> GrinView {
 }
 
 fn run(session: &Session) -> Arc<GrinRun> {
-    forming(session).run.unwrap()
+    forming(session).run.snapshot.unwrap()
 }
 
 /// Waits until what is open stands so, whatever it stood like before.
 fn stands(session: &mut Session, standing: RunStatus) {
     wait(session, "the standing", |view, _| {
-        let GrinView { run, opening, pending, .. } = &view.grin;
-        let now = run.as_ref().map(|run| run.status);
-        now == Some(standing) && !opening && pending.is_none()
+        let GrinView { run, opening, .. } = &view.grin;
+        run.status == standing && !opening
     });
 }
 
@@ -68,7 +67,7 @@ fn open(session: &mut Session, path: &Path) {
 fn slice(session: &mut Session) -> Slice {
     wait(session, "a slice", |view, _| {
         let forming = &view.grin;
-        let run = forming.run.as_ref().unwrap();
+        let run = forming.run.snapshot.as_ref().unwrap();
         forming.slice.as_ref().and_then(|slice| slice.as_ref().as_ref().ok()).is_some_and(|slice| {
             Arc::ptr_eq(&slice.field, &run.field) && slice.settings == forming.slice_settings
         })
@@ -81,7 +80,7 @@ fn refused(session: &mut Session, path: &Path) -> String {
     open(session, path);
     let said = session.view().messages.last().cloned().unwrap();
     assert_eq!(said.severity, Severity::Error, "{}", said.text);
-    assert_eq!(forming(session).error, Some(said.text.clone()));
+    assert_eq!(forming(session).run.error, Some(said.text.clone()));
     said.text
 }
 
@@ -100,7 +99,7 @@ fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
     assert!(run(&session).is_ready());
     form(&mut session, GrinCommand::Start);
     wait(&mut session, "steps", |view, _| {
-        view.grin.run.as_ref().is_some_and(|run| {
+        view.grin.run.snapshot.as_ref().is_some_and(|run| {
             run.progress.as_ref().is_some_and(|progress| progress.step > 15 && progress.level == 1)
         })
     });
@@ -144,7 +143,7 @@ fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
     stands(&mut session, RunStatus::Running);
     assert!(run(&session).progress.as_ref().is_none_or(|progress| progress.step < steps), "anew");
     form(&mut session, GrinCommand::Close);
-    assert!(forming(&session).run.is_none() && forming(&session).slice.is_none());
+    assert!(forming(&session).run.snapshot.is_none() && forming(&session).slice.is_none());
     std::fs::remove_dir_all(folder).unwrap();
 }
 
@@ -162,7 +161,7 @@ fn nothing_is_computed_before_something_is_open_and_looked_at() {
         view.messages.last().is_some_and(|said| said.text.starts_with("there is no field to save"))
     });
     let GrinView { run, slice, analysis: sighting, .. } = forming(&session);
-    assert!(run.is_none() && slice.is_none() && sighting.is_none());
+    assert!(run.snapshot.is_none() && slice.is_none() && sighting.is_none());
 
     form(&mut session, GrinCommand::SetActive(false));
     form(&mut session, GrinCommand::OpenBuiltin("luneburg-radial".into()));
@@ -213,7 +212,7 @@ fn slices_turn_and_show_every_quantity_with_rays_and_the_exact_field() {
     }
     wait(&mut session, "all light", |view, _| {
         let sighting = view.grin.analysis.as_deref().and_then(|seen| seen.as_ref().ok());
-        let run = view.grin.run.as_ref().unwrap();
+        let run = view.grin.run.snapshot.as_ref().unwrap();
         sighting.is_some_and(|seen| {
             let view = &seen.views.value[0];
             assert!(view.error.unwrap() < 1e-6 && view.image.is_none());
@@ -301,7 +300,8 @@ fn a_volume_is_looked_at_and_written_in_the_other_format() {
     form(&mut session, GrinCommand::SetActive(true));
     open(&mut session, &path);
     let seen = run(&session);
-    assert_eq!((seen.document.name.as_str(), seen.status), ("volume.npz", RunStatus::Stopped));
+    assert_eq!(seen.document.name, "volume.npz");
+    assert_eq!(forming(&session).run.status, RunStatus::Stopped);
     let seen = slice(&mut session);
     assert!(seen.paths.is_empty() && seen.difference.is_none() && seen.profile.start.is_empty());
     assert!((seen.range[0] - 1.0).abs() < 1e-12 && (seen.range[1] - 1.59).abs() < 1e-12);

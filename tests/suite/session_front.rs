@@ -4,7 +4,7 @@ use super::merit::bundled;
 use aplanat::lens::Lens;
 use aplanat::optimize::pareto::ParetoSettings;
 use aplanat::session::{
-    Command, ParetoRun, RunStatus, Session, SessionEvent, SessionView, Severity,
+    Command, ParetoRun, RunKind, RunStatus, Session, SessionEvent, SessionView, Severity,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -46,20 +46,22 @@ pub(crate) fn wait(
 }
 
 fn stands(session: &mut Session, standing: RunStatus) {
-    wait(session, "the standing", |_, events| events.contains(&SessionEvent::Front(standing)));
+    wait(session, "the standing", |_, events| {
+        events.contains(&SessionEvent::Run(RunKind::Pareto, standing))
+    });
 }
 
 fn run(session: &Session) -> Arc<ParetoRun> {
-    session.view().pareto.run.unwrap()
+    session.view().pareto.run.snapshot.unwrap()
 }
 
 #[test]
 fn a_front_fills_is_held_goes_on_and_ends_while_the_design_stays() {
     let mut session = session(double_gauss());
     session.apply(start(NEVER, false));
-    assert!(session.view().pareto.starting);
+    assert_eq!(session.view().pareto.run.status, RunStatus::Starting);
     wait(&mut session, "a front", |view, _| {
-        view.pareto.run.as_ref().is_some_and(|run| run.main.front.points().len() > 2)
+        view.pareto.run.snapshot.as_ref().is_some_and(|run| run.main.front.points().len() > 2)
     });
     session.apply(Command::PausePareto);
     stands(&mut session, RunStatus::Paused);
@@ -71,7 +73,7 @@ fn a_front_fills_is_held_goes_on_and_ends_while_the_design_stays() {
     assert_eq!(run(&session).main.done, held.main.done, "it is held");
     session.apply(Command::ResumePareto);
     wait(&mut session, "more steps", |view, _| {
-        view.pareto.run.as_ref().is_some_and(|run| run.main.done > held.main.done)
+        view.pareto.run.snapshot.as_ref().is_some_and(|run| run.main.done > held.main.done)
     });
     session.apply(Command::StopPareto);
     stands(&mut session, RunStatus::Stopped);
@@ -104,12 +106,12 @@ fn a_lens_of_the_front_is_looked_at_and_taken_as_one_step() {
     session.apply(Command::Preview(Some(Box::new(best.lens.clone()))));
     session.apply(Command::AcceptPreview);
     let view = session.view();
-    assert_eq!(view.undo.as_deref(), Some("take a lens of the front"));
+    assert_eq!(view.undo.as_deref(), Some("accept a lens of the Pareto front"));
     assert!(view.preview_lens.is_none());
     assert_eq!(view.lens.surfaces, best.lens.surfaces);
     assert_eq!(view.lens.variables, double_gauss().variables, "the design's own variables");
     wait(&mut session, "where the design stands now", |view, _| {
-        let here = view.pareto.current_design.as_ref();
+        let here = view.design_score.as_ref();
         let here = here.filter(|here| Arc::ptr_eq(&here.lens, &view.lens));
         here.is_some_and(|here| {
             let found = here.score.as_ref().unwrap();
@@ -134,8 +136,11 @@ fn kept_pupils_follow_and_earlier_runs_stay() {
     session.apply(start(SOON, false));
     stands(&mut session, RunStatus::Finished);
     let fronts = session.view().pareto;
-    assert_eq!(fronts.earlier.iter().map(|run| run.number).collect::<Vec<_>>(), [1]);
-    assert_eq!(fronts.run.unwrap().main.front, first.main.front, "the same again");
+    assert_eq!(
+        fronts.earlier.iter().filter_map(|run| Some(run.id?.number)).collect::<Vec<_>>(),
+        [1]
+    );
+    assert_eq!(fronts.run.snapshot.unwrap().main.front, first.main.front, "the same again");
 
     let folder = std::env::temp_dir().join(format!("aplanat-session-{}", std::process::id()));
     session.apply(Command::ExportPareto(Some(folder.clone())));
@@ -148,7 +153,8 @@ fn kept_pupils_follow_and_earlier_runs_stay() {
 
     session.apply(Command::ClearPareto);
     let fronts = session.view().pareto;
-    assert!(fronts.run.is_none() && fronts.earlier.is_empty() && fronts.current_design.is_none());
+    assert!(fronts.run.snapshot.is_none() && fronts.earlier.is_empty());
+    assert!(session.view().design_score.is_none());
     session.apply(Command::ExportPareto(Some(folder.clone())));
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text == "there is no front to export yet")
@@ -161,15 +167,15 @@ fn a_sweep_that_cannot_begin_says_why() {
     let mut session = session(double_gauss());
     let settings = ParetoSettings { points: 0, ..ParetoSettings::default() };
     session.apply(Command::StartPareto { settings, compare: false });
-    stands(&mut session, RunStatus::Stopped);
+    stands(&mut session, RunStatus::Failed);
     let view = session.view();
     let why = "the number of points is 0; expected 1 to 1000";
-    assert_eq!(view.pareto.error.as_deref(), Some(why));
-    assert!(!view.pareto.starting && view.pareto.run.is_none());
+    assert_eq!(view.pareto.run.error.as_deref(), Some(why));
+    assert!(view.pareto.run.snapshot.is_none());
     assert_eq!(view.messages.last().unwrap().severity, Severity::Error);
     session.apply(start(SOON, false));
-    assert!(session.view().pareto.error.is_none());
+    assert!(session.view().pareto.run.error.is_none());
     stands(&mut session, RunStatus::Finished);
     session.apply(Command::New(Box::new(aplanat::lens::blank())));
-    assert!(session.view().pareto.run.is_none(), "another lens has no front yet");
+    assert!(session.view().pareto.run.snapshot.is_none(), "another lens has no front yet");
 }

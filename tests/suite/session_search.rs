@@ -5,7 +5,7 @@ use super::session_front::wait;
 use aplanat::lens::Lens;
 use aplanat::search::{MutationKind, SearchRules, SearchSettings, SteerCommand, Temperature};
 use aplanat::session::{
-    Command, EndReason, RunStatus, Session, SessionEvent, SessionView, Severity,
+    Command, EndReason, RunKind, RunStatus, Session, SessionEvent, SessionView, Severity,
     StructureSearchCommand, StructureSearchRequest, StructureSearchSnapshot,
 };
 use std::path::{Path, PathBuf};
@@ -40,15 +40,17 @@ fn start(session: &mut Session, moves: Option<u64>) {
 }
 
 fn stands(session: &mut Session, standing: RunStatus) {
-    wait(session, "the standing", |_, events| events.contains(&SessionEvent::Explored(standing)));
+    wait(session, "the standing", |_, events| {
+        events.contains(&SessionEvent::Run(RunKind::StructureSearch, standing))
+    });
 }
 
 fn run(session: &Session) -> Arc<StructureSearchSnapshot> {
-    session.view().structure_search.run.unwrap()
+    session.view().structure_search.run.snapshot.unwrap()
 }
 
 fn moves(view: &SessionView) -> u64 {
-    view.structure_search.run.as_ref().map_or(0, |run| run.statistics.moves)
+    view.structure_search.run.snapshot.as_ref().map_or(0, |run| run.statistics.moves)
 }
 
 fn folder(name: &str) -> PathBuf {
@@ -59,10 +61,10 @@ fn folder(name: &str) -> PathBuf {
 fn a_search_goes_on_is_held_and_ends_while_the_design_stays() {
     let mut session = session(double_gauss());
     start(&mut session, None);
-    assert!(session.view().structure_search.starting);
+    assert_eq!(session.view().structure_search.run.status, RunStatus::Starting);
     wait(&mut session, "some moves", |view, _| moves(view) > 6);
     explore(&mut session, StructureSearchCommand::Pause);
-    assert_eq!(session.view().structure_search.pending, Some(RunStatus::Paused));
+    assert_eq!(session.view().structure_search.run.status, RunStatus::Pausing);
     stands(&mut session, RunStatus::Paused);
     let held = run(&session);
     assert!(held.seconds > 0.0 && held.gradients > 0 && held.best.merit < held.start.merit);
@@ -79,7 +81,7 @@ fn a_search_goes_on_is_held_and_ends_while_the_design_stays() {
     assert!(run(&session).best.merit <= held.best.merit, "what was found stays");
     assert!(!session.is_dirty());
     explore(&mut session, StructureSearchCommand::Clear);
-    assert!(session.view().structure_search.run.is_none());
+    assert!(session.view().structure_search.run.snapshot.is_none());
     // The handle of a search that runs ends its thread.
     start(&mut session, None);
     drop(session);
@@ -123,7 +125,7 @@ fn a_person_steers_a_search_between_two_rounds() {
         StructureSearchCommand::Control(SteerCommand::Weight(MutationKind::AddSinglet, 0.0)),
     );
     wait(&mut session, "the weight", |view, _| {
-        let run = view.structure_search.run.as_ref().unwrap();
+        let run = view.structure_search.run.snapshot.as_ref().unwrap();
         run.weights.of(MutationKind::AddSinglet) == 0.0
     });
     let steered = run(&session);
@@ -135,7 +137,7 @@ fn a_person_steers_a_search_between_two_rounds() {
         StructureSearchCommand::Control(SteerCommand::Temperature(Temperature::new(0.5).unwrap())),
     );
     wait(&mut session, "the temperature", |view, _| {
-        let run = view.structure_search.run.as_ref().unwrap();
+        let run = view.structure_search.run.snapshot.as_ref().unwrap();
         run.temperature.value() == 0.5 && run.pinned.is_none()
     });
     explore(&mut session, StructureSearchCommand::Control(SteerCommand::Pin(1_000_000)));
@@ -143,7 +145,7 @@ fn a_person_steers_a_search_between_two_rounds() {
         let refused = "generation 1000000 is not remembered";
         view.messages.last().is_some_and(|said| said.text.starts_with(refused))
     });
-    assert_eq!(run(&session).status, RunStatus::Running);
+    assert_eq!(session.view().structure_search.run.status, RunStatus::Running);
 }
 
 #[test]
@@ -168,13 +170,13 @@ fn a_lens_that_was_found_is_taken_as_one_step() {
     let best = Arc::clone(&run(&session).reservoir[0]);
     explore(&mut session, StructureSearchCommand::Accept(best.number));
     let view = session.view();
-    let title = format!("take lens {} of the search", best.number);
+    let title = format!("accept lens {} of the search", best.number);
     assert_eq!(view.undo.as_deref(), Some(title.as_str()));
     assert_eq!(view.lens.surfaces, best.lens.surfaces);
     let is_held = |v: &aplanat::lens::Variable| v.min.is_some() && v.min == v.max;
     assert!(!view.lens.variables.iter().any(is_held), "what was held is no variable");
     wait(&mut session, "the design beside it", |view, _| {
-        let here = view.structure_search.current_design.as_ref();
+        let here = view.design_score.as_ref();
         here.is_some_and(|here| Arc::ptr_eq(&here.lens, &view.lens))
     });
     session.apply(Command::Undo);
@@ -261,7 +263,11 @@ fn a_person_chooses_where_a_search_is_saved() {
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text.starts_with("the search is not saved"))
     });
-    assert_eq!(run(&session).status, RunStatus::Paused, "the search is not lost");
+    assert_eq!(
+        session.view().structure_search.run.status,
+        RunStatus::Paused,
+        "the search is not lost"
+    );
     drop(session);
     std::fs::remove_dir_all(&folder).unwrap();
 }
@@ -272,30 +278,30 @@ fn a_search_that_cannot_begin_says_why() {
     let mut wrong = quest(None);
     wrong.plan.settings.chains = 0;
     explore(&mut session, StructureSearchCommand::Start(Box::new(wrong)));
-    stands(&mut session, RunStatus::Stopped);
+    stands(&mut session, RunStatus::Failed);
     let view = session.view();
     let why = "setting chains: found 0; expected 1 or more";
-    assert_eq!(view.structure_search.error.as_deref(), Some(why));
-    assert!(!view.structure_search.starting && view.structure_search.run.is_none());
+    assert_eq!(view.structure_search.run.error.as_deref(), Some(why));
+    assert!(view.structure_search.run.snapshot.is_none());
     assert_eq!(view.messages.last().unwrap().severity, Severity::Error);
 
     let mut impossible = quest(None);
     impossible.plan.rules.track = Some(10.0);
     explore(&mut session, StructureSearchCommand::Start(Box::new(impossible)));
-    stands(&mut session, RunStatus::Stopped);
-    let failed = session.view().structure_search.error.unwrap();
+    stands(&mut session, RunStatus::Failed);
+    let failed = session.view().structure_search.run.error.unwrap();
     assert!(failed.starts_with("no lens keeps these limits: a track of 10 mm"), "{failed}");
 
     let file = folder("foreign");
     std::fs::write(&file, "{\"aplanat\": 1}").unwrap();
     explore(&mut session, StructureSearchCommand::ResumeFrom(Some(file.clone())));
-    stands(&mut session, RunStatus::Stopped);
-    let failed = session.view().structure_search.error.unwrap();
+    stands(&mut session, RunStatus::Failed);
+    let failed = session.view().structure_search.run.error.unwrap();
     assert!(failed.contains("no checkpoint of a search over lenses"), "{failed}");
     std::fs::remove_file(&file).unwrap();
 
     start(&mut session, Some(4));
-    assert!(session.view().structure_search.error.is_none());
+    assert!(session.view().structure_search.run.error.is_none());
     stands(&mut session, RunStatus::Finished);
 }
 
@@ -323,7 +329,7 @@ fn a_lens_is_exported_once_every_limit_is_kept() {
     let session = export(|_| {}, &path);
     let said = session.view().messages.last().unwrap().clone();
     assert_eq!(said.severity, Severity::Note, "{}", said.text);
-    assert!(said.text.starts_with("lens 0 finished and exported to "), "{}", said.text);
+    assert!(said.text.starts_with("lens 0 finalized and exported to "), "{}", said.text);
     let made = aplanat::files::open(&path).unwrap().lens;
     assert!(made.surfaces.len() == double_gauss().surfaces.len() && made.variables.is_empty());
     assert!(!session.is_dirty());
@@ -336,7 +342,7 @@ fn a_lens_that_cannot_be_made_is_refused_by_name() {
     let session = export(|rules| rules.track = Some(40.0), &path);
     let said = session.view().messages.last().unwrap().clone();
     assert_eq!(said.severity, Severity::Error);
-    let first = "nothing is written: the lens cannot be made within its limits\n";
+    let first = "nothing is written: the lens cannot be manufactured within its constraints\n";
     assert!(said.text.starts_with(first) && said.text.contains("total track"), "{}", said.text);
     assert!(!path.exists());
 }

@@ -67,8 +67,9 @@ impl Lens {
 
     /// The row of a surface.
     pub(super) fn row_mut(&mut self, surface: usize) -> Result<&mut Row, EditError> {
-        let last = self.surfaces.len() - 1;
-        self.surfaces.get_mut(surface).ok_or(EditError::UnknownSurface { surface, last })
+        let last = (self.surfaces.len() - 1).into();
+        let unknown = EditError::UnknownSurface { surface: surface.into(), last };
+        self.surfaces.get_mut(surface).ok_or(unknown)
     }
 
     /// A zoom position.

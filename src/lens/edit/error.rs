@@ -1,6 +1,6 @@
 //! The reasons for which an edit is refused.
 
-use crate::lens::{LensError, Parameter};
+use crate::lens::{LensError, Parameter, SurfaceNumber};
 
 /// The reason for which an edit is refused; the lens stays as it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -9,12 +9,12 @@ pub enum EditError {
     #[error(transparent)]
     Lens(#[from] LensError),
     /// The lens has no such surface.
-    #[error("there is no surface {surface}; expected 0 to {last}")]
+    #[error("there is no surface {surface}; expected 1 to {last}")]
     UnknownSurface {
         /// The surface that was named.
-        surface: usize,
+        surface: SurfaceNumber,
         /// The last surface of the lens.
-        last: usize,
+        last: SurfaceNumber,
     },
     /// The lens has no such zoom position.
     #[error("there is no zoom position {at}; the lens has {count}")]
@@ -35,7 +35,7 @@ pub enum EditError {
     Solved,
     /// The surface to be removed is the stop.
     #[error("surface {0} is the stop; make another surface the stop first")]
-    RemovedStop(usize),
+    RemovedStop(SurfaceNumber),
     /// The surface to be removed is the only one.
     #[error("the only surface cannot be removed")]
     OnlySurface,
@@ -43,18 +43,18 @@ pub enum EditError {
     #[error("surfaces {first} to {last}: expected the first one in front of the last one")]
     ReversedRange {
         /// The first surface of the group.
-        first: usize,
+        first: SurfaceNumber,
         /// The last surface of the group.
-        last: usize,
+        last: SurfaceNumber,
     },
     /// The group to be reversed has a mirror.
     #[error("surface {0} is a mirror; a group with a mirror cannot be reversed")]
-    Mirror(usize),
+    Mirror(SurfaceNumber),
     /// The group to be reversed has an index that varies along the axis, from its first vertex.
     #[error(
         "the index after surface {0} varies along the axis; a group with it cannot be reversed"
     )]
-    AxialGrin(usize),
+    AxialGrin(SurfaceNumber),
     /// The scale is no positive number.
     #[error("the scale is {0}; expected a number above 0")]
     InvalidScale(f64),

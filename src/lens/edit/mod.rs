@@ -13,8 +13,8 @@ pub use apply::apply_edit;
 pub use error::EditError;
 
 use super::{
-    Aperture, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, Variable, Wavelength,
-    ZoomPosition,
+    Aperture, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, SurfaceNumber,
+    Variable, Wavelength, ZoomPosition,
 };
 use serde::{Deserialize, Serialize};
 
@@ -176,21 +176,26 @@ impl Edit {
 
     /// The title of the edit in a menu, as in `Undo insert surface`.
     pub fn title(&self) -> String {
+        let number = |surface: &usize| SurfaceNumber::new(*surface);
         match self {
             Self::Set { parameter, .. } => parameter.to_string(),
-            Self::SetSemiDiameter { surface, .. } => format!("semi-diameter of surface {surface}"),
-            Self::SetAsphere { surface, .. } => format!("asphere of surface {surface}"),
-            Self::SetMedium { surface, .. } => format!("glass after surface {surface}"),
-            Self::SetObjectMedium(_) => "object medium".to_owned(),
-            Self::SetStop(surface) => format!("stop to surface {surface}"),
-            Self::SetHyperhemisphere { surface, .. } => {
-                format!("hyperhemisphere of surface {surface}")
+            Self::SetSemiDiameter { surface, .. } => {
+                format!("semi-diameter of surface {}", number(surface))
             }
-            Self::SetComment { surface, .. } => format!("comment on surface {surface}"),
-            Self::SetRow { surface, .. } => format!("surface {surface}"),
-            Self::InsertRow { at, .. } => format!("insert surface {at}"),
-            Self::RemoveRow(surface) => format!("remove surface {surface}"),
-            Self::ReverseRows { first, last } => format!("reverse surfaces {first} to {last}"),
+            Self::SetAsphere { surface, .. } => format!("asphere of surface {}", number(surface)),
+            Self::SetMedium { surface, .. } => format!("glass after surface {}", number(surface)),
+            Self::SetObjectMedium(_) => "object medium".to_owned(),
+            Self::SetStop(surface) => format!("stop to surface {}", number(surface)),
+            Self::SetHyperhemisphere { surface, .. } => {
+                format!("hyperhemisphere of surface {}", number(surface))
+            }
+            Self::SetComment { surface, .. } => format!("comment on surface {}", number(surface)),
+            Self::SetRow { surface, .. } => format!("surface {}", number(surface)),
+            Self::InsertRow { at, .. } => format!("insert surface {}", number(at)),
+            Self::RemoveRow(surface) => format!("remove surface {}", number(surface)),
+            Self::ReverseRows { first, last } => {
+                format!("reverse surfaces {} to {}", number(first), number(last))
+            }
             Self::Scale(factor) => format!("scale by {factor}"),
             Self::SetName(_) => "name".to_owned(),
             Self::SetSource(_) => "source".to_owned(),

@@ -7,7 +7,7 @@ use crate::lens::{Lens, Medium, PROFILE_TERMS, Parameter, Quantity, Row};
 pub(super) fn insert(lens: &mut Lens, at: usize, row: &Row) -> Result<(), EditError> {
     let count = lens.surfaces.len();
     if at > count {
-        return Err(EditError::UnknownSurface { surface: at, last: count });
+        return Err(EditError::UnknownSurface { surface: at.into(), last: count.into() });
     }
     let focus = lens.image_solve;
     if at == count {
@@ -26,7 +26,7 @@ pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
         return Err(EditError::OnlySurface);
     }
     if lens.surfaces[surface].stop {
-        return Err(EditError::RemovedStop(surface));
+        return Err(EditError::RemovedStop(surface.into()));
     }
     lens.surfaces.remove(surface);
     lens.renumber_rows(|row| match row {
@@ -55,17 +55,17 @@ pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), 
 pub(super) fn reverse(lens: &mut Lens, first: usize, last: usize) -> Result<(), EditError> {
     lens.row_mut(last)?;
     if first > last {
-        return Err(EditError::ReversedRange { first, last });
+        return Err(EditError::ReversedRange { first: first.into(), last: last.into() });
     }
     if let Some(i) = (first..=last).find(|i| lens.surfaces[*i].medium == Medium::Mirror) {
-        return Err(EditError::Mirror(i));
+        return Err(EditError::Mirror(i.into()));
     }
     let along = |i: &usize| match &lens.surfaces[*i].medium {
         Medium::Grin(gradient) => gradient.axial.iter().any(|term| *term != 0.0),
         _ => false,
     };
     if let Some(i) = (first..last).find(along) {
-        return Err(EditError::AxialGrin(i));
+        return Err(EditError::AxialGrin(i.into()));
     }
     lens.reverse_rows(first, last);
     Ok(())

@@ -62,7 +62,7 @@ impl TaskMenu {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             self.open(ui, view, actions);
-            let Some(run) = view.grin.run.as_deref() else { return };
+            let Some(run) = view.grin.run.snapshot.as_deref() else { return };
             if run.document.task.is_some() {
                 run_controls(ui, view, run, actions);
             }
@@ -124,19 +124,19 @@ fn document_name(ui: &mut Ui, run: &GrinRun) {
 
 /// Starts, pauses and stops the optimization.
 fn run_controls(ui: &mut Ui, view: &SessionView, run: &GrinRun, actions: &mut Actions) {
-    let (text, hint) = if run.is_active() {
+    let (text, hint) = if view.grin.run.is_active() {
         ("Optimize", "Optimize the field in the background; the slice shows its progress")
     } else {
         ("Start over", "Optimize again from the start; unsaved changes of this field are lost")
     };
-    let ready = run.is_ready() || !run.is_active();
-    let ready = ready && view.grin.pending.is_none() && !view.grin.opening;
+    let ready = run.is_ready() || !view.grin.run.is_active();
+    let ready = ready && view.grin.run.status != RunStatus::Starting && !view.grin.opening;
     if main_button(ui, text, ready, hint, "The optimization is already running") {
         actions.push(GrinCommand::Start);
     }
-    let active = run.is_active() && !run.is_ready();
+    let active = view.grin.run.is_active() && !run.is_ready();
     let buttons = [
-        if run.status == RunStatus::Paused && !run.is_ready() {
+        if view.grin.run.status == RunStatus::Paused && !run.is_ready() {
             ActionButton::new("Resume", active, GrinCommand::Resume, "Resume the optimization")
         } else {
             let hint = "Pause the optimization after its current step";
@@ -154,7 +154,7 @@ fn run_controls(ui: &mut Ui, view: &SessionView, run: &GrinRun, actions: &mut Ac
 
 /// How far the search is.
 pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
-    let text = text::status_text(run, view.grin.pending);
+    let text = text::status_text(run, view.grin.run.status);
     match &run.progress {
         Some(progress) => {
             let share = if progress.finished {

@@ -97,10 +97,10 @@ impl Panel for GrinPanel {
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.sync_page(view);
         self.tasks.bar(ui, view, actions);
-        if let Some(why) = &view.grin.error {
+        if let Some(why) = &view.grin.run.error {
             ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
         }
-        let Some(run) = view.grin.run.clone() else {
+        let Some(run) = view.grin.run.snapshot.clone() else {
             if view.grin.opening {
                 ui.weak("Opening…");
             } else {
@@ -118,16 +118,17 @@ impl Panel for GrinPanel {
 impl GrinPanel {
     /// Turns to what is newly open.
     fn sync_page(&mut self, view: &SessionView) {
-        let number = view.grin.run.as_ref().map(|run| run.number);
+        let number = view.grin.run.id.map(|run| run.number);
         if number != self.shown_run {
             self.shown_run = number;
             self.pinned = None;
             self.picture.fit();
-            self.page = if view.grin.run.as_ref().is_some_and(|run| run.document.task.is_none()) {
-                GrinPage::Profile
-            } else {
-                GrinPage::Light
-            };
+            self.page =
+                if view.grin.run.snapshot.as_ref().is_some_and(|run| run.document.task.is_none()) {
+                    GrinPage::Profile
+                } else {
+                    GrinPage::Light
+                };
         }
     }
 

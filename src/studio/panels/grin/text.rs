@@ -11,7 +11,7 @@ use crate::studio::number::format_digits;
 use crate::studio::text;
 
 /// How the search stands, in one line.
-pub(super) fn status_text(run: &GrinRun, pending: Option<RunStatus>) -> String {
+pub(super) fn status_text(run: &GrinRun, status: RunStatus) -> String {
     let Some(task) = &run.document.task else { return volume_text(run) };
     let Some(progress) = &run.progress else {
         let levels: Vec<String> = task.levels.iter().map(|level| level.nodes.to_string()).collect();
@@ -20,7 +20,7 @@ pub(super) fn status_text(run: &GrinRun, pending: Option<RunStatus>) -> String {
     };
     format!(
         "{}: step {} of {}, level {} of {} ({} nodes), loss {}{}",
-        text::status_text(run.status, pending),
+        text::status_text(status),
         progress.step,
         progress.max_steps,
         progress.level + 1,

@@ -100,7 +100,7 @@ impl MeritEditor {
         actions: &mut Actions,
     ) {
         self.warnings(ui, &view.lens, actions);
-        let search = view.optimization.as_deref();
+        let search = view.optimization.snapshot.as_deref();
         let mut unwanted = None;
         Grid::new("terms").num_columns(6).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
             for (text, what) in [("Term", ""), ("Weight", ""), ("Target", "")] {
@@ -224,7 +224,7 @@ impl MeritRow {
             ui.weak(unit(term));
             self.field_choice(ui, view);
         });
-        if let Some(search) = view.optimization.as_deref() {
+        if let Some(search) = view.optimization.snapshot.as_deref() {
             self.value_cells(ui, search);
         }
         ui.small_button("×").on_hover_text("Take the term out of the goal").clicked()

@@ -14,7 +14,7 @@ use crate::session::{Analyses, Command, OptimizationSnapshot, RunStatus, Session
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
-use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text::{capitalize, counted_from_one, status_text};
 use crate::studio::text_input::EditBuffers;
 use merit_editor::MeritEditor;
 
@@ -39,7 +39,7 @@ impl Panel for OptimizerPanel {
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.merit.sync(view);
         self.controls(ui, view, actions);
-        if let Some(search) = view.optimization.as_deref() {
+        if let Some(search) = view.optimization.snapshot.as_deref() {
             progress(ui, view, search);
             let frame = Frame::new().inner_margin(Margin { right: 10, ..Margin::ZERO });
             let plot = Side::bottom("merit history").frame(frame).show_separator_line(false);
@@ -61,9 +61,9 @@ impl Panel for OptimizerPanel {
 
 impl OptimizerPanel {
     fn controls(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        let status = view.optimization.as_ref().map(|run| run.status);
-        let paused = status == Some(RunStatus::Paused);
-        let active = paused || status == Some(RunStatus::Running);
+        let run = &view.optimization;
+        let (paused, active) = (run.status == RunStatus::Paused, run.is_active());
+        let has_result = run.snapshot.is_some();
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             self.start_button(ui, view, active, actions);
@@ -88,13 +88,13 @@ impl OptimizerPanel {
                 ),
                 ActionButton::new(
                     "Take",
-                    status.is_some(),
+                    has_result,
                     Command::AcceptResult,
                     "Make the best lens the design, as one undo step",
                 ),
                 ActionButton::new(
                     "Discard",
-                    status.is_some(),
+                    has_result,
                     Command::DiscardResult,
                     "Stop the optimization and discard its result",
                 ),
@@ -135,12 +135,7 @@ pub(super) fn method_menu(ui: &mut Ui, chosen: &mut DescentMethod) {
 
 /// How the search stands, and the numbers a designer reads first, before and after.
 fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
-    let standing = match search.status {
-        RunStatus::Running => "Running",
-        RunStatus::Paused => "Paused",
-        RunStatus::Stopped => "Stopped",
-        RunStatus::Finished => "Finished",
-    };
+    let standing = status_text(view.optimization.status);
     let step = search.progress.as_ref().map_or(0, |progress| progress.step);
     ui.horizontal(|ui| {
         ui.strong(standing);

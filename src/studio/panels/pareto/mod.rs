@@ -54,16 +54,16 @@ impl Panel for ParetoPanel {
             self.selected = None;
         }
         self.buttons(ui, view, actions);
-        let under_way = view.pareto.run.as_ref().is_some_and(|run| run.is_active());
+        let under_way = view.pareto.run.is_active();
         ui.add_enabled_ui(!under_way, |ui| self.setup.ui(ui, view));
         text::variables_label(ui, view);
-        if let Some(why) = &view.pareto.error {
+        if let Some(why) = &view.pareto.run.error {
             let why = capitalize(&counted_from_one(why));
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
-        match view.pareto.run.as_deref() {
+        match view.pareto.run.snapshot.as_deref() {
             Some(run) => self.show(ui, view, run, actions),
-            None if view.pareto.starting => {
+            None if view.pareto.run.is_active() => {
                 ui.weak("Looking at the lens…");
             }
             None => {
@@ -76,15 +76,15 @@ impl Panel for ParetoPanel {
 
 impl ParetoPanel {
     fn buttons(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        let run = view.pareto.run.as_deref();
-        let active = run.is_some_and(ParetoRun::is_active);
+        let run = view.pareto.run.snapshot.as_deref();
+        let active = view.pareto.run.is_active();
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             self.start_button(ui, view, active, actions);
             let hint = "Write the front into a folder: a table (CSV), a plot (PNG) and every lens \
                         (JSON)";
             let buttons = [
-                if run.is_some_and(|run| run.status == RunStatus::Paused) {
+                if view.pareto.run.status == RunStatus::Paused {
                     ActionButton::new("Resume", active, Command::ResumePareto, "Resume the sweep")
                 } else {
                     let hint = "Pause the sweep after its current slice";
@@ -99,7 +99,7 @@ impl ParetoPanel {
                 ActionButton::new("Export…", run.is_some(), FileRequest::ExportFront, hint),
                 ActionButton::new(
                     "Clear",
-                    run.is_some() || view.pareto.error.is_some(),
+                    run.is_some() || view.pareto.run.error.is_some(),
                     Command::ClearPareto,
                     "Dismiss this front and all earlier ones",
                 ),
@@ -113,7 +113,7 @@ impl ParetoPanel {
 
     fn start_button(&self, ui: &mut Ui, view: &SessionView, active: bool, actions: &mut Actions) {
         let dark = is_dark(view);
-        let ready = !active && !view.pareto.starting && !dark;
+        let ready = !active && !dark;
         let hint = "Sweep the front in the background, on a copy of the design";
         let reason = if dark { NO_LIGHT } else { "A sweep is already running" };
         if main_button(ui, "Start", ready, hint, reason) {
@@ -128,7 +128,7 @@ impl ParetoPanel {
         let share = run.fraction_done() as f32;
         let bar = ProgressBar::new(share)
             .desired_height(16.0)
-            .text(text::progress_text(run, view.pareto.pending));
+            .text(text::progress_text(run, view.pareto.run.status));
         ui.add(bar.corner_radius(2));
         text::hypervolume_label(ui, run);
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });

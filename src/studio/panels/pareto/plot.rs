@@ -11,7 +11,7 @@ use egui_plot::{
 
 use super::text;
 use crate::optimize::pareto::{Front, ParetoPoint};
-use crate::session::{ParetoRun, SessionView};
+use crate::session::{ParetoRun, RunView, SessionView};
 
 /// How near the pointer must be to a point to mean it, in points of the screen.
 const NEAR: f32 = 14.0;
@@ -81,6 +81,17 @@ pub(super) fn plot(
     (clicked || twice).then(|| ClickedDesign { design: design.clone(), double: twice })
 }
 
+/// The latest states of earlier runs.
+fn earlier_runs(view: &SessionView) -> impl Iterator<Item = &ParetoRun> {
+    view.pareto.earlier.iter().filter_map(|run| run.snapshot.as_deref())
+}
+
+/// The legend entry of a run: its number and its hypervolume.
+fn run_name(view: &RunView<ParetoRun>, run: &ParetoRun) -> String {
+    let number = view.id.map_or(0, |id| id.number);
+    format!("run {number}: {:.4}", run.main.hypervolume)
+}
+
 /// The lens nearest to a place on the screen: of the front, of the biased one, of earlier ones.
 fn nearest<'a>(
     view: &'a SessionView,
@@ -88,7 +99,7 @@ fn nearest<'a>(
     pointer: Pos2,
     transform: &PlotTransform,
 ) -> Option<(&'a ParetoPoint, Pos2)> {
-    let earlier = view.pareto.earlier.iter().flat_map(|run| run.main.front.points());
+    let earlier = earlier_runs(view).flat_map(|run| run.main.front.points());
     let biased = run.biased.iter().flat_map(|leg| leg.front.points());
     let all = run.main.front.points().iter().chain(biased).chain(earlier);
     let on_screen = |design: &'a ParetoPoint| {
@@ -104,7 +115,7 @@ fn nearest<'a>(
 /// way may lie far outside.
 fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
     let legs = std::iter::once(&run.main).chain(&run.biased);
-    let legs = legs.chain(view.pareto.earlier.iter().map(|run| &run.main));
+    let legs = legs.chain(earlier_runs(view).map(|run| &run.main));
     let mut points: Vec<[f64; 2]> = legs.flat_map(|leg| plot_points(&leg.front)).collect();
     points.push(plot_point(&run.start));
     points.extend(design_point(view));
@@ -120,7 +131,7 @@ fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
 
 /// Where the design stands.
 fn design_point(view: &SessionView) -> Option<[f64; 2]> {
-    let judged = view.pareto.current_design.as_deref()?;
+    let judged = view.design_score.as_deref()?;
     Some(plot_point(judged.score.as_ref().ok()?))
 }
 
@@ -156,15 +167,16 @@ fn draw(
     let tried: Vec<[f64; 2]> =
         run.current_pass().evaluated.iter().map(|[spot, light]| [*light, 1e3 * spot]).collect();
     plot.points(Points::new("tried", tried).radius(1.2).color(colors.faint).allow_hover(false));
-    for earlier in &view.pareto.earlier {
-        let name = format!("run {}: {:.4}", earlier.number, earlier.main.hypervolume);
+    for run in &view.pareto.earlier {
+        let Some(earlier) = &run.snapshot else { continue };
+        let name = run_name(run, earlier);
         curve(plot, &name, &earlier.main.front, colors.faint, LineStyle::Solid);
     }
     if let Some(biased) = &run.biased {
         let name = format!("pupils kept: {:.4}", biased.hypervolume);
         curve(plot, &name, &biased.front, colors.biased, LineStyle::dashed_dense());
     }
-    let name = format!("run {}: {:.4}", run.number, run.main.hypervolume);
+    let name = run_name(&view.pareto.run, run);
     curve(plot, &name, &run.main.front, colors.front, LineStyle::Solid);
     let start = Points::new("start", vec![plot_point(&run.start)]).shape(MarkerShape::Cross);
     plot.points(start.radius(5.0).color(colors.strong).allow_hover(false));

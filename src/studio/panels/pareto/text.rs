@@ -10,7 +10,7 @@ use crate::studio::text::{capitalize, counted_from_one, status_text};
 
 /// What a sweep may change, and what it takes as it is.
 pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {
-    let lens = view.pareto.run.as_ref().filter(|run| run.is_active());
+    let lens = view.pareto.run.snapshot.as_ref().filter(|_| view.pareto.run.is_active());
     let free = match lens {
         Some(run) => variables_by_kind(&run.start.lens),
         None if view.lens.variables.is_empty() => {
@@ -47,8 +47,8 @@ fn variables_by_kind(lens: &Lens) -> String {
 }
 
 /// How far the run is.
-pub(super) fn progress_text(run: &ParetoRun, pending: Option<RunStatus>) -> String {
-    let standing = status_text(run.status, pending);
+pub(super) fn progress_text(run: &ParetoRun, status: RunStatus) -> String {
+    let standing = status_text(status);
     let leg = run.current_pass();
     let kept = if run.biased.is_some() { ", pupils kept" } else { "" };
     let rate = leg.done as f64 / leg.seconds;

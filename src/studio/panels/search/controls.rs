@@ -18,13 +18,12 @@ use crate::studio::panels::{NO_LIGHT, is_dark};
 /// Start, pause, stop, open, save and clear.
 pub(super) fn buttons(ui: &mut Ui, view: &SessionView, setup: &SearchSetup, actions: &mut Actions) {
     let search = &view.structure_search;
-    let run = search.run.as_deref();
-    let active = run.is_some_and(StructureSearchSnapshot::is_active);
+    let active = search.run.is_active();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         start_button(ui, view, active, setup, actions);
         let buttons = [
-            if run.is_some_and(|run| run.status == RunStatus::Paused) {
+            if search.run.status == RunStatus::Paused {
                 let command = StructureSearchCommand::Resume;
                 ActionButton::new("Resume", active, command, "Resume the search")
             } else {
@@ -40,7 +39,7 @@ pub(super) fn buttons(ui: &mut Ui, view: &SessionView, setup: &SearchSetup, acti
             ),
             ActionButton::new(
                 "Open…",
-                !active && !search.starting,
+                !active,
                 FileRequest::OpenSearch,
                 "Resume a search from its file",
             ),
@@ -52,7 +51,7 @@ pub(super) fn buttons(ui: &mut Ui, view: &SessionView, setup: &SearchSetup, acti
             ),
             ActionButton::new(
                 "Clear",
-                run.is_some() || search.error.is_some(),
+                search.run.snapshot.is_some() || search.run.error.is_some(),
                 StructureSearchCommand::Clear,
                 "Dismiss this search; its file is retained",
             ),
@@ -69,7 +68,7 @@ fn start_button(
     actions: &mut Actions,
 ) {
     let dark = is_dark(view);
-    let ready = !active && !view.structure_search.starting && !dark;
+    let ready = !active && !dark;
     let hint = "Search over structure in the background, on a copy of the design";
     let reason = if dark { NO_LIGHT } else { "A search is already running" };
     if main_button(ui, "Search", ready, hint, reason) {
@@ -83,7 +82,10 @@ fn start_button(
 /// The offer to go on with the search that was left when the program was closed.
 pub(super) fn unfinished_search(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let known = &view.structure_search;
-    let Some(left) = known.unfinished.as_ref().filter(|_| known.run.is_none() && !known.starting)
+    let Some(left) = known
+        .unfinished
+        .as_ref()
+        .filter(|_| known.run.snapshot.is_none() && !known.run.is_active())
     else {
         return;
     };
@@ -120,7 +122,7 @@ fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
 
 /// How far the search is, in numbers.
 pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &StructureSearchSnapshot) {
-    let text = text::status_text(run, view.structure_search.pending);
+    let text = text::status_text(run, view.structure_search.run.status);
     match run.fraction_done() {
         Some(done) => {
             let bar = ProgressBar::new(done as f32).desired_height(16.0).text(text);
@@ -150,12 +152,17 @@ pub(super) fn live_controls(
     actions: &mut Actions,
 ) {
     ui.horizontal_wrapped(|ui| {
-        temperature(ui, run, actions);
+        temperature(ui, view, run, actions);
         preview_choice(ui, view, run, actions);
     });
 }
 
-fn temperature(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Actions) {
+fn temperature(
+    ui: &mut Ui,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
+    actions: &mut Actions,
+) {
     ui.weak("Temperature").on_hover_text(
         "How much worse a lens may become before a descent is given up for a new mutation: at this \
          merit its density is 1/e. Hotter is more patient with bad lenses",
@@ -166,13 +173,16 @@ fn temperature(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Actions
         .range(0.0..=f64::MAX)
         .speed(speed)
         .custom_formatter(|value, _| number::format_digits(value, 3));
-    let drag = ui.add_enabled(run.is_active(), drag).accessible_name("Temperature");
+    let drag =
+        ui.add_enabled(view.structure_search.run.is_active(), drag).accessible_name("Temperature");
     if let Some(temperature) = Temperature::new(value).filter(|_| drag.changed()) {
         actions.push(StructureSearchCommand::Control(SteerCommand::Temperature(temperature)));
     }
     let factor = run.request.plan.settings.reheat;
     let hint = format!("Multiply the temperature by {factor}");
-    let reheat = ui.add_enabled(run.is_active(), Button::new("Reheat")).on_hover_text(hint);
+    let reheat = ui
+        .add_enabled(view.structure_search.run.is_active(), Button::new("Reheat"))
+        .on_hover_text(hint);
     if reheat.clicked() {
         actions.push(StructureSearchCommand::Control(SteerCommand::Reheat));
     }

@@ -136,11 +136,11 @@ pub(super) fn lens_buttons(
     let pin = if run.pinned == Some(number) {
         let command = StructureSearchCommand::Control(SteerCommand::Unpin);
         let hint = "Start new descents from any retained lens again";
-        ActionButton::new("Unpin", run.is_active(), command, hint)
+        ActionButton::new("Unpin", view.structure_search.run.is_active(), command, hint)
     } else {
         let command = StructureSearchCommand::Control(SteerCommand::Pin(number));
         let hint = "Start every new descent from this lens";
-        ActionButton::new("Pin", run.is_active(), command, hint)
+        ActionButton::new("Pin", view.structure_search.run.is_active(), command, hint)
     };
     let buttons = [
         ActionButton::new("Take", true, StructureSearchCommand::Accept(number), &take),

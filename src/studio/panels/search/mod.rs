@@ -18,7 +18,7 @@ mod thumbnail;
 use egui::{Button, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::Panel;
-use crate::session::{Command, SessionView, StructureSearchSnapshot};
+use crate::session::{Command, SessionView, StructureSearchSnapshot, StructureSearchView};
 use crate::studio::actions::Actions;
 use crate::studio::text::{capitalize, counted_from_one};
 use setup::SearchSetup;
@@ -77,14 +77,14 @@ impl Panel for SearchPanel {
         self.sync_page(view);
         controls::buttons(ui, view, &self.setup, actions);
         controls::unfinished_search(ui, view, actions);
-        if let Some(why) = &view.structure_search.error {
+        if let Some(why) = &view.structure_search.run.error {
             let why = capitalize(&counted_from_one(why));
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
-        let run = view.structure_search.run.clone();
+        let run = view.structure_search.run.snapshot.clone();
         if let Some(run) = run.as_deref() {
             controls::progress(ui, view, run);
-        } else if view.structure_search.starting {
+        } else if view.structure_search.run.is_active() {
             ui.weak("Looking at the lens…");
         }
         self.pages(ui, run.is_some());
@@ -95,7 +95,7 @@ impl Panel for SearchPanel {
         scroll.show(ui, |ui| match (self.page, run.as_deref()) {
             (SearchPage::Setup, _) | (_, None) => self.setup_page(ui, view),
             (SearchPage::Lenses, Some(run)) => self.lenses_page(ui, view, run, actions),
-            (SearchPage::Moves, Some(run)) => moves::table(ui, run, actions),
+            (SearchPage::Moves, Some(run)) => moves::table(ui, view, run, actions),
             (SearchPage::Family, Some(run)) => self.family_page(ui, view, run, actions),
         });
     }
@@ -104,7 +104,7 @@ impl Panel for SearchPanel {
 impl SearchPanel {
     /// Turns to what is new: a search that has just begun, or the setup where there is none.
     fn sync_page(&mut self, view: &SessionView) {
-        let number = view.structure_search.run.as_ref().map(|run| run.number);
+        let number = view.structure_search.run.id.map(|run| run.number);
         if number != self.shown_run {
             self.page = if number.is_some() { SearchPage::Lenses } else { SearchPage::Setup };
             self.shown_run = number;
@@ -129,10 +129,10 @@ impl SearchPanel {
     }
 
     fn setup_page(&mut self, ui: &mut Ui, view: &SessionView) {
-        let under_way = view.structure_search.run.as_ref().is_some_and(|run| run.is_active());
+        let under_way = view.structure_search.run.is_active();
         if under_way {
             ui.label(RichText::new("The next search will begin with these.").small().weak());
-        } else if view.structure_search.run.is_none() {
+        } else if view.structure_search.run.snapshot.is_none() {
             ui.label(INTRODUCTION);
         }
         self.setup.ui(ui, view);
@@ -151,7 +151,7 @@ impl SearchPanel {
         let chosen = self.selected_number();
         let clicked =
             clicked.or_else(|| lenses::cards(ui, view, run, chosen, &mut self.thumbnails));
-        self.select(run, clicked, actions);
+        self.select(view, clicked, actions);
     }
 
     /// The line of the lens that was clicked, or of the best one.
@@ -166,7 +166,7 @@ impl SearchPanel {
         let clicked = family::tree(ui, run, number);
         let clicked =
             clicked.or_else(|| family::ancestors(ui, view, run, number, &mut self.thumbnails));
-        self.select(run, clicked, actions);
+        self.select(view, clicked, actions);
     }
 
     /// The generation that was clicked.
@@ -175,15 +175,12 @@ impl SearchPanel {
     }
 
     /// Shows a generation in place of the design.
-    fn select(
-        &mut self,
-        run: &StructureSearchSnapshot,
-        number: Option<u64>,
-        actions: &mut Actions,
-    ) {
+    fn select(&mut self, view: &SessionView, number: Option<u64>, actions: &mut Actions) {
         let Some(number) = number else { return };
-        self.selected = Some((run.number, number));
-        if let Some(lens) = run.lens_by_number(number) {
+        let StructureSearchView { run, .. } = &view.structure_search;
+        let (Some(id), Some(search)) = (run.id, &run.snapshot) else { return };
+        self.selected = Some((id.number, number));
+        if let Some(lens) = search.lens_by_number(number) {
             actions.push(Command::Preview(Some(Box::new((**lens).clone()))));
         }
     }

@@ -4,7 +4,7 @@ use egui::{DragValue, Grid, RichText, Ui};
 
 use super::mutation_style;
 use crate::search::{MutationKind, MutationStatistics, SteerCommand};
-use crate::session::{StructureSearchCommand, StructureSearchSnapshot};
+use crate::session::{SessionView, StructureSearchCommand, StructureSearchSnapshot};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::text::{capitalize, counted_from_one};
@@ -20,7 +20,12 @@ const HEADINGS: [(&str, &str); 7] = [
 ];
 
 /// The table of all kinds.
-pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Actions) {
+pub(super) fn table(
+    ui: &mut Ui,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
+    actions: &mut Actions,
+) {
     Grid::new("moves").num_columns(HEADINGS.len()).spacing([9.0, 3.0]).striped(true).show(
         ui,
         |ui| {
@@ -32,7 +37,7 @@ pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Ac
             }
             ui.end_row();
             for kind in mutation_style::kinds() {
-                row(ui, run, kind, actions);
+                row(ui, view, run, kind, actions);
                 ui.end_row();
             }
         },
@@ -40,7 +45,13 @@ pub(super) fn table(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Ac
     refusal_summary(ui, run);
 }
 
-fn row(ui: &mut Ui, run: &StructureSearchSnapshot, kind: MutationKind, actions: &mut Actions) {
+fn row(
+    ui: &mut Ui,
+    view: &SessionView,
+    run: &StructureSearchSnapshot,
+    kind: MutationKind,
+    actions: &mut Actions,
+) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         mutation_style::symbol(ui, kind);
@@ -49,7 +60,7 @@ fn row(ui: &mut Ui, run: &StructureSearchSnapshot, kind: MutationKind, actions: 
     let mut weight = run.weights.of(kind);
     let drag = DragValue::new(&mut weight).range(0.0..=100.0).speed(0.02).max_decimals(2);
     let name = format!("Weight of {}", kind.name());
-    let drag = ui.add_enabled(run.is_active(), drag).accessible_name(&name);
+    let drag = ui.add_enabled(view.structure_search.run.is_active(), drag).accessible_name(&name);
     if drag.changed() {
         actions.push(StructureSearchCommand::Control(SteerCommand::Weight(kind, weight)));
     }

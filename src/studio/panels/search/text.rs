@@ -28,7 +28,7 @@ fn counted(count: u64, what: &str) -> String {
 }
 
 /// How the search stands, and what it has come to.
-pub(super) fn status_text(run: &StructureSearchSnapshot, pending: Option<RunStatus>) -> String {
+pub(super) fn status_text(run: &StructureSearchSnapshot, status: RunStatus) -> String {
     let why = match run.end_reason {
         Some(EndReason::TimeLimit) => ": its time is up",
         Some(EndReason::Sampler(RunEnd::Moves | RunEnd::Gradients)) => ": its limit is reached",
@@ -36,7 +36,7 @@ pub(super) fn status_text(run: &StructureSearchSnapshot, pending: Option<RunStat
         Some(EndReason::Sampler(RunEnd::Stuck)) => ": no mutation applies any more",
         Some(EndReason::Sampler(RunEnd::Stopped)) | None => "",
     };
-    let standing = text::status_text(run.status, pending);
+    let standing = text::status_text(status);
     let (from, to) = (merit_text(run.start.merit), merit_text(run.best.merit));
     format!("{standing}{why}, merit {from} to {to}")
 }
@@ -120,9 +120,8 @@ pub(super) fn comparison(
     let mut parts = Vec::new();
     let found = run.reservoir.iter().chain([&run.best, &run.start]);
     let found = found.filter(|found| found.number == number).find_map(|found| found.score.as_ref());
-    let pair = found
-        .and_then(scored_design)
-        .zip(view.structure_search.current_design.as_deref().and_then(scored_design));
+    let pair =
+        found.and_then(scored_design).zip(view.design_score.as_deref().and_then(scored_design));
     match pair {
         Some((new, own)) => {
             parts.push(change_text("RMS", 1e3 * own.spot, 1e3 * new.spot, "µm"));

@@ -1,0 +1,262 @@
+//! The analyses of all panels, computed in the background for the latest lens only.
+//!
+//! A newer request replaces one that has not begun, and interrupts one that has between two analyses.
+//! Results carry the version of the design that they belong to and the time of each analysis.
+
+mod effect_timing;
+mod pupils;
+
+pub use effect_timing::measure_effect_costs;
+pub use pupils::FieldPupils;
+
+use super::clock::{Timed, now, time};
+use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
+use super::view::AnalysisSettings;
+use crate::analysis;
+use crate::analysis::{
+    AnalysisError, Distortion, Fan, FieldCurvature, Illumination, RayLayout, Spot, SpotPoints,
+};
+use crate::effects;
+use crate::effects::{EffectPlan, TracePurpose};
+use crate::lens::{FieldPoint, Lens};
+use crate::paraxial::{FirstOrder, Seidel};
+use crate::pupil::{Accuracy, RayModel, RayModelError};
+use pupils::field_pupils;
+use rayon::prelude::*;
+use std::io;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The analyses of one version of the design.
+#[derive(Debug, Clone)]
+pub struct AnalysisResults {
+    /// The version of the design.
+    pub version: u64,
+    /// The lens.
+    pub lens: Arc<Lens>,
+    /// The settings of the analyses.
+    pub settings: AnalysisSettings,
+    /// The analyses, or the reason why there are none.
+    pub analyses: Result<Analyses, String>,
+    /// The time of all analyses together, in milliseconds.
+    pub ms: f64,
+}
+
+/// The analyses of a lens at one zoom position, each with its time.
+#[derive(Debug, Clone)]
+pub struct Analyses {
+    /// The lens with its beam, ready for tracing.
+    pub bench: Timed<Arc<RayModel>>,
+    /// The Seidel sums; `None` without a chief ray.
+    pub seidel: Timed<Option<Seidel<f64>>>,
+    /// The effects that are computed, each with the reason.
+    pub plan: Timed<EffectPlan>,
+    /// The rays of the layout.
+    pub layout: Timed<RayLayout>,
+    /// The points of the spot diagrams, in the order of fields and then wavelengths.
+    pub spot_points: Timed<Vec<SpotPoints>>,
+    /// The spot of each field.
+    pub spots: Timed<Vec<Result<Spot, AnalysisError>>>,
+    /// The radius of the first dark ring of a perfect lens, in mm; `None` if it is not defined.
+    pub airy: Option<f64>,
+    /// The pupils of the fields; `None` while no panel shows them.
+    pub pupils: Option<Timed<FieldPupils>>,
+    /// The ray fans of each field.
+    pub fans: Timed<Vec<Result<Vec<Fan>, AnalysisError>>>,
+    /// The distortion at each field.
+    pub distortion: Timed<Vec<Result<Distortion, AnalysisError>>>,
+    /// The field curvature at each field.
+    pub curvature: Timed<Vec<Result<FieldCurvature, AnalysisError>>>,
+    /// The illumination of each field.
+    pub illumination: Timed<Vec<Illumination>>,
+}
+
+impl Analyses {
+    /// First-order data at the primary wavelength.
+    pub fn first_order(&self) -> &FirstOrder<f64> {
+        &self.bench.value.first_order
+    }
+}
+
+/// A request for the analyses of a lens.
+#[derive(Debug, Clone)]
+pub(super) struct AnalysisRequest {
+    pub(super) version: u64,
+    pub(super) lens: Arc<Lens>,
+    pub(super) settings: AnalysisSettings,
+}
+
+/// The treatment of the costs of effects while no request waits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum EffectTiming {
+    /// The costs are measured.
+    Measured,
+    /// The costs stay unknown.
+    Skipped,
+}
+
+/// The age at which an analysis yields to a newer request, unless nothing was published for longer than
+/// `MAX_GAP`: while a value is dragged, the numbers follow it.
+const YIELD_AGE: Duration = Duration::from_millis(50);
+/// The longest time without results while requests arrive.
+const MAX_GAP: Duration = Duration::from_millis(200);
+/// The time without a request after which the costs of effects are measured.
+const IDLE_TIME: Duration = Duration::from_millis(300);
+
+/// Computes the analyses of all panels in the background, for the latest lens only.
+pub(super) type AnalysisWorker = LatestRequestWorker<AnalysisRequest, AnalysisResults>;
+
+type Output = WorkerOutput<AnalysisRequest, AnalysisResults>;
+
+/// Starts the thread. `wake` is called from it when there are new results.
+pub(super) fn spawn_analysis(
+    timing: EffectTiming,
+    wake: impl Fn() + Send + 'static,
+) -> io::Result<AnalysisWorker> {
+    let mut published = None;
+    AnalysisWorker::spawn("analysis", wake, move |request, output| {
+        let results = answer(request, output, &mut published);
+        if let (Some(results), EffectTiming::Measured) = (results, timing) {
+            measure(results, output);
+        }
+    })
+}
+
+/// Publishes the results of a request. `None` if it was interrupted.
+fn answer(
+    request: AnalysisRequest,
+    output: &Output,
+    published: &mut Option<Instant>,
+) -> Option<AnalysisResults> {
+    let start = now();
+    let recent = published.is_some_and(|last| start.duration_since(last) < MAX_GAP);
+    let overtaken = || recent && start.elapsed() > YIELD_AGE && output.is_interrupted();
+    let interrupted = || output.is_closed() || overtaken();
+    let AnalysisRequest { version, lens, settings } = request;
+    let computed = catch_panic(|| Ok(analyze_unless(&lens, &settings, interrupted)));
+    let analyses = computed.unwrap_or_else(|why| Some(Err(why)))?;
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    let results = AnalysisResults { version, lens, settings, analyses, ms };
+    *published = Some(now());
+    output.publish(results.clone());
+    Some(results)
+}
+
+/// Publishes the results once more with the cost of each effect, if no request interrupts that.
+fn measure(mut results: AnalysisResults, output: &Output) {
+    let Ok(analyses) = &mut results.analyses else { return };
+    if !output.idle_for(IDLE_TIME) {
+        return;
+    }
+    let (lens, settings) = (&results.lens, &results.settings);
+    let plan = catch_panic(|| {
+        measure_effect_costs(lens, settings, || output.is_interrupted()).transpose()
+    });
+    if let Ok(Some(plan)) = plan {
+        analyses.plan.value = plan;
+        output.publish(results);
+    }
+}
+
+/// Computes all analyses of a lens.
+///
+/// # Errors
+/// A lens or aperture through which nothing can be traced.
+pub fn analyze(lens: &Lens, settings: &AnalysisSettings) -> Result<Analyses, String> {
+    let never = || false;
+    analyze_unless(lens, settings, never).unwrap_or_else(|| Err("interrupted".to_owned()))
+}
+
+fn analyze_unless(
+    lens: &Lens,
+    settings: &AnalysisSettings,
+    interrupted: impl Fn() -> bool,
+) -> Option<Result<Analyses, String>> {
+    let plan = time(|| plan_effects(lens, settings));
+    let plan = match plan.value {
+        Ok(value) => Timed { value, ms: plan.ms },
+        Err(error) => return Some(Err(error.to_string())),
+    };
+    let bench = time(|| effects::build_ray_model(lens, settings.zoom, &plan.value));
+    match bench.value {
+        Ok(value) => {
+            let bench = Timed { value: Arc::new(value), ms: bench.ms };
+            Analyses::of(bench, plan, settings, interrupted).map(Ok)
+        }
+        Err(error) => Some(Err(error.to_string())),
+    }
+}
+
+fn plan_effects(lens: &Lens, settings: &AnalysisSettings) -> Result<EffectPlan, RayModelError> {
+    let facts = effects::measure_effects(lens, settings.zoom)?;
+    Ok(effects::plan(&facts, TracePurpose::Spot(settings.tolerance), &settings.overrides))
+}
+
+/// The number of points of a ray fan.
+const FAN_POINTS: usize = 65;
+
+impl Analyses {
+    /// Computes all analyses, those that are looked at first in front. `None` if interrupted.
+    fn of(
+        bench: Timed<Arc<RayModel>>,
+        plan: Timed<EffectPlan>,
+        settings: &AnalysisSettings,
+        interrupted: impl Fn() -> bool,
+    ) -> Option<Self> {
+        let go_on = || (!interrupted()).then_some(());
+        let b = Arc::clone(&bench.value);
+        let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
+        let layout = time(|| analysis::ray_layout(&b, settings.rays));
+        go_on()?;
+        let scatter = time(|| analysis::spot_points(&b));
+        go_on()?;
+        let spots = time(|| for_each_field(&b, |field| spot_with_time(&b, field, accuracy)));
+        go_on()?;
+        let pupils = settings.pupils.then(|| time(|| field_pupils(&b, settings, accuracy)));
+        go_on()?;
+        let fans = time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
+        go_on()?;
+        let illumination = time(|| analysis::illumination(&b, b.primary, accuracy));
+        go_on()?;
+        Some(Self {
+            seidel: time(|| b.seidel()),
+            airy: analysis::airy_radius(&b),
+            distortion: time(|| {
+                for_each_field(&b, |field| analysis::distortion(&b, field, b.primary))
+            }),
+            curvature: time(|| {
+                for_each_field(&b, |field| analysis::field_curvature(&b, field, b.primary))
+            }),
+            bench,
+            plan,
+            layout,
+            spot_points: scatter,
+            spots,
+            pupils,
+            fans,
+            illumination,
+        })
+    }
+}
+
+/// The spot of a field, with the time of its estimates.
+fn spot_with_time(
+    bench: &RayModel,
+    field: FieldPoint,
+    accuracy: Accuracy,
+) -> Result<Spot, AnalysisError> {
+    let Timed { value, ms } = time(|| analysis::spot(bench, field, accuracy));
+    let mut spot = value?;
+    for number in [&mut spot.rms, &mut spot.radius] {
+        number.milliseconds = Some(ms);
+    }
+    Ok(spot)
+}
+
+/// Calls a function for each field in parallel; the results are in the order of the fields.
+pub(super) fn for_each_field<T: Send>(
+    bench: &RayModel,
+    of: impl Fn(FieldPoint) -> T + Sync,
+) -> Vec<T> {
+    bench.fields.par_iter().map(|field| of(*field)).collect()
+}

@@ -1,0 +1,140 @@
+//! Local optimization in the background, on a copy of the design.
+
+use super::run::{Engine, RunKind, RunStatus, RunView, thin_history};
+use crate::lens::Lens;
+use crate::merit::{Goal, TermValue};
+use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer};
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The maximum number of points of the merit history.
+const MAX_HISTORY: usize = 2000;
+
+/// A specification of an optimization.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OptimizationRequest {
+    /// The descent method.
+    pub method: DescentMethod,
+    /// The lens to start from.
+    pub lens: Arc<Lens>,
+    /// The merit function.
+    pub goal: Goal,
+    /// The error allowed of the merit, relative to the size of the spots.
+    pub tolerance: f64,
+}
+
+/// Makes the optimizer of a request.
+pub type OptimizerFactory =
+    dyn Fn(&OptimizationRequest) -> Result<Box<dyn Optimizer>, String> + Send;
+
+/// The state of an optimization.
+#[derive(Debug, Clone)]
+pub struct OptimizationSnapshot {
+    /// The request, with the lens that the optimization started from.
+    pub request: Arc<OptimizationRequest>,
+    /// The outcome of the last step; `None` before the first.
+    pub progress: Option<OptimizationProgress>,
+    /// The best lens so far.
+    pub best: Arc<Lens>,
+    /// The lens at the current step.
+    pub current: Arc<Lens>,
+    /// The terms of the merit for the lens that the optimization started from.
+    pub initial_terms: Vec<TermValue>,
+    /// The terms of the merit for the best lens so far.
+    pub best_terms: Vec<TermValue>,
+    /// The merit against the step, with at most a few thousand points over the whole run.
+    pub history: Vec<MeritSample>,
+}
+
+/// A point of the merit history.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeritSample {
+    /// The number of steps so far.
+    pub step: usize,
+    /// The merit of the current lens.
+    pub current: f64,
+    /// The merit of the best lens so far.
+    pub best: f64,
+}
+
+impl RunView<OptimizationSnapshot> {
+    /// The lens to show: the current one while the optimization is active, the best one afterwards.
+    pub fn displayed_lens(&self) -> Option<&Arc<Lens>> {
+        let snapshot = self.snapshot.as_ref()?;
+        Some(if self.is_active() { &snapshot.current } else { &snapshot.best })
+    }
+}
+
+/// An optimizer with its history.
+pub(super) struct OptimizationEngine {
+    optimizer: Box<dyn Optimizer>,
+    state: OptimizationSnapshot,
+    stride: usize,
+}
+
+impl OptimizationEngine {
+    pub(super) fn start(
+        factory: &OptimizerFactory,
+        request: OptimizationRequest,
+    ) -> Result<Self, String> {
+        let optimizer = factory(&request)?;
+        let initial_terms = optimizer.terms().unwrap_or_default();
+        let merit = initial_terms.iter().map(|term| term.weight * term.value).sum();
+        let state = OptimizationSnapshot {
+            progress: None,
+            best: Arc::clone(&request.lens),
+            current: Arc::clone(&request.lens),
+            request: Arc::new(request),
+            initial_terms,
+            best_terms: Vec::new(),
+            history: vec![MeritSample { step: 0, current: merit, best: merit }],
+        };
+        Ok(Self { optimizer, state, stride: 1 })
+    }
+}
+
+impl Engine for OptimizationEngine {
+    const KIND: RunKind = RunKind::Optimization;
+    const THREAD: &'static str = "optimizer";
+    const INTERVAL: Duration = Duration::from_millis(33);
+
+    type Input = OptimizationRequest;
+    type Request = Infallible;
+    type Report = Infallible;
+    type Snapshot = OptimizationSnapshot;
+
+    fn step(&mut self) -> Result<bool, String> {
+        let progress = self.optimizer.step();
+        let finished = progress.finished;
+        if progress.step.is_multiple_of(self.stride) || finished {
+            let OptimizationProgress { step, merit: current, best, .. } = progress;
+            self.state.history.push(MeritSample { step, current, best });
+        }
+        let step = |sample: &MeritSample| sample.step;
+        thin_history(&mut self.state.history, &mut self.stride, MAX_HISTORY, step);
+        self.state.progress = Some(progress);
+        Ok(finished)
+    }
+
+    fn on_status(&mut self, status: RunStatus) -> Result<(), String> {
+        // The lens at which the optimizer was stopped may be better than the best one that is verified.
+        if status == RunStatus::Stopped {
+            self.optimizer.verify_best();
+        }
+        Ok(())
+    }
+
+    fn handle(&mut self, request: Infallible) -> Result<Option<RunStatus>, String> {
+        match request {}
+    }
+
+    fn snapshot(&mut self) -> OptimizationSnapshot {
+        OptimizationSnapshot {
+            best: Arc::new(self.optimizer.best().clone()),
+            current: Arc::new(self.optimizer.current().clone()),
+            best_terms: self.optimizer.terms().unwrap_or_default(),
+            ..self.state.clone()
+        }
+    }
+}

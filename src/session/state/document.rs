@@ -1,0 +1,128 @@
+//! The document of a session: edits, undo, and its files.
+
+use super::{Session, SessionEvent};
+use crate::files;
+use crate::lens::{Edit, Lens, apply_edit};
+use crate::pupil::limited_by_stop;
+use crate::session::undo::UndoStack;
+use crate::session::view::Severity;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+impl Session {
+    pub(super) fn edit(&mut self, edit: &Edit) {
+        match apply_edit(&self.lens, edit) {
+            Ok(lens) if lens == *self.lens => {}
+            Ok(lens) => {
+                self.history.push(Arc::clone(&self.lens), edit.title(), edit.cell());
+                self.set_design(Arc::new(lens));
+            }
+            Err(why) => self.post(Severity::Warning, why.to_string()),
+        }
+    }
+
+    pub(super) fn limit_by_stop(&mut self) {
+        let limited = limited_by_stop(&self.lens).map_err(|why| why.to_string());
+        let limited = limited.and_then(|lens| {
+            let replace = Edit::Replace(Box::new(lens));
+            apply_edit(&self.lens, &replace).map_err(|why| why.to_string())
+        });
+        self.accept(limited, "limit the beam by the stop");
+    }
+
+    /// Makes a lens the design, as one undo step, or posts the reason why there is none.
+    pub(super) fn accept(&mut self, lens: Result<Lens, String>, title: &str) {
+        match lens {
+            Ok(lens) => {
+                self.history.push(Arc::clone(&self.lens), title.to_owned(), None);
+                self.set_design(Arc::new(lens));
+            }
+            Err(why) => self.post(Severity::Warning, why),
+        }
+    }
+
+    pub(super) fn undo(&mut self) {
+        if let Some(lens) = self.history.undo(&self.lens) {
+            self.set_design(lens);
+        }
+    }
+
+    pub(super) fn redo(&mut self) {
+        if let Some(lens) = self.history.redo(&self.lens) {
+            self.set_design(lens);
+        }
+    }
+
+    /// Makes another lens the design.
+    fn set_design(&mut self, lens: Arc<Lens>) {
+        self.settings.zoom = self.settings.zoom.min(lens.zoom_positions() - 1);
+        self.lens = lens;
+        self.preview_lens = None;
+        self.invalidate();
+    }
+
+    /// Replaces the design by another one with an undo history of its own.
+    pub(super) fn replace_design(&mut self, lens: Lens, path: Option<PathBuf>) {
+        if let Err(why) = lens.check() {
+            return self.post(Severity::Error, why.to_string());
+        }
+        self.optimization.clear();
+        self.pareto.clear();
+        let lens = Arc::new(lens);
+        self.history = UndoStack::default();
+        self.saved = Arc::clone(&lens);
+        self.path = path;
+        self.settings.zoom = 0;
+        self.settings.pupil_wavelength = None;
+        self.selected = None;
+        self.set_design(lens);
+    }
+
+    pub(super) fn open(&mut self, path: &Path) {
+        match files::open(path) {
+            Ok(opened) => {
+                // A foreign file is not overwritten under its own name without asking.
+                let own = (opened.format == files::LensFormat::Native).then(|| path.to_owned());
+                self.replace_design(opened.lens, own);
+                if let Some(report) = opened.report {
+                    self.post(Severity::Note, format!("imported {}\n{report}", path.display()));
+                }
+                self.events.push(SessionEvent::Opened(path.to_owned()));
+            }
+            Err(why) => self.post(Severity::Error, why.to_string()),
+        }
+    }
+
+    pub(super) fn save(&mut self, path: Option<PathBuf>) {
+        let Some(path) = path.or_else(|| self.path.clone()) else {
+            let text = "the lens has no file yet; choose where to save it";
+            return self.post(Severity::Warning, text);
+        };
+        match files::save(&self.lens, &path) {
+            Ok(saved) if saved.format == files::LensFormat::Native => {
+                self.saved = Arc::clone(&self.lens);
+                self.path = Some(path.clone());
+                self.events.push(SessionEvent::Saved(path));
+            }
+            // A foreign file may hold less than the lens, which stays unsaved.
+            Ok(saved) => self.post_export(&path, saved),
+            Err(why) => self.post(Severity::Error, why.to_string()),
+        }
+    }
+
+    pub(super) fn export(&mut self, path: &Path) {
+        match files::save(&self.lens, path) {
+            Ok(saved) => self.post_export(path, saved),
+            Err(why) => self.post(Severity::Error, why.to_string()),
+        }
+    }
+
+    /// Posts what a foreign file contains and what it could not represent.
+    fn post_export(&mut self, path: &Path, saved: files::SaveReport) {
+        let head = Some(format!("exported to {}", path.display()));
+        let proof = saved.proof.map(|p| p.to_string());
+        let parts = [head, proof, saved.report.map(|r| r.to_string())];
+        self.post(Severity::Note, parts.into_iter().flatten().collect::<Vec<_>>().join("\n"));
+        self.events.push(SessionEvent::Saved(path.to_owned()));
+    }
+}

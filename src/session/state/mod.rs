@@ -1,0 +1,369 @@
+//! The session itself: what it holds, how it carries out commands, and what panels see of it.
+
+mod document;
+mod runs;
+
+use super::analysis::{
+    AnalysisRequest, AnalysisResults, AnalysisWorker, EffectTiming, spawn_analysis,
+};
+use super::command::Command;
+use super::experiment::{ExperimentStatus, ExperimentWorker};
+use super::grin_design::GrinState;
+use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
+use super::pareto::ParetoState;
+use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
+use super::score::DesignScore;
+use super::structure_search::StructureSearchState;
+use super::undo::UndoStack;
+use super::view::{AnalysisSettings, Message, SessionView, Severity};
+use crate::experiments::{self, Effort, ExperimentReport};
+use crate::lens::Lens;
+use crate::optimize;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// An event of a session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SessionEvent {
+    /// The design or a setting has changed; the view has this version.
+    Changed(u64),
+    /// A lens was read from this file.
+    Opened(PathBuf),
+    /// Something was written to this file or folder.
+    Saved(PathBuf),
+    /// A background run has another status.
+    Run(RunKind, RunStatus),
+    /// There is a message to the user.
+    Message(Message),
+}
+
+/// The maximum number of messages that are stored.
+const MAX_MESSAGES: usize = 200;
+/// The maximum number of rays of each field in the layout.
+const MAX_RAYS: usize = 2000;
+
+/// One open design.
+#[derive(Debug)]
+pub struct Session {
+    lens: Arc<Lens>,
+    version: u64,
+    history: UndoStack,
+    path: Option<PathBuf>,
+    /// The lens as it is in its file.
+    saved: Arc<Lens>,
+    settings: AnalysisSettings,
+    /// The surface that every panel highlights.
+    selected: Option<usize>,
+    messages: Arc<Vec<Message>>,
+    analysis: AnalysisWorker,
+    optimization: BackgroundRun<OptimizationEngine>,
+    pareto: ParetoState,
+    structure_search: StructureSearchState,
+    grin: GrinState,
+    experiment: ExperimentWorker,
+    design_score: DesignScore,
+    /// The lens that a panel shows in place of the design.
+    preview_lens: Option<Arc<Lens>>,
+    /// Analyzes that lens, or the one that a run shows.
+    preview_analysis: AnalysisWorker,
+    /// The lens whose analysis was requested last.
+    preview_request: Option<PreviewRequest>,
+    /// The version of the analyses of one source.
+    preview_version: u64,
+    events: Vec<SessionEvent>,
+}
+
+/// The source of a lens that is shown in place of the design.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum PreviewSource {
+    /// A panel.
+    Panel,
+    /// A background run.
+    Run(RunId),
+}
+
+/// A lens that is shown in place of the design, with the settings of its analysis.
+#[derive(Debug)]
+struct PreviewRequest {
+    source: PreviewSource,
+    lens: Arc<Lens>,
+    settings: AnalysisSettings,
+}
+
+impl Session {
+    /// Opens a design; `wake` is called from other threads when there is something new to show.
+    ///
+    /// # Errors
+    /// A lens that cannot be used, or a system that cannot start a thread.
+    pub fn new(lens: Lens, wake: impl Fn() + Send + Clone + 'static) -> io::Result<Self> {
+        let start = |request: &OptimizationRequest| {
+            let OptimizationRequest { method, lens, goal, tolerance } = request;
+            let started = optimize::start(*method, lens, goal, *tolerance);
+            started.map_err(|why| why.to_string())
+        };
+        Self::with_optimizer(lens, Box::new(start), wake)
+    }
+
+    /// The same with other optimizers.
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn with_optimizer(
+        lens: Lens,
+        factory: Box<OptimizerFactory>,
+        wake: impl Fn() + Send + Clone + 'static,
+    ) -> io::Result<Self> {
+        lens.check().map_err(io::Error::other)?;
+        let lens = Arc::new(lens);
+        let optimize = move |request, _: &_| OptimizationEngine::start(&factory, request);
+        let session = Self {
+            saved: Arc::clone(&lens),
+            lens,
+            version: 1,
+            history: UndoStack::default(),
+            path: None,
+            settings: AnalysisSettings::default(),
+            selected: None,
+            messages: Arc::default(),
+            analysis: spawn_analysis(EffectTiming::Measured, wake.clone())?,
+            optimization: BackgroundRun::spawn(wake.clone(), optimize)?,
+            pareto: ParetoState::spawn(wake.clone())?,
+            structure_search: StructureSearchState::spawn(wake.clone())?,
+            grin: GrinState::spawn(wake.clone())?,
+            experiment: ExperimentWorker::spawn(wake.clone())?,
+            design_score: DesignScore::spawn(wake.clone())?,
+            preview_lens: None,
+            preview_analysis: spawn_analysis(EffectTiming::Skipped, wake)?,
+            preview_request: None,
+            preview_version: 0,
+            events: Vec::new(),
+        };
+        session.request_analysis();
+        Ok(session)
+    }
+
+    /// Carries out a command and returns the events so far.
+    pub fn apply(&mut self, command: Command) -> Vec<SessionEvent> {
+        match command {
+            Command::Edit(edit) => self.edit(&edit),
+            Command::LimitByStop => self.limit_by_stop(),
+            Command::CommitEdit => self.history.commit(),
+            Command::Undo => self.undo(),
+            Command::Redo => self.redo(),
+            Command::New(lens) => self.replace_design(*lens, None),
+            Command::Open(path) => self.open(&path),
+            Command::Save(path) => self.save(path),
+            Command::Export(path) => self.export(&path),
+            Command::Optimize { method, goal } => self.optimize(method, goal),
+            Command::Pause => self.optimization.pause(),
+            Command::Resume => self.optimization.resume(),
+            Command::Step => self.optimization.step(),
+            Command::Stop => self.optimization.stop(),
+            Command::AcceptResult => self.accept_result(),
+            Command::DiscardResult => self.optimization.clear(),
+            Command::StartPareto { settings, compare } => {
+                self.pareto.start(&self.lens, settings, compare);
+            }
+            Command::PausePareto => self.pareto.run.pause(),
+            Command::ResumePareto => self.pareto.run.resume(),
+            Command::StopPareto => self.pareto.run.stop(),
+            Command::ClearPareto => self.pareto.clear(),
+            Command::ExportPareto(folder) => self.export_pareto(folder),
+            Command::StructureSearch(command) => self.structure_search_command(command),
+            Command::Grin(command) => self.grin_command(command),
+            Command::Preview(lens) => self.preview_lens = lens.map(|lens| Arc::new(*lens)),
+            Command::AcceptPreview => self.accept_preview(),
+            Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
+            Command::ShowZoom(zoom) => self.show_zoom(zoom),
+            Command::ShowRays(rays) => self.change_settings(|s| s.rays = rays.min(MAX_RAYS)),
+            Command::SetEffect(effect, choice) => {
+                self.change_settings(|s| s.overrides.set(effect, choice));
+            }
+            Command::ShowPupils(shown) => self.change_settings(|s| s.pupils = shown),
+            Command::ShowPupilWavelength(wavelength) => {
+                self.change_settings(|s| s.pupil_wavelength = wavelength);
+            }
+            Command::StartExperiment { id, effort } => self.start_experiment(&id, effort),
+            Command::CancelExperiment => self.experiment.cancel(),
+            Command::DismissExperiment => self.experiment.dismiss(),
+            Command::SaveExperiment(folder) => self.save_experiment(&folder),
+            Command::Select(surface) => self.selected = surface,
+            Command::ClearMessages => self.messages = Arc::default(),
+        }
+        self.poll()
+    }
+
+    /// The events since the last call, those of background threads included.
+    pub fn poll(&mut self) -> Vec<SessionEvent> {
+        self.receive_run_events();
+        let is_compared = self.pareto.run.view().id.is_some() || self.structure_search.is_shown();
+        self.design_score.sync(&self.lens, is_compared);
+        self.grin.sync();
+        self.sync_preview();
+        std::mem::take(&mut self.events)
+    }
+
+    /// A snapshot for panels.
+    pub fn view(&self) -> SessionView {
+        SessionView {
+            lens: Arc::clone(&self.lens),
+            version: self.version,
+            results: self.analysis.latest(),
+            optimization: self.optimization.view(),
+            pareto: self.pareto.view(),
+            structure_search: self.structure_search.view(),
+            grin: self.grin.view(),
+            design_score: self.design_score.latest(),
+            preview_lens: self.preview_lens.clone(),
+            preview_results: self.preview_results(),
+            experiment: self.experiment.run(),
+            messages: Arc::clone(&self.messages),
+            undo: self.history.undo_title().map(str::to_owned),
+            redo: self.history.redo_title().map(str::to_owned),
+            path: self.path.clone(),
+            dirty: self.is_dirty(),
+            settings: self.settings.clone(),
+            selected: self.selected.filter(|surface| *surface < self.lens.surfaces.len()),
+        }
+    }
+
+    /// The design.
+    pub fn lens(&self) -> &Arc<Lens> {
+        &self.lens
+    }
+
+    /// The newest analyses, maybe of an earlier version.
+    pub fn results(&self) -> Option<Arc<AnalysisResults>> {
+        self.analysis.latest()
+    }
+
+    /// True if the design differs from its file.
+    pub fn is_dirty(&self) -> bool {
+        !Arc::ptr_eq(&self.lens, &self.saved) && self.lens != self.saved
+    }
+
+    /// The lens that is shown in place of the design, with its source.
+    fn previewed(&self) -> Option<(PreviewSource, Arc<Lens>)> {
+        if let Some(lens) = &self.preview_lens {
+            return Some((PreviewSource::Panel, Arc::clone(lens)));
+        }
+        if let Some((id, lens)) = self.structure_search.previewed() {
+            return Some((PreviewSource::Run(id), lens));
+        }
+        let run = self.optimization.view();
+        Some((PreviewSource::Run(run.id?), Arc::clone(run.displayed_lens()?)))
+    }
+
+    /// Requests the analysis of the lens that is shown in place of the design, if it is another one.
+    fn sync_preview(&mut self) {
+        let Some((source, lens)) = self.previewed() else {
+            self.preview_request = None;
+            return;
+        };
+        let last = self.preview_request.as_ref();
+        let same_source = last.is_some_and(|last| last.source == source);
+        let same_lens = last
+            .is_some_and(|last| Arc::ptr_eq(&last.lens, &lens) && last.settings == self.settings);
+        if same_source && same_lens {
+            return;
+        }
+        self.preview_version += u64::from(!same_source);
+        let (version, settings) = (self.preview_version, self.settings.clone());
+        self.preview_analysis.request(AnalysisRequest {
+            version,
+            lens: Arc::clone(&lens),
+            settings: settings.clone(),
+        });
+        self.preview_request = Some(PreviewRequest { source, lens, settings });
+    }
+
+    /// The analyses of the lens that is shown in place of the design, maybe of one step before.
+    fn preview_results(&self) -> Option<Arc<AnalysisResults>> {
+        let (source, _) = self.previewed()?;
+        let is_current = self.preview_request.as_ref().is_some_and(|last| last.source == source);
+        let latest = self.preview_analysis.latest().filter(|_| is_current);
+        latest.filter(|results| results.version == self.preview_version)
+    }
+
+    /// Makes all analyses so far outdated.
+    fn invalidate(&mut self) {
+        self.version += 1;
+        self.request_analysis();
+        self.events.push(SessionEvent::Changed(self.version));
+    }
+
+    fn request_analysis(&self) {
+        self.analysis.request(AnalysisRequest {
+            version: self.version,
+            lens: Arc::clone(&self.lens),
+            settings: self.settings.clone(),
+        });
+    }
+
+    /// Posts a message to the user.
+    fn post(&mut self, severity: Severity, text: impl Into<String>) {
+        let message = Message { severity, text: text.into() };
+        let messages = Arc::make_mut(&mut self.messages);
+        if messages.len() >= MAX_MESSAGES {
+            messages.remove(0);
+        }
+        messages.push(message.clone());
+        self.events.push(SessionEvent::Message(message));
+    }
+
+    fn start_experiment(&mut self, id: &str, effort: Effort) {
+        match experiments::find(id) {
+            Some(experiment) => self.experiment.start(experiment, effort),
+            None => self.post(Severity::Warning, format!("there is no experiment `{id}`")),
+        }
+    }
+
+    fn save_experiment(&mut self, folder: &Path) {
+        let run = self.experiment.run();
+        let Some(ExperimentStatus::Done(report)) = run.as_deref().map(|run| &run.status) else {
+            let text = "there is no experiment whose results could be saved";
+            return self.post(Severity::Warning, text);
+        };
+        let mut report = ExperimentReport::clone(report);
+        let made = std::fs::create_dir_all(folder).map_err(|why| why.to_string());
+        let written = made.and_then(|()| report.write(folder).map_err(|why| why.to_string()));
+        match written {
+            Ok(()) => {
+                let (id, count) = (report.id, report.files.len());
+                let folder = folder.display();
+                let text = format!("experiment {id}: {count} files written to {folder}");
+                self.post(Severity::Note, text);
+            }
+            Err(why) => self.post(Severity::Error, why),
+        }
+    }
+
+    fn set_tolerance(&mut self, tolerance: f64) {
+        if tolerance > 0.0 && tolerance < 1.0 {
+            self.change_settings(|settings| settings.tolerance = tolerance);
+        } else {
+            let text = format!("the tolerance is {tolerance}; expected a number between 0 and 1");
+            self.post(Severity::Warning, text);
+        }
+    }
+
+    fn show_zoom(&mut self, zoom: usize) {
+        let count = self.lens.zoom_positions();
+        if zoom < count {
+            self.change_settings(|settings| settings.zoom = zoom);
+        } else {
+            let text = format!("there is no zoom position {zoom}; the lens has {count}");
+            self.post(Severity::Warning, text);
+        }
+    }
+
+    /// Changes a setting; setting it to the same value changes nothing.
+    fn change_settings(&mut self, change: impl FnOnce(&mut AnalysisSettings)) {
+        let before = self.settings.clone();
+        change(&mut self.settings);
+        if self.settings != before {
+            self.invalidate();
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The background runs of a session: starting them, their events, and accepting their lenses.
+
+use super::{Session, SessionEvent};
+use crate::lens::{Edit, Lens, apply_edit};
+use crate::merit::Goal;
+use crate::optimize::DescentMethod;
+use crate::session::command::StructureSearchCommand;
+use crate::session::grin_design::{GrinCommand, GrinExport};
+use crate::session::optimization::{OptimizationRequest, OptimizationSnapshot};
+use crate::session::pareto::ParetoExport;
+use crate::session::run::{RunEvent, RunKind, RunStatus};
+use crate::session::structure_search::StructureSearchReport;
+use crate::session::view::Severity;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+impl Session {
+    /// Saves structure searches without a chosen file in a folder from now on, and offers to resume
+    /// the unfinished search in it.
+    pub fn set_save_folder(&mut self, folder: impl Into<PathBuf>) {
+        self.structure_search.set_save_folder(folder.into());
+    }
+
+    /// Takes the events of all runs.
+    pub(super) fn receive_run_events(&mut self) {
+        for event in self.optimization.drain_events() {
+            match self.receive(RunKind::Optimization, event) {
+                None => {}
+                Some(report) => match report {},
+            }
+        }
+        for event in self.pareto.drain_events() {
+            if let Some(export) = self.receive(RunKind::Pareto, event) {
+                self.post_pareto_export(export);
+            }
+        }
+        for event in self.structure_search.drain_events() {
+            if let Some(report) = self.receive(RunKind::StructureSearch, event) {
+                self.post_search_report(report);
+            }
+        }
+        for event in self.grin.drain_events() {
+            if let Some(export) = self.receive(RunKind::GrinDesign, event) {
+                self.post_grin_export(export);
+            }
+        }
+    }
+
+    /// Takes an event of a run and returns the message of its engine, if it is one.
+    fn receive<R>(&mut self, kind: RunKind, event: RunEvent<R>) -> Option<R> {
+        let status = match event {
+            RunEvent::Report(report) => return Some(report),
+            RunEvent::Status(status) => status,
+            RunEvent::Failed(why) => {
+                self.post(Severity::Error, why);
+                RunStatus::Failed
+            }
+        };
+        self.events.push(SessionEvent::Run(kind, status));
+        None
+    }
+
+    pub(super) fn optimize(&mut self, method: DescentMethod, goal: Goal) {
+        self.preview_lens = None;
+        let (lens, tolerance) = (Arc::clone(&self.lens), self.settings.tolerance);
+        self.optimization.start(OptimizationRequest { method, lens, goal, tolerance });
+    }
+
+    /// Makes the best lens of the optimization the design.
+    pub(super) fn accept_result(&mut self) {
+        let Some(run) = self.optimization.snapshot() else {
+            return self.post(Severity::Warning, "there is no optimization result to accept");
+        };
+        let merged = merge_result(&run, &self.lens);
+        if merged.is_ok() {
+            self.optimization.clear();
+        }
+        self.accept(merged, "accept the optimized lens");
+    }
+
+    /// Makes the lens that is shown in place of the design the design. It keeps the variables of the
+    /// design if it can: a sweep of the Pareto front has more of them.
+    pub(super) fn accept_preview(&mut self) {
+        let Some(shown) = self.preview_lens.take() else {
+            return self.post(Severity::Warning, "there is no preview to accept");
+        };
+        let own = Lens { variables: self.lens.variables.clone(), ..Lens::clone(&shown) };
+        let lens = if own.check().is_ok() { own } else { Lens::clone(&shown) };
+        let checked = lens.check().map(|()| lens).map_err(|why| why.to_string());
+        self.accept(checked, "accept a lens of the Pareto front");
+    }
+
+    pub(super) fn export_pareto(&mut self, folder: Option<PathBuf>) {
+        let folder = folder.ok_or_else(|| "choose a folder to export the front to".to_owned());
+        if let Err(why) = folder.and_then(|folder| self.pareto.export(folder)) {
+            self.post(Severity::Warning, why);
+        }
+    }
+
+    fn post_pareto_export(&mut self, export: ParetoExport) {
+        match export {
+            ParetoExport::Written(folder, files) => {
+                let text = format!("{files} files of the front written to {}", folder.display());
+                self.post(Severity::Note, text);
+                self.events.push(SessionEvent::Saved(folder));
+            }
+            ParetoExport::Failed(why) => self.post(Severity::Error, why),
+        }
+    }
+
+    pub(super) fn structure_search_command(&mut self, command: StructureSearchCommand) {
+        if let StructureSearchCommand::Accept(number) = command {
+            return self.accept_found(number);
+        }
+        let starts = matches!(
+            command,
+            StructureSearchCommand::Start(_) | StructureSearchCommand::ResumeFrom(_)
+        );
+        if starts {
+            self.preview_lens = None;
+        }
+        if let Err(why) = self.structure_search.handle(command, &self.lens) {
+            self.post(Severity::Warning, why);
+        }
+    }
+
+    /// Makes a lens of the structure search the design.
+    fn accept_found(&mut self, number: u64) {
+        let found = self.structure_search.lens_by_number(number).and_then(|lens| {
+            let own = without_fixed_variables(&lens);
+            own.check().map(|()| own).map_err(|why| why.to_string())
+        });
+        if found.is_ok() {
+            self.structure_search.end_preview();
+        }
+        self.accept(found, &format!("accept lens {number} of the search"));
+    }
+
+    fn post_search_report(&mut self, report: StructureSearchReport) {
+        match report {
+            StructureSearchReport::Rejected(why) => self.post(Severity::Warning, why),
+            StructureSearchReport::Exported { number, path, text } => {
+                let head = format!("lens {number} finalized and exported to {}", path.display());
+                self.post(Severity::Note, format!("{head}\n{text}"));
+                self.events.push(SessionEvent::Saved(path));
+            }
+            StructureSearchReport::NotExported { why, .. }
+            | StructureSearchReport::NotSaved(why) => self.post(Severity::Error, why),
+        }
+    }
+
+    pub(super) fn grin_command(&mut self, command: GrinCommand) {
+        if let Err(why) = self.grin.handle(command) {
+            self.post(Severity::Warning, why);
+        }
+    }
+
+    fn post_grin_export(&mut self, export: GrinExport) {
+        match export {
+            GrinExport::Written(path, text) => {
+                self.post(Severity::Note, text);
+                self.events.push(SessionEvent::Saved(path));
+            }
+            GrinExport::Failed(why) => self.post(Severity::Error, why),
+        }
+    }
+}
+
+/// The best lens of an optimization. If the design was edited meanwhile, the design with the values
+/// of the variables of the optimization.
+fn merge_result(run: &OptimizationSnapshot, design: &Arc<Lens>) -> Result<Lens, String> {
+    let best = &run.best;
+    if Arc::ptr_eq(&run.request.lens, design) {
+        return Ok(Lens::clone(best));
+    }
+    let same_rows =
+        best.surfaces.len() == design.surfaces.len() && best.zoom.len() == design.zoom.len();
+    if !same_rows {
+        return Err("the surfaces of the design have changed since the optimization started".into());
+    }
+    let mut lens = Lens::clone(design);
+    for variable in &run.request.lens.variables {
+        if let Some(value) = best.get(variable.parameter) {
+            lens.set(variable.parameter, value);
+        }
+    }
+    let lens = apply_edit(&lens, &Edit::SetName(design.name.clone()));
+    lens.map_err(|why| format!("the result does not fit the present design: {why}"))
+}
+
+/// A lens of a structure search without the variables that the search has fixed by equal bounds.
+fn without_fixed_variables(lens: &Lens) -> Lens {
+    let mut own = lens.clone();
+    own.variables.retain(|v| v.min.is_none() || v.min != v.max);
+    own
+}

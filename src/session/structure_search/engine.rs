@@ -1,0 +1,219 @@
+//! The engine of a search over lens structures: rounds, checkpoints, and exports of its lenses.
+
+use super::request::{CheckpointSidecar, LensSearch, StructureSearchRequest};
+use super::snapshot::{EndReason, StructureSearchSnapshot};
+use crate::lens::Lens;
+use crate::merit::ConstraintMargin;
+use crate::search::SteerCommand;
+use crate::session::clock::{Throttle, Timed, time};
+use crate::session::run::{Engine, EventSender, RunKind, RunStatus, catch_panic};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+/// The shortest time between two checkpoints.
+const SAVE_INTERVAL: Duration = Duration::from_secs(5);
+
+/// A search to start or to resume.
+#[derive(Debug)]
+pub(super) enum StructureSearchInput {
+    /// A new search, saved to a file if there is one.
+    New { lens: Arc<Lens>, request: Box<StructureSearchRequest>, path: Option<PathBuf> },
+    /// The search of a checkpoint.
+    Saved(PathBuf),
+}
+
+/// A request to a search.
+#[derive(Debug)]
+pub(super) enum EngineRequest {
+    /// Changes the search between two rounds.
+    Control(SteerCommand),
+    /// Saves the search to another file from now on.
+    SaveTo(PathBuf),
+    /// Finalizes and writes a lens while the search continues.
+    Export { number: u64, lens: Arc<Lens>, path: PathBuf },
+}
+
+/// A message from a search.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::session) enum StructureSearchReport {
+    /// A control of the search was rejected.
+    Rejected(String),
+    /// The lens of a generation was finalized and written; the text describes it.
+    Exported { number: u64, path: PathBuf, text: String },
+    /// The lens of a generation could not be exported.
+    NotExported { number: u64, why: String },
+    /// The search could not be saved.
+    NotSaved(String),
+}
+
+/// A search with its state and its checkpoint.
+pub(super) struct StructureSearchEngine {
+    search: LensSearch,
+    state: StructureSearchSnapshot,
+    sidecar: CheckpointSidecar,
+    saves: Throttle,
+    /// True after an error, when the search is not to be saved any more.
+    is_broken: bool,
+    sender: EventSender<StructureSearchReport>,
+}
+
+impl StructureSearchEngine {
+    pub(super) fn start(
+        input: StructureSearchInput,
+        sender: &EventSender<StructureSearchReport>,
+    ) -> Result<Self, String> {
+        let (search, request, mut sidecar, path) = match input {
+            StructureSearchInput::New { lens, request, path } => {
+                let search = LensSearch::new(&lens, &request).map_err(|why| why.to_string())?;
+                let minutes = request.minutes;
+                let sidecar = CheckpointSidecar { minutes, ..CheckpointSidecar::default() };
+                (search, *request, sidecar, path)
+            }
+            StructureSearchInput::Saved(path) => {
+                let (search, request, sidecar) =
+                    LensSearch::resume(&path).map_err(|why| why.to_string())?;
+                (search, request, sidecar, Some(path))
+            }
+        };
+        let mut state = StructureSearchSnapshot::new(request, &search.run, path);
+        state.start_violations = violations(&search, &search.run.start().point);
+        sidecar.history.begin(&search.run);
+        let mut saves = Throttle::new(SAVE_INTERVAL);
+        saves.ready();
+        Ok(Self { search, state, sidecar, saves, is_broken: false, sender: sender.clone() })
+    }
+
+    /// The reason to end the search, if there is one.
+    fn end_reason(&self) -> Option<EndReason> {
+        let minutes = self.state.request.minutes;
+        let late = minutes.is_some_and(|minutes| self.sidecar.seconds >= 60.0 * minutes);
+        let reason = self.search.run.end_reason().map(EndReason::Sampler);
+        reason.or_else(|| late.then_some(EndReason::TimeLimit))
+    }
+
+    /// Counts the rays of a gradient of the best lens and determines the constraints that it violates.
+    fn evaluate_best(&mut self) {
+        let search = &self.search;
+        self.state.rays = catch_panic(|| Ok(search.rays_per_gradient())).unwrap_or(self.state.rays);
+        self.state.best_violations = violations(search, &search.run.best().point);
+    }
+
+    fn control(&mut self, command: SteerCommand) {
+        if let Err(why) = self.search.control(command) {
+            self.sender.report(StructureSearchReport::Rejected(why.to_string()));
+        }
+    }
+
+    fn save_to(&mut self, path: PathBuf) {
+        self.state.checkpoint.path = Some(path);
+        self.state.checkpoint.moves = None;
+        self.save();
+    }
+
+    /// Writes the checkpoint, and reports a failure once.
+    fn save(&mut self) {
+        if self.is_broken {
+            return;
+        }
+        let error = catch_panic(|| Ok(self.try_save())).unwrap_or_else(Some);
+        if error.is_some() && self.state.checkpoint.error != error {
+            let why = error.clone().unwrap_or_default();
+            let text = format!("the search is not saved: {why}");
+            self.sender.report(StructureSearchReport::NotSaved(text));
+        }
+        self.state.checkpoint.error = error;
+    }
+
+    /// Writes the checkpoint if there is a file for it; the reason if that failed.
+    fn try_save(&mut self) -> Option<String> {
+        let moves = self.search.run.statistics().moves;
+        let path = self.state.checkpoint.path.as_ref()?;
+        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        let saved = made
+            .map_err(|why| format!("{}: {why}", path.display()))
+            .and_then(|()| self.search.save(path, &self.sidecar).map_err(|why| why.to_string()));
+        if saved.is_ok() {
+            self.state.checkpoint.moves = Some(moves);
+        }
+        saved.err()
+    }
+
+    /// Finalizes a lens in a thread of its own, for which the end of the program does not wait.
+    fn export(&self, number: u64, lens: Arc<Lens>, path: PathBuf) {
+        let (finalizer, sender) = (self.search.finalizer(), self.sender.clone());
+        let work = move || match finalizer.write(&lens, &path) {
+            Ok(text) => sender.report(StructureSearchReport::Exported { number, path, text }),
+            Err(why) => sender.report(StructureSearchReport::NotExported { number, why }),
+        };
+        if let Err(why) = thread::Builder::new().name("finalize".into()).spawn(work) {
+            let why = why.to_string();
+            self.sender.report(StructureSearchReport::NotExported { number, why });
+        }
+    }
+}
+
+impl Engine for StructureSearchEngine {
+    const KIND: RunKind = RunKind::StructureSearch;
+    const THREAD: &'static str = "search";
+    const INTERVAL: Duration = Duration::from_millis(100);
+
+    type Input = StructureSearchInput;
+    type Request = EngineRequest;
+    type Report = StructureSearchReport;
+    type Snapshot = StructureSearchSnapshot;
+
+    /// One turn of every chain.
+    fn step(&mut self) -> Result<bool, String> {
+        let before = self.search.run.statistics().gradients;
+        let Timed { value: events, ms } = time(|| self.search.round());
+        self.sidecar.seconds += 1e-3 * ms;
+        self.sidecar.gradients += self.search.run.statistics().gradients - before;
+        self.sidecar.history.record(&self.search.run, &events);
+        self.state.end_reason = self.end_reason();
+        if self.saves.ready() {
+            self.save();
+            self.evaluate_best();
+        }
+        Ok(self.state.end_reason.is_some())
+    }
+
+    fn on_status(&mut self, status: RunStatus) -> Result<(), String> {
+        if status == RunStatus::Failed {
+            self.is_broken = true;
+            return Ok(());
+        }
+        self.evaluate_best();
+        if status != RunStatus::Running {
+            self.save();
+        }
+        Ok(())
+    }
+
+    fn handle(&mut self, request: EngineRequest) -> Result<Option<RunStatus>, String> {
+        match request {
+            EngineRequest::Control(command) => self.control(command),
+            EngineRequest::SaveTo(path) => self.save_to(path),
+            EngineRequest::Export { number, lens, path } => self.export(number, lens, path),
+        }
+        Ok(None)
+    }
+
+    fn snapshot(&mut self) -> StructureSearchSnapshot {
+        self.state.update(&self.search.run);
+        self.state.seconds = self.sidecar.seconds;
+        self.state.gradients = self.sidecar.gradients;
+        self.state.history = Arc::new(self.sidecar.history.clone());
+        self.state.clone()
+    }
+
+    fn close(&mut self) {
+        self.save();
+    }
+}
+
+/// The constraints that a lens violates.
+fn violations(search: &LensSearch, lens: &Lens) -> Vec<ConstraintMargin> {
+    catch_panic(|| Ok(search.violations(lens))).unwrap_or_default()
+}

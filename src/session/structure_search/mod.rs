@@ -1,0 +1,242 @@
+//! The search over lens structures of a session: its run, its files, and the lens that is previewed.
+
+mod engine;
+mod finalize;
+mod history;
+mod request;
+mod snapshot;
+
+pub(super) use engine::StructureSearchReport;
+pub use history::{DescentMark, HistorySample, SearchHistory};
+pub use request::StructureSearchRequest;
+pub use snapshot::{
+    ChainPosition, CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot,
+};
+
+use super::command::StructureSearchCommand;
+use super::run::{BackgroundRun, RunEvent, RunId, RunView};
+use crate::lens::Lens;
+use engine::{EngineRequest, StructureSearchEngine, StructureSearchInput};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The extension of search files.
+const EXTENSION: &str = "search.json";
+/// The name of the file of the search that was dismissed last.
+const DISMISSED: &str = "forgotten.json";
+/// The maximum number of characters of a lens name in a file name.
+const MAX_STEM: usize = 32;
+/// The maximum number of search files for one lens name.
+const MAX_FILES: usize = 10_000;
+
+/// The search over lens structures as panels see it.
+#[derive(Debug, Clone, Default)]
+pub struct StructureSearchView {
+    /// The latest search.
+    pub run: RunView<StructureSearchSnapshot>,
+    /// The index of the chain whose lens is shown in place of the design.
+    pub previewed_chain: Option<usize>,
+    /// The generations whose lenses are being exported.
+    pub exporting: Vec<u64>,
+    /// The file that was chosen for the next search.
+    pub save_path: Option<PathBuf>,
+    /// The file of a search that was unfinished when the program was closed.
+    pub unfinished: Option<PathBuf>,
+}
+
+/// The search over lens structures of a session.
+#[derive(Debug)]
+pub(super) struct StructureSearchState {
+    run: BackgroundRun<StructureSearchEngine>,
+    exporting: Vec<u64>,
+    previewed_chain: Option<usize>,
+    /// The folder of searches without a chosen file.
+    folder: Option<PathBuf>,
+    save_path: Option<PathBuf>,
+    unfinished: Option<PathBuf>,
+}
+
+impl StructureSearchState {
+    pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+        Ok(Self {
+            run: BackgroundRun::spawn(wake, StructureSearchEngine::start)?,
+            exporting: Vec::new(),
+            previewed_chain: None,
+            folder: None,
+            save_path: None,
+            unfinished: None,
+        })
+    }
+
+    /// Saves searches in a folder from now on, and looks for an unfinished one in it.
+    pub(super) fn set_save_folder(&mut self, folder: PathBuf) {
+        self.unfinished = newest_search(&folder);
+        self.folder = Some(folder);
+    }
+
+    /// Carries out a command, or returns the reason why that is impossible.
+    pub(super) fn handle(
+        &mut self,
+        command: StructureSearchCommand,
+        lens: &Arc<Lens>,
+    ) -> Result<(), String> {
+        match command {
+            StructureSearchCommand::Start(request) => {
+                let chosen = self.save_path.take();
+                let path = chosen.or_else(|| unused_path(self.folder.as_ref()?, &lens.name));
+                self.start(StructureSearchInput::New { lens: Arc::clone(lens), request, path });
+            }
+            StructureSearchCommand::ResumeFrom(Some(path)) => {
+                self.start(StructureSearchInput::Saved(restore_dismissed(path)?));
+            }
+            StructureSearchCommand::Pause => self.run.pause(),
+            StructureSearchCommand::Resume => self.run.resume(),
+            StructureSearchCommand::Stop => self.run.stop(),
+            StructureSearchCommand::Control(command) => {
+                self.run.send_request(EngineRequest::Control(command));
+            }
+            StructureSearchCommand::Preview(chain) => self.previewed_chain = chain,
+            StructureSearchCommand::SaveTo(Some(path)) => {
+                if self.run.status().is_active() {
+                    self.run.send_request(EngineRequest::SaveTo(path));
+                } else {
+                    self.save_path = Some(path);
+                }
+            }
+            StructureSearchCommand::Export { number, path: Some(path) } => {
+                let lens = self.lens_by_number(number)?;
+                self.run.send_request(EngineRequest::Export { number, lens, path });
+                self.exporting.push(number);
+            }
+            StructureSearchCommand::Clear => {
+                self.run.clear();
+                self.previewed_chain = None;
+            }
+            StructureSearchCommand::DismissUnfinished => self.dismiss_unfinished()?,
+            StructureSearchCommand::ResumeFrom(None)
+            | StructureSearchCommand::SaveTo(None)
+            | StructureSearchCommand::Export { path: None, .. } => {
+                return Err("no file was named".to_owned());
+            }
+            // The session itself changes the design.
+            StructureSearchCommand::Accept(_) => {}
+        }
+        Ok(())
+    }
+
+    fn start(&mut self, input: StructureSearchInput) {
+        self.unfinished = None;
+        self.run.start(input);
+    }
+
+    /// Renames the file of the unfinished search; it replaces the one that was dismissed before.
+    fn dismiss_unfinished(&mut self) -> Result<(), String> {
+        let Some(file) = self.unfinished.take() else { return Ok(()) };
+        let dismissed = file.with_file_name(DISMISSED);
+        fs::rename(&file, dismissed).map_err(|why| format!("{}: {why}", file.display()))
+    }
+
+    /// The lens of a generation.
+    pub(super) fn lens_by_number(&self, number: u64) -> Result<Arc<Lens>, String> {
+        let search = self.run.snapshot();
+        let search = search.ok_or_else(|| "there is no search over structure".to_owned())?;
+        let lens = search.lens_by_number(number).cloned();
+        lens.ok_or_else(|| format!("generation {number} of the search is not stored any more"))
+    }
+
+    /// The lens that is shown in place of the design, with its search.
+    pub(super) fn previewed(&self) -> Option<(RunId, Arc<Lens>)> {
+        let view = self.run.view();
+        let search = view.snapshot.as_ref().filter(|_| view.is_active())?;
+        let position = search.chains.get(self.previewed_chain?)?.as_ref()?;
+        Some((view.id?, Arc::clone(&position.lens)))
+    }
+
+    /// Shows the design again.
+    pub(super) fn end_preview(&mut self) {
+        self.previewed_chain = None;
+    }
+
+    /// True if there is a search whose lenses the design can be compared with.
+    pub(super) fn is_shown(&self) -> bool {
+        self.run.view().id.is_some()
+    }
+
+    /// The events of the search since the last call.
+    pub(super) fn drain_events(&mut self) -> Vec<RunEvent<StructureSearchReport>> {
+        let events = self.run.drain_events();
+        for event in &events {
+            if let RunEvent::Report(
+                StructureSearchReport::Exported { number, .. }
+                | StructureSearchReport::NotExported { number, .. },
+            ) = event
+            {
+                self.exporting.retain(|exporting| exporting != number);
+            }
+        }
+        events
+    }
+
+    pub(super) fn view(&self) -> StructureSearchView {
+        StructureSearchView {
+            run: self.run.view(),
+            previewed_chain: self.previewed_chain,
+            exporting: self.exporting.clone(),
+            save_path: self.save_path.clone(),
+            unfinished: self.unfinished.clone(),
+        }
+    }
+}
+
+/// The latest search file in a folder.
+fn newest_search(folder: &Path) -> Option<PathBuf> {
+    let files = fs::read_dir(folder).ok()?.flatten();
+    let searches = files.filter(|file| file.file_name().to_string_lossy().ends_with(EXTENSION));
+    let dated = searches.filter_map(|file| Some((file.metadata().ok()?.modified().ok()?, file)));
+    dated.max_by_key(|(date, _)| *date).map(|(_, file)| file.path())
+}
+
+/// The file in which a search is resumed: a dismissed one gets a file of its own again.
+fn restore_dismissed(path: PathBuf) -> Result<PathBuf, String> {
+    if path.file_name().is_none_or(|name| name != DISMISSED) {
+        return Ok(path);
+    }
+    let own = path.parent().and_then(|folder| unused_path(folder, "resumed"));
+    let own = own.ok_or_else(|| format!("{}: there is no free name beside it", path.display()))?;
+    fs::rename(&path, &own).map_err(|why| format!("{}: {why}", path.display()))?;
+    Ok(own)
+}
+
+/// A file that does not exist yet, for a search from a lens of this name.
+fn unused_path(folder: &Path, name: &str) -> Option<PathBuf> {
+    let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { ' ' };
+    let words: String = name.chars().map(plain).collect();
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let stem: String = words.join("_").chars().take(MAX_STEM).collect();
+    let stem = if stem.is_empty() { "lens".to_owned() } else { stem };
+    let path = |number: usize| folder.join(format!("{stem}_{number}.{EXTENSION}"));
+    (1..=MAX_FILES).map(path).find(|path| !path.exists())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_new_search_has_a_file_of_its_own_and_the_newest_is_found_again() -> io::Result<()> {
+        let folder = std::env::temp_dir().join(format!("aplanat-kept-{}", std::process::id()));
+        fs::create_dir_all(&folder)?;
+        assert_eq!(newest_search(&folder), None);
+        let first = unused_path(&folder, "Nikkor-S 50/1.4 (1962)").unwrap_or_default();
+        assert_eq!(first, folder.join("Nikkor-S_50_1.4_1962_1.search.json"));
+        fs::write(&first, "")?;
+        let second = unused_path(&folder, "Nikkor-S 50/1.4 (1962)").unwrap_or_default();
+        assert_eq!(second, folder.join("Nikkor-S_50_1.4_1962_2.search.json"));
+        fs::write(folder.join("other.json"), "")?;
+        assert_eq!(newest_search(&folder), Some(first));
+        assert_eq!(unused_path(&folder, " / "), Some(folder.join("lens_1.search.json")));
+        fs::remove_dir_all(&folder)
+    }
+}
