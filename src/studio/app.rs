@@ -14,7 +14,7 @@ use super::draw::RenderBackend;
 use super::experiment_window::ExperimentWindow;
 use super::file_dialog::{FileDialog, FileRequest};
 use super::menu;
-use super::text::{capitalize, counted_from_one};
+use super::text::capitalize;
 use super::unsaved::{PendingAction, PendingState};
 use super::window::Persistence;
 use crate::files;
@@ -182,10 +182,10 @@ impl Studio {
         let modal = Modal::new(Id::unique("report")).show(context, |ui| {
             let (words, table) = text.split_once('\n').unwrap_or((text, ""));
             ui.set_max_width(if table.is_empty() { 460.0 } else { 820.0 });
-            ui.label(capitalize(&counted_from_one(words)));
+            ui.label(capitalize(words));
             if !table.is_empty() {
                 ScrollArea::both().max_height(440.0).show(ui, |ui| {
-                    let table = RichText::new(counted_from_one(table)).monospace();
+                    let table = RichText::new(table).monospace();
                     ui.add(Label::new(table).extend().selectable(true));
                 });
             }
@@ -300,8 +300,8 @@ fn message_label(ui: &mut Ui, message: &Message) -> Response {
         Severity::Error => visuals.error_fg_color,
     };
     let line = message.text.lines().next().unwrap_or_default();
-    let text = RichText::new(capitalize(&counted_from_one(line))).color(color);
-    ui.add(Label::new(text).truncate()).on_hover_text(capitalize(&counted_from_one(&message.text)))
+    let text = RichText::new(capitalize(line)).color(color);
+    ui.add(Label::new(text).truncate()).on_hover_text(capitalize(&message.text))
 }
 
 fn timing_text(view: &SessionView) -> String {

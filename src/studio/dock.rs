@@ -34,7 +34,7 @@ impl Dock {
         Self { tree, panels: PanelKind::ALL.map(|kind| (kind, kind.panel(backing))).into() }
     }
 
-    /// How the panels are arranged.
+    /// The arrangement of the panels.
     pub const fn tree(&self) -> &Tree<PanelKind> {
         &self.tree
     }
@@ -44,12 +44,12 @@ impl Dock {
         self.tree = default_arrangement();
     }
 
-    /// Whether a panel is shown.
+    /// True if a panel is open, maybe behind another one.
     pub fn is_open(&self, kind: PanelKind) -> bool {
         self.tree.tiles.find_pane(&kind).is_some_and(|tile| self.tree.tiles.is_visible(tile))
     }
 
-    /// Whether a panel can be seen: open, and not behind another one.
+    /// True if a panel is open and not behind another one.
     fn is_visible(&self, kind: PanelKind) -> bool {
         let tile = self.tree.tiles.find_pane(&kind);
         tile.is_some_and(|tile| self.tree.active_tiles().contains(&tile))
@@ -64,13 +64,13 @@ impl Dock {
         }
     }
 
-    /// What a panel's tab says.
+    /// The title of a panel.
     pub fn title(&self, kind: PanelKind) -> &'static str {
         let panel = self.panels.iter().find(|(other, _)| *other == kind);
         panel.map_or("", |(_, panel)| panel.title())
     }
 
-    /// Whether something is being typed into a panel.
+    /// True if a text field of some panel is being edited.
     pub fn is_typing(&self, context: &Context) -> bool {
         self.panels.iter().any(|(_, panel)| panel.is_typing(context))
     }

@@ -80,7 +80,7 @@ impl ExperimentWindow {
                 }
                 ExperimentStatus::Done(report) => self.report(ui, trial.number, report, actions),
                 ExperimentStatus::Stopped => {
-                    ui.label("Stopped before it had found anything.");
+                    ui.label("Stopped before it had a result.");
                     run_again_button(ui, study, actions);
                 }
                 ExperimentStatus::Failed(why) => {
@@ -136,7 +136,7 @@ fn run_again_button(ui: &mut Ui, study: &Experiment, actions: &mut Actions) {
     }
 }
 
-/// Whether all claims hold, what it cost, and what can be done with it.
+/// The verdict on all claims, the cost of the run, and the buttons to save or repeat it.
 fn verdict(ui: &mut Ui, report: &ExperimentReport, actions: &mut Actions) {
     let (failed, all) = (report.outcome.failed().count(), report.outcome.claims.len());
     ui.horizontal(|ui| {

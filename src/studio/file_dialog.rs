@@ -7,7 +7,7 @@ use std::thread;
 
 use egui::Key;
 
-/// What a file is asked for.
+/// The purpose for which a path is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileRequest {
     /// To read a lens from it, of any known form.
@@ -43,7 +43,7 @@ impl FileRequest {
             Self::ExportJson => "Export a copy of the lens",
             Self::ExportFront => "Export the front into a folder",
             Self::ExperimentFolder => "Save the experiment into a folder",
-            Self::OpenSearch => "Go on with a search",
+            Self::OpenSearch => "Resume a search",
             Self::SaveSearch => "Save the search",
             Self::ExportSearchLens(_) => "Export the lens of the search",
             Self::OpenField => "Open a GRIN task or a volume",
@@ -63,17 +63,17 @@ impl FileRequest {
         }
     }
 
-    /// What files of this kind are called.
+    /// The name of the filter for the extensions.
     const fn filter_name(self) -> &'static str {
         if matches!(self, Self::OpenField | Self::SaveField(_)) { "GRIN fields" } else { "Lenses" }
     }
 
-    /// Whether the name of a new file is asked for.
+    /// True if the user types the name of a new file.
     fn asks_for_name(self) -> bool {
         self.is_save() && !matches!(self, Self::ExportFront | Self::ExperimentFolder)
     }
 
-    /// Whether the file is written.
+    /// True if the file is written.
     fn is_save(self) -> bool {
         !matches!(self, Self::Open | Self::OpenSearch | Self::OpenField)
     }
@@ -112,7 +112,7 @@ impl FileDialog {
         }
     }
 
-    /// Whether a question waits for its answer.
+    /// True while a dialog is open.
     pub const fn is_open(&self) -> bool {
         self.native.is_some() || self.prompt.is_some()
     }
@@ -207,7 +207,7 @@ fn open_native(
     Ok(answer)
 }
 
-/// Whether a dialog can be expected: on Linux it comes over the session bus or from `zenity`.
+/// True if the desktop has a file dialog: on Linux it comes over the session bus or from `zenity`.
 fn has_native_dialogs() -> bool {
     if !cfg!(target_os = "linux") {
         return true;

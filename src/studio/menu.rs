@@ -9,7 +9,6 @@ use super::dock::Dock;
 use super::experiment_window;
 use super::file_dialog::FileRequest;
 use super::panels::PanelKind;
-use super::text::counted_from_one;
 use crate::files::{self};
 use crate::lens::blank;
 use crate::session::{Command, SessionView};
@@ -120,7 +119,7 @@ fn file_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         actions.push(FileRequest::ExportJson);
     }
     ui.add_enabled_ui(view.pareto.run.snapshot.is_some(), |ui| {
-        if item(ui, "Export the front…", None) {
+        if item(ui, "Export the Pareto front…", None) {
             actions.push(FileRequest::ExportFront);
         }
     });
@@ -135,10 +134,8 @@ fn edit_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let steps =
         [("Undo", &view.undo, UNDO, Command::Undo), ("Redo", &view.redo, REDO, Command::Redo)];
     for (name, title, key, command) in steps {
-        let text = title.as_ref().map_or_else(
-            || name.to_owned(),
-            |title| format!("{name}: {}", counted_from_one(title)),
-        );
+        let text =
+            title.as_ref().map_or_else(|| name.to_owned(), |title| format!("{name}: {}", title));
         ui.add_enabled_ui(title.is_some(), |ui| {
             if item(ui, &text, Some(&key)) {
                 actions.push(command);
@@ -155,7 +152,7 @@ fn view_menu(ui: &mut Ui, dock: &mut Dock) {
         }
     }
     ui.separator();
-    if item(ui, "Usual arrangement", None) {
+    if item(ui, "Default arrangement", None) {
         dock.reset();
     }
     ui.separator();
@@ -172,10 +169,8 @@ fn undo_buttons(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let steps = [("Undo", &view.undo, Command::Undo), ("Redo", &view.redo, Command::Redo)];
     for (name, title, command) in steps {
         let button = ui.add_enabled(title.is_some(), Button::new(name));
-        let hint = title.as_ref().map_or_else(
-            || name.to_owned(),
-            |title| format!("{name}: {}", counted_from_one(title)),
-        );
+        let hint =
+            title.as_ref().map_or_else(|| name.to_owned(), |title| format!("{name}: {}", title));
         if button.on_hover_text(hint).clicked() {
             actions.push(command);
         }

@@ -1,6 +1,6 @@
 //! Numbers as a designer reads them: seven digits, `Infinity`, a radius for a curvature.
 
-/// How many digits a cell shows; the value itself keeps all of them.
+/// The digits of a number in a cell; the value itself keeps all of them.
 const DIGITS: i32 = 7;
 /// Most digits of a number that stands among others close to it.
 const MAX_DIGITS: i32 = 10;
@@ -33,7 +33,8 @@ pub fn format_digits(value: f64, digits: i32) -> String {
     }
 }
 
-/// How many digits tell numbers of a size apart that are so far from one another; at least `least`.
+/// The digits that are needed to distinguish numbers of this size that differ by this step; at
+/// least `least`.
 pub fn digits_between(size: f64, step: f64, least: i32) -> i32 {
     let apart = (size.abs() / step.abs()).log10();
     if !apart.is_finite() {

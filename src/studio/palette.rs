@@ -49,7 +49,7 @@ const LIMITS_LIGHT: [[u8; 3]; 8] = [
     [60, 85, 125],
 ];
 
-/// What a drawing is coloured with.
+/// The colours of the drawings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Palette {
     dark: bool,
@@ -67,7 +67,7 @@ pub struct Palette {
     pub strong: Rgba,
     /// The axis, and surfaces between equal media.
     pub faint: Rgba,
-    /// Where a ray has died.
+    /// The end of a lost ray.
     pub lost_ray: Rgba,
     /// A change for the better.
     pub better: Rgba,

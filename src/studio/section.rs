@@ -28,7 +28,7 @@ impl<'a> LensSection<'a> {
         Self { system, vertices: system.vertex_positions(), heights: heights(system, reached) }
     }
 
-    /// What a picture of the whole lens shows: all surfaces and the place of the image.
+    /// The bounding box of the whole lens: all surfaces and the image plane.
     pub fn bounds(&self) -> Option<BoundingBox> {
         let heights = self.heights.iter().enumerate();
         let heights = heights.map(|(i, h)| if i == self.last() { 0.0 } else { *h });
@@ -64,12 +64,12 @@ impl<'a> LensSection<'a> {
         self.draw_stop(scene, palette);
     }
 
-    /// Where the image plane is.
+    /// The z of the image plane, in mm.
     pub fn image(&self) -> f64 {
         self.vertices.last().copied().unwrap_or(0.0)
     }
 
-    /// How far the lens reaches from the axis.
+    /// The largest height of the lens above the axis, in mm.
     pub fn highest(&self) -> f64 {
         self.heights.iter().take(self.last()).copied().fold(0.0, f64::max)
     }

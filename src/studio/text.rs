@@ -1,33 +1,17 @@
-//! Messages as a designer reads them: surfaces are counted from 1 in the window, from 0 in files.
+//! Texts that several parts of the window share.
 
 use crate::session::RunStatus;
-
-/// A message with every `surface 3` and `surfaces 3 to 5` counted one further.
-pub fn counted_from_one(message: &str) -> String {
-    let mut words: Vec<String> = message.split(' ').map(str::to_owned).collect();
-    for i in 1..words.len() {
-        let named = matches!(words[i - 1].as_str(), "surface" | "surfaces" | "Surface");
-        let second = i > 2 && matches!(words[i - 1].as_str(), "to" | "and");
-        if named || (second && words[i - 3].starts_with("surface")) {
-            words[i] = one_more(&words[i]);
-        }
-    }
-    words.join(" ")
-}
-
-/// A word that begins with a number, with that number one larger.
-fn one_more(word: &str) -> String {
-    let end = word.find(|c: char| !c.is_ascii_digit()).unwrap_or(word.len());
-    let (digits, rest) = word.split_at(end);
-    let number: Result<usize, _> = digits.parse();
-    number.map_or_else(|_| word.to_owned(), |n| format!("{}{rest}", n + 1))
-}
 
 /// A text with a capital first letter.
 pub fn capitalize(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     first + letters.as_str()
+}
+
+/// A count with its noun, in the plural unless it is 1.
+pub fn counted(count: u64, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// The status of a background run, as the window shows it.
@@ -50,17 +34,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn surfaces_are_counted_from_one() {
-        let cases = [
-            ("radius of surface 0", "radius of surface 1"),
-            ("surface 9: unknown glass `BK 7`", "surface 10: unknown glass `BK 7`"),
-            ("surfaces 2 and 4 are both the stop", "surfaces 3 and 5 are both the stop"),
-            ("flip surfaces 0 to 1", "flip surfaces 1 to 2"),
-            ("2 surfaces are plane", "2 surfaces are plane"),
-            ("the surface is plane", "the surface is plane"),
-        ];
-        for (message, counted) in cases {
-            assert_eq!(counted_from_one(message), counted);
-        }
+    fn texts_begin_with_a_capital_and_counts_have_plurals() {
+        assert_eq!(capitalize("édition"), "Édition");
+        assert_eq!([counted(1, "ray"), counted(0, "ray")], ["1 ray", "0 rays"]);
     }
 }

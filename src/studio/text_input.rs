@@ -10,7 +10,7 @@ use egui::{
     Ui, WidgetText,
 };
 
-/// What was typed into the fields of a panel and is not accepted yet.
+/// Texts of the fields of a panel that are being edited or were rejected.
 #[derive(Debug, Default)]
 pub struct EditBuffers {
     buffers: Vec<EditBuffer>,
@@ -22,28 +22,28 @@ pub struct EditBuffers {
 #[derive(Debug)]
 struct EditBuffer {
     input: Id,
-    /// What the field showed when the typing began.
+    /// The text of the field when the editing began.
     original: String,
     text: String,
     error: Option<String>,
 }
 
-/// How a field looks and what it is called.
+/// Text, name and look of a field.
 #[derive(Debug, Clone, Copy)]
 pub struct TextInput<'a> {
-    /// What a screen reader calls it.
+    /// The accessible name.
     pub name: &'a str,
-    /// What it shows while nothing is typed.
+    /// The text while the field is not edited.
     pub value: &'a str,
-    /// What it shows, faintly, where it is empty.
+    /// The hint in an empty field.
     pub hint: &'a str,
     /// Numbers stand at the right.
     pub align: Align,
-    /// Where it stands.
+    /// The frame of the field.
     pub placement: InputPlacement,
 }
 
-/// Where a field stands.
+/// The surroundings of a field, which decide its frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InputPlacement {
     /// In a table, whose lines are frame enough.
@@ -52,12 +52,12 @@ pub enum InputPlacement {
     Form,
 }
 
-/// What became of a field in this frame.
+/// The result of showing a field.
 #[derive(Debug)]
 pub struct InputResponse {
     /// The field.
     pub response: Response,
-    /// What was typed, when typing has just ended.
+    /// The new text, if the editing has just ended and has changed it.
     pub submitted: Option<String>,
 }
 
@@ -88,7 +88,7 @@ impl EditBuffers {
         }
     }
 
-    /// What was typed into a field has been taken.
+    /// Accepts the text of a field: its buffer is removed.
     pub fn accept(&mut self, field: Id) {
         self.buffers.retain(|draft| draft.input != field);
     }
@@ -98,17 +98,17 @@ impl EditBuffers {
         self.buffers.clear();
     }
 
-    /// Why the last text that was refused cannot be taken.
+    /// The reason why the last rejected text cannot be accepted.
     pub fn last_error(&self) -> Option<&str> {
         self.buffers.iter().rev().find_map(|draft| draft.error.as_deref())
     }
 
-    /// What is being typed into a field.
+    /// The text that is being typed into a field.
     pub fn text(&self, field: Id) -> Option<&str> {
         self.buffers.iter().find(|draft| draft.input == field).map(|draft| draft.text.as_str())
     }
 
-    /// Whether something is being typed into the field that has the cursor.
+    /// True if the field with the cursor has been edited.
     pub fn is_typing(&self, context: &Context) -> bool {
         let cursor = context.memory(Memory::focused);
         self.buffers.iter().any(|draft| Some(draft.input) == cursor)

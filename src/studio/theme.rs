@@ -1,4 +1,4 @@
-//! How the window looks: calm greys around the drawings, one blue accent, compact rows, the same
+//! The look of the window: calm greys around the drawings, one blue accent, compact rows, the same
 //! in dark and in light.
 
 use egui::{

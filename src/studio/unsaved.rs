@@ -6,14 +6,14 @@ use super::panels::grin::DEFAULT_NODES;
 use crate::session::{Command, GrinCommand, RunStatus, SessionView};
 use egui::{Context, Id, Modal, ViewportCommand};
 
-/// What may be lost.
+/// A document that can have unsaved changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum UnsavedDocument {
     Lens,
     Field,
 }
 
-/// What a person wants to do although something would be lost.
+/// An action that may discard unsaved changes.
 #[derive(Debug)]
 pub(super) enum PendingAction {
     Run(Command),
@@ -21,7 +21,7 @@ pub(super) enum PendingAction {
 }
 
 impl PendingAction {
-    /// What it throws away.
+    /// The documents whose unsaved changes it would discard.
     fn discards(&self) -> &'static [UnsavedDocument] {
         match self {
             Self::Quit => &[UnsavedDocument::Lens, UnsavedDocument::Field],
@@ -37,14 +37,14 @@ impl PendingAction {
     }
 }
 
-/// What waits until a person has answered, or until something is saved.
+/// An action that waits for an answer of the user or for a file to be written.
 #[derive(Debug)]
 pub(super) enum PendingState {
     Asking(UnsavedDocument, PendingAction),
     Saving(UnsavedDocument, PendingAction),
 }
 
-/// What a person answers to whether changes may be lost.
+/// The answer to the question about unsaved changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum UnsavedAnswer {
     Save,
@@ -53,7 +53,7 @@ enum UnsavedAnswer {
 }
 
 impl Studio {
-    /// Whether something would be lost that is in no file.
+    /// True if the action would discard unsaved changes.
     pub(super) fn would_discard(&self, then: &PendingAction) -> bool {
         then.discards().iter().any(|lost| self.is_unsaved(*lost))
     }
@@ -162,11 +162,11 @@ fn ask_about_unsaved(
     let (heading, text) = match lost {
         UnsavedDocument::Lens => {
             let name = &view.lens.name;
-            ("Save the changes first?", format!("{name} has changes that are in no file yet."))
+            ("Save the changes first?", format!("{name} has unsaved changes."))
         }
         UnsavedDocument::Field => {
             let name = view.grin.run.snapshot.as_ref().map_or("", |run| run.document.name.as_str());
-            ("Save the field first?", format!("The field of “{name}” is in no file yet."))
+            ("Save the field first?", format!("The field of “{name}” has not been saved."))
         }
     };
     let mut answer = None;

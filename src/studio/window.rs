@@ -9,7 +9,7 @@ use eframe::{App, CreationContext, NativeOptions, Renderer};
 use super::draw::{RenderBackend, install_gpu_cache};
 use super::theme;
 
-/// Why the studio cannot open.
+/// An error that keeps the studio from opening.
 #[derive(Debug, thiserror::Error)]
 pub enum StudioError {
     /// Nothing to show a window on.
@@ -29,9 +29,9 @@ pub enum StudioError {
          {WITHOUT_WINDOW}"
     )]
     NoRenderer {
-        /// What wgpu said.
+        /// The message of wgpu.
         wgpu: String,
-        /// What OpenGL said.
+        /// The message of OpenGL.
         glow: String,
     },
     /// The display has refused the window, or the studio could not start in it.
@@ -43,7 +43,7 @@ const WITHOUT_WINDOW: &str = "the same work without a window: \
     `aplanat info LENS`, `aplanat analyze LENS spot`, `aplanat optimize LENS --out FILE`, \
     `aplanat convert IN OUT`; `aplanat --help` lists all";
 
-/// Whether the window remembers its size and panels from one start to the next.
+/// The choice whether size and panels of the window are restored at the next start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Persistence {
     /// It does.
@@ -52,7 +52,7 @@ pub enum Persistence {
     Disabled,
 }
 
-/// What a window shows, or why there is nothing to show.
+/// The content of a window, or an error.
 pub type AppResult = Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>;
 
 /// Opens a window and stays until it is closed. `start` makes what the window shows; it may be

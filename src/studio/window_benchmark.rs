@@ -1,4 +1,4 @@
-//! What the window costs: a real one is opened, edited, repainted, left alone and closed again.
+//! The cost of the window: a real one is opened, edited, repainted, left idle and closed.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -16,21 +16,21 @@ use crate::lens::{Edit, Parameter, Quantity};
 use crate::measure::{age_ms, processor_ms, time_ms};
 use crate::session::{Command, Session};
 
-/// How many edits are timed.
+/// The number of timed edits.
 const EDITS: usize = 21;
-/// How many repainted frames share the measured processor time.
+/// The number of repainted frames that share the measured processor time.
 const FRAMES: usize = 20;
-/// How long the window is left alone.
+/// The time for which the window is left idle.
 const IDLE_TIME: Duration = Duration::from_secs(5);
-/// How long it may go on settling before that.
+/// The time for which it settles before that.
 const SETTLING_TIME: Duration = Duration::from_millis(700);
-/// How long the numbers of an edit may take at most.
+/// The longest time for the analysis after an edit.
 const MAX_POLLS: u32 = 20_000; // looks, a tenth of a millisecond apart
 
-/// What a window costs. What the system does not count is absent.
+/// The measured cost of a window. A value that the system does not provide is absent.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct WindowMetrics {
-    /// What draws the window.
+    /// The name of the renderer.
     pub renderer: String,
     /// Width and height of the window in pixels.
     pub size: [u32; 2],
@@ -43,7 +43,7 @@ pub struct WindowMetrics {
     pub slowest_edit_ms: f64,
     /// Processor time of a frame in which no drawing changed, all threads together.
     pub frame_processor_ms: Option<f64>,
-    /// How long the window was left alone with the cursor in a text field.
+    /// The time for which the window was left idle with the cursor in a text field.
     pub idle_seconds: f64,
     /// Processor time in that time, all threads together.
     pub idle_processor_ms: Option<f64>,
@@ -91,7 +91,7 @@ struct WindowBenchmark {
     phase: BenchmarkPhase,
 }
 
-/// What is being measured.
+/// The phase of the benchmark.
 #[derive(Debug, Clone, Copy)]
 enum BenchmarkPhase {
     /// The first frame with the lens and all its numbers is not on the screen yet.

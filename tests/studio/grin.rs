@@ -103,7 +103,7 @@ fn a_task_is_worked_on_turned_and_saved_by_buttons() {
     harness.get_by_label_contains("Ready: at most 120 steps, 6, 9 nodes");
     harness.get_by_label_contains("at y = 0 mm: index");
     harness.get_by_label("focus: 11 rays");
-    harness.get_by_label_contains("64 rays, none left out");
+    harness.get_by_label_contains("64 rays, none excluded");
     harness.get_by_label_contains("halving it moves 64 exits by at most");
     for button in ["Optimize", "Save volume…", "x", "Close"] {
         press(&mut harness, button);
@@ -150,8 +150,8 @@ fn a_found_field_has_its_numbers_curves_and_places() {
     let found = opened("luneburg-radial", true);
     let mut harness = panel(found);
     harness.get_by_label_contains("Finished: step ");
-    harness.get_by_label_contains("off by ");
-    harness.get_by_label_contains("rays and back in ");
+    harness.get_by_label_contains("relative error ");
+    harness.get_by_label_contains("rays forward and back in ");
     harness.get_by_label("Start over");
     press(&mut harness, "Loss");
     harness.get_by_label_contains("Loss against ");
@@ -161,7 +161,7 @@ fn a_found_field_has_its_numbers_curves_and_places() {
     assert!(harness.query_by_label("Index along r").is_some(), "this task makes no image");
 
     let slice = harness.get_by_label_contains("at y = 0 mm: index").rect();
-    harness.get_by_label_contains("The pointer reads the field");
+    harness.get_by_label_contains("Hover to read the field");
     harness.get_by_label_contains("at y = 0 mm: index").click();
     harness.run();
     harness.get_by_label_contains("index 1.40");
@@ -183,9 +183,9 @@ fn images_stand_beside_their_pictures() {
     let mut harness = panel(opened("display", false));
     harness.get_by_label("face: 11 rays");
     press(&mut harness, "Images");
-    assert_eq!(harness.get_all_by_label_contains("dB PSNR, 16384 rays, none left out").count(), 2);
+    assert_eq!(harness.get_all_by_label_contains("dB PSNR, 16384 rays, none excluded").count(), 2);
     for view in ["face", "letter"] {
-        for what in ["wanted", "made"] {
+        for what in ["target", "result"] {
             harness.get_by_label(&format!("Image of {view}: {what}"));
         }
     }

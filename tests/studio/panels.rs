@@ -154,7 +154,7 @@ fn a_selected_row_can_be_deleted_and_flipped() {
     harness.run();
     harness.key_press(Key::Delete);
     harness.run();
-    harness.get_by_label("Flip element").click();
+    harness.get_by_label("Reverse element").click();
     harness.run();
     let wanted = [Edit::RemoveRow(2), Edit::ReverseRows { first: 2, last: 4 }];
     assert_eq!(edits(&harness.state().commands), wanted.iter().collect::<Vec<_>>());
@@ -182,7 +182,7 @@ fn searching(standing: RunStatus) -> SessionView {
     let goal = Goal::default_for(&view.lens).unwrap();
     let method = DescentMethod::Adam;
     let task = OptimizationRequest { method, lens: Arc::clone(&view.lens), goal, tolerance: 1e-3 };
-    let refused = Some("ray 4 is lost: clipped at surface 2".to_owned());
+    let refused = Some("ray 4 is lost: clipped at surface 3".to_owned());
     let progress = OptimizationProgress {
         step: 7,
         merit: 0.5,
@@ -248,7 +248,7 @@ fn more_light_is_asked_for_in_a_few_clicks() {
     assert!(harness.query_by_label("Limit the beam by the stop").is_none(), "nobody asks for more");
     type_into(&mut harness, "Minimum of Light", "1.2", Key::Enter);
     press(&mut harness, "Limit the beam by the stop");
-    press(&mut harness, "Free the semi-diameters");
+    press(&mut harness, "Vary the semi-diameters");
     press(&mut harness, "Optimize");
     let commands = &harness.state().commands;
     assert!(commands.contains(&Command::LimitByStop));
@@ -264,7 +264,7 @@ fn more_light_is_asked_for_in_a_few_clicks() {
     let mut ready = optimizer(crate::harness::view_of(lens));
     type_into(&mut ready, "Minimum of Light", "1.2", Key::Enter);
     assert!(ready.query_by_label_contains("Limit the beam").is_none());
-    assert!(ready.query_by_label_contains("Free the semi").is_none());
+    assert!(ready.query_by_label_contains("Vary the semi").is_none());
 }
 
 #[test]
@@ -289,9 +289,9 @@ fn a_new_term_begins_with_what_the_lens_has() {
 #[test]
 fn kept_rays_are_said_to_be_blind_to_light() {
     let mut harness = optimizer(view());
-    assert!(harness.query_by_label_contains("Kept rays tell nothing").is_none());
-    press(&mut harness, "Keep the rays");
-    harness.get_by_label_contains("Kept rays tell nothing about light");
+    assert!(harness.query_by_label_contains("Fixed rays carry no information").is_none());
+    press(&mut harness, "Fixed rays");
+    harness.get_by_label_contains("Fixed rays carry no information about light");
     press(&mut harness, "Optimize");
     assert_eq!(goal_of(&harness.state().commands).pupil, PupilEdge::Frozen);
 }
@@ -397,7 +397,7 @@ fn rims_tell_what_a_tenth_of_a_millimetre_would_do() {
     for surface in [1, 6, 11] {
         harness.get_by_label_contains(&format!("Rim of surface {surface} by 0.1 mm: light +"));
     }
-    harness.get_by_label("no ray ends at 2 to 5, 7 to 10");
+    harness.get_by_label("no ray is limited by 2 to 5, 7 to 10");
     assert!(harness.query_by_label_contains("Rim of surface 2 by").is_none());
     harness.get_by_label_contains("Rim of surface 11 by 0.1 mm").click();
     harness.run();
@@ -499,7 +499,7 @@ fn a_lens_that_cannot_be_traced_says_why_in_every_panel() {
     let mut broken = view();
     let results = broken.results.take().unwrap();
     let mut results = Arc::unwrap_or_clone(results);
-    results.analyses = Err("no beam at surface 2".to_owned());
+    results.analyses = Err("no beam at surface 3".to_owned());
     broken.results = Some(Arc::new(results));
     let mut harness = panel_harness(SpotPanel::new(RenderBackend::Software), broken);
     harness.run();
@@ -553,7 +553,7 @@ fn pareto_front(view: SessionView) -> Harness<'static, PanelState<ParetoPanel>> 
 fn a_front_is_wished_for_with_the_settings_of_the_panel() {
     let mut harness = pareto_front(view());
     harness.get_by_label_contains("How sharp can this lens be for how much light?");
-    harness.get_by_label("Compare with kept pupils").click();
+    harness.get_by_label("Compare with fixed rays").click();
     harness.run();
     harness.get_by_label("Start").click();
     harness.run();
@@ -626,12 +626,12 @@ fn a_click_on_a_point_shows_its_lens() {
 #[test]
 fn a_front_that_failed_says_why_and_a_dark_lens_cannot_begin_one() {
     let mut failed = view();
-    failed.pareto.run.error = Some("surface 2 is steeper than a hemisphere".to_owned());
+    failed.pareto.run.error = Some("surface 3 is steeper than a hemisphere".to_owned());
     pareto_front(failed).get_by_label("Surface 3 is steeper than a hemisphere");
 
     let mut dark = view();
     let mut results = Arc::unwrap_or_clone(dark.results.take().unwrap());
-    results.analyses = Err("no beam at surface 2".to_owned());
+    results.analyses = Err("no beam at surface 3".to_owned());
     dark.results = Some(Arc::new(results));
     let mut harness = pareto_front(dark);
     harness.get_by_label("Start").click();

@@ -81,7 +81,7 @@ fn node(number: u64, kind: Option<MutationKind>) -> Arc<LineageNode<Arc<Lens>>> 
         parent: number.checked_sub(1),
         chain: 0,
         kind,
-        what: if number == 0 { "the start" } else { "a plate before surface 2" }.to_owned(),
+        what: if number == 0 { "the start" } else { "a plate before surface 3" }.to_owned(),
         before: kind.map(|_| 0.05),
         mutated: 0.08,
         descended: 0.02,
@@ -125,7 +125,7 @@ fn searching(standing: RunStatus) -> SessionView {
     });
     let mut statistics =
         SearchStatistics { moves: 60, gradients: 1200, ..SearchStatistics::default() };
-    let refused = [("no gap is wide enough before surface 2".to_owned(), 3)].into();
+    let refused = [("no gap is wide enough before surface 3".to_owned(), 3)].into();
     let tally = MutationStatistics {
         tried: 5,
         refused,
@@ -192,7 +192,7 @@ fn a_search_is_wished_for_as_the_panel_says() {
 fn every_field_may_keep_a_share_of_its_own() {
     let mut harness = panel(view());
     assert!(harness.query_by_label("Least light").is_some());
-    press(&mut harness, "each field by itself");
+    press(&mut harness, "each field separately");
     assert!(harness.query_by_label("Least light").is_none());
     let fields = double_gauss().fields.values.len();
     assert_eq!(harness.query_all_by_label_contains("Least light at ").count(), fields);
@@ -200,7 +200,7 @@ fn every_field_may_keep_a_share_of_its_own() {
     assert_eq!(started(&harness).plan.light, vec![1.0; fields]);
 
     let mut harness = panel(view());
-    press(&mut harness, "each field by itself");
+    press(&mut harness, "each field separately");
     harness.state_mut().view = view_of(Lens { fields: one_field(), ..double_gauss() });
     harness.run();
     press(&mut harness, "Search");
@@ -218,9 +218,9 @@ fn one_field() -> Fields {
 fn limits_weights_and_the_sampler_are_there_by_name() {
     let mut harness = panel(view());
     for (part, fields) in [
-        ("What the factory can make", ["Least glass on the axis", "Steepness", "set"].as_slice()),
-        ("How often each mutation is tried", &["Weight of glue at the start"]),
-        ("How it samples", &["C", "Gamma", "Longest descent", "Lenses kept", "Error of spots"]),
+        ("Manufacturing limits", ["Least glass on the axis", "Steepness", "set"].as_slice()),
+        ("Weights of the mutations", &["Weight of glue at the start"]),
+        ("Sampler", &["C", "Gamma", "Longest descent", "Retained lenses", "Error of spots"]),
     ] {
         press(&mut harness, part);
         for field in fields {
@@ -238,7 +238,7 @@ fn a_search_can_be_held_ended_saved_and_forgotten() {
         (RunStatus::Running, "Stop", StructureSearchCommand::Stop),
         (RunStatus::Finished, "Clear", StructureSearchCommand::Clear),
         (RunStatus::Running, "Reheat", StructureSearchCommand::Control(SteerCommand::Reheat)),
-        (RunStatus::Running, "Follow the search", StructureSearchCommand::Preview(Some(0))),
+        (RunStatus::Running, "Preview the search", StructureSearchCommand::Preview(Some(0))),
     ];
     for (standing, button, explore) in cases {
         let mut harness = panel(searching(standing));
@@ -259,8 +259,8 @@ fn a_search_can_be_held_ended_saved_and_forgotten() {
     harness.get_by_label_contains("merit 0.1 to 0.02");
     harness.get_by_label_contains("60 moves, 1200 gradients of 300 rays, 100 gradients/s (10 ms");
     harness.get_by_label("Saved up to move 50 to b.json");
-    harness.get_by_label_contains("The start breaks 2 limits");
-    harness.get_by_label_contains("The best lens breaks 1 limit:");
+    harness.get_by_label_contains("The start violates 2 limits");
+    harness.get_by_label_contains("The best lens violates 1 limit;");
     harness.get_by_label_contains("Merit against iterations: 30 moments, 1 descents");
     harness.get_by_label("Elements of chain 1 against iterations: 6 now");
 }
@@ -298,7 +298,7 @@ fn a_lens_that_is_kept_is_compared_pinned_taken_and_exported() {
 #[test]
 fn moves_are_counted_with_reasons() {
     let mut harness = panel(searching(RunStatus::Running));
-    press(&mut harness, "Moves");
+    press(&mut harness, "Statistics");
     harness.get_by_label("Weight of add singlet");
     harness.get_by_label("1 of 2");
     harness.get_by_label("17");
@@ -316,7 +316,8 @@ fn every_lens_tells_where_it_came_from() {
     harness.get_by_label_contains(
         "merit 0.05 before, 0.08 after the mutation, 0.02 after the descent",
     );
-    let fates = harness.get_all_by_label_contains("17 moves, 340 gradients in chain 1: the clock");
+    let fates =
+        harness.get_all_by_label_contains("17 moves, 340 gradients in chain 1: ended by its clock");
     assert_eq!(fates.count(), 2);
     press(&mut harness, "Show lens 0");
     let preview = Command::Preview(Some(Box::new(Lens::clone(&other(0)))));
@@ -326,7 +327,7 @@ fn every_lens_tells_where_it_came_from() {
 #[test]
 fn without_a_search_the_panel_says_what_is_missing() {
     let mut failed = view();
-    failed.structure_search.run.error = Some("surface 2 is steeper than a hemisphere".to_owned());
+    failed.structure_search.run.error = Some("surface 3 is steeper than a hemisphere".to_owned());
     panel(failed).get_by_label("Surface 3 is steeper than a hemisphere");
 
     let mut left = view();
@@ -334,8 +335,8 @@ fn without_a_search_the_panel_says_what_is_missing() {
     left.structure_search.unfinished = Some(path.clone());
     let mut harness = panel(left);
     harness.get_by_label("Nikkor_1");
-    press(&mut harness, "Go on");
-    press(&mut harness, "Forget it");
+    press(&mut harness, "Resume");
+    press(&mut harness, "Dismiss");
     assert_eq!(
         asked(&harness),
         [StructureSearchCommand::ResumeFrom(Some(path)), StructureSearchCommand::DismissUnfinished]
@@ -343,7 +344,7 @@ fn without_a_search_the_panel_says_what_is_missing() {
 
     let mut dark = view();
     let mut results = Arc::unwrap_or_clone(dark.results.take().unwrap());
-    results.analyses = Err("no beam at surface 2".to_owned());
+    results.analyses = Err("no beam at surface 3".to_owned());
     dark.results = Some(Arc::new(results));
     let mut harness = panel(dark);
     press(&mut harness, "Search");

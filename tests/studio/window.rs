@@ -177,7 +177,7 @@ fn a_search_over_structure_shows_its_lenses_and_one_is_taken_as_one_step() {
         let moves = harness.state().session().view().structure_search.run.snapshot;
         cards.count() > 0 && moves.is_some_and(|run| run.statistics.moves > 8)
     });
-    harness.get_by_label("Follow the search").click();
+    harness.get_by_label("Preview the search").click();
     wait(&mut harness, "the lens of the chain", |harness| {
         harness.state().session().view().preview_results.is_some()
     });
@@ -249,7 +249,7 @@ fn an_experiment_runs_from_the_menu_and_shows_its_claims_and_pictures() {
     harness.run_steps(3);
     harness.get_by_label("Cancel").click();
     wait(&mut harness, "the end", |harness| {
-        harness.query_by_label("Stopped before it had found anything.").is_some()
+        harness.query_by_label("Stopped before it had a result.").is_some()
     });
     let effort = Effort::Small;
     harness

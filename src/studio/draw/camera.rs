@@ -1,4 +1,4 @@
-//! Which part of the plane a picture shows, with equal axes.
+//! The part of the plane that a drawing shows, with equal axes.
 
 use glam::{DVec2, Vec2};
 
@@ -48,12 +48,12 @@ impl Camera {
         Self { center: bounds.min.midpoint(bounds.max), scale: scale.clamp(MIN_SCALE, MAX_SCALE) }
     }
 
-    /// Where a point of the plane falls in a picture of `size` pixels, y down.
+    /// The pixel of a point of the plane in an image of `size` pixels, y down.
     pub fn to_px(self, mm: DVec2, size: DVec2) -> DVec2 {
         0.5 * size + self.scale * flip(mm - self.center)
     }
 
-    /// Which point of the plane a place in the picture shows.
+    /// The point of the plane at a pixel.
     pub fn to_mm(self, px: DVec2, size: DVec2) -> DVec2 {
         self.center + flip(px - 0.5 * size) / self.scale
     }

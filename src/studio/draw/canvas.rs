@@ -19,7 +19,7 @@ use wgpu::{
 
 use super::{Camera, Scene, gpu, software};
 
-/// What draws the scenes.
+/// The renderer of the scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RenderBackend {
     /// The graphics card, or software that stands in for one.

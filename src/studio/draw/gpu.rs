@@ -26,7 +26,7 @@ use super::{Camera, Rgba, RgbaImage, Scene, Segment, TriangleVertex};
 /// Drawings keep colours as a person picks them: blending happens on the stored values.
 pub const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
-/// Why a drawing could not be fetched from the graphics card.
+/// An error of drawing on the graphics card.
 #[derive(Debug, Error)]
 pub enum GpuError {
     /// No graphics card and no software in its place.
@@ -49,7 +49,7 @@ pub enum GpuError {
     NoAnswer,
 }
 
-/// What the shader knows of the camera.
+/// The camera as the shader reads it.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct ViewUniform {
@@ -141,7 +141,7 @@ impl SceneRenderer {
     }
 }
 
-/// How one kind of shape reaches its program.
+/// The shader and the vertex layout of one kind of primitive.
 struct PrimitivePipeline<'a> {
     vertex: &'a str,
     fragment: &'a str,

@@ -1,4 +1,4 @@
-//! What is drawn: triangles below, lines above, each in the order given.
+//! The scene of a drawing: triangles below, lines above, each in the order given.
 
 use glam::{DVec2, Vec2};
 
@@ -11,7 +11,7 @@ pub type Rgba = [u8; 4];
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct TriangleVertex {
-    /// Where it is, mm.
+    /// Its position, mm.
     pub position: Vec2,
     /// Its colour; the three corners of a triangle share one.
     pub color: Rgba,
@@ -21,9 +21,9 @@ pub struct TriangleVertex {
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Segment {
-    /// Where it starts, mm.
+    /// The start, mm.
     pub from: Vec2,
-    /// Where it ends, mm.
+    /// The end, mm.
     pub to: Vec2,
     /// Width of the line or diameter of the dot, px.
     pub width: f32,
@@ -34,7 +34,7 @@ pub struct Segment {
 /// Everything in one picture. Points that are not finite are left out as they are added.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// What lies behind everything.
+    /// The background colour.
     pub background: Rgba,
     /// Filled triangles, three corners each.
     pub vertices: Vec<TriangleVertex>,
@@ -104,7 +104,7 @@ impl Scene {
     }
 }
 
-/// Whether the way from `a` to `c` passes straight through `b`.
+/// True if the way from `a` to `c` passes straight through `b`.
 fn is_straight(a: DVec2, b: DVec2, c: DVec2) -> bool {
     let (first, second) = (b - a, c - b);
     let size = first.length() * second.length();

@@ -14,14 +14,14 @@ use super::{BoundingBox, Camera, RenderBackend, Scene, SceneCanvas, round_length
 const MARGIN: f64 = 24.0; // points
 /// The scale bar is at most this share of the width, and at most so long.
 const BAR: (f32, f32) = (0.25, 160.0); // share, points
-/// How much nearer one notch of the wheel brings.
+/// The magnification for one notch of the wheel.
 const NOTCH: f64 = 1.2;
 
 /// A part of a panel that shows a scene; it remembers where one looks.
 #[derive(Debug)]
 pub struct SceneView {
     canvas: SceneCanvas,
-    /// Where a person has moved to; none while the whole scene is shown.
+    /// The camera that the user has chosen; `None` while the whole scene is shown.
     user_camera: Option<Camera>,
 }
 
@@ -104,7 +104,7 @@ impl SceneView {
 /// A scene as it is shown.
 #[derive(Debug)]
 pub struct SceneResponse {
-    /// Where it is.
+    /// The area of the scene in the window.
     pub response: Response,
     camera: Camera,
     per_point: f64,
@@ -122,7 +122,7 @@ impl SceneResponse {
         Some((self.camera.to_mm(px, self.size()), self.per_point / self.camera.scale))
     }
 
-    /// Where a point of the plane is on the screen.
+    /// The place on the screen of a point of the plane.
     pub fn to_screen(&self, mm: DVec2) -> egui::Pos2 {
         let px = self.camera.to_px(mm, self.size()) / self.per_point;
         #[expect(clippy::cast_possible_truncation, reason = "a place on the screen")]

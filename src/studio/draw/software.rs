@@ -101,7 +101,7 @@ fn pixel_centers(from: f32, to: f32, count: u32) -> Range<u32> {
     index(from)..index(to)
 }
 
-/// Where the line at height `y` enters and leaves a triangle.
+/// The x at which the line at height `y` enters and leaves a triangle.
 ///
 /// Each edge is taken from its lower end, so that two triangles that share an edge share it to
 /// the last bit and no pixel is drawn twice.
@@ -139,7 +139,7 @@ fn interval_where(slope: f32, offset: f32, low: f32, high: f32) -> (f32, f32) {
     (p.min(q), p.max(q))
 }
 
-/// How much of a pixel a segment covers, 0 to 1.
+/// The share of a pixel that a segment covers, 0 to 1.
 fn segment_coverage(pixel: Vec2, a: Vec2, b: Vec2, half: f32) -> f32 {
     let length = a.distance(b);
     if length < DOT {
@@ -150,7 +150,7 @@ fn segment_coverage(pixel: Vec2, a: Vec2, b: Vec2, half: f32) -> f32 {
     overlap(r.perp_dot(axis), -half, half) * overlap(r.dot(axis), 0.0, length)
 }
 
-/// How much of the unit interval around `x` lies between `low` and `high`.
+/// The length of the unit interval around `x` that lies between `low` and `high`.
 fn overlap(x: f32, low: f32, high: f32) -> f32 {
     ((x + 0.5).min(high) - (x - 0.5).max(low)).max(0.0)
 }

@@ -1,4 +1,5 @@
-//! Which physics is computed for this lens, on which number that rests, and what it saves.
+//! The panel of the physical effects: which are computed, why, and the time that leaving them out
+//! saves.
 
 use egui::{Align, Color32, ComboBox, Frame, Layout, Margin, RichText, ScrollArea, Ui};
 
@@ -44,14 +45,14 @@ fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, actions: &mut Actio
             let reason = capitalize(&decision.reason);
             ui.label(RichText::new(reason).small());
             ui.label(RichText::new(reason_text(decision)).small().weak()).on_hover_text(
-                "What changes if the effect is left out, above what that is needed, and the share \
-                 of the time of tracing that leaving it out saves",
+                "The error if the effect is left out, the limit above which it is needed, and the \
+                 share of the tracing time that leaving it out saves",
             );
         });
     }
 }
 
-/// Whether the effect is computed.
+/// Shows whether the effect is computed.
 fn state_label(ui: &mut Ui, decision: &EffectDecision) {
     let visuals = ui.visuals();
     let (text, color) = if decision.computed {

@@ -1,4 +1,4 @@
-//! What a lens does to rays near its axis: lengths, pupils, and the third-order sums.
+//! The first-order data of a lens: focal lengths, pupils, and the third-order sums.
 
 use egui::{
     Align, Color32, Frame, Grid, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui,

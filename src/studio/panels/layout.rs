@@ -21,7 +21,7 @@ use crate::studio::palette::{Palette, color32};
 use crate::studio::section::LensSection;
 use crate::trace::Fates;
 
-/// How near the pointer must be to a surface to name it, in points.
+/// The distance in points within which the pointer picks a surface.
 const NEAR: f64 = 6.0;
 
 /// The panel.
@@ -43,14 +43,14 @@ struct LayoutDrawing {
     fates: Fates,
     /// Fields without rays, and why.
     fields_without_rays: Vec<(usize, String)>,
-    /// How many pieces of glass the design does not have.
+    /// The number of glass elements that the design does not have.
     added_glass: usize,
 }
 
 /// All on which a drawing depends.
 #[derive(Debug, Clone)]
 struct LayoutKey {
-    /// What is drawn.
+    /// The results that are drawn.
     results: Arc<AnalysisResults>,
     /// The design, drawn faintly below the lens of a search.
     reference: Option<Arc<AnalysisResults>>,
@@ -134,7 +134,7 @@ impl LayoutPanel {
             let color = color32(palette.lost_ray);
             swatch(ui, color);
             ui.label(RichText::new(text).color(color))
-                .on_hover_text("Rays are drawn to the place where they are lost, with a dot there");
+                .on_hover_text("Lost rays are drawn to their end, which is marked by a dot");
         }
         if drawing.added_glass > 0 {
             swatch(ui, color32(palette.added_glass).to_opaque());
@@ -146,13 +146,13 @@ impl LayoutPanel {
     }
 }
 
-/// How many rays are lost, by cause; nothing where none is.
+/// The number of lost rays by cause; `None` if no ray is lost.
 fn losses_text(fates: Fates) -> Option<String> {
     let causes = [
         (fates.clipped, "clipped"),
         (fates.missed, "missed a surface"),
         (fates.total_reflection, "totally reflected"),
-        (fates.turned + fates.trapped, "kept by a gradient"),
+        (fates.turned + fates.trapped, "trapped in a GRIN medium"),
     ];
     let parts: Vec<String> =
         causes.iter().filter(|(n, _)| *n > 0).map(|(n, how)| format!("{n} {how}")).collect();
@@ -292,7 +292,7 @@ fn draw_image(scene: &mut Scene, section: &LensSection<'_>, layout: &RayLayout, 
     scene.line(DVec2::new(z, low), DVec2::new(z, high), 1.5, palette.strong);
 }
 
-/// What *fit* shows: the lens, the image and where the rays come from.
+/// The extent that *Fit* shows: the lens, the image and the starts of the rays.
 fn full_view(section: &LensSection<'_>, layout: &RayLayout) -> Option<BoundingBox> {
     let lens = section.bounds()?;
     let z = section.image();

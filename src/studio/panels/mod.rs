@@ -1,4 +1,4 @@
-//! What the window is made of: one panel a question that a designer asks.
+//! The panels of the window.
 
 mod cell_layout;
 mod effects;
@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 
 use super::draw::RenderBackend;
 use super::number;
-use super::text::{capitalize, counted_from_one};
+use super::text::capitalize;
 use crate::analysis::{Estimate, ImageQuality, Spot};
 use crate::lens::{Edit, FieldKind, FieldPoint, Lens, ParameterKind, add_variables};
 use crate::session::{Analyses, AnalysisResults, SessionView};
@@ -40,19 +40,19 @@ use crate::studio::actions::Actions;
 
 /// A part of the window. It shows a view and writes down actions; it changes nothing.
 pub trait Panel {
-    /// What its tab says.
+    /// The title on its tab.
     fn title(&self) -> &'static str;
 
     /// Shows it.
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions);
 
-    /// Whether something is being typed into it.
+    /// True if one of its text fields is being edited.
     fn is_typing(&self, _context: &Context) -> bool {
         false
     }
 }
 
-/// Which panel; what a saved arrangement of the window remembers.
+/// A kind of panel, as the saved arrangement of the window stores it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PanelKind {
@@ -62,19 +62,19 @@ pub enum PanelKind {
     Slice,
     /// The table of surfaces.
     Prescription,
-    /// Where the rays of each field land.
+    /// The spot diagram of every field.
     Spot,
-    /// Which rays of each field get through, and what ends the others.
+    /// The pupil of every field, with what limits it.
     Pupil,
     /// The search for a better lens.
     Optimizer,
-    /// What the lens can have of sharpness for how much light.
+    /// The Pareto front of sharpness against light.
     Pareto,
     /// The search over structure.
     Search,
     /// Focal lengths, pupils, third-order sums.
     FirstOrder,
-    /// Which physics is computed, and why.
+    /// The physical effects that are computed, and why.
     Effects,
 }
 
@@ -164,13 +164,13 @@ fn relative_error(estimate: Estimate) -> String {
 /// Says why there are no numbers, where there are none.
 fn show_missing_results(ui: &mut Ui, view: &SessionView) {
     let why = match view.results.as_deref().map(|results| &results.analyses) {
-        Some(Err(why)) => capitalize(&counted_from_one(why)),
+        Some(Err(why)) => capitalize(why),
         _ => "Computing…".to_owned(),
     };
     ui.weak(why);
 }
 
-/// What a zoom position is called.
+/// The name of a zoom position.
 fn zoom_name(lens: &Lens, position: usize) -> String {
     match lens.zoom.get(position).map(|position| position.name.as_str()) {
         None | Some("") => format!("Zoom {}", position + 1),

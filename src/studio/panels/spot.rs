@@ -1,4 +1,4 @@
-//! Where the rays of each field land, all cells to one scale.
+//! The spot diagram of every field, all to one scale.
 //!
 //! The dots are for the eye; the radii come from integrals over the pupil, each with its error, its
 //! rays and its time. Both are measured from the centroid of all colours.
@@ -133,9 +133,10 @@ fn tolerance(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
             ui.selectable_value(&mut chosen, error, name);
         }
     });
-    shown.response.accessible_name("Allowed error").on_hover_text(
-        "The error that the numbers may have. As many rays are traced as that takes, no more.",
-    );
+    shown
+        .response
+        .accessible_name("Allowed error")
+        .on_hover_text("The tolerance of the numbers. As many rays are traced as it needs.");
     ui.weak("error below");
     if chosen != view.settings.tolerance {
         actions.push(Command::SetTolerance(chosen));
@@ -262,25 +263,28 @@ fn field_label(ui: &mut Ui, fields: &Fields, field: usize) {
     ui.label(RichText::new(field_name(fields.kind, *point)).color(color));
 }
 
-/// How much of the pupil is lit, where it is clipped.
+/// The share of the pupil that gets through, if it is vignetted.
 fn clipped_label(ui: &mut Ui, lit: f64) {
     if lit < 0.995 {
         let text = RichText::new(format!("{:.0} % of pupil", 100.0 * lit)).small();
         ui.label(text.weak()).on_hover_text(
-            "Surfaces clip the rest. The integral follows the edge of what gets through.",
+            "The rest is vignetted. The integral follows the edge of the remaining pupil.",
         );
     }
 }
 
 fn radii(ui: &mut Ui, spot: &Spot) {
     let line = |ui: &mut Ui, text: String| -> Response { ui.label(RichText::new(text).small()) };
-    line(ui, format!("RMS {}", in_um(spot.rms)))
-        .on_hover_text("Root mean square distance from the centroid of all colours");
+    line(ui, format!("RMS {}", in_um(spot.rms))).on_hover_text(
+        "Root mean square distance from the centroid of all colours, by quadrature over the \
+         pupil; the dots are other rays, by quadrature \
+            over the pupil; the dots are other rays",
+    );
     line(ui, format!("GEO {}", in_um(spot.radius)))
         .on_hover_text("Largest distance from the centroid of all colours");
     let time = spot.rms.milliseconds.map(|ms| format!(", {ms:.2} ms")).unwrap_or_default();
     let rays = RichText::new(format!("{} rays{time}", spot.radius.rays)).small();
-    ui.label(rays.weak()).on_hover_text("Rays traced for these numbers, and the time it took");
+    ui.label(rays.weak()).on_hover_text("Rays traced for these numbers, and the time");
 }
 
 /// A length with its relative error.

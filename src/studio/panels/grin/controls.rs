@@ -1,4 +1,4 @@
-//! What is open, the hand on its search, and how it is looked at.
+//! The controls of a field: open, save and close, its optimization, and the slice.
 
 use egui::{
     Align, Button, ComboBox, DragValue, Label, Layout as Arrange, ProgressBar, RichText,
@@ -67,7 +67,7 @@ impl TaskMenu {
                 run_controls(ui, view, run, actions);
             }
             self.save(ui, run, actions);
-            if ui.button("Close").on_hover_text("Close it; what is not saved is lost").clicked() {
+            if ui.button("Close").on_hover_text("Close; unsaved changes are lost").clicked() {
                 actions.push(GrinCommand::Close);
             }
             document_name(ui, run);
@@ -114,7 +114,7 @@ impl TaskMenu {
     }
 }
 
-/// What is open, in the room that is left.
+/// The name of the open document, in the room that is left.
 fn document_name(ui: &mut Ui, run: &GrinRun) {
     let name = &run.document.name;
     let notes = run.document.task.as_ref().map_or("", |task| task.notes.as_str());
@@ -152,7 +152,7 @@ fn run_controls(ui: &mut Ui, view: &SessionView, run: &GrinRun, actions: &mut Ac
     action_buttons(ui, buttons, actions);
 }
 
-/// How far the search is.
+/// The progress of the optimization.
 pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
     let text = text::status_text(run, view.grin.run.status);
     match &run.progress {
@@ -170,7 +170,7 @@ pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
     }
 }
 
-/// Which slice, what it shows, how many rays.
+/// The plane of the slice, its quantity, and the number of rays.
 pub(super) fn slice_controls(
     ui: &mut Ui,
     view: &SessionView,
@@ -188,8 +188,8 @@ pub(super) fn slice_controls(
             let drag = DragValue::new(&mut sight.rays).range(0..=60).speed(0.1).suffix(" rays");
             ui.add(drag)
                 .on_hover_text(
-                    "Rays of each view in the drawing: those that run nearest to the slice, \
-                     projected onto it",
+                    "Rays of each view in the drawing: those nearest to the slice, projected onto \
+                     it",
                 )
                 .accessible_name("Rays of each view in the slice");
         }
@@ -222,7 +222,7 @@ fn plane_choice(ui: &mut Ui, run: &GrinRun, sight: &mut SliceSettings) {
     ui.weak(name);
     let slider = Slider::new(&mut sight.plane.depth, low..=high).suffix(" mm");
     let slider = ui.add(slider.step_by((high - low) / 200.0).max_decimals(4));
-    slider.on_hover_text("Where the slice is laid").accessible_name("Depth of the slice");
+    slider.on_hover_text("Position of the slice").accessible_name("Depth of the slice");
 }
 
 fn quantity_choice(ui: &mut Ui, run: &GrinRun, sight: &mut SliceSettings) {
@@ -232,5 +232,8 @@ fn quantity_choice(ui: &mut Ui, run: &GrinRun, sight: &mut SliceSettings) {
             ui.selectable_value(&mut sight.quantity, quantity, quantity.name());
         }
     });
-    combo.response.on_hover_text("What the colours show").accessible_name("Quantity of the slice");
+    combo.response.on_hover_text("Quantity of the colours").accessible_name(
+        "Quantity of the \
+        slice",
+    );
 }

@@ -38,7 +38,7 @@ impl ViewImages {
     /// Shows them one above the other.
     pub(super) fn ui(&mut self, ui: &mut Ui, view: &SessionView, run: &GrinRun) {
         let Some(source) = &view.grin.analysis else {
-            ui.weak("Following all light…");
+            ui.weak("Tracing all views…");
             return;
         };
         let Ok(sighting) = source.as_ref() else { return };
@@ -66,11 +66,11 @@ impl ImagePair {
         let side = (0.5 * (ui.available_width() - 10.0)).clamp(60.0, 320.0);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 6.0;
-            for (texture, what) in self.textures.iter().zip(["wanted", "made"]) {
+            for (texture, what) in self.textures.iter().zip(["target", "result"]) {
                 ui.vertical(|ui| {
                     let image = Shown::new(texture).fit_to_exact_size(vec2(side, side));
                     ui.add(image.alt_text(format!("Image of {name}: {what}")))
-                        .on_hover_text("As an eye sees it that looks against the light");
+                        .on_hover_text("Seen against the light");
                     ui.label(RichText::new(what).small().weak());
                 });
             }

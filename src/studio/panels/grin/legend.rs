@@ -1,4 +1,4 @@
-//! What the colours of a slice mean: numbers beside a strip, and the rays of each view.
+//! The legend of a slice: a colour bar with numbers, and the rays of each view.
 
 use egui::{Align2, Color32, Mesh, Rect, RichText, Role, Sense, Shape, TextStyle, Ui};
 use egui::{WidgetInfo, pos2};
@@ -114,7 +114,7 @@ pub(super) fn ray_legend(ui: &mut Ui, slice: &Slice) {
             if let Some(text) = text::excluded_text(ways) {
                 swatch(ui, lost);
                 ui.label(RichText::new(text).small().color(lost)).on_hover_text(
-                    "Rays that do not count are drawn to where they end, with a dot there",
+                    "Excluded rays are drawn to their end, which is marked by a dot",
                 );
             }
         }

@@ -26,10 +26,10 @@ use controls::TaskMenu;
 use images::ViewImages;
 use picture::SlicePicture;
 
-/// What the panel is about, before anything is open.
-const INTRODUCTION: &str = "Which field of refractive index bends light as a task wants it? Open a task and \
-    press Optimize: the field forms while you look at a slice of it, with rays through it. A volume \
-    from a file is shown alike. Nothing is computed before something is open.";
+/// The introduction that is shown before a document is open.
+const INTRODUCTION: &str = "Which field of refractive index bends light as a task asks? Open a \
+    task and press Optimize: the slice shows the field and its rays while they improve. A volume \
+    from a file can be inspected in the same way.";
 
 /// The width of the numbers beside the picture; with less room than the second number they stand
 /// below it, and with less height than the third there are none.
@@ -52,14 +52,10 @@ enum GrinPage {
 }
 
 const PAGES: [(GrinPage, &str, &str); 4] = [
-    (
-        GrinPage::Light,
-        "Light",
-        "Every view: spot or image, rays and those left out, error and time",
-    ),
-    (GrinPage::Loss, "Loss", "The loss against the steps of the search"),
+    (GrinPage::Light, "Light", "Every view: spot or image, rays and excluded rays, error and time"),
+    (GrinPage::Loss, "Loss", "The loss against the steps of the optimization"),
     (GrinPage::Profile, "Profile", "The index along the radius, or along a line through the slice"),
-    (GrinPage::Images, "Images", "What light makes on screens beside what is wanted there"),
+    (GrinPage::Images, "Images", "Images on the screens beside their targets"),
 ];
 
 /// The panel.
@@ -71,7 +67,7 @@ pub struct GrinPanel {
     page: GrinPage,
     /// A place that was clicked, whatever slice is shown.
     pinned: Option<Vec3<f64>>,
-    /// What the panel was turned to last.
+    /// The document that was shown last.
     shown_run: Option<u64>,
 }
 
@@ -190,7 +186,7 @@ impl GrinPanel {
                 ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
             }
             None => {
-                ui.weak("Laying the slice…");
+                ui.weak("Computing the slice…");
             }
         }
     }

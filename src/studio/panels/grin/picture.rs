@@ -120,7 +120,7 @@ fn image(slice: &Slice, dark: bool) -> ColorImage {
     ColorImage::new(slice.size, (0..width * height).map(pixel).collect())
 }
 
-/// What *fit* shows: the slice, and its rays from before they enter to their screens.
+/// The extent that *Fit* shows: the slice, and its rays from before they enter to their screens.
 fn full_view(slice: &Slice) -> BoundingBox {
     let rays =
         slice.paths.iter().flat_map(|ways| &ways.paths).filter(|way| way.excluded().is_none());

@@ -7,7 +7,7 @@ use super::text;
 use crate::session::{GrinRun, LossSample, SessionView};
 use crate::studio::panels::decade_name;
 
-/// What lies in a corner: up to this part of the width and the height from it.
+/// The share of width and height that counts as a corner.
 const NEAR: f64 = 0.4;
 
 /// The corner with the fewest points of some curves in it, for a legend.
@@ -89,7 +89,7 @@ pub(super) fn loss_plot(ui: &mut Ui, run: &GrinRun) {
 /// The index along a line, with the exact one and the one at the start beside it.
 pub(super) fn profile_plot(ui: &mut Ui, view: &SessionView) {
     let Some(Ok(slice)) = view.grin.slice.as_deref() else {
-        ui.weak("Laying the slice…");
+        ui.weak("Computing the slice…");
         return;
     };
     let profile = &slice.profile;

@@ -8,9 +8,9 @@ use crate::grin_design::{
 use crate::math::Vec3;
 use crate::session::{GrinAnalysis, GrinDocument, GrinRun, RunStatus, SessionView, Slice};
 use crate::studio::number::format_digits;
-use crate::studio::text;
+use crate::studio::text::{self, counted};
 
-/// How the search stands, in one line.
+/// The status of the optimization, in one line.
 pub(super) fn status_text(run: &GrinRun, status: RunStatus) -> String {
     let Some(task) = &run.document.task else { return volume_text(run) };
     let Some(progress) = &run.progress else {
@@ -56,7 +56,7 @@ pub(super) fn light_page(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
         None => {
-            ui.weak("Following all light…");
+            ui.weak("Tracing all views…");
         }
     }
     ui.add_space(4.0);
@@ -66,12 +66,11 @@ pub(super) fn light_page(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
             ui,
             "Exact field",
             &format!(
-                "off by {:.2e}, relative; by {:.2e} without the offset of {:.1e} in the square of the \
-             index",
+                "relative error {:.2e}; {:.2e} without an offset of {:.1e} in the squared index",
                 difference.relative, difference.without_offset, difference.offset
             ),
-            "The root mean square difference over the space. Rays see the slope of the squared index \
-            alone: its level is held by the boundary only",
+            "RMS difference over the domain. Rays determine the squared index up to an additive \
+             constant, which only the boundary fixes",
         );
     }
     cost_rows(ui, run);
@@ -90,21 +89,21 @@ pub(super) fn light_page(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
     }
 }
 
-/// What the search has cost.
+/// The cost of the optimization.
 fn cost_rows(ui: &mut Ui, run: &GrinRun) {
     let Some(progress) = &run.progress else { return };
     if run.rays > 0 {
         let each = 1e6 * run.seconds / run.rays as f64;
         row(
             ui,
-            "Search",
+            "Optimization",
             &format!(
-                "{} rays and back in {:.1} s, {} µs a ray with all else",
+                "{} rays forward and back in {:.1} s, {} µs per ray in total",
                 count_text(run.rays),
                 run.seconds,
                 format_digits(each, 3)
             ),
-            "Rays traced for the loss and its gradient; the time of all steps, pauses apart",
+            "Rays traced for the loss and its gradient; the time of all steps without pauses",
         );
     }
     let total = progress.counts.fates.total();
@@ -113,7 +112,7 @@ fn cost_rows(ui: &mut Ui, run: &GrinRun) {
             ui,
             "Last step",
             &format!("{total} rays, {}", exclusions_text(progress.counts)),
-            "What became of the rays of the last step",
+            "Outcome of the rays of the last step",
         );
     }
 }
@@ -126,7 +125,7 @@ fn view_rows(ui: &mut Ui, run: &GrinRun, sighting: &GrinAnalysis) {
             ui.strong(&view.name);
             ui.label(result_text(seen));
             if view.weight == 0.0 {
-                ui.weak("only looked at");
+                ui.weak("weight 0");
             }
         });
         let counts = seen.result.counts;
@@ -137,7 +136,7 @@ fn view_rows(ui: &mut Ui, run: &GrinRun, sighting: &GrinAnalysis) {
     }
     let text = format!("All light in {:.0} ms", sighting.views.ms);
     ui.label(RichText::new(text).small().weak()).on_hover_text(
-        "Judged by the same rays each time; while the search runs about once a second",
+        "Evaluated with the same rays each time; about once a second during an optimization",
     );
 }
 
@@ -148,11 +147,11 @@ fn result_text(seen: &ViewReport) -> String {
         None if seen.result.spot.is_finite() => {
             format!("RMS miss {} mm", format_small(seen.result.spot))
         }
-        None => "no ray counts".to_owned(),
+        None => "no valid ray".to_owned(),
     }
 }
 
-/// How the rays of a view are traced, and how good that is.
+/// The method by which the rays of a view are traced, and its error.
 fn tracing_text(seen: &ViewReport) -> String {
     let how = seen.integrator.name().replace('_', " ");
     let how = format!("{how}, step {} mm", format_small(seen.step));
@@ -160,7 +159,7 @@ fn tracing_text(seen: &ViewReport) -> String {
         Some(error) => {
             format!("{how}; halving it moves {} exits by at most {error:.1e} mm", seen.sample)
         }
-        None => format!("{how}; its error is not known, since no ray of a sample arrives"),
+        None => format!("{how}; error unknown: no ray of the sample arrives"),
     }
 }
 
@@ -180,9 +179,9 @@ fn exclusions_text(counts: RayCounts) -> String {
     let reasons: Vec<String> =
         counts.excluded().map(|(reason, count)| format!("{count} {}", plain(reason))).collect();
     if reasons.is_empty() {
-        "none left out".to_owned()
+        "none excluded".to_owned()
     } else {
-        format!("left out: {}", reasons.join(", "))
+        format!("excluded: {}", reasons.join(", "))
     }
 }
 
@@ -208,14 +207,14 @@ pub(super) fn losses_text(run: &GrinRun) -> String {
     let Some(progress) = &run.progress else { return String::new() };
     let digits = |loss: f64| if loss.is_finite() { format_small(loss) } else { "-".to_owned() };
     format!(
-        "Loss {}{} in the last step, {} the best",
+        "Loss {}{} at the last step, best {}",
         digits(progress.loss),
         loss_unit(run),
         digits(progress.best)
     )
 }
 
-/// What a profile shows.
+/// The title of a profile.
 pub(super) fn profile_text(slice: &Slice) -> String {
     let plane = slice.settings.plane;
     if slice.profile.along == "r" {
@@ -233,7 +232,7 @@ pub(super) fn profile_text(slice: &Slice) -> String {
     )
 }
 
-/// What a slice is called.
+/// The accessible name of a slice.
 pub(super) fn slice_name(slice: &Slice) -> String {
     let plane = slice.settings.plane;
     let (name, depth) = (plane.axis.name(), format_digits(plane.depth, 4));
@@ -244,7 +243,7 @@ pub(super) fn slice_name(slice: &Slice) -> String {
     )
 }
 
-/// What the colours mean.
+/// The range of the colours.
 pub(super) fn color_scale_text(slice: &Slice) -> String {
     let [low, high] = slice.range.map(|value| format_digits(value, 5));
     let name = slice.settings.quantity.name();
@@ -255,7 +254,7 @@ pub(super) fn color_scale_text(slice: &Slice) -> String {
     }
 }
 
-/// What is shown, and the distance of its contours.
+/// The quantity of the slice, and the spacing of its contours.
 pub(super) fn slice_text(slice: &Slice) -> String {
     let quantity = slice.settings.quantity.name();
     let [right, up] = slice.axes().map(SpatialAxis::name);
@@ -269,13 +268,13 @@ pub(super) fn slice_text(slice: &Slice) -> String {
 
 /// The rays of a view that are drawn.
 pub(super) fn rays_text(name: &str, ways: &RayPaths) -> String {
-    format!("{name}: {}", counted(ways.paths.len(), "ray"))
+    format!("{name}: {}", counted(ways.paths.len() as u64, "ray"))
 }
 
-/// How near they are to the slice.
+/// The largest distance of the rays from the slice.
 pub(super) fn distance_text(ways: &RayPaths) -> String {
     format!(
-        "Projected onto the slice: were they straight, they would stay within {} mm of it",
+        "Projected onto the slice; straight rays would stay within {} mm of it",
         format_digits(ways.distance, 2)
     )
 }
@@ -291,7 +290,7 @@ pub(super) fn excluded_text(ways: &RayPaths) -> Option<String> {
     }
     let reasons: Vec<String> =
         reasons.into_iter().map(|(reason, count)| format!("{count} {}", plain(reason))).collect();
-    (!reasons.is_empty()).then(|| format!("left out: {}", reasons.join(", ")))
+    (!reasons.is_empty()).then(|| format!("excluded: {}", reasons.join(", ")))
 }
 
 /// Place and field at a point.
@@ -299,7 +298,7 @@ pub(super) fn probe_text(subject: &GrinDocument, medium: &GrinField, point: Vec3
     let place = [point.x, point.y, point.z].map(|v| format_digits(v, 4));
     let place = format!("x {}  y {}  z {} mm", place[0], place[1], place[2]);
     if !subject.contains(point) {
-        return format!("{place}\noutside of the field");
+        return format!("{place}\noutside the field");
     }
     let sample = medium.field().sample(point);
     let g = sample.gradient;
@@ -312,7 +311,7 @@ pub(super) fn probe_text(subject: &GrinDocument, medium: &GrinField, point: Vec3
 pub(super) fn pinned_line(ui: &mut Ui, run: &GrinRun, pinned: &mut Option<Vec3<f64>>) {
     ui.horizontal(|ui| {
         let Some(point) = *pinned else {
-            let hint = "The pointer reads the field; a click pins a place, to watch it there";
+            let hint = "Hover to read the field; click to pin a point";
             ui.label(RichText::new(hint).small().weak());
             return;
         };
@@ -331,9 +330,4 @@ fn format_small(value: f64) -> String {
     } else {
         format_digits(value, 3)
     }
-}
-
-/// So many of something.
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }

@@ -1,4 +1,5 @@
-//! What a search aims at: terms with weights and targets, and how it treats the edge of the pupil.
+//! The editor of the merit function: terms with weights and targets, and the treatment of the pupil
+//! edge.
 
 use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::path::PathBuf;
@@ -34,14 +35,14 @@ struct MeritRow {
 const EDGES: [(PupilEdge, &str, &str); 2] = [
     (
         PupilEdge::Moving,
-        "Follow it",
-        "Derivatives know that the pupil moves with the lens: unbiased, and light can be asked for.",
+        "Moving",
+        "Derivatives include the motion of the pupil edge: unbiased, and light can be optimized.",
     ),
     (
         PupilEdge::Frozen,
-        "Keep the rays",
-        "The rays of now are kept, as in most programs: faster, but biased wherever something \
-         clips, and blind to light.",
+        "Fixed rays",
+        "The present rays are reused, as in most programs: faster, but biased where the beam is \
+         vignetted, and blind to changes of light.",
     ),
 ];
 
@@ -66,7 +67,7 @@ impl MeritEditor {
         };
     }
 
-    /// What the search is to aim at.
+    /// The goal of the optimization.
     pub(super) fn goal(&self) -> Goal {
         Goal {
             terms: self.active_terms().collect(),
@@ -107,8 +108,8 @@ impl MeritEditor {
                 heading(ui, text, what);
             }
             if search.is_some() {
-                heading(ui, "Before", "What the design lacks of it, or how much of it there is");
-                heading(ui, "Now", "The same at the best lens so far");
+                heading(ui, "Before", "Its value for the design");
+                heading(ui, "Now", "Its value for the best lens so far");
             }
             ui.end_row();
             for (i, aim) in self.terms.iter_mut().enumerate() {
@@ -124,7 +125,7 @@ impl MeritEditor {
         self.add_menu(ui, view);
     }
 
-    /// What stands in the way of the light that is asked for, each with the remedy.
+    /// Warnings about what prevents the lens from gaining light, each with a button that fixes it.
     fn warnings(&mut self, ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
         let more: Vec<&str> = self
             .active_terms()
@@ -133,9 +134,9 @@ impl MeritEditor {
             .collect();
         let about_light = self.active_terms().any(|weighted| weighted.term.concerns_light());
         if about_light && self.edge == PupilEdge::Frozen {
-            let what = "Kept rays tell nothing about light: those terms are counted but do not \
-                        guide the search.";
-            if warning_with_fix(ui, what, "Follow the edge", EDGES[0].2) {
+            let what = "Fixed rays carry no information about light: these terms are evaluated \
+                but do not guide the optimization.";
+            if warning_with_fix(ui, what, "Let the edge move", EDGES[0].2) {
                 self.edge = PupilEdge::Moving;
             }
         }
@@ -145,21 +146,20 @@ impl MeritEditor {
         let asked = more.join(" and ");
         if !is_limited_by_stop(lens) {
             let what = format!(
-                "{asked}: the beam ends at the ideal entrance pupil, which no surface moves, so it \
-                 cannot grow.",
+                "{asked}: the beam is limited by the ideal entrance pupil, which no surface \
+                 moves, so the light cannot grow.",
             );
-            let hint = "Makes the rim of the stop, as large as the beam is there now, the aperture \
-                        of the lens: one undo step";
+            let hint = "Make the semi-diameter of the stop, at the present size of the beam, the \
+                aperture of the lens, as one undo step";
             if warning_with_fix(ui, &what, "Limit the beam by the stop", hint) {
                 actions.push(Command::LimitByStop);
             }
         }
         let rim = |v: &crate::lens::Variable| v.parameter.quantity == Quantity::SemiDiameter;
         if !lens.variables.iter().any(rim) {
-            let what = format!("{asked}: no semi-diameter is variable, so rims stay as they are.");
-            let hint = "Lets the optimizer change every semi-diameter that is written: one undo \
-                        step";
-            if warning_with_fix(ui, &what, "Free the semi-diameters", hint) {
+            let what = format!("{asked}: no semi-diameter is variable, so the rims cannot change.");
+            let hint = "Make every semi-diameter of the prescription variable, as one undo step";
+            if warning_with_fix(ui, &what, "Vary the semi-diameters", hint) {
                 actions.push(add_variables_edit(lens, &[ParameterKind::SemiDiameters]));
             }
         }
@@ -183,7 +183,7 @@ impl MeritEditor {
     }
 }
 
-/// Whether rims alone limit the beam, at every zoom position.
+/// True if the stop alone limits the beam, at every zoom position.
 fn is_limited_by_stop(lens: &Lens) -> bool {
     let by_stop = |zoom| matches!(lens.aperture_at(zoom), Aperture::StopSemiDiameter(_));
     (0..lens.zoom_positions()).all(by_stop)
@@ -227,7 +227,7 @@ impl MeritRow {
         if let Some(search) = view.optimization.snapshot.as_deref() {
             self.value_cells(ui, search);
         }
-        ui.small_button("×").on_hover_text("Take the term out of the goal").clicked()
+        ui.small_button("×").on_hover_text("Remove the term").clicked()
     }
 
     /// The choice of the field where the term is about one.
@@ -248,7 +248,7 @@ impl MeritRow {
         combo.response.accessible_name("Field of Relative illumination");
     }
 
-    /// What the search has made of it.
+    /// The values of the term before the optimization and at its best lens.
     fn value_cells(&self, ui: &mut Ui, search: &OptimizationSnapshot) {
         let asked = search.request.goal.terms.iter();
         let term = asked.map(|w| w.term).find(|t| t.name() == self.weighted.term.name());

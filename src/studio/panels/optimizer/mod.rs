@@ -14,14 +14,14 @@ use crate::session::{Analyses, Command, OptimizationSnapshot, RunStatus, Session
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
-use crate::studio::text::{capitalize, counted_from_one, status_text};
+use crate::studio::text::{capitalize, status_text};
 use crate::studio::text_input::EditBuffers;
 use merit_editor::MeritEditor;
 
-/// How high the merit history is, in points; less where there is little room.
+/// The height of the merit history, in points; less if there is little room.
 const HISTORY: f32 = 130.0;
 
-const NO_VARIABLES: &str = "No number is variable: press the badge beside one in the prescription.";
+const NO_VARIABLES: &str = "No number is variable: click the badge beside one in the prescription.";
 
 /// The panel.
 #[derive(Debug, Default)]
@@ -133,7 +133,7 @@ pub(super) fn method_menu(ui: &mut Ui, chosen: &mut DescentMethod) {
     combo.response.accessible_name("Method");
 }
 
-/// How the search stands, and the numbers a designer reads first, before and after.
+/// The status of the optimization, and spot, focal length and light before and after it.
 fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
     let standing = status_text(view.optimization.status);
     let step = search.progress.as_ref().map_or(0, |progress| progress.step);
@@ -146,14 +146,14 @@ fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
         }
     });
     ui.label(changes_text(view).join(", ")).on_hover_text(
-        "Mean RMS radius of the spots, focal length, and the mean area of the pupils that gets \
-         through: of the design and of the lens that the search shows",
+        "Mean RMS radius of the spots, focal length and mean area of the pupils, of the design \
+         and of the optimized lens",
     );
     let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
     if let Some(why) = refused {
-        let text = RichText::new(capitalize(&counted_from_one(why))).small();
+        let text = RichText::new(capitalize(why)).small();
         ui.label(text.color(ui.visuals().warn_fg_color))
-            .on_hover_text("Steps that would make the lens invalid are refused and shortened");
+            .on_hover_text("Steps that would make the lens invalid are rejected and shortened");
     }
 }
 

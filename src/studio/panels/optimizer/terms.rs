@@ -5,7 +5,7 @@ use crate::session::{Analyses, SessionView};
 use crate::studio::number;
 use crate::studio::panels::{design_results, mean_pupil_area};
 
-/// What a term is called.
+/// The title of a term.
 pub(super) const fn title(term: Term) -> &'static str {
     match term {
         Term::Spot => "Spot",
@@ -28,25 +28,25 @@ pub(super) const fn title(term: Term) -> &'static str {
     }
 }
 
-/// What it asks for.
+/// The explanation of a term.
 pub(super) const fn hint(term: Term) -> &'static str {
     match term {
         Term::Spot => "Mean square spot radius over fields and wavelengths, about the centroids",
         Term::SpotIntegral => {
-            "Square distance from the centroid, summed over all light that gets through instead \
-             of averaged: it falls when light is lost, so pair it with a term for light"
+            "Square distance from the centroid, integrated over all light that gets through \
+             instead of averaged: it falls when light is lost, so combine it with a term for light"
         }
         Term::Throughput => {
-            "As much light as possible: minus the mean area of the pupils. It has no target and \
-             never stops asking; its weight sets how much blur a square millimetre is worth"
+            "As much light as possible: minus the mean area of the pupils. It has no target; its \
+             weight sets how much blur a square millimetre is worth"
         }
         Term::ThroughputLoss(_) => {
             "As much light as possible, counted as a share: one minus the mean area of the pupils \
              over this one"
         }
         Term::Light(_) => {
-            "At least this share of the light that each field has now: 1 loses none, 1.2 asks for \
-             20 % more. Met as soon as the light is there"
+            "At least this share of the present light of each field: 1 retains it, 1.2 asks for \
+             20 % more"
         }
         Term::RelativeIllumination { .. } => {
             "The light of a field over that on the axis not below this share: the ratio of the \
@@ -120,7 +120,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::SpotIntegral => format!("{} mm⁴", short(value)),
         Term::Throughput => format!("{} mm²", number::format_digits(-value, 4)),
         Term::ThroughputLoss(_) => format!("{} %", short(100.0 * value)),
-        _ if root == 0.0 => "met".to_owned(),
+        _ if root == 0.0 => "satisfied".to_owned(),
         Term::Light(_) | Term::RelativeIllumination { .. } => {
             format!("{} % short", short(100.0 * root))
         }
@@ -131,7 +131,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
     }
 }
 
-/// Whether it may want more light than the lens has.
+/// True if the term may ask for more light than the lens has.
 pub(super) fn can_ask_for_more_light(term: Term) -> bool {
     match term {
         Term::Light(share) => share > 1.0,

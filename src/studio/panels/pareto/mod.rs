@@ -16,14 +16,15 @@ use crate::studio::actions::Actions;
 use crate::studio::file_dialog::FileRequest;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
 use crate::studio::panels::{NO_LIGHT, is_dark};
-use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text::capitalize;
 use setup::ParetoSetup;
 
-/// What the panel is about, before anything is swept.
-const INTRODUCTION: &str = "How sharp can this lens be for how much light? The sweep trades the two against \
-    each other over many weights, each descended from the lens before it, and draws every lens \
-    that none beats in both.\n\
-    Click a point to see its lens, double click to take it. The design stays what it is meanwhile.";
+/// The introduction that is shown before the first sweep.
+const INTRODUCTION: &str = "How sharp can this lens be for how much light? The sweep trades the \
+    two against \
+    each other over many weights, each descended from the lens before it, and plots every lens \
+    that no other lens beats in both.\n\
+    Click a point to show its lens, double-click to take it. The design does not change meanwhile.";
 
 /// The height of what is said about the lens that was clicked: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
@@ -34,7 +35,7 @@ pub struct ParetoPanel {
     setup: ParetoSetup,
     /// The lens that was clicked.
     selected: Option<ParetoPoint>,
-    /// Whether the plot shows all of the front; not while a person has moved it.
+    /// True while the plot shows the whole front; false once the user has moved it.
     fit: bool,
 }
 
@@ -58,13 +59,13 @@ impl Panel for ParetoPanel {
         ui.add_enabled_ui(!under_way, |ui| self.setup.ui(ui, view));
         text::variables_label(ui, view);
         if let Some(why) = &view.pareto.run.error {
-            let why = capitalize(&counted_from_one(why));
+            let why = capitalize(why);
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
         match view.pareto.run.snapshot.as_deref() {
             Some(run) => self.show(ui, view, run, actions),
             None if view.pareto.run.is_active() => {
-                ui.weak("Looking at the lens…");
+                ui.weak("Preparing…");
             }
             None => {
                 ui.separator();
@@ -179,7 +180,7 @@ impl ParetoPanel {
             let back = ui.add_enabled(shown, Button::new("Back to the design"));
             if back
                 .on_hover_text(
-                    "Show the design again in all panels; the table of surfaces never left it",
+                    "Show the design again in all panels; the prescription always shows it",
                 )
                 .clicked()
             {

@@ -13,7 +13,7 @@ use super::text;
 use crate::optimize::pareto::{Front, ParetoPoint};
 use crate::session::{ParetoRun, RunView, SessionView};
 
-/// How near the pointer must be to a point to mean it, in points of the screen.
+/// The distance in points within which the pointer picks a lens.
 const NEAR: f32 = 14.0;
 /// The room around what is shown, as a share of it.
 const MARGIN: f64 = 0.06;
@@ -129,13 +129,13 @@ fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
     })
 }
 
-/// Where the design stands.
+/// The spot and the light of the design.
 fn design_point(view: &SessionView) -> Option<[f64; 2]> {
     let judged = view.design_score.as_deref()?;
     Some(plot_point(judged.score.as_ref().ok()?))
 }
 
-/// What the plane is coloured with.
+/// The colours of the plot.
 struct ParetoColors {
     front: Color32,
     biased: Color32,
@@ -173,7 +173,7 @@ fn draw(
         curve(plot, &name, &earlier.main.front, colors.faint, LineStyle::Solid);
     }
     if let Some(biased) = &run.biased {
-        let name = format!("pupils kept: {:.4}", biased.hypervolume);
+        let name = format!("fixed rays: {:.4}", biased.hypervolume);
         curve(plot, &name, &biased.front, colors.biased, LineStyle::dashed_dense());
     }
     let name = run_name(&view.pareto.run, run);

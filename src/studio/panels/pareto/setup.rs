@@ -1,4 +1,4 @@
-//! How a front is to be swept: how many weights, how long each, from which blur to which.
+//! The settings of a sweep: the number of weights, the steps of each, the range of blur.
 
 use std::ops::RangeInclusive;
 
@@ -26,8 +26,8 @@ impl ParetoSetup {
         let ParetoSettings { points, steps, blur, method, .. } = &mut self.settings;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            count(ui, "points", points, 1..=200, "How many weights between sharpness and light");
-            count(ui, "steps each", steps, 1..=100_000, "No more steps than this for every weight");
+            count(ui, "points", points, 1..=200, "Number of weights between sharpness and light");
+            count(ui, "steps each", steps, 1..=100_000, "Maximum steps for each weight");
             method_menu(ui, method);
         });
         ui.horizontal_wrapped(|ui| {
@@ -35,17 +35,16 @@ impl ParetoSetup {
             ui.weak("Rim blur").on_hover_text(BLUR);
             blurs(ui, blur, focal_length(view));
             ui.add_space(6.0);
-            ui.checkbox(&mut self.compare, "Compare with kept pupils").on_hover_text(COMPARE);
+            ui.checkbox(&mut self.compare, "Compare with fixed rays").on_hover_text(COMPARE);
         });
     }
 }
 
-const BLUR: &str = "How far a ray at the rim of the pupil may be off before light is given up for \
-    sharpness: the root of the weight. A small blur asks for sharp lenses, a large one for bright \
-    ones.";
-const COMPARE: &str = "Afterwards the same again with derivatives that keep the rays as they are, \
-    as most programs do: they do not see what the rims of the lens let through. Its front is drawn \
-    in grey.";
+const BLUR: &str = "The transverse error of a ray at the rim of the pupil at which light and \
+    sharpness are worth the same: the root of the weight. A small blur gives sharp lenses, a \
+    large one bright lenses.";
+const COMPARE: &str = "Repeats the sweep with derivatives at fixed rays, as most programs compute \
+    them: they ignore how the rims change the light. Its front is drawn in grey.";
 
 fn count(ui: &mut Ui, name: &str, value: &mut usize, range: RangeInclusive<usize>, hint: &str) {
     let drag = DragValue::new(value).range(range).speed(0.5);

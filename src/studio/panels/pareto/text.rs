@@ -6,9 +6,9 @@ use crate::lens::{Lens, Quantity};
 use crate::optimize::pareto::ParetoPoint;
 use crate::session::{ParetoRun, RunStatus, SessionView};
 use crate::studio::number;
-use crate::studio::text::{capitalize, counted_from_one, status_text};
+use crate::studio::text::{capitalize, status_text};
 
-/// What a sweep may change, and what it takes as it is.
+/// The variables of the sweep.
 pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {
     let lens = view.pareto.run.snapshot.as_ref().filter(|_| view.pareto.run.is_active());
     let free = match lens {
@@ -19,17 +19,17 @@ pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {
         None => format!("the {} variables and all semi-diameters", view.lens.variables.len()),
     };
     let text = format!(
-        "Free: {free}. Fields and wavelengths are those of the lens, its aperture becomes the rim \
-         of the stop."
+        "Variables: {free}. Fields and wavelengths are those of the lens; its aperture becomes \
+         the semi-diameter of the stop."
     );
     ui.add(Label::new(RichText::new(text).small().weak()).wrap()).on_hover_text(
-        "A lens without variables has all its curvatures and gaps free; the focal length and the \
-         thicknesses of glass and air stay sensible. The aperture becomes the semi-diameter of the \
-         stop, so that the pupil is what the rims let through and nothing else.",
+        "If the lens has no variables, all curvatures and gaps are varied; the focal length and \
+         the thicknesses of glass and air are constrained. The aperture becomes the semi-diameter \
+         of the stop, so that the rims alone limit the beam.",
     );
 }
 
-/// How many numbers of each kind are free.
+/// The number of variables of each kind.
 fn variables_by_kind(lens: &Lens) -> String {
     let kinds = [
         ("curvatures", Quantity::Curvature),
@@ -46,49 +46,49 @@ fn variables_by_kind(lens: &Lens) -> String {
     parts.join(", ")
 }
 
-/// How far the run is.
+/// The progress of the run.
 pub(super) fn progress_text(run: &ParetoRun, status: RunStatus) -> String {
     let standing = status_text(status);
     let leg = run.current_pass();
-    let kept = if run.biased.is_some() { ", pupils kept" } else { "" };
+    let kept = if run.biased.is_some() { ", fixed rays" } else { "" };
     let rate = leg.done as f64 / leg.seconds;
     let rate = if rate.is_finite() { format!(", {rate:.0} steps/s") } else { String::new() };
     let (done, total, seconds) = (leg.done, leg.total, leg.seconds);
     format!("{standing}{kept}: {done} of {total} steps{rate}, {seconds:.1} s")
 }
 
-/// How many lenses there are, and how much their fronts cover.
+/// The number of lenses, and the hypervolume of the fronts.
 pub(super) fn hypervolume_label(ui: &mut Ui, run: &ParetoRun) {
     let main = &run.main;
     let (lenses, tried) = (main.front.points().len(), main.evaluated.len());
     let volume = main.hypervolume;
     let kept = run.biased.as_ref();
-    let kept = kept.map(|leg| format!(", {:.4} with pupils kept", leg.hypervolume));
+    let kept = kept.map(|leg| format!(", {:.4} with fixed rays", leg.hypervolume));
     let text = format!("{lenses} lenses on the front, {tried} tried; hypervolume {volume:.4}");
     ui.label(text + &kept.unwrap_or_default()).on_hover_text(
         "The area that the front covers in the plane of spot and light, against twice the spot of \
          the lens at the start, in multiples of the start's spot times its light: larger is better",
     );
     if let Some(why) = &run.current_pass().rejection {
-        let text = RichText::new(capitalize(&counted_from_one(why))).small();
+        let text = RichText::new(capitalize(why)).small();
         ui.label(text.color(ui.visuals().warn_fg_color))
-            .on_hover_text("A weight that could not be searched for is left out");
+            .on_hover_text("A weight whose optimization fails is skipped");
     }
 }
 
-/// What the lens that was clicked is worth, with errors.
+/// Spot and light of the selected lens, with errors.
 pub(super) fn selection_label(ui: &mut Ui, run: &ParetoRun, chosen: Option<&ParetoPoint>) {
     match chosen {
         Some(design) => {
             ui.add(Label::new(design_text(design, &run.start).replace('\n', ", ")).wrap());
         }
         None => {
-            ui.weak("Click a point to see its lens in every panel; the design stays.");
+            ui.weak("Click a point to show its lens in every panel; the design does not change.");
         }
     }
 }
 
-/// What a lens is worth, a line a number.
+/// Spot and light of a lens, one value a line.
 pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
     let spot = with_error(1e3 * design.spot, 1e3 * design.spot_error);
     let light = with_error(design.light, design.light_error);

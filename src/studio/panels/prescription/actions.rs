@@ -1,4 +1,4 @@
-//! What can be done with a row: insert, delete, turn around, make it the stop.
+//! Actions on a row: insert, delete, reverse, make it the stop.
 
 use crate::lens::{Edit, Lens, Medium, Row};
 
@@ -22,25 +22,25 @@ pub(super) const ALL: [RowAction; 5] = [
 ];
 
 impl RowAction {
-    /// What a button says.
+    /// The text of its button.
     pub(super) const fn title(self) -> &'static str {
         match self {
             Self::InsertBefore => "Insert before",
             Self::InsertAfter => "Insert after",
             Self::Remove => "Delete",
-            Self::Flip => "Flip element",
+            Self::Flip => "Reverse element",
             Self::Stop => "Make stop",
         }
     }
 
-    /// What it does, in more words.
+    /// The explanation of its button.
     pub(super) const fn hint(self) -> &'static str {
         match self {
-            Self::InsertBefore => "Puts a plane surface in front of the selected one (Insert)",
-            Self::InsertAfter => "Puts a plane surface behind the selected one",
-            Self::Remove => "Takes the selected surface and the gap behind it out (Delete)",
-            Self::Flip => "Turns the glass element or group of the selected surface around",
-            Self::Stop => "Makes the selected surface the aperture stop",
+            Self::InsertBefore => "Insert a plane surface in front of the selected one (Insert)",
+            Self::InsertAfter => "Insert a plane surface behind the selected one",
+            Self::Remove => "Delete the selected surface and the gap behind it (Delete)",
+            Self::Flip => "Reverse the element or cemented group of the selected surface",
+            Self::Stop => "Make the selected surface the aperture stop",
         }
     }
 

@@ -1,4 +1,4 @@
-//! What decides a number: nothing (it is fixed), the optimizer, another number, or a solve.
+//! The badge of a number: fixed, variable, picked up from another number, or solved.
 
 use egui::{
     Align, Button, Color32, CornerRadius, Id, Popup, PopupCloseBehavior, Response, RichText, Sense,
@@ -9,13 +9,12 @@ use crate::lens::{Edit, Lens, Parameter, Pickup, Quantity, Variable};
 use crate::math::expression::evaluate;
 use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::text::counted_from_one;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 
-/// How wide a badge is, in points.
+/// The width of a badge, in points.
 pub(super) const WIDTH: f32 = 18.0;
 
-/// What decides a number.
+/// The status of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum ParameterStatus {
     Fixed,
@@ -25,7 +24,7 @@ pub(super) enum ParameterStatus {
 }
 
 impl ParameterStatus {
-    /// What decides a number of a lens.
+    /// The status of a number of a lens.
     pub(super) fn of(lens: &Lens, parameter: Parameter) -> Self {
         let last = parameter.surface + 1 == lens.surfaces.len();
         let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
@@ -49,12 +48,10 @@ impl ParameterStatus {
 
     fn hint(self) -> String {
         match self {
-            Self::Fixed => "Fixed. Press to let the optimizer change it (Ctrl+Shift+V).".into(),
-            Self::Variable(_) => "Variable: the optimizer may change it. Press to fix it; \
-                                   press the right button for bounds."
-                .into(),
-            Self::Pickup(p) => counted_from_one(&format!("Pickup: it follows the {}.", p.source)),
-            Self::ImageSolve(_) => "Solved for the paraxial focus. Press to change that.".into(),
+            Self::Fixed => "Fixed. Click to make it variable (Ctrl+Shift+V).".into(),
+            Self::Variable(_) => "Variable. Click to fix it; right-click for bounds.".into(),
+            Self::Pickup(p) => format!("Pickup: it follows the {}.", p.source),
+            Self::ImageSolve(_) => "Paraxial image solve. Click to change it.".into(),
         }
     }
 }
@@ -158,7 +155,7 @@ impl StatusMenu<'_> {
             choice(
                 ui,
                 matches!(decides, ParameterStatus::ImageSolve(_)),
-                "Solve: paraxial focus",
+                "Solve: paraxial image",
                 edits,
             );
         }
@@ -283,7 +280,7 @@ impl StatusMenu<'_> {
         let read = read(&text);
         match read {
             Some(_) => drafts.accept(id),
-            None => drafts.reject(id, format!("`{text}` is no number that fits here")),
+            None => drafts.reject(id, format!("`{text}` is not a valid number here")),
         }
         read
     }

@@ -3,10 +3,10 @@
 use crate::lens::{GradientIndex, Medium, ProfileLaw, glass};
 use crate::studio::number;
 
-/// How many glasses are proposed while one types.
+/// The number of glasses that are suggested while the user types.
 const PROPOSALS: usize = 8;
 
-/// What a cell shows.
+/// The text of a cell.
 pub(super) fn format_medium(medium: &Medium) -> String {
     match medium {
         Medium::Air => String::new(),
@@ -35,7 +35,7 @@ fn show_gradient(gradient: &GradientIndex) -> String {
     format!("gradient {law}{base}{}{}", list("r", &gradient.radial), list("z", &gradient.axial))
 }
 
-/// What such a text means; `None` where it is none.
+/// Parses the text of a gradient-index medium; `None` if it is none.
 fn parse_gradient(text: &str) -> Option<Medium> {
     let mut words = text.strip_prefix("gradient ")?.split_whitespace().peekable();
     let law = match words.peek() {
@@ -61,7 +61,7 @@ fn parse_gradient(text: &str) -> Option<Medium> {
     Some(Medium::Grin(Box::new(GradientIndex { base, law, radial: radial?, axial: axial? })))
 }
 
-/// What a cell means. A name that is in no catalogue is kept, so that the lens can say so.
+/// Parses the text of a cell. An unknown name is kept, so that the error of the lens names it.
 pub(super) fn parse_medium(text: &str) -> Medium {
     let text = text.trim();
     if text.is_empty() || text.eq_ignore_ascii_case("air") {
@@ -116,7 +116,8 @@ pub(super) fn describe_medium(medium: &Medium) -> String {
         Medium::Index(n) => format!("Index {n} at every wavelength"),
         Medium::Mirror => "A mirror: the gap behind it is filled like the one before it".to_owned(),
         Medium::Grin(gradient) => format!(
-            "A gradient of the {} on this glass: coefficients of r^2, r^4, ... after `r`, of z, z^2, \
+            "A gradient of the {} on this glass: coefficients of r^2, r^4, ... after `r`, of z, \
+             z^2, \
              ... after `z`, which counts from this surface. {}",
             match gradient.law {
                 ProfileLaw::Index => "index",

@@ -17,13 +17,13 @@ use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::design_results;
-use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text::capitalize;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput as Cell};
 
-/// How high a row is, in points.
+/// The height of a row, in points.
 const ROW: f32 = 21.0;
 
-/// What a cell holds.
+/// A column of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum TableColumn {
     Radius,
@@ -59,7 +59,7 @@ impl TableColumn {
             Self::Radius => {
                 "Radius of curvature in mm, positive where the centre lies to the right; \
                  Infinity for a plane. The optimizer works on the curvature 1/R. \
-                 Arithmetic goes on from the old value: *2, /2, +5, - 3."
+                 Arithmetic starts from the old value: *2, /2, +5, - 3."
             }
             Self::Thickness => "Distance along the axis to the next surface, in mm",
             Self::Glass => "What fills the gap behind the surface; empty for air",
@@ -112,7 +112,7 @@ fn thickness_at(lens: &Lens, surface: usize, zoom: usize) -> Quantity {
     if own { Quantity::ZoomThickness(zoom) } else { Quantity::Thickness }
 }
 
-/// What a number is called in the window, where surfaces are counted from 1.
+/// The name of a number.
 pub(super) fn parameter_name(parameter: Parameter) -> String {
     let what = match parameter.quantity {
         Quantity::Curvature => "Radius",
@@ -180,7 +180,7 @@ impl PrescriptionTable<'_> {
 
     fn image_row(&self, row: &mut TableRow<'_, '_>, columns: &[TableColumn]) {
         row.col(|ui| {
-            row_name(ui, "IMA").on_hover_text("The image plane: no surface of the lens");
+            row_name(ui, "IMA").on_hover_text("The image plane");
         });
         for column in columns {
             row.col(|ui| match column {
@@ -274,7 +274,8 @@ impl PrescriptionTable<'_> {
         }
     }
 
-    /// What a number cell shows: radius for curvature, the solved gap where it is solved.
+    /// The text of a number cell: the radius for a curvature, the solved gap if there is an image
+    /// solve.
     fn value_text(&self, parameter: Parameter) -> String {
         let value = self.view.lens.get(parameter);
         match parameter.quantity {
@@ -297,7 +298,7 @@ impl PrescriptionTable<'_> {
         bench.channels[bench.primary].system.surfaces.get(surface).map(|s| s.thickness)
     }
 
-    /// How far from the axis the drawn rays meet a surface.
+    /// The largest height at which the drawn rays meet a surface.
     fn reached_text(&self, surface: usize) -> String {
         let numbers = design_results(self.view).filter(|_| self.view.is_current());
         let reached = numbers.and_then(|n| n.layout.value.ray_heights.get(surface).copied());
@@ -440,7 +441,7 @@ impl PrescriptionTable<'_> {
                 true
             }
             Err(why) => {
-                self.buffers.reject(id, capitalize(&counted_from_one(&why)));
+                self.buffers.reject(id, capitalize(&why));
                 false
             }
         }
@@ -497,7 +498,7 @@ fn columns(lens: &Lens) -> Vec<TableColumn> {
 fn header(mut row: TableRow<'_, '_>, columns: &[TableColumn]) {
     row.col(|ui| {
         ui.add_space(6.0);
-        ui.weak("Surf").on_hover_text("Counted from 1, as designers do; files count from 0");
+        ui.weak("Surf").on_hover_text("Surface number: the object is 0, the first surface 1");
     });
     for column in columns {
         row.col(|ui| {
@@ -521,7 +522,7 @@ fn row_name(ui: &mut Ui, text: &str) -> Response {
     ui.weak(text)
 }
 
-/// What a screen reader calls the number of a row.
+/// The accessible name of the number of a row.
 fn row_label(surface: usize) -> String {
     format!("Row of surface {}", surface + 1)
 }

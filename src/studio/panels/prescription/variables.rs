@@ -6,18 +6,18 @@ use crate::lens::{Edit, Lens, Medium, Parameter, ParameterKind, Quantity, Variab
 use crate::studio::actions::Actions;
 use crate::studio::panels::add_variables_edit;
 
-/// What can be freed at once.
+/// The kinds of numbers that can be made variable at once.
 const KINDS: [(&str, ParameterKind); 7] = [
-    ("Free every radius", ParameterKind::Curvatures),
-    ("Free every thickness", ParameterKind::Thicknesses),
-    ("Free every semi-diameter", ParameterKind::SemiDiameters),
-    ("Free every conic constant that is not 0", ParameterKind::Conics),
-    ("Free every asphere coefficient", ParameterKind::Aspheres),
-    ("Free every index that is no catalogue glass's", ParameterKind::Indices),
-    ("Free every gradient coefficient", ParameterKind::GrinCoefficients),
+    ("Vary all radii", ParameterKind::Curvatures),
+    ("Vary all thicknesses", ParameterKind::Thicknesses),
+    ("Vary all semi-diameters", ParameterKind::SemiDiameters),
+    ("Vary all nonzero conic constants", ParameterKind::Conics),
+    ("Vary all asphere coefficients", ParameterKind::Aspheres),
+    ("Vary all indices except those of catalogue glasses", ParameterKind::Indices),
+    ("Vary all GRIN coefficients", ParameterKind::GrinCoefficients),
 ];
 
-/// How many numbers are variable, with a menu to free or fix many at once, as one undo step.
+/// The number of variables, with a menu to add or remove many at once, as one undo step.
 pub(super) fn menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
     let count = lens.variables.len();
     let text = if count == 1 { "1 variable".to_owned() } else { format!("{count} variables") };
@@ -25,10 +25,10 @@ pub(super) fn menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
         let freeing =
             KINDS.iter().map(|(title, kind)| (*title, add_variables_edit(lens, &[*kind])));
         let mut choices: Vec<(&str, Edit)> = freeing.collect();
-        choices.insert(2, ("Free every air gap", add_air_gaps_edit(lens)));
+        choices.insert(2, ("Vary all air gaps", add_air_gaps_edit(lens)));
         choices
-            .push(("Fix every semi-diameter", remove_variables_edit(lens, Quantity::SemiDiameter)));
-        choices.push(("Fix everything", Edit::SetVariables(Vec::new())));
+            .push(("Fix all semi-diameters", remove_variables_edit(lens, Quantity::SemiDiameter)));
+        choices.push(("Fix all", Edit::SetVariables(Vec::new())));
         let now = Edit::SetVariables(lens.variables.clone());
         for (title, edit) in choices {
             if ui.add_enabled(edit != now, Button::new(title)).clicked() {
@@ -38,8 +38,7 @@ pub(super) fn menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
         }
     });
     button.response.on_hover_text(
-        "Numbers with the badge V are what the optimizer may change. \
-         Press the badge beside a number to free or fix it alone.",
+        "Variables have the badge V. Click the badge beside a number to vary or fix it alone.",
     );
 }
 

@@ -36,7 +36,7 @@ pub struct PupilPanel {
     /// Limits in the order in which they have turned up, so that none changes its colour while the
     /// lens is bent.
     known_limits: Vec<PupilLimit>,
-    /// How many surfaces the lens has that they belong to.
+    /// The number of surfaces of the lens that the limits belong to.
     surfaces: usize,
 }
 
@@ -96,7 +96,7 @@ fn limits(pupils: &session::FieldPupils) -> Vec<PupilLimit> {
     limits
 }
 
-/// What the drawings show.
+/// The explanation of the drawings.
 const HINT: &str = "Shaded: rays that get through. Coloured: what ends them. Dashed: the ideal \
      entrance pupil, as it would be if no surface clipped. Rings: corners, where one limit takes \
      over from another. Cross: the centroid. In the plane through the first vertex, seen along the \
@@ -143,7 +143,7 @@ fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, actions: &mut Actio
     }
 }
 
-/// What is shown in one frame.
+/// The content of one frame.
 struct PupilView<'a> {
     known_limits: &'a [PupilLimit],
     view: &'a SessionView,
@@ -170,7 +170,7 @@ impl PupilView<'_> {
         color32(palette.limit(surfaces().position(|known| *known == limit).unwrap_or(0)))
     }
 
-    /// Whether a limit belongs to the surface that is pointed out.
+    /// True if a limit belongs to the selected surface.
     fn is_selected(&self, limit: PupilLimit) -> bool {
         limit.surface().is_some() && limit.surface() == self.view.selected
     }
@@ -247,7 +247,7 @@ impl PupilView<'_> {
         scale_bar(ui, first, window.scale(first), BAR);
     }
 
-    /// Where a picture is touched, by the name that a screen reader gives it.
+    /// The response of the area of a pupil, with its accessible name.
     fn interact(&self, ui: &Ui, rect: Rect, field: usize, pupil: &FieldPupil) -> Response {
         let id = Id::unique("pupil").with(field);
         let response = ui.interact(rect, id, Sense::click());

@@ -9,7 +9,7 @@ use crate::session::FieldPupils;
 use crate::studio::draw::BoundingBox;
 use crate::studio::palette::{Palette, color32};
 
-/// How near the pointer must be to a side to name it, in points.
+/// The distance in points within which the pointer picks a side.
 const NEAR: f32 = 7.0;
 /// The ideal pupil is shown whole unless it is so much larger than every real one.
 const LARGER: f64 = 1.6;
@@ -20,7 +20,7 @@ const SHORT: f32 = 26.0;
 /// The number stands inside a pupil that reaches so far inwards, in points.
 const DEEP: f32 = 22.0;
 
-/// What the pictures show of the plane: each its own place, all to one scale.
+/// The part of the plane that each drawing shows, all to one scale.
 #[derive(Debug)]
 pub(super) struct PupilWindow {
     centers: Vec<DVec2>,
@@ -116,7 +116,7 @@ impl<'a> PupilPicture<'a> {
         }
     }
 
-    /// What limits the pupil at the side nearest to a place of the window.
+    /// The limit at the side nearest to a place of the window.
     pub(super) fn limit_near(&self, at: Pos2) -> Option<PupilLimit> {
         let sides = self.outline()?.sides.iter();
         let distance = |side: &OutlineSide| {
@@ -184,7 +184,7 @@ impl<'a> PupilPicture<'a> {
         painter.extend(Shape::dashed_line(&self.to_screen_all(&self.pupil.disc), stroke, 4.0, 3.0));
     }
 
-    /// What gets through, as triangles around the point that sees all of the edge.
+    /// The area of the pupil, as triangles around the point from which its whole edge is visible.
     fn fill(&self, outline: &PupilOutline, color: Color32) -> Shape {
         let mut mesh = Mesh::default();
         mesh.colored_vertex(self.to_screen(outline.center), color);

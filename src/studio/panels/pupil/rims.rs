@@ -1,5 +1,5 @@
-//! What a tenth of a millimetre of glass would do: for every rim that ends rays, how much light and
-//! sharpness it would win or lose with a larger semi-diameter.
+//! The table of semi-diameter sensitivities: for every rim that ends rays, the light and the
+//! sharpness that it would gain or lose with a semi-diameter larger by 0.1 mm.
 
 use std::ops::RangeInclusive;
 
@@ -19,24 +19,24 @@ use crate::studio::panels::field_name;
 
 /// By how much every semi-diameter is larger in the table, in mm.
 const STEP: f64 = 0.1;
-/// How high a row is, in points.
+/// The height of a row, in points.
 const ROW: f32 = 17.0;
 const HEAD: f32 = 30.0;
-/// How wide a number with its arrow is.
+/// The width of a number with its arrow.
 const CELL: f32 = 58.0;
 /// The largest arrow.
 const ARROW: f32 = 10.0;
 /// The line above the table.
 const TITLE: f32 = 19.0;
-/// What the pictures with their words need.
+/// The height that the pupils with their labels need.
 const PICTURES: f32 = 205.0;
 
-const HINT: &str = "What each rim would do if its semi-diameter were 0.1 mm larger: the change of \
-     the light, in per cent of the mean area of the pupils, and of the RMS radius of the spot at \
-     this wavelength, in µm. To first order, with the motion of the pupil's edge. Blue is for the \
-     better, orange for the worse; the length of an arrow compares within its kind. The ideal \
-     entrance pupil (dashed) is no rim: where it ends the beam, no glass moves it. A higher panel \
-     shows the table.";
+const HINT: &str = "The effect of a semi-diameter that is 0.1 mm larger: the change of the light, \
+    in per cent of the mean area of the pupils, and of the RMS radius of the spot at \
+     this wavelength, in µm. To first order, with the motion of the pupil's edge. Blue is \
+     better, orange is worse; arrow lengths compare within their kind. Where the ideal entrance \
+     pupil (dashed) limits the beam, no semi-diameter has an effect. Enlarge the panel to see the \
+     table.";
 
 /// The two numbers of a rim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +51,7 @@ struct FieldColumns<'a> {
     rims: Result<&'a RimSensitivities, String>,
 }
 
-/// What the table shows.
+/// The content of the table.
 struct SensitivityTable<'a> {
     groups: Vec<FieldColumns<'a>>,
     /// The mean area of the pupils in mm², of which light is a share.
@@ -61,7 +61,7 @@ struct SensitivityTable<'a> {
     selected: Option<usize>,
 }
 
-/// How high the table below the pictures is: nothing where there is nothing to tell.
+/// The height of the table below the pupils; 0 without sensitivities.
 pub(super) fn height(ui: &Ui, shown: &PupilView<'_>) -> f32 {
     let Some(all) = &shown.pupils.all_rims else { return 0.0 };
     let whole = TITLE
@@ -86,7 +86,7 @@ pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, actions: &mut Actio
         return;
     }
     if felt.is_empty() {
-        ui.weak("No rim ends a ray: the beam ends at the ideal entrance pupil.");
+        ui.weak("No rim limits the beam: the ideal entrance pupil does.");
         return;
     }
     table.show(ui, &felt, actions);
@@ -102,7 +102,7 @@ fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, felt: &[usi
         ui.strong("+0.1 mm of semi-diameter").on_hover_text(HINT);
         let others = remaining_surfaces(felt, shown.results.lens.surfaces.len());
         if !others.is_empty() {
-            let text = format!("no ray ends at {others}");
+            let text = format!("no ray is limited by {others}");
             ui.label(RichText::new(text).small().weak());
         }
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
@@ -133,7 +133,7 @@ impl<'a> SensitivityTable<'a> {
         effects.map(|effect| self.change(effect, kind).value.abs()).fold(0.0, f64::max)
     }
 
-    /// Whether a rim does something at some field.
+    /// True if the rim limits the rays of some field.
     fn limits_rays(&self, surface: usize) -> bool {
         let mut known = self.groups.iter().filter_map(|group| group.rims.as_ref().ok());
         known.any(|rims| rims.surfaces[surface].is_significant())
@@ -252,7 +252,7 @@ impl<'a> SensitivityTable<'a> {
         };
         let lines: Vec<String> = self.groups.iter().map(line).collect();
         format!(
-            "Surface {}, semi-diameter 0.1 mm larger\n{}\nClick to point the surface out.",
+            "Surface {}, semi-diameter 0.1 mm larger\n{}\nClick to select the surface.",
             surface + 1,
             lines.join("\n")
         )

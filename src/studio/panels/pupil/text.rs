@@ -21,28 +21,28 @@ const GAP: f32 = 7.0;
 /// The room that the square in front of a limit takes.
 const MARK: f32 = 12.0;
 
-/// What a limit is, for somebody who points at it.
+/// The explanation of a limit.
 pub(super) const fn hint(limit: PupilLimit) -> &'static str {
     match limit {
         PupilLimit::Disc => {
-            "The beam ends as the aperture of the lens says; no surface clips it there."
+            "The beam is limited by the aperture of the lens; no surface clips it there."
         }
         PupilLimit::Surface(_, RayLimit::Rim) => {
-            "The beam ends at the semi-diameter of this surface. Click to point the surface out."
+            "The beam ends at the semi-diameter of this surface. Click to select the surface."
         }
         PupilLimit::Surface(_, RayLimit::Obstruction) => {
-            "The obstruction of this surface stops rays nearer to the axis. Click to point it out."
+            "The obstruction of this surface stops rays nearer to the axis. Click to select it."
         }
         PupilLimit::Surface(_, RayLimit::Miss | RayLimit::Equator) => {
-            "Rays beyond pass by this surface without meeting it. Click to point it out."
+            "Rays beyond miss this surface. Click to select it."
         }
         PupilLimit::Surface(_, RayLimit::TotalReflection) => {
-            "Rays beyond are totally reflected at this surface. Click to point it out."
+            "Rays beyond are totally reflected at this surface. Click to select it."
         }
         PupilLimit::Surface(_, RayLimit::Side) => {
-            "Rays beyond leave the gradient in front of this surface through its side."
+            "Rays beyond leave the GRIN medium in front of this surface through its side."
         }
-        PupilLimit::Unaimed => "No ray is found beyond that crosses the stop.",
+        PupilLimit::Unaimed => "No ray beyond reaches the stop.",
     }
 }
 
@@ -68,16 +68,16 @@ impl PupilView<'_> {
                 let text = format!("ragged: {}", pieces_text(*pieces));
                 ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color))
                     .on_hover_text(
-                        "No point sees all of the edge, so that it is not followed: dots are rays \
-                         of a grid that get through, and the area is what a dense sample of rays \
-                         counts.",
+                        "The edge is not visible from any one point and cannot be followed: dots \
+                         are rays of a grid that get through, and the area is that of a dense \
+                         sample of rays.",
                     );
             }
             PupilShape::Dark(_) | PupilShape::Unbounded | PupilShape::NoRays(_) => {}
         }
         let cost = format!("{} rays, {:.2} ms", pupil.value.rays, pupil.ms);
         ui.label(RichText::new(cost).small().weak())
-            .on_hover_text("Rays traced for outline and numbers, and the time it took");
+            .on_hover_text("Rays traced for outline and numbers, and the time");
     }
 
     fn area(&self, ui: &mut Ui, pupil: &FieldPupil, light: &PupilExtent) {
@@ -94,7 +94,7 @@ impl PupilView<'_> {
         }
     }
 
-    /// What limits the pupil and over what share of its edge.
+    /// The limits of the pupil with their shares of its edge.
     fn shares(&self, ui: &mut Ui, outline: &PupilOutline) {
         let palette = Palette::for_visuals(ui.visuals());
         ui.horizontal_wrapped(|ui| {
@@ -109,7 +109,7 @@ impl PupilView<'_> {
         });
     }
 
-    /// How many lines of such a width the shares of a pupil take.
+    /// The number of lines of this width that the shares of a pupil take.
     pub(super) fn lines(&self, ui: &Ui, pupil: &FieldPupil, width: f32) -> usize {
         let PupilShape::Outlined(outline) = &pupil.shape else { return 1 };
         let (mut lines, mut used) = (1, 0.0);
@@ -142,7 +142,7 @@ impl PupilView<'_> {
         format!("{who} {:.0} %", 100.0 * share)
     }
 
-    /// What stands in a picture in which there is nothing to draw.
+    /// Shows why a pupil cannot be drawn.
     pub(super) fn message(&self, ui: &mut Ui, picture: Rect, pupil: &FieldPupil) {
         let text = match &pupil.shape {
             PupilShape::Outlined(_) | PupilShape::Irregular { .. } => return,
@@ -172,7 +172,7 @@ impl PupilView<'_> {
             Fate::Clipped(_) => ("clips", "Make its semi-diameter larger or the field smaller."),
             Fate::Missed(_) => ("is missed by", "Bend it less or make the field smaller."),
             Fate::Turned(_) | Fate::Trapped(_) => {
-                ("is not reached through the gradient by", "Weaken the gradient.")
+                ("is not reached through the GRIN medium by", "Weaken the index gradient.")
             }
             Fate::TotalReflection(_) | Fate::Imaged => {
                 ("totally reflects", "Bend it less or make the field smaller.")
@@ -185,7 +185,7 @@ impl PupilView<'_> {
         )
     }
 
-    /// What a screen reader says about a pupil.
+    /// The accessible description of a pupil.
     pub(super) fn summary(&self, pupil: &FieldPupil) -> String {
         match &pupil.shape {
             PupilShape::Outlined(outline) if outline.is_clear() => "clear disc".to_owned(),
@@ -202,7 +202,7 @@ impl PupilView<'_> {
         }
     }
 
-    /// What is said about the side under the pointer.
+    /// The description of the side under the pointer.
     pub(super) fn describe(&self, pupil: &FieldPupil, limit: PupilLimit) -> String {
         let PupilShape::Outlined(outline) = &pupil.shape else {
             return capitalize(&self.limit_name(limit));

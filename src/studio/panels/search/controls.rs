@@ -1,4 +1,4 @@
-//! What begins, holds and ends a search, how far it is, and the hand on it while it goes on.
+//! Start, pause, stop, progress and live controls of a search.
 
 use egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui};
 
@@ -91,24 +91,24 @@ pub(super) fn unfinished_search(ui: &mut Ui, view: &SessionView, actions: &mut A
     };
     let name = left.file_name().map(|name| name.to_string_lossy().into_owned());
     ui.horizontal_wrapped(|ui| {
-        ui.label("A search was left:").on_hover_text(left.display().to_string());
+        ui.label("Unfinished search:").on_hover_text(left.display().to_string());
         ui.strong(name.unwrap_or_default().trim_end_matches(".search.json"));
-        if ui.button("Go on").on_hover_text("Go on where it was saved").clicked() {
+        if ui.button("Resume").on_hover_text("Resume it from its file").clicked() {
             actions.push(StructureSearchCommand::ResumeFrom(Some(left.clone())));
         }
         ui.add_space(12.0);
-        let hint =
-            "Put its file aside; Open… finds it as forgotten.json until another is forgotten";
-        if ui.button("Forget it").on_hover_text(hint).clicked() {
+        let hint = "Dismiss. The file is kept as forgotten.json until the next dismissal";
+        if ui.button("Dismiss").on_hover_text(hint).clicked() {
             actions.push(StructureSearchCommand::DismissUnfinished);
         }
     });
 }
 
-const GRADIENT: &str = "A move of a chain is some gradient steps; a gradient is that of all spots, \
-    pupils and limits by every free number of the lens, with the rays of the best lens";
+const GRADIENT: &str = "A move of a chain consists of gradient steps; a gradient holds the \
+    derivatives of all spots, pupils and limits by every variable. The number of rays is that of \
+    the best lens";
 
-/// What the start and the best lens do not keep, which only what is exported has to.
+/// Limits that the start and the best lens violate; only an exported lens has to satisfy them.
 fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
     for (lens, limits) in [("start", &run.start_violations), ("best lens", &run.best_violations)] {
         if !limits.is_empty() {
@@ -120,7 +120,7 @@ fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
     }
 }
 
-/// How far the search is, in numbers.
+/// The progress of the search.
 pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &StructureSearchSnapshot) {
     let text = text::status_text(run, view.structure_search.run.status);
     match run.fraction_done() {
@@ -144,7 +144,7 @@ pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &StructureSearchSna
     violations(ui, run);
 }
 
-/// What can be changed while it goes on: the temperature, and the chain that is followed.
+/// The live controls: the temperature, and the chain that is previewed.
 pub(super) fn live_controls(
     ui: &mut Ui,
     view: &SessionView,
@@ -164,8 +164,8 @@ fn temperature(
     actions: &mut Actions,
 ) {
     ui.weak("Temperature").on_hover_text(
-        "How much worse a lens may become before a descent is given up for a new mutation: at this \
-         merit its density is 1/e. Hotter is more patient with bad lenses",
+        "The merit at which the density of a lens is 1/e. At a higher temperature, descents from \
+         worse lenses last longer",
     );
     let mut value = run.temperature.value();
     let speed = 0.01 * value.max(f64::MIN_POSITIVE);
@@ -196,8 +196,8 @@ fn preview_choice(
 ) {
     let mut follows = view.structure_search.previewed_chain.is_some();
     let chain = view.structure_search.previewed_chain.unwrap_or(0);
-    let hint = "Show the lens of a chain in place of the design as it changes, in all panels";
-    let check = Checkbox::new(&mut follows, "Follow the search");
+    let hint = "Show the current lens of a chain in place of the design, in all panels";
+    let check = Checkbox::new(&mut follows, "Preview the search");
     if ui.add(check).on_hover_text(hint).changed() {
         actions.push(Command::Preview(None));
         actions.push(StructureSearchCommand::Preview(follows.then_some(chain)));
@@ -205,7 +205,7 @@ fn preview_choice(
     if follows && run.chains.len() > 1 {
         let mut number = chain + 1;
         let drag = DragValue::new(&mut number).range(1..=run.chains.len()).prefix("chain ");
-        if ui.add(drag).accessible_name("Chain that is followed").changed() {
+        if ui.add(drag).accessible_name("Previewed chain").changed() {
             actions.push(StructureSearchCommand::Preview(Some(number - 1)));
         }
     }

@@ -1,5 +1,5 @@
-//! Where a lens came from: the last generations as a tree, merit downwards and time to the right,
-//! and the line of one of them in words.
+//! The ancestors of a lens: the last generations as a tree, with merit downwards and time to the
+//! right, and the line of one of them in words.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use crate::lens::Lens;
 use crate::search::{LineageNode, OfferOutcome};
 use crate::session::{SessionView, StructureSearchSnapshot};
 
-/// How many of the last generations the tree shows, besides the line of the one that is chosen.
+/// The number of last generations that the tree shows, besides the line of the selected one.
 const MAX_NODES: usize = 80;
-/// How near the pointer must be to a generation to mean it.
+/// The distance in points within which the pointer picks a generation.
 const NEAR: f32 = 10.0;
-/// How high the tree is.
+/// The height of the tree.
 const HEIGHT: f32 = 120.0;
 
 type Generation = Arc<LineageNode<Arc<Lens>>>;
@@ -83,7 +83,7 @@ fn faint(ui: &Ui) -> Color32 {
     ui.visuals().weak_text_color().gamma_multiply(0.6)
 }
 
-/// Where each generation stands: in the order of birth, the better the lower.
+/// The position of each generation: in the order of birth, the better the lower.
 fn node_positions(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
     let height = |node: &Generation| {
         let merit = node.descended;
@@ -112,7 +112,7 @@ pub(super) fn ancestors(
     let mut clicked = None;
     let generations: Vec<&Generation> = run.ancestry(number).collect();
     if generations.is_empty() {
-        ui.weak(format!("Lens {number} is not remembered any more."));
+        ui.weak(format!("Lens {number} is no longer stored."));
     }
     for node in &generations {
         ui.horizontal(|ui| {
@@ -129,7 +129,7 @@ pub(super) fn ancestors(
     }
     let oldest = generations.last();
     if let Some(parent) = oldest.and_then(|node| node.parent) {
-        ui.weak(format!("Before that came lens {parent}, which is not remembered any more."));
+        ui.weak(format!("Its parent, lens {parent}, is no longer stored."));
     }
     clicked
 }

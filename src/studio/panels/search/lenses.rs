@@ -60,7 +60,7 @@ pub(super) fn cards(
     clicked
 }
 
-/// How a card stands out.
+/// The style of a card.
 #[derive(Clone, Copy)]
 struct CardStyle {
     selected: bool,

@@ -1,4 +1,4 @@
-//! How much of its light each field keeps: one share for all, or one for each.
+//! The share of its light that each field has to retain: one for all, or one for each.
 
 use egui::{DragValue, Ui};
 
@@ -12,14 +12,20 @@ pub(super) fn shares(ui: &mut Ui, light: &mut Vec<f64>, lens: &Lens) {
     ui.vertical(|ui| {
         ui.horizontal(|ui| {
             if let [all] = &mut light[..] {
-                share(ui, "Least light", all, "Every field keeps at least this share");
+                share(
+                    ui,
+                    "Least light",
+                    all,
+                    "Every field retains at least this share of its \
+                    light",
+                );
             }
             ui.weak("of the light at the start");
         });
         if fields.len() > 1 {
             let mut each = light.len() > 1;
-            let hint = "Ask for a share of its own of every field";
-            if ui.checkbox(&mut each, "each field by itself").on_hover_text(hint).changed() {
+            let hint = "Set the share of each field separately";
+            if ui.checkbox(&mut each, "each field separately").on_hover_text(hint).changed() {
                 *light = if each { vec![light[0]; fields.len()] } else { vec![mean(light)] };
             }
         }
@@ -38,7 +44,13 @@ pub(super) fn matching_fields(mut light: Vec<f64>, lens: &Lens) -> Vec<f64> {
 fn field_shares(ui: &mut Ui, light: &mut [f64], fields: &[FieldPoint], lens: &Lens) {
     for (value, field) in light.iter_mut().zip(fields) {
         let name = field_name(lens.fields.kind, *field);
-        share(ui, &format!("Least light at {name}"), value, "This field keeps at least this share");
+        share(
+            ui,
+            &format!("Least light at {name}"),
+            value,
+            "This field retains at least this \
+            share of its light",
+        );
         ui.weak(format!("at {name}"));
     }
 }

@@ -1,4 +1,4 @@
-//! What a factory can make, and how the sampler goes: what is seldom changed.
+//! Manufacturing limits, and settings of the sampler that are seldom changed.
 
 use egui::{ComboBox, Grid, Ui};
 
@@ -8,7 +8,7 @@ use crate::search::{SearchRules, Termination};
 
 /// The limits of the factory.
 pub(super) fn limits_section(ui: &mut Ui, rules: &mut SearchRules) {
-    ui.collapsing("What the factory can make", |ui| {
+    ui.collapsing("Manufacturing limits", |ui| {
         Grid::new("factory").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
             let ranges = [
                 ("Glass on the axis", "glass on the axis", &mut rules.glass_center),
@@ -49,7 +49,7 @@ fn optional_limits(ui: &mut Ui, rules: &mut SearchRules) {
     ];
     for (title, name, value, mut usual) in limits {
         ui.weak(title);
-        let hint = "Without it what the lens has at the start is the measure";
+        let hint = "If it is not set, the value of the starting lens is the limit";
         let what = format!("{name} set");
         optional(ui, "set", value, &mut usual, hint, |ui, value| {
             length(ui, &what, value, 0.0..=100_000.0);
@@ -59,15 +59,20 @@ fn optional_limits(ui: &mut Ui, rules: &mut SearchRules) {
 }
 
 const ENDS: [(Termination, &str, &str); 3] = [
-    (Termination::Ratio, "by density", "Bad starts are given up soon: algorithm 1"),
-    (Termination::Relative, "by improvement", "How fast it improves counts, not where it began"),
-    (Termination::Clocks, "by two clocks", "The clocks of section 4.4.1"),
+    (Termination::Ratio, "by density", "Descents from bad lenses end early (algorithm 1)"),
+    (
+        Termination::Relative,
+        "by improvement",
+        "The rate of improvement counts, not the merit at \
+        the start",
+    ),
+    (Termination::Clocks, "by two clocks", "Competing clocks (section 4.4.1)"),
 ];
 
-/// How the sampler goes.
+/// The settings of the sampler.
 pub(super) fn sampler_section(ui: &mut Ui, plan: &mut SearchPlan) {
     let (settings, local) = (&mut plan.settings, &mut plan.local);
-    ui.collapsing("How it samples", |ui| {
+    ui.collapsing("Sampler", |ui| {
         Grid::new("sampler").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
             ui.weak("Descents end");
             let name = ENDS.iter().find(|(end, ..)| *end == settings.termination);
@@ -87,37 +92,31 @@ pub(super) fn sampler_section(ui: &mut Ui, plan: &mut SearchPlan) {
                 &mut settings.c,
                 0.0..=10.0,
                 0.002,
-                "The larger, the shorter descents are",
+                "A larger value makes descents shorter",
             );
             ui.end_row();
             ui.weak("γ");
-            let hint = "How often a descent begins anywhere instead of from a lens that is kept";
+            let hint = "The probability that a descent starts from a random lens instead of a \
+                retained one";
             drag(ui, "Gamma", &mut settings.gamma, 0.0..=1.0, 0.002, hint);
             ui.end_row();
             ui.weak("Longest descent");
-            let hint = "In moves: what ends a descent that no chance ends";
+            let hint = "Maximum moves per descent";
             drag(ui, "Longest descent", &mut settings.longest, 1..=1_000_000, 1.0, hint);
             ui.end_row();
-            ui.weak("Lenses kept");
+            ui.weak("Retained lenses");
             ui.horizontal(|ui| {
-                let hint = "How many lenses are kept and mutated";
-                drag(ui, "Lenses kept", &mut settings.reservoir, 1..=100, 0.05, hint);
+                let hint = "The size of the reservoir of lenses that are mutated";
+                drag(ui, "Retained lenses", &mut settings.reservoir, 1..=100, 0.05, hint);
                 let hint = "At most one of each pattern of glass and air";
                 let one = &mut settings.one_per_topology;
                 ui.checkbox(one, "one of each pattern").on_hover_text(hint);
             });
             ui.end_row();
-            ui.weak("Steps of a move");
-            drag(
-                ui,
-                "Steps of a move",
-                &mut local.steps,
-                1..=1000,
-                0.1,
-                "Gradient steps of a move",
-            );
+            ui.weak("Steps per move");
+            drag(ui, "Steps per move", &mut local.steps, 1..=1000, 0.1, "Gradient steps per move");
             ui.end_row();
-            ui.weak("Spots good to");
+            ui.weak("Spot tolerance");
             ui.horizontal(|ui| {
                 let mut percent = 100.0 * local.tolerance;
                 let hint = "The relative error of the radius of a spot: smaller costs more rays";
@@ -127,10 +126,10 @@ pub(super) fn sampler_section(ui: &mut Ui, plan: &mut SearchPlan) {
                 ui.weak("%");
             });
             ui.end_row();
-            ui.weak("Free besides");
+            ui.weak("Also variable");
             ui.horizontal(|ui| {
-                ui.checkbox(&mut local.rims, "rims").on_hover_text("Semi-diameters may change");
-                let hint = "Indices of model glasses may change; real glasses stay real";
+                ui.checkbox(&mut local.rims, "rims").on_hover_text("Semi-diameters are variable");
+                let hint = "Indices of model glasses are variable; catalogue glasses are not";
                 ui.checkbox(&mut local.indices, "model glasses").on_hover_text(hint);
             });
             ui.end_row();

@@ -20,15 +20,16 @@ use egui::{Button, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 use super::Panel;
 use crate::session::{Command, SessionView, StructureSearchSnapshot, StructureSearchView};
 use crate::studio::actions::Actions;
-use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text::capitalize;
 use setup::SearchSetup;
 use thumbnail::Thumbnails;
 
-/// What the panel is about, before anything is searched.
-const INTRODUCTION: &str = "Which lens of another structure is better? Chains descend from the design, add, \
-    remove, glue, split, bend, flip and exchange elements, and keep the best lens of every \
-    pattern of glass and air.\n\
-    The design stays what it is until one of their lenses is taken.";
+/// The introduction that is shown before the first search.
+const INTRODUCTION: &str = "Which lens of another structure is better? Chains descend from the \
+    design, add, \
+    remove, glue, split, bend, flip and exchange elements, and retain the best lens of \
+    every pattern of glass and air.\n\
+    The design does not change until one of their lenses is taken.";
 
 /// The height of what is said about the lens that was clicked: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
@@ -38,22 +39,22 @@ const MIN_HEIGHT: f32 = 240.0;
 /// A part of the panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum SearchPage {
-    /// What is asked for.
+    /// The settings of the next search.
     #[default]
     Setup,
-    /// How it goes, and the lenses that are kept.
+    /// The merit history, and the retained lenses.
     Lenses,
-    /// What became of each kind of mutation.
+    /// The outcome of each kind of mutation.
     Moves,
-    /// Where a lens came from.
+    /// The ancestors of a lens.
     Family,
 }
 
 const PAGES: [(SearchPage, &str, &str); 4] = [
-    (SearchPage::Setup, "Setup", "What the search may do, and how long"),
-    (SearchPage::Lenses, "Lenses", "The merit as it falls, and the lenses that are kept"),
-    (SearchPage::Moves, "Moves", "How often each kind of mutation is tried, and what became of it"),
-    (SearchPage::Family, "Family", "Where a lens came from, mutation by mutation"),
+    (SearchPage::Setup, "Setup", "Settings of the next search"),
+    (SearchPage::Lenses, "Lenses", "Merit history and retained lenses"),
+    (SearchPage::Moves, "Statistics", "Attempts and outcomes of each kind of mutation"),
+    (SearchPage::Family, "Family", "Ancestors of a lens, mutation by mutation"),
 ];
 
 /// The panel.
@@ -78,14 +79,14 @@ impl Panel for SearchPanel {
         controls::buttons(ui, view, &self.setup, actions);
         controls::unfinished_search(ui, view, actions);
         if let Some(why) = &view.structure_search.run.error {
-            let why = capitalize(&counted_from_one(why));
+            let why = capitalize(why);
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
         let run = view.structure_search.run.snapshot.clone();
         if let Some(run) = run.as_deref() {
             controls::progress(ui, view, run);
         } else if view.structure_search.run.is_active() {
-            ui.weak("Looking at the lens…");
+            ui.weak("Preparing…");
         }
         self.pages(ui, run.is_some());
         if let (SearchPage::Lenses | SearchPage::Family, Some(run)) = (self.page, run.as_deref()) {
@@ -131,7 +132,7 @@ impl SearchPanel {
     fn setup_page(&mut self, ui: &mut Ui, view: &SessionView) {
         let under_way = view.structure_search.run.is_active();
         if under_way {
-            ui.label(RichText::new("The next search will begin with these.").small().weak());
+            ui.label(RichText::new("These settings apply to the next search.").small().weak());
         } else if view.structure_search.run.snapshot.is_none() {
             ui.label(INTRODUCTION);
         }
@@ -213,7 +214,7 @@ impl SearchPanel {
         let number = self.selected_number();
         let lens = number.and_then(|number| run.lens_by_number(number));
         let (Some(number), Some(_)) = (number, lens) else {
-            ui.weak("Click a lens or a mark to see it beside the design.");
+            ui.weak("Click a lens or a mark to compare it with the design.");
             return;
         };
         if lenses::lens_buttons(ui, view, run, number, actions) {

@@ -1,4 +1,4 @@
-//! What became of each kind of mutation, and how often it is tried from now on.
+//! The outcome of each kind of mutation, and the weight with which it is tried.
 
 use egui::{DragValue, Grid, RichText, Ui};
 
@@ -7,16 +7,16 @@ use crate::search::{MutationKind, MutationStatistics, SteerCommand};
 use crate::session::{SessionView, StructureSearchCommand, StructureSearchSnapshot};
 use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::text::{capitalize, counted_from_one};
+use crate::studio::text::capitalize;
 
 const HEADINGS: [(&str, &str); 7] = [
     ("Mutation", ""),
-    ("Weight", "How often it is tried, times the weight of the setup; 0 forbids it"),
-    ("Tried", "How often it was tried"),
-    ("Refused", "How often it did not apply; the commonest reason stands below the pointer"),
-    ("Better", "Descents that came below the lens before the mutation, of those that have ended"),
-    ("Kept", "Descents whose lens was kept"),
-    ("Life", "How many moves a descent lasts that began with it, on average"),
+    ("Weight", "Relative frequency; 0 excludes the mutation"),
+    ("Tried", "Number of attempts"),
+    ("Refused", "Attempts that did not apply; hover for the most common reason"),
+    ("Better", "Ended descents that gave a better lens than the one before the mutation"),
+    ("Retained", "Descents whose lens was retained"),
+    ("Length", "Mean length of its descents, in moves"),
 ];
 
 /// The table of all kinds.
@@ -77,7 +77,6 @@ fn refusal_cell(ui: &mut Ui, kind: MutationKind, tally: &MutationStatistics) {
     let refused: u64 = tally.refused.values().sum();
     let label = ui.label((refused + tally.rejected).to_string());
     if let Some((why, count)) = most_common_refusal(tally) {
-        let why = counted_from_one(why);
         label
             .on_hover_text(format!("{} was refused {count} times: {why}", capitalize(kind.name())));
     }
@@ -94,7 +93,7 @@ fn refusal_summary(ui: &mut Ui, run: &StructureSearchSnapshot) {
     for kind in mutation_style::kinds() {
         let tally = run.statistics.kinds.get(&kind);
         if let Some((why, count)) = tally.and_then(most_common_refusal) {
-            let text = format!("{}, {count} × refused: {}", kind.name(), counted_from_one(why));
+            let text = format!("{}, {count} × refused: {}", kind.name(), why);
             ui.label(RichText::new(capitalize(&text)).small().weak());
         }
     }

@@ -1,4 +1,4 @@
-//! How kinds of mutations look: each has a colour and a shape of its own.
+//! The colour and the symbol of each kind of mutation.
 
 use egui::{Color32, Sense, Shape, Stroke, Ui, Visuals, pos2, vec2};
 use egui_plot::MarkerShape;

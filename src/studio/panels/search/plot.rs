@@ -8,9 +8,9 @@ use super::{mutation_style, text};
 use crate::session::{DescentMark, HistorySample, SessionView, StructureSearchSnapshot};
 use crate::studio::panels::decade_name;
 
-/// How near the pointer must be to a mark to mean it, in points of the screen.
+/// The distance in points within which the pointer picks a mark.
 const NEAR: f32 = 10.0;
-/// How high the strip of elements is.
+/// The height of the plot of elements.
 const STRIP: f32 = 44.0;
 /// The room for the numbers at the left.
 const AXIS: f32 = 40.0;
@@ -67,7 +67,7 @@ fn merit_plot(
             plot.line(Line::new("chain", chain_curve(run, other)).color(faint).width(0.8));
         }
         let weak = visuals.weak_text_color();
-        plot.line(Line::new("followed chain", chain_curve(run, chain)).color(weak).width(1.2));
+        plot.line(Line::new("previewed chain", chain_curve(run, chain)).color(weak).width(1.2));
         start_line(plot, run, visuals.warn_fg_color);
         let best = run.history.moments.iter();
         let best: PlotPoints<'_> =
@@ -151,7 +151,11 @@ fn hovered_mark(ui: &Ui, run: &StructureSearchSnapshot, shown: &PlotResponse<()>
             text::outcome_text(node)
         ),
         None => {
-            format!("Lens {}, forgotten since; merit {}", mark.number, text::merit_text(mark.merit))
+            format!(
+                "Lens {}, no longer stored; merit {}",
+                mark.number,
+                text::merit_text(mark.merit)
+            )
         }
     };
     let response = shown.response.clone().on_hover_text_at_pointer(text);
@@ -159,7 +163,7 @@ fn hovered_mark(ui: &Ui, run: &StructureSearchSnapshot, shown: &PlotResponse<()>
     clicked.then_some(mark.number).filter(|number| run.lens_by_number(*number).is_some())
 }
 
-/// How many elements the lens of the chain has.
+/// The number of elements of the lens of a chain.
 fn elements_plot(ui: &mut Ui, run: &StructureSearchSnapshot, chain: usize) {
     let steps: Vec<[f64; 2]> = run
         .history

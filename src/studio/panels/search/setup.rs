@@ -1,4 +1,4 @@
-//! What a search is asked for: the sampler, what may become of the lens, how long.
+//! The settings of a search: the sampler, the structure, the goal, the end.
 
 use std::ops::RangeInclusive;
 
@@ -15,13 +15,13 @@ use crate::session::{SessionView, StructureSearchRequest};
 #[derive(Debug)]
 pub(super) struct SearchSetup {
     request: StructureSearchRequest,
-    /// Whether a person has said how many elements there may be.
+    /// True once the user has changed the number of elements.
     element_count_edited: bool,
-    /// Whether new glass is one of those that the design is made of.
+    /// True if new elements are made of the glasses of the design.
     design_glasses_only: bool,
     /// The gradients that brute force divides among its mutations.
     brute_force_gradients: u64,
-    /// What stands in a field that is switched off.
+    /// The values of inactive limits.
     disabled: DisabledValues,
 }
 
@@ -53,22 +53,22 @@ const METHODS: [(SearchMethod, &str, &str); 3] = [
     (
         SearchMethod::Restore,
         "RESTORE",
-        "Descents that end by chance and begin again from a mutation of a lens that is kept",
+        "Descents of random length, each started from a mutation of a retained lens",
     ),
     (
         SearchMethod::Metropolis,
         "Metropolis-Hastings",
-        "Noisy gradient steps and reversible mutations, each accepted or not",
+        "Noisy gradient steps and reversible mutations, each accepted or rejected",
     ),
     (
         SearchMethod::Brute,
         "Brute force",
-        "After each element one more and each element less, descended for as long",
+        "Every insertion and removal of one element, each optimized with the same budget",
     ),
 ];
 
 impl SearchSetup {
-    /// What is asked for, for the design as it is.
+    /// The request for a search from the present design.
     pub(super) fn request(&self, view: &SessionView) -> StructureSearchRequest {
         let mut quest = self.request.clone();
         quest.plan.light = light::matching_fields(quest.plan.light, &view.lens);
@@ -106,11 +106,19 @@ impl SearchSetup {
         });
         combo.response.accessible_name("Search method");
         ui.end_row();
-        ui.weak("Chance");
+        ui.weak("Sampling");
         ui.horizontal(|ui| {
-            drag(ui, "Seed", &mut settings.seed, 0..=u64::MAX, 0.1, "The same seed searches alike");
+            drag(
+                ui,
+                "Seed",
+                &mut settings.seed,
+                0..=u64::MAX,
+                0.1,
+                "The same seed gives the same \
+                search",
+            );
             ui.weak("seed,");
-            let hint = "Descents side by side that share the lenses that are kept";
+            let hint = "Parallel descents that share the retained lenses";
             drag(ui, "Chains", &mut settings.chains, 1..=64, 0.05, hint);
             ui.weak("chains");
         });
@@ -123,26 +131,34 @@ impl SearchSetup {
             rules.elements =
                 SearchRules::default().admit_element_count(piece_count(&view.lens)).elements;
         }
-        ui.weak("Elements").on_hover_text("How many pieces of glass a lens may have");
+        ui.weak("Elements").on_hover_text("The number of elements that a lens may have");
         ui.horizontal(|ui| {
             let [min, max] = &mut rules.elements;
             let fewest =
-                drag(ui, "Fewest elements", min, 1..=*max, 0.05, "The fewest pieces of glass");
+                drag(ui, "Fewest elements", min, 1..=*max, 0.05, "Minimum number of elements");
             ui.weak("to");
-            let most = drag(ui, "Most elements", max, *min..=40, 0.05, "The most pieces of glass");
+            let most = drag(
+                ui,
+                "Most elements",
+                max,
+                *min..=40,
+                0.05,
+                "Maximum number of \
+                elements",
+            );
             self.element_count_edited |= fewest || most;
             ui.weak(format!("({} now)", piece_count(&view.lens)));
         });
         ui.end_row();
-        ui.weak("Untouched").on_hover_text("Surfaces that mutations leave alone");
+        ui.weak("Fixed ends").on_hover_text("Surfaces that mutations do not change");
         fixed_ends(ui, &mut rules.kept, view.lens.surfaces.len());
         ui.end_row();
         ui.weak("New glass");
         ui.horizontal(|ui| {
-            let hint = "New elements are made of any glass of the catalogue";
+            let hint = "New elements use any glass of the catalogue";
             ui.radio_value(&mut self.design_glasses_only, false, "of the catalogue")
                 .on_hover_text(hint);
-            let hint = "New elements are made of the glasses that the design is made of";
+            let hint = "New elements use only the glasses of the design";
             ui.radio_value(&mut self.design_glasses_only, true, "of this lens").on_hover_text(hint);
         });
         ui.end_row();
@@ -160,7 +176,7 @@ impl SearchSetup {
         light::shares(ui, &mut quest.plan.light, lens);
         ui.end_row();
         ui.weak("Focal length");
-        let hint = "Ask for another focal length than that of the design";
+        let hint = "The target, if it is not the focal length of the design";
         let asleep = &mut self.disabled;
         optional(
             ui,
@@ -174,8 +190,8 @@ impl SearchSetup {
         );
         ui.end_row();
         ui.weak("Rims");
-        let hint = "Remove the diaphragm and open every rim as far as its neighbours and this \
-            semi-diameter allow: the search then decides what stops the light";
+        let hint = "Remove the stop and open every semi-diameter as far as the neighbouring \
+            surfaces and this value allow: the search then decides what limits the beam";
         optional(ui, "Open them up to", &mut quest.open, &mut asleep.open, hint, |ui, value| {
             length(ui, "Largest rim at the start", value, 0.1..=10_000.0);
         });
@@ -186,18 +202,18 @@ impl SearchSetup {
         let Self { request: quest, disabled: asleep, brute_force_gradients: gradients, .. } = self;
         if quest.plan.settings.method == SearchMethod::Brute {
             ui.weak("Gradients");
-            let hint = "They are divided among all mutations";
+            let hint = "The budget that is divided among all mutations";
             drag(ui, "Gradients of brute force", gradients, 1..=u64::MAX, 100.0, hint);
             ui.end_row();
         }
         ui.weak("Ends after");
-        let hint = "The search ends after so much work";
+        let hint = "The time limit of the search";
         optional(ui, "minutes", &mut quest.minutes, &mut asleep.minutes, hint, |ui, value| {
             drag(ui, "Minutes of the search", value, 0.1..=100_000.0, 0.1, hint);
         });
         ui.end_row();
         ui.label("");
-        let hint = "The search ends after so many moves of all chains together";
+        let hint = "The limit of moves of all chains together";
         optional(
             ui,
             "moves",
@@ -213,7 +229,7 @@ impl SearchSetup {
 
     fn weights_section(&mut self, ui: &mut Ui) {
         let weights = &mut self.request.plan.rules.weights;
-        ui.collapsing("How often each mutation is tried", |ui| {
+        ui.collapsing("Weights of the mutations", |ui| {
             Grid::new("weights").num_columns(4).spacing([8.0, 3.0]).show(ui, |ui| {
                 for (i, kind) in MutationKind::MUTATIONS.into_iter().enumerate() {
                     weight_field(ui, weights, kind);
@@ -224,7 +240,7 @@ impl SearchSetup {
     }
 }
 
-/// How often a kind is tried.
+/// The weight of a kind of mutation.
 fn weight_field(ui: &mut Ui, weights: &mut Vec<(MutationKind, f64)>, kind: MutationKind) {
     ui.horizontal(|ui| {
         mutation_style::symbol(ui, kind);
@@ -233,31 +249,34 @@ fn weight_field(ui: &mut Ui, weights: &mut Vec<(MutationKind, f64)>, kind: Mutat
     let listed = weights.iter().find(|(other, _)| *other == kind);
     let mut weight = listed.map_or(1.0, |(_, weight)| *weight);
     let name = format!("Weight of {} at the start", kind.name());
-    if drag(ui, &name, &mut weight, 0.0..=100.0, 0.02, "0 forbids it") {
+    if drag(ui, &name, &mut weight, 0.0..=100.0, 0.02, "0 excludes it") {
         weights.retain(|(other, _)| *other != kind);
         weights.push((kind, weight));
     }
 }
 
-/// What a search may change, and what it takes as it is.
+/// The choice of the variables, and a summary of what is varied.
 fn variables_choice(ui: &mut Ui, lens: &Lens, free: &mut bool) {
     let count = lens.variables.len();
     if count > 0 {
-        ui.checkbox(free, "Free every curvature and gap").on_hover_text(
-            "Also those that are no variables of the design; their bounds do not count then",
+        ui.checkbox(free, "Vary all curvatures and gaps").on_hover_text(
+            "Includes numbers that are not variables of the design; bounds of variables are \
+             ignored",
         );
     }
     let text = if count == 0 || *free {
-        "Free: structure, curvatures, gaps and rims. Limits: those of the factory below.".to_owned()
+        "Variables: structure, curvatures, gaps and semi-diameters, within the manufacturing \
+         limits below."
+            .to_owned()
     } else {
         format!(
-            "Free: structure, rims, the {count} variables of the design and all that is new; \
-             other curvatures and gaps are held."
+            "Variables: structure, semi-diameters, the {count} variables of the design and all \
+             new elements; other curvatures and gaps are fixed."
         )
     };
     ui.add(Label::new(RichText::new(text).small().weak()).wrap());
     if lens.zoom_positions() > 1 {
-        let text = "A zoom lens: gaps that move are never joined, so some mutations do not apply.";
+        let text = "A zoom lens: moving gaps are never merged, so some mutations do not apply.";
         ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color));
     }
 }
@@ -275,13 +294,13 @@ fn glasses(lens: &Lens) -> Vec<String> {
     names
 }
 
-/// How many surfaces at both ends mutations leave alone.
+/// The number of surfaces at both ends that mutations do not change.
 fn fixed_ends(ui: &mut Ui, [front, rear]: &mut [usize; 2], count: usize) {
     ui.horizontal(|ui| {
-        let hint = "Mutations leave so many surfaces at this end alone: a group stays what it is";
-        drag(ui, "Untouched at the front", front, 0..=count, 0.05, hint);
+        let hint = "The number of surfaces at this end that mutations do not change";
+        drag(ui, "Fixed surfaces at the front", front, 0..=count, 0.05, hint);
         ui.weak("surfaces at the front,");
-        drag(ui, "Untouched at the rear", rear, 0..=count, 0.05, hint);
+        drag(ui, "Fixed surfaces at the rear", rear, 0..=count, 0.05, hint);
         ui.weak("at the rear");
     });
 }

@@ -11,7 +11,7 @@ use crate::session::{
 };
 use crate::studio::number;
 use crate::studio::panels::optimizer::changes_text;
-use crate::studio::text::{self, counted_from_one};
+use crate::studio::text::{self, counted};
 
 fn short(value: f64) -> String {
     number::format_digits(value, 4)
@@ -19,21 +19,18 @@ fn short(value: f64) -> String {
 
 /// A merit as it is read.
 pub(super) fn merit_text(value: f64) -> String {
-    if value.is_finite() { short(value) } else { "worthless".to_owned() }
+    if value.is_finite() { short(value) } else { "no merit".to_owned() }
 }
 
-/// So many of something.
-fn counted(count: u64, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
-/// How the search stands, and what it has come to.
+/// The status of the search, and the merit of its start and of its best lens.
 pub(super) fn status_text(run: &StructureSearchSnapshot, status: RunStatus) -> String {
     let why = match run.end_reason {
-        Some(EndReason::TimeLimit) => ": its time is up",
-        Some(EndReason::Sampler(RunEnd::Moves | RunEnd::Gradients)) => ": its limit is reached",
-        Some(EndReason::Sampler(RunEnd::Done)) => ": everything is tried",
-        Some(EndReason::Sampler(RunEnd::Stuck)) => ": no mutation applies any more",
+        Some(EndReason::TimeLimit) => ": time limit reached",
+        Some(EndReason::Sampler(RunEnd::Moves | RunEnd::Gradients)) => {
+            ": limit of moves or gradients reached"
+        }
+        Some(EndReason::Sampler(RunEnd::Done)) => ": all mutations tried",
+        Some(EndReason::Sampler(RunEnd::Stuck)) => ": no mutation applies",
         Some(EndReason::Sampler(RunEnd::Stopped)) | None => "",
     };
     let standing = text::status_text(status);
@@ -41,7 +38,7 @@ pub(super) fn status_text(run: &StructureSearchSnapshot, status: RunStatus) -> S
     format!("{standing}{why}, merit {from} to {to}")
 }
 
-/// How much it has done, and how fast.
+/// The work done so far, and its rate.
 pub(super) fn speed_text(run: &StructureSearchSnapshot) -> String {
     let done = &run.statistics;
     let rate = run.gradients as f64 / run.seconds;
@@ -76,17 +73,17 @@ fn duration_text(seconds: f64) -> String {
 /// That a lens breaks so many limits.
 pub(super) fn violations_text(lens: &str, count: usize) -> String {
     let limits = if count == 1 { "limit" } else { "limits" };
-    format!("The {lens} breaks {count} {limits}: what is exported has to keep them")
+    format!("The {lens} violates {count} {limits}; an exported lens has to satisfy them")
 }
 
-/// Where the search is saved; whether that failed.
+/// The file of the search; true if writing it has failed.
 pub(super) fn checkpoint_text(checkpoint: &CheckpointStatus) -> (String, bool) {
     if let Some(why) = &checkpoint.error {
         return (format!("Not saved: {why}"), true);
     }
     let name = checkpoint.path.as_ref().and_then(|path| path.file_name());
     match (name, checkpoint.moves) {
-        (None, _) => ("Not saved: no file was chosen".to_owned(), false),
+        (None, _) => ("Not saved: no file is chosen".to_owned(), false),
         (Some(name), None) => (format!("Will be saved to {}", name.to_string_lossy()), false),
         (Some(name), Some(moves)) => {
             (format!("Saved up to move {moves} to {}", name.to_string_lossy()), false)
@@ -94,7 +91,7 @@ pub(super) fn checkpoint_text(checkpoint: &CheckpointStatus) -> (String, bool) {
     }
 }
 
-/// What a lens is worth: a line a number.
+/// Spot, light, elements and merit of a lens, in lines.
 pub(super) fn lens_text(found: &FoundLens) -> String {
     let merit = merit_text(found.merit);
     let elements = found.elements;
@@ -104,8 +101,8 @@ pub(super) fn lens_text(found: &FoundLens) -> String {
             let [spot, light] = [1e3 * spot, *light].map(|v| number::format_digits(v, 3));
             format!("{spot} µm, {light} mm²\n{elements} elements, {merit}")
         }
-        Some(Err(why)) => format!("{elements} elements, {merit}\n{}", counted_from_one(why)),
-        None => format!("{elements} elements, {merit}\nstill descends"),
+        Some(Err(why)) => format!("{elements} elements, {merit}\n{}", why),
+        None => format!("{elements} elements, {merit}\ndescent not finished"),
     }
 }
 
@@ -133,8 +130,8 @@ pub(super) fn comparison(
     parts.push(format!("elements {own} to {new}"));
     let text = format!("Lens {number}: {}", parts.join(", "));
     ui.add(Label::new(text).wrap()).on_hover_text(
-        "The design and this lens: root of the mean square radius of the spots, mean area of the \
-         pupils, pieces of glass. The beam of both is limited by the stop",
+        "The design and this lens: RMS spot radius, mean area of the pupils, number of elements. \
+         The beam of both is limited by the stop",
     );
 }
 
@@ -148,16 +145,16 @@ fn change_text(name: &str, old: f64, new: f64, unit: &str) -> String {
     format!("{name} {} to {} {unit} ({sign}{percent} %)", short(old), short(new))
 }
 
-/// What a generation is: the mutation in words.
+/// The mutation with which a generation began.
 pub(super) fn mutation_text<P>(node: &LineageNode<P>) -> String {
-    let what = counted_from_one(&node.what);
+    let what = &node.what;
     match node.kind {
         Some(kind) => format!("{}: {what}", kind.name()),
-        None => what,
+        None => what.clone(),
     }
 }
 
-/// What became of a generation: merits, moves, what ended it, whether it was kept.
+/// The merits, the moves, the end and the place in the reservoir of a generation.
 pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
     let before = node.before.map(|before| format!("{} before, ", merit_text(before)));
     let merits = format!(
@@ -167,23 +164,25 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
         merit_text(node.descended)
     );
     let end = match node.ended {
-        None => "it goes on",
-        Some(DescentEnd::Clock) => "the clock ended it",
-        Some(DescentEnd::Longest) => "it had its longest time",
-        Some(DescentEnd::Lost) => "it lost all light",
-        Some(DescentEnd::Mutated) => "a mutation was accepted",
-        Some(DescentEnd::Budget) => "its gradients were used up",
+        None => "not finished",
+        Some(DescentEnd::Clock) => "ended by its clock",
+        Some(DescentEnd::Longest) => "ended at the maximum length",
+        Some(DescentEnd::Lost) => "ended without light",
+        Some(DescentEnd::Mutated) => "ended by an accepted mutation",
+        Some(DescentEnd::Budget) => "ended by its budget of gradients",
     };
     let kept = match node.offer {
         None => String::new(),
-        Some(OfferOutcome::Entered) => "; kept".to_owned(),
-        Some(OfferOutcome::Replaced(other)) => format!("; kept in place of lens {other}"),
+        Some(OfferOutcome::Entered) => "; retained".to_owned(),
+        Some(OfferOutcome::Replaced(other)) => format!("; retained in place of lens {other}"),
         Some(OfferOutcome::Same(other)) => format!("; the same as lens {other}"),
         Some(OfferOutcome::BehindTwin(other)) => {
-            format!("; not kept: lens {other} of the same pattern is no worse")
+            format!("; not retained: lens {other} of the same pattern is at least as good")
         }
-        Some(OfferOutcome::BehindAll) => "; not kept: all that are kept are no worse".to_owned(),
-        Some(OfferOutcome::Worthless) => "; not kept: it is worth nothing".to_owned(),
+        Some(OfferOutcome::BehindAll) => "; not retained: all retained lenses are at least as \
+            good"
+            .to_owned(),
+        Some(OfferOutcome::Worthless) => "; not retained: no merit".to_owned(),
     };
     let (moves, gradients) = (counted(node.moves, "move"), counted(node.gradients, "gradient"));
     let chain = node.chain + 1;
