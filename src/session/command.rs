@@ -70,7 +70,7 @@ pub enum Command {
     /// Ends the sweep and dismisses all fronts.
     ClearPareto,
     /// Writes the front into a folder: table, plot and every lens.
-    ExportPareto(Option<PathBuf>),
+    ExportPareto(PathBuf),
     /// A command for the search over lens structures.
     StructureSearch(StructureSearchCommand),
     /// A command for the gradient-index field.
@@ -117,7 +117,7 @@ pub enum StructureSearchCommand {
     /// Starts a search from the design, in place of the one before.
     Start(Box<StructureSearchRequest>),
     /// Resumes the search of a file.
-    ResumeFrom(Option<PathBuf>),
+    ResumeFrom(PathBuf),
     /// Pauses the search after its current round.
     Pause,
     /// Resumes the search.
@@ -129,7 +129,7 @@ pub enum StructureSearchCommand {
     /// Shows the lens of the chain with this index in place of the design; `None` shows the design.
     Preview(Option<usize>),
     /// Saves the search to this file from now on, or the next search if none is active.
-    SaveTo(Option<PathBuf>),
+    SaveTo(PathBuf),
     /// Makes the lens of a generation the design, as one undo step.
     Accept(u64),
     /// Finalizes and writes the lens of a generation.
@@ -137,7 +137,7 @@ pub enum StructureSearchCommand {
         /// The generation.
         number: u64,
         /// The file.
-        path: Option<PathBuf>,
+        path: PathBuf,
     },
     /// Ends the search and dismisses its lenses; its file remains.
     Clear,

@@ -149,16 +149,14 @@ impl Studio {
             FileRequest::Open => Command::Open(path),
             FileRequest::ExperimentFolder => Command::SaveExperiment(path),
             FileRequest::Save => Command::Save(Some(path)),
-            FileRequest::ExportFront => Command::ExportPareto(Some(path)),
-            FileRequest::OpenSearch => search(StructureSearchCommand::ResumeFrom(Some(path))),
-            FileRequest::SaveSearch => search(StructureSearchCommand::SaveTo(Some(path))),
+            FileRequest::ExportFront => Command::ExportPareto(path),
+            FileRequest::OpenSearch => search(StructureSearchCommand::ResumeFrom(path)),
+            FileRequest::SaveSearch => search(StructureSearchCommand::SaveTo(path)),
             FileRequest::ExportSearchLens(number) => {
-                search(StructureSearchCommand::Export { number, path: Some(path) })
+                search(StructureSearchCommand::Export { number, path })
             }
-            FileRequest::OpenField => Command::Grin(GrinCommand::OpenFile(Some(path))),
-            FileRequest::SaveField(nodes) => {
-                Command::Grin(GrinCommand::Save { path: Some(path), nodes })
-            }
+            FileRequest::OpenField => Command::Grin(GrinCommand::OpenFile(path)),
+            FileRequest::SaveField(nodes) => Command::Grin(GrinCommand::Save { path, nodes }),
             FileRequest::ExportZemax | FileRequest::ExportJson => Command::Export(path),
         };
         self.run_or_ask(context, PendingAction::Run(command), None);

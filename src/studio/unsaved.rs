@@ -27,7 +27,7 @@ impl PendingAction {
             Self::Quit => &[UnsavedDocument::Lens, UnsavedDocument::Field],
             Self::Run(Command::New(_) | Command::Open(_)) => &[UnsavedDocument::Lens],
             Self::Run(Command::Grin(
-                GrinCommand::OpenFile(Some(_))
+                GrinCommand::OpenFile(_)
                 | GrinCommand::OpenBuiltin(_)
                 | GrinCommand::Close
                 | GrinCommand::Start,

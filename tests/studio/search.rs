@@ -339,7 +339,7 @@ fn without_a_search_the_panel_says_what_is_missing() {
     press(&mut harness, "Dismiss");
     assert_eq!(
         asked(&harness),
-        [StructureSearchCommand::ResumeFrom(Some(path)), StructureSearchCommand::DismissUnfinished]
+        [StructureSearchCommand::ResumeFrom(path), StructureSearchCommand::DismissUnfinished]
     );
 
     let mut dark = view();

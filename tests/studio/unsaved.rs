@@ -75,7 +75,7 @@ fn a_field_is_not_lost_without_a_question() {
 fn a_field_that_is_in_a_file_is_replaced_at_once() {
     let mut harness = formed();
     let path = std::env::temp_dir().join(format!("aplanat-{}-field.npz", std::process::id()));
-    tell(&mut harness, GrinCommand::Save { path: Some(path.clone()), nodes: 5 });
+    tell(&mut harness, GrinCommand::Save { path: path.clone(), nodes: 5 });
     wait(&mut harness, "the file", |harness| !run(harness).unwrap().is_unsaved());
     std::fs::remove_file(path).unwrap();
     press(&mut harness, "Start over");

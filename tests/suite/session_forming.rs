@@ -59,7 +59,7 @@ fn stands(session: &mut Session, standing: RunStatus) {
 }
 
 fn open(session: &mut Session, path: &Path) {
-    form(session, GrinCommand::OpenFile(Some(path.to_owned())));
+    form(session, GrinCommand::OpenFile(path.to_owned()));
     wait(session, "the opening", |view, _| !view.grin.opening);
 }
 
@@ -128,13 +128,13 @@ fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
 
     for name in ["field.npz", "field.json"] {
         let file = folder.join(name);
-        form(&mut session, GrinCommand::Save { path: Some(file.clone()), nodes: 65 });
+        form(&mut session, GrinCommand::Save { path: file.clone(), nodes: 65 });
         wait(&mut session, "the file", |_, events| {
             events.contains(&SessionEvent::Saved(file.clone()))
         });
         assert_eq!(read_volume(&file).unwrap(), headless.best().volume(task.space, 65).unwrap());
     }
-    form(&mut session, GrinCommand::Save { path: Some(folder.join("field.txt")), nodes: 65 });
+    form(&mut session, GrinCommand::Save { path: folder.join("field.txt"), nodes: 65 });
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text.contains("ends in .npz or .json"))
     });
@@ -156,7 +156,7 @@ fn nothing_is_computed_before_something_is_open_and_looked_at() {
         session.view().messages.last().unwrap().text,
         "there is no task to work on; open one first"
     );
-    form(&mut session, GrinCommand::Save { path: Some("field.npz".into()), nodes: 65 });
+    form(&mut session, GrinCommand::Save { path: "field.npz".into(), nodes: 65 });
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text.starts_with("there is no field to save"))
     });
@@ -310,7 +310,7 @@ fn a_volume_is_looked_at_and_written_in_the_other_format() {
     form(&mut session, GrinCommand::Start);
     assert_eq!(session.view().messages.last().unwrap().text, "a volume has no task to work on");
     let file = folder.join("copy.json");
-    form(&mut session, GrinCommand::Save { path: Some(file.clone()), nodes: 65 });
+    form(&mut session, GrinCommand::Save { path: file.clone(), nodes: 65 });
     wait(&mut session, "the file", |_, events| events.contains(&SessionEvent::Saved(file.clone())));
     assert_eq!(read_volume(&file).unwrap(), known);
     std::fs::remove_dir_all(folder).unwrap();

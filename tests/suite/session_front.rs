@@ -143,7 +143,7 @@ fn kept_pupils_follow_and_earlier_runs_stay() {
     assert_eq!(fronts.run.snapshot.unwrap().main.front, first.main.front, "the same again");
 
     let folder = std::env::temp_dir().join(format!("aplanat-session-{}", std::process::id()));
-    session.apply(Command::ExportPareto(Some(folder.clone())));
+    session.apply(Command::ExportPareto(folder.clone()));
     wait(&mut session, "the files", |_, events| {
         events.contains(&SessionEvent::Saved(folder.clone()))
     });
@@ -155,7 +155,7 @@ fn kept_pupils_follow_and_earlier_runs_stay() {
     let fronts = session.view().pareto;
     assert!(fronts.run.snapshot.is_none() && fronts.earlier.is_empty());
     assert!(session.view().design_score.is_none());
-    session.apply(Command::ExportPareto(Some(folder.clone())));
+    session.apply(Command::ExportPareto(folder.clone()));
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text == "there is no front to export yet")
     });

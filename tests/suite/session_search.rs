@@ -203,7 +203,7 @@ fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
     second.set_save_folder(&folder);
     let left = second.view().structure_search.unfinished.unwrap();
     assert!(left.starts_with(&folder), "{}", left.display());
-    explore(&mut second, StructureSearchCommand::ResumeFrom(Some(left.clone())));
+    explore(&mut second, StructureSearchCommand::ResumeFrom(left.clone()));
     assert_eq!(second.view().structure_search.unfinished, None);
     stands(&mut second, RunStatus::Finished);
     let (whole, found) = (run(&whole), run(&second));
@@ -237,7 +237,7 @@ fn a_forgotten_search_with_light_of_its_own_for_each_field_goes_on() {
     second.set_save_folder(&folder);
     explore(&mut second, StructureSearchCommand::DismissUnfinished);
     let forgotten = folder.join("forgotten.json");
-    explore(&mut second, StructureSearchCommand::ResumeFrom(Some(forgotten.clone())));
+    explore(&mut second, StructureSearchCommand::ResumeFrom(forgotten.clone()));
     stands(&mut second, RunStatus::Finished);
     assert_eq!(moves(&second.view()), 8);
     let place = run(&second).checkpoint.path.clone().unwrap();
@@ -251,15 +251,15 @@ fn a_person_chooses_where_a_search_is_saved() {
     let folder = folder("place");
     let mut session = session(double_gauss());
     let [before, behind] = ["a.json", "b.json"].map(|name| folder.join(name));
-    explore(&mut session, StructureSearchCommand::SaveTo(Some(before.clone())));
+    explore(&mut session, StructureSearchCommand::SaveTo(before.clone()));
     assert_eq!(session.view().structure_search.save_path.as_ref(), Some(&before));
     start(&mut session, None);
     explore(&mut session, StructureSearchCommand::Pause);
     stands(&mut session, RunStatus::Paused);
     assert!(before.exists());
-    explore(&mut session, StructureSearchCommand::SaveTo(Some(behind.clone())));
+    explore(&mut session, StructureSearchCommand::SaveTo(behind.clone()));
     wait(&mut session, "the other file", |_, _| behind.exists());
-    explore(&mut session, StructureSearchCommand::SaveTo(Some(before.join("under a file"))));
+    explore(&mut session, StructureSearchCommand::SaveTo(before.join("under a file")));
     wait(&mut session, "a refusal", |view, _| {
         view.messages.last().is_some_and(|said| said.text.starts_with("the search is not saved"))
     });
@@ -294,7 +294,7 @@ fn a_search_that_cannot_begin_says_why() {
 
     let file = folder("foreign");
     std::fs::write(&file, "{\"aplanat\": 1}").unwrap();
-    explore(&mut session, StructureSearchCommand::ResumeFrom(Some(file.clone())));
+    explore(&mut session, StructureSearchCommand::ResumeFrom(file.clone()));
     stands(&mut session, RunStatus::Failed);
     let failed = session.view().structure_search.run.error.unwrap();
     assert!(failed.contains("no checkpoint of a search over lenses"), "{failed}");
@@ -312,10 +312,7 @@ fn export(rules: impl Fn(&mut SearchRules), path: &Path) -> Session {
     rules(&mut asked.plan.rules);
     explore(&mut session, StructureSearchCommand::Start(Box::new(asked)));
     stands(&mut session, RunStatus::Finished);
-    explore(
-        &mut session,
-        StructureSearchCommand::Export { number: 0, path: Some(path.to_owned()) },
-    );
+    explore(&mut session, StructureSearchCommand::Export { number: 0, path: path.to_owned() });
     assert_eq!(session.view().structure_search.exporting, [0]);
     wait(&mut session, "the end of it", |view, _| view.structure_search.exporting.is_empty());
     session

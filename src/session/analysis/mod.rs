@@ -106,7 +106,7 @@ const IDLE_TIME: Duration = Duration::from_millis(300);
 /// Computes the analyses of all panels in the background, for the latest lens only.
 pub(super) type AnalysisWorker = LatestRequestWorker<AnalysisRequest, AnalysisResults>;
 
-type Output = WorkerOutput<AnalysisRequest, AnalysisResults>;
+type AnalysisOutput = WorkerOutput<AnalysisRequest, AnalysisResults>;
 
 /// Starts the thread. `wake` is called from it when there are new results.
 pub(super) fn spawn_analysis(
@@ -125,7 +125,7 @@ pub(super) fn spawn_analysis(
 /// Publishes the results of a request. `None` if it was interrupted.
 fn answer(
     request: AnalysisRequest,
-    output: &Output,
+    output: &AnalysisOutput,
     published: &mut Option<Instant>,
 ) -> Option<AnalysisResults> {
     let start = now();
@@ -143,7 +143,7 @@ fn answer(
 }
 
 /// Publishes the results once more with the cost of each effect, if no request interrupts that.
-fn measure(mut results: AnalysisResults, output: &Output) {
+fn measure(mut results: AnalysisResults, output: &AnalysisOutput) {
     let Ok(analyses) = &mut results.analyses else { return };
     if !output.idle_for(IDLE_TIME) {
         return;

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 #[serde(rename_all = "snake_case")]
 pub enum GrinCommand {
     /// Opens a task or a volume from a file in place of the open document.
-    OpenFile(Option<PathBuf>),
+    OpenFile(PathBuf),
     /// Opens a built-in task.
     OpenBuiltin(String),
     /// Starts the design of the field from its beginning.
@@ -23,7 +23,7 @@ pub enum GrinCommand {
     /// Writes the best field: `.npz`, or `.json` with the numbers beside it in `.raw`.
     Save {
         /// The file.
-        path: Option<PathBuf>,
+        path: PathBuf,
         /// The number of nodes along a side, for a field that is a spline in one coordinate.
         nodes: usize,
     },

@@ -98,21 +98,18 @@ impl GrinState {
     /// Carries out a command, or returns the reason why that is impossible.
     pub(super) fn handle(&mut self, command: GrinCommand) -> Result<(), String> {
         match command {
-            GrinCommand::OpenFile(Some(path)) => self.run.start(DocumentSource::File(path)),
+            GrinCommand::OpenFile(path) => self.run.start(DocumentSource::File(path)),
             GrinCommand::OpenBuiltin(name) => self.run.start(DocumentSource::Builtin(name)),
             GrinCommand::Start => self.start()?,
             GrinCommand::Pause => self.run.pause(),
             GrinCommand::Resume => self.run.resume(),
             GrinCommand::Stop => self.run.stop(),
-            GrinCommand::Save { path: Some(path), nodes } => {
+            GrinCommand::Save { path, nodes } => {
                 if self.run.snapshot().is_none() {
                     return Err("there is no field to save; open a task first".to_owned());
                 }
                 self.writing = true;
                 self.run.send_request(GrinRequest::Write(path, nodes));
-            }
-            GrinCommand::OpenFile(None) | GrinCommand::Save { path: None, .. } => {
-                return Err("no file was named".to_owned());
             }
             GrinCommand::Close => {
                 self.run.clear();

@@ -1,6 +1,6 @@
 //! The thread of a background run and the session's handle of it.
 
-use super::engine::{Engine, EventSender, Message, RunEvent, catch_panic};
+use super::engine::{Engine, EventSender, RunEvent, ThreadMessage, catch_panic};
 use super::tracker::RunTracker;
 use super::{RunId, RunStatus, RunView};
 use crate::session::clock::Throttle;
@@ -34,7 +34,7 @@ struct Published<S> {
 pub(in crate::session) struct BackgroundRun<E: Engine> {
     tracker: RunTracker,
     requests: Option<Sender<Request<E>>>,
-    messages: Receiver<Message<E::Report>>,
+    messages: Receiver<ThreadMessage<E::Report>>,
     published: Slot<Published<E::Snapshot>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -265,7 +265,7 @@ where
                 self.run = Some(ActiveRun { number, status, engine });
                 self.set_status(status);
             }
-            Err(why) => self.sender.send(Message::Failed(number, why)),
+            Err(why) => self.sender.send(ThreadMessage::Failed(number, why)),
         }
     }
 
@@ -307,7 +307,7 @@ where
         run.status = status;
         let number = run.number;
         self.publish();
-        self.sender.send(Message::Status(number, status));
+        self.sender.send(ThreadMessage::Status(number, status));
     }
 
     fn fail(&mut self, why: String) {
@@ -317,7 +317,7 @@ where
         // What a failed engine still says of itself is of no consequence.
         catch_panic(|| run.engine.on_status(RunStatus::Failed)).unwrap_or_default();
         self.publish();
-        self.sender.send(Message::Failed(number, why));
+        self.sender.send(ThreadMessage::Failed(number, why));
     }
 
     fn show(&mut self) {
@@ -341,7 +341,7 @@ where
                 Ok(())
             });
             if let Err(why) = closed {
-                self.sender.send(Message::Failed(run.number, why));
+                self.sender.send(ThreadMessage::Failed(run.number, why));
             }
         }
     }

@@ -66,7 +66,7 @@ pub(in crate::session) enum RunEvent<R> {
 
 /// A message from the thread of a run.
 #[derive(Debug)]
-pub(super) enum Message<R> {
+pub(super) enum ThreadMessage<R> {
     Status(u64, RunStatus),
     Failed(u64, String),
     Report(R),
@@ -74,7 +74,7 @@ pub(super) enum Message<R> {
 
 /// Sends messages from a run to the session and wakes the window.
 pub(in crate::session) struct EventSender<R> {
-    messages: Sender<Message<R>>,
+    messages: Sender<ThreadMessage<R>>,
     wake: Arc<Mutex<dyn Fn() + Send>>,
 }
 
@@ -85,17 +85,20 @@ impl<R> Clone for EventSender<R> {
 }
 
 impl<R> EventSender<R> {
-    pub(super) fn new(messages: Sender<Message<R>>, wake: impl Fn() + Send + 'static) -> Self {
+    pub(super) fn new(
+        messages: Sender<ThreadMessage<R>>,
+        wake: impl Fn() + Send + 'static,
+    ) -> Self {
         Self { messages, wake: Arc::new(Mutex::new(wake)) }
     }
 
     /// Sends a message of the engine.
     pub(in crate::session) fn report(&self, report: R) {
-        self.send(Message::Report(report));
+        self.send(ThreadMessage::Report(report));
     }
 
     /// Sends a message; nobody receives it while the session is being dropped.
-    pub(super) fn send(&self, message: Message<R>) {
+    pub(super) fn send(&self, message: ThreadMessage<R>) {
         self.messages.send(message).unwrap_or_default();
         self.wake();
     }

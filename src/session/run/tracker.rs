@@ -1,7 +1,7 @@
 //! The session's view of the status of its latest run, ahead of what the thread has reported.
 
 use super::RunStatus;
-use super::engine::{Message, RunEvent};
+use super::engine::{RunEvent, ThreadMessage};
 
 /// Tracks the latest run of one kind; messages of earlier runs are ignored.
 #[derive(Debug, Default)]
@@ -57,15 +57,15 @@ impl RunTracker {
     }
 
     /// Takes a message of the thread; `None` if it is of an earlier run.
-    pub(super) fn receive<R>(&mut self, message: Message<R>) -> Option<RunEvent<R>> {
+    pub(super) fn receive<R>(&mut self, message: ThreadMessage<R>) -> Option<RunEvent<R>> {
         match message {
-            Message::Status(number, status) => {
+            ThreadMessage::Status(number, status) => {
                 self.receive_status(number, status).then_some(RunEvent::Status(status))
             }
-            Message::Failed(number, why) => {
+            ThreadMessage::Failed(number, why) => {
                 self.receive_error(number, &why).then_some(RunEvent::Failed(why))
             }
-            Message::Report(report) => Some(RunEvent::Report(report)),
+            ThreadMessage::Report(report) => Some(RunEvent::Report(report)),
         }
     }
 
@@ -134,7 +134,7 @@ mod tests {
     };
 
     fn tell(tracker: &mut RunTracker, number: u64, status: RunStatus) -> RunStatus {
-        let _: Option<RunEvent<()>> = tracker.receive(Message::Status(number, status));
+        let _: Option<RunEvent<()>> = tracker.receive(ThreadMessage::Status(number, status));
         tracker.status()
     }
 
@@ -160,7 +160,7 @@ mod tests {
         let first = tracker.start(false);
         let second = tracker.start(false);
         assert_eq!(tell(&mut tracker, first, Stopped), Starting);
-        let event = tracker.receive::<()>(Message::Failed(second, "no lens".to_owned()));
+        let event = tracker.receive::<()>(ThreadMessage::Failed(second, "no lens".to_owned()));
         assert_eq!(event, Some(RunEvent::Failed("no lens".to_owned())));
         assert_eq!((tracker.status(), tracker.error()), (Failed, Some("no lens")));
         tracker.clear();
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(tell(&mut tracker, first, Paused), Paused);
         let second = tracker.start(true);
         assert_eq!((tracker.status(), tracker.current()), (Paused, Some(first)));
-        tracker.receive::<()>(Message::Failed(second, "no task".to_owned()));
+        tracker.receive::<()>(ThreadMessage::Failed(second, "no task".to_owned()));
         assert_eq!((tracker.status(), tracker.error()), (Paused, Some("no task")));
         let third = tracker.start(true);
         assert_eq!(tell(&mut tracker, third, Stopped), Stopped);

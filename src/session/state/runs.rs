@@ -90,9 +90,8 @@ impl Session {
         self.accept(checked, "accept a lens of the Pareto front");
     }
 
-    pub(super) fn export_pareto(&mut self, folder: Option<PathBuf>) {
-        let folder = folder.ok_or_else(|| "choose a folder to export the front to".to_owned());
-        if let Err(why) = folder.and_then(|folder| self.pareto.export(folder)) {
+    pub(super) fn export_pareto(&mut self, folder: PathBuf) {
+        if let Err(why) = self.pareto.export(folder) {
             self.post(Severity::Warning, why);
         }
     }

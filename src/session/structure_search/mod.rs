@@ -88,7 +88,7 @@ impl StructureSearchState {
                 let path = chosen.or_else(|| unused_path(self.folder.as_ref()?, &lens.name));
                 self.start(StructureSearchInput::New { lens: Arc::clone(lens), request, path });
             }
-            StructureSearchCommand::ResumeFrom(Some(path)) => {
+            StructureSearchCommand::ResumeFrom(path) => {
                 self.start(StructureSearchInput::Saved(restore_dismissed(path)?));
             }
             StructureSearchCommand::Pause => self.run.pause(),
@@ -98,14 +98,14 @@ impl StructureSearchState {
                 self.run.send_request(EngineRequest::Control(command));
             }
             StructureSearchCommand::Preview(chain) => self.previewed_chain = chain,
-            StructureSearchCommand::SaveTo(Some(path)) => {
+            StructureSearchCommand::SaveTo(path) => {
                 if self.run.status().is_active() {
                     self.run.send_request(EngineRequest::SaveTo(path));
                 } else {
                     self.save_path = Some(path);
                 }
             }
-            StructureSearchCommand::Export { number, path: Some(path) } => {
+            StructureSearchCommand::Export { number, path } => {
                 let lens = self.lens_by_number(number)?;
                 self.run.send_request(EngineRequest::Export { number, lens, path });
                 self.exporting.push(number);
@@ -115,11 +115,6 @@ impl StructureSearchState {
                 self.previewed_chain = None;
             }
             StructureSearchCommand::DismissUnfinished => self.dismiss_unfinished()?,
-            StructureSearchCommand::ResumeFrom(None)
-            | StructureSearchCommand::SaveTo(None)
-            | StructureSearchCommand::Export { path: None, .. } => {
-                return Err("no file was named".to_owned());
-            }
             // The session itself changes the design.
             StructureSearchCommand::Accept(_) => {}
         }

@@ -94,7 +94,7 @@ pub(super) fn unfinished_search(ui: &mut Ui, view: &SessionView, actions: &mut A
         ui.label("Unfinished search:").on_hover_text(left.display().to_string());
         ui.strong(name.unwrap_or_default().trim_end_matches(".search.json"));
         if ui.button("Resume").on_hover_text("Resume it from its file").clicked() {
-            actions.push(StructureSearchCommand::ResumeFrom(Some(left.clone())));
+            actions.push(StructureSearchCommand::ResumeFrom(left.clone()));
         }
         ui.add_space(12.0);
         let hint = "Dismiss. The file is kept as forgotten.json until the next dismissal";
