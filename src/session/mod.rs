@@ -26,9 +26,11 @@ mod structure_search;
 mod undo;
 mod view;
 
-pub use analysis::{Analyses, AnalysisResults, FieldPupils, analyze, measure_effect_costs};
+pub use analysis::{
+    Analyses, AnalysisResults, AnalysisSettings, FieldPupils, analyze, measure_effect_costs,
+};
 pub use clock::Timed;
-pub use command::{Command, StructureSearchCommand};
+pub use command::Command;
 pub use experiment::{ExperimentRun, ExperimentStatus};
 pub use grin_design::{
     Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinRun, GrinView,
@@ -42,6 +44,7 @@ pub use slot::Slot;
 pub use state::{Session, SessionEvent};
 pub use structure_search::{
     ChainPosition, CheckpointStatus, DescentMark, EndReason, FoundLens, HistorySample,
-    SearchHistory, StructureSearchRequest, StructureSearchSnapshot, StructureSearchView,
+    SearchHistory, StructureSearchCommand, StructureSearchRequest, StructureSearchSnapshot,
+    StructureSearchView,
 };
-pub use view::{AnalysisSettings, Message, SessionView, Severity};
+pub use view::{Message, SessionView, Severity};

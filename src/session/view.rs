@@ -1,6 +1,6 @@
 //! The state of a session that panels read.
 
-use super::analysis::AnalysisResults;
+use super::analysis::{AnalysisResults, AnalysisSettings};
 use super::experiment::ExperimentRun;
 use super::grin_design::GrinView;
 use super::optimization::OptimizationSnapshot;
@@ -8,7 +8,6 @@ use super::pareto::ParetoView;
 use super::run::RunView;
 use super::score::ScoredLens;
 use super::structure_search::StructureSearchView;
-use crate::effects::EffectOverrides;
 use crate::lens::{Lens, blank};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -86,36 +85,6 @@ impl SessionView {
     /// True if the analyses belong to the present version.
     pub fn is_current(&self) -> bool {
         self.results.as_ref().is_some_and(|results| results.version == self.version)
-    }
-}
-
-/// The settings of the analyses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AnalysisSettings {
-    /// The relative error allowed of the numbers.
-    pub tolerance: f64,
-    /// The index of the zoom position.
-    pub zoom: usize,
-    /// The number of rays of each field in the layout.
-    pub rays: usize,
-    /// The effects that are not left to the plan.
-    pub overrides: EffectOverrides,
-    /// True if the pupils are computed, because a panel shows them.
-    pub pupils: bool,
-    /// The index of the wavelength of the pupils; `None` for the primary one.
-    pub pupil_wavelength: Option<usize>,
-}
-
-impl Default for AnalysisSettings {
-    fn default() -> Self {
-        Self {
-            tolerance: 1e-3,
-            zoom: 0,
-            rays: 15,
-            overrides: EffectOverrides::default(),
-            pupils: false,
-            pupil_wavelength: None,
-        }
     }
 }
 

@@ -1,12 +1,12 @@
 //! The measured cost of each effect: the time of the spots of a lens with it and without it.
 
+use super::settings::AnalysisSettings;
 use crate::analysis;
 use crate::effects;
 use crate::effects::{Effect, EffectMeasurements, EffectOverride, EffectPlan, TracePurpose};
 use crate::lens::Lens;
 use crate::pupil::Accuracy;
 use crate::session::clock::time;
-use crate::session::view::AnalysisSettings;
 
 /// The number of measurements, of which the shortest counts.
 const REPETITIONS: usize = 2;

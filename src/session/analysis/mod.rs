@@ -5,13 +5,14 @@
 
 mod effect_timing;
 mod pupils;
+mod settings;
 
 pub use effect_timing::measure_effect_costs;
 pub use pupils::FieldPupils;
+pub use settings::AnalysisSettings;
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
-use super::view::AnalysisSettings;
 use crate::analysis;
 use crate::analysis::{
     AnalysisError, Distortion, Fan, FieldCurvature, Illumination, RayLayout, Spot, SpotPoints,
@@ -21,8 +22,7 @@ use crate::effects::{EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
 use crate::paraxial::{FirstOrder, Seidel};
 use crate::pupil::{Accuracy, RayModel, RayModelError};
-use pupils::field_pupils;
-use rayon::prelude::*;
+use pupils::{field_pupils, for_each_field};
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -251,12 +251,4 @@ fn spot_with_time(
         number.milliseconds = Some(ms);
     }
     Ok(spot)
-}
-
-/// Calls a function for each field in parallel; the results are in the order of the fields.
-pub(super) fn for_each_field<T: Send>(
-    bench: &RayModel,
-    of: impl Fn(FieldPoint) -> T + Sync,
-) -> Vec<T> {
-    bench.fields.par_iter().map(|field| of(*field)).collect()
 }

@@ -1,12 +1,12 @@
 //! The pupils of all fields, each with its time.
 
-use super::for_each_field;
+use super::settings::AnalysisSettings;
 use crate::analysis;
 use crate::analysis::{Estimate, FieldPupil, RimSensitivities};
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, DerivativeError, RayModel};
 use crate::session::clock::{Timed, time};
-use crate::session::view::AnalysisSettings;
+use rayon::prelude::*;
 
 /// The pupils of all fields at one wavelength.
 #[derive(Debug, Clone)]
@@ -52,4 +52,12 @@ pub(super) fn field_pupils(
         rims,
         all_rims,
     }
+}
+
+/// Calls a function for each field in parallel; the results are in the order of the fields.
+pub(super) fn for_each_field<T: Send>(
+    bench: &RayModel,
+    of: impl Fn(FieldPoint) -> T + Sync,
+) -> Vec<T> {
+    bench.fields.par_iter().map(|field| of(*field)).collect()
 }

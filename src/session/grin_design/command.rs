@@ -1,6 +1,6 @@
 //! Commands for the gradient-index field of a session.
 
-use super::slice::SliceSettings;
+use super::slice_settings::SliceSettings;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

@@ -9,13 +9,15 @@ mod contour;
 mod document;
 mod engine;
 mod slice;
+mod slice_settings;
 
 pub use command::GrinCommand;
 pub use contour::Contour;
 pub use document::{DocumentSource, GrinDocument};
 pub(super) use engine::GrinExport;
 pub use engine::{GrinRun, LossSample, MAX_NODES};
-pub use slice::{IndexProfile, Slice, SliceQuantity, SliceSettings};
+pub use slice::{IndexProfile, Slice};
+pub use slice_settings::{SliceQuantity, SliceSettings};
 
 use super::clock::{Throttle, Timed, time};
 use super::run::{BackgroundRun, LatestRequestWorker, RunEvent, RunStatus, RunView};

@@ -2,6 +2,7 @@
 
 use super::contour::{Contour, contours, level_set};
 use super::document::GrinDocument;
+use super::slice_settings::{SliceQuantity, SliceSettings};
 use crate::grin::IndexField;
 use crate::grin_design::{
     FieldDifference, FieldRepresentation, GrinField, RayPaths, SlicePlane, SpatialAxis,
@@ -9,7 +10,6 @@ use crate::grin_design::{
 use crate::math::Vec3;
 use crate::session::clock::time;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// The number of cells along the longer side of a slice.
@@ -24,61 +24,6 @@ const POINTS: usize = 200;
 const CONTOURS: f64 = 10.0;
 /// A range narrower than this fraction of its values counts as empty.
 const FLAT: f64 = 1e-12;
-
-/// The maximum number of rays of each view in a slice.
-pub(super) const MAX_RAYS: usize = 60;
-
-/// The quantity that a slice shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SliceQuantity {
-    /// The refractive index.
-    Index,
-    /// The absolute value of its gradient, in 1/mm.
-    Slope,
-    /// The index minus that of the initial field.
-    Change,
-    /// The index minus that of the reference field.
-    Error,
-}
-
-impl SliceQuantity {
-    /// Every quantity.
-    pub const ALL: [Self; 4] = [Self::Index, Self::Slope, Self::Change, Self::Error];
-
-    /// The name of the quantity with its unit.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Index => "index",
-            Self::Slope => "gradient of the index, 1/mm",
-            Self::Change => "index minus the initial one",
-            Self::Error => "index minus the reference",
-        }
-    }
-
-    /// True if zero is in the middle of the scale of the quantity.
-    pub const fn is_difference(self) -> bool {
-        matches!(self, Self::Change | Self::Error)
-    }
-}
-
-/// The settings of a slice.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct SliceSettings {
-    /// The plane of the slice.
-    pub plane: SlicePlane,
-    /// The quantity that it shows.
-    pub quantity: SliceQuantity,
-    /// The maximum number of rays of each view.
-    pub rays: usize,
-}
-
-impl Default for SliceSettings {
-    fn default() -> Self {
-        let plane = SlicePlane { axis: SpatialAxis::Y, depth: 0.0 };
-        Self { plane, quantity: SliceQuantity::Index, rays: 11 }
-    }
-}
 
 /// A request for a slice.
 #[derive(Debug, Clone)]

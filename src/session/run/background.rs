@@ -1,8 +1,8 @@
 //! The thread of a background run and the session's handle of it.
 
 use super::engine::{Engine, EventSender, RunEvent, ThreadMessage, catch_panic};
+use super::status::{RunId, RunStatus, RunView};
 use super::tracker::RunTracker;
-use super::{RunId, RunStatus, RunView};
 use crate::session::clock::Throttle;
 use crate::session::slot::Slot;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -350,7 +350,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::run::RunKind;
+    use crate::session::run::status::RunKind;
     use std::convert::Infallible;
     use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! The contract between a background run and the computation that it carries out.
 
-use super::{RunKind, RunStatus};
+use super::status::{RunKind, RunStatus};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::Sender;

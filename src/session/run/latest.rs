@@ -1,6 +1,6 @@
 //! A worker that carries out the latest request; a newer one replaces one that has not begun.
 
-use super::catch_panic;
+use super::engine::catch_panic;
 use crate::session::slot::{LatestRequest, Slot};
 use std::io;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! The session's view of the status of its latest run, ahead of what the thread has reported.
 
-use super::RunStatus;
 use super::engine::{RunEvent, ThreadMessage};
+use super::status::RunStatus;
 
 /// Tracks the latest run of one kind; messages of earlier runs are ignored.
 #[derive(Debug, Default)]

@@ -4,7 +4,8 @@ mod document;
 mod runs;
 
 use super::analysis::{
-    AnalysisRequest, AnalysisResults, AnalysisWorker, EffectTiming, spawn_analysis,
+    AnalysisRequest, AnalysisResults, AnalysisSettings, AnalysisWorker, EffectTiming,
+    spawn_analysis,
 };
 use super::command::Command;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
@@ -15,7 +16,7 @@ use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
 use super::score::DesignScore;
 use super::structure_search::StructureSearchState;
 use super::undo::UndoStack;
-use super::view::{AnalysisSettings, Message, SessionView, Severity};
+use super::view::{Message, SessionView, Severity};
 use crate::experiments::{self, Effort, ExperimentReport};
 use crate::lens::Lens;
 use crate::optimize;

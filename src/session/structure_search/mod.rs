@@ -1,11 +1,13 @@
 //! The search over lens structures of a session: its run, its files, and the lens that is previewed.
 
+mod command;
 mod engine;
 mod finalize;
 mod history;
 mod request;
 mod snapshot;
 
+pub use command::StructureSearchCommand;
 pub(super) use engine::StructureSearchReport;
 pub use history::{DescentMark, HistorySample, SearchHistory};
 pub use request::StructureSearchRequest;
@@ -13,7 +15,6 @@ pub use snapshot::{
     ChainPosition, CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot,
 };
 
-use super::command::StructureSearchCommand;
 use super::run::{BackgroundRun, RunEvent, RunId, RunView};
 use crate::lens::Lens;
 use engine::{EngineRequest, StructureSearchEngine, StructureSearchInput};
