@@ -1,4 +1,4 @@
-//! A session keeps the design sound, whatever it is told, and its threads keep their word.
+//! A session keeps its design valid, whatever the commands, and its background threads in order.
 
 use aplanat::effects::{Effect, EffectOverride};
 use aplanat::experiments::{self, Effort, Experiment};

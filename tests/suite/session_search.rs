@@ -1,7 +1,7 @@
-//! A search over structure behind a session: held, steered, saved, gone on with, taken, ended.
+//! The structure search of a session: paused, controlled, saved, resumed, accepted, stopped.
 
 use super::merit::bundled;
-use super::session_front::wait;
+use super::session_pareto::wait;
 use aplanat::lens::Lens;
 use aplanat::search::{MutationKind, SearchRules, SearchSettings, SteerCommand, Temperature};
 use aplanat::session::{

@@ -1,7 +1,7 @@
-//! A gradient-index field behind a session: opened, looked at, formed, held, stopped, written; the
-//! same field as without a window, and wrong files refused.
+//! The gradient-index field of a session: opened, shown, designed, paused, stopped, written; the same
+//! field as without a window, and wrong files refused.
 
-use super::session_front::wait;
+use super::session_pareto::wait;
 use aplanat::files::{Volume, read_volume, write_volume};
 use aplanat::grin::field::RegularGrid;
 use aplanat::grin_design::{
@@ -171,7 +171,7 @@ fn nothing_is_computed_before_something_is_open_and_looked_at() {
     let GrinView { slice, analysis: sighting, .. } = forming(&session);
     assert!(slice.is_none() && sighting.is_none(), "nobody looks");
     form(&mut session, GrinCommand::SetActive(true));
-    super::session_forming::slice(&mut session);
+    super::session_grin::slice(&mut session);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! A front that is swept behind a session: held, ended, compared, looked at, taken, written.
+//! The Pareto sweep of a session: paused, stopped, compared, previewed, accepted, exported.
 
 use super::merit::bundled;
 use aplanat::lens::Lens;
