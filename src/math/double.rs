@@ -1,4 +1,4 @@
-//! Twice the precision of `f64`, to measure what rounding costs.
+//! Numbers with twice the precision of `f64`, to measure rounding errors.
 //!
 //! A number is the unevaluated sum of two `f64` (Dekker 1971; Joldes, Muller and Popescu, "Tight
 //! and rigorous error bounds for basic building blocks of double-word arithmetic", ACM TOMS 44,
@@ -8,7 +8,7 @@ use super::Real;
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// The sum of a number and a correction below its last digit.
+/// A number as the sum of an `f64` and a correction below its last digit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct DoubleDouble {
     high: f64,
@@ -23,7 +23,7 @@ fn two_sum(a: f64, b: f64) -> DoubleDouble {
     DoubleDouble { high, low: (a - (high - rest)) + (b - rest) }
 }
 
-/// The same where `|a| ≥ |b|` (Dekker).
+/// The same for `|a| ≥ |b|` (Dekker).
 #[inline]
 fn fast_two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
@@ -38,7 +38,7 @@ fn two_product(a: f64, b: f64) -> DoubleDouble {
 }
 
 impl DoubleDouble {
-    /// The difference to the nearest `f64`.
+    /// The correction to the nearest `f64`.
     pub fn low(self) -> f64 {
         self.low
     }

@@ -1,4 +1,4 @@
-//! Forward derivatives: a value with its slopes along `N` directions.
+//! Dual numbers: a value with its derivatives along `N` directions.
 //!
 //! Over `f64` it is a first derivative, over another dual a second one (a jet). After Griewank
 //! and Walther, *Evaluating Derivatives* (2008), chapter 3.
@@ -17,13 +17,13 @@ pub struct Dual<R, const N: usize> {
 }
 
 impl<R: Real, const N: usize> Dual<R, N> {
-    /// A number that no direction changes.
+    /// A constant, with derivatives zero.
     #[inline(always)]
     pub fn constant(value: R) -> Self {
         Self { value, slope: [R::ZERO; N] }
     }
 
-    /// A number that grows with unit slope along one direction.
+    /// A variable, with derivative 1 along one direction.
     ///
     /// # Panics
     /// If `direction` is not less than `N`.

@@ -1,7 +1,7 @@
 //! Second derivatives along two directions: a value with its gradient and its Hessian.
 //!
-//! What a [`Dual`](super::Dual) over another dual of two directions carries, without the mixed
-//! derivative that stands there twice: 15 products for one, not 25.
+//! A jet holds the same as a [`Dual`](super::Dual) over another dual of two directions, but the mixed
+//! derivative only once: a product takes 15 multiplications instead of 25.
 
 use super::Real;
 use std::cmp::Ordering;
@@ -19,7 +19,7 @@ pub struct Jet<R> {
 }
 
 impl<R: Real> Jet<R> {
-    /// A number that neither variable changes.
+    /// A constant, with derivatives zero.
     #[inline(always)]
     pub fn constant(value: R) -> Self {
         Self { value, slope: [R::ZERO; 2], hessian: [R::ZERO; 3] }
@@ -28,7 +28,7 @@ impl<R: Real> Jet<R> {
     /// The variable x (0) or y (1) itself.
     ///
     /// # Panics
-    /// If `direction` is neither.
+    /// If `direction` is neither 0 nor 1.
     #[inline(always)]
     pub fn variable(value: R, direction: usize) -> Self {
         let mut slope = [R::ZERO; 2];
@@ -36,7 +36,7 @@ impl<R: Real> Jet<R> {
         Self { value, slope, hessian: [R::ZERO; 3] }
     }
 
-    /// The product with a number that neither variable changes.
+    /// The product with a constant.
     #[inline(always)]
     #[must_use]
     pub fn scaled(self, factor: R) -> Self {
@@ -231,7 +231,7 @@ mod tests {
 
     type Nested = Dual<Dual<f64, 2>, 2>;
 
-    /// Something with every operation in it.
+    /// A formula with every operation.
     fn formula<R: Real>(x: R, y: R) -> R {
         let a = x * y + x.sqrt() / (y * y - x);
         let mut b = (a * a + R::TWO).sqrt() - y / a;

@@ -1,13 +1,13 @@
-//! Vector instructions chosen at run time.
+//! Vector instructions, selected at run time.
 //!
-//! A plain build may use only what every processor of the target has. The same loop compiled once
-//! more for wider registers is two to four times as fast, so the hot loops run inside [`run_vectorized`].
-//! Nothing in them is contracted or reordered: every width gives the same bits.
+//! A plain build may use only the instructions that every processor of the target has. The same loop
+//! compiled for wider registers is two to four times as fast, so the hot loops run inside
+//! [`run_vectorized`]. Nothing in them is contracted or reordered: every width gives the same bits.
 
-/// How many lanes the vector instructions have.
+/// The width of vector instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SimdWidth {
-    /// What every processor of the target has.
+    /// The instructions that every processor of the target has.
     Baseline,
     /// AVX2: 256 bits.
     Bits256,
@@ -16,7 +16,7 @@ pub enum SimdWidth {
 }
 
 impl SimdWidth {
-    /// The widest that this processor has.
+    /// The largest width of this processor.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -35,8 +35,8 @@ impl SimdWidth {
     }
 }
 
-/// Runs `work`, compiled for the widest lanes that the processor has, `width` at most. It must be
-/// a closure marked `#[inline(always)]` that calls only such functions, or nothing is gained.
+/// Runs `work`, compiled for the largest width of the processor up to `width`. It must be a closure
+/// marked `#[inline(always)]` that calls only such functions, or nothing is gained.
 #[expect(
     unsafe_code,
     reason = "measured: 940 against 220 million ray-surfaces a second; see `measure trace`"

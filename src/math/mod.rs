@@ -1,4 +1,4 @@
-//! Numbers without optics.
+//! Numbers and their calculus, without optics.
 //!
 //! The physics is written once over the trait [`Real`]: `f64` gives a ray, `f32` a fast preview,
 //! a [`Dual`] a derivative, a dual of duals a second derivative, a [`Jet`] all second derivatives by

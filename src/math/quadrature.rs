@@ -15,7 +15,7 @@ pub fn gauss_legendre(count: usize, from: f64, to: f64) -> Vec<(f64, f64)> {
     (0..count).map(node).collect()
 }
 
-/// The zero number `i`, counted from the largest, of the Legendre polynomial, with its weight.
+/// The zero of the Legendre polynomial with index `i`, from the largest down, and its weight.
 fn legendre_zero(count: usize, i: usize) -> (f64, f64) {
     let n = count as f64;
     let mut x = (PI * (i as f64 + 0.75) / (n + 0.5)).cos();

@@ -1,11 +1,11 @@
-//! The number type that the physics is written over.
+//! The trait of the number types over which the physics is written.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// A real number, or something that behaves like one and carries derivatives along.
+/// A real number, with or without derivatives.
 ///
-/// Comparisons look at the value alone, so a [`Dual`](super::Dual) takes the path of the plain
+/// Comparisons regard the value alone, so that a [`Dual`](super::Dual) takes the same path as the plain
 /// number.
 pub trait Real:
     Copy
@@ -33,7 +33,7 @@ pub trait Real:
     /// The distance from one to the next larger number.
     const EPSILON: f64;
 
-    /// How many derivatives it carries along: 0 for a plain number.
+    /// The order of the derivatives: 0 for a plain number.
     const ORDER: usize;
 
     /// The number nearest to `value`, with no derivative.
@@ -42,7 +42,7 @@ pub trait Real:
     /// The value alone, without derivatives.
     fn value(self) -> f64;
 
-    /// The square root; not a number for a negative argument.
+    /// The square root; NaN for a negative argument.
     #[must_use]
     fn sqrt(self) -> Self;
 
@@ -53,14 +53,14 @@ pub trait Real:
         Self::select(self < Self::ZERO, -self, self)
     }
 
-    /// `yes` where the condition holds, else `no`: a choice that a vector of rays can make too.
+    /// `yes` if the condition is true, else `no`: a choice that vector instructions can make too.
     #[inline(always)]
     #[must_use]
     fn select(condition: bool, yes: Self, no: Self) -> Self {
         if condition { yes } else { no }
     }
 
-    /// Whether the value and every derivative are finite.
+    /// True if the value and every derivative are finite.
     fn is_finite(self) -> bool;
 }
 

@@ -1,6 +1,6 @@
-//! Numbers in messages.
+//! The format of numbers in messages.
 
-/// A number in a message: a very large or small one by its exponent, not by hundreds of digits.
+/// The text of a number; a very large or small one has an exponent instead of hundreds of digits.
 pub(crate) fn format_short(value: f64) -> String {
     let plain = value == 0.0 || (1e-4..1e9).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }

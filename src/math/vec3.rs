@@ -40,7 +40,7 @@ impl<R: Real> Vec3<R> {
         Vec3::new(self.x.value(), self.y.value(), self.z.value())
     }
 
-    /// Whether every component is finite.
+    /// True if every component is finite.
     pub fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite() && self.z.is_finite()
     }

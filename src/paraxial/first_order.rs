@@ -1,23 +1,23 @@
-//! Cardinal points, pupils, and the two rays from which all else follows.
+//! Cardinal points, pupils, marginal and chief ray.
 //!
 //! The rays `(y, nu) = (1, 0)` and `(0, 1)` in front of the lens are the columns of its matrix
-//! (Welford 1986, section 3.6). A ray that vanishes at the stop gives both pupils, and no case
-//! needs a special path: a pupil at infinity is a ray that leaves parallel to the axis.
+//! (Welford 1986, section 3.6). A ray with height zero at the stop gives both pupils without a special
+//! case: a pupil at infinity is a ray that leaves parallel to the axis.
 
 use super::ray::{ParaxialRay, paraxial_grins, paraxial_ray, signed_indices};
 use crate::lens::{Aperture, FieldKind, Lens, Object, System};
 use crate::math::Real;
 
-/// How a lens is used: from where the light comes, how wide the beam and how large the field is.
+/// The use of a lens: the position of the object, the system aperture and the size of the field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
-    /// Where the object is.
+    /// The position of the object.
     pub object: Object,
-    /// What limits the beam on the axis.
+    /// The system aperture.
     pub aperture: Aperture,
-    /// What the field is measured in.
+    /// The quantity that `edge` is.
     pub field: FieldKind,
-    /// The edge of the field, in degrees or mm as `field` says; the chief ray belongs to it.
+    /// The edge of the field, to which the chief ray belongs, in degrees or mm as `field` says.
     pub edge: f64,
 }
 
@@ -33,22 +33,22 @@ impl Beam {
     }
 }
 
-/// Why first-order data do not exist for a beam.
+/// A reason for which first-order data do not exist for a beam.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ParaxialError {
-    /// An infinitely distant pupil has no diameter.
+    /// The entrance pupil is at infinity and has no diameter.
     #[error(
         "the aperture is an entrance pupil diameter, but the entrance pupil is at infinity; \
          expected an object NA, an f-number or the semi-diameter of the stop"
     )]
     PupilAtInfinity,
-    /// The beam does not converge anywhere.
+    /// The lens is afocal, so that there is no f-number.
     #[error("the aperture is an f-number, but the lens focuses nothing")]
     Afocal,
-    /// No cone leads from the object point through the pupil.
-    #[error("the object lies in the plane of the entrance pupil; no beam starts there")]
+    /// The object lies in the plane of the entrance pupil.
+    #[error("the object lies in the plane of the entrance pupil, so that there is no beam")]
     ObjectInPupil,
-    /// A cone wider than a half space.
+    /// The object NA is not below the index of object space.
     #[error("the object NA is {na}, but the index there is {index}; expected a smaller NA")]
     NumericalAperture {
         /// The numerical aperture.
@@ -56,24 +56,24 @@ pub enum ParaxialError {
         /// The index in front of the lens.
         index: f64,
     },
-    /// The stop stands where the object is imaged, so that its size limits no beam.
-    #[error("the stop lies at an image of the object, so its size limits nothing")]
+    /// The stop lies at an image of the object, so that its size limits no beam.
+    #[error("the stop lies at an image of the object, so that its size does not limit the beam")]
     StopAtImage,
 }
 
-/// An image of the stop.
+/// The entrance or exit pupil: an image of the stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParaxialPupil<R> {
-    /// Where it is, in mm: the entrance pupil from the first vertex, the exit pupil from the last
-    /// vertex before the image; `None` at infinity (telecentric).
+    /// The position in mm, of the entrance pupil from the first vertex, of the exit pupil from the
+    /// last vertex before the image; `None` at infinity (telecentric).
     pub position: Option<R>,
-    /// Its diameter in mm; `None` at infinity.
+    /// The diameter in mm; `None` at infinity.
     pub diameter: Option<R>,
 }
 
 /// The first-order data of a lens at one wavelength.
 ///
-/// What does not exist is `None`: the focal length of an afocal lens, the position of a pupil at
+/// Data that do not exist are `None`: the focal length of an afocal lens, the position of a pupil at
 /// infinity, the magnification of an object at infinity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstOrder<R> {
@@ -89,43 +89,44 @@ pub struct FirstOrder<R> {
     pub front_principal_plane: Option<R>,
     /// The rear principal plane, from the last vertex before the image in mm.
     pub rear_principal_plane: Option<R>,
-    /// The stop as seen from the object.
+    /// The entrance pupil: the stop as seen from the object.
     pub entrance_pupil: ParaxialPupil<R>,
-    /// The stop as seen from the image.
+    /// The exit pupil: the stop as seen from the image.
     pub exit_pupil: ParaxialPupil<R>,
     /// The height of the marginal ray at the stop, in mm, not negative.
     pub stop_semi_diameter: R,
-    /// Focal length over entrance pupil diameter.
+    /// The f-number: focal length over entrance pupil diameter.
     pub f_number: Option<R>,
-    /// One over twice the image-space numerical aperture `n'u'` of the marginal ray.
+    /// The working f-number: the reciprocal of twice the image-space numerical aperture `n'u'` of the
+    /// marginal ray.
     pub working_f_number: Option<R>,
     /// The paraxial image, from the last vertex before the image in mm.
     pub paraxial_image: Option<R>,
-    /// How far behind the paraxial image the image plane stands, in mm.
+    /// The distance from the paraxial image to the image plane, in mm.
     pub image_defocus: Option<R>,
-    /// Image height over object height; `None` for an object at infinity.
+    /// The magnification: image height over object height; `None` for an object at infinity.
     pub magnification: Option<R>,
     /// The Lagrange invariant `n (ū y − u ȳ)`, in mm.
     pub lagrange: Option<R>,
-    /// The Petzval sum `Σ (n' − n) c / (n n')`, less `∫ 2 n₁/n² dz` where a gradient
-    /// `n = n₀ + n₁ r²` fills a gap (Marchand 1978, chapter 9), in 1/mm.
+    /// The Petzval sum `Σ (n' − n) c / (n n')` in 1/mm, less `∫ 2 n₁/n² dz` in every GRIN medium
+    /// `n = n₀ + n₁ r²` (Marchand 1978, chapter 9).
     pub petzval_sum: R,
-    /// The ray from the axial object point past the rim of the stop.
+    /// The marginal ray, from the axial object point through the rim of the stop.
     pub marginal: ParaxialRay<R>,
-    /// The ray from the edge of the field through the centre of the stop; `None` where none
-    /// exists: a field of 90 degrees or more, or a collimated beam and a pupil at infinity.
+    /// The chief ray, from the edge of the field through the centre of the stop; `None` for a field of
+    /// 90 degrees or more, or for a collimated beam and a pupil at infinity.
     pub chief: Option<ParaxialRay<R>>,
 }
 
 /// The matrix of a lens from its first vertex to every surface, as two rays.
 struct TransferRays<R> {
-    /// `(y, nu) = (1, 0)`.
+    /// The ray with `(y, nu) = (1, 0)`.
     parallel: ParaxialRay<R>,
-    /// `(y, nu) = (0, 1)`.
+    /// The ray with `(y, nu) = (0, 1)`.
     slanted: ParaxialRay<R>,
     /// The signed index in front of the lens.
     index: R,
-    /// The signed index behind it.
+    /// The signed index behind the lens.
     index_behind: R,
     stop: usize,
     /// The last surface before the image.
@@ -150,7 +151,7 @@ impl<R: Real> TransferRays<R> {
         -(self.index_behind * self.parallel.slopes[self.last])
     }
 
-    /// The entrance pupil, from the first vertex.
+    /// The position of the entrance pupil, from the first vertex; `None` at infinity.
     fn entrance(&self) -> Option<R> {
         let height = self.parallel.heights[self.stop];
         (height.value() != 0.0).then(|| self.index * self.slanted.heights[self.stop] / height)
@@ -161,17 +162,17 @@ impl<R: Real> TransferRays<R> {
         y * self.parallel.heights[self.stop] + self.index * u * self.slanted.heights[self.stop]
     }
 
-    /// The slope of this ray behind the lens.
+    /// The slope behind the lens of the ray with this height and slope in front of it.
     fn slope_behind(&self, (y, u): (R, R)) -> R {
         y * self.parallel.slopes[self.last] + self.index * u * self.slanted.slopes[self.last]
     }
 
-    /// The height of this ray in the entrance pupil, if that is not at infinity.
+    /// The height of the ray in the entrance pupil; `None` at infinity.
     fn height_in_pupil(&self, (y, u): (R, R)) -> Option<R> {
         self.entrance().map(|z| y + z * u)
     }
 
-    /// The factor that makes the axial ray the marginal one.
+    /// The factor that scales the axial ray to the marginal ray.
     fn marginal_scale(&self, beam: &Beam) -> Result<R, ParaxialError> {
         let ray = unscaled_marginal(beam.object);
         let pupil = self.height_in_pupil(ray);
@@ -227,16 +228,14 @@ impl<R: Real> TransferRays<R> {
         self.entrance().map(|z| (-(z * slope), slope))
     }
 
-    /// The chief ray of an object point at a height; parallel to the axis if the pupil is at
-    /// infinity.
+    /// The chief ray of an object point at a height, parallel to the axis for a pupil at infinity.
     fn off_axis(&self, distance: f64, height: R) -> Option<(R, R)> {
         let Some(pupil) = self.entrance() else { return Some((height, R::ZERO)) };
         let reach = R::from_f64(distance) + pupil;
         (reach.value() != 0.0).then(|| (height * pupil / reach, -(height / reach)))
     }
 
-    /// Image height over object height; `None` where the image lies at infinity or at the object's
-    /// own principal plane.
+    /// Image height over object height; `None` for an image at infinity.
     fn magnification(&self, distance: f64) -> Option<R> {
         let behind =
             self.index_behind * self.slope_behind(unscaled_marginal(Object::Finite(distance)));
@@ -244,7 +243,7 @@ impl<R: Real> TransferRays<R> {
     }
 }
 
-/// The height at the first vertex and the slope of the marginal ray, but for a factor.
+/// The height at the first vertex and the slope of the marginal ray, up to a factor.
 fn unscaled_marginal<R: Real>(object: Object) -> (R, R) {
     match object {
         Object::Infinity => (R::ONE, R::ZERO),
@@ -256,11 +255,11 @@ fn nonzero<R: Real>(value: R, otherwise: ParaxialError) -> Result<(), ParaxialEr
     if value.value() == 0.0 { Err(otherwise) } else { Ok(()) }
 }
 
-/// The first-order data of a lens for a beam. A system without a marked stop has it at its first
-/// surface; the last surface is the image plane.
+/// The first-order data of a lens for a beam. The first surface is the stop of a system without a
+/// marked stop; the last surface is the image plane.
 ///
 /// # Errors
-/// Where the aperture has no meaning for the lens: see [`ParaxialError`].
+/// An aperture that does not define a beam for the lens; see [`ParaxialError`].
 pub fn first_order<R: Real>(
     system: &System<R>,
     beam: &Beam,
@@ -322,7 +321,7 @@ fn entrance_pupil<R: Real>(basis: &TransferRays<R>, marginal: (R, R)) -> Paraxia
     ParaxialPupil { position: basis.entrance(), diameter }
 }
 
-/// The exit pupil from a ray that vanishes at the stop.
+/// The exit pupil, from a ray with height zero at the stop.
 fn exit_pupil<R: Real>(
     basis: &TransferRays<R>,
     system: &System<R>,
@@ -338,15 +337,15 @@ fn exit_pupil<R: Real>(
 
 fn petzval_sum<R: Real>(system: &System<R>) -> R {
     let indices = signed_indices(system);
-    let slabs = paraxial_grins(system);
+    let gaps = paraxial_grins(system);
     let (mut sum, mut n) = (R::ZERO, indices[0]);
     for (i, surface) in system.surfaces.iter().enumerate() {
         let behind = indices[i + 1];
         sum += (behind - n) * surface.shape.curvature() / (n * behind);
         n = behind;
-        if let Some(Some(slab)) = slabs.get(i) {
-            sum += slab.petzval;
-            n = slab.index_behind;
+        if let Some(Some(gap)) = gaps.get(i) {
+            sum += gap.petzval;
+            n = gap.index_behind;
         }
     }
     sum

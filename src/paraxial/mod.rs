@@ -1,12 +1,12 @@
-//! First-order optics: what a lens does to rays close to its axis.
+//! First-order optics: the imaging of a lens by rays close to its axis.
 //!
-//! Two rays say everything: a marginal one from the axial object point past the rim of the stop,
-//! and a chief one from the edge of the field through its centre. Cardinal points, pupils and the
-//! third-order sums follow. After Welford, *Aberrations of Optical Systems* (1986), chapters 3, 6
+//! Two rays determine all results: the marginal ray, from the axial object point through the rim of
+//! the stop, and the chief ray, from the edge of the field through its centre. Cardinal points, pupils
+//! and the third-order sums follow from them. After Welford, *Aberrations of Optical Systems* (1986), chapters 3, 6
 //! and 8.
 //!
-//! Sign conventions are Welford's: slopes `u = dy/dz`, and the index counts negative after an odd
-//! number of mirrors, so that one formula serves lenses and mirrors. Everything is written over
+//! Sign conventions are Welford's: slopes are `u = dy/dz`, and the index is negative behind an odd
+//! number of mirrors, so that one formula holds for lenses and mirrors. Everything is written over
 //! [`Real`](crate::math::Real), so that a dual yields the derivative of a focal length.
 
 mod first_order;

@@ -1,6 +1,6 @@
-//! A ray close to the axis: refraction `n'u' = nu − y (n' − n) c`, transfer `y⁺ = y + t u'`
-//! (Welford 1986, equations 3.11 and 3.12), or the matrix of the [`ParaxialGrin`] of a gradient, whose
-//! indices are those on the axis at the two faces.
+//! Paraxial rays: refraction `n'u' = nu − y (n' − n) c` and transfer `y⁺ = y + t u'` (Welford 1986,
+//! equations 3.11 and 3.12), or the matrix of a GRIN medium ([`ParaxialGrin`]), whose indices are those
+//! on the axis at its two surfaces.
 
 use crate::lens::{ParaxialGrin, System};
 use crate::math::Real;
@@ -16,8 +16,7 @@ pub struct ParaxialRay<R> {
     pub slopes: Vec<R>,
 }
 
-/// The index of every gap, the space in front of the first surface first; negative after an odd
-/// number of mirrors.
+/// The index of every gap, starting with object space; negative behind an odd number of mirrors.
 pub fn signed_indices<R: Real>(system: &System<R>) -> Vec<R> {
     let mut sense = R::ONE;
     let mut indices = Vec::with_capacity(system.surfaces.len() + 1);
@@ -31,7 +30,7 @@ pub fn signed_indices<R: Real>(system: &System<R>) -> Vec<R> {
     indices
 }
 
-/// The gradients of the gaps, for paraxial rays; none for a lens of glass.
+/// The first-order optics of the GRIN media in the gaps; empty for a lens without any.
 pub(super) fn paraxial_grins<R: Real>(system: &System<R>) -> Vec<Option<ParaxialGrin<R>>> {
     if !system.has_grin() {
         return Vec::new();
@@ -47,7 +46,7 @@ pub(super) fn paraxial_grins<R: Real>(system: &System<R>) -> Vec<Option<Paraxial
 /// The paraxial ray that meets the vertex plane of the first surface at `height` with `slope`.
 pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> ParaxialRay<R> {
     let indices = signed_indices(system);
-    let slabs = paraxial_grins(system);
+    let gaps = paraxial_grins(system);
     let mut before = indices[0];
     let count = system.surfaces.len();
     let (mut heights, mut slopes) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -57,9 +56,9 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
         nu -= y * (indices[i + 1] - before) * surface.shape.curvature();
         let u = nu / indices[i + 1];
         slopes.push(u);
-        if let Some(Some(slab)) = slabs.get(i) {
-            (y, nu) = slab.transfer(y, nu);
-            before = slab.index_behind;
+        if let Some(Some(gap)) = gaps.get(i) {
+            (y, nu) = gap.transfer(y, nu);
+            before = gap.index_behind;
         } else {
             y += surface.thickness * u;
             before = indices[i + 1];
@@ -69,7 +68,7 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
 }
 
 impl<R: Real> ParaxialRay<R> {
-    /// The same ray with every height and slope multiplied.
+    /// The same ray with every height and slope multiplied by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: R) -> Self {
         Self {
@@ -84,8 +83,8 @@ impl<R: Real> ParaxialRay<R> {
         if surface == 0 { self.start_slope } else { self.slopes[surface - 1] }
     }
 
-    /// Where the ray behind a surface crosses the axis, from that surface's vertex in mm; `None`
-    /// where it runs parallel to the axis.
+    /// The position at which the ray behind a surface crosses the axis, in mm from the vertex of that
+    /// surface; `None` if the ray is parallel to the axis.
     pub fn crossing(&self, surface: usize) -> Option<R> {
         let (y, u) = (self.heights[surface], self.slopes[surface]);
         (u.value() != 0.0).then(|| -(y / u))

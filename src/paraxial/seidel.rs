@@ -3,8 +3,8 @@
 //! With `A = n (u + y c)`, `Ā = n (ū + ȳ c)` and `Δ` the difference behind minus in front:
 //! `S₁ = −A² y Δ(u/n)`, `S₂ = −A Ā y Δ(u/n)`, `S₃ = −Ā² y Δ(u/n)`, `S₄ = −H² c Δ(1/n)`, and
 //! `S₅ = Ā (c Δ(1/n) ȳ (Ā y + H) − Ā² y Δ(1/n²))`, which is `Ā (S₃ + S₄) / A` without the
-//! division. A figured surface adds `8 a Δn` times `y⁴, y³ȳ, y²ȳ², yȳ³`, where `a` is what its
-//! r⁴ term has beyond the sphere's.
+//! division. An aspheric surface adds `8 a Δn` times `y⁴, y³ȳ, y²ȳ², yȳ³`, where `a` is the excess of
+//! its r⁴ term over that of the sphere.
 
 use super::first_order::FirstOrder;
 use super::ray::signed_indices;
@@ -49,16 +49,16 @@ impl<R: Real> SeidelSums<R> {
 /// The third-order sums of a lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seidel<R> {
-    /// One entry a surface, without the image plane.
+    /// The sums of each surface, without the image plane.
     pub surfaces: Vec<SeidelSums<R>>,
-    /// Their sum.
+    /// The sums of the lens.
     pub total: SeidelSums<R>,
 }
 
 /// The third-order sums along the marginal and chief ray of `data`, which belongs to `system`.
 /// `outer` is the same lens at the shortest and the longest wavelength; without it the chromatic
-/// sums are zero. `None` where there is no chief ray, and for a lens with a gradient, whose own
-/// third-order sums are not known here.
+/// sums are zero. `None` without a chief ray, and for a lens with a GRIN medium, whose third-order
+/// contributions are not implemented.
 pub fn seidel<R: Real>(
     system: &System<R>,
     data: &FirstOrder<R>,
@@ -75,7 +75,7 @@ pub fn seidel<R: Real>(
         let surface = &system.surfaces[i];
         let c = surface.shape.curvature();
         let (y, y_chief) = (data.marginal.heights[i], chief.heights[i]);
-        let meeting = SurfaceHeights {
+        let heights = SurfaceHeights {
             n,
             behind,
             c,
@@ -86,7 +86,7 @@ pub fn seidel<R: Real>(
             lagrange,
         };
         let colour = spread[i + 1] - spread[i];
-        meeting.sums(figuring(surface), colour)
+        heights.sums(figuring(surface), colour)
     };
     let surfaces: Vec<_> = (0..system.surfaces.len().saturating_sub(1)).map(at).collect();
     let total = surfaces.iter().fold(SeidelSums::default(), SeidelSums::plus);
@@ -104,13 +104,13 @@ fn relative_dispersions<R: Real>(
     (0..indices.len()).map(gap).collect()
 }
 
-/// What the r⁴ term of a surface has beyond that of the sphere with its curvature.
+/// The excess of the r⁴ term of a surface over that of the sphere with its curvature.
 fn figuring<R: Real>(surface: &Surface<R>) -> R {
     let (c, conic, terms) = surface.shape.numbers();
     conic * c * c * c * R::from_f64(0.125) + terms[0]
 }
 
-/// The two rays at one surface.
+/// The marginal and the chief ray at one surface.
 struct SurfaceHeights<R> {
     n: R,
     behind: R,

@@ -1,10 +1,10 @@
-//! Where a ray first crosses an even asphere.
+//! The first intersection of a ray with an even asphere.
 //!
-//! Newton's iteration from the conic alone is not safe: it can jump to another crossing of a waved
-//! surface, or leave the domain. It is trusted where the surface is nowhere steep enough to be
-//! crossed twice. Elsewhere the crossings are isolated: an interval of the ray whose end heights
-//! are too large for the steepest slope inside it holds none, one on which the height is monotone
-//! holds at most one, and everything else is halved.
+//! Newton's iteration from the conic alone is not safe: it can jump to another crossing of a wavy
+//! surface, or leave the domain. Its result is trusted if the surface is nowhere steep enough to be
+//! crossed twice. Otherwise the crossings are isolated: an interval of the ray whose end heights are
+//! too large for the steepest slope inside it contains none, one on which the height is monotone
+//! contains at most one, and any other interval is halved.
 
 use super::interface::Interface;
 use crate::lens::Shape;
@@ -12,9 +12,8 @@ use crate::math::Real;
 use crate::math::Vec3;
 
 /// A bound of the slope `|dz/dr|` of an asphere within `radius` of the axis, at most a few percent
-/// above the slope itself; infinite where there is none.
-///
-/// The slope at the middle of each of some intervals, and what it can change by inside.
+/// above the largest slope; infinite if there is none. It is the slope at the middle of each of
+/// several intervals plus a bound of its change inside.
 pub(super) fn slope_bound<R: Real>(shape: &Shape<R>, radius: f64) -> f64 {
     let Shape::Asphere { curvature, conic, terms } = shape else { return 0.0 };
     slope_bound_between(
@@ -26,7 +25,8 @@ pub(super) fn slope_bound<R: Real>(shape: &Shape<R>, radius: f64) -> f64 {
     )
 }
 
-/// Between which heights an asphere lies within `radius` of the axis; infinite without a bound.
+/// A lower and an upper bound of the sag of an asphere within `radius` of the axis, in mm; infinite if
+/// there is none.
 pub(super) fn sag_range<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
     let Shape::Asphere { curvature, conic, terms } = shape else { return (0.0, 0.0) };
     let (c, conic, terms) = (curvature.value(), conic.value(), terms.map(Real::value));
@@ -44,7 +44,7 @@ pub(super) fn sag_range<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
     (low, high)
 }
 
-/// A bound of the slope between two distances from the axis, from some intervals of them.
+/// A bound of the slope between two distances from the axis, from a number of intervals.
 fn slope_bound_between(
     c: f64,
     conic: f64,
@@ -52,17 +52,17 @@ fn slope_bound_between(
     (from, to): (f64, f64),
     intervals: u32,
 ) -> f64 {
-    let (mut steepest, width): (f64, f64) = (0.0, (to - from) / f64::from(intervals));
+    let (mut bound, width): (f64, f64) = (0.0, (to - from) / f64::from(intervals));
     for i in 0..intervals {
         let start = from + f64::from(i) * width;
         let change = 0.5 * width * second_derivative_bound(c, conic, terms, start + width);
-        // `max` would forget what is not a number.
+        // `max` would ignore NaN.
         if !change.is_finite() {
             return f64::INFINITY;
         }
-        steepest = steepest.max(slope_at(c, conic, terms, start + 0.5 * width).abs() + change);
+        bound = bound.max(slope_at(c, conic, terms, start + 0.5 * width).abs() + change);
     }
-    steepest
+    bound
 }
 
 /// `dz/dr` at a distance from the axis.
@@ -80,7 +80,7 @@ fn second_derivative_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f6
     if !(radicand > 0.0 && radius.is_finite()) {
         return f64::INFINITY;
     }
-    // Where the conic flattens outwards it bends most at the vertex.
+    // A conic that flattens outwards has its largest second derivative at the vertex.
     let least = radicand.min(1.0);
     let mut bound = c.abs() / (least * least.sqrt());
     let mut power = r2;
@@ -92,7 +92,7 @@ fn second_derivative_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f6
 }
 
 impl<R: Real> Interface<R> {
-    /// The square of the distance from the axis within which the conic exists and nothing clips.
+    /// The square of the distance from the axis up to which the conic exists and nothing is clipped.
     #[inline(always)]
     fn usable_radius2(&self) -> R {
         let square = (R::ONE + self.conic) * self.curvature * self.curvature;
@@ -101,7 +101,7 @@ impl<R: Real> Interface<R> {
     }
 }
 
-/// A ray against one asphere, in plain numbers.
+/// A ray and an asphere, in plain numbers.
 struct RayAtAsphere {
     surface: Interface<f64>,
     p: Vec3<f64>,
@@ -110,20 +110,20 @@ struct RayAtAsphere {
     across: f64,
     /// `p·k` across the axis.
     slant: f64,
-    /// Where on the ray it starts.
+    /// The parameter along `k` of the start of the ray.
     start: f64,
 }
 
-/// Where some rays cross an asphere, as far as Newton's iteration can be trusted.
+/// The crossings of rays with an asphere by Newton's iteration, and whether they can be trusted.
 pub(super) struct NewtonResult<R, const W: usize> {
-    /// How far along `k`.
+    /// The parameters along `k`.
     pub(super) s: [R; W],
-    /// 1 where this is the only crossing inside the semi-diameter, else 0: a number of the same
-    /// width as the others, so that the lanes need no conversion.
+    /// 1 if this is the only crossing inside the semi-diameter, else 0; a number of the same width as
+    /// the others, so that the vector instructions need no conversion.
     pub(super) trusted: [R; W],
 }
 
-/// Points of rays and their optical directions, as columns.
+/// Points of rays and optical directions, as columns.
 pub(super) struct RayStarts<R, const W: usize> {
     columns: [[R; W]; 6],
 }
@@ -147,8 +147,8 @@ impl<R: Real, const W: usize> RayStarts<R, W> {
     }
 }
 
-/// Newton's iteration from the conic, or from the vertex plane where that is missed. Each ray stops
-/// by itself, so that it does not matter which others are beside it.
+/// Newton's iteration from the conic, or from the vertex plane for a ray that misses the conic. Each
+/// ray stops on its own, so that its result does not depend on the other rays.
 #[inline(always)]
 pub(super) fn newton_crossings<R: Real, const W: usize>(
     surface: &Interface<R>,
@@ -178,27 +178,27 @@ pub(super) fn newton_crossings<R: Real, const W: usize>(
             break;
         }
     }
-    let steepest = R::from_f64(surface.slope_bound);
-    let steepest2 = steepest * steepest;
+    let bound = R::from_f64(surface.slope_bound);
+    let bound2 = bound * bound;
     let trusted = std::array::from_fn(|j| {
         let (p, k) = rays.get(j);
         let point = p + k * s[j];
         let across2 = k.x * k.x + k.y * k.y;
         // A ray along the axis crosses a graph once, however steep that may be elsewhere.
-        let unique = (across2 == R::ZERO) | (steepest2 * across2 < k.z * k.z);
+        let unique = (across2 == R::ZERO) | (bound2 * across2 < k.z * k.z);
         let inside = point.x * point.x + point.y * point.y <= surface.usable_radius2();
         R::select(unique & inside & !(moving[j] > R::ZERO), R::ONE, R::ZERO)
     });
     NewtonResult { s, trusted }
 }
 
-/// Steps of Newton's iteration before a crossing is isolated instead.
+/// The number of steps of Newton's iteration before a crossing is isolated instead.
 const NEWTON_STEPS: usize = 10;
 
-/// How far along `k` the ray first crosses the surface in its sense of travel: inside the
-/// semi-diameter if it does so there, else outside; `None` where it never does.
+/// The parameter along `k` of the first crossing of the surface in the sense of travel: inside the
+/// semi-diameter if there is one, else outside; `None` if there is none.
 ///
-/// `p` is any point of the ray, and the ray starts at `p + start k`.
+/// `p` is any point of the ray, which starts at `p + start k`.
 pub(super) fn find_crossing(
     surface: Interface<f64>,
     p: Vec3<f64>,
@@ -211,7 +211,7 @@ pub(super) fn find_crossing(
     if quick.trusted[0] > 0.0 { Some(quick.s[0]) } else { isolate_crossing(surface, p, k, start) }
 }
 
-/// The same by isolating the crossings.
+/// As [`find_crossing`], by isolating the crossings.
 pub(super) fn isolate_crossing(
     surface: Interface<f64>,
     p: Vec3<f64>,
@@ -236,13 +236,13 @@ pub(super) fn isolate_crossing(
 }
 
 impl RayAtAsphere {
-    /// Beyond this distance from the axis the conic does not exist.
+    /// The distance from the axis up to which the conic exists.
     fn domain_radius(&self) -> f64 {
         let square = (1.0 + self.surface.conic) * self.surface.curvature.powi(2);
         if square > 0.0 { 1.0 / square.sqrt() } else { f64::INFINITY }
     }
 
-    /// A distance from the axis within which an unlimited surface is searched.
+    /// The distance from the axis up to which an unlimited surface is searched.
     fn search_radius(&self) -> f64 {
         let start = self.p.x.hypot(self.p.y);
         let at_vertex_plane =
@@ -255,8 +255,8 @@ impl RayAtAsphere {
         x * x + y * y
     }
 
-    /// A bound of the slope of the surface along a part of the ray, which is within `radius`.
-    fn steepest(&self, from: f64, to: f64, radius: f64) -> f64 {
+    /// A bound of the slope of the surface along a part of the ray that lies within `radius`.
+    fn bound(&self, from: f64, to: f64, radius: f64) -> f64 {
         let nearest = (-self.slant / (self.across * self.across)).max(from).min(to);
         let low = if nearest.is_finite() { self.r2(nearest).sqrt() } else { 0.0 };
         let high = self.r2(from).max(self.r2(to)).sqrt().min(radius);
@@ -265,7 +265,7 @@ impl RayAtAsphere {
         slope_bound_between(surface.curvature, surface.conic, &surface.terms, range, 2)
     }
 
-    /// Height of the surface above the ray, and its slope along the ray.
+    /// The height of the surface above the ray, and its derivative along the ray.
     fn height(&self, s: f64) -> (f64, f64) {
         let (z, dz_dr2) = self.surface.sag(self.r2(s));
         let along = self.slant + s * self.across * self.across;
@@ -277,8 +277,8 @@ impl RayAtAsphere {
         (self.p.x.abs() + self.p.y.abs() + self.p.z.abs()) / k
     }
 
-    /// The first crossing within `radius` of the axis and between two heights, behind the start of
-    /// the ray, or else the last one in front of it.
+    /// The first crossing behind the start of the ray, or else the last one in front of it, within
+    /// `radius` of the axis and between two heights.
     fn first_crossing(&self, radius: f64, heights: (f64, f64)) -> Option<f64> {
         let (from, to) = self.part_within(radius)?;
         let (low, high) = self.part_between(heights);
@@ -307,7 +307,7 @@ impl RayAtAsphere {
         })
     }
 
-    /// The part of the ray between two heights, a little more for rounding.
+    /// The part of the ray between two heights, with a margin for rounding.
     fn part_between(&self, (low, high): (f64, f64)) -> (f64, f64) {
         let (a, b) = ((low - self.p.z) / self.k.z, (high - self.p.z) / self.k.z);
         let slack = 1e-9 * (a.abs() + b.abs() + self.scale());
@@ -327,7 +327,7 @@ impl RayAtAsphere {
         IntervalEnd { s, height: self.surface.sense * self.height(s).0 }
     }
 
-    /// The crossing between two points of opposite height, by Newton's iteration kept inside.
+    /// The crossing between two points with heights of opposite sign, by a bracketed Newton's iteration.
     fn solve_bracketed(&self, mut above: f64, mut below: f64) -> f64 {
         let mut s = 0.5 * (above + below);
         for _ in 0..200 {
@@ -349,14 +349,14 @@ impl RayAtAsphere {
     }
 }
 
-/// Which crossing of an interval is wanted.
+/// The choice among the crossings in an interval.
 #[derive(Clone, Copy, PartialEq)]
 enum CrossingChoice {
     First,
     Last,
 }
 
-/// A search for one crossing within some distance of the axis.
+/// A search for one crossing within `radius` of the axis.
 struct CrossingSearch<'a> {
     problem: &'a RayAtAsphere,
     radius: f64,
@@ -365,12 +365,12 @@ struct CrossingSearch<'a> {
 }
 
 impl CrossingSearch<'_> {
-    /// A crossing from above between two points, by halving what cannot be decided.
+    /// A crossing from above between two points; halves intervals that cannot be decided.
     fn isolate(&mut self, from: IntervalEnd, to: IntervalEnd) -> Option<f64> {
         self.budget = self.budget.checked_sub(1)?;
         let problem = self.problem;
         let width = to.s - from.s;
-        let steep = problem.steepest(from.s, to.s, self.radius) * problem.across;
+        let steep = problem.bound(from.s, to.s, self.radius) * problem.across;
         let monotone = steep < problem.k.z.abs();
         let same_side = (from.height > 0.0) == (to.height > 0.0);
         let reach = (problem.k.z.abs() + steep) * width;
@@ -392,12 +392,12 @@ impl CrossingSearch<'_> {
     }
 }
 
-/// An end of an interval of the ray, with the signed height above the ray there.
+/// An end of an interval of the ray, with the signed height of the surface above the ray.
 #[derive(Clone, Copy)]
 struct IntervalEnd {
     s: f64,
     height: f64,
 }
 
-/// How many intervals are looked at before the search gives up.
+/// The number of intervals after which the search fails.
 const MAX_INTERVALS: u32 = 20_000;

@@ -1,15 +1,15 @@
-//! Many rays at once: the same step over blocks of rays, in the widest lanes of this processor.
+//! Tracing many rays at once, in blocks, with the widest vector instructions of the processor.
 //!
-//! Rays travel in blocks that stay in the first-level cache through all surfaces. The loop over a
-//! block has no branch on a ray, so the compiler turns it into vector instructions; it is compiled
-//! once for each width and the widest that the processor has is chosen at run time. Nothing is
-//! contracted or reordered, so every width, every number of threads and the single ray give the
-//! same bits.
+//! A block of rays stays in the first-level cache through all surfaces. The loop over a block has no
+//! branch on a ray, so that the compiler turns it into vector instructions; it is compiled for each
+//! width, and the widest that the processor has is selected at run time. Nothing is contracted or
+//! reordered, so that every width, every number of threads and the single ray give the same bits.
+//! GRIN media are the exception: there every ray takes steps of its own.
 
 use super::asphere;
 use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
-use super::graded::PropagatedRay;
 use super::interface::{Interface, Intersection, Refraction, SurfaceForm};
+use super::propagation::PropagatedRay;
 use super::single::{Ray, optical_direction};
 use super::{Fates, Tracer};
 use crate::lens::SystemError;
@@ -18,46 +18,46 @@ use crate::math::Vec3;
 use crate::math::{SimdWidth, run_vectorized};
 use rayon::prelude::*;
 
-/// Rays in a block.
+/// The number of rays in a block.
 pub(super) const BLOCK: usize = 64;
-/// Rays that one task traces when all cores work.
+/// The number of rays of one parallel task.
 pub(super) const CHUNK: usize = 64 * BLOCK;
 
 /// Rays as columns, each starting in the frame of the first vertex.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rays<R> {
-    /// Start, in mm.
+    /// The x coordinates of the starts, in mm.
     pub x: Vec<R>,
-    /// Start, in mm.
+    /// The y coordinates of the starts, in mm.
     pub y: Vec<R>,
-    /// Start, in mm.
+    /// The z coordinates of the starts, in mm.
     pub z: Vec<R>,
-    /// Direction cosine.
+    /// The direction cosines along x.
     pub l: Vec<R>,
-    /// Direction cosine.
+    /// The direction cosines along y.
     pub m: Vec<R>,
-    /// Direction cosine.
+    /// The direction cosines along z.
     pub n: Vec<R>,
 }
 
 impl<R: Real> Rays<R> {
-    /// No rays, with room for some.
+    /// No rays, with capacity for `count`.
     pub fn with_capacity(count: usize) -> Self {
         let column = || Vec::with_capacity(count);
         Self { x: column(), y: column(), z: column(), l: column(), m: column(), n: column() }
     }
 
-    /// How many there are.
+    /// The number of rays.
     pub fn len(&self) -> usize {
         self.x.len()
     }
 
-    /// Whether there are none.
+    /// True if there are no rays.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }
 
-    /// Adds one.
+    /// Adds a ray.
     pub fn push(&mut self, ray: Ray<R>) {
         self.x.push(ray.point.x);
         self.y.push(ray.point.y);
@@ -67,10 +67,10 @@ impl<R: Real> Rays<R> {
         self.n.push(ray.direction.z);
     }
 
-    /// The ray number `i`.
+    /// The ray with index `i`.
     ///
     /// # Panics
-    /// If there are not that many.
+    /// If there is no such ray.
     pub fn get(&self, i: usize) -> Ray<R> {
         Ray {
             point: Vec3::new(self.x[i], self.y[i], self.z[i]),
@@ -91,7 +91,10 @@ impl<R: Real> Rays<R> {
 }
 
 impl Rays<f64> {
-    /// Refuses a batch with a ray that cannot be traced.
+    /// Checks every ray; see [`Ray::check`].
+    ///
+    /// # Errors
+    /// The first ray that cannot be traced.
     pub fn check(&self) -> Result<(), SystemError> {
         (0..self.len()).try_for_each(|i| self.get(i).check(i))
     }
@@ -106,7 +109,7 @@ impl<R: Real> FromIterator<Ray<R>> for Rays<R> {
     }
 }
 
-/// A part of some rays.
+/// A borrowed part of the columns of [`Rays`].
 #[derive(Clone, Copy)]
 pub(super) struct RaySlice<'a, R> {
     x: &'a [R],
@@ -117,51 +120,51 @@ pub(super) struct RaySlice<'a, R> {
     n: &'a [R],
 }
 
-/// Where rays land, as columns, in the frame of the last surface; zeros for a ray that was lost.
+/// The landings of rays as columns, in the frame of the last surface; zeros for a lost ray.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Landings<R> {
-    /// Point, in mm.
+    /// The x coordinates of the points, in mm.
     pub x: Vec<R>,
-    /// Point, in mm.
+    /// The y coordinates of the points, in mm.
     pub y: Vec<R>,
-    /// Point, in mm.
+    /// The z coordinates of the points, in mm.
     pub z: Vec<R>,
-    /// Direction cosine behind the last surface.
+    /// The direction cosines along x behind the last surface.
     pub l: Vec<R>,
-    /// Direction cosine behind the last surface.
+    /// The direction cosines along y behind the last surface.
     pub m: Vec<R>,
-    /// Direction cosine behind the last surface.
+    /// The direction cosines along z behind the last surface.
     pub n: Vec<R>,
-    /// Optical path from the start, in mm.
+    /// The optical paths from the starts, in mm.
     pub opl: Vec<R>,
     codes: Vec<u32>,
 }
 
-/// Where rays land across the axis, and nothing else: what a spot needs.
+/// The landings of rays across the axis alone, for spots; zeros for a lost ray.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ImagePoints<R> {
-    /// Point, in mm; 0 for a ray that was lost.
+    /// The x coordinates of the points, in mm.
     pub x: Vec<R>,
-    /// Point, in mm; 0 for a ray that was lost.
+    /// The y coordinates of the points, in mm.
     pub y: Vec<R>,
     codes: Vec<u32>,
 }
 
-/// What is kept of traced rays.
+/// A receiver of traced rays.
 pub trait TraceSink<R>: Send {
-    /// Whether the optical path is wanted.
+    /// True if directions and optical paths are stored too.
     const WITH_PATH: bool;
-    /// Makes room for this many rays.
+    /// Sets the number of rays.
     fn resize(&mut self, count: usize);
-    /// A borrowed part for every `size` rays, in order.
+    /// Borrowed parts of `size` rays each, in order.
     fn parts(&mut self, size: usize) -> Vec<TraceSinkPart<'_, R>>;
-    /// How a ray ended.
+    /// The fate of a ray.
     fn fate(&self, ray: usize) -> Fate;
-    /// How many rays ended how.
+    /// The number of rays of each fate.
     fn fates(&self) -> Fates;
 }
 
-/// A borrowed stretch of the columns of a [`TraceSink`]; empty columns are not wanted.
+/// A borrowed part of the columns of a [`TraceSink`]; columns that are not stored are empty.
 #[derive(Debug)]
 pub struct TraceSinkPart<'a, R> {
     columns: [&'a mut [R]; 7],
@@ -248,8 +251,7 @@ impl<R: Real> Tracer<R> {
         self.trace_batch_with(SimdWidth::detect(), rays, sink);
     }
 
-    /// Traces rays on the calling thread with at most these lanes; narrower ones where the
-    /// processor has no such lanes.
+    /// Traces rays on the calling thread with vector instructions of at most this width.
     ///
     /// # Panics
     /// If the columns of `rays` differ in length.
@@ -265,7 +267,7 @@ impl<R: Real> Tracer<R> {
         }
     }
 
-    /// Traces rays on all cores; the same bits as [`Tracer::trace_batch`].
+    /// Traces rays on all cores; the results have the same bits as [`Tracer::trace_batch`].
     ///
     /// # Panics
     /// If the columns of `rays` differ in length.
@@ -291,7 +293,8 @@ impl<R: Real> Tracer<R> {
         );
     }
 
-    /// What only fills a block up counts as lost where every ray costs time of its own.
+    /// Marks the rays that only fill up a block as lost, in a lens where every ray costs time of its
+    /// own.
     #[inline(always)]
     pub(super) fn mask(&self, block: &mut RayBlock<R>, count: usize) {
         if !self.grin_gaps.is_empty() {
@@ -325,7 +328,7 @@ impl<R: Real> Tracer<R> {
     }
 }
 
-/// Rays on their way, as columns.
+/// A block of rays on their way, as columns.
 #[derive(Clone)]
 pub(super) struct RayBlock<R> {
     pub(super) x: [R; BLOCK],
@@ -335,8 +338,8 @@ pub(super) struct RayBlock<R> {
     pub(super) ky: [R; BLOCK],
     pub(super) kz: [R; BLOCK],
     opl: [R; BLOCK],
-    /// 0 for a ray on its way, else where and why it was lost; a number of the same width as the
-    /// others, so that the lanes need no conversion.
+    /// 0 for a ray on its way, else the code of its loss; a number of the same width as the others, so
+    /// that the vector instructions need no conversion.
     pub(super) code: [R; BLOCK],
 }
 
@@ -347,7 +350,7 @@ impl<R: Real> RayBlock<R> {
         Self { x: zero, y: zero, z: zero, kx: zero, ky: zero, kz: zero, opl: zero, code: zero }
     }
 
-    /// Takes rays from the columns; a block that is not full is filled up with its first ray.
+    /// Loads rays from columns; a block that is not full is filled up with its first ray.
     #[inline(always)]
     pub(super) fn load(&mut self, rays: RaySlice<'_, R>, from: usize, count: usize, index: R) {
         for (to, column) in [
@@ -369,7 +372,7 @@ impl<R: Real> RayBlock<R> {
         }
     }
 
-    /// Takes rays as they are made.
+    /// Loads the rays that `ray` makes.
     #[inline(always)]
     pub(super) fn fill(&mut self, index: R, ray: impl Fn(usize) -> Ray<R>) {
         for j in 0..BLOCK {
@@ -422,38 +425,39 @@ impl<R: Real> RayBlock<R> {
     #[inline(never)]
     fn cross_grin_into<S: TraceSink<R>>(&mut self, tracer: &Tracer<R>, number: usize) {
         let mut opl = self.opl;
-        self.cross_grin(tracer, number, |j, arrival| {
+        self.cross_grin(tracer, number, |j, arrived| {
             if S::WITH_PATH {
-                opl[j] += arrival.path;
+                opl[j] += arrived.path;
             }
         });
         self.opl = opl;
     }
 
-    /// Crosses a surface that a gradient touches, ray by ray.
+    /// Crosses a surface that a GRIN medium touches, ray by ray.
     #[inline(never)]
     pub(super) fn cross_grin(
         &mut self,
         tracer: &Tracer<R>,
         number: usize,
-        mut keep: impl FnMut(usize, &PropagatedRay<R>),
+        mut keep: impl FnMut(usize, &PropagatedRay<'_, R>),
     ) {
+        let site = tracer.site(number);
         for j in 0..BLOCK {
             if self.code[j] > R::ZERO {
                 continue;
             }
             let (p, k) = self.state(j);
-            let arrival = tracer.propagate(number, p, k);
-            keep(j, &arrival);
-            let crossing = arrival.refract();
+            let arrived = site.propagate(p, k);
+            keep(j, &arrived);
+            let crossing = arrived.refract();
             self.set(j, crossing.point, crossing.k);
-            if let Some(cause) = arrival.loss_cause(&crossing) {
+            if let Some(cause) = arrived.loss_cause(&crossing) {
                 self.code[j] = R::from_f64(f64::from(fate::encode(number as u32, cause)));
             }
         }
     }
 
-    /// Crosses a surface and keeps the distance to it.
+    /// Crosses a surface and stores the distance to it.
     #[inline(always)]
     pub(super) fn cross_recording(
         &mut self,
@@ -465,7 +469,7 @@ impl<R: Real> RayBlock<R> {
     }
 
     /// Crosses a surface; the two senses of travel are compiled apart, since a factor that is known
-    /// to be one costs nothing.
+    /// to be 1 costs nothing.
     #[inline(always)]
     pub(super) fn cross_with(
         &mut self,
@@ -545,8 +549,8 @@ impl<R: Real> RayBlock<R> {
         }
     }
 
-    /// How far from its start, or from its point of closest approach, every ray meets an asphere;
-    /// not a number where it does not.
+    /// The distance along `k` of every ray to an asphere, from its start or its point of closest
+    /// approach; NaN for a miss.
     #[inline(always)]
     fn asphere_distances(&self, interface: &Interface<R>) -> [R; BLOCK] {
         let mut before = [R::ZERO; BLOCK];
@@ -587,7 +591,7 @@ impl<R: Real> RayBlock<R> {
             let p = Vec3::new(p.x, p.y, p.z - interface.gap);
             let met = meet(&interface, j, p, k);
             keep(j, &met);
-            let crossing = interface.refract(met, k);
+            let crossing = interface.refract(met, k, interface.dn2);
             self.set(j, crossing.point, crossing.k);
             let code = first_cause(&crossing, missed, clipped, reflected);
             self.code[j] = R::select(self.code[j] > R::ZERO, self.code[j], code);
@@ -623,7 +627,7 @@ impl<R: Real> RayBlock<R> {
     }
 }
 
-/// The code of the first thing that goes wrong at a surface, or 0.
+/// The code of the first cause of a loss at a surface, or 0.
 #[inline(always)]
 fn first_cause<R: Real>(crossing: &Refraction<R>, missed: R, clipped: R, reflected: R) -> R {
     let code = R::select(crossing.reflected, reflected, R::ZERO);

@@ -1,28 +1,28 @@
-//! How a ray ends.
+//! The fate of a ray: it arrives, or it is lost for a cause at a surface.
 
 use serde::Serialize;
 
-/// How a ray ends, and at which surface (counted from 0).
+/// The fate of a ray, with the index of the surface at which it ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Fate {
-    /// It reaches the last surface.
+    /// The ray reaches the last surface.
     Imaged,
-    /// It does not meet the surface.
+    /// The ray misses the surface.
     Missed(u32),
-    /// It meets the surface outside the semi-diameter or inside the obstruction, or it leaves the
-    /// gradient in front of it through its side.
+    /// The ray meets the surface outside the semi-diameter or inside the obstruction, or it leaves the
+    /// GRIN medium in front through its side.
     Clipped(u32),
-    /// It is totally reflected.
+    /// The ray is totally reflected at the surface.
     TotalReflection(u32),
-    /// The gradient in front of the surface turns it back to where it came from.
+    /// The GRIN medium in front of the surface turns the ray back.
     Turned(u32),
-    /// It is still in the gradient in front of the surface after the largest number of steps, or
-    /// where that has no index.
+    /// The ray is still in the GRIN medium in front of the surface after the largest number of steps,
+    /// or reaches a point where that has no index.
     Trapped(u32),
 }
 
 impl Fate {
-    /// What this kind of end is called in files and reports.
+    /// The name of the kind of fate in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Imaged => "imaged",
@@ -34,7 +34,7 @@ impl Fate {
         }
     }
 
-    /// The surface at which the ray was lost; `None` for one that arrived.
+    /// The index of the surface at which the ray is lost; `None` for a ray that arrives.
     pub fn surface(self) -> Option<usize> {
         match self {
             Self::Imaged => None,
@@ -46,13 +46,13 @@ impl Fate {
         }
     }
 
-    /// Whether the ray arrived.
+    /// True if the ray arrives.
     pub fn is_imaged(self) -> bool {
         self == Self::Imaged
     }
 
-    /// The number that stands for a cause at a surface inside the kernels: 0 for a ray on its way,
-    /// else `CAUSES_PER_SURFACE surface + cause`.
+    /// The fate of a code of the kernels: 0 for a ray on its way, else
+    /// `CAUSES_PER_SURFACE surface + cause`.
     pub(super) fn from_code(code: u32) -> Self {
         let surface = code / CAUSES_PER_SURFACE;
         match code % CAUSES_PER_SURFACE {
@@ -71,40 +71,40 @@ pub(super) const CLIPPED: u32 = 2;
 pub(super) const TOTAL_REFLECTION: u32 = 3;
 pub(super) const TURNED: u32 = 4;
 pub(super) const TRAPPED: u32 = 5;
-/// Room for causes at each surface.
+/// The number of codes for each surface.
 const CAUSES_PER_SURFACE: u32 = 8;
 
-/// The number that stands for a cause at a surface.
+/// The code of a cause at a surface.
 pub(super) fn encode(surface: u32, cause: u32) -> u32 {
     CAUSES_PER_SURFACE * surface + cause
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
-fn is_none(count: &usize) -> bool {
+fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// How many rays ended how.
+/// The number of rays of each fate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Fates {
-    /// Arrived.
+    /// Rays that arrive.
     pub imaged: usize,
-    /// Missed a surface.
+    /// Rays that miss a surface.
     pub missed: usize,
-    /// Clipped by a semi-diameter or an obstruction.
+    /// Rays that are clipped.
     pub clipped: usize,
-    /// Totally reflected.
+    /// Rays that are totally reflected.
     pub total_reflection: usize,
-    /// Turned back by a gradient.
-    #[serde(skip_serializing_if = "is_none")]
+    /// Rays that a GRIN medium turns back.
+    #[serde(skip_serializing_if = "is_zero")]
     pub turned: usize,
-    /// Kept by a gradient.
-    #[serde(skip_serializing_if = "is_none")]
+    /// Rays that a GRIN medium traps.
+    #[serde(skip_serializing_if = "is_zero")]
     pub trapped: usize,
 }
 
 impl Fates {
-    /// Counts one more.
+    /// Counts one more ray.
     pub fn count(&mut self, fate: Fate) {
         match fate {
             Fate::Imaged => self.imaged += 1,
@@ -116,7 +116,7 @@ impl Fates {
         }
     }
 
-    /// How many rays there are.
+    /// The number of all rays.
     pub fn total(self) -> usize {
         let lost = self.missed + self.clipped + self.total_reflection;
         self.imaged + lost + self.turned + self.trapped

@@ -1,7 +1,7 @@
-//! One surface as a ray meets it: where, under which angle, and how it goes on.
+//! The intersection of a ray with one surface, and its refraction or reflection there.
 //!
-//! The formulas are free of branches on the ray, so that the same text traces one ray, a vector
-//! of rays and a dual number. With `p` the start of the ray in the frame of the surface, `k` its
+//! The formulas have no branches on the ray, so that the same code traces one ray, a vector of rays
+//! and a dual number. With `p` the start of the ray in the frame of the surface, `k` its
 //! optical direction, `c` the curvature and `κ` the conic constant (Welford, *Aberrations of
 //! Optical Systems*, 1986, section 4.4):
 //!
@@ -11,11 +11,12 @@
 //! ```
 
 use super::asphere;
+use super::propagation::LocalIndices;
 use crate::lens::{ASPHERE_TERMS, Shape, System};
 use crate::math::Real;
 use crate::math::Vec3;
 
-/// The form of a surface, as far as it decides what has to be computed.
+/// The form of a surface, which decides what has to be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SurfaceForm {
     Plane,
@@ -24,23 +25,23 @@ pub(super) enum SurfaceForm {
     Asphere,
 }
 
-/// A surface with every constant that does not depend on the ray.
+/// A surface between two media, with every constant that does not depend on the ray.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Interface<R> {
     pub(super) form: SurfaceForm,
     pub(super) mirror: bool,
-    /// Whether rays come from so far away that they are first moved to their point of closest
-    /// approach: `B² − A F` would cancel otherwise.
+    /// True if rays start so far away that they are first moved to their point of closest approach,
+    /// because `B² − A F` would cancel otherwise.
     pub(super) starts_far: bool,
     /// The sense of travel σ in front of the surface, +1 or −1.
     pub(super) sense: R,
-    /// The distance from the vertex before.
+    /// The thickness of the gap in front, in mm.
     pub(super) gap: R,
     pub(super) curvature: R,
     pub(super) conic: R,
     pub(super) terms: [R; ASPHERE_TERMS],
-    /// The surface whose index the light is in when it arrives; `None` for the index in front of
-    /// the first one. A mirror sets no index.
+    /// The last surface in front that is not a mirror, whose index the light travels in; `None` for
+    /// the index of object space.
     pub(super) medium_before: Option<usize>,
     /// The index in front.
     pub(super) index_before: R,
@@ -52,23 +53,23 @@ pub(super) struct Interface<R> {
     pub(super) dn2: R,
     /// The square of the semi-diameter.
     pub(super) rim2: R,
-    /// The square of the radius of the obstruction, 0 where there is none.
+    /// The square of the radius of the obstruction; 0 for none.
     pub(super) obstruction2: R,
-    /// `1 − (1+κ) c z` may not fall below this: 0 on the sag sheet, anything where the far half
-    /// of an ellipsoid counts too.
+    /// The least permitted `1 − (1+κ) c z`, the component of the normal along the axis: 0, or −∞ for
+    /// a hyperhemisphere.
     pub(super) min_normal_z: R,
-    /// The largest slope of an asphere inside its semi-diameter; infinite where there is no bound.
+    /// A bound of the slope of an asphere inside its semi-diameter; infinite if there is none.
     pub(super) slope_bound: f64,
-    /// The lowest and the highest point of an asphere inside its semi-diameter.
+    /// A lower and an upper bound of the sag of an asphere inside its semi-diameter, in mm.
     pub(super) sag_range: (f64, f64),
 }
 
-/// Where a ray meets a surface, before anything happens to it.
+/// The intersection of a ray with a surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Intersection<R> {
     /// The point in the frame of the surface.
     pub(super) point: Vec3<R>,
-    /// How far along `k` it lies.
+    /// The parameter of the point along the ray: the start plus `s k`.
     pub(super) s: R,
     /// The normal `N`, of length `√m`.
     pub(super) normal: Vec3<R>,
@@ -76,6 +77,7 @@ pub(super) struct Intersection<R> {
     pub(super) a: R,
     /// `N·N`.
     pub(super) m: R,
+    /// True if the ray does not meet the surface.
     pub(super) missed: bool,
 }
 
@@ -90,10 +92,11 @@ pub(super) struct Refraction<R> {
     pub(super) reflected: bool,
 }
 
-/// Rays that travel farther than this many radii of curvature are moved close first.
+/// The length of a gap in radii of curvature beyond which rays are moved to their point of closest
+/// approach first.
 const FAR_START: f64 = 0.5;
 
-/// The surfaces of a system, prepared.
+/// The surfaces of a system, prepared for tracing.
 pub(super) fn interfaces<R: Real>(system: &System<R>) -> Vec<Interface<R>> {
     let (mut n, mut gap, mut sense) = (system.index_before, R::ZERO, R::ONE);
     let mut medium = None;
@@ -140,43 +143,42 @@ fn form<R>(shape: &Shape<R>) -> SurfaceForm {
 }
 
 impl<R: Real> Interface<R> {
-    /// Meets the surface and goes on behind it; `p` is in the frame of the vertex before.
+    /// The intersection with a ray that starts at `start` in the frame of the surface.
     #[inline(always)]
-    pub(super) fn cross(&self, p: Vec3<R>, k: Vec3<R>) -> Refraction<R> {
-        let start = Vec3::new(p.x, p.y, p.z - self.gap);
-        let met = match self.form {
+    pub(super) fn intersect(&self, start: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
+        match self.form {
             SurfaceForm::Plane => self.intersect_plane(start, k),
             SurfaceForm::Sphere => self.intersect_sphere(start, k),
             SurfaceForm::Conic => self.intersect_conic(start, k),
             SurfaceForm::Asphere => self.intersect_asphere(start, k),
-        };
-        let crossing = self.refract(met, k);
-        let clipped = crossing.clipped || self.obstructs(met.point);
-        Refraction { clipped, ..crossing }
+        }
     }
 
-    /// Whether a point of the surface lies inside its obstruction. Asked apart from
-    /// [`Interface::refract`], so that the many surfaces without one pay nothing.
+    /// True if a point of the surface lies inside its obstruction. Not part of
+    /// [`Interface::refract`], so that surfaces without an obstruction cost nothing.
     #[inline(always)]
     pub(super) fn obstructs(&self, p: Vec3<R>) -> bool {
         p.x * p.x + p.y * p.y < self.obstruction2
     }
 
-    /// Clips at the rim, then refracts or reflects.
+    /// Clips a ray at the rim, then refracts or reflects it; `dn2` is `n'² − n²` at the point.
     #[inline(always)]
-    pub(super) fn refract(&self, met: Intersection<R>, k: Vec3<R>) -> Refraction<R> {
+    pub(super) fn refract(&self, met: Intersection<R>, k: Vec3<R>, dn2: R) -> Refraction<R> {
         let p = met.point;
         let clipped = !(p.x * p.x + p.y * p.y <= self.rim2);
-        let (gamma, reflected) =
-            if self.mirror { (-(met.a + met.a) / met.m, false) } else { self.snell_factor(&met) };
+        let (gamma, reflected) = if self.mirror {
+            (-(met.a + met.a) / met.m, false)
+        } else {
+            self.snell_factor(&met, dn2)
+        };
         let k = k + met.normal * gamma;
         Refraction { point: p, k, s: met.s, missed: met.missed, clipped, reflected }
     }
 
-    /// `Γ` of Snell's law `k' = k + Γ N`, and whether the ray is totally reflected instead.
+    /// `Γ` of Snell's law `k' = k + Γ N`; and true if the ray is totally reflected instead.
     #[inline(always)]
-    fn snell_factor(&self, met: &Intersection<R>) -> (R, bool) {
-        let behind2 = met.a * met.a + self.dn2 * met.m;
+    fn snell_factor(&self, met: &Intersection<R>, dn2: R) -> (R, bool) {
+        let behind2 = met.a * met.a + dn2 * met.m;
         let behind = self.sense * behind2.sqrt();
         let gamma = (behind - met.a) / met.m;
         (gamma, !(behind2 >= R::ZERO))
@@ -223,8 +225,8 @@ impl<R: Real> Interface<R> {
         Intersection { point, s: before + s, normal, a, m: normal.dot(normal), missed }
     }
 
-    /// The root of `A s² − 2 B s + F` where `k·N` has the sense of travel, with `k·N`, and whether
-    /// there is none. The form without cancellation is chosen by the sign of `B`.
+    /// The root of `A s² − 2 B s + F` for which `k·N` has the sense of travel, `k·N`, and true if
+    /// there is no root. The sign of `B` selects the form without cancellation.
     #[inline(always)]
     fn root(&self, a: R, b: R, f: R) -> (R, R, bool) {
         let square = b * b - a * f;
@@ -235,8 +237,8 @@ impl<R: Real> Interface<R> {
         (above / below, normal, !(square > R::ZERO))
     }
 
-    /// The point of closest approach to the vertex, and how far along `k` it lies; the start
-    /// itself where nothing would cancel.
+    /// The point of the ray closest to the vertex and its parameter along `k`; the start itself if
+    /// nothing would cancel.
     #[inline(always)]
     pub(super) fn closest_approach(&self, p: Vec3<R>, k: Vec3<R>) -> (Vec3<R>, R) {
         if self.starts_far {
@@ -258,7 +260,7 @@ impl<R: Real> Interface<R> {
         self.intersection_on_asphere(start, k, s, before)
     }
 
-    /// The meeting at `start + s k`, which lies on the asphere; missed where `s` is not a number.
+    /// The intersection at `start + s k`, which lies on the asphere; missed if `s` is NaN.
     #[inline(always)]
     pub(super) fn intersection_on_asphere(
         &self,
@@ -269,38 +271,83 @@ impl<R: Real> Interface<R> {
     ) -> Intersection<R> {
         let point = start + k * s;
         let (_, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
+        self.intersection_with_slope(point, k, before + s, dz_dr2)
+    }
+
+    /// The intersection at a point that lies on the surface.
+    pub(super) fn intersection_at(&self, point: Vec3<R>, k: Vec3<R>, s: R) -> Intersection<R> {
+        let (_, dz_dr2) = self.surface_sag(point.x * point.x + point.y * point.y);
+        self.intersection_with_slope(point, k, s, dz_dr2)
+    }
+
+    /// The intersection at a point at which `dz/dr²` is known.
+    #[inline(always)]
+    fn intersection_with_slope(
+        &self,
+        point: Vec3<R>,
+        k: Vec3<R>,
+        s: R,
+        dz_dr2: R,
+    ) -> Intersection<R> {
         let slope = -(dz_dr2 + dz_dr2);
         let normal = Vec3::new(point.x * slope, point.y * slope, R::ONE);
         let a = k.dot(normal);
         let missed = !(self.sense * a > R::ZERO);
-        Intersection { point, s: before + s, normal, a, m: normal.dot(normal), missed }
+        Intersection { point, s, normal, a, m: normal.dot(normal), missed }
+    }
+
+    /// The height of a point above the surface along the sense of travel, negative in front of it,
+    /// and its derivative along `v`. The point is in the frame of a vertex `gap` mm in front.
+    pub(super) fn signed_height(&self, x: Vec3<R>, v: Vec3<R>, gap: R) -> (R, R) {
+        let (sag, dz_dr2) = self.surface_sag(x.x * x.x + x.y * x.y);
+        let along = (x.x * v.x + x.y * v.y) * dz_dr2;
+        (self.sense * (x.z - gap - sag), self.sense * (v.z - along - along))
+    }
+
+    /// True if the conic exists at the distance of a point from the axis.
+    pub(super) fn exists_at(&self, x: Vec3<R>) -> bool {
+        let r2 = x.x * x.x + x.y * x.y;
+        (R::ONE + self.conic) * self.curvature * self.curvature * r2 < R::ONE
+    }
+
+    /// The indices on both sides.
+    #[inline(always)]
+    pub(super) fn indices(&self) -> LocalIndices<R> {
+        let (n2, dn2) = (self.n2, self.dn2);
+        LocalIndices { before: self.index_before, n2, behind: self.index_behind, dn2 }
     }
 
     /// The same surface without derivatives.
     pub(super) fn value(&self) -> Interface<f64> {
+        self.map(Real::value)
+    }
+
+    /// The same surface with every number mapped by `f`.
+    #[inline(always)]
+    pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Interface<S> {
         Interface {
             form: self.form,
             mirror: self.mirror,
             starts_far: self.starts_far,
-            sense: self.sense.value(),
-            gap: self.gap.value(),
-            curvature: self.curvature.value(),
-            conic: self.conic.value(),
-            terms: self.terms.map(Real::value),
+            sense: f(self.sense),
+            gap: f(self.gap),
+            curvature: f(self.curvature),
+            conic: f(self.conic),
+            terms: self.terms.map(&f),
             medium_before: self.medium_before,
-            index_before: self.index_before.value(),
-            n2: self.n2.value(),
-            index_behind: self.index_behind.value(),
-            dn2: self.dn2.value(),
-            rim2: self.rim2.value(),
-            obstruction2: self.obstruction2.value(),
-            min_normal_z: self.min_normal_z.value(),
+            index_before: f(self.index_before),
+            n2: f(self.n2),
+            index_behind: f(self.index_behind),
+            dn2: f(self.dn2),
+            rim2: f(self.rim2),
+            obstruction2: f(self.obstruction2),
+            min_normal_z: f(self.min_normal_z),
             slope_bound: self.slope_bound,
             sag_range: self.sag_range,
         }
     }
 
-    /// `z(r) − z` at a point and its slope along `k`.
+    /// `z(r) − z` at a point, and its derivative along `k`.
     #[inline(always)]
     pub(super) fn height_above(&self, point: Vec3<R>, k: Vec3<R>) -> (R, R) {
         let (z, dz_dr2) = self.sag(point.x * point.x + point.y * point.y);
@@ -308,7 +355,13 @@ impl<R: Real> Interface<R> {
         (z - point.z, along + along - k.z)
     }
 
-    /// Sag and its derivative by r²; at the edge of the conic beyond it.
+    /// As [`Interface::sag`], without computing a plane.
+    fn surface_sag(&self, r2: R) -> (R, R) {
+        if self.form == SurfaceForm::Plane { (R::ZERO, R::ZERO) } else { self.sag(r2) }
+    }
+
+    /// The sag and its derivative by r²; beyond the edge of the conic, with the conic part at its
+    /// edge.
     #[inline(always)]
     pub(super) fn sag(&self, r2: R) -> (R, R) {
         let c = self.curvature;

@@ -1,45 +1,46 @@
-//! How far rays are from every limit that a surface sets them, and derivatives through that.
+//! Limit functions: the distances of rays from every limit of a surface, with second derivatives by
+//! the pupil coordinates and derivatives by the lens.
 //!
-//! An integral over the rays that get through changes with the place of its edge as well. What is
-//! needed for that is a family of rays with its second derivatives by two coordinates of the pupil
-//! ([`Jet`]), and at every surface the functions that are negative for a ray that passes and zero
-//! at the edge:
+//! An integral over the rays that get through changes also with the position of its edge. Its
+//! derivative needs a family of rays with its second derivatives by two coordinates of the pupil
+//! ([`Jet`]), and at every surface functions that are negative for a ray that passes and zero at the
+//! edge:
 //!
 //! ```text
-//! rim    (r²/R² − 1)/2, and of an obstruction (1 − r²/h²)/2
-//! angle  max(0, 1 − (n'/n)²) N·N − (k·N)²/n²
-//! sheet  −(1 − (1+κ) c z), or (1+κ) c² r² − 1 at an asphere
+//! rim         (r²/R² − 1)/2, and of an obstruction (1 − r²/h²)/2
+//! angle       max(0, 1 − (n'/n)²) N·N − (k·N)²/n²
+//! conic edge  −(1 − (1+κ) c z), or (1+κ) c² r² − 1 at an asphere
 //! ```
 //!
-//! All are smooth on the axis and of no dimension, so that none is near its edge by its unit alone.
-//! With N·N = 1 the angle is the square of the cosine of incidence against that of the critical
-//! angle where the index falls, and against grazing incidence elsewhere: where a sphere or a conic
-//! is just missed its discriminant (k·N)² is zero, and so it is where a ray touches an asphere. An
-//! asphere that a ray crosses more than once may end a family by another crossing that comes first
-//! all at once; no limit tells of that.
+//! All are smooth on the axis and dimensionless, so that none is near its edge because of its unit.
+//! With N·N = 1 the angle compares the square of the cosine of incidence with that of the critical
+//! angle if the index falls, and with grazing incidence otherwise: where a sphere or conic is just
+//! missed, its discriminant (k·N)² is zero, and so it is where a ray touches an asphere. A ray that
+//! crosses an asphere more than once may end a family discontinuously, when another crossing becomes
+//! the first; no limit function shows that.
 //!
-//! Homeward, derivatives are first-order jets whose values matter. The transpose of multiplication
-//! by a jet `v + x ε + y η` is again a multiplication, of what is written as `v εη + x η + y ε`, in
-//! the algebra with ε² = η² = 0: so the adjoint of every ray runs unchanged over `Dual<Dual>`, and
-//! the answer is what stands at εη.
+//! On the way back, derivatives are first-order jets whose values are needed. The transpose of a
+//! multiplication by a jet `v + x ε + y η` is a multiplication again, of the number written as
+//! `v εη + x η + y ε` in the algebra with ε² = η² = 0: the adjoint of every ray therefore runs
+//! unchanged over `Dual<Dual>`, and the result is the coefficient of εη.
 
 use super::Tracer;
-use super::backward::{AdjointSeed, GradientSink, LimitAdjoint, SeedSource, SystemGradient};
+use super::adjoint::{AdjointSeed, GradientSink, LimitAdjoint, SeedSource, SystemGradient};
 use super::batch::{BLOCK, RayBlock};
 use super::interface::{Interface, SurfaceForm};
 use super::single::Ray;
-use super::slot::SurfaceParameter;
+use super::surface_parameter::SurfaceParameter;
 use crate::lens::{System, SystemError};
 use crate::math::{Dual, Jet, Real, Vec3};
 use crate::math::{SimdWidth, run_vectorized};
 
-/// Rays that travel abreast.
+/// The number of rays in a block.
 pub const LANES: usize = BLOCK;
 
-/// A number of the algebra with ε² = η² = 0; the outer slope belongs to ε.
+/// A number of the algebra with ε² = η² = 0; the outer slope is the coefficient of ε.
 type MixedDual<R> = Dual<Dual<R, 1>, 1>;
 
-/// A limit of a surface.
+/// A limit function of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum LimitFunction {
     Rim,
@@ -55,8 +56,8 @@ impl<R: Real> Interface<R> {
         R::select(self.dn2 < R::ZERO, -self.dn2, R::ZERO)
     }
 
-    /// Whether a limit can end anything. A plane ends no ray by its angle where the index does not
-    /// fall, and the rim keeps most rays from where a conic turns over.
+    /// True if a limit can end rays. A plane ends no ray by its angle unless the index falls, and the
+    /// rim usually lies inside the edge of the conic.
     fn has(&self, limit: LimitFunction) -> bool {
         let surface = self.value();
         let c2 = (1.0 + surface.conic) * surface.curvature * surface.curvature;
@@ -106,7 +107,7 @@ impl<R: Real> Interface<Jet<R>> {
         }
     }
 
-    /// One of the functions above, from the point and `k·N`.
+    /// A limit function, from the point and `k·N`.
     #[inline(always)]
     fn limit_value(&self, limit: LimitFunction, p: Vec3<Jet<R>>, a: Jet<R>) -> Jet<R> {
         let r2 = p.x * p.x + p.y * p.y;
@@ -136,26 +137,26 @@ impl<R: Real> Interface<Jet<R>> {
 }
 
 /// A block of rays that have arrived, each with its derivatives by two pupil coordinates, and the
-/// derivatives that their adjoint begins with.
+/// derivatives with which their adjoint starts.
 #[derive(Debug)]
 pub struct JetBlock<R> {
-    /// Where they land across the axis.
+    /// The x and y coordinates of the landings, in mm.
     pub landing: [[Jet<R>; LANES]; 2],
-    /// How far they are from every limit that may end them, below zero.
+    /// The limit functions, negative for rays that pass.
     pub limits: Vec<[Jet<R>; LANES]>,
-    /// The derivative of the answer by where they land, to be filled in.
+    /// The derivative of the result by x and y of the landings, to be filled in.
     pub by_landing: [[R; LANES]; 2],
-    /// The derivative of the answer by each limit, to be filled in: by its value and by its two
-    /// slopes.
+    /// The derivative of the result by each limit function, to be filled in: by its value and by its
+    /// two slopes.
     pub by_limit: Vec<[[R; 3]; LANES]>,
 }
 
-/// A system made ready for derivatives of integrals over the rays that get through it.
+/// A system prepared for derivatives of integrals over the rays that get through it.
 #[derive(Debug, Clone)]
 pub struct WarpTracer<R> {
     forward: Tracer<Jet<R>>,
     backward: Tracer<MixedDual<R>>,
-    /// Surface by surface.
+    /// The limit functions with the index of their surface, in the order of surfaces.
     limits: Vec<(usize, LimitFunction)>,
 }
 
@@ -163,11 +164,12 @@ impl<R: Real> WarpTracer<R> {
     /// Prepares a system.
     ///
     /// # Errors
-    /// Numbers that no ray can be traced with: see [`System::check`]. A gradient, whose steps would
-    /// have to carry second derivatives.
+    /// A number that cannot be traced with (see [`System::check`]), or a GRIN medium, whose steps
+    /// would have to carry second derivatives.
     pub fn new(system: &System<f64>) -> Result<Self, SystemError> {
         if let Some(surface) = system.surfaces.iter().position(|s| s.grin.is_some()) {
-            let why = "has no warp field; expected `boundary` or `difference`".to_owned();
+            let why =
+                "has no warp field; expected the method `boundary` or `difference`".to_owned();
             return Err(SystemError::Grin { surface: surface.into(), why });
         }
         let outward = Tracer::new(&system.cast::<Jet<R>>())?;
@@ -186,14 +188,14 @@ impl<R: Real> WarpTracer<R> {
         Ok(Self { forward: outward, backward: homeward, limits })
     }
 
-    /// How many surfaces there are.
+    /// The number of surfaces, including the image plane.
     pub fn surfaces(&self) -> usize {
         self.forward.surfaces()
     }
 
-    /// The derivative by every number of the system, at fixed rays, of a sum over the rays at some
-    /// points; `fill` gives the derivatives of the sum by where a block of them lands and by their
-    /// limits. All of them should arrive: one that does not counts nothing.
+    /// The derivative by every number of the system, for fixed rays, of a sum over the rays at the
+    /// given points of the pupil; `fill` sets the derivatives of the sum by the landings of a block
+    /// of rays and by their limit functions. All rays should arrive; lost rays do not contribute.
     pub fn gradient(
         &self,
         points: &[[R; 2]],
@@ -201,18 +203,18 @@ impl<R: Real> WarpTracer<R> {
         fill: impl Fn(&[[R; 2]; LANES], &mut JetBlock<R>),
     ) -> SystemGradient<R> {
         let mut gradient = SystemGradient::zero(self.surfaces());
-        let mut room = WarpWorkspace::new(self);
+        let mut workspace = WarpWorkspace::new(self);
         let width = SimdWidth::detect();
         for points in points.chunks(BLOCK) {
             let mut all = [points[0]; BLOCK];
             all[..points.len()].copy_from_slice(points);
-            // Compiled apart: all in one is too much for the lanes to be found.
+            // Compiled apart: all in one is too large to be vectorized.
             let block = run_vectorized(
                 width,
                 #[inline(always)]
                 || {
                     self.forward(
-                        &mut room,
+                        &mut workspace,
                         points.len(),
                         #[inline(always)]
                         |j| ray(all[j]),
@@ -222,36 +224,42 @@ impl<R: Real> WarpTracer<R> {
             run_vectorized(
                 width,
                 #[inline(always)]
-                || fill(&all, &mut room.jets),
+                || fill(&all, &mut workspace.jets),
             );
             run_vectorized(
                 width,
                 #[inline(always)]
                 || {
-                    room.distribute_limits(&self.limits);
+                    workspace.distribute_limits(&self.limits);
                     let (block, sum) = (block.map(first_order), &mut MixedPart(&mut gradient));
-                    self.backward.backward(block, &room.distances, points.len(), &room, sum);
+                    self.backward.backward(
+                        block,
+                        &workspace.distances,
+                        points.len(),
+                        &workspace,
+                        sum,
+                    );
                 },
             );
         }
         gradient
     }
 
-    /// Traces a block and keeps the limits and the distance to each surface.
+    /// Traces a block and stores the limit functions and the distance to each surface.
     #[inline(always)]
     fn forward(
         &self,
-        room: &mut WarpWorkspace<R>,
+        workspace: &mut WarpWorkspace<R>,
         count: usize,
         ray: impl Fn(usize) -> Ray<Jet<R>>,
     ) -> RayBlock<Jet<R>> {
         let mut block = RayBlock::new();
         block.fill(self.forward.index_before, ray);
-        // What only fills the block up counts as lost.
+        // Rays that only fill up the block count as lost.
         block.code[count..].fill(Jet::ONE);
-        let mut limits = self.limits.iter().zip(&mut room.jets.limits).peekable();
+        let mut limits = self.limits.iter().zip(&mut workspace.jets.limits).peekable();
         for (i, interface) in self.forward.interfaces.iter().enumerate() {
-            // Local, so that the lanes need not ask whether it overlaps the block.
+            // Local, so that the compiler knows that it does not overlap the block.
             let mut kept = [[Jet::ZERO; BLOCK]; 2];
             block.cross_with(
                 interface,
@@ -260,12 +268,12 @@ impl<R: Real> WarpTracer<R> {
                 |j, met| (kept[0][j], kept[1][j]) = (met.s, met.a),
             );
             let [distances, slants] = kept;
-            for (to, from) in room.distances[i].iter_mut().zip(&distances) {
+            for (to, from) in workspace.distances[i].iter_mut().zip(&distances) {
                 *to = first_order(*from);
             }
             while let Some(((_, limit), lanes)) = limits.next_if(|((surface, _), _)| *surface == i)
             {
-                // Known inside the loops, so that these have no branch.
+                // Constant inside the loops, so that these have no branch.
                 match limit {
                     LimitFunction::Rim => {
                         interface.limit_values(LimitFunction::Rim, &block, &slants, lanes)
@@ -282,7 +290,7 @@ impl<R: Real> WarpTracer<R> {
                 }
             }
         }
-        room.jets.landing = [block.x, block.y];
+        workspace.jets.landing = [block.x, block.y];
         block
     }
 }
@@ -297,13 +305,13 @@ fn first_order<R: Real>(jet: Jet<R>) -> MixedDual<R> {
     }
 }
 
-/// What derivatives by a jet are as a number of the algebra.
+/// The derivatives by a jet as a number of the algebra.
 #[inline(always)]
 fn transposed<R: Real>([value, x, y]: [R; 3]) -> MixedDual<R> {
     Dual { value: Dual { value: R::ZERO, slope: [x] }, slope: [Dual { value: y, slope: [value] }] }
 }
 
-/// What a block needs on its way, made once.
+/// The buffers for a block, allocated once.
 struct WarpWorkspace<R> {
     jets: JetBlock<R>,
     distances: Vec<[MixedDual<R>; BLOCK]>,
@@ -322,31 +330,31 @@ impl<R: Real> WarpWorkspace<R> {
         };
         let distances = vec![[MixedDual::ZERO; BLOCK]; surfaces];
         let none = [MixedDual::ZERO; BLOCK];
-        let pulls =
+        let limits =
             vec![
                 LimitAdjoint { rim: none, angle: none, obstruction: None, conic_edge: None };
                 surfaces
             ];
-        Self { jets: abreast, distances, limit_adjoints: pulls }
+        Self { jets: abreast, distances, limit_adjoints: limits }
     }
 
-    /// Brings what was filled in to its surface.
+    /// Moves the derivatives that were filled in to their surfaces.
     #[inline(always)]
     fn distribute_limits(&mut self, limits: &[(usize, LimitFunction)]) {
         for ((surface, limit), by_limit) in limits.iter().zip(&self.jets.by_limit) {
-            let pulls = &mut self.limit_adjoints[*surface];
+            let limits = &mut self.limit_adjoints[*surface];
             let lanes = match limit {
-                LimitFunction::Rim => &mut pulls.rim,
+                LimitFunction::Rim => &mut limits.rim,
                 LimitFunction::Obstruction => {
-                    pulls.obstruction.get_or_insert([MixedDual::ZERO; BLOCK])
+                    limits.obstruction.get_or_insert([MixedDual::ZERO; BLOCK])
                 }
-                LimitFunction::Angle => &mut pulls.angle,
+                LimitFunction::Angle => &mut limits.angle,
                 LimitFunction::ConicEdge => {
-                    pulls.conic_edge.get_or_insert([MixedDual::ZERO; BLOCK])
+                    limits.conic_edge.get_or_insert([MixedDual::ZERO; BLOCK])
                 }
             };
-            for (pull, by_limit) in lanes.iter_mut().zip(by_limit) {
-                *pull = transposed(*by_limit);
+            for (derivative, by_limit) in lanes.iter_mut().zip(by_limit) {
+                *derivative = transposed(*by_limit);
             }
         }
     }
@@ -365,7 +373,7 @@ impl<R: Real> SeedSource<MixedDual<R>> for WarpWorkspace<R> {
     }
 }
 
-/// Takes what stands at εη.
+/// Adds the coefficients of εη to a gradient.
 struct MixedPart<'a, R>(&'a mut SystemGradient<R>);
 
 impl<R: Real> GradientSink<MixedDual<R>> for MixedPart<'_, R> {

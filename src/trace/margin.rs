@@ -1,134 +1,164 @@
-//! How narrowly a ray passes each surface.
+//! Margins: by how much a ray stays inside the limits of each surface.
 //!
-//! The set of rays that get through a lens ends where one of these margins is zero. They are
-//! smooth along a family of rays on both sides of that place, so that it can be found to the last
-//! digit by a root finder, which yes or no could not.
+//! The set of rays that get through a lens ends where one of the margins is zero. Along a family of
+//! rays a margin is smooth on both sides of that edge, so that a root finder finds the edge to the
+//! last digit, which the mere fate of rays would not permit.
 
 use super::Tracer;
-use super::interface::{Interface, Intersection, SurfaceForm};
+use super::interface::{Interface, SurfaceForm};
+use super::propagation::PropagatedRay;
 use super::single::{Ray, optical_direction};
-use crate::math::Real;
-use crate::math::Vec3;
+use crate::math::{Real, Vec3};
 
-/// What may end a ray at a surface.
+/// A limit at which a surface, or the gap in front of it, ends rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum RayLimit {
-    /// The surface is not met: the ray passes by it.
+    /// The ray misses the surface.
     Miss,
-    /// The ray meets the far half of a sphere or conic, behind its equator, which does not count.
+    /// The ray meets the far half of a sphere or conic, behind its equator, which is not part of the
+    /// surface.
     Equator,
-    /// The ray meets it outside the semi-diameter.
+    /// The ray meets the surface outside the semi-diameter.
     Rim,
-    /// The ray meets it inside the obstruction.
+    /// The ray meets the surface inside the obstruction.
     Obstruction,
     /// The ray is totally reflected.
     TotalReflection,
-    /// The ray leaves the gradient in front of the surface through its side.
+    /// The ray leaves the GRIN medium in front of the surface through its side.
     Side,
 }
 
 impl<R: Real> Tracer<R> {
-    /// Follows a ray and calls `visit` with every hurdle on its way and the margin by which it is
-    /// taken: positive for a ray that passes, negative for one that does not. A ray goes on behind
-    /// a rim or an obstruction that clips it, but not behind a surface that it misses or that
-    /// reflects it totally.
+    /// Traces a ray and calls `visit` with every surface, each of its limits and the margin there:
+    /// positive for a ray inside the limit, negative for one outside. A ray continues behind a rim or
+    /// an obstruction that clips it, but not behind a surface that it misses or that reflects it
+    /// totally.
     ///
     /// The margin is `sd² − r²` in mm² at a rim and `r² − h²` at an obstruction, the square of the
-    /// optical direction's component along the normal at a miss and at a total reflection, −1 at an
-    /// asphere that is missed, and the normal's component along the axis at an equator. Where a
-    /// gradient touches a surface it is treated like an asphere, and the side of the glass like a rim.
+    /// component of the optical direction along the normal at a miss and at a total reflection, −1 at
+    /// an asphere that is missed, and the component of the normal along the axis at an equator. A
+    /// surface that a GRIN medium touches is treated as an asphere, and the side of the medium as a
+    /// rim.
     pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, RayLimit, R)) {
         let mut k = optical_direction(ray.direction, self.index_before);
         let mut point = ray.point;
-        for (i, interface) in self.interfaces.iter().enumerate() {
-            if self.touches_grin(i) {
-                let arrival = self.propagate(i, point, k);
-                arrival.margins(i, &mut visit);
-                let Some(passed) = arrival.cross_at_edge(None) else { return };
-                (point, k) = passed;
-                continue;
-            }
-            let start = Vec3::new(point.x, point.y, point.z - interface.gap);
-            let met = interface.intersect(start, k);
-            let passes_by = met.missed && !interface.is_behind_equator(&met);
-            visit(i, RayLimit::Miss, interface.miss_margin(&met, start, k, passes_by));
-            if passes_by {
-                return;
-            }
-            if interface.has_equator() {
-                visit(i, RayLimit::Equator, interface.equator_margin(&met));
-            }
-            if met.missed {
-                return;
-            }
-            let p = met.point;
-            if interface.rim2.value() < f64::INFINITY {
-                visit(i, RayLimit::Rim, interface.rim_margin(p));
-            }
-            if interface.obstruction2.value() > 0.0 {
-                visit(i, RayLimit::Obstruction, interface.obstruction_margin(p));
-            }
-            if !interface.mirror {
-                let behind2 = met.a * met.a + interface.dn2 * met.m;
-                visit(i, RayLimit::TotalReflection, behind2);
-                if !(behind2 >= R::ZERO) {
-                    return;
-                }
-            }
-            k = interface.refract(met, k).k;
-            point = p;
+        for i in 0..self.interfaces.len() {
+            let arrived = self.propagate(i, point, k);
+            arrived.margins(i, &mut visit);
+            let Some(behind) = arrived.cross_at_edge(None) else { return };
+            (point, k) = behind;
         }
     }
 }
 
-impl<R: Real> Interface<R> {
-    pub(super) fn rim_margin(&self, p: Vec3<R>) -> R {
-        self.rim2 - (p.x * p.x + p.y * p.y)
-    }
-
-    pub(super) fn obstruction_margin(&self, p: Vec3<R>) -> R {
-        p.x * p.x + p.y * p.y - self.obstruction2
-    }
-
-    pub(super) fn intersect(&self, start: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
-        match self.form {
-            SurfaceForm::Plane => self.intersect_plane(start, k),
-            SurfaceForm::Sphere => self.intersect_sphere(start, k),
-            SurfaceForm::Conic => self.intersect_conic(start, k),
-            SurfaceForm::Asphere => self.intersect_asphere(start, k),
+impl<R: Real> PropagatedRay<'_, R> {
+    /// Visits the margins at the surface, up to the first limit that the ray cannot pass.
+    #[inline(always)]
+    fn margins(&self, i: usize, visit: &mut impl FnMut(usize, RayLimit, R)) {
+        let (surface, met) = (self.surface, &self.met);
+        let passes_by = met.missed && !self.is_behind_equator();
+        visit(i, RayLimit::Miss, self.miss_margin(passes_by));
+        if passes_by {
+            return;
+        }
+        if self.has_equator() {
+            visit(i, RayLimit::Equator, self.equator_margin());
+        }
+        if met.missed {
+            return;
+        }
+        if surface.rim2.value() < f64::INFINITY {
+            visit(i, RayLimit::Rim, surface.rim_margin(met.point));
+        }
+        if let Some(side) = self.side_margin().filter(|side| side.value() < f64::INFINITY) {
+            visit(i, RayLimit::Side, side);
+        }
+        if surface.obstruction2.value() > 0.0 {
+            visit(i, RayLimit::Obstruction, surface.obstruction_margin(met.point));
+        }
+        if !surface.mirror {
+            visit(i, RayLimit::TotalReflection, self.reflection_margin());
         }
     }
 
-    /// `(k·N)²`, negative where no point of the ray lies on the surface.
-    fn miss_margin(&self, met: &Intersection<R>, p: Vec3<R>, k: Vec3<R>, passes_by: bool) -> R {
-        let square = match self.form {
-            SurfaceForm::Plane => return self.sense * k.z,
-            SurfaceForm::Asphere if met.missed => return -R::ONE,
-            SurfaceForm::Asphere => return met.a * met.a,
-            SurfaceForm::Sphere | SurfaceForm::Conic => self.discriminant(p, k),
+    /// The margin at one limit of the surface; see [`Tracer::margins`].
+    pub(super) fn margin(&self, limit: RayLimit) -> R {
+        let (surface, met) = (self.surface, &self.met);
+        match limit {
+            RayLimit::Rim => surface.rim_margin(met.point),
+            RayLimit::Obstruction => surface.obstruction_margin(met.point),
+            RayLimit::TotalReflection => self.reflection_margin(),
+            RayLimit::Equator if self.has_closed_form() => self.equator_margin(),
+            RayLimit::Equator => R::ONE,
+            RayLimit::Side => self.side_margin().unwrap_or(R::ONE),
+            RayLimit::Miss => match self.closed_form_miss_margin() {
+                Some(margin) => margin,
+                None if met.missed && !self.is_straight() => -R::ONE,
+                None => met.a * met.a,
+            },
+        }
+    }
+
+    /// `(k·N)²`, negative if no point of the ray lies on the surface.
+    fn miss_margin(&self, passes_by: bool) -> R {
+        let square = match self.closed_form_miss_margin() {
+            Some(margin) if self.surface.form == SurfaceForm::Plane => return margin,
+            Some(square) => square,
+            None if self.met.missed => return -R::ONE,
+            None => return self.met.a * self.met.a,
         };
         // Rounding may tell the two computations of the discriminant apart: the ray decides.
         let agrees = passes_by != (square > R::ZERO);
         R::select(agrees, square, R::ZERO - R::from_f64(f64::from(u8::from(passes_by))))
     }
 
-    /// Whether only the half of the surface in front of its equator counts.
+    /// The margin at a miss of a straight ray: at a plane the component of `k` along the axis, at a
+    /// sphere or conic the discriminant.
+    fn closed_form_miss_margin(&self) -> Option<R> {
+        let start = self.closed_form_start()?;
+        Some(match self.surface.form {
+            SurfaceForm::Plane => self.surface.sense * self.k.z,
+            _ => self.surface.discriminant(start, self.k),
+        })
+    }
+
+    fn reflection_margin(&self) -> R {
+        self.met.a * self.met.a + self.indices.dn2 * self.met.m
+    }
+
+    /// The component of the normal along the axis, negative behind the equator.
+    fn equator_margin(&self) -> R {
+        self.met.normal.z - self.surface.min_normal_z
+    }
+
+    /// True if the far half of a sphere or conic is not part of the surface.
     fn has_equator(&self) -> bool {
-        matches!(self.form, SurfaceForm::Sphere | SurfaceForm::Conic)
-            && self.min_normal_z.value() > f64::NEG_INFINITY
+        self.has_closed_form()
+            && self.surface.form != SurfaceForm::Plane
+            && self.surface.min_normal_z.value() > f64::NEG_INFINITY
     }
 
-    /// The normal's component along the axis, negative behind the equator.
-    pub(super) fn equator_margin(&self, met: &Intersection<R>) -> R {
-        met.normal.z - self.min_normal_z
+    /// True if the ray meets the surface behind its equator.
+    fn is_behind_equator(&self) -> bool {
+        self.has_equator() && self.equator_margin() < R::ZERO
     }
 
-    /// Whether the ray meets the surface behind its equator, instead of not at all.
-    fn is_behind_equator(&self, met: &Intersection<R>) -> bool {
-        self.has_equator() && self.equator_margin(met) < R::ZERO
+    fn has_closed_form(&self) -> bool {
+        self.closed_form_start().is_some()
+    }
+}
+
+impl<R: Real> Interface<R> {
+    fn rim_margin(&self, p: Vec3<R>) -> R {
+        self.rim2 - (p.x * p.x + p.y * p.y)
     }
 
-    pub(super) fn discriminant(&self, p: Vec3<R>, k: Vec3<R>) -> R {
+    fn obstruction_margin(&self, p: Vec3<R>) -> R {
+        p.x * p.x + p.y * p.y - self.obstruction2
+    }
+
+    /// `(k·N)²` at the intersection of a straight ray with a sphere or conic, negative for a miss.
+    fn discriminant(&self, p: Vec3<R>, k: Vec3<R>) -> R {
         let c = self.curvature;
         let axial = self.conic * p.z;
         let b = k.z - c * (p.dot(k) + axial * k.z);

@@ -1,52 +1,52 @@
-//! Real rays through a resolved lens: move to the surface, meet it, refract.
+//! Real rays through a resolved lens: propagation to the next surface, intersection, refraction.
 //!
 //! After Spencer and Murty, "General Ray-Tracing Procedure", JOSA 52 (1962), with the optical
 //! direction `k = n (L, M, N)` in place of the direction cosines (Feder, JOSA 41, 1951): Snell's
 //! law becomes `k' = k + Γ N`, and no index ratio is needed. A ray that does not arrive ends with
 //! a [`Fate`] that names the surface and the cause.
 //!
-//! Which crossing of a surface counts is decided by the sense of travel σ, which starts at +1 and
-//! turns at every mirror: the one with `σ k·N > 0`. It is not the sign of `N`: light that comes
-//! from behind the front lens of a fisheye still travels forwards.
+//! The sense of travel σ, which starts at +1 and changes its sign at every mirror, decides which of
+//! several intersections counts: the one with `σ k·N > 0`. The sign of `N` does not: light that
+//! reaches the front lens of a fisheye from behind still travels forwards.
+//!
+//! A gap is a propagator ([`propagation`]): straight lines in a homogeneous medium, steps of an
+//! integrator in a GRIN medium ([`grin_gap`]). Derivatives are forward, by dual numbers in place of
+//! plain ones, or backward, by the adjoint of a block of rays ([`adjoint`]).
 
+mod adjoint;
 mod asphere;
-mod backward;
 mod batch;
 mod edge;
 mod fate;
-mod gap;
-mod graded;
-mod graded_back;
-mod graded_edge;
+mod grin_gap;
 mod interface;
 mod limit;
 mod margin;
+mod propagation;
 mod single;
-mod slot;
-mod step;
+mod surface_parameter;
 
 pub use crate::math::SimdWidth;
-pub use backward::{AdjointSeed, SurfaceGradient, SystemGradient};
+pub use adjoint::{AdjointSeed, SurfaceGradient, SystemGradient};
 pub use batch::{ImagePoints, Landings, Rays, TraceSink};
 pub use fate::{Fate, Fates};
+pub use grin_gap::GrinStepPlan;
 pub use limit::{JetBlock, LANES, WarpTracer};
 pub use margin::RayLimit;
 pub use single::{Ray, RayPolyline, TracedRay};
-pub use slot::SurfaceParameter;
-pub use step::GrinStepPlan;
+pub use surface_parameter::SurfaceParameter;
 
-use crate::lens::System;
-use crate::lens::SystemError;
+use crate::lens::{System, SystemError};
 use crate::math::Real;
-use gap::GrinGap;
+use grin_gap::GrinGap;
 use interface::Interface;
 
-/// A system made ready for tracing: checked, with every constant of a surface worked out once.
+/// A system prepared for tracing: checked, with every constant of a surface computed once.
 #[derive(Debug, Clone)]
 pub struct Tracer<R> {
     interfaces: Vec<Interface<R>>,
     index_before: R,
-    /// The gradients of the gaps; empty for a lens of glass.
+    /// The GRIN media of the gaps; empty for a lens without any.
     grin_gaps: Vec<Option<GrinGap<R>>>,
     step_plans: Vec<GrinStepPlan>,
 }
@@ -55,7 +55,8 @@ impl<R: Real> Tracer<R> {
     /// Prepares a system.
     ///
     /// # Errors
-    /// Numbers that no ray can be traced with: see [`System::check`].
+    /// A number that cannot be traced with (see [`System::check`]), or a GRIN medium that is too
+    /// strong.
     pub fn new(system: &System<R>) -> Result<Self, SystemError> {
         system.check()?;
         let interfaces = interface::interfaces(system);
@@ -68,7 +69,7 @@ impl<R: Real> Tracer<R> {
         Ok(tracer)
     }
 
-    /// Fills the gaps of a system that have a gradient.
+    /// Prepares the gaps with a GRIN medium.
     fn fill_grin_gaps(&mut self, system: &System<R>) -> Result<(), SystemError> {
         for (i, surface) in system.surfaces.iter().enumerate() {
             let faces = self.interfaces.get(i).zip(self.interfaces.get(i + 1));
@@ -85,13 +86,13 @@ impl<R: Real> Tracer<R> {
         Ok(())
     }
 
-    /// The steps in every gap with a gradient.
+    /// The steps in every gap with a GRIN medium.
     pub fn grin_step_plans(&self) -> &[GrinStepPlan] {
         &self.step_plans
     }
 
-    /// The same surfaces with no rim that clips. An asphere still ends where it was said to end:
-    /// behind that its polynomial means nothing.
+    /// The same surfaces without rims and obstructions that clip. The intersection with an asphere is
+    /// still sought inside its semi-diameter first, since its polynomial has no meaning outside.
     #[must_use]
     pub fn without_rims(mut self) -> Self {
         for interface in &mut self.interfaces {
@@ -103,7 +104,7 @@ impl<R: Real> Tracer<R> {
         self
     }
 
-    /// How many surfaces a ray crosses, the image plane included.
+    /// The number of surfaces, including the image plane.
     pub fn surfaces(&self) -> usize {
         self.interfaces.len()
     }

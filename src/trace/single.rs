@@ -1,9 +1,8 @@
-//! One ray at a time, over any number type, with everything about its way.
+//! Tracing one ray at a time, over any number type, with all that happens to it.
 
 use super::Tracer;
-use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
-use super::graded::PropagatedRay;
-use super::interface::Interface;
+use super::fate::{self, Fate};
+use super::propagation::PropagatedRay;
 use crate::lens::SystemError;
 use crate::math::Real;
 use crate::math::Vec3;
@@ -11,15 +10,17 @@ use crate::math::Vec3;
 /// A straight ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Ray<R> {
-    /// A point on it, in mm.
+    /// A point of the ray, in mm.
     pub point: Vec3<R>,
-    /// Its direction cosines.
+    /// The direction cosines.
     pub direction: Vec3<R>,
 }
 
 impl Ray<f64> {
-    /// Refuses a ray that is not finite or whose direction is not of length 1 within 1e-9; `number`
-    /// is how the error calls it.
+    /// Checks that the ray is finite and that its direction has length 1 within 1e-9.
+    ///
+    /// # Errors
+    /// [`SystemError::Ray`], which names the ray by `number`.
     pub fn check(&self, number: usize) -> Result<(), SystemError> {
         let refuse = |found: String| Err(SystemError::Ray { ray: number, found });
         let (p, d) = (self.point, self.direction);
@@ -35,30 +36,30 @@ impl Ray<f64> {
     }
 }
 
-/// Where and how a ray ended.
+/// A ray that has been traced, and its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TracedRay<R> {
-    /// How.
+    /// The fate of the ray.
     pub fate: Fate,
-    /// Point and direction in the frame of the surface where it ended: behind the last surface for
-    /// a ray that arrived, where it was clipped or reflected, or where it was before the surface
-    /// that it missed (in the frame of that surface).
+    /// Point and direction in the frame of the surface at which the ray ends: behind the last surface
+    /// for a ray that arrives, at the point where it is clipped or totally reflected, or in front of
+    /// the surface that it misses.
     pub ray: Ray<R>,
     /// The optical path from the start to that point, in mm.
     pub opl: R,
-    /// The first surface that was reached by going backwards.
+    /// The index of the first surface that the ray reaches by going backwards.
     pub first_backward_surface: Option<usize>,
 }
 
-/// The corners of a ray's way and how it ended.
+/// The polyline of a ray through a lens, for drawing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPolyline {
-    /// The start, every point of incidence, and points between on the curve through a gradient, in
-    /// the frame of the first vertex.
+    /// The start, every point of intersection, and intermediate points in GRIN media, in the frame of
+    /// the first vertex, in mm.
     pub points: Vec<Vec3<f64>>,
-    /// How far from the axis it meets each surface, as far as it gets.
+    /// The distance from the axis at each surface that the ray reaches, in mm.
     pub heights: Vec<f64>,
-    /// How it ended.
+    /// The fate of the ray.
     pub fate: Fate,
 }
 
@@ -68,16 +69,19 @@ impl<R: Real> Tracer<R> {
         self.trace_surfaces(ray, self.interfaces.len(), |_, _| {})
     }
 
-    /// Traces one ray and calls `visit` with each surface and the point of incidence in its frame.
+    /// Traces one ray and calls `visit` with the index of each surface and the point of intersection
+    /// in its frame.
     pub fn visit(&self, ray: Ray<R>, visit: impl FnMut(usize, Vec3<R>)) -> TracedRay<R> {
         self.trace_surfaces(ray, self.interfaces.len(), visit)
     }
 
-    /// Traces one ray through the first surfaces, up to and with `surface`.
+    /// Traces one ray through the first surfaces, up to and including `surface`.
     pub fn trace_to(&self, ray: Ray<R>, surface: usize) -> TracedRay<R> {
         self.trace_surfaces(ray, (surface + 1).min(self.interfaces.len()), |_, _| {})
     }
 
+    /// Compiled apart for lenses with and without GRIN media, whose steps would take registers from
+    /// the loop over homogeneous media.
     fn trace_surfaces(
         &self,
         ray: Ray<R>,
@@ -85,138 +89,80 @@ impl<R: Real> Tracer<R> {
         visit: impl FnMut(usize, Vec3<R>),
     ) -> TracedRay<R> {
         if self.grin_gaps.is_empty() {
-            self.trace_homogeneous(ray, surfaces, visit)
+            self.trace_loop::<false>(ray, surfaces, visit)
         } else {
-            self.trace_grin(ray, surfaces, visit)
+            self.trace_loop::<true>(ray, surfaces, visit)
         }
     }
 
-    fn trace_homogeneous(
+    fn trace_loop<const GRIN: bool>(
         &self,
         ray: Ray<R>,
         surfaces: usize,
         mut visit: impl FnMut(usize, Vec3<R>),
     ) -> TracedRay<R> {
-        let mut k = optical_direction(ray.direction, self.index_before);
-        let mut landing =
-            TracedRay { fate: Fate::Imaged, ray, opl: R::ZERO, first_backward_surface: None };
-        let mut index = self.index_before;
-        for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
-            let Some(behind) = landing.cross(i, interface, k, &mut visit) else { break };
-            (k, index) = (behind, interface.index_behind);
-        }
-        landing.ray.direction = k * (R::ONE / index);
-        landing
-    }
-
-    /// The same where a gradient fills a gap: a loop of its own, since what it needs would take
-    /// registers from the other one.
-    #[cold]
-    #[inline(never)]
-    fn trace_grin(
-        &self,
-        ray: Ray<R>,
-        surfaces: usize,
-        mut visit: impl FnMut(usize, Vec3<R>),
-    ) -> TracedRay<R> {
-        let mut k = optical_direction(ray.direction, self.index_before);
-        let mut landing =
-            TracedRay { fate: Fate::Imaged, ray, opl: R::ZERO, first_backward_surface: None };
-        let mut index = self.index_before;
-        for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
-            if !self.touches_grin(i) {
-                let Some(behind) = landing.cross(i, interface, k, &mut visit) else { break };
-                (k, index) = (behind, interface.index_behind);
-                continue;
-            }
-            let p = landing.ray.point;
-            let arrival = self.propagate(i, p, k);
-            let Some(behind) = landing.cross_grin(i, p, &arrival, &mut visit) else {
-                (k, index) = (arrival.k, arrival.surface.index_before);
+        let (mut k, mut index) =
+            (optical_direction(ray.direction, self.index_before), self.index_before);
+        let (opl, first_backward_surface) = (R::ZERO, None);
+        let mut traced = TracedRay { fate: Fate::Imaged, ray, opl, first_backward_surface };
+        for (i, surface) in self.interfaces[..surfaces].iter().enumerate() {
+            let p = traced.ray.point;
+            let arrived = if GRIN {
+                self.propagate(i, p, k)
+            } else {
+                PropagatedRay::straight(surface, Vec3::new(p.x, p.y, p.z - surface.gap), k)
+            };
+            let Some(behind) = traced.cross(i, p, &arrived, &mut visit) else {
+                (k, index) = (arrived.k, arrived.indices.before);
                 break;
             };
-            (k, index) = (behind, arrival.surface.index_behind);
+            (k, index) = (behind, arrived.indices.behind);
         }
-        landing.ray.direction = k * (R::ONE / index);
-        landing
+        traced.ray.direction = k * (R::ONE / index);
+        traced
     }
 }
 
 impl<R: Real> TracedRay<R> {
-    /// Takes a ray with the optical direction `k` through a surface between glasses; its direction
-    /// behind, if it gets through.
+    /// Takes the ray from `p`, in the frame of the surface before, through a surface to which it has
+    /// been propagated. Returns its optical direction behind, or `None` if it is lost.
     #[inline(always)]
     fn cross(
         &mut self,
         i: usize,
-        interface: &Interface<R>,
-        k: Vec3<R>,
-        visit: &mut impl FnMut(usize, Vec3<R>),
-    ) -> Option<Vec3<R>> {
-        let p = self.ray.point;
-        let crossing = interface.cross(p, k);
-        let code = |cause| fate::encode(i as u32, cause);
-        if crossing.missed {
-            self.ray.point.z = p.z - interface.gap;
-            self.fate = Fate::from_code(code(MISSED));
-            return None;
-        }
-        self.ray.point = crossing.point;
-        self.opl += crossing.s * interface.n2;
-        if self.first_backward_surface.is_none() && is_backwards(crossing.s, p, interface.n2) {
-            self.first_backward_surface = Some(i);
-        }
-        visit(i, crossing.point);
-        if crossing.clipped || crossing.reflected {
-            let cause = if crossing.clipped { CLIPPED } else { TOTAL_REFLECTION };
-            self.fate = Fate::from_code(code(cause));
-            return None;
-        }
-        Some(crossing.k)
-    }
-
-    /// Takes a ray that comes from `p` through a surface that a gradient touches; its direction
-    /// behind, if it gets through.
-    fn cross_grin(
-        &mut self,
-        i: usize,
         p: Vec3<R>,
-        arrival: &PropagatedRay<R>,
+        arrived: &PropagatedRay<'_, R>,
         visit: &mut impl FnMut(usize, Vec3<R>),
     ) -> Option<Vec3<R>> {
-        let crossing = arrival.refract();
-        if arrival.met.missed {
-            self.ray.point = arrival.end_position(p);
+        let refraction = arrived.refract();
+        if arrived.met.missed {
+            self.ray.point = arrived.end_position(p);
         } else {
-            self.ray.point = crossing.point;
-            self.opl += arrival.path;
+            self.ray.point = refraction.point;
+            self.opl += arrived.path;
             if self.first_backward_surface.is_none()
-                && is_backwards(crossing.s, p, arrival.surface.n2)
+                && is_backwards(refraction.s, p, arrived.indices.n2)
             {
                 self.first_backward_surface = Some(i);
             }
-            visit(i, crossing.point);
+            visit(i, refraction.point);
         }
-        match arrival.loss_cause(&crossing) {
-            None => Some(crossing.k),
-            Some(cause) => {
-                self.fate = Fate::from_code(fate::encode(i as u32, cause));
-                None
-            }
-        }
+        let Some(cause) = arrived.loss_cause(&refraction) else { return Some(refraction.k) };
+        self.fate = Fate::from_code(fate::encode(i as u32, cause));
+        None
     }
 }
 
-/// Whether a way of length `s k` from `p` leads back by more than rounding can explain, as between
-/// surfaces that touch.
+/// True if the path of length `s k` from `p` leads backwards by more than rounding explains, as
+/// between surfaces that touch.
 fn is_backwards<R: Real>(s: R, p: Vec3<R>, n2: R) -> bool {
     let size = p.x.value().abs() + p.y.value().abs() + p.z.value().abs();
     s.value() * n2.value().sqrt() < -16.0 * R::EPSILON * size
 }
 
 impl Tracer<f64> {
-    /// The corners of a ray's way, for drawing. A ray that misses a surface is drawn on to the
-    /// vertex plane of that surface, if it is going there.
+    /// The polyline of a ray, for drawing. A ray that misses a surface is extended to the vertex plane
+    /// of that surface, if it travels towards it.
     pub fn path(&self, ray: Ray<f64>) -> RayPolyline {
         let mut points = vec![ray.point];
         let mut vertices = Vec::with_capacity(self.interfaces.len());

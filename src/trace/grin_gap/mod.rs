@@ -1,40 +1,61 @@
-//! The gap that a gradient fills, and the steps through it.
+//! A gap with a GRIN medium, and the steps of a ray through it.
 //!
-//! Drifts and kicks of [`grin`](crate::grin), all steps of the same length, the last one cut so that it
-//! ends on the next surface. Each step is undone exactly on the way back, and its transpose is applied:
-//! what is kept of a ray is one number a gap, as in glass, the length of σ.
+//! A ray obeys `dx/dσ = v`, `dv/dσ = n ∇n` with `|v| = n`, so that `v` is the optical direction `k` of
+//! homogeneous media. Its steps are drifts and kicks of [`grin`](crate::grin). All have the same
+//! length, which a plan chooses ([`plan`]), but the last one ends on the next surface. On the way back
+//! each step is undone exactly and its transpose is applied ([`adjoint`]): a ray stores one number
+//! per gap, as in homogeneous media, the length of σ.
+
+mod adjoint;
+mod plan;
+
+pub(super) use adjoint::StateAdjoint;
+pub use plan::GrinStepPlan;
 
 use super::Ray;
 use super::fate::{MISSED, TRAPPED, TURNED};
 use super::interface::Interface;
-use crate::grin::field::ProfileGradient;
-use crate::grin::{IntegratorOp, RayState};
+use crate::grin::{Integrator, IntegratorOp, RayState};
 use crate::lens::RotationalProfile;
 use crate::math::{Real, Vec3};
 
-/// A gap filled with a gradient, ready for rays.
+/// A gap with a GRIN medium, prepared for tracing.
 #[derive(Debug, Clone)]
 pub(super) struct GrinGap<R> {
     pub(super) field: RotationalProfile<R>,
     pub(super) ops: Vec<IntegratorOp<R>>,
     /// The length of a step in σ, in mm over the index.
     pub(super) step: R,
-    /// Steps after which a ray counts as trapped.
+    /// The number of steps after which a ray counts as trapped.
     pub(super) max_steps: u32,
-    /// The square of the radius of the glass: of the wider of its two faces.
+    /// The square of the radius of the glass, the larger semi-diameter of its two surfaces.
     pub(super) side2: R,
 }
 
 /// A ray at the end of a gap.
 pub(super) struct GapExit<R> {
     pub(super) state: RayState<R>,
-    /// All of σ, negative for a ray that went back.
+    /// The length in σ, negative for a ray that goes back.
     pub(super) length: R,
     /// The largest square of the distance from the axis on the way.
     pub(super) widest: R,
 }
 
+/// The integrator of a step: the most accurate one for its number of kicks, symplectic and symmetric.
+const INTEGRATOR: Integrator = Integrator::BlanesMoan;
+
 impl<R: Real> GrinGap<R> {
+    /// The same steps in a field over another number type.
+    pub(super) fn with_field<S: Real>(&self, field: RotationalProfile<S>) -> GrinGap<S> {
+        GrinGap {
+            field,
+            ops: INTEGRATOR.ops(),
+            step: S::from_f64(self.step.value()),
+            max_steps: self.max_steps,
+            side2: S::from_f64(self.side2.value()),
+        }
+    }
+
     /// One step of length `h`.
     #[inline(always)]
     pub(super) fn advance(&self, state: RayState<R>, h: R) -> RayState<R> {
@@ -52,7 +73,7 @@ impl<R: Real> GrinGap<R> {
         RayState { x, v, path }
     }
 
-    /// How fast the end of a step of length `h` moves with `h`.
+    /// The derivative by `h` of the end of a step of length `h`.
     fn rate(&self, state: RayState<R>, h: R) -> RayState<R> {
         let RayState { mut x, mut v, .. } = state;
         let mut rate = RayState::default();
@@ -75,7 +96,8 @@ impl<R: Real> GrinGap<R> {
     }
 
     /// Steps through the gap to the surface behind it. A ray that starts behind that surface, as
-    /// where two surfaces cross, goes back to it.
+    /// where two surfaces cross, goes back to it. The error is the code of the cause of a loss, and
+    /// the last state.
     pub(super) fn cross(
         &self,
         surface: &Interface<R>,
@@ -111,8 +133,8 @@ impl<R: Real> GrinGap<R> {
         Err((TRAPPED, state))
     }
 
-    /// The length of the last step that ends on the surface, between 0 and `h`, and its end: Newton's
-    /// iteration between two lengths on either side.
+    /// The length of the last step, which ends on the surface, between 0 and `h`, and its end, by a
+    /// bracketed Newton's iteration.
     fn last_step(
         &self,
         surface: &Interface<R>,
@@ -151,8 +173,7 @@ impl<R: Real> GrinGap<R> {
                 break;
             }
         }
-        // The derivatives that a number carries settle by as many digits a step as the velocity is
-        // good for.
+        // Each iteration adds as many correct digits to the derivatives as `v` has.
         for _ in 0..2 * R::ORDER {
             let end = self.advance(before, length);
             let (height, slope) = surface.signed_height(end.x, end.v, gap);
@@ -165,9 +186,9 @@ impl<R: Real> GrinGap<R> {
         (near && surface.exists_at(end.x)).then_some((length, end))
     }
 
-    /// The larger of a square of the distance from the axis and the largest one on a step. Where the
-    /// step has its farthest point inside and near the side of the glass, that point is looked for;
-    /// the derivative of its distance does not depend on where exactly it is.
+    /// The larger of `widest` and the largest square of the distance from the axis on a step. A
+    /// maximum inside the step is located if it is near the side of the glass; the derivative of the
+    /// distance does not depend on its exact position.
     fn widest_radius2(&self, widest: R, before: RayState<R>, h: R, after: RayState<R>) -> R {
         let end = square_of_distance(after.x);
         let widest = R::select(end > widest, end, widest);
@@ -175,7 +196,7 @@ impl<R: Real> GrinGap<R> {
         let peaks = rises > R::ZERO && falls < R::ZERO;
         // The tangent lies above a curve that bends down.
         let highest = square_of_distance(before.x) + R::TWO * rises;
-        // The slopes of a margin are asked for where nothing clips, too.
+        // The derivatives of a margin are needed even if nothing clips.
         let far = R::ORDER == 0 && highest.value() < NEAR_SIDE * self.side2.value();
         if !peaks || far {
             return widest;
@@ -195,14 +216,14 @@ impl<R: Real> GrinGap<R> {
     }
 }
 
-/// Where `|v|² = n²` is less than this the polynomial means no glass any more.
+/// The least `|v|² = n²` for which the polynomial still describes a medium.
 const MIN_INDEX2: f64 = 0.04;
 
-/// Points of a drawn ray inside a gradient.
+/// The least number of points of a drawn ray inside a GRIN medium.
 const DRAWN_POINTS: u32 = 24;
 
 impl GrinGap<f64> {
-    /// Points of a ray that starts behind the surface before, between its ends.
+    /// Intermediate points of a ray that starts behind the surface before.
     pub(super) fn sample_points(
         &self,
         surface: &Interface<f64>,
@@ -210,7 +231,7 @@ impl GrinGap<f64> {
     ) -> impl Iterator<Item = Vec3<f64>> {
         let index = self.field.index(ray.point);
         let start = RayState { x: ray.point, v: ray.direction * index, path: 0.0 };
-        let length = self.cross(surface, None, start).map_or(0.0, |crossed| crossed.length);
+        let length = self.cross(surface, None, start).map_or(0.0, |exit| exit.length);
         let pieces = (length.abs() / self.step).ceil().clamp(1.0, 4096.0) as u32;
         let pieces = pieces.max(DRAWN_POINTS);
         let mut state = start;
@@ -221,96 +242,23 @@ impl GrinGap<f64> {
     }
 }
 
-/// Rays that stay below this part of the square of the radius of the glass are not looked at more
-/// closely.
+/// The part of the square of the radius of the glass below which a maximum is not located.
 const NEAR_SIDE: f64 = 0.8;
 
+/// The square of the distance from the axis.
 fn square_of_distance<R: Real>(x: Vec3<R>) -> R {
     x.x * x.x + x.y * x.y
 }
 
-/// Half of how fast the square of the distance from the axis grows.
+/// Half of the derivative of the square of the distance from the axis by σ.
 fn radial_rate<R: Real>(state: &RayState<R>) -> R {
     state.x.x * state.v.x + state.x.y * state.v.y
 }
 
-/// Whether a ray is in front of the surface by which it came, and on its way from it.
+/// True if a ray is in front of the surface by which it entered, and moves away from it.
 fn is_turned_back<R: Real>(entry: Option<&Interface<R>>, state: &RayState<R>) -> bool {
     entry.is_some_and(|entry| {
         let (height, rate) = entry.signed_height(state.x, state.v, R::ZERO);
         height < R::ZERO && rate < R::ZERO
     })
-}
-
-/// The derivative of something by a state.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct StateAdjoint<R> {
-    pub(super) x: Vec3<R>,
-    pub(super) v: Vec3<R>,
-    pub(super) path: R,
-}
-
-impl<R: Real> GrinGap<R> {
-    /// The length of the last step and the number of those before it, of a ray that took `length`.
-    fn steps(&self, length: R) -> (R, u32, R) {
-        let h = if length < R::ZERO { -self.step } else { self.step };
-        let whole = (length.value() / h.value()).floor();
-        let count = if whole > 0.0 { whole as u32 } else { 0 };
-        (length - h * R::from_f64(f64::from(count)), count, h)
-    }
-
-    /// How fast the end of the last step moves with its length.
-    pub(super) fn final_rate(&self, end: RayState<R>, length: R) -> RayState<R> {
-        let (last, _, _) = self.steps(length);
-        // Undone by its negative: every list of pieces reads the same backwards.
-        let before = self.advance(end, -last);
-        self.rate(before, last)
-    }
-
-    /// Undoes all steps of a ray that took `length`, and takes the derivatives along.
-    pub(super) fn backward(
-        &self,
-        end: RayState<R>,
-        length: R,
-        pull: StateAdjoint<R>,
-        by: &mut ProfileGradient<R>,
-    ) -> (RayState<R>, StateAdjoint<R>) {
-        let (last, count, h) = self.steps(length);
-        let (mut state, mut pull) = self.undo(end, last, pull, by);
-        for _ in 0..count {
-            (state, pull) = self.undo(state, h, pull, by);
-        }
-        (state, pull)
-    }
-
-    /// Undoes one step and applies its transpose.
-    fn undo(
-        &self,
-        state: RayState<R>,
-        h: R,
-        pull: StateAdjoint<R>,
-        by: &mut ProfileGradient<R>,
-    ) -> (RayState<R>, StateAdjoint<R>) {
-        let RayState { mut x, mut v, mut path } = state;
-        let mut pull = pull;
-        for op in self.ops.iter().rev() {
-            match *op {
-                IntegratorOp::Drift(c) => {
-                    x = x - v * (c * h);
-                    pull.v = pull.v + pull.x * (c * h);
-                }
-                IntegratorOp::Kick(c) => {
-                    let weight = c * h;
-                    let here = self.field.force(x);
-                    v = v - here.force * weight;
-                    path -= weight * here.square;
-                    self.field.accumulate(x, pull.path * weight, pull.v * weight, by);
-                    let turn =
-                        self.field.force_derivative(x, pull.v) + here.force * (R::TWO * pull.path);
-                    pull.x = pull.x + turn * weight;
-                }
-            }
-        }
-        (RayState { x, v, path }, pull)
-    }
 }

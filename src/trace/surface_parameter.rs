@@ -1,13 +1,13 @@
-//! Naming one number of a resolved system.
+//! The name of one number of a resolved system, and access to the number by it.
 
-use super::backward::{SurfaceGradient, SystemGradient};
+use super::adjoint::{SurfaceGradient, SystemGradient};
 use crate::lens::{
     ASPHERE_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, Shape, Surface,
     System,
 };
 use crate::math::Real;
 
-/// A number of a surface that a ray depends on.
+/// A number of a surface, or of the gap behind it, on which rays depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfaceParameter {
     /// The curvature.
@@ -16,18 +16,18 @@ pub enum SurfaceParameter {
     Conic,
     /// An asphere coefficient.
     AsphereTerm(usize),
-    /// The gap behind the surface.
+    /// The thickness of the gap behind the surface.
     Thickness,
-    /// The index behind the surface; `None` of the surfaces for the one in front of all.
+    /// The index behind the surface.
     Index,
-    /// The semi-diameter, on which no ray depends but the edge of a pupil does.
+    /// The semi-diameter, on which the edge of a pupil depends, though no ray does.
     SemiDiameter,
-    /// A coefficient of the gradient behind the surface.
+    /// A coefficient of the GRIN medium behind the surface.
     GrinTerm(usize),
 }
 
 impl SurfaceParameter {
-    /// Every kind of number, each with a unit of its own.
+    /// All kinds of numbers.
     pub fn all() -> impl Iterator<Item = Self> {
         let plain =
             [Self::Curvature, Self::Conic, Self::Thickness, Self::Index, Self::SemiDiameter];
@@ -35,12 +35,12 @@ impl SurfaceParameter {
         figured.chain((0..PROFILE_TERMS).map(Self::GrinTerm))
     }
 
-    /// Whether a surface has such a number; a plane has the curvature zero.
+    /// True if a surface has such a number; a plane has the curvature zero.
     pub fn exists_on<R>(self, surface: &Surface<R>) -> bool {
         let shape = &surface.shape;
         match self {
             Self::GrinTerm(k) => match &surface.grin {
-                Some(grade) => grade.law != ProfileLaw::Sech || k == 0 || k >= RADIAL_TERMS,
+                Some(grin) => grin.law != ProfileLaw::Sech || k == 0 || k >= RADIAL_TERMS,
                 None => false,
             },
             Self::Curvature | Self::Thickness | Self::Index | Self::SemiDiameter => true,
@@ -49,12 +49,12 @@ impl SurfaceParameter {
         }
     }
 
-    /// Writes a surface in a form that has this number, even where it is zero.
+    /// Changes the form of a surface to one that has this number, even if it is zero.
     pub fn promote_shape<R: Real>(self, system: &mut System<R>, surface: usize) {
         if let Self::GrinTerm(k) = self {
             let plain = ProfileCoefficients::new(ProfileLaw::Index, [R::ZERO; PROFILE_TERMS]);
-            let graded = &mut system.surfaces[surface].grin;
-            *graded = Some(graded.unwrap_or(plain).with_term(k));
+            let grin = &mut system.surfaces[surface].grin;
+            *grin = Some(grin.unwrap_or(plain).with_term(k));
         }
         let shape = &mut system.surfaces[surface].shape;
         *shape = match (self, *shape) {
@@ -65,7 +65,8 @@ impl SurfaceParameter {
         };
     }
 
-    /// This number of a surface that [`SurfaceParameter::promote_shape`] has written in a form that has it.
+    /// The number itself, of a surface in a form that has it (see
+    /// [`SurfaceParameter::promote_shape`]).
     pub fn value_mut<R: Real>(self, system: &mut System<R>, surface: usize) -> &mut R {
         let surface = &mut system.surfaces[surface];
         match (self, &mut surface.shape) {
@@ -80,7 +81,7 @@ impl SurfaceParameter {
             (Self::Conic, Shape::Conic { conic, .. } | Shape::Asphere { conic, .. }) => conic,
             (Self::AsphereTerm(term), Shape::Asphere { terms, .. }) => &mut terms[term],
             (Self::GrinTerm(k), _) => match &mut surface.grin {
-                Some(grade) => &mut grade.terms[k],
+                Some(grin) => &mut grin.terms[k],
                 None => &mut surface.index,
             },
             // An index is always there.
@@ -91,8 +92,8 @@ impl SurfaceParameter {
 
 impl<R: Real> SurfaceGradient<R> {
     /// The derivative by one number.
-    pub fn by(&self, slot: SurfaceParameter) -> R {
-        match slot {
+    pub fn by(&self, parameter: SurfaceParameter) -> R {
+        match parameter {
             SurfaceParameter::Curvature => self.curvature,
             SurfaceParameter::Conic => self.conic,
             SurfaceParameter::AsphereTerm(term) => self.terms[term],
@@ -103,9 +104,9 @@ impl<R: Real> SurfaceGradient<R> {
         }
     }
 
-    /// The derivative by one number, to be written.
-    pub fn by_mut(&mut self, slot: SurfaceParameter) -> &mut R {
-        match slot {
+    /// The derivative by one number, mutable.
+    pub fn by_mut(&mut self, parameter: SurfaceParameter) -> &mut R {
+        match parameter {
             SurfaceParameter::Curvature => &mut self.curvature,
             SurfaceParameter::Conic => &mut self.conic,
             SurfaceParameter::AsphereTerm(term) => &mut self.terms[term],
@@ -118,24 +119,24 @@ impl<R: Real> SurfaceGradient<R> {
 }
 
 impl<R: Real> SystemGradient<R> {
-    /// Each number of this gradient joined with that of another one of as many surfaces.
+    /// Combines each number of this gradient with that of another one with as many surfaces.
     #[must_use]
-    pub fn zip_with(&self, other: &Self, join: impl Fn(R, R) -> R) -> Self {
+    pub fn zip_with(&self, other: &Self, combine: impl Fn(R, R) -> R) -> Self {
         let pairs = self.numbers().zip(other.numbers());
-        Self::from_numbers(self.surfaces.len(), pairs.map(|(a, b)| join(a, b)))
+        Self::from_numbers(self.surfaces.len(), pairs.map(|(a, b)| combine(a, b)))
     }
 
-    /// The derivatives by the numbers of one kind, surface by surface; the index in front of all
-    /// comes before the other indices.
-    pub fn of_kind(&self, slot: SurfaceParameter) -> impl Iterator<Item = R> {
-        let front = (slot == SurfaceParameter::Index).then_some(self.index_before);
-        front.into_iter().chain(self.surfaces.iter().map(move |surface| surface.by(slot)))
+    /// The derivatives by the numbers of one kind, surface by surface; the index of object space is
+    /// the first of the indices.
+    pub fn of_kind(&self, parameter: SurfaceParameter) -> impl Iterator<Item = R> {
+        let front = (parameter == SurfaceParameter::Index).then_some(self.index_before);
+        front.into_iter().chain(self.surfaces.iter().map(move |surface| surface.by(parameter)))
     }
 }
 
 impl SystemGradient<f64> {
-    /// The largest derivative by a number of one kind.
-    pub fn largest(&self, slot: SurfaceParameter) -> f64 {
-        self.of_kind(slot).fold(0.0, |largest, by| largest.max(by.abs()))
+    /// The largest absolute derivative by a number of one kind.
+    pub fn largest(&self, parameter: SurfaceParameter) -> f64 {
+        self.of_kind(parameter).fold(0.0, |largest, by| largest.max(by.abs()))
     }
 }

@@ -1,50 +1,48 @@
-//! How many steps the gap of a gradient calls for.
+//! The number of steps for a gap with a GRIN medium.
 //!
-//! A few rays that fill the gap are traced by a number of steps and by twice as many, until that moves
-//! none of them by more than a tolerance. The number is a power of two, so that it stays the same
-//! while a search moves the lens; it depends on nothing but the gap and its two faces, so that every
-//! number type takes the same steps.
+//! A few rays that fill the gap are traced with a number of steps and with twice as many, until that
+//! moves none of them by more than a tolerance. The number is a power of two, so that it stays the
+//! same while an optimizer changes the lens; it depends only on the gap and its two surfaces, so that
+//! every number type takes the same steps.
 
-use super::gap::GrinGap;
-use super::interface::Interface;
-use crate::grin::{Integrator, RayState};
+use super::{GrinGap, INTEGRATOR};
+use crate::grin::RayState;
 use crate::lens::{ProfileLaw, RADIAL_TERMS, RotationalProfile, SystemError};
 use crate::math::{Real, Vec3};
+use crate::trace::interface::Interface;
 use serde::Serialize;
 
-/// How exact a ray is behind a gap, of its length.
+/// The permitted error of a ray behind a gap, as a part of the length of the gap.
 const TOLERANCE: f64 = 1e-11;
-/// More steps than this are not tried.
+/// The largest number of steps that is tried.
 const MAX_STEPS: u32 = 4096;
-/// A ray may be so many times longer than the axis.
+/// The permitted length of a ray, as a multiple of the length on the axis.
 const MAX_LENGTH_RATIO: u32 = 8;
-/// What the steps are made of: the most accurate for a number of kicks, symplectic and symmetric.
-const INTEGRATOR: Integrator = Integrator::BlanesMoan;
 
-/// The steps of one gap, and what they are good for.
+/// The steps of one gap, and their accuracy.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GrinStepPlan {
-    /// The surface in front of the gap.
+    /// The index of the surface in front of the gap.
     pub surface: usize,
-    /// Steps of a ray along the axis.
+    /// The number of steps of a ray along the axis.
     pub steps: u32,
-    /// The largest change of a place or a direction when the steps are halved, in mm and of the
+    /// The largest change when the steps are halved, of a position in mm or of a direction times the
     /// length of the gap.
     pub error: f64,
-    /// The change that was allowed.
+    /// The largest permitted change, in mm.
     pub tolerance: f64,
-    /// How often the field is asked for a ray along the axis.
+    /// The number of evaluations of the field for a ray along the axis.
     pub kicks: u32,
     /// The length of a step in σ, in mm over the index.
     pub step: f64,
 }
 
 impl<R: Real> GrinGap<R> {
-    /// Prepares a gap between two surfaces, `number` of which the first one is.
+    /// Prepares a gap between two surfaces; `number` is the index of the first one.
     ///
     /// # Errors
-    /// A gradient so strong that no number of steps will do.
-    pub(super) fn new(
+    /// A GRIN medium that is too strong for any number of steps.
+    pub(in crate::trace) fn new(
         field: RotationalProfile<R>,
         number: usize,
         faces: [&Interface<R>; 2],
@@ -66,7 +64,7 @@ impl<R: Real> GrinGap<R> {
     }
 }
 
-/// Tries 1, 2, 4, ... steps.
+/// Tries powers of two as the number of steps.
 fn choose_steps(
     field: &RotationalProfile<f64>,
     surface: usize,
@@ -111,8 +109,8 @@ fn choose_steps(
     Err(SystemError::Grin { surface: surface.into(), why })
 }
 
-/// The fewest steps that are worth a trial: light may turn by a third of a right angle or so in one,
-/// else rays that leave would hide what happens.
+/// The least number of steps that is tried: in one step light may turn by about a third of a right
+/// angle, because with fewer steps rays would leave the glass and hide the error.
 fn min_steps(field: &RotationalProfile<f64>, reach: f64, whole: f64) -> u32 {
     let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
     let places = [0.0, 0.5, 1.0].map(|share| Vec3::new(0.0, share * reach, 0.0));
@@ -121,7 +119,7 @@ fn min_steps(field: &RotationalProfile<f64>, reach: f64, whole: f64) -> u32 {
         .flat_map(|at| axes.map(|along| field.force_derivative(*at, along).dot(along)));
     let strongest = bends.fold(0.0, |most: f64, bend| most.max(bend.abs()));
     let turns = whole * strongest.sqrt();
-    // Beyond all steps that are tried, whatever it is.
+    // Otherwise more than the largest number that is tried.
     if turns < f64::from(MAX_STEPS) {
         (turns.ceil() as u32).max(1).next_power_of_two()
     } else {
@@ -129,11 +127,11 @@ fn min_steps(field: &RotationalProfile<f64>, reach: f64, whole: f64) -> u32 {
     }
 }
 
-/// A coefficient that counts though it is zero is tried where it changes the index by this.
+/// The relative change of the index by which an active coefficient that is zero is raised.
 const TRIAL_CHANGE: f64 = 1e-3;
 
-/// The same gradient with those coefficients raised that count though they are zero: a search is about
-/// to move them.
+/// The same field with the active coefficients that are zero raised, because an optimizer is about to
+/// change them.
 fn with_trial_terms(
     field: &RotationalProfile<f64>,
     reach: f64,
@@ -152,8 +150,8 @@ fn with_trial_terms(
     field
 }
 
-/// How far from the axis rays are tried: to the rim, or where nobody says to where the index has
-/// changed by a twentieth, but not farther than the gap is long.
+/// The distance from the axis up to which rays are tried: that of the rim or, without a rim, that at
+/// which the index has changed by a twentieth, but at most the length of the gap.
 fn trial_radius(field: &RotationalProfile<f64>, length: f64) -> f64 {
     if field.coefficients.reach.is_finite() {
         return field.coefficients.reach;
@@ -170,7 +168,7 @@ fn trial_radius(field: &RotationalProfile<f64>, length: f64) -> f64 {
     r
 }
 
-/// How long the gap is where it is longest.
+/// The largest length of the gap, in mm.
 fn longest_length(faces: &[Interface<f64>; 2], reach: f64) -> f64 {
     let edge = |face: &Interface<f64>| {
         let sag = face.sag(reach * reach).0;
@@ -178,11 +176,12 @@ fn longest_length(faces: &[Interface<f64>; 2], reach: f64) -> f64 {
     };
     let along = faces[1].gap.abs();
     let at_rim = (faces[1].gap + edge(&faces[1]) - edge(&faces[0])).abs();
-    // A gap between surfaces that touch has no length, but a ray may cross it all the same.
+    // A gap between surfaces that touch has no length on the axis, but a ray may cross it.
     along.max(at_rim).max(1e-3 * reach)
 }
 
-/// Rays at the first face: through its vertex, its zone and its rim, straight and slanted.
+/// Rays at the first surface, through its vertex, its zone and its rim, parallel to the axis and
+/// inclined.
 fn trial_rays(
     field: &RotationalProfile<f64>,
     face: &Interface<f64>,
@@ -204,7 +203,7 @@ fn trial_rays(
     starts
 }
 
-/// How far the ends of a ray by two numbers of steps lie apart; nothing for a ray that leaves the
+/// The difference between the ends of a ray with two numbers of steps; 0 for a ray that leaves the
 /// glass.
 fn end_difference(
     start: &RayState<f64>,
@@ -225,7 +224,7 @@ fn end_difference(
         Some(state)
     };
     let (Some(a), Some(b)) = (end(coarse), end(fine)) else {
-        // Leaving counts where only one of the two does so.
+        // A ray that leaves with only one of the two numbers of steps is an error.
         return if end(fine).is_none() { 0.0 } else { f64::INFINITY };
     };
     let size = |v: Vec3<f64>| v.dot(v).sqrt();
