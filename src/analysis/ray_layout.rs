@@ -47,7 +47,7 @@ pub fn ray_layout(bench: &RayModel, count: usize) -> RayLayout {
             Ok(launch) => {
                 for pupil in pupil_coordinates(count) {
                     if let Some(ray) = launch.ray([0.0, pupil]) {
-                        let mut path = launch.channel().tracer.path(ray);
+                        let mut path = launch.channel().tracer.polyline(ray);
                         layout.count(&path);
                         extend_backwards(bench, &mut path.points, ray.direction);
                         let wavelength = bench.primary;

@@ -59,7 +59,7 @@ impl<'a> SectionPlot<'a> {
         color: Color,
     ) {
         let Some(ray) = launch.ray(p) else { return };
-        let path = launch.channel().tracer.path(ray);
+        let path = launch.channel().tracer.polyline(ray);
         let before = ray.point - ray.direction * self.reach;
         let start = [before.z, before.y];
         let corners = std::iter::once(start).chain(path.points.iter().map(|p| [p.z, p.y]));

@@ -37,7 +37,8 @@ pub struct Glass {
     /// The name that the manufacturer gives it.
     pub name: String,
     /// The manufacturer: SCHOTT, OHARA, HOYA, …
-    pub maker: String,
+    #[serde(rename = "maker")]
+    pub manufacturer: String,
     /// The index at the d line.
     pub nd: f64,
     /// The Abbe number at the d line.
@@ -72,7 +73,7 @@ impl Glass {
 
     /// The manufacturer and the name, as in lens files.
     pub fn full_name(&self) -> String {
-        format!("{} {}", self.maker, self.name)
+        format!("{} {}", self.manufacturer, self.name)
     }
 }
 

@@ -268,13 +268,13 @@ impl<R: Real> ParaxialGrin<R> {
 
     /// Solves a gap without variation along the axis: the matrix of one step, squared repeatedly.
     fn solve_radial(&mut self, thickness: R) {
-        let (n, pull) = (self.index_behind, self.force_constant);
+        let (n, force) = (self.index_behind, self.force_constant);
         let h = thickness * R::from_f64(1.0 / MAGNUS_STEPS as f64);
-        self.matrix = matrix_exponential(R::ZERO, h / n, h * pull);
+        self.matrix = matrix_exponential(R::ZERO, h / n, h * force);
         for _ in 0..MAGNUS_STEPS.ilog2() {
             self.matrix = matrix_product(self.matrix, self.matrix);
         }
-        self.petzval = -(pull / (n * n) * thickness);
+        self.petzval = -(force / (n * n) * thickness);
     }
 
     /// Solves a gap whose index varies along the axis.

@@ -183,7 +183,7 @@ pub enum Medium {
     /// Air, with index 1.
     #[default]
     Air,
-    /// A catalogue glass by maker and name, such as `SCHOTT N-BK7`.
+    /// A catalogue glass by manufacturer and name, such as `SCHOTT N-BK7`.
     Glass(String),
     /// A model glass: refractive index and Abbe number at the d line.
     Model {

@@ -75,7 +75,7 @@ impl Medium {
     fn index(&self) -> Option<f64> {
         match self {
             Self::Model { nd: n, .. } | Self::Index(n) => Some(*n),
-            Self::Grin(gradient) => gradient.base.index(),
+            Self::Grin(grin) => grin.base.index(),
             Self::Air | Self::Glass(_) | Self::Mirror => None,
         }
     }
@@ -83,7 +83,7 @@ impl Medium {
     fn index_mut(&mut self) -> Option<&mut f64> {
         match self {
             Self::Model { nd: n, .. } | Self::Index(n) => Some(n),
-            Self::Grin(gradient) => gradient.base.index_mut(),
+            Self::Grin(grin) => grin.base.index_mut(),
             Self::Air | Self::Glass(_) | Self::Mirror => None,
         }
     }
@@ -104,7 +104,7 @@ impl Lens {
             Quantity::ZoomThickness(zoom) => self.thickness_at(parameter.surface, zoom),
             Quantity::Index => row.medium.index(),
             Quantity::Grin(k) => match &row.medium {
-                Medium::Grin(gradient) => gradient.term(k),
+                Medium::Grin(grin) => grin.term(k),
                 _ => None,
             },
             Quantity::SemiDiameter => row.semi_diameter,
@@ -135,7 +135,7 @@ impl Lens {
                 None => return false,
             },
             Quantity::Grin(k) => match &mut row.medium {
-                Medium::Grin(gradient) => return gradient.set_term(k, value),
+                Medium::Grin(grin) => return grin.set_term(k, value),
                 _ => return false,
             },
             Quantity::SemiDiameter => {

@@ -172,7 +172,7 @@ impl<R: Real> WarpTracer<R> {
                 "has no warp field; expected the method `boundary` or `difference`".to_owned();
             return Err(SystemError::Grin { surface: surface.into(), why });
         }
-        let outward = Tracer::new(&system.cast::<Jet<R>>())?;
+        let forward = Tracer::new(&system.cast::<Jet<R>>())?;
         let kinds = [
             LimitFunction::Rim,
             LimitFunction::Obstruction,
@@ -180,12 +180,12 @@ impl<R: Real> WarpTracer<R> {
             LimitFunction::ConicEdge,
         ];
         let all = |i: usize| kinds.map(|limit| (i, limit));
-        let limits = (0..outward.surfaces()).flat_map(all);
-        let limits = limits.filter(|(i, limit)| outward.interfaces[*i].has(*limit)).collect();
-        let mut homeward = Tracer::<MixedDual<R>>::new(&system.cast())?;
+        let limits = (0..forward.surfaces()).flat_map(all);
+        let limits = limits.filter(|(i, limit)| forward.interfaces[*i].has(*limit)).collect();
+        let mut backward = Tracer::<MixedDual<R>>::new(&system.cast())?;
         // The square of an infinite number has no slopes.
-        homeward.interfaces.iter_mut().for_each(|i| i.rim2 = MixedDual::from_f64(i.rim2.value()));
-        Ok(Self { forward: outward, backward: homeward, limits })
+        backward.interfaces.iter_mut().for_each(|i| i.rim2 = MixedDual::from_f64(i.rim2.value()));
+        Ok(Self { forward, backward, limits })
     }
 
     /// The number of surfaces, including the image plane.
@@ -321,10 +321,10 @@ struct WarpWorkspace<R> {
 impl<R: Real> WarpWorkspace<R> {
     fn new(tracer: &WarpTracer<R>) -> Self {
         let (surfaces, limits) = (tracer.forward.surfaces(), tracer.limits.len());
-        let jets = [Jet::ZERO; BLOCK];
-        let abreast = JetBlock {
-            landing: [jets; 2],
-            limits: vec![jets; limits],
+        let zero = [Jet::ZERO; BLOCK];
+        let jets = JetBlock {
+            landing: [zero; 2],
+            limits: vec![zero; limits],
             by_landing: [[R::ZERO; BLOCK]; 2],
             by_limit: vec![[[R::ZERO; 3]; BLOCK]; limits],
         };
@@ -335,7 +335,7 @@ impl<R: Real> WarpWorkspace<R> {
                 LimitAdjoint { rim: none, angle: none, obstruction: None, conic_edge: None };
                 surfaces
             ];
-        Self { jets: abreast, distances, limit_adjoints: limits }
+        Self { jets, distances, limit_adjoints: limits }
     }
 
     /// Moves the derivatives that were filled in to their surfaces.

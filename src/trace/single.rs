@@ -163,7 +163,7 @@ fn is_backwards<R: Real>(s: R, p: Vec3<R>, n2: R) -> bool {
 impl Tracer<f64> {
     /// The polyline of a ray, for drawing. A ray that misses a surface is extended to the vertex plane
     /// of that surface, if it travels towards it.
-    pub fn path(&self, ray: Ray<f64>) -> RayPolyline {
+    pub fn polyline(&self, ray: Ray<f64>) -> RayPolyline {
         let mut points = vec![ray.point];
         let mut vertices = Vec::with_capacity(self.interfaces.len());
         let mut z = 0.0;

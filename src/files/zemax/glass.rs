@@ -143,7 +143,7 @@ fn unlisted_medium(line: &GlassLine) -> Result<ImportedMedium, ParseError> {
 
 /// True for materials without a maker: crystals, fused silica, plastics.
 pub(super) fn is_general(glass: &Glass) -> bool {
-    matches!(glass.maker.as_str(), "CRYSTAL" | "PLASTIC" | "FUSED_SILICA")
+    matches!(glass.manufacturer.as_str(), "CRYSTAL" | "PLASTIC" | "FUSED_SILICA")
 }
 
 /// nd and vd of a six-digit code: 1.517 and 64.2 for `517642` and `517.642`.

@@ -75,7 +75,11 @@ impl<R: Real> AdjointBlock<R> {
 
     /// Retraces the block through a surface to the one before.
     #[inline(always)]
-    pub(super) fn retrace_surface(&mut self, surface: &Interface<R>, limits: Option<&LimitAdjoint<R>>) {
+    pub(super) fn retrace_surface(
+        &mut self,
+        surface: &Interface<R>,
+        limits: Option<&LimitAdjoint<R>>,
+    ) {
         let sheet = limits.and_then(|limits| {
             self.rim_adjoint(surface, &limits.rim);
             if let Some(by_limit) = &limits.obstruction {

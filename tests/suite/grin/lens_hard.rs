@@ -86,9 +86,9 @@ fn grin_lens_a_ray_that_cannot_go_on_turns_round() {
     tracer.trace_batch(&rays, &mut hits);
     assert_eq!((hits.fate(0), hits.x[0], hits.opl[0]), (Fate::Turned(1), 0.0, 0.0));
     assert_eq!((hits.fates().turned, hits.fates().imaged, hits.fates().total()), (1, 1, 2));
-    let path = tracer.path(ray(0.0, 0.0, 0.0, 0.9));
+    let path = tracer.polyline(ray(0.0, 0.0, 0.0, 0.9));
     assert_eq!(path.fate, Fate::Turned(1));
-    let bent = tracer.path(ray(0.0, 0.0, 0.0, 0.5));
+    let bent = tracer.polyline(ray(0.0, 0.0, 0.0, 0.5));
     assert!(bent.points.len() > 20 && bent.heights.len() == 3);
     assert!(bent.points.iter().all(|p| p.is_finite()));
     assert!(bent.points.windows(2).all(|pair| pair[1].z > pair[0].z));
@@ -140,7 +140,7 @@ fn grin_lens_an_index_below_one_and_gradients_too_strong_are_refused_by_name() {
     let mut bad = system(&half_pitch(1.0));
     bad.surfaces[0].grin =
         Some(ProfileCoefficients::new(ProfileLaw::Index, [f64::NAN; PROFILE_TERMS]));
-    assert!(Tracer::new(&bad).unwrap_err().to_string().contains("gradient coefficient"));
+    assert!(Tracer::new(&bad).unwrap_err().to_string().contains("GRIN coefficient"));
 }
 
 #[test]
@@ -242,7 +242,7 @@ fn grin_lens_the_edge_of_a_pupil_moves_with_every_number() {
         Accuracy { tolerance: 1e-2, max_rays: 10_000 },
     );
     let message = refused.unwrap_err().to_string();
-    assert!(message.contains("has no warp field; expected `boundary`"), "{message}");
+    assert!(message.contains("has no warp field; expected the method `boundary`"), "{message}");
 }
 
 #[test]
@@ -394,7 +394,7 @@ fn grin_lens_files_are_exact_and_say_what_is_wrong() {
     assert!(mirror.check().unwrap_err().to_string().contains("ends at a mirror"));
     let mut front = busy("index", &[-0.01], &[]);
     front.object_medium = front.surfaces[0].medium.clone();
-    assert!(front.check().unwrap_err().to_string().contains("the space of the object"));
+    assert!(front.check().unwrap_err().to_string().contains("object space"));
 }
 
 #[test]

@@ -62,7 +62,7 @@ impl ZemaxWriter {
             let Medium::Glass(name) = medium else { continue };
             // Materials without a maker are in the general catalogue of the other program.
             let own = glass::find(name).filter(|glass| !there::is_general(glass));
-            let maker = own.map_or("MISC", |glass| glass.maker.as_str());
+            let maker = own.map_or("MISC", |glass| glass.manufacturer.as_str());
             if !makers.contains(&maker) {
                 makers.push(maker);
             }
