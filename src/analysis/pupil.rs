@@ -9,7 +9,7 @@ use crate::pupil::{
     Accuracy, Launch, LaunchError, PupilOutline, PupilPattern, RayModel, Region, RegionKind,
     pattern_points,
 };
-use crate::trace::{Fate, ImagePoints, Rays, TraceSink};
+use crate::trace::{Fate, TraceSink};
 
 /// The pupil of a field at a wavelength.
 #[derive(Debug, Clone, PartialEq)]
@@ -177,11 +177,8 @@ fn ray_loss(launch: &Launch<'_>) -> RayLoss {
 
 /// The fates of the rays at some pupil points, without the points from which none can be launched.
 fn trace_fates(launch: &Launch<'_>, points: &[[f64; 2]]) -> Vec<([f64; 2], Fate)> {
-    let started: Vec<_> = points.iter().filter_map(|p| Some((*p, launch.ray(*p)?))).collect();
-    let rays: Rays<f64> = started.iter().map(|(_, ray)| *ray).collect();
-    let mut landed = ImagePoints::default();
-    launch.channel().tracer.trace_batch(&rays, &mut landed);
-    started.iter().enumerate().map(|(i, (p, _))| (*p, landed.fate(i))).collect()
+    let (launched, landed) = launch.trace_points(points);
+    launched.iter().enumerate().map(|(ray, i)| (points[*i], landed.fate(ray))).collect()
 }
 
 impl FieldPupil {

@@ -37,20 +37,20 @@ pub struct LayoutRay {
 const LEAD: f64 = 0.15;
 
 /// Traces `count` meridional rays of each field at the primary wavelength.
-pub fn ray_layout(bench: &RayModel, count: usize) -> RayLayout {
+pub fn ray_layout(model: &RayModel, count: usize) -> RayLayout {
     let mut layout = RayLayout {
-        ray_heights: vec![0.0; bench.channels[bench.primary].tracer.surfaces()],
+        ray_heights: vec![0.0; model.channels[model.primary].tracer.surfaces()],
         ..RayLayout::default()
     };
-    for (field, point) in bench.fields.iter().enumerate() {
-        match bench.launch(*point, bench.primary) {
+    for (field, point) in model.fields.iter().enumerate() {
+        match model.launch(*point, model.primary) {
             Ok(launch) => {
                 for pupil in pupil_coordinates(count) {
                     if let Some(ray) = launch.ray([0.0, pupil]) {
                         let mut path = launch.channel().tracer.polyline(ray);
                         layout.count(&path);
-                        extend_backwards(bench, &mut path.points, ray.direction);
-                        let wavelength = bench.primary;
+                        extend_backwards(model, &mut path.points, ray.direction);
+                        let wavelength = model.primary;
                         layout.rays.push(LayoutRay { field, wavelength, pupil, path });
                     }
                 }
@@ -81,18 +81,18 @@ impl RayLayout {
 }
 
 /// The z at which rays begin: in front of all surfaces, also of mirrors before the first vertex.
-fn drawing_start(bench: &RayModel) -> f64 {
-    let positions = bench.channels[bench.primary].system.vertex_positions();
+fn drawing_start(model: &RayModel) -> f64 {
+    let positions = model.channels[model.primary].system.vertex_positions();
     let first = positions.iter().copied().fold(0.0, f64::min);
     let last = positions.iter().copied().fold(0.0, f64::max);
     first - LEAD * (last - first)
 }
 
 /// Moves the start of a ray to the object or to a plane in front of the lens, whichever is nearer.
-fn extend_backwards(bench: &RayModel, points: &mut [Vec3<f64>], along: Vec3<f64>) {
+fn extend_backwards(model: &RayModel, points: &mut [Vec3<f64>], along: Vec3<f64>) {
     let [start, ..] = points else { return };
-    let front = drawing_start(bench);
-    let from = match bench.beam.object {
+    let front = drawing_start(model);
+    let from = match model.beam.object {
         Object::Finite(distance) if distance > 0.0 => -distance,
         _ => f64::NEG_INFINITY,
     };

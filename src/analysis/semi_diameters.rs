@@ -75,7 +75,7 @@ pub fn rim_sensitivities(
     let (area, center) = (lit.moments.area, lit.moments.centroid);
     let light = differentiate(&region, &QuadraticIntegrand::throughput(), estimator, accuracy)?;
     let spread = differentiate(&region, &QuadraticIntegrand::spread(center), estimator, accuracy)?;
-    let rms = (lit.moments.spread / area).sqrt();
+    let rms = lit.moments.rms_radius();
     let rays = lit.rays_traced + light.rays + spread.rays;
     let effect = |i: usize| {
         sensitivity(

@@ -3,7 +3,7 @@
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, Nodes, PupilMoments, RayModel, Region, RegionKind, converge};
-use crate::trace::{ImagePoints, Landings, Rays, TraceSink};
+use crate::trace::{Landings, TraceSink};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -316,9 +316,7 @@ fn edge_points(region: &Region<'_>) -> Vec<[f64; 2]> {
 }
 
 fn farthest_ray(region: &Region<'_>, points: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
-    let rays: Rays<f64> = points.iter().filter_map(|p| region.launch.ray(*p)).collect();
-    let mut landed = ImagePoints::default();
-    region.launch.channel().tracer.trace_batch(&rays, &mut landed);
-    let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
+    let (launched, landed) = region.launch.trace_points(points);
+    let arrived = (0..launched.len()).filter(|i| landed.fate(*i).is_imaged());
     arrived.map(|i| (landed.x[i] - x).hypot(landed.y[i] - y)).fold(0.0, f64::max)
 }

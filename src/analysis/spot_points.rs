@@ -4,7 +4,7 @@
 //! and not from these rays.
 
 use crate::pupil::{Launch, PupilPattern, RayModel, pattern_points};
-use crate::trace::{Fates, ImagePoints, Rays, TraceSink};
+use crate::trace::{Fates, TraceSink};
 
 /// The image points of one field at one wavelength.
 #[derive(Debug, Clone, Default)]
@@ -23,13 +23,13 @@ pub struct SpotPoints {
 const RINGS: usize = 6;
 
 /// The image points of every field and wavelength; a field without light has none.
-pub fn spot_points(bench: &RayModel) -> Vec<SpotPoints> {
+pub fn spot_points(model: &RayModel) -> Vec<SpotPoints> {
     let points = pattern_points(PupilPattern::Hexapolar(RINGS));
     let mut all = Vec::new();
-    for (field, point) in bench.fields.iter().enumerate() {
-        for wavelength in 0..bench.channels.len() {
+    for (field, point) in model.fields.iter().enumerate() {
+        for wavelength in 0..model.channels.len() {
             let dots =
-                bench.launch(*point, wavelength).ok().map(|launch| points_of(&launch, &points));
+                model.launch(*point, wavelength).ok().map(|launch| points_of(&launch, &points));
             all.push(SpotPoints { field, wavelength, ..dots.unwrap_or_default() });
         }
     }
@@ -37,10 +37,8 @@ pub fn spot_points(bench: &RayModel) -> Vec<SpotPoints> {
 }
 
 fn points_of(launch: &Launch<'_>, points: &[[f64; 2]]) -> SpotPoints {
-    let rays: Rays<f64> = points.iter().filter_map(|p| launch.ray(*p)).collect();
-    let mut landed = ImagePoints::default();
-    launch.channel().tracer.trace_batch(&rays, &mut landed);
-    let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
+    let (launched, landed) = launch.trace_points(points);
+    let arrived = (0..launched.len()).filter(|i| landed.fate(*i).is_imaged());
     SpotPoints {
         points: arrived.map(|i| [landed.x[i], landed.y[i]]).collect(),
         fates: landed.fates(),

@@ -167,7 +167,7 @@ impl RaySampling {
         let radius = |nodes: &Nodes| {
             orders += 1;
             let moments = region.moments(nodes);
-            (moments.area > 0.0).then(|| [(moments.spread / moments.area).sqrt()])
+            (moments.area > 0.0).then(|| [moments.rms_radius()])
         };
         let found = converge(&region, accuracy, radius, |values| *values);
         let error = found.map_or(0.0, |f| f.errors[0] / f.values[0].max(f64::MIN_POSITIVE));

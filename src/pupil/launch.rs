@@ -10,7 +10,7 @@ use super::field_source::{FieldSource, GRAZING, PupilMap, field_source, paraxial
 use super::ray_model::{Aiming, Channel, Dual2, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Real;
-use crate::trace::{Ray, TracedRay};
+use crate::trace::{ImagePoints, Ray, Rays, TracedRay};
 use serde::Serialize;
 
 /// The reason why a field has no rays.
@@ -184,6 +184,22 @@ impl<'a> Launch<'a> {
     #[inline(always)]
     pub(super) fn mapped_ray<R: Real>(&self, p: [R; 2]) -> Ray<R> {
         self.source.ray(self.map.map(p))
+    }
+
+    /// Traces the rays of some pupil points: the indices of those points from which a ray could be
+    /// launched, and the ends of these rays in the same order.
+    pub fn trace_points(&self, points: &[[f64; 2]]) -> (Vec<usize>, ImagePoints<f64>) {
+        let mut rays = Rays::with_capacity(points.len());
+        let mut launched = Vec::with_capacity(points.len());
+        for (i, p) in points.iter().enumerate() {
+            if let Some(ray) = self.ray(*p) {
+                rays.push(ray);
+                launched.push(i);
+            }
+        }
+        let mut traced = ImagePoints::default();
+        self.channel().tracer.trace_batch(&rays, &mut traced);
+        (launched, traced)
     }
 
     /// The ray at these pupil coordinates with its derivatives by the two pupil coordinates.

@@ -107,7 +107,7 @@ impl Region<'_> {
     /// A frame whose square from −1 to 1 holds all of the pupil with a margin.
     fn enclosing_frame(&self) -> Option<PolarFrame> {
         let frame = match &self.kind {
-            RegionKind::Clear => PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
+            RegionKind::Clear => PolarFrame::UNIT,
             RegionKind::StarShaped(boundary) => {
                 boundary.enclosing_square(self.launch.is_symmetric())
             }

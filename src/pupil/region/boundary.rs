@@ -36,6 +36,9 @@ pub struct PolarFrame {
 }
 
 impl PolarFrame {
+    /// The frame of the pupil coordinates themselves.
+    pub const UNIT: Self = Self { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] };
+
     /// The derivative of the pupil coordinates by the radius, at an azimuth measured from +y
     /// towards +x.
     pub fn direction(&self, azimuth: f64) -> [f64; 2] {

@@ -37,3 +37,10 @@ pub struct Region<'a> {
     /// The number of rays traced to find it.
     pub rays: usize,
 }
+
+impl Region<'_> {
+    /// True if no light gets through.
+    pub fn is_dark(&self) -> bool {
+        self.kind == RegionKind::Dark
+    }
+}

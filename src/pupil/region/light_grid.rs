@@ -1,21 +1,13 @@
-//! The search for the region of a pupil.
-//!
-//! Sixteen rays at the rim decide whether anything clips. If so, a coarse grid of rays shows the
-//! position of the light, the number of its pieces, and whether it is star-shaped about a point;
-//! then the edge is searched for from there.
+//! A coarse grid of rays that shows the position and the form of the light in a pupil.
 
 use super::annulus::Annulus;
 use super::boundary::{Boundary, EdgePoint, PolarFrame};
-use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter, margin_minima};
-use super::kind::{Region, RegionKind};
-use super::nodes::Nodes;
+use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
+use super::kind::RegionKind;
 use crate::pupil::launch::Launch;
-use crate::pupil::patterns::{PupilPattern, pattern_points};
-use crate::trace::{ImagePoints, Rays, TraceSink};
+use crate::trace::TraceSink;
 use std::f64::consts::{PI, TAU};
 
-/// The number of rays at the rim that decide whether a pupil is clear.
-const RIM_RAYS: usize = 16;
 /// The grids that search for light if no disc limits the pupil: cells along a side, and the largest
 /// distance from the axis that a grid so fine is used for.
 const SCANS: [(usize, f64); 3] = [(25, 120.0), (101, 13.0), (301, 1.7)];
@@ -31,136 +23,18 @@ const AZIMUTHS: usize = 24;
 /// The distance from the axis to which light is searched for first if no disc limits the pupil.
 const FIRST_REACH: f64 = 1.6;
 
-impl<'a> Region<'a> {
-    /// Searches for the region of a launch.
-    pub fn new(launch: Launch<'a>) -> Self {
-        let disc = launch.model.ends_at_disc();
-        let shadows = launch.obstruction_centers();
-        let mut rays = 0;
-        if launch.model.stop_radius() == 0.0 {
-            return Self { launch, kind: RegionKind::Dark, rays };
-        }
-        if disc && launch.is_clear(&shadows, &mut rays) {
-            return Self { launch, kind: RegionKind::Clear, rays };
-        }
-        let Some(grid) = LightGrid::around_light(&launch, &mut rays) else {
-            return Self { launch, kind: RegionKind::Dark, rays };
-        };
-        let kind = grid.classify(&launch, &shadows);
-        rays += match &kind {
-            RegionKind::StarShaped(boundary) => boundary.rays,
-            RegionKind::Irregular { annulus: Some(annulus), .. } => annulus.rays(),
-            _ => 0,
-        };
-        Self { launch, kind, rays }
-    }
-
-    /// The points of a pattern over a disc, or an ellipse, that holds all of the light: a sum over
-    /// those that arrive is what clipped patterns give in other programs.
-    pub fn pattern_nodes(&self, chosen: PupilPattern) -> Nodes {
-        let frame = match &self.kind {
-            RegionKind::Clear => PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] },
-            RegionKind::StarShaped(_) | RegionKind::Irregular { .. }
-                if self.launch.model.ends_at_disc() =>
-            {
-                PolarFrame { center: [0.0; 2], axes: [[1.0, 0.0], [0.0, 1.0]] }
-            }
-            RegionKind::StarShaped(boundary) => boundary.enclosing_disc(),
-            RegionKind::Irregular { square: (center, half), .. } => {
-                let reach = half * std::f64::consts::SQRT_2;
-                PolarFrame { center: *center, axes: [[reach, 0.0], [0.0, reach]] }
-            }
-            RegionKind::Dark | RegionKind::Unbounded => return Nodes::default(),
-        };
-        let place = |p: &[f64; 2]| {
-            let [a, b] = frame.axes;
-            [0, 1].map(|i| frame.center[i] + p[0] * a[i] + p[1] * b[i])
-        };
-        let points: Vec<_> = pattern_points(chosen).iter().map(place).collect();
-        let weight = PI * frame.area() / points.len() as f64;
-        Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
-    }
-
-    /// True if no light gets through.
-    pub fn is_dark(&self) -> bool {
-        self.kind == RegionKind::Dark
-    }
-}
-
-/// The pupil point at an azimuth of the rim.
-fn rim_point(azimuth: f64) -> [f64; 2] {
-    azimuth.sin_cos().into()
-}
-
-/// The point of the unit disc nearest to another one.
-fn nearest_in_disc([x, y]: [f64; 2]) -> [f64; 2] {
-    let outside = x.hypot(y).max(1.0);
-    [x / outside, y / outside]
-}
-
 impl Launch<'_> {
-    /// The centre of the shadow of every obstruction, inside the pupil or not: the pupil point of
-    /// the ray through the vertex of the surface. `None` for one that was not found.
-    fn obstruction_centers(&self) -> Vec<Option<[f64; 2]>> {
-        let surfaces = self.channel().system.surfaces.iter().enumerate();
-        let obstructed = surfaces.filter(|(_, surface)| surface.obstruction > 0.0);
-        obstructed.map(|(i, _)| self.through_vertex(i)).collect()
-    }
-
-    /// True if the whole disc gets through, judged by the margins of rays at its rim, at the minima
-    /// of margins in between, and by the ray nearest to the centre of each shadow, which may be too
-    /// small for all of them.
-    fn is_clear(&self, shadows: &[Option<[f64; 2]>], rays: &mut usize) -> bool {
-        let half = self.is_symmetric();
-        let step = if half { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
-        let mut margins = Vec::with_capacity(RIM_RAYS);
-        for i in 0..RIM_RAYS {
-            *rays += 1;
-            let Some(found) = self.margins_if_passing(rim_point(step * i as f64)) else {
-                return false;
-            };
-            margins.push(found);
-        }
-        *rays += 1;
-        let dips = margin_minima(&margins, half);
-        *rays += dips.len();
-        let passes = |p: [f64; 2]| self.margins_if_passing(p).is_some();
-        *rays += shadows.len();
-        passes([0.0, 0.0])
-            && dips.into_iter().all(|dip| passes(rim_point(step * dip)))
-            && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(nearest_in_disc(p))))
-    }
-
     /// For each pupil point, true if its ray gets through the surfaces.
     pub(super) fn lit_mask(&self, points: &[[f64; 2]]) -> Vec<bool> {
         let mut lit = vec![false; points.len()];
-        let launched = points.iter().enumerate().filter_map(|(i, p)| Some((i, self.ray(*p)?)));
-        let (places, rays): (Vec<usize>, Rays<f64>) = launched.unzip_rays();
-        let mut landed = ImagePoints::default();
-        self.channel().tracer.trace_batch(&rays, &mut landed);
-        places.iter().enumerate().for_each(|(ray, i)| lit[*i] = landed.fate(ray).is_imaged());
+        let (traced, landed) = self.trace_points(points);
+        traced.iter().enumerate().for_each(|(ray, i)| lit[*i] = landed.fate(ray).is_imaged());
         lit
     }
 }
 
-/// Splits pairs into values and rays.
-trait UnzipRays<T> {
-    fn unzip_rays(self) -> (Vec<T>, Rays<f64>);
-}
-
-impl<T, I: Iterator<Item = (T, crate::trace::Ray<f64>)>> UnzipRays<T> for I {
-    fn unzip_rays(self) -> (Vec<T>, Rays<f64>) {
-        let mut rays = Rays::default();
-        let places = self.map(|(place, ray)| {
-            rays.push(ray);
-            place
-        });
-        (places.collect(), rays)
-    }
-}
-
 /// A coarse grid of rays over a square of the pupil plane, each lit or dark.
-struct LightGrid {
+pub(super) struct LightGrid {
     cells: usize,
     center: [f64; 2],
     half: f64,
@@ -170,7 +44,7 @@ struct LightGrid {
 
 impl LightGrid {
     /// A grid that holds all of the light with enough lit rays; `None` if there is none.
-    fn around_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
+    pub(super) fn around_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
         let mut grid =
             SCANS.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays))?;
         for _ in 0..MAX_ZOOMS {
@@ -246,7 +120,7 @@ impl LightGrid {
         self.lit_cells().any(|i| at_edge(i % self.cells) || at_edge(i / self.cells))
     }
 
-    fn classify(&self, launch: &Launch<'_>, shadows: &[Option<[f64; 2]>]) -> RegionKind {
+    pub(super) fn classify(&self, launch: &Launch<'_>, shadows: &[Option<[f64; 2]>]) -> RegionKind {
         if !launch.model.ends_at_disc() && self.touches_its_edge() {
             return RegionKind::Unbounded;
         }

@@ -15,6 +15,7 @@ mod moments;
 mod nodes;
 mod outline;
 mod quadrature;
+mod search;
 mod traced_pupil;
 
 pub use annulus::Annulus;

@@ -5,12 +5,14 @@
 //! azimuth along every arc, and in the radius with weight `r` up to the edge. A pupil that is its
 //! own mirror image is integrated over one half.
 
-use super::boundary::Boundary;
+use super::boundary::{Boundary, PolarFrame};
 use super::edge_search::{EdgeSearch, GUESS_SPREAD};
 use super::kind::{Region, RegionKind};
 use super::nodes::{Grading, Nodes, RadialLine, clear_nodes, irregular_nodes, line_nodes};
 use crate::pupil::gauss_rules::legendre;
+use crate::pupil::patterns::{PupilPattern, pattern_points};
 use crate::trace::{Rays, TraceSink};
+use std::f64::consts::{PI, SQRT_2};
 
 /// The accuracy that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,6 +138,32 @@ impl Region<'_> {
             }
         }
         (lines, search.rays)
+    }
+
+    /// The points of a pattern over a disc, or an ellipse, that holds all of the light: a sum over
+    /// those that arrive is what clipped patterns give in other programs.
+    pub fn pattern_nodes(&self, chosen: PupilPattern) -> Nodes {
+        let frame = match &self.kind {
+            RegionKind::Clear => PolarFrame::UNIT,
+            RegionKind::StarShaped(_) | RegionKind::Irregular { .. }
+                if self.launch.model.ends_at_disc() =>
+            {
+                PolarFrame::UNIT
+            }
+            RegionKind::StarShaped(boundary) => boundary.enclosing_disc(),
+            RegionKind::Irregular { square: (center, half), .. } => {
+                let reach = half * SQRT_2;
+                PolarFrame { center: *center, axes: [[reach, 0.0], [0.0, reach]] }
+            }
+            RegionKind::Dark | RegionKind::Unbounded => return Nodes::default(),
+        };
+        let place = |p: &[f64; 2]| {
+            let [a, b] = frame.axes;
+            [0, 1].map(|i| frame.center[i] + p[0] * a[i] + p[1] * b[i])
+        };
+        let points: Vec<_> = pattern_points(chosen).iter().map(place).collect();
+        let weight = PI * frame.area() / points.len() as f64;
+        Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
     }
 
     /// Traces nodes into a sink.

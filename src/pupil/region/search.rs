@@ -1,0 +1,83 @@
+//! The search for the region of a pupil.
+//!
+//! Sixteen rays at the rim decide whether anything clips. If so, a coarse grid of rays shows the
+//! position of the light, the number of its pieces, and whether it is star-shaped about a point;
+//! then the edge is searched for from there.
+
+use super::edge_search::margin_minima;
+use super::kind::{Region, RegionKind};
+use super::light_grid::LightGrid;
+use crate::pupil::launch::Launch;
+use std::f64::consts::{PI, TAU};
+
+/// The number of rays at the rim that decide whether a pupil is clear.
+const RIM_RAYS: usize = 16;
+impl<'a> Region<'a> {
+    /// Searches for the region of a launch.
+    pub fn new(launch: Launch<'a>) -> Self {
+        let disc = launch.model.ends_at_disc();
+        let shadows = launch.obstruction_centers();
+        let mut rays = 0;
+        if launch.model.stop_radius() == 0.0 {
+            return Self { launch, kind: RegionKind::Dark, rays };
+        }
+        if disc && launch.is_clear(&shadows, &mut rays) {
+            return Self { launch, kind: RegionKind::Clear, rays };
+        }
+        let Some(grid) = LightGrid::around_light(&launch, &mut rays) else {
+            return Self { launch, kind: RegionKind::Dark, rays };
+        };
+        let kind = grid.classify(&launch, &shadows);
+        rays += match &kind {
+            RegionKind::StarShaped(boundary) => boundary.rays,
+            RegionKind::Irregular { annulus: Some(annulus), .. } => annulus.rays(),
+            _ => 0,
+        };
+        Self { launch, kind, rays }
+    }
+}
+
+/// The pupil point at an azimuth of the rim.
+fn rim_point(azimuth: f64) -> [f64; 2] {
+    azimuth.sin_cos().into()
+}
+
+/// The point of the unit disc nearest to another one.
+fn nearest_in_disc([x, y]: [f64; 2]) -> [f64; 2] {
+    let outside = x.hypot(y).max(1.0);
+    [x / outside, y / outside]
+}
+
+impl Launch<'_> {
+    /// The centre of the shadow of every obstruction, inside the pupil or not: the pupil point of
+    /// the ray through the vertex of the surface. `None` for one that was not found.
+    fn obstruction_centers(&self) -> Vec<Option<[f64; 2]>> {
+        let surfaces = self.channel().system.surfaces.iter().enumerate();
+        let obstructed = surfaces.filter(|(_, surface)| surface.obstruction > 0.0);
+        obstructed.map(|(i, _)| self.through_vertex(i)).collect()
+    }
+
+    /// True if the whole disc gets through, judged by the margins of rays at its rim, at the minima
+    /// of margins in between, and by the ray nearest to the centre of each shadow, which may be too
+    /// small for all of them.
+    fn is_clear(&self, shadows: &[Option<[f64; 2]>], rays: &mut usize) -> bool {
+        let half = self.is_symmetric();
+        let step = if half { PI / (RIM_RAYS - 1) as f64 } else { TAU / RIM_RAYS as f64 };
+        let mut margins = Vec::with_capacity(RIM_RAYS);
+        for i in 0..RIM_RAYS {
+            *rays += 1;
+            let Some(found) = self.margins_if_passing(rim_point(step * i as f64)) else {
+                return false;
+            };
+            margins.push(found);
+        }
+        *rays += 1;
+        let dips = margin_minima(&margins, half);
+        *rays += dips.len();
+        let passes = |p: [f64; 2]| self.margins_if_passing(p).is_some();
+        *rays += shadows.len();
+        passes([0.0, 0.0])
+            && dips.into_iter().all(|dip| passes(rim_point(step * dip)))
+            && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(nearest_in_disc(p))))
+    }
+}
