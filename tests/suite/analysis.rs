@@ -2,8 +2,8 @@
 
 use crate::reference::{Reference, Worst, count, lenses, number, numbers};
 use aplanat::analysis::{
-    PupilShape, distortion, fan, field_curvature, illumination, mtf, path_differences, pupil, spot,
-    wavefront,
+    AnalysisError, PupilShape, distortion, fan, field_curvature, illumination, image_quality, mtf,
+    path_differences, pupil, spot, spots, wavefront,
 };
 use aplanat::lens::{FieldKind, FieldPoint};
 use aplanat::paraxial::{Beam, first_order, seidel};
@@ -291,4 +291,25 @@ fn wide_pupils_are_compared_across_the_beam() {
         assert!(pupil.across_beam && share.value < before && share.value > 0.1);
         before = share.value;
     }
+}
+
+#[test]
+fn the_quality_of_a_lens_is_the_mean_of_its_spots() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    let accuracy = Accuracy { tolerance: 1e-4, ..Accuracy::default() };
+    let (mut total, mut square, mut area) = (0.0, 0.0, 0.0);
+    for (field, spot) in model.fields.iter().zip(spots(&model, accuracy)) {
+        let spot = spot.unwrap();
+        total += field.weight;
+        square += field.weight * spot.rms.value.powi(2);
+        area += field.weight * spot.light.value;
+    }
+    let quality = image_quality(&lens, 1e-4).unwrap();
+    assert!((quality.spot.unwrap().value / (square / total).sqrt() - 1.0).abs() < 1e-12);
+    assert!((quality.light.value / (area / total) - 1.0).abs() < 1e-12 && quality.is_fully_lit);
+    lens.surfaces[0].semi_diameter = Some(0.0);
+    let dark = image_quality(&lens, 1e-4).unwrap();
+    assert_eq!((dark.spot, dark.light.value), (Err(AnalysisError::NoLight), 0.0));
+    assert!(!dark.is_fully_lit);
 }

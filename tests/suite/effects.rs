@@ -1,4 +1,4 @@
-//! What the plan leaves out costs nothing and changes no more than it said, on every lens.
+//! Effects that a plan leaves out change the numbers by no more than it promises, on every lens.
 
 use aplanat::analysis::{AnalysisError, Spot, spots};
 use aplanat::effects::{
@@ -50,8 +50,8 @@ fn change(a: &RayModel, b: &RayModel) -> Option<(f64, f64)> {
     Some((change, error))
 }
 
-/// How many stop radii the chief ray of the farthest field crosses the stop from where the other
-/// does.
+/// The distance between the points where the chief rays of the farthest field cross the stop in two
+/// models, in stop radii.
 fn chief_change(a: &RayModel, b: &RayModel) -> f64 {
     let edge = |bench: &RayModel| {
         let field = FieldPoint { x: 0.0, y: bench.beam.edge, weight: 1.0 };

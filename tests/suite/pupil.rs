@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 /// Relative to the RMS radius, or to the height of a centroid. One unit of a ray's rounding comes on
 /// top: a spot of 0.2 µm behind a pupil of 2.4 m has no eleven digits in double precision.
 const TOLERANCE: f64 = 1e-11;
-/// How many units of rounding a ray may be off.
+/// The tolerance of a ray, in units of rounding.
 const ROUNDING: f64 = 16.0;
 
 /// Centroid and RMS distance from it.
@@ -42,7 +42,7 @@ fn size(bench: &RayModel) -> f64 {
     rows.iter().map(|row| &row.thickness).chain(heights).fold(0.0, |m: f64, v| m.max(v.abs()))
 }
 
-/// Where the rays of the usual pattern land.
+/// The image points of the rays of the usual pattern.
 fn hexapolar(bench: &RayModel, field: usize, wavelength: usize) -> Vec<[f64; 2]> {
     let launch = bench.launch(bench.fields[field], wavelength).unwrap();
     let rays: Rays<f64> = pattern_points(PupilPattern::Hexapolar(6))

@@ -15,7 +15,7 @@ use aplanat::pupil::{
 use aplanat::trace::{Ray, RayLimit, SurfaceParameter, SystemGradient, Tracer};
 use std::f64::consts::PI;
 
-/// What central differences leave of fifteen digits.
+/// The error of central differences, relatively.
 const TOLERANCE: f64 = 1e-7;
 const ORDER: usize = 8;
 const ASKED: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 400_000 };

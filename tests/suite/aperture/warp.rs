@@ -92,8 +92,8 @@ fn aperture_gradients_by_the_warp_field_have_no_bias() {
     assert!(off <= BIASED, "{off} in {place}");
 }
 
-/// How many standard errors the mean of some estimates is off at most; the first of three numbers is
-/// the estimate, the last the exact one.
+/// The largest deviation of the mean of some estimates, in standard errors; the first of three
+/// numbers is the estimate, the last the exact one.
 fn farthest_of(columns: &[Vec<[f64; 3]>]) -> f64 {
     let off = |i: usize| {
         let each = || columns.iter().map(|rows| rows[i][0]);

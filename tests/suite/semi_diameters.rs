@@ -1,13 +1,13 @@
-//! What the size of every rim does, against lenses with larger and smaller rims.
+//! Sensitivities to semi-diameters, compared with lenses with larger and smaller ones.
 
 use aplanat::analysis::{self, RimSensitivities, RimSensitivity};
 use aplanat::files::{bundled_lenses, json};
 use aplanat::lens::{Lens, Parameter, Quantity};
 use aplanat::pupil::{Accuracy, DerivativeError, RayModel};
 
-/// By how much rims are made larger and smaller, in mm.
+/// The change of a semi-diameter, in mm.
 const STEP: f64 = 1e-3;
-/// What quadrature and step leave of a difference, relative to the largest.
+/// The error of a difference from quadrature and step, relative to the largest.
 const LEFT: f64 = 1e-3;
 
 /// The first lens of the library: its rims alone limit the beam.
@@ -24,7 +24,7 @@ fn light_and_blur(lens: &Lens, field: usize) -> [f64; 2] {
     [color.light.value, color.rms.value]
 }
 
-/// How both change when a rim grows, per mm.
+/// The derivatives of area and RMS radius by a semi-diameter, per mm.
 fn shown(lens: &Lens, field: usize, surface: usize) -> [f64; 2] {
     let parameter = Parameter::new(surface, Quantity::SemiDiameter);
     let at = |change: f64| {
