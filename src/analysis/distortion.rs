@@ -65,7 +65,6 @@ impl RayModel {
 /// The distortion of a field at a wavelength.
 ///
 /// # Errors
-///
 /// The chief ray does not reach the image, or the lens has no focal length to compare with.
 pub fn distortion(
     model: &RayModel,
@@ -88,7 +87,6 @@ pub fn distortion(
 /// ray: the same numbers as Coddington's equations give.
 ///
 /// # Errors
-///
 /// The chief ray does not reach the image.
 pub fn field_curvature(
     model: &RayModel,

@@ -33,7 +33,6 @@ pub struct Fan {
 /// primary wavelength.
 ///
 /// # Errors
-///
 /// The chief ray does not reach the image, or the field has no rays.
 pub fn fan(model: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>, AnalysisError> {
     let chief = model.chief_point(field, model.primary)?;

@@ -22,7 +22,6 @@ pub struct MtfPoint {
 /// absolute.
 ///
 /// # Errors
-///
 /// The field is dark.
 pub fn mtf(
     model: &RayModel,

@@ -25,7 +25,6 @@ pub struct Wavefront {
 /// The wavefront of a field at a wavelength; errors are relative to its RMS.
 ///
 /// # Errors
-///
 /// The field is dark or its chief ray does not reach the image.
 pub fn wavefront(
     model: &RayModel,
@@ -47,7 +46,6 @@ pub fn wavefront(
 /// The path differences at some pupil points in wavelengths; `None` for a ray that is lost.
 ///
 /// # Errors
-///
 /// The field has no rays or its chief ray does not reach the image.
 pub fn path_differences(
     model: &RayModel,

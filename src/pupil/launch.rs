@@ -5,8 +5,8 @@
 //! more need no special case; for an object point the plane of the entrance pupil; for a
 //! telecentric beam `q` is the slope. A [`PupilMap`] leads from pupil coordinates to that plane.
 
-use super::aim::{AimedRay, aim_at};
 use super::field_source::{FieldSource, GRAZING, PupilMap, field_source, paraxial_map};
+use super::ray_aiming::{AimedRay, aim_at};
 use super::ray_model::{Aiming, Channel, Dual2, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Real;
@@ -62,6 +62,16 @@ pub struct Launch<'a> {
     aiming: Aiming,
     source: FieldSource,
     map: PupilMap,
+}
+
+impl RayModel {
+    /// The rays of a field at a wavelength.
+    ///
+    /// # Errors
+    /// A field without rays: see [`LaunchError`].
+    pub fn launch(&self, field: FieldPoint, wavelength: usize) -> Result<Launch<'_>, LaunchError> {
+        Launch::new(self, field, wavelength, self.aiming)
+    }
 }
 
 impl<'a> Launch<'a> {

@@ -5,8 +5,6 @@ use crate::math::Dual;
 use crate::paraxial::{Beam, FirstOrder, ParaxialError, Seidel, first_order, seidel};
 use crate::trace::Tracer;
 
-use super::launch::Launch;
-
 /// A number with its derivatives by the two coordinates of a pupil.
 pub type Dual2 = Dual<f64, 2>;
 
@@ -23,10 +21,6 @@ pub enum Aiming {
     /// itself.
     Stop,
 }
-
-/// The largest distance of the paraxial chief ray from the centre of the stop, in stop radii, up to
-/// which paraxial aiming is used: beyond it, much of the beam would be missed.
-pub const WIDE_AIMING_THRESHOLD: f64 = 0.25;
 
 /// The reason why a lens cannot be traced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -76,20 +70,10 @@ pub struct RayModel {
 }
 
 impl RayModel {
-    /// A lens at a zoom position, aimed as [`choose_aiming`](Self::choose_aiming) decides.
-    ///
-    /// # Errors
-    /// A lens that cannot be resolved, or an aperture without meaning for it.
-    pub fn from_lens(lens: &Lens, zoom: usize) -> Result<Self, RayModelError> {
-        let mut model = Self::with_aiming(lens, zoom, Aiming::Paraxial)?;
-        model.choose_aiming();
-        Ok(model)
-    }
-
     /// A lens at a zoom position, with a given aiming.
     ///
     /// # Errors
-    /// As of [`from_lens`](Self::from_lens).
+    /// A lens that cannot be resolved, or an aperture without meaning for it.
     pub fn with_aiming(lens: &Lens, zoom: usize, aiming: Aiming) -> Result<Self, RayModelError> {
         let system = |w: &crate::lens::Wavelength| Ok((w.um, w.weight, lens.resolve(zoom, w.um)?));
         let systems: Result<Vec<_>, LensError> = lens.wavelengths.iter().map(system).collect();
@@ -132,19 +116,6 @@ impl RayModel {
             first_order: first,
             aiming,
         })
-    }
-
-    /// The rays of a field at a wavelength.
-    ///
-    /// # Errors
-    ///
-    /// A field without rays: see [`LaunchError`](super::LaunchError).
-    pub fn launch(
-        &self,
-        field: FieldPoint,
-        wavelength: usize,
-    ) -> Result<Launch<'_>, super::LaunchError> {
-        Launch::new(self, field, wavelength, self.aiming)
     }
 
     /// The Seidel sums; the chromatic ones between the shortest and the longest wavelength if there
@@ -197,26 +168,5 @@ impl RayModel {
     /// The index of the stop surface.
     pub fn stop(&self) -> usize {
         self.channels[self.primary].system.stop.unwrap_or(0)
-    }
-
-    /// Chooses between paraxial aiming and aiming by the real chief ray: the latter if the paraxial
-    /// chief ray of the farthest field misses the centre of the stop by more than
-    /// [`WIDE_AIMING_THRESHOLD`]. Returns that miss, in stop radii; `None` if the ray does not reach
-    /// the stop.
-    pub fn choose_aiming(&mut self) -> Option<f64> {
-        let miss = self.stop_miss();
-        let wide = miss.is_none_or(|miss| miss > WIDE_AIMING_THRESHOLD);
-        self.aiming = if wide { Aiming::Chief } else { Aiming::Paraxial };
-        miss
-    }
-
-    /// The distance of the paraxial chief ray of the farthest field from the centre of the stop, in
-    /// stop radii; `None` if the ray does not reach the stop.
-    fn stop_miss(&self) -> Option<f64> {
-        let edge = FieldPoint { x: 0.0, y: self.beam.edge, weight: 1.0 };
-        let launch = Launch::new(self, edge, self.primary, Aiming::Paraxial).ok()?;
-        let [x, y] = launch.stop_point([0.0, 0.0])?;
-        let miss = x.hypot(y) / self.stop_radius();
-        miss.is_finite().then_some(miss)
     }
 }

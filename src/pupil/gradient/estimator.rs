@@ -102,7 +102,6 @@ const MOST: f64 = 16.0;
 /// with its semi-diameter.
 ///
 /// # Errors
-///
 /// A pupil without light or edge; `Boundary` for a pupil that is neither star-shaped nor an
 /// annulus, `Warp` for a lens with an obstruction or a gradient-index gap.
 pub fn differentiate(
