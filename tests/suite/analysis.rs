@@ -15,14 +15,14 @@ const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, max_rays: 400_000 };
 #[test]
 fn reference_integrals() {
     for lens in lenses() {
-        let (bench, mut worst) = (lens.open_bench(), Worst::default());
+        let (model, mut worst) = (lens.open_model(), Worst::default());
         for exact in lens.data["integrals"].as_array().unwrap() {
-            let field = bench.fields[count(&exact["f"])];
-            let got = spot(&bench, field, ACCURACY).unwrap();
+            let field = model.fields[count(&exact["f"])];
+            let got = spot(&model, field, ACCURACY).unwrap();
             for exact in exact["per_wavelength"].as_array().unwrap() {
                 let w = count(&exact["w"]);
                 let color = got.channels[w].unwrap();
-                let mtf = mtf(&bench, field, w, &[10.0, 30.0], ACCURACY).unwrap();
+                let mtf = mtf(&model, field, w, &[10.0, 30.0], ACCURACY).unwrap();
                 for (got, name) in [
                     (color.rms, "rms"),
                     (color.centroid[0], "centroid_x"),
@@ -45,14 +45,14 @@ fn reference_integrals() {
 #[test]
 fn reference_vignetted() {
     for lens in lenses() {
-        let (bench, mut worst) = (lens.clipped_bench(), Worst::default());
+        let (model, mut worst) = (lens.clipped_model(), Worst::default());
         let w = lens.primary();
-        let light = illumination(&bench, w, ACCURACY);
-        let pupil = bench.first_order.entrance_pupil.diameter.unwrap();
+        let light = illumination(&model, w, ACCURACY);
+        let pupil = model.first_order.entrance_pupil.diameter.unwrap();
         let scale = (pupil / number(&lens.data["aperture"]["epd"])).powi(2);
         for exact in lens.data["vignetted"]["fields"].as_array().unwrap() {
             let f = count(&exact["f"]);
-            let field = bench.fields[f];
+            let field = model.fields[f];
             if exact["no_light"].as_bool() == Some(true) {
                 assert!(light[f].error.is_some() && light[f].cone.value == 0.0, "{}", lens.id());
                 continue;
@@ -71,12 +71,12 @@ fn reference_vignetted() {
             };
             note("relative_illumination", light[f].relative.unwrap(), 1.0);
             note("solid_angle_projected", light[f].cone, 1.0);
-            let got = spot(&bench, field, ACCURACY).unwrap().channels[w].unwrap();
+            let got = spot(&model, field, ACCURACY).unwrap().channels[w].unwrap();
             note("ep_area_unit_disc", got.area, scale);
             note("unvignetted_fraction", got.area, scale / std::f64::consts::PI);
             note("rms", got.rms, 1.0);
             note("centroid_y", got.centroid[1], 1.0);
-            let mtf = mtf(&bench, field, w, &[30.0], ACCURACY).unwrap();
+            let mtf = mtf(&model, field, w, &[30.0], ACCURACY).unwrap();
             note("gmtf_t30", mtf[0].tangential, 1.0);
         }
         worst.check(&format!("vignetted {}", lens.id()), 1.0);
@@ -85,8 +85,8 @@ fn reference_vignetted() {
 
 /// Sixteen times the rounding of the path along the axis, in wavelengths: long systems have no
 /// better path differences.
-fn path_rounding(bench: &RayModel, wavelength: usize) -> f64 {
-    let color = &bench.channels[wavelength];
+fn path_rounding(model: &RayModel, wavelength: usize) -> f64 {
+    let color = &model.channels[wavelength];
     let gap = |s: &aplanat::lens::Surface<f64>| s.index * s.thickness.abs();
     let path: f64 = color.system.surfaces.iter().map(gap).sum();
     16.0 * 0.5 * f64::EPSILON * path / (color.um * 1e-3)
@@ -95,7 +95,7 @@ fn path_rounding(bench: &RayModel, wavelength: usize) -> f64 {
 #[test]
 fn reference_path_differences() {
     for lens in lenses() {
-        let (bench, mut worst) = (lens.open_bench(), Worst::default());
+        let (model, mut worst) = (lens.open_model(), Worst::default());
         for ray in lens.data["rays"].as_array().unwrap() {
             if ray["opd_waves"].is_null() {
                 continue;
@@ -103,17 +103,17 @@ fn reference_path_differences() {
             let (f, w) = (count(&ray["f"]), count(&ray["w"]));
             let pupil = numbers(&ray["pupil"]);
             let points = [[pupil[0], pupil[1]]];
-            let got = path_differences(&bench, bench.fields[f], w, &points).unwrap()[0].unwrap();
-            let tolerance = path_rounding(&bench, w).max(1e-8);
+            let got = path_differences(&model, model.fields[f], w, &points).unwrap()[0].unwrap();
+            let tolerance = path_rounding(&model, w).max(1e-8);
             worst.note(got, number(&ray["opd_waves"]), tolerance, format!("{f} {w} {pupil:?}"));
         }
         for exact in lens.data["integrals"].as_array().unwrap() {
-            let field = bench.fields[count(&exact["f"])];
+            let field = model.fields[count(&exact["f"])];
             for exact in exact["per_wavelength"].as_array().unwrap() {
                 let w = count(&exact["w"]);
-                let got = wavefront(&bench, field, w, ACCURACY).unwrap().rms;
+                let got = wavefront(&model, field, w, ACCURACY).unwrap().rms;
                 let err = 10.0 * number(&exact["err"]["rms_opd_waves"]);
-                let tolerance = err.max(path_rounding(&bench, w)).max(1e-9);
+                let tolerance = err.max(path_rounding(&model, w)).max(1e-9);
                 let name = format!("rms f {} w {w}", field.y);
                 worst.note(got.value, number(&exact["rms_opd_waves"]), tolerance, name);
             }
@@ -125,9 +125,9 @@ fn reference_path_differences() {
 #[test]
 fn reference_chief_rays() {
     for lens in lenses() {
-        let (bench, mut worst) = (lens.open_bench(), Worst::default());
+        let (model, mut worst) = (lens.open_model(), Worst::default());
         for exact in lens.data["chief"].as_array().unwrap() {
-            let got = distortion(&bench, bench.fields[count(&exact["f"])], lens.primary()).unwrap();
+            let got = distortion(&model, model.fields[count(&exact["f"])], lens.primary()).unwrap();
             let size = number(&exact["y_gauss"]).abs();
             worst.note(got.height, number(&exact["y_chief"]), size, "y_chief");
             worst.note(got.ideal, number(&exact["y_gauss"]), size, "y_gauss");
@@ -143,21 +143,21 @@ fn reference_chief_rays() {
 }
 
 /// Every analysis of a field, for a lens that lets nothing of it through.
-fn all_dark(bench: &RayModel, field: FieldPoint) {
+fn all_dark(model: &RayModel, field: FieldPoint) {
     let accuracy = Accuracy::default();
-    assert!(spot(bench, field, accuracy).is_err());
-    assert!(mtf(bench, field, 0, &[10.0], accuracy).is_err());
-    assert!(wavefront(bench, field, 0, accuracy).is_err());
-    let light = illumination(&RayModel { fields: vec![field], ..bench.clone() }, 0, accuracy);
+    assert!(spot(model, field, accuracy).is_err());
+    assert!(mtf(model, field, 0, &[10.0], accuracy).is_err());
+    assert!(wavefront(model, field, 0, accuracy).is_err());
+    let light = illumination(&RayModel { fields: vec![field], ..model.clone() }, 0, accuracy);
     assert_eq!(light[0].cone.value, 0.0);
     assert!(light[0].error.is_some() && light[0].relative.is_none());
-    if let Ok(fans) = fan(bench, field, 11) {
+    if let Ok(fans) = fan(model, field, 11) {
         assert!(fans.iter().all(|f| f.tangential.iter().all(|point| point.error.is_none())));
     }
-    if let Ok(found) = distortion(bench, field, 0) {
+    if let Ok(found) = distortion(model, field, 0) {
         assert!(found.height.is_finite() && found.ideal.is_finite());
     }
-    if let Ok(found) = field_curvature(bench, field, 0) {
+    if let Ok(found) = field_curvature(model, field, 0) {
         assert!([found.tangential, found.sagittal].iter().flatten().all(|z| z.is_finite()));
     }
 }
@@ -170,12 +170,12 @@ fn a_field_without_light_says_so_in_every_analysis() {
     for lens in lenses().iter().filter(angles).filter(behind) {
         for angle in [75.0, 90.0, -150.0] {
             let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
-            let mut bench = lens.clipped_bench();
-            for color in &mut bench.channels {
+            let mut model = lens.clipped_model();
+            for color in &mut model.channels {
                 color.system.surfaces[0].semi_diameter = 1e-9;
                 color.tracer = Tracer::new(&color.system).unwrap();
             }
-            all_dark(&bench, field);
+            all_dark(&model, field);
         }
     }
 }
@@ -184,13 +184,13 @@ fn a_field_without_light_says_so_in_every_analysis() {
 fn a_spot_out_of_focus_is_the_spot_of_the_moved_image_plane() {
     let lens = lenses().into_iter().find(|lens| lens.id() == "cooke_triplet").unwrap();
     let at = |defocus: f64| {
-        let mut bench = lens.open_bench();
-        for color in &mut bench.channels {
+        let mut model = lens.open_model();
+        for color in &mut model.channels {
             let last = color.system.surfaces.len() - 2;
             color.system.surfaces[last].thickness += defocus;
             color.tracer = Tracer::new(&color.system).unwrap();
         }
-        spot(&bench, bench.fields[2], ACCURACY).unwrap()
+        spot(&model, model.fields[2], ACCURACY).unwrap()
     };
     let focused = at(0.0);
     for defocus in [-0.3, 0.1, 0.4] {
@@ -208,13 +208,13 @@ fn a_spot_out_of_focus_is_the_spot_of_the_moved_image_plane() {
 #[test]
 fn field_curvature_near_the_axis_follows_the_seidel_sums() {
     let lens = lenses().into_iter().find(|lens| lens.id() == "cooke_triplet").unwrap();
-    let bench = lens.open_bench();
-    let system = &bench.channels[bench.primary].system;
-    let beam = Beam { edge: 0.1, ..bench.beam };
+    let model = lens.open_model();
+    let system = &model.channels[model.primary].system;
+    let beam = Beam { edge: 0.1, ..model.beam };
     let first = first_order(system, &beam).unwrap();
     let sums = seidel(system, &first, None).unwrap().total;
     let at = |y: f64| {
-        field_curvature(&bench, FieldPoint { x: 0.0, y, weight: 1.0 }, bench.primary).unwrap()
+        field_curvature(&model, FieldPoint { x: 0.0, y, weight: 1.0 }, model.primary).unwrap()
     };
     let (axis, edge) = (at(0.0), at(0.1));
     // Longitudinal shifts −(S3 + S4)/(2 n' u'²) and −(3 S3 + S4)/(2 n' u'²); Welford 8.
@@ -232,13 +232,13 @@ fn field_curvature_near_the_axis_follows_the_seidel_sums() {
 fn an_error_estimate_covers_the_error() {
     let (mut worst, mut count) = (0.0f64, 0);
     let lenses = lenses();
-    let benches = lenses.iter().flat_map(|lens| [lens.open_bench(), lens.clipped_bench()]);
-    for bench in benches {
-        for field in &bench.fields {
-            let Ok(exact) = spot(&bench, *field, ACCURACY) else { continue };
+    let benches = lenses.iter().flat_map(|lens| [lens.open_model(), lens.clipped_model()]);
+    for model in benches {
+        for field in &model.fields {
+            let Ok(exact) = spot(&model, *field, ACCURACY) else { continue };
             for tolerance in [1e-1, 1e-2, 1e-3, 1e-5] {
                 let accuracy = Accuracy { tolerance, ..ACCURACY };
-                let rough = spot(&bench, *field, accuracy).unwrap();
+                let rough = spot(&model, *field, accuracy).unwrap();
                 let error = (rough.rms.value - exact.rms.value).abs();
                 worst = worst.max(error / (rough.rms.error + exact.rms.error));
                 count += 1;
@@ -258,14 +258,14 @@ fn the_pupil_of_a_dark_field_tells_which_surface_ends_most_rays() {
     let mut lens = bundled("double_gauss_rudolph_50");
     let field = FieldPoint { x: 0.0, y: 40.0, weight: 1.0 };
     lens.fields.values.push(field);
-    let bench = RayModel::from_lens(&lens, 0).unwrap();
-    let dark = pupil(&bench, field, bench.primary, Accuracy::default());
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    let dark = pupil(&model, field, model.primary, Accuracy::default());
     let PupilShape::Dark(loss) = dark.shape else { panic!("{:?}", dark.shape) };
     assert_eq!(
         (loss.main_fate, loss.rays, loss.includes_chief),
         (Some(Fate::Clipped(0)), 127, true)
     );
-    let whole = pupil(&bench, FieldPoint { y: 0.0, ..field }, bench.primary, Accuracy::default());
+    let whole = pupil(&model, FieldPoint { y: 0.0, ..field }, model.primary, Accuracy::default());
     let share = dark.share_of(whole.extent.unwrap().area).unwrap();
     assert_eq!(share.value, 0.0);
     assert!(dark.extent.is_none());
@@ -273,15 +273,15 @@ fn the_pupil_of_a_dark_field_tells_which_surface_ends_most_rays() {
 
 #[test]
 fn wide_pupils_are_compared_across_the_beam() {
-    let bench = RayModel::from_lens(&bundled("fisheye_minolta_16_f28"), 0).unwrap();
+    let model = RayModel::from_lens(&bundled("fisheye_minolta_16_f28"), 0).unwrap();
     let seen = |y: f64| {
         let field = FieldPoint { x: 0.0, y, weight: 1.0 };
-        pupil(&bench, field, bench.primary, Accuracy::default())
+        pupil(&model, field, model.primary, Accuracy::default())
     };
     let axis = seen(0.0).extent.unwrap().area;
     // The aperture is f/2.8 at 16 mm, and no surface clips on the axis.
     let exact =
-        std::f64::consts::PI * (bench.first_order.entrance_pupil.diameter.unwrap() / 2.0).powi(2);
+        std::f64::consts::PI * (model.first_order.entrance_pupil.diameter.unwrap() / 2.0).powi(2);
     assert!((axis.value / exact - 1.0).abs() < 1e-12);
     let mut before = 1.0 + 1e-9;
     for angle in [20.0, 45.0, 80.0, 92.0] {

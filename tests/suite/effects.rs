@@ -29,8 +29,8 @@ fn forced(effect: Effect, choice: EffectOverride) -> EffectOverrides {
     EffectOverrides::default().with(effect, choice)
 }
 
-fn exact(bench: &RayModel) -> Vec<Result<Spot, AnalysisError>> {
-    spots(bench, Accuracy { tolerance: 1e-4, ..Accuracy::default() })
+fn exact(model: &RayModel) -> Vec<Result<Spot, AnalysisError>> {
+    spots(model, Accuracy { tolerance: 1e-4, ..Accuracy::default() })
 }
 
 /// The largest change of the RMS radius of any field, in mm, and the errors of both; `None` where
@@ -53,9 +53,9 @@ fn change(a: &RayModel, b: &RayModel) -> Option<(f64, f64)> {
 /// The distance between the points where the chief rays of the farthest field cross the stop in two
 /// models, in stop radii.
 fn chief_change(a: &RayModel, b: &RayModel) -> f64 {
-    let edge = |bench: &RayModel| {
-        let field = FieldPoint { x: 0.0, y: bench.beam.edge, weight: 1.0 };
-        bench.launch(field, bench.primary).unwrap().stop_point([0.0, 0.0]).unwrap()
+    let edge = |model: &RayModel| {
+        let field = FieldPoint { x: 0.0, y: model.beam.edge, weight: 1.0 };
+        model.launch(field, model.primary).unwrap().stop_point([0.0, 0.0]).unwrap()
     };
     let ([ax, ay], [bx, by]) = (edge(a), edge(b));
     (ax - bx).hypot(ay - by) / a.stop_radius()
@@ -181,8 +181,8 @@ fn a_far_object_is_at_infinity_and_a_near_one_is_not() {
         let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
         let object = auto.decision(Effect::FiniteObject).unwrap();
         assert_eq!(object.computed, finite, "{object:?}");
-        let bench = build_ray_model(&lens, 0, &auto).unwrap();
-        assert_eq!(bench.beam.object == Object::Infinity, !finite);
+        let model = build_ray_model(&lens, 0, &auto).unwrap();
+        assert_eq!(model.beam.object == Object::Infinity, !finite);
         check("double Gauss", 0, &lens, &auto, object);
     }
     assert_eq!(lens.fields.kind, FieldKind::Angle);

@@ -36,15 +36,15 @@ fn compare(worst: &mut Worst, got: [f64; 3], exact: &serde_json::Value, rounding
 }
 
 /// The largest coordinate on the way of a beam.
-fn size(bench: &RayModel) -> f64 {
-    let rows = &bench.channels[bench.primary].system.surfaces;
-    let heights = bench.first_order.marginal.heights.iter();
+fn size(model: &RayModel) -> f64 {
+    let rows = &model.channels[model.primary].system.surfaces;
+    let heights = model.first_order.marginal.heights.iter();
     rows.iter().map(|row| &row.thickness).chain(heights).fold(0.0, |m: f64, v| m.max(v.abs()))
 }
 
 /// The image points of the rays of the usual pattern.
-fn hexapolar(bench: &RayModel, field: usize, wavelength: usize) -> Vec<[f64; 2]> {
-    let launch = bench.launch(bench.fields[field], wavelength).unwrap();
+fn hexapolar(model: &RayModel, field: usize, wavelength: usize) -> Vec<[f64; 2]> {
+    let launch = model.launch(model.fields[field], wavelength).unwrap();
     let rays: Rays<f64> = pattern_points(PupilPattern::Hexapolar(6))
         .iter()
         .map(|p| launch.ray(*p).unwrap())
@@ -58,13 +58,13 @@ fn hexapolar(bench: &RayModel, field: usize, wavelength: usize) -> Vec<[f64; 2]>
 #[test]
 fn reference_spots() {
     for lens in lenses() {
-        let (bench, mut worst) = (lens.open_bench(), Worst::default());
-        let rounding = unit(&lens).max(size(&bench) * f64::EPSILON * 0.5);
+        let (model, mut worst) = (lens.open_model(), Worst::default());
+        let rounding = unit(&lens).max(size(&model) * f64::EPSILON * 0.5);
         for exact in lens.data["spots"].as_array().unwrap() {
             let field = count(&exact["f"]);
             let mut all = Vec::new();
             for color in exact["per_wavelength"].as_array().unwrap() {
-                let points = hexapolar(&bench, field, count(&color["w"]));
+                let points = hexapolar(&model, field, count(&color["w"]));
                 compare(&mut worst, spot(&points), color, rounding);
                 all.extend(points);
             }
@@ -84,12 +84,12 @@ fn unit(lens: &Reference) -> f64 {
 #[test]
 fn reference_rays_of_exact_pupil_points() {
     for lens in lenses() {
-        let (bench, mut worst) = (lens.open_bench(), Worst::default());
-        let rounding = ROUNDING * (size(&bench) * f64::EPSILON * 0.5).max(unit(&lens));
+        let (model, mut worst) = (lens.open_model(), Worst::default());
+        let rounding = ROUNDING * (size(&model) * f64::EPSILON * 0.5).max(unit(&lens));
         for ray in lens.data["rays"].as_array().unwrap() {
             let (f, w) = (count(&ray["f"]), count(&ray["w"]));
             let pupil = numbers(&ray["pupil"]);
-            let launch = bench.launch(bench.fields[f], w).unwrap();
+            let launch = model.launch(model.fields[f], w).unwrap();
             let start = launch.ray([pupil[0], pupil[1]]).unwrap();
             let landing = launch.channel().tracer.trace(start);
             let exact = numbers(&ray["xy_exact_pupil"]);
@@ -123,11 +123,11 @@ fn double_gauss() -> Reference {
 }
 
 /// Prints the errors of all orders against the highest and returns them.
-fn errors(bench: &RayModel, field: usize) -> Vec<(usize, f64)> {
-    let region = Region::new(bench.launch(bench.fields[field], bench.primary).unwrap());
+fn errors(model: &RayModel, field: usize) -> Vec<(usize, f64)> {
+    let region = Region::new(model.launch(model.fields[field], model.primary).unwrap());
     let orders = orders(&region);
     let best = orders.last().unwrap().2;
-    println!("field {}, {} rays to find the pupil", bench.fields[field].y, region.rays);
+    println!("field {}, {} rays to find the pupil", model.fields[field].y, region.rays);
     for (rays, all, rms) in &orders {
         println!("  {rays} rays ({all} with the edge): {:.1e}", (rms / best - 1.0).abs());
     }
@@ -136,16 +136,16 @@ fn errors(bench: &RayModel, field: usize) -> Vec<(usize, f64)> {
 
 #[test]
 fn a_clear_pupil_takes_25_rays_for_nine_digits() {
-    let errors = errors(&double_gauss().open_bench(), 2);
+    let errors = errors(&double_gauss().open_model(), 2);
     let (_, error) = errors.iter().find(|(rays, _)| *rays == 25).unwrap();
     assert!(*error < 1e-9, "{error:e}");
 }
 
 #[test]
 fn a_clipped_pupil_takes_72_rays_for_six_digits() {
-    let bench = double_gauss().clipped_bench();
+    let model = double_gauss().clipped_model();
     for field in [1, 2] {
-        let errors = errors(&bench, field);
+        let errors = errors(&model, field);
         assert!(errors.iter().any(|(rays, error)| *rays <= 72 && *error < 1e-6));
     }
 }
@@ -167,7 +167,7 @@ fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
     System { index_before: 1.0, surfaces, stop: Some(stop) }
 }
 
-fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> RayModel {
+fn model(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> RayModel {
     let beam = Beam { object: Object::Infinity, aperture, field: FieldKind::Angle, edge };
     let fields = vec![FieldPoint { x: 0.0, y: edge, weight: 1.0 }];
     RayModel {
@@ -195,9 +195,9 @@ fn a_pupil_cut_by_a_distant_rim_is_the_overlap_of_two_discs() {
     let edge = 0.1f64.atan().to_degrees();
     for offset in [-3.0, -0.5, 0.0, 0.5, 3.0, 4.9] {
         let rows = [(0.0, 100.0, 1.0, 5.0), (0.0, 50.0, 1.0, 10.0 + offset)];
-        let bench =
-            bench(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
-        let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+        let model =
+            model(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
+        let region = Region::new(model.launch(model.fields[0], 0).unwrap());
         let exact = overlap(5.0, 10.0 + offset, 10.0) / 25.0;
         assert!((area(&region) - exact).abs() < 1e-12, "{offset}: {} {exact}", area(&region));
     }
@@ -208,15 +208,15 @@ fn a_pupil_cut_by_a_distant_rim_is_the_overlap_of_two_discs() {
 fn vignetted(rim: f64, turn: f64) -> (RayModel, FieldPoint) {
     let edge = 0.1f64.atan().to_degrees();
     let rows = [(0.0, 100.0, 1.0, 5.0), (0.0, 50.0, 1.0, rim)];
-    let bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
-    (bench, FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+    let model = model(system(&rows, 0), Aperture::StopSemiDiameter(5.0), edge, Aiming::Paraxial);
+    (model, FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
 }
 
 #[test]
 fn the_sides_of_an_outline_are_as_long_as_the_arcs_of_two_discs() {
     for (rim, turn) in [(8.0, 0.0), (10.0, 0.0), (10.0, 0.7), (12.0, -2.0)] {
-        let (bench, field) = vignetted(rim, turn);
-        let region = Region::new(bench.launch(field, 0).unwrap());
+        let (model, field) = vignetted(rim, turn);
+        let region = Region::new(model.launch(field, 0).unwrap());
         let outline = region.outline(128).unwrap();
         let (stop, clips) =
             (PupilLimit::Surface(0, RayLimit::Rim), PupilLimit::Surface(1, RayLimit::Rim));
@@ -247,8 +247,8 @@ fn the_sides_of_an_outline_are_as_long_as_the_arcs_of_two_discs() {
 fn the_extent_of_a_pupil_is_in_square_millimetres_about_its_centroid() {
     let accuracy = Accuracy { tolerance: 1e-10, max_rays: 100_000 };
     for (rim, turn) in [(10.0, 0.0), (8.0, 0.7)] {
-        let (bench, field) = vignetted(rim, turn);
-        let region = Region::new(bench.launch(field, 0).unwrap());
+        let (model, field) = vignetted(rim, turn);
+        let region = Region::new(model.launch(field, 0).unwrap());
         let found = region.extent(accuracy).unwrap();
         let exact = overlap(5.0, rim, 10.0);
         assert!((found.values[0] - exact).abs() < 1e-9 * exact, "{} {exact}", found.values[0]);
@@ -275,8 +275,8 @@ fn a_clear_pupil_is_a_disc_of_the_aperture() {
     let rows = [(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, f64::INFINITY)];
     let aperture = Aperture::EntrancePupilDiameter(10.0);
     for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
-        let bench = bench(system(&rows, 1), aperture, 20.0, aiming);
-        let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+        let model = model(system(&rows, 1), aperture, 20.0, aiming);
+        let region = Region::new(model.launch(model.fields[0], 0).unwrap());
         let outline = region.outline(64).unwrap();
         assert!(outline.is_clear() && outline.corners().count() == 0);
         assert_eq!(outline.limits_by_share(), [(PupilLimit::Disc, 1.0)]);
@@ -289,7 +289,7 @@ fn a_clear_pupil_is_a_disc_of_the_aperture() {
 
 #[test]
 fn limits_have_names() {
-    let (bench, _) = vignetted(8.0, 0.0);
+    let (model, _) = vignetted(8.0, 0.0);
     let cases = [
         (PupilLimit::Disc, "entrance pupil"),
         (PupilLimit::Surface(0, RayLimit::Rim), "stop, surface 1"),
@@ -299,7 +299,7 @@ fn limits_have_names() {
         (PupilLimit::Unaimed, "no ray to the stop"),
     ];
     for (limit, name) in cases {
-        assert_eq!(bench.limit_name(limit), name);
+        assert_eq!(model.limit_name(limit), name);
     }
 }
 
@@ -307,8 +307,8 @@ fn limits_have_names() {
 fn a_stop_of_size_zero_is_dark() {
     let rows = [(0.01, 5.0, 1.5, 20.0), (-0.01, 10.0, 1.0, 20.0), (0.0, 80.0, 1.0, 0.0)];
     for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
-        let bench = bench(system(&rows, 2), Aperture::StopSemiDiameter(0.0), 5.0, aiming);
-        let Ok(launch) = bench.launch(bench.fields[0], 0) else { continue };
+        let model = model(system(&rows, 2), Aperture::StopSemiDiameter(0.0), 5.0, aiming);
+        let Ok(launch) = model.launch(model.fields[0], 0) else { continue };
         assert!(Region::new(launch).is_dark(), "{aiming:?}");
     }
 }
@@ -320,10 +320,10 @@ fn a_sliver_that_a_rim_cuts_off_is_seen() {
         let rows = [(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, 60.0)];
         let edge = ((55.0 + 5.0 * cut) / 100.0f64).atan().to_degrees();
         let aperture = Aperture::EntrancePupilDiameter(10.0);
-        let bench = bench(system(&rows, 0), aperture, edge, Aiming::Paraxial);
+        let model = model(system(&rows, 0), aperture, edge, Aiming::Paraxial);
         for turn in [0.0f64, 0.2, 0.11] {
             let field = FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 };
-            let region = Region::new(bench.launch(field, 0).unwrap());
+            let region = Region::new(model.launch(field, 0).unwrap());
             let exact = overlap(1.0, 12.0, 11.0 + cut);
             assert!(
                 matches!(region.kind, RegionKind::StarShaped(_)),
@@ -340,8 +340,8 @@ fn a_rim_of_size_zero_is_dark() {
     for edge in [0.0, 3.0] {
         let rows = [(0.01, 5.0, 1.5, 20.0), (-0.01, 90.0, 1.0, 0.0)];
         for aperture in [Aperture::StopSemiDiameter(5.0), Aperture::EntrancePupilDiameter(10.0)] {
-            let bench = bench(system(&rows, 0), aperture, edge, Aiming::Paraxial);
-            let launch = bench.launch(bench.fields[0], 0).unwrap();
+            let model = model(system(&rows, 0), aperture, edge, Aiming::Paraxial);
+            let launch = model.launch(model.fields[0], 0).unwrap();
             assert!(Region::new(launch).is_dark(), "{aperture:?} {edge}");
         }
     }
@@ -350,11 +350,11 @@ fn a_rim_of_size_zero_is_dark() {
 #[test]
 fn a_beam_that_nothing_limits_is_endless() {
     let rows = [(0.0, 10.0, 1.5, f64::INFINITY), (0.0, 10.0, 1.0, f64::INFINITY)];
-    let mut bench = bench(system(&rows, 0), Aperture::StopSemiDiameter(1.0), 5.0, Aiming::Paraxial);
-    let color = &mut bench.channels[0];
+    let mut model = model(system(&rows, 0), Aperture::StopSemiDiameter(1.0), 5.0, Aiming::Paraxial);
+    let color = &mut model.channels[0];
     color.system.surfaces[0].semi_diameter = f64::INFINITY;
     color.tracer = aplanat::trace::Tracer::new(&color.system).unwrap();
-    let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+    let region = Region::new(model.launch(model.fields[0], 0).unwrap());
     assert_eq!(region.kind, RegionKind::Unbounded);
 }
 
@@ -363,12 +363,12 @@ fn a_pupil_in_two_pieces_is_told_and_sampled() {
     // Strong spherical aberration: a small hole where a zone crosses the axis lets the middle and
     // that zone through, but not what lies between.
     let rows = [(0.02, 8.0, 1.5, 14.0), (-0.02, 44.4, 1.0, 14.0), (0.0, 5.0, 1.0, 0.12)];
-    let bench =
-        bench(system(&rows, 0), Aperture::EntrancePupilDiameter(26.0), 0.0, Aiming::Paraxial);
-    let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+    let model =
+        model(system(&rows, 0), Aperture::EntrancePupilDiameter(26.0), 0.0, Aiming::Paraxial);
+    let region = Region::new(model.launch(model.fields[0], 0).unwrap());
     let RegionKind::Irregular { pieces, .. } = region.kind else { panic!("{:?}", region.kind) };
     assert!(pieces >= 2, "{pieces}");
-    let spot = aplanat::analysis::spot(&bench, bench.fields[0], Accuracy::default()).unwrap();
+    let spot = aplanat::analysis::spot(&model, model.fields[0], Accuracy::default()).unwrap();
     let points = pattern_points(PupilPattern::Square(900));
     let rays: Rays<f64> = points.iter().map(|p| region.launch.ray(*p).unwrap()).collect();
     let mut landed = ImagePoints::default();
@@ -385,14 +385,14 @@ fn shadowed(inner: f64, away: f64, turn: f64) -> (RayModel, FieldPoint) {
     let mut lens = system(&[(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, f64::INFINITY)], 0);
     lens.surfaces[1].obstruction = 5.0 * inner;
     let edge = (0.05 * away).atan().to_degrees();
-    let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
-    (bench, FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
+    let model = model(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
+    (model, FieldPoint { x: edge * turn.sin(), y: edge * turn.cos(), weight: 1.0 })
 }
 
 /// The area of a pupil, with its error.
-fn lit(bench: &RayModel, field: FieldPoint, tolerance: f64) -> aplanat::analysis::Estimate {
+fn lit(model: &RayModel, field: FieldPoint, tolerance: f64) -> aplanat::analysis::Estimate {
     let accuracy = Accuracy { tolerance, max_rays: 300_000 };
-    aplanat::analysis::spot(bench, field, accuracy).unwrap().channels[0].unwrap().area
+    aplanat::analysis::spot(model, field, accuracy).unwrap().channels[0].unwrap().area
 }
 
 #[test]
@@ -401,12 +401,12 @@ fn an_annular_pupil_is_one_piece_that_no_point_sees() {
         for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
             let mut lens = system(&[(0.0, 50.0, 1.0, 5.0)], 0);
             lens.surfaces[0].obstruction = 5.0 * inner;
-            let bench = bench(lens, Aperture::StopSemiDiameter(5.0), 1.0, aiming);
-            let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+            let model = model(lens, Aperture::StopSemiDiameter(5.0), 1.0, aiming);
+            let region = Region::new(model.launch(model.fields[0], 0).unwrap());
             assert_ring(&region);
             let exact = PI * (1.0 - inner * inner);
             assert!((area(&region) - exact).abs() < 1e-12, "{inner} {aiming:?}");
-            let estimate = lit(&bench, bench.fields[0], 1e-6);
+            let estimate = lit(&model, model.fields[0], 1e-6);
             assert!((estimate.value - exact).abs() < 1e-9, "{inner} {aiming:?}: {estimate:?}");
             assert!(estimate.rays < 2000, "{inner} {aiming:?}: {estimate:?}");
         }
@@ -424,13 +424,13 @@ fn a_shadow_smaller_than_the_first_look_is_found() {
     for inner in [0.05, 0.01, 1e-3, 1e-6] {
         for away in [0.0, 0.043, 0.51, 0.93, 0.9999] {
             for turn in [0.0f64, 0.2, 2.9] {
-                let (bench, field) = shadowed(inner, away, turn);
-                let region = Region::new(bench.launch(field, 0).unwrap());
+                let (model, field) = shadowed(inner, away, turn);
+                let region = Region::new(model.launch(field, 0).unwrap());
                 let whole = away + inner < 1.0;
                 if whole {
                     assert_ring(&region);
                     let exact = PI * (1.0 - inner * inner);
-                    let found = lit(&bench, field, 1e-3);
+                    let found = lit(&model, field, 1e-3);
                     let error = (found.value - exact).abs();
                     let what = format!("{inner} {away} {turn}: {error:e} {found:?}");
                     assert!(error <= 3.0 * found.error + 1e-9, "{what}");
@@ -448,8 +448,8 @@ fn a_shadow_smaller_than_the_first_look_is_found() {
         }
         // Just outside, and far from it.
         for away in [1.0 + 1.01 * inner, 3.0, 40.0] {
-            let (bench, field) = shadowed(inner, away, 0.2);
-            let region = Region::new(bench.launch(field, 0).unwrap());
+            let (model, field) = shadowed(inner, away, 0.2);
+            let region = Region::new(model.launch(field, 0).unwrap());
             assert_eq!(region.kind, RegionKind::Clear, "{inner} {away}");
         }
     }
@@ -462,8 +462,8 @@ fn a_shadow_that_bites_the_edge_leaves_a_pupil_that_is_split_where_one_point_see
         [(2.0, 2.5), (2.0, 2.9), (0.5, 1.3), (0.02, 1.01), (0.2, 1.1), (2.0, 2.0), (0.5, 0.9)]
     {
         for turn in [0.0, 0.3] {
-            let (bench, field) = shadowed(inner, away, turn);
-            let region = Region::new(bench.launch(field, 0).unwrap());
+            let (model, field) = shadowed(inner, away, turn);
+            let region = Region::new(model.launch(field, 0).unwrap());
             let exact = PI - overlap(1.0, inner, away);
             match region.kind {
                 RegionKind::StarShaped(_) => {
@@ -472,7 +472,7 @@ fn a_shadow_that_bites_the_edge_leaves_a_pupil_that_is_split_where_one_point_see
                     assert!((area(&region) - exact).abs() < 1e-7, "{inner} {away} {turn}");
                 }
                 RegionKind::Irregular { .. } => {
-                    let area = lit(&bench, field, 1e-3);
+                    let area = lit(&model, field, 1e-3);
                     let error = (area.value - exact).abs();
                     assert!(error <= 3.0 * area.error, "{inner} {away}: {area:?} {exact}");
                 }
@@ -490,23 +490,23 @@ fn a_shadow_across_a_narrow_pupil_leaves_two_pieces() {
     let mut lens = system(&rows, 0);
     lens.surfaces[1].obstruction = 1.5;
     let edge = 0.08f64.atan().to_degrees();
-    let bench = bench(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
-    let region = Region::new(bench.launch(bench.fields[0], 0).unwrap());
+    let model = model(lens, Aperture::EntrancePupilDiameter(10.0), edge, Aiming::Paraxial);
+    let region = Region::new(model.launch(model.fields[0], 0).unwrap());
     assert!(matches!(region.kind, RegionKind::Irregular { pieces: 2, .. }), "{:?}", region.kind);
 }
 
 #[test]
 fn an_obstruction_as_wide_as_the_beam_is_dark() {
-    let (bench, field) = shadowed(1.5, 0.2, 0.0);
-    assert!(Region::new(bench.launch(field, 0).unwrap()).is_dark());
+    let (model, field) = shadowed(1.5, 0.2, 0.0);
+    assert!(Region::new(model.launch(field, 0).unwrap()).is_dark());
 }
 
 #[test]
 fn turning_the_field_turns_the_spot() {
-    let bench = double_gauss().clipped_bench();
+    let model = double_gauss().clipped_model();
     let spot = |x: f64, y: f64| {
         let accuracy = Accuracy { tolerance: 1e-8, max_rays: 100_000 };
-        aplanat::analysis::spot(&bench, FieldPoint { x, y, weight: 1.0 }, accuracy).unwrap()
+        aplanat::analysis::spot(&model, FieldPoint { x, y, weight: 1.0 }, accuracy).unwrap()
     };
     let upright = spot(0.0, 14.0);
     for angle in [0.3f64, 1.0, std::f64::consts::FRAC_PI_2, -2.5] {
@@ -520,10 +520,10 @@ fn turning_the_field_turns_the_spot() {
 #[test]
 fn aimed_rays_cross_the_stop_where_they_should() {
     for lens in lenses().iter().filter(|lens| lens.aimed_at_stop()) {
-        let bench = lens.clipped_bench();
-        let radius = bench.stop_radius();
-        for field in &bench.fields {
-            let launch = bench.launch(*field, bench.primary).unwrap();
+        let model = lens.clipped_model();
+        let radius = model.stop_radius();
+        for field in &model.fields {
+            let launch = model.launch(*field, model.primary).unwrap();
             for p in pattern_points(PupilPattern::Hexapolar(3)) {
                 let [x, y] = launch.stop_point(p).unwrap();
                 let miss = (x - p[0] * radius).hypot(y - p[1] * radius);
@@ -536,13 +536,13 @@ fn aimed_rays_cross_the_stop_where_they_should() {
 #[test]
 fn a_fisheye_takes_light_from_behind_it() {
     let lens = aplanat::files::open("lenses/fisheye_minolta_16_f28.json").unwrap().lens;
-    let bench = RayModel::from_lens(&lens, 0).unwrap();
-    assert_eq!(bench.aiming, Aiming::Chief);
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    assert_eq!(model.aiming, Aiming::Chief);
     for angle in [45.0, 80.0, 88.0, 90.0, 92.0] {
         let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
-        let launch = bench.launch(field, bench.primary).unwrap();
+        let launch = model.launch(field, model.primary).unwrap();
         let [x, y] = launch.stop_point([0.0, 0.0]).unwrap();
-        assert!(x.hypot(y) < 1e-9 * bench.stop_radius(), "{angle}");
+        assert!(x.hypot(y) < 1e-9 * model.stop_radius(), "{angle}");
         println!("{angle} degrees: pupil area {:.6}", area(&Region::new(launch)));
     }
 }
@@ -563,15 +563,15 @@ fn a_telecentric_object_space_fills_its_aperture() {
         field: FieldKind::ObjectHeight,
         edge: 2.0,
     };
-    let mut bench =
+    let mut model =
         RayModel::from_systems(vec![(0.55, 1.0, lens)], 0, beam, Aiming::Paraxial).unwrap();
     // Rounding may leave the pupil very far away instead of at infinity; both must do.
-    for position in [bench.first_order.entrance_pupil.position, None] {
-        bench.first_order.entrance_pupil.position = position;
+    for position in [model.first_order.entrance_pupil.position, None] {
+        model.first_order.entrance_pupil.position = position;
         if position.is_none() {
-            bench.first_order.entrance_pupil.diameter = None;
+            model.first_order.entrance_pupil.diameter = None;
         }
-        let launch = bench.launch(FieldPoint { x: 0.0, y: 2.0, weight: 1.0 }, 0).unwrap();
+        let launch = model.launch(FieldPoint { x: 0.0, y: 2.0, weight: 1.0 }, 0).unwrap();
         let [x, y] = launch.stop_point([0.0, 0.0]).unwrap();
         assert!(x.hypot(y) < 0.05, "{x} {y}");
         let ray = launch.ray([0.0, 1.0]).unwrap();

@@ -98,7 +98,7 @@ impl Reference {
     }
 
     /// The lens ready for rays over the whole unit disc of the pupil, clipped by nothing.
-    pub(crate) fn open_bench(&self) -> RayModel {
+    pub(crate) fn open_model(&self) -> RayModel {
         let systems = self.systems(|w| self.open(w));
         let (aiming, mut beam) = (self.aiming(), self.beam());
         if aiming == Aiming::Stop {
@@ -109,7 +109,7 @@ impl Reference {
 
     /// The lens ready for rays, limited by its stop and clipped by its semi-diameters; by its stop
     /// alone where rays are aimed at that.
-    pub(crate) fn clipped_bench(&self) -> RayModel {
+    pub(crate) fn clipped_model(&self) -> RayModel {
         let aimed = self.aimed_at_stop();
         let systems = self.systems(|w| if aimed { self.open(w) } else { self.clipped(w) });
         let mut beam = self.beam();
@@ -128,9 +128,9 @@ impl Reference {
         if self.aimed_at_stop() { Aiming::Stop } else { Aiming::Paraxial }
     }
 
-    fn with_fields(&self, bench: RayModel) -> RayModel {
+    fn with_fields(&self, model: RayModel) -> RayModel {
         let field = |y: f64| FieldPoint { x: 0.0, y, weight: 1.0 };
-        RayModel { fields: self.fields().into_iter().map(field).collect(), ..bench }
+        RayModel { fields: self.fields().into_iter().map(field).collect(), ..model }
     }
 
     /// The lens at a wavelength, clipped by nothing.

@@ -17,10 +17,10 @@ fn double_gauss() -> Lens {
 
 /// Area and RMS radius of a field at the primary wavelength.
 fn light_and_blur(lens: &Lens, field: usize) -> [f64; 2] {
-    let bench = RayModel::from_lens(lens, 0).unwrap();
+    let model = RayModel::from_lens(lens, 0).unwrap();
     let accuracy = Accuracy { tolerance: 1e-8, ..Accuracy::default() };
-    let spot = analysis::spot(&bench, bench.fields[field], accuracy).unwrap();
-    let color = spot.channels[bench.primary].unwrap();
+    let spot = analysis::spot(&model, model.fields[field], accuracy).unwrap();
+    let color = spot.channels[model.primary].unwrap();
     [color.light.value, color.rms.value]
 }
 
@@ -37,9 +37,9 @@ fn shown(lens: &Lens, field: usize, surface: usize) -> [f64; 2] {
 }
 
 fn of(lens: &Lens, field: usize, tolerance: f64) -> Result<RimSensitivities, DerivativeError> {
-    let bench = RayModel::from_lens(lens, 0).unwrap();
+    let model = RayModel::from_lens(lens, 0).unwrap();
     let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-    analysis::rim_sensitivities(&bench, bench.fields[field], bench.primary, accuracy)
+    analysis::rim_sensitivities(&model, model.fields[field], model.primary, accuracy)
 }
 
 fn both(effect: &RimSensitivity) -> [analysis::Estimate; 2] {

@@ -14,8 +14,8 @@ const ORDER: usize = 10;
 fn aperture_gradients_by_boundary_match_every_case() {
     let mut worst = Worst::default();
     for case in cases() {
-        let bench = case.bench();
-        let region = Region::new(case.launch(&bench));
+        let model = case.model();
+        let region = Region::new(case.launch(&model));
         let moments = region.trace_pupil(ORDER).moments;
         let name = case.name();
         for (key, got) in [

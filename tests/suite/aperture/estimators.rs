@@ -25,14 +25,14 @@ const CASES: [(&str, usize, [f64; 2]); 4] = [
     ("zoom_nikkor_28_80", 1, [0.0, 1.0]),
 ];
 
-fn bench(name: &str, zoom: usize) -> RayModel {
+fn model(name: &str, zoom: usize) -> RayModel {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("lenses/{name}.json"));
     RayModel::from_lens(&files::open(&path).unwrap().lens, zoom).unwrap()
 }
 
-fn launch(bench: &RayModel, part: f64) -> Launch<'_> {
-    let field = FieldPoint { x: 0.0, y: part * bench.beam.edge, weight: 1.0 };
-    bench.launch(field, bench.primary).unwrap()
+fn launch(model: &RayModel, part: f64) -> Launch<'_> {
+    let field = FieldPoint { x: 0.0, y: part * model.beam.edge, weight: 1.0 };
+    model.launch(field, model.primary).unwrap()
 }
 
 /// Notes the differences between two derivatives, each against the largest of its kind and a
@@ -56,9 +56,9 @@ pub(super) fn compare(
 fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_found_anew() {
     let mut worst = Worst::default();
     for (name, zoom, fields) in CASES {
-        let bench = bench(name, zoom);
+        let model = model(name, zoom);
         for part in fields {
-            let region = Region::new(launch(&bench, part));
+            let region = Region::new(launch(&model, part));
             let lit = region.trace_pupil(ORDER);
             for (term, cost) in [
                 ("spot", QuadraticIntegrand::spread(lit.moments.centroid)),
@@ -85,8 +85,8 @@ fn beyond(found: &PupilDerivative, exact: &SystemGradient<f64>, slot: SurfacePar
 #[test]
 fn aperture_gradients_are_as_good_as_asked_for_and_as_stated() {
     for case in cases() {
-        let bench = case.bench();
-        let region = Region::new(case.launch(&bench));
+        let model = case.model();
+        let region = Region::new(case.launch(&model));
         let lit = region.trace_pupil(10);
         for cost in
             [QuadraticIntegrand::spread(lit.moments.centroid), QuadraticIntegrand::throughput()]
@@ -116,8 +116,8 @@ fn aperture_gradients_are_as_good_as_asked_for_and_as_stated() {
 #[test]
 fn aperture_gradients_stop_where_the_rays_run_out_and_say_so() {
     let case = &cases()[2];
-    let bench = case.bench();
-    let region = Region::new(case.launch(&bench));
+    let model = case.model();
+    let region = Region::new(case.launch(&model));
     let (cost, _) = case.spot();
     for (estimator, most_rays) in [
         (DerivativeEstimator::Biased, 10_000),
@@ -135,8 +135,8 @@ fn aperture_gradients_stop_where_the_rays_run_out_and_say_so() {
 #[test]
 fn an_aperture_in_one_piece_calls_for_its_boundary() {
     for case in cases() {
-        let bench = case.bench();
-        let region = Region::new(case.launch(&bench));
+        let model = case.model();
+        let region = Region::new(case.launch(&model));
         let (estimator, reason) = choose_estimator(&region, Accuracy::default()).unwrap();
         assert_eq!(estimator, DerivativeEstimator::Boundary, "{reason}");
         assert!(reason.contains("one piece"), "{reason}");

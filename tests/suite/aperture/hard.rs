@@ -41,7 +41,7 @@ fn system(rows: &[Row], stop: usize) -> System<f64> {
 }
 
 /// A system limited by its rims, for a beam from infinity.
-fn bench(system: System<f64>) -> RayModel {
+fn model(system: System<f64>) -> RayModel {
     let rim = system.surfaces[system.stop.unwrap_or(0)].semi_diameter;
     let beam = Beam {
         object: Object::Infinity,
@@ -52,8 +52,8 @@ fn bench(system: System<f64>) -> RayModel {
     RayModel::from_systems(vec![(0.5876, 1.0, system)], 0, beam, Aiming::Paraxial).unwrap()
 }
 
-fn launch(bench: &RayModel, degrees: f64) -> Launch<'_> {
-    bench.launch(FieldPoint { x: 0.0, y: degrees, weight: 1.0 }, 0).unwrap()
+fn launch(model: &RayModel, degrees: f64) -> Launch<'_> {
+    model.launch(FieldPoint { x: 0.0, y: degrees, weight: 1.0 }, 0).unwrap()
 }
 
 fn costs(region: &Region<'_>) -> [QuadraticIntegrand; 2] {
@@ -70,8 +70,8 @@ fn is_finite(derivative: &PupilDerivative) -> bool {
 
 /// All estimators agree: boundary with differences to `tolerance`, the warp field with both within
 /// six of its standard errors, and no number is not one.
-fn all_agree(what: &str, bench: &RayModel, degrees: f64, tolerance: f64) {
-    let region = Region::new(launch(bench, degrees));
+fn all_agree(what: &str, model: &RayModel, degrees: f64, tolerance: f64) {
+    let region = Region::new(launch(model, degrees));
     let mut worst = Worst::default();
     for cost in costs(&region) {
         let what = format!("{what}, {cost:?}");
@@ -130,8 +130,8 @@ fn aperture_gradients_converge_where_a_grazing_edge_meets_a_rim() {
     ] {
         let mut system = case.system();
         system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter *= factor);
-        let bench = bench(system);
-        let region = Region::new(launch(&bench, degrees));
+        let model = model(system);
+        let region = Region::new(launch(&model, degrees));
         let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
         let arcs = boundary.arcs.iter().map(|arc| arc.limit);
         assert_eq!(
@@ -162,8 +162,8 @@ fn aperture_gradients_with_two_limits_at_once_share_them() {
     // Two rims of the same size in a beam along the axis: the pupil shrinks with either, and grows
     // with both together alone.
     let rows = [(0.0, 5.0, 1.0, 4.0), (0.0, 10.0, 1.0, 4.0)];
-    let bench = bench(system(&rows, 0));
-    let region = Region::new(launch(&bench, 0.0));
+    let model = model(system(&rows, 0));
+    let region = Region::new(launch(&model, 0.0));
     let cost = QuadraticIntegrand::throughput();
     let exact = -std::f64::consts::TAU * 4.0;
     for estimator in
@@ -183,11 +183,11 @@ fn aperture_gradients_hold_at_a_critical_angle() {
     let rows = [(0.0, 2.0, 1.5, 9.9), (-0.1, 5.0, 1.0, 9.9)];
     let system = system(&rows, 0);
     for degrees in [0.0, 5.0] {
-        let bench = bench(system.clone());
-        let region = Region::new(launch(&bench, degrees));
+        let model = model(system.clone());
+        let region = Region::new(launch(&model, degrees));
         let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
         assert_eq!(boundary.arcs[0].limit, PupilLimit::Surface(1, RayLimit::TotalReflection));
-        all_agree("a critical angle", &bench, degrees, 1e-6);
+        all_agree("a critical angle", &model, degrees, 1e-6);
     }
 }
 
@@ -196,18 +196,18 @@ fn aperture_gradients_hold_where_rays_miss_a_sphere() {
     // A rim that is larger than its sphere: the pupil ends where rays touch the sphere, or where
     // they would meet its far half.
     let rows = [(-0.01, 12.0, 1.0, 30.0), (0.08, 4.0, 1.1, 20.0), (0.0, 20.0, 1.0, 40.0)];
-    let bench = bench(system(&rows, 0));
+    let model = model(system(&rows, 0));
     // On the axis rays touch it at its equator, and from the side the two edges touch each other:
     // where two limits vanish at once, edges and corners are not known to rounding.
     for degrees in [0.0, 3.0, 20.0] {
-        let region = Region::new(launch(&bench, degrees));
+        let region = Region::new(launch(&model, degrees));
         let lit = region.trace_pupil(4);
         let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
         let ends = |hurdle| boundary.arcs.iter().any(|a| a.limit == PupilLimit::Surface(1, hurdle));
         assert!(ends(RayLimit::Miss) && (degrees == 0.0 || ends(RayLimit::Equator)));
         let found = lit.boundary_derivative(&QuadraticIntegrand::throughput()).unwrap();
         assert_eq!(found.surfaces[1].semi_diameter, 0.0);
-        all_agree("a missed sphere", &bench, degrees, 1e-4);
+        all_agree("a missed sphere", &model, degrees, 1e-4);
     }
 }
 
@@ -221,20 +221,20 @@ fn aperture_gradients_hold_for_planes_and_equal_indices_in_a_collimated_beam() {
         (0.02, 3.0, 1.6, 7.0),
         (-0.01, 40.0, 1.0, 7.0),
     ];
-    let bench = bench(system(&rows, 2));
-    all_agree("planes and equal indices", &bench, 0.0, TOLERANCE);
-    all_agree("planes and equal indices", &bench, 4.0, TOLERANCE);
+    let model = model(system(&rows, 2));
+    all_agree("planes and equal indices", &model, 0.0, TOLERANCE);
+    all_agree("planes and equal indices", &model, 4.0, TOLERANCE);
 }
 
 #[test]
 fn aperture_gradients_of_no_light_are_an_error_that_says_what_to_do() {
     let rows = [(0.0, 50.0, 1.0, 4.0), (0.02, 5.0, 1.5, 5.0), (0.0, 50.0, 1.0, 5.0)];
-    let clipped = bench(system(&rows, 0));
-    let closed = bench(system(&[(0.0, 5.0, 1.0, 0.0)], 0));
-    for (bench, degrees, says) in
+    let clipped = model(system(&rows, 0));
+    let closed = model(system(&[(0.0, 5.0, 1.0, 0.0)], 0));
+    for (model, degrees, says) in
         [(&clipped, 30.0, "clipped by surface 2"), (&closed, 0.0, "open the stop")]
     {
-        let region = Region::new(launch(bench, degrees));
+        let region = Region::new(launch(model, degrees));
         let dark = choose_estimator(&region, ASKED).unwrap_err();
         assert!(
             matches!(dark, DerivativeError::Dark(..)) && dark.to_string().contains(says),
@@ -279,8 +279,8 @@ fn aperture_gradients_of_a_pupil_in_pieces_come_from_the_warp_field() {
     // A ball lens focuses its zones far apart; a small rim behind lets a disc and a ring through.
     let rows = [(0.1, 18.0, 1.5, 9.9), (-0.1, 2.0, 1.0, 9.9), (0.0, 5.0, 1.0, 1.0)];
     let system = system(&rows, 2);
-    let bench = bench(system.clone());
-    let region = Region::new(launch(&bench, 0.0));
+    let model = model(system.clone());
+    let region = Region::new(launch(&model, 0.0));
     assert!(matches!(region.kind, RegionKind::Irregular { pieces: 2, .. }), "{:?}", region.kind);
     let asked = Accuracy { tolerance: 1e-6, max_rays: 100_000 };
     let (estimator, reason) = choose_estimator(&region, asked).unwrap();
@@ -324,9 +324,9 @@ fn aperture_gradients_of_a_ring_move_both_of_its_edges() {
     let rows = [(0.0, 20.0, 1.0, 10.0), (0.02, 5.0, 1.5, 12.0), (-0.01, 60.0, 1.0, 9.0)];
     let mut system = system(&rows, 0);
     system.surfaces[1].obstruction = 3.0;
-    let bench = bench(system);
+    let model = model(system);
     for degrees in [0.0, 2.0, 6.0] {
-        let region = Region::new(launch(&bench, degrees));
+        let region = Region::new(launch(&model, degrees));
         assert!(
             matches!(region.kind, RegionKind::Irregular { annulus: Some(_), .. }),
             "{:?}",
@@ -365,10 +365,10 @@ fn aperture_gradients_scale_with_the_lens_over_a_hundred_decades() {
             surface.thickness *= scale;
             surface.semi_diameter *= scale;
         }
-        bench(system)
+        model(system)
     };
-    let derivatives = |bench: &RayModel| -> Vec<(&'static str, f64, SystemGradient<f64>)> {
-        let region = Region::new(launch(bench, 14.0));
+    let derivatives = |model: &RayModel| -> Vec<(&'static str, f64, SystemGradient<f64>)> {
+        let region = Region::new(launch(model, 14.0));
         let center = region.trace_pupil(4).moments.centroid;
         let mut found = Vec::new();
         for (cost, power) in
@@ -414,8 +414,8 @@ fn unscaled(gradient: &SystemGradient<f64>, scale: f64, power: f64) -> SystemGra
 #[test]
 fn aperture_gradients_by_the_warp_field_are_the_same_in_single_precision() {
     for case in cases().iter().take(5) {
-        let bench = case.bench();
-        let region = Region::new(case.launch(&bench));
+        let model = case.model();
+        let region = Region::new(case.launch(&model));
         for cost in costs(&region) {
             let sampling = WarpSampling { count: 4096, seed: 5 };
             let double = region.warp_derivative(&cost, sampling).unwrap();
@@ -435,10 +435,10 @@ fn an_aperture_of_one_axial_ray_is_dark_and_rays_along_the_axis_are_harmless() {
     // Fields on the axis: every estimator meets the axial ray or its neighbourhood.
     let rows = [(0.02, 5.0, 1.5, 10.0), (-0.02, 50.0, 1.0, 10.0)];
     let mut single = system(&rows, 0);
-    let open = bench(single.clone());
+    let open = model(single.clone());
     all_agree("a beam along the axis", &open, 0.0, TOLERANCE);
     single.surfaces[1].semi_diameter = 0.0;
-    let pinhole = bench(single);
+    let pinhole = model(single);
     let region = Region::new(launch(&pinhole, 0.0));
     let dark =
         differentiate(&region, &QuadraticIntegrand::throughput(), DerivativeEstimator::Warp, ASKED);

@@ -56,7 +56,7 @@ impl Case {
         System { index_before: number(&lens["index_before_first"]), surfaces, stop }
     }
 
-    pub(crate) fn bench(&self) -> RayModel {
+    pub(crate) fn model(&self) -> RayModel {
         self.bench_of(self.system())
     }
 
@@ -73,9 +73,9 @@ impl Case {
         RayModel::from_systems(vec![(0.5876, 1.0, system)], 0, beam, Aiming::Paraxial).unwrap()
     }
 
-    pub(crate) fn launch<'a>(&self, bench: &'a RayModel) -> Launch<'a> {
+    pub(crate) fn launch<'a>(&self, model: &'a RayModel) -> Launch<'a> {
         let field = FieldPoint { x: 0.0, y: self.number("field_deg"), weight: 1.0 };
-        bench.launch(field, 0).unwrap()
+        model.launch(field, 0).unwrap()
     }
 
     /// The spot about the exact centroid, and the exact derivative of its integral.

@@ -40,8 +40,8 @@ fn errors_off([found, error, exact]: [f64; 3]) -> f64 {
 fn aperture_gradients_by_the_warp_field_are_within_their_standard_errors() {
     let (mut numbers, mut beyond, mut farthest) = (0, 0, 0.0_f64);
     for case in cases() {
-        let bench = case.bench();
-        let region = Region::new(case.launch(&bench));
+        let model = case.model();
+        let region = Region::new(case.launch(&model));
         for (seed, (what, (cost, expected))) in objectives(&case).into_iter().enumerate() {
             let sampling = WarpSampling { count: 8192, seed: seed as u32 + 1 };
             let found = region.warp_derivative(&cost, sampling).unwrap();
@@ -71,8 +71,8 @@ const BIASED: f64 = 6.5;
 fn aperture_gradients_by_the_warp_field_have_no_bias() {
     let mut farthest = (0.0_f64, String::new());
     for case in cases() {
-        let bench = case.bench();
-        let region = Region::new(case.launch(&bench));
+        let model = case.model();
+        let region = Region::new(case.launch(&model));
         for (what, (cost, expected)) in objectives(&case) {
             let estimates: Vec<PupilDerivative> = (0..SEEDS)
                 .map(|seed| {
@@ -117,8 +117,8 @@ fn bits(found: &PupilDerivative) -> Vec<u64> {
 #[test]
 fn aperture_gradients_by_the_warp_field_do_not_depend_on_threads() {
     let case = &cases()[2];
-    let bench = case.bench();
-    let region = Region::new(case.launch(&bench));
+    let model = case.model();
+    let region = Region::new(case.launch(&model));
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let sampling = WarpSampling { count: 8 * 5000, seed: 3 };
@@ -130,8 +130,8 @@ fn aperture_gradients_by_the_warp_field_do_not_depend_on_threads() {
 #[test]
 fn aperture_gradients_by_the_warp_field_hold_in_single_precision() {
     for case in cases() {
-        let bench = case.bench();
-        let region = Region::new(case.launch(&bench));
+        let model = case.model();
+        let region = Region::new(case.launch(&model));
         for (what, (cost, _)) in objectives(&case) {
             let sampling = WarpSampling { count: 2048, seed: 5 };
             let double = region.warp_derivative(&cost, sampling).unwrap();
@@ -149,14 +149,14 @@ fn aperture_gradients_by_the_warp_field_hold_in_single_precision() {
     }
 }
 
-fn bench(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> RayModel {
+fn model(system: System<f64>, aperture: Aperture, edge: f64, aiming: Aiming) -> RayModel {
     let beam = Beam { object: Object::Infinity, aperture, field: FieldKind::Angle, edge };
     RayModel::from_systems(vec![(0.5876, 1.0, system)], 0, beam, aiming).unwrap()
 }
 
-fn region(bench: &RayModel) -> Region<'_> {
-    let field = FieldPoint { x: 0.0, y: bench.beam.edge, weight: 1.0 };
-    Region::new(bench.launch(field, 0).unwrap())
+fn region(model: &RayModel) -> Region<'_> {
+    let field = FieldPoint { x: 0.0, y: model.beam.edge, weight: 1.0 };
+    Region::new(model.launch(field, 0).unwrap())
 }
 
 #[test]
@@ -164,8 +164,8 @@ fn aperture_gradients_where_a_disc_ends_the_beam_have_no_motion_of_it() {
     // Nothing clips: all of the derivative is that of fixed rays.
     let mut system = cases()[3].system();
     system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = f64::INFINITY);
-    let bench = bench(system, Aperture::EntrancePupilDiameter(12.0), 3.0, Aiming::Paraxial);
-    let region = region(&bench);
+    let model = model(system, Aperture::EntrancePupilDiameter(12.0), 3.0, Aiming::Paraxial);
+    let region = region(&model);
     assert_eq!(region.kind, RegionKind::Clear);
     for cost in [QuadraticIntegrand::spread([0.0, 2.3]), QuadraticIntegrand::throughput()] {
         let found = region.warp_derivative(&cost, WarpSampling { count: 8192, seed: 2 }).unwrap();
@@ -180,12 +180,12 @@ fn aperture_gradients_where_a_disc_ends_the_beam_have_no_motion_of_it() {
 #[test]
 fn aperture_gradients_of_rays_aimed_at_the_stop_move_with_its_rim() {
     for case in [&cases()[1], &cases()[4]] {
-        let plain = case.bench();
+        let plain = case.model();
         let system = plain.channels[0].system.clone();
-        let bench = bench(system, plain.beam.aperture, plain.beam.edge, Aiming::Stop);
+        let model = model(system, plain.beam.aperture, plain.beam.edge, Aiming::Stop);
         let (cost, expected) = case.throughput();
         let found =
-            region(&bench).warp_derivative(&cost, WarpSampling { count: 8192, seed: 4 }).unwrap();
+            region(&model).warp_derivative(&cost, WarpSampling { count: 8192, seed: 4 }).unwrap();
         for name in GROUPS {
             for row in compare(&found, expected, name) {
                 assert!(errors_off(row) <= FARTHEST, "{name} {row:?}");
@@ -207,8 +207,8 @@ fn aperture_gradients_scale_with_the_lens() {
             surface.thickness *= scale;
             surface.semi_diameter *= scale;
         }
-        let bench = case.bench_of(system);
-        let launch = case.launch(&bench);
+        let model = case.bench_of(system);
+        let launch = case.launch(&model);
         let cost = QuadraticIntegrand {
             center: [0.0, case.number("centroid_y") * scale],
             ..case.spot().0
@@ -242,7 +242,7 @@ fn aperture_gradients_move_the_shadow_of_an_obstruction() {
         case.bench_of(system)
     };
     let obstructed = changed(|surface| surface.obstruction = 3.0);
-    let benches = [case.bench(), changed(|surface| surface.semi_diameter = 3.0)];
+    let benches = [case.model(), changed(|surface| surface.semi_diameter = 3.0)];
     for cost in [case.spot().0, case.throughput().0] {
         let region = Region::new(case.launch(&obstructed));
         let found = region.warp_derivative(&cost, WarpSampling { count: 8192, seed: 6 }).unwrap();
@@ -303,8 +303,8 @@ fn aperture_gradients_by_the_warp_field_are_finite_in_hard_cases() {
         ),
     ];
     for (name, rows, aperture, edge) in hard {
-        let bench = bench(system(rows), aperture, edge, Aiming::Paraxial);
-        let region = region(&bench);
+        let model = model(system(rows), aperture, edge, Aiming::Paraxial);
+        let region = region(&model);
         for cost in [QuadraticIntegrand::spread([0.0; 2]), QuadraticIntegrand::throughput()] {
             let sampling = WarpSampling { count: 4096, seed: 9 };
             let double = region.warp_derivative(&cost, sampling);

@@ -225,8 +225,8 @@ fn agree(region: &Region<'_>, cost: &QuadraticIntegrand) -> SystemGradient<f64> 
 #[test]
 fn grin_lens_the_edge_of_a_pupil_moves_with_every_number() {
     let lens = clipped();
-    let bench = RayModel::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
-    let region = Region::new(bench.launch(lens.fields.values[1], 0).unwrap());
+    let model = RayModel::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
+    let region = Region::new(model.launch(lens.fields.values[1], 0).unwrap());
     let RegionKind::StarShaped(boundary) = &region.kind else { panic!("{:?}", region.kind) };
     assert!(boundary.arcs.len() > 1, "{} arcs", boundary.arcs.len());
     for cost in [
@@ -252,8 +252,8 @@ fn grin_lens_the_side_of_a_rod_limits_its_pupil() {
     lens.surfaces[1].semi_diameter = Some(0.97);
     lens.aperture = aplanat::lens::Aperture::StopSemiDiameter(1.0);
     lens.fields.values[1].y = 20.0;
-    let bench = RayModel::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
-    let region = Region::new(bench.launch(lens.fields.values[1], 0).unwrap());
+    let model = RayModel::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
+    let region = Region::new(model.launch(lens.fields.values[1], 0).unwrap());
     let edge = agree(&region, &QuadraticIntegrand::throughput());
     // It is the side that clips, and a wider rod lets more light through.
     assert!(edge.surfaces[0].semi_diameter < -0.1, "{}", edge.surfaces[0].semi_diameter);
@@ -428,8 +428,8 @@ fn grin_lens_effects_say_what_a_gradient_costs_and_leave_out_none() {
     assert!(decision.reason.contains("steps"), "{}", decision.reason);
     let off =
         planned(&rod, &EffectOverrides::default().with(Effect::GradientIndex, EffectOverride::Off));
-    let bench = effects::build_ray_model(&rod, 0, &off).unwrap();
-    assert!(!bench.has_grin() && effects::build_ray_model(&rod, 0, &auto).unwrap().has_grin());
+    let model = effects::build_ray_model(&rod, 0, &off).unwrap();
+    assert!(!model.has_grin() && effects::build_ray_model(&rod, 0, &auto).unwrap().has_grin());
     let even = busy("index", &[0.0], &[]);
     let mut even = even;
     even.surfaces[1].medium = Medium::Index(1.55);
